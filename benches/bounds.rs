@@ -1,14 +1,14 @@
 //! What bounds and constraints cost: whole identifications of the lunar sampler.
 //!
-//! Limits stay near the free optimum: far from it the residual is large, and Gauss–Newton steps take hundreds of
-//! iterations with bounds and constraints alike.
+//! Limits stay near the free optimum: far from it the residual is large, and Gauss–Newton steps
+//! take hundreds of iterations with bounds and constraints alike.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench may panic")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use divan::Bencher;
-use flexcal::identify::{Options, identify};
+use flexcal::fit::{Options, identify};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 
@@ -18,7 +18,10 @@ const BOUNDS: [(&str, &str); 2] = [
         "\"A.*\" = { sigma_relative = 0.5 }",
         "\"A.*\" = { sigma_relative = 0.5, max_relative = 1.02, min_relative = 0.98 }",
     ),
-    ("\"joint*.d\" = { sigma_mm = 30.0 }", "\"joint*.d\" = { sigma_mm = 30.0, min_mm = -1, max_mm = 1 }"),
+    (
+        "\"joint*.d\" = { sigma_mm = 30.0 }",
+        "\"joint*.d\" = { sigma_mm = 30.0, min_mm = -1, max_mm = 1 }",
+    ),
 ];
 
 const CONSTRAINTS: &str = "
@@ -49,7 +52,8 @@ fn bench_identify(bencher: Bencher, text: &str, data: &str) {
     let problem = Problem::parse(text, &cases().join("problem.toml")).unwrap();
     let (measurements, _) = Measurements::read(&[cases().join(data)], &problem).unwrap();
     let data = Dataset::of(&problem, measurements).unwrap();
-    bencher.bench_local(|| identify(divan::black_box(&problem), &data, &Options::default()).unwrap());
+    bencher
+        .bench_local(|| identify(divan::black_box(&problem), &data, &Options::default()).unwrap());
 }
 
 #[divan::bench(args = DATA)]

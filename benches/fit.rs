@@ -18,7 +18,8 @@ fn main() {
 
 /// From zero to the minimum.
 fn fit(objective: &impl Objective) -> Solution {
-    let solution = minimise(objective, DVector::zeros(objective.parameters()), &Settings::default());
+    let solution =
+        minimise(objective, DVector::zeros(objective.parameters()), &Settings::default());
     assert!(solution.termination.converged(), "{}", solution.termination);
     solution
 }

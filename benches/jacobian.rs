@@ -31,7 +31,10 @@ fn main() {
 fn check(problem: &impl LeastSquares, x: &DVector<f64>) {
     let check = check_jacobian(problem, x, &DVector::from_element(x.len(), 1e-2));
     let (column, worst) = check.worst().unwrap();
-    assert!(worst.relative_error < 1e-7_f64.max(2.0 * worst.accuracy), "unknown {column}: {worst:?}");
+    assert!(
+        worst.relative_error < 1e-7_f64.max(2.0 * worst.accuracy),
+        "unknown {column}: {worst:?}"
+    );
 }
 
 /// Residuals and Jacobian of all poses of `problem`.
@@ -48,9 +51,9 @@ fn linearise(bencher: Bencher, problem: &impl LeastSquares, x: &DVector<f64>) {
 fn evaluate(bencher: Bencher, problem: &impl LeastSquares, x: &DVector<f64>) {
     let poses = problem.items();
     let mut out = vec![0.0; problem.rows_per_item() * poses];
-    bencher
-        .counter(ItemsCount::new(poses))
-        .bench_local(|| problem.residuals(divan::black_box(x), 0..poses, divan::black_box(&mut out)));
+    bencher.counter(ItemsCount::new(poses)).bench_local(|| {
+        problem.residuals(divan::black_box(x), 0..poses, divan::black_box(&mut out))
+    });
 }
 
 /// UR10, rigid, 33 geometric parameters.
@@ -78,9 +81,9 @@ mod rigid {
         let residuals = ur10.residuals(&ur10.geometric);
         let x = Ur10::some_point(&residuals);
         let mut out = DMatrix::zeros(3 * POSES, x.len());
-        bencher
-            .counter(ItemsCount::new(POSES))
-            .bench_local(|| common::central_differences(&residuals, divan::black_box(&x), &mut out));
+        bencher.counter(ItemsCount::new(POSES)).bench_local(|| {
+            common::central_differences(&residuals, divan::black_box(&x), &mut out)
+        });
     }
 
     #[divan::bench]
@@ -107,9 +110,9 @@ mod elastic {
         let lunar = Lunar::new();
         let x = DVector::zeros(lunar.parameters());
         let mut out = DMatrix::zeros(3 * lunar.poses(), x.len());
-        bencher
-            .counter(ItemsCount::new(lunar.poses()))
-            .bench_local(|| common::central_differences(&lunar.residuals(), divan::black_box(&x), &mut out));
+        bencher.counter(ItemsCount::new(lunar.poses())).bench_local(|| {
+            common::central_differences(&lunar.residuals(), divan::black_box(&x), &mut out)
+        });
     }
 
     #[divan::bench]

@@ -58,7 +58,8 @@ fn gauss_newton_step(bencher: Bencher, n: usize) {
 fn limited_step(bencher: Bencher, n: usize) {
     let (matrix, constant) = (triangle(n), constant(n));
     let length = Factor::new(matrix.clone(), constant.clone(), 1e-12).gauss_newton().norm();
-    bencher.bench_local(|| Factor::new(matrix.clone(), constant.clone(), 1e-12).limited(0.3 * length));
+    bencher
+        .bench_local(|| Factor::new(matrix.clone(), constant.clone(), 1e-12).limited(0.3 * length));
 }
 
 /// ½‖R x + c‖² with a slope that is a half too steep, so that many equal iterations are needed.
@@ -84,7 +85,11 @@ impl Objective for Steep {
 
     fn linearise(&self, x: &DVector<f64>) -> Linearisation {
         let projected = &self.triangle * x + &self.constant;
-        Linearisation { cost: 0.5 * projected.norm_squared(), triangle: 1.5 * &self.triangle, projected }
+        Linearisation {
+            cost: 0.5 * projected.norm_squared(),
+            triangle: 1.5 * &self.triangle,
+            projected,
+        }
     }
 }
 
@@ -94,7 +99,9 @@ fn iterations(bencher: Bencher, n: usize) {
     let (objective, start) = (Steep::new(n), DVector::from_element(n, 1.0));
     let iterations = minimise(&objective, start.clone(), &Settings::default()).iterations;
     let counter = divan::counter::ItemsCount::new(iterations);
-    bencher.counter(counter).bench_local(|| minimise(black_box(&objective), start.clone(), &Settings::default()));
+    bencher
+        .counter(counter)
+        .bench_local(|| minimise(black_box(&objective), start.clone(), &Settings::default()));
 }
 
 /// What an iteration takes for its evaluations.

@@ -1,18 +1,21 @@
-//! Closes the loop on a problem and writes its report: `cargo run --example loop_report -- PROBLEM FOLDER [FILE…]`.
+//! Closes the loop on a problem and writes its report: `cargo run --example loop_report -- PROBLEM
+//! FOLDER [FILE…]`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use flexcal::diagnose::close;
-use flexcal::identify::Options;
+use flexcal::fit::Options;
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use flexcal::report::{self, PlotData};
+use flexcal::select::close;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = env::args().skip(1).collect();
-    let [problem, folder, files @ ..] = &arguments[..] else { return Err("PROBLEM FOLDER [FILE…]".into()) };
+    let [problem, folder, files @ ..] = &arguments[..] else {
+        return Err("PROBLEM FOLDER [FILE…]".into());
+    };
     let (problem, folder) = (Problem::read(Path::new(problem))?, Path::new(folder));
     let files: Vec<PathBuf> = files.iter().map(PathBuf::from).collect();
     let files = if files.is_empty() { &problem.data.files } else { &files };

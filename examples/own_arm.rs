@@ -1,15 +1,15 @@
 //! An arm of one's own, from its data sheet to an estimate: `cargo run --example own_arm`.
 //!
-//! Declared in text, measured on the virtual test rig (which knows a truth that the declared arm does not), identified, and
-//! printed beside that truth.
+//! Declared in text, measured on the virtual test rig (which knows a truth that the declared arm
+//! does not), identified, and printed beside that truth.
 
 use std::error::Error;
 use std::path::Path;
 
-use flexcal::identify::{Options, identify};
+use flexcal::fit::{Options, identify};
 use flexcal::measurement::{Dataset, DatasetError};
 use flexcal::problem::Problem;
-use flexcal::simulate::{Simulation, Truth, simulate};
+use flexcal::rig::{Simulation, Truth, simulate};
 
 /// One row a joint: Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β). Two joints give way under their loads.
 const ARM: &str = r#"
@@ -64,10 +64,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         let known = simulation.parameters.iter().find(|parameter| parameter.name == estimate.name);
         let known = known.map_or_else(String::new, |parameter| format!("{:.5}", parameter.value));
         let error = estimate.std_error.map_or_else(String::new, |error| format!("{error:.2e}"));
-        lines.push(format!("{:<18} {:>13.5} {error:>11} {known:>13}", estimate.name, estimate.estimate));
+        lines.push(format!(
+            "{:<18} {:>13.5} {error:>11} {known:>13}",
+            estimate.name, estimate.estimate
+        ));
     }
-    let [before, after] = [&found.registered, &found.fitted].map(|errors| errors.held_out.mean.norm * 1e3);
-    lines.push(format!("held-out poses are off by {after:.3} mm on average; before, by {before:.3} mm"));
+    let [before, after] =
+        [&found.registered, &found.fitted].map(|errors| errors.held_out.mean.norm * 1e3);
+    lines.push(format!(
+        "held-out poses are off by {after:.3} mm on average; before, by {before:.3} mm"
+    ));
     #[expect(clippy::print_stdout, reason = "an example shows what it found")]
     {
         println!("{}", lines.join("\n"));
@@ -75,7 +81,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Simulated rows as data. Your own would come from arrays as well, or from files by `Dataset::read`.
+/// Simulated rows as data. Your own would come from arrays as well, or from files by
+/// `Dataset::read`.
 fn measured(simulation: &Simulation) -> Result<Dataset, DatasetError> {
     let rows = &simulation.rows;
     let configurations = rows.iter().map(|row| &row.conditions.configuration);

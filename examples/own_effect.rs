@@ -1,18 +1,19 @@
 //! An effect that no catalogue holds, without touching flexcal: `cargo run --example own_effect`.
 //!
-//! Suppose that the second joint of the lunar sampler has a belt that slackens as it is warmed. One parameter more at a slot of
-//! the model, multiplied by a driver (docs/effects.md lists both): fitted beside everything that the problem declares, and
-//! offered to the search for what the model lacks, beside the catalogue.
+//! Suppose that the second joint of the lunar sampler has a belt that slackens as it is warmed. One
+//! parameter more at a site of the model, multiplied by a regressor (docs/effects.md lists both):
+//! fitted beside everything that the problem declares, and offered to the search for what the model
+//! lacks, beside the catalogue.
 
 use std::error::Error;
 use std::path::Path;
 
-use flexcal::diagnose::trace;
-use flexcal::identify::{Options, identify};
+use flexcal::fit::{Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::model::effect::{CustomEffect, Term};
-use flexcal::model::parameter::{Driver, Slot};
+use flexcal::model::parameter::{ParameterSite, Regressor};
 use flexcal::problem::{Effect, Problem};
+use flexcal::select::trace;
 
 /// Δθ = slack · (T − 20 °C).
 #[derive(Debug)]
@@ -32,8 +33,8 @@ impl CustomEffect for Belt {
 
     fn terms(&self, problem: &Problem) -> Vec<Term> {
         // The last number is 1 σ of the prior [rad/K].
-        let slot = Slot::coordinate(problem, self.joint);
-        vec![Term::driven("slack", slot, Driver::Warming { reference: 20.0 }, 1e-4)]
+        let site = ParameterSite::coordinate(problem, self.joint);
+        vec![Term::driven("slack", site, Regressor::Warming { reference: 20.0 }, 1e-4)]
     }
 
     fn describe(&self) -> String {
@@ -54,14 +55,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     let rms = |poses: f64| poses * 1e3;
     #[expect(clippy::print_stdout, reason = "an example shows what it found")]
     {
-        println!("{} = {:.2e} ± {:.1e} rad/K", own.name, own.estimate, own.std_error.unwrap_or(f64::NAN));
+        println!(
+            "{} = {:.2e} ± {:.1e} rad/K",
+            own.name,
+            own.estimate,
+            own.std_error.unwrap_or(f64::NAN)
+        );
         println!(
             "rms error on held-out poses: {:.3} mm without it, {:.3} mm with it",
             rms(before.fitted.held_out.rms.norm),
             rms(after.fitted.held_out.rms.norm)
         );
         match rank {
-            Some(rank) => println!("number {} of what the residual points to, the first is:", rank + 1),
+            Some(rank) => {
+                println!("number {} of what the residual points to, the first is:", rank + 1)
+            }
             None => println!("not among what the residual points to, the first is:"),
         }
         println!("{}", traced.describe(&traced.ranking[0].effect));

@@ -4,30 +4,34 @@
 //!
 //! From input to result, each room uses only those before it:
 //!
-//! 1. [`problem`] and [`measurement`]: the arm as declared and the poses as measured, in SI units. A mistake in a file is an
-//!    [`error`] that says where.
-//! 2. [`spatial`], [`scalar`], [`mechanics`]: frames, and the arm's physics written once for real and dual numbers.
-//! 3. [`model`]: what is free ([`model::parameter`]), the catalogue of what an arm may do besides ([`model::effect`]), and
-//!    positions with their derivatives as a function of both.
-//! 4. [`least_squares`]: residuals of many small items and the solvers for them, which know no arms.
-//! 5. [`identify`]: what to fit in which order, identifiability, standard errors, comparison, compensation.
-//! 6. [`diagnose`]: what structure the residual still has, which effects it points to ([`diagnose::trace`]), and the loop that
-//!    adds them ([`diagnose::close`]).
+//! 1. [`problem`] and [`measurement`]: the arm as declared and the poses as measured, in SI units.
+//!    A mistake in a file is an [`error`] that says where.
+//! 2. [`spatial`], [`scalar`], [`mechanics`]: frames, and the arm's physics written once for real
+//!    and dual numbers.
+//! 3. [`model`]: what is free ([`model::parameter`]), the catalogue of what an arm may do besides
+//!    ([`model::effect`]), and positions with their derivatives as a function of both.
+//! 4. [`least_squares`]: residuals of many small items and the solvers for them, which know no
+//!    arms.
+//! 5. [`fit`]: what to fit in which order, identifiability, standard errors, comparison,
+//!    compensation.
+//! 6. [`select`]: what structure the residual still has, which effects it points to
+//!    ([`select::trace`]), and the loop that adds them ([`select::close`]).
 //! 7. [`report`]: text, JSON, Markdown, HTML and figures.
 //!
-//! Beside this way stand [`design`] (which poses to measure, and what they will tell), [`monte_carlo`] (many fits where the
-//! truth is known), [`urdf`] (arms from URDF, and identified ones back into it), [`paper`] (the closed forms of \[Chen2021\], a baseline), and [`simulate`], a rig that shares no physics
-//! with the model.
+//! Beside this way stand [`design`] (which poses to measure, and what they will tell),
+//! [`study`] (many fits where the truth is known), [`urdf`] (arms from URDF, and identified
+//! ones back into it), [`paper`] (the closed forms of \[Chen2021\], a baseline), and [`rig`],
+//! a rig that shares no physics with the model.
 //!
 //! # The same walk in code
 //!
 //! ```
 //! use std::path::Path;
 //!
-//! use flexcal::diagnose::{Verdict, close};
+//! use flexcal::select::{Verdict, close};
 //! use flexcal::measurement::Dataset;
 //! use flexcal::problem::Problem;
-//! use flexcal::identify::{Options, identify};
+//! use flexcal::fit::{Options, identify};
 //!
 //! // The arm as declared, and the poses: 28 to identify, 50 held out.
 //! let problem = Problem::read(Path::new("problems/lunar-sampler"))?;
@@ -47,13 +51,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! `examples/` has an arm of one's own from text to estimate, an effect of one's own, and a report; `docs/` explains files,
-//! effects, plans and results.
+//! `examples/` has an arm of one's own from text to estimate, an effect of one's own, and a report;
+//! `docs/` explains files, effects, plans and results.
 //!
 //! # Indices
 //!
-//! What reads input indexes nothing (`clippy::indexing_slicing` is denied there: [`error`], [`files`], [`problem`], [`quantity`],
-//! [`monte_carlo`], [`urdf`], the readers of [`measurement`] and [`simulate`], the command line). What reckons does: its indices are those of arrays that one
+//! What reads input indexes nothing (`clippy::indexing_slicing` is denied there: [`error`],
+//! [`files`], [`problem`], [`quantity`], [`study`], [`urdf`], the readers of [`measurement`]
+//! and [`rig`], the command line). What reckons does: its indices are those of arrays that one
 //! constructor made of one length from what was read.
 
 // The command line names this library as any other program does.
@@ -63,18 +68,15 @@ extern crate self as flexcal;
 #[doc(hidden)]
 pub mod cli;
 pub mod design;
-pub mod diagnose;
 #[deny(clippy::indexing_slicing)]
 pub mod error;
 #[deny(clippy::indexing_slicing)]
 pub mod files;
-pub mod identify;
+pub mod fit;
 pub mod least_squares;
 pub mod measurement;
 pub mod mechanics;
 pub mod model;
-#[deny(clippy::indexing_slicing)]
-pub mod monte_carlo;
 mod numeric;
 pub mod paper;
 #[deny(clippy::indexing_slicing)]
@@ -83,9 +85,12 @@ pub mod problem;
 pub mod quantity;
 mod random;
 pub mod report;
+pub mod rig;
 pub mod scalar;
-pub mod simulate;
+pub mod select;
 pub mod spatial;
+#[deny(clippy::indexing_slicing)]
+pub mod study;
 #[deny(clippy::indexing_slicing)]
 pub mod urdf;
 

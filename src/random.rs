@@ -12,9 +12,11 @@ pub(crate) fn stream(seed: u64, stream: u64) -> ChaCha8Rng {
     random
 }
 
-/// A standard normal number: √(−2 ln(1 − u)) cos 2πv with u, v even in [0, 1).                [Box & Muller 1958]
+/// A standard normal number: √(−2 ln(1 − u)) cos 2πv with u, v even in [0, 1).                [Box
+/// & Muller 1958]
 ///
-/// It stays as it is: with any other method the same seed would give other measurements than the ones that are published.
+/// It stays as it is: with any other method the same seed would give other measurements than the
+/// ones that are published.
 pub(crate) fn normal(random: &mut ChaCha8Rng) -> f64 {
     let (u, v): (f64, f64) = (random.random(), random.random());
     (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos()

@@ -10,7 +10,8 @@ pub trait Scalar: DualNum<f64> + Copy + Send + Sync {}
 
 impl<T: DualNum<f64> + Copy + Send + Sync> Scalar for T {}
 
-/// `value` as a dual number, with a unit derivative in `direction` where that lies within the N seeded ones.
+/// `value` as a dual number, with a unit derivative in `direction` where that lies within the N
+/// seeded ones.
 pub fn seeded<const N: usize>(value: f64, direction: Option<usize>) -> DualSVec64<N> {
     match direction {
         Some(k) if k < N => DualSVec64::new(value, Derivative::derivative_generic(Const, Const, k)),

@@ -1,4 +1,5 @@
-//! Plans and forecasts: the exchange, what it promises against what measurements then give, and the commands.
+//! Plans and forecasts: the exchange, what it promises against what measurements then give, and the
+//! commands.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 

@@ -1,4 +1,5 @@
-//! Rows that measure something else than positions: contacts with points and surfaces, distances to anchors.
+//! Rows that measure something else than positions: contacts with points and surfaces, distances to
+//! anchors.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 #![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]

@@ -1,6 +1,11 @@
-//! The paper's closed forms: each group of equations, each misprint, and the iteration, on the lunar sampler.
+//! The paper's closed forms: each group of equations, each misprint, and the iteration, on the
+//! lunar sampler.
 
-#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test that fails may panic; sizes are shown")]
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test that fails may panic; sizes are shown"
+)]
 
 mod common;
 

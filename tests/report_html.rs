@@ -1,4 +1,5 @@
-//! The report for people: whole, self-contained, the same every time, and with everything in it that was found.
+//! The report for people: whole, self-contained, the same every time, and with everything in it
+//! that was found.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
@@ -6,11 +7,11 @@ mod common;
 
 use common::arms::{measured, path};
 use common::made::part;
-use flexcal::diagnose::close;
-use flexcal::identify::{ErrorSummary, Options, identify};
+use flexcal::fit::{ErrorSummary, Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{Problem, Robust, RobustLoss};
 use flexcal::report::{self, PlotData, Report};
+use flexcal::select::close;
 use nalgebra::Vector3;
 use serde_json::Value;
 
@@ -57,14 +58,16 @@ fn poses(page: &Report) -> Vec<Value> {
 fn check(page: &Report) {
     assert_eq!(badly_nested(&page.html), None);
     let namespace = "http://www.w3.org/2000/svg";
-    for (name, text) in page.figures.iter().chain([&("report.html".to_owned(), page.html.clone())]) {
+    for (name, text) in page.figures.iter().chain([&("report.html".to_owned(), page.html.clone())])
+    {
         let outside = text.replace(namespace, "");
         for reference in ["http:", "https:", "//", " src=", "@import", "url(", "NaN", "inf\""] {
             assert!(!outside.contains(reference), "{name} has {reference}");
         }
     }
     // One script that is its own, and what it knows of the poses; none in the figures.
-    let scripts: Vec<&str> = page.html.split("<script").skip(1).map(|text| text.split('>').next().unwrap()).collect();
+    let scripts: Vec<&str> =
+        page.html.split("<script").skip(1).map(|text| text.split('>').next().unwrap()).collect();
     assert_eq!(scripts, [" type=\"application/json\" id=\"poses\"", ""]);
     assert!(page.figures.iter().all(|(_, figure)| !figure.contains("<script")));
     assert!(page.figures.len() >= 5);
@@ -72,11 +75,13 @@ fn check(page: &Report) {
         assert!(report::is_figure(name), "{name}");
         assert_eq!(badly_nested(figure), None, "{name}");
         assert!(figure.starts_with("<svg ") && figure.contains("aria-label=\""), "{name}");
-        // The file needs nothing of the page: paper of its own, colours written out, others where it is dark.
+        // The file needs nothing of the page: paper of its own, colours written out, others where
+        // it is dark.
         assert!(!figure.contains("var(") && figure.contains("fill=\"#ffffff\""), "{name}");
         assert!(figure.contains("prefers-color-scheme:dark"), "{name}");
         // The same poses have the same colour in every legend.
-        for (kind, colour) in [("\nfitted pose", "\"#A3ADB8\""), ("\nheld-out pose", "\"#1F2328\"")] {
+        for (kind, colour) in [("\nfitted pose", "\"#A3ADB8\""), ("\nheld-out pose", "\"#1F2328\"")]
+        {
             for (before, _) in figure.match_indices(kind).map(|(at, _)| figure.split_at(at)) {
                 let mark = before.rsplit('<').nth(1).unwrap();
                 let is_mark = mark.starts_with("circle") || mark.starts_with("rect");
@@ -84,16 +89,20 @@ fn check(page: &Report) {
             }
         }
         // Labels carry their units, but where there are none: numbers without one have no brackets.
-        let labelled =
-            figure.matches('[').count() - figure.matches("[fill=").count() - figure.matches("[stroke=").count();
+        let labelled = figure.matches('[').count()
+            - figure.matches("[fill=").count()
+            - figure.matches("[stroke=").count();
         let units = ["correlations", "misprints", "ranking", "residual-joints", "singular-values"];
         let without = units.iter().any(|own| name.starts_with(own));
         assert!((labelled >= 1) != without, "{name} has no axis with a unit");
         assert!(!figure.contains("[1]") && !figure.contains("−0 "), "{name}");
     }
     // The data of each figure, in the page itself.
-    for data in
-        page.html.split("href=\"data:text/csv;charset=utf-8,").skip(1).map(|text| text.split('"').next().unwrap())
+    for data in page
+        .html
+        .split("href=\"data:text/csv;charset=utf-8,")
+        .skip(1)
+        .map(|text| text.split('"').next().unwrap())
     {
         let lines: Vec<&str> = data.trim_end_matches("%0A").split("%0A").collect();
         assert!(lines.len() > 1 && lines[0].contains(','), "{data}");
@@ -102,7 +111,11 @@ fn check(page: &Report) {
     // Every dot of a pose is one that the page knows.
     let poses = poses(page);
     let known: Vec<u64> = poses.iter().map(|pose| pose["row"].as_u64().unwrap()).collect();
-    let dots = page.html.split(" data-p=\"").skip(1).map(|text| text.split('"').next().unwrap().parse().unwrap());
+    let dots = page
+        .html
+        .split(" data-p=\"")
+        .skip(1)
+        .map(|text| text.split('"').next().unwrap().parse().unwrap());
     let dots: Vec<u64> = dots.collect();
     assert!(dots.len() > 50 && dots.iter().all(|row| known.contains(row)), "{} dots", dots.len());
     assert_eq!(page.html.matches("<figure ").count(), page.figures.len());
@@ -139,7 +152,8 @@ fn a_closed_loop_shows_what_it_found() {
     let states = ["nominal arm", "as declared, fitted", "with what was found"];
     assert!(states.iter().all(|state| page.html.contains(&format!("class=\"label\">{state}<"))));
     // Each effect contributes, in millimetres over the workspace.
-    let drift = shown.contributions.iter().find(|own| own.name.starts_with("tracker-drift")).unwrap();
+    let drift =
+        shown.contributions.iter().find(|own| own.name.starts_with("tracker-drift")).unwrap();
     assert!(drift.is_effect && (0.2e-3..3e-3).contains(&drift.moved), "{drift:?}");
     let again = report::loop_report(&problem, &closure, &shown);
     assert_eq!(page, again);
@@ -158,7 +172,8 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     };
     close(&shown.stages[0].errors, &found.registered.held_out);
     close(&shown.stages[shown.stages.len() - 1].errors, &found.fitted.held_out);
-    let fitted: Vec<Vector3<f64>> = shown.residuals.iter().filter(|r| !r.held_out).map(|r| r.error).collect();
+    let fitted: Vec<Vector3<f64>> =
+        shown.residuals.iter().filter(|r| !r.held_out).map(|r| r.error).collect();
     close(&fitted, &found.fitted.identification);
     // Strong correlations are those of the estimate.
     let name = |name: &String| shown.correlations.names.iter().position(|own| own == name).unwrap();
@@ -176,7 +191,10 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
             (Ok(_), true) => "failed: ",
             (Ok(_), false) => "passed: ",
         };
-        assert!(page.html.contains(&format!(">{verdict}{check}<").replace('&', "&amp;")), "{check}");
+        assert!(
+            page.html.contains(&format!(">{verdict}{check}<").replace('&', "&amp;")),
+            "{check}"
+        );
     }
     let told = report::identification_report(&problem, &found, &shown).markdown;
     assert!(told.contains("- passed: ") && told.contains("## What the poses can tell"), "{told}");
@@ -206,16 +224,26 @@ fn poses_without_an_equilibrium_are_counted_and_left_out() {
     let words = format!("3 of {count} held-out poses have no equilibrium");
     let page = report::identification_report(&problem, &found, &shown);
     check(&page);
-    assert!(page.html.contains(&words) && page.html.contains("3 poses without an equilibrium are left out"));
+    assert!(
+        page.html.contains(&words)
+            && page.html.contains("3 poses without an equilibrium are left out")
+    );
     let dots = |page: &Report| {
-        page.figures.iter().find(|(name, _)| name == "held-out-errors.svg").unwrap().1.matches("<circle").count()
+        page.figures
+            .iter()
+            .find(|(name, _)| name == "held-out-errors.svg")
+            .unwrap()
+            .1
+            .matches("<circle")
+            .count()
     };
     let whole = PlotData::of_identification(&problem, &data, &found).unwrap();
     // One dot fewer in each of the four panels for each of the three poses.
     assert_eq!(dots(&page) + 12, dots(&report::identification_report(&problem, &found, &whole)));
-    for text in
-        [report::identification_report(&problem, &found, &shown).markdown, report::estimate_text(&problem, &found)]
-    {
+    for text in [
+        report::identification_report(&problem, &found, &shown).markdown,
+        report::estimate_text(&problem, &found),
+    ] {
         assert!(text.contains(&words) && !text.contains("NaN"), "{text}");
     }
 }
@@ -225,7 +253,8 @@ fn the_pose_behind_the_largest_residual_is_named_and_flattens_nothing() {
     let (problem, mut data) = case("tests/cases/a-none.csv");
     let row = data.split.identification[9];
     data.measurements.positions[row] += Vector3::new(0.3, 0.0, 0.0);
-    let problem = Problem { robust: Some(Robust { loss: RobustLoss::Huber, threshold: None }), ..problem };
+    let problem =
+        Problem { robust: Some(Robust { loss: RobustLoss::Huber, threshold: None }), ..problem };
     let found = identify(&problem, &data, &Options::default()).unwrap();
     let shown = PlotData::of_identification(&problem, &data, &found).unwrap();
     let page = report::identification_report(&problem, &found, &shown);
@@ -236,26 +265,40 @@ fn the_pose_behind_the_largest_residual_is_named_and_flattens_nothing() {
         let (pose, arm) = (&shown.residuals[row], arm.as_ref().unwrap());
         let [.., joint, tip] = arm.bent.as_slice() else { panic!("a line has two ends") };
         assert!((tip - (pose.position - pose.error)).norm() < 1e-9, "{row}");
-        assert!(((tip - joint).norm() - tool).abs() < 0.02, "{row}: {} {tool}", (tip - joint).norm());
-        assert!(arm.rigid.len() == arm.bent.len() && (tip - arm.rigid[arm.rigid.len() - 1]).norm() > 1e-3);
+        assert!(
+            ((tip - joint).norm() - tool).abs() < 0.02,
+            "{row}: {} {tool}",
+            (tip - joint).norm()
+        );
+        assert!(
+            arm.rigid.len() == arm.bent.len()
+                && (tip - arm.rigid[arm.rigid.len() - 1]).norm() > 1e-3
+        );
     }
     // The first row of the table, and in the data of every figure that has it.
     let place = shown.residuals[row].place.clone();
     assert_eq!(place, format!("a-none.csv:{}", data.measurements.location(row).line.unwrap()));
     let first = page.html.split("<tr data-row=\"").nth(1).unwrap();
-    assert!(first.starts_with(&row.to_string()) && first[..80].contains(&place), "{}", &first[..80]);
+    assert!(
+        first.starts_with(&row.to_string()) && first[..80].contains(&place),
+        "{}",
+        &first[..80]
+    );
     let own = poses(&page).into_iter().find(|pose| pose["row"] == row).unwrap();
     assert!((own["after"][0].as_f64().unwrap() - shown.residuals[row].error.x * 1e3).abs() < 1e-3);
     assert_eq!(own["q"].as_array().unwrap().len(), 4);
-    // It stands at the rim with a note, and the others keep their room: their mean size is more than a tenth of the panel.
+    // It stands at the rim with a note, and the others keep their room: their mean size is more
+    // than a tenth of the panel.
     let order = &page.figures.iter().find(|(name, _)| name == "residual-order.svg").unwrap().1;
     assert!(order.contains("1 beyond"), "{order}");
     let tagged = order.split("<circle data-p=\"").skip(1).take(28);
-    let height =
-        |text: &str| -> f64 { text.split("cy=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap() };
+    let height = |text: &str| -> f64 {
+        text.split("cy=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
+    };
     let heights: Vec<f64> = tagged.map(height).collect();
     let middle = heights.iter().sum::<f64>() / heights.len() as f64;
-    let spread = (heights.iter().map(|at| (at - middle).powi(2)).sum::<f64>() / heights.len() as f64).sqrt();
+    let spread =
+        (heights.iter().map(|at| (at - middle).powi(2)).sum::<f64>() / heights.len() as f64).sqrt();
     assert!(spread > 0.1 * 4.0 * 80.0, "{spread}");
 }
 

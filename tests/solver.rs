@@ -1,4 +1,5 @@
-//! Solvers against certified results, and what they promise at the edges: rank deficiency, bounds, threads.
+//! Solvers against certified results, and what they promise at the edges: rank deficiency, bounds,
+//! threads.
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 

@@ -1,4 +1,5 @@
-//! What statics must obey whatever the formulas: beams of the textbook, reciprocity, symmetry, convergence, limits.
+//! What statics must obey whatever the formulas: beams of the textbook, reciprocity, symmetry,
+//! convergence, limits.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 

@@ -1,5 +1,5 @@
-//! Studies: the same bytes however they are interrupted, shared out and threaded; statistics that mean what they say; and
-//! bad input.
+//! Studies: the same bytes however they are interrupted, shared out and threaded; statistics that
+//! mean what they say; and bad input.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
@@ -13,8 +13,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use assert_cmd::Command;
-use flexcal::monte_carlo::{Results, Shard, Store, Study, collect, pending, run};
 use flexcal::report;
+use flexcal::study::{Results, Shard, Store, Study, collect, pending, run};
 use serde_json::Value;
 
 /// Three rigid joints, few parameters: a fit takes a moment.
@@ -95,7 +95,9 @@ impl Bench {
     /// Finished parts in a folder of results.
     fn parts(&self, out: &str) -> usize {
         let Ok(entries) = fs::read_dir(self.path(out).join("cells")) else { return 0 };
-        entries.filter(|entry| entry.as_ref().unwrap().path().extension().is_some_and(|e| e == "json")).count()
+        entries
+            .filter(|entry| entry.as_ref().unwrap().path().extension().is_some_and(|e| e == "json"))
+            .count()
     }
 
     fn flexcal(&self, arguments: &[&str]) -> assert_cmd::assert::Assert {
@@ -126,14 +128,22 @@ fn text(bytes: &[u8]) -> String {
 #[test]
 fn names_with_a_comma_stay_one_cell() {
     let bench = Bench::new();
-    bench.edit("problem.toml", "[parameters]", "[[effect]]\njoint-coupling = { joint = 3, from = 2 }\n[parameters]");
+    bench.edit(
+        "problem.toml",
+        "[parameters]",
+        "[[effect]]\njoint-coupling = { joint = 3, from = 2 }\n[parameters]",
+    );
     bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 3");
     bench.flexcal(&["study", ".", "--out", "out", "--quiet"]).success();
     for (name, column) in [("study.csv", "largest_bias_of"), ("parameters.csv", "parameter")] {
         let mut table = csv::Reader::from_path(bench.path("out").join(name)).unwrap();
         let place = table.headers().unwrap().iter().position(|name| name == column).unwrap();
-        let names: Vec<String> = table.records().map(|row| row.unwrap()[place].to_owned()).collect();
-        assert!(name == "study.csv" || names.iter().any(|name| name == "joint-coupling[3,2].factor"), "{names:?}");
+        let names: Vec<String> =
+            table.records().map(|row| row.unwrap()[place].to_owned()).collect();
+        assert!(
+            name == "study.csv" || names.iter().any(|name| name == "joint-coupling[3,2].factor"),
+            "{names:?}"
+        );
     }
 }
 
@@ -159,9 +169,13 @@ fn declared_effects_are_drawn_and_found_again() {
                 continue;
             }
             let number = |column: &str| row[place(column)].parse::<f64>().unwrap();
-            // Drawn from priors of 1e-2 (gear ratio) and 1e-3: a fit of 30 poses knows better, and how much.
+            // Drawn from priors of 1e-2 (gear ratio) and 1e-3: a fit of 30 poses knows better, and
+            // how much.
             let (fits, rms, coverage) = (number("fits"), number("rms_error"), number("coverage"));
-            assert!(fits > 35.0 && rms > 0.0 && rms < 9e-4 && coverage > 0.8, "{source} {name}: {row:?}");
+            assert!(
+                fits > 35.0 && rms > 0.0 && rms < 9e-4 && coverage > 0.8,
+                "{source} {name}: {row:?}"
+            );
             seen += 1;
         }
         assert_eq!(seen, 2 * 5, "{source}: five parameters of effects by two solvers");
@@ -170,7 +184,10 @@ fn declared_effects_are_drawn_and_found_again() {
     bench.edit("problem.toml", "gear-ratio = { joint = 2 }", "joint-thermal-drift = { joint = 2 }");
     bench.edit("problem.toml", "[data]", "[data]\nreference_temperature_C = 20");
     let error = text_of_error(&bench.flexcal(&["study", "."]).code(2));
-    assert!(error.contains("problem.toml:") && error.contains("temperature_C = [from, to] in [poses]"), "{error}");
+    assert!(
+        error.contains("problem.toml:") && error.contains("temperature_C = [from, to] in [poses]"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -180,13 +197,17 @@ fn an_effect_of_loads_or_temperature_is_studied_as_the_loop_declares_it() {
     let effect = "[[effect]]\nlink-thermal-bending = { link = \"A\" }\n[parameters]";
     fs::write(bench.path("problem.toml"), problem.replacen("[parameters]", effect, 1)).unwrap();
     let (before, _) = STUDY.split_once("[poses]").unwrap();
-    let study =
-        before.replace("repetitions = 120", "repetitions = 2").replace("[8]", "[30]").replace(", \"gauss-newton\"", "");
+    let study = before
+        .replace("repetitions = 120", "repetitions = 2")
+        .replace("[8]", "[30]")
+        .replace(", \"gauss-newton\"", "");
     let poses = "[poses]\nq1_deg = [-90, 90]\nq2_deg = [-65, 15]\nq3_deg = [15, 130]\nq4_deg = [-95, 75]\ntemperature_C = [15, 30]\n";
     fs::write(bench.path("STUDY.toml"), study + poses).unwrap();
     bench.flexcal(&["study", ".", "--out", "out", "--quiet"]).success();
     let rows = fs::read_to_string(bench.path("out/parameters.csv")).unwrap();
-    let fitted = rows.lines().filter(|row| row.contains("link-thermal-bending[A].about_") && row.contains(",2,"));
+    let fitted = rows
+        .lines()
+        .filter(|row| row.contains("link-thermal-bending[A].about_") && row.contains(",2,"));
     assert_eq!(fitted.count(), 4, "{rows}");
 }
 
@@ -199,8 +220,9 @@ fn folders_to_merge_from_are_there() {
     let bench = Bench::new();
     bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 3");
     bench.flexcal(&["study", ".", "--out", "one", "--quiet"]).success();
-    let merge =
-        |more: &[&str]| bench.flexcal(&[&["study", "merge", ".", "--out", "all", "--from", "one"], more].concat());
+    let merge = |more: &[&str]| {
+        bench.flexcal(&[&["study", "merge", ".", "--out", "all", "--from", "one"], more].concat())
+    };
     merge(&[]).success();
     let error = text_of_error(&merge(&["tow"]).code(2));
     assert!(error.contains("--from tow: no such folder"), "{error}");
@@ -278,7 +300,10 @@ fn damaged_and_foreign_parts_are_not_used() {
     let (one, other) = (files.next().unwrap(), files.next().unwrap());
     fs::copy(&other, &one).unwrap();
     let message = pending(&study, &store, Shard::WHOLE).unwrap_err().to_string();
-    assert!(message.contains("belongs to other inputs") && message.contains(&one.display().to_string()), "{message}");
+    assert!(
+        message.contains("belongs to other inputs") && message.contains(&one.display().to_string()),
+        "{message}"
+    );
     fs::write(&one, "{").unwrap();
     let assert = bench.flexcal(&["study", "STUDY.toml", "--out", "out"]).code(2);
     assert!(text(&assert.get_output().stderr).contains("damaged"));
@@ -317,16 +342,22 @@ fn shares_of_the_command_line_merge_to_the_same_bytes() {
     let bench = Bench::new();
     let assert = bench.flexcal(&["study", "STUDY.toml"]).success();
     let table = text(&assert.get_output().stdout);
-    for expected in ["gauss-newton", "levenberg-marquardt", "held out mean", "out/small-study/study.csv"] {
+    for expected in
+        ["gauss-newton", "levenberg-marquardt", "held out mean", "out/small-study/study.csv"]
+    {
         assert!(table.contains(expected), "{expected} missing in:\n{table}");
     }
     for share in ["1/3", "2/3", "3/3"] {
         // In one folder, and each in its own.
         let done = format!("done/{}", &share[..1]);
-        bench.flexcal(&["study", "STUDY.toml", "--out", "shared", "--shard", share, "--done", &done]).success();
+        bench
+            .flexcal(&["study", "STUDY.toml", "--out", "shared", "--shard", share, "--done", &done])
+            .success();
         assert_eq!(fs::read_to_string(bench.path(&done)).unwrap(), "flexcal study: done\n");
         let own = format!("own-{}", &share[..1]);
-        bench.flexcal(&["study", "STUDY.toml", "--out", &own, "--shard", share, "--quiet"]).success();
+        bench
+            .flexcal(&["study", "STUDY.toml", "--out", &own, "--shard", share, "--quiet"])
+            .success();
         assert!(!bench.path("shared/study.csv").exists() && bench.parts(&own) == PARTS / 3);
     }
     // What was true before is not true until it is again; another file stays.
@@ -335,14 +366,29 @@ fn shares_of_the_command_line_merge_to_the_same_bytes() {
     assert!(!bench.path("done/1").exists() && bench.path("STUDY.toml").exists());
     let assert = bench.flexcal(&["study", "merge", "STUDY.toml", "--out", "own-1"]).code(2);
     assert!(text(&assert.get_output().stderr).contains("8 of 12 parts of the study are missing"));
-    let json = bench.flexcal(&["study", "merge", "STUDY.toml", "--out", "shared", "--json"]).success();
-    let from = ["study", "merge", "STUDY.toml", "--out", "all", "--from", "own-1", "own-2", "own-3", "--quiet"];
+    let json =
+        bench.flexcal(&["study", "merge", "STUDY.toml", "--out", "shared", "--json"]).success();
+    let from = [
+        "study",
+        "merge",
+        "STUDY.toml",
+        "--out",
+        "all",
+        "--from",
+        "own-1",
+        "own-2",
+        "own-3",
+        "--quiet",
+    ];
     bench.flexcal(&from).success();
     let expected = bench.results("out/small-study");
     assert_eq!(bench.results("shared"), expected);
     assert_eq!(bench.results("all"), expected);
     assert_eq!(text(&json.get_output().stdout), expected[1]);
-    assert_eq!(fs::read_to_string(bench.path("all/timing.csv")).unwrap().lines().count(), 1 + CELLS);
+    assert_eq!(
+        fs::read_to_string(bench.path("all/timing.csv")).unwrap().lines().count(),
+        1 + CELLS
+    );
 }
 
 #[test]
@@ -366,11 +412,14 @@ fn figures_are_what_they_say() {
             // Four standard deviations of each figure.
             assert!(bias.abs() < 4.0 * spread / 1000.0_f64.sqrt(), "{parameter}");
             assert!((spread / claimed - 1.0).abs() < 4.0 / 2000.0_f64.sqrt(), "{parameter}");
-            assert!((of("coverage") - 0.95).abs() < 4.0 * (0.95_f64 * 0.05 / 1000.0).sqrt(), "{parameter}");
+            assert!(
+                (of("coverage") - 0.95).abs() < 4.0 * (0.95_f64 * 0.05 / 1000.0).sqrt(),
+                "{parameter}"
+            );
         }
     }
-    // The same arms, poses and noise: solvers that find the minimum find the same one; four times the noise, four times
-    // the spread, nearly.
+    // The same arms, poses and noise: solvers that find the minimum find the same one; four times
+    // the noise, four times the spread, nearly.
     let spread = |cell: usize, k: usize| number(&cells[cell]["parameters"][k]["spread"]);
     for k in 0..5 {
         assert!((spread(0, k) / spread(1, k) - 1.0).abs() < 1e-4);
@@ -390,7 +439,8 @@ fn the_rig_measures_what_the_model_lacks() {
     fs::write(bench.path("STUDY.toml"), format!("{study}truth = \"TRUTH.toml\"\n")).unwrap();
     let assert = bench.flexcal(&["study", "."]).code(2);
     assert!(text(&assert.get_output().stderr).contains("write data = \"rig\""));
-    fs::write(bench.path("STUDY.toml"), format!("{study}truth = \"TRUTH.toml\"\ndata = \"rig\"\n")).unwrap();
+    fs::write(bench.path("STUDY.toml"), format!("{study}truth = \"TRUTH.toml\"\ndata = \"rig\"\n"))
+        .unwrap();
     let assert = bench.flexcal(&["study", ".", "--json"]).success();
     let json: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
     let chi2 = json["cells"][0]["reduced_chi2"].as_f64().unwrap();
@@ -404,7 +454,10 @@ fn a_folder_without_a_study_is_told_where_to_read() {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
     let assert = command.args(["study", "."]).current_dir(folder.path()).assert().code(2);
     let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
-    assert!(message.contains("STUDY.toml: no such file") && message.contains("docs/study.md"), "{message}");
+    assert!(
+        message.contains("STUDY.toml: no such file") && message.contains("docs/study.md"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -413,14 +466,21 @@ fn a_study_of_contacts_is_refused() {
     fs::write(bench.path("problem.toml"), format!("{ARM}[[point]]\nname = 'left'\n")).unwrap();
     let assert = bench.flexcal(&["study", "."]).code(2);
     let message = text(&assert.get_output().stderr);
-    assert!(message.contains("STUDY.toml:3: problem: a study draws and fits positions"), "{message}");
+    assert!(
+        message.contains("STUDY.toml:3: problem: a study draws and fits positions"),
+        "{message}"
+    );
 }
 
 #[test]
 fn bad_studies_are_named_and_leave_nothing_behind() {
     let cases: &[(&str, &str, &[&str])] = &[
         ("seed = 7", "sed = 7", &["seed", "missing", "(is it sed?)"]),
-        ("seed = 7", "seed = 7\nstrategy = 3", &["STUDY.toml:5", "strategy", "unknown key (did you mean strategies?)"]),
+        (
+            "seed = 7",
+            "seed = 7\nstrategy = 3",
+            &["STUDY.toml:5", "strategy", "unknown key (did you mean strategies?)"],
+        ),
         ("repetitions = 120", "repetitions = 0", &["STUDY.toml:5", "repetitions"]),
         ("repetitions = 120", "repetitions = 2000000", &["STUDY.toml:5", "too large"]),
         ("[0.05, 0.2]", "[0.05, 0.0]", &["STUDY.toml:6", "position_sigma_mm[2]", "above zero"]),
@@ -450,13 +510,20 @@ fn bad_studies_are_named_and_leave_nothing_behind() {
         for word in expected {
             assert!(message.contains(word), "{to}: {word:?} missing in: {message}");
         }
-        assert!(assert.get_output().stdout.is_empty() && !bench.path("out").exists(), "{to} left something behind");
+        assert!(
+            assert.get_output().stdout.is_empty() && !bench.path("out").exists(),
+            "{to} left something behind"
+        );
     }
     let bench = Bench::new();
     bench.edit("problem.toml", "sigma_mm = 3.0 }", "sigma_mm = 3.0, max_mm = 9.0 }");
     let assert = bench.flexcal(&["study", "STUDY.toml"]).code(2);
     assert!(text(&assert.get_output().stderr).contains("gauss-newton does not keep the bounds"));
-    for arguments in [&["study"][..], &["study", ".", "--shard", "0/3"], &["study", ".", "--shard", "1/3", "--json"]] {
+    for arguments in [
+        &["study"][..],
+        &["study", ".", "--shard", "0/3"],
+        &["study", ".", "--shard", "1/3", "--json"],
+    ] {
         bench.flexcal(arguments).code(2);
     }
     bench.flexcal(&["study", "nowhere.toml"]).code(2);

@@ -1,4 +1,5 @@
-//! docs/tutorial.md, lived through: its files written, its commands run, every line that it shows compared.
+//! docs/tutorial.md, lived through: its files written, its commands run, every line that it shows
+//! compared.
 //!
 //! `FLEXCAL_REFILL=1 cargo test --test tutorial` writes what is printed into the page instead.
 
@@ -26,7 +27,10 @@ fn parts(page: &str) -> Vec<Part<'_>> {
     let (mut parts, mut open): (Vec<Part>, Option<Block>) = (Vec::new(), None);
     for line in page.lines() {
         let fence = line.strip_prefix("```");
-        assert!(fence.is_none_or(str::is_empty) || open.is_none(), "a fence within a fence: {line}");
+        assert!(
+            fence.is_none_or(str::is_empty) || open.is_none(),
+            "a fence within a fence: {line}"
+        );
         match (fence, open.take()) {
             (Some(""), Some(block)) => parts.push(Part::Block(block)),
             (Some(info), None) => open = Some(Block { info, lines: Vec::new() }),
@@ -63,8 +67,11 @@ fn printed(command: &str, folder: &Path) -> String {
         return fs::read_to_string(folder.join(&arguments[0])).unwrap();
     }
     assert_eq!(program, "flexcal");
-    let output =
-        Command::new(assert_cmd::cargo::cargo_bin!("flexcal")).args(arguments).current_dir(folder).output().unwrap();
+    let output = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap();
     assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }
@@ -79,7 +86,11 @@ fn chosen(text: &str, ranges: &str) -> Vec<String> {
     for range in ranges.split_whitespace() {
         let (from, to) = range.split_once('-').unwrap();
         let (from, to): (usize, usize) = (from.parse().unwrap(), to.parse().unwrap());
-        assert!(from >= next && from <= to && to <= lines.len(), "{range} of {} lines", lines.len());
+        assert!(
+            from >= next && from <= to && to <= lines.len(),
+            "{range} of {} lines",
+            lines.len()
+        );
         if from > next {
             shown.push("…".to_owned());
         }
@@ -120,8 +131,10 @@ fn the_tutorial_shows_what_happens() {
             let command = block.lines[0].strip_prefix("$ ").unwrap();
             let shown = chosen(&printed(command, folder.path()), rest);
             if env::var_os("FLEXCAL_REFILL").is_none() {
-                let (page, now) =
-                    (lines[1..].iter().map(|line| timeless(line)), shown.iter().map(|line| timeless(line)));
+                let (page, now) = (
+                    lines[1..].iter().map(|line| timeless(line)),
+                    shown.iter().map(|line| timeless(line)),
+                );
                 assert_eq!(page.collect::<Vec<_>>(), now.collect::<Vec<_>>(), "{command}");
             }
             lines.truncate(1);
@@ -144,15 +157,22 @@ fn the_tutorial_shows_what_happens() {
 fn what_is_left_out_is_marked() {
     assert_eq!(chosen("a\nb\nc\nd\ne\n", "1-2 4-4"), ["a", "b", "…", "d", "…"]);
     assert_eq!(chosen("a\nb\n", ""), ["a", "b"]);
-    assert_eq!(words("plan a --separate \"x = { y = 1 }\" z"), ["plan", "a", "--separate", "x = { y = 1 }", "z"]);
-    assert_eq!(timeless("converged: nothing falls after 6 steps, 0.119 s"), "converged: nothing falls after 6");
+    assert_eq!(
+        words("plan a --separate \"x = { y = 1 }\" z"),
+        ["plan", "a", "--separate", "x = { y = 1 }", "z"]
+    );
+    assert_eq!(
+        timeless("converged: nothing falls after 6 steps, 0.119 s"),
+        "converged: nothing falls after 6"
+    );
 }
 
 /// The pages of the documentation, the README first.
 fn pages() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let docs = fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path());
-    let mut pages: Vec<PathBuf> = docs.filter(|path| path.extension().is_some_and(|ending| ending == "md")).collect();
+    let mut pages: Vec<PathBuf> =
+        docs.filter(|path| path.extension().is_some_and(|ending| ending == "md")).collect();
     pages.sort();
     pages.insert(0, root.join("README.md"));
     pages
@@ -232,22 +252,38 @@ fn an_own_arm_goes_the_way_of_the_readme_to_its_end() {
         if command.starts_with("flexcal init ") {
             // What others do with an instrument, the rig does here.
             let truth = root.join("problems/panda/TRUTH.toml");
-            let measure = format!("flexcal simulate panda --truth '{}' --poses 80 --seed 1 --out rig", truth.display());
+            let measure = format!(
+                "flexcal simulate panda --truth '{}' --poses 80 --seed 1 --out rig",
+                truth.display()
+            );
             printed(&measure, folder.path());
-            fs::copy(folder.path().join("rig/measurements.csv"), folder.path().join("panda/measurements.csv")).unwrap();
+            fs::copy(
+                folder.path().join("rig/measurements.csv"),
+                folder.path().join("panda/measurements.csv"),
+            )
+            .unwrap();
         }
     }
     let [init, check, found, _, exported] = said.as_slice() else { panic!("{commands:?}") };
-    for words in ["target_m", "position_sigma_mm", "30 % of the poses", "Next: flexcal check panda --poses 40"] {
+    for words in [
+        "target_m",
+        "position_sigma_mm",
+        "30 % of the poses",
+        "Next: flexcal check panda --poses 40",
+    ] {
         assert!(init.contains(words), "{words:?} missing in:\n{init}");
     }
     for words in ["it takes 58", "target_m = [0, 0, 0]"] {
         assert!(check.contains(words), "{words:?} missing in:\n{check}");
     }
-    assert!(found.contains("Explained: one effect was found") && found.contains("joint = 4"), "{found}");
+    assert!(
+        found.contains("Explained: one effect was found") && found.contains("joint = 4"),
+        "{found}"
+    );
     assert!(exported.contains("held-out poses: mean 0."), "{exported}");
     assert!(
-        folder.path().join("calibrated.urdf").is_file() && folder.path().join("out/panda-closed/report.html").is_file()
+        folder.path().join("calibrated.urdf").is_file()
+            && folder.path().join("out/panda-closed/report.html").is_file()
     );
 }
 
@@ -276,7 +312,8 @@ fn commands_of_the_documentation_are_understood() {
     // Those of the list of commands do what they say, but for what takes minutes.
     let list = fs::read_to_string(root.join("docs/commands.md")).unwrap();
     let own = |command: &String| {
-        command.contains("lunar-sampler") && !["study", "plan"].contains(&words(command)[1].as_str())
+        command.contains("lunar-sampler")
+            && !["study", "plan"].contains(&words(command)[1].as_str())
     };
     let quick: Vec<String> = commands(&list).into_iter().filter(own).collect();
     assert!(quick.len() >= 8, "{quick:?}");

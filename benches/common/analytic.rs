@@ -1,9 +1,10 @@
-//! The geometric Jacobian of a rigid arm written by hand: what automatic differentiation is measured against.
+//! The geometric Jacobian of a rigid arm written by hand: what automatic differentiation is
+//! measured against.
 
 use std::ops::Range;
 
 use flexcal::least_squares::{Block, LeastSquares};
-use flexcal::model::parameter::{JointField, Slot};
+use flexcal::model::parameter::{JointField, ParameterSite};
 use flexcal::model::{Model, PoseResiduals};
 use nalgebra::{DVector, Vector3};
 
@@ -48,13 +49,13 @@ impl<'a> Analytic<'a> {
         let (mut values, mut columns) = (self.nominal.clone(), vec![[None; 5]; self.nominal.len()]);
         let (mut target, mut target_columns) = (self.target, [None; 3]);
         for (column, (&k, x)) in self.residuals.unknowns().iter().zip(x).enumerate() {
-            match self.model.parameters[k].slot {
-                Slot::Joint { joint, field } => {
+            match self.model.parameters[k].site {
+                ParameterSite::Joint { joint, field } => {
                     let place = JointField::GEOMETRY.iter().position(|&f| f == field).unwrap();
                     values[joint][place] += x;
                     columns[joint][place] = Some(column);
                 }
-                Slot::Target { axis, .. } => {
+                ParameterSite::Target { axis, .. } => {
                     target[axis] += x;
                     target_columns[axis] = Some(column);
                 }
@@ -78,7 +79,11 @@ fn turn(u: &mut Vector3<f64>, v: &mut Vector3<f64>, (sin, cos): (f64, f64)) {
 }
 
 /// Walks outwards; returns the axes and origin of the last frame.
-fn walk(links: &[Link], q: &[f64], mut see: impl FnMut(usize, Motion)) -> ([Vector3<f64>; 3], Vector3<f64>) {
+fn walk(
+    links: &[Link],
+    q: &[f64],
+    mut see: impl FnMut(usize, Motion),
+) -> ([Vector3<f64>; 3], Vector3<f64>) {
     let (mut x, mut y, mut z) = (Vector3::x(), Vector3::y(), Vector3::z());
     let mut origin = Vector3::zeros();
     for (i, (link, q)) in links.iter().zip(q).enumerate() {
@@ -124,9 +129,11 @@ impl LeastSquares for Analytic<'_> {
         for (row, pose) in self.residuals.poses()[items].iter().enumerate() {
             let scale = -1.0 / pose.sigma;
             let mut put = |column: usize, v: Vector3<f64>| {
-                block.column_mut(column)[3 * row..3 * row + 3].copy_from_slice((v * scale).as_slice());
+                block.column_mut(column)[3 * row..3 * row + 3]
+                    .copy_from_slice((v * scale).as_slice());
             };
-            let (axes, origin) = walk(&links, pose.setup.configuration, |i, motion| motions[i] = motion);
+            let (axes, origin) =
+                walk(&links, pose.setup.configuration, |i, motion| motions[i] = motion);
             let p = origin + axes[0] * target.x + axes[1] * target.y + axes[2] * target.z;
             put(last, p - pose.measured);
             for (column, axis) in target_columns.iter().zip(axes) {

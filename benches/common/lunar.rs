@@ -1,6 +1,7 @@
-//! The lunar sampler: two elastic links and three elastic joints, statics on the bent arm, 32 parameters with priors.
+//! The lunar sampler: two elastic links and three elastic joints, statics on the bent arm, 32
+//! parameters with priors.
 
-use flexcal::identify::Placement;
+use flexcal::fit::Placement;
 use flexcal::least_squares::{Fit, LinearRows};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::{Model, PoseResiduals};
@@ -43,14 +44,21 @@ impl Lunar {
     /// Residuals of the identification poses as a function of all parameters.
     pub fn residuals(&self) -> PoseResiduals<'_> {
         let n = self.parameters();
-        let poses = self.placement.poses(&self.data.measurements, &self.data.split.identification, self.sigma);
+        let poses = self.placement.poses(
+            &self.data.measurements,
+            &self.data.split.identification,
+            self.sigma,
+        );
         PoseResiduals::new(&self.model, poses, (0..n).collect(), DVector::zeros(n))
     }
 
     /// The data with the priors of all parameters.
     pub fn fit<'a>(&self, residuals: &'a PoseResiduals<'a>) -> Fit<'a, PoseResiduals<'a>> {
-        let weights = self.model.parameters.iter().map(|parameter| parameter.sigma.unwrap().recip());
+        let weights =
+            self.model.parameters.iter().map(|parameter| parameter.sigma.unwrap().recip());
         let matrix = DMatrix::from_diagonal(&DVector::from_iterator(self.parameters(), weights));
-        Fit::new(residuals).with_rows(LinearRows { matrix, constant: DVector::zeros(self.parameters()) }).unwrap()
+        Fit::new(residuals)
+            .with_rows(LinearRows { matrix, constant: DVector::zeros(self.parameters()) })
+            .unwrap()
     }
 }

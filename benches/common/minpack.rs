@@ -25,7 +25,8 @@ impl<'a, P: LeastSquares> Minpack<'a, P> {
         Self { rows, ..self }
     }
 
-    /// With every point that the solver asks for moved to the nearest one within bounds, which it does not know of.
+    /// With every point that the solver asks for moved to the nearest one within bounds, which it
+    /// does not know of.
     pub fn clamped(self, bounds: Option<&'a Bounds>) -> Self {
         Self { bounds, ..self }
     }
@@ -42,7 +43,8 @@ impl<'a, P: LeastSquares> Minpack<'a, P> {
 
     /// ½‖r‖² at the minimum found from x = 0.
     pub fn minimise(problem: &'a P) -> f64 {
-        let (_, report) = Self::new(problem, DVector::zeros(problem.parameters())).solve(&Settings::default());
+        let (_, report) =
+            Self::new(problem, DVector::zeros(problem.parameters())).solve(&Settings::default());
         assert!(report.termination.was_successful());
         report.objective_function
     }
@@ -70,7 +72,8 @@ impl<P: LeastSquares> LeastSquaresProblem<f64, Dyn, Dyn> for Minpack<'_, P> {
             Some(rows) => {
                 let m = data.len();
                 let mut all = data.resize_vertically(m + rows.constant.len(), 0.0);
-                all.rows_mut(m, rows.constant.len()).copy_from(&(&rows.matrix * &self.x + &rows.constant));
+                all.rows_mut(m, rows.constant.len())
+                    .copy_from(&(&rows.matrix * &self.x + &rows.constant));
                 all
             }
             None => data,

@@ -18,10 +18,18 @@ const ERRORS: (f64, f64) = (4e-3, 2e-3);
 const WITHIN: f64 = 1.5;
 /// Every so many-th pose has a gross error of up to so much on each coordinate [m].
 const GROSS: (usize, f64) = (10, 5e-3);
-/// Parameters that positions cannot tell from others: d of parallel axes, β where the next link has an α, and those of
-/// the last link that the target's coordinates replace.
-const REDUNDANT: [&str; 8] =
-    ["joint1.beta", "joint2.d", "joint3.d", "joint4.beta", "joint5.beta", "joint6.theta", "joint6.d", "joint6.beta"];
+/// Parameters that positions cannot tell from others: d of parallel axes, β where the next link has
+/// an α, and those of the last link that the target's coordinates replace.
+const REDUNDANT: [&str; 8] = [
+    "joint1.beta",
+    "joint2.d",
+    "joint3.d",
+    "joint4.beta",
+    "joint5.beta",
+    "joint6.theta",
+    "joint6.d",
+    "joint6.beta",
+];
 
 /// A UR10 and its measured poses.
 pub struct Ur10 {
@@ -41,9 +49,11 @@ impl Ur10 {
         problem.tool.target = Vector3::new(0.06, 0.04, 0.109);
         let model = Model::new(&problem, &[String::new()], &[String::new()]).unwrap();
         let names = || model.parameters.iter().map(|parameter| parameter.name.as_str()).enumerate();
-        let geometric: Vec<usize> = names().filter(|(_, name)| !name.starts_with("base")).map(|(k, _)| k).collect();
+        let geometric: Vec<usize> =
+            names().filter(|(_, name)| !name.starts_with("base")).map(|(k, _)| k).collect();
         let identifiable = geometric.iter().copied();
-        let identifiable = identifiable.filter(|&k| !REDUNDANT.contains(&model.parameters[k].name.as_str()));
+        let identifiable =
+            identifiable.filter(|&k| !REDUNDANT.contains(&model.parameters[k].name.as_str()));
 
         let mut random = ChaCha8Rng::seed_from_u64(2024);
         let normal = |random: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(random) };
@@ -62,8 +72,10 @@ impl Ur10 {
             model,
         };
         let errors = ur10.residuals_at(Vec::new(), truth).position_errors(&DVector::zeros(0));
-        ur10.measured =
-            errors.iter().map(|error| Vector3::from_fn(|i, _| NOISE * normal(&mut random) - error[i])).collect();
+        ur10.measured = errors
+            .iter()
+            .map(|error| Vector3::from_fn(|i, _| NOISE * normal(&mut random) - error[i]))
+            .collect();
         ur10
     }
 
@@ -73,15 +85,16 @@ impl Ur10 {
     }
 
     fn residuals_at(&self, unknowns: Vec<usize>, at: DVector<f64>) -> PoseResiduals<'_> {
-        let poses = self.configurations.iter().zip(&self.measured).map(|(configuration, measured)| Pose {
-            setup: PoseView::of(configuration),
-            base: 0,
-            target: 0,
-            observation: Observation::default(),
-            measured,
-            sigma: NOISE,
-            orientation: None,
-        });
+        let poses =
+            self.configurations.iter().zip(&self.measured).map(|(configuration, measured)| Pose {
+                setup: PoseView::of(configuration),
+                base: 0,
+                target: 0,
+                observation: Observation::default(),
+                measured,
+                sigma: NOISE,
+                orientation: None,
+            });
         PoseResiduals::new(&self.model, poses.collect::<Vec<_>>(), unknowns, at)
     }
 

@@ -5,7 +5,8 @@
 //!     peers serve <name>                                a problem of `tests/cases/bounded`: limits, flexcal's optimum and times, then
 //!                                                       for each line x a line of residuals and derivatives
 //!
-//! kind: plain; box (bounds that a few true values lie beyond); huber, l1 (gross errors, and flexcal's losses)
+//! kind: plain; box (bounds that a few true values lie beyond); huber, l1 (gross errors, and
+//! flexcal's losses)
 #![allow(
     clippy::expect_used,
     clippy::unwrap_used,
@@ -36,7 +37,8 @@ const REPEATS: usize = 15;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).filter(|word| *word != "--bench").collect();
+    let arguments: Vec<&str> =
+        arguments.iter().map(String::as_str).filter(|word| *word != "--bench").collect();
     match arguments[..] {
         ["write", poses, unknowns, kind, file] => {
             let ur10 = arm(poses, kind);
@@ -71,15 +73,17 @@ fn chosen<'a>(ur10: &'a Ur10, unknowns: &str) -> &'a [usize] {
     sets.into_iter().find(|set| set.len().to_string() == unknowns).expect("25 or 33 unknowns")
 }
 
-/// σ; the nominal α, a, θ, d, β of each joint and the target; which of these are unknown; lower and upper bounds of these, if any; the
-/// loss; a pose a line.
+/// σ; the nominal α, a, θ, d, β of each joint and the target; which of these are unknown; lower and
+/// upper bounds of these, if any; the loss; a pose a line.
 fn csv(ur10: &Ur10, unknowns: &[usize], kind: &str) -> String {
     let mut out = format!("{NOISE}\n");
-    let nominal: Vec<String> = ur10.geometric.iter().map(|&k| ur10.model.parameters[k].nominal.to_string()).collect();
+    let nominal: Vec<String> =
+        ur10.geometric.iter().map(|&k| ur10.model.parameters[k].nominal.to_string()).collect();
     let place = |k: &usize| ur10.geometric.iter().position(|g| g == k).unwrap().to_string();
     let unknown: Vec<String> = unknowns.iter().map(place).collect();
     let bounds = ur10.bounds(unknowns);
-    let bounds: Vec<String> = bounds.lower().iter().chain(bounds.upper()).map(f64::to_string).collect();
+    let bounds: Vec<String> =
+        bounds.lower().iter().chain(bounds.upper()).map(f64::to_string).collect();
     let bounds = if kind == "box" { bounds.join(",") } else { String::new() };
     writeln!(out, "{}\n{}\n{bounds}", nominal.join(","), unknown.join(",")).unwrap();
     match loss(kind) {
@@ -97,7 +101,8 @@ fn csv(ur10: &Ur10, unknowns: &[usize], kind: &str) -> String {
 fn time(ur10: &Ur10, unknowns: &[usize], kind: &str, repeats: usize) {
     let residuals = ur10.residuals(unknowns);
     let objective = Fit::new(&residuals).with_loss(loss(kind));
-    let (start, settings, bounds) = (DVector::zeros(unknowns.len()), Settings::default(), ur10.bounds(unknowns));
+    let (start, settings, bounds) =
+        (DVector::zeros(unknowns.len()), Settings::default(), ur10.bounds(unknowns));
     let solve = || match kind {
         "box" => minimise_bounded(&objective, start.clone(), &bounds, &settings),
         _ => minimise(&objective, start.clone(), &settings),
@@ -122,28 +127,43 @@ fn words<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
     values.into_iter().map(f64::to_string).collect::<Vec<String>>().join(" ")
 }
 
-/// Lower and upper bounds; the number of constraints and for each its limits and coefficients; flexcal's steps, cost, time and optimum,
-/// with the time of residuals and Jacobian once, both on one thread [s]. Then, for each line x, the whitened residuals with those of the priors, and the Jacobian row after row.
+/// Lower and upper bounds; the number of constraints and for each its limits and coefficients;
+/// flexcal's steps, cost, time and optimum, with the time of residuals and Jacobian once, both on
+/// one thread [s]. Then, for each line x, the whitened residuals with those of the priors, and the
+/// Jacobian row after row.
 fn serve(own: &Bounded) {
     let residuals = own.residuals();
     let fit = own.fit(&residuals);
-    let solve = || minimise_constrained(&fit, own.nominal(), &own.bounds, &own.rows, &Settings::default());
+    let solve =
+        || minimise_constrained(&fit, own.nominal(), &own.bounds, &own.rows, &Settings::default());
     let (found, pool) = (solve(), common::pool(1));
     let (fitted, linearised) =
         pool.install(|| (median(REPEATS, solve), median(10 * REPEATS, || fit.linearise(&found.x))));
     let mut out = std::io::stdout().lock();
-    writeln!(out, "{}\n{}\n{}", words(own.bounds.lower()), words(own.bounds.upper()), own.rows.len()).unwrap();
+    writeln!(
+        out,
+        "{}\n{}\n{}",
+        words(own.bounds.lower()),
+        words(own.bounds.upper()),
+        own.rows.len()
+    )
+    .unwrap();
     for i in 0..own.rows.len() {
         let (lower, upper) = (own.rows.lower()[i], own.rows.upper()[i]);
-        writeln!(out, "{lower} {upper} {}", words(&own.rows.matrix().row(i).clone_owned())).unwrap();
+        writeln!(out, "{lower} {upper} {}", words(&own.rows.matrix().row(i).clone_owned()))
+            .unwrap();
     }
     let (steps, cost) = (found.iterations, found.cost);
     writeln!(out, "{steps} {cost} {fitted} {linearised} {}", words(&found.x)).unwrap();
     let priors = own.priors();
     for line in std::io::stdin().lines() {
         let line = line.unwrap();
-        let x = DVector::from_iterator(found.x.len(), line.split_whitespace().map(|word| word.parse().unwrap()));
-        let (data, slopes) = pool.install(|| (residual_vector(&residuals, &x), jacobian(&residuals, &x)));
+        let x = DVector::from_iterator(
+            found.x.len(),
+            line.split_whitespace().map(|word| word.parse().unwrap()),
+        );
+        let (data, slopes) =
+            pool.install(|| (residual_vector(&residuals, &x), jacobian(&residuals, &x)));
         let own = &priors.matrix * &x;
         // Column after column of the transpose: row after row.
         let slopes = (slopes.transpose(), priors.matrix.transpose());

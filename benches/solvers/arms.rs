@@ -1,6 +1,6 @@
 //! The arms: a rigid UR10, and the lunar sampler bending under its loads.
 
-use flexcal::identify::Placement;
+use flexcal::fit::Placement;
 use flexcal::least_squares::solver::Bounds;
 use flexcal::least_squares::{LeastSquares as _, LinearRows, Loss};
 use flexcal::measurement::Dataset;
@@ -23,8 +23,13 @@ const FAR: f64 = 5.0;
 const FAR_STARTS: usize = 3;
 
 /// Limits of `tests/cases/bounded` that bind a little, much, and against the truth.
-const WITHIN: [&str; 5] =
-    ["stiffness", "tight-geometry", "mild-constraints", "against-the-truth", "constraints-against-the-truth"];
+const WITHIN: [&str; 5] = [
+    "stiffness",
+    "tight-geometry",
+    "mild-constraints",
+    "against-the-truth",
+    "constraints-against-the-truth",
+];
 /// Losses with what `[robust]` calls them.
 const LOSSES: [(&str, Loss); 2] = [
     ("huber", Loss::Huber { threshold: Loss::HUBER_POSITION }),
@@ -66,7 +71,10 @@ impl Arms {
             within: WITHIN
                 .map(|name| (format!("lunar sampler, {name}"), Bounded::read(name)))
                 .into_iter()
-                .chain([("service arm".to_owned(), Bounded::of(Problem::read(&file("problems/service-arm")).unwrap()))])
+                .chain([(
+                    "service arm".to_owned(),
+                    Bounded::of(Problem::read(&file("problems/service-arm")).unwrap()),
+                )])
                 .collect(),
             spoilt: Bounded::read("stiffness").spoilt(),
         }
@@ -75,7 +83,9 @@ impl Arms {
     pub fn cases(&self) -> Vec<Case<'_>> {
         let mut cases = Vec::new();
         for ur10 in &self.ur10 {
-            for (class, unknowns) in [(Class::Identifiable, &ur10.identifiable), (Class::Redundant, &ur10.geometric)] {
+            for (class, unknowns) in
+                [(Class::Identifiable, &ur10.identifiable), (Class::Redundant, &ur10.geometric)]
+            {
                 cases.push(of_ur10(ur10, class, unknowns, ""));
             }
         }
@@ -86,11 +96,19 @@ impl Arms {
         for (name, own) in &self.within {
             let rows = (!own.rows.is_empty()).then(|| own.rows.clone());
             let case = Case::new(Class::Bounded, name.clone(), own.residuals(), own.nominal());
-            cases.push(Case { priors: Some(own.priors()), bounds: Some(own.bounds.clone()), rows, ..case });
+            cases.push(Case {
+                priors: Some(own.priors()),
+                bounds: Some(own.bounds.clone()),
+                rows,
+                ..case
+            });
         }
         for (word, loss) in LOSSES {
             for ur10 in &self.gross {
-                cases.push(Case { loss, ..of_ur10(ur10, Class::Robust, &ur10.identifiable, &format!(", {word}")) });
+                cases.push(Case {
+                    loss,
+                    ..of_ur10(ur10, Class::Robust, &ur10.identifiable, &format!(", {word}"))
+                });
             }
             let (name, own) = (format!("lunar sampler, 28 poses, {word}"), &self.spoilt);
             let case = Case::new(Class::Robust, name, own.residuals(), own.nominal());
@@ -102,10 +120,20 @@ impl Arms {
             let bounds = Bounds::new(-ERRORS * &sigmas, ERRORS * sigmas).unwrap();
             cases.push(lunar.case(Class::Elastic, "nominal start", nominal.clone(), None));
             for (k, far) in lunar.far.iter().enumerate() {
-                cases.push(lunar.case(Class::Elastic, &format!("far start {}", k + 1), far.clone(), None));
+                cases.push(lunar.case(
+                    Class::Elastic,
+                    &format!("far start {}", k + 1),
+                    far.clone(),
+                    None,
+                ));
             }
             cases.push(lunar.case(Class::Bounded, "nominal start", nominal, Some(bounds.clone())));
-            cases.push(lunar.case(Class::Bounded, "far start 1", lunar.far[0].clone(), Some(bounds)));
+            cases.push(lunar.case(
+                Class::Bounded,
+                "far start 1",
+                lunar.far[0].clone(),
+                Some(bounds),
+            ));
         }
         cases
     }
@@ -118,7 +146,13 @@ impl Lunar {
         let mut measurements = made::at_random(&problem, poses, 1.5, &mut random);
         let model = made::model_of(&problem, &measurements);
         let truth = ERRORS * made::draw(&model, |_| 0.0, &mut random);
-        made::measure(&problem, &mut measurements, &truth, problem.data.position_sigma.unwrap(), &mut random);
+        made::measure(
+            &problem,
+            &mut measurements,
+            &truth,
+            problem.data.position_sigma.unwrap(),
+            &mut random,
+        );
         let split = made::split_at(poses, &measurements);
         let mut lunar = Self {
             placement: Placement::of(&measurements),
@@ -129,8 +163,11 @@ impl Lunar {
             truth,
         };
         let sigmas = lunar.sigmas();
-        let mut far =
-            || &lunar.truth + sigmas.map(|sigma| if random.random_bool(0.5) { FAR * sigma } else { -FAR * sigma });
+        let mut far = || {
+            &lunar.truth
+                + sigmas
+                    .map(|sigma| if random.random_bool(0.5) { FAR * sigma } else { -FAR * sigma })
+        };
         lunar.far = (0..FAR_STARTS).map(|_| far()).collect();
         lunar
     }
@@ -140,22 +177,33 @@ impl Lunar {
     }
 
     fn sigmas(&self) -> DVector<f64> {
-        DVector::from_iterator(self.truth.len(), self.model.parameters.iter().map(|parameter| parameter.sigma.unwrap()))
+        DVector::from_iterator(
+            self.truth.len(),
+            self.model.parameters.iter().map(|parameter| parameter.sigma.unwrap()),
+        )
     }
 
     fn residuals(&self) -> PoseResiduals<'_> {
         let n = self.truth.len();
         let sigma = self.problem.data.position_sigma.unwrap();
-        let poses = self.placement.poses(&self.data.measurements, &self.data.split.identification, sigma);
+        let poses =
+            self.placement.poses(&self.data.measurements, &self.data.split.identification, sigma);
         PoseResiduals::new(&self.model, poses, (0..n).collect(), DVector::zeros(n))
     }
 
     /// All parameters with their priors.
-    pub fn case(&self, class: Class, start_name: &str, start: DVector<f64>, bounds: Option<Bounds>) -> Case<'_> {
+    pub fn case(
+        &self,
+        class: Class,
+        start_name: &str,
+        start: DVector<f64>,
+        bounds: Option<Bounds>,
+    ) -> Case<'_> {
         let n = self.truth.len();
         let matrix = DMatrix::from_diagonal(&self.sigmas().map(f64::recip));
         let priors = Some(LinearRows { matrix, constant: DVector::zeros(n) });
-        let case = Case::new(class, format!("{}, {start_name}", self.name()), self.residuals(), start);
+        let case =
+            Case::new(class, format!("{}, {start_name}", self.name()), self.residuals(), start);
         Case { priors, bounds, ..case }
     }
 }
@@ -163,7 +211,8 @@ impl Lunar {
 /// A UR10 from nominal values.
 fn of_ur10<'a>(ur10: &'a Ur10, class: Class, unknowns: &[usize], more: &str) -> Case<'a> {
     let residuals = ur10.residuals(unknowns);
-    let name = format!("UR10, {} parameters, {} poses{more}", unknowns.len(), ur10.configurations.len());
+    let name =
+        format!("UR10, {} parameters, {} poses{more}", unknowns.len(), ur10.configurations.len());
     let start = DVector::zeros(residuals.parameters());
     Case::new(class, name, residuals, start)
 }

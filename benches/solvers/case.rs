@@ -108,7 +108,12 @@ pub struct Case<'a> {
 
 impl<'a> Case<'a> {
     /// A problem of a class, without priors, limits and known minima.
-    pub fn new(class: Class, name: String, data: impl LeastSquares + 'a, start: DVector<f64>) -> Self {
+    pub fn new(
+        class: Class,
+        name: String,
+        data: impl LeastSquares + 'a,
+        start: DVector<f64>,
+    ) -> Self {
         Self {
             class,
             name,
@@ -160,7 +165,9 @@ impl<'a> Case<'a> {
             let kept = |j| (bounds.lower()[j]..=bounds.upper()[j]).contains(&x[j]);
             (0..x.len()).all(kept)
         };
-        if !self.bounds.as_ref().is_none_or(inside) || !self.rows.as_ref().is_none_or(|rows| rows.contain(x)) {
+        if !self.bounds.as_ref().is_none_or(inside)
+            || !self.rows.as_ref().is_none_or(|rows| rows.contain(x))
+        {
             return f64::INFINITY;
         }
         self.fit(&Watched::new(self.data.as_ref(), self.limit())).cost(x)
@@ -171,16 +178,25 @@ impl<'a> Case<'a> {
 pub fn collections() -> Vec<Case<'static>> {
     let mut cases = Vec::new();
     for start in 0..2 {
-        for dataset in nist::datasets().into_iter().filter(|dataset| nist::HIGHER_DIFFICULTY.contains(&dataset.name)) {
-            let (name, begin) = (format!("{}, start {}", dataset.name, start + 1), dataset.starts[start].clone());
+        for dataset in nist::datasets()
+            .into_iter()
+            .filter(|dataset| nist::HIGHER_DIFFICULTY.contains(&dataset.name))
+        {
+            let (name, begin) =
+                (format!("{}, start {}", dataset.name, start + 1), dataset.starts[start].clone());
             let minima = vec![0.5 * dataset.rss];
-            cases.push(Case { minima, accuracy: 1e-9, ..Case::new(Class::Nist, name, dataset, begin) });
+            cases.push(Case {
+                minima,
+                accuracy: 1e-9,
+                ..Case::new(Class::Nist, name, dataset, begin)
+            });
         }
     }
     for problem in more_garbow_hillstrom::problems() {
         let minima = problem.minima.iter().map(|squares| 0.5 * squares).collect();
         let start = DVector::from_vec(problem.start);
-        let case = Case::new(Class::MoreGarbowHillstrom, problem.name.to_owned(), problem.analytic, start);
+        let case =
+            Case::new(Class::MoreGarbowHillstrom, problem.name.to_owned(), problem.analytic, start);
         cases.push(Case { minima, accuracy: 1e-5, ..case });
     }
     cases.sort_by(|a, b| (a.class, a.name.as_str()).cmp(&(b.class, b.name.as_str())));

@@ -33,10 +33,13 @@ use arms::Arms;
 use row::Row;
 
 fn main() {
-    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
+    let words: Vec<String> =
+        std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     let asked = |class: &str, name: &str| {
         words.is_empty()
-            || words.iter().any(|word| format!("{class}/{name}").to_lowercase().contains(&word.to_lowercase()))
+            || words
+                .iter()
+                .any(|word| format!("{class}/{name}").to_lowercase().contains(&word.to_lowercase()))
     };
     // Solvers that fail by a panic are reported in their rows.
     std::panic::set_hook(Box::new(|_| ()));
@@ -47,7 +50,9 @@ fn main() {
         for case in cases.filter(|case| asked(case.class.name(), &case.name)) {
             rows.extend(tell(row::measure(&case)));
         }
-        for arm in arms.lunar.iter().filter(|arm| asked(case::Class::Sequential.name(), &arm.name())) {
+        for arm in
+            arms.lunar.iter().filter(|arm| asked(case::Class::Sequential.name(), &arm.name()))
+        {
             rows.extend(tell(row::sequential(arm)));
         }
     });
@@ -64,7 +69,12 @@ fn main() {
 fn tell(rows: Vec<Row>) -> Vec<Row> {
     if let Some(row) = rows.first() {
         let reached = rows.iter().filter(|row| row.reached.is_ok()).count();
-        eprintln!("{} / {}: {reached} of {} solvers reach the optimum", row.class.name(), row.problem, rows.len());
+        eprintln!(
+            "{} / {}: {reached} of {} solvers reach the optimum",
+            row.class.name(),
+            row.problem,
+            rows.len()
+        );
     }
     rows
 }

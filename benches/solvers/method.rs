@@ -4,10 +4,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
 use argmin::core::observers::Observe;
-use flexcal::identify::SolverChoice;
+use flexcal::fit::SolverChoice;
 use flexcal::least_squares::solver::{
-    Bounds, GaussNewtonSettings, Inequalities, PseudoInverseSettings, Solution, State, Within, minimise,
-    minimise_gauss_newton, minimise_pseudo_inverse, minimise_within,
+    Bounds, GaussNewtonSettings, Inequalities, PseudoInverseSettings, Solution, State, Within,
+    minimise, minimise_gauss_newton, minimise_pseudo_inverse, minimise_within,
 };
 use flexcal::least_squares::{LeastSquares as _, Loss};
 use nalgebra::DVector;
@@ -57,7 +57,11 @@ pub struct End {
 impl From<Solution> for End {
     fn from(solution: Solution) -> Self {
         let Solution { x, iterations, termination, .. } = solution;
-        Self { x, iterations, complaint: (!termination.converged()).then(|| termination.as_str().to_owned()) }
+        Self {
+            x,
+            iterations,
+            complaint: (!termination.converged()).then(|| termination.as_str().to_owned()),
+        }
     }
 }
 
@@ -80,7 +84,8 @@ impl Method {
         match self {
             Self::LevenbergMarquardt => "levenberg-marquardt",
             Self::Bounded(within) => {
-                let own = SolverChoice::EACH.into_iter().find(|solver| solver.within() == Some(within));
+                let own =
+                    SolverChoice::EACH.into_iter().find(|solver| solver.within() == Some(within));
                 own.map_or("bounded", SolverChoice::as_str)
             }
             Self::GaussNewton => "gauss-newton",
@@ -92,12 +97,15 @@ impl Method {
         }
     }
 
-    /// Whether its row tells something of this problem. Without bounds those that keep them all do the same: one is enough.
+    /// Whether its row tells something of this problem. Without bounds those that keep them all do
+    /// the same: one is enough.
     pub fn tells(self, case: &Case) -> bool {
         let (bounded, boxed) = (case.bounds.is_some(), case.rows.is_none());
         match self {
             Self::Bounded(Within::ActiveSet) => true,
-            Self::Bounded(Within::Reflective | Within::Clamped) | Self::MinpackClamped => bounded && boxed,
+            Self::Bounded(Within::Reflective | Within::Clamped) | Self::MinpackClamped => {
+                bounded && boxed
+            }
             Self::Bounded(_) => bounded,
             Self::Minpack => case.loss == Loss::Squares,
             _ => true,
@@ -111,11 +119,22 @@ impl Method {
         let end = catch_unwind(AssertUnwindSafe(|| self.end(case, &watched)));
         let seconds = begin.elapsed().as_secs_f64();
         let start = case.start.clone();
-        let End { x, iterations, complaint } =
-            end.unwrap_or_else(|_| End { x: start, iterations: 0, complaint: Some("it panics".to_owned()) });
+        let End { x, iterations, complaint } = end.unwrap_or_else(|_| End {
+            x: start,
+            iterations: 0,
+            complaint: Some("it panics".to_owned()),
+        });
         let (residuals, jacobians) = watched.evaluations();
-        let late = watched.is_late().then(|| format!("not done within {} s", case.limit().as_secs()));
-        Run { cost: case.cost(&x), iterations, residuals, jacobians, seconds, complaint: late.or(complaint) }
+        let late =
+            watched.is_late().then(|| format!("not done within {} s", case.limit().as_secs()));
+        Run {
+            cost: case.cost(&x),
+            iterations,
+            residuals,
+            jacobians,
+            seconds,
+            complaint: late.or(complaint),
+        }
     }
 
     fn end(self, case: &Case, data: &Watched) -> End {
@@ -125,13 +144,19 @@ impl Method {
             Self::LevenbergMarquardt => minimise(fit, start, &settings).into(),
             Self::Bounded(within) => {
                 let bounds = case.bounds.clone().unwrap_or_else(|| Bounds::none(data.parameters()));
-                let rows = case.rows.clone().unwrap_or_else(|| Inequalities::none(data.parameters()));
-                minimise_within(within, fit, start, (&bounds, &rows), &settings, None::<Silent>).into()
+                let rows =
+                    case.rows.clone().unwrap_or_else(|| Inequalities::none(data.parameters()));
+                minimise_within(within, fit, start, (&bounds, &rows), &settings, None::<Silent>)
+                    .into()
             }
             Self::GaussNewton => {
-                let tolerance = settings.cost_tolerance.sqrt().min(GaussNewtonSettings::default().tolerance);
-                let settings =
-                    GaussNewtonSettings { tolerance, max_iterations: settings.max_iterations, ..Default::default() };
+                let tolerance =
+                    settings.cost_tolerance.sqrt().min(GaussNewtonSettings::default().tolerance);
+                let settings = GaussNewtonSettings {
+                    tolerance,
+                    max_iterations: settings.max_iterations,
+                    ..Default::default()
+                };
                 minimise_gauss_newton(fit, start, &settings).into()
             }
             Self::PseudoInverse => {
@@ -148,8 +173,13 @@ impl Method {
                 let problem = Minpack::new(data, start).with_rows(case.priors.as_ref());
                 let bounds = case.bounds.as_ref().filter(|_| self == Self::MinpackClamped);
                 let (x, report) = problem.clamped(bounds).solve(&settings);
-                let complaint = (!report.termination.was_successful()).then(|| format!("{:?}", report.termination));
-                End { x, iterations: report.number_of_evaluations.saturating_sub(1) as u64, complaint }
+                let complaint = (!report.termination.was_successful())
+                    .then(|| format!("{:?}", report.termination));
+                End {
+                    x,
+                    iterations: report.number_of_evaluations.saturating_sub(1) as u64,
+                    complaint,
+                }
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Performance profiles [Dolan & Moré 2002] as a picture.
 //!
-//! ρ(τ) of a solver is the part of the problems on which it reaches the optimum in at most τ times the time of the fastest that does.
+//! ρ(τ) of a solver is the part of the problems on which it reaches the optimum in at most τ times
+//! the time of the fastest that does.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -14,7 +15,8 @@ const MOST: f64 = 100.0;
 const SIZE: (f64, f64) = (540.0, 240.0);
 const LEFT: f64 = 62.0;
 const STEP: f64 = 330.0;
-/// Colours that those tell apart who see some of them alike [Okabe & Ito 2008], and dashes for those who see none.
+/// Colours that those tell apart who see some of them alike [Okabe & Ito 2008], and dashes for
+/// those who see none.
 const LINES: [(&str, &str); 7] = [
     ("#000000", ""),
     ("#0072b2", "9 4"),
@@ -35,7 +37,8 @@ const EVERYWHERE: [&str; 7] = [
     "gauss-newton",
     "pseudo-inverse",
 ];
-const WITHIN: [&str; 5] = ["bounded", "interior-point", "reflective", "clamped", "MINPACK port, clamped"];
+const WITHIN: [&str; 5] =
+    ["bounded", "interior-point", "reflective", "clamped", "MINPACK port, clamped"];
 
 /// Over all classes but `sequential`, which is a strategy, and over the bounded one.
 pub fn picture(rows: &[Row]) -> String {
@@ -54,19 +57,35 @@ fn panel(out: &mut String, top: f64, title: &str, rows: &[&Row], solvers: &[&str
     let (width, height) = SIZE;
     let x = |ratio: f64| LEFT + width * ratio.ln() / MOST.ln();
     let y = |part: f64| top + height * (1.0 - part);
-    let problems: BTreeSet<(Class, &str)> = rows.iter().map(|row| (row.class, row.problem.as_str())).collect();
+    let problems: BTreeSet<(Class, &str)> =
+        rows.iter().map(|row| (row.class, row.problem.as_str())).collect();
     let (right, below, count) = (LEFT + width, top + height, problems.len());
-    writeln!(out, "<text x=\"{LEFT}\" y=\"{}\" font-weight=\"bold\">{title}: {count} problems</text>", top - 12.0)
-        .unwrap();
+    writeln!(
+        out,
+        "<text x=\"{LEFT}\" y=\"{}\" font-weight=\"bold\">{title}: {count} problems</text>",
+        top - 12.0
+    )
+    .unwrap();
     for part in [0.0, 0.25, 0.5, 0.75, 1.0] {
         let y = y(part);
         writeln!(out, "<path d=\"M{LEFT} {y:.1}H{right}\" stroke=\"#ddd\"/>").unwrap();
-        writeln!(out, "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{part}</text>", LEFT - 6.0, y + 4.0).unwrap();
+        writeln!(
+            out,
+            "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{part}</text>",
+            LEFT - 6.0,
+            y + 4.0
+        )
+        .unwrap();
     }
     for ratio in [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0] {
         let x = x(ratio);
         writeln!(out, "<path d=\"M{x:.1} {top}V{below}\" stroke=\"#ddd\"/>").unwrap();
-        writeln!(out, "<text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">{ratio}</text>", below + 17.0).unwrap();
+        writeln!(
+            out,
+            "<text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">{ratio}</text>",
+            below + 17.0
+        )
+        .unwrap();
     }
     let middle = LEFT + width / 2.0;
     writeln!(
@@ -94,12 +113,24 @@ fn panel(out: &mut String, top: f64, title: &str, rows: &[&Row], solvers: &[&str
         let (begin, height) = (right + 18.0, top + 12.0 + 24.0 * k as f64);
         writeln!(out, "<path d=\"M{begin} {height}h42\" {style}/>").unwrap();
         let reached = ratios.len();
-        writeln!(out, "<text x=\"{}\" y=\"{}\">{solver} ({reached})</text>", begin + 50.0, height + 4.0).unwrap();
+        writeln!(
+            out,
+            "<text x=\"{}\" y=\"{}\">{solver} ({reached})</text>",
+            begin + 50.0,
+            height + 4.0
+        )
+        .unwrap();
     }
 }
 
-/// Times of a solver over those of the fastest of `solvers` that reaches the optimum, sorted, of the problems on which it does.
-fn ratios(rows: &[&Row], problems: &BTreeSet<(Class, &str)>, solvers: &[&str], solver: &str) -> Vec<f64> {
+/// Times of a solver over those of the fastest of `solvers` that reaches the optimum, sorted, of
+/// the problems on which it does.
+fn ratios(
+    rows: &[&Row],
+    problems: &BTreeSet<(Class, &str)>,
+    solvers: &[&str],
+    solver: &str,
+) -> Vec<f64> {
     let ratio = |&(class, problem): &(Class, &str)| {
         let reached = || {
             let of = rows.iter().filter(move |row| row.class == class && row.problem == problem);

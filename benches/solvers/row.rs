@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use flexcal::identify::{Options, SolverChoice, Strategy, identify};
+use flexcal::fit::{Options, SolverChoice, Strategy, identify};
 use flexcal::least_squares::solver::Within;
 use nalgebra::DVector;
 
@@ -39,7 +39,8 @@ pub struct Row {
 
 /// Every solver on `case`, repeated in turn.
 pub fn measure(case: &Case) -> Vec<Row> {
-    let methods: Vec<Method> = Method::EACH.into_iter().filter(|method| method.tells(case)).collect();
+    let methods: Vec<Method> =
+        Method::EACH.into_iter().filter(|method| method.tells(case)).collect();
     let (runs, seconds) = repeated(methods.len(), |k| methods[k].run(case), |run| run.seconds);
     let found = || runs.iter().map(|run| run.cost);
     let best = |listed: f64| {
@@ -49,7 +50,11 @@ pub fn measure(case: &Case) -> Vec<Row> {
     // What is listed to a few digits is made precise by those that come to it.
     let optima: Vec<f64> = match case.minima[..] {
         [] => vec![found().fold(f64::INFINITY, f64::min)],
-        _ => case.minima.iter().map(|&listed| if listed == 0.0 { 0.0 } else { best(listed) }).collect(),
+        _ => case
+            .minima
+            .iter()
+            .map(|&listed| if listed == 0.0 { 0.0 } else { best(listed) })
+            .collect(),
     };
     let row = |((run, seconds), method): ((&Run, f64), Method)| Row {
         class: case.class,
@@ -66,7 +71,8 @@ pub fn measure(case: &Case) -> Vec<Row> {
 }
 
 fn reached(run: &Run, optima: &[f64], case: &Case) -> Result<(), String> {
-    if optima.iter().any(|&best| run.cost <= best * (1.0 + REACHED) + ZERO * f64::from(best == 0.0)) {
+    if optima.iter().any(|&best| run.cost <= best * (1.0 + REACHED) + ZERO * f64::from(best == 0.0))
+    {
         return Ok(());
     }
     let best = optima.iter().copied().fold(f64::INFINITY, f64::min);
@@ -97,17 +103,27 @@ pub fn sequential(arm: &Lunar) -> Vec<Row> {
     let (best, ..) = cost(&joint);
     let tells = |solver: &SolverChoice| matches!(solver.within(), None | Some(Within::ActiveSet));
     let each: Vec<SolverChoice> = SolverChoice::EACH.into_iter().filter(tells).collect();
-    let solve = |k: usize| cost(&Options::default().with_strategy(Strategy::Sequential).with_solver(each[k]));
+    let solve = |k: usize| {
+        cost(&Options::default().with_strategy(Strategy::Sequential).with_solver(each[k]))
+    };
     let (runs, seconds) = repeated(each.len(), solve, |run| run.2);
-    let row = |((run, seconds), solver): ((&(f64, flexcal::identify::Identification, f64), f64), SolverChoice)| {
+    let row = |((run, seconds), solver): (
+        (&(f64, flexcal::fit::Identification, f64), f64),
+        SolverChoice,
+    )| {
         let (cost, found, _) = run;
         let gap = cost / best - 1.0;
         Row {
             class: Class::Sequential,
             problem: arm.name(),
             solver: solver.as_str(),
-            reached: if gap <= SETTLED { Ok(()) } else { Err(format!("cost {gap:.1e} of the optimum above it")) },
-            complaint: (!found.termination.converged()).then(|| found.termination.as_str().to_owned()),
+            reached: if gap <= SETTLED {
+                Ok(())
+            } else {
+                Err(format!("cost {gap:.1e} of the optimum above it"))
+            },
+            complaint: (!found.termination.converged())
+                .then(|| found.termination.as_str().to_owned()),
             iterations: found.iterations,
             residuals: usize::try_from(found.evaluations).unwrap(),
             jacobians: None,
@@ -117,8 +133,13 @@ pub fn sequential(arm: &Lunar) -> Vec<Row> {
     runs.iter().zip(seconds).zip(each).map(row).collect()
 }
 
-/// The first run of each of `count` solvers, and the median time of its repetitions, which are taken in turn.
-fn repeated<T>(count: usize, mut run: impl FnMut(usize) -> T, time: impl Fn(&T) -> f64) -> (Vec<T>, Vec<f64>) {
+/// The first run of each of `count` solvers, and the median time of its repetitions, which are
+/// taken in turn.
+fn repeated<T>(
+    count: usize,
+    mut run: impl FnMut(usize) -> T,
+    time: impl Fn(&T) -> f64,
+) -> (Vec<T>, Vec<f64>) {
     let first: Vec<T> = (0..count).map(&mut run).collect();
     let mut times: Vec<Vec<f64>> = first.iter().map(|run| vec![time(run)]).collect();
     let wanted = |times: &[f64]| (BUDGET / times[0]).clamp(1.0, REPETITIONS as f64);

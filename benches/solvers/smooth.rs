@@ -1,14 +1,17 @@
-//! argmin's solvers of smooth functions on f = ½‖r‖², with the gradient Jᵀr and the Gauss–Newton Hessian JᵀJ.
+//! argmin's solvers of smooth functions on f = ½‖r‖², with the gradient Jᵀr and the Gauss–Newton
+//! Hessian JᵀJ.
 //!
-//! Neither chooses its own scale, so each unknown is measured in the length of its column of J at the start. argmin's
-//! trust region has no test for convergence, its L-BFGS one in absolute units: the adapter ends both by the tests on
-//! gradient and step that the other solvers use.
+//! Neither chooses its own scale, so each unknown is measured in the length of its column of J at
+//! the start. argmin's trust region has no test for convergence, its L-BFGS one in absolute units:
+//! the adapter ends both by the tests on gradient and step that the other solvers use.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use argmin::core::observers::{Observe, ObserverMode};
-use argmin::core::{CostFunction, Error, Executor, Gradient, Hessian, IterState, KV, Solver, State as _};
+use argmin::core::{
+    CostFunction, Error, Executor, Gradient, Hessian, IterState, KV, Solver, State as _,
+};
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::quasinewton::LBFGS;
 use argmin::solver::trustregion::{Steihaug, TrustRegion};
@@ -29,12 +32,14 @@ type Vector = DVector<f64>;
 type Matrix = DMatrix<f64>;
 type State<G, H> = IterState<Vector, G, (), H, (), f64>;
 
-/// Steihaug's conjugate gradients within a radius; the first is ‖r‖, the length that orthogonal columns would need.
+/// Steihaug's conjugate gradients within a radius; the first is ‖r‖, the length that orthogonal
+/// columns would need.
 pub fn trust_region(objective: impl Objective, start: &Vector, settings: &Settings) -> End {
     let smooth = Smooth::new(objective, start, settings);
     let radius = smooth.residual.max(f64::MIN_POSITIVE);
     let inner = Steihaug::new().with_max_iters(10 * start.len() as u64);
-    let solver = TrustRegion::new(inner).with_max_radius(1e6 * radius).unwrap().with_radius(radius).unwrap();
+    let solver =
+        TrustRegion::new(inner).with_max_radius(1e6 * radius).unwrap().with_radius(radius).unwrap();
     smooth.run(|state: State<Vector, Matrix>| state, solver, settings.max_iterations)
 }
 
@@ -94,7 +99,10 @@ impl<'a, O: Objective> Smooth<'a, O> {
         let linearisation = objective.linearise(start);
         let norms = linearisation.triangle.column_iter().map(|column| column.norm());
         Self {
-            scale: Vector::from_iterator(start.len(), norms.map(|norm| if norm > 0.0 { norm } else { 1.0 })),
+            scale: Vector::from_iterator(
+                start.len(),
+                norms.map(|norm| if norm > 0.0 { norm } else { 1.0 }),
+            ),
             residual: (2.0 * linearisation.cost).sqrt(),
             seen: RefCell::new(Seen {
                 best: (start.clone(), linearisation.cost),
@@ -107,7 +115,12 @@ impl<'a, O: Objective> Smooth<'a, O> {
         }
     }
 
-    fn run<G, H, S>(&self, typed: fn(State<G, H>) -> State<G, H>, solver: S, max_iterations: u64) -> End
+    fn run<G, H, S>(
+        &self,
+        typed: fn(State<G, H>) -> State<G, H>,
+        solver: S,
+        max_iterations: u64,
+    ) -> End
     where
         S: for<'b> Solver<&'b Self, State<G, H>>,
         State<G, H>: argmin::core::State<Param = Vector, Float = f64>,
@@ -124,7 +137,9 @@ impl<'a, O: Objective> Smooth<'a, O> {
             .run();
         let complaint = match (self.seen.borrow().ended, result) {
             (Ended::Failed(why), _) => Some(why.to_owned()),
-            (Ended::Not, Ok(result)) if result.state.get_iter() >= max_iterations => Some("iteration-limit".to_owned()),
+            (Ended::Not, Ok(result)) if result.state.get_iter() >= max_iterations => {
+                Some("iteration-limit".to_owned())
+            }
             (Ended::Not, Err(error)) => Some(error.to_string()),
             (Ended::Not | Ended::Converged, _) => None,
         };
@@ -152,7 +167,8 @@ impl<'a, O: Objective> Smooth<'a, O> {
             return self.stop(Ended::Failed("derivatives-not-finite"));
         }
         let size = |j: usize| triangle.column(j).norm() * (2.0 * cost).sqrt();
-        let cosine = |j: usize| triangle.column(j).dot(projected).abs() / size(j).max(f64::MIN_POSITIVE);
+        let cosine =
+            |j: usize| triangle.column(j).dot(projected).abs() / size(j).max(f64::MIN_POSITIVE);
         if *cost == 0.0 || (0..q.len()).all(|j| cosine(j) <= self.settings.gradient_tolerance) {
             return self.stop(Ended::Converged);
         }
@@ -189,7 +205,9 @@ impl<O: Objective> Gradient for &Smooth<'_, O> {
     type Gradient = Vector;
 
     fn gradient(&self, q: &Vector) -> Result<Vector, Error> {
-        self.at(q, |linearisation| linearisation.triangle.tr_mul(&linearisation.projected).component_div(&self.scale))
+        self.at(q, |linearisation| {
+            linearisation.triangle.tr_mul(&linearisation.projected).component_div(&self.scale)
+        })
     }
 }
 

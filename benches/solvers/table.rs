@@ -72,7 +72,9 @@ fn verdict(row: &Row) -> String {
 
 /// What limits cost: the solver that keeps them beside the one that does not, which ends outside.
 fn price(out: &mut String, rows: &[Row]) {
-    let of = |solver: &'static str| rows.iter().filter(move |row| row.class == Class::Bounded && row.solver == solver);
+    let of = |solver: &'static str| {
+        rows.iter().filter(move |row| row.class == Class::Bounded && row.solver == solver)
+    };
     let free = |row: &Row| of("levenberg-marquardt").find(|free| free.problem == row.problem);
     let mut pairs = of("bounded").filter_map(|row| Some((row, free(row)?))).peekable();
     if pairs.peek().is_none() {
@@ -83,8 +85,12 @@ fn price(out: &mut String, rows: &[Row]) {
     for (row, free) in pairs {
         let [time, other] = [row, free].map(|row| milliseconds(row.seconds));
         let (problem, ratio) = (&row.problem, row.seconds / free.seconds);
-        writeln!(out, "| {problem} | {} | {} | {time} | {other} | {ratio:.2} |", row.iterations, free.iterations)
-            .unwrap();
+        writeln!(
+            out,
+            "| {problem} | {} | {} | {time} | {other} | {ratio:.2} |",
+            row.iterations, free.iterations
+        )
+        .unwrap();
     }
 }
 
@@ -95,12 +101,16 @@ fn summarise(out: &mut String, class: Class, rows: &[Row]) {
             solvers.push(row.solver);
         }
     }
-    let of =
-        |solver: &str| rows.iter().filter(move |row| row.class == class && row.solver == solver).collect::<Vec<_>>();
+    let of = |solver: &str| {
+        rows.iter()
+            .filter(move |row| row.class == class && row.solver == solver)
+            .collect::<Vec<_>>()
+    };
     let total = |rows: &[&Row]| rows.iter().map(|row| row.seconds).sum::<f64>();
     let all = |rows: &[&Row]| rows.iter().all(|row| row.reached.is_ok());
     let most = solvers.iter().map(|solver| of(solver).len()).max().unwrap_or(0);
-    let fastest = solvers.iter().map(|solver| of(solver)).filter(|rows| rows.len() == most && all(rows));
+    let fastest =
+        solvers.iter().map(|solver| of(solver)).filter(|rows| rows.len() == most && all(rows));
     let fastest = fastest.min_by(|a, b| total(a).total_cmp(&total(b))).unwrap_or_default();
     for solver in solvers {
         let rows = of(solver);
@@ -108,9 +118,15 @@ fn summarise(out: &mut String, class: Class, rows: &[Row]) {
         let steps: u64 = rows.iter().map(|row| row.iterations).sum();
         let beside = fastest.iter().filter(|row| rows.iter().any(|own| own.problem == row.problem));
         let beside: f64 = beside.map(|row| row.seconds).sum();
-        let factor = if all(&rows) { format!("{:.2}", total(&rows) / beside) } else { "–".to_owned() };
+        let factor =
+            if all(&rows) { format!("{:.2}", total(&rows) / beside) } else { "–".to_owned() };
         let (count, time) = (rows.len(), milliseconds(total(&rows)));
-        writeln!(out, "| {} | {solver} | {reached} of {count} | {steps} | {time} | {factor} |", class.name()).unwrap();
+        writeln!(
+            out,
+            "| {} | {solver} | {reached} of {count} | {steps} | {time} | {factor} |",
+            class.name()
+        )
+        .unwrap();
     }
 }
 
@@ -126,8 +142,14 @@ fn machine() -> String {
     let cpus = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpus.lines().find_map(|line| line.strip_prefix("model name")?.split(": ").nth(1));
     let compiler = Command::new("rustc").arg("-V").output();
-    let compiler =
-        compiler.map_or_else(|_| "rustc".to_owned(), |out| String::from_utf8_lossy(&out.stdout).trim().to_owned());
+    let compiler = compiler.map_or_else(
+        |_| "rustc".to_owned(),
+        |out| String::from_utf8_lossy(&out.stdout).trim().to_owned(),
+    );
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    format!("{} ({cores} cores, {}), {compiler}", model.unwrap_or("an unknown processor"), std::env::consts::ARCH)
+    format!(
+        "{} ({cores} cores, {}), {compiler}",
+        model.unwrap_or("an unknown processor"),
+        std::env::consts::ARCH
+    )
 }

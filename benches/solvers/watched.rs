@@ -7,7 +7,8 @@ use std::time::{Duration, Instant};
 use flexcal::least_squares::{Block, LeastSquares};
 use nalgebra::DVector;
 
-/// The problem itself while there is time; after that no point lies in its domain, which ends any solver.
+/// The problem itself while there is time; after that no point lies in its domain, which ends any
+/// solver.
 pub struct Watched<'a> {
     problem: &'a dyn LeastSquares,
     deadline: Instant,
@@ -18,7 +19,12 @@ pub struct Watched<'a> {
 
 impl<'a> Watched<'a> {
     pub fn new(problem: &'a dyn LeastSquares, limit: Duration) -> Self {
-        Self { problem, deadline: Instant::now() + limit, late: AtomicBool::new(false), items: Default::default() }
+        Self {
+            problem,
+            deadline: Instant::now() + limit,
+            late: AtomicBool::new(false),
+            items: Default::default(),
+        }
     }
 
     /// Evaluations of the whole residual alone, and of residual and Jacobian.

@@ -14,7 +14,10 @@ pub fn numbers(py: Python<'_>, values: impl Iterator<Item = f64>) -> Array<'_> {
 
 /// 64-bit integers.
 pub fn integers(py: Python<'_>, values: impl Iterator<Item = usize>) -> Array<'_> {
-    PyByteArray::new(py, &values.flat_map(|value| (value as u64).to_ne_bytes()).collect::<Vec<u8>>())
+    PyByteArray::new(
+        py,
+        &values.flat_map(|value| (value as u64).to_ne_bytes()).collect::<Vec<u8>>(),
+    )
 }
 
 /// Rows of three coordinates, shape = (rows, 3).
@@ -24,5 +27,10 @@ pub fn points<'py>(py: Python<'py>, points: &[Vector3<f64>]) -> Array<'py> {
 
 /// Matrices of one shape one after the other, shape = (matrices, rows, columns).
 pub fn derivatives<'py>(py: Python<'py>, all: &[DMatrix<f64>]) -> Array<'py> {
-    numbers(py, all.iter().flat_map(|matrix| matrix.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>())))
+    numbers(
+        py,
+        all.iter().flat_map(|matrix| {
+            matrix.row_iter().flat_map(|row| row.iter().copied().collect::<Vec<_>>())
+        }),
+    )
 }

@@ -42,7 +42,8 @@ pub enum Source {
 pub enum Column {
     /// The bytes of an array of 64-bit numbers.
     Numbers(PyBackedBytes),
-    /// For each row the number of its word, the bytes of an array of 64-bit integers; and the words.
+    /// For each row the number of its word, the bytes of an array of 64-bit integers; and the
+    /// words.
     Words(PyBackedBytes, Vec<String>),
 }
 
@@ -59,7 +60,8 @@ impl Source {
             Source::Files(files) => return Ok(Input::Files(files)),
             Source::Columns(name, columns) => (name, columns),
         };
-        let columns = columns.into_iter().map(|(name, column)| Ok((name.clone(), column.values(&name)?)));
+        let columns =
+            columns.into_iter().map(|(name, column)| Ok((name.clone(), column.values(&name)?)));
         let columns = columns.collect::<PyResult<Vec<_>>>()?;
         ColumnTable::new(name, columns).map(Input::Columns).map_err(|error| raised(&error))
     }
@@ -70,14 +72,18 @@ impl Column {
         match self {
             Column::Numbers(bytes) => {
                 let (values, _) = bytes.as_chunks();
-                Ok(ColumnValues::Numbers(values.iter().map(|value| f64::from_ne_bytes(*value)).collect()))
+                Ok(ColumnValues::Numbers(
+                    values.iter().map(|value| f64::from_ne_bytes(*value)).collect(),
+                ))
             }
             Column::Words(bytes, names) => {
                 let (codes, _) = bytes.as_chunks();
                 let codes = codes.iter().map(|code| i64::from_ne_bytes(*code));
-                let label = |code: i64| usize::try_from(code).ok().filter(|label| *label < names.len());
+                let label =
+                    |code: i64| usize::try_from(code).ok().filter(|label| *label < names.len());
                 let of_row: Option<Vec<usize>> = codes.map(label).collect();
-                let of_row = of_row.ok_or_else(|| of_argument(name, "a code without a word".to_owned()))?;
+                let of_row =
+                    of_row.ok_or_else(|| of_argument(name, "a code without a word".to_owned()))?;
                 Ok(ColumnValues::Words(Labels { names, of_row }))
             }
         }

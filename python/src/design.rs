@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexcal::design::{self, Candidates, Criterion, DesignError, Judged, Pair, PlanOptions, PlanProgress};
-use flexcal::identify::Progress;
+use flexcal::design::{
+    self, Candidates, Criterion, DesignError, Judged, Pair, PlanOptions, PlanProgress,
+};
+use flexcal::fit::Progress;
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::{PoseRanges, Problem as Declared};
 use flexcal::report;
-use flexcal::simulate::Truth;
+use flexcal::rig::Truth;
 use pyo3::prelude::*;
 
 use crate::data::Poses;
@@ -56,7 +58,13 @@ impl Check {
 impl Plan {
     /// plan.json.
     fn json(&self) -> String {
-        report::plan_json(&self.problem, self.reached(), self.seed, &self.found, self.separated.as_ref())
+        report::plan_json(
+            &self.problem,
+            self.reached(),
+            self.seed,
+            &self.found,
+            self.separated.as_ref(),
+        )
     }
 
     /// What the command line prints.
@@ -92,7 +100,10 @@ fn ranges(problem: &Declared, truth: Option<&Path>) -> Result<PoseRanges, Design
 }
 
 /// The same, if it is known: a TRUTH.toml that is named must be right, limits may be missing.
-fn known_ranges(problem: &Declared, truth: Option<&Path>) -> Result<Option<PoseRanges>, DesignError> {
+fn known_ranges(
+    problem: &Declared,
+    truth: Option<&Path>,
+) -> Result<Option<PoseRanges>, DesignError> {
     match ranges(problem, truth) {
         Err(DesignError::NoRange(_)) => Ok(None),
         other => other.map(Some),
@@ -113,14 +124,24 @@ fn judged(
             Err(DesignError::TooFewCandidates { poses, candidates: table.len() })
         }
         (Some(table), count) => {
-            let poses = count.map_or_else(|| table.clone(), |count| design::some_of(table, count, seed));
-            Ok(Judged::Table { poses: Box::new(poses), within: known_ranges(problem, truth)?, held_out: None })
+            let poses =
+                count.map_or_else(|| table.clone(), |count| design::some_of(table, count, seed));
+            Ok(Judged::Table {
+                poses: Box::new(poses),
+                within: known_ranges(problem, truth)?,
+                held_out: None,
+            })
         }
     }
 }
 
-/// Measured poses as they are judged: those to identify with, where predictions count in those held out.
-fn judged_data(problem: &Declared, rows: &Measurements, truth: Option<&Path>) -> Result<Judged, DesignError> {
+/// Measured poses as they are judged: those to identify with, where predictions count in those held
+/// out.
+fn judged_data(
+    problem: &Declared,
+    rows: &Measurements,
+    truth: Option<&Path>,
+) -> Result<Judged, DesignError> {
     let data = Dataset::of(problem, rows.clone())?;
     let held_out = design::with_known_words(&data);
     Ok(Judged::Table {
@@ -130,7 +151,8 @@ fn judged_data(problem: &Declared, rows: &Measurements, truth: Option<&Path>) ->
     })
 }
 
-/// Says what measurements in some poses will tell: `measured` ones, `count` of the `candidates`, or `count` drawn.
+/// Says what measurements in some poses will tell: `measured` ones, `count` of the `candidates`, or
+/// `count` drawn.
 #[pyfunction]
 pub fn check(
     py: Python<'_>,
@@ -151,7 +173,10 @@ pub fn check(
         };
         design::check(&declared, &judged?, seed)
     })?;
-    Ok(Check { problem: Arc::clone(&problem.declared), check: check.map_err(|error| raised(&error))? })
+    Ok(Check {
+        problem: Arc::clone(&problem.declared),
+        check: check.map_err(|error| raised(&error))?,
+    })
 }
 
 /// Chooses the poses that identify best, or that tell two effects apart.
@@ -175,7 +200,9 @@ pub fn plan(
         Pair::new(&problem.declared, [effect(&one)?, effect(&other)?])
     });
     let pair = pair.transpose().map_err(|error| raised(&error))?;
-    let problem = pair.as_ref().map_or_else(|| Arc::clone(&problem.declared), |pair| Arc::new(pair.declared.clone()));
+    let problem = pair
+        .as_ref()
+        .map_or_else(|| Arc::clone(&problem.declared), |pair| Arc::new(pair.declared.clone()));
     let declared = Arc::clone(&problem);
     let chosen = criterion.clone();
     let found = supervised(py, None, move |sink| {
@@ -185,13 +212,25 @@ pub fn plan(
         };
         // A sweep is a step at which an interrupt ends the work.
         let sweep = |sweep: PlanProgress| {
-            sink(Progress::Step { iteration: sweep.sweep as u64, unknowns: 0, poses, cost: sweep.value });
+            sink(Progress::Step {
+                iteration: sweep.sweep as u64,
+                unknowns: 0,
+                poses,
+                cost: sweep.value,
+            });
         };
-        let options = PlanOptions { poses, criterion: &chosen, seed, workspace: None, progress: Some(&sweep) };
+        let options = PlanOptions {
+            poses,
+            criterion: &chosen,
+            seed,
+            workspace: None,
+            progress: Some(&sweep),
+        };
         match &pair {
             Some(pair) => design::separate(pair, &candidates, given.as_deref(), &options)
                 .map(|(plan, separated)| (plan, Some(separated))),
-            None => design::plan(&declared, &candidates, given.as_deref(), &options).map(|plan| (plan, None)),
+            None => design::plan(&declared, &candidates, given.as_deref(), &options)
+                .map(|plan| (plan, None)),
         }
     })?;
     let (found, separated) = found.map_err(|error: DesignError| raised(&error))?;

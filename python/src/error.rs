@@ -10,10 +10,13 @@ mod python {
     pyo3::import_exception!(flexcal.errors, InputError);
 }
 
-/// What every mistake in the input is raised as: the message, and where it is known file, line and key.
+/// What every mistake in the input is raised as: the message, and where it is known file, line and
+/// key.
 pub fn raised(error: &(dyn Error + 'static)) -> PyErr {
     let (file, line, key) = match mistake(error) {
-        Some(input) => (Some(input.location.file.clone()), input.location.line, input.location.key.clone()),
+        Some(input) => {
+            (Some(input.location.file.clone()), input.location.line, input.location.key.clone())
+        }
         None => (None, None, None),
     };
     python::InputError::new_err((with_causes(error), file, line, key))

@@ -1,6 +1,7 @@
 //! flexcal in Python: the extension module `flexcal._core` behind the package `flexcal`.
 //!
-//! It passes arrays and words through; what Python users see (tables, documentation, types) is written in Python.
+//! It passes arrays and words through; what Python users see (tables, documentation, types) is
+//! written in Python.
 
 mod array;
 mod data;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use flexcal::identify;
+use flexcal::fit;
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use flexcal::report::{self, PlotData, Report};
@@ -25,7 +25,7 @@ type Pages = (String, String, Vec<(String, String)>);
 pub struct Identification {
     pub problem: Arc<Problem>,
     pub data: Arc<Dataset>,
-    pub found: Arc<identify::Identification>,
+    pub found: Arc<fit::Identification>,
 }
 
 /// A closed loop.
@@ -34,7 +34,7 @@ pub struct ClosedLoop {
     pub problem: Arc<Problem>,
     pub text: Arc<str>,
     pub data: Arc<Dataset>,
-    pub closure: Arc<flexcal::diagnose::ClosedLoop>,
+    pub closure: Arc<flexcal::select::ClosedLoop>,
 }
 
 /// What a residual points to.
@@ -42,7 +42,7 @@ pub struct ClosedLoop {
 pub struct Trace {
     pub problem: Arc<Problem>,
     pub data: Arc<Dataset>,
-    pub found: Arc<flexcal::diagnose::Trace>,
+    pub found: Arc<flexcal::select::Trace>,
 }
 
 #[pymethods]
@@ -63,7 +63,7 @@ impl Identification {
             let shown = PlotData::of_identification(&self.problem, &self.data, &self.found)?;
             Ok(pages(report::identification_report(&self.problem, &self.found, &shown)))
         })
-        .map_err(|error: identify::IdentifyError| raised(&error))
+        .map_err(|error: fit::IdentifyError| raised(&error))
     }
 
     /// Why the fit is not to be trusted, if it is not.
@@ -78,10 +78,12 @@ impl Identification {
         self.found.reasons_to_ask()
     }
 
-    /// Covariance of all parameters, SI, shape = (parameters, parameters); NaN where one of the two has no standard error.
+    /// Covariance of all parameters, SI, shape = (parameters, parameters); NaN where one of the two
+    /// has no standard error.
     fn covariance<'py>(&self, py: Python<'py>) -> Array<'py> {
         let found = &self.found;
-        let known: Vec<bool> = found.estimates.iter().map(|estimate| estimate.std_error.is_some()).collect();
+        let known: Vec<bool> =
+            found.estimates.iter().map(|estimate| estimate.std_error.is_some()).collect();
         let n = known.len();
         let value = |(j, k): (usize, usize)| {
             let both = known.get(j) == Some(&true) && known.get(k) == Some(&true);
@@ -104,12 +106,13 @@ impl Identification {
 
     /// The URDF that the problem came from, with the origins that were identified.
     fn export_urdf(&self, py: Python<'_>, urdf: PathBuf) -> PyResult<Export> {
-        py.detach(|| Export::new(&urdf, &self.problem, &self.data, &self.found)).map_err(|error| raised(&error))
+        py.detach(|| Export::new(&urdf, &self.problem, &self.data, &self.found))
+            .map_err(|error| raised(&error))
     }
 
     /// ∂p/∂q of the identified arm, shape = (poses, 3, joints).
     fn jacobian<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
-        let found = py.detach(|| identify::jacobian(&self.problem, Some(&self.found), &poses.rows));
+        let found = py.detach(|| fit::jacobian(&self.problem, Some(&self.found), &poses.rows));
         Ok(derivatives(py, &found.map_err(|error| raised(&error))?))
     }
 }
@@ -132,7 +135,7 @@ impl ClosedLoop {
             let shown = PlotData::of_loop(&self.problem, &self.data, &self.closure)?;
             Ok(pages(report::loop_report(&self.problem, &self.closure, &shown)))
         })
-        .map_err(|error: identify::IdentifyError| raised(&error))
+        .map_err(|error: fit::IdentifyError| raised(&error))
     }
 
     /// problem.closed.toml: the problem with what was found declared, its data where they were.
@@ -150,7 +153,8 @@ impl ClosedLoop {
 
     /// The fit with everything that was found.
     fn after(&self) -> Identification {
-        let (problem, found) = (Arc::new(self.closure.closed.clone()), Arc::new(self.closure.after.clone()));
+        let (problem, found) =
+            (Arc::new(self.closure.closed.clone()), Arc::new(self.closure.after.clone()));
         Identification { problem, data: Arc::clone(&self.data), found }
     }
 }

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use flexcal::diagnose;
-use flexcal::identify::{self, Options, Placement, SolverChoice, Strategy};
+use flexcal::fit::{self, Options, Placement, SolverChoice, Strategy};
 use flexcal::model::Model;
 use flexcal::nalgebra::DVector;
 use flexcal::problem::{Joint, JointKind};
+use flexcal::select;
 use flexcal::urdf::{Chain, Description, Robot, describe};
 use pyo3::prelude::*;
 
@@ -32,21 +32,31 @@ impl Problem {
     /// Reads a problem.toml, or the one in a folder.
     #[staticmethod]
     fn read(path: PathBuf) -> PyResult<Self> {
-        let (problem, text) = flexcal::problem::Problem::read_with_text(&path).map_err(|error| raised(&error))?;
+        let (problem, text) =
+            flexcal::problem::Problem::read_with_text(&path).map_err(|error| raised(&error))?;
         Ok(Self { declared: Arc::new(problem), text, notes: Vec::new() })
     }
 
-    /// Reads a problem from its text; `file` names it in messages, and data files are looked for beside it.
+    /// Reads a problem from its text; `file` names it in messages, and data files are looked for
+    /// beside it.
     #[staticmethod]
     fn parse(text: &str, file: PathBuf) -> PyResult<Self> {
-        let problem = flexcal::problem::Problem::parse(text, &file).map_err(|error| raised(&error))?;
+        let problem =
+            flexcal::problem::Problem::parse(text, &file).map_err(|error| raised(&error))?;
         Ok(Self { declared: Arc::new(problem), text: Arc::from(text), notes: Vec::new() })
     }
 
-    /// The chain between two links of a URDF; `file` names the problem in messages, and data files are looked for beside it.
+    /// The chain between two links of a URDF; `file` names the problem in messages, and data files
+    /// are looked for beside it.
     #[staticmethod]
-    fn from_urdf(urdf: PathBuf, base: Option<&str>, tip: Option<&str>, file: PathBuf) -> PyResult<Self> {
-        let described = Robot::read(&urdf).and_then(|robot| describe(&Chain::new(&robot, base, tip)?));
+    fn from_urdf(
+        urdf: PathBuf,
+        base: Option<&str>,
+        tip: Option<&str>,
+        file: PathBuf,
+    ) -> PyResult<Self> {
+        let described =
+            Robot::read(&urdf).and_then(|robot| describe(&Chain::new(&robot, base, tip)?));
         let Description { text, notes, .. } = described.map_err(|error| raised(&error))?;
         Ok(Self { notes, ..Self::parse(&text, file)? })
     }
@@ -113,9 +123,12 @@ impl Problem {
         let found = supervised(py, progress.as_ref(), {
             let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
             move |sink| {
-                let options =
-                    Options::default().with_carriers().with_strategy(strategy).with_solver(solver).with_progress(sink);
-                identify::identify(&problem, &data, &options)
+                let options = Options::default()
+                    .with_influential_rows()
+                    .with_strategy(strategy)
+                    .with_solver(solver)
+                    .with_progress(sink);
+                fit::identify(&problem, &data, &options)
             }
         })?;
         let found = found.map_err(|error| raised(&error))?;
@@ -123,22 +136,38 @@ impl Problem {
     }
 
     /// Finds the effects that the problem lacks.
-    fn close(&self, py: Python<'_>, data: &Data, progress: Option<Bound<'_, PyAny>>) -> PyResult<ClosedLoop> {
+    fn close(
+        &self,
+        py: Python<'_>,
+        data: &Data,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<ClosedLoop> {
         let (problem, data) = (Arc::clone(&self.declared), Arc::clone(&data.data));
         let closure = supervised(py, progress.as_ref(), {
             let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
-            move |sink| diagnose::close(&problem, &data, &Options::default().with_carriers().with_progress(sink))
+            move |sink| {
+                select::close(
+                    &problem,
+                    &data,
+                    &Options::default().with_influential_rows().with_progress(sink),
+                )
+            }
         })?;
         let closure = closure.map_err(|error| raised(&error))?;
         Ok(ClosedLoop { problem, text: Arc::clone(&self.text), data, closure: Arc::new(closure) })
     }
 
     /// Ranks the effects that the residual points to.
-    fn trace(&self, py: Python<'_>, data: &Data, progress: Option<Bound<'_, PyAny>>) -> PyResult<Trace> {
+    fn trace(
+        &self,
+        py: Python<'_>,
+        data: &Data,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<Trace> {
         let (problem, data) = (Arc::clone(&self.declared), Arc::clone(&data.data));
         let trace = supervised(py, progress.as_ref(), {
             let (problem, data) = (Arc::clone(&problem), Arc::clone(&data));
-            move |sink| diagnose::trace(&problem, &data, &Options::default().with_progress(sink))
+            move |sink| select::trace(&problem, &data, &Options::default().with_progress(sink))
         })?;
         let trace = trace.map_err(|error| raised(&error))?;
         Ok(Trace { problem, data, found: Arc::new(trace) })
@@ -158,13 +187,18 @@ impl Problem {
 
     /// ∂p/∂q of the nominal arm, shape = (poses, 3, joints).
     fn jacobian<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
-        let found = py.detach(|| identify::jacobian(&self.declared, None, &poses.rows));
+        let found = py.detach(|| fit::jacobian(&self.declared, None, &poses.rows));
         Ok(derivatives(py, &found.map_err(|error| raised(&error))?))
     }
 }
 
 /// What a word of an argument stands for.
-fn word<T: Copy>(argument: &str, word: &str, each: &[T], name: fn(T) -> &'static str) -> PyResult<T> {
+fn word<T: Copy>(
+    argument: &str,
+    word: &str,
+    each: &[T],
+    name: fn(T) -> &'static str,
+) -> PyResult<T> {
     each.iter().copied().find(|&value| name(value) == word).ok_or_else(|| {
         let known: Vec<&str> = each.iter().map(|&value| name(value)).collect();
         of_argument(argument, format!("{argument}: \"{word}\" is none of {}", known.join(", ")))

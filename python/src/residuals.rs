@@ -1,6 +1,6 @@
 //! What a fit leaves, as the columns of a table.
 
-use flexcal::identify::Residual;
+use flexcal::fit::Residual;
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use flexcal::report::{Column, residual_columns};
@@ -19,10 +19,16 @@ pub fn table<'py>(
     let columns = PyDict::new(py);
     for (name, column) in py.detach(|| residual_columns(problem, &data.measurements, residuals)) {
         match column {
-            Column::Words(labels) => columns.set_item(name, (integers(py, labels.of_row.into_iter()), labels.names))?,
+            Column::Words(labels) => {
+                columns.set_item(name, (integers(py, labels.of_row.into_iter()), labels.names))?
+            }
             Column::Counts(values) => columns.set_item(name, integers(py, values.into_iter()))?,
-            Column::Flags(values) => columns.set_item(name, integers(py, values.into_iter().map(usize::from)))?,
-            Column::Numbers(values, _) => columns.set_item(name, numbers(py, values.into_iter()))?,
+            Column::Flags(values) => {
+                columns.set_item(name, integers(py, values.into_iter().map(usize::from)))?
+            }
+            Column::Numbers(values, _) => {
+                columns.set_item(name, numbers(py, values.into_iter()))?
+            }
             _ => {}
         }
     }

@@ -1,4 +1,5 @@
-//! Long work on a thread of its own, without Python's lock; meanwhile signals are seen and progress is told.
+//! Long work on a thread of its own, without Python's lock; meanwhile signals are seen and progress
+//! is told.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -8,7 +9,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
-use flexcal::identify::{Progress, ProgressSink};
+use flexcal::fit::{Progress, ProgressSink};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
@@ -26,10 +27,11 @@ enum Event<T> {
 /// Unwinds the thread whose result nobody waits for.
 struct Abandoned;
 
-/// Runs `work` on a thread; `progress` is called with iteration, unknowns, poses and cost of every step.
+/// Runs `work` on a thread; `progress` is called with iteration, unknowns, poses and cost of every
+/// step.
 ///
-/// A signal (KeyboardInterrupt) or an error of `progress` is raised at once; the thread ends at its next step. The same `work`
-/// gives the same result however it is watched.
+/// A signal (KeyboardInterrupt) or an error of `progress` is raised at once; the thread ends at its
+/// next step. The same `work` gives the same result however it is watched.
 ///
 /// # Errors
 /// What was raised meanwhile, or RuntimeError if the work panicked.
@@ -41,7 +43,8 @@ pub fn supervised<T: Send + 'static>(
     let (sender, receiver) = channel();
     let abandoned = Arc::new(AtomicBool::new(false));
     let sink: ProgressSink = {
-        let (sender, abandoned, told) = (sender.clone(), Arc::clone(&abandoned), progress.is_some());
+        let (sender, abandoned, told) =
+            (sender.clone(), Arc::clone(&abandoned), progress.is_some());
         Arc::new(move |step| {
             if abandoned.load(Ordering::Relaxed) {
                 resume_unwind(Box::new(Abandoned));
@@ -69,7 +72,9 @@ fn watched<T: Send>(
         let receiver = &mut receiver;
         match py.detach(move || receiver.recv_timeout(PATIENCE)) {
             Ok(Event::Step(told)) => {
-                if let (Some(progress), Progress::Step { iteration, unknowns, poses, cost }) = (progress, told) {
+                if let (Some(progress), Progress::Step { iteration, unknowns, poses, cost }) =
+                    (progress, told)
+                {
                     progress.call1((iteration, unknowns, poses, cost))?;
                 }
                 py.check_signals()?;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use flexcal::error::InputError;
-use flexcal::identify::{Identification, Placement};
+use flexcal::fit::{Identification, Placement};
 use flexcal::measurement::Dataset;
 use flexcal::model::Model;
 use flexcal::problem::Problem;
@@ -36,15 +36,22 @@ impl Export {
 
 impl Export {
     /// The geometry of an identified arm in the URDF that its problem came from.
-    pub fn new(urdf: &Path, problem: &Problem, data: &Dataset, found: &Identification) -> Result<Self, InputError> {
+    pub fn new(
+        urdf: &Path,
+        problem: &Problem,
+        data: &Dataset,
+        found: &Identification,
+    ) -> Result<Self, InputError> {
         let robot = Robot::read(urdf)?;
         let chain = Chain::of(&robot, problem)?;
         let placement = Placement::of(&data.measurements);
-        let model = found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
+        let model =
+            found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
         let arm = model.arm(|k| found.x.get(k).copied().unwrap_or(0.0));
         let moved = export(&chain, problem, &arm)?;
         let errors = Some(ExportErrors::of(&model, &found.x, data, None));
-        let exported = Exported { problem, model: &model, file: None, moved: Some(&moved.moved), errors };
+        let exported =
+            Exported { problem, model: &model, file: None, moved: Some(&moved.moved), errors };
         let (json, summary) = (report::export_json(&exported), report::export_text(&exported));
         Ok(Self { text: moved.text, json, summary })
     }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flexcal::files::digest;
-use flexcal::identify::{self, Options, SolverChoice, Strategy};
+use flexcal::fit::{self, Options, SolverChoice, Strategy};
 use flexcal::report::{self, AcceptanceRecord};
 
 use super::diagnostic;
@@ -32,12 +32,13 @@ pub struct Arguments {
 /// Identifies, judges the held-out poses, and writes the record and the page.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, data, results } = common.read("accept", &["acceptance.json", "acceptance.html"])?;
-    identify::held_out_positions(&problem, &data)?;
+    let Input { problem, data, results } =
+        common.read("accept", &["acceptance.json", "acceptance.html"])?;
+    fit::held_out_positions(&problem, &data)?;
     let options = Options::default().with_strategy(Strategy::Joint).with_solver(SolverChoice::Auto);
-    let fit = |sink| identify::identify(&problem, &data, &options.with_progress(sink));
+    let fit = |sink| fit::identify(&problem, &data, &options.with_progress(sink));
     let found = Line::during(common.talks(), None, fit)?;
-    let judged = identify::acceptance(&problem, &data, &found)?;
+    let judged = fit::acceptance(&problem, &data, &found)?;
     let file = common.problem_file();
     let inputs = std::iter::once(&file).chain(common.files(&problem));
     let record = AcceptanceRecord {
@@ -60,7 +61,8 @@ fn sha256(file: &Path) -> Option<String> {
 /// The commit of the git repository around a file, as its HEAD names it.
 fn commit(file: &Path) -> Option<String> {
     let whole = file.canonicalize().ok()?;
-    let git = whole.ancestors().skip(1).map(|folder| folder.join(".git")).find(|git| git.exists())?;
+    let git =
+        whole.ancestors().skip(1).map(|folder| folder.join(".git")).find(|git| git.exists())?;
     let read = |path: PathBuf| Some(fs::read_to_string(path).ok()?.trim().to_owned());
     // A worktree's .git is a file that names its folder, and that one the folder of the references.
     let folder = match read(git.clone()) {
@@ -69,9 +71,12 @@ fn commit(file: &Path) -> Option<String> {
     };
     let head = read(folder.join("HEAD"))?;
     let Some(name) = head.strip_prefix("ref: ") else { return Some(head) };
-    let common = read(folder.join("commondir")).map_or_else(|| folder.clone(), |common| folder.join(common));
+    let common =
+        read(folder.join("commondir")).map_or_else(|| folder.clone(), |common| folder.join(common));
     read(common.join(name)).or_else(|| {
         let packed = read(common.join("packed-refs"))?;
-        packed.lines().find_map(|line| Some(line.strip_suffix(name)?.strip_suffix(' ')?.trim().to_owned()))
+        packed
+            .lines()
+            .find_map(|line| Some(line.strip_suffix(name)?.strip_suffix(' ')?.trim().to_owned()))
     })
 }

@@ -38,7 +38,9 @@ pub struct Arguments {
 /// A check that has no poses.
 #[derive(Debug, thiserror::Error)]
 enum PosesError {
-    #[error("no poses to check; give --poses N, --candidates FILE.csv, or measurements with --data")]
+    #[error(
+        "no poses to check; give --poses N, --candidates FILE.csv, or measurements with --data"
+    )]
     None,
     #[error("--poses {poses}: the tables of --candidates have only {rows} rows")]
     TooMany { poses: usize, rows: usize },
@@ -55,7 +57,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = report::check_json(&problem, &check);
     results.write(&[("check.json", &json)])?;
     let written = results.path("check.json");
-    common.tell(&json, || format!("{}\nWritten to {}\n", report::check_text(&problem, &check), written.display()))?;
+    common.tell(&json, || {
+        format!("{}\nWritten to {}\n", report::check_text(&problem, &check), written.display())
+    })?;
     if check.suffices() {
         return Ok(Outcome::Done);
     }
@@ -73,18 +77,25 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Er
         (Some(table), poses) => {
             let rows = table.len();
             let poses = match poses {
-                Some(poses) if poses > rows => return Err(PosesError::TooMany { poses, rows }.into()),
+                Some(poses) if poses > rows => {
+                    return Err(PosesError::TooMany { poses, rows }.into());
+                }
                 Some(poses) => design::some_of(&table, poses, source.seed),
                 None => table,
             };
-            Ok(Judged::Table { poses: Box::new(poses), within: source.known_ranges(problem)?, held_out: None })
+            Ok(Judged::Table {
+                poses: Box::new(poses),
+                within: source.known_ranges(problem)?,
+                held_out: None,
+            })
         }
         (None, Some(poses)) => {
             common.warn(problem.far_target().as_slice());
             Ok(Judged::Drawn(source.all_ranges(problem)?, poses))
         }
         (None, None) => {
-            let files: &[PathBuf] = if common.data().is_empty() { &problem.data.files } else { common.data() };
+            let files: &[PathBuf] =
+                if common.data().is_empty() { &problem.data.files } else { common.data() };
             if files.is_empty() {
                 return Err(PosesError::None.into());
             }

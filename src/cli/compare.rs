@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use clap::Args;
-use flexcal::identify::{self, CompareOptions};
+use flexcal::fit::{self, CompareOptions};
 use flexcal::report::{self, PlotData};
 
 use super::diagnostic;
@@ -20,7 +20,8 @@ use super::progress::Line;
 pub struct Arguments {
     #[command(flatten)]
     common: Common,
-    /// Let the procedure of [Chen2021] take part; it does anyway where the problem declares the paper's arm
+    /// Let the procedure of [Chen2021] take part; it does anyway where the problem declares the
+    /// paper's arm
     #[arg(long)]
     paper: bool,
 }
@@ -28,9 +29,10 @@ pub struct Arguments {
 /// Compares, writes `compare.json`, `report.md` and `report.html`, and prints the tables.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, data, results } = common.read("compare", &["compare.json", REPORT[0], REPORT[1]])?;
+    let Input { problem, data, results } =
+        common.read("compare", &["compare.json", REPORT[0], REPORT[1]])?;
     let comparison = Line::during(common.talks(), None, |progress| {
-        identify::compare(&problem, &data, &CompareOptions { paper: arguments.paper, progress })
+        fit::compare(&problem, &data, &CompareOptions { paper: arguments.paper, progress })
     })?;
     let json = report::compare_json(&problem, &comparison);
     let shown = PlotData::of_comparison(&problem, &data, &comparison)?;

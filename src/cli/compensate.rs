@@ -5,11 +5,11 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use flexcal::error::InputErrorKind;
-use flexcal::identify::SavedEstimate;
+use flexcal::fit::SavedEstimate;
 use flexcal::measurement::Measurements;
 use flexcal::model::Model;
 use flexcal::problem::Problem;
-use flexcal::{identify, report};
+use flexcal::{fit, report};
 
 use super::diagnostic;
 use super::input::Common;
@@ -60,8 +60,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let mut problem = Problem::read(common.problem())?;
     // Targets are not split: every row is one.
     problem.data.held_out = None;
-    let results =
-        common.results("compensate", &problem, std::slice::from_ref(&arguments.estimate), &["commands.csv"])?;
+    let results = common.results(
+        "compensate",
+        &problem,
+        std::slice::from_ref(&arguments.estimate),
+        &["commands.csv"],
+    )?;
     let (targets, warnings) = Measurements::read_poses(common.data(), &problem)?;
     let targets = targets.of_the_arm();
     if let Some(row) = (0..targets.len()).find(|&row| !targets.observation(row).is_position()) {
@@ -69,10 +73,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     common.warn(&warnings);
     // Targets may be waypoints alone.
-    for missing in identify::missing_target_columns(&problem, &targets).iter().filter(|_| !common.quiet) {
+    for missing in fit::missing_target_columns(&problem, &targets).iter().filter(|_| !common.quiet)
+    {
         diagnostic::warn(&format!("{missing}; commands leave out what depends on it"));
     }
-    let placement = identify::Placement::of(&targets);
+    let placement = fit::Placement::of(&targets);
     let model = Model::new(&problem, &placement.bases, &placement.targets)?;
     let estimate = SavedEstimate::read(&arguments.estimate)?;
     let model = estimate.model(model);
@@ -91,26 +96,30 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     // As they are shown, and as they are sought: in the measuring frame.
     let (targets, sought) = match (targets.position_measured, arguments.frame) {
         (false, _) => {
-            let waypoints = identify::waypoints(&problem, &model, &x, &targets)?;
+            let waypoints = fit::waypoints(&problem, &model, &x, &targets)?;
             let shown = match arguments.frame {
                 Frame::Measuring => waypoints.clone(),
-                Frame::Base => identify::seen_in_base(&model, &x, &waypoints),
+                Frame::Base => fit::seen_in_base(&model, &x, &waypoints),
             };
             (shown, waypoints)
         }
         (true, Frame::Measuring) => (targets.clone(), targets),
         (true, Frame::Base) => {
-            let sought = identify::seen_from_base(&model, &x, &targets);
+            let sought = fit::seen_from_base(&model, &x, &targets);
             (targets, sought)
         }
     };
-    let commands = identify::compensate(&problem, &model, &x, &sought)?;
+    let commands = fit::compensate(&problem, &model, &x, &sought)?;
     results.write(&[("commands.csv", &report::commands_csv(&problem, &targets, &commands))])?;
     common.tell(&report::commands_json(&problem, &commands), || {
         let written = results.path("commands.csv");
-        format!("{}\nWritten to {}\n", report::commands_text(&problem, &targets, &commands), written.display())
+        format!(
+            "{}\nWritten to {}\n",
+            report::commands_text(&problem, &targets, &commands),
+            written.display()
+        )
     })?;
-    let all = commands.iter().all(identify::Command::is_reached);
+    let all = commands.iter().all(fit::Command::is_reached);
     if !all && common.quiet {
         diagnostic::warn("a target is not reached; without --quiet it is named");
     }

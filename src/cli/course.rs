@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use flexcal::identify::{COST_TOLERANCE, Progress};
+use flexcal::fit::{COST_TOLERANCE, Progress};
 
 /// Steps beyond which nothing is said of the time that is left.
 const FORESEEN: f64 = 200.0;
@@ -52,10 +52,20 @@ impl Course {
         self.now = now;
         match progress {
             &Progress::Step { iteration, unknowns, poses, cost } => {
-                let same = |last: &Step| last.iteration < iteration && last.unknowns == unknowns && last.poses == poses;
+                let same = |last: &Step| {
+                    last.iteration < iteration && last.unknowns == unknowns && last.poses == poses
+                };
                 self.step = Some(match self.step.take().filter(same) {
                     Some(last) => last.next(iteration, cost, now),
-                    None => Step { iteration, unknowns, poses, cost, gain: None, begun: (iteration, now), left: None },
+                    None => Step {
+                        iteration,
+                        unknowns,
+                        poses,
+                        cost,
+                        gain: None,
+                        begun: (iteration, now),
+                        left: None,
+                    },
                 });
             }
             Progress::Round { round, effects, fit, fits } => {
@@ -66,9 +76,17 @@ impl Course {
                 self.step = None;
                 self.fit_begun = (*fit > 0).then_some(now);
                 let (done, time) = self.fits_done;
-                let end = (*fit > 0).then(|| now + (fits + 1).saturating_sub(*fit) as f64 * time / done);
+                let end =
+                    (*fit > 0).then(|| now + (fits + 1).saturating_sub(*fit) as f64 * time / done);
                 let last = effects.last().map(|effect| effect.name().to_owned());
-                self.round = Some(Round { number: *round, effects: effects.len(), last, fit: *fit, fits: *fits, end });
+                self.round = Some(Round {
+                    number: *round,
+                    effects: effects.len(),
+                    last,
+                    fit: *fit,
+                    fits: *fits,
+                    end,
+                });
             }
             _ => (self.finishing, self.round, self.step) = (true, None, None),
         }
@@ -76,14 +94,22 @@ impl Course {
 }
 
 impl Step {
-    /// The step after this one. Time is left for as many steps as gains need that go on to fall as the last two did.
+    /// The step after this one. Time is left for as many steps as gains need that go on to fall as
+    /// the last two did.
     fn next(self, iteration: u64, cost: f64, now: f64) -> Self {
         let gain = self.cost - cost;
         let each = (now - self.begun.1) / (iteration - self.begun.0) as f64;
-        let steps = |before: f64| ((COST_TOLERANCE * cost / gain).ln() / (gain / before).ln()).max(0.0);
+        let steps =
+            |before: f64| ((COST_TOLERANCE * cost / gain).ln() / (gain / before).ln()).max(0.0);
         let left = self.gain.filter(|before| gain > 0.0 && gain < *before).map(steps);
         let left = left.filter(|steps| *steps < FORESEEN).map(|steps| steps * each);
-        Self { iteration, cost, gain: if gain > 0.0 { Some(gain) } else { self.gain }, left, ..self }
+        Self {
+            iteration,
+            cost,
+            gain: if gain > 0.0 { Some(gain) } else { self.gain },
+            left,
+            ..self
+        }
     }
 }
 
@@ -107,7 +133,10 @@ impl fmt::Display for Course {
             f.write_str("; ")?;
         }
         let Step { iteration, unknowns, poses, cost, left, .. } = step;
-        write!(f, "{poses} poses, {unknowns} parameters: step {iteration}, half the sum of squares {cost:.6e}")?;
+        write!(
+            f,
+            "{poses} poses, {unknowns} parameters: step {iteration}, half the sum of squares {cost:.6e}"
+        )?;
         about(f, left.filter(|_| self.round.is_none()), "fit")
     }
 }
@@ -137,7 +166,9 @@ mod tests {
         }
         // From a gain of 9e-3 to 1e-11 in steps of 2 s, each of which gains 0.09 of the one before.
         assert!(
-            course.to_string().ends_with("step 4, half the sum of squares 1.001000e0, about 17 s left of the fit"),
+            course.to_string().ends_with(
+                "step 4, half the sum of squares 1.001000e0, about 17 s left of the fit"
+            ),
             "{course}"
         );
         course.take(&step(1, 5.0), 9.0);
@@ -155,11 +186,22 @@ mod tests {
         course.take(&round(0), 4.0);
         assert_eq!(course.to_string(), "round 2, 0 effects, weighing candidates");
         course.take(&round(1), 10.0);
-        assert_eq!(course.to_string(), "round 2, 0 effects, fit 1 of 3, about 12 s left of the round");
+        assert_eq!(
+            course.to_string(),
+            "round 2, 0 effects, fit 1 of 3, about 12 s left of the round"
+        );
         course.take(&round(2), 12.0);
-        assert_eq!(course.to_string(), "round 2, 0 effects, fit 2 of 3, about 6 s left of the round");
+        assert_eq!(
+            course.to_string(),
+            "round 2, 0 effects, fit 2 of 3, about 6 s left of the round"
+        );
         course.take(&step(1, 1.0), 13.0);
-        assert!(course.to_string().contains("about 5 s left of the round; 20 poses, 4 parameters: step 1"), "{course}");
+        assert!(
+            course
+                .to_string()
+                .contains("about 5 s left of the round; 20 poses, 4 parameters: step 1"),
+            "{course}"
+        );
         course.take(&Progress::Finishing, 20.0);
         assert_eq!(course.to_string(), "weighing what was found");
     }

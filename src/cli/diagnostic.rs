@@ -5,8 +5,10 @@ use std::io::Write as _;
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use flexcal::design::DesignError;
-use flexcal::error::{InputError, InputErrorKind, Location, Warning, mistake, one_line, veiled, with_causes};
-use flexcal::identify::Identification;
+use flexcal::error::{
+    InputError, InputErrorKind, Location, Warning, mistake, one_line, veiled, with_causes,
+};
+use flexcal::fit::Identification;
 use flexcal::report;
 
 use super::outcome::Outcome;
@@ -18,7 +20,11 @@ const WIDTH: usize = 1000;
 pub fn print(error: &(dyn Error + 'static)) {
     let mistake = mistake(error);
     let flagged = error.downcast_ref().and_then(by_arguments).or(mistake.and_then(with_argument));
-    show(Level::ERROR, &flagged.unwrap_or_else(|| with_causes(error)), mistake.map(|input| &*input.location));
+    show(
+        Level::ERROR,
+        &flagged.unwrap_or_else(|| with_causes(error)),
+        mistake.map(|input| &*input.location),
+    );
 }
 
 /// A mistake in the input that an argument avoids.
@@ -35,9 +41,9 @@ fn by_arguments(error: &DesignError) -> Option<String> {
         DesignError::TooFewCandidates { poses, candidates } => {
             Some(format!("--poses {poses}: there are only {candidates} candidates"))
         }
-        DesignError::SameEffect { .. } | DesignError::DeclaredEffect { .. } | DesignError::FollowsTime { .. } => {
-            Some(format!("--separate: {error}"))
-        }
+        DesignError::SameEffect { .. }
+        | DesignError::DeclaredEffect { .. }
+        | DesignError::FollowsTime { .. } => Some(format!("--separate: {error}")),
         _ => None,
     }
 }
@@ -54,8 +60,8 @@ pub fn warn(message: &str) {
     show(Level::WARNING, message, None);
 }
 
-/// What a command comes to that made a fit; warns where that is not to be trusted, or stands on priors. Exit status 1 has its
-/// reason in one line even where the command is to be quiet.
+/// What a command comes to that made a fit; warns where that is not to be trusted, or stands on
+/// priors. Exit status 1 has its reason in one line even where the command is to be quiet.
 pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
     if !fit.is_trusted() {
         warn(&report::why_not_trusted(fit));
@@ -70,7 +76,10 @@ pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
 }
 
 fn show(level: Level<'_>, message: &str, location: Option<&Location>) {
-    let (message, path) = (one_line(message), location.map(|location| one_line(&location.file.display().to_string())));
+    let (message, path) = (
+        one_line(message),
+        location.map(|location| one_line(&location.file.display().to_string())),
+    );
     let title = level.primary_title(message);
     let excerpt = location.and_then(|location| Some((location, location.excerpt.as_ref()?)));
     let group = match excerpt {

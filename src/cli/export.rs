@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use flexcal::identify::{Placement, SavedEstimate, check_columns};
+use flexcal::fit::{Placement, SavedEstimate, check_columns};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
 use flexcal::problem::Problem;
@@ -34,7 +34,12 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     estimate: PathBuf,
     /// The URDF that the problem came from; it is not changed
-    #[arg(long, value_name = "ARM.urdf", required_unless_present = "format", conflicts_with = "format")]
+    #[arg(
+        long,
+        value_name = "ARM.urdf",
+        required_unless_present = "format",
+        conflicts_with = "format"
+    )]
     urdf: Option<PathBuf>,
     /// Origins of the joints as YAML instead
     #[arg(long, value_name = "FORMAT")]
@@ -60,7 +65,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let flags = &arguments.flags;
     let problem = Problem::read(&arguments.problem)?;
     let estimates = SavedEstimate::read(&arguments.estimate)?;
-    let model = estimates.model(Model::new(&problem, &estimates.words("base"), &estimates.words("tool"))?);
+    let model =
+        estimates.model(Model::new(&problem, &estimates.words("base"), &estimates.words("tool"))?);
     let x = estimates.vector(&problem, &model)?;
     let arm = model.arm(|k| x.get(k).copied().unwrap_or(0.0));
     let (text, moved, default) = match (&arguments.urdf, arguments.format) {
@@ -71,26 +77,50 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             (export.text, Some(export.moved), PathBuf::from(name))
         }
         (None, format) => {
-            let form = if matches!(format, Some(Format::UrYaml)) { Yaml::UniversalRobots } else { Yaml::Ros };
-            (yaml(&joint_origins(&problem, &arm, form)?, form), None, PathBuf::from("kinematics.yaml"))
+            let form = if matches!(format, Some(Format::UrYaml)) {
+                Yaml::UniversalRobots
+            } else {
+                Yaml::Ros
+            };
+            (
+                yaml(&joint_origins(&problem, &arm, form)?, form),
+                None,
+                PathBuf::from("kinematics.yaml"),
+            )
         }
     };
     let path = flags.out.clone().unwrap_or_else(|| flags.folder(&problem.name).join(default));
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."))
+        .to_owned();
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let own =
-        if arguments.problem.is_dir() { arguments.problem.join("problem.toml") } else { arguments.problem.clone() };
+    let own = if arguments.problem.is_dir() {
+        arguments.problem.join("problem.toml")
+    } else {
+        arguments.problem.clone()
+    };
     let files = if arguments.data.is_empty() { &problem.data.files } else { &arguments.data };
     let inputs = [&[own, arguments.estimate.clone()], arguments.urdf.as_slice(), files].concat();
     let results = Results::claim("export", folder, inputs, &[&name], (flags.force, flags.quiet))?;
     // Measurements that the problem names need not be at hand any more.
-    let at_hand = !arguments.data.is_empty() || !files.is_empty() && files.iter().all(|file| file.is_file());
-    if let Some(absent) = files.iter().find(|file| !file.is_file()).filter(|_| !at_hand && !flags.quiet) {
+    let at_hand =
+        !arguments.data.is_empty() || !files.is_empty() && files.iter().all(|file| file.is_file());
+    if let Some(absent) =
+        files.iter().find(|file| !file.is_file()).filter(|_| !at_hand && !flags.quiet)
+    {
         diagnostic::warn(&format!("errors are not judged: {} is not there", absent.display()));
     }
     let errors = if at_hand { Some(errors(&problem, files, &estimates, flags)?) } else { None };
     results.write(&[(&name, &text)])?;
-    let exported = Exported { problem: &problem, model: &model, file: Some(&path), moved: moved.as_deref(), errors };
+    let exported = Exported {
+        problem: &problem,
+        model: &model,
+        file: Some(&path),
+        moved: moved.as_deref(),
+        errors,
+    };
     flags.tell(&report::export_json(&exported), || report::export_text(&exported))?;
     if !estimates.trusted {
         diagnostic::warn("the estimate is not to be trusted, and so is this file not");

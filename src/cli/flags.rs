@@ -14,7 +14,8 @@ pub struct Flags {
     /// Folder for results [default: out/<name of the problem>]
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Replace files that this command or the problem reads, and files that flexcal did not write or that were changed since
+    /// Replace files that this command or the problem reads, and files that flexcal did not write
+    /// or that were changed since
     #[arg(long)]
     pub force: bool,
     /// Print the result as JSON on standard output, and nothing else
@@ -52,7 +53,8 @@ impl Flags {
         self.out.clone().unwrap_or_else(|| Path::new("out").join(name))
     }
 
-    /// Where `command`, which reads `inputs`, writes the results called `names` of what is called `name`.
+    /// Where `command`, which reads `inputs`, writes the results called `names` of what is called
+    /// `name`.
     pub fn claim(
         &self,
         command: &'static str,

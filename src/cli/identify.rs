@@ -5,7 +5,7 @@ use std::path::Path;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use flexcal::identify::{self, Identification, IdentifyError, Options, SolverChoice, Strategy};
+use flexcal::fit::{self, Identification, IdentifyError, Options, SolverChoice, Strategy};
 use flexcal::report::{self, PlotData, shell_word};
 
 use super::input::{Common, Input};
@@ -42,11 +42,14 @@ fn words<T: Copy + Send + Sync + 'static, const N: usize>(
 ) -> impl TypedValueParser<Value = T> {
     let values = each.map(|value| PossibleValue::new(name(value)).help(summary(value)));
     PossibleValuesParser::new(values).try_map(move |word| {
-        each.into_iter().find(|&value| name(value) == word).ok_or_else(|| format!("{word} stands for nothing"))
+        each.into_iter()
+            .find(|&value| name(value) == word)
+            .ok_or_else(|| format!("{word} stands for nothing"))
     })
 }
 
-/// Identifies, writes `estimate.json`, `residuals.csv`, `report.md` and `report.html`, and prints what it came to.
+/// Identifies, writes `estimate.json`, `residuals.csv`, `report.md` and `report.html`, and prints
+/// what it came to.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let Input { problem, data, results } =
@@ -56,21 +59,27 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let options = Options::default()
         .with_strategy(arguments.strategy)
         .with_solver(arguments.solver)
-        .with_carriers()
+        .with_influential_rows()
         .with_stop(stop.clone());
-    let (sources, identification) = Line::during(common.talks(), stop, |sink| -> Result<_, IdentifyError> {
-        let options = options.with_progress(sink);
-        let found = identify::identify(&problem, &data, &options)?;
-        // The fit that was asked for is there: an interrupt ends no more than what is told beside it.
-        match identify::joint_sources(&problem, &data, &options, &found) {
-            Err(error) if error.is_interrupted() => Ok((None, found)),
-            sources => Ok((sources?, found)),
-        }
-    })?;
+    let (sources, identification) =
+        Line::during(common.talks(), stop, |sink| -> Result<_, IdentifyError> {
+            let options = options.with_progress(sink);
+            let found = fit::identify(&problem, &data, &options)?;
+            // The fit that was asked for is there: an interrupt ends no more than what is told
+            // beside it.
+            match fit::joint_sources(&problem, &data, &options, &found) {
+                Err(error) if error.is_interrupted() => Ok((None, found)),
+                sources => Ok((sources?, found)),
+            }
+        })?;
     let json = report::estimate_json(&problem, &identification);
     let shown = PlotData::of_identification(&problem, &data, &identification)?;
     let told = report::identification_report(&problem, &identification, &shown);
-    let residuals = report::residuals_csv(&problem, &data.measurements, &identification.residuals(&problem, &data)?);
+    let residuals = report::residuals_csv(
+        &problem,
+        &data.measurements,
+        &identification.residuals(&problem, &data)?,
+    );
     results.write_report(&[("estimate.json", &json), ("residuals.csv", &residuals)], &told)?;
     let sources = sources.as_ref().map(report::joint_sources_text);
     common.tell(&json, || {
@@ -92,8 +101,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 /// What to do after a fit, in one line.
 fn next(common: &Common, found: &Identification, estimate: &Path) -> String {
     let named = common.named();
-    match report::look_at_carriers(found, &common.problem_file()) {
-        Some(look) => format!("{look}; where nothing is wrong, flexcal loop {named} looks for what the model lacks"),
+    match report::show_influential_rows(found, &common.problem_file()) {
+        Some(look) => format!(
+            "{look}; where nothing is wrong, flexcal loop {named} looks for what the model lacks"
+        ),
         // Of what says so little neither a cause nor a correction can be told.
         None if !found.is_trusted() || report::tells_little(found) => {
             format!("flexcal check {named} says what the poses can tell")
@@ -101,10 +112,14 @@ fn next(common: &Common, found: &Identification, estimate: &Path) -> String {
         None if found.too_few_poses.is_some() => {
             format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
         }
-        None if report::lacks_something(found) => format!("flexcal loop {named} looks for what the model lacks"),
+        None if report::lacks_something(found) => {
+            format!("flexcal loop {named} looks for what the model lacks")
+        }
         None => {
             let [problem, estimate] = [common.problem(), estimate].map(shell_word);
-            format!("flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv corrects commands")
+            format!(
+                "flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv corrects commands"
+            )
         }
     }
 }

@@ -38,7 +38,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let chain = Chain::new(&robot, arguments.base.as_deref(), arguments.tip.as_deref())?;
     let description = describe(&chain)?;
     let flags = &arguments.flags;
-    let results = flags.claim("init", &description.name, vec![arguments.urdf.clone()], &["problem.toml"])?;
+    let results =
+        flags.claim("init", &description.name, vec![arguments.urdf.clone()], &["problem.toml"])?;
     results.write(&[("problem.toml", &description.text)])?;
     let file = results.path("problem.toml");
     let json = report::init_json(&chain, &description, &file);

@@ -43,10 +43,11 @@ pub struct Input {
     pub results: Results,
 }
 
-/// The problem among the arguments, and the files of `--data`, which takes what follows: the last of several is the problem where
-/// none is named, if it is a folder or a TOML file, as no table is.
+/// The problem among the arguments, and the files of `--data`, which takes what follows: the last
+/// of several is the problem where none is named, if it is a folder or a TOML file, as no table is.
 fn split<'a>(named: Option<&'a Path>, data: &'a [PathBuf]) -> (&'a Path, &'a [PathBuf]) {
-    let is_problem = |path: &Path| path.is_dir() || path.extension().is_some_and(|ending| ending == "toml");
+    let is_problem =
+        |path: &Path| path.is_dir() || path.extension().is_some_and(|ending| ending == "toml");
     match (named, data) {
         (Some(named), data) => (named, data),
         (None, [data @ .., last]) if !data.is_empty() && is_problem(last) => (last, data),
@@ -62,8 +63,10 @@ impl Common {
 
     /// The problem, and the measurement files where any are named, as arguments of another command.
     pub fn named(&self) -> String {
-        let data: Vec<String> = self.data().iter().map(|file| format!(" {}", shell_word(file))).collect();
-        let data = if data.is_empty() { String::new() } else { format!(" --data{}", data.concat()) };
+        let data: Vec<String> =
+            self.data().iter().map(|file| format!(" {}", shell_word(file))).collect();
+        let data =
+            if data.is_empty() { String::new() } else { format!(" --data{}", data.concat()) };
         format!("{}{data}", shell_word(self.problem()))
     }
 
@@ -103,13 +106,17 @@ impl Common {
     /// Says that the search for effects leaves orientations out, where the problem fits them.
     pub fn say_of_orientation(&self, problem: &Problem, data: &mut Dataset) {
         if problem.data.fits_orientation {
-            let warning = Warning { location: problem.data.location.clone(), kind: WarningKind::OrientationLeftOut };
+            let warning = Warning {
+                location: problem.data.location.clone(),
+                kind: WarningKind::OrientationLeftOut,
+            };
             self.warn(std::slice::from_ref(&warning));
             data.measurements.warnings.push(warning);
         }
     }
 
-    /// Where `command` writes the results called `names`; besides problem and data it reads `others`.
+    /// Where `command` writes the results called `names`; besides problem and data it reads
+    /// `others`.
     pub fn results(
         &self,
         command: &'static str,
@@ -133,11 +140,12 @@ impl Common {
         if problem.is_dir() { problem.join("problem.toml") } else { problem.to_owned() }
     }
 
-    /// Name of the results of `problem`; those of a `problem.closed.toml` do not go where those of the problem went that it comes
-    /// from.
+    /// Name of the results of `problem`; those of a `problem.closed.toml` do not go where those of
+    /// the problem went that it comes from.
     fn results_name(&self, problem: &Problem) -> String {
         let file = self.problem_file();
         let variant = file.file_stem().and_then(|stem| stem.to_str()?.strip_prefix("problem."));
-        variant.map_or_else(|| problem.name.clone(), |variant| format!("{}-{variant}", problem.name))
+        variant
+            .map_or_else(|| problem.name.clone(), |variant| format!("{}-{variant}", problem.name))
     }
 }

@@ -3,7 +3,7 @@
 use std::process::exit;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-use flexcal::identify::Stop;
+use flexcal::fit::Stop;
 
 /// Exit status of what an interrupt ends with nothing written: 128 + SIGINT, as shells count.
 pub const STATUS: u8 = 130;
@@ -11,7 +11,8 @@ pub const STATUS: u8 = 130;
 /// Held while files take their names.
 static WRITING: Mutex<()> = Mutex::new(());
 
-/// What the first interrupt asks to end; the second one ends the process at once, between files rather than among them.
+/// What the first interrupt asks to end; the second one ends the process at once, between files
+/// rather than among them.
 ///
 /// An interrupt that is ignored, or handled by a program that this one is a part of, stays so.
 pub fn stop() -> Stop {

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use clap::Args;
-use flexcal::diagnose;
-use flexcal::identify::Options;
+use flexcal::fit::Options;
 use flexcal::problem::Problem;
 use flexcal::report::{self, PlotData, shell_word};
+use flexcal::select;
 
 use super::input::Common;
 use super::outcome::Outcome;
@@ -33,7 +33,8 @@ pub struct Arguments {
     verbose: bool,
 }
 
-/// Closes the loop, writes `loop.json`, `problem.closed.toml`, `residuals.csv` and both reports, and prints the story.
+/// Closes the loop, writes `loop.json`, `problem.closed.toml`, `residuals.csv` and both reports,
+/// and prints the story.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let (problem, text) = Problem::read_with_text(common.problem())?;
@@ -44,13 +45,17 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.say_if_nothing_is_free(&problem);
     common.say_of_orientation(&problem, &mut data);
     let stop = interrupt::stop();
-    let options = Options::default().with_carriers().with_stop(stop.clone());
-    let close = |sink| diagnose::close(&problem, &data, &options.with_progress(sink));
+    let options = Options::default().with_influential_rows().with_stop(stop.clone());
+    let close = |sink| select::close(&problem, &data, &options.with_progress(sink));
     let closure = Line::during(common.talks(), stop, close)?;
     let json = report::loop_json(&problem, &closure);
-    fs::create_dir_all(&results.folder).map_err(|source| WriteError::Io { path: results.folder.clone(), source })?;
-    let files =
-        common.files(&problem).iter().map(|file| seen_from(&results.folder, file)).collect::<Result<Vec<_>, _>>()?;
+    fs::create_dir_all(&results.folder)
+        .map_err(|source| WriteError::Io { path: results.folder.clone(), source })?;
+    let files = common
+        .files(&problem)
+        .iter()
+        .map(|file| seen_from(&results.folder, file))
+        .collect::<Result<Vec<_>, _>>()?;
     let shown = PlotData::of_loop(&problem, &data, &closure)?;
     let texts = [
         ("loop.json", json.as_str()),
@@ -72,12 +77,17 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         } else {
             report::loop_brief(&problem, &closure, output::columns())
         };
-        let next = match report::look_at_carriers(&closure.before.fit, &common.problem_file()) {
+        let next = match report::show_influential_rows(&closure.before.fit, &common.problem_file())
+        {
             Some(look) => format!("Next: {look}\n"),
-            None if closure.interrupted => "Next: the same command again, to look to the end\n".to_owned(),
+            None if closure.interrupted => {
+                "Next: the same command again, to look to the end\n".to_owned()
+            }
             None if closure.after.is_trusted() => {
                 let closed = shell_word(&results.path("problem.closed.toml"));
-                format!("Next: flexcal identify {closed} -v lists the parameters of the final fit\n")
+                format!(
+                    "Next: flexcal identify {closed} -v lists the parameters of the final fit\n"
+                )
             }
             None => String::new(),
         };

@@ -18,7 +18,8 @@ pub struct Arguments {
     /// Replace pages that flexcal did not write
     #[arg(long, requires = "out")]
     force: bool,
-    /// Write the page of every command to this folder (flexcal.1, flexcal-identify.1, …), and print nothing
+    /// Write the page of every command to this folder (flexcal.1, flexcal-identify.1, …), and print
+    /// nothing
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -37,8 +38,10 @@ pub fn run(arguments: &Arguments, flexcal: Command) -> Result<Outcome, Box<dyn E
         pages.push((format!("{name}.1"), page(command.clone().display_name(name))?));
     }
     pages.push(("flexcal.1".to_owned(), page(flexcal)?));
-    let pages: Vec<(&str, &str)> = pages.iter().map(|(name, page)| (name.as_str(), page.as_str())).collect();
-    Results::claim("man", folder.clone(), Vec::new(), &[], (arguments.force, true))?.write(&pages)?;
+    let pages: Vec<(&str, &str)> =
+        pages.iter().map(|(name, page)| (name.as_str(), page.as_str())).collect();
+    Results::claim("man", folder.clone(), Vec::new(), &[], (arguments.force, true))?
+        .write(&pages)?;
     Ok(Outcome::Done)
 }
 

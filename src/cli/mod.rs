@@ -30,7 +30,7 @@ mod trace;
 use std::ffi::OsString;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
-use flexcal::identify::IdentifyError;
+use flexcal::fit::IdentifyError;
 
 use outcome::Outcome;
 
@@ -64,13 +64,16 @@ enum Command {
     Trace(trace::Arguments),
     /// Find the effects that a problem lacks and add them, until nothing is left to find.
     Loop(loop_command::Arguments),
-    /// Say where an identified arm will be, and what measurements leave of that, without another fit.
+    /// Say where an identified arm will be, and what measurements leave of that, without another
+    /// fit.
     Predict(predict::Arguments),
     /// Find the joint commands that bring the arm, as identified, to desired positions.
     Compensate(compensate::Arguments),
-    /// Record to sign: accuracy of predictions before and after, counted as ISO 9283 does, with conditions and digests of every input.
+    /// Record to sign: accuracy of predictions before and after, counted as ISO 9283 does, with
+    /// conditions and digests of every input.
     Accept(accept::Arguments),
-    /// Write the identified geometry into the URDF that the problem came from, or as YAML for a driver.
+    /// Write the identified geometry into the URDF that the problem came from, or as YAML for a
+    /// regressor.
     Export(export::Arguments),
     /// Say what measurements in some poses will tell, before anyone makes them.
     Check(check::Arguments),
@@ -86,8 +89,8 @@ enum Command {
     Man(man::Arguments),
 }
 
-/// Runs the command line, `arguments` being the program's name and what follows it: exit status 0 done, 1 the fit is not to be
-/// trusted, 2 bad input, 130 interrupted with nothing written.
+/// Runs the command line, `arguments` being the program's name and what follows it: exit status 0
+/// done, 1 the fit is not to be trusted, 2 bad input, 130 interrupted with nothing written.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
@@ -119,7 +122,11 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(Outcome::NotTrusted | Outcome::Interrupted) => 1,
         Err(error) => {
             diagnostic::print(error.as_ref());
-            if error.downcast_ref().is_some_and(IdentifyError::is_interrupted) { interrupt::STATUS } else { 2 }
+            if error.downcast_ref().is_some_and(IdentifyError::is_interrupted) {
+                interrupt::STATUS
+            } else {
+                2
+            }
         }
     }
 }

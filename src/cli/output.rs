@@ -32,7 +32,8 @@ pub enum WriteError {
     Foreign { path: PathBuf },
 }
 
-/// Where the results of a command go, and which files they may replace: those that flexcal wrote there, unless they are read.
+/// Where the results of a command go, and which files they may replace: those that flexcal wrote
+/// there, unless they are read.
 pub struct Results {
     pub folder: PathBuf,
     command: &'static str,
@@ -45,8 +46,8 @@ pub struct Results {
 }
 
 impl Results {
-    /// The results of `command` in `folder`, once nothing stands in the way of those called `names`; a later one of
-    /// [`write`](Self::write) may have more.
+    /// The results of `command` in `folder`, once nothing stands in the way of those called
+    /// `names`; a later one of [`write`](Self::write) may have more.
     pub fn claim(
         command: &'static str,
         folder: PathBuf,
@@ -64,7 +65,8 @@ impl Results {
         Ok(claimed)
     }
 
-    /// Files that are there under names of figures, of which nobody knows yet which a page will have.
+    /// Files that are there under names of figures, of which nobody knows yet which a page will
+    /// have.
     fn figures(&self) -> Vec<String> {
         let Ok(entries) = fs::read_dir(self.folder.join(FIGURES)) else { return Vec::new() };
         let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
@@ -86,10 +88,14 @@ impl Results {
         self.keep(texts, |_| false)
     }
 
-    /// The same with a report: `report.md`, `report.html` and its figures in `figures`, from where those of an older page go.
+    /// The same with a report: `report.md`, `report.html` and its figures in `figures`, from where
+    /// those of an older page go.
     pub fn write_report(&self, texts: &[(&str, &str)], report: &Report) -> Result<(), WriteError> {
-        let drawn: Vec<(String, &str)> =
-            report.figures.iter().map(|(name, figure)| (format!("{FIGURES}/{name}"), figure.as_str())).collect();
+        let drawn: Vec<(String, &str)> = report
+            .figures
+            .iter()
+            .map(|(name, figure)| (format!("{FIGURES}/{name}"), figure.as_str()))
+            .collect();
         let told = REPORT.into_iter().zip([report.markdown.as_str(), report.html.as_str()]);
         let figures = drawn.iter().map(|(name, figure)| (name.as_str(), *figure));
         let texts: Vec<(&str, &str)> = texts.iter().copied().chain(told).chain(figures).collect();
@@ -100,18 +106,26 @@ impl Results {
         self.keep(&texts, is_older)
     }
 
-    /// Writes files all or none, as far as file systems allow: what can be in the way is found before the first is in its
-    /// place. Files of the record of which `is_older` says so are removed, and what the same command wrote before and has none of now:
-    /// it would stand beside results that it does not belong to.
-    fn keep(&self, texts: &[(&str, &str)], is_older: impl Fn(&str) -> bool) -> Result<(), WriteError> {
+    /// Writes files all or none, as far as file systems allow: what can be in the way is found
+    /// before the first is in its place. Files of the record of which `is_older` says so are
+    /// removed, and what the same command wrote before and has none of now: it would stand beside
+    /// results that it does not belong to.
+    fn keep(
+        &self,
+        texts: &[(&str, &str)],
+        is_older: impl Fn(&str) -> bool,
+    ) -> Result<(), WriteError> {
         let mut record = self.record()?;
         texts.iter().try_for_each(|(name, _)| self.check(&record, name))?;
         let others = self.others(&record, texts);
         let is_left = |name: &str| {
-            let claimed = self.names.iter().any(|own| own == name) && texts.iter().all(|(own, _)| *own != name);
+            let claimed = self.names.iter().any(|own| own == name)
+                && texts.iter().all(|(own, _)| *own != name);
             claimed && record.writer(&self.folder, name) == Some(self.command)
         };
-        let is_ours = |name: &&str| is_left(name) || (is_older(name) && record.writer(&self.folder, name).is_some());
+        let is_ours = |name: &&str| {
+            is_left(name) || (is_older(name) && record.writer(&self.folder, name).is_some())
+        };
         let mut older: Vec<String> = record.names().filter(is_ours).map(str::to_owned).collect();
         older.sort();
         older.dedup();
@@ -125,7 +139,8 @@ impl Results {
             record.add(self.command, name, text);
         }
         let _unbroken = interrupt::unbroken();
-        // Before the files, with what stands in their place now: they are known whenever this is interrupted.
+        // Before the files, with what stands in their place now: they are known whenever this is
+        // interrupted.
         self.write_record(&record)?;
         for (file, path) in ready {
             file.put().map_err(|source| WriteError::Io { path, source })?;
@@ -138,15 +153,19 @@ impl Results {
         self.write_record(&record)?;
         if let (Some((name, other)), false) = (others, self.quiet) {
             let what = if name == REPORT[0] { "the report" } else { &name };
-            diagnostic::warn(&format!("{what} of {other} in the same folder is replaced; --out keeps both"));
+            diagnostic::warn(&format!(
+                "{what} of {other} in the same folder is replaced; --out keeps both"
+            ));
         }
         Ok(())
     }
 
-    /// The first of these files that is there and another command's, a report before all others, with that command.
+    /// The first of these files that is there and another command's, a report before all others,
+    /// with that command.
     fn others(&self, record: &Record, texts: &[(&str, &str)]) -> Option<(String, String)> {
         let other = |&(name, _): &(&str, &str)| {
-            let writer = record.writer(&self.folder, name).filter(|writer| *writer != self.command)?;
+            let writer =
+                record.writer(&self.folder, name).filter(|writer| *writer != self.command)?;
             Some((name.to_owned(), writer.to_owned()))
         };
         let report = texts.iter().find(|(name, _)| *name == REPORT[0]);
@@ -154,11 +173,14 @@ impl Results {
     }
 
     fn record(&self) -> Result<Record, WriteError> {
-        Record::of(&self.folder).map_err(|source| WriteError::Io { path: Record::file(&self.folder), source })
+        Record::of(&self.folder)
+            .map_err(|source| WriteError::Io { path: Record::file(&self.folder), source })
     }
 
     fn write_record(&self, record: &Record) -> Result<(), WriteError> {
-        record.write(&self.folder).map_err(|source| WriteError::Io { path: Record::file(&self.folder), source })
+        record
+            .write(&self.folder)
+            .map_err(|source| WriteError::Io { path: Record::file(&self.folder), source })
     }
 
     /// Whether a result may take its name.
@@ -172,7 +194,11 @@ impl Results {
             Some(above) if !above.is_dir() && !above.as_os_str().is_empty() => {
                 return why("a file is in the way of its folder");
             }
-            Some(above) if above != self.folder && above.starts_with(&self.folder) && above.is_symlink() => {
+            Some(above)
+                if above != self.folder
+                    && above.starts_with(&self.folder)
+                    && above.is_symlink() =>
+            {
                 return why("its folder is a symbolic link, which is not followed");
             }
             _ => {}
@@ -192,11 +218,12 @@ impl Results {
 
 /// Columns of the terminal that reads standard output; as many as wanted where none does.
 pub fn columns() -> usize {
-    terminal_size::terminal_size_of(io::stdout()).map_or(usize::MAX, |(width, _)| usize::from(width.0).max(40))
+    terminal_size::terminal_size_of(io::stdout())
+        .map_or(usize::MAX, |(width, _)| usize::from(width.0).max(40))
 }
 
-/// Prints to standard output what people read, without characters that do something to their terminal; a closed pipe ends the
-/// printing quietly.
+/// Prints to standard output what people read, without characters that do something to their
+/// terminal; a closed pipe ends the printing quietly.
 pub fn print(text: &str) -> Result<(), WriteError> {
     print_all(&visible(text))
 }
@@ -207,7 +234,9 @@ pub fn print_json(json: &str) -> Result<(), WriteError> {
     for character in json.chars() {
         if is_hidden(character) && character != '\n' {
             let mut halves = [0; 2];
-            text.extend(character.encode_utf16(&mut halves).iter().map(|half| format!("\\u{half:04x}")));
+            text.extend(
+                character.encode_utf16(&mut halves).iter().map(|half| format!("\\u{half:04x}")),
+            );
         } else {
             text.push(character);
         }

@@ -39,7 +39,8 @@ pub struct Arguments {
     /// What to make small
     #[arg(long, value_enum, ignore_case = true, default_value_t = CriterionArgument::S)]
     criterion: CriterionArgument,
-    /// Choose the poses that tell two effects apart; each as trace and loop name it and as a problem declares it
+    /// Choose the poses that tell two effects apart; each as trace and loop name it and as a
+    /// problem declares it
     #[arg(long, value_name = "EFFECT", num_args = 2, conflicts_with = "criterion")]
     separate: Vec<String>,
     /// Box that the nominal target stays in, frame of the arm's base
@@ -54,7 +55,9 @@ pub struct Arguments {
 
 /// So many finite numbers with commas between them.
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
-    let numbers = text.split(',').map(|word| word.trim().parse().ok().filter(|number: &f64| number.is_finite()));
+    let numbers = text
+        .split(',')
+        .map(|word| word.trim().parse().ok().filter(|number: &f64| number.is_finite()));
     let numbers: Option<Vec<f64>> = numbers.collect();
     numbers
         .and_then(|numbers| numbers.try_into().ok())
@@ -82,7 +85,9 @@ fn workspace(arguments: &Arguments) -> Result<Option<Workspace>, WorkspaceError>
 /// A workspace that makes no sense.
 #[derive(Debug, thiserror::Error)]
 enum WorkspaceError {
-    #[error("--workspace-mm: the box is empty; write X0,X1,Y0,Y1,Z0,Z1, the lesser of each pair first")]
+    #[error(
+        "--workspace-mm: the box is empty; write X0,X1,Y0,Y1,Z0,Z1, the lesser of each pair first"
+    )]
     Empty,
     #[error("--keep-out-mm: 0,0,0 is no normal of a plane")]
     NoNormal,
@@ -140,7 +145,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let line = common.talks().then(Line::new);
     let show = |PlanProgress { start, sweep, value }: PlanProgress| {
         if let Some(line) = &line {
-            let what = start.map_or_else(|| "refining".to_owned(), |start| format!("start {start}"));
+            let what =
+                start.map_or_else(|| "refining".to_owned(), |start| format!("start {start}"));
             line.say(|| format!("{what}, sweep {sweep}: ln of the criterion {value:.4}"));
         }
     };
@@ -155,7 +161,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let result = match &pair {
         Some(pair) => design::separate(pair, &candidates, given.as_ref(), &options)
             .map(|(plan, separated)| (plan, Some(separated))),
-        None => design::plan(&problem, &candidates, given.as_ref(), &options).map(|plan| (plan, None)),
+        None => {
+            design::plan(&problem, &candidates, given.as_ref(), &options).map(|plan| (plan, None))
+        }
     };
     if let Some(line) = &line {
         line.clear();

@@ -7,7 +7,7 @@ use flexcal::design::DesignError;
 use flexcal::error::InputError;
 use flexcal::measurement::Measurements;
 use flexcal::problem::{PoseRanges, Problem};
-use flexcal::simulate::Truth;
+use flexcal::rig::Truth;
 
 use super::flags::Flags;
 
@@ -17,7 +17,8 @@ pub struct Source {
     /// Tables of poses to take, with the columns of measurements; positions are not needed
     #[arg(long, value_name = "FILE.csv", num_args = 1..)]
     pub candidates: Vec<PathBuf>,
-    /// Where poses may lie: [poses] of this file or of the one in this folder, instead of the limits of the joints (min_deg, max_deg)
+    /// Where poses may lie: [poses] of this file or of the one in this folder, instead of the
+    /// limits of the joints (min_deg, max_deg)
     #[arg(long, value_name = "TRUTH.toml")]
     pub truth: Option<PathBuf>,
     /// Seed of every random number
@@ -28,13 +29,19 @@ pub struct Source {
 impl Source {
     /// The files that are named.
     pub fn files(&self) -> Vec<PathBuf> {
-        let truth =
-            self.truth.iter().map(|truth| if truth.is_dir() { truth.join("TRUTH.toml") } else { truth.clone() });
+        let truth = self
+            .truth
+            .iter()
+            .map(|truth| if truth.is_dir() { truth.join("TRUTH.toml") } else { truth.clone() });
         self.candidates.iter().cloned().chain(truth).collect()
     }
 
     /// The table of candidates, if one is named.
-    pub fn table(&self, problem: &Problem, flags: &Flags) -> Result<Option<Measurements>, InputError> {
+    pub fn table(
+        &self,
+        problem: &Problem,
+        flags: &Flags,
+    ) -> Result<Option<Measurements>, InputError> {
         if self.candidates.is_empty() {
             return Ok(None);
         }
@@ -49,7 +56,8 @@ impl Source {
         Ok(Truth::read(file, problem)?.poses)
     }
 
-    /// The same without temperatures and sides on which no declared effect depends: they need not be set.
+    /// The same without temperatures and sides on which no declared effect depends: they need not
+    /// be set.
     pub fn ranges(&self, problem: &Problem) -> Result<PoseRanges, DesignError> {
         Ok(self.all_ranges(problem)?.that_matter(problem))
     }

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::Args;
-use flexcal::identify::{self, SavedEstimate};
+use flexcal::fit::{self, SavedEstimate};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::{HeldOut, Problem};
 use flexcal::report;
@@ -28,7 +28,8 @@ Examples:
 pub struct Arguments {
     #[command(flatten)]
     common: Common,
-    /// The estimate.json of an identification of the same problem; without it the nominal arm is predicted
+    /// The estimate.json of an identification of the same problem; without it the nominal arm is
+    /// predicted
     #[arg(long, value_name = "ESTIMATE.json")]
     estimate: Option<PathBuf>,
 }
@@ -49,17 +50,24 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if !trusted {
         diagnostic::warn("the estimate is not to be trusted, and so are the predictions not");
     }
-    // Rows that nobody divided are predicted all the same; chance divides those that were fitted, no others.
+    // Rows that nobody divided are predicted all the same; chance divides those that were fitted,
+    // no others.
     let by_chance = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }));
     let split = Split::new(&problem, &rows).ok().filter(|_| !by_chance || common.data().is_empty());
-    let prediction = identify::predict(&problem, estimate.as_ref(), &rows, split.as_ref())?;
-    let mut texts = vec![("predictions.csv", report::predictions_csv(&problem, &rows, &prediction))];
+    let prediction = fit::predict(&problem, estimate.as_ref(), &rows, split.as_ref())?;
+    let mut texts =
+        vec![("predictions.csv", report::predictions_csv(&problem, &rows, &prediction))];
     texts.extend(
-        prediction.residuals.as_ref().map(|all| ("residuals.csv", report::residuals_csv(&problem, &rows, all))),
+        prediction
+            .residuals
+            .as_ref()
+            .map(|all| ("residuals.csv", report::residuals_csv(&problem, &rows, all))),
     );
-    let errors = prediction.errors.as_ref().map(|errors| report::errors_json(errors, &prediction.spreads));
+    let errors =
+        prediction.errors.as_ref().map(|errors| report::errors_json(errors, &prediction.spreads));
     texts.extend(errors.clone().map(|json| ("errors.json", json)));
-    let borrowed: Vec<(&str, &str)> = texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
+    let borrowed: Vec<(&str, &str)> =
+        texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
     results.write(&borrowed)?;
     common.tell(errors.as_deref().unwrap_or("{}\n"), || {
         let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, Once, PoisonError};
 use std::time::{Duration, Instant};
 
-use flexcal::identify::{Progress, ProgressSink, Stop};
+use flexcal::fit::{Progress, ProgressSink, Stop};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::course::Course;
@@ -33,11 +33,22 @@ impl Line {
         let bar = ProgressBar::new_spinner();
         let shown = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}");
         bar.set_style(shown.unwrap_or_else(|_| ProgressStyle::default_spinner()));
-        Arc::new(Self { bar, begun: Instant::now(), course: Mutex::default(), ticking: Once::new(), stop: stop.into() })
+        Arc::new(Self {
+            bar,
+            begun: Instant::now(),
+            course: Mutex::default(),
+            ticking: Once::new(),
+            stop: stop.into(),
+        })
     }
 
-    /// Does some work, which reports to a line of progress where that is `shown`; the line is gone when the work is done.
-    pub fn during<T>(shown: bool, stop: impl Into<Option<Stop>>, work: impl FnOnce(Option<ProgressSink>) -> T) -> T {
+    /// Does some work, which reports to a line of progress where that is `shown`; the line is gone
+    /// when the work is done.
+    pub fn during<T>(
+        shown: bool,
+        stop: impl Into<Option<Stop>>,
+        work: impl FnOnce(Option<ProgressSink>) -> T,
+    ) -> T {
         let line = shown.then(|| Self::until(stop));
         let done = work(line.as_ref().map(Self::sink));
         if let Some(line) = line {
@@ -85,7 +96,9 @@ impl FitBar {
     pub fn new(fits: u64, kept: u64) -> Self {
         let bar = ProgressBar::new(fits);
         let shown = "{wide_bar} {human_pos} of {human_len} fits, {eta} left";
-        bar.set_style(ProgressStyle::with_template(shown).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_style(
+            ProgressStyle::with_template(shown).unwrap_or_else(|_| ProgressStyle::default_bar()),
+        );
         bar.set_position(kept);
         bar.reset_eta();
         Self(bar)

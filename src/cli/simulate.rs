@@ -8,7 +8,7 @@ use flexcal::error::InputError;
 use flexcal::measurement::Measurements;
 use flexcal::problem::{HeldOut, PoseConditions, Problem};
 use flexcal::report::shell_word;
-use flexcal::simulate::{Simulation, Truth, simulate, simulate_poses};
+use flexcal::rig::{Simulation, Truth, simulate, simulate_poses};
 
 use super::diagnostic;
 use super::flags::Flags;
@@ -24,7 +24,8 @@ pub struct Arguments {
     /// A problem.toml, or the folder that holds one [default: the current folder]
     #[arg(default_value = ".", hide_default_value = true)]
     problem: PathBuf,
-    /// How the true arm differs from the problem, and from where poses are drawn; or the folder that holds it
+    /// How the true arm differs from the problem, and from where poses are drawn; or the folder
+    /// that holds it
     #[arg(long, value_name = "TRUTH.toml")]
     truth: PathBuf,
     /// Number of poses, drawn in the ranges of [poses]
@@ -44,11 +45,13 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let problem = Problem::read(&arguments.problem)?;
     let truth = Truth::read(&arguments.truth, &problem)?;
-    let inside = |path: &Path, name: &str| if path.is_dir() { path.join(name) } else { path.to_owned() };
+    let inside =
+        |path: &Path, name: &str| if path.is_dir() { path.join(name) } else { path.to_owned() };
     let own = [inside(&arguments.problem, "problem.toml"), inside(&arguments.truth, "TRUTH.toml")];
     let inputs = [&own[..], &problem.data.files, &arguments.data].concat();
     let flags = &arguments.flags;
-    let results = flags.claim("simulate", &problem.name, inputs, &["measurements.csv", "truth.json"])?;
+    let results =
+        flags.claim("simulate", &problem.name, inputs, &["measurements.csv", "truth.json"])?;
     let simulation = match arguments.poses {
         Some(poses) => simulate(&problem, &truth, poses as usize, arguments.seed)?,
         None => simulate_poses(&problem, &truth, poses_of(arguments, &problem)?, arguments.seed)?,
@@ -56,7 +59,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (json, table) = (simulation.truth_json(), results.path("measurements.csv"));
     results.write(&[("measurements.csv", &simulation.csv()), ("truth.json", &json)])?;
     // A fraction is divided by whoever reads the rows.
-    let divided = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. })) || simulation.held_out() > 0;
+    let divided = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }))
+        || simulation.held_out() > 0;
     flags.tell(&json, || {
         let next = if divided { next(&arguments.problem, &table) } else { String::new() };
         summary(&simulation, &table) + &next
@@ -71,11 +75,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 }
 
 /// What the rows of the tables set, and the target that each names.
-fn poses_of(arguments: &Arguments, problem: &Problem) -> Result<Vec<(PoseConditions, String)>, InputError> {
+fn poses_of(
+    arguments: &Arguments,
+    problem: &Problem,
+) -> Result<Vec<(PoseConditions, String)>, InputError> {
     let (rows, warnings) = Measurements::read_poses(&arguments.data, problem)?;
     arguments.flags.warn(&warnings);
     let target = rows.target.as_ref().filter(|_| !problem.targets.is_empty());
-    let word = |row: usize| target.and_then(|own| own.names.get(*own.of_row.get(row)?).cloned()).unwrap_or_default();
+    let word = |row: usize| {
+        target.and_then(|own| own.names.get(*own.of_row.get(row)?).cloned()).unwrap_or_default()
+    };
     Ok(rows.all_conditions().into_iter().enumerate().map(|(row, own)| (own, word(row))).collect())
 }
 

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use flexcal::files::Ready;
-use flexcal::monte_carlo::{self, CellResult, MisprintStudy, Request, Shard, Store, Study};
 use flexcal::report::{self, shell_word};
+use flexcal::study::{self, CellResult, MisprintStudy, Request, Shard, Store, Study};
 
 use super::diagnostic;
 use super::flags::Flags;
@@ -19,14 +19,16 @@ use super::progress::FitBar;
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 #[command(mut_arg("out", |arg| arg.help("Folder for results [default: out/<name of the study>]")))]
-#[command(after_help = "Finished parts are kept in DIR/cells: what was interrupted goes on where it stopped.
+#[command(
+    after_help = "Finished parts are kept in DIR/cells: what was interrupted goes on where it stopped.
 
 Examples:
   flexcal study problems/lunar-sampler/STUDY.toml
   flexcal study STUDY.toml --out results --shard 1/2
   flexcal study STUDY.toml --out results --shard 2/2
   flexcal study merge STUDY.toml --out results
-  flexcal study problems/lunar-sampler/MISPRINTS.toml")]
+  flexcal study problems/lunar-sampler/MISPRINTS.toml"
+)]
 pub struct Arguments {
     #[command(subcommand)]
     merge: Option<Merge>,
@@ -38,7 +40,8 @@ pub struct Arguments {
     /// Do the i-th of n shares alone, and write no results: that is for `study merge`
     #[arg(long, value_name = "i/n", conflicts_with = "json")]
     shard: Option<Shard>,
-    /// Write FILE once all is done, with exit status 0: what a workflow waits for; an older FILE is removed first
+    /// Write FILE once all is done, with exit status 0: what a workflow waits for; an older FILE is
+    /// removed first
     #[arg(long, value_name = "FILE")]
     done: Option<PathBuf>,
 }
@@ -114,8 +117,8 @@ impl Common {
     }
 }
 
-/// Does the fits that are not done yet, or merges; then writes `study.csv`, `study.json`, `parameters.csv`, `timing.csv`
-/// and prints the table.
+/// Does the fits that are not done yet, or merges; then writes `study.csv`, `study.json`,
+/// `parameters.csv`, `timing.csv` and prints the table.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(Merge::Merge { common, from }) = &arguments.merge {
         let study = Study::read(&common.study)?;
@@ -123,7 +126,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         if let Some(folder) = from.iter().find(|folder| !folder.is_dir()) {
             return Err(NoFolder { folder: folder.clone() }.into());
         }
-        let folders = if from.is_empty() { std::slice::from_ref(&results.folder) } else { from.as_slice() };
+        let folders =
+            if from.is_empty() { std::slice::from_ref(&results.folder) } else { from.as_slice() };
         let stores: Vec<Store> = folders.iter().map(|folder| Store::new(folder)).collect();
         return finish(common, &study, &results, &stores);
     }
@@ -157,7 +161,9 @@ fn work(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Error>
     }
     if common.flags.talks() {
         let (file, folder) = (shell_word(&common.study), shell_word(&results.folder));
-        output::print(&format!("Share done. After the last: flexcal study merge {file} --out {folder}\n"))?;
+        output::print(&format!(
+            "Share done. After the last: flexcal study merge {file} --out {folder}\n"
+        ))?;
     }
     Ok(Outcome::Done)
 }
@@ -166,8 +172,9 @@ fn work(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Error>
 fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn Error>> {
     let names = ["misprints.json", REPORT[0], REPORT[1]];
     let results = common.claim(&study.name, &study.files, &names)?;
-    let bar = common.flags.talks().then(|| FitBar::new((study.specimens * study.cases.len()) as u64, 0));
-    let found = monte_carlo::replicate(study, || bar.iter().for_each(FitBar::advance));
+    let bar =
+        common.flags.talks().then(|| FitBar::new((study.specimens * study.cases.len()) as u64, 0));
+    let found = study::replicate(study, || bar.iter().for_each(FitBar::advance));
     bar.iter().for_each(FitBar::clear);
     let found = found?;
     let json = report::replica_json(study, &found);
@@ -177,18 +184,23 @@ fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn 
 }
 
 fn fit(common: &Common, study: &Study, store: &Store, shard: Shard) -> Result<(), Box<dyn Error>> {
-    let parts = monte_carlo::pending(study, store, shard)?;
+    let parts = study::pending(study, store, shard)?;
     let own = study.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index));
     let all: usize = own.map(|(_, part)| part.repetitions.len()).sum();
     let open: usize = parts.iter().map(|part| part.repetitions.len()).sum();
     let bar = common.flags.talks().then(|| FitBar::new(all as u64, (all - open) as u64));
-    let done = monte_carlo::run(study, store, &parts, || bar.iter().for_each(FitBar::advance));
+    let done = study::run(study, store, &parts, || bar.iter().for_each(FitBar::advance));
     bar.iter().for_each(FitBar::clear);
     Ok(done?)
 }
 
-fn finish(common: &Common, study: &Study, results: &Results, stores: &[Store]) -> Result<Outcome, Box<dyn Error>> {
-    let found = monte_carlo::collect(study, stores)?;
+fn finish(
+    common: &Common,
+    study: &Study,
+    results: &Results,
+    stores: &[Store],
+) -> Result<Outcome, Box<dyn Error>> {
+    let found = study::collect(study, stores)?;
     let json = report::study_json(study, &found);
     let texts = [
         (NAMES[0], json.as_str()),
@@ -199,7 +211,10 @@ fn finish(common: &Common, study: &Study, results: &Results, stores: &[Store]) -
     results.write(&texts)?;
     common.flags.tell(&json, || {
         let (text, table) = (report::study_text(study, &found), results.path("study.csv"));
-        format!("{text}\nWritten to {}, each parameter to parameters.csv beside it\n", table.display())
+        format!(
+            "{text}\nWritten to {}, each parameter to parameters.csv beside it\n",
+            table.display()
+        )
     })?;
     let hopeless = |cell: &CellResult| cell.tally.failed() == cell.tally.fits;
     Ok(if found.cells.iter().any(hopeless) { Outcome::NotTrusted } else { Outcome::Done })

@@ -3,8 +3,8 @@
 use std::error::Error;
 
 use clap::Args;
-use flexcal::identify::Options;
-use flexcal::{diagnose, report};
+use flexcal::fit::Options;
+use flexcal::{report, select};
 
 use super::diagnostic;
 use super::input::{Common, Input};
@@ -29,11 +29,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.say_if_nothing_is_free(&problem);
     common.say_of_orientation(&problem, &mut data);
     let trace = Line::during(common.talks(), None, |sink| {
-        diagnose::trace(&problem, &data, &Options::default().with_progress(sink))
+        select::trace(&problem, &data, &Options::default().with_progress(sink))
     })?;
     let json = report::trace_json(&problem, &trace);
     results.write(&[("trace.json", &json)])?;
     let written = results.path("trace.json");
-    common.tell(&json, || format!("{}\nWritten to {}\n", report::trace_text(&problem, &trace), written.display()))?;
+    common.tell(&json, || {
+        format!("{}\nWritten to {}\n", report::trace_text(&problem, &trace), written.display())
+    })?;
     Ok(diagnostic::judged(&trace.fit, common.quiet))
 }

@@ -15,7 +15,8 @@ use crate::random;
 const ANGLE_STEP: f64 = 1e-4;
 /// Lengths are commanded in steps of this \[m\].
 const LENGTH_STEP: f64 = 1e-6;
-/// Added to the stream of the poses for what is drawn apart, so that poses are the same with it and without.
+/// Added to the stream of the poses for what is drawn apart, so that poses are the same with it and
+/// without.
 const APART: u64 = 1 << 32;
 /// Forces and temperatures are set in steps of this \[N\], [°C].
 const SETTING_STEP: f64 = 0.1;
@@ -47,10 +48,18 @@ impl PoseRanges {
         Ok(Self { joints, ..Self::default() })
     }
 
-    /// `count` poses, drawn one after the other, so that more of them leave the first ones as they are. Each quantity by
-    /// itself, of the targets one after the other; positions are zero.
-    pub fn draw(&self, problem: &Problem, count: usize, extremes: Extremes, seed: u64, stream: u64) -> Measurements {
-        let (mut random, mut apart) = (random::stream(seed, stream), random::stream(seed, APART + stream));
+    /// `count` poses, drawn one after the other, so that more of them leave the first ones as they
+    /// are. Each quantity by itself, of the targets one after the other; positions are zero.
+    pub fn draw(
+        &self,
+        problem: &Problem,
+        count: usize,
+        extremes: Extremes,
+        seed: u64,
+        stream: u64,
+    ) -> Measurements {
+        let (mut random, mut apart) =
+            (random::stream(seed, stream), random::stream(seed, APART + stream));
         let value = |random: &mut ChaCha8Rng, (from, to): (f64, f64)| {
             let (kind, within) = (random.random::<f64>(), random.random::<f64>());
             match extremes {
@@ -65,16 +74,20 @@ impl PoseRanges {
             let choice = value(&mut random, (0.0, 1.0));
             let hoist = self.hoist.map(|range| value(&mut random, range));
             let temperature = self.temperature.map(|range| value(&mut apart, range));
-            let covariates = self.covariates.iter().map(|&range| value(&mut apart, range)).collect();
+            let covariates =
+                self.covariates.iter().map(|&range| value(&mut apart, range)).collect();
             let sides = self.joints.iter().map(|_| random.random()).collect();
             let target = pose % problem.targets.len().max(1);
-            drawn.push(problem, &Draft { joints, choice, hoist, temperature, covariates, sides, target });
+            drawn.push(
+                problem,
+                &Draft { joints, choice, hoist, temperature, covariates, sides, target },
+            );
         }
         drawn.finish()
     }
 
-    /// For each row of `poses` itself and `count` others near it: about half of its quantities moved by up to `reach` of
-    /// their range, and now and then another payload or side.
+    /// For each row of `poses` itself and `count` others near it: about half of its quantities
+    /// moved by up to `reach` of their range, and now and then another payload or side.
     pub(super) fn vary(
         &self,
         problem: &Problem,
@@ -91,15 +104,25 @@ impl PoseRanges {
             for _ in 0..count {
                 let mut next = own.clone();
                 let mut near = |value: &mut f64, (from, to): (f64, f64)| {
-                    let (moves, step) = (random.random::<bool>(), 2.0 * random.random::<f64>() - 1.0);
+                    let (moves, step) =
+                        (random.random::<bool>(), 2.0 * random.random::<f64>() - 1.0);
                     if moves {
                         *value = (*value + step * reach * (to - from)).clamp(from, to);
                     }
                 };
                 next.joints.iter_mut().zip(&self.joints).for_each(|(q, &range)| near(q, range));
-                next.hoist.iter_mut().zip(&self.hoist).for_each(|(force, &range)| near(force, range));
-                next.temperature.iter_mut().zip(&self.temperature).for_each(|(degrees, &range)| near(degrees, range));
-                next.covariates.iter_mut().zip(&self.covariates).for_each(|(own, &range)| near(own, range));
+                next.hoist
+                    .iter_mut()
+                    .zip(&self.hoist)
+                    .for_each(|(force, &range)| near(force, range));
+                next.temperature
+                    .iter_mut()
+                    .zip(&self.temperature)
+                    .for_each(|(degrees, &range)| near(degrees, range));
+                next.covariates
+                    .iter_mut()
+                    .zip(&self.covariates)
+                    .for_each(|(own, &range)| near(own, range));
                 if random.random::<f64>() < 0.25 {
                     next.choice = random.random();
                 }
@@ -133,8 +156,9 @@ impl Draft {
     /// A row that was drawn from these ranges.
     fn of(ranges: &PoseRanges, poses: &Measurements, row: usize) -> Self {
         let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
-        let place = at(&poses.payload)
-            .and_then(|mass| ranges.payloads.iter().position(|&known| known.to_bits() == mass.to_bits()));
+        let place = at(&poses.payload).and_then(|mass| {
+            ranges.payloads.iter().position(|&known| known.to_bits() == mass.to_bits())
+        });
         let n = poses.joints;
         let sides = poses.approach.as_ref().map_or_else(
             || vec![false; n],
@@ -171,8 +195,20 @@ impl<'a> Table<'a> {
     fn new(ranges: &'a PoseRanges, problem: &Problem) -> Self {
         let (joints, target) = (problem.joints.len(), Vec::new());
         let names = problem.targets.iter().map(|own| own.name.clone()).collect();
-        let (configurations, payload, hoist, temperature, covariates, approach) = Default::default();
-        Self { ranges, joints, names, target, configurations, payload, hoist, temperature, covariates, approach }
+        let (configurations, payload, hoist, temperature, covariates, approach) =
+            Default::default();
+        Self {
+            ranges,
+            joints,
+            names,
+            target,
+            configurations,
+            payload,
+            hoist,
+            temperature,
+            covariates,
+            approach,
+        }
     }
 
     fn push(&mut self, problem: &Problem, draft: &Draft) {
@@ -182,7 +218,8 @@ impl<'a> Table<'a> {
                 JointKind::Fixed => 0.0,
                 JointKind::Prismatic => rounded(q, LENGTH_STEP, (from, to)),
                 JointKind::Revolute => {
-                    rounded(q.to_degrees(), ANGLE_STEP, (from.to_degrees(), to.to_degrees())).to_radians()
+                    rounded(q.to_degrees(), ANGLE_STEP, (from.to_degrees(), to.to_degrees()))
+                        .to_radians()
                 }
             };
             self.configurations.push(q);
@@ -193,10 +230,16 @@ impl<'a> Table<'a> {
             });
         }
         let choices = self.ranges.payloads.len();
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded down to an index")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "rounded down to an index"
+        )]
         let choice = (draft.choice * choices as f64) as usize;
         self.payload.extend(self.ranges.payloads.get(choice.min(choices.saturating_sub(1))));
-        let set = |value: Option<f64>, range: Option<(f64, f64)>| Some(rounded(value?, SETTING_STEP, range?));
+        let set = |value: Option<f64>, range: Option<(f64, f64)>| {
+            Some(rounded(value?, SETTING_STEP, range?))
+        };
         self.hoist.extend(set(draft.hoist, self.ranges.hoist));
         self.temperature.extend(set(draft.temperature, self.ranges.temperature));
         self.covariates.extend(&draft.covariates);
@@ -218,7 +261,8 @@ impl<'a> Table<'a> {
             time: (0_u32..).take(count).map(f64::from).collect(),
             approach: self.ranges.approach.then_some(self.approach),
             session: Labels { names: vec![String::new()], of_row: vec![0; count] },
-            target: (!self.names.is_empty()).then_some(Labels { names: self.names, of_row: self.target }),
+            target: (!self.names.is_empty())
+                .then_some(Labels { names: self.names, of_row: self.target }),
             ..Measurements::default()
         }
     }

@@ -1,22 +1,23 @@
 //! What measurements in given poses will tell, before anyone makes them.
 //!
-//! Rank, unidentifiable combinations and predictions are linear about the nominal arm; standard errors are those to expect of arms
-//! drawn from the priors.
+//! Rank, unidentifiable combinations and predictions are linear about the nominal arm; standard
+//! errors are those to expect of arms drawn from the priors.
 
 use super::coordinates::{coordinates, first_of_each};
 use super::plan::choose;
 use super::{DesignError, Extremes, Forecast, Growth, Prediction, Sensitivity, Site};
-use crate::diagnose::{Detection, detectable};
 use crate::error::InputErrorKind;
-use crate::identify::Placement;
+use crate::fit::Placement;
 use crate::measurement::{Dataset, Labels, Measurements, RowOrder, different};
 use crate::problem::{Observation, PoseRanges, Problem};
+use crate::select::{Detection, detectable};
 
 /// Poses in which predictions are judged.
 const WORKSPACE: usize = 500;
 /// Length of the series that shows what more poses would bring.
 const SERIES: usize = 384;
-/// Arms drawn from the priors, least and most; as many poses together as these, if that lies between.
+/// Arms drawn from the priors, least and most; as many poses together as these, if that lies
+/// between.
 const ARMS: (usize, usize) = (16, 200);
 const ARM_POSES: usize = 20_000;
 /// Streams of random numbers of one seed.
@@ -31,7 +32,8 @@ const ARM: u64 = 12;
 pub enum Judged {
     /// So many, drawn evenly within ranges.
     Drawn(PoseRanges, usize),
-    /// Rows of a table. Predictions are judged elsewhere: within ranges, in rows held out, or in the rows themselves.
+    /// Rows of a table. Predictions are judged elsewhere: within ranges, in rows held out, or in
+    /// the rows themselves.
     Table {
         /// The poses.
         poses: Box<Measurements>,
@@ -63,10 +65,11 @@ pub struct Check {
     pub prediction: Prediction,
     /// Where that is.
     pub elsewhere: Elsewhere,
-    /// Root mean square length of the error of one position measured with the σ of these poses \[m\]; `None` where they measure
-    /// tilts alone.
+    /// Root mean square length of the error of one position measured with the σ of these poses
+    /// \[m\]; `None` where they measure tilts alone.
     pub noise: Option<f64>,
-    /// What that σ is of: the first kind of what is measured that is a length ([`Observation::kind`]).
+    /// What that σ is of: the first kind of what is measured that is a length
+    /// ([`Observation::kind`]).
     pub noise_of: &'static str,
     /// Of the first n of a series of such poses.
     pub growth: Growth,
@@ -85,9 +88,12 @@ pub struct Check {
 /// Judges poses.
 ///
 /// # Errors
-/// The problem does not say enough, or the nominal arm does not come to rest in one of the poses of a table.
+/// The problem does not say enough, or the nominal arm does not come to rest in one of the poses of
+/// a table.
 pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, DesignError> {
-    let draw = |ranges: &PoseRanges, count, stream| ranges.draw(problem, count, Extremes::No, seed, stream);
+    let draw = |ranges: &PoseRanges, count, stream| {
+        ranges.draw(problem, count, Extremes::No, seed, stream)
+    };
     let (series, count, workspace, elsewhere) = match judged {
         Judged::Drawn(ranges, count) => {
             let series = draw(ranges, SERIES.max(2 * count), POSES);
@@ -143,9 +149,19 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
         noise,
         noise_of: lengths.unwrap_or_default().kind(),
         detection: detectable(problem, &poses)?,
-        growth: Growth::new(parameters, &told, attainable.as_ref(), &workspace, (noise.unwrap_or(0.0), count)),
+        growth: Growth::new(
+            parameters,
+            &told,
+            attainable.as_ref(),
+            &workspace,
+            (noise.unwrap_or(0.0), count),
+        ),
         coordinates: coordinates(&poses, told.coordinates, 0..count),
-        distinct: coordinates(&poses, told.coordinates, first_of_each(&poses.pose_numbers(problem))),
+        distinct: coordinates(
+            &poses,
+            told.coordinates,
+            first_of_each(&poses.pose_numbers(problem)),
+        ),
         different: different(&poses.pose_numbers(problem), 0..count),
         without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),
     })
@@ -166,7 +182,8 @@ fn measured_as(table: &Measurements, drawn: Measurements) -> Measurements {
 }
 
 impl Check {
-    /// Whether the poses decide every parameter as far as poses of their kind can, and measure as many coordinates as parameters have no prior.
+    /// Whether the poses decide every parameter as far as poses of their kind can, and measure as
+    /// many coordinates as parameters have no prior.
     pub fn suffices(&self) -> bool {
         self.forecast.open <= self.growth.open && self.distinct >= self.without_prior
     }
@@ -177,7 +194,8 @@ pub fn some_of(table: &Measurements, count: usize, seed: u64) -> Measurements {
     table.select(&choose(table.len(), count, seed, ORDER))
 }
 
-/// The held-out rows of sessions and targets that identification rows use as well: those in which predictions can be judged.
+/// The held-out rows of sessions and targets that identification rows use as well: those in which
+/// predictions can be judged.
 pub fn with_known_words(data: &Dataset) -> Vec<usize> {
     let Dataset { measurements, split } = data;
     let placement = Placement::of(measurements);
@@ -198,7 +216,8 @@ fn noise(problem: &Problem, table: &Measurements, kind: Observation) -> f64 {
     let own = |row: &usize| table.observation(*row).kind() == kind.kind();
     let squares = match &table.sigma {
         Some(sigmas) => {
-            let own: Vec<f64> = (0..sigmas.len()).filter(own).map(|row| sigmas[row] * sigmas[row]).collect();
+            let own: Vec<f64> =
+                (0..sigmas.len()).filter(own).map(|row| sigmas[row] * sigmas[row]).collect();
             own.iter().sum::<f64>() / own.len().max(1) as f64
         }
         None => declared * declared,

@@ -6,7 +6,11 @@ use crate::measurement::Measurements;
 use crate::problem::Observation;
 
 /// Numbers that some rows of a table measure, of which a position has so many.
-pub(super) fn coordinates(table: &Measurements, of_position: usize, rows: impl IntoIterator<Item = usize>) -> usize {
+pub(super) fn coordinates(
+    table: &Measurements,
+    of_position: usize,
+    rows: impl IntoIterator<Item = usize>,
+) -> usize {
     let of_row = |row: usize| match table.observation(row) {
         Observation::Position => of_position,
         other => other.coordinates(),

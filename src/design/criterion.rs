@@ -9,8 +9,8 @@ const MOSTLY_PRIOR: f64 = 0.5;
 
 /// What a plan makes small: a size of the covariance C that a set of poses leaves, priors included.
 ///
-/// S, D, A and E are about the arm's parameters. Bases and targets are estimated along with them and are in C, but their own
-/// errors do not count.
+/// S, D, A and E are about the arm's parameters. Bases and targets are estimated along with them
+/// and are in C, but their own errors do not count.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Criterion {
@@ -18,12 +18,14 @@ pub enum Criterion {
     D,
     /// Π C_kk: the geometric mean of the standard errors. Does not depend on units.
     S,
-    /// Σ C_kk / C̄_kk: the mean variance, each parameter's in units of what as many average candidates leave of it, C̄.
+    /// Σ C_kk / C̄_kk: the mean variance, each parameter's in units of what as many average
+    /// candidates leave of it, C̄.
     A,
-    /// The largest variance of any combination, in units of what as many average candidates leave of it; of the
-    /// combinations that those decide more than the priors do.
+    /// The largest variance of any combination, in units of what as many average candidates leave
+    /// of it; of the combinations that those decide more than the priors do.
     E,
-    /// D_s: det of the part of C of these parameters (numbers in the model), all others estimated along with them.
+    /// D_s: det of the part of C of these parameters (numbers in the model), all others estimated
+    /// along with them.
     Subset(Vec<usize>),
     /// S of these parameters alone (numbers in the model), all others estimated along with them.
     Each(Vec<usize>),
@@ -65,8 +67,8 @@ impl Criterion {
         }
     }
 
-    /// Ready to measure information matrices in scaled unknowns; `average` is that of average poses, `prior` that of the
-    /// priors alone.
+    /// Ready to measure information matrices in scaled unknowns; `average` is that of average
+    /// poses, `prior` that of the priors alone.
     pub(super) fn yardstick(
         &self,
         parameters: &[Parameter],
@@ -77,7 +79,10 @@ impl Criterion {
         let is_wanted = |k: usize| match self {
             Self::Subset(columns) | Self::Each(columns) => columns.contains(&k),
             // Where only bases or targets are free, they are what is looked for.
-            _ => !parameters[k].slot.is_placement() || parameters.iter().all(|p| p.slot.is_placement()),
+            _ => {
+                !parameters[k].site.is_placement()
+                    || parameters.iter().all(|p| p.site.is_placement())
+            }
         };
         let (wanted, rest): (Vec<usize>, Vec<usize>) = (0..n).partition(|&k| is_wanted(k));
         let size = match self {
@@ -98,18 +103,22 @@ impl Criterion {
 }
 
 impl Yardstick {
-    /// ln of the size that information M leaves, per parameter where it is a determinant or a product; infinite where M is singular.
+    /// ln of the size that information M leaves, per parameter where it is a determinant or a
+    /// product; infinite where M is singular.
     pub fn value(&self, information: &DMatrix<f64>) -> f64 {
         let Some(cholesky) = information.clone().cholesky() else { return f64::INFINITY };
         match &self.size {
             Size::Determinant => {
-                let Some(rest) = part(information, &self.rest).cholesky() else { return f64::INFINITY };
+                let Some(rest) = part(information, &self.rest).cholesky() else {
+                    return f64::INFINITY;
+                };
                 let log = |l: &DMatrix<f64>| 2.0 * l.diagonal().iter().map(|d| d.ln()).sum::<f64>();
                 (log(rest.l_dirty()) - log(cholesky.l_dirty())) / self.wanted.len() as f64
             }
             Size::Product => {
                 let variances = cholesky.inverse().diagonal();
-                self.wanted.iter().map(|&k| variances[k].ln()).sum::<f64>() / self.wanted.len() as f64
+                self.wanted.iter().map(|&k| variances[k].ln()).sum::<f64>()
+                    / self.wanted.len() as f64
             }
             Size::Trace(weights) => cholesky.inverse().diagonal().dot(weights).ln(),
             Size::Eigenvalue(combinations) => {
@@ -125,10 +134,11 @@ pub(super) fn part(matrix: &DMatrix<f64>, keep: &[usize]) -> DMatrix<f64> {
     matrix.select_rows(keep).select_columns(keep)
 }
 
-/// Combinations F of the unknowns, uncorrelated and of variance one after average poses, that those decide more than the
-/// priors do; all of them, if none is.
+/// Combinations F of the unknowns, uncorrelated and of variance one after average poses, that those
+/// decide more than the priors do; all of them, if none is.
 ///
-/// (C̄_ss)⁻¹ = L Lᵀ and L⁻¹ P_ss L⁻ᵀ = Q diag(prior's share) Qᵀ; rows of Qᵀ Lᵀ whose share is below a half.
+/// (C̄_ss)⁻¹ = L Lᵀ and L⁻¹ P_ss L⁻ᵀ = Q diag(prior's share) Qᵀ; rows of Qᵀ Lᵀ whose share is below
+/// a half.
 fn decided(average: &DMatrix<f64>, prior: &DMatrix<f64>, wanted: &[usize]) -> Option<DMatrix<f64>> {
     let covariance = part(&average.clone().cholesky()?.inverse(), wanted);
     let l = covariance.cholesky()?.inverse().cholesky()?.unpack();
@@ -136,7 +146,8 @@ fn decided(average: &DMatrix<f64>, prior: &DMatrix<f64>, wanted: &[usize]) -> Op
     let share = l.solve_lower_triangular(&half.transpose())?;
     let eigen = (0.5 * (&share + share.transpose())).symmetric_eigen();
     let count = eigen.eigenvalues.len();
-    let mut kept: Vec<usize> = (0..count).filter(|&k| eigen.eigenvalues[k] < MOSTLY_PRIOR).collect();
+    let mut kept: Vec<usize> =
+        (0..count).filter(|&k| eigen.eigenvalues[k] < MOSTLY_PRIOR).collect();
     if kept.is_empty() {
         kept = (0..count).collect();
     }

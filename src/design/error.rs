@@ -47,10 +47,14 @@ pub enum DesignError {
         effect: String,
     },
     /// The nominal arm does not come to rest anywhere.
-    #[error("the nominal arm has no equilibrium under its loads in any pose; check stiffnesses and masses")]
+    #[error(
+        "the nominal arm has no equilibrium under its loads in any pose; check stiffnesses and masses"
+    )]
     NoEquilibrium,
     /// No pose tells anything.
-    #[error("no free parameter moves the target in any pose; check lengths, ranges and their units")]
+    #[error(
+        "no free parameter moves the target in any pose; check lengths, ranges and their units"
+    )]
     NothingSeen,
 }
 

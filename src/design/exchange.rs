@@ -8,7 +8,8 @@ use super::sensitivity::Sensitivity;
 use crate::least_squares::Identifiability;
 use crate::model::parameter::Parameter;
 
-/// Part of the information of average poses that every plan has: keeps plans with too few poses comparable.
+/// Part of the information of average poses that every plan has: keeps plans with too few poses
+/// comparable.
 const RIDGE: f64 = 1e-6;
 /// Information on combinations that neither candidates nor priors see: they stay where they are.
 const HELD: f64 = 1e4;
@@ -52,7 +53,8 @@ impl Exchanged {
 impl Exchange {
     /// Of `poses` poses beside those `given`, which are measured in any case.
     ///
-    /// `None` where the information on the parameters is not finite: some candidate has no equilibrium.
+    /// `None` where the information on the parameters is not finite: some candidate has no
+    /// equilibrium.
     pub fn new(
         parameters: &[Parameter],
         candidates: &Sensitivity,
@@ -65,7 +67,8 @@ impl Exchange {
             n,
             parameters.iter().map(|parameter| parameter.sigma.map_or(0.0, |sigma| sigma.powi(-2))),
         ));
-        let mut average = candidates.information() * (poses as f64 / candidates.len().max(1) as f64);
+        let mut average =
+            candidates.information() * (poses as f64 / candidates.len().max(1) as f64);
         let mut ground = &prior + &average * RIDGE;
         if let Some(given) = given {
             let known = given.information();
@@ -73,7 +76,8 @@ impl Exchange {
             ground += known;
         }
         let mut all = &average + &prior;
-        let scale = DVector::from_fn(n, |k, _| if all[(k, k)] > 0.0 { all[(k, k)].sqrt() } else { 1.0 });
+        let scale =
+            DVector::from_fn(n, |k, _| if all[(k, k)] > 0.0 { all[(k, k)].sqrt() } else { 1.0 });
         let scaled = |mut matrix: DMatrix<f64>| {
             for j in 0..n {
                 for i in 0..n {
@@ -97,13 +101,23 @@ impl Exchange {
         ground += &held;
         all += &held;
         let yardstick = criterion.yardstick(parameters, &all, &scaled_prior)?;
-        Some(Self { candidates: rows, coordinates: candidates.coordinates, scale, ground, yardstick })
+        Some(Self {
+            candidates: rows,
+            coordinates: candidates.coordinates,
+            scale,
+            ground,
+            yardstick,
+        })
     }
 
     /// Other candidates, measured by the same criterion in the same units.
     #[must_use]
     pub fn with_candidates(&self, candidates: &Sensitivity) -> Self {
-        Self { candidates: in_scale(candidates, &self.scale), coordinates: candidates.coordinates, ..self.clone() }
+        Self {
+            candidates: in_scale(candidates, &self.scale),
+            coordinates: candidates.coordinates,
+            ..self.clone()
+        }
     }
 
     /// Number of candidates.
@@ -116,8 +130,8 @@ impl Exchange {
         self.yardstick.value(&self.information(chosen.iter().copied()))
     }
 
-    /// Exchanges each pose in turn for the best candidate, until a sweep over all of them gains nothing  [Cook & Nachtsheim
-    /// 1980: the modified Fedorov exchange].
+    /// Exchanges each pose in turn for the best candidate, until a sweep over all of them gains
+    /// nothing  [Cook & Nachtsheim 1980: the modified Fedorov exchange].
     ///
     /// No candidate is taken twice. `swept` is told of every sweep.
     pub fn improve(&self, mut chosen: Vec<usize>, mut swept: impl FnMut(usize, f64)) -> Exchanged {
@@ -126,8 +140,11 @@ impl Exchange {
             let before = values[values.len() - 1];
             let mut value = before;
             for place in 0..chosen.len() {
-                let others = (0..chosen.len()).filter(|&other| other != place).map(|other| chosen[other]);
-                let Some(scan) = Scan::new(&self.yardstick, &self.information(others)) else { continue };
+                let others =
+                    (0..chosen.len()).filter(|&other| other != place).map(|other| chosen[other]);
+                let Some(scan) = Scan::new(&self.yardstick, &self.information(others)) else {
+                    continue;
+                };
                 // Rounding must not pass for a gain.
                 let least = value - 1e-10 * value.abs().max(1.0);
                 if let Some((better, gained)) =

@@ -24,7 +24,8 @@ pub struct Expected {
     pub nominal: f64,
     /// 1 σ of the prior at the nominal value, SI.
     pub prior: Option<f64>,
-    /// 1 σ of the estimate, SI (that of a logarithm times the nominal value); `None` where nothing will be learned.
+    /// 1 σ of the estimate, SI (that of a logarithm times the nominal value); `None` where nothing
+    /// will be learned.
     pub std_error: Option<f64>,
     /// Part of the value that the data will give, 0…1.
     pub identified: f64,
@@ -81,7 +82,7 @@ impl Forecast {
                     std_error: None,
                     identified: identifiability.visible[k],
                     identified_at_nominal: identifiability.visible[k],
-                    is_placement: parameter.slot.is_placement(),
+                    is_placement: parameter.site.is_placement(),
                 };
                 if visible[k] > 1.0 - PARTLY_OPEN {
                     expected.learn(parameter, variances[k]);
@@ -90,14 +91,21 @@ impl Forecast {
                 expected
             })
             .collect();
-        Self { poses: sensitivity.len(), identifiability, expected, covariance, open: gauge.nrows() }
+        Self {
+            poses: sensitivity.len(),
+            identifiability,
+            expected,
+            covariance,
+            open: gauge.nrows(),
+        }
     }
 
-    /// The same, with the errors to expect of arms that differ from the nominal one: root mean squares over what the poses
-    /// tell about each of them, in `arms`.
+    /// The same, with the errors to expect of arms that differ from the nominal one: root mean
+    /// squares over what the poses tell about each of them, in `arms`.
     ///
-    /// Where a combination is unidentifiable at the nominal arm and its prior is wide, other parameters go with it at other arms: their
-    /// errors are larger than the nominal arm's linearisation says.
+    /// Where a combination is unidentifiable at the nominal arm and its prior is wide, other
+    /// parameters go with it at other arms: their errors are larger than the nominal arm's
+    /// linearisation says.
     #[must_use]
     pub fn over(mut self, parameters: &[Parameter], arms: &[Sensitivity]) -> Self {
         if arms.is_empty() {
@@ -116,7 +124,8 @@ impl Forecast {
 
     /// How well the identified arm predicts positions elsewhere; `poses` in metres (σ = 1 m).
     ///
-    /// The error of a prediction J x has the covariance J C Jᵀ. Noise of a measurement there comes on top.
+    /// The error of a prediction J x has the covariance J C Jᵀ. Noise of a measurement there comes
+    /// on top.
     pub fn prediction(&self, poses: &Sensitivity) -> Prediction {
         let mut squares: Vec<f64> = (0..poses.len())
             .map(|k| {
@@ -126,13 +135,21 @@ impl Forecast {
             .collect();
         squares.sort_by(f64::total_cmp);
         let count = squares.len().max(1);
-        let at = |share: usize| squares.get((count - 1) * share / 100).copied().unwrap_or(0.0).sqrt();
-        Prediction { median: at(50), most: at(95), rms: (squares.iter().sum::<f64>() / count as f64).sqrt() }
+        let at =
+            |share: usize| squares.get((count - 1) * share / 100).copied().unwrap_or(0.0).sqrt();
+        Prediction {
+            median: at(50),
+            most: at(95),
+            rms: (squares.iter().sum::<f64>() / count as f64).sqrt(),
+        }
     }
 
     /// How many of the arm's parameters will be identified to 90 % or more.
     pub fn well_identified(&self) -> usize {
-        self.expected.iter().filter(|expected| !expected.is_placement && expected.is_well_identified()).count()
+        self.expected
+            .iter()
+            .filter(|expected| !expected.is_placement && expected.is_well_identified())
+            .count()
     }
 }
 
@@ -168,8 +185,10 @@ impl Known {
     fn of(triangle: &DMatrix<f64>, parameters: &[Parameter]) -> Self {
         let n = parameters.len();
         let sigmas: Vec<Option<f64>> = parameters.iter().map(|parameter| parameter.sigma).collect();
-        let Identifiability { gauge, visible, .. } = Identifiability::of(&with_priors(triangle, &sigmas));
-        let covariance = Uncertainty::of(triangle, &sigmas, &gauge, &vec![false; n], 1.0).covariance;
+        let Identifiability { gauge, visible, .. } =
+            Identifiability::of(&with_priors(triangle, &sigmas));
+        let covariance =
+            Uncertainty::of(triangle, &sigmas, &gauge, &vec![false; n], 1.0).covariance;
         let variances = covariance.diagonal().iter().map(|variance| variance.max(0.0)).collect();
         Self { covariance, variances, gauge, visible }
     }
@@ -180,7 +199,8 @@ fn with_priors(triangle: &DMatrix<f64>, sigmas: &[Option<f64>]) -> DMatrix<f64> 
     let n = triangle.ncols();
     let mut stacked = DMatrix::zeros(2 * n, n);
     stacked.rows_mut(0, n).copy_from(triangle);
-    let inverse = DVector::from_iterator(n, sigmas.iter().map(|sigma| sigma.map_or(0.0, f64::recip)));
+    let inverse =
+        DVector::from_iterator(n, sigmas.iter().map(|sigma| sigma.map_or(0.0, f64::recip)));
     stacked.rows_mut(n, n).set_diagonal(&inverse);
     stacked.qr().unpack_r()
 }

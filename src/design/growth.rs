@@ -17,8 +17,8 @@ pub struct Growth {
     pub attainable_rank: usize,
     /// Combinations that stay open when all that can be seen is.
     pub open: usize,
-    /// The least number of poses that see all of that and predict positions as exactly as one is measured
-    /// (rms); `None` where the series is too short.
+    /// The least number of poses that see all of that and predict positions as exactly as one is
+    /// measured (rms); `None` where the series is too short.
     pub enough: Option<usize>,
 }
 
@@ -38,9 +38,10 @@ pub struct GrowthStep {
 }
 
 impl Growth {
-    /// Of the poses of `series` in their order, with predictions judged in the poses `workspace` (in metres); `noise` is the
-    /// root mean square length of the error of one measured position \[m\], and `also` a number to look at besides. What can be
-    /// seen is what the series and the poses `elsewhere` see together.
+    /// Of the poses of `series` in their order, with predictions judged in the poses `workspace`
+    /// (in metres); `noise` is the root mean square length of the error of one measured position
+    /// \[m\], and `also` a number to look at besides. What can be seen is what the series and the
+    /// poses `elsewhere` see together.
     pub fn new(
         parameters: &[Parameter],
         series: &Sensitivity,
@@ -49,7 +50,8 @@ impl Growth {
         (noise, also): (f64, usize),
     ) -> Self {
         let step = |poses: usize| {
-            let forecast = Forecast::new(parameters, &series.select(&(0..poses).collect::<Vec<_>>()));
+            let forecast =
+                Forecast::new(parameters, &series.select(&(0..poses).collect::<Vec<_>>()));
             GrowthStep {
                 poses,
                 rank: forecast.identifiability.rank,
@@ -58,7 +60,8 @@ impl Growth {
                 prediction: forecast.prediction(workspace),
             }
         };
-        let mut ladder: Vec<usize> = LADDER.into_iter().filter(|&poses| poses < series.len()).collect();
+        let mut ladder: Vec<usize> =
+            LADDER.into_iter().filter(|&poses| poses < series.len()).collect();
         ladder.extend([also.min(series.len()), series.len()]);
         ladder.sort_unstable();
         ladder.dedup();
@@ -70,11 +73,13 @@ impl Growth {
             }
             None => steps.last().map_or((0, 0), |last| (last.rank, last.open)),
         };
-        let suffices =
-            |step: &GrowthStep| step.rank == attainable_rank && step.open == open && step.prediction.rms <= noise;
+        let suffices = |step: &GrowthStep| {
+            step.rank == attainable_rank && step.open == open && step.prediction.rms <= noise
+        };
         // More poses never tell less, so that the least number can be bracketed.
         let enough = steps.iter().position(suffices).map(|first| {
-            let (mut few, mut many) = (if first == 0 { 0 } else { steps[first - 1].poses }, steps[first].poses);
+            let (mut few, mut many) =
+                (if first == 0 { 0 } else { steps[first - 1].poses }, steps[first].poses);
             while many - few > 1 {
                 let middle = few.midpoint(many);
                 if suffices(&step(middle)) { many = middle } else { few = middle }

@@ -1,8 +1,9 @@
-//! Design of experiments: which poses to measure, and what measurements will tell before anyone makes them.
+//! Design of experiments: which poses to measure, and what measurements will tell before anyone
+//! makes them.
 //!
-//! Everything here is linear about the nominal arm. M = Σ JᵢᵀJᵢ + P is the information on the free parameters: Jᵢ the
-//! derivatives of a position over its σ (3 rows a pose), P = diag(1/σ²) of the priors; C = M⁻¹ is the covariance to expect.
-//! Positions need not be measured for that.
+//! Everything here is linear about the nominal arm. M = Σ JᵢᵀJᵢ + P is the information on the free
+//! parameters: Jᵢ the derivatives of a position over its σ (3 rows a pose), P = diag(1/σ²) of the
+//! priors; C = M⁻¹ is the covariance to expect. Positions need not be measured for that.
 
 mod candidate_poses;
 mod check;

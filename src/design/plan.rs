@@ -5,9 +5,11 @@ use rand::seq::SliceRandom as _;
 use rayon::prelude::*;
 
 use super::coordinates::{coordinates, first_of_each};
-use super::{Criterion, DesignError, Exchange, Exchanged, Extremes, Forecast, Sensitivity, Site, Workspace};
+use super::{
+    Criterion, DesignError, Exchange, Exchanged, Extremes, Forecast, Sensitivity, Site, Workspace,
+};
 use crate::measurement::Measurements;
-use crate::model::parameter::{Parameter, Slot};
+use crate::model::parameter::{Parameter, ParameterSite};
 use crate::numeric::median;
 use crate::problem::{PoseRanges, Problem};
 use crate::random;
@@ -18,7 +20,8 @@ pub(super) const DRAWN: [usize; 2] = [500, 2000];
 const STARTS: usize = 8;
 /// The best exchanges that are refined.
 const REFINED: usize = 4;
-/// Rounds of candidates drawn about the best poses, by how far they lie apart, as a part of the ranges.
+/// Rounds of candidates drawn about the best poses, by how far they lie apart, as a part of the
+/// ranges.
 const ROUNDS: [f64; 8] = [0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.02];
 /// Candidates of a round.
 const ABOUT: usize = 2500;
@@ -90,15 +93,16 @@ pub struct Plan {
     pub coordinates: usize,
     /// Of the poses given and as many others, drawn at random again and again.
     pub random: Vec<Forecast>,
-    /// Whether the plan decides every parameter as far as all candidates together can, and measures as many
-    /// coordinates as parameters have no prior.
+    /// Whether the plan decides every parameter as far as all candidates together can, and measures
+    /// as many coordinates as parameters have no prior.
     pub suffices: bool,
 }
 
-/// Chooses poses by exchange from several starts; the same for the same seed, however many threads there are.
+/// Chooses poses by exchange from several starts; the same for the same seed, however many threads
+/// there are.
 ///
-/// Within ranges, candidates are drawn, and then drawn again ever closer about the best poses. Poses in `given` are measured
-/// in any case.
+/// Within ranges, candidates are drawn, and then drawn again ever closer about the best poses.
+/// Poses in `given` are measured in any case.
 ///
 /// # Errors
 /// There are fewer candidates than poses, or the problem does not say enough.
@@ -112,7 +116,9 @@ pub fn plan(
     if poses == 0 {
         return Err(DesignError::NoPoses);
     }
-    let draw = |ranges: &PoseRanges, count, extremes, stream| ranges.draw(problem, count, extremes, seed, stream);
+    let draw = |ranges: &PoseRanges, count, extremes, stream| {
+        ranges.draw(problem, count, extremes, seed, stream)
+    };
     let given = with_known_distances(given, candidates);
     let given = given.as_ref();
     let (usual, ends) = match candidates {
@@ -156,8 +162,8 @@ pub fn plan(
     }
     let attainable = attainable.saturating_sub(untouched(parameters, &[Some(&all)]));
     let (attainable_rank, least_poses) = attainable_rank(parameters, given.as_ref(), &all);
-    let exchange =
-        Exchange::new(parameters, &all, given.as_ref(), poses, criterion).ok_or(DesignError::NoEquilibrium)?;
+    let exchange = Exchange::new(parameters, &all, given.as_ref(), poses, criterion)
+        .ok_or(DesignError::NoEquilibrium)?;
     let (ends, starts) = starts(&exchange, options);
     let begun = |end: &Exchanged| Found {
         poses: table.select(&end.chosen),
@@ -169,13 +175,16 @@ pub fn plan(
         Candidates::Within(ranges) => ends[..REFINED.min(ends.len())]
             .par_iter()
             .enumerate()
-            .map(|(number, end)| begun(end).refined(problem, &site, ranges, &exchange, (options, number as u64)))
+            .map(|(number, end)| {
+                begun(end).refined(problem, &site, ranges, &exchange, (options, number as u64))
+            })
             .collect(),
         Candidates::Rows(_) => ends.iter().take(1).map(begun).collect(),
     };
     let tried = tried + found.iter().map(|found| found.tried).sum::<usize>();
     // Of equals the first.
-    let best = found.into_iter().reduce(|best, next| if next.value < best.value { next } else { best });
+    let best =
+        found.into_iter().reduce(|best, next| if next.value < best.value { next } else { best });
     let Found { poses: chosen, told, value, .. } = best.ok_or(DesignError::NoEquilibrium)?;
     let forecast = |own: &Sensitivity| match &given {
         Some(given) => Forecast::new(parameters, &given.and(own)),
@@ -183,11 +192,15 @@ pub fn plan(
     };
     let random = (0..DRAWS)
         .into_par_iter()
-        .map(|draw| forecast(&usual.select(&choose(usual.len(), poses, seed, FIRST_DRAW + draw as u64))))
+        .map(|draw| {
+            forecast(&usual.select(&choose(usual.len(), poses, seed, FIRST_DRAW + draw as u64)))
+        })
         .collect();
     let planned = forecast(&told);
     let of_position = all.coordinates;
-    let distinct = |own: &Measurements| coordinates(own, of_position, first_of_each(&own.pose_numbers(problem)));
+    let distinct = |own: &Measurements| {
+        coordinates(own, of_position, first_of_each(&own.pose_numbers(problem)))
+    };
     let apart = of_arm.as_ref().map_or(0, distinct) + distinct(&chosen);
     let every = |own: &Measurements| coordinates(own, of_position, 0..own.len());
     let coordinates = measured.as_ref().map_or(0, every) + every(&chosen);
@@ -210,20 +223,32 @@ pub fn plan(
     })
 }
 
-/// Combinations that the poses given and all candidates see together, and poses without which they cannot be seen.
-fn attainable_rank(parameters: &[Parameter], given: Option<&Sensitivity>, all: &Sensitivity) -> (usize, usize) {
+/// Combinations that the poses given and all candidates see together, and poses without which they
+/// cannot be seen.
+fn attainable_rank(
+    parameters: &[Parameter],
+    given: Option<&Sensitivity>,
+    all: &Sensitivity,
+) -> (usize, usize) {
     let rank = |own: &Sensitivity| Forecast::new(parameters, own).identifiability.rank;
-    let (most, before) = given.map_or_else(|| (rank(all), 0), |given| (rank(&given.and(all)), rank(given)));
+    let (most, before) =
+        given.map_or_else(|| (rank(all), 0), |given| (rank(&given.and(all)), rank(given)));
     (most, most.saturating_sub(before).div_ceil(all.coordinates))
 }
 
-/// What is measured in any case, with the known distances between points that only the candidates touch.
-fn with_known_distances(given: Option<&Measurements>, candidates: &Candidates) -> Option<Measurements> {
+/// What is measured in any case, with the known distances between points that only the candidates
+/// touch.
+fn with_known_distances(
+    given: Option<&Measurements>,
+    candidates: &Candidates,
+) -> Option<Measurements> {
     let Candidates::Rows(rows) = candidates else { return given.cloned() };
-    let is_told =
-        |observation| given.is_some_and(|given| (0..given.len()).any(|row| given.observation(row) == observation));
-    let known: Vec<usize> =
-        (0..rows.len()).filter(|&row| !rows.observation(row).is_of_arm() && !is_told(rows.observation(row))).collect();
+    let is_told = |observation| {
+        given.is_some_and(|given| (0..given.len()).any(|row| given.observation(row) == observation))
+    };
+    let known: Vec<usize> = (0..rows.len())
+        .filter(|&row| !rows.observation(row).is_of_arm() && !is_told(rows.observation(row)))
+        .collect();
     match given {
         _ if known.is_empty() => given.cloned(),
         Some(given) => Some(given.and(&rows.select(&known))),
@@ -231,10 +256,14 @@ fn with_known_distances(given: Option<&Measurements>, candidates: &Candidates) -
     }
 }
 
-/// Numbers without a prior of points, anchors and surfaces that none of these rows touches: what is left out need not be found.
+/// Numbers without a prior of points, anchors and surfaces that none of these rows touches: what is
+/// left out need not be found.
 fn untouched(parameters: &[Parameter], rows: &[Option<&Sensitivity>]) -> usize {
-    let is_seen = |k: usize| rows.iter().flatten().any(|own| own.rows.row(k).iter().any(|slope| *slope != 0.0));
-    let is_free = |own: &Parameter| matches!(own.slot, Slot::Fixture { .. }) && own.sigma.is_none();
+    let is_seen = |k: usize| {
+        rows.iter().flatten().any(|own| own.rows.row(k).iter().any(|slope| *slope != 0.0))
+    };
+    let is_free =
+        |own: &Parameter| matches!(own.site, ParameterSite::Fixture { .. }) && own.sigma.is_none();
     (0..parameters.len()).filter(|&k| is_free(&parameters[k]) && !is_seen(k)).count()
 }
 
@@ -251,7 +280,12 @@ fn starts(exchange: &Exchange, options: &PlanOptions) -> (Vec<Exchanged>, Vec<f6
     let mut ends: Vec<Exchanged> = (0..STARTS)
         .into_par_iter()
         .map(|start| {
-            let chosen = choose(exchange.candidates(), options.poses, options.seed, FIRST_START + start as u64);
+            let chosen = choose(
+                exchange.candidates(),
+                options.poses,
+                options.seed,
+                FIRST_START + start as u64,
+            );
             exchange.improve(chosen, |sweep, value| options.tell(Some(start + 1), sweep, value))
         })
         .collect();
@@ -296,7 +330,9 @@ impl Found {
                 .collect();
             let own = (0..kept.len()).filter(|&k| is_own(kept[k])).collect();
             let told = told.select(&kept);
-            let end = exchange.with_candidates(&told).improve(own, |sweep, value| options.tell(None, sweep, value));
+            let end = exchange
+                .with_candidates(&told)
+                .improve(own, |sweep, value| options.tell(None, sweep, value));
             self.tried += kept.len() - options.poses;
             self.value = end.value();
             self.poses = about.select(&end.chosen.iter().map(|&k| kept[k]).collect::<Vec<_>>());
@@ -307,15 +343,18 @@ impl Found {
 }
 
 impl Plan {
-    /// 1 σ of parameter k after random poses, the median of the draws, SI; `None` where most of them say nothing.
+    /// 1 σ of parameter k after random poses, the median of the draws, SI; `None` where most of
+    /// them say nothing.
     pub fn random_error(&self, k: usize) -> Option<f64> {
         let errors = self.random.iter().map(|forecast| forecast.expected[k].std_error);
         median(errors.map(|error| error.unwrap_or(f64::INFINITY))).filter(|error| error.is_finite())
     }
 
-    /// The arm's parameters that random poses identify to 90 % or more (median of the draws), by their numbers.
+    /// The arm's parameters that random poses identify to 90 % or more (median of the draws), by
+    /// their numbers.
     pub fn meaningful(&self) -> Vec<usize> {
-        let share = |k: usize| median(self.random.iter().map(|forecast| forecast.expected[k].identified));
+        let share =
+            |k: usize| median(self.random.iter().map(|forecast| forecast.expected[k].identified));
         let arm = |k: &usize| !self.planned.expected[*k].is_placement;
         (0..self.planned.expected.len())
             .filter(arm)
@@ -323,12 +362,14 @@ impl Plan {
             .collect()
     }
 
-    /// By what factor the plan's standard errors are smaller than those of random poses: the geometric mean over these
-    /// parameters; `None` without any that both give.
+    /// By what factor the plan's standard errors are smaller than those of random poses: the
+    /// geometric mean over these parameters; `None` without any that both give.
     pub fn gain(&self, parameters: &[usize]) -> Option<f64> {
         let ratios: Vec<f64> = parameters
             .iter()
-            .filter_map(|&k| Some((self.random_error(k)? / self.planned.expected[k].std_error?).ln()))
+            .filter_map(|&k| {
+                Some((self.random_error(k)? / self.planned.expected[k].std_error?).ln())
+            })
             .collect();
         (!ratios.is_empty()).then(|| (ratios.iter().sum::<f64>() / ratios.len() as f64).exp())
     }

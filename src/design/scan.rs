@@ -15,7 +15,8 @@ const HALVINGS: usize = 50;
 
 /// Information without one of the poses, ready to try candidates in its place.
 ///
-/// One more pose J (3 rows, 6 with its orientation) takes C to C − W S⁻¹ Wᵀ, W = C Jᵀ, S = I + J C Jᵀ          [Fedorov 1972, ch. 3]
+/// One more pose J (3 rows, 6 with its orientation) takes C to C − W S⁻¹ Wᵀ, W = C Jᵀ, S = I + J C
+/// Jᵀ          [Fedorov 1972, ch. 3]
 pub(super) struct Scan<'a> {
     yardstick: &'a Yardstick,
     covariance: DMatrix<f64>,
@@ -44,11 +45,16 @@ impl<'a> Scan<'a> {
     pub fn new(yardstick: &'a Yardstick, information: &DMatrix<f64>) -> Option<Self> {
         let covariance = information.clone().cholesky()?.inverse();
         let state = match &yardstick.size {
-            Size::Determinant => State::Determinant(part(information, &yardstick.rest).cholesky()?.inverse()),
+            Size::Determinant => {
+                State::Determinant(part(information, &yardstick.rest).cholesky()?.inverse())
+            }
             Size::Product => State::Product,
-            Size::Trace(weights) => State::Trace { weights, before: covariance.diagonal().dot(weights) },
+            Size::Trace(weights) => {
+                State::Trace { weights, before: covariance.diagonal().dot(weights) }
+            }
             Size::Eigenvalue(combinations) => {
-                let eigen = (combinations * &covariance * combinations.transpose()).symmetric_eigen();
+                let eigen =
+                    (combinations * &covariance * combinations.transpose()).symmetric_eigen();
                 let turned = eigen.eigenvectors.transpose() * combinations;
                 State::Eigenvalue { values: eigen.eigenvalues, turned }
             }
@@ -56,8 +62,8 @@ impl<'a> Scan<'a> {
         Some(Self { yardstick, covariance, value: yardstick.value(information), state })
     }
 
-    /// The candidate (Jᵀ of all, shape = (unknowns, coordinates · candidates)) with the lowest value below `least`, of those
-    /// that `may` be taken; the first of equals.
+    /// The candidate (Jᵀ of all, shape = (unknowns, coordinates · candidates)) with the lowest
+    /// value below `least`, of those that `may` be taken; the first of equals.
     pub fn best(
         &self,
         (candidates, coordinates): (&DMatrix<f64>, usize),
@@ -83,7 +89,9 @@ impl<'a> Scan<'a> {
         let starts: Vec<usize> = (0..count).step_by(TOGETHER).collect();
         let best: Vec<_> = starts
             .into_par_iter()
-            .map(|start| self.best_of::<R>(candidates, start..(start + TOGETHER).min(count), &may, least))
+            .map(|start| {
+                self.best_of::<R>(candidates, start..(start + TOGETHER).min(count), &may, least)
+            })
             .collect();
         best.into_iter().flatten().reduce(|best, next| if next.1 < best.1 { next } else { best })
     }
@@ -112,7 +120,8 @@ impl<'a> Scan<'a> {
             State::Eigenvalue { turned, .. } => turned * &moved,
         };
         for k in (0..range.len()).filter(|&k| may(range.start + k)) {
-            let (j, w, other) = (rows.columns(R * k, R), moved.columns(R * k, R), other.columns(R * k, R));
+            let (j, w, other) =
+                (rows.columns(R * k, R), moved.columns(R * k, R), other.columns(R * k, R));
             let s: Square<R> = plus_identity(&j, &w);
             let value = match &self.state {
                 State::Determinant(_) => {
@@ -149,7 +158,12 @@ impl<'a> Scan<'a> {
     /// S of the rest's part alone; `moved` is W of that.
     fn rest_s<const R: usize>(&self, j: &DMatrixView<f64>, moved: &DMatrixView<f64>) -> Square<R> {
         let entry = |a: usize, b: usize| -> f64 {
-            self.yardstick.rest.iter().zip(moved.column(b).iter()).map(|(&row, w)| j[(row, a)] * w).sum()
+            self.yardstick
+                .rest
+                .iter()
+                .zip(moved.column(b).iter())
+                .map(|(&row, w)| j[(row, a)] * w)
+                .sum()
         };
         Square::from_fn(|a, b| f64::from(u8::from(a == b)) + entry(a, b))
     }
@@ -189,14 +203,22 @@ fn trace<const R: usize>(w: &DMatrixView<f64>, s: &Square<R>, weighted: &DMatrix
     let Some(inverse) = s.try_inverse() else { return 0.0 };
     let gram = |a: usize, b: usize| w.column(a).dot(&weighted.column(b)) * inverse[(a, b)];
     let on: f64 = (0..R).map(|a| gram(a, a)).sum();
-    let off: f64 = (0..R).flat_map(|a| (a + 1..R).map(move |b| (a, b))).map(|(a, b)| gram(a, b)).sum();
+    let off: f64 =
+        (0..R).flat_map(|a| (a + 1..R).map(move |b| (a, b))).map(|(a, b)| gram(a, b)).sum();
     on + 2.0 * off
 }
 
-/// ln of the largest eigenvalue of Λ − Z Zᵀ, Z Zᵀ = Y S⁻¹ Yᵀ with Y = Qᵀ F W; `least` or more where it is no less than that.
+/// ln of the largest eigenvalue of Λ − Z Zᵀ, Z Zᵀ = Y S⁻¹ Yᵀ with Y = Qᵀ F W; `least` or more where
+/// it is no less than that.
 ///
-/// Of Λ − Z Zᵀ − t as many eigenvalues are positive as of Λ − t and S − Yᵀ(Λ − t)⁻¹Y together, less the rows of S [Haynsworth 1968].
-fn largest<const R: usize>(values: &DVector<f64>, w: &DMatrixView<f64>, s: &Square<R>, least: f64) -> f64
+/// Of Λ − Z Zᵀ − t as many eigenvalues are positive as of Λ − t and S − Yᵀ(Λ − t)⁻¹Y together, less
+/// the rows of S [Haynsworth 1968].
+fn largest<const R: usize>(
+    values: &DVector<f64>,
+    w: &DMatrixView<f64>,
+    s: &Square<R>,
+    least: f64,
+) -> f64
 where
     Square<R>: Small,
 {
@@ -212,7 +234,12 @@ where
 }
 
 /// Number of positive eigenvalues of S − Yᵀ(Λ − t)⁻¹Y.
-fn positive_eigenvalues<const R: usize>(s: &Square<R>, w: &DMatrixView<f64>, values: &DVector<f64>, t: f64) -> usize
+fn positive_eigenvalues<const R: usize>(
+    s: &Square<R>,
+    w: &DMatrixView<f64>,
+    values: &DVector<f64>,
+    t: f64,
+) -> usize
 where
     Square<R>: Small,
 {

@@ -9,10 +9,12 @@ use crate::model::{Model, Pose, PoseResiduals};
 /// Poses differentiated together.
 const TOGETHER: usize = 64;
 
-/// Derivatives of the measured coordinates of some poses, over their σ, with respect to every free parameter.
+/// Derivatives of the measured coordinates of some poses, over their σ, with respect to every free
+/// parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensitivity {
-    /// Jᵀ, shape = (parameters, coordinates · poses) [1 / unit of x]; not finite where a pose has no equilibrium.
+    /// Jᵀ, shape = (parameters, coordinates · poses) [1 / unit of x]; not finite where a pose has
+    /// no equilibrium.
     pub rows: DMatrix<f64>,
     /// Measured coordinates of a pose: three, or six with its orientation.
     pub coordinates: usize,
@@ -96,7 +98,11 @@ impl Sensitivity {
         let n = self.rows.nrows();
         let mut block = Block::zeros(self.rows.ncols(), n);
         for j in 0..n {
-            block.column_mut(j).iter_mut().zip(self.rows.row(j).iter()).for_each(|(out, value)| *out = *value);
+            block
+                .column_mut(j)
+                .iter_mut()
+                .zip(self.rows.row(j).iter())
+                .for_each(|(out, value)| *out = *value);
         }
         let mut triangle = Triangle::new(n);
         triangle.absorb(&mut block);

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-/// A box and half-spaces that the nominal target has to stay in, frame of the arm's base; the rest of the arm is not looked at.
+/// A box and half-spaces that the nominal target has to stay in, frame of the arm's base; the rest
+/// of the arm is not looked at.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Workspace {
     /// Opposite corners of the box, least first \[m\].
@@ -17,6 +18,7 @@ impl Workspace {
         let inside = |[from, to]: &[Vector3<f64>; 2]| {
             point.iter().zip(from).zip(to).all(|((x, from), to)| (*from..=*to).contains(x))
         };
-        self.room.as_ref().is_none_or(inside) && self.planes.iter().all(|(normal, least)| normal.dot(point) >= *least)
+        self.room.as_ref().is_none_or(inside)
+            && self.planes.iter().all(|(normal, least)| normal.dot(point) >= *least)
     }
 }

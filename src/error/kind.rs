@@ -20,9 +20,13 @@ pub enum InputErrorKind {
     // Files.
     #[error("no such file; give a problem.toml or the folder that holds one")]
     ProblemMissing,
-    #[error("no such file; give the TRUTH.toml that describes the simulation, or the folder that holds one")]
+    #[error(
+        "no such file; give the TRUTH.toml that describes the simulation, or the folder that holds one"
+    )]
     TruthMissing,
-    #[error("no such file; give a STUDY.toml or the folder that holds one; docs/study.md says how to write one")]
+    #[error(
+        "no such file; give a STUDY.toml or the folder that holds one; docs/study.md says how to write one"
+    )]
     StudyMissing,
     #[error("no such file: {}; paths are relative to the study's folder", path.display())]
     StudyFileMissing { path: PathBuf },
@@ -38,7 +42,9 @@ pub enum InputErrorKind {
     Unreadable { source: io::Error },
     #[error("larger than {most} MiB; is it the right file?")]
     FileTooLarge { most: u64 },
-    #[error("the line is longer than {most} KiB; is it a table with its rows on lines of their own?")]
+    #[error(
+        "the line is longer than {most} KiB; is it a table with its rows on lines of their own?"
+    )]
     LineTooLong { most: u64 },
     #[error("{found} {what}; at most {most}")]
     TooMany { what: &'static str, found: usize, most: usize },
@@ -98,13 +104,17 @@ pub enum InputErrorKind {
     Empty,
 
     // The arm.
-    #[error("\"{name}\" cannot name a folder; leave out / \\ : * ? \" < > | and spaces or dots at either end")]
+    #[error(
+        "\"{name}\" cannot name a folder; leave out / \\ : * ? \" < > | and spaces or dots at either end"
+    )]
     NotAFolderName { name: String },
     #[error("an arm has at least one joint; add a section [[joint]]")]
     NoJoints,
     #[error("a beam lies along its joint's a, which is 0 here; give a_m or a_mm")]
     BeamWithoutLength,
-    #[error("a beam lies along a before its joint; write the table in the modified form (without dh = \"standard\")")]
+    #[error(
+        "a beam lies along a before its joint; write the table in the modified form (without dh = \"standard\")"
+    )]
     BeamInStandardForm,
     #[error(
         "a standard table has one chain and one tool, behind its last row; write it in the modified form (without dh = \"standard\")"
@@ -112,11 +122,17 @@ pub enum InputErrorKind {
     NotInStandardForm,
     #[error("{what} takes one chain of joints; this arm is a tree")]
     NotAChain { what: &'static str },
-    #[error("{what} takes one tool behind the last joint; this arm has a [[target]], or its tool on another joint")]
+    #[error(
+        "{what} takes one tool behind the last joint; this arm has a [[target]], or its tool on another joint"
+    )]
     NotOneTool { what: &'static str },
-    #[error("joint {joint} cannot stand on joint {parent}: list it behind the joint that it stands on")]
+    #[error(
+        "joint {joint} cannot stand on joint {parent}: list it behind the joint that it stands on"
+    )]
     StandsOnLater { joint: usize, parent: u64 },
-    #[error("the branch of joint {parent} has ended; list everything that stands on a joint right behind it")]
+    #[error(
+        "the branch of joint {parent} has ended; list everything that stands on a joint right behind it"
+    )]
     BranchEnded { parent: u64 },
     #[error("a fixed joint follows no other; leave mimic out, or give the joint another kind")]
     FixedFollows,
@@ -136,9 +152,15 @@ pub enum InputErrorKind {
     TargetsUnnamed { targets: Vec<String> },
     #[error("another {what} is called \"{name}\" (line {line}); choose another name")]
     RepeatedFixture { what: &'static str, name: String, line: usize },
-    #[error("no {what} is called \"{name}\"{}; {}", meant(name, known), list("there are", known, "none is declared"))]
+    #[error(
+        "no {what} is called \"{name}\"{}; {}",
+        meant(name, known),
+        list("there are", known, "none is declared")
+    )]
     UnknownFixture { what: &'static str, name: String, known: Vec<String> },
-    #[error("nobody knows where {parameter} is, so it can neither be held nor have a prior; write {write}")]
+    #[error(
+        "nobody knows where {parameter} is, so it can neither be held nor have a prior; write {write}"
+    )]
     HeldUnknown { parameter: String, write: &'static str },
     #[error("nobody knows where the {what} \"{name}\" is; declare about where: {write}")]
     PlaceUnknown { what: &'static str, name: String, write: &'static str },
@@ -173,9 +195,14 @@ pub enum InputErrorKind {
     UnknownLink { link: String, links: Vec<String> },
     #[error("a joint is coupled to another one; for joint {joint} alone write gear-ratio")]
     CoupledToItself { joint: usize },
-    #[error("\"{name}\" cannot name a covariate: it is one of flexcal's own columns, or holds one of [ ] , * ?")]
+    #[error(
+        "\"{name}\" cannot name a covariate: it is one of flexcal's own columns, or holds one of [ ] , * ?"
+    )]
     NoCovariateName { name: String },
-    #[error("no covariate is called \"{name}\"; [data.covariates] {}", list("has", known, "has none"))]
+    #[error(
+        "no covariate is called \"{name}\"; [data.covariates] {}",
+        list("has", known, "has none")
+    )]
     UnknownCovariate { name: String, known: Vec<String> },
     #[error("every row names a fixed point in the column nest; none is of the arm")]
     NestsAlone,
@@ -185,7 +212,9 @@ pub enum InputErrorKind {
     NotOnePlace,
     #[error("no order; write at least one, as in [1]")]
     NoOrders,
-    #[error("{order} is no order; write a number of cycles a revolution, above 0 and up to {highest}")]
+    #[error(
+        "{order} is no order; write a number of cycles a revolution, above 0 and up to {highest}"
+    )]
     NotAnOrder { order: f64, highest: f64 },
     #[error("order {order} stands twice")]
     RepeatedOrder { order: u32 },
@@ -193,7 +222,9 @@ pub enum InputErrorKind {
     RepeatedEffect { line: usize },
     #[error("order {order} of this joint is declared already on line {line}")]
     RepeatedHarmonic { order: u32, line: usize },
-    #[error("joint {joint} is fixed and takes no command; leave the effect out, or free the joint's own parameters")]
+    #[error(
+        "joint {joint} is fixed and takes no command; leave the effect out, or free the joint's own parameters"
+    )]
     NoCommand { joint: usize },
     #[error("joint {joint} has no link that could bend: its a is 0")]
     NoLink { joint: usize },
@@ -212,11 +243,15 @@ pub enum InputErrorKind {
     RepeatedCompensator { joint: usize, line: usize },
     #[error("no beam has a hoist; add a section [joint.beam.hoist]")]
     NoHoist,
-    #[error("the loads act on the bent arm already; with this effect write equilibrium = \"undeflected\" in [statics]")]
+    #[error(
+        "the loads act on the bent arm already; with this effect write equilibrium = \"undeflected\" in [statics]"
+    )]
     InEquilibriumAlready,
     #[error("{name} enters where another parameter is already")]
     Occupied { name: String },
-    #[error("{name} is driven, and only the coordinate of a moving joint and a shift of the measurement may be")]
+    #[error(
+        "{name} is driven, and only the coordinate of a moving joint and a shift of the measurement may be"
+    )]
     NotDrivable { name: String },
     #[error("{name} enters where the arm has nothing")]
     EntersNowhere { name: String },
@@ -252,13 +287,19 @@ pub enum InputErrorKind {
     // Constraints.
     #[error("a constraint speaks of angles, lengths, stiffnesses and rigidities only")]
     NotConstrainable,
-    #[error("no terms; write the parameters and their coefficients, as in {{ \"A.EI\" = 1.0, \"B.EI\" = -1.0 }}")]
+    #[error(
+        "no terms; write the parameters and their coefficients, as in {{ \"A.EI\" = 1.0, \"B.EI\" = -1.0 }}"
+    )]
     NoTerms,
     #[error("a coefficient of 0 says nothing; leave the parameter out")]
     NoCoefficient,
     #[error("no limit; write at_least or at_most (with a unit for lengths and angles)")]
     NoLimit,
-    #[error("no such parameter{}; {}", meant(name, known), list("there are", known, "the arm has none"))]
+    #[error(
+        "no such parameter{}; {}",
+        meant(name, known),
+        list("there are", known, "the arm has none")
+    )]
     UnknownParameter { name: String, known: Vec<String> },
     #[error(
         "does not add up with {other}: angles, lengths and logarithms of stiffnesses go in constraints of their own"
@@ -268,14 +309,20 @@ pub enum InputErrorKind {
     LimitOfAnotherKind { parameter: String, write: &'static str },
     #[error("no parameter is free, so there is nothing to identify; {write}")]
     NothingFree { write: &'static str },
-    #[error("none of its parameters is free; free one in [parameters], or leave the constraint out")]
+    #[error(
+        "none of its parameters is free; free one in [parameters], or leave the constraint out"
+    )]
     NothingConstrained,
 
-    #[error("the nominal arm has no equilibrium under its loads here; check stiffnesses and masses")]
+    #[error(
+        "the nominal arm has no equilibrium under its loads here; check stiffnesses and masses"
+    )]
     NoEquilibrium,
 
     // The truth of a simulation.
-    #[error("a range is two numbers, the lower one first; for a fixed value write [{value}, {value}]")]
+    #[error(
+        "a range is two numbers, the lower one first; for a fixed value write [{value}, {value}]"
+    )]
     OneNumber { value: f64 },
     #[error("a range is two numbers, the lower one first; found {found}")]
     NotARange { found: usize },
@@ -285,7 +332,9 @@ pub enum InputErrorKind {
     AlwaysInEquilibrium,
     #[error("needs temperatures; write {write}")]
     NeedsTemperature { write: &'static str },
-    #[error("the problem holds out session \"{session}\", and a simulation has no sessions; use column or fraction")]
+    #[error(
+        "the problem holds out session \"{session}\", and a simulation has no sessions; use column or fraction"
+    )]
     NoSessions { session: String },
 
     // Studies.
@@ -293,13 +342,19 @@ pub enum InputErrorKind {
     Repeated,
     #[error("the list is empty; write at least one value")]
     EmptyList,
-    #[error("a study of misprints is done at once, with neither shares nor parts; leave out --shard and merge")]
+    #[error(
+        "a study of misprints is done at once, with neither shares nor parts; leave out --shard and merge"
+    )]
     NotOfFits,
     #[error("the study says how many poses there are; leave it out")]
     PosesOfStudy,
-    #[error("the model makes no measurements with effects that the problem does not declare; write data = \"rig\"")]
+    #[error(
+        "the model makes no measurements with effects that the problem does not declare; write data = \"rig\""
+    )]
     NeedsRig,
-    #[error("{solver} does not keep the bounds and constraints of the problem; write bounded, interior-point or auto")]
+    #[error(
+        "{solver} does not keep the bounds and constraints of the problem; write bounded, interior-point or auto"
+    )]
     SolverIgnoresBounds { solver: &'static str },
     #[error("no parameter of the kind that {strategy} varies is free in the problem; leave it out")]
     NothingToVary { strategy: &'static str },
@@ -323,7 +378,10 @@ pub enum InputErrorKind {
          whatever is to judge the arm; identify tells the errors of contacts, distances and tilts"
     )]
     NoPositionsHeldOut,
-    #[error("no session is called \"{session}\"; there {}", list("is", sessions, "is no column session"))]
+    #[error(
+        "no session is called \"{session}\"; there {}",
+        list("is", sessions, "is no column session")
+    )]
     UnknownSession { session: String, sessions: Vec<String> },
 
     // Tables of measurements.
@@ -349,7 +407,9 @@ pub enum InputErrorKind {
     NoSuchColumn { file: PathBuf, name: String, known: Vec<String> },
     #[error("{} has several columns of this name; say which by its place, as in \"#{place}\"", file.display())]
     AmbiguousColumn { file: PathBuf, place: usize },
-    #[error("the table has a column {name} of its own, and none that is {write}; is that meant here?")]
+    #[error(
+        "the table has a column {name} of its own, and none that is {write}; is that meant here?"
+    )]
     ColumnHidden { name: String, write: String },
     #[error("not a column that flexcal knows{}", question(meant.as_deref()))]
     UnknownMeaning { meant: Option<String> },
@@ -361,15 +421,21 @@ pub enum InputErrorKind {
         "orientation is to be fitted, and the measurements hold none; add rx_deg, ry_deg, rz_deg or qx, qy, qz, qw"
     )]
     NoOrientation,
-    #[error("orientation is weighed against position; write position_sigma_mm too, or a column sigma_mm")]
+    #[error(
+        "orientation is weighed against position; write position_sigma_mm too, or a column sigma_mm"
+    )]
     NoPositionSigma,
     #[error("\"{value}\" is neither a number nor a time such as 2024-05-31T14:03:20.5")]
     NotATime { value: String },
-    #[error("\"{value}\" is not a number; where numbers have a decimal comma, write decimal = \",\" in [data.format]")]
+    #[error(
+        "\"{value}\" is not a number; where numbers have a decimal comma, write decimal = \",\" in [data.format]"
+    )]
     DecimalComma { value: String },
     #[error("missing; add {write}{}", instead("column ", near.as_deref()))]
     MissingColumn { write: String, near: Option<String> },
-    #[error("not a column that is known; a letter off {meant}: write that, or a name that is not so near")]
+    #[error(
+        "not a column that is known; a letter off {meant}: write that, or a name that is not so near"
+    )]
     MistypedColumn { meant: String },
     #[error("given already as column {first}; keep one of the two")]
     RepeatedColumn { first: String },
@@ -400,7 +466,9 @@ pub enum NoRows {
     Column { column: String, word: &'static str },
     #[error("every row is of session \"{session}\"")]
     Session { session: String },
-    #[error("the {rows} rows have {configurations} joint configurations, too few for fraction {fraction}")]
+    #[error(
+        "the {rows} rows have {configurations} joint configurations, too few for fraction {fraction}"
+    )]
     Fraction { rows: usize, configurations: usize, fraction: String },
 }
 
@@ -415,7 +483,9 @@ pub enum WarningKind {
     Unmapped { names: Vec<String> },
     #[error("nothing was measured in {rows} row{}, the first here: left out", plural(*rows))]
     RowsMissing { rows: usize },
-    #[error("orientations take no part in the search for effects: its fits and its evidence are of positions")]
+    #[error(
+        "orientations take no part in the search for effects: its fits and its evidence are of positions"
+    )]
     OrientationLeftOut,
     #[error(
         "rows are marked in the column split, and held_out divides them otherwise; held_out = {{ column = \"split\" }} follows the marks"
@@ -460,7 +530,11 @@ fn more(rows: usize, named: &[String]) -> String {
 }
 
 fn further(rows: usize) -> String {
-    if rows > 1 { format!(", and in {} further row{}", rows - 1, plural(rows - 1)) } else { String::new() }
+    if rows > 1 {
+        format!(", and in {} further row{}", rows - 1, plural(rows - 1))
+    } else {
+        String::new()
+    }
 }
 
 /// Where a column goes that is not a known one written wrongly.
@@ -483,7 +557,8 @@ fn difference(other: &Path, has: bool) -> String {
 
 /// `there are "a", "b"`.
 fn in_quotes(names: &[String]) -> String {
-    let names: Vec<String> = names.iter().map(|name| format!("\"{}\"", shortened(name, 40))).collect();
+    let names: Vec<String> =
+        names.iter().map(|name| format!("\"{}\"", shortened(name, 40))).collect();
     list("there are", &names, "its header is empty")
 }
 

@@ -2,7 +2,8 @@
 
 use strsim::{damerau_levenshtein, normalized_damerau_levenshtein};
 
-/// How alike two words must be for one to be meant by the other: 1 is the same word, 0 has nothing in common.
+/// How alike two words must be for one to be meant by the other: 1 is the same word, 0 has nothing
+/// in common.
 const ALIKE: f64 = 0.6;
 
 /// Longer words are not compared: no known one is near [bytes].
@@ -24,7 +25,8 @@ pub(crate) fn nearest<T: AsRef<str>>(word: &str, known: impl IntoIterator<Item =
     best.map(|(_, candidate)| candidate)
 }
 
-/// Whether one letter left out, added, replaced or exchanged with the next, or nothing but capitals, makes one word of another.
+/// Whether one letter left out, added, replaced or exchanged with the next, or nothing but
+/// capitals, makes one word of another.
 pub(crate) fn one_typo(word: &str, known: &str) -> bool {
     damerau_levenshtein(&word.to_lowercase(), &known.to_lowercase()) <= 1
 }

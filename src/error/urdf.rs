@@ -45,7 +45,9 @@ pub enum UrdfMistake {
     NoJoint { name: String, known: Vec<String> },
     #[error("joints follow each other in a circle by <mimic>")]
     MimicCircle,
-    #[error("link \"{link}\" is the child of two joints, \"{first}\" and \"{second}\"; a URDF is a tree")]
+    #[error(
+        "link \"{link}\" is the child of two joints, \"{first}\" and \"{second}\"; a URDF is a tree"
+    )]
     TwoParents { link: String, first: String, second: String },
     #[error("the joints form a loop through link \"{link}\"; a URDF is a tree")]
     Loop { link: String },

@@ -1,4 +1,5 @@
-//! Files: read up to a size, written whole or not at all, and told apart from those of others; tables as their text.
+//! Files: read up to a size, written whole or not at all, and told apart from those of others;
+//! tables as their text.
 
 mod ready;
 mod record;

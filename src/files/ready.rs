@@ -8,8 +8,9 @@ use tempfile::NamedTempFile;
 
 /// A text that is on the disk as a whole and lacks only its name.
 ///
-/// Where the system can, it has no name at all until then, so that a process that is killed leaves nothing behind; killed between the
-/// two calls that replace a file, it leaves what the next one to replace files there takes away.
+/// Where the system can, it has no name at all until then, so that a process that is killed leaves
+/// nothing behind; killed between the two calls that replace a file, it leaves what the next one to
+/// replace files there takes away.
 #[derive(Debug)]
 pub struct Ready {
     path: PathBuf,
@@ -24,7 +25,8 @@ enum Kept {
 }
 
 impl Ready {
-    /// Writes `text` for `path`, whose folder is made if it is not there, and waits until the disk has it.
+    /// Writes `text` for `path`, whose folder is made if it is not there, and waits until the disk
+    /// has it.
     ///
     /// An existing file keeps its permissions, a new one gets those that files of the process get.
     ///
@@ -103,35 +105,44 @@ const PASSING: &str = ".flexcal-";
 #[cfg(target_os = "linux")]
 const LEFT: std::time::Duration = std::time::Duration::from_secs(60);
 
-/// Takes away what processes left that are no more. On a folder that several machines share a number may be that of another one's: what is
-/// younger than [`LEFT`] stays.
+/// Takes away what processes left that are no more. On a folder that several machines share a
+/// number may be that of another one's: what is younger than [`LEFT`] stays.
 #[cfg(target_os = "linux")]
 fn clear(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
-        let process = name.to_str().and_then(|name| name.strip_prefix(PASSING)?.split_once('-')?.0.parse::<u32>().ok());
+        let process = name
+            .to_str()
+            .and_then(|name| name.strip_prefix(PASSING)?.split_once('-')?.0.parse::<u32>().ok());
         let is_gone = |process: u32| !Path::new("/proc").join(process.to_string()).exists();
-        let is_old = || entry.metadata()?.modified()?.elapsed().map_err(io::Error::other).map(|age| age > LEFT);
+        let is_old = || {
+            entry.metadata()?.modified()?.elapsed().map_err(io::Error::other).map(|age| age > LEFT)
+        };
         if process.is_some_and(is_gone) && is_old().unwrap_or(false) {
             _ = fs::remove_file(entry.path());
         }
     }
 }
 
-/// Gives a file without a name its own: at once where nothing has it, else by way of a name that nobody else takes.
+/// Gives a file without a name its own: at once where nothing has it, else by way of a name that
+/// nobody else takes.
 #[cfg(target_os = "linux")]
 fn name(file: &File, folder: &Path, path: &Path) -> io::Result<()> {
     use std::os::fd::AsRawFd as _;
 
     use rustix::fs::{AtFlags, CWD, linkat};
     let nameless = format!("/proc/self/fd/{}", file.as_raw_fd());
-    let link = |to: &Path| linkat(CWD, &nameless, CWD, to, AtFlags::SYMLINK_FOLLOW).map_err(io::Error::from);
+    let link = |to: &Path| {
+        linkat(CWD, &nameless, CWD, to, AtFlags::SYMLINK_FOLLOW).map_err(io::Error::from)
+    };
     match link(path) {
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
         done => return done,
     }
     clear(folder);
-    let new = tempfile::Builder::new().prefix(&format!("{PASSING}{}-", std::process::id())).make_in(folder, link)?;
+    let new = tempfile::Builder::new()
+        .prefix(&format!("{PASSING}{}-", std::process::id()))
+        .make_in(folder, link)?;
     fs::rename(new.path(), path)?;
     // It is gone under this name already.
     _ = new.into_temp_path().keep();

@@ -13,7 +13,8 @@ const NAME: &str = ".flexcal";
 /// Largest one that is read [bytes].
 const LARGEST: u64 = 1 << 20;
 
-/// What flexcal wrote to a folder: a line of digest, command and name for each file, in `.flexcal` there.
+/// What flexcal wrote to a folder: a line of digest, command and name for each file, in `.flexcal`
+/// there.
 ///
 /// A file that has been changed since is not flexcal's any more.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -41,7 +42,12 @@ impl Record {
     pub fn of(folder: &Path) -> io::Result<Self> {
         let text = match at_most(&folder.join(NAME), LARGEST) {
             Ok(text) => text,
-            Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    io::ErrorKind::NotFound | io::ErrorKind::NotADirectory
+                ) =>
+            {
                 return Ok(Self::default());
             }
             Err(error) => return Err(error),
@@ -49,7 +55,11 @@ impl Record {
         let line = |line: &str| {
             let (digest, rest) = line.split_once(' ')?;
             let (command, name) = rest.split_once(' ')?;
-            Some(Line { digest: digest.to_owned(), command: command.to_owned(), name: name.to_owned() })
+            Some(Line {
+                digest: digest.to_owned(),
+                command: command.to_owned(),
+                name: name.to_owned(),
+            })
         };
         Ok(Self { lines: String::from_utf8_lossy(&text).lines().filter_map(line).collect() })
     }
@@ -80,7 +90,10 @@ impl Record {
             .lines
             .iter()
             .enumerate()
-            .filter(|(k, own)| !gone(&own.name) && self.lines.iter().skip(k + 1).all(|later| later.name != own.name))
+            .filter(|(k, own)| {
+                !gone(&own.name)
+                    && self.lines.iter().skip(k + 1).all(|later| later.name != own.name)
+            })
             .map(|(_, line)| line.clone())
             .collect();
         self.lines = last;

@@ -18,9 +18,10 @@ const UNSEEN: f64 = 1e-10;
 /// Residuals and derivatives at a point, which serve at others.
 ///
 /// About x₀ with J₀ = Q₀ R₀: r(x) = r₀ + J₀ δ + ρ, δ = x − x₀. By J₀ the linearised problem at x is
-/// [R₀ c], c = Q₀ᵀ r(x) = c₀ + R₀ δ + R₀ (R₀ᵀR₀)⁻¹ J₀ᵀ ρ; it leaves (J(x) − J₀)ᵀ r out of the gradient, which is of the order of ρ. So derivatives
-/// serve where ‖ρ‖ is a small part of ‖J₀ δ‖, or ‖ρ‖² no more than the mean ‖r‖² / N of one number, and no unknown was without effect
-/// at x₀: such a one may have one elsewhere.
+/// [R₀ c], c = Q₀ᵀ r(x) = c₀ + R₀ δ + R₀ (R₀ᵀR₀)⁻¹ J₀ᵀ ρ; it leaves (J(x) − J₀)ᵀ r out of the
+/// gradient, which is of the order of ρ. So derivatives serve where ‖ρ‖ is a small part of ‖J₀ δ‖,
+/// or ‖ρ‖² no more than the mean ‖r‖² / N of one number, and no unknown was without effect at x₀:
+/// such a one may have one elsewhere.
 #[derive(Debug)]
 pub(super) struct Base {
     /// Which data.
@@ -55,7 +56,8 @@ struct Within {
 impl Within {
     /// `None` where an unknown has no effect, or numbers are not finite.
     fn new(triangle: &Triangle) -> Option<Self> {
-        let Linearisation { triangle: mut scaled, projected: constant, .. } = triangle.clone().into_linearisation();
+        let Linearisation { triangle: mut scaled, projected: constant, .. } =
+            triangle.clone().into_linearisation();
         let n = constant.len();
         let lengths = DVector::from_iterator(n, scaled.column_iter().map(|column| column.norm()));
         if !lengths.iter().all(|length| length.is_normal()) {
@@ -83,7 +85,12 @@ struct Missed {
 
 impl Base {
     /// Of all items, linearised at `x`, and their factor.
-    pub fn new(x: &DVector<f64>, (data, unit): (u64, f64), chunks: Vec<Chunk>, triangle: Triangle) -> Self {
+    pub fn new(
+        x: &DVector<f64>,
+        (data, unit): (u64, f64),
+        chunks: Vec<Chunk>,
+        triangle: Triangle,
+    ) -> Self {
         Self { data, unit, x: x.clone(), chunks, triangle, within: OnceLock::new() }
     }
 
@@ -100,10 +107,15 @@ impl Base {
             let mut residual = vec![0.0; block.rows()];
             problem.residuals(x, items.clone(), &mut residual);
             let square = sum_of_squares(&residual);
-            let columns = DMatrixView::from_slice(&block.values[..n * block.rows()], block.rows(), n);
+            let columns =
+                DMatrixView::from_slice(&block.values[..n * block.rows()], block.rows(), n);
             let way = columns * &step;
             let own = block.column(n).iter().zip(&way).map(|(start, way)| start + way);
-            let rest: Vec<f64> = residual.iter().zip(own).map(|(there, foreseen)| there / larger - foreseen).collect();
+            let rest: Vec<f64> = residual
+                .iter()
+                .zip(own)
+                .map(|(there, foreseen)| there / larger - foreseen)
+                .collect();
             let rest = DVector::from_vec(rest);
             Missed {
                 squares: [square, sum_of_squares(way.as_slice()), sum_of_squares(rest.as_slice())],

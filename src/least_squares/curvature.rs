@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// How far each unknown is moved: by its effect on all residuals together, as a part of their length.
+/// How far each unknown is moved: by its effect on all residuals together, as a part of their
+/// length.
 const STEP: f64 = 1e-4;
 
 /// What is known of an objective at a point.
@@ -17,8 +18,8 @@ pub(super) struct Slopes {
 
 /// S = Σ rᵢ ∇²rᵢ = ∂(Jᵀr)/∂x − JᵀJ, by differences of the gradient Jᵀr.
 ///
-/// One call of `slopes` for each unknown. An unknown is moved up, or down where `within` forbids that; where it forbids both, its
-/// row and column hold what the others say of them.
+/// One call of `slopes` for each unknown. An unknown is moved up, or down where `within` forbids
+/// that; where it forbids both, its row and column hold what the others say of them.
 pub(super) fn by_differences(
     slopes: impl Fn(&DVector<f64>) -> Slopes,
     x: &DVector<f64>,

@@ -10,7 +10,8 @@ const TABLE: usize = 12;
 const SHRINK: f64 = 1.4;
 /// First steps tried, as fractions of an unknown's typical size.
 const FIRST_STEPS: [f64; 4] = [0.3, 3e-2, 3e-3, 3e-4];
-/// An unknown whose whole effect is below this fraction of the largest is judged against that fraction.
+/// An unknown whose whole effect is below this fraction of the largest is judged against that
+/// fraction.
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// How one column of the Jacobian compares with differences.
@@ -43,12 +44,19 @@ impl JacobianCheck {
 
 /// Compares the derivatives of `problem` at `x` with central differences extrapolated to step zero.
 ///
-/// F = lim (r(x + h eⱼ) − r(x − h eⱼ)) / 2h, extrapolated in h² over steps h, h/1.4, h/1.4², …       [Ridders 1982]
+/// F = lim (r(x + h eⱼ) − r(x − h eⱼ)) / 2h, extrapolated in h² over steps h, h/1.4, h/1.4², …
+/// [Ridders 1982]
 ///
-/// `step` holds the typical size of each unknown (any sign, not zero), from which the steps h start.
-pub fn check_jacobian(problem: &impl LeastSquares, x: &DVector<f64>, step: &DVector<f64>) -> JacobianCheck {
+/// `step` holds the typical size of each unknown (any sign, not zero), from which the steps h
+/// start.
+pub fn check_jacobian(
+    problem: &impl LeastSquares,
+    x: &DVector<f64>,
+    step: &DVector<f64>,
+) -> JacobianCheck {
     let exact = jacobian(problem, x);
-    let differences: Vec<_> = (0..x.len()).map(|j| extrapolate(problem, x, j, step[j].abs())).collect();
+    let differences: Vec<_> =
+        (0..x.len()).map(|j| extrapolate(problem, x, j, step[j].abs())).collect();
     let effect = |j: usize| differences[j].0.norm() * step[j].abs();
     let largest = (0..x.len()).map(effect).filter(|e| e.is_finite()).fold(0.0, f64::max);
     let columns = differences
@@ -57,14 +65,22 @@ pub fn check_jacobian(problem: &impl LeastSquares, x: &DVector<f64>, step: &DVec
         .map(|(j, (difference, error))| {
             let floor = (NEGLIGIBLE * largest / step[j].abs()).max(f64::MIN_POSITIVE);
             let size = difference.norm().max(floor);
-            ColumnCheck { relative_error: (exact.column(j) - difference).norm() / size, accuracy: error / size }
+            ColumnCheck {
+                relative_error: (exact.column(j) - difference).norm() / size,
+                accuracy: error / size,
+            }
         })
         .collect();
     JacobianCheck { columns }
 }
 
 /// The best extrapolation over several first steps, with its estimated error.
-fn extrapolate<P: LeastSquares>(problem: &P, x: &DVector<f64>, j: usize, size: f64) -> (DVector<f64>, f64) {
+fn extrapolate<P: LeastSquares>(
+    problem: &P,
+    x: &DVector<f64>,
+    j: usize,
+    size: f64,
+) -> (DVector<f64>, f64) {
     let rows = problem.items() * problem.rows_per_item();
     let mut best = (DVector::from_element(rows, f64::NAN), f64::INFINITY);
     for first in FIRST_STEPS {
@@ -76,7 +92,12 @@ fn extrapolate<P: LeastSquares>(problem: &P, x: &DVector<f64>, j: usize, size: f
     best
 }
 
-fn central_difference<P: LeastSquares>(problem: &P, x: &DVector<f64>, j: usize, h: f64) -> DVector<f64> {
+fn central_difference<P: LeastSquares>(
+    problem: &P,
+    x: &DVector<f64>,
+    j: usize,
+    h: f64,
+) -> DVector<f64> {
     let at = |value: f64| {
         let mut moved = x.clone();
         moved[j] = value;

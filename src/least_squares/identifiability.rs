@@ -1,6 +1,7 @@
 //! What the measurements can tell: rank, conditioning, and the combinations they cannot tell.
 //!
-//! Columns of the Jacobian are scaled to unit norm first, so that angles, lengths and logarithms compare.
+//! Columns of the Jacobian are scaled to unit norm first, so that angles, lengths and logarithms
+//! compare.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,15 +10,18 @@ use super::singular::SingularValues;
 
 /// A scaled singular value below this part of the largest counts as zero.
 ///
-/// Exactly redundant parameters come out near 1e-15, parameters that good data tell apart above 1e-5.
+/// Exactly redundant parameters come out near 1e-15, parameters that good data tell apart above
+/// 1e-5.
 pub const BLIND_BELOW: f64 = 1e-9;
-/// A column of the Jacobian with a norm below this part of the largest, per unit of its scale, counts as zero.
+/// A column of the Jacobian with a norm below this part of the largest, per unit of its scale,
+/// counts as zero.
 const ZERO_COLUMN: f64 = 1e-14;
 /// Part of a combination from which an unknown gives it its name.
 const SIZEABLE: f64 = 0.1;
 /// Entries of a combination below this are rounding.
 const NEGLIGIBLE: f64 = 1e-6;
-/// A triangle without a singular value below this part of the largest sees everything, however that is counted.
+/// A triangle without a singular value below this part of the largest sees everything, however that
+/// is counted.
 const CERTAIN: f64 = 2.0 * BLIND_BELOW;
 /// What moves nothing by more than this part of the largest is blind, however that is counted.
 const ROUNDING: f64 = 1e-12;
@@ -31,7 +35,8 @@ pub struct Identifiability {
     pub rank: usize,
     /// Combinations of parameters that leave every measurement as it is.
     pub unidentifiable: Vec<UnidentifiableCombination>,
-    /// Rows that span the unidentifiable combinations, orthonormal in the scaled unknowns, shape = (n − rank, n) [1 / unit of x].
+    /// Rows that span the unidentifiable combinations, orthonormal in the scaled unknowns, shape =
+    /// (n − rank, n) [1 / unit of x].
     pub gauge: DMatrix<f64>,
     /// Part of each unknown that lies outside the unidentifiable combinations, 0…1.
     pub visible: Vec<f64>,
@@ -40,7 +45,8 @@ pub struct Identifiability {
 /// Parameters that can change together without changing any measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnidentifiableCombination {
-    /// Unknown and weight in scaled unknowns (unit norm, first weight positive), in the order of the unknowns.
+    /// Unknown and weight in scaled unknowns (unit norm, first weight positive), in the order of
+    /// the unknowns.
     pub weights: Vec<(usize, f64)>,
     /// What the scaled Jacobian makes of it.
     pub singular_value: f64,
@@ -66,12 +72,16 @@ impl Identifiability {
         }
     }
 
-    /// Observability indices O1 to O5 over the identifiable directions, from m measured coordinates.
+    /// Observability indices O1 to O5 over the identifiable directions, from m measured
+    /// coordinates.
     ///
-    /// O1 = (Π σ)^(1/r) / √m,  O2 = `σ_r` / `σ_1`,  O3 = `σ_r`,  O4 = `σ_r`² / `σ_1`,  O5 = 1 / Σ 1/σ   [Sun & Hollerbach 2008].
+    /// O1 = (Π σ)^(1/r) / √m,  O2 = `σ_r` / `σ_1`,  O3 = `σ_r`,  O4 = `σ_r`² / `σ_1`,  O5 = 1 / Σ
+    /// 1/σ   [Sun & Hollerbach 2008].
     pub fn observability(&self, measurements: usize) -> [f64; 5] {
         let used = &self.singular_values[..self.rank];
-        let (Some(&largest), Some(&smallest)) = (used.first(), used.last()) else { return [0.0; 5] };
+        let (Some(&largest), Some(&smallest)) = (used.first(), used.last()) else {
+            return [0.0; 5];
+        };
         let mean_log = used.iter().map(|value| value.ln()).sum::<f64>() / used.len() as f64;
         [
             mean_log.exp() / (measurements as f64).sqrt(),
@@ -95,9 +105,9 @@ pub(crate) struct Blind {
 impl Blind {
     /// Of the least-squares problem with triangular factor `triangle` (n × n).
     ///
-    /// Singular values are formed only where triangles do not decide: if R with unit columns has no small singular value for certain,
-    /// nothing is blind; and if by pivoted QR, R P = Q [R₁ R₂; 0 ε] with R₁ such a triangle and ε rounding, what is blind is spanned by
-    /// P [−R₁⁻¹R₂; 1].
+    /// Singular values are formed only where triangles do not decide: if R with unit columns has no
+    /// small singular value for certain, nothing is blind; and if by pivoted QR, R P = Q [R₁ R₂; 0
+    /// ε] with R₁ such a triangle and ε rounding, what is blind is spanned by P [−R₁⁻¹R₂; 1].
     pub fn in_triangle(triangle: &DMatrix<f64>) -> Self {
         let n = triangle.ncols();
         let Scaled { matrix: scaled, scale } = Scaled::of(triangle);
@@ -113,8 +123,13 @@ impl Blind {
 
     /// Of orthonormal rows that span it in scaled unknowns.
     fn of(null: &DMatrix<f64>, scale: &[f64]) -> Self {
-        let visible = (0..null.ncols()).map(|j| (1.0 - null.column(j).norm_squared()).clamp(0.0, 1.0)).collect();
-        Self { gauge: DMatrix::from_fn(null.nrows(), null.ncols(), |i, j| null[(i, j)] * scale[j]), visible }
+        let visible = (0..null.ncols())
+            .map(|j| (1.0 - null.column(j).norm_squared()).clamp(0.0, 1.0))
+            .collect();
+        Self {
+            gauge: DMatrix::from_fn(null.nrows(), null.ncols(), |i, j| null[(i, j)] * scale[j]),
+            visible,
+        }
     }
 }
 
@@ -128,7 +143,10 @@ impl Scaled {
     fn of(triangle: &DMatrix<f64>) -> Self {
         let norms: Vec<f64> = triangle.column_iter().map(|column| column.norm()).collect();
         let largest = norms.iter().copied().fold(0.0, f64::max);
-        let scale: Vec<f64> = norms.iter().map(|&norm| if norm > ZERO_COLUMN * largest { norm } else { 1.0 }).collect();
+        let scale: Vec<f64> = norms
+            .iter()
+            .map(|&norm| if norm > ZERO_COLUMN * largest { norm } else { 1.0 })
+            .collect();
         let mut matrix = triangle.clone();
         for (mut column, (norm, scale)) in matrix.column_iter_mut().zip(norms.iter().zip(&scale)) {
             column.scale_mut(if *norm > ZERO_COLUMN * largest { scale.recip() } else { 0.0 });
@@ -137,7 +155,8 @@ impl Scaled {
     }
 }
 
-/// Orthonormal rows that span what a matrix with columns of unit norm makes zero, where pivoted QR decides that for certain.
+/// Orthonormal rows that span what a matrix with columns of unit norm makes zero, where pivoted QR
+/// decides that for certain.
 fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = scaled.ncols();
     let qr = scaled.clone().col_piv_qr();
@@ -152,7 +171,8 @@ fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     // The largest singular value is √n at most: that of all columns, which R₁ has only a part of.
     let inverse = regular_inverse(&first, CERTAIN * (n as f64 / rank as f64).sqrt())?;
     let mut null = DMatrix::zeros(n, n - rank);
-    null.rows_mut(0, rank).copy_from(&(inverse * triangle.view((0, rank), (rank, n - rank)) * -1.0));
+    null.rows_mut(0, rank)
+        .copy_from(&(inverse * triangle.view((0, rank), (rank, n - rank)) * -1.0));
     null.rows_mut(rank, n - rank).fill_with_identity();
     qr.p().inv_permute_rows(&mut null);
     Some(null.qr().q().transpose())
@@ -164,7 +184,9 @@ pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
     let mut rest = DMatrix::identity(n, n) - basis * basis.transpose();
     let mut rows = DMatrix::zeros(n - r, n);
     for mut row in rows.row_iter_mut() {
-        let longest = (0..n).max_by(|&i, &j| rest.column(i).norm().total_cmp(&rest.column(j).norm())).unwrap_or(0);
+        let longest = (0..n)
+            .max_by(|&i, &j| rest.column(i).norm().total_cmp(&rest.column(j).norm()))
+            .unwrap_or(0);
         let direction = rest.column(longest).normalize();
         let along = direction.transpose() * &rest;
         rest -= &direction * along;
@@ -173,14 +195,16 @@ pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
     rows
 }
 
-/// The reduced row echelon form of the null space: a basis that depends on the space alone, with few unknowns in each
-/// combination. Pivots are the earliest unknowns that have a part in a combination worth the name, then any.
+/// The reduced row echelon form of the null space: a basis that depends on the space alone, with
+/// few unknowns in each combination. Pivots are the earliest unknowns that have a part in a
+/// combination worth the name, then any.
 fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<UnidentifiableCombination> {
     let (rows, n) = null.shape();
     let mut row = 0;
     let mut pivots = Vec::new();
-    for (least, column) in
-        [SIZEABLE, NEGLIGIBLE].into_iter().flat_map(|least| (0..n).map(move |column| (least, column)))
+    for (least, column) in [SIZEABLE, NEGLIGIBLE]
+        .into_iter()
+        .flat_map(|least| (0..n).map(move |column| (least, column)))
     {
         if row == rows {
             break;
@@ -192,7 +216,8 @@ fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<UnidentifiableCom
                 null[(i, column)] = 0.0;
             }
         }
-        if entry < least * null.row(pivot).norm() || entry < NEGLIGIBLE || pivots.contains(&column) {
+        if entry < least * null.row(pivot).norm() || entry < NEGLIGIBLE || pivots.contains(&column)
+        {
             continue;
         }
         pivots.push(column);
@@ -237,22 +262,40 @@ mod tests {
         // Columns: a, b, a, 0, a + b
         let base = DMatrix::from_row_slice(4, 2, &[1.0, 0.2, 0.5, -1.0, 0.0, 2.0, 3.0, 1.0]);
         let (a, b) = (base.column(0), base.column(1));
-        let jacobian =
-            DMatrix::from_columns(&[a.clone_owned(), b.clone_owned(), a.clone_owned(), DVector::zeros(4), a + b]);
+        let jacobian = DMatrix::from_columns(&[
+            a.clone_owned(),
+            b.clone_owned(),
+            a.clone_owned(),
+            DVector::zeros(4),
+            a + b,
+        ]);
         let mut padded = DMatrix::zeros(5, 5);
         padded.rows_mut(0, 4).copy_from(&jacobian);
         let triangle = padded.qr().unpack_r();
         let found = Identifiability::of(&triangle);
         assert_eq!(found.rank, 2);
-        let unknowns: Vec<Vec<usize>> =
-            found.unidentifiable.iter().map(|own| own.weights.iter().map(|w| w.0).collect()).collect();
+        let unknowns: Vec<Vec<usize>> = found
+            .unidentifiable
+            .iter()
+            .map(|own| own.weights.iter().map(|w| w.0).collect())
+            .collect();
         assert_eq!(unknowns, [vec![0, 2], vec![1, 2, 4], vec![3]]);
-        assert!(found.unidentifiable.iter().all(|own| own.singular_value < 1e-12 && own.weights[0].1 > 0.0));
+        assert!(
+            found
+                .unidentifiable
+                .iter()
+                .all(|own| own.singular_value < 1e-12 && own.weights[0].1 > 0.0)
+        );
         assert!(found.visible[3] == 0.0 && found.visible[1] > 0.0);
         // Orthonormal in scaled unknowns, and seen by no row there.
-        let norms: Vec<f64> =
-            triangle.column_iter().map(|c| c.norm()).map(|n| if n > 1e-12 { n } else { 1.0 }).collect();
-        let unscaled = |matrix: &DMatrix<f64>| DMatrix::from_fn(matrix.nrows(), 5, |i, j| matrix[(i, j)] / norms[j]);
+        let norms: Vec<f64> = triangle
+            .column_iter()
+            .map(|c| c.norm())
+            .map(|n| if n > 1e-12 { n } else { 1.0 })
+            .collect();
+        let unscaled = |matrix: &DMatrix<f64>| {
+            DMatrix::from_fn(matrix.nrows(), 5, |i, j| matrix[(i, j)] / norms[j])
+        };
         let rows = unscaled(&found.gauge);
         assert!((&rows * rows.transpose() - DMatrix::identity(3, 3)).amax() < 1e-12);
         assert!((unscaled(&triangle) * rows.transpose()).amax() < 1e-12);
@@ -261,18 +304,32 @@ mod tests {
         assert!(certain_null(&Scaled::of(&triangle).matrix).is_some());
         let own = unscaled(&blind.gauge);
         assert!((own.transpose() * &own - rows.transpose() * &rows).amax() < 1e-12);
-        assert!(blind.visible.iter().zip(&found.visible).all(|(own, other)| (own - other).abs() < 1e-12));
+        assert!(
+            blind
+                .visible
+                .iter()
+                .zip(&found.visible)
+                .all(|(own, other)| (own - other).abs() < 1e-12)
+        );
     }
 
     #[test]
     fn what_pivots_do_not_decide_is_left_to_singular_values() {
         for small in [1e-6, 1e-9, 1e-11, 1e-13] {
-            let mut triangle =
-                DMatrix::from_fn(6, 6, |i, j| if i <= j { ((1 + 3 * i + 7 * j) as f64).sin() + 1.5 } else { 0.0 });
+            let mut triangle = DMatrix::from_fn(6, 6, |i, j| {
+                if i <= j { ((1 + 3 * i + 7 * j) as f64).sin() + 1.5 } else { 0.0 }
+            });
             triangle[(5, 5)] = small;
             let (blind, found) = (Blind::in_triangle(&triangle), Identifiability::of(&triangle));
             assert_eq!(blind.gauge.nrows(), 6 - found.rank, "{small}");
-            assert!(blind.visible.iter().zip(&found.visible).all(|(own, other)| (own - other).abs() < 1e-9), "{small}");
+            assert!(
+                blind
+                    .visible
+                    .iter()
+                    .zip(&found.visible)
+                    .all(|(own, other)| (own - other).abs() < 1e-9),
+                "{small}"
+            );
         }
     }
 }

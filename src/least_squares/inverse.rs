@@ -1,10 +1,12 @@
-//! Inverses of upper triangles: they say for certain that a problem is well conditioned, at a small part of the cost of singular values.
+//! Inverses of upper triangles: they say for certain that a problem is well conditioned, at a small
+//! part of the cost of singular values.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::kernel::{dot, norm};
 
-/// R⁻¹, if no singular value of R is below `least` of the largest; nothing where that is not certain, or R no upper triangle.
+/// R⁻¹, if no singular value of R is below `least` of the largest; nothing where that is not
+/// certain, or R no upper triangle.
 ///
 /// Columns of R are at most of length one, so that `σ₁ ≤ √n`; and `σₙ ≥ 1/‖R⁻¹‖`.
 pub(super) fn regular_inverse(triangle: &DMatrix<f64>, least: f64) -> Option<DMatrix<f64>> {
@@ -26,8 +28,12 @@ pub(super) fn regular_inverse(triangle: &DMatrix<f64>, least: f64) -> Option<DMa
     certain.then_some(inverse)
 }
 
-/// The sum of ‖eⱼᵀ R⁻¹‖² `weight²` over some pairs of j and weight; nothing where R is no upper triangle.
-pub(super) fn inverse_rows(triangle: &DMatrix<f64>, weighted: impl Iterator<Item = (usize, f64)>) -> Option<f64> {
+/// The sum of ‖eⱼᵀ R⁻¹‖² `weight²` over some pairs of j and weight; nothing where R is no upper
+/// triangle.
+pub(super) fn inverse_rows(
+    triangle: &DMatrix<f64>,
+    weighted: impl Iterator<Item = (usize, f64)>,
+) -> Option<f64> {
     let n = triangle.ncols();
     if !is_upper(triangle) {
         return None;
@@ -47,7 +53,8 @@ pub(super) fn inverse_rows(triangle: &DMatrix<f64>, weighted: impl Iterator<Item
 /// Whether a matrix is square with nothing below its diagonal.
 fn is_upper(matrix: &DMatrix<f64>) -> bool {
     let below = |(j, column): (usize, &[f64])| column[j + 1..].iter().all(|value| *value == 0.0);
-    matrix.is_square() && matrix.as_slice().chunks_exact(matrix.nrows().max(1)).enumerate().all(below)
+    matrix.is_square()
+        && matrix.as_slice().chunks_exact(matrix.nrows().max(1)).enumerate().all(below)
 }
 
 #[cfg(test)]
@@ -56,7 +63,9 @@ mod tests {
 
     #[test]
     fn inverses_are_those_of_well_conditioned_upper_triangles_alone() {
-        let entry = |i: usize, j: usize| if i <= j { ((1 + 3 * i + 7 * j + i * j) as f64).sin() + 2.0 } else { 0.0 };
+        let entry = |i: usize, j: usize| {
+            if i <= j { ((1 + 3 * i + 7 * j + i * j) as f64).sin() + 2.0 } else { 0.0 }
+        };
         let mut triangle = DMatrix::from_fn(9, 9, entry);
         triangle.column_iter_mut().for_each(|mut column| {
             column.normalize_mut();
@@ -68,7 +77,8 @@ mod tests {
         assert!((found / expected - 1.0).abs() < 1e-12);
         let (condition, smallest) = (1.0 / inverse.norm(), 1e-5 * triangle[(8, 8)]);
         assert!(
-            regular_inverse(&triangle, condition).is_none() && regular_inverse(&triangle, 0.3 * condition).is_some()
+            regular_inverse(&triangle, condition).is_none()
+                && regular_inverse(&triangle, 0.3 * condition).is_some()
         );
         triangle[(8, 8)] = smallest;
         assert!(regular_inverse(&triangle, 1e-4).is_none());

@@ -1,6 +1,6 @@
-//! Loops over columns, written so that the compiler keeps independent sums in vector registers: wide ones where the
-//! processor has them. The order of every sum is written out and products are never fused, so that results are the same
-//! either way.
+//! Loops over columns, written so that the compiler keeps independent sums in vector registers:
+//! wide ones where the processor has them. The order of every sum is written out and products are
+//! never fused, so that results are the same either way.
 
 use multiversion::multiversion;
 use nalgebra::DMatrix;

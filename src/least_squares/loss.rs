@@ -5,17 +5,19 @@ use super::kernel::{norm, sum_of_squares};
 
 /// How the residual of an item (a pose) counts: ½ρ(s²), where s = ‖r‖ is its whitened length \[σ\].
 ///
-/// Rows of an item are scaled by √ρ′, with ρ′ = dρ/d(s²). The gradient ρ′ Jᵀr is then exact, the curvature ρ′ JᵀJ leaves
-/// out ρ″: the first-order form of [Triggs et al. 2000, sec. 4.3], which Ceres takes where ρ″ < 0. Every ρ here is concave in
-/// s², so the weighted problem lies above the cost of the linearised residual: steps achieve what they predict or more
-/// (gain ratios of 1 to 2), and the tests for convergence hold as they are.
+/// Rows of an item are scaled by √ρ′, with ρ′ = dρ/d(s²). The gradient ρ′ Jᵀr is then exact, the
+/// curvature ρ′ JᵀJ leaves out ρ″: the first-order form of [Triggs et al. 2000, sec. 4.3], which
+/// Ceres takes where ρ″ < 0. Every ρ here is concave in s², so the weighted problem lies above the
+/// cost of the linearised residual: steps achieve what they predict or more (gain ratios of 1 to
+/// 2), and the tests for convergence hold as they are.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub enum Loss {
     /// ρ = s²: least squares.
     #[default]
     Squares,
-    /// ρ = s² up to s = k, 2ks − k² beyond                                                         [Huber 1964]
+    /// ρ = s² up to s = k, 2ks − k² beyond
+    /// [Huber 1964]
     Huber {
         /// k \[σ\].
         threshold: f64,
@@ -32,12 +34,15 @@ pub enum Loss {
 impl Loss {
     /// k with which [`Loss::Huber`] keeps 95 % efficiency on three coordinates of Gaussian noise.
     ///
-    /// Efficiency B²/A with A = E‖ψ‖²/3 and B = P(s ≤ k) + ⅔ k E[1/s; s > k], s² ~ χ²₃ (one coordinate: 1.345).
-    ///                                                                            [Huber & Ronchetti 2009, ch. 7]
+    /// Efficiency B²/A with A = E‖ψ‖²/3 and B = P(s ≤ k) + ⅔ k E[1/s; s > k], s² ~ χ²₃ (one
+    /// coordinate: 1.345).
+    /// [Huber & Ronchetti 2009, ch. 7]
     pub const HUBER_POSITION: f64 = 1.628;
-    /// c of [`Loss::L1`] for three coordinates: exp(−2s) has the standard deviation 1 in each, as the whitened noise.
+    /// c of [`Loss::L1`] for three coordinates: exp(−2s) has the standard deviation 1 in each, as
+    /// the whitened noise.
     pub const L1_POSITION: f64 = 2.0;
-    /// ε of [`Loss::L1`]: small against the noise, so that 85 % efficiency on Gaussian noise is that of the plain length.
+    /// ε of [`Loss::L1`]: small against the noise, so that 85 % efficiency on Gaussian noise is
+    /// that of the plain length.
     pub const L1_SMOOTHING: f64 = 0.1;
 
     /// ρ(s²).
@@ -47,7 +52,9 @@ impl Loss {
             Self::Huber { threshold } if s <= threshold => s * s,
             Self::Huber { threshold } => threshold * (2.0 * s - threshold),
             // c s²/(√(s² + ε²) + ε), free of cancellation and of overflow.
-            Self::L1 { slope, smoothing } => 2.0 * slope * s * (s / (s.hypot(smoothing) + smoothing)),
+            Self::L1 { slope, smoothing } => {
+                2.0 * slope * s * (s / (s.hypot(smoothing) + smoothing))
+            }
         }
     }
 
@@ -93,7 +100,10 @@ impl Loss {
         }
         let residuals = block.column(block.parameters());
         let sum = self.sum(residuals, rows);
-        let roots: Vec<f64> = residuals.chunks_exact(rows.max(1)).map(|item| self.weight(norm(item)).sqrt()).collect();
+        let roots: Vec<f64> = residuals
+            .chunks_exact(rows.max(1))
+            .map(|item| self.weight(norm(item)).sqrt())
+            .collect();
         for j in 0..=block.parameters() {
             for (item, root) in block.column_mut(j).chunks_exact_mut(rows.max(1)).zip(&roots) {
                 for value in item {
@@ -104,11 +114,13 @@ impl Loss {
         Some(sum)
     }
 
-    /// Variance of an estimate over that of its weighted Jacobian, from the whitened lengths of its residuals.
+    /// Variance of an estimate over that of its weighted Jacobian, from the whitened lengths of its
+    /// residuals.
     ///
-    /// (JᵀWJ)⁻¹ · A w̄ / B², with A = Σ‖ρ′ r‖²/ν, w̄ the mean of ρ′ and B that of the curvature ∂²(½ρ)/∂r² over all directions of
-    /// all items; ν are the degrees of freedom, and `coordinates` says how many numbers each item has: its directions
-    ///                                                                              [Huber & Ronchetti 2009, sec. 7.6].
+    /// (JᵀWJ)⁻¹ · A w̄ / B², with A = Σ‖ρ′ r‖²/ν, w̄ the mean of ρ′ and B that of the curvature
+    /// ∂²(½ρ)/∂r² over all directions of all items; ν are the degrees of freedom, and `coordinates`
+    /// says how many numbers each item has: its directions
+    /// [Huber & Ronchetti 2009, sec. 7.6].
     pub fn variance_factor(self, lengths: &[f64], coordinates: &[usize], freedom: f64) -> f64 {
         let directions = coordinates.iter().sum::<usize>() as f64;
         if self == Self::Squares || directions <= 0.0 || freedom <= 0.0 {
@@ -120,7 +132,8 @@ impl Loss {
         let influence = sum(&|s, _| (self.weight(s) * s).powi(2)) / freedom;
         let weight = sum(&|s, own| own * self.weight(s)) / directions;
         // Along the residual the curvature is that of the loss, across it the weight.
-        let curvature = sum(&|s, own| (own - 1.0) * self.weight(s) + self.curvature(s)) / directions;
+        let curvature =
+            sum(&|s, own| (own - 1.0) * self.weight(s) + self.curvature(s)) / directions;
         influence * weight / (curvature * curvature)
     }
 }
@@ -129,7 +142,8 @@ impl Loss {
 mod tests {
     use super::*;
 
-    /// Against closed forms of A / B² over normal residuals of one and of two numbers, at thresholds where most of them are beyond.
+    /// Against closed forms of A / B² over normal residuals of one and of two numbers, at
+    /// thresholds where most of them are beyond.
     #[test]
     fn variance_of_rows_of_one_and_two_numbers() {
         use statrs::distribution::{ContinuousCDF as _, Normal};
@@ -144,8 +158,13 @@ mod tests {
             let loss = Loss::Huber { threshold };
             let freedom = (coordinates * lengths.len()) as f64;
             let factor = loss.variance_factor(&lengths, &vec![coordinates; lengths.len()], freedom);
-            let weight = lengths.iter().map(|&s| loss.weight(s)).sum::<f64>() / lengths.len() as f64;
-            assert!((factor / weight - expected).abs() < 2e-3, "{coordinates}: {}", factor / weight);
+            let weight =
+                lengths.iter().map(|&s| loss.weight(s)).sum::<f64>() / lengths.len() as f64;
+            assert!(
+                (factor / weight - expected).abs() < 2e-3,
+                "{coordinates}: {}",
+                factor / weight
+            );
         }
     }
 }

@@ -8,11 +8,12 @@ use nalgebra::DVector;
 use super::chord::Base;
 use super::{Loss, Triangle};
 
-/// Linearisations that are kept: those of the last point, of the one before, and of the first one of the same data, which is asked for at the
-/// end.
+/// Linearisations that are kept: those of the last point, of the one before, and of the first one
+/// of the same data, which is asked for at the end.
 const KEPT: usize = 3;
 
-/// The last linearisations of some data, to be asked for again: reducing many rows costs far more than all that is done with the factor.
+/// The last linearisations of some data, to be asked for again: reducing many rows costs far more
+/// than all that is done with the factor.
 #[derive(Debug, Default)]
 pub struct Memory {
     kept: Mutex<VecDeque<(Key, f64, Triangle)>>,
@@ -30,10 +31,10 @@ pub(super) struct Key {
 }
 
 impl Memory {
-    /// One for fits after which others follow, or of which little is asked: steps go by the derivatives of where they began, as long as these
-    /// foresee what comes.
+    /// One for fits after which others follow, or of which little is asked: steps go by the
+    /// derivatives of where they began, as long as these foresee what comes.
     #[must_use]
-    pub fn in_passing() -> Self {
+    pub fn provisional() -> Self {
         Self { base: Some(Mutex::default()), ..Self::default() }
     }
 
@@ -42,13 +43,21 @@ impl Memory {
         self.base.is_some()
     }
 
-    /// What is kept below `key`, or what `reduce` makes of it, for residuals in this `unit`: of squares another unit is another size.
-    pub(super) fn recall(&self, key: &Key, unit: f64, reduce: impl FnOnce() -> Triangle) -> Triangle {
+    /// What is kept below `key`, or what `reduce` makes of it, for residuals in this `unit`: of
+    /// squares another unit is another size.
+    pub(super) fn recall(
+        &self,
+        key: &Key,
+        unit: f64,
+        reduce: impl FnOnce() -> Triangle,
+    ) -> Triangle {
         let is_known = |(own, known, _): &&(Key, f64, Triangle)| {
             own == key && (key.loss == Loss::Squares || known.to_bits() == unit.to_bits())
         };
-        let found =
-            locked(&self.kept).iter().find(is_known).map(|(_, known, triangle)| triangle.clone().times(known / unit));
+        let found = locked(&self.kept)
+            .iter()
+            .find(is_known)
+            .map(|(_, known, triangle)| triangle.clone().times(known / unit));
         found.unwrap_or_else(|| {
             let triangle = reduce();
             let mut kept = locked(&self.kept);

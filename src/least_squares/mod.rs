@@ -1,7 +1,8 @@
 //! Nonlinear least squares over many small items; knows no arms.
 //!
-//! A problem is a sum over items (poses, data points) of whitened residuals r(x). Solvers never see the m × n Jacobian:
-//! it is reduced, block by block, to the triangular factor of its QR decomposition.
+//! A problem is a sum over items (poses, data points) of whitened residuals r(x). Solvers never see
+//! the m × n Jacobian: it is reduced, block by block, to the triangular factor of its QR
+//! decomposition.
 
 mod chord;
 mod curvature;
@@ -51,7 +52,8 @@ pub trait LeastSquares: Sync {
     /// Residuals per item (3 for a position).
     fn rows_per_item(&self) -> usize;
 
-    /// Writes the whitened residuals of `items`, item after item; a value that is not finite marks x as out of the domain.
+    /// Writes the whitened residuals of `items`, item after item; a value that is not finite marks
+    /// x as out of the domain.
     fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]);
 
     /// Writes the whitened residuals of `items` and their derivatives ∂r/∂x.
@@ -123,11 +125,16 @@ pub trait Objective {
     /// The linearised problem min ‖J p + r‖ at x, reduced by an orthogonal transformation.
     fn linearise(&self, x: &DVector<f64>) -> Linearisation;
 
-    /// S = ∂(Jᵀr)/∂x − JᵀJ at x, what the linearised problem leaves out of the second derivatives of the cost.
+    /// S = ∂(Jᵀr)/∂x − JᵀJ at x, what the linearised problem leaves out of the second derivatives
+    /// of the cost.
     ///
-    /// By differences of the gradient unless an objective knows better; evaluated only where `within` allows. Nothing where
-    /// derivatives are not finite.
-    fn curvature(&self, x: &DVector<f64>, within: &dyn Fn(&DVector<f64>) -> bool) -> Option<DMatrix<f64>> {
+    /// By differences of the gradient unless an objective knows better; evaluated only where
+    /// `within` allows. Nothing where derivatives are not finite.
+    fn curvature(
+        &self,
+        x: &DVector<f64>,
+        within: &dyn Fn(&DVector<f64>) -> bool,
+    ) -> Option<DMatrix<f64>> {
         by_differences(|x| slopes(self.linearise(x)), x, within)
     }
 
@@ -136,7 +143,8 @@ pub trait Objective {
         vec![None; self.parameters()]
     }
 
-    /// Jᵀ r″, r″ the second derivative of r along a step p from x; nothing where it is not known or not finite.
+    /// Jᵀ r″, r″ the second derivative of r along a step p from x; nothing where it is not known or
+    /// not finite.
     fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
         let _ = (x, step);
         None
@@ -156,7 +164,11 @@ impl<O: Objective + ?Sized> Objective for &O {
         (**self).linearise(x)
     }
 
-    fn curvature(&self, x: &DVector<f64>, within: &dyn Fn(&DVector<f64>) -> bool) -> Option<DMatrix<f64>> {
+    fn curvature(
+        &self,
+        x: &DVector<f64>,
+        within: &dyn Fn(&DVector<f64>) -> bool,
+    ) -> Option<DMatrix<f64>> {
         (**self).curvature(x, within)
     }
 
@@ -169,7 +181,8 @@ impl<O: Objective + ?Sized> Objective for &O {
     }
 }
 
-/// J = Q R at one point: ‖J p + r‖² = ‖R p + Qᵀr‖² + rest; rows are weighted where there is a robust loss.
+/// J = Q R at one point: ‖J p + r‖² = ‖R p + Qᵀr‖² + rest; rows are weighted where there is a
+/// robust loss.
 #[derive(Debug, Clone)]
 pub struct Linearisation {
     /// ½‖r‖², or ½Σρ.

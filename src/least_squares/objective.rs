@@ -10,7 +10,9 @@ use super::chord::{Base, Chunk};
 use super::curvature::by_differences;
 use super::kernel::{dot, sum_of_squares};
 use super::memory::Key;
-use super::{Block, LeastSquares, Linearisation, Loss, MANY_UNKNOWNS, Memory, Objective, Triangle, slopes};
+use super::{
+    Block, LeastSquares, Linearisation, Loss, MANY_UNKNOWNS, Memory, Objective, Triangle, slopes,
+};
 
 /// Items reduced together: beyond this many no m × n matrix is kept, only n × n factors.
 pub const CHUNK_ITEMS: usize = 256;
@@ -18,14 +20,15 @@ pub const CHUNK_ITEMS: usize = 256;
 /// Part of a step over which the second derivative along it is taken.
 const BEND_STEP: f64 = 0.1;
 
-/// Rows, over the number of unknowns, that are absorbed chunk after chunk before factors are merged: merging two costs as much as
-/// absorbing half as many rows as there are unknowns.
+/// Rows, over the number of unknowns, that are absorbed chunk after chunk before factors are
+/// merged: merging two costs as much as absorbing half as many rows as there are unknowns.
 const ROWS_PER_UNKNOWN: usize = 4;
 
 /// Chunks whose results exist at the same time.
 const GROUP_CHUNKS: usize = 64;
 
-/// Numbers up to which derivatives of all data are kept in passing, where unknowns are many: 128 MB.
+/// Numbers up to which derivatives of all data are kept in passing, where unknowns are many: 128
+/// MB.
 const MOST_KEPT: usize = 1 << 24;
 
 /// Linear residual rows r = A x + b beside the data: priors, gauge conditions.
@@ -42,7 +45,9 @@ pub struct LinearRows {
 #[non_exhaustive]
 pub enum RowsError {
     /// The matrix has another number of columns than the problem has unknowns.
-    #[error("adding linear rows: the matrix has {columns} columns, the problem {parameters} unknowns")]
+    #[error(
+        "adding linear rows: the matrix has {columns} columns, the problem {parameters} unknowns"
+    )]
     Columns {
         /// Columns of the matrix.
         columns: usize,
@@ -61,9 +66,10 @@ pub enum RowsError {
 
 /// A data problem with optional linear rows, ready for a solver.
 ///
-/// Items are walked in chunks of [`CHUNK_ITEMS`]; each chunk, or each few of them where unknowns are many, is reduced to its own
-/// [`Triangle`], and these are merged in order, or two by two where that is work, always the same ones, so that the result is the same
-/// to the bit for any number of threads. One chunk alone never leaves its thread.
+/// Items are walked in chunks of [`CHUNK_ITEMS`]; each chunk, or each few of them where unknowns
+/// are many, is reduced to its own [`Triangle`], and these are merged in order, or two by two where
+/// that is work, always the same ones, so that the result is the same to the bit for any number of
+/// threads. One chunk alone never leaves its thread.
 #[derive(Debug, Clone)]
 pub struct Fit<'a, P> {
     problem: &'a P,
@@ -85,8 +91,8 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         self
     }
 
-    /// Keeps linearisations in `memory`, and takes those that are there; `data` tells the problem from others that share it, but for the
-    /// `unit` that its residuals are counted in.
+    /// Keeps linearisations in `memory`, and takes those that are there; `data` tells the problem
+    /// from others that share it, but for the `unit` that its residuals are counted in.
     #[must_use]
     pub fn remembering(mut self, memory: &'a Memory, data: u64, unit: f64) -> Self {
         self.memory = Some((memory, data, unit));
@@ -150,7 +156,12 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     }
 
     /// The factor of a run of chunks, each filled by `fill`.
-    fn run_triangle(&self, fill: &impl Fn(usize, &mut Block), run: Range<usize>, block: &mut Block) -> Triangle {
+    fn run_triangle(
+        &self,
+        fill: &impl Fn(usize, &mut Block),
+        run: Range<usize>,
+        block: &mut Block,
+    ) -> Triangle {
         let mut triangle = Triangle::new(self.problem.parameters());
         for index in run {
             fill(index, block);
@@ -169,7 +180,8 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         self.reduce_by(&|index, block: &mut Block| self.fill(x, index, block))
     }
 
-    /// The factor of all chunks, each filled by `fill`: of few unknowns, whose factors are merged in no time, chunk by chunk in order.
+    /// The factor of all chunks, each filled by `fill`: of few unknowns, whose factors are merged
+    /// in no time, chunk by chunk in order.
     fn reduce_by(&self, fill: &(impl Fn(usize, &mut Block) + Sync)) -> Triangle {
         if self.run_length() > 1 {
             return self.halves(fill, 0..self.chunks(), &Mutex::default());
@@ -184,7 +196,8 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         total.unwrap_or_else(|| Triangle::new(self.problem.parameters()))
     }
 
-    /// The factor of some chunks: of a run, or of two halves, each on a thread of its own; `spare` are blocks to use again.
+    /// The factor of some chunks: of a run, or of two halves, each on a thread of its own; `spare`
+    /// are blocks to use again.
     fn halves(
         &self,
         fill: &(impl Fn(usize, &mut Block) + Sync),
@@ -206,7 +219,8 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         first
     }
 
-    /// The factor of all data at x, in passing by the derivatives of an earlier point where these serve.
+    /// The factor of all data at x, in passing by the derivatives of an earlier point where these
+    /// serve.
     fn factor(&self, x: &DVector<f64>) -> Triangle {
         let Some((memory, data, unit)) = self.memory else { return self.reduce(x) };
         memory.recall(&Key { data, loss: self.loss, x: x.clone() }, unit, || {
@@ -233,19 +247,26 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
             Chunk { items: self.chunk(index), block }
         };
         let chunks: Vec<Chunk> = (0..self.chunks()).into_par_iter().map(chunk).collect();
-        let triangle = self.reduce_by(&|index, block: &mut Block| block.clone_from(&chunks[index].block));
+        let triangle =
+            self.reduce_by(&|index, block: &mut Block| block.clone_from(&chunks[index].block));
         Base::new(x, key, chunks, triangle)
     }
 
-    /// Whether derivatives of all data may be kept: those of squares and of many unknowns, of which they take the time, and of no more data
-    /// than memory has room for.
+    /// Whether derivatives of all data may be kept: those of squares and of many unknowns, of which
+    /// they take the time, and of no more data than memory has room for.
     fn keeps_derivatives(&self) -> bool {
-        let (n, rows) = (self.problem.parameters(), self.problem.items() * self.problem.rows_per_item());
+        let (n, rows) =
+            (self.problem.parameters(), self.problem.items() * self.problem.rows_per_item());
         self.loss == Loss::Squares && n >= MANY_UNKNOWNS && rows * n <= MOST_KEPT
     }
 
     /// Jᵀ r″ of a chunk, r″ = 2 (r(x + h p) − r − h J p) / h².
-    fn chunk_bend(&self, (x, step): (&DVector<f64>, &DVector<f64>), index: usize, block: &mut Block) -> DVector<f64> {
+    fn chunk_bend(
+        &self,
+        (x, step): (&DVector<f64>, &DVector<f64>),
+        index: usize,
+        block: &mut Block,
+    ) -> DVector<f64> {
         self.fill(x, index, block);
         let n = block.parameters();
         let mut moved = vec![0.0; block.rows()];
@@ -260,7 +281,8 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     }
 }
 
-/// Maps every one of `count` chunks, in parallel when there are several, and hands the results on in order.
+/// Maps every one of `count` chunks, in parallel when there are several, and hands the results on
+/// in order.
 fn in_order<B, T: Send>(
     count: usize,
     buffer: impl Fn() -> B + Sync + Send,
@@ -307,8 +329,13 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
     }
 
     /// By differences of the gradients of each point itself.
-    fn curvature(&self, x: &DVector<f64>, within: &dyn Fn(&DVector<f64>) -> bool) -> Option<DMatrix<f64>> {
-        let plain = Fit { problem: self.problem, rows: self.rows.clone(), loss: self.loss, memory: None };
+    fn curvature(
+        &self,
+        x: &DVector<f64>,
+        within: &dyn Fn(&DVector<f64>) -> bool,
+    ) -> Option<DMatrix<f64>> {
+        let plain =
+            Fit { problem: self.problem, rows: self.rows.clone(), loss: self.loss, memory: None };
         by_differences(|x| slopes(plain.linearise(x)), x, within)
     }
 
@@ -326,7 +353,9 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
 
     fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
         // In passing a further step costs less.
-        if self.memory.is_some_and(|(memory, ..)| memory.is_in_passing()) && self.keeps_derivatives() {
+        if self.memory.is_some_and(|(memory, ..)| memory.is_in_passing())
+            && self.keeps_derivatives()
+        {
             return None;
         }
         let mut total = DVector::zeros(x.len());
@@ -356,7 +385,8 @@ mod tests {
     use super::*;
     use crate::least_squares::{jacobian, residual_vector};
 
-    /// A straight line through many points, which remembers the largest part of them that was asked for at once.
+    /// A straight line through many points, which remembers the largest part of them that was asked
+    /// for at once.
     struct Line {
         points: usize,
         largest: AtomicUsize,
@@ -415,10 +445,17 @@ mod tests {
             assert_eq!((plain.triangle, plain.projected), (found.triangle, found.projected));
             line.largest.load(Ordering::Relaxed) > 0
         };
-        // The last two are kept, and the first of the same data; asked of anything else, the data are reduced.
+        // The last two are kept, and the first of the same data; asked of anything else, the data
+        // are reduced.
         assert!(asked(&x, Loss::Squares, 1));
-        assert!(!asked(&x, Loss::Squares, 1) && asked(&x, robust, 1) && !asked(&x, Loss::Squares, 1));
-        assert!(asked(&x, Loss::Squares, 2) && asked(&other, Loss::Squares, 1) && !asked(&x, Loss::Squares, 1));
+        assert!(
+            !asked(&x, Loss::Squares, 1) && asked(&x, robust, 1) && !asked(&x, Loss::Squares, 1)
+        );
+        assert!(
+            asked(&x, Loss::Squares, 2)
+                && asked(&other, Loss::Squares, 1)
+                && !asked(&x, Loss::Squares, 1)
+        );
         assert!(asked(&x, Loss::Squares, 2));
     }
 
@@ -450,7 +487,10 @@ mod tests {
             self.residuals(x, items.clone(), block.column_mut(4));
             for (row, t) in items.map(|i| i as f64 / 700.0).enumerate() {
                 let slopes = [1.0, 1.0, t, t * (x[3] * t).cos()];
-                slopes.into_iter().enumerate().for_each(|(j, slope)| block.column_mut(j)[row] = slope / self.unit);
+                slopes
+                    .into_iter()
+                    .enumerate()
+                    .for_each(|(j, slope)| block.column_mut(j)[row] = slope / self.unit);
             }
         }
     }
@@ -467,7 +507,10 @@ mod tests {
             let there = base.at(&curve, &x, unit).unwrap().into_linearisation();
             let residual = residual_vector(&curve, &x);
             let gradient = columns.tr_mul(&residual) * (0.1 / unit);
-            assert!((there.triangle.tr_mul(&there.projected) - &gradient).norm() < 1e-6 * gradient.norm());
+            assert!(
+                (there.triangle.tr_mul(&there.projected) - &gradient).norm()
+                    < 1e-6 * gradient.norm()
+            );
             assert!((2.0 * there.cost / residual.norm_squared() - 1.0).abs() < 1e-12);
             // Of what two unknowns do alike nothing runs off.
             assert!(there.projected.norm_squared() < residual.norm_squared());

@@ -1,4 +1,5 @@
-//! Singular values by one-sided Jacobi rotations: slow for large matrices, exact and never failing for ours.
+//! Singular values by one-sided Jacobi rotations: slow for large matrices, exact and never failing
+//! for ours.
 
 use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector};
@@ -8,7 +9,8 @@ use super::kernel::dot;
 
 /// Sweeps over all pairs of columns; five are usual.
 const SWEEPS: usize = 60;
-/// Columns that one thread rotates against as many others at a time, and how many there must be for that: fewer are one thread's.
+/// Columns that one thread rotates against as many others at a time, and how many there must be for
+/// that: fewer are one thread's.
 const TOGETHER: usize = 32;
 const WORTH_THREADS: usize = 4 * TOGETHER;
 
@@ -26,16 +28,18 @@ pub(super) struct Decomposition {
 impl Decomposition {
     /// Of B and c; without `constant` nothing is projected.
     ///
-    /// B P = Q R by column-pivoted QR; the columns of Rᵀ are then rotated until orthogonal: they become σᵢ Pᵀvᵢ, and the same
-    /// rotations turn Qᵀc into Uᵀc.                                               [Hestenes 1958; Drmač & Veselić 2008]
+    /// B P = Q R by column-pivoted QR; the columns of Rᵀ are then rotated until orthogonal: they
+    /// become σᵢ Pᵀvᵢ, and the same rotations turn Qᵀc into Uᵀc.
+    /// [Hestenes 1958; Drmač & Veselić 2008]
     ///
-    /// The last rows of R, all together shorter than `cut`·σ₁/8, are left out before: they add no more than the square of that
-    /// to any σ², and would be the slowest to rotate.
+    /// The last rows of R, all together shorter than `cut`·σ₁/8, are left out before: they add no
+    /// more than the square of that to any σ², and would be the slowest to rotate.
     pub fn new(matrix: &DMatrix<f64>, constant: Option<&DVector<f64>>, cut: f64) -> Self {
         let qr = matrix.clone().col_piv_qr();
         let triangle = qr.r();
         // No row from k on is longer than √n |Rₖₖ|.
-        let least = cut / (8.0 * matrix.ncols() as f64) * triangle.get((0, 0)).map_or(0.0, |first| first.abs());
+        let least = cut / (8.0 * matrix.ncols() as f64)
+            * triangle.get((0, 0)).map_or(0.0, |first| first.abs());
         let rank = (0..triangle.nrows()).take_while(|&k| triangle[(k, k)].abs() > least).count();
         let mut columns = triangle.rows(0, rank).transpose();
         let mut projected = DVector::zeros(rank);
@@ -69,8 +73,9 @@ impl SingularValues {
         order.sort_by(|&a, &b| singular[b].total_cmp(&singular[a]));
         let mut values: Vec<f64> = order.iter().map(|&k| singular[k]).collect();
         values.resize(n, 0.0);
-        let right =
-            DMatrix::from_fn(n, n, |i, j| if values[j].is_normal() { columns[(i, order[j])] / values[j] } else { 0.0 });
+        let right = DMatrix::from_fn(n, n, |i, j| {
+            if values[j].is_normal() { columns[(i, order[j])] / values[j] } else { 0.0 }
+        });
         Self { values, right }
     }
 }
@@ -82,8 +87,10 @@ fn orthogonalise(columns: &mut DMatrix<f64>, projected: &mut DVector<f64>) {
         return;
     }
     let together = if n < WORTH_THREADS { n.max(1) } else { TOGETHER };
-    let parts = columns.as_slice().chunks(together * rows).zip(projected.as_slice().chunks(together));
-    let mut parts: Vec<Part> = parts.map(|(entries, projected)| Part::new(rows, entries, projected)).collect();
+    let parts =
+        columns.as_slice().chunks(together * rows).zip(projected.as_slice().chunks(together));
+    let mut parts: Vec<Part> =
+        parts.map(|(entries, projected)| Part::new(rows, entries, projected)).collect();
     if parts.len() > 1 && parts.len() % 2 == 1 {
         parts.push(Part::new(rows, &[], &[]));
     }
@@ -92,20 +99,24 @@ fn orthogonalise(columns: &mut DMatrix<f64>, projected: &mut DVector<f64>) {
             break;
         }
     }
-    for (part, (entries, projected)) in parts
-        .iter()
-        .zip(columns.as_mut_slice().chunks_mut(together * rows).zip(projected.as_mut_slice().chunks_mut(together)))
-    {
+    for (part, (entries, projected)) in parts.iter().zip(
+        columns
+            .as_mut_slice()
+            .chunks_mut(together * rows)
+            .zip(projected.as_mut_slice().chunks_mut(together)),
+    ) {
         entries.copy_from_slice(&part.entries);
         projected.copy_from_slice(&part.projected);
     }
 }
 
-/// Every pair of columns once, whether any was rotated. Parts meet as in a tournament: in each round every one meets another, on whatever
-/// thread, so that results are the same for any number of them.
+/// Every pair of columns once, whether any was rotated. Parts meet as in a tournament: in each
+/// round every one meets another, on whatever thread, so that results are the same for any number
+/// of them.
 fn sweep(parts: &mut [Part]) -> bool {
     parts.par_iter_mut().for_each(Part::measure);
-    let mut rotated = parts.par_iter_mut().map(Part::among_themselves).reduce(|| false, |a, b| a | b);
+    let mut rotated =
+        parts.par_iter_mut().map(Part::among_themselves).reduce(|| false, |a, b| a | b);
     for _ in 1..parts.len() {
         let (near, far) = parts.split_at_mut(parts.len() / 2);
         let pairs = near.par_iter_mut().zip(far.par_iter_mut().rev());
@@ -130,18 +141,29 @@ type Column<'a> = (&'a mut [f64], &'a mut f64, &'a mut f64);
 
 impl Part {
     fn new(rows: usize, entries: &[f64], projected: &[f64]) -> Self {
-        Self { rows, entries: entries.to_vec(), squares: vec![0.0; projected.len()], projected: projected.to_vec() }
+        Self {
+            rows,
+            entries: entries.to_vec(),
+            squares: vec![0.0; projected.len()],
+            projected: projected.to_vec(),
+        }
     }
 
     /// Forms the squares anew.
     fn measure(&mut self) {
         let columns = self.entries.chunks_exact(self.rows);
-        self.squares.iter_mut().zip(columns).for_each(|(square, column)| *square = dot(column, column));
+        self.squares
+            .iter_mut()
+            .zip(columns)
+            .for_each(|(square, column)| *square = dot(column, column));
     }
 
     fn columns(&mut self) -> impl Iterator<Item = Column<'_>> {
         let numbers = self.squares.iter_mut().zip(&mut self.projected);
-        self.entries.chunks_exact_mut(self.rows).zip(numbers).map(|(column, (square, entry))| (column, square, entry))
+        self.entries
+            .chunks_exact_mut(self.rows)
+            .zip(numbers)
+            .map(|(column, (square, entry))| (column, square, entry))
     }
 
     /// Rotates every pair of its columns.
@@ -209,24 +231,34 @@ mod tests {
 
     #[test]
     fn rank_one_is_seen_as_such() {
-        let (u, v) = (DVector::from_vec(vec![1.0, 2.0, 2.0]), DVector::from_vec(vec![0.6, 0.0, 0.8]));
+        let (u, v) =
+            (DVector::from_vec(vec![1.0, 2.0, 2.0]), DVector::from_vec(vec![0.6, 0.0, 0.8]));
         let found = SingularValues::of(&(&u * v.transpose()));
-        assert!((found.values[0] - 3.0).abs() < 1e-15 && found.values[1] < 1e-15 && found.values[2] < 1e-15);
+        assert!(
+            (found.values[0] - 3.0).abs() < 1e-15
+                && found.values[1] < 1e-15
+                && found.values[2] < 1e-15
+        );
         assert!((found.right.column(0).dot(&v).abs() - 1.0).abs() < 1e-15);
     }
 
     #[test]
     fn a_matrix_is_put_together_again() {
         for (rows, n) in [(5, 4), (170, 161), (200, 192)] {
-            let matrix = DMatrix::from_fn(rows, n, |i, j| ((1 + 3 * i + 7 * j + i * j) as f64).sin());
+            let matrix =
+                DMatrix::from_fn(rows, n, |i, j| ((1 + 3 * i + 7 * j + i * j) as f64).sin());
             let constant = DVector::from_fn(rows, |i, _| (2.3 * i as f64).cos());
-            let Decomposition { columns, singular, projected } = Decomposition::new(&matrix, Some(&constant), 0.0);
+            let Decomposition { columns, singular, projected } =
+                Decomposition::new(&matrix, Some(&constant), 0.0);
             let tolerance = 1e-14 * matrix.norm_squared();
-            assert!((&columns * columns.transpose() - matrix.transpose() * &matrix).norm() < tolerance);
+            assert!(
+                (&columns * columns.transpose() - matrix.transpose() * &matrix).norm() < tolerance
+            );
             // Σ σᵢ vᵢ uᵢᵀc = Bᵀc
             assert!((&columns * projected - matrix.transpose() * constant).norm() < tolerance);
             let orthogonal = columns.transpose() * &columns;
-            let squares = DMatrix::from_diagonal(&DVector::from_iterator(n, singular.iter().map(|s| s * s)));
+            let squares =
+                DMatrix::from_diagonal(&DVector::from_iterator(n, singular.iter().map(|s| s * s)));
             assert!((orthogonal - squares).norm() < tolerance);
         }
     }

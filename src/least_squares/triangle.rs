@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector};
 use super::kernel::{PANEL, dot, dots, norm, subtract, sum_of_squares};
 use super::{Block, Linearisation};
 
-/// Reflectors applied together as matrix products, where so many columns are left: a wide panel costs more itself, and fewer passes
-/// over what is behind it.
+/// Reflectors applied together as matrix products, where so many columns are left: a wide panel
+/// costs more itself, and fewer passes over what is behind it.
 const WIDE: [(usize, usize); 2] = [(WIDEST, 384), (NARROWER, WIDE_FROM)];
 const WIDEST: usize = 96;
 /// Those of the widest are taken so many at a time among themselves.
@@ -17,10 +17,11 @@ const WIDE_FROM: usize = 128;
 
 /// The triangular factor of all rows absorbed so far.
 ///
-/// \[R c; 0 d\] = Qᵀ \[J r\], so ‖J p + r‖² = ‖R p + c‖² + ‖d‖²          [Golub & Van Loan 2013, §5.2 and §6.5.3]
+/// \[R c; 0 d\] = Qᵀ \[J r\], so ‖J p + r‖² = ‖R p + c‖² + ‖d‖²          [Golub & Van Loan 2013,
+/// §5.2 and §6.5.3]
 ///
-/// A block of rows is absorbed by n reflectors; R being triangular, reflector k touches only row k of R and the
-/// rows of the block. Work: 2 n² per row, memory: n². No m × n matrix is ever kept.
+/// A block of rows is absorbed by n reflectors; R being triangular, reflector k touches only row k
+/// of R and the rows of the block. Work: 2 n² per row, memory: n². No m × n matrix is ever kept.
 #[derive(Debug, Clone)]
 pub struct Triangle {
     parameters: usize,
@@ -36,12 +37,14 @@ impl Triangle {
         Self { parameters, rows: vec![0.0; parameters * (parameters + 1)], squares: 0.0 }
     }
 
-    /// The triangular factor of a matrix, of many columns in less time where its rows begin with zeros, as those of a factor do.
+    /// The triangular factor of a matrix, of many columns in less time where its rows begin with
+    /// zeros, as those of a factor do.
     pub(crate) fn of(matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let (m, n) = matrix.shape();
         let mut order: Vec<usize> = (0..m).collect();
         if n >= WIDE_FROM {
-            let first = |row: &usize| matrix.row(*row).iter().position(|value| *value != 0.0).unwrap_or(n);
+            let first =
+                |row: &usize| matrix.row(*row).iter().position(|value| *value != 0.0).unwrap_or(n);
             order.sort_by_cached_key(first);
         }
         let mut block = Block::zeros(m, n);
@@ -63,7 +66,8 @@ impl Triangle {
         self.squares
     }
 
-    /// The same factor with another cost: that of a robust loss, which weighted rows do not add up to.
+    /// The same factor with another cost: that of a robust loss, which weighted rows do not add up
+    /// to.
     #[must_use]
     pub(super) fn with_sum_of_squares(mut self, squares: f64) -> Self {
         self.squares = squares;
@@ -82,27 +86,32 @@ impl Triangle {
     /// The same factor R of other residuals, with their c and their ‖r‖².
     pub(super) fn with_residual(mut self, constant: &DVector<f64>, squares: f64) -> Self {
         let n = self.parameters;
-        self.rows.chunks_exact_mut(n + 1).zip(constant.iter()).for_each(|(row, value)| row[n] = *value);
+        self.rows
+            .chunks_exact_mut(n + 1)
+            .zip(constant.iter())
+            .for_each(|(row, value)| row[n] = *value);
         self.squares = squares;
         self
     }
 
     /// Takes in the rows of `block`, whose values are lost.
     ///
-    /// A block for another number of unknowns is a mistake of the caller and is checked in debug builds only.
+    /// A block for another number of unknowns is a mistake of the caller and is checked in debug
+    /// builds only.
     pub fn absorb(&mut self, block: &mut Block) {
         self.squares += sum_of_squares(block.column(block.parameters));
         self.reduce(block, |_| usize::MAX);
     }
 
-    /// The same of rows sorted by the first column in which they have an entry, as priors are: of many unknowns, few are touched by the
-    /// first reflectors.
+    /// The same of rows sorted by the first column in which they have an entry, as priors are: of
+    /// many unknowns, few are touched by the first reflectors.
     pub(super) fn absorb_rows(&mut self, block: &mut Block) {
         let n = block.parameters;
         if n < WIDE_FROM {
             return self.absorb(block);
         }
-        let first = |row: usize| (0..n).find(|&j| block.values[j * block.rows + row] != 0.0).unwrap_or(n);
+        let first =
+            |row: usize| (0..n).find(|&j| block.values[j * block.rows + row] != 0.0).unwrap_or(n);
         let firsts: Vec<usize> = (0..block.rows).map(first).collect();
         if !firsts.is_sorted() {
             return self.absorb(block);
@@ -126,7 +135,11 @@ impl Triangle {
     }
 
     /// The problem \[R c\] with further rows diag(d) p = 0, whose cost is left out.
-    pub(crate) fn damped(triangle: &DMatrix<f64>, projected: &DVector<f64>, diagonal: &DVector<f64>) -> Linearisation {
+    pub(crate) fn damped(
+        triangle: &DMatrix<f64>,
+        projected: &DVector<f64>,
+        diagonal: &DVector<f64>,
+    ) -> Linearisation {
         let n = diagonal.len();
         let mut damped = Self::new(n);
         let mut block = Block::zeros(n, n);
@@ -146,12 +159,17 @@ impl Triangle {
         let n = self.parameters;
         Linearisation {
             cost: 0.5 * self.squares,
-            triangle: DMatrix::from_fn(n, n, |i, j| if i <= j { self.rows[i * (n + 1) + j] } else { 0.0 }),
+            triangle: DMatrix::from_fn(
+                n,
+                n,
+                |i, j| if i <= j { self.rows[i * (n + 1) + j] } else { 0.0 },
+            ),
             projected: DVector::from_fn(n, |i, _| self.rows[i * (n + 1) + n]),
         }
     }
 
-    /// Reduces the block to zero, panel after panel; `filled(k)` bounds the non-zero rows of its first k columns.
+    /// Reduces the block to zero, panel after panel; `filled(k)` bounds the non-zero rows of its
+    /// first k columns.
     fn reduce(&mut self, block: &mut Block, filled: impl Fn(usize) -> usize) {
         let (n, m) = (self.parameters, block.rows);
         debug_assert_eq!(n, block.parameters);
@@ -165,7 +183,13 @@ impl Triangle {
             let end = first + wide;
             for (part, own) in factors[..wide].chunks_mut(NARROWER).enumerate() {
                 let first = first + part * NARROWER;
-                self.reduce_columns(block, first..first + own.len(), first + own.len(), |_| used, own);
+                self.reduce_columns(
+                    block,
+                    first..first + own.len(),
+                    first + own.len(),
+                    |_| used,
+                    own,
+                );
                 self.apply(block, (first, end), used, own);
             }
             self.apply(block, (first, n + 1), used, &factors[..wide]);
@@ -174,7 +198,8 @@ impl Triangle {
         self.reduce_columns(block, first..n, n + 1, filled, &mut []);
     }
 
-    /// Reduces some columns of the block, and the columns behind them up to `end`; the reflectors' factors τ, as far as there is room.
+    /// Reduces some columns of the block, and the columns behind them up to `end`; the reflectors'
+    /// factors τ, as far as there is room.
     fn reduce_columns(
         &mut self,
         block: &mut Block,
@@ -189,8 +214,13 @@ impl Triangle {
             let used = filled(first + width).min(m);
             let (panel, trailing) = block.values[first * m..end * m].split_at_mut(width * m);
             let own = self.factor_panel(first, width, panel, m, used);
-            factors.iter_mut().skip(first - columns.start).zip(&own[..width]).for_each(|(all, own)| *all = *own);
-            let vectors: [&[f64]; PANEL] = std::array::from_fn(|i| &panel[i.min(width - 1) * m..][..used]);
+            factors
+                .iter_mut()
+                .skip(first - columns.start)
+                .zip(&own[..width])
+                .for_each(|(all, own)| *all = *own);
+            let vectors: [&[f64]; PANEL] =
+                std::array::from_fn(|i| &panel[i.min(width - 1) * m..][..used]);
             let coupling = coupling(&vectors, width);
             for (j, column) in trailing.chunks_exact_mut(m).enumerate() {
                 let column = &mut column[..used];
@@ -207,11 +237,18 @@ impl Triangle {
         }
     }
 
-    /// Applies the reflectors of the wide panel at `first` to the columns behind it up to `end`, as matrix products.
+    /// Applies the reflectors of the wide panel at `first` to the columns behind it up to `end`, as
+    /// matrix products.
     ///
-    /// With the vectors V below their leading ones, H₁ … H_k = 1 − U T Uᵀ: W = Tᵀ (R + Vᵀ C), R ← R − W, C ← C − V W
-    /// [Schreiber and Van Loan 1989]
-    fn apply(&mut self, block: &mut Block, (first, end): (usize, usize), used: usize, factors: &[f64]) {
+    /// With the vectors V below their leading ones, H₁ … H_k = 1 − U T Uᵀ: W = Tᵀ (R + Vᵀ C), R ← R
+    /// − W, C ← C − V W [Schreiber and Van Loan 1989]
+    fn apply(
+        &mut self,
+        block: &mut Block,
+        (first, end): (usize, usize),
+        used: usize,
+        factors: &[f64],
+    ) {
         let wide = factors.len();
         if first + wide == end {
             return;
@@ -242,7 +279,14 @@ impl Triangle {
     }
 
     /// Replaces `width` columns by their reflectors and returns the factors τ of H = I − τ u uᵀ.
-    fn factor_panel(&mut self, first: usize, width: usize, panel: &mut [f64], m: usize, used: usize) -> [f64; PANEL] {
+    fn factor_panel(
+        &mut self,
+        first: usize,
+        width: usize,
+        panel: &mut [f64],
+        m: usize,
+        used: usize,
+    ) -> [f64; PANEL] {
         let stride = self.parameters + 1;
         let mut factors = [0.0; PANEL];
         for i in 0..width {
@@ -264,9 +308,11 @@ impl Triangle {
     }
 }
 
-/// Householder reflector that sends (α, v) to (β, 0); `vector` becomes the part of u below its leading 1.
+/// Householder reflector that sends (α, v) to (β, 0); `vector` becomes the part of u below its
+/// leading 1.
 ///
-/// β = −sign(α) ‖(α, v)‖, τ = (β − α)/β, u = (1, v/(α − β))          [Golub & Van Loan 2013, alg. 5.1.1]
+/// β = −sign(α) ‖(α, v)‖, τ = (β − α)/β, u = (1, v/(α − β))          [Golub & Van Loan 2013, alg.
+/// 5.1.1]
 ///
 /// Returns (β, τ); for v = 0 nothing is done and τ = 0.
 pub(super) fn reflector(alpha: f64, vector: &mut [f64]) -> (f64, f64) {
@@ -325,8 +371,14 @@ mod tests {
         let gram = stacked.tr_mul(stacked);
         let reduced = triangle.into_linearisation();
         let scale = gram.amax();
-        assert!((reduced.triangle.tr_mul(&reduced.triangle) - gram.view((0, 0), (n, n))).amax() <= tolerance * scale);
-        assert!((reduced.triangle.tr_mul(&reduced.projected) - gram.view((0, n), (n, 1))).amax() <= tolerance * scale);
+        assert!(
+            (reduced.triangle.tr_mul(&reduced.triangle) - gram.view((0, 0), (n, n))).amax()
+                <= tolerance * scale
+        );
+        assert!(
+            (reduced.triangle.tr_mul(&reduced.projected) - gram.view((0, n), (n, 1))).amax()
+                <= tolerance * scale
+        );
         assert!((2.0 * reduced.cost - gram[(n, n)]).abs() <= tolerance * scale);
     }
 
@@ -372,7 +424,10 @@ mod tests {
                 other.absorb_rows(&mut priors.clone());
                 let [all, few] = [triangle, other].map(Triangle::into_linearisation);
                 assert!((all.cost / few.cost - 1.0).abs() < 1e-14);
-                assert!((all.triangle - few.triangle).amax() < 1e-13 && (all.projected - few.projected).amax() < 1e-13);
+                assert!(
+                    (all.triangle - few.triangle).amax() < 1e-13
+                        && (all.projected - few.projected).amax() < 1e-13
+                );
             }
         }
     }

@@ -10,7 +10,8 @@ use super::singular::SingularValues;
 const HARD: f64 = 1e5;
 /// Scaled singular values below this part of the largest carry no information.
 const NO_INFORMATION: f64 = 1e-13;
-/// Where no singular value is below this part of the largest, an inverse is exact enough: to 1e-7 at worst.
+/// Where no singular value is below this part of the largest, an inverse is exact enough: to 1e-7
+/// at worst.
 const WELL_CONDITIONED: f64 = 1e-9;
 
 /// Covariance of the unknowns of a fit, and what it rests on.
@@ -25,9 +26,10 @@ pub struct Uncertainty {
 impl Uncertainty {
     /// (`RᵀR` / s² + `PᵀP`)⁻¹ on the free unknowns, with the unidentifiable combinations held.
     ///
-    /// `data` is the triangular factor R of the whitened data, `prior_sigma` 1 σ of each unknown's prior, `gauge` rows that
-    /// span the unidentifiable combinations, `held` marks unknowns that are not estimated (at a bound), and s² = `noise_factor`
-    /// multiplies the assumed variance of the data.
+    /// `data` is the triangular factor R of the whitened data, `prior_sigma` 1 σ of each unknown's
+    /// prior, `gauge` rows that span the unidentifiable combinations, `held` marks unknowns that
+    /// are not estimated (at a bound), and s² = `noise_factor` multiplies the assumed variance of
+    /// the data.
     pub fn of(
         data: &DMatrix<f64>,
         prior_sigma: &[Option<f64>],
@@ -56,8 +58,10 @@ impl Uncertainty {
                 covariance[(j, k)] = small[(a, b)];
             }
         }
-        let from_priors: f64 = priors.iter().map(|&(j, sigma)| small[(j, j)] / (sigma * sigma)).sum();
-        let effective_parameters = (free.len() as f64 - gauge.nrows() as f64 - from_priors).max(0.0);
+        let from_priors: f64 =
+            priors.iter().map(|&(j, sigma)| small[(j, j)] / (sigma * sigma)).sum();
+        let effective_parameters =
+            (free.len() as f64 - gauge.nrows() as f64 - from_priors).max(0.0);
         Self { covariance, effective_parameters }
     }
 
@@ -67,13 +71,17 @@ impl Uncertainty {
     }
 }
 
-/// (`AᵀA`)⁺ through the triangular factor of A with its columns scaled to unit norm, or through its singular values.
+/// (`AᵀA`)⁺ through the triangular factor of A with its columns scaled to unit norm, or through its
+/// singular values.
 fn inverse_normal(mut a: DMatrix<f64>) -> DMatrix<f64> {
     let n = a.ncols();
     if n == 0 {
         return DMatrix::zeros(0, 0);
     }
-    let scale = DVector::from_iterator(n, a.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }));
+    let scale = DVector::from_iterator(
+        n,
+        a.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }),
+    );
     for (mut column, scale) in a.column_iter_mut().zip(scale.iter()) {
         column.unscale_mut(*scale);
     }

@@ -8,10 +8,12 @@ use super::{Linearisation, Triangle};
 
 /// Weight that turns rows of held combinations into constraints.
 const HARD: f64 = 1e5;
-/// Variances that are searched, as logarithms of their ratio to the assumed one, and the steps of the search.
+/// Variances that are searched, as logarithms of their ratio to the assumed one, and the steps of
+/// the search.
 const SEARCH: (f64, f64) = (-60.0, 60.0);
 const STEPS: u32 = 480;
-/// Directions in which a prior reaches the data with more than this part of their variance say nothing of the noise.
+/// Directions in which a prior reaches the data with more than this part of their variance say
+/// nothing of the noise.
 const DECIDED: f64 = 0.1;
 /// Golden sections of the best step: ln s² is then known to 1e-8.
 const SECTIONS: u32 = 40;
@@ -19,13 +21,15 @@ const GOLDEN: f64 = 0.618_033_988_749_894_8;
 
 /// Restricted likelihood of the variance of the data, priors being what they are.
 ///
-/// Linearised about a fit, the data at the priors' means are y = A z + e with z ∼ N(0, I), e ∼ N(0, s² I): unknowns without a
-/// prior are projected out, those with one scaled by it. With A = U diag(a) Vᵀ, c = Uᵀy and m rows that A does not reach,
+/// Linearised about a fit, the data at the priors' means are y = A z + e with z ∼ N(0, I), e ∼ N(0,
+/// s² I): unknowns without a prior are projected out, those with one scaled by it. With A = U
+/// diag(a) Vᵀ, c = Uᵀy and m rows that A does not reach,
 ///
-/// −2 ln L(s²) = Σ (ln(s² + a²) + c²/(s² + a²)) + m ln s² + ‖y − U c‖²/s²          [Patterson & Thompson 1971]
+/// −2 ln L(s²) = Σ (ln(s² + a²) + c²/(s² + a²)) + m ln s² + ‖y − U c‖²/s²          [Patterson &
+/// Thompson 1971]
 ///
-/// Directions with a² above 0.1 are projected out too: the data decide there, and a prior that they contradict is no noise.
-/// s² = 1 is the variance by which the data were whitened.
+/// Directions with a² above 0.1 are projected out too: the data decide there, and a prior that they
+/// contradict is no noise. s² = 1 is the variance by which the data were whitened.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VarianceLikelihood {
     /// a² and c² of each direction that a prior reaches.
@@ -37,8 +41,9 @@ pub struct VarianceLikelihood {
 }
 
 impl VarianceLikelihood {
-    /// From the linearisation at the unknowns `x` of `rows` rows of data, `squares` being their ‖r‖²; `priors` holds 1 σ of
-    /// each unknown's prior, `held` marks unknowns that are not estimated, and `closed` are rows of combinations that are held.
+    /// From the linearisation at the unknowns `x` of `rows` rows of data, `squares` being their
+    /// ‖r‖²; `priors` holds 1 σ of each unknown's prior, `held` marks unknowns that are not
+    /// estimated, and `closed` are rows of combinations that are held.
     pub fn of(
         data: &Linearisation,
         (rows, squares): (usize, f64),
@@ -61,7 +66,9 @@ impl VarianceLikelihood {
         for (place, &j) in free.iter().chain(&known).enumerate() {
             let scale = priors[j].unwrap_or(1.0);
             stack.view_mut((0, place), (n, 1)).copy_from(&(data.triangle.column(j) * scale));
-            stack.view_mut((n, place), (closed.nrows(), 1)).copy_from(&(closed.column(j) * (HARD * scale)));
+            stack
+                .view_mut((n, place), (closed.nrows(), 1))
+                .copy_from(&(closed.column(j) * (HARD * scale)));
         }
         stack.view_mut((0, width), (n, 1)).copy_from(&at_priors);
         stack.view_mut((n, width), (closed.nrows(), 1)).copy_from(&(closed * moved * -HARD));
@@ -69,9 +76,11 @@ impl VarianceLikelihood {
         let (first, k) = (free.len(), known.len());
         let left = reduced.view((first, first), (k, k)).into_owned();
         let y = reduced.view((first, width), (k, 1)).column(0).into_owned();
-        let rest = (squares - data.projected.norm_squared()).max(0.0) + reduced[(width, width)].powi(2);
+        let rest =
+            (squares - data.projected.norm_squared()).max(0.0) + reduced[(width, width)].powi(2);
         let free_rows = (rows + closed.nrows()) as f64 - first as f64;
-        // ‖left⁻¹‖² bounds every a² from below: where all directions are projected out, no singular value is needed.
+        // ‖left⁻¹‖² bounds every a² from below: where all directions are projected out, no singular
+        // value is needed.
         let inverse = inverse_rows(&left, (0..k).map(|j| (j, 1.0)));
         if inverse.is_some_and(|squares| squares * DECIDED < 1.0) {
             return Self { directions: Vec::new(), rest, free_rows: free_rows - k as f64 };
@@ -79,7 +88,8 @@ impl VarianceLikelihood {
         // Singular vectors on the left: of the transpose those on the right.
         let SingularValues { values, right } = SingularValues::of(&left.transpose());
         let along = right.tr_mul(&y);
-        let mut directions: Vec<(f64, f64)> = values.iter().zip(along.iter()).map(|(a, c)| (a * a, c * c)).collect();
+        let mut directions: Vec<(f64, f64)> =
+            values.iter().zip(along.iter()).map(|(a, c)| (a * a, c * c)).collect();
         let lost = (y.norm_squared() - along.norm_squared()).max(0.0);
         directions.retain(|(a, _)| *a > 0.0);
         let seen = directions.len() as f64;
@@ -98,7 +108,10 @@ impl VarianceLikelihood {
     pub fn maximum(&self) -> (f64, f64) {
         let step = (SEARCH.1 - SEARCH.0) / f64::from(STEPS);
         let place = |k: u32| SEARCH.0 + f64::from(k) * step;
-        let best = (0..=STEPS).map(place).min_by(|a, b| self.at(*a).total_cmp(&self.at(*b))).unwrap_or(0.0);
+        let best = (0..=STEPS)
+            .map(place)
+            .min_by(|a, b| self.at(*a).total_cmp(&self.at(*b)))
+            .unwrap_or(0.0);
         let (mut low, mut high) = (best - step, best + step);
         for _ in 0..SECTIONS {
             let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
@@ -134,7 +147,14 @@ mod tests {
         triangle.absorb(&mut block);
         let closed = DMatrix::zeros(0, 2);
         let data = triangle.into_linearisation();
-        VarianceLikelihood::of(&data, (rows, squares), &DVector::zeros(2), &[Some(1.0), None], &[false; 2], &closed)
+        VarianceLikelihood::of(
+            &data,
+            (rows, squares),
+            &DVector::zeros(2),
+            &[Some(1.0), None],
+            &[false; 2],
+            &closed,
+        )
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! Combinations of unknowns that the data see too weakly for an estimate, and fits that leave them where they are.
+//! Combinations of unknowns that the data see too weakly for an estimate, and fits that leave them
+//! where they are.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,10 +8,12 @@ use super::inverse::inverse_rows;
 use super::singular::SingularValues;
 use super::{Block, Linearisation, Objective, Triangle};
 
-/// A combination is weak if moving it by its own size changes all measured coordinates together by less than this many σ.
+/// A combination is weak if moving it by its own size changes all measured coordinates together by
+/// less than this many σ.
 ///
-/// An estimate of it would then have a standard error above a fifth of that size: it may lie anywhere. What an arm really
-/// deviates by, at most a hundredth of its size, moves no position by more than 0.05 σ along it.
+/// An estimate of it would then have a standard error above a fifth of that size: it may lie
+/// anywhere. What an arm really deviates by, at most a hundredth of its size, moves no position by
+/// more than 0.05 σ along it.
 pub const WEAK_BELOW: f64 = 5.0;
 /// Parts of a combination below this are rounding.
 const NEGLIGIBLE: f64 = 1e-6;
@@ -18,23 +21,27 @@ const NEGLIGIBLE: f64 = 1e-6;
 /// Combinations of unknowns that are seen too weakly to be estimated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weak {
-    /// Rows that span them, as strong as what is seen best, shape = (combinations, n) [1 / unit of x].
+    /// Rows that span them, as strong as what is seen best, shape = (combinations, n) [1 / unit of
+    /// x].
     pub rows: DMatrix<f64>,
-    /// Each by itself: weights in units of the unknowns' sizes, and the σ by which all data move with it.
+    /// Each by itself: weights in units of the unknowns' sizes, and the σ by which all data move
+    /// with it.
     pub combinations: Vec<UnidentifiableCombination>,
     /// Part of each unknown that lies outside of them, 0…1.
     pub visible: Vec<f64>,
 }
 
 impl Weak {
-    /// Those of the problem with triangular factor `triangle` (n × n): priors are part of it, and rows of what is held anyhow.
+    /// Those of the problem with triangular factor `triangle` (n × n): priors are part of it, and
+    /// rows of what is held anyhow.
     ///
-    /// `sizes` holds how far each unknown may plausibly go: of those without one (a prior keeps them, or they may be anywhere)
-    /// nothing is asked, they follow the others. With R = [R₁ R₂; 0 R₃], the others first, the σ by which data move with
-    /// S w is ‖R₃ S w‖, S = diag(sizes).
+    /// `sizes` holds how far each unknown may plausibly go: of those without one (a prior keeps
+    /// them, or they may be anywhere) nothing is asked, they follow the others. With R = [R₁ R₂; 0
+    /// R₃], the others first, the σ by which data move with S w is ‖R₃ S w‖, S = diag(sizes).
     pub fn of(triangle: &DMatrix<f64>, sizes: &[Option<f64>]) -> Option<Self> {
         let n = triangle.ncols();
-        let sized: Vec<(usize, f64)> = sizes.iter().enumerate().filter_map(|(j, size)| Some((j, (*size)?))).collect();
+        let sized: Vec<(usize, f64)> =
+            sizes.iter().enumerate().filter_map(|(j, size)| Some((j, (*size)?))).collect();
         if sized.is_empty() {
             return None;
         }
@@ -55,11 +62,18 @@ impl Weak {
         }
         let mut reduced = Triangle::new(n);
         reduced.absorb(&mut block);
-        let seen = reduced.into_linearisation().triangle.view((first, first), (sized.len(), sized.len())).into_owned();
+        let seen = reduced
+            .into_linearisation()
+            .triangle
+            .view((first, first), (sized.len(), sized.len()))
+            .into_owned();
         if seen.iter().any(|value| !value.is_finite()) || is_strong(&seen) {
             return None;
         }
-        let strongest = sized.iter().map(|&(j, size)| triangle.column(j).norm() * size).fold(WEAK_BELOW, f64::max);
+        let strongest = sized
+            .iter()
+            .map(|&(j, size)| triangle.column(j).norm() * size)
+            .fold(WEAK_BELOW, f64::max);
         let SingularValues { values, right } = SingularValues::of(&seen);
         let strong = values.iter().filter(|value| **value >= WEAK_BELOW).count();
         let spanned = super::identifiability::complement(&right.columns(0, strong).into_owned());
@@ -70,7 +84,10 @@ impl Weak {
             rows.set_column(j, &(spanned.column(place) * (strongest / size)));
         }
         let combination = |row: nalgebra::RowDVector<f64>| {
-            let sign = row.iter().find(|weight| weight.abs() > NEGLIGIBLE).map_or(1.0, |weight| weight.signum());
+            let sign = row
+                .iter()
+                .find(|weight| weight.abs() > NEGLIGIBLE)
+                .map_or(1.0, |weight| weight.signum());
             let weights = row.iter().enumerate().filter(|(_, weight)| weight.abs() > NEGLIGIBLE);
             let weights = weights.map(|(place, weight)| (sized[place].0, sign * weight)).collect();
             UnidentifiableCombination { weights, singular_value: (&seen * row.transpose()).norm() }
@@ -80,7 +97,8 @@ impl Weak {
     }
 }
 
-/// Whether an upper triangle leaves no vector of length one shorter than [`WEAK_BELOW`], by ‖T⁻¹‖ in Frobenius's norm.
+/// Whether an upper triangle leaves no vector of length one shorter than [`WEAK_BELOW`], by ‖T⁻¹‖
+/// in Frobenius's norm.
 fn is_strong(triangle: &DMatrix<f64>) -> bool {
     let n = triangle.ncols();
     if (0..n).any(|j| triangle[(j, j)].abs() < WEAK_BELOW) {
@@ -117,12 +135,21 @@ impl<O: Objective> Objective for Steadied<'_, O> {
         }
     }
 
-    fn curvature(&self, x: &DVector<f64>, within: &dyn Fn(&DVector<f64>) -> bool) -> Option<DMatrix<f64>> {
+    fn curvature(
+        &self,
+        x: &DVector<f64>,
+        within: &dyn Fn(&DVector<f64>) -> bool,
+    ) -> Option<DMatrix<f64>> {
         self.objective.curvature(x, within)
     }
 
     fn reach(&self) -> Vec<Option<f64>> {
-        self.objective.reach().into_iter().zip(self.sizes).map(|(known, size)| known.or(*size)).collect()
+        self.objective
+            .reach()
+            .into_iter()
+            .zip(self.sizes)
+            .map(|(known, size)| known.or(*size))
+            .collect()
     }
 
     fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
@@ -138,8 +165,12 @@ mod tests {
     fn what_moves_the_data_by_less_than_its_level_is_weak() {
         // y = x₀ + x₁ + ε (x₁ − x₂), x₃ alone; 1 is everyone's size but of x₃, which has none.
         let of = |difference: f64| {
-            let rows =
-                [[1e3, 1e3, 0.0, 1.0], [0.0, difference, -difference, 0.0], [0.0, 0.0, 1e3, 2.0], [0.0, 0.0, 0.0, 1e3]];
+            let rows = [
+                [1e3, 1e3, 0.0, 1.0],
+                [0.0, difference, -difference, 0.0],
+                [0.0, 0.0, 1e3, 2.0],
+                [0.0, 0.0, 0.0, 1e3],
+            ];
             DMatrix::from_fn(4, 4, |i, j| rows[i][j])
         };
         let sizes = [Some(1.0), Some(1.0), Some(1.0), None];
@@ -147,8 +178,15 @@ mod tests {
         let weak = Weak::of(&of(2.0), &sizes).unwrap();
         let [combination] = weak.combinations.as_slice() else { panic!("{weak:?}") };
         assert_eq!(combination.weights.iter().map(|(j, _)| *j).collect::<Vec<_>>()[..2], [0, 1]);
-        assert!((combination.weights[0].1 + combination.weights[1].1).abs() < 1e-2 && combination.weights[0].1 > 0.7);
-        assert!(combination.singular_value < 2.0 && weak.visible[2] > 0.99 && (weak.visible[3] - 1.0).abs() < 1e-15);
+        assert!(
+            (combination.weights[0].1 + combination.weights[1].1).abs() < 1e-2
+                && combination.weights[0].1 > 0.7
+        );
+        assert!(
+            combination.singular_value < 2.0
+                && weak.visible[2] > 0.99
+                && (weak.visible[3] - 1.0).abs() < 1e-15
+        );
         // What is ten times as large is ten times as well seen.
         assert_eq!(Weak::of(&of(2.0), &[Some(10.0), Some(10.0), Some(10.0), None]), None);
         assert_eq!(Weak::of(&of(0.0), &[None; 4]), None);

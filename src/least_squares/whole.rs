@@ -23,7 +23,10 @@ pub fn residual_vector<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> DVecto
 }
 
 /// The whole Jacobian ∂r/∂x, m × n, and all residuals; parts of the items on every core.
-pub fn jacobian_and_residual<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+pub fn jacobian_and_residual<P: LeastSquares>(
+    problem: &P,
+    x: &DVector<f64>,
+) -> (DMatrix<f64>, DVector<f64>) {
     let (items, rows, n) = (problem.items(), problem.rows_per_item(), problem.parameters());
     let (all, together) = ((rows * items).max(1), (rows * CHUNK_ITEMS).max(1));
     let mut jacobian = zeros(rows * items, n);
@@ -83,7 +86,8 @@ mod tests {
                 let row = 2 * (i - first);
                 block.column_mut(0)[row] = 2.0 * i as f64 * x[0];
                 block.column_mut(1)[row + 1] = 1.0;
-                block.column_mut(2)[row..row + 2].copy_from_slice(&[i as f64 * x[0] * x[0], x[1] - i as f64]);
+                block.column_mut(2)[row..row + 2]
+                    .copy_from_slice(&[i as f64 * x[0] * x[0], x[1] - i as f64]);
             }
         }
     }
@@ -102,7 +106,10 @@ mod tests {
                 _ => 0.0,
             };
             assert_eq!(residual_vector(&Rows(items), &x), residual);
-            assert_eq!(jacobian_and_residual(&Rows(items), &x), (DMatrix::from_fn(2 * items, 2, slope), residual));
+            assert_eq!(
+                jacobian_and_residual(&Rows(items), &x),
+                (DMatrix::from_fn(2 * items, 2, slope), residual)
+            );
         }
     }
 }

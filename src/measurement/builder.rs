@@ -59,7 +59,8 @@ pub enum DatasetError {
     },
 }
 
-/// A [`Dataset`] under construction; every method takes one value per row, and a later call replaces an earlier one.
+/// A [`Dataset`] under construction; every method takes one value per row, and a later call
+/// replaces an earlier one.
 #[derive(Debug, Clone)]
 pub struct DatasetBuilder {
     configurations: Vec<Vec<f64>>,
@@ -79,8 +80,9 @@ pub struct DatasetBuilder {
 }
 
 impl Dataset {
-    /// From plain arrays: configurations, shape = (rows)(joints) \[rad\] or \[m\], fixed joints included with any value, and
-    /// measured positions, shape = (rows), measuring frame \[m\]. Other columns follow by name; no row is held out unless
+    /// From plain arrays: configurations, shape = (rows)(joints) \[rad\] or \[m\], fixed joints
+    /// included with any value, and measured positions, shape = (rows), measuring frame \[m\].
+    /// Other columns follow by name; no row is held out unless
     /// [`held_out`](DatasetBuilder::held_out) says so.
     pub fn builder<C: AsRef<[f64]>>(
         configurations: impl IntoIterator<Item = C>,
@@ -113,7 +115,8 @@ impl Dataset {
 }
 
 impl DatasetBuilder {
-    /// Measured orientation of the target, measuring frame; fitted where the problem has an `orientation_sigma`.
+    /// Measured orientation of the target, measuring frame; fitted where the problem has an
+    /// `orientation_sigma`.
     #[must_use]
     pub fn orientation(mut self, orientations: Vec<UnitQuaternion<f64>>) -> Self {
         self.orientations = Some(orientations);
@@ -162,7 +165,8 @@ impl DatasetBuilder {
         self
     }
 
-    /// The problem's own covariates, shape = (rows)(covariates), in the order of its `[data.covariates]` and in their units.
+    /// The problem's own covariates, shape = (rows)(covariates), in the order of its
+    /// `[data.covariates]` and in their units.
     #[must_use]
     pub fn covariates<C: AsRef<[f64]>>(mut self, covariates: impl IntoIterator<Item = C>) -> Self {
         self.covariates = rows_of(covariates);
@@ -201,7 +205,10 @@ impl DatasetBuilder {
             *held_out.get_mut(row).ok_or(DatasetError::NoSuchRow { row, rows })? = true;
         }
         let (held_out, identification) = (0..rows).partition(|&row| held_out[row]);
-        Ok(Dataset { measurements: self.measurements()?, split: Split { identification, held_out } })
+        Ok(Dataset {
+            measurements: self.measurements()?,
+            split: Split { identification, held_out },
+        })
     }
 
     /// The measurements alone.
@@ -216,7 +223,11 @@ impl DatasetBuilder {
             length(column, values.len(), rows)?;
             for (row, values) in values.iter().enumerate() {
                 if values.len() != joints {
-                    return Err(DatasetError::Joints { row, expected: joints, found: values.len() });
+                    return Err(DatasetError::Joints {
+                        row,
+                        expected: joints,
+                        found: values.len(),
+                    });
                 }
                 finite(column, row, values)?;
             }
@@ -225,7 +236,10 @@ impl DatasetBuilder {
         let one = |column, values: Option<Vec<f64>>| {
             let Some(values) = values else { return Ok(None) };
             length(column, values.len(), rows)?;
-            values.iter().enumerate().try_for_each(|(row, value)| finite(column, row, &[*value]))?;
+            values
+                .iter()
+                .enumerate()
+                .try_for_each(|(row, value)| finite(column, row, &[*value]))?;
             Ok(Some(values))
         };
         let within = |column, values: Option<Vec<f64>>, rule, wrong: fn(&f64) -> bool| {
@@ -266,7 +280,10 @@ impl DatasetBuilder {
             temperature: one("temperature", self.temperature)?,
             time_measured: time.is_some(),
             time: time.unwrap_or_else(|| (0..rows).map(|row| row as f64).collect()),
-            approach: self.approach.map(|approach| directions(flat("approach", &approach)?, joints)).transpose()?,
+            approach: self
+                .approach
+                .map(|approach| directions(flat("approach", &approach)?, joints))
+                .transpose()?,
             covariates,
             session: words("session", self.session)?.unwrap_or_else(unnamed),
             target: words("target", self.target)?,
@@ -313,5 +330,9 @@ fn finite(column: &'static str, row: usize, values: &[f64]) -> Result<(), Datase
         return Err(DatasetError::NotFinite { column, row });
     }
     let reckoned_with = values.iter().all(|value| value.abs() <= GREATEST);
-    if reckoned_with { Ok(()) } else { Err(DatasetError::OutOfRange { column, row, rule: "larger than 1e150" }) }
+    if reckoned_with {
+        Ok(())
+    } else {
+        Err(DatasetError::OutOfRange { column, row, rule: "larger than 1e150" })
+    }
 }

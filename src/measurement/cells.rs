@@ -41,6 +41,8 @@ pub(super) fn is_validation(table: &Table, place: usize) -> Result<bool, InputEr
     match table.word(place)? {
         "validation" => Ok(true),
         "identification" => Ok(false),
-        word => Err(table.cell_error(place, InputErrorKind::UnknownSplit { word: shortened(word) })),
+        word => {
+            Err(table.cell_error(place, InputErrorKind::UnknownSplit { word: shortened(word) }))
+        }
     }
 }

@@ -10,8 +10,8 @@ use crate::error::{InputError, InputErrorKind, Location};
 /// Text that is made at a time [bytes].
 const CHUNK: usize = 1 << 15;
 
-/// A table in memory: what a file of measurements holds, with the names that its columns have there. Its rows go by the lines
-/// that they would have in a file: the first one is on line 2.
+/// A table in memory: what a file of measurements holds, with the names that its columns have
+/// there. Its rows go by the lines that they would have in a file: the first one is on line 2.
 ///
 /// ```
 /// use std::path::Path;
@@ -53,7 +53,10 @@ impl ColumnTable {
     ///
     /// # Errors
     /// A column of another length than the first.
-    pub fn new(name: impl Into<PathBuf>, columns: Vec<(String, ColumnValues)>) -> Result<Self, InputError> {
+    pub fn new(
+        name: impl Into<PathBuf>,
+        columns: Vec<(String, ColumnValues)>,
+    ) -> Result<Self, InputError> {
         let name = name.into();
         let rows = columns.first().map_or(0, |(_, values)| values.len());
         for (column, values) in &columns {
@@ -72,7 +75,8 @@ impl ColumnTable {
 
     /// Its text as it would stand in a file.
     pub(super) fn into_text(self) -> impl Read {
-        let header = self.columns.iter().map(|(name, _)| quoted(name)).collect::<Vec<_>>().join(",") + "\n";
+        let header =
+            self.columns.iter().map(|(name, _)| quoted(name)).collect::<Vec<_>>().join(",") + "\n";
         Text { table: self, row: 0, chunk: header, read: 0 }
     }
 }

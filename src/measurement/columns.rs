@@ -36,8 +36,8 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Finds the columns in a header; what nobody knows is a warning. Positions and the column of held-out rows need not be
-    /// there unless the poses are `measured`.
+    /// Finds the columns in a header; what nobody knows is a warning. Positions and the column of
+    /// held-out rows need not be there unless the poses are `measured`.
     pub fn find(
         table: &Table,
         problem: &Problem,
@@ -102,7 +102,8 @@ impl Columns {
                 // Numbers count joints otherwise where another name is misspelt.
                 Meaning::Ignored(WarningKind::JointIgnored { .. }) if rule.is_some() => {
                     let meant = numbering.meant(name, &there, problem);
-                    shifted = shifted.or_else(|| Some(error(InputErrorKind::UnknownMeaning { meant })));
+                    shifted =
+                        shifted.or_else(|| Some(error(InputErrorKind::UnknownMeaning { meant })));
                 }
                 Meaning::Ignored(WarningKind::UnitIgnored { write }) if rule.is_some() => {
                     return Err(error(InputErrorKind::UnknownMeaning { meant: Some(write) }));
@@ -120,17 +121,23 @@ impl Columns {
                     unknown.push(name);
                     let asked = unknown.len() <= ASKED;
                     let meant = asked.then(|| numbering.meant(name, &there, problem)).flatten();
-                    if let Some(meant) = meant.as_ref().filter(|meant| counts(meant) && one_typo(name, meant)) {
-                        mistyped =
-                            mistyped.or_else(|| Some(error(InputErrorKind::MistypedColumn { meant: meant.clone() })));
+                    if let Some(meant) =
+                        meant.as_ref().filter(|meant| counts(meant) && one_typo(name, meant))
+                    {
+                        mistyped = mistyped.or_else(|| {
+                            Some(error(InputErrorKind::MistypedColumn { meant: meant.clone() }))
+                        });
                     }
                     let kind = WarningKind::ColumnIgnored { meant };
                     warnings.push(Warning { location: table.column(name), kind });
                 }
             }
         }
-        if let (Some(HeldOut::Fraction { .. }), true) = (&problem.data.held_out, measured && columns.has_split()) {
-            warnings.push(Warning { location: table.column("split"), kind: WarningKind::SplitUnused });
+        if let (Some(HeldOut::Fraction { .. }), true) =
+            (&problem.data.held_out, measured && columns.has_split())
+        {
+            warnings
+                .push(Warning { location: table.column("split"), kind: WarningKind::SplitUnused });
         }
         if !unmapped.is_empty() {
             let location = Location { key: None, ..table.column("") };
@@ -159,8 +166,10 @@ impl Columns {
     ) -> Result<(), InputError> {
         let near = |name: &str| nearest(name, unknown).map(|near| (*near).to_owned());
         let missing = |bases: &[&str], unit: Unit| {
-            let write = bases.iter().map(|base| unit.spelled(base)).collect::<Vec<_>>().join(" or ");
-            let near = bases.iter().flat_map(|base| unit.spellings(base)).find_map(|name| near(&name));
+            let write =
+                bases.iter().map(|base| unit.spelled(base)).collect::<Vec<_>>().join(" or ");
+            let near =
+                bases.iter().flat_map(|base| unit.spellings(base)).find_map(|name| near(&name));
             let first = bases.first().copied().unwrap_or_default();
             Err(table.column(first).error(InputErrorKind::MissingColumn { write, near }))
         };
@@ -173,14 +182,20 @@ impl Columns {
                 && !self.has(source(index))
             {
                 let number = format!("q{}{suffix}", numbering.number(index));
-                let namesakes = || problem.joints.iter().enumerate().filter(|(_, own)| own.name == joint.name);
+                let namesakes =
+                    || problem.joints.iter().enumerate().filter(|(_, own)| own.name == joint.name);
                 let is_shared = namesakes().nth(1).is_some();
-                let of_it = |name: &&&str| name.strip_prefix(&joint.name).is_some_and(|rest| rest.starts_with('_'));
+                let of_it = |name: &&&str| {
+                    name.strip_prefix(&joint.name).is_some_and(|rest| rest.starts_with('_'))
+                };
                 if let Some(column) = unknown.iter().find(of_it).filter(|_| is_shared) {
-                    let write =
-                        namesakes().map(|(own, _)| unit.spelled(&format!("q{}{suffix}", numbering.number(own))));
+                    let write = namesakes().map(|(own, _)| {
+                        unit.spelled(&format!("q{}{suffix}", numbering.number(own)))
+                    });
                     let (name, write) = (joint.name.clone(), write.collect());
-                    return Err(table.column(column).error(InputErrorKind::SharedJointName { name, write }));
+                    return Err(table
+                        .column(column)
+                        .error(InputErrorKind::SharedJointName { name, write }));
                 }
                 let usable = |name: &&str| suffix.is_empty() && !name.contains(' ') && !is_shared;
                 let named = Some(joint.name.as_str()).filter(usable);
@@ -188,7 +203,12 @@ impl Columns {
             }
         }
         for (k, own) in problem.data.covariates.iter().enumerate() {
-            let used = || problem.effects.iter().any(|declared| declared.effect.covariate() == Some(own.name.as_str()));
+            let used = || {
+                problem
+                    .effects
+                    .iter()
+                    .any(|declared| declared.effect.covariate() == Some(own.name.as_str()))
+            };
             if !self.has(Role::Covariate(k)) && (measured || used()) {
                 let write = format!("it, or take it out of [data.covariates] in {}", own.location);
                 return Err(table
@@ -205,7 +225,9 @@ impl Columns {
         ] {
             if self.has(has) && !self.has(lacks) && (measured || has != Role::Anchor) {
                 let write = write.to_owned();
-                return Err(table.column(&write).error(InputErrorKind::MissingColumn { near: near(&write), write }));
+                return Err(table
+                    .column(&write)
+                    .error(InputErrorKind::MissingColumn { near: near(&write), write }));
             }
         }
         // One coordinate alone is no position.
@@ -214,7 +236,9 @@ impl Columns {
             return self.require_marked(table, problem, measured, near);
         }
         let named_otherwise = Unit::Length.spellings("x").find_map(|name| near(&name)).is_some();
-        if let (false, Some((place, write))) = (has_position || named_otherwise, self.undeclared(problem, |_| true)) {
+        if let (false, Some((place, write))) =
+            (has_position || named_otherwise, self.undeclared(problem, |_| true))
+        {
             let name = self.names.get(place).map_or("", String::as_str);
             return Err(table.column(name).error(InputErrorKind::NotDeclared { write }));
         }
@@ -224,7 +248,9 @@ impl Columns {
             }
         }
         if let (true, true) = self.orientations() {
-            return Err(table.column("qx").error(InputErrorKind::RepeatedColumn { first: "rx".to_owned() }));
+            return Err(table
+                .column("qx")
+                .error(InputErrorKind::RepeatedColumn { first: "rx".to_owned() }));
         }
         self.require_marked(table, problem, measured, near)
     }
@@ -241,7 +267,9 @@ impl Columns {
             && self.marked.is_none()
         {
             let write = format!("it, or change held_out in {}", problem.data.held_out_location);
-            return Err(table.column(name).error(InputErrorKind::MissingColumn { write, near: near(name) }));
+            return Err(table
+                .column(name)
+                .error(InputErrorKind::MissingColumn { write, near: near(name) }));
         }
         Ok(())
     }
@@ -253,21 +281,30 @@ impl Columns {
             .any(|role| self.has(role))
     }
 
-    /// The place of the first column for which the problem lacks a declaration, of those `chosen`, and what it lacks.
-    pub fn undeclared(&self, problem: &Problem, chosen: impl Fn(usize) -> bool) -> Option<(usize, &'static str)> {
-        let lacking = |(place, name): (usize, &String)| Some((place, Role::undeclared(name, problem)?));
+    /// The place of the first column for which the problem lacks a declaration, of those `chosen`,
+    /// and what it lacks.
+    pub fn undeclared(
+        &self,
+        problem: &Problem,
+        chosen: impl Fn(usize) -> bool,
+    ) -> Option<(usize, &'static str)> {
+        let lacking =
+            |(place, name): (usize, &String)| Some((place, Role::undeclared(name, problem)?));
         self.names.iter().enumerate().filter_map(lacking).find(|&(place, _)| chosen(place))
     }
 
     /// Whether the row that the table is at measures something else than a position.
     pub fn observes_at(&self, table: &Table) -> bool {
-        let filled =
-            |role: Role| self.place(role).is_some_and(|place| table.text(place).is_ok_and(|cell| !cell.is_empty()));
+        let filled = |role: Role| {
+            self.place(role)
+                .is_some_and(|place| table.text(place).is_ok_and(|cell| !cell.is_empty()))
+        };
         let roles = [Role::Point, Role::Distance, Role::Surface, Role::Tilt(0)];
         self.file == Some(Role::Point) || roles.into_iter().any(filled)
     }
 
-    /// The number of the row that the table is at in the column of a role \[SI\]; 0 where there is no such column.
+    /// The number of the row that the table is at in the column of a role \[SI\]; 0 where there is
+    /// no such column.
     pub fn length(&self, table: &Table, role: Role) -> Result<f64, InputError> {
         let column = self.read.iter().find(|column| column.role == role);
         column.map_or(Ok(0.0), |column| table.number(column.place).map(column.to_si))
@@ -292,7 +329,8 @@ impl Columns {
 
     /// Whether there is a whole orientation as angles, and as a quaternion.
     pub fn orientations(&self) -> (bool, bool) {
-        let all = |count: usize, role: fn(usize) -> Role| (0..count).all(|axis| self.has(role(axis)));
+        let all =
+            |count: usize, role: fn(usize) -> Role| (0..count).all(|axis| self.has(role(axis)));
         (all(3, Role::Orientation), all(4, Role::Quaternion))
     }
 
@@ -302,7 +340,8 @@ impl Columns {
     }
 
     pub fn has(&self, role: Role) -> bool {
-        self.file == Some(role) || self.read.binary_search_by_key(&role, |column| column.role).is_ok()
+        self.file == Some(role)
+            || self.read.binary_search_by_key(&role, |column| column.role).is_ok()
     }
 }
 
@@ -312,12 +351,14 @@ fn called(name: &str, theirs: Option<&String>) -> String {
     name.to_owned() + &theirs.unwrap_or_default()
 }
 
-/// A column that is missing is the fault of an entry of the map that gives its name to one which the table has itself.
+/// A column that is missing is the fault of an entry of the map that gives its name to one which
+/// the table has itself.
 fn blamed(error: InputError, (rule, name): (&ColumnRule, &str)) -> InputError {
     match *error.kind {
-        InputErrorKind::MissingColumn { write, .. } => {
-            rule.location.clone().error(InputErrorKind::ColumnHidden { name: name.to_owned(), write })
-        }
+        InputErrorKind::MissingColumn { write, .. } => rule
+            .location
+            .clone()
+            .error(InputErrorKind::ColumnHidden { name: name.to_owned(), write }),
         kind => error.location.error(kind),
     }
 }
@@ -339,9 +380,14 @@ struct Numbering {
 impl Numbering {
     /// Columns go by the joint's number, or else by its place among the joints that move.
     fn of<'a>(names: impl Iterator<Item = &'a str>, problem: &Problem) -> Self {
-        let numbers: Vec<usize> = names.filter_map(|name| numbered(split_unit(name).0, "q")).collect();
+        let numbers: Vec<usize> =
+            names.filter_map(|name| numbered(split_unit(name).0, "q")).collect();
         let all = || (0..problem.joints.len()).collect::<Vec<_>>();
-        let moving = problem.joints.iter().enumerate().filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
+        let moving = problem
+            .joints
+            .iter()
+            .enumerate()
+            .filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
         let moving: Vec<usize> = moving.map(|(index, _)| index).collect();
         let by_number = moving.iter().all(|index| numbers.contains(&(index + 1)));
         let by_order = (1..=moving.len()).all(|number| numbers.contains(&number))
@@ -359,16 +405,26 @@ impl Numbering {
 
     /// The column that an unknown name is meant to be, of those that the table does not have.
     fn meant(&self, name: &str, there: &BTreeSet<&str>, problem: &Problem) -> Option<String> {
-        let moving =
-            || problem.joints.iter().enumerate().filter_map(|(k, own)| Some((k, own, unit_of(own.commanded())?)));
+        let moving = || {
+            problem
+                .joints
+                .iter()
+                .enumerate()
+                .filter_map(|(k, own)| Some((k, own, unit_of(own.commanded())?)))
+        };
         let joints = moving().map(|(index, _, unit)| (self.number(index), unit));
         let named = moving().map(|(_, joint, unit)| (joint.name.clone(), unit));
-        let plain = PLAIN.iter().filter(|(_, role)| role.is_known_to(problem)).map(|(name, _)| (*name).to_owned());
+        let plain = PLAIN
+            .iter()
+            .filter(|(_, role)| role.is_known_to(problem))
+            .map(|(name, _)| (*name).to_owned());
         let approach = joints.clone().map(|(number, _)| format!("approach{number}"));
         let measured = MEASURED.iter().filter(|(_, role, ..)| role.is_known_to(problem));
         let measured = measured.map(|&(base, _, unit, _)| (base.to_owned(), unit));
         let measured = measured.chain(joints.map(|(number, unit)| (format!("q{number}"), unit)));
-        let measured = measured.chain(named).flat_map(|(base, unit)| unit.spellings(&base).collect::<Vec<_>>());
+        let measured = measured
+            .chain(named)
+            .flat_map(|(base, unit)| unit.spellings(&base).collect::<Vec<_>>());
         let lacking = |name: &String| !there.contains(split_unit(name).0);
         nearest(name, plain.chain(approach).chain(measured).filter(lacking))
     }
@@ -379,12 +435,15 @@ impl Numbering {
             return meaning;
         }
         let plain = |role| Ok(Meaning::Read(role, identity));
-        if let Some((_, role)) = PLAIN.iter().find(|(known, role)| *known == name && role.is_known_to(problem)) {
+        if let Some((_, role)) =
+            PLAIN.iter().find(|(known, role)| *known == name && role.is_known_to(problem))
+        {
             return plain(*role);
         }
         if let Some(number) = numbered(name, "approach") {
-            let moves =
-                |&joint: &usize| problem.joints.get(joint).is_some_and(|own| own.commanded() != JointKind::Fixed);
+            let moves = |&joint: &usize| {
+                problem.joints.get(joint).is_some_and(|own| own.commanded() != JointKind::Fixed)
+            };
             return match self.joint(number).filter(moves) {
                 Some(joint) => plain(Role::Approach(joint)),
                 None => Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number })),
@@ -397,31 +456,43 @@ impl Numbering {
         {
             let (base, suffix) = suffix;
             let unit = suffix.strip_prefix('_').and_then(|suffix| Unit::Angle.suffix(suffix));
-            let needed = || InputErrorKind::NeedsUnit { noun: Unit::Angle.noun(), write: Unit::Angle.spelled(base) };
+            let needed = || InputErrorKind::NeedsUnit {
+                noun: Unit::Angle.noun(),
+                write: Unit::Angle.spelled(base),
+            };
             return unit.map(|unit| Meaning::Read(tilt, unit.to_si)).ok_or_else(needed);
         }
         let (base, suffix) = split_unit(name);
-        let reading = suffix.and_then(|suffix| suffix.strip_prefix("read_")).filter(|_| numbered(base, "q").is_some());
+        let reading = suffix
+            .and_then(|suffix| suffix.strip_prefix("read_"))
+            .filter(|_| numbered(base, "q").is_some());
         let suffix = reading.or(suffix);
-        let measured = MEASURED.iter().find(|(known, role, ..)| *known == base && role.is_known_to(problem));
+        let measured =
+            MEASURED.iter().find(|(known, role, ..)| *known == base && role.is_known_to(problem));
         let (role, unit, strict) = if let Some(&(_, role, unit, strict)) = measured {
             (role, unit, strict)
         } else {
             let Some(number) = numbered(base, "q") else { return Ok(Meaning::Unknown) };
             let joint = self.joint(number);
-            let Some((joint, unit)) =
-                joint.and_then(|joint| Some((joint, unit_of(problem.joints.get(joint)?.commanded())?)))
+            let Some((joint, unit)) = joint
+                .and_then(|joint| Some((joint, unit_of(problem.joints.get(joint)?.commanded())?)))
             else {
                 return Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number }));
             };
             (if reading.is_some() { Role::Reading(joint) } else { Role::Joint(joint) }, unit, true)
         };
-        let write = || unit.spelled(&if reading.is_some() { format!("{base}_read") } else { base.to_owned() });
+        let write = || {
+            unit.spelled(&if reading.is_some() { format!("{base}_read") } else { base.to_owned() })
+        };
         match suffix {
             Some(suffix) => match unit.suffix(suffix) {
                 Some(suffix) => Ok(Meaning::Read(role, suffix.to_si)),
                 None if strict && Unit::all_suffixes().any(|known| known == suffix) => {
-                    Err(InputErrorKind::WrongUnit { noun: unit.noun(), suffix: suffix.to_owned(), write: write() })
+                    Err(InputErrorKind::WrongUnit {
+                        noun: unit.noun(),
+                        suffix: suffix.to_owned(),
+                        write: write(),
+                    })
                 }
                 None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),
             },
@@ -443,13 +514,16 @@ fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
 /// Conversion of a time without a unit: a date, which needs none.
 pub(super) const DATE: fn(f64) -> f64 = |_| f64::NAN;
 
-/// What the name of a column means that is the name of a joint, with a unit: `shoulder_pan_joint_rad`. Names that two joints
-/// have, and those of other columns, mean no joint.
+/// What the name of a column means that is the name of a joint, with a unit:
+/// `shoulder_pan_joint_rad`. Names that two joints have, and those of other columns, mean no joint.
 fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputErrorKind>> {
     let base = split_unit(name).0;
     let other = PLAIN.iter().any(|(known, _)| *known == name) || numbered(base, "q").is_some();
     let measured = MEASURED.iter().find(|(known, ..)| *known == base);
-    if other || measured.is_some_and(|(known, _, unit, _)| unit.spellings(known).any(|spelled| spelled == name)) {
+    if other
+        || measured
+            .is_some_and(|(known, _, unit, _)| unit.spellings(known).any(|spelled| spelled == name))
+    {
         return None;
     }
     let joint_of = |name: &str| {
@@ -458,7 +532,10 @@ fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputE
     };
     let unit = |(index, joint): (usize, &Joint)| Some((index, unit_of(joint.commanded())?));
     if let Some((_, unit)) = joint_of(name).and_then(unit) {
-        return Some(Err(InputErrorKind::NeedsUnit { noun: unit.noun(), write: unit.spelled(name) }));
+        return Some(Err(InputErrorKind::NeedsUnit {
+            noun: unit.noun(),
+            write: unit.spelled(name),
+        }));
     }
     let (base, suffix) = name.rsplit_once('_')?;
     let (index, unit) = joint_of(base).and_then(unit)?;
@@ -475,7 +552,10 @@ fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputE
 /// Whether a column that was meant would be missed: a pose's name and orientations decide nothing.
 fn counts(meant: &str) -> bool {
     let base = split_unit(meant).0;
-    base != "pose" && !MEASURED.iter().any(|(known, role, ..)| *known == base && matches!(role, Role::Orientation(_)))
+    base != "pose"
+        && !MEASURED
+            .iter()
+            .any(|(known, role, ..)| *known == base && matches!(role, Role::Orientation(_)))
 }
 
 /// What q of a joint is measured in, where it takes one.

@@ -27,7 +27,8 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    /// Measurements divided as given; the numbers in `split` are rows of `measurements`, each part in ascending order.
+    /// Measurements divided as given; the numbers in `split` are rows of `measurements`, each part
+    /// in ascending order.
     pub fn new(measurements: Measurements, split: Split) -> Self {
         Self { measurements, split }
     }
@@ -35,8 +36,8 @@ impl Dataset {
     /// Measurements divided as the problem says (`held_out` of `[data]`, or their column `split`).
     ///
     /// # Errors
-    /// An empty part, a session that nobody measured, no word on what is held out, or an unknown point, anchor or surface with too
-    /// few rows to say more than where it is.
+    /// An empty part, a session that nobody measured, no word on what is held out, or an unknown
+    /// point, anchor or surface with too few rows to say more than where it is.
     pub fn of(problem: &Problem, measurements: Measurements) -> Result<Self, InputError> {
         measurements.enough_contacts(problem)?;
         let split = Split::new(problem, &measurements)?;
@@ -55,7 +56,10 @@ impl Dataset {
     ///
     /// # Errors
     /// The first mistake found in the files or in their division.
-    pub fn read_files(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
+    pub fn read_files(
+        files: &[PathBuf],
+        problem: &Problem,
+    ) -> Result<(Self, Vec<Warning>), InputError> {
         let (measurements, mut warnings) = Measurements::read(files, problem)?;
         warnings.extend(measurements.repeated_rows(problem.data.position_sigma));
         warnings.extend(measurements.time_going_back());
@@ -66,7 +70,10 @@ impl Dataset {
     ///
     /// # Errors
     /// The first mistake found in the table or in its division.
-    pub fn read_columns(table: ColumnTable, problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
+    pub fn read_columns(
+        table: ColumnTable,
+        problem: &Problem,
+    ) -> Result<(Self, Vec<Warning>), InputError> {
         let (measurements, mut warnings) = Measurements::read_columns(table, problem)?;
         warnings.extend(measurements.repeated_rows(problem.data.position_sigma));
         warnings.extend(measurements.time_going_back());

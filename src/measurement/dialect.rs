@@ -1,4 +1,5 @@
-//! How a table is written: what sets its columns apart, which line names them, and lines that say nothing.
+//! How a table is written: what sets its columns apart, which line names them, and lines that say
+//! nothing.
 
 use std::io::{Read, Result};
 
@@ -24,10 +25,13 @@ pub(super) struct Layout {
 impl Layout {
     /// Of a table that begins with `beginning`.
     ///
-    /// The header is the first line that holds most of the names of the map, or else the first that says something; columns are
-    /// set apart by the one of `,` `;` and tab that it has most of, else by spaces if it has any.
+    /// The header is the first line that holds most of the names of the map, or else the first that
+    /// says something; columns are set apart by the one of `,` `;` and tab that it has most of,
+    /// else by spaces if it has any.
     pub fn of(beginning: &[u8], dialect: &Dialect) -> Self {
-        let text = String::from_utf8_lossy(beginning.strip_prefix(BYTE_ORDER_MARK_UTF8).unwrap_or(beginning));
+        let text = String::from_utf8_lossy(
+            beginning.strip_prefix(BYTE_ORDER_MARK_UTF8).unwrap_or(beginning),
+        );
         let text = text.replace("\r\n", "\n").replace('\r', "\n");
         let names: Vec<&str> = dialect
             .columns
@@ -37,7 +41,9 @@ impl Layout {
                 ColumnOf::Place(_) | ColumnOf::File => None,
             })
             .collect();
-        let is_comment = |line: &str| dialect.comment.as_ref().is_some_and(|mark| line.trim_start().starts_with(mark));
+        let is_comment = |line: &str| {
+            dialect.comment.as_ref().is_some_and(|mark| line.trim_start().starts_with(mark))
+        };
         let lines = text.split('\n').enumerate().take(LINES);
         let speaking: Vec<(usize, &str)> =
             lines.filter(|(_, line)| !line.trim().is_empty() && !is_comment(line)).collect();
@@ -47,13 +53,16 @@ impl Layout {
             names.iter().filter(|name| cells.iter().any(|cell| cell == *name)).count()
         };
         // Of equals the first: the last of the lines from the end.
-        let counted = speaking.iter().rev().map(|&own| (held(own.1), own)).filter(|(count, _)| *count > 0);
+        let counted =
+            speaking.iter().rev().map(|&own| (held(own.1), own)).filter(|(count, _)| *count > 0);
         let named = counted.max_by_key(|(count, _)| *count).map(|(_, own)| own);
         match (named, speaking.first()) {
             (Some((skipped, line)), _) => Self { delimiter: apart(line), skipped },
             // Lines that say nothing are passed over anyway.
             (None, Some((_, line))) => Self { delimiter: apart(line), skipped: 0 },
-            (None, None) => Self { delimiter: dialect.delimiter.unwrap_or(Delimiter::Byte(b',')), skipped: 0 },
+            (None, None) => {
+                Self { delimiter: dialect.delimiter.unwrap_or(Delimiter::Byte(b',')), skipped: 0 }
+            }
         }
     }
 
@@ -70,7 +79,10 @@ impl Layout {
 fn most_of(line: &str) -> Delimiter {
     let count = |byte: u8| line.bytes().filter(|own| *own == byte).count();
     // The last of equals is taken.
-    let most = [b'\t', b';', b','].into_iter().max_by_key(|byte| count(*byte)).filter(|byte| count(*byte) > 0);
+    let most = [b'\t', b';', b',']
+        .into_iter()
+        .max_by_key(|byte| count(*byte))
+        .filter(|byte| count(*byte) > 0);
     match most {
         Some(byte) => Delimiter::Byte(byte),
         None if line.trim().contains(' ') && !line.contains('"') => Delimiter::Spaces,
@@ -87,7 +99,8 @@ fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
     }
 }
 
-/// Passes a table on with lines before the header and comments made empty, and runs of spaces made tabs.
+/// Passes a table on with lines before the header and comments made empty, and runs of spaces made
+/// tabs.
 pub(super) struct Rewritten<R> {
     pub lines: R,
     /// Lines before the header that are still to come.
@@ -145,8 +158,11 @@ impl<R: Read> Rewritten<R> {
             self.skipped = self.skipped.saturating_sub(1);
             self.ready = if line.is_empty() { Vec::new() } else { vec![b'\n'] };
         } else if self.spaces {
-            self.ready =
-                text.split(u8::is_ascii_whitespace).filter(|cell| !cell.is_empty()).collect::<Vec<_>>().join(&TAB);
+            self.ready = text
+                .split(u8::is_ascii_whitespace)
+                .filter(|cell| !cell.is_empty())
+                .collect::<Vec<_>>()
+                .join(&TAB);
             self.ready.extend((!line.is_empty()).then_some(b'\n'));
         } else {
             self.ready = line;
@@ -195,7 +211,11 @@ mod tests {
             ("a\n", bytes(b','), 0),
             ("", bytes(b','), 0),
         ] {
-            assert_eq!(Layout::of(text.as_bytes(), &Dialect::default()), Layout { delimiter, skipped }, "{text:?}");
+            assert_eq!(
+                Layout::of(text.as_bytes(), &Dialect::default()),
+                Layout { delimiter, skipped },
+                "{text:?}"
+            );
         }
     }
 
@@ -206,9 +226,13 @@ mod tests {
             ours: String::new(),
             location: crate::error::Location::file("problem.toml"),
         };
-        let dialect = Dialect { columns: ["a", "b", "misspelt"].map(rule).to_vec(), ..Dialect::default() };
+        let dialect =
+            Dialect { columns: ["a", "b", "misspelt"].map(rule).to_vec(), ..Dialect::default() };
         let text = "day 1, tool b\nb,c\na;b;c\n1;2;3\n";
-        assert_eq!(Layout::of(text.as_bytes(), &dialect), Layout { delimiter: Delimiter::Byte(b';'), skipped: 2 });
+        assert_eq!(
+            Layout::of(text.as_bytes(), &dialect),
+            Layout { delimiter: Delimiter::Byte(b';'), skipped: 2 }
+        );
     }
 
     #[test]
@@ -218,7 +242,9 @@ mod tests {
         let layout = Layout::of(text.as_bytes(), &dialect);
         assert_eq!(layout, Layout { delimiter: Delimiter::Spaces, skipped: 0 });
         let mut plain = String::new();
-        Rewritten::new(text.as_bytes(), layout, dialect.comment.as_deref()).read_to_string(&mut plain).unwrap();
+        Rewritten::new(text.as_bytes(), layout, dialect.comment.as_deref())
+            .read_to_string(&mut plain)
+            .unwrap();
         assert_eq!(plain, "\nx\ty\n\n\n1\t2\n3\t4\n");
     }
 }

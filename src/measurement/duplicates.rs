@@ -17,9 +17,9 @@ const STEPS: [f64; 8] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 const WHOLE: f64 = 1e-3;
 
 impl Measurements {
-    /// A warning where rows are the same as earlier ones to the last digit: with measurements, a copy. `sigma` is the declared
-    /// one of a coordinate \[m\]. Where digits are so much finer that chance hardly repeats all of a position, copies that differ in
-    /// their times count too.
+    /// A warning where rows are the same as earlier ones to the last digit: with measurements, a
+    /// copy. `sigma` is the declared one of a coordinate \[m\]. Where digits are so much finer that
+    /// chance hardly repeats all of a position, copies that differ in their times count too.
     pub fn repeated_rows(&self, sigma: Option<f64>) -> Option<Warning> {
         let fine = sigma.map_or(FINE_LENGTH, |sigma| FINE * sigma);
         let by_time = self.time_measured && self.step().is_some_and(|step| step > fine);
@@ -34,8 +34,17 @@ impl Measurements {
             }
         }
         let &(row, first) = repeated.first()?;
-        let others = repeated.iter().skip(1).take(NAMED).map(|&(row, _)| self.location(row).to_string()).collect();
-        let kind = WarningKind::RowsRepeated { rows: repeated.len(), first: self.location(first).to_string(), others };
+        let others = repeated
+            .iter()
+            .skip(1)
+            .take(NAMED)
+            .map(|&(row, _)| self.location(row).to_string())
+            .collect();
+        let kind = WarningKind::RowsRepeated {
+            rows: repeated.len(),
+            first: self.location(first).to_string(),
+            others,
+        };
         Some(Warning { location: self.location(row), kind })
     }
 
@@ -46,18 +55,34 @@ impl Measurements {
         STEPS.into_iter().find(|step| is_whole(*step))
     }
 
-    /// Everything that was measured in a row, its time where that counts; a time that was only counted is none.
+    /// Everything that was measured in a row, its time where that counts; a time that was only
+    /// counted is none.
     fn bits(&self, row: usize, by_time: bool) -> Vec<u64> {
-        let columns = [&self.sigma, &self.payload, &self.hoist, &self.temperature].into_iter().flatten();
-        let numbers = self.configuration(row).iter().chain(self.positions.get(row).into_iter().flatten());
+        let columns =
+            [&self.sigma, &self.payload, &self.hoist, &self.temperature].into_iter().flatten();
+        let numbers =
+            self.configuration(row).iter().chain(self.positions.get(row).into_iter().flatten());
         let numbers = numbers.chain(columns.filter_map(|column| column.get(row)));
         let time = self.time.get(row).filter(|_| self.time_measured && by_time);
-        let approach = self.approach.iter().flat_map(|all| all.iter().skip(row * self.joints).take(self.joints));
+        let approach = self
+            .approach
+            .iter()
+            .flat_map(|all| all.iter().skip(row * self.joints).take(self.joints));
         let words = [Some(&self.session), self.target.as_ref()].into_iter().flatten();
         let words = words.filter_map(|labels| labels.of_row.get(row)).copied();
         let words = words.chain(self.observation(row).key()).map(|word| word as u64);
-        let turned = self.orientations.iter().filter_map(|all| all.get(row)).flat_map(|own| own.coords.iter());
+        let turned = self
+            .orientations
+            .iter()
+            .filter_map(|all| all.get(row))
+            .flat_map(|own| own.coords.iter());
         // Zero has no sign.
-        numbers.chain(turned).chain(time).chain(approach).map(|number| (number + 0.0).to_bits()).chain(words).collect()
+        numbers
+            .chain(turned)
+            .chain(time)
+            .chain(approach)
+            .map(|number| (number + 0.0).to_bits())
+            .chain(words)
+            .collect()
     }
 }

@@ -40,7 +40,8 @@ impl PoseNames {
 
     /// Of the next row.
     pub fn push(&mut self, name: Option<&str>) {
-        let number = name.and_then(|name| name.parse().ok()).filter(|number: &f64| number.is_finite());
+        let number =
+            name.and_then(|name| name.parse().ok()).filter(|number: &f64| number.is_finite());
         match (&mut *self, number, name) {
             (Self::Numbers(numbers), Some(number), _) => numbers.push(number),
             (Self::Numbers(numbers), None, Some(name)) => {
@@ -68,7 +69,9 @@ impl PoseNames {
 
 /// The names of files without their endings; of those that share one with their folders.
 pub(super) fn stems(files: &[PathBuf]) -> Vec<String> {
-    let stem = |file: &PathBuf| file.file_stem().map_or_else(String::new, |stem| one_line(&stem.to_string_lossy()));
+    let stem = |file: &PathBuf| {
+        file.file_stem().map_or_else(String::new, |stem| one_line(&stem.to_string_lossy()))
+    };
     let all: Vec<String> = files.iter().map(stem).collect();
     let named = |(file, own): (&PathBuf, &String)| {
         let shared = all.iter().filter(|other| *other == own).count() > 1;

@@ -41,23 +41,39 @@ impl Commands<'_> {
 }
 
 impl Measurements {
-    /// A warning where temperatures are those of an oven, or in another unit, at the row of the least.
+    /// A warning where temperatures are those of an oven, or in another unit, at the row of the
+    /// least.
     pub(super) fn kelvins(&self) -> Option<Warning> {
-        let (row, &least) = self.temperature.iter().flatten().enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b))?;
+        let (row, &least) = self
+            .temperature
+            .iter()
+            .flatten()
+            .enumerate()
+            .min_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let location = self.location(row).with_key("temperature_C");
-        (least > HOT).then(|| Warning { location, kind: WarningKind::Kelvins { least: format!("{least}") } })
+        (least > HOT)
+            .then(|| Warning { location, kind: WarningKind::Kelvins { least: format!("{least}") } })
     }
 
-    /// A warning where columns in radians turn a joint further than joints turn, at the row that is furthest off.
+    /// A warning where columns in radians turn a joint further than joints turn, at the row that is
+    /// furthest off.
     pub(super) fn many_turns(&self, problem: &Problem, columns: &[Commands]) -> Option<Warning> {
         let is_angle = |column: &&Commands| {
             column.unit() == "rad"
-                && problem.joints.get(column.joint).is_some_and(|own| own.commanded() == JointKind::Revolute)
+                && problem
+                    .joints
+                    .get(column.joint)
+                    .is_some_and(|own| own.commanded() == JointKind::Revolute)
         };
-        let value = |row: usize, joint: usize| self.configuration(row).get(joint).copied().unwrap_or(0.0);
-        let every = columns.iter().filter(is_angle).flat_map(|column| (0..self.len()).map(move |row| (column, row)));
-        let (column, row) =
-            every.max_by(|(a, i), (b, j)| value(*i, a.joint).abs().total_cmp(&value(*j, b.joint).abs()))?;
+        let value =
+            |row: usize, joint: usize| self.configuration(row).get(joint).copied().unwrap_or(0.0);
+        let every = columns
+            .iter()
+            .filter(is_angle)
+            .flat_map(|column| (0..self.len()).map(move |row| (column, row)));
+        let (column, row) = every.max_by(|(a, i), (b, j)| {
+            value(*i, a.joint).abs().total_cmp(&value(*j, b.joint).abs())
+        })?;
         let turns = value(row, column.joint).abs() / std::f64::consts::TAU;
         let kind = WarningKind::ManyTurns {
             value: format!("{} = {}", column.name, column.shown(value(row, column.joint))),
@@ -67,11 +83,13 @@ impl Measurements {
         (turns > MANY_TURNS).then_some(Warning { location, kind })
     }
 
-    /// A warning for each joint that was commanded beyond its declared range, at the row that is furthest beyond.
+    /// A warning for each joint that was commanded beyond its declared range, at the row that is
+    /// furthest beyond.
     pub(super) fn beyond_limits(&self, problem: &Problem, columns: &[Commands]) -> Vec<Warning> {
         let warning = |column: &Commands| {
             let (min, max) = problem.joints.get(column.joint)?.limits;
-            let value = |row: usize| self.configuration(row).get(column.joint).copied().unwrap_or(0.0);
+            let value =
+                |row: usize| self.configuration(row).get(column.joint).copied().unwrap_or(0.0);
             let beyond = |row: usize| (min - value(row)).max(value(row) - max);
             let rows: Vec<usize> = (0..self.len()).filter(|&row| beyond(row) > ROUNDING).collect();
             // The first of equals.

@@ -5,7 +5,8 @@ use std::io::{BufRead, Error, ErrorKind, Read, Result};
 /// Longest record of a table [KiB].
 pub(super) const RECORD_KIB: u64 = 1024;
 
-/// Passes text on with every CRLF or CR as LF, and with an LF at the end; refuses to go on within a record that is too long.
+/// Passes text on with every CRLF or CR as LF, and with an LF at the end; refuses to go on within a
+/// record that is too long.
 pub(super) struct Lines<R> {
     inner: R,
     last: u8,

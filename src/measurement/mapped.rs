@@ -8,7 +8,8 @@ use crate::problem::{ColumnOf, ColumnRule, Dialect};
 
 /// The names of a table's columns.
 pub(super) struct Names<'a> {
-    /// For each column what flexcal calls it, and the rule that says so; its own name where no rule does.
+    /// For each column what flexcal calls it, and the rule that says so; its own name where no rule
+    /// does.
     pub of_place: Vec<(&'a str, Option<&'a ColumnRule>)>,
     /// What the name of the file stands for.
     pub of_file: Option<&'a ColumnRule>,
@@ -33,10 +34,16 @@ impl<'a> Names<'a> {
                 }
                 ColumnOf::Place(number) => Some(number - 1).filter(|place| *place < of_place.len()),
                 ColumnOf::Name(name) => {
-                    let mut places = (0..).zip(&table.header).filter(|(_, own)| *own == name).map(|(place, _)| place);
+                    let mut places = (0..)
+                        .zip(&table.header)
+                        .filter(|(_, own)| *own == name)
+                        .map(|(place, _)| place);
                     let first = places.next();
                     if let Some(other) = places.next() {
-                        let kind = InputErrorKind::AmbiguousColumn { file: table.file.clone(), place: other + 1 };
+                        let kind = InputErrorKind::AmbiguousColumn {
+                            file: table.file.clone(),
+                            place: other + 1,
+                        };
                         return Err(rule.location.clone().error(kind));
                     }
                     first
@@ -67,5 +74,9 @@ fn no_such(rule: &ColumnRule, file: &Path, header: &[String]) -> InputError {
         ColumnOf::Place(place) => format!("#{place}"),
         ColumnOf::File => "#file".to_owned(),
     };
-    rule.location.clone().error(InputErrorKind::NoSuchColumn { file: file.to_owned(), name, known: header.to_vec() })
+    rule.location.clone().error(InputErrorKind::NoSuchColumn {
+        file: file.to_owned(),
+        name,
+        known: header.to_vec(),
+    })
 }

@@ -68,16 +68,19 @@ pub struct Measurements {
     pub nests: Vec<NestReading>,
     /// What each row measures; empty where all of them measure positions.
     pub observations: Vec<Observation>,
-    /// The measured numbers of each row, zeros behind them \[m\]: positions in the measuring frame, distances, 0 of a contact.
+    /// The measured numbers of each row, zeros behind them \[m\]: positions in the measuring frame,
+    /// distances, 0 of a contact.
     pub positions: Vec<Vector3<f64>>,
     /// Whether they were measured; 0 otherwise, in poses that are still to be measured.
     pub position_measured: bool,
-    /// Unit of the positions in the first file in SI: 1/1000 for millimetres; `None` where they came from no file.
+    /// Unit of the positions in the first file in SI: 1/1000 for millimetres; `None` where they
+    /// came from no file.
     pub position_unit: Option<f64>,
-    /// Measured orientations of the target in the measuring frame, where there are all of their columns; NaN in a row without one.
+    /// Measured orientations of the target in the measuring frame, where there are all of their
+    /// columns; NaN in a row without one.
     pub orientations: Option<Vec<UnitQuaternion<f64>>>,
-    /// 1 σ of each coordinate from the column `sigma_mm`, or of the row's kind where there are several; NaN where it is not
-    /// known \[m\].
+    /// 1 σ of each coordinate from the column `sigma_mm`, or of the row's kind where there are
+    /// several; NaN where it is not known \[m\].
     pub sigma: Option<Vec<f64>>,
     /// Payload \[kg\].
     pub payload: Option<Vec<f64>>,
@@ -89,9 +92,11 @@ pub struct Measurements {
     pub time: Vec<f64>,
     /// Whether `time` was measured, not counted.
     pub time_measured: bool,
-    /// Direction from which each joint came, −1, 0 or +1, shape = (rows, joints); 0 at joints without a column.
+    /// Direction from which each joint came, −1, 0 or +1, shape = (rows, joints); 0 at joints
+    /// without a column.
     pub approach: Option<Vec<f64>>,
-    /// Values of the problem's own covariates, in their order and units, shape = (rows, covariates); empty where there are none.
+    /// Values of the problem's own covariates, in their order and units, shape = (rows,
+    /// covariates); empty where there are none.
     pub covariates: Vec<f64>,
     /// Number of each pose from the column `pose`, where every row has one and it is a number.
     pub pose: Option<Vec<f64>>,
@@ -101,13 +106,15 @@ pub struct Measurements {
     pub session: Labels,
     /// Target of each row; `None` where there is no column.
     pub target: Option<Labels>,
-    /// Whether the row is marked `validation`: in the column that the problem names, or in `split` where it says nothing.
+    /// Whether the row is marked `validation`: in the column that the problem names, or in `split`
+    /// where it says nothing.
     pub marked_held_out: Option<Vec<bool>>,
     /// How the first file writes the commands, a column a joint; none where they came from no file.
     pub command_columns: Vec<CommandColumn>,
     /// What was passed over in the files, for reports.
     pub warnings: Vec<Warning>,
-    /// In which order the rows were measured: found when it is first asked for, so rows change before that or in a copy.
+    /// In which order the rows were measured: found when it is first asked for, so rows change
+    /// before that or in a copy.
     pub order: RowOrder,
 }
 
@@ -185,7 +192,8 @@ impl Measurements {
 
     /// What rows measure, one observation of each kind that there is, positions first.
     pub fn kinds(&self) -> Vec<Observation> {
-        let mut kinds: Vec<Observation> = (0..self.len()).map(|row| self.observation(row)).collect();
+        let mut kinds: Vec<Observation> =
+            (0..self.len()).map(|row| self.observation(row)).collect();
         kinds.sort_unstable();
         kinds.dedup_by_key(|own| own.kind());
         kinds
@@ -213,7 +221,8 @@ impl Measurements {
 
     /// Whether the σ of every row is known, from columns or from `[data]`.
     pub fn noise_is_declared(&self, problem: &Problem) -> bool {
-        self.knows_sigma() || (self.observations.is_empty() && problem.data.position_sigma.is_some())
+        self.knows_sigma()
+            || (self.observations.is_empty() && problem.data.position_sigma.is_some())
     }
 
     /// File and line of a row, for messages.
@@ -249,7 +258,10 @@ impl Measurements {
             temperature: self.temperature.as_ref().map(|all| &all[row]),
             time: self.time[row],
             elapsed: self.time[row] - first,
-            approach: self.approach.as_ref().map(|all| &all[row * self.joints..(row + 1) * self.joints]),
+            approach: self
+                .approach
+                .as_ref()
+                .map(|all| &all[row * self.joints..(row + 1) * self.joints]),
             covariates: self.covariates_of(row),
             past: PastOf::row(self, narrow),
             strains: None,
@@ -267,9 +279,11 @@ impl Measurements {
         &self.configurations[row * self.joints..(row + 1) * self.joints]
     }
 
-    /// The same rows with the other of commands and readings as configurations, where the table has both and they differ.
+    /// The same rows with the other of commands and readings as configurations, where the table has
+    /// both and they differ.
     pub fn by_other_joints(&self) -> Option<Self> {
-        let other = self.other_configurations.as_ref().filter(|other| **other != self.configurations)?;
+        let other =
+            self.other_configurations.as_ref().filter(|other| **other != self.configurations)?;
         let (configurations, own) = (other.clone(), self.configurations.clone());
         Some(Self { configurations, other_configurations: Some(own), ..self.clone() })
     }
@@ -279,7 +293,10 @@ impl Measurements {
     pub fn select(&self, rows: &[usize]) -> Self {
         let one = |column: &[f64]| rows.iter().map(|&row| column[row]).collect::<Vec<f64>>();
         let each = |column: &[f64]| {
-            rows.iter().flat_map(|&row| &column[row * self.joints..(row + 1) * self.joints]).copied().collect()
+            rows.iter()
+                .flat_map(|&row| &column[row * self.joints..(row + 1) * self.joints])
+                .copied()
+                .collect()
         };
         let words = |labels: &Labels| Labels {
             names: labels.names.clone(),
@@ -299,7 +316,10 @@ impl Measurements {
             positions: rows.iter().map(|&row| self.positions[row]).collect(),
             position_measured: self.position_measured,
             position_unit: self.position_unit,
-            orientations: self.orientations.as_ref().map(|all| rows.iter().map(|&row| all[row]).collect()),
+            orientations: self
+                .orientations
+                .as_ref()
+                .map(|all| rows.iter().map(|&row| all[row]).collect()),
             sigma: self.sigma.as_deref().map(one),
             payload: self.payload.as_deref().map(one),
             hoist: self.hoist.as_deref().map(one),
@@ -312,7 +332,10 @@ impl Measurements {
             pose_names: self.pose_names.as_ref().map(words),
             session: words(&self.session),
             target: self.target.as_ref().map(words),
-            marked_held_out: self.marked_held_out.as_ref().map(|marked| rows.iter().map(|&row| marked[row]).collect()),
+            marked_held_out: self
+                .marked_held_out
+                .as_ref()
+                .map(|marked| rows.iter().map(|&row| marked[row]).collect()),
             command_columns: self.command_columns.clone(),
             warnings: self.warnings.clone(),
             order: RowOrder::default(),
@@ -323,7 +346,9 @@ impl Measurements {
     #[must_use]
     pub(crate) fn and(&self, other: &Self) -> Self {
         let joined = |own: &[f64], other: &[f64]| [own, other].concat();
-        let both = |own: &Option<Vec<f64>>, other: &Option<Vec<f64>>| Some(joined(own.as_ref()?, other.as_ref()?));
+        let both = |own: &Option<Vec<f64>>, other: &Option<Vec<f64>>| {
+            Some(joined(own.as_ref()?, other.as_ref()?))
+        };
         let mut all = self.clone();
         all.origin.extend(&other.origin);
         all.configurations.extend(&other.configurations);
@@ -333,8 +358,10 @@ impl Measurements {
             all.observations = [each(self), each(other)].concat();
         }
         all.positions.extend(&other.positions);
-        all.orientations =
-            self.orientations.as_ref().and_then(|own| Some([own.as_slice(), other.orientations.as_deref()?].concat()));
+        all.orientations = self
+            .orientations
+            .as_ref()
+            .and_then(|own| Some([own.as_slice(), other.orientations.as_deref()?].concat()));
         all.sigma = both(&self.sigma, &other.sigma);
         all.payload = both(&self.payload, &other.payload);
         all.hoist = both(&self.hoist, &other.hoist);

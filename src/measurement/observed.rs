@@ -1,4 +1,5 @@
-//! What rows measure besides positions: contacts with points and surfaces, distances to anchors, known distances between points.
+//! What rows measure besides positions: contacts with points and surfaces, distances to anchors,
+//! known distances between points.
 
 use std::path::Path;
 
@@ -12,7 +13,8 @@ use crate::error::{InputError, InputErrorKind};
 use crate::problem::fixture::{frame, unknown};
 use crate::problem::{Fixture, KnownDistance, Observation, Problem};
 
-/// Something that a row measures, and its numbers \[m\]; those of a position are in its own columns.
+/// Something that a row measures, and its numbers \[m\]; those of a position are in its own
+/// columns.
 pub(super) struct Observed {
     pub observation: Observation,
     pub numbers: Vector3<f64>,
@@ -26,8 +28,9 @@ impl Observed {
     }
 }
 
-/// Everything that the row measures which the table is at, in the order position, point, distance, surface; a table of positions
-/// alone measures one in every row, and `in_point` is where the whole file is. A position that is `lost` is none.
+/// Everything that the row measures which the table is at, in the order position, point, distance,
+/// surface; a table of positions alone measures one in every row, and `in_point` is where the whole
+/// file is. A position that is `lost` is none.
 pub(super) fn of_row(
     table: &Table,
     columns: &Columns,
@@ -42,7 +45,8 @@ pub(super) fn of_row(
         let place = columns.place(role);
         place.filter(|&place| table.text(place).is_ok_and(|cell| !cell.is_empty()))
     };
-    let of_point = |name: &str, place: Option<usize>| fixture(table, place, ("point", name), problem);
+    let of_point =
+        |name: &str, place: Option<usize>| fixture(table, place, ("point", name), problem);
     let mut all = Vec::new();
     if !lost && (0..3).any(|axis| filled(Role::Position(axis)).is_some()) {
         all.push(Observed::position(true));
@@ -55,42 +59,65 @@ pub(super) fn of_row(
         let observation = Observation::Point(of_point(name, place)?);
         all.push(Observed { observation, numbers: Vector3::zeros(), measured: true });
     }
-    let lone = |place: usize, has, lacks| Err(table.cell_error(place, InputErrorKind::HalfObserved { has, lacks }));
+    let lone = |place: usize, has, lacks| {
+        Err(table.cell_error(place, InputErrorKind::HalfObserved { has, lacks }))
+    };
     match (filled(Role::Anchor), filled(Role::Distance)) {
         (Some(place), None) if measured => return lone(place, "an anchor", "a distance"),
         (None, Some(place)) => return lone(place, "a distance", "an anchor"),
         (Some(place), distance) => {
-            let observation =
-                Observation::Distance(fixture(table, Some(place), ("anchor", table.name(place)?), problem)?);
-            let number = distance.map(|_| columns.length(table, Role::Distance)).transpose()?.unwrap_or(0.0);
+            let observation = Observation::Distance(fixture(
+                table,
+                Some(place),
+                ("anchor", table.name(place)?),
+                problem,
+            )?);
+            let number =
+                distance.map(|_| columns.length(table, Role::Distance)).transpose()?.unwrap_or(0.0);
             if let Some(place) = distance.filter(|_| number <= 0.0) {
                 return Err(table.cell_error(place, InputErrorKind::NotPositive { value: number }));
             }
-            all.push(Observed { observation, numbers: number * Vector3::x(), measured: distance.is_some() });
+            all.push(Observed {
+                observation,
+                numbers: number * Vector3::x(),
+                measured: distance.is_some(),
+            });
         }
         (None, None) => {}
     }
     match (filled(Role::Surface), filled(Role::Offset)) {
         (None, Some(place)) => return lone(place, "an offset", "a surface"),
         (Some(place), offset) => {
-            let observation =
-                Observation::Surface(fixture(table, Some(place), ("surface", table.name(place)?), problem)?);
-            let number = offset.map(|_| columns.length(table, Role::Offset)).transpose()?.unwrap_or(0.0);
+            let observation = Observation::Surface(fixture(
+                table,
+                Some(place),
+                ("surface", table.name(place)?),
+                problem,
+            )?);
+            let number =
+                offset.map(|_| columns.length(table, Role::Offset)).transpose()?.unwrap_or(0.0);
             all.push(Observed { observation, numbers: number * Vector3::x(), measured: true });
         }
         (None, None) => {}
     }
     match (filled(Role::Tilt(0)), filled(Role::Tilt(1)), filled(Role::Frame)) {
         (Some(_), Some(_), frame) => {
-            let numbers = [columns.length(table, Role::Tilt(0))?, columns.length(table, Role::Tilt(1))?];
+            let numbers =
+                [columns.length(table, Role::Tilt(0))?, columns.length(table, Role::Tilt(1))?];
             let observation = Observation::Tilt(frame_of(table, frame, problem)?);
-            all.push(Observed { observation, numbers: Vector3::new(numbers[0], numbers[1], 0.0), measured: true });
+            all.push(Observed {
+                observation,
+                numbers: Vector3::new(numbers[0], numbers[1], 0.0),
+                measured: true,
+            });
         }
         (None, None, Some(frame)) if !measured => {
             let observation = Observation::Tilt(frame_of(table, Some(frame), problem)?);
             all.push(Observed { observation, numbers: Vector3::zeros(), measured: false });
         }
-        (Some(place), None, _) | (None, Some(place), _) => return lone(place, "a tilt", "that of the other axis"),
+        (Some(place), None, _) | (None, Some(place), _) => {
+            return lone(place, "a tilt", "that of the other axis");
+        }
         (None, None, Some(place)) => return lone(place, "a frame", "its tilts"),
         (None, None, None) => {}
     }
@@ -105,10 +132,12 @@ pub(super) fn of_row(
     }
 }
 
-/// The frame that a cell names: `base`, a joint by its name, or `joint3`; that of the tool without a word.
+/// The frame that a cell names: `base`, a joint by its name, or `joint3`; that of the tool without
+/// a word.
 fn frame_of(table: &Table, place: Option<usize>, problem: &Problem) -> Result<usize, InputError> {
     let Some(place) = place else { return Ok(problem.tool.joint + 1) };
-    frame(table.name(place)?, &problem.joints, problem.tool.joint).map_err(|kind| table.cell_error(place, kind))
+    frame(table.name(place)?, &problem.joints, problem.tool.joint)
+        .map_err(|kind| table.cell_error(place, kind))
 }
 
 /// The fixture that a cell names.
@@ -130,17 +159,21 @@ fn fixture(
     })
 }
 
-/// Refuses a table of positions without a column of targets where the problem declares some; where rows may measure something else
-/// each of them decides.
-pub(super) fn names_targets(table: &Table, columns: &Columns, problem: &Problem) -> Result<(), InputError> {
+/// Refuses a table of positions without a column of targets where the problem declares some; where
+/// rows may measure something else each of them decides.
+pub(super) fn names_targets(
+    table: &Table,
+    columns: &Columns,
+    problem: &Problem,
+) -> Result<(), InputError> {
     if problem.targets.is_empty() || columns.has(Role::Target) || columns.observes() {
         return Ok(());
     }
     Err(table.column("target").error(problem.unknown_target("")))
 }
 
-/// Refuses the row that the table is at, in a file with this `stem`, where it names a target that the problem does not declare
-/// among others, or names none and measures more than tilts.
+/// Refuses the row that the table is at, in a file with this `stem`, where it names a target that
+/// the problem does not declare among others, or names none and measures more than tilts.
 pub(super) fn known_target(
     table: &Table,
     columns: &Columns,
@@ -167,8 +200,12 @@ pub(super) fn known_target(
     })
 }
 
-/// Adds the known distances between points as rows of their own, behind the others, and settles the σ of every row.
-pub(super) fn complete(measurements: &mut Measurements, problem: &Problem) -> Result<(), InputError> {
+/// Adds the known distances between points as rows of their own, behind the others, and settles the
+/// σ of every row.
+pub(super) fn complete(
+    measurements: &mut Measurements,
+    problem: &Problem,
+) -> Result<(), InputError> {
     if measurements.observations.is_empty() || measurements.is_empty() {
         return Ok(());
     }
@@ -176,13 +213,17 @@ pub(super) fn complete(measurements: &mut Measurements, problem: &Problem) -> Re
         // Tilts are of no target: their rows go with one that others measure.
         let is_known = |word: &&String| problem.targets.iter().any(|own| own.name == **word);
         let first = of_rows.names.iter().find(is_known).unwrap_or(&declared.name);
-        let words = of_rows.of_row.iter().map(|&word| of_rows.names.get(word).filter(is_known).unwrap_or(first));
+        let words = of_rows
+            .of_row
+            .iter()
+            .map(|&word| of_rows.names.get(word).filter(is_known).unwrap_or(first));
         *of_rows = words.collect();
     }
     let of_table = measurements.len();
     let touched = |&fixture: &usize, all: &[Observation]| {
         let is_known = |own: &Fixture| own.known.iter().all(Option::is_some);
-        all.contains(&Observation::Point(fixture)) || problem.fixtures.get(fixture).is_some_and(is_known)
+        all.contains(&Observation::Point(fixture))
+            || problem.fixtures.get(fixture).is_some_and(is_known)
     };
     for distance in &problem.distances {
         if distance.between.iter().all(|point| touched(point, &measurements.observations)) {
@@ -220,11 +261,13 @@ impl Measurements {
     /// Whether rows tell more of every fixture that is not known than where it is.
     pub(super) fn enough_contacts(&self, problem: &Problem) -> Result<(), InputError> {
         for (index, fixture) in problem.fixtures.iter().enumerate() {
-            let rows: Vec<usize> =
-                (0..self.len()).filter(|&row| self.observation(row).fixture() == Some(index)).collect();
+            let rows: Vec<usize> = (0..self.len())
+                .filter(|&row| self.observation(row).fixture() == Some(index))
+                .collect();
             let Some(&first) = rows.first() else { continue };
             let known = problem.distances.iter().filter(|own| own.between.contains(&index)).count();
-            let measured = rows.iter().map(|&row| self.observation(row).coordinates()).sum::<usize>() + known;
+            let measured =
+                rows.iter().map(|&row| self.observation(row).coordinates()).sum::<usize>() + known;
             let numbers = fixture.known.iter().filter(|known| known.is_none()).count();
             if numbers > 0 && measured <= numbers {
                 let (what, name) = (fixture.kind.word(), fixture.name.clone());
@@ -244,7 +287,8 @@ impl Measurements {
         let narrow = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         let mut row = self.select(&[0]);
         row.origin = vec![(narrow(place), narrow(distance.location.line.unwrap_or(0)))];
-        row.observations = vec![Observation::Between(narrow(distance.between[0]), narrow(distance.between[1]))];
+        row.observations =
+            vec![Observation::Between(narrow(distance.between[0]), narrow(distance.between[1]))];
         row.positions = vec![distance.length * Vector3::x()];
         row.sigma = Some(vec![distance.sigma]);
         row.nests.clear();
@@ -263,7 +307,8 @@ impl Measurements {
     /// The rows in which the arm takes part: known distances between points left out.
     #[must_use]
     pub fn of_the_arm(self) -> Self {
-        let rows: Vec<usize> = (0..self.len()).filter(|&row| self.observation(row).is_of_arm()).collect();
+        let rows: Vec<usize> =
+            (0..self.len()).filter(|&row| self.observation(row).is_of_arm()).collect();
         if rows.len() == self.len() { self } else { self.select(&rows) }
     }
 

@@ -7,7 +7,8 @@ use super::Measurements;
 use crate::error::{Warning, WarningKind};
 use crate::problem::{Past, PoseTable};
 
-/// The order of a table's rows, found when it is first asked for; a copy finds its own, for its rows may change.
+/// The order of a table's rows, found when it is first asked for; a copy finds its own, for its
+/// rows may change.
 #[derive(Debug, Default)]
 pub struct RowOrder(OnceLock<Found>);
 
@@ -35,10 +36,13 @@ impl Found {
     fn of(table: &Measurements) -> Self {
         let session = |row: usize| table.session.of_row.get(row).copied().unwrap_or(0);
         let mut rows: Vec<usize> = (0..table.len()).collect();
-        rows.sort_by(|&a, &b| session(a).cmp(&session(b)).then(table.time[a].total_cmp(&table.time[b])));
+        rows.sort_by(|&a, &b| {
+            session(a).cmp(&session(b)).then(table.time[a].total_cmp(&table.time[b]))
+        });
         let mut places = vec![(0, 0); rows.len()];
         let mut begin = 0_u32;
-        for ((&row, &before), at) in rows.iter().zip(rows.first().into_iter().chain(&rows)).zip(0..) {
+        for ((&row, &before), at) in rows.iter().zip(rows.first().into_iter().chain(&rows)).zip(0..)
+        {
             if session(row) != session(before) {
                 begin = at;
             }
@@ -46,7 +50,9 @@ impl Found {
         }
         let n = table.joints;
         let one = |column: &[f64]| rows.iter().map(|&row| column[row]).collect();
-        let each = |column: &[f64]| rows.iter().flat_map(|&row| &column[row * n..(row + 1) * n]).copied().collect();
+        let each = |column: &[f64]| {
+            rows.iter().flat_map(|&row| &column[row * n..(row + 1) * n]).copied().collect()
+        };
         let sorted = (!rows.is_sorted()).then(|| Past {
             times: one(&table.time),
             temperatures: table.temperature.as_deref().map(one).unwrap_or_default(),
@@ -58,13 +64,15 @@ impl Found {
 }
 
 impl Measurements {
-    /// Median time between two configurations of a session that differ in it, and that of the longest session from end to end \[s\]; `None`
-    /// where times were not measured, or none differ. Readings repeated in one configuration say nothing of how fast poses follow one another.
+    /// Median time between two configurations of a session that differ in it, and that of the
+    /// longest session from end to end \[s\]; `None` where times were not measured, or none differ.
+    /// Readings repeated in one configuration say nothing of how fast poses follow one another.
     pub fn clock(&self) -> Option<(f64, f64)> {
         let found = self.found();
         let sorted = found.sorted.as_ref();
         let times = sorted.map_or(self.time.as_slice(), |sorted| &sorted.times);
-        let configurations = sorted.map_or(self.configurations.as_slice(), |sorted| &sorted.configurations);
+        let configurations =
+            sorted.map_or(self.configurations.as_slice(), |sorted| &sorted.configurations);
         let at_pose = |k: usize| configurations.get(k * self.joints..(k + 1) * self.joints);
         let (mut between, mut longest) = (Vec::new(), 0.0_f64);
         for &(begin, at) in &found.places {
@@ -74,10 +82,14 @@ impl Measurements {
             between.extend(is_next.then(|| times[at] - times[at - 1]));
         }
         between.sort_by(f64::total_cmp);
-        between.get(between.len() / 2).filter(|_| self.time_measured).map(|median| (*median, longest))
+        between
+            .get(between.len() / 2)
+            .filter(|_| self.time_measured)
+            .map(|median| (*median, longest))
     }
 
-    /// A warning where the time of a row is before that of the row above it, in one file and session.
+    /// A warning where the time of a row is before that of the row above it, in one file and
+    /// session.
     pub fn time_going_back(&self) -> Option<Warning> {
         if !self.time_measured {
             return None;
@@ -88,7 +100,9 @@ impl Measurements {
         let mut back: Vec<(usize, f64)> = Vec::new();
         for row in 0..self.len() {
             let before = last.insert((file(row), session(row)), self.time[row]);
-            back.extend(before.map(|before| (row, before - self.time[row])).filter(|(_, by)| *by > 0.0));
+            back.extend(
+                before.map(|before| (row, before - self.time[row])).filter(|(_, by)| *by > 0.0),
+            );
         }
         let &(row, by) = back.first()?;
         let kind = WarningKind::TimeGoesBack { rows: back.len(), back: format!("{by:.3}") };
@@ -104,7 +118,8 @@ impl PoseTable for Measurements {
     /// What was measured before a row, in its session.
     fn past(&self, row: usize) -> Past<&[f64]> {
         let Found { places, sorted } = self.found();
-        let Some((begin, at)) = places.get(row).map(|&(begin, at)| (begin as usize, at as usize)) else {
+        let Some((begin, at)) = places.get(row).map(|&(begin, at)| (begin as usize, at as usize))
+        else {
             return Past::default();
         };
         let n = self.joints;
@@ -120,7 +135,11 @@ impl PoseTable for Measurements {
         Past {
             times: columns.times.get(begin..at).unwrap_or_default(),
             // Without times nobody knows how long ago it was so warm.
-            temperatures: columns.temperatures.get(begin..at).filter(|_| self.time_measured).unwrap_or_default(),
+            temperatures: columns
+                .temperatures
+                .get(begin..at)
+                .filter(|_| self.time_measured)
+                .unwrap_or_default(),
             configurations: columns.configurations.get(begin * n..at * n).unwrap_or_default(),
             approaches: columns.approaches.get(begin * n..at * n).unwrap_or_default(),
         }
@@ -153,13 +172,22 @@ mod tests {
         assert_eq!(warning.kind, WarningKind::TimeGoesBack { rows: 2, back: "5.000".to_owned() });
         assert_eq!(warning.location.line, Some(3));
         let past = table.past(0);
-        assert_eq!((past.times, past.temperatures), ([0.0, 4.0].as_slice(), [21.0, 24.0].as_slice()));
-        assert_eq!((past.configurations, past.approaches), ([2.0, 3.0, 8.0, 9.0].as_slice(), [].as_slice()));
+        assert_eq!(
+            (past.times, past.temperatures),
+            ([0.0, 4.0].as_slice(), [21.0, 24.0].as_slice())
+        );
+        assert_eq!(
+            (past.configurations, past.approaches),
+            ([2.0, 3.0, 8.0, 9.0].as_slice(), [].as_slice())
+        );
         assert_eq!(table.past(2).times, [1.0]);
         assert!(table.past(1).times.is_empty() && table.past(3).configurations.is_empty());
         let in_order = table.select(&[1, 4, 0, 3, 2]);
         assert_eq!(in_order.time_going_back(), None);
-        assert_eq!((in_order.past(2).times, in_order.past(4).temperatures), (past.times, [23.0].as_slice()));
+        assert_eq!(
+            (in_order.past(2).times, in_order.past(4).temperatures),
+            (past.times, [23.0].as_slice())
+        );
         // A row's conditions read the same, and keep it by themselves.
         let setup = table.setup(0, table.first_time());
         assert_eq!((setup.past.read(), setup.past.place()), (past, Some(0)));

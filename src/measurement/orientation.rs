@@ -36,7 +36,8 @@ impl Cells {
     pub fn of_quaternion(&self) -> Option<UnitQuaternion<f64>> {
         let [x, y, z, w] = self.quaternion;
         let quaternion = Quaternion::new(w, x, y, z);
-        ((quaternion.norm() - 1.0).abs() <= ROUNDING).then(|| UnitQuaternion::from_quaternion(quaternion))
+        ((quaternion.norm() - 1.0).abs() <= ROUNDING)
+            .then(|| UnitQuaternion::from_quaternion(quaternion))
     }
 }
 

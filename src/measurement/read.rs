@@ -26,11 +26,15 @@ impl Measurements {
         Self::read_table(files, problem, true)
     }
 
-    /// Reads poses that may still be to measure: as [`Measurements::read`], with positions zero where there are none.
+    /// Reads poses that may still be to measure: as [`Measurements::read`], with positions zero
+    /// where there are none.
     ///
     /// # Errors
     /// The first mistake found, a file that cannot be read among them.
-    pub fn read_poses(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
+    pub fn read_poses(
+        files: &[PathBuf],
+        problem: &Problem,
+    ) -> Result<(Self, Vec<Warning>), InputError> {
         Self::read_table(files, problem, false)
     }
 
@@ -38,25 +42,39 @@ impl Measurements {
     ///
     /// # Errors
     /// The first mistake found.
-    pub fn read_columns(table: ColumnTable, problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
+    pub fn read_columns(
+        table: ColumnTable,
+        problem: &Problem,
+    ) -> Result<(Self, Vec<Warning>), InputError> {
         Self::read_column_table(table, problem, true)
     }
 
-    /// Reads poses that may still be to measure from a table in memory: as [`Measurements::read_columns`], with positions zero
-    /// where there are none.
+    /// Reads poses that may still be to measure from a table in memory: as
+    /// [`Measurements::read_columns`], with positions zero where there are none.
     ///
     /// # Errors
     /// The first mistake found.
-    pub fn read_pose_columns(table: ColumnTable, problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
+    pub fn read_pose_columns(
+        table: ColumnTable,
+        problem: &Problem,
+    ) -> Result<(Self, Vec<Warning>), InputError> {
         Self::read_column_table(table, problem, false)
     }
 
-    fn read_table(files: &[PathBuf], problem: &Problem, measured: bool) -> Result<(Self, Vec<Warning>), InputError> {
+    fn read_table(
+        files: &[PathBuf],
+        problem: &Problem,
+        measured: bool,
+    ) -> Result<(Self, Vec<Warning>), InputError> {
         let mut tables = Tables::new(files, problem, measured);
         for (index, file) in files.iter().enumerate() {
             if files.iter().take(index).any(|other| other == file || same_file(other, file)) {
                 let again = InputErrorKind::RepeatedFile { path: file.clone() };
-                return Err(of_file((file, files), problem, [again, InputErrorKind::GivenFileRepeated]));
+                return Err(of_file(
+                    (file, files),
+                    problem,
+                    [again, InputErrorKind::GivenFileRepeated],
+                ));
             }
             let missing = || {
                 let named = InputErrorKind::DataFileMissing { path: file.clone() };
@@ -102,21 +120,33 @@ impl<'a> Tables<'a> {
         observed::names_targets(&table, &columns, self.problem)?;
         if !table.next_row()? {
             let line = table.line();
-            return Err(Location::file(&table.file).at_line(line).error(InputErrorKind::NoRowsBelowHeader));
+            return Err(Location::file(&table.file)
+                .at_line(line)
+                .error(InputErrorKind::NoRowsBelowHeader));
         }
         columns.settle_time(&table, &mut self.warnings)?;
-        let rows = self.builder.get_or_insert_with(|| Builder::new(self.files, &table, &columns, self.problem));
+        let rows = self
+            .builder
+            .get_or_insert_with(|| Builder::new(self.files, &table, &columns, self.problem));
         rows.same_columns(&table, &columns)?;
         let (before, mut left_out) = (rows.seen(), LeftOut::default());
         loop {
-            let lost = dialect.missing.as_ref().is_some_and(|missing| is_missing(missing, &table, &columns));
+            let lost = dialect
+                .missing
+                .as_ref()
+                .is_some_and(|missing| is_missing(missing, &table, &columns));
             if lost && !columns.observes_at(&table) {
                 left_out.count(&table);
             } else if let Some(name) = columns.nest(&table) {
                 rows.push_nest(index, name, &table, &columns)?;
             } else {
                 let in_point = (columns.file == Some(Role::Point)).then(|| rows.stem(index));
-                let all = observed::of_row(&table, &columns, (self.problem, self.measured, lost), in_point)?;
+                let all = observed::of_row(
+                    &table,
+                    &columns,
+                    (self.problem, self.measured, lost),
+                    in_point,
+                )?;
                 observed::known_target(&table, &columns, (rows.stem(index), &all), self.problem)?;
                 for observed in &all {
                     rows.push(index, &table, &columns, observed)?;
@@ -186,12 +216,14 @@ fn is_missing(missing: &Missing, table: &Table, columns: &Columns) -> bool {
     };
     let mut cells = columns.read.iter().filter_map(|column| axis(&column)).peekable();
     match missing {
-        Missing::Word(word) => cells.any(|(_, place)| table.text(place).is_ok_and(|cell| cell == word)),
+        Missing::Word(word) => {
+            cells.any(|(_, place)| table.text(place).is_ok_and(|cell| cell == word))
+        }
         Missing::Position(nothing) => {
             let same = |(axis, place): (usize, usize)| {
-                table
-                    .number(place)
-                    .is_ok_and(|value| nothing.get(axis).is_some_and(|own| own.to_bits() == (value + 0.0).to_bits()))
+                table.number(place).is_ok_and(|value| {
+                    nothing.get(axis).is_some_and(|own| own.to_bits() == (value + 0.0).to_bits())
+                })
             };
             cells.peek().is_some() && cells.all(same)
         }
@@ -202,7 +234,12 @@ fn is_missing(missing: &Missing, table: &Table, columns: &Columns) -> bool {
 fn both_joints(columns: &Columns) -> bool {
     let count = |reading: bool| {
         let of_joint = |column: &&Column| matches!(column.role, Role::Joint(_) | Role::Reading(_));
-        columns.read.iter().filter(of_joint).filter(|column| column.role.is_reading() == reading).count()
+        columns
+            .read
+            .iter()
+            .filter(of_joint)
+            .filter(|column| column.role.is_reading() == reading)
+            .count()
     };
     count(true) > 0 && count(true) == count(false)
 }
@@ -210,7 +247,11 @@ fn both_joints(columns: &Columns) -> bool {
 /// How a table writes the commands of a joint, if that is what a column holds.
 fn command(column: &Column, table: &Table) -> Option<CommandColumn> {
     let Role::Joint(joint) = column.role else { return None };
-    Some(CommandColumn { joint, name: table.name_of(column.place).to_owned(), unit: (column.to_si)(1.0) })
+    Some(CommandColumn {
+        joint,
+        name: table.name_of(column.place).to_owned(),
+        unit: (column.to_si)(1.0),
+    })
 }
 
 /// The columns of commands among all of them.
@@ -222,8 +263,13 @@ fn commands(columns: &[(Column, String)]) -> Vec<Commands<'_>> {
     joints.collect()
 }
 
-/// The error of one of the files: `named` at the line of the problem that names it, or else `given` on the command line.
-fn of_file((file, files): (&Path, &[PathBuf]), problem: &Problem, [named, given]: [InputErrorKind; 2]) -> InputError {
+/// The error of one of the files: `named` at the line of the problem that names it, or else `given`
+/// on the command line.
+fn of_file(
+    (file, files): (&Path, &[PathBuf]),
+    problem: &Problem,
+    [named, given]: [InputErrorKind; 2],
+) -> InputError {
     if problem.data.files == files {
         problem.data.files_location.clone().error(named)
     } else {
@@ -267,7 +313,11 @@ impl Builder {
             observations: Vec::new(),
             positions: Vec::new(),
             position_measured: true,
-            position_unit: columns.read.iter().find(|own| own.role == Role::Position(0)).map(|own| (own.to_si)(1.0)),
+            position_unit: columns
+                .read
+                .iter()
+                .find(|own| own.role == Role::Position(0))
+                .map(|own| (own.to_si)(1.0)),
             orientations: (columns.orientations() != (false, false)).then(Vec::new),
             sigma: if mixed { Some(Vec::new()) } else { list(Role::Sigma) },
             payload: list(Role::Payload),
@@ -282,12 +332,20 @@ impl Builder {
             session: Labels::default(),
             target: (names_targets || columns.has(Role::Target)).then(Labels::default),
             marked_held_out: columns.marked.map(|_| Vec::new()),
-            command_columns: columns.read.iter().filter_map(|column| command(column, table)).collect(),
+            command_columns: columns
+                .read
+                .iter()
+                .filter_map(|column| command(column, table))
+                .collect(),
             warnings: Vec::new(),
             order: RowOrder::default(),
         };
         let poses = PoseNames::of(columns.has(Role::Pose));
-        let columns = columns.read.iter().map(|column| (*column, columns.name_of(column).to_owned())).collect();
+        let columns = columns
+            .read
+            .iter()
+            .map(|column| (*column, columns.name_of(column).to_owned()))
+            .collect();
         let (session, target) = (LabelsBuilder::default(), LabelsBuilder::default());
         Self {
             measurements,
@@ -313,17 +371,21 @@ impl Builder {
         self.stems.get(file).map_or("", String::as_str)
     }
 
-    /// Whether a file has the columns of the first one; `pose` alone may come and go, and what is measured, and of which target, where
-    /// that may be something else than positions.
+    /// Whether a file has the columns of the first one; `pose` alone may come and go, and what is
+    /// measured, and of which target, where that may be something else than positions.
     fn same_columns(&self, table: &Table, columns: &Columns) -> Result<(), InputError> {
         let differ = |name: &str, has| {
             let other = self.measurements.files.first().cloned().unwrap_or_default();
             Err(table.column(name).error(InputErrorKind::ColumnsDiffer { other, has }))
         };
-        let of_observed =
-            |role: Role| role.is_observed() || role == Role::Sigma || (role == Role::Target && self.names_targets);
+        let of_observed = |role: Role| {
+            role.is_observed()
+                || role == Role::Sigma
+                || (role == Role::Target && self.names_targets)
+        };
         let comes_and_goes = |role: Role| role == Role::Pose || (self.mixed && of_observed(role));
-        for (column, name) in self.columns.iter().filter(|(column, _)| !comes_and_goes(column.role)) {
+        for (column, name) in self.columns.iter().filter(|(column, _)| !comes_and_goes(column.role))
+        {
             if !columns.has(column.role) {
                 return differ(name, true);
             }
@@ -337,7 +399,13 @@ impl Builder {
     }
 
     /// Adds the row that the table is at, which measures a fixed point.
-    fn push_nest(&mut self, file: usize, name: &str, table: &Table, columns: &Columns) -> Result<(), InputError> {
+    fn push_nest(
+        &mut self,
+        file: usize,
+        name: &str,
+        table: &Table,
+        columns: &Columns,
+    ) -> Result<(), InputError> {
         let narrow = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         let mut reading = NestReading {
             origin: (narrow(file), narrow(table.line())),
@@ -356,7 +424,11 @@ impl Builder {
         for column in &columns.read {
             match column.role {
                 Role::Position(axis) => {
-                    set(reading.position.as_mut_slice(), axis, (column.to_si)(table.number(column.place)?));
+                    set(
+                        reading.position.as_mut_slice(),
+                        axis,
+                        (column.to_si)(table.number(column.place)?),
+                    );
                 }
                 Role::Time => reading.time = Some(table.time(column.place, column.to_si)?),
                 Role::Session => table.text(column.place)?.clone_into(&mut reading.session),
@@ -369,7 +441,13 @@ impl Builder {
     }
 
     /// Adds what is `observed` in the row that the table is at.
-    fn push(&mut self, file: usize, table: &Table, columns: &Columns, observed: &Observed) -> Result<(), InputError> {
+    fn push(
+        &mut self,
+        file: usize,
+        table: &Table,
+        columns: &Columns,
+        observed: &Observed,
+    ) -> Result<(), InputError> {
         let Observed { observation, numbers, measured } = *observed;
         let measurements = &mut self.measurements;
         let joints = measurements.joints;
@@ -387,7 +465,11 @@ impl Builder {
             measurements.time.push(row as f64);
         }
         let (mut position, mut pose, mut turned) = (numbers, None, Cells::default());
-        for column in columns.read.iter().filter(|column| observation.is_position() || !column.role.is_observed()) {
+        for column in columns
+            .read
+            .iter()
+            .filter(|column| observation.is_position() || !column.role.is_observed())
+        {
             let number = || table.number(column.place).map(column.to_si);
             match column.role {
                 Role::Joint(joint) | Role::Reading(joint) => {
@@ -399,7 +481,9 @@ impl Builder {
                     }
                 }
                 Role::Position(axis) => set(position.as_mut_slice(), axis, number()?),
-                Role::Sigma if self.mixed && (observation.is_angle() || table.text(column.place)?.is_empty()) => {}
+                Role::Sigma
+                    if self.mixed
+                        && (observation.is_angle() || table.text(column.place)?.is_empty()) => {}
                 Role::Sigma => add(&mut measurements.sigma, above_zero(table, column)?),
                 Role::Payload => add(&mut measurements.payload, not_negative(table, column)?),
                 Role::Hoist => add(&mut measurements.hoist, number()?),
@@ -435,7 +519,9 @@ impl Builder {
             }
         }
         match columns.file {
-            Some(Role::Session) => self.session.push(self.stems.get(file).map_or("", String::as_str)),
+            Some(Role::Session) => {
+                self.session.push(self.stems.get(file).map_or("", String::as_str))
+            }
             Some(Role::Target) => self.target.push(self.stems.get(file).map_or("", String::as_str)),
             _ => {}
         }
@@ -455,7 +541,9 @@ impl Builder {
             orientations.push(match columns.orientations() {
                 _ if !observation.is_position() => UnitQuaternion::identity(),
                 (true, _) => turned.of_angles(self.rotation),
-                _ => turned.of_quaternion().ok_or_else(|| table.error(InputErrorKind::NotAQuaternion))?,
+                _ => turned
+                    .of_quaternion()
+                    .ok_or_else(|| table.error(InputErrorKind::NotAQuaternion))?,
             });
         }
         self.poses.push(pose);

@@ -55,7 +55,8 @@ impl Role {
         if matches!(self, Self::Frame | Self::Tilt(_)) {
             return problem.data.tilt_sigma.is_some();
         }
-        self.declared_by().is_none_or(|word| problem.fixtures.iter().any(|own| own.kind.word() == word))
+        self.declared_by()
+            .is_none_or(|word| problem.fixtures.iter().any(|own| own.kind.word() == word))
     }
 
     /// What `problem.toml` lacks for a column of this name to mean anything, if it lacks something.
@@ -76,7 +77,11 @@ impl Role {
         self.declared_by().is_some()
             || matches!(
                 self,
-                Self::Frame | Self::Tilt(_) | Self::Position(_) | Self::Orientation(_) | Self::Quaternion(_)
+                Self::Frame
+                    | Self::Tilt(_)
+                    | Self::Position(_)
+                    | Self::Orientation(_)
+                    | Self::Quaternion(_)
             )
     }
 
@@ -103,7 +108,8 @@ pub(super) const PLAIN: [(&str, Role); 13] = [
     ("qw", Role::Quaternion(3)),
 ];
 
-/// Columns with a unit, and whether they need one: a column such as `time` may be about something else.
+/// Columns with a unit, and whether they need one: a column such as `time` may be about something
+/// else.
 pub(super) const MEASURED: [(&str, Role, Unit, bool); 13] = [
     ("x", Role::Position(0), Unit::Length, true),
     ("y", Role::Position(1), Unit::Length, true),

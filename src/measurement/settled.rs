@@ -7,22 +7,37 @@ use crate::error::{InputError, InputErrorKind, Warning, WarningKind};
 use crate::quantity::Unit;
 
 impl Columns {
-    /// A column `time` without a unit holds dates, or else nothing that is known: it is left out with a warning.
+    /// A column `time` without a unit holds dates, or else nothing that is known: it is left out
+    /// with a warning.
     ///
     /// # Errors
     /// A map says that it holds times, and its first cell is none.
-    pub fn settle_time(&mut self, table: &Table, warnings: &mut Vec<Warning>) -> Result<(), InputError> {
-        let dated = |column: &Column| (column.to_si)(0.0).is_finite() || table.is_date(column.place);
-        if let Some(place) = self.read.iter().position(|column| column.role == Role::Time && !dated(column)) {
+    pub fn settle_time(
+        &mut self,
+        table: &Table,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<(), InputError> {
+        let dated =
+            |column: &Column| (column.to_si)(0.0).is_finite() || table.is_date(column.place);
+        if let Some(place) =
+            self.read.iter().position(|column| column.role == Role::Time && !dated(column))
+        {
             let column = self.read.remove(place);
-            let (theirs, value) = (table.name_of(column.place), shortened(table.text(column.place)?));
+            let (theirs, value) =
+                (table.name_of(column.place), shortened(table.text(column.place)?));
             let is_number = value.is_empty() || table.number(column.place).is_ok();
             if !is_number && theirs != "time" {
-                return Err(table.column(theirs).at_line(table.line()).error(InputErrorKind::NotATime { value }));
+                return Err(table
+                    .column(theirs)
+                    .at_line(table.line())
+                    .error(InputErrorKind::NotATime { value }));
             }
             let write = Unit::Time.spelled("time");
-            let kind =
-                if is_number { WarningKind::UnitIgnored { write } } else { WarningKind::NotADate { value, write } };
+            let kind = if is_number {
+                WarningKind::UnitIgnored { write }
+            } else {
+                WarningKind::NotADate { value, write }
+            };
             warnings.push(Warning { location: table.column(theirs), kind });
         }
         Ok(())

@@ -24,14 +24,18 @@ impl Split {
     /// An empty part, a session that nobody measured, or no word on what is held out.
     pub fn new(problem: &Problem, measurements: &Measurements) -> Result<Self, InputError> {
         let error = |kind| problem.data.held_out_location.clone().error(kind);
-        let marked = || measurements.marked_held_out.clone().ok_or_else(|| error(InputErrorKind::NoHeldOut));
+        let marked =
+            || measurements.marked_held_out.clone().ok_or_else(|| error(InputErrorKind::NoHeldOut));
         let held_out = match &problem.data.held_out {
             None | Some(HeldOut::Column(_)) => marked()?,
             Some(HeldOut::Session(session)) => of_session(session, measurements).map_err(error)?,
-            Some(HeldOut::Fraction { fraction, seed }) => at_random(*fraction, *seed, problem, measurements),
+            Some(HeldOut::Fraction { fraction, seed }) => {
+                at_random(*fraction, *seed, problem, measurements)
+            }
         };
         let held_out = with_known_distances(held_out, measurements);
-        let (held_out, identification): (Vec<_>, Vec<_>) = (0..measurements.len()).partition(|&row| held_out[row]);
+        let (held_out, identification): (Vec<_>, Vec<_>) =
+            (0..measurements.len()).partition(|&row| held_out[row]);
         let cause = |word| match &problem.data.held_out {
             None => NoRows::Column { column: "split".to_owned(), word },
             Some(HeldOut::Column(column)) => NoRows::Column { column: column.clone(), word },
@@ -52,13 +56,17 @@ impl Split {
     }
 }
 
-/// The same, with a known distance among the fitted rows where both of its points are touched there, else held out.
+/// The same, with a known distance among the fitted rows where both of its points are touched
+/// there, else held out.
 fn with_known_distances(mut held_out: Vec<bool>, measurements: &Measurements) -> Vec<bool> {
     let touched = |point: usize| {
-        (0..measurements.len()).any(|row| !held_out[row] && measurements.observation(row) == Observation::Point(point))
+        (0..measurements.len())
+            .any(|row| !held_out[row] && measurements.observation(row) == Observation::Point(point))
     };
     let known = |row: usize| match measurements.observation(row) {
-        Observation::Between(first, second) => Some((row, !(touched(first as usize) && touched(second as usize)))),
+        Observation::Between(first, second) => {
+            Some((row, !(touched(first as usize) && touched(second as usize))))
+        }
         _ => None,
     };
     for (row, is_held_out) in (0..measurements.len()).filter_map(known).collect::<Vec<_>>() {
@@ -80,7 +88,12 @@ fn of_session(session: &str, measurements: &Measurements) -> Result<Vec<bool>, I
 }
 
 /// Marks rows until they make up the fraction; rows of one configuration stay together.
-fn at_random(fraction: f64, seed: u64, problem: &Problem, measurements: &Measurements) -> Vec<bool> {
+fn at_random(
+    fraction: f64,
+    seed: u64,
+    problem: &Problem,
+    measurements: &Measurements,
+) -> Vec<bool> {
     let (of_row, count) = measurements.configurations(problem);
     let mut sizes = vec![0_usize; count];
     for &configuration in &of_row {

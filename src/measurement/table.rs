@@ -10,7 +10,9 @@ use csv::{ByteRecord, Reader, ReaderBuilder};
 use super::dialect::{LOOKED_AT, Layout, Rewritten};
 use super::lines::{Lines, RECORD_KIB};
 use super::time::iso_8601;
-use crate::error::{BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, is_hidden, lines};
+use crate::error::{
+    BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, is_hidden, lines,
+};
 use crate::problem::Dialect;
 use crate::problem::item::GREATEST;
 
@@ -37,8 +39,13 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// Opens a file written in a `dialect` and reads its header; `missing` makes the error where there is no such file.
-    pub fn open(file: &Path, dialect: &Dialect, missing: impl FnOnce() -> InputError) -> Result<Self, InputError> {
+    /// Opens a file written in a `dialect` and reads its header; `missing` makes the error where
+    /// there is no such file.
+    pub fn open(
+        file: &Path,
+        dialect: &Dialect,
+        missing: impl FnOnce() -> InputError,
+    ) -> Result<Self, InputError> {
         let input = File::open(file).map_err(|source| match source.kind() {
             io::ErrorKind::NotFound => missing(),
             _ => Location::file(file).error(InputErrorKind::Unreadable { source }),
@@ -47,7 +54,11 @@ impl Table {
     }
 
     /// Reads the header of a text; messages call it `file`.
-    pub fn of_text(file: &Path, dialect: &Dialect, mut input: Box<dyn Read>) -> Result<Self, InputError> {
+    pub fn of_text(
+        file: &Path,
+        dialect: &Dialect,
+        mut input: Box<dyn Read>,
+    ) -> Result<Self, InputError> {
         let unreadable = |source| Location::file(file).error(InputErrorKind::Unreadable { source });
         let mut beginning = Vec::new();
         input.by_ref().take(LOOKED_AT).read_to_end(&mut beginning).map_err(unreadable)?;
@@ -55,7 +66,8 @@ impl Table {
             return Err(Location::file(file).error(InputErrorKind::Workbook));
         }
         let layout = Layout::of(&beginning, dialect);
-        let lines = Lines::new(BufReader::with_capacity(1 << 16, Cursor::new(beginning).chain(input)));
+        let lines =
+            Lines::new(BufReader::with_capacity(1 << 16, Cursor::new(beginning).chain(input)));
         let reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -127,11 +139,14 @@ impl Table {
             Location::file(&self.file).error(InputErrorKind::Unreadable { source })
         })?;
         if found {
-            // Every record ends in a line feed of its own; one that does not is open to the end of the file.
+            // Every record ends in a line feed of its own; one that does not is open to the end of
+            // the file.
             self.line = self.next_line().saturating_sub(lines(self.record.as_slice()));
             if self.line < first {
                 self.line = first;
-                return Err(Location::file(&self.file).at_line(first).error(InputErrorKind::OpenQuote));
+                return Err(Location::file(&self.file)
+                    .at_line(first)
+                    .error(InputErrorKind::OpenQuote));
             }
         }
         Ok(found)
@@ -153,20 +168,27 @@ impl Table {
 
     /// A cell of the row as text, without white space at its ends.
     pub fn text(&self, place: usize) -> Result<&str, InputError> {
-        std::str::from_utf8(self.cell(place)).map_err(|_| self.cell_error(place, InputErrorKind::NotUtf8))
+        std::str::from_utf8(self.cell(place))
+            .map_err(|_| self.cell_error(place, InputErrorKind::NotUtf8))
     }
 
     /// A cell of the row as a word that is not empty.
     pub fn word(&self, place: usize) -> Result<&str, InputError> {
         let word = self.text(place)?;
-        if word.is_empty() { Err(self.cell_error(place, InputErrorKind::EmptyCell)) } else { Ok(word) }
+        if word.is_empty() {
+            Err(self.cell_error(place, InputErrorKind::EmptyCell))
+        } else {
+            Ok(word)
+        }
     }
 
     /// A cell of the row as a word that can be seen.
     pub fn name(&self, place: usize) -> Result<&str, InputError> {
         let word = self.word(place)?;
         match word.chars().find(|&character| is_hidden(character)) {
-            Some(hidden) => Err(self.cell_error(place, InputErrorKind::Hidden { code: hidden.into() })),
+            Some(hidden) => {
+                Err(self.cell_error(place, InputErrorKind::Hidden { code: hidden.into() }))
+            }
             None => Ok(word),
         }
     }
@@ -189,7 +211,8 @@ impl Table {
         }
     }
 
-    /// A cell of the row as a time: a number in a unit, or a date and time after ISO 8601 \[s since 1970\].
+    /// A cell of the row as a time: a number in a unit, or a date and time after ISO 8601 \[s since
+    /// 1970\].
     pub fn time(&self, place: usize, to_si: fn(f64) -> f64) -> Result<f64, InputError> {
         let word = self.word(place)?;
         match iso_8601(word) {
@@ -224,7 +247,9 @@ impl Table {
 
     /// A place in the header line.
     pub fn column(&self, name: &str) -> Location {
-        Location::file(&self.file).at_line(self.header_line).with_key(format!("column {}", shortened(name)))
+        Location::file(&self.file)
+            .at_line(self.header_line)
+            .with_key(format!("column {}", shortened(name)))
     }
 
     /// A mistake in the row as a whole.

@@ -1,9 +1,11 @@
 //! Dates and times after ISO 8601.
 
-/// Seconds from 1970-01-01T00:00 UTC to a date and time, if that is what a text is; without a zone it is taken as UTC.
+/// Seconds from 1970-01-01T00:00 UTC to a date and time, if that is what a text is; without a zone
+/// it is taken as UTC.
 ///
-/// Extended (`2024-05-31T14:03:20.25+02:00`, with a space for the T) and basic (`20240531T140320Z`, also without the T); seconds may
-/// be left out of the extended form, and have a decimal point or comma.
+/// Extended (`2024-05-31T14:03:20.25+02:00`, with a space for the T) and basic (`20240531T140320Z`,
+/// also without the T); seconds may be left out of the extended form, and have a decimal point or
+/// comma.
 pub(super) fn iso_8601(text: &str) -> Option<f64> {
     let (clock, zone) = split_zone(text.trim());
     let plain: String = clock.chars().filter(|c| !"-:T ".contains(*c)).collect();
@@ -18,18 +20,28 @@ pub(super) fn iso_8601(text: &str) -> Option<f64> {
         Some(_) => return None,
         None => (plain.as_str(), 0.0),
     };
-    if !digits.is_ascii() || !digits.bytes().all(|byte| byte.is_ascii_digit()) || ![12, 14].contains(&digits.len()) {
+    if !digits.is_ascii()
+        || !digits.bytes().all(|byte| byte.is_ascii_digit())
+        || ![12, 14].contains(&digits.len())
+    {
         return None;
     }
     if digits.len() == 12 && (marks.is_empty() || fraction != 0.0) {
         return None;
     }
-    let number = |from: usize, to: usize| digits.get(from..to).map_or(Some(0), |part| part.parse::<i64>().ok());
+    let number = |from: usize, to: usize| {
+        digits.get(from..to).map_or(Some(0), |part| part.parse::<i64>().ok())
+    };
     let (year, month, day) = (number(0, 4)?, number(4, 6)?, number(6, 8)?);
     let (hour, minute, second) = (number(8, 10)?, number(10, 12)?, number(12, 14)?);
     let next = if month < 12 { (year, month + 1) } else { (year + 1, 1) };
     let length = days(next.0, next.1, 1) - days(year, month, 1);
-    if !(1..=12).contains(&month) || !(1..=length).contains(&day) || hour > 24 || minute > 59 || second > 60 {
+    if !(1..=12).contains(&month)
+        || !(1..=length).contains(&day)
+        || hour > 24
+        || minute > 59
+        || second > 60
+    {
         return None;
     }
     let whole = days(year, month, day) * 86400 + hour * 3600 + minute * 60 + second - zone?;
@@ -44,24 +56,30 @@ fn split_zone(text: &str) -> (&str, Option<i64>) {
     // A sign before the time of the day is part of the date.
     let day = text.find(['T', ' ']).unwrap_or(text.len());
     let sign = text.get(day..).and_then(|rest| rest.rfind(['+', '-'])).map(|place| day + place);
-    let Some((clock, zone)) = sign.and_then(|place| Some((text.get(..place)?, text.get(place..)?))) else {
+    let Some((clock, zone)) = sign.and_then(|place| Some((text.get(..place)?, text.get(place..)?)))
+    else {
         return (text, Some(0));
     };
     let digits: String = zone.chars().skip(1).filter(|c| *c != ':').collect();
     let ahead = match (digits.len(), digits.get(..2).and_then(|h| h.parse::<i64>().ok())) {
         (2, Some(hours)) => Some(hours * 3600),
-        (4, Some(hours)) => {
-            digits.get(2..).and_then(|m| m.parse::<i64>().ok()).map(|minutes| hours * 3600 + minutes * 60)
-        }
+        (4, Some(hours)) => digits
+            .get(2..)
+            .and_then(|m| m.parse::<i64>().ok())
+            .map(|minutes| hours * 3600 + minutes * 60),
         _ => None,
     };
     (clock, ahead.map(|ahead| if zone.starts_with('-') { -ahead } else { ahead }))
 }
 
-/// Days from 1970-01-01 to a date of the Gregorian calendar, leap years counted: years begin in March.
+/// Days from 1970-01-01 to a date of the Gregorian calendar, leap years counted: years begin in
+/// March.
 fn days(year: i64, month: i64, day: i64) -> i64 {
     let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
-    365 * year + year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400) + (153 * month + 2) / 5 + day
+    365 * year + year.div_euclid(4) - year.div_euclid(100)
+        + year.div_euclid(400)
+        + (153 * month + 2) / 5
+        + day
         - 719_469
 }
 

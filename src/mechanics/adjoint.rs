@@ -1,15 +1,18 @@
 //! The adjoint sweep: derivatives of the position at rest, by virtual work.
 //!
-//! With Λ the influence of the moments' equations (see [`super::statics`]), each coordinate of p + Λ·(G − x) changes with
-//! the place of every load, section and segment. Walking inwards from the target, the wrench that does that change as virtual
-//! work on everything passed so far is kept for each of the three coordinates: a load f at r adds the force f × W, with W
-//! the Λ-weighted axes of all sections inwards of it; a section adds what its own place and axes do to its moment. A segment's
-//! derivative is then the work of that wrench on the segment's twist, and for the spring of a joint what turning the joint does
-//! to its moment. For the moments themselves this is Λ again, so that Λ is a fixed point of the sweep, reached by the same
-//! contraction as the equilibrium itself.
+//! With Λ the influence of the moments' equations (see [`super::statics`]), each coordinate of p +
+//! Λ·(G − x) changes with the place of every load, section and segment. Walking inwards from the
+//! target, the wrench that does that change as virtual work on everything passed so far is kept for
+//! each of the three coordinates: a load f at r adds the force f × W, with W the Λ-weighted axes of
+//! all sections inwards of it; a section adds what its own place and axes do to its moment. A
+//! segment's derivative is then the work of that wrench on the segment's twist, and for the spring
+//! of a joint what turning the joint does to its moment. For the moments themselves this is Λ
+//! again, so that Λ is a fixed point of the sweep, reached by the same contraction as the
+//! equilibrium itself.
 //!
-//! Where branches meet, the wrenches of all of them add up. A branch without the target carries the virtual forces of its loads
-//! alone: that is how its masses, by bending the trunk, move the target of another.
+//! Where branches meet, the wrenches of all of them add up. A branch without the target carries the
+//! virtual forces of its loads alone: that is how its masses, by bending the trunk, move the target
+//! of another.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -34,13 +37,16 @@ impl Virtual {
 
     /// Work on a segment's end.
     fn on(&self, column: &Column) -> Vector3<f64> {
-        let each = |i: usize| self.moment[i].dot(&column.rotation) + self.force[i].dot(&column.translation);
+        let each = |i: usize| {
+            self.moment[i].dot(&column.rotation) + self.force[i].dot(&column.translation)
+        };
         Vector3::new(each(0), each(1), each(2))
     }
 }
 
 impl Tape {
-    /// Finds Λ, then the derivatives of the position `at` \[m\] of the target with respect to all parameters.
+    /// Finds Λ, then the derivatives of the position `at` \[m\] of the target with respect to all
+    /// parameters.
     pub(super) fn differentiate(&mut self, at: &Vector3<f64>) -> Result<(), StaticsError> {
         self.find_influence(at)?;
         self.weigh_loads();
@@ -57,7 +63,8 @@ impl Tape {
             self.adjoint_sweep(at, Sought::Influence);
             let Self { influence, image, anderson, .. } = self;
             let largest = image.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-            let change = influence.iter().zip(&*image).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            let change =
+                influence.iter().zip(&*image).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
             if change <= SETTLED * largest {
                 return Ok(());
             }
@@ -72,7 +79,9 @@ impl Tape {
         let Self { steps, loads, influence, .. } = self;
         let mut weights = [Vector3::zeros(); 3];
         let mut forks = Vec::new();
-        let weigh = |load: &mut Load, weights: &Each| load.virtually = weights.each_ref().map(|w| load.force.cross(w));
+        let weigh = |load: &mut Load, weights: &Each| {
+            load.virtually = weights.each_ref().map(|w| load.force.cross(w))
+        };
         for step in steps {
             match step {
                 Step::Load(load) => weigh(&mut loads[*load], &weights),
@@ -91,7 +100,18 @@ impl Tape {
 
     /// From the tips, the target among them, to the base.
     fn adjoint_sweep(&mut self, at: &Vector3<f64>, sought: Sought) {
-        let Self { steps, target, loads, columns, moves, influence, image, derivatives, stride, .. } = self;
+        let Self {
+            steps,
+            target,
+            loads,
+            columns,
+            moves,
+            influence,
+            image,
+            derivatives,
+            stride,
+            ..
+        } = self;
         image.fill(0.0);
         let (mut wrench, mut branches) = (Virtual::default(), Vec::new());
         for (index, step) in steps.iter().enumerate().rev() {
@@ -127,9 +147,14 @@ impl Tape {
                     };
                     match sought {
                         Sought::Influence => {
-                            for (lane, unknown) in (segment.moment_lane..).zip(segment.unknowns.clone()) {
+                            for (lane, unknown) in
+                                (segment.moment_lane..).zip(segment.unknowns.clone())
+                            {
                                 // What tilts does so in two halves.
-                                image[3 * unknown..][..3].iter_mut().zip(&work(lane)).for_each(|(a, w)| *a += w);
+                                image[3 * unknown..][..3]
+                                    .iter_mut()
+                                    .zip(&work(lane))
+                                    .for_each(|(a, w)| *a += w);
                             }
                         }
                         Sought::Parameters => {
@@ -141,7 +166,8 @@ impl Tape {
                     if segment.turns {
                         let turned = Matrix3::from_columns(&[work(0), work(1), work(2)]);
                         for (i, about_root) in turned.row_iter().enumerate() {
-                            wrench.force[i] += own.iter().map(|load| load.virtually[i]).sum::<Vector3<f64>>();
+                            wrench.force[i] +=
+                                own.iter().map(|load| load.virtually[i]).sum::<Vector3<f64>>();
                             wrench.moment[i] = segment.root.vector(&about_root.transpose())
                                 + segment.root.origin.cross(&wrench.force[i]);
                         }
@@ -163,8 +189,10 @@ impl Section {
     /// Λ-weighted axes.
     fn weights(&self, influence: &[f64]) -> Each {
         let mut weights = [Vector3::zeros(); 3];
-        for (axis, influence) in
-            self.axes.iter().zip(influence[3 * self.unknowns.start..3 * self.unknowns.end].chunks_exact(3))
+        for (axis, influence) in self
+            .axes
+            .iter()
+            .zip(influence[3 * self.unknowns.start..3 * self.unknowns.end].chunks_exact(3))
         {
             for i in 0..3 {
                 weights[i] += axis * influence[i];
@@ -173,7 +201,8 @@ impl Section {
         weights
     }
 
-    /// The section's moment is a·(M − r × F): its own place r and axes a, where they turn with the arm, move.
+    /// The section's moment is a·(M − r × F): its own place r and axes a, where they turn with the
+    /// arm, move.
     fn act(&self, influence: &[f64], wrench: &mut Virtual) {
         let weights = self.weights(influence);
         if self.felt == Felt::OnTheArm {

@@ -4,11 +4,12 @@
 const DEPTH: usize = 4;
 /// A difference that the others explain up to this part, in squares, is rounding.
 const EXPLAINED: f64 = 1e-20;
-/// A pass that shrinks the residual less than this finds no contraction to speed up: it is taken as it is.
+/// A pass that shrinks the residual less than this finds no contraction to speed up: it is taken as
+/// it is.
 const CONTRACTS: f64 = 0.5;
 
-/// A difference of residuals g(x) − x, orthogonal to the others, with that of the images g(x) it belongs to; its square
-/// is zero where it says nothing.
+/// A difference of residuals g(x) − x, orthogonal to the others, with that of the images g(x) it
+/// belongs to; its square is zero where it says nothing.
 #[derive(Debug, Clone, Default)]
 struct Pair {
     residual: Vec<f64>,
@@ -16,8 +17,9 @@ struct Pair {
     squares: f64,
 }
 
-/// Speeds up x ← g(x) by what earlier passes tell of g's slope: g(x) less the part of the differences of images whose
-/// residuals make up this one.                                                    [Anderson 1965; Walker & Ni 2011]
+/// Speeds up x ← g(x) by what earlier passes tell of g's slope: g(x) less the part of the
+/// differences of images whose residuals make up this one.
+/// [Anderson 1965; Walker & Ni 2011]
 #[derive(Debug, Clone, Default)]
 pub(super) struct Anderson {
     pairs: [Pair; DEPTH],
@@ -45,7 +47,10 @@ impl Anderson {
             set(&mut pair.residual, n, |k| residual(k) - last.residual[k]);
             set(&mut pair.image, n, |k| image[k] - last.image[k]);
             let whole = dot(&pair.residual, &pair.residual);
-            let others = pairs[..newer].iter().enumerate().filter(|(k, other)| *k != oldest && other.squares > 0.0);
+            let others = pairs[..newer]
+                .iter()
+                .enumerate()
+                .filter(|(k, other)| *k != oldest && other.squares > 0.0);
             for (_, other) in others {
                 let part = dot(&pair.residual, &other.residual) / other.squares;
                 subtract(&mut pair.residual, part, &other.residual);
@@ -91,7 +96,11 @@ mod tests {
     /// A contraction of three unknowns with two slow directions, a little bent.
     fn image(x: &[f64]) -> Vec<f64> {
         let [a, b, c] = [x[0], x[1], x[2]];
-        vec![1.0 + 0.3 * a - 0.1 * b + 0.01 * a * c, 2.0 + 0.1 * a + 0.2 * b, -1.0 + 0.05 * b * b - 0.02 * c]
+        vec![
+            1.0 + 0.3 * a - 0.1 * b + 0.01 * a * c,
+            2.0 + 0.1 * a + 0.2 * b,
+            -1.0 + 0.05 * b * b - 0.02 * c,
+        ]
     }
 
     /// Passes until the residual is below rounding, and where.

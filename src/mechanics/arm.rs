@@ -8,7 +8,8 @@ use crate::problem::{Equilibrium, PoseView, Problem, Tree};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
-/// An arm, or several on one trunk, with its parameters as scalars S; predicts in its own base frame.
+/// An arm, or several on one trunk, with its parameters as scalars S; predicts in its own base
+/// frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arm<S> {
     /// Gravity, arm base frame [m/s²].
@@ -33,7 +34,8 @@ pub struct Arm<S> {
     pub rope: Option<Rope<S>>,
     /// Flexibility of the base about its x and y [rad/(N·m)].
     pub mounting: Option<[S; 2]>,
-    /// λ from loads on the rigid arm (0) to loads on the bent arm (1), where the declared statics are undeflected.
+    /// λ from loads on the rigid arm (0) to loads on the bent arm (1), where the declared statics
+    /// are undeflected.
     pub mixing: Option<S>,
 }
 
@@ -79,7 +81,10 @@ impl<S: Scalar> Arm<S> {
     /// Whether any joint or link deflects.
     pub fn is_elastic(&self) -> bool {
         let gives = |joint: &Joint<S>| {
-            joint.turns() || joint.lateral.is_some() || joint.slide.is_some() || joint.beam.is_some()
+            joint.turns()
+                || joint.lateral.is_some()
+                || joint.slide.is_some()
+                || joint.beam.is_some()
         };
         self.mounting.is_some() || self.joints.iter().any(gives)
     }
@@ -100,8 +105,8 @@ impl<S: Scalar> Arm<S> {
         frame
     }
 
-    /// For each joint its axis, a point \[m\] and a direction, and the frame behind it, of the arm that does not deflect; arm base
-    /// frame.
+    /// For each joint its axis, a point \[m\] and a direction, and the frame behind it, of the arm
+    /// that does not deflect; arm base frame.
     pub fn rigid_joints(&self, configuration: &[f64]) -> Vec<(Vector3<S>, Vector3<S>, Frame<S>)> {
         let mut frame = Frame::identity();
         let mut forks = vec![frame; self.tree.further_on_base()];

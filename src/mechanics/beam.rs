@@ -1,8 +1,8 @@
 //! The Euler–Bernoulli cantilever in closed form, in three dimensions.
 //!
-//! Root frame: x along the beam, the tip at x = L. Every load is a wrench at a station or spread evenly; deflections
-//! superpose. L may be negative (the link runs along −x); rigidities then enter with the sign of L, which leaves every
-//! formula as it stands.
+//! Root frame: x along the beam, the tip at x = L. Every load is a wrench at a station or spread
+//! evenly; deflections superpose. L may be negative (the link runs along −x); rigidities then enter
+//! with the sign of L, which leaves every formula as it stands.
 
 use nalgebra::Vector3;
 
@@ -20,14 +20,16 @@ pub struct Flexibility<S> {
     pub about_z: S,
     /// 1/GJ [1/(N·m²)].
     pub twist: S,
-    /// Couplings `k_y`, `k_z` [1/(N·m²)] of twist with bending about y and z: curvature `k_y M_x`, rate of twist `k_y M_y`, the same
-    /// about z; with `k_y`² ≤ `about_y`·`twist` no load gains energy.
+    /// Couplings `k_y`, `k_z` [1/(N·m²)] of twist with bending about y and z: curvature `k_y M_x`,
+    /// rate of twist `k_y M_y`, the same about z; with `k_y`² ≤ `about_y`·`twist` no load gains
+    /// energy.
     pub coupling: Option<[S; 2]>,
 }
 
 impl Flexibility<f64> {
     /// Nothing gives way.
-    pub const RIGID: Self = Self { axial: 0.0, about_y: 0.0, about_z: 0.0, twist: 0.0, coupling: None };
+    pub const RIGID: Self =
+        Self { axial: 0.0, about_y: 0.0, about_z: 0.0, twist: 0.0, coupling: None };
 }
 
 /// Force \[N\] and moment [N·m] at one point, in one frame.
@@ -80,16 +82,18 @@ pub struct Cantilever<'a, S> {
     pub spread: Vector3<S>,
     /// Strain without load, the same all along.
     pub strain: Option<Strain<S>>,
-    /// Point loads: station s \[m\] between 0 and L, and wrench there. The tip load is the one at s = L.
+    /// Point loads: station s \[m\] between 0 and L, and wrench there. The tip load is the one at s
+    /// = L.
     pub points: &'a [(S, Wrench<S>)],
 }
 
 impl<S: Scalar> Cantilever<'_, S> {
     /// Deflection of the section at `x` \[m\], 0 ≤ x/L ≤ 1.
     ///
-    /// Load F, M at s, for x ≤ s:  δ = F (s x²/2 − x³/6)/EI + M x²/(2EI),  φ = F (s x − x²/2)/EI + M x/EI;
-    /// beyond s the beam stays straight. Spread load q:  δ = q (L²x²/4 − L x³/6 + x⁴/24)/EI. Small slopes only.
-    /// At the tip these are [Chen2021, eq. 4 and 6] without their misprints.
+    /// Load F, M at s, for x ≤ s:  δ = F (s x²/2 − x³/6)/EI + M x²/(2EI),  φ = F (s x − x²/2)/EI +
+    /// M x/EI; beyond s the beam stays straight. Spread load q:  δ = q (L²x²/4 − L x³/6 +
+    /// x⁴/24)/EI. Small slopes only. At the tip these are [Chen2021, eq. 4 and 6] without their
+    /// misprints.
     pub fn at(&self, x: S) -> Deflection<S> {
         let l = self.length;
         let (x2, l2) = (x * x, l * l);
@@ -145,9 +149,14 @@ impl<S: Scalar> Cantilever<'_, S> {
                 deflection_of_moment: half,
                 slope_of_moment: s,
             };
-            let mean = |inside: S, end: S, slope: S| (inside + (end + slope * beyond * 0.5) * beyond) / l;
+            let mean =
+                |inside: S, end: S, slope: S| (inside + (end + slope * beyond * 0.5) * beyond) / l;
             let shape = Shape {
-                deflection_of_force: mean(half * half * 0.5, end.deflection_of_force, end.slope_of_force),
+                deflection_of_force: mean(
+                    half * half * 0.5,
+                    end.deflection_of_force,
+                    end.slope_of_force,
+                ),
                 slope_of_force: half,
                 deflection_of_moment: mean(s * half / 3.0, end.deflection_of_moment, s),
                 slope_of_moment: (half + s * beyond) / l,
@@ -175,7 +184,14 @@ impl<S: Scalar> Cantilever<'_, S> {
         }
     }
 
-    fn superpose_spread(&self, out: &mut Deflection<S>, k: &Flexibility<S>, deflection: S, slope: S, stretch: S) {
+    fn superpose_spread(
+        &self,
+        out: &mut Deflection<S>,
+        k: &Flexibility<S>,
+        deflection: S,
+        slope: S,
+        stretch: S,
+    ) {
         let q = &self.spread;
         out.displacement.x += k.axial * q.x * stretch;
         out.displacement.y += k.about_z * q.y * deflection;
@@ -187,7 +203,8 @@ impl<S: Scalar> Cantilever<'_, S> {
         }
     }
 
-    /// Strain without load turns the section at x by κ x and moves it by ε x along and κ x²/2 across.
+    /// Strain without load turns the section at x by κ x and moves it by ε x along and κ x²/2
+    /// across.
     fn superpose_strain(&self, out: &mut Deflection<S>, x: S, half_square: S) {
         let Some(Strain { axial, curvature: [about_y, about_z] }) = self.strain else { return };
         out.displacement.x += axial * x;
@@ -199,11 +216,18 @@ impl<S: Scalar> Cantilever<'_, S> {
 }
 
 /// Rotation about z is +slope in y; rotation about y is −slope in z.
-fn superpose<S: Scalar>(out: &mut Deflection<S>, k: &Flexibility<S>, shape: &Shape<S>, wrench: &Wrench<S>) {
+fn superpose<S: Scalar>(
+    out: &mut Deflection<S>,
+    k: &Flexibility<S>,
+    shape: &Shape<S>,
+    wrench: &Wrench<S>,
+) {
     let (f, m) = (&wrench.force, &wrench.moment);
     out.displacement.x += k.axial * f.x * shape.slope_of_moment;
-    out.displacement.y += k.about_z * (f.y * shape.deflection_of_force + m.z * shape.deflection_of_moment);
-    out.displacement.z += k.about_y * (f.z * shape.deflection_of_force - m.y * shape.deflection_of_moment);
+    out.displacement.y +=
+        k.about_z * (f.y * shape.deflection_of_force + m.z * shape.deflection_of_moment);
+    out.displacement.z +=
+        k.about_y * (f.z * shape.deflection_of_force - m.y * shape.deflection_of_moment);
     out.rotation.x += k.twist * m.x * shape.slope_of_moment;
     out.rotation.y += k.about_y * (m.y * shape.slope_of_moment - f.z * shape.slope_of_force);
     out.rotation.z += k.about_z * (m.z * shape.slope_of_moment + f.y * shape.slope_of_force);

@@ -2,13 +2,16 @@
 
 use crate::scalar::Scalar;
 
-/// Part of the larger arm of a spring below which its length is none: the line of its pull has no direction.
+/// Part of the larger arm of a spring below which its length is none: the line of its pull has no
+/// direction.
 const NONE: f64 = 1e-9;
 
-/// A spring between what stands before a joint and the link behind it, in the plane across the joint's axis.
+/// A spring between what stands before a joint and the link behind it, in the plane across the
+/// joint's axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Compensator<S> {
-    /// End A on what stands before the joint, x and y of the frame that has not yet turned, its origin on the axis \[m\].
+    /// End A on what stands before the joint, x and y of the frame that has not yet turned, its
+    /// origin on the axis \[m\].
     pub anchor: [f64; 2],
     /// End B on the link, x and y of the frame that has turned \[m\].
     pub lever: [f64; 2],
@@ -21,13 +24,15 @@ pub struct Compensator<S> {
 }
 
 impl<S: Scalar> Compensator<S> {
-    /// Moment about the joint's axis on the link behind it [N·m], to be added to that of the loads beyond the joint.
+    /// Moment about the joint's axis on the link behind it [N·m], to be added to that of the loads
+    /// beyond the joint.
     ///
     /// τ = F · `(P × A)_z` / l,  F = k (l − l₀) + F₀,  P = Rz(φ) B,  l = |A − P|
     ///
-    /// `angle` is (sin, cos) of φ = θ + q as the joint has turned, its twist included. F > 0 pulls the ends together: τ > 0 turns B
-    /// towards A about +z. `(P × A)_z` / l is the distance of the line of pull from the axis. Where the ends meet, that line has no
-    /// direction, and of F only k l counts, whose moment k `(P × A)_z` is smooth. Everything between axis and ends is rigid.
+    /// `angle` is (sin, cos) of φ = θ + q as the joint has turned, its twist included. F > 0 pulls
+    /// the ends together: τ > 0 turns B towards A about +z. `(P × A)_z` / l is the distance of the
+    /// line of pull from the axis. Where the ends meet, that line has no direction, and of F only k
+    /// l counts, whose moment k `(P × A)_z` is smooth. Everything between axis and ends is rigid.
     pub fn moment(&self, (sin, cos): (S, S)) -> S {
         let ([ax, ay], [bx, by]) = (self.anchor, self.lever);
         let (px, py) = (cos * bx - sin * by, sin * bx + cos * by);
@@ -68,7 +73,8 @@ mod tests {
 
     #[test]
     fn a_spring_of_a_right_angle_pulls_with_its_height_over_the_hypotenuse() {
-        // 0.3, 0.4, 0.5 m: F = k (0.5 − 0.2) + F₀, 0.24 m from the axis, and the link turns from x towards y.
+        // 0.3, 0.4, 0.5 m: F = k (0.5 − 0.2) + F₀, 0.24 m from the axis, and the link turns from x
+        // towards y.
         let (k, f) = (2e3, 150.0);
         let moment = spring(k, f).moment((0.0, 1.0));
         assert!((moment - (k * 0.3 + f) * 0.24).abs() < 1e-10, "{moment} N·m");
@@ -92,11 +98,15 @@ mod tests {
         let spring = Compensator { anchor: [0.3, 0.0], ..spring(1e5, 1e4) };
         for angle in [0.0, 1e-200, 1e-12, 1e-9, 1e-6] {
             for seeded in 0..3 {
-                let seed = |value: f64, number| Dual64::new(value, f64::from(u8::from(seeded == number)));
+                let seed =
+                    |value: f64, number| Dual64::new(value, f64::from(u8::from(seeded == number)));
                 let mut own = spring.lift::<Dual64>();
                 (own.rate, own.preload) = (seed(1e5, 0), seed(1e4, 1));
                 let moment = own.moment(seed(angle, 2).sin_cos());
-                assert!(moment.re.is_finite() && moment.eps.is_finite(), "{angle} rad, {seeded}: {moment}");
+                assert!(
+                    moment.re.is_finite() && moment.eps.is_finite(),
+                    "{angle} rad, {seeded}: {moment}"
+                );
             }
         }
     }

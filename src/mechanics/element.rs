@@ -42,10 +42,11 @@ pub(super) struct Element<'a, S> {
 
 /// An element that has bent.
 ///
-/// Deflections are taken relative to the chord from root to tip and forces are resolved along it: what the closed form
-/// neglects (the axial force's lever on the bent axis, the shortening of a bent axis) is then small of higher order. The
-/// chord's frame has half the tip's twist, as the section in the middle has: rotations and bending planes then err alike
-/// on both sides of it, and the error of n elements falls with n².
+/// Deflections are taken relative to the chord from root to tip and forces are resolved along it:
+/// what the closed form neglects (the axial force's lever on the bent axis, the shortening of a
+/// bent axis) is then small of higher order. The chord's frame has half the tip's twist, as the
+/// section in the middle has: rotations and bending planes then err alike on both sides of it, and
+/// the error of n elements falls with n².
 pub(super) struct BentElement<'a, S> {
     element: &'a Element<'a, S>,
     cantilever: Cantilever<'a, S>,
@@ -64,14 +65,19 @@ impl<S: Scalar> Element<'_, S> {
     }
 
     /// The clamped beam with its loads resolved in `axes`; `points` is memory.
-    fn cantilever<'p>(&self, axes: &Frame<S>, points: &'p mut Vec<(S, Wrench<S>)>) -> Cantilever<'p, S> {
+    fn cantilever<'p>(
+        &self,
+        axes: &Frame<S>,
+        points: &'p mut Vec<(S, Wrench<S>)>,
+    ) -> Cantilever<'p, S> {
         points.clear();
         for load in self.own_loads() {
             let (station, offset) = self.station_and_offset(load);
             let force = axes.resolve(&load.force);
             points.push((station, Wrench { force, moment: offset.cross(&force) }));
         }
-        let tip = Wrench { force: axes.resolve(&self.tip.force), moment: axes.resolve(&self.tip.moment) };
+        let tip =
+            Wrench { force: axes.resolve(&self.tip.force), moment: axes.resolve(&self.tip.moment) };
         points.push((self.length, tip));
         Cantilever {
             length: self.length,
@@ -82,7 +88,8 @@ impl<S: Scalar> Element<'_, S> {
         }
     }
 
-    /// The section that carries a load, measured from the element's root, and the rigid arm from there to it \[m\].
+    /// The section that carries a load, measured from the element's root, and the rigid arm from
+    /// there to it \[m\].
     fn station_and_offset(&self, load: &LinkLoad<S>) -> (S, Vector3<S>) {
         let x = load.at.x - self.start;
         let part = x.re() / self.length.re();
@@ -96,8 +103,14 @@ impl<S: Scalar> Element<'_, S> {
         (station, Vector3::new(x - station, load.at.y, load.at.z))
     }
 
-    /// Tip frame to first order [Chen2021, eq. 20-22 as corrected]: loads resolved in the frame `rigid` of the rigid arm.
-    pub fn first_order_tip(&self, root: Frame<S>, rigid: &Frame<S>, points: &mut Vec<(S, Wrench<S>)>) -> Frame<S> {
+    /// Tip frame to first order [Chen2021, eq. 20-22 as corrected]: loads resolved in the frame
+    /// `rigid` of the rigid arm.
+    pub fn first_order_tip(
+        &self,
+        root: Frame<S>,
+        rigid: &Frame<S>,
+        points: &mut Vec<(S, Wrench<S>)>,
+    ) -> Frame<S> {
         let Deflection { displacement, rotation } = self.cantilever(rigid, points).tip();
         let mut tip = root;
         tip.translate_x(self.length);
@@ -107,7 +120,11 @@ impl<S: Scalar> Element<'_, S> {
     }
 
     /// The element bent by its loads, clamped at `root`.
-    pub fn bend<'p>(&'p self, root: &Frame<S>, points: &'p mut Vec<(S, Wrench<S>)>) -> BentElement<'p, S> {
+    pub fn bend<'p>(
+        &'p self,
+        root: &Frame<S>,
+        points: &'p mut Vec<(S, Wrench<S>)>,
+    ) -> BentElement<'p, S> {
         let lean_of = |tip: &Deflection<S>| {
             let slope = tip.displacement / self.length;
             Vector3::new(tip.rotation.x * 0.5, -slope.z, slope.y)

@@ -1,4 +1,5 @@
-//! The forward pass from the base to the tips, branch by branch: frames, loads, and the sections whose moments bend something.
+//! The forward pass from the base to the tips, branch by branch: frames, loads, and the sections
+//! whose moments bend something.
 
 use nalgebra::Vector3;
 
@@ -20,11 +21,12 @@ pub(super) enum Bend<'a, S> {
     Rigid,
     /// By these moments, on the bent arm; records events.
     Bent(&'a [S]),
-    /// The same segment by segment. Each segment begins at a frame without derivatives, so that its end tells what its own
-    /// numbers do. With a rotation vector, whose value is zero, beam elements first turn by it: their end then tells what
-    /// turning their root does.
+    /// The same segment by segment. Each segment begins at a frame without derivatives, so that its
+    /// end tells what its own numbers do. With a rotation vector, whose value is zero, beam
+    /// elements first turn by it: their end then tells what turning their root does.
     Apart(&'a [S], Option<&'a Vector3<S>>),
-    /// By these moments, with forces resolved in the frames of the last rigid walk; records nothing.
+    /// By these moments, with forces resolved in the frames of the last rigid walk; records
+    /// nothing.
     FirstOrder(&'a [S]),
 }
 
@@ -52,18 +54,32 @@ impl<S: Scalar> Walk<'_, S> {
         }
     }
 
-    /// Ends a segment that bends by the last `unknowns` moments, if the arm is walked segment by segment.
-    fn cut(&mut self, segment: Segment, unknowns: usize, events: &mut Vec<Event<S>>, cuts: &mut Vec<Cut<S>>) {
+    /// Ends a segment that bends by the last `unknowns` moments, if the arm is walked segment by
+    /// segment.
+    fn cut(
+        &mut self,
+        segment: Segment,
+        unknowns: usize,
+        events: &mut Vec<Event<S>>,
+        cuts: &mut Vec<Cut<S>>,
+    ) {
         if let Bend::Apart(..) = self.bend {
-            cuts.push(Cut { frame: self.frame, segment, unknowns: (self.next - unknowns, unknowns) });
+            cuts.push(Cut {
+                frame: self.frame,
+                segment,
+                unknowns: (self.next - unknowns, unknowns),
+            });
             events.push(Event::Cut);
             self.frame = self.frame.constant();
         }
     }
 
-    /// Tilts by flexibilities [rad/(N·m)] about x and y; the moments are felt along the axes half way.
+    /// Tilts by flexibilities [rad/(N·m)] about x and y; the moments are felt along the axes half
+    /// way.
     fn tilt(&mut self, [about_x, about_y]: &[S; 2], segment: Segment, ws: &mut Workspace<S>) {
-        let half = self.moments().map(|[x, y]| Vector3::new(*about_x * x, *about_y * y, S::from(0.0)) * S::from(0.5));
+        let half = self
+            .moments()
+            .map(|[x, y]| Vector3::new(*about_x * x, *about_y * y, S::from(0.0)) * S::from(0.5));
         if let Some(half) = &half {
             self.frame.rotate(half);
             self.cut(segment, 2, &mut ws.events, &mut ws.cuts);
@@ -78,11 +94,12 @@ impl<S: Scalar> Walk<'_, S> {
         }
     }
 
-    /// Goes along a slide of `length` L \[m\], negative along −z, with `flexibility` 1/EI [1/(N·m²)]: a cantilever without weight that
-    /// everything beyond loads at its end.
+    /// Goes along a slide of `length` L \[m\], negative along −z, with `flexibility` 1/EI
+    /// [1/(N·m²)]: a cantilever without weight that everything beyond loads at its end.
     ///
-    /// δ = F L³/(3EI) + M L²/(2EI),  φ = F L²/(2EI) + M L/(EI). Along it the moment changes evenly: two tilts at the points of Gauss and
-    /// Legendre, each by the moment there times L/(2EI), sum that up exactly. Small slopes only.
+    /// δ = F L³/(3EI) + M L²/(2EI),  φ = F L²/(2EI) + M L/(EI). Along it the moment changes evenly:
+    /// two tilts at the points of Gauss and Legendre, each by the moment there times L/(2EI), sum
+    /// that up exactly. Small slopes only.
     fn slide(&mut self, flexibility: S, length: S, segment: Segment, ws: &mut Workspace<S>) {
         let half = flexibility * length * (0.5 * length.re().signum());
         let mut passed = 0.0;
@@ -118,15 +135,19 @@ impl<S: Scalar> Walk<'_, S> {
 }
 
 impl<S: Scalar> Arm<S> {
-    /// Forces of ropes, and beyond each link; only ropes that lean depend on how the arm bends, by the unknowns `state`.
+    /// Forces of ropes, and beyond each link; only ropes that lean depend on how the arm bends, by
+    /// the unknowns `state`.
     ///
-    /// Before there is a state (empty) leaning ropes are taken as if their hooks were above the base.
+    /// Before there is a state (empty) leaning ropes are taken as if their hooks were above the
+    /// base.
     pub(super) fn gather_forces(&self, setup: &PoseView, state: &[S], ws: &mut Workspace<S>) {
         let zero = Vector3::from_element(S::from(0.0));
         let mut hooks = state.chunks_exact(2);
         ws.ropes.clear();
         ws.ropes.extend(self.joints.iter().map(|joint| {
-            let Some(hoist) = joint.beam.as_ref().and_then(|beam| beam.hoist.as_ref()) else { return zero };
+            let Some(hoist) = joint.beam.as_ref().and_then(|beam| beam.hoist.as_ref()) else {
+                return zero;
+            };
             let hook = || hooks.next().map_or([S::from(0.0); 2], |hook| [hook[0], hook[1]]);
             self.pull(hoist, setup, hook)
         }));
@@ -134,7 +155,8 @@ impl<S: Scalar> Arm<S> {
         ws.beyond.resize(self.joints.len(), zero);
         ws.weights.clear();
         let (mut mass, mut hoisted) = (S::from(0.0), zero);
-        for (index, ((joint, beyond), rope)) in self.joints.iter().zip(&mut ws.beyond).zip(&ws.ropes).enumerate().rev()
+        for (index, ((joint, beyond), rope)) in
+            self.joints.iter().zip(&mut ws.beyond).zip(&ws.ropes).enumerate().rev()
         {
             for (more, pull) in (0..self.tree.further_on(index)).filter_map(|_| ws.weights.pop()) {
                 mass += more;
@@ -180,8 +202,15 @@ impl<S: Scalar> Arm<S> {
     }
 
     /// Walks through all branches; returns the frame of the joint `tip`, arm base frame.
-    pub(super) fn walk(&self, setup: &PoseView, bend: Bend<S>, tip: usize, ws: &mut Workspace<S>) -> Frame<S> {
-        let mut walk = Walk { setup, bend, frame: Frame::identity(), next: self.hook_unknowns(), tip };
+    pub(super) fn walk(
+        &self,
+        setup: &PoseView,
+        bend: Bend<S>,
+        tip: usize,
+        ws: &mut Workspace<S>,
+    ) -> Frame<S> {
+        let mut walk =
+            Walk { setup, bend, frame: Frame::identity(), next: self.hook_unknowns(), tip };
         let mut found = walk.frame;
         ws.forks.clear();
         ws.passed = 0;
@@ -227,7 +256,11 @@ impl<S: Scalar> Arm<S> {
             let Coordinates { angle, offset } = joint.turned(setup.configuration[i], slip, twist);
             if joint.turns() && walk.records() {
                 let pull = joint.compensator.as_ref().map(|spring| spring.moment(angle));
-                ws.events.push(Event::Axis { at: walk.frame.origin, axis: walk.frame.axes[2], pull });
+                ws.events.push(Event::Axis {
+                    at: walk.frame.origin,
+                    axis: walk.frame.axes[2],
+                    pull,
+                });
             }
             walk.frame.rotate_z(angle);
             let mut turned = usize::from(joint.turns());
@@ -247,7 +280,8 @@ impl<S: Scalar> Arm<S> {
             if walk.records() {
                 for body in &joint.bodies {
                     let force = self.gravity * S::from(body.mass);
-                    ws.events.push(Event::Load { at: walk.frame.point(&body.at.map(S::from)), force });
+                    ws.events
+                        .push(Event::Load { at: walk.frame.point(&body.at.map(S::from)), force });
                 }
             }
             if i == self.payload_joint() {
@@ -268,7 +302,18 @@ impl<S: Scalar> Arm<S> {
 
     /// Walks along the beam of joint `link`, element by element.
     fn walk_beam(&self, beam: &Beam<S>, link: usize, walk: &mut Walk<S>, ws: &mut Workspace<S>) {
-        let Workspace { events, hooks, cuts, ropes, beyond, rigid_roots, trail, link_loads, points, .. } = ws;
+        let Workspace {
+            events,
+            hooks,
+            cuts,
+            ropes,
+            beyond,
+            rigid_roots,
+            trail,
+            link_loads,
+            points,
+            ..
+        } = ws;
         let elements = self.beam_elements;
         let length = self.joints[link].a / elements as f64;
         self.load_beam(beam, ropes[link], length, link_loads);
@@ -276,9 +321,12 @@ impl<S: Scalar> Arm<S> {
         let strain = beam.strain.as_ref().map(|strain| strain.and(of_pose.unwrap_or_default()));
         let weight = self.gravity * S::from(beam.mass / elements as f64);
         for number in 0..elements {
-            let further = link_loads.iter().filter(|load| load.element > number).map(|load| load.force);
-            let further = weight * S::from((elements - 1 - number) as f64) + further.sum::<Vector3<S>>();
-            let moment = walk.moments().map_or_else(|| Vector3::from_element(S::from(0.0)), Vector3::from);
+            let further =
+                link_loads.iter().filter(|load| load.element > number).map(|load| load.force);
+            let further =
+                weight * S::from((elements - 1 - number) as f64) + further.sum::<Vector3<S>>();
+            let moment =
+                walk.moments().map_or_else(|| Vector3::from_element(S::from(0.0)), Vector3::from);
             let element = Element {
                 number,
                 length,
@@ -332,10 +380,15 @@ impl<S: Scalar> Arm<S> {
         }
     }
 
-    /// Lists the loads of a beam with elements of `length` \[m\]; `rope` is the force of its rope \[N\].
+    /// Lists the loads of a beam with elements of `length` \[m\]; `rope` is the force of its rope
+    /// \[N\].
     fn load_beam(&self, beam: &Beam<S>, rope: Vector3<S>, length: S, loads: &mut Vec<LinkLoad<S>>) {
         let last = (self.beam_elements - 1) as f64;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rounded down and clamped")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "rounded down and clamped"
+        )]
         let load = |at: Vector3<S>, force, rope| LinkLoad {
             element: (at.x.re() / length.re()).clamp(0.0, last) as usize,
             at,
@@ -343,7 +396,9 @@ impl<S: Scalar> Arm<S> {
             rope,
         };
         loads.clear();
-        let carried = |carried: &PointMass| load(carried.at.map(S::from), self.gravity * S::from(carried.mass), false);
+        let carried = |carried: &PointMass| {
+            load(carried.at.map(S::from), self.gravity * S::from(carried.mass), false)
+        };
         loads.extend(beam.masses.iter().map(carried));
         if let Some(added) = &beam.added {
             let at = Vector3::new(added.at * length.re().signum(), S::from(0.0), S::from(0.0));

@@ -10,10 +10,11 @@ use crate::problem::{Equilibrium, PoseView};
 use crate::spatial::Frame;
 
 impl Arm<Dual64> {
-    /// The frame behind the arm's mounting and that behind every joint, arm base frame, of a pose that the same arm without
-    /// derivatives has brought to `rest`.
+    /// The frame behind the arm's mounting and that behind every joint, arm base frame, of a pose
+    /// that the same arm without derivatives has brought to `rest`.
     ///
-    /// The moments' derivatives follow from the fixed point x = G(x) of [`super::statics`] by passing through it until they settle too.
+    /// The moments' derivatives follow from the fixed point x = G(x) of [`super::statics`] by
+    /// passing through it until they settle too.
     pub(crate) fn frames(
         &self,
         setup: &PoseView,

@@ -14,8 +14,8 @@ const FLAT: f64 = 20.0;
 pub struct Nonlinear<S> {
     /// Angle per cube of the moment [rad/(N·m)³].
     pub cubic: S,
-    /// Play \[rad\], \[m\] where the joint slides: taken up by the direction of approach; where that is not known by the
-    /// moment, which moves no joint along its slide.
+    /// Play \[rad\], \[m\] where the joint slides: taken up by the direction of approach; where
+    /// that is not known by the moment, which moves no joint along its slide.
     pub play: S,
 }
 
@@ -47,8 +47,8 @@ impl<S: Scalar> Nonlinear<S> {
     }
 }
 
-/// tanh x with its derivative 1 − tanh² x, finite at any x: from [`FLAT`] on they are 1 and 0 to rounding, where sinh x / cosh x
-/// of dual numbers overflows.
+/// tanh x with its derivative 1 − tanh² x, finite at any x: from [`FLAT`] on they are 1 and 0 to
+/// rounding, where sinh x / cosh x of dual numbers overflows.
 fn tanh<S: Scalar>(x: S) -> S {
     if x.re().abs() < FLAT { x.tanh() } else { S::from(x.re().signum()) }
 }
@@ -65,13 +65,22 @@ pub struct Strain<S> {
 impl<S: Scalar> Strain<S> {
     /// With that of one pose: elongation, then curvatures.
     pub(super) fn and(&self, [axial, y, z]: [f64; 3]) -> Self {
-        Self { axial: self.axial + axial, curvature: [self.curvature[0] + y, self.curvature[1] + z] }
+        Self {
+            axial: self.axial + axial,
+            curvature: [self.curvature[0] + y, self.curvature[1] + z],
+        }
     }
 }
 
 impl<S: Scalar> Rope<S> {
-    /// Force \[N\] of a tension \[N\] in a declared direction, with the hook at these x and y \[m\], base frame.
-    pub(super) fn pull(&self, direction: &Vector3<f64>, tension: f64, [x, y]: [S; 2]) -> Vector3<S> {
+    /// Force \[N\] of a tension \[N\] in a declared direction, with the hook at these x and y
+    /// \[m\], base frame.
+    pub(super) fn pull(
+        &self,
+        direction: &Vector3<f64>,
+        tension: f64,
+        [x, y]: [S; 2],
+    ) -> Vector3<S> {
         let mut direction = direction.map(S::from);
         direction.x += self.lean[0] + self.trolley * x;
         direction.y += self.lean[1] + self.trolley * y;
@@ -104,6 +113,10 @@ impl AddedMass<f64> {
 impl Rope<f64> {
     /// The same as constants of another scalar.
     pub(super) fn lift<S: Scalar>(&self) -> Rope<S> {
-        Rope { force: S::from(self.force), lean: self.lean.map(S::from), trolley: S::from(self.trolley) }
+        Rope {
+            force: S::from(self.force),
+            lean: self.lean.map(S::from),
+            trolley: S::from(self.trolley),
+        }
     }
 }

@@ -27,7 +27,10 @@ impl<S: Scalar> Angle<S> {
 
 impl Angle<f64> {
     fn lift<S: Scalar>(&self) -> Angle<S> {
-        Angle { value: S::from(self.value), sin_cos: (S::from(self.sin_cos.0), S::from(self.sin_cos.1)) }
+        Angle {
+            value: S::from(self.value),
+            sin_cos: (S::from(self.sin_cos.0), S::from(self.sin_cos.1)),
+        }
     }
 }
 
@@ -61,8 +64,8 @@ impl<S: Scalar> Placement<S> {
     }
 }
 
-/// One joint with the link before it: `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β)  [Chen2021, eq. 1], behind the placement where
-/// there is one.
+/// One joint with the link before it: `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β)  [Chen2021, eq. 1],
+/// behind the placement where there is one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint<S> {
     /// What q does.
@@ -85,7 +88,8 @@ pub struct Joint<S> {
     pub nonlinear: Option<Nonlinear<S>>,
     /// Flexibility about x and y of the frame that has not yet turned [rad/(N·m)].
     pub lateral: Option<[S; 2]>,
-    /// Flexibility 1/EI of the slide, a cantilever that is as long as the joint's own d + q [1/(N·m²)].
+    /// Flexibility 1/EI of the slide, a cantilever that is as long as the joint's own d + q
+    /// [1/(N·m²)].
     pub slide: Option<S>,
     /// Spring that takes off part of the moment about `z_i`.
     pub compensator: Option<Compensator<S>>,
@@ -153,14 +157,21 @@ impl<S: Scalar> Joint<S> {
 
     /// Angle about the axis under a moment [N·m] about it.
     pub(super) fn twist(&self, moment: S, approach: Option<f64>) -> S {
-        let linear = self.flexibility.map_or_else(|| S::from(0.0), |flexibility| flexibility * moment);
+        let linear =
+            self.flexibility.map_or_else(|| S::from(0.0), |flexibility| flexibility * moment);
         let takes_up_play = approach.is_none() && self.kind != JointKind::Prismatic;
-        self.nonlinear.as_ref().map_or(linear, |nonlinear| linear + nonlinear.twist(moment, takes_up_play))
+        self.nonlinear
+            .as_ref()
+            .map_or(linear, |nonlinear| linear + nonlinear.twist(moment, takes_up_play))
     }
 
-    /// What play adds to the joint's coordinate when it came from a known direction \[rad\] or \[m\].
+    /// What play adds to the joint's coordinate when it came from a known direction \[rad\] or
+    /// \[m\].
     pub(super) fn slip(&self, approach: Option<f64>) -> Option<S> {
-        self.nonlinear.as_ref().zip(approach).map(|(nonlinear, approach)| nonlinear.play * (0.5 * approach))
+        self.nonlinear
+            .as_ref()
+            .zip(approach)
+            .map(|(nonlinear, approach)| nonlinear.play * (0.5 * approach))
     }
 
     /// Where a configuration puts the joint, `slip` added to q and `twist` to the angle.
@@ -202,7 +213,8 @@ impl<S: Scalar> Joint<S> {
         frame.rotate_x(self.alpha.sin_cos);
     }
 
-    /// Moves `frame` through the part of a rigid `T_i` before the joint turns: the placement and Rx(α) Tx(a).
+    /// Moves `frame` through the part of a rigid `T_i` before the joint turns: the placement and
+    /// Rx(α) Tx(a).
     pub(super) fn root(&self, frame: &mut Frame<S>) {
         self.begin(frame);
         frame.translate_x(self.a);

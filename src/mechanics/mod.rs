@@ -1,4 +1,5 @@
-//! The arm's physics, generic over the scalar: frames, elastic links and joints, static equilibrium.
+//! The arm's physics, generic over the scalar: frames, elastic links and joints, static
+//! equilibrium.
 
 mod adjoint;
 mod anderson;

@@ -1,4 +1,5 @@
-//! From a forward pass segment by segment to the tape: how the end and the loads of each segment move with each of its numbers.
+//! From a forward pass segment by segment to the tape: how the end and the loads of each segment
+//! move with each of its numbers.
 
 use nalgebra::Vector3;
 use num_dual::Dual64;
@@ -8,7 +9,8 @@ use super::workspace::{Event, Workspace};
 use crate::spatial::Frame;
 
 impl Tape {
-    /// Takes down a forward pass segment by segment; `parameters` counts those of each segment. The columns are left to be filled in.
+    /// Takes down a forward pass segment by segment; `parameters` counts those of each segment. The
+    /// columns are left to be filled in.
     pub(super) fn record(&mut self, ws: &Workspace<Dual64>, parameters: &[usize]) {
         self.clear();
         let mut cuts = ws.cuts.iter();
@@ -39,12 +41,16 @@ impl Tape {
                         parameter_lane: segment.first_lane(),
                         lanes: segment.first_lane() + parameters[segment.index()],
                         events: if segment.is_beam() { index - own..index } else { index..index },
-                        axis: index.checked_sub(1).filter(|&last| matches!(ws.events[last], Event::Axis { .. })),
+                        axis: index
+                            .checked_sub(1)
+                            .filter(|&last| matches!(ws.events[last], Event::Axis { .. })),
                         ..TapedSegment::default()
                     });
                     root = cut.real();
                 }
-                Event::Tip { .. } => self.section(root.origin, &Frame::identity().axes, Felt::InSpace),
+                Event::Tip { .. } => {
+                    self.section(root.origin, &Frame::identity().axes, Felt::InSpace)
+                }
                 Event::Axis { .. } => self.section(root.origin, &root.axes[2..], Felt::OnTheArm),
                 Event::Tilt { .. } => self.section(root.origin, &root.axes[..2], Felt::OnTheArm),
                 Event::Fork { further } => {
@@ -64,7 +70,8 @@ impl Tape {
         self.sum_loads();
     }
 
-    /// Fills in the columns of one direction, from the same pass with derivatives in that direction.
+    /// Fills in the columns of one direction, from the same pass with derivatives in that
+    /// direction.
     pub(super) fn fill(&mut self, lane: usize, ws: &Workspace<Dual64>) {
         let segments = self.steps.iter().filter_map(|step| match step {
             Step::Segment(segment) => Some(segment),
@@ -79,9 +86,14 @@ impl Tape {
                 Some(Event::Axis { pull: Some(pull), .. }) => pull.eps,
                 _ => 0.0,
             };
-            self.columns[segment.column(lane)] =
-                Column { rotation, translation: velocity - rotation.cross(&segment.tip.origin), pull };
-            for (moved, event) in self.moves[segment.moves(lane)].iter_mut().zip(&ws.events[segment.events.clone()]) {
+            self.columns[segment.column(lane)] = Column {
+                rotation,
+                translation: velocity - rotation.cross(&segment.tip.origin),
+                pull,
+            };
+            for (moved, event) in
+                self.moves[segment.moves(lane)].iter_mut().zip(&ws.events[segment.events.clone()])
+            {
                 if let Event::Load { at, .. } = event {
                     *moved = at.map(|c| c.eps);
                 }

@@ -1,8 +1,8 @@
 //! Segments of the arm: each is differentiated alone, by the few numbers that act on it.
 //!
-//! A segment is the base that tilts, a joint, or a beam element; between segments only a frame is handed on. Segments do not
-//! feel each other, so that numbers of different segments share one direction of a forward pass in dual numbers. The adjoint
-//! sweep (`adjoint.rs`) chains them.
+//! A segment is the base that tilts, a joint, or a beam element; between segments only a frame is
+//! handed on. Segments do not feel each other, so that numbers of different segments share one
+//! direction of a forward pass in dual numbers. The adjoint sweep (`adjoint.rs`) chains them.
 
 use super::arm::Arm;
 use crate::scalar::Scalar;
@@ -24,8 +24,8 @@ pub enum Segment {
 }
 
 impl Segment {
-    /// The first direction that is left for parameters: a beam's root turns in three, an element bends by three moments, a
-    /// joint tilts by two and turns by one.
+    /// The first direction that is left for parameters: a beam's root turns in three, an element
+    /// bends by three moments, a joint tilts by two and turns by one.
     pub fn first_lane(self) -> usize {
         if self.is_beam() { 6 } else { 3 }
     }
@@ -66,7 +66,9 @@ pub(super) struct Cut<S> {
 /// Directions of all moments of an arm, in their order.
 pub(super) fn moment_lanes<S: Scalar>(arm: &Arm<S>) -> Vec<usize> {
     let mut lanes = Vec::new();
-    let mut add = |segment: Segment, count: usize| lanes.extend((0..count).map(|k| segment.moment_lane(count) + k));
+    let mut add = |segment: Segment, count: usize| {
+        lanes.extend((0..count).map(|k| segment.moment_lane(count) + k))
+    };
     if arm.mounting.is_some() {
         add(Segment::Mounting, 2);
     }
@@ -91,6 +93,9 @@ pub(super) fn moment_lanes<S: Scalar>(arm: &Arm<S>) -> Vec<usize> {
 
 impl<S: Scalar> Cut<S> {
     pub(super) fn real(&self) -> Frame<f64> {
-        Frame { axes: self.frame.axes.map(|axis| axis.map(|c| c.re())), origin: self.frame.origin.map(|c| c.re()) }
+        Frame {
+            axes: self.frame.axes.map(|axis| axis.map(|c| c.re())),
+            origin: self.frame.origin.map(|c| c.re()),
+        }
     }
 }

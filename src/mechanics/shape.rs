@@ -10,7 +10,8 @@ use crate::problem::PoseView;
 /// Elements by which a beam is drawn at least.
 const ELEMENTS: usize = 4;
 
-/// An arm as a line from its base to the frame of its target: each joint before and after it turned, and points along its beams.
+/// An arm as a line from its base to the frame of its target: each joint before and after it
+/// turned, and points along its beams.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Shape {
     /// Where nothing gives way \[m\].

@@ -1,14 +1,15 @@
 //! Static equilibrium: which moments bend the arm, and where its end point comes to rest.
 //!
-//! The unknowns x of equilibrium are the moments at the sections that bend: three at every beam element's tip, one about
-//! every flexible joint, two where something tilts; and the places of hooks whose ropes may lean. A walk with moments x places every load, and the loads give moments G(x). The rigid
-//! walk's moments are the paper's first order; x = G(x) is equilibrium on the bent arm. With P(x) the target position,
-//! its total derivative needs no iteration in dual numbers:
+//! The unknowns x of equilibrium are the moments at the sections that bend: three at every beam
+//! element's tip, one about every flexible joint, two where something tilts; and the places of
+//! hooks whose ropes may lean. A walk with moments x places every load, and the loads give moments
+//! G(x). The rigid walk's moments are the paper's first order; x = G(x) is equilibrium on the bent
+//! arm. With P(x) the target position, its total derivative needs no iteration in dual numbers:
 //!
 //! p = P(x*) + Λ (G(x*) − x*),  Λ = `P_x` (I − `G_x`)⁻¹,
 //!
-//! has the value and the first derivatives of the equilibrium position when the walk is made in dual numbers at the
-//! real fixed point x* (implicit function theorem, in adjoint form).
+//! has the value and the first derivatives of the equilibrium position when the walk is made in
+//! dual numbers at the real fixed point x* (implicit function theorem, in adjoint form).
 
 use nalgebra::Vector3;
 use num_dual::Dual64;
@@ -21,14 +22,16 @@ use crate::spatial::Frame;
 
 pub use super::workspace::Workspace;
 
-/// Passes after which a fixed point that has not settled is given up: the arm is too soft for its loads.
+/// Passes after which a fixed point that has not settled is given up: the arm is too soft for its
+/// loads.
 pub(super) const MAX_PASSES: usize = 200;
 /// Moments have settled when they change by less than this part of the largest.
 pub(super) const SETTLED: f64 = 1e-13;
-/// Λ whose last pass changed it by less than this part of the largest hovers about its fixed point: rounding keeps it from settling
-/// further, and no derivative feels it.
+/// Λ whose last pass changed it by less than this part of the largest hovers about its fixed point:
+/// rounding keeps it from settling further, and no derivative feels it.
 pub(super) const HOVERING: f64 = 1e-9;
-/// Rounding of a moment relative to the sum of its terms, which cancel where a hoist balances the arm.
+/// Rounding of a moment relative to the sum of its terms, which cancel where a hoist balances the
+/// arm.
 const ROUNDING: f64 = 1e-15;
 /// Why a pose has no static equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -104,7 +107,11 @@ impl Arm<f64> {
             pose.frame = self.walk(setup, Bend::Bent(&pose.moments), tip, ws);
             ws.sum_moments();
             let largest = ws.next_moments.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-            let change = pose.moments.iter().zip(&ws.next_moments).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            let change = pose
+                .moments
+                .iter()
+                .zip(&ws.next_moments)
+                .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
             if !change.is_finite() {
                 break;
             }
@@ -120,7 +127,8 @@ impl Arm<f64> {
     }
 }
 
-/// (1 − λ) of one frame and λ of another, point by point; no frame between, but every point of it is.
+/// (1 − λ) of one frame and λ of another, point by point; no frame between, but every point of it
+/// is.
 fn mixed<S: Scalar>(one: &Frame<S>, other: &Frame<S>, mixing: S) -> Frame<S> {
     let mix = |one: &Vector3<S>, other: &Vector3<S>| one + (other - one) * mixing;
     let axes = std::array::from_fn(|i| mix(&one.axes[i], &other.axes[i]));
@@ -140,7 +148,8 @@ impl Response {
         Self { arm: arm.lift(), ws: Workspace::default() }
     }
 
-    /// Fills in Λ of an equilibrated pose for the target at `target` \[m\], in the frame that the pose was brought to rest for.
+    /// Fills in Λ of an equilibrated pose for the target at `target` \[m\], in the frame that the
+    /// pose was brought to rest for.
     ///
     /// # Errors
     /// Λ does not settle: a little more load, and the arm would not come to rest.
@@ -170,7 +179,9 @@ impl Response {
             for i in 0..3 {
                 pose.position_response[i * n + j] = position[i].eps;
             }
-            for (response, moment) in pose.moment_response[j * n..].iter_mut().zip(&self.ws.next_moments) {
+            for (response, moment) in
+                pose.moment_response[j * n..].iter_mut().zip(&self.ws.next_moments)
+            {
                 *response = moment.eps;
             }
         }
@@ -192,10 +203,12 @@ impl Equilibrated {
             let mut change = 0.0_f64;
             for _ in 0..MAX_PASSES {
                 change = 0.0;
-                // In place from the tip inwards (Gauss–Seidel): outboard moments act on everything inboard.
+                // In place from the tip inwards (Gauss–Seidel): outboard moments act on everything
+                // inboard.
                 for j in (0..n).rev() {
                     let column = &self.moment_response[j * n..(j + 1) * n];
-                    let next = direct[j] + adjoint.iter().zip(column).map(|(l, g)| l * g).sum::<f64>();
+                    let next =
+                        direct[j] + adjoint.iter().zip(column).map(|(l, g)| l * g).sum::<f64>();
                     change = change.max((next - adjoint[j]).abs());
                     adjoint[j] = next;
                 }
@@ -205,7 +218,10 @@ impl Equilibrated {
             }
             let largest = adjoint.iter().fold(scale, |m, x| m.max(x.abs()));
             // No number compares with NaN.
-            if change.is_nan() || change > HOVERING * largest || adjoint.iter().any(|x| !x.is_finite()) {
+            if change.is_nan()
+                || change > HOVERING * largest
+                || adjoint.iter().any(|x| !x.is_finite())
+            {
                 return Err(StaticsError::NotSettled);
             }
         }
@@ -214,10 +230,11 @@ impl Equilibrated {
 }
 
 impl<S: Scalar> Arm<S> {
-    /// Position \[m\] of the target at `target` \[m\] in the pose's frame, arm base frame, with its exact first derivatives.
+    /// Position \[m\] of the target at `target` \[m\] in the pose's frame, arm base frame, with its
+    /// exact first derivatives.
     ///
-    /// `pose` is the same pose brought to rest with the real parts of this arm's parameters, and for loads on the bent
-    /// arm its Λ for the same target.
+    /// `pose` is the same pose brought to rest with the real parts of this arm's parameters, and
+    /// for loads on the bent arm its Λ for the same target.
     pub fn target_position(
         &self,
         setup: &PoseView,
@@ -243,7 +260,8 @@ impl<S: Scalar> Arm<S> {
             (Some(first_order), None) => first_order,
             (None, _) => self.at_rest(setup, &target, pose, &mut moments, ws),
             (Some(first_order), Some(mixing)) => {
-                first_order + (self.at_rest(setup, &target, pose, &mut moments, ws) - first_order) * mixing
+                first_order
+                    + (self.at_rest(setup, &target, pose, &mut moments, ws) - first_order) * mixing
             }
         };
         ws.moments = moments;
@@ -305,7 +323,11 @@ mod tests {
     fn an_adjoint_that_does_not_settle_is_an_error_of_the_pose() {
         let mut near = pose(0.5);
         assert_eq!(near.solve_adjoint(), Ok(()));
-        assert!(near.adjoint.iter().all(|own| (own - 2.0).abs() < 1e-12), "1 / (1 − 1/2): {:?}", near.adjoint);
+        assert!(
+            near.adjoint.iter().all(|own| (own - 2.0).abs() < 1e-12),
+            "1 / (1 − 1/2): {:?}",
+            near.adjoint
+        );
         for factor in [1.0, -2.0, 2.0, f64::NAN] {
             assert_eq!(pose(factor).solve_adjoint(), Err(StaticsError::NotSettled), "{factor}");
         }

@@ -10,7 +10,8 @@ use crate::spatial::Frame;
 /// One vector for each coordinate of the position.
 pub(super) type Each = [Vector3<f64>; 3];
 
-/// How a part's end moves with one number: point r of everything beyond moves by rotation × r + translation.
+/// How a part's end moves with one number: point r of everything beyond moves by rotation × r +
+/// translation.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Column {
     /// \[rad\] per unit.
@@ -43,7 +44,8 @@ pub(super) enum Step {
     Branch,
 }
 
-/// A part with the places of its numbers: one column for each of its directions, and as many moves as it has loads.
+/// A part with the places of its numbers: one column for each of its directions, and as many moves
+/// as it has loads.
 ///
 /// The first three directions of a part that `turns` are those of its root, in its own axes.
 #[derive(Debug, Clone, Default)]
@@ -136,7 +138,11 @@ pub(super) struct Tape {
 impl Tape {
     /// For `parts` of at most `lanes` directions.
     pub fn new(parts: usize, lanes: usize) -> Self {
-        Self { derivatives: vec![Vector3::zeros(); parts * lanes], stride: lanes, ..Self::default() }
+        Self {
+            derivatives: vec![Vector3::zeros(); parts * lanes],
+            stride: lanes,
+            ..Self::default()
+        }
     }
 
     /// Derivative of the position with respect to the parameter in a direction of a segment.
@@ -181,7 +187,8 @@ impl Tape {
         segment.loads = self.loads.len() - segment.events.len()..self.loads.len();
         (segment.first_column, segment.first_move) = (self.columns.len(), self.moves.len());
         self.columns.resize(segment.first_column + segment.lanes, Column::default());
-        self.moves.resize(segment.first_move + segment.lanes * segment.loads.len(), Vector3::zeros());
+        self.moves
+            .resize(segment.first_move + segment.lanes * segment.loads.len(), Vector3::zeros());
         self.steps.truncate(self.steps.len() - segment.loads.len());
         self.steps.push(Step::Segment(segment));
     }
@@ -193,7 +200,9 @@ impl Tape {
         for step in self.steps.iter_mut().rev() {
             match step {
                 Step::Load(load) => sums.add(&self.loads[*load]),
-                Step::Segment(segment) => self.loads[segment.loads.clone()].iter().for_each(|load| sums.add(load)),
+                Step::Segment(segment) => {
+                    self.loads[segment.loads.clone()].iter().for_each(|load| sums.add(load))
+                }
                 Step::Section(section) => {
                     section.force = sums.force;
                     section.moment = sums.moment - section.at.cross(&sums.force);

@@ -16,7 +16,8 @@ pub(super) enum Event<S> {
     Load { at: Vector3<S>, force: Vector3<S> },
     /// The tip of a beam element: its three moments are unknowns.
     Tip { at: Vector3<S> },
-    /// A flexible joint: the moment about its axis is an unknown, of all loads beyond and of the spring that may pull there [N·m].
+    /// A flexible joint: the moment about its axis is an unknown, of all loads beyond and of the
+    /// spring that may pull there [N·m].
     Axis { at: Vector3<S>, axis: Vector3<S>, pull: Option<S> },
     /// What tilts about two axes: the moments about them are unknowns.
     Tilt { at: Vector3<S>, axes: [Vector3<S>; 2] },
@@ -34,7 +35,8 @@ pub struct Workspace<S> {
     pub(super) events: Vec<Event<S>>,
     pub(super) moments: Vec<S>,
     pub(super) next_moments: Vec<S>,
-    /// Where each hook is, x and y in the arm base frame \[m\], if ropes may lean: unknowns before all moments.
+    /// Where each hook is, x and y in the arm base frame \[m\], if ropes may lean: unknowns before
+    /// all moments.
     pub(super) hooks: Vec<[S; 2]>,
     /// Where the segments of the arm end, if it is walked segment by segment.
     pub(super) cuts: Vec<Cut<S>>,
@@ -42,7 +44,8 @@ pub struct Workspace<S> {
     pub(super) passed: usize,
     /// Frames at which branches are still to begin, the last first.
     pub(super) forks: Vec<Frame<S>>,
-    /// Mass \[kg\] and hoists' force \[N\] of branches whose fork is still to come, and the same of forces and moments.
+    /// Mass \[kg\] and hoists' force \[N\] of branches whose fork is still to come, and the same of
+    /// forces and moments.
     pub(super) weights: Vec<(S, Vector3<S>)>,
     pub(super) wrenches: Vec<(Vector3<S>, Vector3<S>)>,
     /// Frame behind the mounting and behind each joint in the last walk, where they are kept.
@@ -54,7 +57,8 @@ pub struct Workspace<S> {
     pub(super) beyond: Vec<Vector3<S>>,
     /// Frame at each link's root in the last rigid walk.
     pub(super) rigid_roots: Vec<Frame<S>>,
-    /// Where the last walk came by: ends of beam elements, and each joint before and after it turned, arm base frame \[m\].
+    /// Where the last walk came by: ends of beam elements, and each joint before and after it
+    /// turned, arm base frame \[m\].
     pub(super) trail: Vec<Vector3<S>>,
     pub(super) link_loads: Vec<LinkLoad<S>>,
     pub(super) points: Vec<(S, Wrench<S>)>,
@@ -88,7 +92,8 @@ impl<S> Default for Workspace<S> {
 }
 
 impl Workspace<f64> {
-    /// Sum of the sizes of all moments about the base in the last walk, and of those of springs [N·m].
+    /// Sum of the sizes of all moments about the base in the last walk, and of those of springs
+    /// [N·m].
     pub(super) fn turning(&self) -> f64 {
         let term = |event: &Event<f64>| match event {
             Event::Load { at, force } => at.norm() * force.norm(),
@@ -108,7 +113,8 @@ impl<S: Scalar> Workspace<S> {
         }
     }
 
-    /// The unknowns as the last walk gives them: places of hooks \[m\], then moments where something bends [N·m].
+    /// The unknowns as the last walk gives them: places of hooks \[m\], then moments where
+    /// something bends [N·m].
     pub(super) fn sum_moments(&mut self) {
         let Self { events, next_moments, hooks, wrenches, .. } = self;
         let zero = Vector3::from_element(S::from(0.0));

@@ -2,9 +2,10 @@
 
 use super::Model;
 use crate::mechanics::Flexibility;
-use crate::model::parameter::{ArmField, BeamField, Slot};
+use crate::model::parameter::{ArmField, BeamField, ParameterSite};
 
-/// What an ablated model keeps of the elasticity; what effects add to loads and to the shape of the arm stays.
+/// What an ablated model keeps of the elasticity; what effects add to loads and to the shape of the
+/// arm stays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Ablation {
@@ -22,7 +23,8 @@ pub enum Ablation {
 
 impl Ablation {
     /// In order from least to most.
-    pub const EACH: [Self; 5] = [Self::Rigid, Self::JointsOnly, Self::LinksOnly, Self::BendingOnly, Self::All];
+    pub const EACH: [Self; 5] =
+        [Self::Rigid, Self::JointsOnly, Self::LinksOnly, Self::BendingOnly, Self::All];
 
     /// Name in results.
     pub fn as_str(self) -> &'static str {
@@ -35,19 +37,28 @@ impl Ablation {
         }
     }
 
-    fn keeps(self, slot: Slot) -> bool {
-        match (self, slot) {
-            (Self::Rigid, slot) => !slot.is_elastic(),
-            (Self::LinksOnly | Self::BendingOnly, Slot::Joint { .. }) => !slot.is_elastic(),
-            (Self::LinksOnly | Self::BendingOnly, Slot::Arm(ArmField::MountingX | ArmField::MountingY))
+    fn keeps(self, site: ParameterSite) -> bool {
+        match (self, site) {
+            (Self::Rigid, site) => !site.is_elastic(),
+            (Self::LinksOnly | Self::BendingOnly, ParameterSite::Joint { .. }) => {
+                !site.is_elastic()
+            }
+            (
+                Self::LinksOnly | Self::BendingOnly,
+                ParameterSite::Arm(ArmField::MountingX | ArmField::MountingY),
+            )
             | (
                 Self::BendingOnly,
-                Slot::Beam {
-                    field: BeamField::Axial | BeamField::Twist | BeamField::CouplingY | BeamField::CouplingZ,
+                ParameterSite::Beam {
+                    field:
+                        BeamField::Axial
+                        | BeamField::Twist
+                        | BeamField::CouplingY
+                        | BeamField::CouplingZ,
                     ..
                 },
             ) => false,
-            (Self::JointsOnly, Slot::Beam { field, .. }) => !field.is_rigidity(),
+            (Self::JointsOnly, ParameterSite::Beam { field, .. }) => !field.is_rigidity(),
             _ => true,
         }
     }
@@ -58,16 +69,20 @@ impl Model {
     #[must_use]
     pub fn ablated(&self, ablation: Ablation) -> Self {
         let mut model = self.clone();
-        let kept: Vec<usize> =
-            (0..model.parameters.len()).filter(|&k| ablation.keeps(model.parameters[k].slot)).collect();
-        model.parameters.retain(|parameter| ablation.keeps(parameter.slot));
-        model.constraints = self.constraints.iter().filter_map(|constraint| constraint.on(&kept)).collect();
+        let kept: Vec<usize> = (0..model.parameters.len())
+            .filter(|&k| ablation.keeps(model.parameters[k].site))
+            .collect();
+        model.parameters.retain(|parameter| ablation.keeps(parameter.site));
+        model.constraints =
+            self.constraints.iter().filter_map(|constraint| constraint.on(&kept)).collect();
         for joint in &mut model.nominal.joints {
             if matches!(ablation, Ablation::Rigid | Ablation::LinksOnly | Ablation::BendingOnly) {
                 (joint.flexibility, joint.lateral, joint.slide) = (None, None, None);
             }
             // A rigid link that changes with temperature is still walked along.
-            if ablation == Ablation::Rigid && joint.beam.as_ref().is_some_and(|beam| beam.strain.is_none()) {
+            if ablation == Ablation::Rigid
+                && joint.beam.as_ref().is_some_and(|beam| beam.strain.is_none())
+            {
                 joint.beam = None;
             }
             let Some(beam) = &mut joint.beam else { continue };

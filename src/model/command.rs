@@ -5,13 +5,15 @@ use nalgebra::DVector;
 use super::Model;
 use super::driven::Driven;
 use crate::mechanics::Arm;
-use crate::model::parameter::{Driver, JointField, Parameter, Slot};
+use crate::model::parameter::{JointField, Parameter, ParameterSite, Regressor};
 use crate::problem::{Joint, JointKind, Problem};
 
 impl Model {
-    /// The arm with parameters `x`, whose free parameters are now the corrections to its moving joints' commands.
+    /// The arm with parameters `x`, whose free parameters are now the corrections to its moving
+    /// joints' commands.
     ///
-    /// A correction to q is one to θ of a revolute joint and to d of a prismatic one. Bases and targets stay as in `x`.
+    /// A correction to q is one to θ of a revolute joint and to d of a prismatic one. Bases and
+    /// targets stay as in `x`.
     #[must_use]
     pub fn commanded(&self, problem: &Problem, x: &DVector<f64>) -> Self {
         let arm = self.arm(|k| x[k]);
@@ -22,7 +24,7 @@ impl Model {
             instrument: self.instrument_at(x.as_slice()),
             bases: self.base_poses(x.as_slice()),
             targets: self.target_positions(x.as_slice()),
-            carriers: self.carriers.clone(),
+            influential_rows: self.influential_rows.clone(),
             fixtures: self.fixtures(x.as_slice()),
             declared: self.declared.clone(),
             turned: self.target_rotations(x.as_slice()),
@@ -31,7 +33,8 @@ impl Model {
         }
     }
 
-    /// The same without what effects make of the measurement: it predicts where the target is, not what is read of it.
+    /// The same without what effects make of the measurement: it predicts where the target is, not
+    /// what is read of it.
     #[must_use]
     pub fn true_to_position(self) -> Self {
         Self { instrument: self.instrument.true_to_position(), ..self }
@@ -45,7 +48,8 @@ impl Model {
         self
     }
 
-    /// The full parameter vector for values \[SI\] by name, or the first name that `value` does not know.
+    /// The full parameter vector for values \[SI\] by name, or the first name that `value` does not
+    /// know.
     ///
     /// # Errors
     /// A free parameter has no value.
@@ -59,13 +63,13 @@ impl Model {
 
     /// Whether something that is not free follows the joints' commands.
     pub fn follows_commands(&self) -> bool {
-        self.driven.iter().any(|driven| driven.driver.follows_commands())
+        self.driven.iter().any(|driven| driven.regressor.follows_commands())
     }
 
     /// Joints that the parameters of a commanded model move, in their order.
     pub fn moving_joints(&self) -> Vec<usize> {
-        let joint = |parameter: &Parameter| match parameter.slot {
-            Slot::Joint { joint, .. } => Some(joint),
+        let joint = |parameter: &Parameter| match parameter.site {
+            ParameterSite::Joint { joint, .. } => Some(joint),
             _ => None,
         };
         self.parameters.iter().filter_map(joint).collect()
@@ -83,8 +87,8 @@ fn commands(problem: &Problem, arm: &Arm<f64>, of: fn(&Joint) -> JointKind) -> V
         };
         Some(Parameter {
             name: format!("q{}", joint + 1),
-            slot: Slot::Joint { joint, field },
-            driver: Driver::Constant,
+            site: ParameterSite::Joint { joint, field },
+            regressor: Regressor::Constant,
             nominal,
             sigma: None,
             lower: f64::NEG_INFINITY,

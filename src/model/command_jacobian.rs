@@ -9,12 +9,18 @@ use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 use crate::problem::Problem;
 
 impl Model {
-    /// ∂p/∂q of predicted positions at the full parameter vector `x`, for each pose of shape = (3, joints), measuring frame
-    /// \[m/rad\], of joints that slide \[m/m\]; 0 at fixed joints, NaN where a pose has no equilibrium.
+    /// ∂p/∂q of predicted positions at the full parameter vector `x`, for each pose of shape = (3,
+    /// joints), measuring frame \[m/rad\], of joints that slide \[m/m\]; 0 at fixed joints, NaN
+    /// where a pose has no equilibrium.
     ///
-    /// A command moves its own joint, what is driven by it in other joints, and what the instrument adds by it:
-    /// ∂p/∂q = ∂p/∂θ (1 + ∂Δθ/∂q) + ∂s/∂q. The side from which a joint comes stays.
-    pub fn command_jacobian(&self, problem: &Problem, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<DMatrix<f64>> {
+    /// A command moves its own joint, what is driven by it in other joints, and what the instrument
+    /// adds by it: ∂p/∂q = ∂p/∂θ (1 + ∂Δθ/∂q) + ∂s/∂q. The side from which a joint comes stays.
+    pub fn command_jacobian(
+        &self,
+        problem: &Problem,
+        poses: Vec<Pose>,
+        x: &DVector<f64>,
+    ) -> Vec<DMatrix<f64>> {
         let arm = self.commanded(problem, x);
         let joints = arm.joints();
         let own = arm.moving_joints().len();
@@ -36,7 +42,8 @@ impl Model {
                     turned.column_mut(joint).copy_from_slice(&block.column(column)[rows.clone()]);
                     turned.column_mut(joint).neg_mut();
                 }
-                // No equilibrium: the residual itself is no number, and its derivatives are not written.
+                // No equilibrium: the residual itself is no number, and its derivatives are not
+                // written.
                 if block.column(moving.len())[rows].iter().any(|value| value.is_nan()) {
                     return DMatrix::from_element(3, joints, f64::NAN);
                 }
@@ -45,7 +52,7 @@ impl Model {
                     // No command drives the strain of a beam.
                     let Place::Joint(follows) = driven.place else { continue };
                     for &joint in &moving {
-                        let slope = driven.value * driven.driver.slope(&pose.setup, joint);
+                        let slope = driven.value * driven.regressor.slope(&pose.setup, joint);
                         jacobian.column_mut(joint).axpy(slope, &turned.column(follows), 1.0);
                     }
                 }

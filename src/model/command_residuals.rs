@@ -8,7 +8,8 @@ use super::{Model, Pose, PoseResiduals};
 use crate::least_squares::{Block, LeastSquares};
 use crate::problem::Problem;
 
-/// Residuals of poses over corrections to the commands of an arm, from the configurations of the poses.
+/// Residuals of poses over corrections to the commands of an arm, from the configurations of the
+/// poses.
 ///
 /// A joint that follows another moves by ratio × the correction of its leader.
 pub struct CommandResiduals<'a> {
@@ -20,8 +21,8 @@ pub struct CommandResiduals<'a> {
 }
 
 impl<'a> CommandResiduals<'a> {
-    /// Of `arm` with `commands` commands, whose parameters are those of [`Model::commanded`] and then those of
-    /// [`Model::with_followers`].
+    /// Of `arm` with `commands` commands, whose parameters are those of [`Model::commanded`] and
+    /// then those of [`Model::with_followers`].
     pub fn new(problem: &Problem, arm: &'a Model, commands: usize, poses: Vec<Pose<'a>>) -> Self {
         let moving = arm.moving_joints();
         let follower = |joint: &usize| {
@@ -37,7 +38,10 @@ impl<'a> CommandResiduals<'a> {
     /// Corrections to all coordinates, of followers as well.
     fn all(&self, x: &DVector<f64>) -> DVector<f64> {
         let followers = self.followers.iter().map(|&(leader, ratio)| ratio * x[leader]);
-        DVector::from_iterator(self.commands + self.followers.len(), x.iter().copied().chain(followers))
+        DVector::from_iterator(
+            self.commands + self.followers.len(),
+            x.iter().copied().chain(followers),
+        )
     }
 }
 

@@ -33,7 +33,10 @@ impl Commands {
         self.configuration.extend_from_slice(setup.configuration);
         self.strains.clear();
         let mut waves = Waves::default();
-        let others = self.others.iter().map(|own| (own.place, own.value * waves.value(own.driver, setup)));
+        let others = self
+            .others
+            .iter()
+            .map(|own| (own.place, own.value * waves.value(own.regressor, setup)));
         let series = self.series.iter().map(|own| (own.place, own.value(setup.configuration)));
         for (place, added) in others.chain(series) {
             match place {
@@ -55,36 +58,46 @@ impl Commands {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::parameter::Driver;
+    use crate::model::parameter::Regressor;
 
     #[test]
     fn waves_other_drivers_and_strains_add_up() {
         let strain = Place::Strain { joint: 1, which: 2 };
         let waves = (1..=20).flat_map(|order| {
             let value = 1e-3 / f64::from(order);
-            [(Place::Joint(0), Driver::Sine(1, order), value), (strain, Driver::Cosine(0, order), -value)]
+            [
+                (Place::Joint(0), Regressor::Sine(1, order), value),
+                (strain, Regressor::Cosine(0, order), -value),
+            ]
         });
         let others = [
-            (Place::Joint(0), Driver::Warming { reference: 20.0 }, 1e-4),
-            (Place::Joint(1), Driver::Command(0), 0.5),
-            (Place::Strain { joint: 0, which: 0 }, Driver::Elapsed, 1e-6),
+            (Place::Joint(0), Regressor::Warming { reference: 20.0 }, 1e-4),
+            (Place::Joint(1), Regressor::Command(0), 0.5),
+            (Place::Strain { joint: 0, which: 0 }, Regressor::Elapsed, 1e-6),
         ];
-        let known: Vec<Driven> =
-            waves.chain(others).map(|(place, driver, value)| Driven { place, driver, value }).collect();
+        let known: Vec<Driven> = waves
+            .chain(others)
+            .map(|(place, regressor, value)| Driven { place, regressor, value })
+            .collect();
         let mut commands = Commands::new(&known, &[], &[]);
         assert!(commands.series.len() == 2 && commands.others.len() == 3);
         // A pose with strains of the last one would show it.
         for configuration in [[0.3, -1.2], [0.9, 0.4]] {
-            let pose = PoseView { temperature: Some(&31.0), elapsed: 7.0, ..PoseView::of(&configuration) };
+            let pose =
+                PoseView { temperature: Some(&31.0), elapsed: 7.0, ..PoseView::of(&configuration) };
             let (mut joints, mut strains) = (configuration, [[0.0; 3]; 2]);
-            for Driven { place, driver, value } in &known {
+            for Driven { place, regressor, value } in &known {
                 match *place {
-                    Place::Joint(joint) => joints[joint] += value * driver.value(&pose),
-                    Place::Strain { joint, which } => strains[joint][which] += value * driver.value(&pose),
+                    Place::Joint(joint) => joints[joint] += value * regressor.value(&pose),
+                    Place::Strain { joint, which } => {
+                        strains[joint][which] += value * regressor.value(&pose)
+                    }
                 }
             }
             let found = commands.apply(&pose);
-            let near = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-14);
+            let near = |a: &[f64], b: &[f64]| {
+                a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-14)
+            };
             assert!(
                 near(found.configuration, &joints)
                     && near(found.strains.unwrap().as_flattened(), strains.as_flattened())

@@ -1,7 +1,8 @@
-//! Predicted positions with their derivatives, by dual numbers where the structure of the arm keeps them small.
+//! Predicted positions with their derivatives, by dual numbers where the structure of the arm keeps
+//! them small.
 //!
-//! A base or a target moves the position rigidly, and on a rigid arm so does every parameter of a link. On an elastic arm
-//! every load moves too.
+//! A base or a target moves the position rigidly, and on a rigid arm so does every parameter of a
+//! link. On an elastic arm every load moves too.
 
 use nalgebra::{DVector, Vector3};
 
@@ -18,7 +19,7 @@ use super::rows::Rows;
 use super::tilt::Tilts;
 use super::turn;
 use crate::least_squares::Block;
-use crate::model::parameter::{Driver, Slot};
+use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::Observation;
 use crate::spatial::Frame;
 
@@ -26,13 +27,13 @@ use crate::spatial::Frame;
 pub(super) struct Linearised {
     commands: Commands,
     instrument: Instrument,
-    /// Columns of what the measurement does: scale, and shifts by axis and driver.
+    /// Columns of what the measurement does: scale, and shifts by axis and regressor.
     scale: Option<usize>,
     /// Entry of the strain and column.
     strains: Vec<(usize, usize)>,
-    shifts: Vec<(usize, Driver, usize)>,
+    shifts: Vec<(usize, Regressor, usize)>,
     /// The same of turns of the bases.
-    turns: Vec<(usize, Driver, usize)>,
+    turns: Vec<(usize, Regressor, usize)>,
     bases: Vec<Base>,
     targets: Vec<Target>,
     /// Fixtures, and the columns of their numbers.
@@ -45,26 +46,44 @@ pub(super) struct Linearised {
 }
 
 impl Linearised {
-    /// About the full parameter vector `x`; `unknowns[j]` is the parameter of column j, and poses may be `oriented` or measure tilts.
-    pub fn new(model: &Model, x: &DVector<f64>, unknowns: &[usize], (oriented, tilted): (bool, bool)) -> Self {
+    /// About the full parameter vector `x`; `unknowns[j]` is the parameter of column j, and poses
+    /// may be `oriented` or measure tilts.
+    pub fn new(
+        model: &Model,
+        x: &DVector<f64>,
+        unknowns: &[usize],
+        (oriented, tilted): (bool, bool),
+    ) -> Self {
         let arm = model.arm(|k| x[k]);
         let mut bases: Vec<Base> = model.base_poses(x.as_slice()).iter().map(Base::new).collect();
-        let places = model.target_positions(x.as_slice()).into_iter().zip(model.target_rotations(x.as_slice()));
-        let target = |(own, (position, rotation))| Target::new(model.carrier(own), position, &rotation);
+        let places = model
+            .target_positions(x.as_slice())
+            .into_iter()
+            .zip(model.target_rotations(x.as_slice()));
+        let target =
+            |(own, (position, rotation))| Target::new(model.carrier(own), position, &rotation);
         let mut targets: Vec<Target> = places.enumerate().map(target).collect();
-        let mut fixtures: Vec<_> = model.fixtures(x.as_slice()).into_iter().map(|own| (own, [None; 4])).collect();
-        let (mut scale, mut strains, mut shifts, mut turns) = (None, Vec::new(), Vec::new(), Vec::new());
+        let mut fixtures: Vec<_> =
+            model.fixtures(x.as_slice()).into_iter().map(|own| (own, [None; 4])).collect();
+        let (mut scale, mut strains, mut shifts, mut turns) =
+            (None, Vec::new(), Vec::new(), Vec::new());
         for (column, &k) in unknowns.iter().enumerate() {
             let parameter = &model.parameters[k];
-            match parameter.slot {
-                Slot::Base { base, axis } => bases[base].columns[axis] = Some(column),
-                Slot::Target { target, axis } => targets[target].columns[axis] = Some(column),
-                Slot::Fixture { fixture, axis, .. } => fixtures[fixture].1[axis] = Some(column),
-                Slot::Scale => scale = Some(column),
-                Slot::Strain { entry } => strains.push((entry, column)),
-                Slot::Shift { axis } => shifts.push((axis, parameter.driver, column)),
-                Slot::Turn { axis } => turns.push((axis, parameter.driver, column)),
-                Slot::Joint { .. } | Slot::Beam { .. } | Slot::Arm(_) => {}
+            match parameter.site {
+                ParameterSite::Base { base, axis } => bases[base].columns[axis] = Some(column),
+                ParameterSite::Target { target, axis } => {
+                    targets[target].columns[axis] = Some(column)
+                }
+                ParameterSite::Fixture { fixture, axis, .. } => {
+                    fixtures[fixture].1[axis] = Some(column)
+                }
+                ParameterSite::Scale => scale = Some(column),
+                ParameterSite::Strain { entry } => strains.push((entry, column)),
+                ParameterSite::Shift { axis } => shifts.push((axis, parameter.regressor, column)),
+                ParameterSite::Turn { axis } => turns.push((axis, parameter.regressor, column)),
+                ParameterSite::Joint { .. }
+                | ParameterSite::Beam { .. }
+                | ParameterSite::Arm(_) => {}
             }
         }
         let inputs = inputs(model, unknowns);
@@ -82,11 +101,24 @@ impl Linearised {
             (false, true) => 0,
         };
         let probe = Block::zeros(probed, unknowns.len());
-        Self { commands, instrument, scale, strains, shifts, turns, bases, targets, fixtures, tilts, inner, probe }
+        Self {
+            commands,
+            instrument,
+            scale,
+            strains,
+            shifts,
+            turns,
+            bases,
+            targets,
+            fixtures,
+            tilts,
+            inner,
+            probe,
+        }
     }
 
-    /// Writes the whitened residual of a pose and its derivatives into three rows of a block of zeros, six where its orientation
-    /// counts.
+    /// Writes the whitened residual of a pose and its derivatives into three rows of a block of
+    /// zeros, six where its orientation counts.
     #[inline]
     pub fn write(&mut self, pose: &Pose, block: &mut Block, row: usize) {
         if pose.observation.is_position() {
@@ -96,7 +128,8 @@ impl Linearised {
         }
     }
 
-    /// Writes the whitened residual of what is measured against a fixture, and its derivatives, into three rows.
+    /// Writes the whitened residual of what is measured against a fixture, and its derivatives,
+    /// into three rows.
     fn write_contact(&mut self, pose: &Pose, block: &mut Block, row: usize) {
         let per_sigma = -1.0 / pose.sigma;
         let last_column = block.parameters();
@@ -104,7 +137,8 @@ impl Linearised {
             block.column_mut(column)[row..row + 3].copy_from_slice((of * per_sigma).as_slice());
         };
         if let Observation::Between(first, second) = pose.observation {
-            let ((one, own), (other, others)) = (&self.fixtures[first as usize], &self.fixtures[second as usize]);
+            let ((one, own), (other, others)) =
+                (&self.fixtures[first as usize], &self.fixtures[second as usize]);
             let Slopes { seen, by_target, by_fixture } = between(one, other);
             let by_first = own.iter().zip(by_fixture.column_iter());
             let by_second = others.iter().zip(by_target.column_iter());
@@ -127,7 +161,11 @@ impl Linearised {
         let mut put = |column: usize, of: Vector3<f64>| {
             block.column_mut(column)[row..row + 3].copy_from_slice((of * per_sigma).as_slice());
         };
-        let Some((fixture, columns)) = pose.observation.fixture().map(|fixture| self.fixtures[fixture]) else { return };
+        let Some((fixture, columns)) =
+            pose.observation.fixture().map(|fixture| self.fixtures[fixture])
+        else {
+            return;
+        };
         let (base, target) = (&self.bases[pose.base], &self.targets[pose.target]);
         let turned = self.turned(base, pose);
         let base = turned.as_ref().unwrap_or(base);
@@ -138,20 +176,34 @@ impl Linearised {
             probe.column_mut(column).fill(0.0);
         }
         let mut moves = Rows { block: probe, row: 0, scale: 1.0 };
-        let Some(last) = self.inner.write(&pose.setup, &setup, base, (target.carrier, &target.position), &mut moves)
-        else {
+        let Some(last) = self.inner.write(
+            &pose.setup,
+            &setup,
+            base,
+            (target.carrier, &target.position),
+            &mut moves,
+        ) else {
             put(last_column, Vector3::from_element(f64::NAN));
             return;
         };
         let position = placed(&last, base, target, &mut moves);
         let Slopes { seen, by_target, by_fixture } = fixture.slopes(&position);
-        // What is missing to be at a point is told along the axes of the arm's base, which turn with it.
-        let in_base = |of: Vector3<f64>| if pose.observation.is_point() { base.frame.resolve(&of) } else { of };
+        // What is missing to be at a point is told along the axes of the arm's base, which turn
+        // with it.
+        let in_base = |of: Vector3<f64>| {
+            if pose.observation.is_point() { base.frame.resolve(&of) } else { of }
+        };
         if pose.observation.is_point() {
             let origin = base.frame.origin;
-            for ((column, turned), (_, carried)) in base.turned(&(origin + seen)).zip(base.turned(&origin)) {
+            for ((column, turned), (_, carried)) in
+                base.turned(&(origin + seen)).zip(base.turned(&origin))
+            {
                 let with_axes = turned - carried;
-                probe.column_mut(column).iter_mut().zip(&with_axes).for_each(|(own, with)| *own -= with);
+                probe
+                    .column_mut(column)
+                    .iter_mut()
+                    .zip(&with_axes)
+                    .for_each(|(own, with)| *own -= with);
             }
         }
         for column in 0..probe.parameters() {
@@ -169,7 +221,10 @@ impl Linearised {
     /// The base as it has turned in a pose; `None` where none does.
     fn turned(&self, base: &Base, pose: &Pose) -> Option<Base> {
         self.instrument.turns().then(|| {
-            let columns = self.turns.iter().map(|&(axis, driver, column)| (axis, column, driver.value(&pose.setup)));
+            let columns = self
+                .turns
+                .iter()
+                .map(|&(axis, regressor, column)| (axis, column, regressor.value(&pose.setup)));
             base.turned_by(&self.instrument.turn(&pose.setup), columns)
         })
     }
@@ -183,8 +238,13 @@ impl Linearised {
         let per_sigma = -1.0 / pose.sigma;
         let last_column = block.parameters();
         let mut rows = Rows { block, row, scale: per_sigma * (1.0 + self.instrument.scale) };
-        let Some(last) = self.inner.write(&pose.setup, &setup, base, (target.carrier, &target.position), &mut rows)
-        else {
+        let Some(last) = self.inner.write(
+            &pose.setup,
+            &setup,
+            base,
+            (target.carrier, &target.position),
+            &mut rows,
+        ) else {
             rows.put(last_column, &Vector3::from_element(f64::NAN));
             return;
         };
@@ -197,8 +257,8 @@ impl Linearised {
         for &(entry, column) in &self.strains {
             rows.put(column, &(strained(entry) * predicted));
         }
-        for &(axis, driver, column) in &self.shifts {
-            rows.put(column, &Vector3::ith(axis, driver.value(&pose.setup)));
+        for &(axis, regressor, column) in &self.shifts {
+            rows.put(column, &Vector3::ith(axis, regressor.value(&pose.setup)));
         }
         let seen = self.instrument.of(&predicted, &pose.setup);
         rows.put(last_column, &(seen - pose.measured));
@@ -209,7 +269,8 @@ impl Linearised {
     }
 }
 
-/// The target's position \[m\], measuring frame, from the frame `last` that carries it there; writes what base and target do to it.
+/// The target's position \[m\], measuring frame, from the frame `last` that carries it there;
+/// writes what base and target do to it.
 #[inline]
 fn placed(last: &Frame<f64>, base: &Base, target: &Target, rows: &mut Rows) -> Vector3<f64> {
     let position = last.point(&target.position);

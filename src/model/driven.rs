@@ -1,6 +1,6 @@
 //! What adds to the joints' commands and to the strains of beams.
 
-use crate::model::parameter::{BeamField, Driver, JointField, Parameter, Slot};
+use crate::model::parameter::{BeamField, JointField, Parameter, ParameterSite, Regressor};
 use crate::problem::{Mimic, Problem};
 
 /// What is added to.
@@ -17,12 +17,12 @@ pub(super) enum Place {
     },
 }
 
-/// A known addition: value × driver.
+/// A known addition: value × regressor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Driven {
     pub place: Place,
-    pub driver: Driver,
-    /// \[rad\], \[m\], \[1/m\] or 1 per unit of the driver.
+    pub regressor: Regressor,
+    /// \[rad\], \[m\], \[1/m\] or 1 per unit of the regressor.
     pub value: f64,
 }
 
@@ -32,7 +32,11 @@ impl Driven {
         let joints = problem.joints.iter().enumerate();
         let driven = joints.filter_map(|(joint, own)| {
             let Mimic { joint: other, ratio } = own.mimic?;
-            Some(Self { place: Place::Joint(joint), driver: Driver::command(problem, other + 1), value: ratio })
+            Some(Self {
+                place: Place::Joint(joint),
+                regressor: Regressor::command(problem, other + 1),
+                value: ratio,
+            })
         });
         driven.collect()
     }
@@ -40,19 +44,24 @@ impl Driven {
     /// What is known to drive and the free parameters at the full parameter vector `x`.
     pub fn all(known: &[Self], parameters: &[Parameter], x: &[f64]) -> Vec<Self> {
         let free = parameters.iter().zip(x);
-        let free = free.filter_map(|(parameter, &x)| Self::of(parameter.slot, parameter.driver, x));
+        let free =
+            free.filter_map(|(parameter, &x)| Self::of(parameter.site, parameter.regressor, x));
         known.iter().copied().chain(free).collect()
     }
 
-    /// What a parameter at `x` adds to, if it is driven and acts on a joint's coordinate or a beam's strain.
-    fn of(slot: Slot, driver: Driver, x: f64) -> Option<Self> {
-        let place = match slot {
-            Slot::Joint { joint, field: JointField::Theta | JointField::D } => Place::Joint(joint),
-            Slot::Beam { joint, field } => {
-                Place::Strain { joint, which: BeamField::STRAINS.iter().position(|own| *own == field)? }
+    /// What a parameter at `x` adds to, if it is driven and acts on a joint's coordinate or a
+    /// beam's strain.
+    fn of(site: ParameterSite, regressor: Regressor, x: f64) -> Option<Self> {
+        let place = match site {
+            ParameterSite::Joint { joint, field: JointField::Theta | JointField::D } => {
+                Place::Joint(joint)
             }
+            ParameterSite::Beam { joint, field } => Place::Strain {
+                joint,
+                which: BeamField::STRAINS.iter().position(|own| *own == field)?,
+            },
             _ => return None,
         };
-        (!driver.is_constant()).then_some(Self { place, driver, value: x })
+        (!regressor.is_constant()).then_some(Self { place, regressor, value: x })
     }
 }

@@ -1,7 +1,7 @@
 //! Derivatives of an elastic arm with respect to its own parameters.
 //!
-//! What a parameter does to its own part is taken alone, and virtual work tells what that does to the target; parameters
-//! that change loads go through the whole statics, one by one.
+//! What a parameter does to its own part is taken alone, and virtual work tells what that does to
+//! the target; parameters that change loads go through the whole statics, one by one.
 
 use nalgebra::{DVector, Vector3};
 use num_dual::Dual64;
@@ -11,11 +11,12 @@ use super::enter::enter;
 use super::inputs::Input;
 use super::rows::Rows;
 use crate::mechanics::{Angle, Arm, Equilibrated, Response, Segment, Sensitivity, Workspace};
-use crate::model::parameter::{ArmField, BeamField, JointField, Slot};
+use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
 use crate::problem::PoseView;
 use crate::spatial::Frame;
 
-/// An elastic arm, part by part where its parameters act on one part alone, else one by one through the whole arm.
+/// An elastic arm, part by part where its parameters act on one part alone, else one by one through
+/// the whole arm.
 pub(super) struct Elastic {
     parts: Option<Parts>,
     response: Response,
@@ -44,7 +45,7 @@ impl Elastic {
     pub fn new(model: &Model, x: &DVector<f64>, arm: Arm<f64>, inputs: Vec<Input>) -> Self {
         let (mut apart, mut whole) = (Vec::new(), Vec::new());
         for input in inputs {
-            match part_of(&arm, input.slot).filter(|_| Sensitivity::applies_to(&arm)) {
+            match part_of(&arm, input.site).filter(|_| Sensitivity::applies_to(&arm)) {
                 Some(part) => {
                     let before = apart.iter().filter(|(_, of, _)| *of == part).count();
                     apart.push((input, part, part.first_lane() + before));
@@ -55,18 +56,29 @@ impl Elastic {
         let parts = (!apart.is_empty()).then(|| {
             let count = |part| apart.iter().filter(|(_, of, _)| *of == part).count();
             let seeded = |lane| {
-                let of_lane: Vec<&Input> =
-                    apart.iter().filter(|(_, _, own)| *own == lane).map(|(input, _, _)| input).collect();
+                let of_lane: Vec<&Input> = apart
+                    .iter()
+                    .filter(|(_, _, own)| *own == lane)
+                    .map(|(input, _, _)| input)
+                    .collect();
                 seed_arm(model, x, &of_lane)
             };
             Parts { sensitivity: Sensitivity::new(&arm, count, seeded), inputs: apart.clone() }
         });
         let (response, rest) = (Response::new(&arm), Equilibrated::default());
-        Self { parts, response, whole, arm, rest, real: Workspace::default(), ws: Workspace::default() }
+        Self {
+            parts,
+            response,
+            whole,
+            arm,
+            rest,
+            real: Workspace::default(),
+            ws: Workspace::default(),
+        }
     }
 
-    /// Writes the derivatives of a target \[m\] in the frame of the joint `tip`; returns that frame, measuring frame, `None` where the
-    /// pose has no equilibrium.
+    /// Writes the derivatives of a target \[m\] in the frame of the joint `tip`; returns that
+    /// frame, measuring frame, `None` where the pose has no equilibrium.
     pub fn write(
         &mut self,
         commanded: &PoseView,
@@ -89,20 +101,28 @@ impl Elastic {
         }
         for Whole { arm, input } in whole {
             let position = arm.target_position(setup, target, rest, ws);
-            rows.put_input(input, commanded, &base.vector(&position.map(|coordinate| coordinate.eps)));
+            rows.put_input(
+                input,
+                commanded,
+                &base.vector(&position.map(|coordinate| coordinate.eps)),
+            );
         }
         Some(base.seen(&rest.frame))
     }
 }
 
 /// The part on which alone an input acts; none where it changes loads.
-fn part_of(arm: &Arm<f64>, slot: Slot) -> Option<Segment> {
-    match slot {
-        Slot::Joint { joint, field: JointField::A } if arm.joints[joint].beam.is_some() => Some(Segment::Beam(joint)),
-        Slot::Joint { joint, .. } => Some(Segment::Joint(joint)),
-        Slot::Beam { field: BeamField::AddedMass, .. } => None,
-        Slot::Beam { joint, .. } => Some(Segment::Beam(joint)),
-        Slot::Arm(ArmField::MountingX | ArmField::MountingY) => Some(Segment::Mounting),
+fn part_of(arm: &Arm<f64>, site: ParameterSite) -> Option<Segment> {
+    match site {
+        ParameterSite::Joint { joint, field: JointField::A }
+            if arm.joints[joint].beam.is_some() =>
+        {
+            Some(Segment::Beam(joint))
+        }
+        ParameterSite::Joint { joint, .. } => Some(Segment::Joint(joint)),
+        ParameterSite::Beam { field: BeamField::AddedMass, .. } => None,
+        ParameterSite::Beam { joint, .. } => Some(Segment::Beam(joint)),
+        ParameterSite::Arm(ArmField::MountingX | ArmField::MountingY) => Some(Segment::Mounting),
         _ => None,
     }
 }
@@ -113,8 +133,8 @@ pub(super) fn seed_arm(model: &Model, x: &DVector<f64>, inputs: &[&Input]) -> Ar
     let mut arm = model.arm(|k| Dual64::new(x[k], f64::from(u8::from(is_seeded(k)))));
     let seed = Dual64::from(0.0).derivative();
     for input in inputs.iter().filter(|input| input.parameter.is_none()) {
-        match input.slot {
-            Slot::Joint { joint, field } => {
+        match input.site {
+            ParameterSite::Joint { joint, field } => {
                 let joint = &mut arm.joints[joint];
                 match field {
                     JointField::Alpha => joint.alpha = Angle::new(joint.alpha.value + seed),
@@ -124,7 +144,7 @@ pub(super) fn seed_arm(model: &Model, x: &DVector<f64>, inputs: &[&Input]) -> Ar
                     _ => joint.theta += seed,
                 }
             }
-            Slot::Beam { .. } => enter(&mut arm, input.slot, 0.0, seed, &mut [seed; 2]),
+            ParameterSite::Beam { .. } => enter(&mut arm, input.site, 0.0, seed, &mut [seed; 2]),
             _ => {}
         }
     }

@@ -1,28 +1,32 @@
-//! How a parameter enters the arm, by its slot.
+//! How a parameter enters the arm, by its site.
 
-use crate::mechanics::{AddedMass, Angle, Arm, Beam, Compensator, Flexibility, Nonlinear, Rope, Strain};
-use crate::model::parameter::{ArmField, BeamField, JointField, Slot};
+use crate::mechanics::{
+    AddedMass, Angle, Arm, Beam, Compensator, Flexibility, Nonlinear, Rope, Strain,
+};
+use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
 use crate::problem::Effect;
 use crate::scalar::Scalar;
 use crate::spatial::rotate;
 use nalgebra::Vector3;
 
-/// Makes room at a slot for an effect's parameter, whose value without the effect is `nominal`.
-pub(super) fn prepare(arm: &mut Arm<f64>, slot: Slot, nominal: f64) {
-    match slot {
-        Slot::Joint { joint, field } => {
+/// Makes room at a site for an effect's parameter, whose value without the effect is `nominal`.
+pub(super) fn prepare(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64) {
+    match site {
+        ParameterSite::Joint { joint, field } => {
             let joint = &mut arm.joints[joint];
             match field {
                 JointField::Compliance => _ = joint.flexibility.get_or_insert(0.0),
                 JointField::Cubic | JointField::Play | JointField::SlidingPlay => {
                     joint.nonlinear.get_or_insert(Nonlinear { cubic: 0.0, play: 0.0 });
                 }
-                JointField::LateralX | JointField::LateralY => _ = joint.lateral.get_or_insert([0.0; 2]),
+                JointField::LateralX | JointField::LateralY => {
+                    _ = joint.lateral.get_or_insert([0.0; 2])
+                }
                 JointField::SlideFlexibility => _ = joint.slide.get_or_insert(0.0),
                 _ => {}
             }
         }
-        Slot::Beam { joint, field } => {
+        ParameterSite::Beam { joint, field } => {
             let beam = arm.joints[joint].beam.get_or_insert_with(weightless);
             match field {
                 BeamField::BowY | BeamField::BowZ | BeamField::Stretch => {
@@ -40,21 +44,24 @@ pub(super) fn prepare(arm: &mut Arm<f64>, slot: Slot, nominal: f64) {
                 _ => {}
             }
         }
-        Slot::Arm(field) => match field {
-            ArmField::HoistForce | ArmField::HoistLeanX | ArmField::HoistLeanY | ArmField::HoistTrolley => {
+        ParameterSite::Arm(field) => match field {
+            ArmField::HoistForce
+            | ArmField::HoistLeanX
+            | ArmField::HoistLeanY
+            | ArmField::HoistTrolley => {
                 arm.rope.get_or_insert(Rope { force: 0.0, lean: [0.0; 2], trolley: 0.0 });
             }
             ArmField::MountingX | ArmField::MountingY => _ = arm.mounting.get_or_insert([0.0; 2]),
             ArmField::Mixing => _ = arm.mixing.get_or_insert(0.0),
             ArmField::Payload | ArmField::GravityX | ArmField::GravityY => {}
         },
-        Slot::Base { .. }
-        | Slot::Target { .. }
-        | Slot::Fixture { .. }
-        | Slot::Shift { .. }
-        | Slot::Turn { .. }
-        | Slot::Scale
-        | Slot::Strain { .. } => {}
+        ParameterSite::Base { .. }
+        | ParameterSite::Target { .. }
+        | ParameterSite::Fixture { .. }
+        | ParameterSite::Shift { .. }
+        | ParameterSite::Turn { .. }
+        | ParameterSite::Scale
+        | ParameterSite::Strain { .. } => {}
     }
 }
 
@@ -64,14 +71,22 @@ pub(super) fn place(arm: &mut Arm<f64>, effect: &Effect) {
         && let Some(joint) = arm.joints.get_mut(joint.wrapping_sub(1))
     {
         let free_length = free_length.0;
-        let spring = Compensator { anchor: *anchor, lever: *lever, free_length, rate: 0.0, preload: 0.0 };
+        let spring =
+            Compensator { anchor: *anchor, lever: *lever, free_length, rate: 0.0, preload: 0.0 };
         joint.compensator.get_or_insert(spring);
     }
 }
 
 /// A link that was declared rigid, ready to bend.
 fn weightless() -> Beam<f64> {
-    Beam { mass: 0.0, flexibility: Flexibility::RIGID, masses: Vec::new(), hoist: None, strain: None, added: None }
+    Beam {
+        mass: 0.0,
+        flexibility: Flexibility::RIGID,
+        masses: Vec::new(),
+        hoist: None,
+        strain: None,
+        added: None,
+    }
 }
 
 /// Turns gravity by the rotation vector (x, y, 0) \[rad\].
@@ -79,12 +94,18 @@ pub(super) fn turn_gravity<S: Scalar>(arm: &mut Arm<S>, [x, y]: [S; 2]) {
     arm.gravity = rotate(&Vector3::new(x, y, S::from(0.0)), &arm.gravity);
 }
 
-/// Sets a slot of the arm to its nominal value and a deviation x; effects add to what is declared.
+/// Sets a site of the arm to its nominal value and a deviation x; effects add to what is declared.
 ///
 /// The turn of gravity is collected in `tilt`: both of its angles belong to one rotation vector.
-pub(super) fn enter<S: Scalar>(arm: &mut Arm<S>, slot: Slot, nominal: f64, x: S, tilt: &mut [S; 2]) {
-    match slot {
-        Slot::Joint { joint, field } => {
+pub(super) fn enter<S: Scalar>(
+    arm: &mut Arm<S>,
+    site: ParameterSite,
+    nominal: f64,
+    x: S,
+    tilt: &mut [S; 2],
+) {
+    match site {
+        ParameterSite::Joint { joint, field } => {
             let joint = &mut arm.joints[joint];
             if let (Some(place), Some(placement)) = (field.placement(), &mut joint.placement) {
                 match place.checked_sub(3) {
@@ -99,30 +120,40 @@ pub(super) fn enter<S: Scalar>(arm: &mut Arm<S>, slot: Slot, nominal: f64, x: S,
                 (JointField::D, ..) => joint.d = x + nominal,
                 (JointField::Beta, ..) => joint.beta = Angle::new(x + nominal),
                 (JointField::Stiffness, ..) => joint.flexibility = Some((-x).exp() / nominal),
-                (JointField::Compliance, ..) => joint.flexibility = Some(joint.flexibility.map_or(x, |c| c + x)),
+                (JointField::Compliance, ..) => {
+                    joint.flexibility = Some(joint.flexibility.map_or(x, |c| c + x))
+                }
                 (JointField::Cubic, Some(nonlinear), _) => nonlinear.cubic += x,
-                (JointField::Play | JointField::SlidingPlay, Some(nonlinear), _) => nonlinear.play += x,
+                (JointField::Play | JointField::SlidingPlay, Some(nonlinear), _) => {
+                    nonlinear.play += x
+                }
                 (JointField::LateralX, _, Some(lateral)) => lateral[0] += x,
                 (JointField::LateralY, _, Some(lateral)) => lateral[1] += x,
-                (JointField::SpringRate, ..) => joint.compensator.iter_mut().for_each(|spring| spring.rate += x),
-                (JointField::SpringPreload, ..) => joint.compensator.iter_mut().for_each(|spring| spring.preload += x),
-                (JointField::SlideFlexibility, ..) => joint.slide = Some(joint.slide.map_or(x, |known| known + x)),
+                (JointField::SpringRate, ..) => {
+                    joint.compensator.iter_mut().for_each(|spring| spring.rate += x)
+                }
+                (JointField::SpringPreload, ..) => {
+                    joint.compensator.iter_mut().for_each(|spring| spring.preload += x)
+                }
+                (JointField::SlideFlexibility, ..) => {
+                    joint.slide = Some(joint.slide.map_or(x, |known| known + x))
+                }
                 _ => {}
             }
         }
-        Slot::Beam { joint, field } => {
+        ParameterSite::Beam { joint, field } => {
             if let Some(beam) = &mut arm.joints[joint].beam {
                 enter_beam(beam, field, nominal, x);
             }
         }
-        Slot::Arm(field) => enter_arm(arm, field, x, tilt),
-        Slot::Base { .. }
-        | Slot::Target { .. }
-        | Slot::Fixture { .. }
-        | Slot::Shift { .. }
-        | Slot::Turn { .. }
-        | Slot::Scale
-        | Slot::Strain { .. } => {}
+        ParameterSite::Arm(field) => enter_arm(arm, field, x, tilt),
+        ParameterSite::Base { .. }
+        | ParameterSite::Target { .. }
+        | ParameterSite::Fixture { .. }
+        | ParameterSite::Shift { .. }
+        | ParameterSite::Turn { .. }
+        | ParameterSite::Scale
+        | ParameterSite::Strain { .. } => {}
     }
 }
 
@@ -164,7 +195,14 @@ fn enter_arm<S: Scalar>(arm: &mut Arm<S>, field: ArmField, x: S, tilt: &mut [S; 
         (ArmField::HoistTrolley, Some(rope), _) => rope.trolley += x,
         (ArmField::MountingX, _, Some(mounting)) => mounting[0] += x,
         (ArmField::MountingY, _, Some(mounting)) => mounting[1] += x,
-        (ArmField::HoistForce | ArmField::HoistLeanX | ArmField::HoistLeanY | ArmField::HoistTrolley, None, _)
+        (
+            ArmField::HoistForce
+            | ArmField::HoistLeanX
+            | ArmField::HoistLeanY
+            | ArmField::HoistTrolley,
+            None,
+            _,
+        )
         | (ArmField::MountingX | ArmField::MountingY, _, None) => {}
     }
 }

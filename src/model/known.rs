@@ -14,10 +14,12 @@ use crate::model::parameter::Parameter;
 /// Part of a number by which it may differ where it is the same but for rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Whitened residuals of some poses and their derivatives at a point, by parameter; three rows a pose.
+/// Whitened residuals of some poses and their derivatives at a point, by parameter; three rows a
+/// pose.
 ///
-/// A model of the same arm with further effects, which do nothing while their parameters are 0, has the same ones there, and columns of
-/// these effects beside them. A name stands for the same parameter in both.
+/// A model of the same arm with further effects, which do nothing while their parameters are 0, has
+/// the same ones there, and columns of these effects beside them. A name stands for the same
+/// parameter in both.
 #[derive(Debug, Clone)]
 pub(crate) struct KnownDerivatives {
     /// Of each parameter its deviation from nominal, and its column if it has one.
@@ -29,8 +31,8 @@ pub(crate) struct KnownDerivatives {
 }
 
 impl KnownDerivatives {
-    /// At the full parameter vector `x` of a model with these `parameters`, of poses of these 1 σ \[m\]; the first columns of the Jacobian
-    /// are those of the `unknowns`.
+    /// At the full parameter vector `x` of a model with these `parameters`, of poses of these 1 σ
+    /// \[m\]; the first columns of the Jacobian are those of the `unknowns`.
     pub fn new(
         (parameters, x): (&[Parameter], &DVector<f64>),
         unknowns: &[usize],
@@ -43,7 +45,8 @@ impl KnownDerivatives {
         Self { parameters, sigma, jacobian, residual }
     }
 
-    /// Which of the unknowns have no column; `None` where `x` is another point, or poses are not as many.
+    /// Which of the unknowns have no column; `None` where `x` is another point, or poses are not as
+    /// many.
     pub fn lacking(
         &self,
         poses: &[Pose],
@@ -63,8 +66,8 @@ impl KnownDerivatives {
         self.parameters.get(&parameter.name)?.1
     }
 
-    /// Fills the block of some poses from what is known and from the columns of `new`, those `lacking`, and its residual; not where that
-    /// residual is not the known one.
+    /// Fills the block of some poses from what is known and from the columns of `new`, those
+    /// `lacking`, and its residual; not where that residual is not the known one.
     pub fn fill(
         &self,
         block: &mut Block,
@@ -85,7 +88,11 @@ impl KnownDerivatives {
             if let Some(column) = self.column(&parameters[k]) {
                 let column = self.jacobian.column(column);
                 let column = column.as_slice();
-                block.column_mut(j).iter_mut().enumerate().for_each(|(row, out)| *out = known(column, row));
+                block
+                    .column_mut(j)
+                    .iter_mut()
+                    .enumerate()
+                    .for_each(|(row, out)| *out = known(column, row));
             }
         }
         let places = lacking.iter().copied().chain([unknowns.len()]).enumerate();
@@ -122,7 +129,8 @@ mod tests {
     }
 
     #[test]
-    fn known_columns_of_an_arm_that_bends_are_those_formed_anew_also_of_poses_that_were_set_aside() {
+    fn known_columns_of_an_arm_that_bends_are_those_formed_anew_also_of_poses_that_were_set_aside()
+    {
         are_those_formed_anew(ELASTIC, 1e6);
     }
 
@@ -145,9 +153,12 @@ mod tests {
             let own = configurations.iter().enumerate();
             own.map(|(k, own)| pose(own, times * sigma(k, aside))).collect()
         };
-        let (plain, more) =
-            (model(arm, ""), model(arm, "[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 3] }\n"));
-        let names = |model: &Model| model.parameters.iter().map(|own| own.name.clone()).collect::<Vec<_>>();
+        let (plain, more) = (
+            model(arm, ""),
+            model(arm, "[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 3] }\n"),
+        );
+        let names =
+            |model: &Model| model.parameters.iter().map(|own| own.name.clone()).collect::<Vec<_>>();
         let x = DVector::from_fn(plain.parameters.len(), |j, _| 0.01 * (1.0 + j as f64));
         let unknowns = |model: &Model| (0..model.parameters.len()).collect::<Vec<_>>();
         let residuals = PoseResiduals::new(&plain, poses(1.0, aside), unknowns(&plain), x.clone());
@@ -164,7 +175,8 @@ mod tests {
         let at = |name: &String| all.iter().position(|own| own == name).map_or(0.0, |j| x[j]);
         let start = DVector::from_iterator(more.parameters.len(), names(&more).iter().map(at));
         let fresh = PoseResiduals::new(&more, poses(2.0, 1.0), unknowns(&more), start.clone());
-        let begun = PoseResiduals::new(&more, poses(2.0, 1.0), unknowns(&more), start.clone()).knowing(Some(&known));
+        let begun = PoseResiduals::new(&more, poses(2.0, 1.0), unknowns(&more), start.clone())
+            .knowing(Some(&known));
         let ((expected, there), (found, own)) =
             (jacobian_and_residual(&fresh, &start), jacobian_and_residual(&begun, &start));
         let mut difference = found - &expected;

@@ -1,5 +1,5 @@
-//! The model: an arm, its bases and targets, and where each free parameter enters. Immutable; knows no files and no
-//! sensors.
+//! The model: an arm, its bases and targets, and where each free parameter enters. Immutable; knows
+//! no files and no sensors.
 
 mod ablation;
 mod command;
@@ -37,7 +37,9 @@ use nalgebra::Vector3;
 
 use crate::error::InputError;
 use crate::mechanics::{Arm, Joint};
-use crate::model::parameter::{Driver, LinearConstraint, Parameter, Slot, constrain, resolve};
+use crate::model::parameter::{
+    LinearConstraint, Parameter, ParameterSite, Regressor, constrain, resolve,
+};
 use crate::problem::{BasePose, Effect, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
@@ -56,7 +58,7 @@ pub struct Model {
     bases: Vec<BasePose>,
     targets: Vec<Vector3<f64>>,
     /// Index of the joint whose frame carries each target.
-    carriers: Vec<usize>,
+    influential_rows: Vec<usize>,
     /// Orientation of each target in that frame, a rotation vector \[rad\].
     turned: Vec<Vector3<f64>>,
     /// Points, anchors and surfaces, as declared; 0 where nothing is known.
@@ -70,19 +72,24 @@ pub struct Model {
 }
 
 impl Model {
-    /// The declared arm with its effects, one base per name in `bases` and one target per name in `targets`.
+    /// The declared arm with its effects, one base per name in `bases` and one target per name in
+    /// `targets`.
     ///
     /// # Errors
-    /// A rule of `[parameters]` or a constraint does not fit the parameters there are, a custom effect finds no room, or the problem
-    /// declares targets and not all of these.
-    pub fn new(problem: &Problem, bases: &[String], targets: &[String]) -> Result<Self, InputError> {
+    /// A rule of `[parameters]` or a constraint does not fit the parameters there are, a custom
+    /// effect finds no room, or the problem declares targets and not all of these.
+    pub fn new(
+        problem: &Problem,
+        bases: &[String],
+        targets: &[String],
+    ) -> Result<Self, InputError> {
         terms::check_customs(problem, bases.len(), targets.len())?;
         let effects = &effect::parameters(problem);
         let own = targets.iter().map(|word| problem.target(word)).collect::<Result<Vec<_>, _>>()?;
         let parameters = resolve(problem, bases, targets, effects)?;
         let mut nominal = Arm::nominal(problem);
         for effect in effects {
-            enter::prepare(&mut nominal, effect.slot, effect.nominal);
+            enter::prepare(&mut nominal, effect.site, effect.nominal);
         }
         for declared in &problem.effects {
             enter::place(&mut nominal, &declared.effect);
@@ -94,7 +101,7 @@ impl Model {
             instrument: Instrument::default(),
             bases: vec![problem.base.clone(); bases.len()],
             targets: own.iter().map(|own| own.at).collect(),
-            carriers: own.iter().map(|own| own.joint).collect(),
+            influential_rows: own.iter().map(|own| own.joint).collect(),
             turned: own.iter().map(|own| own.rotation).collect(),
             fixtures: problem.fixtures.iter().map(FixtureAt::declared).collect(),
             declared: problem.fixtures.iter().map(|own| own.known.clone()).collect(),
@@ -102,23 +109,25 @@ impl Model {
         })
     }
 
-    /// The same model with a further parameter, free and without effect at zero, at each of these slots.
+    /// The same model with a further parameter, free and without effect at zero, at each of these
+    /// slots.
     ///
-    /// Given with each slot is the value that it has where nothing deviates; what the arm declares goes before it.
+    /// Given with each site is the value that it has where nothing deviates; what the arm declares
+    /// goes before it.
     #[must_use]
-    pub fn probing(&self, slots: &[(Slot, f64)]) -> Self {
+    pub fn probing(&self, slots: &[(ParameterSite, f64)]) -> Self {
         let mut model = self.clone();
-        for &(slot, nominal) in slots {
-            enter::prepare(&mut model.nominal, slot, nominal);
-            let added = match slot {
-                Slot::Joint { field, .. } => field.is_geometry(),
-                Slot::Shift { .. } => true,
+        for &(site, nominal) in slots {
+            enter::prepare(&mut model.nominal, site, nominal);
+            let added = match site {
+                ParameterSite::Joint { field, .. } => field.is_geometry(),
+                ParameterSite::Shift { .. } => true,
                 _ => false,
             };
             model.parameters.push(Parameter {
                 name: String::new(),
-                slot,
-                driver: if added { Driver::Unit } else { Driver::Constant },
+                site,
+                regressor: if added { Regressor::Unit } else { Regressor::Constant },
                 nominal,
                 sigma: None,
                 lower: f64::NEG_INFINITY,
@@ -128,7 +137,8 @@ impl Model {
         model
     }
 
-    /// The same model with what these effects declare of the arm besides their parameters: where springs are.
+    /// The same model with what these effects declare of the arm besides their parameters: where
+    /// springs are.
     #[must_use]
     pub(crate) fn placing(&self, effects: &[Effect]) -> Self {
         let mut model = self.clone();
@@ -143,19 +153,21 @@ impl Model {
         self.nominal.joints.len()
     }
 
-    /// How far the nominal arm can stretch \[m\]: Σ √(a² + d²), or ‖xyz‖, over the joints that carry a target and to it, the most of
-    /// all targets; 1 m where all that is nought.
+    /// How far the nominal arm can stretch \[m\]: Σ √(a² + d²), or ‖xyz‖, over the joints that
+    /// carry a target and to it, the most of all targets; 1 m where all that is nought.
     pub fn size(&self) -> f64 {
         let length = |joint: &Joint<f64>| {
-            joint.a.hypot(joint.d) + joint.placement.as_ref().map_or(0.0, |placement| placement.xyz.norm())
+            joint.a.hypot(joint.d)
+                + joint.placement.as_ref().map_or(0.0, |placement| placement.xyz.norm())
         };
         let Arm { joints, tree, .. } = &self.nominal;
         let links = |tip: usize| -> f64 {
-            let carrying = joints.iter().enumerate().filter(|(joint, _)| tree.leads_through(*joint, tip));
+            let carrying =
+                joints.iter().enumerate().filter(|(joint, _)| tree.leads_through(*joint, tip));
             carrying.map(|(_, own)| length(own)).sum()
         };
         let reach = |(target, &tip): (&Vector3<f64>, &usize)| links(tip) + target.norm();
-        let reach = self.targets.iter().zip(&self.carriers).map(reach).fold(0.0, f64::max);
+        let reach = self.targets.iter().zip(&self.influential_rows).map(reach).fold(0.0, f64::max);
         if reach > 0.0 { reach } else { 1.0 }
     }
 
@@ -169,11 +181,15 @@ impl Model {
         let mut arm = self.nominal.lift();
         let mut tilt = [S::from(0.0); 2];
         for (k, parameter) in self.parameters.iter().enumerate() {
-            if parameter.driver.is_constant() {
-                enter::enter(&mut arm, parameter.slot, parameter.nominal, x(k), &mut tilt);
+            if parameter.regressor.is_constant() {
+                enter::enter(&mut arm, parameter.site, parameter.nominal, x(k), &mut tilt);
             }
         }
-        if self.parameters.iter().any(|parameter| matches!(parameter.slot, Slot::Arm(field) if field.turns_gravity())) {
+        if self
+            .parameters
+            .iter()
+            .any(|parameter| matches!(parameter.site, ParameterSite::Arm(field) if field.turns_gravity()))
+        {
             enter::turn_gravity(&mut arm, tilt);
         }
         arm
@@ -193,7 +209,7 @@ impl Model {
     pub fn base_poses(&self, x: &[f64]) -> Vec<BasePose> {
         let mut bases = self.bases.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
-            if let Slot::Base { base, axis } = parameter.slot {
+            if let ParameterSite::Base { base, axis } = parameter.site {
                 if axis < 3 {
                     bases[base].translation[axis] += x;
                 } else {
@@ -206,19 +222,22 @@ impl Model {
 
     /// Base frames in the measuring frame.
     pub fn base_frames(&self, x: &[f64]) -> Vec<Frame<f64>> {
-        self.base_poses(x).iter().map(|base| Frame::from_rotation_vector(base.translation, &base.rotation)).collect()
+        self.base_poses(x)
+            .iter()
+            .map(|base| Frame::from_rotation_vector(base.translation, &base.rotation))
+            .collect()
     }
 
     /// Index of the joint whose frame carries a target.
     pub(crate) fn carrier(&self, target: usize) -> usize {
-        self.carriers.get(target).copied().unwrap_or_else(|| self.nominal.last())
+        self.influential_rows.get(target).copied().unwrap_or_else(|| self.nominal.last())
     }
 
     /// Targets in the frames that carry them \[m\].
     pub fn target_positions(&self, x: &[f64]) -> Vec<Vector3<f64>> {
         let mut targets = self.targets.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
-            if let Slot::Target { target, axis: axis @ 0..3 } = parameter.slot {
+            if let ParameterSite::Target { target, axis: axis @ 0..3 } = parameter.site {
                 targets[target][axis] += x;
             }
         }
@@ -234,7 +253,7 @@ impl Model {
     pub(crate) fn fixtures(&self, x: &[f64]) -> Vec<FixtureAt<f64>> {
         let mut fixtures = self.fixtures.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
-            if let Slot::Fixture { fixture, axis, .. } = parameter.slot {
+            if let ParameterSite::Fixture { fixture, axis, .. } = parameter.site {
                 fixtures[fixture].numbers[axis] += x;
             }
         }
@@ -245,7 +264,7 @@ impl Model {
     pub fn target_rotations(&self, x: &[f64]) -> Vec<Vector3<f64>> {
         let mut turned = self.turned.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
-            if let Slot::Target { target, axis: axis @ 3.. } = parameter.slot {
+            if let ParameterSite::Target { target, axis: axis @ 3.. } = parameter.site {
                 turned[target][axis - 3] += x;
             }
         }

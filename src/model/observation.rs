@@ -1,4 +1,5 @@
-//! What a row of each kind is predicted to measure, from where the target is and where the fixtures are.
+//! What a row of each kind is predicted to measure, from where the target is and where the fixtures
+//! are.
 
 use nalgebra::{Matrix3, Matrix3x4, Vector3};
 use num_dual::DualSVec64;
@@ -9,10 +10,12 @@ use crate::spatial::plane_normal;
 
 /// Most numbers of a fixture.
 const NUMBERS: usize = 4;
-/// What a prediction is differentiated by: the target's three coordinates, then the fixture's numbers.
+/// What a prediction is differentiated by: the target's three coordinates, then the fixture's
+/// numbers.
 const INPUTS: usize = 3 + NUMBERS;
 
-/// A fixture at some parameters: its numbers in the order of [`FixtureKind::fields`], SI, measuring frame; 0 behind the last.
+/// A fixture at some parameters: its numbers in the order of [`FixtureKind::fields`], SI, measuring
+/// frame; 0 behind the last.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FixtureAt<S> {
     pub kind: FixtureKind,
@@ -46,7 +49,8 @@ impl FixtureAt<f64> {
     pub(super) fn slopes(&self, position: &Vector3<f64>) -> Slopes {
         let position = Vector3::from_fn(|i, _| seeded::<INPUTS>(position[i], Some(i)));
         let numbers = std::array::from_fn(|k| seeded::<INPUTS>(self.numbers[k], Some(3 + k)));
-        let seen: Vector3<DualSVec64<INPUTS>> = FixtureAt { kind: self.kind, numbers }.seen(&position);
+        let seen: Vector3<DualSVec64<INPUTS>> =
+            FixtureAt { kind: self.kind, numbers }.seen(&position);
         let by = [gradient(&seen.x), gradient(&seen.y), gradient(&seen.z)];
         Slopes {
             seen: seen.map(|own| own.re),
@@ -56,13 +60,15 @@ impl FixtureAt<f64> {
     }
 }
 
-/// Distance \[m\] between two points, and its derivatives: by the second as the target, by the first as the fixture.
+/// Distance \[m\] between two points, and its derivatives: by the second as the target, by the
+/// first as the fixture.
 pub(super) fn between(first: &FixtureAt<f64>, second: &FixtureAt<f64>) -> Slopes {
     FixtureAt { kind: FixtureKind::Anchor, ..*first }.slopes(&second.place())
 }
 
 impl<S: Scalar> FixtureAt<S> {
-    /// What is seen of the fixture from the target's `position` \[m\], measuring frame; zeros behind the numbers that there are.
+    /// What is seen of the fixture from the target's `position` \[m\], measuring frame; zeros
+    /// behind the numbers that there are.
     ///
     /// - point P: x − P, which is 0 in the socket
     /// - anchor A: ‖x − A‖

@@ -10,13 +10,15 @@ use crate::problem::{BasePose, PoseView};
 use crate::scalar::{gradient, seeded};
 use crate::spatial::{Frame, rotation_axes};
 
-/// A base frame, how its rotation turns with its rotation vector, and the columns of its six coordinates.
+/// A base frame, how its rotation turns with its rotation vector, and the columns of its six
+/// coordinates.
 #[derive(Clone)]
 pub(super) struct Base {
     pub frame: Frame<f64>,
     /// Where the coordinates of its translation move it, measuring frame.
     pub along: [Vector3<f64>; 3],
-    /// What turns it besides, about the measuring frame's origin: columns, and what they do to a point.
+    /// What turns it besides, about the measuring frame's origin: columns, and what they do to a
+    /// point.
     turns: Vec<(usize, Frame<f64>)>,
     turning: [Frame<f64>; 3],
     pub columns: [Option<usize>; 6],
@@ -53,9 +55,13 @@ impl Base {
         }
     }
 
-    /// The same turned by a rotation vector \[rad\] about the measuring frame's origin, with columns and what each is multiplied by for
-    /// coordinates of that vector.
-    pub fn turned_by(&self, turn: &Vector3<f64>, columns: impl Iterator<Item = (usize, usize, f64)>) -> Self {
+    /// The same turned by a rotation vector \[rad\] about the measuring frame's origin, with
+    /// columns and what each is multiplied by for coordinates of that vector.
+    pub fn turned_by(
+        &self,
+        turn: &Vector3<f64>,
+        columns: impl Iterator<Item = (usize, usize, f64)>,
+    ) -> Self {
         let by = Frame::from_rotation_vector(Vector3::zeros(), turn);
         let (turning, back) = (turning(turn), by.inverse());
         let column = |(axis, column, factor): (usize, usize, f64)| {
@@ -71,19 +77,31 @@ impl Base {
         }
     }
 
-    /// What the rotation of the base does to a point \[m\], measuring frame, by the columns of its coordinates.
-    pub fn turned<'b>(&'b self, point: &Vector3<f64>) -> impl Iterator<Item = (usize, Vector3<f64>)> + 'b {
+    /// What the rotation of the base does to a point \[m\], measuring frame, by the columns of its
+    /// coordinates.
+    pub fn turned<'b>(
+        &'b self,
+        point: &Vector3<f64>,
+    ) -> impl Iterator<Item = (usize, Vector3<f64>)> + 'b {
         let (in_arm, point) = (self.frame.resolve(&(point - self.frame.origin)), *point);
         let columns = self.columns[3..].iter().zip(&self.turning);
-        let own = columns.filter_map(move |(column, turning)| Some(((*column)?, turning.vector(&in_arm))));
+        let own = columns
+            .filter_map(move |(column, turning)| Some(((*column)?, turning.vector(&in_arm))));
         own.chain(self.turns.iter().map(move |(column, slope)| (*column, slope.vector(&point))))
     }
 }
 
 impl Target {
-    /// At a place \[m\] and with a rotation vector \[rad\] in the frame of the joint `carrier`; no coordinate has a column yet.
+    /// At a place \[m\] and with a rotation vector \[rad\] in the frame of the joint `carrier`; no
+    /// coordinate has a column yet.
     pub fn new(carrier: usize, position: Vector3<f64>, rotation: &Vector3<f64>) -> Self {
-        Self { carrier, position, axes: rotation_axes(rotation), turning: turning(rotation), columns: [None; 6] }
+        Self {
+            carrier,
+            position,
+            axes: rotation_axes(rotation),
+            turning: turning(rotation),
+            columns: [None; 6],
+        }
     }
 
     /// What its own rotation does to its axes, in that frame, by the columns of its coordinates.
@@ -94,8 +112,9 @@ impl Target {
 }
 
 impl Inner {
-    /// Writes the derivatives of a point \[m\] in the frame of a joint with respect to the arm's own parameters; returns that frame,
-    /// measuring frame, `None` where the pose has no equilibrium.
+    /// Writes the derivatives of a point \[m\] in the frame of a joint with respect to the arm's
+    /// own parameters; returns that frame, measuring frame, `None` where the pose has no
+    /// equilibrium.
     ///
     /// `setup` is the pose as the joints take it, `commanded` as it was commanded.
     #[inline]
@@ -114,9 +133,13 @@ impl Inner {
     }
 }
 
-/// Derivatives of a rotation exp(`[w]×`) with respect to the three coordinates of w, as the derivatives of its axes.
+/// Derivatives of a rotation exp(`[w]×`) with respect to the three coordinates of w, as the
+/// derivatives of its axes.
 fn turning(w: &Vector3<f64>) -> [Frame<f64>; 3] {
     let seeded_w: Vector3<DualSVec64<3>> = Vector3::from_fn(|i, _| seeded(w[i], Some(i)));
     let axes = rotation_axes(&seeded_w).map(|axis| axis.map(|coordinate| gradient(&coordinate)));
-    std::array::from_fn(|k| Frame { axes: axes.map(|axis| axis.map(|g| g[k])), origin: Vector3::zeros() })
+    std::array::from_fn(|k| Frame {
+        axes: axes.map(|axis| axis.map(|g| g[k])),
+        origin: Vector3::zeros(),
+    })
 }

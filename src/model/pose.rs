@@ -15,7 +15,8 @@ pub struct Pose<'a> {
     pub target: usize,
     /// What is measured of it.
     pub observation: Observation,
-    /// The measured numbers, zeros behind them \[m\]: the position, measuring frame; a distance; 0 of a contact.
+    /// The measured numbers, zeros behind them \[m\]: the position, measuring frame; a distance; 0
+    /// of a contact.
     pub measured: &'a Vector3<f64>,
     /// 1 σ of each of them \[m\].
     pub sigma: f64,
@@ -24,7 +25,8 @@ pub struct Pose<'a> {
 }
 
 impl Pose<'_> {
-    /// How many numbers are measured: those of the observation, and three of an orientation that counts.
+    /// How many numbers are measured: those of the observation, and three of an orientation that
+    /// counts.
     pub fn coordinates(&self) -> usize {
         self.observation.coordinates() + if self.orientation.is_some() { 3 } else { 0 }
     }

@@ -22,10 +22,12 @@ use crate::spatial::{Frame, rotation_axes, turn_between};
 const POSITION: usize = 3;
 const POSE: usize = 6;
 
-/// Whitened residuals (measured − predicted) / σ of some poses as a function of some of the parameters.
+/// Whitened residuals (measured − predicted) / σ of some poses as a function of some of the
+/// parameters.
 ///
-/// Three rows a pose, 0 behind the numbers that it measures; six where any has an orientation that counts, the last three log(R Rₚᵀ) / σ of measured R and predicted Rₚ,
-/// measuring frame, and 0 for poses without.
+/// Three rows a pose, 0 behind the numbers that it measures; six where any has an orientation that
+/// counts, the last three log(R Rₚᵀ) / σ of measured R and predicted Rₚ, measuring frame, and 0 for
+/// poses without.
 pub struct PoseResiduals<'a> {
     model: &'a Model,
     poses: Arc<Vec<Pose<'a>>>,
@@ -48,10 +50,17 @@ struct Seen {
 }
 
 impl<'a> PoseResiduals<'a> {
-    /// Residuals of `poses`, which may be shared with others; the parameters listed in `unknowns` vary, the others stay as in `at`.
-    pub fn new(model: &'a Model, poses: impl Into<Arc<Vec<Pose<'a>>>>, unknowns: Vec<usize>, at: DVector<f64>) -> Self {
+    /// Residuals of `poses`, which may be shared with others; the parameters listed in `unknowns`
+    /// vary, the others stay as in `at`.
+    pub fn new(
+        model: &'a Model,
+        poses: impl Into<Arc<Vec<Pose<'a>>>>,
+        unknowns: Vec<usize>,
+        at: DVector<f64>,
+    ) -> Self {
         let poses = poses.into();
-        let rows = if poses.iter().any(|pose| pose.orientation.is_some()) { POSE } else { POSITION };
+        let rows =
+            if poses.iter().any(|pose| pose.orientation.is_some()) { POSE } else { POSITION };
         let tilted = poses.iter().any(|pose| pose.observation.is_angle());
         Self { model, poses, unknowns, at, rows, tilted, known: None }
     }
@@ -91,13 +100,17 @@ impl<'a> PoseResiduals<'a> {
         self.errors(x, |pose, seen| pose.measured - seen.position)
     }
 
-    /// Rotation vectors from the predicted to the measured orientations, measuring frame \[rad\]; 0 for poses without, NaN where a
-    /// pose has no equilibrium.
+    /// Rotation vectors from the predicted to the measured orientations, measuring frame \[rad\]; 0
+    /// for poses without, NaN where a pose has no equilibrium.
     pub fn orientation_errors(&self, x: &DVector<f64>) -> Vec<Vector3<f64>> {
         self.errors(x, |_, seen| seen.turn.unwrap_or_default())
     }
 
-    fn errors(&self, x: &DVector<f64>, of: impl Fn(&Pose, &Seen) -> Vector3<f64> + Sync) -> Vec<Vector3<f64>> {
+    fn errors(
+        &self,
+        x: &DVector<f64>,
+        of: impl Fn(&Pose, &Seen) -> Vector3<f64> + Sync,
+    ) -> Vec<Vector3<f64>> {
         let mut errors = vec![Vector3::zeros(); self.poses.len()];
         let write = |(chunk, errors): (usize, &mut [Vector3<f64>])| {
             let first = chunk * CHUNK_ITEMS;
@@ -116,7 +129,12 @@ impl<'a> PoseResiduals<'a> {
         errors
     }
 
-    fn each_prediction(&self, x: &DVector<f64>, items: Range<usize>, mut use_it: impl FnMut(&Pose, Seen)) {
+    fn each_prediction(
+        &self,
+        x: &DVector<f64>,
+        items: Range<usize>,
+        mut use_it: impl FnMut(&Pose, Seen),
+    ) {
         let full = self.full(x);
         let arm = self.model.arm(|k| full[k]);
         let bases = self.model.base_frames(full.as_slice());
@@ -137,7 +155,8 @@ impl<'a> PoseResiduals<'a> {
             }
             let lost = Vector3::from_element(f64::NAN);
             if let Observation::Tilt(frame) = pose.observation {
-                let tilts = tilts.get_or_insert_with(|| Tilts::new(self.model, &full, arm.clone(), Vec::new()));
+                let tilts = tilts
+                    .get_or_insert_with(|| Tilts::new(self.model, &full, arm.clone(), Vec::new()));
                 let seen = tilts.at(&commands.apply(&pose.setup), frame).unwrap_or(lost);
                 use_it(pose, Seen { position: seen, turn: None });
                 continue;
@@ -152,8 +171,10 @@ impl<'a> PoseResiduals<'a> {
                     let base = instrument.base(&bases[pose.base], &pose.setup);
                     let position = base.point(&rest.frame.point(&targets[pose.target]));
                     let turn = pose.orientation.map(|own| {
-                        let axes = turned[pose.target].map(|axis| base.vector(&rest.frame.vector(&axis)));
-                        own.axes().map_or(Vector3::zeros(), |measured| turn_between(&axes, &measured))
+                        let axes =
+                            turned[pose.target].map(|axis| base.vector(&rest.frame.vector(&axis)));
+                        own.axes()
+                            .map_or(Vector3::zeros(), |measured| turn_between(&axes, &measured))
                     });
                     let seen = match pose.observation.fixture() {
                         Some(fixture) if pose.observation.is_point() => {
@@ -172,33 +193,45 @@ impl<'a> PoseResiduals<'a> {
 }
 
 impl Model {
-    /// Residuals measured − predicted of poses at the full parameter vector `x`, measuring frame \[m\]; NaN where a pose has no
-    /// equilibrium.
+    /// Residuals measured − predicted of poses at the full parameter vector `x`, measuring frame
+    /// \[m\]; NaN where a pose has no equilibrium.
     pub fn residuals(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
         PoseResiduals::new(self, poses, Vec::new(), x.clone()).position_errors(&DVector::zeros(0))
     }
 
-    /// Predicted positions of poses at the full parameter vector `x`, as measured, measuring frame \[m\]; NaN where a pose has no
-    /// equilibrium.
+    /// Predicted positions of poses at the full parameter vector `x`, as measured, measuring frame
+    /// \[m\]; NaN where a pose has no equilibrium.
     pub fn predict(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
         let measured: Vec<Vector3<f64>> = poses.iter().map(|pose| *pose.measured).collect();
-        measured.into_iter().zip(self.residuals(poses, x)).map(|(measured, residual)| measured - residual).collect()
+        measured
+            .into_iter()
+            .zip(self.residuals(poses, x))
+            .map(|(measured, residual)| measured - residual)
+            .collect()
     }
 
-    /// Rotation vectors from the predicted to the measured orientations of poses, measuring frame \[rad\], as
-    /// [`PoseResiduals::orientation_errors`].
+    /// Rotation vectors from the predicted to the measured orientations of poses, measuring frame
+    /// \[rad\], as [`PoseResiduals::orientation_errors`].
     pub fn orientation_residuals(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
-        PoseResiduals::new(self, poses, Vec::new(), x.clone()).orientation_errors(&DVector::zeros(0))
+        PoseResiduals::new(self, poses, Vec::new(), x.clone())
+            .orientation_errors(&DVector::zeros(0))
     }
 
-    /// Frames that carry the targets, in the arm's base frame, at the full parameter vector `x`; `None` without equilibrium.
+    /// Frames that carry the targets, in the arm's base frame, at the full parameter vector `x`;
+    /// `None` without equilibrium.
     pub fn frames(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Frame<f64>>> {
         let arm = self.arm(|k| x[k]);
         let some = |poses: &[Pose]| {
             let mut commands = self.commands(x);
             let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
             let mut frame = |pose: &Pose| {
-                arm.equilibrate_at(&commands.apply(&pose.setup), self.carrier(pose.target), &mut ws, &mut rest).ok()?;
+                arm.equilibrate_at(
+                    &commands.apply(&pose.setup),
+                    self.carrier(pose.target),
+                    &mut ws,
+                    &mut rest,
+                )
+                .ok()?;
                 Some(rest.frame)
             };
             poses.iter().map(&mut frame).collect::<Vec<_>>()
@@ -206,25 +239,29 @@ impl Model {
         poses.par_chunks(CHUNK_ITEMS).flat_map_iter(some).collect()
     }
 
-    /// Predicted orientations of the targets at the full parameter vector `x`, rotation vectors, measuring frame \[rad\]; NaN where a
-    /// pose has no equilibrium.
+    /// Predicted orientations of the targets at the full parameter vector `x`, rotation vectors,
+    /// measuring frame \[rad\]; NaN where a pose has no equilibrium.
     pub fn orientations(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let (bases, turned) = (self.base_frames(x), self.target_rotations(x));
         let instrument = self.instrument_at(x);
         let still = [Vector3::x(), Vector3::y(), Vector3::z()];
         let orientation = |(pose, frame): (&Pose, Option<Frame<f64>>)| {
             let last = instrument.base(&bases[pose.base], &pose.setup).seen(&frame?);
-            Some(turn_between(&still, &rotation_axes(&turned[pose.target]).map(|axis| last.vector(&axis))))
+            Some(turn_between(
+                &still,
+                &rotation_axes(&turned[pose.target]).map(|axis| last.vector(&axis)),
+            ))
         };
         let all = poses.iter().zip(self.frames(poses, x)).map(orientation);
         all.map(|turn| turn.unwrap_or(Vector3::from_element(f64::NAN))).collect()
     }
 
-    /// Positions of poses as the geometry alone has them at the full parameter vector `x`, as measured, measuring frame \[m\]: nothing
-    /// of the arm gives way, and no effect acts on it.
+    /// Positions of poses as the geometry alone has them at the full parameter vector `x`, as
+    /// measured, measuring frame \[m\]: nothing of the arm gives way, and no effect acts on it.
     pub fn geometric_positions(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let arm = self.arm(|k| x[k]);
-        let (bases, targets, instrument) = (self.base_frames(x), self.target_positions(x), self.instrument_at(x));
+        let (bases, targets, instrument) =
+            (self.base_frames(x), self.target_positions(x), self.instrument_at(x));
         let mut commands = Commands::new(&self.driven, &[], &[]);
         let position = |pose: &Pose| {
             let tip = arm.rigid_frame(&commands.apply(&pose.setup), self.carrier(pose.target));
@@ -234,11 +271,13 @@ impl Model {
         poses.iter().map(position).collect()
     }
 
-    /// Residuals measured − predicted of poses, whatever they measure, as the geometry alone predicts them at the full parameter vector
-    /// `x` \[m\], of tilts \[rad\]; points, anchors and surfaces are where `x` has them.
+    /// Residuals measured − predicted of poses, whatever they measure, as the geometry alone
+    /// predicts them at the full parameter vector `x` \[m\], of tilts \[rad\]; points, anchors and
+    /// surfaces are where `x` has them.
     pub fn geometric_residuals(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let arm = self.arm(|k| x[k]);
-        let (bases, targets, instrument) = (self.base_frames(x), self.target_positions(x), self.instrument_at(x));
+        let (bases, targets, instrument) =
+            (self.base_frames(x), self.target_positions(x), self.instrument_at(x));
         let fixtures = self.fixtures(x);
         let mut commands = Commands::new(&self.driven, &[], &[]);
         let residual = |pose: &Pose| {
@@ -253,7 +292,9 @@ impl Model {
                     let tip = arm.rigid_frame(&setup, self.carrier(pose.target));
                     let position = base.point(&tip.point(&targets[pose.target]));
                     match of.fixture() {
-                        Some(fixture) if of.is_point() => base.resolve(&fixtures[fixture].seen(&position)),
+                        Some(fixture) if of.is_point() => {
+                            base.resolve(&fixtures[fixture].seen(&position))
+                        }
                         Some(fixture) => fixtures[fixture].seen(&position),
                         None => instrument.of(&position, &pose.setup),
                     }
@@ -264,7 +305,8 @@ impl Model {
         poses.iter().map(residual).collect()
     }
 
-    /// The arm as a line to the target at the full parameter vector `x`, measuring frame \[m\]; `None` without equilibrium.
+    /// The arm as a line to the target at the full parameter vector `x`, measuring frame \[m\];
+    /// `None` without equilibrium.
     pub fn shapes(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Shape>> {
         let arm = self.arm(|k| x[k]);
         let (bases, targets) = (self.base_frames(x), self.target_positions(x));
@@ -275,27 +317,40 @@ impl Model {
             let Shape { mut rigid, mut bent } = arm.shape(&setup, tip).ok()?;
             rigid.push(arm.rigid_frame(&setup, tip).point(&targets[pose.target]));
             bent.push(frame?.point(&targets[pose.target]));
-            rigid.iter_mut().chain(&mut bent).for_each(|point| *point = bases[pose.base].point(point));
+            rigid
+                .iter_mut()
+                .chain(&mut bent)
+                .for_each(|point| *point = bases[pose.base].point(point));
             Some(Shape { rigid, bent })
         };
         poses.iter().zip(self.frames(poses, x)).map(shape).collect()
     }
 
-    /// Where the arm has its target in each pose at the full parameter vector `x`, whatever was measured of it, measuring frame \[m\]; NaN
-    /// without equilibrium. What effects do to the measurement is not in them.
+    /// Where the arm has its target in each pose at the full parameter vector `x`, whatever was
+    /// measured of it, measuring frame \[m\]; NaN without equilibrium. What effects do to the
+    /// measurement is not in them.
     pub(crate) fn target_places(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let (bases, points) = (self.base_frames(x), self.points(poses, x));
         let lost = Vector3::from_element(f64::NAN);
-        poses.iter().zip(points).map(|(pose, at)| at.map_or(lost, |at| bases[pose.base].point(&at))).collect()
+        poses
+            .iter()
+            .zip(points)
+            .map(|(pose, at)| at.map_or(lost, |at| bases[pose.base].point(&at)))
+            .collect()
     }
 
-    /// Target positions in the arm's base frame \[m\] at the full parameter vector `x`; `None` without equilibrium.
+    /// Target positions in the arm's base frame \[m\] at the full parameter vector `x`; `None`
+    /// without equilibrium.
     ///
     /// What effects do to the measurement is not in them.
     pub fn points(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Vector3<f64>>> {
         let targets = self.target_positions(x);
         let frames = self.frames(poses, x);
-        poses.iter().zip(frames).map(|(pose, frame)| Some(frame?.point(&targets[pose.target]))).collect()
+        poses
+            .iter()
+            .zip(frames)
+            .map(|(pose, frame)| Some(frame?.point(&targets[pose.target])))
+            .collect()
     }
 }
 
@@ -315,7 +370,9 @@ impl LeastSquares for PoseResiduals<'_> {
     fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
         let mut rows = out.chunks_exact_mut(self.rows);
         self.each_prediction(x, items, |pose, seen| {
-            let Some((position, turn)) = rows.next().map(|row| row.split_at_mut(POSITION)) else { return };
+            let Some((position, turn)) = rows.next().map(|row| row.split_at_mut(POSITION)) else {
+                return;
+            };
             position.copy_from_slice(((pose.measured - seen.position) / pose.sigma).as_slice());
             let sigma = pose.orientation.map_or(1.0, |own| own.sigma);
             let error = seen.turn.unwrap_or_default() / sigma;
@@ -326,18 +383,21 @@ impl LeastSquares for PoseResiduals<'_> {
     fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
         let linearise = |unknowns: &[usize], block: &mut Block| {
             let full = self.full(x);
-            let mut linearised = Linearised::new(self.model, &full, unknowns, (self.rows == POSE, self.tilted));
+            let mut linearised =
+                Linearised::new(self.model, &full, unknowns, (self.rows == POSE, self.tilted));
             for (k, pose) in self.poses[items.clone()].iter().enumerate() {
                 linearised.write(pose, block, self.rows * k);
             }
         };
         let parameters = self.model.parameters.as_slice();
         if let Some(known) = self.known.filter(|_| self.rows == POSITION)
-            && let Some(lacking) = known.lacking(&self.poses, (parameters, &self.full(x)), &self.unknowns)
+            && let Some(lacking) =
+                known.lacking(&self.poses, (parameters, &self.full(x)), &self.unknowns)
         {
             let mut new = Block::zeros(block.rows(), lacking.len());
             linearise(&lacking.iter().map(|&j| self.unknowns[j]).collect::<Vec<_>>(), &mut new);
-            let (of, own) = ((self.poses.as_slice(), items.clone()), (parameters, self.unknowns.as_slice()));
+            let (of, own) =
+                ((self.poses.as_slice(), items.clone()), (parameters, self.unknowns.as_slice()));
             if known.fill(block, of, own, (&new, &lacking)) {
                 return;
             }

@@ -1,8 +1,9 @@
 //! Derivatives of a rigid arm with respect to its own parameters.
 //!
-//! Every parameter belongs to one motion. Inwards, the target is carried through each motion in dual numbers, which tells
-//! what its parameter does in the frame before it; outwards, that frame chains on in plain numbers. Of a tree of joints that is the
-//! way from the base to the target; parameters elsewhere do nothing.
+//! Every parameter belongs to one motion. Inwards, the target is carried through each motion in
+//! dual numbers, which tells what its parameter does in the frame before it; outwards, that frame
+//! chains on in plain numbers. Of a tree of joints that is the way from the base to the target;
+//! parameters elsewhere do nothing.
 
 use nalgebra::Vector3;
 use num_dual::Dual64;
@@ -10,7 +11,7 @@ use num_dual::Dual64;
 use super::inputs::Input;
 use super::rows::Rows;
 use crate::mechanics::{Angle, Arm, Coordinates, Joint, Placement};
-use crate::model::parameter::{JointField, Slot};
+use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{PoseView, Tree};
 use crate::spatial::{Frame, turn_x, turn_y, turn_z};
 
@@ -25,14 +26,16 @@ pub(super) struct Rigid {
     placed: Vec<[Vector3<f64>; 6]>,
 }
 
-/// A link with each of its parameters seeded, and which input each is: the five of its motions, and the six of its placement.
+/// A link with each of its parameters seeded, and which input each is: the five of its motions, and
+/// the six of its placement.
 struct Link {
     joint: Joint<Dual64>,
     inputs: [Option<usize>; 5],
     placing: [Option<usize>; 6],
 }
 
-/// What the parameters of a link do to the target, each in the frame before its own motion, and where q puts the joint.
+/// What the parameters of a link do to the target, each in the frame before its own motion, and
+/// where q puts the joint.
 struct Carried {
     derivatives: [Vector3<f64>; 5],
     coordinates: Coordinates<Dual64>,
@@ -43,8 +46,10 @@ impl Rigid {
     pub fn new(arm: &Arm<f64>, inputs: Vec<Input>) -> Self {
         let mut links: Vec<Link> = arm.joints.iter().map(Link::seeded).collect();
         for (index, input) in inputs.iter().enumerate() {
-            if let Slot::Joint { joint, field } = input.slot {
-                if let Some(place) = JointField::GEOMETRY.iter().position(|&geometric| geometric == field) {
+            if let ParameterSite::Joint { joint, field } = input.site {
+                if let Some(place) =
+                    JointField::GEOMETRY.iter().position(|&geometric| geometric == field)
+                {
                     links[joint].inputs[place] = Some(index);
                 }
                 if let Some(place) = field.placement() {
@@ -55,7 +60,8 @@ impl Rigid {
         Self { links, tree: arm.tree.clone(), inputs, carried: Vec::new(), placed: Vec::new() }
     }
 
-    /// Writes the derivatives of a target \[m\] in the frame of the joint `tip`; returns that frame, measuring frame.
+    /// Writes the derivatives of a target \[m\] in the frame of the joint `tip`; returns that
+    /// frame, measuring frame.
     #[inline]
     pub fn write(
         &mut self,
@@ -91,7 +97,11 @@ impl Rigid {
             {
                 place(placement, &mut frame, |place, frame| {
                     if let Some(input) = link.placing[place] {
-                        rows.put_input(&inputs[input], commanded, &frame.vector(&derivatives[place]));
+                        rows.put_input(
+                            &inputs[input],
+                            commanded,
+                            &frame.vector(&derivatives[place]),
+                        );
                     }
                 });
             }
@@ -111,7 +121,9 @@ impl Link {
         let angle = |angle: Angle<f64>| Angle::new(seed(angle.value));
         let (alpha, beta) = (angle(joint.alpha), angle(joint.beta));
         let (a, theta, d) = (seed(joint.a), seed(joint.theta), seed(joint.d));
-        let placement = joint.placement.map(|own| Placement { xyz: own.xyz.map(seed), rpy: own.rpy.map(angle) });
+        let placement = joint
+            .placement
+            .map(|own| Placement { xyz: own.xyz.map(seed), rpy: own.rpy.map(angle) });
         Self {
             joint: Joint { placement, alpha, a, theta, d, beta, ..joint.lift() },
             inputs: [None; 5],
@@ -119,12 +131,18 @@ impl Link {
         }
     }
 
-    /// Carries a point \[m\] from the frame after the link to the frame before it, with what α, a, θ, d, β do to it.
+    /// Carries a point \[m\] from the frame after the link to the frame before it, with what α, a,
+    /// θ, d, β do to it.
     #[inline]
-    fn carry(&self, at: &Coordinates<Dual64>, point: &Vector3<f64>) -> ([Vector3<f64>; 5], Vector3<f64>) {
+    fn carry(
+        &self,
+        at: &Coordinates<Dual64>,
+        point: &Vector3<f64>,
+    ) -> ([Vector3<f64>; 5], Vector3<f64>) {
         let Joint { alpha, a, beta, .. } = &self.joint;
         let (by_beta, point) = derivative(&turn_y(beta.sin_cos, point));
-        let (by_d, point) = derivative(&Vector3::new(point.x.into(), point.y.into(), at.offset + point.z));
+        let (by_d, point) =
+            derivative(&Vector3::new(point.x.into(), point.y.into(), at.offset + point.z));
         let (by_theta, point) = derivative(&turn_z(at.angle, &point));
         let (by_a, point) = derivative(&Vector3::new(*a + point.x, point.y.into(), point.z.into()));
         let (by_alpha, point) = derivative(&turn_x(alpha.sin_cos, &point));
@@ -133,7 +151,12 @@ impl Link {
 
     /// Moves `frame` through the link; `before` sees it before each motion.
     #[inline]
-    fn advance(&self, at: &Coordinates<Dual64>, frame: &mut Frame<f64>, mut before: impl FnMut(usize, &Frame<f64>)) {
+    fn advance(
+        &self,
+        at: &Coordinates<Dual64>,
+        frame: &mut Frame<f64>,
+        mut before: impl FnMut(usize, &Frame<f64>),
+    ) {
         let Joint { alpha, a, beta, .. } = &self.joint;
         before(0, frame);
         frame.rotate_x(real(alpha.sin_cos));
@@ -148,9 +171,12 @@ impl Link {
     }
 }
 
-/// Carries a point \[m\] from behind a placement to before it, with what x, y, z, roll, pitch, yaw do to it, each in the frame
-/// before its own motion.
-fn carry_through(placement: &Placement<Dual64>, point: &Vector3<f64>) -> ([Vector3<f64>; 6], Vector3<f64>) {
+/// Carries a point \[m\] from behind a placement to before it, with what x, y, z, roll, pitch, yaw
+/// do to it, each in the frame before its own motion.
+fn carry_through(
+    placement: &Placement<Dual64>,
+    point: &Vector3<f64>,
+) -> ([Vector3<f64>; 6], Vector3<f64>) {
     let [roll, pitch, yaw] = &placement.rpy;
     let (by_roll, point) = derivative(&turn_x(roll.sin_cos, point));
     let (by_pitch, point) = derivative(&turn_y(pitch.sin_cos, &point));
@@ -160,7 +186,11 @@ fn carry_through(placement: &Placement<Dual64>, point: &Vector3<f64>) -> ([Vecto
 }
 
 /// Moves `frame` through a placement; `before` sees it before each motion.
-fn place(placement: &Placement<Dual64>, frame: &mut Frame<f64>, mut before: impl FnMut(usize, &Frame<f64>)) {
+fn place(
+    placement: &Placement<Dual64>,
+    frame: &mut Frame<f64>,
+    mut before: impl FnMut(usize, &Frame<f64>),
+) {
     let [roll, pitch, yaw] = &placement.rpy;
     (0..3).for_each(|axis| before(axis, frame));
     frame.translate(&placement.xyz.map(|coordinate| coordinate.re));

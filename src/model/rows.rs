@@ -45,8 +45,8 @@ impl Rows<'_> {
             self.put(column, derivative);
         }
         let mut waves = Waves::default();
-        for &(column, driver) in &input.driven {
-            self.put(column, &(derivative * waves.value(driver, commanded)));
+        for &(column, regressor) in &input.driven {
+            self.put(column, &(derivative * waves.value(regressor, commanded)));
         }
     }
 }

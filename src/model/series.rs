@@ -3,7 +3,7 @@
 use multiversion::multiversion;
 
 use super::driven::{Driven, Place};
-use crate::model::parameter::Driver;
+use crate::model::parameter::Regressor;
 
 /// Orders that are summed side by side.
 const LANES: usize = 4;
@@ -24,11 +24,12 @@ pub(super) struct Series {
 }
 
 impl Series {
-    /// Takes out of what drives a pose the waves of a joint that add to the same, where these are many and leave few orders out.
+    /// Takes out of what drives a pose the waves of a joint that add to the same, where these are
+    /// many and leave few orders out.
     pub fn take(all: &mut Vec<Driven>) -> Vec<Self> {
         let mut found: Vec<(Self, usize)> = Vec::new();
-        for &Driven { place, driver, value } in &*all {
-            let Some((joint, order, of)) = wave(driver) else { continue };
+        for &Driven { place, regressor, value } in &*all {
+            let Some((joint, order, of)) = wave(regressor) else { continue };
             let is_it = |(own, _): &(Self, usize)| (own.place, own.joint) == (place, joint);
             let number = found.iter().position(is_it).unwrap_or(found.len());
             if number == found.len() {
@@ -45,7 +46,7 @@ impl Series {
         found.retain(|(series, waves)| *waves >= MANY && *waves >= DENSE * series.terms.len());
         let taken: Vec<Self> = found.into_iter().map(|(series, _)| series).collect();
         all.retain(|own| {
-            wave(own.driver).is_none_or(|(joint, ..)| {
+            wave(own.regressor).is_none_or(|(joint, ..)| {
                 !taken.iter().any(|series| (series.place, series.joint) == (own.place, joint))
             })
         });
@@ -58,11 +59,15 @@ impl Series {
     }
 }
 
-/// Joint, order less one, and whether it is a cosine, of a driver that is a wave of a whole order.
-fn wave(driver: Driver) -> Option<(usize, usize, usize)> {
-    match driver {
-        Driver::Sine(joint, order) if (1..=HIGHEST).contains(&order) => Some((joint, order as usize - 1, 0)),
-        Driver::Cosine(joint, order) if (1..=HIGHEST).contains(&order) => Some((joint, order as usize - 1, 1)),
+/// Joint, order less one, and whether it is a cosine, of a regressor that is a wave of a whole order.
+fn wave(regressor: Regressor) -> Option<(usize, usize, usize)> {
+    match regressor {
+        Regressor::Sine(joint, order) if (1..=HIGHEST).contains(&order) => {
+            Some((joint, order as usize - 1, 0))
+        }
+        Regressor::Cosine(joint, order) if (1..=HIGHEST).contains(&order) => {
+            Some((joint, order as usize - 1, 1))
+        }
         _ => None,
     }
 }
@@ -99,20 +104,24 @@ mod tests {
         let mut all: Vec<Driven> = Vec::new();
         for order in 1..=43 {
             let value = 1e-3 / f64::from(order);
-            all.push(Driven { place, driver: Driver::Sine(1, order), value });
-            all.push(Driven { place, driver: Driver::Cosine(1, order), value: -2.0 * value });
+            all.push(Driven { place, regressor: Regressor::Sine(1, order), value });
+            all.push(Driven { place, regressor: Regressor::Cosine(1, order), value: -2.0 * value });
         }
         // Others stay by themselves: another place, few waves, orders far apart.
         let few = [(Place::Joint(2), 1, 3), (place, 2, 1), (place, 2, 400)];
-        let few = few.map(|(place, joint, order)| Driven { place, driver: Driver::Sine(joint, order), value: 1.0 });
+        let few = few.map(|(place, joint, order)| Driven {
+            place,
+            regressor: Regressor::Sine(joint, order),
+            value: 1.0,
+        });
         let mut left: Vec<Driven> = all.iter().chain(&few).copied().collect();
-        left.push(Driven { place, driver: Driver::Elapsed, value: 1.0 });
+        left.push(Driven { place, regressor: Regressor::Elapsed, value: 1.0 });
         let series = Series::take(&mut left);
         assert!(series.len() == 1 && left.len() == 4 && left[..3] == few);
         for k in -30..30 {
             let configuration = [0.4, 0.21 * f64::from(k), 1.0];
             let pose = PoseView::of(&configuration);
-            let expected: f64 = all.iter().map(|own| own.value * own.driver.value(&pose)).sum();
+            let expected: f64 = all.iter().map(|own| own.value * own.regressor.value(&pose)).sum();
             assert!((series[0].value(&configuration) - expected).abs() < 1e-15);
         }
     }

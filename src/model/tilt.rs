@@ -79,15 +79,19 @@ fn tilts(
     ws: &mut Workspace<Dual64>,
 ) -> Vector3<Dual64> {
     let frames = arm.frames(setup, rest, ws);
-    let Some(frame) = frames.get(frame).or(frames.last()) else { return Vector3::from_element(Dual64::from(0.0)) };
+    let Some(frame) = frames.get(frame).or(frames.last()) else {
+        return Vector3::from_element(Dual64::from(0.0));
+    };
     above(&frame.axes, &arm.gravity)
 }
 
-/// How far the x and the y axis of a frame lie above the horizontal: sin τ = a·u with u up, against gravity.
+/// How far the x and the y axis of a frame lie above the horizontal: sin τ = a·u with u up, against
+/// gravity.
 fn above<S: Scalar>(axes: &[Vector3<S>; 3], gravity: &Vector3<S>) -> Vector3<S> {
     let zero = S::from(0.0);
     let weight = gravity.dot(gravity).sqrt();
-    let up = if weight.re() > 0.0 { -gravity / weight } else { Vector3::new(zero, zero, S::from(1.0)) };
+    let up =
+        if weight.re() > 0.0 { -gravity / weight } else { Vector3::new(zero, zero, S::from(1.0)) };
     let tilt = |axis: &Vector3<S>| {
         let sine = axis.dot(&up);
         let level = axis.cross(&up);

@@ -1,4 +1,5 @@
-//! Derivatives of an orientation, from those of points: where the ends of the target's axes go, so turns the target.
+//! Derivatives of an orientation, from those of points: where the ends of the target's axes go, so
+//! turns the target.
 
 use nalgebra::Vector3;
 
@@ -22,10 +23,11 @@ pub(super) struct About<'a> {
     pub last: &'a Frame<f64>,
 }
 
-/// Writes the whitened residual log(R Rₚᵀ) / σ and its derivatives into three rows of a block of zeros.
+/// Writes the whitened residual log(R Rₚᵀ) / σ and its derivatives into three rows of a block of
+/// zeros.
 ///
-/// With eₖ the axes of Rₚ and deₖ what a parameter does to them, Rₚ turns by ω = ½ Σ eₖ × deₖ, and the residual r changes by
-/// −J⁻¹(r) ω  ([`logarithm_slope`]).
+/// With eₖ the axes of Rₚ and deₖ what a parameter does to them, Rₚ turns by ω = ½ Σ eₖ × deₖ, and
+/// the residual r changes by −J⁻¹(r) ω  ([`logarithm_slope`]).
 pub(super) fn write(
     inner: &mut Inner,
     probe: &mut Block,
@@ -50,10 +52,12 @@ pub(super) fn write(
         }
     }
     let axes = target.axes.map(|axis| last.vector(&axis));
-    let error = orientation.axes().map_or(Vector3::zeros(), |measured| turn_between(&axes, &measured));
+    let error =
+        orientation.axes().map_or(Vector3::zeros(), |measured| turn_between(&axes, &measured));
     let slope = logarithm_slope(&error) / -orientation.sigma;
     let mut put = |column: usize, turned: [Vector3<f64>; 3]| {
-        let turn: Vector3<f64> = axes.iter().zip(&turned).map(|(axis, turned)| axis.cross(turned) * 0.5).sum();
+        let turn: Vector3<f64> =
+            axes.iter().zip(&turned).map(|(axis, turned)| axis.cross(turned) * 0.5).sum();
         block.column_mut(column)[row..row + 3].copy_from_slice((slope * turn).as_slice());
     };
     for column in 0..probe.parameters() {
@@ -65,5 +69,6 @@ pub(super) fn write(
         put(column, turned.map(|axis| last.vector(&axis)));
     }
     let last_column = block.parameters();
-    block.column_mut(last_column)[row..row + 3].copy_from_slice((error / orientation.sigma).as_slice());
+    block.column_mut(last_column)[row..row + 3]
+        .copy_from_slice((error / orientation.sigma).as_slice());
 }

@@ -1,4 +1,5 @@
-//! Factors of symmetric matrices by products of parts, which are fast where columns one by one are not.
+//! Factors of symmetric matrices by products of parts, which are fast where columns one by one are
+//! not.
 
 use nalgebra::{Cholesky, DMatrix, DMatrixViewMut, DVector};
 
@@ -9,7 +10,8 @@ const PANEL: usize = 64;
 
 /// L of M = L Lᵀ, of which the lower half is read; `None` where M is not positive definite.
 ///
-/// Panel after panel: with M = (A · ; B C) and A = L Lᵀ, the rows below are P = B L⁻ᵀ and what is left is C − P Pᵀ.
+/// Panel after panel: with M = (A · ; B C) and A = L Lᵀ, the rows below are P = B L⁻ᵀ and what is
+/// left is C − P Pᵀ.
 pub(crate) fn lower_factor(mut matrix: DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = matrix.nrows();
     if n <= PANEL {
@@ -70,7 +72,12 @@ pub(crate) fn inverse_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
     let first = inverse_lower(&lower.view((0, 0), (half, half)).into_owned());
     let last = inverse_lower(&lower.view((half, half), (rest, rest)).into_owned());
     let mut all = DMatrix::zeros(n, n);
-    all.view_mut((half, 0), (rest, half)).gemm(-1.0, &last, &(lower.view((half, 0), (rest, half)) * &first), 0.0);
+    all.view_mut((half, 0), (rest, half)).gemm(
+        -1.0,
+        &last,
+        &(lower.view((half, 0), (rest, half)) * &first),
+        0.0,
+    );
     all.view_mut((0, 0), (half, half)).copy_from(&first);
     all.view_mut((half, half), (rest, rest)).copy_from(&last);
     all
@@ -82,9 +89,13 @@ pub(crate) fn inverse_factor(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 }
 
 /// x of M x = b, of which the lower half is read; `None` where M is not positive definite.
-pub(crate) fn solve_positive(matrix: DMatrix<f64>, mut right: DVector<f64>) -> Option<DVector<f64>> {
+pub(crate) fn solve_positive(
+    matrix: DMatrix<f64>,
+    mut right: DVector<f64>,
+) -> Option<DVector<f64>> {
     let lower = lower_factor(matrix)?;
-    let solved = lower.solve_lower_triangular_mut(&mut right) && lower.tr_solve_lower_triangular_mut(&mut right);
+    let solved = lower.solve_lower_triangular_mut(&mut right)
+        && lower.tr_solve_lower_triangular_mut(&mut right);
     solved.then_some(right)
 }
 
@@ -95,11 +106,16 @@ mod tests {
     #[test]
     fn it_is_what_columns_one_by_one_come_to() {
         for n in [1, 7, 24, 25, 130] {
-            let a = DMatrix::from_fn(n + 3, n, |i, j| ((12.9898 * i as f64 + 78.233 * j as f64).sin() * 43.7) % 1.0);
+            let a = DMatrix::from_fn(n + 3, n, |i, j| {
+                ((12.9898 * i as f64 + 78.233 * j as f64).sin() * 43.7) % 1.0
+            });
             let mut matrix = DMatrix::identity(n, n) * 0.1 + a.transpose() * a;
             let lower = matrix.clone().cholesky().unwrap().l();
             matrix.fill_upper_triangle(f64::NAN, 1);
-            assert!((inverse_factor(&matrix).unwrap() * &lower - DMatrix::identity(n, n)).amax() < 1e-11);
+            assert!(
+                (inverse_factor(&matrix).unwrap() * &lower - DMatrix::identity(n, n)).amax()
+                    < 1e-11
+            );
             let x = DVector::from_fn(n, |i, _| (i as f64).cos());
             let right = &lower * lower.tr_mul(&x);
             assert!((solve_positive(matrix.clone(), right.clone()).unwrap() - x).amax() < 1e-10);
@@ -111,7 +127,8 @@ mod tests {
     #[test]
     fn what_is_nearly_dependent_is_factored_as_column_by_column() {
         // Sines of close orders, a little added to the diagonal.
-        let a = DMatrix::from_fn(400, 130, |i, j| ((1.0 + 0.05 * j as f64) * i as f64 / 400.0).sin());
+        let a =
+            DMatrix::from_fn(400, 130, |i, j| ((1.0 + 0.05 * j as f64) * i as f64 / 400.0).sin());
         let mut matrix = a.transpose() * &a;
         for j in 0..130 {
             matrix[(j, j)] *= 1.0 + 1e-12;
@@ -121,7 +138,12 @@ mod tests {
         let plain = matrix.clone().cholesky().unwrap().solve(&right);
         let left = |x: &DVector<f64>| (&matrix * x - &right).norm();
         let own = solve_positive(matrix.clone(), right.clone()).unwrap();
-        assert!(left(&own) <= 10.0 * left(&plain) + 1e-12 * right.norm(), "{:e} {:e}", left(&own), left(&plain));
+        assert!(
+            left(&own) <= 10.0 * left(&plain) + 1e-12 * right.norm(),
+            "{:e} {:e}",
+            left(&own),
+            left(&plain)
+        );
         assert!(inverse_factor(&matrix).is_some());
     }
 }

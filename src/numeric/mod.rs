@@ -8,8 +8,8 @@ pub use bootstrap::Interval;
 pub(crate) use bootstrap::mean_interval;
 pub(crate) use factor::{inverse_factor, inverse_lower, lower_factor, solve_positive};
 pub(crate) use product::{
-    gram, lower_product, multiply_by_upper, product, product_along, product_with_upper, product_with_upper_above,
-    take_off_product, transposed_product, zeros,
+    gram, lower_product, multiply_by_upper, product, product_along, product_with_upper,
+    product_with_upper_above, take_off_product, transposed_product, zeros,
 };
 
 /// The median of some values, the mean of the two in the middle of an even number; `None` of none.
@@ -21,7 +21,11 @@ pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 }
 
 /// The interval in which `is_below` turns false, after so many halvings.
-pub(crate) fn bisected(is_below: impl Fn(f64) -> bool, (mut low, mut high): (f64, f64), halvings: usize) -> (f64, f64) {
+pub(crate) fn bisected(
+    is_below: impl Fn(f64) -> bool,
+    (mut low, mut high): (f64, f64),
+    halvings: usize,
+) -> (f64, f64) {
     for _ in 0..halvings {
         let middle = 0.5 * (low + high);
         if is_below(middle) { low = middle } else { high = middle }

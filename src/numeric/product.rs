@@ -1,5 +1,5 @@
-//! Products of tall matrices on every core: each part of the result is one thread's, and parts depend on sizes alone, so that they are
-//! the same to the bit for any number of threads.
+//! Products of tall matrices on every core: each part of the result is one thread's, and parts
+//! depend on sizes alone, so that they are the same to the bit for any number of threads.
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn, MatrixView};
 use rayon::prelude::*;
@@ -8,7 +8,8 @@ use rayon::prelude::*;
 const TOGETHER: usize = 96;
 /// The same of a narrow result, of which nothing is packed.
 const FEW: usize = 8;
-/// Columns up to which a product is formed by axpys and dots: there is too little to do with what would be packed.
+/// Columns up to which a product is formed by axpys and dots: there is too little to do with what
+/// would be packed.
 const NARROW: usize = 5;
 /// Rows that one thread goes through at a time where the result is narrow.
 const SHORT: usize = 1024;
@@ -35,13 +36,18 @@ pub(crate) fn product_with_upper(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<
 }
 
 /// A B of a square upper triangle B, with so many rows of zeros below.
-pub(crate) fn product_with_upper_above(a: &DMatrix<f64>, b: &DMatrix<f64>, more: usize) -> DMatrix<f64> {
+pub(crate) fn product_with_upper_above(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    more: usize,
+) -> DMatrix<f64> {
     let mut out = zeros(a.nrows() + more, b.ncols());
     product_to(a, b, &mut out, |columns| columns);
     out
 }
 
-/// A B of a square upper triangle B, in the place of a large A: new memory takes a good part of the time of the product.
+/// A B of a square upper triangle B, in the place of a large A: new memory takes a good part of the
+/// time of the product.
 pub(crate) fn multiply_by_upper(a: &mut DMatrix<f64>, b: &DMatrix<f64>) {
     if a.len() < WORTH_PLACE {
         *a = product_with_upper(a, b);
@@ -61,12 +67,17 @@ pub(crate) fn multiply_by_upper(a: &mut DMatrix<f64>, b: &DMatrix<f64>) {
 
 /// C − A B in the place of a tall C.
 pub(crate) fn take_off_product(c: DMatrixViewMut<f64>, a: &DMatrix<f64>, b: &DMatrix<f64>) {
-    let form = |first, mut own: DMatrixViewMut<f64>| own.gemm(-1.0, &a.rows(first, own.nrows()), b, 1.0);
+    let form =
+        |first, mut own: DMatrixViewMut<f64>| own.gemm(-1.0, &a.rows(first, own.nrows()), b, 1.0);
     by_rows(c, 0, &form);
 }
 
 /// Some rows after others of a tall matrix, on every core, each with the number of its first row.
-fn by_rows(mut all: DMatrixViewMut<f64>, first: usize, form: &(impl Fn(usize, DMatrixViewMut<f64>) + Sync)) {
+fn by_rows(
+    mut all: DMatrixViewMut<f64>,
+    first: usize,
+    form: &(impl Fn(usize, DMatrixViewMut<f64>) + Sync),
+) {
     let half = all.nrows() / 2;
     if all.nrows() <= SHORT {
         return form(first, all);
@@ -75,8 +86,14 @@ fn by_rows(mut all: DMatrixViewMut<f64>, first: usize, form: &(impl Fn(usize, DM
     rayon::join(|| by_rows(upper, first, form), || by_rows(lower, first + half, form));
 }
 
-/// A B in the first rows of `out`, of which the first columns, so many, have nothing below so many rows of B.
-fn product_to(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>, filled: impl Fn(usize) -> usize + Sync) {
+/// A B in the first rows of `out`, of which the first columns, so many, have nothing below so many
+/// rows of B.
+fn product_to(
+    a: &DMatrix<f64>,
+    b: &DMatrix<f64>,
+    out: &mut DMatrix<f64>,
+    filled: impl Fn(usize) -> usize + Sync,
+) {
     let (rows, inner, columns) = (a.nrows(), a.ncols(), b.ncols());
     if rows * inner * columns < WORTH_THREADS || inner == 0 {
         return a.mul_to(b, &mut out.rows_mut(0, rows));
@@ -86,7 +103,12 @@ fn product_to(a: &DMatrix<f64>, b: &DMatrix<f64>, out: &mut DMatrix<f64>, filled
         let (first, count) = (part * TOGETHER, own.len() / long);
         let filled = filled(first + count);
         let mut own = DMatrixViewMut::from_slice(own, long, count);
-        own.rows_mut(0, rows).gemm(1.0, &a.columns(0, filled), &b.view((0, first), (filled, count)), 0.0);
+        own.rows_mut(0, rows).gemm(
+            1.0,
+            &a.columns(0, filled),
+            &b.view((0, first), (filled, count)),
+            0.0,
+        );
     };
     // Of a triangle what takes longest comes first.
     out.as_mut_slice().par_chunks_mut(long * TOGETHER).enumerate().rev().for_each(form);
@@ -97,12 +119,18 @@ pub(crate) fn lower_product(lower: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f
     let mut out = DMatrix::zeros(lower.nrows(), b.ncols());
     for first in (0..lower.nrows()).step_by(TOGETHER) {
         let end = lower.nrows().min(first + TOGETHER);
-        out.rows_range_mut(first..end).gemm(1.0, &lower.view((first, 0), (end - first, end)), &b.rows(0, end), 0.0);
+        out.rows_range_mut(first..end).gemm(
+            1.0,
+            &lower.view((first, 0), (end - first, end)),
+            &b.rows(0, end),
+            0.0,
+        );
     }
     out
 }
 
-/// A B of a narrow B: some rows after others, which stay in the processor's cache from column to column.
+/// A B of a narrow B: some rows after others, which stay in the processor's cache from column to
+/// column.
 fn narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let rows = a.nrows();
     let of_rows = |part: usize| a.rows(part * SHORT, SHORT.min(rows - part * SHORT)) * b;
@@ -126,7 +154,8 @@ pub(crate) fn product_along(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> 
     let mut out = zeros(b.ncols(), n);
     let form = |(part, own): (usize, &mut [f64])| {
         let (first, count) = (part * together, own.len() / turned.nrows());
-        let (mut own, a) = (DMatrixViewMut::from_slice(own, turned.nrows(), count), a.columns(first, count));
+        let (mut own, a) =
+            (DMatrixViewMut::from_slice(own, turned.nrows(), count), a.columns(first, count));
         if turned.nrows().min(count) <= NARROW {
             for (mut out, column) in own.column_iter_mut().zip(a.column_iter()) {
                 out.iter_mut().zip(b.column_iter()).for_each(|(out, b)| *out = b.dot(&column));
@@ -152,9 +181,19 @@ pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
         let mut own = DMatrixViewMut::from_slice(own, n, count);
         let above = first + count;
         if count <= NARROW {
-            own.rows_mut(0, above).gemm_tr(1.0, &a.columns(0, above), &a.columns(first, count), 0.0);
+            own.rows_mut(0, above).gemm_tr(
+                1.0,
+                &a.columns(0, above),
+                &a.columns(first, count),
+                0.0,
+            );
         } else {
-            own.rows_mut(0, above).gemm(1.0, &transposed.rows(0, above), &a.columns(first, count), 0.0);
+            own.rows_mut(0, above).gemm(
+                1.0,
+                &transposed.rows(0, above),
+                &a.columns(first, count),
+                0.0,
+            );
         }
     };
     // The longest columns first.
@@ -163,14 +202,15 @@ pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     out
 }
 
-/// Aᵀ, of which nothing is copied; not for products of a size up to `NARROW`: they go by axpys, and nalgebra's do not keep
-/// within columns with gaps between their numbers.
+/// Aᵀ, of which nothing is copied; not for products of a size up to `NARROW`: they go by axpys, and
+/// nalgebra's do not keep within columns with gaps between their numbers.
 fn transposed_view(a: &DMatrix<f64>) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> {
     let (rows, n) = a.shape();
     DMatrixView::from_slice_with_strides_generic(a.as_slice(), Dyn(n), Dyn(rows), Dyn(rows), Dyn(1))
 }
 
-/// AᵀB of a tall A and a B as tall: some columns of A after others, so that each sum is that of one thread.
+/// AᵀB of a tall A and a B as tall: some columns of A after others, so that each sum is that of one
+/// thread.
 pub(crate) fn transposed_product(a: &DMatrix<f64>, b: DMatrixView<f64>) -> DMatrix<f64> {
     let (rows, n) = a.shape();
     // See `transposed_view`.
@@ -202,7 +242,8 @@ mod tests {
 
     #[test]
     fn products_are_those_of_one_thread() {
-        let entry = |i: usize, j: usize| ((12.9898 * i as f64 + 78.233 * j as f64).sin() * 43.7) % 1.0;
+        let entry =
+            |i: usize, j: usize| ((12.9898 * i as f64 + 78.233 * j as f64).sin() * 43.7) % 1.0;
         for (rows, inner, columns) in [
             (3, 2, 4),
             (700, 70, 41),
@@ -213,10 +254,12 @@ mod tests {
             (2600, 410, 3),
             (4, 600, 500),
         ] {
-            let (a, b) = (DMatrix::from_fn(rows, inner, entry), DMatrix::from_fn(inner, columns, entry));
+            let (a, b) =
+                (DMatrix::from_fn(rows, inner, entry), DMatrix::from_fn(inner, columns, entry));
             let scale = 1e-15 * rows.max(inner) as f64;
             assert!((product(&a, &b) - &a * &b).amax() <= scale);
-            let upper = DMatrix::from_fn(inner, inner, |i, j| if i <= j { entry(i, j) } else { 0.0 });
+            let upper =
+                DMatrix::from_fn(inner, inner, |i, j| if i <= j { entry(i, j) } else { 0.0 });
             let (expected, mut in_place) = (&a * &upper, a.clone());
             let above = product_with_upper_above(&a, &upper, 2);
             assert!((product_with_upper(&a, &upper) - &expected).amax() <= scale);
@@ -229,7 +272,10 @@ mod tests {
             assert!((&own - a.transpose() * &a).amax() <= scale * 10.0 && own == own.transpose());
             let tall = DMatrix::from_fn(rows, columns, |i, j| entry(i, j + inner));
             assert!((product_along(&a, &tall) - a.transpose() * &tall).amax() <= scale * 10.0);
-            assert!((transposed_product(&a, tall.as_view()) - a.transpose() * &tall).amax() <= scale * 10.0);
+            assert!(
+                (transposed_product(&a, tall.as_view()) - a.transpose() * &tall).amax()
+                    <= scale * 10.0
+            );
             let mut left = tall.clone();
             take_off_product(left.as_view_mut(), &a, &b);
             assert!((left - (&tall - &a * &b)).amax() <= scale);

@@ -23,7 +23,12 @@ impl EndPoint {
     /// The arm of `problem` with the geometry of `parameters`, loaded and set as `setup` says.
     ///
     /// `parameters` has an entry for each joint; coordinates missing in the configuration are 0.
-    pub fn new(problem: &Problem, parameters: &Parameters, setup: &PoseView, reading: &Reading) -> Self {
+    pub fn new(
+        problem: &Problem,
+        parameters: &Parameters,
+        setup: &PoseView,
+        reading: &Reading,
+    ) -> Self {
         let chain = Chain::new(problem, &parameters.geometry, setup.configuration);
         let loads = Loads::new(problem, &chain, setup);
         Self { elastic: Elastic::new(&chain, &loads, reading), chain, reading: *reading }
@@ -31,29 +36,35 @@ impl EndPoint {
 
     /// Displacement \[m\] in the measuring frame of a motion D of the end frame: R [I 0] D.
     ///
-    /// Printed differently: `EndFrame`. D of eq. 27 and 37 lies in the end frame, yet eq. 39 sets it equal to
-    /// `PE_meas` − `PE_nom` of the measuring frame: [I 0] D.
+    /// Printed differently: `EndFrame`. D of eq. 27 and 37 lies in the end frame, yet eq. 39 sets
+    /// it equal to `PE_meas` − `PE_nom` of the measuring frame: [I 0] D.
     pub fn displacement(&self, motion: &Vector6<f64>) -> Vector3<f64> {
         let own: Vector3<f64> = motion.fixed_rows::<3>(0).into_owned();
         if self.reading.keeps(Misprint::EndFrame) { own } else { split(&self.chain.end()).0 * own }
     }
 
-    /// `D_f` = `J_f` `d_f` as a displacement, measuring frame \[m\]                          [Chen2021, eq. 27, 39]
+    /// `D_f` = `J_f` `d_f` as a displacement, measuring frame \[m\]
+    /// [Chen2021, eq. 27, 39]
     pub fn deflection(&self, parameters: &Parameters) -> Vector3<f64> {
         self.displacement(&self.elastic.motion(parameters))
     }
 
-    /// The three rows of `J_g` that positions need, 3 × 5n, measuring frame               [Chen2021, eq. 38, 39, 42]
+    /// The three rows of `J_g` that positions need, 3 × 5n, measuring frame
+    /// [Chen2021, eq. 38, 39, 42]
     pub fn jacobian(&self) -> Matrix3xX<f64> {
         let motions = geometric::jacobian(&self.chain, &self.reading);
-        let columns: Vec<Vector3<f64>> =
-            motions.column_iter().map(|column| self.displacement(&column.fixed_rows::<6>(0).into_owned())).collect();
+        let columns: Vec<Vector3<f64>> = motions
+            .column_iter()
+            .map(|column| self.displacement(&column.fixed_rows::<6>(0).into_owned()))
+            .collect();
         Matrix3xX::from_columns(&columns)
     }
 
-    /// `D_End` = `J_f` `d_f` + `J_g` e, first order in both, measuring frame \[m\]        [Chen2021, eq. 39, 41]
+    /// `D_End` = `J_f` `d_f` + `J_g` e, first order in both, measuring frame \[m\]
+    /// [Chen2021, eq. 39, 41]
     ///
-    /// e = [e₁ … e_n] has 5n entries. Eq. 40 has `d_f` of the true parameters; eq. 41 takes it at E and S and so drops what e changes in the deflection.
+    /// e = [e₁ … e_n] has 5n entries. Eq. 40 has `d_f` of the true parameters; eq. 41 takes it at E
+    /// and S and so drops what e changes in the deflection.
     pub fn error(&self, parameters: &Parameters, e: &DVector<f64>) -> Vector3<f64> {
         self.deflection(parameters) + self.jacobian() * e
     }

@@ -13,7 +13,8 @@ pub enum Form {
 
 /// A misprint that changes a formula; each is documented where the formula stands.
 ///
-/// How much each moves the end point of the lunar sampler, and what it does to a calibration, stands in `docs/paper.md`.
+/// How much each moves the end point of the lunar sampler, and what it does to a calibration,
+/// stands in `docs/paper.md`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Misprint {
@@ -27,9 +28,11 @@ pub enum Misprint {
     Stretch,
     /// Eq. 6: link A carries the weights beyond it, but not the hoist beyond it.
     HoistBeyond,
-    /// Eq. 10: joint 2 has the length of joint 3; nothing where both are as long, as in the nominal arm.
+    /// Eq. 10: joint 2 has the length of joint 3; nothing where both are as long, as in the nominal
+    /// arm.
     JointTwoLength,
-    /// Eq. 8-10: torsion turns about `z_i` after Ry(β), the joint about `z_i` before it; the same for β = 0.
+    /// Eq. 8-10: torsion turns about `z_i` after Ry(β), the joint about `z_i` before it; the same
+    /// for β = 0.
     JointAxis,
     /// Eq. 16: `U_i` for `U_{i+1}`.
     TransferIndex,
@@ -63,30 +66,47 @@ impl Misprint {
         Self::BetaLeftOut,
     ];
 
-    /// Those that the paper itself contradicts elsewhere: nobody who ran its formulas can have kept them.
+    /// Those that the paper itself contradicts elsewhere: nobody who ran its formulas can have kept
+    /// them.
     ///
-    /// Eq. 17 and 18 are right against 16; eq. 21 with 22 is dT = (V Δ V⁻¹) T, which eq. 24 states in the inertial frame, as
-    /// the text to eq. 26 says, so that in eq. 23 and 25 only T or the frame is on the wrong side; eq. 33-37 are right against
-    /// 28 and 29; the inertial frame of eq. 26 is against the end frame of eq. 37 and 39; and table 2 identifies the β
-    /// that the text to eq. 45 leaves out.
-    pub const CONTRADICTED: [Self; 5] =
-        [Self::TransferIndex, Self::LinkTransfer, Self::GeometricSide, Self::EndFrame, Self::BetaLeftOut];
+    /// Eq. 17 and 18 are right against 16; eq. 21 with 22 is dT = (V Δ V⁻¹) T, which eq. 24 states
+    /// in the inertial frame, as the text to eq. 26 says, so that in eq. 23 and 25 only T or the
+    /// frame is on the wrong side; eq. 33-37 are right against 28 and 29; the inertial frame of eq.
+    /// 26 is against the end frame of eq. 37 and 39; and table 2 identifies the β that the text to
+    /// eq. 45 leaves out.
+    pub const CONTRADICTED: [Self; 5] = [
+        Self::TransferIndex,
+        Self::LinkTransfer,
+        Self::GeometricSide,
+        Self::EndFrame,
+        Self::BetaLeftOut,
+    ];
 
     /// Name in results, where it stands, and what it says in a few words.
     const fn words(self) -> (&'static str, &'static str, &'static str) {
         match self {
             Self::TipForceLever => ("tip-force-lever", "eq. 4", "tip force times l² for l³"),
             Self::HoistBending => ("hoist-bending", "eq. 4", "the hoist does not bend link B"),
-            Self::SlopePlaces => ("slope-places", "eq. 4, 5, 7", "slopes exchanged, or without their sign"),
+            Self::SlopePlaces => {
+                ("slope-places", "eq. 4, 5, 7", "slopes exchanged, or without their sign")
+            }
             Self::Stretch => ("stretch", "eq. 6", "stretch by own weight twice"),
-            Self::HoistBeyond => ("hoist-beyond", "eq. 6", "link A does not feel the hoist on link B"),
-            Self::JointTwoLength => ("joint-two-length", "eq. 10", "joint 2 with the length of joint 3"),
+            Self::HoistBeyond => {
+                ("hoist-beyond", "eq. 6", "link A does not feel the hoist on link B")
+            }
+            Self::JointTwoLength => {
+                ("joint-two-length", "eq. 10", "joint 2 with the length of joint 3")
+            }
             Self::JointAxis => ("joint-axis", "eq. 8-10", "joints give way about z after Ry(β)"),
             Self::TransferIndex => ("transfer-index", "eq. 16", "U_i for U_{i+1}"),
             Self::LinkSide => ("link-side", "eq. 21", "links deflect about their root"),
-            Self::LinkTransfer => ("link-transfer", "eq. 23, 25", "V⁻¹ΔV: carried by the frames before the link"),
+            Self::LinkTransfer => {
+                ("link-transfer", "eq. 23, 25", "V⁻¹ΔV: carried by the frames before the link")
+            }
             Self::GeometricSide => ("geometric-side", "eq. 28, 29", "Δ_i T_i for T_i Δ_i"),
-            Self::EndFrame => ("end-frame", "eq. 37, 39", "end frame taken for the measuring frame"),
+            Self::EndFrame => {
+                ("end-frame", "eq. 37, 39", "end frame taken for the measuring frame")
+            }
             Self::BetaLeftOut => ("beta-left-out", "eq. 45", "β is not identified"),
         }
     }
@@ -132,12 +152,15 @@ impl Reading {
     }
 }
 
-/// Everything corrected, or everything as printed that the authors can have run: `Printed` keeps every misprint but those of
-/// [`Misprint::CONTRADICTED`], which have their effect only when chosen by name.
+/// Everything corrected, or everything as printed that the authors can have run: `Printed` keeps
+/// every misprint but those of [`Misprint::CONTRADICTED`], which have their effect only when chosen
+/// by name.
 impl From<Form> for Reading {
     fn from(form: Form) -> Self {
         let all = Self { forms: [form; Misprint::ALL.len()] };
-        Misprint::CONTRADICTED.into_iter().fold(all, |reading, misprint| reading.with(misprint, Form::Corrected))
+        Misprint::CONTRADICTED
+            .into_iter()
+            .fold(all, |reading, misprint| reading.with(misprint, Form::Corrected))
     }
 }
 

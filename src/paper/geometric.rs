@@ -6,7 +6,8 @@ use super::form::{Misprint, Reading};
 use super::kinematics::{Chain, Mdh};
 use super::transfer::transfer;
 
-/// From `e_i` = [Δα Δa Δθ Δd Δβ] to the differential motion [dx dy dz δx δy δz] of frame i, frame i.
+/// From `e_i` = [Δα Δa Δθ Δd Δβ] to the differential motion [dx dy dz δx δy δz] of frame i, frame
+/// i.
 ///
 /// ```text
 /// ⎡ −d sθ cβ   cθ cβ    0   −sβ  0 ⎤
@@ -58,19 +59,22 @@ pub fn error_matrix(link: &Mdh) -> SMatrix<f64, 6, 5> {
 
 /// From the motion of frame i (joint `k`, counted from 0) to that of the end frame.
 ///
-/// dT = Σ T₁ … `T_i` `Δ_i` T_{i+1} … T_n = T Σ `U_{i+1}`⁻¹ `Δ_i` `U_{i+1}`              [Chen2021, eq. 32-37]
+/// dT = Σ T₁ … `T_i` `Δ_i` T_{i+1} … T_n = T Σ `U_{i+1}`⁻¹ `Δ_i` `U_{i+1}`              [Chen2021,
+/// eq. 32-37]
 ///
-/// Printed differently: `GeometricSide`, eq. 28 and 29 have `dT_i` = `Δ_i` `T_i`, which makes it `U_i`⁻¹ `Δ_i` `U_i`; eq. 31
-/// and eq. 33-37 hold for `T_i` `Δ_i`.
+/// Printed differently: `GeometricSide`, eq. 28 and 29 have `dT_i` = `Δ_i` `T_i`, which makes it
+/// `U_i`⁻¹ `Δ_i` `U_i`; eq. 31 and eq. 33-37 hold for `T_i` `Δ_i`.
 pub fn error_transfer(chain: &Chain, k: usize, reading: &Reading) -> Matrix6<f64> {
     transfer(&chain.after[if reading.keeps(Misprint::GeometricSide) { k } else { k + 1 }])
 }
 
-/// `J_g` = [`J_g1` … `J_gn`], 6 × 5n: `D_g` = `J_g` e, motion of the end frame, end frame  [Chen2021, eq. 38]
+/// `J_g` = [`J_g1` … `J_gn`], 6 × 5n: `D_g` = `J_g` e, motion of the end frame, end frame
+/// [Chen2021, eq. 38]
 pub fn jacobian(chain: &Chain, reading: &Reading) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(6, 5 * chain.links.len());
     for (k, link) in chain.links.iter().enumerate() {
-        out.fixed_view_mut::<6, 5>(0, 5 * k).copy_from(&(error_transfer(chain, k, reading) * error_matrix(link)));
+        out.fixed_view_mut::<6, 5>(0, 5 * k)
+            .copy_from(&(error_transfer(chain, k, reading) * error_matrix(link)));
     }
     out
 }

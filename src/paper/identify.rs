@@ -1,4 +1,5 @@
-//! The paper's procedure: stiffness by linear least squares, then geometry by the iterated pseudo-inverse, eq. 42-45.
+//! The paper's procedure: stiffness by linear least squares, then geometry by the iterated
+//! pseudo-inverse, eq. 42-45.
 
 use nalgebra::DVector;
 
@@ -24,7 +25,8 @@ pub struct Options {
 impl Options {
     /// By these formulas, the stiffness from there.
     pub fn new(reading: impl Into<Reading>, stiffness: StiffnessStage) -> Self {
-        let iteration = PseudoInverseSettings { tolerance: 1e-6, ..PseudoInverseSettings::default() };
+        let iteration =
+            PseudoInverseSettings { tolerance: 1e-6, ..PseudoInverseSettings::default() };
         Self { reading: reading.into(), stiffness, iteration }
     }
 }
@@ -34,10 +36,12 @@ impl Options {
 pub struct Identified {
     /// E and S; flexibilities come out as the data have them, even below zero.
     pub parameters: Parameters,
-    /// The iteration of eq. 45: why it stopped, after how many steps; its x are the errors e from nominal.
+    /// The iteration of eq. 45: why it stopped, after how many steps; its x are the errors e from
+    /// nominal.
     pub iteration: Solution,
-    /// Part of each entry of e = [e₁ … e_n] that the poses see by itself at nominal geometry, 0…1, shape = (5n); the rest is a
-    /// choice, of least length, among combinations that move no position. 0 for what is not identified.
+    /// Part of each entry of e = [e₁ … e_n] that the poses see by itself at nominal geometry, 0…1,
+    /// shape = (5n); the rest is a choice, of least length, among combinations that move no
+    /// position. 0 for what is not identified.
     pub seen: Vec<f64>,
 }
 
@@ -46,7 +50,9 @@ pub struct Identified {
 #[non_exhaustive]
 pub enum IdentifyError {
     /// Three coordinates a pose are fewer equations than the 5n unknowns of eq. 42.
-    #[error("identifying {unknowns} geometric parameters takes at least {needed} poses, there are {poses}")]
+    #[error(
+        "identifying {unknowns} geometric parameters takes at least {needed} poses, there are {poses}"
+    )]
     TooFewPoses {
         /// Unknowns of eq. 42.
         unknowns: usize,
@@ -75,22 +81,29 @@ pub enum IdentifyError {
 
 /// Identifies stiffness, then geometry, from measured positions; one sweep.
 ///
-/// 1. Stiffness by the [`StiffnessStage`] (§3.3: it comes first; the paper does not print its equations).
-/// 2. With these fixed, e_{j+1} = `J_g(E_j)`⁺ [`PE_meas` − `PE_nom(E_j)` − `D_f(E_j)`], E_{j+1} = E_j + e_{j+1}, until e
-///    is negligible                                                                     [Chen2021, eq. 45]
+/// 1. Stiffness by the [`StiffnessStage`] (§3.3: it comes first; the paper does not print its
+///    equations).
+/// 2. With these fixed, e_{j+1} = `J_g(E_j)`⁺ [`PE_meas` − `PE_nom(E_j)` − `D_f(E_j)`], E_{j+1} =
+///    E_j + e_{j+1}, until e is negligible
+///    [Chen2021, eq. 45]
 ///
-/// Geometric errors that look like deflections mislead stage 1 from positions: it explains them by flexibilities many times
-/// the true ones, or negative, and stage 2 cannot take that back. From load differences it does not see them. Eq. 41, which
-/// drops the coupling, matters less; `docs/paper.md` has figures for all.
+/// Geometric errors that look like deflections mislead stage 1 from positions: it explains them by
+/// flexibilities many times the true ones, or negative, and stage 2 cannot take that back. From
+/// load differences it does not see them. Eq. 41, which drops the coupling, matters less;
+/// `docs/paper.md` has figures for all.
 ///
-/// All flexibilities that the problem gives and all 5n geometric parameters are unknown, whatever `[parameters]` says; base
-/// and target are known. Printed differently: `BetaLeftOut`, the text to eq. 45 has E_j = [α a θ d]ᵀ, so that β stays
-/// nominal, though e has it and table 2 identifies it.
+/// All flexibilities that the problem gives and all 5n geometric parameters are unknown, whatever
+/// `[parameters]` says; base and target are known. Printed differently: `BetaLeftOut`, the text to
+/// eq. 45 has E_j = [α a θ d]ᵀ, so that β stays nominal, though e has it and table 2 identifies it.
 ///
 /// # Errors
-/// The poses do not fit the arm, are too few for eq. 42, or are not finite. A diverging iteration is not an error: it is
-/// told in [`Identified::iteration`].
-pub fn identify(problem: &Problem, poses: &[Measured], options: &Options) -> Result<Identified, IdentifyError> {
+/// The poses do not fit the arm, are too few for eq. 42, or are not finite. A diverging iteration
+/// is not an error: it is told in [`Identified::iteration`].
+pub fn identify(
+    problem: &Problem,
+    poses: &[Measured],
+    options: &Options,
+) -> Result<Identified, IdentifyError> {
     let expected = problem.joints.len();
     for (pose, measured) in poses.iter().enumerate() {
         let found = measured.setup.configuration.len();
@@ -101,7 +114,11 @@ pub fn identify(problem: &Problem, poses: &[Measured], options: &Options) -> Res
     let unknowns = geometric_unknowns(expected, &options.reading);
     let needed = unknowns.len().div_ceil(3);
     if poses.len() < needed {
-        return Err(IdentifyError::TooFewPoses { unknowns: unknowns.len(), needed, poses: poses.len() });
+        return Err(IdentifyError::TooFewPoses {
+            unknowns: unknowns.len(),
+            needed,
+            poses: poses.len(),
+        });
     }
     let finite = poses.iter().all(|pose| pose.position.iter().all(|x| x.is_finite()));
     let mut parameters = match stiffness(problem, poses, &options.reading, options.stiffness) {
@@ -112,7 +129,8 @@ pub fn identify(problem: &Problem, poses: &[Measured], options: &Options) -> Res
         None => return Err(IdentifyError::NotFinite),
     };
     let start = DVector::zeros(unknowns.len());
-    let geometry = GeometryResiduals::new(problem, poses, &parameters, unknowns.clone(), options.reading);
+    let geometry =
+        GeometryResiduals::new(problem, poses, &parameters, unknowns.clone(), options.reading);
     let sight = Identifiability::of(&Fit::new(&geometry).linearise(&start).triangle);
     let mut seen = vec![0.0; 5 * expected];
     unknowns.iter().zip(sight.visible).for_each(|(&place, visible)| seen[place] = visible);

@@ -42,17 +42,22 @@ impl Mdh {
         self
     }
 
-    /// `T_i1` = Rx(α) Tx(a), up to the tip of the link                                    [Chen2021, eq. 20]
+    /// `T_i1` = Rx(α) Tx(a), up to the tip of the link
+    /// [Chen2021, eq. 20]
     pub fn to_tip(&self) -> Matrix4<f64> {
         turn(Vector3::x() * self.alpha) * shift(Vector3::x() * self.a)
     }
 
-    /// `T_i2` = Rz(θ) Tz(d) Ry(β), from the tip of the link                              [Chen2021, eq. 20]
+    /// `T_i2` = Rz(θ) Tz(d) Ry(β), from the tip of the link                              [Chen2021,
+    /// eq. 20]
     pub fn from_tip(&self) -> Matrix4<f64> {
-        turn(Vector3::z() * self.theta) * shift(Vector3::z() * self.d) * turn(Vector3::y() * self.beta)
+        turn(Vector3::z() * self.theta)
+            * shift(Vector3::z() * self.d)
+            * turn(Vector3::y() * self.beta)
     }
 
-    /// `T_i` = Rx(α) Tx(a) Rz(θ) Tz(d) Ry(β)                                              [Chen2021, eq. 1]
+    /// `T_i` = Rx(α) Tx(a) Rz(θ) Tz(d) Ry(β)
+    /// [Chen2021, eq. 1]
     pub fn transform(&self) -> Matrix4<f64> {
         self.to_tip() * self.from_tip()
     }
@@ -68,14 +73,18 @@ fn shift(translation: Vector3<f64>) -> Matrix4<f64> {
 
 /// The axes of a transform, as a rotation matrix, and its origin \[m\].
 pub(super) fn split(transform: &Matrix4<f64>) -> (Matrix3<f64>, Vector3<f64>) {
-    (transform.fixed_view::<3, 3>(0, 0).into_owned(), transform.fixed_view::<3, 1>(0, 3).into_owned())
+    (
+        transform.fixed_view::<3, 3>(0, 0).into_owned(),
+        transform.fixed_view::<3, 1>(0, 3).into_owned(),
+    )
 }
 
 /// One configuration of the rigid arm.
 ///
-/// The paper ends in frame n, `U_{n+1}` = I; here `U_{n+1}` = Trans(target), since on axis n itself neither Δθ nor Δβ of the
-/// last joint moves the end point. The paper's inertial frame is the arm's base frame; measured positions lie in the
-/// measuring frame, which sees the base at the problem's `base`.
+/// The paper ends in frame n, `U_{n+1}` = I; here `U_{n+1}` = Trans(target), since on axis n itself
+/// neither Δθ nor Δβ of the last joint moves the end point. The paper's inertial frame is the arm's
+/// base frame; measured positions lie in the measuring frame, which sees the base at the problem's
+/// `base`.
 #[derive(Debug, Clone)]
 pub struct Chain {
     /// Parameters with the configuration added.
@@ -89,11 +98,13 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// The arm of `problem` with `geometry` at configuration q, shape = (joints) \[rad\] or \[m\]; missing coordinates are 0.
+    /// The arm of `problem` with `geometry` at configuration q, shape = (joints) \[rad\] or \[m\];
+    /// missing coordinates are 0.
     pub fn new(problem: &Problem, geometry: &[Mdh], configuration: &[f64]) -> Self {
         let q = configuration.iter().copied().chain(std::iter::repeat(0.0));
         let declared = geometry.iter().zip(&problem.joints);
-        let links: Vec<Mdh> = declared.zip(q).map(|((link, joint), q)| link.at(joint.kind, q)).collect();
+        let links: Vec<Mdh> =
+            declared.zip(q).map(|((link, joint), q)| link.at(joint.kind, q)).collect();
         let transforms: Vec<Matrix4<f64>> = links.iter().map(Mdh::transform).collect();
         let mut before = vec![Matrix4::identity()];
         let mut product = Matrix4::identity();
@@ -114,7 +125,8 @@ impl Chain {
         Self { links, base, before, after }
     }
 
-    /// T = T₁ … T_n, here with base and target, measuring frame                           [Chen2021, eq. 2]
+    /// T = T₁ … T_n, here with base and target, measuring frame
+    /// [Chen2021, eq. 2]
     pub fn end(&self) -> Matrix4<f64> {
         self.base * self.after[0]
     }

@@ -29,7 +29,8 @@ pub struct LinkTerms {
     pub bend_z: (f64, f64),
     /// `GI_p` Δφ [N·m²].
     pub twist: f64,
-    /// Whether the link is one of eq. 4 (it carries loads between its ends, as link B) or of eq. 6 (link A).
+    /// Whether the link is one of eq. 4 (it carries loads between its ends, as link B) or of eq. 6
+    /// (link A).
     pub carries: bool,
 }
 
@@ -43,34 +44,40 @@ struct Plane {
 impl LinkTerms {
     /// Stretch, bending in two planes and twist of a cantilever under its loads.
     ///
-    /// Δx = [q_x l² + 2 (Σ P_x s + G_x l)] / (2EA)
-    /// Δy = [q_y l⁴ + 4 (M l² + Σ P_y s² (l − s))] / (8EI) + [Σ P_y s³ + G_y l³] / (3EI)
-    /// Δz = [M l² + Σ M_s s² + 2 Σ M_s s (l − s)] / (2EI)
-    /// Δφ = [Σ M_x s + M_x l] / (GI_p)
-    /// slope y = q_y l³ / (6EI) + [Σ P_y s² + G_y l² + 2 M l] / (2EI), slope z = [Σ M_s s + M l] / (EI)
-    /// \[Chen2021, eq. 4 for a link that carries loads, eq. 6 for one that does not\]
+    /// Δx = [q_x l² + 2 (Σ P_x s + G_x l)] / (2EA) Δy = [q_y l⁴ + 4 (M l² + Σ P_y s² (l − s))] /
+    /// (8EI) + [Σ P_y s³ + G_y l³] / (3EI) Δz = [M l² + Σ M_s s² + 2 Σ M_s s (l − s)] / (2EI) Δφ =
+    /// [Σ M_x s + M_x l] / (GI_p) slope y = q_y l³ / (6EI) + [Σ P_y s² + G_y l² + 2 M l] / (2EI),
+    /// slope z = [Σ M_s s + M l] / (EI) \[Chen2021, eq. 4 for a link that carries loads, eq. 6 for
+    /// one that does not\]
     ///
-    /// Link frame: q [N/m], point loads P \[N\], `M_s` [N·m] at s \[m\], tip load G \[N\], M [N·m]. The paper's links bend in a
-    /// vertical plane, so that it needs no forces along z and no moments of carried masses in the vertical plane; both forms
-    /// here have all terms in both planes, which are zero for its arm.
+    /// Link frame: q [N/m], point loads P \[N\], `M_s` [N·m] at s \[m\], tip load G \[N\], M [N·m].
+    /// The paper's links bend in a vertical plane, so that it needs no forces along z and no
+    /// moments of carried masses in the vertical plane; both forms here have all terms in both
+    /// planes, which are zero for its arm.
     ///
-    /// Printed differently: `TipForceLever`, G l² for G l³ in Δy of eq. 4 (a force × length² among forces × length³);
-    /// `HoistBending`, of the hoist only `F_1r` in Δx of eq. 4, though the text says that `F_1n` and `M_F1` bend the link;
-    /// `Stretch`, q l²/(EA) in eq. 6; `HoistBeyond`, no hoist at all in eq. 6.
+    /// Printed differently: `TipForceLever`, G l² for G l³ in Δy of eq. 4 (a force × length² among
+    /// forces × length³); `HoistBending`, of the hoist only `F_1r` in Δx of eq. 4, though the text
+    /// says that `F_1n` and `M_F1` bend the link; `Stretch`, q l²/(EA) in eq. 6; `HoistBeyond`, no
+    /// hoist at all in eq. 6.
     pub fn new(loads: &LinkLoads, reading: &Reading) -> Self {
         let l = loads.length;
         let carries = !loads.points.is_empty();
         let hoist_bends = !reading.keeps(Misprint::HoistBending);
         let tip = if carries || !reading.keeps(Misprint::HoistBeyond) {
-            Wrench { force: loads.tip.force + loads.tip_hoist.force, moment: loads.tip.moment + loads.tip_hoist.moment }
+            Wrench {
+                force: loads.tip.force + loads.tip_hoist.force,
+                moment: loads.tip.moment + loads.tip_hoist.moment,
+            }
         } else {
             loads.tip
         };
         let own = if !carries && reading.keeps(Misprint::Stretch) { l * l } else { 0.5 * l * l };
         let pulls: f64 = loads.points.iter().map(|p| p.wrench.force.x * p.station).sum();
-        let bending: Vec<PointLoad> = loads.points.iter().filter(|p| hoist_bends || !p.hoist).copied().collect();
+        let bending: Vec<PointLoad> =
+            loads.points.iter().filter(|p| hoist_bends || !p.hoist).copied().collect();
         let twists: f64 = bending.iter().map(|p| p.wrench.moment.x * p.station).sum();
-        let lever = if carries && reading.keeps(Misprint::TipForceLever) { l * l } else { l * l * l };
+        let lever =
+            if carries && reading.keeps(Misprint::TipForceLever) { l * l } else { l * l * l };
         let y = Plane {
             spread: loads.spread.y,
             tip: (tip.force.y, tip.moment.z),
@@ -93,12 +100,15 @@ impl LinkTerms {
         }
     }
 
-    /// `D_A` or `D_B`: differential motion [Δx Δy Δz Δα Δβ Δθ] of the link's tip, \[m\] and \[rad\], link frame.
+    /// `D_A` or `D_B`: differential motion [Δx Δy Δz Δα Δβ Δθ] of the link's tip, \[m\] and
+    /// \[rad\], link frame.
     ///
-    /// Bending along y turns about z, bending along z about −y: Δθ = slope y, Δβ = −slope z     [Chen2021, eq. 5, 7]
+    /// Bending along y turns about z, bending along z about −y: Δθ = slope y, Δβ = −slope z
+    /// [Chen2021, eq. 5, 7]
     ///
-    /// Printed differently: `SlopePlaces`. Eq. 4 puts the slope of y into Δβ and that of z into Δθ, and eq. 5 takes them as
-    /// rotations about y and z; eq. 7 has slope y right and slope z without its sign. Its Δ, not eq. 6, is what eq. 21-26 use.
+    /// Printed differently: `SlopePlaces`. Eq. 4 puts the slope of y into Δβ and that of z into Δθ,
+    /// and eq. 5 takes them as rotations about y and z; eq. 7 has slope y right and slope z without
+    /// its sign. Its Δ, not eq. 6, is what eq. 21-26 use.
     pub fn motion(&self, flexibility: &LinkFlexibility, reading: &Reading) -> Vector6<f64> {
         let slope_y = flexibility.about_z * self.bend_y.1;
         let slope_z = flexibility.about_y * self.bend_z.1;
@@ -122,11 +132,13 @@ impl Plane {
     /// EI times deflection and slope of the tip; `lever` is what the tip force is multiplied by.
     fn bend(&self, l: f64, lever: f64, points: &[PointLoad]) -> (f64, f64) {
         let (force, moment) = self.tip;
-        let mut deflection = self.spread * l.powi(4) / 8.0 + force * lever / 3.0 + moment * l * l / 2.0;
+        let mut deflection =
+            self.spread * l.powi(4) / 8.0 + force * lever / 3.0 + moment * l * l / 2.0;
         let mut slope = self.spread * l.powi(3) / 6.0 + force * l * l / 2.0 + moment * l;
         for point in points {
             let ((force, moment), s) = ((self.points)(point), point.station);
-            deflection += force * (s.powi(3) / 3.0 + s * s * (l - s) / 2.0) + moment * (s * s / 2.0 + s * (l - s));
+            deflection += force * (s.powi(3) / 3.0 + s * s * (l - s) / 2.0)
+                + moment * (s * s / 2.0 + s * (l - s));
             slope += force * s * s / 2.0 + moment * s;
         }
         (deflection, slope)

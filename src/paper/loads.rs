@@ -1,8 +1,9 @@
 //! Every load of a pose, resolved in the frames of the rigid arm.
 //!
-//! The paper resolves them by hand for its arm (`G_4r`, `G_4n`, `M_4P`, `M_4V`, …, §2.1 and §2.2); here they follow from the
-//! frames, with signs, for any arm: component x of a link's frame is the paper's index r, components y and z its index n
-//! in the two planes; moment components z and y are its `M_V` and (with the other sign) `M_Pn`, component x its `M_Pr`.
+//! The paper resolves them by hand for its arm (`G_4r`, `G_4n`, `M_4P`, `M_4V`, …, §2.1 and §2.2);
+//! here they follow from the frames, with signs, for any arm: component x of a link's frame is the
+//! paper's index r, components y and z its index n in the two planes; moment components z and y are
+//! its `M_V` and (with the other sign) `M_Pn`, component x its `M_Pr`.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -38,7 +39,8 @@ pub struct LinkLoads {
     pub spread: Vector3<f64>,
     /// Carried masses and the hoist.
     pub points: Vec<PointLoad>,
-    /// Weights beyond the tip, at the tip: `G_4`, `M_4` or `G_34`, `M_34`                 [Chen2021, eq. 3]
+    /// Weights beyond the tip, at the tip: `G_4`, `M_4` or `G_34`, `M_34`
+    /// [Chen2021, eq. 3]
     pub tip: Wrench,
     /// Hoists on links further out, at the tip.
     pub tip_hoist: Wrench,
@@ -75,7 +77,8 @@ impl Loads {
         let gravity = problem.gravity;
         let n = problem.joints.len();
         let mut forces = Vec::new();
-        let push = |forces: &mut Vec<Load>, at, force, hoist| forces.push(Load { at, force, hoist });
+        let push =
+            |forces: &mut Vec<Load>, at, force, hoist| forces.push(Load { at, force, hoist });
         let (axes, origin) = split(&chain.before[n]);
         let payload = setup.payload.copied().unwrap_or(problem.tool.payload_mass);
         push(&mut forces, origin + axes * problem.tool.payload_at, gravity * payload, false);
@@ -88,7 +91,8 @@ impl Loads {
             let (axes, tip) = split(&(chain.before[k] * chain.links[k].to_tip()));
             let (weights, hoists) = (about(&forces, tip, false), about(&forces, tip, true));
             let axis = axes.column(2);
-            out.joints[k] = JointLoads { weights: axis.dot(&weights.moment), hoists: axis.dot(&hoists.moment) };
+            out.joints[k] =
+                JointLoads { weights: axis.dot(&weights.moment), hoists: axis.dot(&hoists.moment) };
             if let Some(beam) = &joint.beam {
                 let length = chain.links[k].a;
                 let mut link = LinkLoads {
@@ -112,15 +116,22 @@ impl Loads {
 }
 
 /// Places in the link's frame \[m\] and forces in the base frame \[N\] of what a beam carries.
-fn carried(beam: &Beam, gravity: Vector3<f64>, setup: &PoseView) -> Vec<(Vector3<f64>, Vector3<f64>, bool)> {
+fn carried(
+    beam: &Beam,
+    gravity: Vector3<f64>,
+    setup: &PoseView,
+) -> Vec<(Vector3<f64>, Vector3<f64>, bool)> {
     let masses = beam.masses.iter().map(|mass| (mass.position, gravity * mass.mass, false));
     let hoist = beam.hoist.iter();
     masses
-        .chain(hoist.map(|hoist| (hoist.at, hoist.direction * setup.hoist.copied().unwrap_or(hoist.force), true)))
+        .chain(hoist.map(|hoist| {
+            (hoist.at, hoist.direction * setup.hoist.copied().unwrap_or(hoist.force), true)
+        }))
         .collect()
 }
 
-/// A force at `at`, carried to the link's axis: what hangs beyond an end acts at that end, with its lever.
+/// A force at `at`, carried to the link's axis: what hangs beyond an end acts at that end, with its
+/// lever.
 fn point_load(at: Vector3<f64>, length: f64, force: Vector3<f64>, hoist: bool) -> PointLoad {
     let station = at.x.clamp(length.min(0.0), length.max(0.0));
     let offset = at - Vector3::x() * station;

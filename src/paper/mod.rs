@@ -1,8 +1,8 @@
 //! The paper's closed forms, equation by equation, in plain numbers: a baseline and a check.
 //!
-//! \[Chen2021\] Chen Gang, Sun Fenglei, Li Tong, Shao Wen: "Accuracy Compensation for a Lunar Sampling Manipulator with
-//! Elastic Deformation", J. Nanjing Univ. of Aeronautics & Astronautics 53(1), 2021, 1-10,
-//! doi 10.16356/j.1005-2615.2021.01.001 (Chinese).
+//! \[Chen2021\] Chen Gang, Sun Fenglei, Li Tong, Shao Wen: "Accuracy Compensation for a Lunar
+//! Sampling Manipulator with Elastic Deformation", J. Nanjing Univ. of Aeronautics & Astronautics
+//! 53(1), 2021, 1-10, doi 10.16356/j.1005-2615.2021.01.001 (Chinese).
 //!
 //! | equations | here |
 //! |---|---|
@@ -15,26 +15,32 @@
 //! | 42-45 least squares, iteration | [`least_squares`], [`stiffness`], [`identify`], [`crate::least_squares::solver::PseudoInverse`] |
 //! | tables 1-3 | [`published`] |
 //!
-//! Shares no physics with the model: forces are resolved in the frames of the rigid arm and every effect is of first order.
+//! Shares no physics with the model: forces are resolved in the frames of the rigid arm and every
+//! effect is of first order.
 //!
 //! # Misprints
-//! Each formula that is misprinted takes a [`Reading`], which says for each [`Misprint`] whether the [`Form`] is the
-//! printed or the corrected one; the difference stands where the formula does, its size in `docs/paper.md`. Misprints that
-//! are not formulas:
+//! Each formula that is misprinted takes a [`Reading`], which says for each [`Misprint`] whether
+//! the [`Form`] is the printed or the corrected one; the difference stands where the formula does,
+//! its size in `docs/paper.md`. Misprints that are not formulas:
 //!
-//! - Table 1 has `α_2` = −90°, table 2 has 90°: two conventions for the sign of θ₂ to θ₄, metres apart for the same angles.
-//!   Table 2 identifies Δβ₁ = Δθ₂ = 0.304°, which is what a step of least length does at −90°, where both turn the arm
-//!   alike; at 90° it makes them opposite. "Bends toward +y" (§2.1) says −90°, too. Against it: parallel axes would make
-//!   Δd₂ = Δd₃ = Δd₄, where table 2 has 16, 5 and 8 mm. The closed forms take any α.
-//! - Tables 1 and 2 print a in degrees and a, d in mm; they are metres: a reach of 3.7 mm otherwise.
+//! - Table 1 has `α_2` = −90°, table 2 has 90°: two conventions for the sign of θ₂ to θ₄, metres
+//!   apart for the same angles. Table 2 identifies Δβ₁ = Δθ₂ = 0.304°, which is what a step of
+//!   least length does at −90°, where both turn the arm alike; at 90° it makes them opposite.
+//!   "Bends toward +y" (§2.1) says −90°, too. Against it: parallel axes would make Δd₂ = Δd₃ = Δd₄,
+//!   where table 2 has 16, 5 and 8 mm. The closed forms take any α.
+//! - Tables 1 and 2 print a in degrees and a, d in mm; they are metres: a reach of 3.7 mm
+//!   otherwise.
 //! - Table 1 prints d₃ = −a₃, the length of link A; with table 2 it is −0.10 m, presumably −a₂.
-//! - §2.1.1 calls both components of the camera's place `r_cx`; its moment is `M_c` = −`m_c` g `r_cz`. The frames decide.
-//! - Eq. 8 has l₅, the length of a link 5 that an arm of four joints lacks. Joints enter by l/(`GI_p`) = 1/k alone.
+//! - §2.1.1 calls both components of the camera's place `r_cx`; its moment is `M_c` = −`m_c` g
+//!   `r_cz`. The frames decide.
+//! - Eq. 8 has l₅, the length of a link 5 that an arm of four joints lacks. Joints enter by
+//!   l/(`GI_p`) = 1/k alone.
 //! - Eq. 13 to 16 lack their products and sums over the joints; eq. 17 has them.
 //! - Eq. 26 is "in the inertial frame", where eq. 25 and 27 to 39 have the end frame.
 //! - The text to table 3 prints 88.63 % where its numbers give 1 − 5.5416/48.9644 = 88.68 %.
-//! - Table 2 identifies Δθ₄ and Δβ₄ from positions. The end point of eq. 2 lies on axis 4, where both columns of `J_g` are
-//!   zero; they can be seen only with the target off the axis, as in [`Chain`].
+//! - Table 2 identifies Δθ₄ and Δβ₄ from positions. The end point of eq. 2 lies on axis 4, where
+//!   both columns of `J_g` are zero; they can be seen only with the target off the axis, as in
+//!   [`Chain`].
 
 mod end_point;
 mod form;

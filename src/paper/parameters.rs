@@ -44,11 +44,13 @@ impl Parameters {
                 .joints
                 .iter()
                 .map(|joint| {
-                    joint.beam.as_ref().map_or_else(LinkFlexibility::default, |beam| LinkFlexibility {
-                        axial: reciprocal(beam.ea),
-                        about_y: reciprocal(beam.ei_y),
-                        about_z: reciprocal(beam.ei_z),
-                        twist: reciprocal(beam.gj),
+                    joint.beam.as_ref().map_or_else(LinkFlexibility::default, |beam| {
+                        LinkFlexibility {
+                            axial: reciprocal(beam.ea),
+                            about_y: reciprocal(beam.ei_y),
+                            about_z: reciprocal(beam.ei_z),
+                            twist: reciprocal(beam.gj),
+                        }
                     })
                 })
                 .collect(),
@@ -64,13 +66,17 @@ impl Parameters {
 
     /// No geometry, and one flexibility of 1.
     pub(super) fn unit(joints: usize, which: Flexibility) -> Self {
-        let mut out =
-            Self { geometry: Vec::new(), joints: vec![0.0; joints], links: vec![LinkFlexibility::default(); joints] };
+        let mut out = Self {
+            geometry: Vec::new(),
+            joints: vec![0.0; joints],
+            links: vec![LinkFlexibility::default(); joints],
+        };
         out.set(which, 1.0);
         out
     }
 
-    /// The flexibilities that are not 0. A link with one EI for both planes has one bending flexibility, as in the paper.
+    /// The flexibilities that are not 0. A link with one EI for both planes has one bending
+    /// flexibility, as in the paper.
     pub fn flexibilities(&self) -> Vec<Flexibility> {
         let joints = self.joints.iter().enumerate().map(|(k, _)| Flexibility::Joint(k));
         let links = self.links.iter().enumerate().flat_map(|(k, link)| {
@@ -100,7 +106,9 @@ impl Parameters {
         match which {
             Flexibility::Joint(k) => self.joints[k] = value,
             Flexibility::Axial(k) => self.links[k].axial = value,
-            Flexibility::Bending(k) => (self.links[k].about_y, self.links[k].about_z) = (value, value),
+            Flexibility::Bending(k) => {
+                (self.links[k].about_y, self.links[k].about_z) = (value, value)
+            }
             Flexibility::BendingY(k) => self.links[k].about_y = value,
             Flexibility::BendingZ(k) => self.links[k].about_z = value,
             Flexibility::Twist(k) => self.links[k].twist = value,

@@ -18,10 +18,11 @@ pub struct Measured<'a> {
     pub position: Vector3<f64>,
 }
 
-/// Residuals `PE_meas` − `PE_nom(E)` − `D_f(E)` \[m\] with the paper's derivative −`J_g(E)` for the pseudo-inverse.
+/// Residuals `PE_meas` − `PE_nom(E)` − `D_f(E)` \[m\] with the paper's derivative −`J_g(E)` for the
+/// pseudo-inverse.
 ///
-/// The derivative leaves out ∂`D_f`/∂E (eq. 41), so the iteration stops where `J_g`ᵀ r = 0, near the minimum of ‖r‖, not
-/// in it.
+/// The derivative leaves out ∂`D_f`/∂E (eq. 41), so the iteration stops where `J_g`ᵀ r = 0, near
+/// the minimum of ‖r‖, not in it.
 pub struct GeometryResiduals<'a> {
     problem: &'a Problem,
     poses: &'a [Measured<'a>],
@@ -31,8 +32,8 @@ pub struct GeometryResiduals<'a> {
 }
 
 impl<'a> GeometryResiduals<'a> {
-    /// Of `poses`, about the geometry and with the flexibilities of `parameters`; `unknowns` are places in
-    /// e = [e₁ … e_n], and every pose has as many joints as the arm.
+    /// Of `poses`, about the geometry and with the flexibilities of `parameters`; `unknowns` are
+    /// places in e = [e₁ … e_n], and every pose has as many joints as the arm.
     pub fn new(
         problem: &'a Problem,
         poses: &'a [Measured<'a>],

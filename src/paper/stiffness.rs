@@ -9,7 +9,8 @@ use crate::least_squares::solver::minimum_norm_step;
 use crate::least_squares::{Block, Triangle};
 use crate::problem::Problem;
 
-/// Where the stiffness comes from. The paper says that elastic parameters are calibrated first, and not how.
+/// Where the stiffness comes from. The paper says that elastic parameters are calibrated first, and
+/// not how.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum StiffnessStage {
@@ -19,16 +20,19 @@ pub enum StiffnessStage {
     Nominal,
     /// By linear least squares from the measured positions, the geometry held at nominal.
     Positions,
-    /// The same from differences between poses of one configuration under different loads: the geometry cancels.
+    /// The same from differences between poses of one configuration under different loads: the
+    /// geometry cancels.
     LoadDifferences,
 }
 
 impl StiffnessStage {
     /// All of them.
-    pub const EACH: [Self; 4] = [Self::Rigid, Self::Nominal, Self::Positions, Self::LoadDifferences];
+    pub const EACH: [Self; 4] =
+        [Self::Rigid, Self::Nominal, Self::Positions, Self::LoadDifferences];
 
-    /// Singular values of the elastic Jacobian, its columns multiplied by the nominal flexibilities, up to this fraction of the
-    /// largest are dropped: those combinations keep their nominal value.
+    /// Singular values of the elastic Jacobian, its columns multiplied by the nominal
+    /// flexibilities, up to this fraction of the largest are dropped: those combinations keep their
+    /// nominal value.
     pub const TOLERANCE: f64 = 1e-2;
 
     /// Name in results.
@@ -42,7 +46,8 @@ impl StiffnessStage {
     }
 }
 
-/// x = A⁺ b with singular values up to `tolerance`·σ₁ dropped                             [Chen2021, eq. 43, 44]
+/// x = A⁺ b with singular values up to `tolerance`·σ₁ dropped
+/// [Chen2021, eq. 43, 44]
 ///
 /// `None` where A or b is not finite, or they differ in rows.
 pub fn least_squares(a: &DMatrix<f64>, b: &DVector<f64>, tolerance: f64) -> Option<DVector<f64>> {
@@ -59,17 +64,19 @@ pub fn least_squares(a: &DMatrix<f64>, b: &DVector<f64>, tolerance: f64) -> Opti
     Some(minimum_norm_step(&triangle.into_linearisation(), tolerance))
 }
 
-/// What a pose says of the flexibilities: ∂`D_f`/∂ln c, shape = (3, flexibilities), and `PE_meas` − `PE_nom` − `D_f` \[m\].
+/// What a pose says of the flexibilities: ∂`D_f`/∂ln c, shape = (3, flexibilities), and `PE_meas` −
+/// `PE_nom` − `D_f` \[m\].
 type Equations = (Matrix3xX<f64>, Vector3<f64>);
 
 /// Flexibilities by linear least squares at nominal geometry, where `D_f` is linear in them:
 /// c = c₀ + C⁺ [`PE_meas` − `PE_nom` − C c₀].
 ///
-/// From load differences each pose counts less the mean of its configuration, which takes away what the loads do not change:
-/// all errors of the geometry but their part in `J_f` (eq. 40). Poses of a configuration that was measured under one load say
-/// nothing then.
+/// From load differences each pose counts less the mean of its configuration, which takes away what
+/// the loads do not change: all errors of the geometry but their part in `J_f` (eq. 40). Poses of a
+/// configuration that was measured under one load say nothing then.
 ///
-/// `None` where something is not finite, and from load differences where no configuration was measured under several loads.
+/// `None` where something is not finite, and from load differences where no configuration was
+/// measured under several loads.
 pub fn stiffness(
     problem: &Problem,
     poses: &[Measured],
@@ -82,8 +89,10 @@ pub fn stiffness(
         StiffnessStage::Nominal => return Some(parameters),
         StiffnessStage::Positions | StiffnessStage::LoadDifferences => parameters.flexibilities(),
     };
-    let mut equations: Vec<Equations> =
-        poses.iter().map(|pose| equations_of(problem, &parameters, &unknowns, pose, reading)).collect();
+    let mut equations: Vec<Equations> = poses
+        .iter()
+        .map(|pose| equations_of(problem, &parameters, &unknowns, pose, reading))
+        .collect();
     if stage == StiffnessStage::LoadDifferences {
         equations = differences(poses, &equations)?;
     }
@@ -108,18 +117,22 @@ fn equations_of(
     reading: &Reading,
 ) -> Equations {
     let end = EndPoint::new(problem, parameters, &pose.setup, reading);
-    let derivative = |which: &Flexibility| end.displacement(&end.elastic.derivative(*which)) * parameters.get(*which);
+    let derivative = |which: &Flexibility| {
+        end.displacement(&end.elastic.derivative(*which)) * parameters.get(*which)
+    };
     let columns: Vec<Vector3<f64>> = unknowns.iter().map(derivative).collect();
     (Matrix3xX::from_columns(&columns), pose.position - end.position(parameters))
 }
 
-/// Each pose less the mean of its configuration, for configurations that were measured under several loads; `None` where
-/// there is none.
+/// Each pose less the mean of its configuration, for configurations that were measured under
+/// several loads; `None` where there is none.
 fn differences(poses: &[Measured], equations: &[Equations]) -> Option<Vec<Equations>> {
     let load = |pose: &Measured| (pose.setup.payload.copied(), pose.setup.hoist.copied());
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (k, pose) in poses.iter().enumerate() {
-        let same = |group: &&mut Vec<usize>| poses[group[0]].setup.configuration == pose.setup.configuration;
+        let same = |group: &&mut Vec<usize>| {
+            poses[group[0]].setup.configuration == pose.setup.configuration
+        };
         match groups.iter_mut().find(same) {
             Some(group) => group.push(k),
             None => groups.push(vec![k]),
@@ -134,7 +147,9 @@ fn differences(poses: &[Measured], equations: &[Equations]) -> Option<Vec<Equati
             columns += &equations[k].0;
             rest += equations[k].1;
         }
-        out.extend(group.iter().map(|&k| (&equations[k].0 - &columns / n, equations[k].1 - rest / n)));
+        out.extend(
+            group.iter().map(|&k| (&equations[k].0 - &columns / n, equations[k].1 - rest / n)),
+        );
     }
     (!out.is_empty()).then_some(out)
 }

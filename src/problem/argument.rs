@@ -67,7 +67,8 @@ impl Argument {
         }
     }
 
-    /// Its part of the place of an effect: orders have none, nor has what is about a place that is named.
+    /// Its part of the place of an effect: orders have none, nor has what is about a place that is
+    /// named.
     pub(crate) fn place(&self) -> Option<String> {
         match self {
             Self::Joint(joint) => Some(joint.to_string()),
@@ -129,7 +130,8 @@ impl From<&f64> for Argument {
     }
 }
 
-/// The arguments of one effect, read one after the other and checked against the arm: a method for each kind.
+/// The arguments of one effect, read one after the other and checked against the arm: a method for
+/// each kind.
 pub(crate) struct Reader<'s, 'a, 'i> {
     pub section: Section<'a, 'i>,
     joints: &'s [Joint],
@@ -178,7 +180,8 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         }
     }
 
-    /// The same of a joint whose load something takes off: that it gives way is seen when all effects are read.
+    /// The same of a joint whose load something takes off: that it gives way is seen when all
+    /// effects are read.
     pub fn relieved_joint(&mut self, key: &str) -> Result<usize, InputError> {
         self.turning_joint(key)
     }
@@ -216,7 +219,9 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
 
     /// The name of a covariate; whether there is one is seen when the data are read.
     pub fn covariate(&mut self, key: &str) -> Result<String, InputError> {
-        let item = self.section.require(key, &format!("{key} = \"…\", the name of a column in [data.covariates]"))?;
+        let item = self
+            .section
+            .require(key, &format!("{key} = \"…\", the name of a column in [data.covariates]"))?;
         Ok(item.text()?.to_owned())
     }
 
@@ -224,7 +229,9 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
     pub fn beam(&mut self, key: &str) -> Result<String, InputError> {
         let item = self.section.require(key, &format!("{key} = \"…\", the name of a beam"))?;
         let link = item.text()?.to_owned();
-        let links = || self.joints.iter().filter_map(|joint| joint.beam.as_ref()).map(|beam| beam.name.clone());
+        let links = || {
+            self.joints.iter().filter_map(|joint| joint.beam.as_ref()).map(|beam| beam.name.clone())
+        };
         if links().any(|known| known == link) {
             Ok(link)
         } else {
@@ -262,31 +269,42 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
     /// A time \[s\]; its key ends in the unit.
     pub fn time(&mut self, key: &str) -> Result<f64, InputError> {
         let base = key.strip_suffix("_s").unwrap_or(key);
-        self.section.number(base, Unit::Time)?.ok_or_else(|| self.section.missing(base, Unit::Time.spelled(base)))
+        self.section
+            .number(base, Unit::Time)?
+            .ok_or_else(|| self.section.missing(base, Unit::Time.spelled(base)))
     }
 
     /// A time above zero \[s\]; its key ends in the unit.
     pub fn duration(&mut self, key: &str) -> Result<f64, InputError> {
         let base = key.strip_suffix("_s").unwrap_or(key);
-        let found = self.section.positive(base, Unit::Time, |value| InputErrorKind::NotPositive { value })?;
+        let found = self
+            .section
+            .positive(base, Unit::Time, |value| InputErrorKind::NotPositive { value })?;
         found.ok_or_else(|| self.section.missing(base, Unit::Time.spelled(base)))
     }
 
     /// An angle above zero \[rad\]; its key ends in the unit.
     pub fn way(&mut self, key: &str) -> Result<f64, InputError> {
         let base = key.strip_suffix("_rad").unwrap_or(key);
-        let found = self.section.positive(base, Unit::Angle, |value| InputErrorKind::NotPositive { value })?;
+        let found = self
+            .section
+            .positive(base, Unit::Angle, |value| InputErrorKind::NotPositive { value })?;
         found.ok_or_else(|| self.section.missing(base, Unit::Angle.spelled(base)))
     }
 
-    /// An end of a spring, x and y in the plane across the axis, which it does not lie on \[m\]; its key ends in the unit.
+    /// An end of a spring, x and y in the plane across the axis, which it does not lie on \[m\];
+    /// its key ends in the unit.
     pub fn arm(&mut self, key: &str) -> Result<[f64; 2], InputError> {
         let base = key.strip_suffix("_m").unwrap_or(key);
         let Some((item, suffix)) = self.section.quantity(base, Unit::Length)? else {
             return Err(self.section.missing(base, Unit::Length.spelled(base)));
         };
         let end = item.pair()?.map(suffix.to_si);
-        if end[0].hypot(end[1]) > 0.0 { Ok(end) } else { Err(item.error(InputErrorKind::OnTheAxis)) }
+        if end[0].hypot(end[1]) > 0.0 {
+            Ok(end)
+        } else {
+            Err(item.error(InputErrorKind::OnTheAxis))
+        }
     }
 
     /// The free length of a spring, 0 or more \[m\]; its key ends in the unit.
@@ -310,7 +328,10 @@ impl<'s> Examples<'s> {
     }
 
     fn moving(&self) -> impl Iterator<Item = usize> {
-        (1..).zip(self.joints).filter(|(_, joint)| joint.commanded() != JointKind::Fixed).map(|(number, _)| number)
+        (1..)
+            .zip(self.joints)
+            .filter(|(_, joint)| joint.commanded() != JointKind::Fixed)
+            .map(|(number, _)| number)
     }
 
     fn first(&self) -> usize {
@@ -330,7 +351,9 @@ impl<'s> Examples<'s> {
     }
 
     pub fn turning_joint(&self) -> String {
-        let turns = |&number: &usize| self.joints.get(number - 1).is_some_and(|own| own.kind == JointKind::Revolute);
+        let turns = |&number: &usize| {
+            self.joints.get(number - 1).is_some_and(|own| own.kind == JointKind::Revolute)
+        };
         self.moving().find(turns).unwrap_or(self.first()).to_string()
     }
 
@@ -343,7 +366,9 @@ impl<'s> Examples<'s> {
     }
 
     pub fn sliding_joint(&self) -> String {
-        let slides = |&number: &usize| self.joints.get(number - 1).is_some_and(|own| own.kind == JointKind::Prismatic);
+        let slides = |&number: &usize| {
+            self.joints.get(number - 1).is_some_and(|own| own.kind == JointKind::Prismatic)
+        };
         self.moving().find(slides).unwrap_or(self.first()).to_string()
     }
 
@@ -361,7 +386,11 @@ impl<'s> Examples<'s> {
     }
 
     pub fn beam(&self) -> String {
-        let name = self.joints.iter().find_map(|joint| joint.beam.as_ref()).map_or("A", |beam| beam.name.as_str());
+        let name = self
+            .joints
+            .iter()
+            .find_map(|joint| joint.beam.as_ref())
+            .map_or("A", |beam| beam.name.as_str());
         quoted(name)
     }
 

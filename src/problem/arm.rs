@@ -10,8 +10,11 @@ use crate::quantity::Unit;
 
 /// Every `[[joint]]`, at least one, and whether they are written in the standard form.
 pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<(Vec<Joint>, bool), InputError> {
-    let form = root.word("dh", &["modified", "standard"], &[Form::Modified, Form::Standard])?.unwrap_or(Form::Modified);
-    let (mut joints, mut beams, mut mimics, mut parents) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let form = root
+        .word("dh", &["modified", "standard"], &[Form::Modified, Form::Standard])?
+        .unwrap_or(Form::Modified);
+    let (mut joints, mut beams, mut mimics, mut parents) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for mut section in root.sections("joint")? {
         let mimic = section.section("mimic")?;
         let parent = section.get("parent");
@@ -25,8 +28,11 @@ pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<(Vec<Joint>, bool), I
     if joints.is_empty() {
         return Err(root.location().with_key("joint").error(InputErrorKind::NoJoints));
     }
-    let leads: Vec<bool> =
-        joints.iter().zip(&mimics).map(|(own, mimic)| own.kind != JointKind::Fixed && mimic.is_none()).collect();
+    let leads: Vec<bool> = joints
+        .iter()
+        .zip(&mimics)
+        .map(|(own, mimic)| own.kind != JointKind::Fixed && mimic.is_none())
+        .collect();
     for ((joint, section), parent) in joints.iter_mut().zip(mimics).zip(tree::parents(&parents)?) {
         joint.mimic = section.map(|section| mimic(section, &leads)).transpose()?;
         joint.parent = parent;
@@ -50,9 +56,15 @@ fn mimic(mut section: Section<'_, '_>, leads: &[bool]) -> Result<Mimic, InputErr
     let number = item.whole(0)?;
     let joint = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
     let mimic = match joint.and_then(|joint| Some((joint, *leads.get(joint)?))) {
-        Some((joint, true)) => Mimic { joint, ratio: section.get("ratio").map_or(Ok(1.0), |item| item.number())? },
+        Some((joint, true)) => {
+            Mimic { joint, ratio: section.get("ratio").map_or(Ok(1.0), |item| item.number())? }
+        }
         Some((_, false)) => return Err(item.error(InputErrorKind::NoLeader { joint: number })),
-        None => return Err(item.error(InputErrorKind::UnknownJoint { joint: number, joints: leads.len() })),
+        None => {
+            return Err(
+                item.error(InputErrorKind::UnknownJoint { joint: number, joints: leads.len() })
+            );
+        }
     };
     section.finish()?;
     Ok(mimic)
@@ -66,7 +78,9 @@ fn joint(
 ) -> Result<Joint, InputError> {
     let name = section.text("name")?.map_or_else(|| format!("joint {number}"), str::to_owned);
     let kinds = [JointKind::Revolute, JointKind::Prismatic, JointKind::Fixed];
-    let kind = section.word("kind", &["revolute", "prismatic", "fixed"], &kinds)?.unwrap_or(JointKind::Revolute);
+    let kind = section
+        .word("kind", &["revolute", "prismatic", "fixed"], &kinds)?
+        .unwrap_or(JointKind::Revolute);
     if follows && kind == JointKind::Fixed {
         return Err(section.error(InputErrorKind::FixedFollows));
     }
@@ -84,7 +98,9 @@ fn joint(
     let limits = limits(&mut section, if follows { JointKind::Fixed } else { kind })?;
     let stiffness = stiff(&mut section, "stiffness", Unit::TorsionalStiffness)?;
     let beam = match section.section("beam")? {
-        Some(beam) if form == Form::Standard => return Err(beam.error(InputErrorKind::BeamInStandardForm)),
+        Some(beam) if form == Form::Standard => {
+            return Err(beam.error(InputErrorKind::BeamInStandardForm));
+        }
         Some(beam) if a == 0.0 => return Err(beam.error(InputErrorKind::BeamWithoutLength)),
         Some(section) => Some(beam(section, beams)?),
         None => None,
@@ -132,7 +148,10 @@ fn limits(section: &mut Section<'_, '_>, kind: JointKind) -> Result<(f64, f64), 
     };
     match (limit("min")?, limit("max")?) {
         (Some((min, lower)), Some((max, upper))) if min > max => Err(lower.above(&upper)),
-        (min, max) => Ok((min.map_or(f64::NEG_INFINITY, |(min, _)| min), max.map_or(f64::INFINITY, |(max, _)| max))),
+        (min, max) => Ok((
+            min.map_or(f64::NEG_INFINITY, |(min, _)| min),
+            max.map_or(f64::INFINITY, |(max, _)| max),
+        )),
     }
 }
 
@@ -154,7 +173,9 @@ fn beam(mut section: Section<'_, '_>, beams: &mut Vec<String>) -> Result<Beam, I
 /// The name of a beam, which begins the names of its parameters.
 fn beam_name(item: &Item<'_, '_>, beams: &[String]) -> Result<String, InputError> {
     let name = item.text()?.to_owned();
-    let reserved = name.strip_prefix("joint").is_some_and(|number| number.bytes().all(|byte| byte.is_ascii_digit()))
+    let reserved = name
+        .strip_prefix("joint")
+        .is_some_and(|number| number.bytes().all(|byte| byte.is_ascii_digit()))
         || ["tool", "base"].contains(&name.as_str())
         || effect::NAMES.contains(&name.as_str());
     if name.contains(|c: char| ".*[]\"".contains(c) || c.is_whitespace() || c.is_control()) {
@@ -196,7 +217,9 @@ fn bodies(
     for mut section in section.sections(key)? {
         let number = bodies.len() + 1;
         let name = section.text("name")?.map_or_else(|| format!("{key} {number}"), str::to_owned);
-        let mass = section.not_negative("mass", Unit::Mass)?.ok_or_else(|| section.missing("mass_kg", "mass_kg"))?;
+        let mass = section
+            .not_negative("mass", Unit::Mass)?
+            .ok_or_else(|| section.missing("mass_kg", "mass_kg"))?;
         let position = if position_needed {
             section.require_vector(base, Unit::Length)?
         } else {

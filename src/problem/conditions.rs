@@ -26,7 +26,8 @@ pub struct PoseConditions {
     pub past: Past,
 }
 
-/// The same of a pose whose numbers are kept elsewhere, in a table for instance: fits hold one for each pose.
+/// The same of a pose whose numbers are kept elsewhere, in a table for instance: fits hold one for
+/// each pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PoseView<'a> {
     /// Configuration q, shape = (joints) \[rad\] or \[m\]; fixed joints ignore theirs.
@@ -47,8 +48,8 @@ pub struct PoseView<'a> {
     pub covariates: &'a [f64],
     /// What was before.
     pub past: PastOf<'a>,
-    /// Strain of the beam of each joint without load, shape = (joints): elongation, then curvatures about y and z [1/m]; `None`:
-    /// none. Most poses have none: a thin reference keeps them small.
+    /// Strain of the beam of each joint without load, shape = (joints): elongation, then curvatures
+    /// about y and z [1/m]; `None`: none. Most poses have none: a thin reference keeps them small.
     pub strains: Option<&'a Vec<[f64; 3]>>,
 }
 
@@ -77,7 +78,8 @@ impl PoseView<'_> {
 }
 
 impl PoseConditions {
-    /// Enters the pose into the past of the next one. Temperatures and sides are those of all poses or of none.
+    /// Enters the pose into the past of the next one. Temperatures and sides are those of all poses
+    /// or of none.
     pub(crate) fn enter(&self, past: &mut Past) {
         past.times.push(self.time);
         past.temperatures.extend(self.temperature);
@@ -120,12 +122,23 @@ pub struct PoseRanges {
 }
 
 impl PoseRanges {
-    /// The same without temperatures, sides and covariates on which no declared effect depends: they need not be set.
+    /// The same without temperatures, sides and covariates on which no declared effect depends:
+    /// they need not be set.
     #[must_use]
     pub fn that_matter(self, problem: &Problem) -> Self {
-        let declared = |matters: fn(&Effect) -> bool| problem.effects.iter().any(|own| matters(&own.effect));
+        let declared =
+            |matters: fn(&Effect) -> bool| problem.effects.iter().any(|own| matters(&own.effect));
         let (thermal, sided) = (declared(Effect::is_thermal), declared(Effect::has_sides));
-        let covariates = if declared(|effect| effect.covariate().is_some()) { self.covariates } else { Vec::new() };
-        Self { temperature: self.temperature.filter(|_| thermal), approach: self.approach && sided, covariates, ..self }
+        let covariates = if declared(|effect| effect.covariate().is_some()) {
+            self.covariates
+        } else {
+            Vec::new()
+        };
+        Self {
+            temperature: self.temperature.filter(|_| thermal),
+            approach: self.approach && sided,
+            covariates,
+            ..self
+        }
     }
 }

@@ -64,13 +64,19 @@ fn constraint(mut section: Section<'_, '_>) -> Result<Constraint, InputError> {
         // `terms = { A.EI = 1.0 }` without quotes is a table `A` that holds `EI`.
         if term.holds_tables() {
             let inner = term.section()?.entries().first().map_or("…", |(inner, _)| *inner);
-            return Err(term.error(InputErrorKind::UnquotedName { name: format!("{name}.{inner}") }));
+            return Err(
+                term.error(InputErrorKind::UnquotedName { name: format!("{name}.{inner}") })
+            );
         }
         let coefficient = term.number()?;
         if coefficient == 0.0 {
             return Err(term.error(InputErrorKind::NoCoefficient));
         }
-        terms.push(ConstraintTerm { name: name.to_owned(), coefficient, location: term.location() });
+        terms.push(ConstraintTerm {
+            name: name.to_owned(),
+            coefficient,
+            location: term.location(),
+        });
     }
     if terms.is_empty() {
         return Err(item.error(InputErrorKind::NoTerms));
@@ -80,7 +86,9 @@ fn constraint(mut section: Section<'_, '_>) -> Result<Constraint, InputError> {
     section.finish()?;
     match (&at_least, &at_most) {
         (None, None) => return Err(section.error(InputErrorKind::NoLimit)),
-        (Some((least, lower)), Some((most, upper))) if least.kind == most.kind && least.value > most.value => {
+        (Some((least, lower)), Some((most, upper)))
+            if least.kind == most.kind && least.value > most.value =>
+        {
             return Err(lower.above(upper));
         }
         _ => {}
@@ -90,7 +98,10 @@ fn constraint(mut section: Section<'_, '_>) -> Result<Constraint, InputError> {
 }
 
 /// A limit in one of its units, or bare for logarithms.
-fn limit<'a, 'i>(section: &mut Section<'a, 'i>, base: &str) -> Result<Option<(Limit, Item<'a, 'i>)>, InputError> {
+fn limit<'a, 'i>(
+    section: &mut Section<'a, 'i>,
+    base: &str,
+) -> Result<Option<(Limit, Item<'a, 'i>)>, InputError> {
     let mut found = Vec::new();
     if let Some(item) = section.get(base) {
         found.push((item.number()?, LimitKind::Logarithm, item));
@@ -101,7 +112,11 @@ fn limit<'a, 'i>(section: &mut Section<'a, 'i>, base: &str) -> Result<Option<(Li
         }
     }
     if let [_, (.., second), ..] = &found[..] {
-        return Err(second.error(InputErrorKind::GivenTwice { first: format!("{base} in another unit") }));
+        return Err(
+            second.error(InputErrorKind::GivenTwice { first: format!("{base} in another unit") })
+        );
     }
-    Ok(found.pop().map(|(value, kind, item)| (Limit { value, kind, location: item.location() }, item)))
+    Ok(found
+        .pop()
+        .map(|(value, kind, item)| (Limit { value, kind, location: item.location() }, item)))
 }

@@ -21,7 +21,8 @@ pub struct Data {
     pub files: Vec<PathBuf>,
     /// 1 σ of a measured coordinate \[m\]; `None`: not known.
     pub position_sigma: Option<f64>,
-    /// The same of a target at a point, of a measured distance, and of a distance from a surface \[m\].
+    /// The same of a target at a point, of a measured distance, and of a distance from a surface
+    /// \[m\].
     pub point_sigma: Option<f64>,
     /// See [`point_sigma`](Self::point_sigma).
     pub distance_sigma: Option<f64>,
@@ -149,10 +150,12 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         }
         files_location = item.location();
     }
-    let mut sigma = |base| section.positive(base, Unit::Length, |value| InputErrorKind::NotPositive { value });
+    let mut sigma =
+        |base| section.positive(base, Unit::Length, |value| InputErrorKind::NotPositive { value });
     let (position_sigma, point_sigma) = (sigma("position_sigma")?, sigma("point_sigma")?);
     let (distance_sigma, surface_sigma) = (sigma("distance_sigma")?, sigma("surface_sigma")?);
-    let tilt_sigma = section.positive("tilt_sigma", Unit::Angle, |value| InputErrorKind::NotPositive { value })?;
+    let tilt_sigma = section
+        .positive("tilt_sigma", Unit::Angle, |value| InputErrorKind::NotPositive { value })?;
     let mut held_out = None;
     let mut held_out_location = location.clone();
     if let Some(item) = section.get("held_out") {
@@ -162,10 +165,12 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     let reference_temperature = section.number("reference_temperature", Unit::Temperature)?;
     let sources = [JointSource::Commanded, JointSource::Read];
     let joints = section.word("joints", &["commanded", "read"], &sources)?.unwrap_or_default();
-    let orientation_sigma =
-        section.positive("orientation_sigma", Unit::Angle, |value| InputErrorKind::NotPositive { value })?;
+    let orientation_sigma = section.positive("orientation_sigma", Unit::Angle, |value| {
+        InputErrorKind::NotPositive { value }
+    })?;
     let dialect = dialect::read(&mut section)?;
-    let covariates = section.section("covariates")?.map_or(Ok(Vec::new()), |section| covariates(&section))?;
+    let covariates =
+        section.section("covariates")?.map_or(Ok(Vec::new()), |section| covariates(&section))?;
     section.finish()?;
     Ok(Data {
         files,
@@ -198,7 +203,11 @@ fn covariates(section: &Section<'_, '_>) -> Result<Vec<OwnCovariate>, InputError
         if name.trim() != name || name.is_empty() || name.contains(['[', ']', ',', '*', '?', '"']) {
             return Err(item.error(InputErrorKind::NoCovariateName { name: name.to_owned() }));
         }
-        Ok(OwnCovariate { name: name.to_owned(), meaning: item.text()?.to_owned(), location: item.location() })
+        Ok(OwnCovariate {
+            name: name.to_owned(),
+            meaning: item.text()?.to_owned(),
+            location: item.location(),
+        })
     };
     entries.into_iter().map(one).collect()
 }
@@ -211,7 +220,9 @@ fn held_out_rows(mut section: Section<'_, '_>) -> Result<HeldOut, InputError> {
     section.finish()?;
     match (column, fraction, session, seed) {
         (Some(column), None, None, None) => Ok(HeldOut::Column(column.text()?.trim().to_owned())),
-        (None, None, Some(session), None) => Ok(HeldOut::Session(session.text()?.trim().to_owned())),
+        (None, None, Some(session), None) => {
+            Ok(HeldOut::Session(session.text()?.trim().to_owned()))
+        }
         (None, Some(item), None, seed) => {
             let fraction = item.number()?;
             if fraction <= 0.0 || fraction >= 1.0 {

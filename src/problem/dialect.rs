@@ -6,7 +6,8 @@ use crate::error::{InputError, InputErrorKind, Location};
 /// Most columns of a map.
 const MOST_COLUMNS: usize = 10_000;
 
-/// How tables are written and what their columns are called, where that is not as flexcal writes them.
+/// How tables are written and what their columns are called, where that is not as flexcal writes
+/// them.
 #[derive(Debug, Clone, Default)]
 pub struct Dialect {
     /// What columns stand for, by their names in the table.
@@ -26,7 +27,12 @@ pub struct Dialect {
 impl Dialect {
     /// The same of a table in memory, whose cells need nothing to set them apart.
     pub(crate) fn in_memory(&self) -> Self {
-        Self { delimiter: Some(Delimiter::Byte(b',')), decimal_comma: false, comment: None, ..self.clone() }
+        Self {
+            delimiter: Some(Delimiter::Byte(b',')),
+            decimal_comma: false,
+            comment: None,
+            ..self.clone()
+        }
     }
 }
 
@@ -104,13 +110,16 @@ pub(super) fn read(data: &mut Section<'_, '_>) -> Result<Dialect, InputError> {
     }
     if let Some(comma) = format.word("decimal", &[".", ","], &[false, true])? {
         dialect.decimal_comma = comma;
-        if let Some(item) = format.peek("decimal").filter(|_| comma && dialect.delimiter == Some(Delimiter::Byte(b',')))
+        if let Some(item) = format
+            .peek("decimal")
+            .filter(|_| comma && dialect.delimiter == Some(Delimiter::Byte(b',')))
         {
             return Err(item.error(InputErrorKind::DecimalDelimiter));
         }
     }
     let kinds = [RotationKind::Vector, RotationKind::EulerXyz, RotationKind::RollPitchYaw];
-    dialect.rotation = format.word("rotation", &["vector", "euler-xyz", "rpy"], &kinds)?.unwrap_or_default();
+    dialect.rotation =
+        format.word("rotation", &["vector", "euler-xyz", "rpy"], &kinds)?.unwrap_or_default();
     dialect.comment = format.text("comment")?.map(str::to_owned);
     if let Some(item) = format.get("missing") {
         dialect.missing = Some(missing(item.any_text()?, dialect.decimal_comma));

@@ -7,29 +7,34 @@ use sha2::{Digest as _, Sha256};
 
 use super::quoted::quoted;
 use super::{
-    BasePose, Beam, Body, Effect, Equilibrium, Hoist, Joint, JointKind, Mimic, Placement, Problem, Statics, Target,
-    Tool,
+    BasePose, Beam, Body, Effect, Equilibrium, Hoist, Joint, JointKind, Mimic, Placement, Problem,
+    Statics, Target, Tool,
 };
 
 impl Problem {
-    /// A digest of everything declared that predictions depend on, 64 hexadecimal digits: the same on every machine, and
-    /// for the same value in another unit.
+    /// A digest of everything declared that predictions depend on, 64 hexadecimal digits: the same
+    /// on every machine, and for the same value in another unit.
     ///
-    /// It is the SHA-256 of a text of words and numbers with a space before each, numbers in SI with twelve digits
-    /// (`5.00000000000e-1`):
-    /// - `undeflected` or `deflected`, without a space; beam elements; gravity; target; where the payload hangs; translation
-    ///   and rotation of the base; mass of the payload; where the tool has an orientation, `turned` and its rotation vector; where another
-    ///   joint than the last carries it, `on` and its number;
-    /// - for each target a new line with `target`, its name in quotes, the number of its joint, place and rotation vector;
-    /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; where it stands on another than the one before `on` and the number of
-    ///   that, 0 for the base; where it is placed by xyz and rpy `placed` and these; where
-    ///   it follows another `mimic`, its number and the ratio; α, a, θ, d, β; stiffness, or `rigid`; `mass`, mass and
-    ///   position of each body; with a beam `beam`, its name in quotes, mass, EA, `EI_y`, `EI_z`, GJ, each or `rigid`, its masses,
-    ///   and with a hoist `hoist`, force, hook and direction;
-    /// - for each effect, in the order of the alphabet, a new line with its declaration as in a problem file;
+    /// It is the SHA-256 of a text of words and numbers with a space before each, numbers in SI
+    /// with twelve digits (`5.00000000000e-1`):
+    /// - `undeflected` or `deflected`, without a space; beam elements; gravity; target; where the
+    ///   payload hangs; translation and rotation of the base; mass of the payload; where the tool
+    ///   has an orientation, `turned` and its rotation vector; where another joint than the last
+    ///   carries it, `on` and its number;
+    /// - for each target a new line with `target`, its name in quotes, the number of its joint,
+    ///   place and rotation vector;
+    /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; where it stands on
+    ///   another than the one before `on` and the number of that, 0 for the base; where it is
+    ///   placed by xyz and rpy `placed` and these; where it follows another `mimic`, its number and
+    ///   the ratio; α, a, θ, d, β; stiffness, or `rigid`; `mass`, mass and position of each body;
+    ///   with a beam `beam`, its name in quotes, mass, EA, `EI_y`, `EI_z`, GJ, each or `rigid`, its
+    ///   masses, and with a hoist `hoist`, force, hook and direction;
+    /// - for each effect, in the order of the alphabet, a new line with its declaration as in a
+    ///   problem file;
     /// - T₀, where an effect follows the temperature.
     ///
-    /// Names for people, limits of joints, `[parameters]`, constraints, data and noise do not enter.
+    /// Names for people, limits of joints, `[parameters]`, constraints, data and noise do not
+    /// enter.
     pub fn digest(&self) -> String {
         let Self { gravity, statics, joints, tool, targets, base, effects, data, .. } = self;
         let Statics { equilibrium, beam_elements } = statics;
@@ -57,7 +62,8 @@ impl Problem {
             joint(&mut text, index, own);
         }
         // The order in which effects are declared changes nothing.
-        let mut declared: Vec<String> = effects.iter().map(|own| format!("\n{}", own.effect.declaration())).collect();
+        let mut declared: Vec<String> =
+            effects.iter().map(|own| format!("\n{}", own.effect.declaration())).collect();
         declared.sort_unstable();
         text.extend(declared);
         if let (true, Some(reference)) =
@@ -79,8 +85,21 @@ pub(crate) fn hexadecimal(text: &str) -> String {
 }
 
 fn joint(text: &mut String, index: usize, joint: &Joint) {
-    let Joint { kind, parent, placement, mimic, alpha, a, theta, d, beta, stiffness, beam: elastic, bodies, .. } =
-        joint;
+    let Joint {
+        kind,
+        parent,
+        placement,
+        mimic,
+        alpha,
+        a,
+        theta,
+        d,
+        beta,
+        stiffness,
+        beam: elastic,
+        bodies,
+        ..
+    } = joint;
     text.push_str(match kind {
         JointKind::Revolute => "\nrevolute",
         JointKind::Prismatic => "\nprismatic",
@@ -167,7 +186,10 @@ mod tests {
             zero.repeat(12)
         );
         assert_eq!(problem.digest(), hexadecimal(&canonical));
-        assert_eq!(problem.digest(), "3027950590543685817207b2ac35d00da78b76ec6770419be953cf72bc81fabe");
+        assert_eq!(
+            problem.digest(),
+            "3027950590543685817207b2ac35d00da78b76ec6770419be953cf72bc81fabe"
+        );
         assert_eq!(quoted("a \"b\" \\"), "\"a \\\"b\\\" \\\\\"");
     }
 }

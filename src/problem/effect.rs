@@ -1,4 +1,5 @@
-//! The catalogue's effects, declared in one table: names, arguments, reading and writing follow from it.
+//! The catalogue's effects, declared in one table: names, arguments, reading and writing follow
+//! from it.
 //!
 //! What an effect does is said by its family in `model::effect`.
 
@@ -31,13 +32,15 @@ macro_rules! key {
     };
 }
 
-/// From lines `Variant "name-in-files" { field: Type = kind }`; the kinds are methods of [`Reader`] and [`Examples`].
+/// From lines `Variant "name-in-files" { field: Type = kind }`; the kinds are methods of [`Reader`]
+/// and [`Examples`].
 macro_rules! effects {
     ($(
         $(#[$doc:meta])*
         $variant:ident $name:literal $({ $($field:ident: $type:ty = $kind:ident $(as $key:literal)?),+ })?
     )+) => {
-        /// An effect and its arguments; joints are numbered from 1 as in files, links go by the name of their beam.
+        /// An effect and its arguments; joints are numbered from 1 as in files, links go by the
+        /// name of their beam.
         #[derive(Debug, Clone, PartialEq)]
         #[non_exhaustive]
         #[expect(missing_docs, reason = "arguments carry the names of the file format")]
@@ -59,7 +62,8 @@ macro_rules! effects {
                 }
             }
 
-            /// Arguments by key, in the order of the files; the place of a custom effect, unless that is the whole arm.
+            /// Arguments by key, in the order of the files; the place of a custom effect, unless
+            /// that is the whole arm.
             pub fn arguments(&self) -> Vec<(&'static str, Argument)> {
                 match self {
                     $(Self::$variant $({ $($field),+ })? => {
@@ -96,7 +100,8 @@ effects! {
     JointCompliance "joint-compliance" { joint: usize = any_joint }
     /// Δθ = Σₖ aₖ sin kθ + bₖ cos kθ, with θ = q as commanded.
     JointHarmonic "joint-harmonic" { joint: usize = moving_joint, orders: Vec<u32> = orders }
-    /// Δθ = a sin kθ + b cos kθ of an order k that need be no whole number, with θ = q as commanded.
+    /// Δθ = a sin kθ + b cos kθ of an order k that need be no whole number, with θ = q as
+    /// commanded.
     JointWave "joint-wave" { joint: usize = moving_joint, order: f64 = order }
     /// Δθ = ε θ, with θ = q as commanded.
     GearRatio "gear-ratio" { joint: usize = moving_joint }
@@ -104,13 +109,15 @@ effects! {
     Backlash "backlash" { joint: usize = moving_joint }
     /// Play that opens with the payload m: Δθ = (w m / 2)·approach.
     PayloadBacklash "payload-backlash" { joint: usize = moving_joint }
-    /// Friction pulls the joint back the way on which it came, Δθ = h z with dz/dθ = (g − z)/s, g = ±1 the side from which it comes.
+    /// Friction pulls the joint back the way on which it came, Δθ = h z with dz/dθ = (g − z)/s, g =
+    /// ±1 the side from which it comes.
     JointHysteresis "joint-hysteresis" { joint: usize = turning_joint, distance: f64 = way as "distance_rad" }
     /// Δθ = c₃ `M_z`³ beyond the linear torsion.
     JointNonlinearStiffness "joint-nonlinear-stiffness" { joint: usize = any_joint }
     /// Bearings tilt by (`c_x` `M_x`, `c_y` `M_y`, 0) before the joint turns.
     JointLateralCompliance "joint-lateral-compliance" { joint: usize = any_joint }
-    /// A spring from an anchor before the joint to a lever on the link behind it pulls the two together: with a moment about the axis.
+    /// A spring from an anchor before the joint to a lever on the link behind it pulls the two
+    /// together: with a moment about the axis.
     GravityCompensator "gravity-compensator" {
         joint: usize = relieved_joint,
         anchor: [f64; 2] = arm as "anchor_m",
@@ -163,7 +170,8 @@ effects! {
     StationMove "station-move" { at_time: f64 = time as "at_time_s" }
     /// Measured positions move by d (1 − exp(−(t − `t_first`)/τ)).
     TrackerSettling "tracker-settling" { time_constant: f64 = duration as "time_constant_s" }
-    /// Δθ of a joint, or a small motion of the base, in proportion to one of the problem's own covariates.
+    /// Δθ of a joint, or a small motion of the base, in proportion to one of the problem's own
+    /// covariates.
     Covariate "covariate" { joint: Mount = mount, of: String = covariate }
 }
 
@@ -174,7 +182,8 @@ fn keyed(field: &'static str, argument: Argument) -> (&'static str, Argument) {
 
 /// `name = { key = value }`; without arguments `name = true`.
 fn declaration(name: &str, arguments: &[(&str, String)]) -> String {
-    let all: Vec<String> = arguments.iter().map(|(key, value)| format!("{key} = {value}")).collect();
+    let all: Vec<String> =
+        arguments.iter().map(|(key, value)| format!("{key} = {value}")).collect();
     match all.join(", ") {
         none if none.is_empty() => format!("{name} = true"),
         all => format!("{name} = {{ {all} }}"),
@@ -182,14 +191,20 @@ fn declaration(name: &str, arguments: &[(&str, String)]) -> String {
 }
 
 impl Effect {
-    /// Where it is, as its parameters' names say it in brackets: a joint's number, a link, a time; empty for the whole.
+    /// Where it is, as its parameters' names say it in brackets: a joint's number, a link, a time;
+    /// empty for the whole.
     pub fn place(&self) -> String {
-        self.arguments().iter().filter_map(|(_, argument)| argument.place()).collect::<Vec<_>>().join(",")
+        self.arguments()
+            .iter()
+            .filter_map(|(_, argument)| argument.place())
+            .collect::<Vec<_>>()
+            .join(",")
     }
 
     /// As a problem declares it: `gear-ratio = { joint = 3 }`.
     pub fn declaration(&self) -> String {
-        let arguments: Vec<_> = self.arguments().iter().map(|(key, argument)| (*key, argument.toml())).collect();
+        let arguments: Vec<_> =
+            self.arguments().iter().map(|(key, argument)| (*key, argument.toml())).collect();
         declaration(self.name(), &arguments)
     }
 
@@ -202,7 +217,9 @@ impl Effect {
     pub fn is_thermal(&self) -> bool {
         matches!(
             self,
-            Self::JointThermalDrift { .. } | Self::LinkThermalBending { .. } | Self::LinkThermalExpansion { .. }
+            Self::JointThermalDrift { .. }
+                | Self::LinkThermalBending { .. }
+                | Self::LinkThermalExpansion { .. }
         ) || self.lags()
     }
 
@@ -234,13 +251,19 @@ impl Effect {
 
     /// Whether it depends on the side from which joints come.
     pub fn has_sides(&self) -> bool {
-        matches!(self, Self::Backlash { .. } | Self::PayloadBacklash { .. } | Self::JointHysteresis { .. })
+        matches!(
+            self,
+            Self::Backlash { .. } | Self::PayloadBacklash { .. } | Self::JointHysteresis { .. }
+        )
     }
 
-    /// Whether it follows time, or the order of the poses, rather than what poses can be chosen for.
+    /// Whether it follows time, or the order of the poses, rather than what poses can be chosen
+    /// for.
     pub fn follows_time(&self) -> bool {
         let moves = matches!(self, Self::StationShift { .. } | Self::StationMove { .. });
-        moves || matches!(self, Self::TrackerDrift | Self::TrackerSettling { .. }) || self.has_memory()
+        moves
+            || matches!(self, Self::TrackerDrift | Self::TrackerSettling { .. })
+            || self.has_memory()
     }
 
     /// Whether it depends on the poses before.
@@ -248,14 +271,14 @@ impl Effect {
         self.lags() || matches!(self, Self::JointHysteresis { .. })
     }
 
-    /// An order that this and another harmonic of one joint share; a wave of a whole order is a harmonic.
+    /// An order that this and another harmonic of one joint share; a wave of a whole order is a
+    /// harmonic.
     pub(super) fn shared_order(&self, other: &Self) -> Option<u32> {
         match (self, other) {
-            (Self::JointHarmonic { joint, orders }, Self::JointHarmonic { joint: own, orders: more })
-                if joint == own =>
-            {
-                more.iter().find(|order| orders.contains(order)).copied()
-            }
+            (
+                Self::JointHarmonic { joint, orders },
+                Self::JointHarmonic { joint: own, orders: more },
+            ) if joint == own => more.iter().find(|order| orders.contains(order)).copied(),
             (Self::JointHarmonic { joint, orders }, Self::JointWave { joint: own, order })
             | (Self::JointWave { joint: own, order }, Self::JointHarmonic { joint, orders })
                 if joint == own =>
@@ -266,11 +289,21 @@ impl Effect {
         }
     }
 
-    /// Why it could never act on this arm: the declared model has it already, or has nothing for it to act on.
-    pub(crate) fn refusal(&self, statics: Statics, joints: &[Joint], data: &Data) -> Option<InputErrorKind> {
-        let hoisted = || joints.iter().any(|joint| joint.beam.as_ref().is_some_and(|beam| beam.hoist.is_some()));
+    /// Why it could never act on this arm: the declared model has it already, or has nothing for it
+    /// to act on.
+    pub(crate) fn refusal(
+        &self,
+        statics: Statics,
+        joints: &[Joint],
+        data: &Data,
+    ) -> Option<InputErrorKind> {
+        let hoisted = || {
+            joints.iter().any(|joint| joint.beam.as_ref().is_some_and(|beam| beam.hoist.is_some()))
+        };
         match self {
-            Self::LinkBending { joint } if joints.get(joint.wrapping_sub(1)).is_none_or(|own| own.a == 0.0) => {
+            Self::LinkBending { joint }
+                if joints.get(joint.wrapping_sub(1)).is_none_or(|own| own.a == 0.0) =>
+            {
                 Some(InputErrorKind::NoLink { joint: *joint })
             }
             Self::DeflectedEquilibrium if statics.equilibrium == Equilibrium::Deflected => {
@@ -282,7 +315,9 @@ impl Effect {
                 Some(InputErrorKind::UnknownCovariate { name: of.clone(), known })
             }
             effect if effect.is_thermal() && data.reference_temperature.is_none() => {
-                Some(InputErrorKind::NeedsTemperature { write: "reference_temperature_C in [data]" })
+                Some(InputErrorKind::NeedsTemperature {
+                    write: "reference_temperature_C in [data]",
+                })
             }
             _ => None,
         }
@@ -342,7 +377,10 @@ mod tests {
     fn effects_are_written_as_they_are_read() {
         assert_eq!(Effect::GearRatio { joint: 3 }.declaration(), "gear-ratio = { joint = 3 }");
         assert_eq!(Effect::HoistForce.declaration(), "hoist-force = true");
-        assert_eq!(Effect::StationShift { at_time: 600.0 }.declaration(), "station-shift = { at_time_s = 600.0 }");
+        assert_eq!(
+            Effect::StationShift { at_time: 600.0 }.declaration(),
+            "station-shift = { at_time_s = 600.0 }"
+        );
         let harmonic = Effect::JointHarmonic { joint: 2, orders: vec![1, 4] };
         let json = r#"{"effect":"joint-harmonic","joint":2,"orders":[1,4]}"#;
         assert_eq!(serde_json::to_string(&harmonic).ok().as_deref(), Some(json));

@@ -12,7 +12,10 @@ use super::{Data, Effect, EffectDeclaration, Joint, Problem, Statics};
 use crate::error::{InputError, InputErrorKind, Location};
 
 /// Every `[[effect]]`.
-pub(super) fn read(root: &mut Section<'_, '_>, joints: &[Joint]) -> Result<Vec<EffectDeclaration>, InputError> {
+pub(super) fn read(
+    root: &mut Section<'_, '_>,
+    joints: &[Joint],
+) -> Result<Vec<EffectDeclaration>, InputError> {
     let mut effects: Vec<EffectDeclaration> = Vec::new();
     for section in root.sections("effect")? {
         let entries = section.entries();
@@ -24,8 +27,9 @@ pub(super) fn read(root: &mut Section<'_, '_>, joints: &[Joint]) -> Result<Vec<E
             let line = first.location.line.unwrap_or(0);
             return Err(item.error(InputErrorKind::RepeatedEffect { line }));
         }
-        let shared =
-            |known: &EffectDeclaration| Some((known.effect.shared_order(&effect)?, known.location.line.unwrap_or(0)));
+        let shared = |known: &EffectDeclaration| {
+            Some((known.effect.shared_order(&effect)?, known.location.line.unwrap_or(0)))
+        };
         if let Some((order, line)) = effects.iter().find_map(shared) {
             return Err(item.error(InputErrorKind::RepeatedHarmonic { order, line }));
         }
@@ -55,13 +59,18 @@ fn check_alone(
     effect.refusal(statics, joints, data).map_or(Ok(()), |kind| Err(location.clone().error(kind)))
 }
 
-/// Refuses a compensator where nothing gives way about the joint's axis, and a second one of one joint.
+/// Refuses a compensator where nothing gives way about the joint's axis, and a second one of one
+/// joint.
 fn check_compensators(effects: &[EffectDeclaration], joints: &[Joint]) -> Result<(), InputError> {
     for (k, EffectDeclaration { effect, location }) in effects.iter().enumerate() {
         let Some(joint) = effect.compensated() else { continue };
-        if let Some(first) = effects.iter().take(k).find(|known| known.effect.compensated() == Some(joint)) {
+        if let Some(first) =
+            effects.iter().take(k).find(|known| known.effect.compensated() == Some(joint))
+        {
             let line = first.location.line.unwrap_or(0);
-            return Err(location.clone().error(InputErrorKind::RepeatedCompensator { joint, line }));
+            return Err(location
+                .clone()
+                .error(InputErrorKind::RepeatedCompensator { joint, line }));
         }
         if !gives_way(joint, joints, effects.iter().map(|own| &own.effect)) {
             return Err(location.clone().error(InputErrorKind::NothingToRelieve { joint }));
@@ -70,23 +79,32 @@ fn check_compensators(effects: &[EffectDeclaration], joints: &[Joint]) -> Result
     Ok(())
 }
 
-/// Whether a joint, counted from 1, turns by a moment about its axis: it has a stiffness, or one of these effects makes it compliant.
-pub(crate) fn gives_way<'e>(joint: usize, joints: &[Joint], mut effects: impl Iterator<Item = &'e Effect>) -> bool {
+/// Whether a joint, counted from 1, turns by a moment about its axis: it has a stiffness, or one of
+/// these effects makes it compliant.
+pub(crate) fn gives_way<'e>(
+    joint: usize,
+    joints: &[Joint],
+    mut effects: impl Iterator<Item = &'e Effect>,
+) -> bool {
     let stiff = joints.get(joint.wrapping_sub(1)).is_some_and(|own| own.stiffness.is_some());
     stiff || effects.any(|effect| *effect == Effect::JointCompliance { joint })
 }
 
-/// One effect written as in a problem file, its `[[effect]]` left out: `gear-ratio = { joint = 3 }`; `hoist-force` alone
-/// stands for `hoist-force = true`.
-pub(super) fn parse(text: &str, named: &Path, problem: &Problem) -> Result<EffectDeclaration, InputError> {
+/// One effect written as in a problem file, its `[[effect]]` left out: `gear-ratio = { joint = 3
+/// }`; `hoist-force` alone stands for `hoist-force = true`.
+pub(super) fn parse(
+    text: &str,
+    named: &Path,
+    problem: &Problem,
+) -> Result<EffectDeclaration, InputError> {
     if text.contains('=') {
         return written(text.to_owned(), named, problem);
     }
     written(format!("{text} = true"), named, problem).map_err(|error| {
         let kind = match *error.kind {
-            InputErrorKind::MissingKey { .. } => {
-                InputErrorKind::NeedsArguments { write: format!("'{}'", example(text.trim(), problem)) }
-            }
+            InputErrorKind::MissingKey { .. } => InputErrorKind::NeedsArguments {
+                write: format!("'{}'", example(text.trim(), problem)),
+            },
             kind => kind,
         };
         // Nobody wrote the text that was read.
@@ -102,7 +120,10 @@ fn written(text: String, named: &Path, problem: &Problem) -> Result<EffectDeclar
     let [(name, item)] = entries.as_slice() else {
         return Err(section.error(InputErrorKind::NotOneEffect { found: section.len() }));
     };
-    let declared = EffectDeclaration { effect: effect(name, item, &problem.joints)?, location: item.location() };
+    let declared = EffectDeclaration {
+        effect: effect(name, item, &problem.joints)?,
+        location: item.location(),
+    };
     check_alone(&declared, problem.statics, &problem.joints, &problem.data)?;
     let all = [problem.effects.as_slice(), std::slice::from_ref(&declared)].concat();
     check_compensators(&all, &problem.joints)?;
@@ -110,7 +131,11 @@ fn written(text: String, named: &Path, problem: &Problem) -> Result<EffectDeclar
 }
 
 /// One effect; `true` stands for no arguments.
-pub(crate) fn effect(name: &str, item: &Item<'_, '_>, joints: &[Joint]) -> Result<Effect, InputError> {
+pub(crate) fn effect(
+    name: &str,
+    item: &Item<'_, '_>,
+    joints: &[Joint],
+) -> Result<Effect, InputError> {
     let empty = DeTable::new();
     let section = match item.boolean() {
         Ok(true) => item.section_of(&empty),
@@ -119,7 +144,9 @@ pub(crate) fn effect(name: &str, item: &Item<'_, '_>, joints: &[Joint]) -> Resul
     };
     let mut arguments = Reader::new(section, joints);
     let Some(effect) = Effect::read(name, &mut arguments)? else {
-        return Err(item.error(InputErrorKind::UnknownEffect { name: name.to_owned(), known: NAMES }));
+        return Err(
+            item.error(InputErrorKind::UnknownEffect { name: name.to_owned(), known: NAMES })
+        );
     };
     arguments.section.finish()?;
     Ok(effect)

@@ -1,5 +1,5 @@
-//! What stands around the arm and is touched or measured against instead of a tracker: `[[point]]`, `[[anchor]]`, `[[surface]]`,
-//! and the known distances between points.
+//! What stands around the arm and is touched or measured against instead of a tracker: `[[point]]`,
+//! `[[anchor]]`, `[[surface]]`, and the known distances between points.
 //!
 //! All of it stands in the measuring frame.
 
@@ -38,7 +38,8 @@ pub enum FixtureKind {
     Point,
     /// A point to which distances are measured; x, y, z \[m\].
     Anchor,
-    /// A plane n·x = d with n = exp(\[(rx, ry, 0)\]×) ẑ, or near −ẑ, with rx above 3π/4, n = −exp(\[(rx − π, ry, 0)\]×) ẑ; rx, ry \[rad\], d \[m\].
+    /// A plane n·x = d with n = exp(\[(rx, ry, 0)\]×) ẑ, or near −ẑ, with rx above 3π/4, n =
+    /// −exp(\[(rx − π, ry, 0)\]×) ẑ; rx, ry \[rad\], d \[m\].
     Plane,
     /// A sphere: centre x, y, z and radius \[m\].
     Sphere,
@@ -103,10 +104,11 @@ pub enum Observation {
     Distance(usize),
     /// Distance of the target from a surface, 0 in contact: one number.
     Surface(usize),
-    /// Tilts of the x and the y axis of a frame against the horizontal: two numbers. Frame 0 is the arm's base, frame i that of joint
-    /// i.
+    /// Tilts of the x and the y axis of a frame against the horizontal: two numbers. Frame 0 is the
+    /// arm's base, frame i that of joint i.
     Tilt(usize),
-    /// Distance between two points, without the arm: one number. Indices are narrow so that both take the room of one.
+    /// Distance between two points, without the arm: one number. Indices are narrow so that both
+    /// take the room of one.
     Between(u32, u32),
 }
 
@@ -146,14 +148,17 @@ impl Observation {
     pub fn fixtures(self) -> [Option<usize>; 2] {
         match self {
             Self::Position | Self::Tilt(_) => [None; 2],
-            Self::Point(fixture) | Self::Distance(fixture) | Self::Surface(fixture) => [Some(fixture), None],
+            Self::Point(fixture) | Self::Distance(fixture) | Self::Surface(fixture) => {
+                [Some(fixture), None]
+            }
             Self::Between(first, second) => [Some(first as usize), Some(second as usize)],
         }
     }
 
     /// What tells it from others, as numbers.
     pub(crate) fn key(self) -> [usize; 3] {
-        let [first, second] = self.fixtures().map(|fixture| fixture.map_or(0, |fixture| fixture + 1));
+        let [first, second] =
+            self.fixtures().map(|fixture| fixture.map_or(0, |fixture| fixture + 1));
         let frame = if let Self::Tilt(frame) = self { frame + 1 } else { 0 };
         [first, second, 4 * frame + self.coordinates()]
     }
@@ -163,13 +168,14 @@ impl Observation {
         matches!(self, Self::Tilt(_))
     }
 
-    /// Whether it measures where something is in the measuring frame, rather than against something else.
+    /// Whether it measures where something is in the measuring frame, rather than against something
+    /// else.
     pub fn is_position(self) -> bool {
         self == Self::Position
     }
 
-    /// Whether the target is at a point; what is missing to that is told along the axes of the arm's base, so that it does not
-    /// depend on where arm and point stand together.
+    /// Whether the target is at a point; what is missing to that is told along the axes of the
+    /// arm's base, so that it does not depend on where arm and point stand together.
     pub fn is_point(self) -> bool {
         matches!(self, Self::Point(_))
     }
@@ -180,20 +186,28 @@ impl Observation {
     }
 }
 
-/// The frame of an arm that a word names: `base`, a joint by its name, or `joint3`; `tool` is that of the joint that holds
-/// the tool, number `tool` counted from 0.
+/// The frame of an arm that a word names: `base`, a joint by its name, or `joint3`; `tool` is that
+/// of the joint that holds the tool, number `tool` counted from 0.
 ///
 /// # Errors
 /// It names none.
 pub(crate) fn frame(word: &str, joints: &[Joint], tool: usize) -> Result<usize, InputErrorKind> {
     let named = || joints.iter().position(|joint| joint.name == word).map(|index| index + 1);
-    let numbered = || word.strip_prefix("joint")?.parse().ok().filter(|number| (1..=joints.len()).contains(number));
+    let numbered = || {
+        word.strip_prefix("joint")?
+            .parse()
+            .ok()
+            .filter(|number| (1..=joints.len()).contains(number))
+    };
     match word {
         "base" => Ok(0),
         "tool" => Ok(tool + 1),
         _ => named().or_else(numbered).ok_or_else(|| {
             let joints = joints.iter().map(|joint| joint.name.clone());
-            let known = std::iter::once("base".to_owned()).chain(joints).chain(["tool".to_owned()]).collect();
+            let known = std::iter::once("base".to_owned())
+                .chain(joints)
+                .chain(["tool".to_owned()])
+                .collect();
             InputErrorKind::UnknownFixture { what: "frame", name: word.to_owned(), known }
         }),
     }
@@ -201,7 +215,9 @@ pub(crate) fn frame(word: &str, joints: &[Joint], tool: usize) -> Result<usize, 
 
 /// A word that names a frame of an arm: the joint's own, unless that names another.
 pub(crate) fn frame_word(place: usize, joints: &[Joint], tool: usize) -> String {
-    let Some(joint) = place.checked_sub(1).and_then(|joint| joints.get(joint)) else { return "base".to_owned() };
+    let Some(joint) = place.checked_sub(1).and_then(|joint| joints.get(joint)) else {
+        return "base".to_owned();
+    };
     let is_it = frame(&joint.name, joints, tool).is_ok_and(|named| named == place);
     if is_it { joint.name.clone() } else { format!("joint{place}") }
 }
@@ -217,15 +233,23 @@ pub(super) fn name_of(item: &Item<'_, '_>, what: &'static str) -> Result<String,
 }
 
 /// Every fixture, in the order point, anchor, surface, and the known distances.
-pub(super) fn read(root: &mut Section<'_, '_>) -> Result<(Vec<Fixture>, Vec<KnownDistance>), InputError> {
+pub(super) fn read(
+    root: &mut Section<'_, '_>,
+) -> Result<(Vec<Fixture>, Vec<KnownDistance>), InputError> {
     let mut fixtures: Vec<Fixture> = Vec::new();
     for table in ["point", "anchor", "surface"] {
         for mut section in root.sections(table)? {
             let item = section.require("name", "name = \"…\"")?;
             let name = name_of(&item, "a fixture")?;
-            if let Some(first) = fixtures.iter().find(|own| own.kind.word() == table && own.name == name) {
+            if let Some(first) =
+                fixtures.iter().find(|own| own.kind.word() == table && own.name == name)
+            {
                 let line = first.location.line.unwrap_or(0);
-                return Err(item.error(InputErrorKind::RepeatedFixture { what: table, name, line }));
+                return Err(item.error(InputErrorKind::RepeatedFixture {
+                    what: table,
+                    name,
+                    line,
+                }));
             }
             let (kind, known) = match table {
                 "point" => place(&mut section, FixtureKind::Point)?,
@@ -236,7 +260,8 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<(Vec<Fixture>, Vec<Know
             fixtures.push(Fixture { name, kind, known, location: section.location() });
         }
     }
-    let distances = root.sections("distance")?.into_iter().map(|section| distance(section, &fixtures));
+    let distances =
+        root.sections("distance")?.into_iter().map(|section| distance(section, &fixtures));
     let distances = distances.collect::<Result<_, _>>()?;
     Ok((fixtures, distances))
 }
@@ -255,7 +280,10 @@ fn surface(section: &mut Section<'_, '_>) -> Result<Known, InputError> {
     let kind = section.word("kind", &["plane", "sphere"], &kinds)?.unwrap_or(FixtureKind::Plane);
     if kind == FixtureKind::Sphere {
         let (_, mut known) = place(section, kind)?;
-        known.push(section.positive("radius", Unit::Length, |value| InputErrorKind::NotPositive { value })?);
+        known.push(
+            section
+                .positive("radius", Unit::Length, |value| InputErrorKind::NotPositive { value })?,
+        );
         return Ok((kind, known));
     }
     let at = section.vector("at", Unit::Length)?;
@@ -269,7 +297,8 @@ fn surface(section: &mut Section<'_, '_>) -> Result<Known, InputError> {
     Ok((kind, vec![Some(rx), Some(ry), at.map(|at| at.dot(&normal) / length)]))
 }
 
-/// The first two numbers (rx, ry) of a plane with this normal, of length 1 \[rad\]; see [`plane_normal`](crate::spatial::plane_normal).
+/// The first two numbers (rx, ry) of a plane with this normal, of length 1 \[rad\]; see
+/// [`plane_normal`](crate::spatial::plane_normal).
 pub fn lean(normal: &Vector3<f64>) -> [f64; 2] {
     let across = normal.x.hypot(normal.y);
     let angle = across.atan2(normal.z);
@@ -283,14 +312,22 @@ pub fn lean(normal: &Vector3<f64>) -> [f64; 2] {
     }
 }
 
-fn distance(mut section: Section<'_, '_>, fixtures: &[Fixture]) -> Result<KnownDistance, InputError> {
+fn distance(
+    mut section: Section<'_, '_>,
+    fixtures: &[Fixture],
+) -> Result<KnownDistance, InputError> {
     let item = section.require("between", "between = [\"…\", \"…\"], two points")?;
     let points = item.list("a list of two names of points")?;
-    let names: Vec<&str> = fixtures.iter().filter(|own| own.kind == FixtureKind::Point).map(|own| &*own.name).collect();
+    let names: Vec<&str> = fixtures
+        .iter()
+        .filter(|own| own.kind == FixtureKind::Point)
+        .map(|own| &*own.name)
+        .collect();
     let mut between = Vec::new();
     for point in &points {
         let name = point.text()?;
-        let known = fixtures.iter().position(|own| own.kind == FixtureKind::Point && own.name == name);
+        let known =
+            fixtures.iter().position(|own| own.kind == FixtureKind::Point && own.name == name);
         between.push(known.ok_or_else(|| point.error(unknown("point", name, &names)))?);
     }
     let [first, second] = between[..] else {
@@ -312,9 +349,15 @@ fn distance(mut section: Section<'_, '_>, fixtures: &[Fixture]) -> Result<KnownD
         }
     }
     let length = length.ok_or_else(|| section.missing("mm", "mm = … or m = …"))?;
-    let sigma = section.positive("sigma", Unit::Length, |value| InputErrorKind::NotPositive { value })?;
+    let sigma =
+        section.positive("sigma", Unit::Length, |value| InputErrorKind::NotPositive { value })?;
     section.finish()?;
-    Ok(KnownDistance { between: [first, second], length, sigma: sigma.unwrap_or(EXACT), location: section.location() })
+    Ok(KnownDistance {
+        between: [first, second],
+        length,
+        sigma: sigma.unwrap_or(EXACT),
+        location: section.location(),
+    })
 }
 
 /// The mistake of a word that names no fixture.

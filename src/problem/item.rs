@@ -37,7 +37,8 @@ impl Document {
             return Err(Location::file(file).at_line(1).error(InputErrorKind::Utf16));
         }
         let text = String::from_utf8(bytes).map_err(|error| {
-            let valid = error.as_bytes().get(..error.utf8_error().valid_up_to()).unwrap_or_default();
+            let valid =
+                error.as_bytes().get(..error.utf8_error().valid_up_to()).unwrap_or_default();
             Location::file(file).at_line(lines(valid)).error(InputErrorKind::NotUtf8)
         })?;
         Ok(Self { file: file.to_owned(), text: Arc::from(text) })
@@ -47,7 +48,8 @@ impl Document {
     pub fn table(&self) -> Result<Spanned<DeTable<'_>>, InputError> {
         DeTable::parse(&self.text).map_err(|error| {
             let span = error.span().unwrap_or(self.text.len()..self.text.len());
-            let near_text = self.text.get(span.clone()).unwrap_or_default().chars().take(40).collect();
+            let near_text =
+                self.text.get(span.clone()).unwrap_or_default().chars().take(40).collect();
             let message = error.message().to_owned();
             self.locate(span).error(InputErrorKind::Syntax { message, near_text })
         })
@@ -93,10 +95,17 @@ impl<'a, 'i> Item<'a, 'i> {
         self.location().error(kind)
     }
 
-    /// The error of a lower limit at this place that is above the upper one at another, both as they are written.
+    /// The error of a lower limit at this place that is above the upper one at another, both as
+    /// they are written.
     pub fn above(&self, upper: &Self) -> InputError {
         let written = |own: &Self| {
-            own.document.text.get(own.span.clone()).unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
+            own.document
+                .text
+                .get(own.span.clone())
+                .unwrap_or_default()
+                .split_whitespace()
+                .collect::<Vec<_>>()
+                .join(" ")
         };
         self.error(InputErrorKind::LimitsCross { lower: written(self), upper: written(upper) })
     }
@@ -141,10 +150,12 @@ impl<'a, 'i> Item<'a, 'i> {
     /// A whole number of at least `least`.
     pub fn whole(&self, least: u64) -> Result<u64, InputError> {
         let written = match self.value {
-            DeValue::Integer(integer) => match u64::from_str_radix(integer.as_str(), integer.radix()) {
-                Ok(number) if number >= least => return Ok(number),
-                _ => integer.as_str(),
-            },
+            DeValue::Integer(integer) => {
+                match u64::from_str_radix(integer.as_str(), integer.radix()) {
+                    Ok(number) if number >= least => return Ok(number),
+                    _ => integer.as_str(),
+                }
+            }
             DeValue::Float(float) => float.as_str(),
             _ => return Err(self.wrong_type("a whole number")),
         };
@@ -161,8 +172,17 @@ impl<'a, 'i> Item<'a, 'i> {
     }
 
     /// Refuses more of something than can be meant.
-    pub fn check_count(&self, what: &'static str, found: usize, most: usize) -> Result<(), InputError> {
-        if found > most { Err(self.error(InputErrorKind::TooMany { what, found, most })) } else { Ok(()) }
+    pub fn check_count(
+        &self,
+        what: &'static str,
+        found: usize,
+        most: usize,
+    ) -> Result<(), InputError> {
+        if found > most {
+            Err(self.error(InputErrorKind::TooMany { what, found, most }))
+        } else {
+            Ok(())
+        }
     }
 
     /// True or false.
@@ -228,7 +248,8 @@ fn integer_as_float(integer: &DeInteger<'_>) -> Option<f64> {
 
 /// `path.key`, the key in quotes where it is not bare.
 pub(crate) fn join(path: &str, key: &str) -> String {
-    let bare = !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
+    let bare =
+        !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
     let dot = if path.is_empty() { "" } else { "." };
     if bare { format!("{path}{dot}{key}") } else { format!("{path}{dot}\"{key}\"") }
 }

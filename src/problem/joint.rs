@@ -15,7 +15,8 @@ pub enum JointKind {
     Fixed,
 }
 
-/// `[[joint]]`: `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β)  [Chen2021, eq. 1], behind the placement where there is one.
+/// `[[joint]]`: `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β)  [Chen2021, eq. 1], behind the placement
+/// where there is one.
 #[derive(Debug, Clone)]
 pub struct Joint {
     /// Name for people; parameters go by number.

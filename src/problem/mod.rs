@@ -1,7 +1,7 @@
 //! The problem file: the arm as declared, what is free, and where the data are.
 //!
-//! Everything here is plain data in SI units (m, rad, N, kg, s; temperatures in °C), read once from `problem.toml`
-//! and never changed afterwards.
+//! Everything here is plain data in SI units (m, rad, N, kg, s; temperatures in °C), read once from
+//! `problem.toml` and never changed afterwards.
 
 mod argument;
 mod arm;
@@ -85,10 +85,14 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Whether something of the declared arm gives way: a joint with a stiffness, or a beam with a rigidity.
+    /// Whether something of the declared arm gives way: a joint with a stiffness, or a beam with a
+    /// rigidity.
     pub fn is_elastic(&self) -> bool {
-        let bends = |beam: &Beam| [beam.ea, beam.ei_y, beam.ei_z, beam.gj].iter().any(Option::is_some);
-        self.joints.iter().any(|joint| joint.stiffness.is_some() || joint.beam.as_ref().is_some_and(bends))
+        let bends =
+            |beam: &Beam| [beam.ea, beam.ei_y, beam.ei_z, beam.gj].iter().any(Option::is_some);
+        self.joints
+            .iter()
+            .any(|joint| joint.stiffness.is_some() || joint.beam.as_ref().is_some_and(bends))
     }
 
     /// How the joints stand on each other.
@@ -99,8 +103,9 @@ impl Problem {
     /// Whether the joints are one chain, which carries tool and targets behind its last joint.
     pub fn is_chain(&self) -> bool {
         let last = self.joints.len().saturating_sub(1);
-        let mut carriers = self.targets.iter().map(|own| own.joint).chain([self.tool.joint]);
-        self.tree().is_chain() && carriers.all(|joint| joint == last)
+        let mut influential_rows =
+            self.targets.iter().map(|own| own.joint).chain([self.tool.joint]);
+        self.tree().is_chain() && influential_rows.all(|joint| joint == last)
     }
 
     /// Refuses a tree of joints, for the sake of `what`.
@@ -111,14 +116,16 @@ impl Problem {
         let mut joints = self.joints.iter().enumerate();
         match joints.find(|(index, own)| own.parent != index.checked_sub(1)) {
             Some((index, own)) => {
-                let location = own.location.clone().with_key(format!("joint[{}].parent", index + 1));
+                let location =
+                    own.location.clone().with_key(format!("joint[{}].parent", index + 1));
                 Err(location.error(InputErrorKind::NotAChain { what }))
             }
             None => Ok(()),
         }
     }
 
-    /// What the word of a row's target names: one of `[[target]]`, or the point of `[tool]` where none is declared.
+    /// What the word of a row's target names: one of `[[target]]`, or the point of `[tool]` where
+    /// none is declared.
     ///
     /// # Errors
     /// There are targets, and none has that name.
@@ -153,15 +160,23 @@ impl Problem {
         let length = |joint: &Joint| {
             let placed = joint.placement.as_ref().map_or(0.0, |own| own.xyz.norm());
             let (min, max) = joint.limits;
-            let way = if joint.kind == JointKind::Prismatic { min.abs().max(max.abs()) } else { 0.0 };
+            let way =
+                if joint.kind == JointKind::Prismatic { min.abs().max(max.abs()) } else { 0.0 };
             joint.a.hypot(joint.d) + placed + way
         };
-        let whole = || Location { line: None, excerpt: None, ..self.data.location.clone().with_key("tool.target") };
+        let whole = || Location {
+            line: None,
+            excerpt: None,
+            ..self.data.location.clone().with_key("tool.target")
+        };
         let farthest = self.targets.iter().max_by(|a, b| a.at.norm().total_cmp(&b.at.norm()));
-        let (location, target) =
-            farthest.map_or_else(|| (whole(), self.tool.target), |own| (own.location.clone(), own.at));
+        let (location, target) = farthest
+            .map_or_else(|| (whole(), self.tool.target), |own| (own.location.clone(), own.at));
         let (links, distance) = (self.joints.iter().map(length).sum::<f64>(), target.norm());
-        let kind = WarningKind::FarTarget { distance: format!("{distance:.3}"), links: format!("{links:.3}") };
+        let kind = WarningKind::FarTarget {
+            distance: format!("{distance:.3}"),
+            links: format!("{links:.3}"),
+        };
         (links > 0.0 && distance > 2.0 * links).then_some(Warning { location, kind })
     }
 }

@@ -66,7 +66,8 @@ fn rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputError>
     }
     let mut section = item.section()?;
     // `tool.x = { … }` without quotes is a table `tool` that holds a table `x`.
-    if let Some((inner, _)) = section.entries().into_iter().find(|(_, inner)| inner.holds_tables()) {
+    if let Some((inner, _)) = section.entries().into_iter().find(|(_, inner)| inner.holds_tables())
+    {
         let name = format!("{pattern}.{inner}");
         return Err(item.error(InputErrorKind::UnquotedName { name }));
     }
@@ -125,7 +126,8 @@ impl<'a, 'i> Spread<'a, 'i> {
     }
 
     fn quantities(&self) -> Quantities {
-        let [angle, length, relative] = self.0.each_ref().map(|value| value.as_ref().map(|(value, _)| *value));
+        let [angle, length, relative] =
+            self.0.each_ref().map(|value| value.as_ref().map(|(value, _)| *value));
         Quantities { angle, length, relative }
     }
 }
@@ -146,7 +148,9 @@ fn check(
         return Err(item.above(upper));
     }
     // A ratio to the nominal value is positive; its logarithm is what has bounds.
-    if let Some((value, item)) = min.into_iter().chain(max).find(|(value, _)| nominal > 0.0 && *value <= 0.0) {
+    if let Some((value, item)) =
+        min.into_iter().chain(max).find(|(value, _)| nominal > 0.0 && *value <= 0.0)
+    {
         return Err(item.error(InputErrorKind::NotPositive { value: *value }));
     }
     Ok(())

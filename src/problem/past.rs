@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-/// The poses of a session that were measured before one, from the first to the last; empty where none were, or none are known.
+/// The poses of a session that were measured before one, from the first to the last; empty where
+/// none were, or none are known.
 ///
 /// V holds one number per pose, or one per pose and joint: a `Vec<f64>` or a `&[f64]`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -97,26 +98,33 @@ impl fmt::Debug for PastOf<'_> {
     }
 }
 
-/// Beyond this many time constants or distances nothing is left of what was before: exp(−36) is below rounding.
+/// Beyond this many time constants or distances nothing is left of what was before: exp(−36) is
+/// below rounding.
 const FORGOTTEN: f64 = 36.0;
 
 impl Past<&[f64]> {
-    /// Temperature of what follows the measured one with a time constant τ \[s\], dT̃/dt = (T − T̃)/τ, at a `time` \[s\] at which T
-    /// is measured [°C].
+    /// Temperature of what follows the measured one with a time constant τ \[s\], dT̃/dt = (T −
+    /// T̃)/τ, at a `time` \[s\] at which T is measured [°C].
     ///
     /// T goes evenly from each reading to the next, and T̃ begins at the first of them.
     pub fn lagging(&self, now: (f64, f64), time_constant: f64) -> f64 {
-        let first = self.times.partition_point(|time| *time < now.0 - FORGOTTEN * time_constant).saturating_sub(1);
+        let first = self
+            .times
+            .partition_point(|time| *time < now.0 - FORGOTTEN * time_constant)
+            .saturating_sub(1);
         Lag { time_constant, known: None }.felt_from(first, self, now)
     }
 
-    /// Which part of its friction pulls a joint, counted from 0, back the way on which it came, −1 to 1: on a way Δq it follows the side g
-    /// = ±1 from which the joint comes, z = g + (z' − g) exp(−|Δq|/s), with a distance s \[rad\] or \[m\]. \[Dahl 1968\]
+    /// Which part of its friction pulls a joint, counted from 0, back the way on which it came, −1
+    /// to 1: on a way Δq it follows the side g = ±1 from which the joint comes, z = g + (z' − g)
+    /// exp(−|Δq|/s), with a distance s \[rad\] or \[m\]. \[Dahl 1968\]
     ///
-    /// The side is that of the pose, or the sign of Δq where that is not known; z begins at the side of the first pose.
+    /// The side is that of the pose, or the sign of Δq where that is not known; z begins at the
+    /// side of the first pose.
     pub fn dragged(&self, joint: usize, (q, side): (f64, f64), distance: f64) -> f64 {
         let joints = self.configurations.len().checked_div(self.times.len()).unwrap_or(0);
-        let of = |column: &[f64], pose: usize| column.get(pose * joints + joint).copied().unwrap_or(0.0);
+        let of =
+            |column: &[f64], pose: usize| column.get(pose * joints + joint).copied().unwrap_or(0.0);
         let (mut q, mut side) = (q, side);
         let (mut gone, mut pulled) = (0.0, 0.0);
         for pose in (0..self.times.len()).rev() {
@@ -136,7 +144,11 @@ impl Past<&[f64]> {
     /// Derivative of [`Past::dragged`] by q, (g − z)/s along the way: 0 where no pose was before.
     pub fn drag_slope(&self, joint: usize, (q, side): (f64, f64), distance: f64) -> f64 {
         let joints = self.configurations.len().checked_div(self.times.len()).unwrap_or(0);
-        let last = self.times.len().checked_sub(1).and_then(|pose| self.configurations.get(pose * joints + joint));
+        let last = self
+            .times
+            .len()
+            .checked_sub(1)
+            .and_then(|pose| self.configurations.get(pose * joints + joint));
         let way = last.map_or(0.0, |before| q - before);
         if way == 0.0 {
             return 0.0;
@@ -150,7 +162,8 @@ impl Past<&[f64]> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lag {
     time_constant: f64,
-    /// Where the poses of the session begin in memory, how many of them are behind, and T̃ at the last.
+    /// Where the poses of the session begin in memory, how many of them are behind, and T̃ at the
+    /// last.
     known: Option<(usize, usize, f64)>,
 }
 
@@ -168,9 +181,12 @@ impl Lag {
     fn felt_from(&mut self, first: usize, past: &Past<&[f64]>, now: (f64, f64)) -> f64 {
         let reading = |k: usize| Some((*past.times.get(k)?, *past.temperatures.get(k)?));
         let session = past.times.as_ptr().addr();
-        let ahead = |(own, behind, _): &(usize, usize, f64)| *own == session && *behind <= past.times.len();
+        let ahead =
+            |(own, behind, _): &(usize, usize, f64)| *own == session && *behind <= past.times.len();
         let begin = || Some((session, first + 1, reading(first)?.1));
-        let Some((_, mut behind, mut felt)) = self.known.filter(ahead).or_else(begin) else { return now.1 };
+        let Some((_, mut behind, mut felt)) = self.known.filter(ahead).or_else(begin) else {
+            return now.1;
+        };
         while let Some((before, next)) = reading(behind - 1).zip(reading(behind)) {
             felt = self.after(felt, before, next);
             behind += 1;
@@ -179,8 +195,8 @@ impl Lag {
         reading(behind - 1).map_or(now.1, |before| self.after(felt, before, now))
     }
 
-    /// T̃ after T went evenly from one reading to the next: by the rate times τ it stays behind in the end,
-    /// T̃ = T − (1 − e) τ ΔT/Δt + (T̃' − T') e, e = exp(−Δt/τ).
+    /// T̃ after T went evenly from one reading to the next: by the rate times τ it stays behind in
+    /// the end, T̃ = T − (1 − e) τ ΔT/Δt + (T̃' − T') e, e = exp(−Δt/τ).
     fn after(&self, felt: f64, before: (f64, f64), next: (f64, f64)) -> f64 {
         let passed = (next.0 - before.0) / self.time_constant;
         let behind = if passed > 0.0 { -(-passed).exp_m1() / passed } else { 1.0 };
@@ -214,9 +230,12 @@ mod tests {
         assert_eq!(Past::default().lagging((5.0, 17.0), 30.0).to_bits(), 17_f64.to_bits());
         let mut lag = Lag::new(tau);
         for k in [0, 2, 3, 1] {
-            let past = Past { times: &TIMES[..k], temperatures: &temperatures[..k], ..Past::default() };
-            let (one_by_one, alone) =
-                (lag.felt(&past, (TIMES[k], temperatures[k])), past.lagging((TIMES[k], temperatures[k]), tau));
+            let past =
+                Past { times: &TIMES[..k], temperatures: &temperatures[..k], ..Past::default() };
+            let (one_by_one, alone) = (
+                lag.felt(&past, (TIMES[k], temperatures[k])),
+                past.lagging((TIMES[k], temperatures[k]), tau),
+            );
             assert!((one_by_one - alone).abs() < 1e-12, "{k}: {one_by_one}, not {alone}");
         }
     }
@@ -231,7 +250,8 @@ mod tests {
                 z = way.signum() + (z - way.signum()) * (-way.abs() / 0.3).exp();
             }
             let configurations: Vec<f64> = commands[..k].iter().flat_map(|q| [9.0, *q]).collect();
-            let approaches: Vec<f64> = [0.0, -1.0].into_iter().chain([0.0; 6]).take(2 * k).collect();
+            let approaches: Vec<f64> =
+                [0.0, -1.0].into_iter().chain([0.0; 6]).take(2 * k).collect();
             let past = Past {
                 times: &TIMES[..k],
                 configurations: &configurations,

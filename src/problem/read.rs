@@ -7,15 +7,16 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::item::Document;
 use super::section::Section;
-use super::target::Carriers;
+use super::target::InfluentialRows;
 use super::{
-    BasePose, Effect, EffectDeclaration, Equilibrium, Placement, Problem, Statics, UrdfEnds, arm, constraints, data,
-    effects, fixture, parameters, robust, target,
+    BasePose, Effect, EffectDeclaration, Equilibrium, Placement, Problem, Statics, UrdfEnds, arm,
+    constraints, data, effects, fixture, parameters, robust, target,
 };
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
-/// Most elements of a beam: eight are as good as any number, and the time of a pose grows with their square.
+/// Most elements of a beam: eight are as good as any number, and the time of a pose grows with
+/// their square.
 const MOST_ELEMENTS: usize = 32;
 
 impl Problem {
@@ -37,7 +38,8 @@ impl Problem {
         Ok((problem_of(&document)?, document.text))
     }
 
-    /// Reads a problem from its text; `file` names it in messages, and data files are looked for beside it.
+    /// Reads a problem from its text; `file` names it in messages, and data files are looked for
+    /// beside it.
     ///
     /// # Errors
     /// The first mistake found.
@@ -45,13 +47,15 @@ impl Problem {
         problem_of(&Document { file: file.to_owned(), text: Arc::from(text) })
     }
 
-    /// The same problem with one more effect declared, behind the others; joints are numbered from 1.
+    /// The same problem with one more effect declared, behind the others; joints are numbered from
+    /// 1.
     #[must_use]
     pub fn with_effect(&self, effect: Effect) -> Self {
         let mut problem = self.clone();
-        problem
-            .effects
-            .push(EffectDeclaration { effect, location: Location::file(&self.data.location.file).with_key("effect") });
+        problem.effects.push(EffectDeclaration {
+            effect,
+            location: Location::file(&self.data.location.file).with_key("effect"),
+        });
         problem
     }
 
@@ -63,8 +67,8 @@ impl Problem {
         problem
     }
 
-    /// Reads an effect that this arm may have, written as in a problem file (`gear-ratio = { joint = 3 }`); `named` is what
-    /// messages call the text.
+    /// Reads an effect that this arm may have, written as in a problem file (`gear-ratio = { joint
+    /// = 3 }`); `named` is what messages call the text.
     ///
     /// # Errors
     /// It is no effect, or one that could never act on this arm.
@@ -80,12 +84,13 @@ fn problem_of(document: &Document) -> Result<Problem, InputError> {
 fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let name = name(&mut root)?;
     let title = root.text("title")?.unwrap_or(&name).to_owned();
-    let gravity = root.vector("gravity", Unit::Acceleration)?.unwrap_or(Vector3::new(0.0, 0.0, -9.80665));
+    let gravity =
+        root.vector("gravity", Unit::Acceleration)?.unwrap_or(Vector3::new(0.0, 0.0, -9.80665));
     let statics = statics(root.section("statics")?)?;
     let (joints, is_standard) = arm::joints(&mut root)?;
-    let carriers = Carriers { joints: &joints, is_standard };
-    let tool = target::tool(root.section("tool")?, &carriers)?;
-    let targets = target::targets(&mut root, &tool, &carriers)?;
+    let influential_rows = InfluentialRows { joints: &joints, is_standard };
+    let tool = target::tool(root.section("tool")?, &influential_rows)?;
+    let targets = target::targets(&mut root, &tool, &influential_rows)?;
     let base = base(root.section("base")?)?;
     let urdf = root.section("urdf")?.map(urdf).transpose()?;
     let effects = effects::read(&mut root, &joints)?;
@@ -125,7 +130,8 @@ pub(crate) fn name(root: &mut Section<'_, '_>) -> Result<String, InputError> {
     let name = item.text()?;
     let barred = |c: char| c.is_control() || BARRED_IN_NAMES.contains(c);
     let edges = |c: char| c.is_whitespace() || c == '.';
-    if name.contains(barred) || name.starts_with(edges) || name.ends_with(edges) || name.len() > 200 {
+    if name.contains(barred) || name.starts_with(edges) || name.ends_with(edges) || name.len() > 200
+    {
         let name = name.chars().take(200).collect();
         return Err(item.error(InputErrorKind::NotAFolderName { name }));
     }
@@ -136,7 +142,9 @@ fn statics(section: Option<Section<'_, '_>>) -> Result<Statics, InputError> {
     let mut statics = Statics { equilibrium: Equilibrium::Deflected, beam_elements: 1 };
     let Some(mut section) = section else { return Ok(statics) };
     let meanings = [Equilibrium::Deflected, Equilibrium::Undeflected];
-    if let Some(equilibrium) = section.word("equilibrium", &["deflected", "undeflected"], &meanings)? {
+    if let Some(equilibrium) =
+        section.word("equilibrium", &["deflected", "undeflected"], &meanings)?
+    {
         statics.equilibrium = equilibrium;
     }
     if let Some(item) = section.get("beam_elements") {
@@ -148,7 +156,8 @@ fn statics(section: Option<Section<'_, '_>>) -> Result<Statics, InputError> {
 }
 
 fn urdf(mut section: Section<'_, '_>) -> Result<UrdfEnds, InputError> {
-    let base = section.require("base", "base = \"…\", the link at the arm's base")?.text()?.to_owned();
+    let base =
+        section.require("base", "base = \"…\", the link at the arm's base")?.text()?.to_owned();
     let tip = section.require("tip", "tip = \"…\", the link at its tip")?.text()?.to_owned();
     section.finish()?;
     Ok(UrdfEnds { base, tip })

@@ -8,7 +8,8 @@ use crate::error::{InputError, InputErrorKind};
 pub struct Robust {
     /// What residuals count.
     pub loss: RobustLoss,
-    /// `threshold_sigma`: the length of a residual from which it counts less than its square \[σ\]; `None`: the usual one.
+    /// `threshold_sigma`: the length of a residual from which it counts less than its square \[σ\];
+    /// `None`: the usual one.
     pub threshold: Option<f64>,
 }
 
@@ -28,7 +29,9 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Option<Robust>, InputEr
     let words = ["huber", "l1"];
     let meanings = [RobustLoss::Huber, RobustLoss::L1];
     let Some(loss) = section.word("loss", &["huber", "l1"], &meanings)? else {
-        return Err(section.missing("loss", words.map(|word| format!("loss = \"{word}\"")).join(" or ")));
+        return Err(
+            section.missing("loss", words.map(|word| format!("loss = \"{word}\"")).join(" or "))
+        );
     };
     let mut threshold = None;
     if let Some(item) = section.get("threshold_sigma") {

@@ -23,7 +23,12 @@ pub(crate) struct Section<'a, 'i> {
 }
 
 impl<'a, 'i> Section<'a, 'i> {
-    pub fn new(document: &'a Document, path: String, span: Range<usize>, table: &'a DeTable<'i>) -> Self {
+    pub fn new(
+        document: &'a Document,
+        path: String,
+        span: Range<usize>,
+        table: &'a DeTable<'i>,
+    ) -> Self {
         Self { document, path, span, table, known: Vec::new() }
     }
 
@@ -40,8 +45,12 @@ impl<'a, 'i> Section<'a, 'i> {
 
     /// The error of a key that is not there; one that nobody asked for may be meant by it.
     pub fn missing(&self, key: &str, write: impl Into<String>) -> InputError {
-        let others = self.entries().into_iter().map(|(key, _)| key).filter(|key| !self.asked_for(key));
-        let kind = InputErrorKind::MissingKey { write: write.into(), near: nearest(key, others).map(str::to_owned) };
+        let others =
+            self.entries().into_iter().map(|(key, _)| key).filter(|key| !self.asked_for(key));
+        let kind = InputErrorKind::MissingKey {
+            write: write.into(),
+            near: nearest(key, others).map(str::to_owned),
+        };
         self.location().with_key(join(&self.path, key)).error(kind)
     }
 
@@ -93,8 +102,13 @@ impl<'a, 'i> Section<'a, 'i> {
     ) -> Result<Option<T>, InputError> {
         let Some(item) = self.get(key) else { return Ok(None) };
         let word = item.text()?;
-        let meaning = words.iter().zip(meanings).find(|(known, _)| **known == word).map(|(_, meaning)| *meaning);
-        let unknown = || item.error(InputErrorKind::UnknownWord { word: word.to_owned(), known: words });
+        let meaning = words
+            .iter()
+            .zip(meanings)
+            .find(|(known, _)| **known == word)
+            .map(|(_, meaning)| *meaning);
+        let unknown =
+            || item.error(InputErrorKind::UnknownWord { word: word.to_owned(), known: words });
         meaning.ok_or_else(unknown).map(Some)
     }
 
@@ -112,7 +126,11 @@ impl<'a, 'i> Section<'a, 'i> {
     }
 
     /// The value of the key `base` with one of the suffixes of `unit`, and that suffix.
-    pub fn pick(&mut self, base: &str, unit: Unit) -> Result<Option<(Item<'a, 'i>, Suffix)>, InputError> {
+    pub fn pick(
+        &mut self,
+        base: &str,
+        unit: Unit,
+    ) -> Result<Option<(Item<'a, 'i>, Suffix)>, InputError> {
         let mut found: Option<(Item<'a, 'i>, Suffix)> = None;
         let mut first_key = String::new();
         for suffix in unit.suffixes() {
@@ -129,7 +147,11 @@ impl<'a, 'i> Section<'a, 'i> {
     }
 
     /// The same, where `base` has this one unit: no suffix, or that of another unit, is an error.
-    pub fn quantity(&mut self, base: &str, unit: Unit) -> Result<Option<(Item<'a, 'i>, Suffix)>, InputError> {
+    pub fn quantity(
+        &mut self,
+        base: &str,
+        unit: Unit,
+    ) -> Result<Option<(Item<'a, 'i>, Suffix)>, InputError> {
         if let Some(bare) = self.peek(base).filter(|item| !item.holds_tables()) {
             let write = unit.spelled(base);
             return Err(bare.error(InputErrorKind::NeedsUnit { noun: unit.noun(), write }));
@@ -137,7 +159,11 @@ impl<'a, 'i> Section<'a, 'i> {
         for suffix in Unit::all_suffixes().filter(|suffix| unit.suffix(suffix).is_none()) {
             if let Some(item) = self.peek(&format!("{base}_{suffix}")) {
                 let (suffix, write) = (suffix.to_owned(), unit.spelled(base));
-                return Err(item.error(InputErrorKind::WrongUnit { noun: unit.noun(), suffix, write }));
+                return Err(item.error(InputErrorKind::WrongUnit {
+                    noun: unit.noun(),
+                    suffix,
+                    write,
+                }));
             }
         }
         self.pick(base, unit)
@@ -153,7 +179,11 @@ impl<'a, 'i> Section<'a, 'i> {
     pub fn not_negative(&mut self, base: &str, unit: Unit) -> Result<Option<f64>, InputError> {
         let Some((item, suffix)) = self.quantity(base, unit)? else { return Ok(None) };
         let value = item.number()?;
-        if value < 0.0 { Err(item.error(InputErrorKind::Negative { value })) } else { Ok(Some((suffix.to_si)(value))) }
+        if value < 0.0 {
+            Err(item.error(InputErrorKind::Negative { value }))
+        } else {
+            Ok(Some((suffix.to_si)(value)))
+        }
     }
 
     /// A number with a unit that is above zero \[SI\]; `zero` makes the error where it is not.
@@ -185,9 +215,10 @@ impl<'a, 'i> Section<'a, 'i> {
     pub fn finish(&self) -> Result<(), InputError> {
         let unknown = self.entries().into_iter().find(|(key, _)| !self.asked_for(key));
         match unknown {
-            Some((key, item)) => {
-                Err(item.error(InputErrorKind::UnknownKey { key: shortened(key, 80), known: self.known.clone() }))
-            }
+            Some((key, item)) => Err(item.error(InputErrorKind::UnknownKey {
+                key: shortened(key, 80),
+                known: self.known.clone(),
+            })),
             None => Ok(()),
         }
     }

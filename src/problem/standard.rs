@@ -7,8 +7,9 @@ use crate::spatial::Frame;
 
 /// The same arm from rows that stand for Rz(θ+q) Tz(d) Tx(a) Rx(α).
 ///
-/// a and α of a row are those of the next joint here, where Rx(α) Tx(a) = Tx(a) Rx(α) come first; those of the last row belong to
-/// a fixed joint that is added behind it. Bodies stay where they are: in the frame before a and α.
+/// a and α of a row are those of the next joint here, where Rx(α) Tx(a) = Tx(a) Rx(α) come first;
+/// those of the last row belong to a fixed joint that is added behind it. Bodies stay where they
+/// are: in the frame before a and α.
 pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
     let mut joints = Vec::with_capacity(rows.len() + 1);
     // a and α of the row before.

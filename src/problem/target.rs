@@ -1,4 +1,5 @@
-//! What is measured and what is carried: `[tool]`, and `[[target]]` where several points are measured.
+//! What is measured and what is carried: `[tool]`, and `[[target]]` where several points are
+//! measured.
 
 use nalgebra::Vector3;
 
@@ -41,18 +42,24 @@ pub struct Target {
 impl Target {
     /// What `[tool]` says, without a name.
     pub(super) fn of_tool(tool: &Tool, location: Location) -> Self {
-        Self { name: String::new(), joint: tool.joint, at: tool.target, rotation: tool.rotation, location }
+        Self {
+            name: String::new(),
+            joint: tool.joint,
+            at: tool.target,
+            rotation: tool.rotation,
+            location,
+        }
     }
 }
 
 /// Joints that may carry something.
-pub(super) struct Carriers<'a> {
+pub(super) struct InfluentialRows<'a> {
     pub joints: &'a [Joint],
     /// Whether frames have no place of their own in the file's form of the joints.
     pub is_standard: bool,
 }
 
-impl Carriers<'_> {
+impl InfluentialRows<'_> {
     /// The joint with the number behind the key `joint`.
     fn joint(&self, section: &mut Section<'_, '_>) -> Result<Option<usize>, InputError> {
         let Some(item) = section.get("joint") else { return Ok(None) };
@@ -63,18 +70,22 @@ impl Carriers<'_> {
         let joint = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
         match joint.filter(|&joint| joint < self.joints.len()) {
             Some(joint) => Ok(Some(joint)),
-            None => Err(item.error(InputErrorKind::UnknownJoint { joint: number, joints: self.joints.len() })),
+            None => Err(item
+                .error(InputErrorKind::UnknownJoint { joint: number, joints: self.joints.len() })),
         }
     }
 }
 
 /// `[tool]`, all of it at the origin of the last frame where the section is not there.
-pub(super) fn tool(section: Option<Section<'_, '_>>, carriers: &Carriers) -> Result<Tool, InputError> {
-    let joint = carriers.joints.len().saturating_sub(1);
+pub(super) fn tool(
+    section: Option<Section<'_, '_>>,
+    influential_rows: &InfluentialRows,
+) -> Result<Tool, InputError> {
+    let joint = influential_rows.joints.len().saturating_sub(1);
     let (target, rotation, payload_at) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
     let mut tool = Tool { joint, target, rotation, payload_at, payload_mass: 0.0 };
     let Some(mut section) = section else { return Ok(tool) };
-    tool.joint = carriers.joint(&mut section)?.unwrap_or(joint);
+    tool.joint = influential_rows.joint(&mut section)?.unwrap_or(joint);
     tool.target = section.vector("target", Unit::Length)?.unwrap_or_default();
     tool.rotation = section.vector("rotation", Unit::Angle)?.unwrap_or_default();
     tool.payload_at = section.vector("payload_at", Unit::Length)?.unwrap_or(tool.target);
@@ -84,7 +95,11 @@ pub(super) fn tool(section: Option<Section<'_, '_>>, carriers: &Carriers) -> Res
 }
 
 /// Every `[[target]]`; what one does not say of itself is as in `[tool]`.
-pub(super) fn targets(root: &mut Section<'_, '_>, tool: &Tool, carriers: &Carriers) -> Result<Vec<Target>, InputError> {
+pub(super) fn targets(
+    root: &mut Section<'_, '_>,
+    tool: &Tool,
+    influential_rows: &InfluentialRows,
+) -> Result<Vec<Target>, InputError> {
     let mut targets: Vec<Target> = Vec::new();
     for mut section in root.sections("target")? {
         let item = section.require("name", "name = \"…\", a word of the column target")?;
@@ -93,7 +108,7 @@ pub(super) fn targets(root: &mut Section<'_, '_>, tool: &Tool, carriers: &Carrie
             let line = first.location.line.unwrap_or(0);
             return Err(item.error(InputErrorKind::RepeatedFixture { what: "target", name, line }));
         }
-        let joint = carriers.joint(&mut section)?.unwrap_or(tool.joint);
+        let joint = influential_rows.joint(&mut section)?.unwrap_or(tool.joint);
         let at = section.vector("at", Unit::Length)?.unwrap_or(tool.target);
         let rotation = section.vector("rotation", Unit::Angle)?.unwrap_or(tool.rotation);
         section.finish()?;

@@ -11,14 +11,16 @@ use crate::error::{InputError, InputErrorKind};
 pub struct Tree {
     /// For each joint the index behind the last one that stands on it; empty for a chain.
     ends: Vec<usize>,
-    /// Further branches that begin at the base and behind each joint, besides the first; empty for a chain.
+    /// Further branches that begin at the base and behind each joint, besides the first; empty for
+    /// a chain.
     further: Vec<usize>,
 }
 
 impl Tree {
     /// Of joints that each name the one they stand on.
     pub fn of(joints: &[Joint]) -> Self {
-        let is_chain = joints.iter().enumerate().all(|(index, own)| own.parent == index.checked_sub(1));
+        let is_chain =
+            joints.iter().enumerate().all(|(index, own)| own.parent == index.checked_sub(1));
         if is_chain {
             return Self::default();
         }
@@ -30,7 +32,9 @@ impl Tree {
                 *of_parent = end.max(*of_parent);
             }
         }
-        let on = |carrier: Option<usize>| joints.iter().filter(|own| own.parent == carrier).count().saturating_sub(1);
+        let on = |carrier: Option<usize>| {
+            joints.iter().filter(|own| own.parent == carrier).count().saturating_sub(1)
+        };
         stands.further = std::iter::once(None).chain((0..joints.len()).map(Some)).map(on).collect();
         stands
     }
@@ -40,13 +44,15 @@ impl Tree {
         self.ends.is_empty()
     }
 
-    /// Whether the way from the base to the frame of the joint `tip` leads through a joint, `tip` itself included.
+    /// Whether the way from the base to the frame of the joint `tip` leads through a joint, `tip`
+    /// itself included.
     #[inline]
     pub fn leads_through(&self, joint: usize, tip: usize) -> bool {
         joint <= tip && self.ends.get(joint).is_none_or(|&end| tip < end)
     }
 
-    /// Whether a joint begins a branch that stands on an earlier joint than the one before it, or on the base.
+    /// Whether a joint begins a branch that stands on an earlier joint than the one before it, or
+    /// on the base.
     #[inline]
     pub fn begins_branch(&self, joint: usize) -> bool {
         joint.checked_sub(1).and_then(|before| self.ends.get(before)) == Some(&joint)
@@ -64,8 +70,8 @@ impl Tree {
     }
 }
 
-/// On which joint each joint stands, from the values of its `parent`, a number counted from 1 or 0 for the base; without one on
-/// the joint before.
+/// On which joint each joint stands, from the values of its `parent`, a number counted from 1 or 0
+/// for the base; without one on the joint before.
 pub(super) fn parents(given: &[Option<Item<'_, '_>>]) -> Result<Vec<Option<usize>>, InputError> {
     let mut parents = Vec::with_capacity(given.len());
     // From the base to the joint before: what the next one may stand on.
@@ -78,10 +84,16 @@ pub(super) fn parents(given: &[Option<Item<'_, '_>>]) -> Result<Vec<Option<usize
                 let parent = usize::try_from(number).unwrap_or(usize::MAX).checked_sub(1);
                 match parent {
                     Some(parent) if parent >= given.len() => {
-                        return Err(item.error(InputErrorKind::UnknownJoint { joint: number, joints: given.len() }));
+                        return Err(item.error(InputErrorKind::UnknownJoint {
+                            joint: number,
+                            joints: given.len(),
+                        }));
                     }
                     Some(parent) if parent >= joint => {
-                        return Err(item.error(InputErrorKind::StandsOnLater { joint: joint + 1, parent: number }));
+                        return Err(item.error(InputErrorKind::StandsOnLater {
+                            joint: joint + 1,
+                            parent: number,
+                        }));
                     }
                     Some(parent) if !open.contains(&parent) => {
                         return Err(item.error(InputErrorKind::BranchEnded { parent: number }));

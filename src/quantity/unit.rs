@@ -116,7 +116,12 @@ const fn suffix(name: &'static str, to_si: fn(f64) -> f64) -> Suffix {
     Suffix { name, to_si }
 }
 
-const fn row(noun: &'static str, symbol: &'static str, suffixes: &'static [Suffix], shown: Shown) -> Row {
+const fn row(
+    noun: &'static str,
+    symbol: &'static str,
+    suffixes: &'static [Suffix],
+    shown: Shown,
+) -> Row {
     Row { noun, symbol, suffixes, shown }
 }
 
@@ -125,29 +130,53 @@ impl Unit {
     fn row(self) -> Row {
         use Shown::{As, Plain, Prefixed};
         match self {
-            Self::Angle => {
-                row("an angle", "rad", const { &[suffix("deg", f64::to_radians), si("rad")] }, As(DEGREES, "°"))
-            }
-            Self::Length => row("a length", "m", const { &[si("m"), suffix("mm", |x| x / 1000.0)] }, As(1e3, "mm")),
+            Self::Angle => row(
+                "an angle",
+                "rad",
+                const { &[suffix("deg", f64::to_radians), si("rad")] },
+                As(DEGREES, "°"),
+            ),
+            Self::Length => row(
+                "a length",
+                "m",
+                const { &[si("m"), suffix("mm", |x| x / 1000.0)] },
+                As(1e3, "mm"),
+            ),
             Self::Mass => row("a mass", "kg", const { &[si("kg")] }, Plain),
             Self::Force => row("a force", "N", const { &[si("N")] }, Plain),
             Self::Acceleration => row("an acceleration", "m/s²", const { &[si("m_s2")] }, Plain),
             Self::Temperature => row("a temperature", "°C", const { &[si("C")] }, Plain),
             Self::Time => row("a time", "s", const { &[si("s")] }, Plain),
-            Self::ForcePerLength => row("a force per length", "N/m", const { &[si("N_per_m")] }, Prefixed),
-            Self::TorsionalStiffness => row("a stiffness", "N·m/rad", const { &[si("N_m_per_rad")] }, Prefixed),
+            Self::ForcePerLength => {
+                row("a force per length", "N/m", const { &[si("N_per_m")] }, Prefixed)
+            }
+            Self::TorsionalStiffness => {
+                row("a stiffness", "N·m/rad", const { &[si("N_m_per_rad")] }, Prefixed)
+            }
             Self::AxialRigidity => row("a force", "N", const { &[si("N")] }, Prefixed),
             Self::FlexuralRigidity => row("a rigidity", "N·m²", const { &[si("N_m2")] }, Prefixed),
-            Self::Compliance => row("a compliance", "rad/(N·m)", const { &[si("rad_per_N_m")] }, As(1e6, "µrad/(N·m)")),
+            Self::Compliance => row(
+                "a compliance",
+                "rad/(N·m)",
+                const { &[si("rad_per_N_m")] },
+                As(1e6, "µrad/(N·m)"),
+            ),
             Self::CubicCompliance => {
                 let shown = As(1e9, "nrad/(N·m)³");
                 row("a cubic compliance", "rad/(N·m)³", const { &[si("rad_per_N3_m3")] }, shown)
             }
-            Self::Flexibility => row("a flexibility", "1/(N·m²)", const { &[si("per_N_m2")] }, As(1e6, "1/(MN·m²)")),
-            Self::CurvaturePerDegree => {
-                row("a curvature per °C", "1/(m·K)", const { &[si("per_m_C")] }, As(1e6, "µrad/(m·K)"))
+            Self::Flexibility => {
+                row("a flexibility", "1/(N·m²)", const { &[si("per_N_m2")] }, As(1e6, "1/(MN·m²)"))
             }
-            Self::PerDegree => row("a strain per °C", "1/K", const { &[si("per_C")] }, As(1e6, "10⁻⁶/K")),
+            Self::CurvaturePerDegree => row(
+                "a curvature per °C",
+                "1/(m·K)",
+                const { &[si("per_m_C")] },
+                As(1e6, "µrad/(m·K)"),
+            ),
+            Self::PerDegree => {
+                row("a strain per °C", "1/K", const { &[si("per_C")] }, As(1e6, "10⁻⁶/K"))
+            }
             Self::AnglePerDegree => {
                 let suffixes = const { &[suffix("deg_per_C", f64::to_radians), si("rad_per_C")] };
                 row("an angle per °C", "rad/K", suffixes, As(DEGREES, "°/K"))
@@ -166,14 +195,20 @@ impl Unit {
             }
             Self::PerLength => row("a number per length", "1/m", const { &[si("per_m")] }, Plain),
             Self::Speed => {
-                let suffixes =
-                    const { &[si("m_per_s"), suffix("mm_per_s", |x| x / 1000.0), suffix("mm_per_h", |x| x / 3.6e6)] };
+                let suffixes = const {
+                    &[
+                        si("m_per_s"),
+                        suffix("mm_per_s", |x| x / 1000.0),
+                        suffix("mm_per_h", |x| x / 3.6e6),
+                    ]
+                };
                 row("a speed", "m/s", suffixes, As(3.6e6, "mm/h"))
             }
             Self::LengthPerAngle => row("a length per angle", "m/rad", &[], As(1e3, "mm/rad")),
             Self::AnglePerLength => row("an angle per length", "rad/m", &[], As(DEGREES, "°/m")),
             Self::AnglePerUnit => {
-                let suffixes = const { &[suffix("deg_per_unit", f64::to_radians), si("rad_per_unit")] };
+                let suffixes =
+                    const { &[suffix("deg_per_unit", f64::to_radians), si("rad_per_unit")] };
                 row("an angle per unit of a covariate", "rad/unit", suffixes, As(DEGREES, "°/unit"))
             }
             Self::LengthPerUnit => {
@@ -191,12 +226,14 @@ impl Unit {
         self.row().symbol
     }
 
-    /// Whether a parameter of this unit deviates by ln(value / nominal): stiffnesses and rigidities.
+    /// Whether a parameter of this unit deviates by ln(value / nominal): stiffnesses and
+    /// rigidities.
     pub fn is_relative(self) -> bool {
         matches!(self, Self::TorsionalStiffness | Self::AxialRigidity | Self::FlexuralRigidity)
     }
 
-    /// The unit for people: degrees, millimetres, and stiffnesses with the prefix that suits `magnitude` \[SI\].
+    /// The unit for people: degrees, millimetres, and stiffnesses with the prefix that suits
+    /// `magnitude` \[SI\].
     pub fn display(self, magnitude: f64) -> Display {
         let Row { symbol, shown, .. } = self.row();
         match shown {

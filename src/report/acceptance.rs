@@ -1,4 +1,5 @@
-//! What `accept` says and writes: the accuracy of an arm before and after, with what it was measured under and by, to be signed.
+//! What `accept` says and writes: the accuracy of an arm before and after, with what it was
+//! measured under and by, to be signed.
 
 use std::path::PathBuf;
 
@@ -12,7 +13,7 @@ use super::json::{list, object, to_text};
 use super::quantity::{about_three_digits, counted, mm, number};
 use super::render::{report, text};
 use super::table;
-use crate::identify::{Acceptance, AcceptancePose, Accuracy, Identification};
+use crate::fit::{Acceptance, AcceptancePose, Accuracy, Identification};
 use crate::measurement::Measurements;
 use crate::problem::{HeldOut, Problem};
 
@@ -20,8 +21,7 @@ use crate::problem::{HeldOut, Problem};
 const CYCLES: usize = 30;
 
 /// What the numbers are of.
-const JUDGED: &str =
-    "These are errors of predicted positions: what a controller reaches with commands corrected by them is not judged.";
+const JUDGED: &str = "These are errors of predicted positions: what a controller reaches with commands corrected by them is not judged.";
 
 /// Which inputs a certificate is of, and what no file says.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -64,7 +64,10 @@ fn repeatability(judged: &Acceptance) -> Option<f64> {
 fn protocol(problem: &Problem) -> String {
     let chosen = match &problem.data.held_out {
         Some(HeldOut::Fraction { fraction, seed }) => {
-            format!("a random part of {} % of the configurations (seed {seed})", number(100.0 * fraction, 1))
+            format!(
+                "a random part of {} % of the configurations (seed {seed})",
+                number(100.0 * fraction, 1)
+            )
         }
         Some(HeldOut::Session(name)) => {
             format!("every row of session {name}, whose base and tool alone were fitted to it")
@@ -83,16 +86,22 @@ fn conditions(problem: &Problem, rows: &Measurements, judged: &Acceptance) -> Ve
         unit: unit.to_owned(),
         range: range(own().map(value)),
     };
-    let joints = table::commands(problem)
-        .into_iter()
-        .map(|own| condition(&own.name(), &own.symbol(), &|row| rows.configuration(row)[own.joint] * own.factor()));
+    let joints = table::commands(problem).into_iter().map(|own| {
+        condition(&own.name(), &own.symbol(), &|row| {
+            rows.configuration(row)[own.joint] * own.factor()
+        })
+    });
     let places = ["x", "y", "z"].into_iter().enumerate();
-    let places = places.map(|(axis, name)| condition(name, "mm", &|row| rows.positions[row][axis] * 1e3));
-    let columns =
-        [("temperature", "°C", &rows.temperature), ("payload", "kg", &rows.payload), ("hoist", "N", &rows.hoist)];
-    let measured = columns
-        .into_iter()
-        .filter_map(|(name, unit, values)| values.as_ref().map(|values| condition(name, unit, &|row| values[row])));
+    let places =
+        places.map(|(axis, name)| condition(name, "mm", &|row| rows.positions[row][axis] * 1e3));
+    let columns = [
+        ("temperature", "°C", &rows.temperature),
+        ("payload", "kg", &rows.payload),
+        ("hoist", "N", &rows.hoist),
+    ];
+    let measured = columns.into_iter().filter_map(|(name, unit, values)| {
+        values.as_ref().map(|values| condition(name, unit, &|row| values[row]))
+    });
     joints.chain(places).chain(measured).collect()
 }
 
@@ -131,7 +140,8 @@ pub fn acceptance_json(
 /// The accuracy in brief, ending in a line break.
 pub fn acceptance_text(problem: &Problem, judged: &Acceptance) -> String {
     let poses = counted(judged.poses.len(), "held-out pose");
-    let mut blocks = vec![Block::lines(format!("{}\n{poses}; {}", problem.title, protocol(problem)))];
+    let mut blocks =
+        vec![Block::lines(format!("{}\n{poses}; {}", problem.title, protocol(problem)))];
     blocks.extend(judgement(judged));
     text(&blocks)
 }
@@ -153,11 +163,14 @@ pub fn acceptance_page(
         of: counted(judged.poses.len(), "held-out pose"),
         facts: Vec::new(),
     };
-    let trust = if found.is_trusted() { "The fit is trusted." } else { "Beware: the fit is not to be trusted." };
-    let sigma = problem
-        .data
-        .position_sigma
-        .map_or("not declared".to_owned(), |sigma| format!("{} mm per coordinate, 1 σ", mm(sigma, 4)));
+    let trust = if found.is_trusted() {
+        "The fit is trusted."
+    } else {
+        "Beware: the fit is not to be trusted."
+    };
+    let sigma = problem.data.position_sigma.map_or("not declared".to_owned(), |sigma| {
+        format!("{} mm per coordinate, 1 σ", mm(sigma, 4))
+    });
     let instrument = record.instrument.as_deref().unwrap_or("not named");
     let conditions = conditions(problem, rows, judged).into_iter().map(|own| {
         let shown = [own.range.0, own.range.1].map(|value| number(value, 1));
@@ -179,7 +192,11 @@ pub fn acceptance_page(
             protocol(problem),
             rows_in(found, |errors| errors.identification)
         )),
-        Block::Table(Table::new(&["held-out poses", "from", "to", "unit"], conditions.collect(), &[0, 3])),
+        Block::Table(Table::new(
+            &["held-out poses", "from", "to", "unit"],
+            conditions.collect(),
+            &[0, 3],
+        )),
         Block::heading("What it is of"),
         Block::Text(format!(
             "Arm {}; strategy {}, solver {}; digest of the declared arm {}.",
@@ -206,11 +223,15 @@ fn judgement<'a>(judged: &Acceptance) -> [Block<'a>; 3] {
 /// AP before and after.
 fn accuracy(judged: &Acceptance) -> Table {
     let row = |name: &str, of: &Accuracy| {
-        let values = [of.mean.value, of.mean.low, of.mean.high, of.rms, of.max].map(|value| mm(value, 4));
+        let values =
+            [of.mean.value, of.mean.low, of.mean.high, of.rms, of.max].map(|value| mm(value, 4));
         [vec![name.to_owned()], values.to_vec()].concat()
     };
     let header = ["pose accuracy AP, mm", "mean", "95 % from", "to", "rms", "max"];
-    let rows = vec![row("nominal arm, base and tool fitted", &judged.before), row("as identified", &judged.after)];
+    let rows = vec![
+        row("nominal arm, base and tool fitted", &judged.before),
+        row("as identified", &judged.after),
+    ];
     let notes = "AP: distance from the predicted position to the barycentre of those measured in the same pose, after ISO 9283; \
                  the interval is of the mean, by bootstrap over poses";
     Table::new(&header, rows, &[0]).noted(&[notes])

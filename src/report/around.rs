@@ -3,7 +3,7 @@
 use super::document::{Block, Table};
 use super::errors::{measure, shown};
 use super::quantity::{mm, number};
-use crate::identify::{ErrorSummary, Identification, PointSpread};
+use crate::fit::{ErrorSummary, Identification, PointSpread};
 
 /// Errors of every kind of rows where there are several, and the spread of the target at points.
 pub(super) fn around<'a>(found: &Identification) -> Vec<Block<'a>> {
@@ -26,13 +26,22 @@ pub(super) fn around<'a>(found: &Identification) -> Vec<Block<'a>> {
     }
     let spreads = found.spreads.iter().map(|(before, after, held_out)| {
         let words = if *held_out { "held out" } else { "" };
-        vec![after.point.clone(), words.to_owned(), after.n.to_string(), mm(before.mean, 4), mm(after.mean, 4)]
+        vec![
+            after.point.clone(),
+            words.to_owned(),
+            after.n.to_string(),
+            mm(before.mean, 4),
+            mm(after.mean, 4),
+        ]
     });
     let rows: Vec<Vec<String>> = spreads.collect();
     if !rows.is_empty() {
         let header = ["spread at points, mm", "", "rows", "before", "after"];
         let mut table = Table::new(&header, rows, &[0, 1]);
-        table.notes.push("mean distance of the predicted target from its mean over the rows at one point".to_owned());
+        table.notes.push(
+            "mean distance of the predicted target from its mean over the rows at one point"
+                .to_owned(),
+        );
         table.notes.extend(unsteady(found.spreads.iter().map(|own| &own.1)));
         blocks.push(Block::Table(table));
     }

@@ -1,4 +1,5 @@
-//! What `identify` and `loop` print unless all of it is asked for: one screen, with where the rest is.
+//! What `identify` and `loop` print unless all of it is asked for: one screen, with where the rest
+//! is.
 
 use super::around::unsteady;
 use super::closed_loop::{errors, to_know};
@@ -12,17 +13,21 @@ use super::quantity::{counted, number};
 use super::render::text_within;
 use super::unexplained::{places, size_alone};
 use super::verdict::{called, is_beside, verdict};
-use crate::diagnose::{ClosedLoop, Found, Verdict};
-use crate::identify::{Estimate, Identification, size_of_kind};
+use crate::fit::{Estimate, Identification, size_of_kind};
 use crate::problem::Problem;
+use crate::select::{ClosedLoop, Found, Verdict};
 
 /// Lines of a screen, less those that say where results are and what to do next.
 const LINES: usize = 22;
 
-/// A fit on one screen of so many columns, ending in a line break: errors, how large the residual is, and what to look at.
+/// A fit on one screen of so many columns, ending in a line break: errors, how large the residual
+/// is, and what to look at.
 pub fn estimate_brief(problem: &Problem, found: &Identification, columns: usize) -> String {
-    let mut blocks =
-        vec![headline(problem, found), Block::Table(errors_by_axis(found)), Block::lines(noise(problem, found))];
+    let mut blocks = vec![
+        headline(problem, found),
+        Block::Table(errors_by_axis(found)),
+        Block::lines(noise(problem, found)),
+    ];
     blocks.extend(carried(found));
     blocks.push(Block::Lines(parameters(&found.estimates), worth_a_look(found)));
     text_within(&blocks, columns)
@@ -44,17 +49,23 @@ fn parameters(estimates: &[Estimate]) -> String {
     let held = count(|own| own.at_bound.is_some() || !own.fitted);
     let well = count(is_well);
     let in_part = count(|own| own.at_bound.is_none() && own.fitted && own.identified > 0.1) - well;
-    let parts = [(in_part, "in part"), (estimates.len() - held - well - in_part, "hardly"), (held, "held")];
-    let rest: Vec<String> = parts.iter().filter(|own| own.0 > 0).map(|(n, how)| format!(", {n} {how}")).collect();
+    let parts =
+        [(in_part, "in part"), (estimates.len() - held - well - in_part, "hardly"), (held, "held")];
+    let rest: Vec<String> =
+        parts.iter().filter(|own| own.0 > 0).map(|(n, how)| format!(", {n} {how}")).collect();
     let rest = rest.concat();
-    format!("{} of {} identified well{rest}; -v lists them.", well, counted(estimates.len(), "parameter"))
+    format!(
+        "{} of {} identified well{rest}; -v lists them.",
+        well,
+        counted(estimates.len(), "parameter")
+    )
 }
 
 /// What the tables would tell at length.
 fn worth_a_look(found: &Identification) -> Vec<String> {
     let mut points = Vec::new();
     if let Some(own) = &found.orientation {
-        let mean = |of: &crate::identify::Errors| number(of.held_out.mean.norm.to_degrees(), 4);
+        let mean = |of: &crate::fit::Errors| number(of.held_out.mean.norm.to_degrees(), 4);
         points.push(format!(
             "orientation: {} ° before, {} ° after, mean of the held-out poses",
             mean(&own.registered),
@@ -71,7 +82,8 @@ fn worth_a_look(found: &Identification) -> Vec<String> {
         )
     }));
     points.extend(unsteady(found.spreads.iter().map(|own| &own.1)));
-    let of_parameters = format!("of {} not identifiable", counted(found.unknowns.len(), "parameter"));
+    let of_parameters =
+        format!("of {} not identifiable", counted(found.unknowns.len(), "parameter"));
     let counts = [
         (found.identifiability().unidentifiable.len(), "combination", of_parameters.as_str()),
         (found.weak.len(), "combination", "seen too weakly"),
@@ -83,7 +95,8 @@ fn worth_a_look(found: &Identification) -> Vec<String> {
     points
 }
 
-/// A loop on one screen of so many columns, ending in a line break: what it came to, what was found, and what remains.
+/// A loop on one screen of so many columns, ending in a line break: what it came to, what was
+/// found, and what remains.
 pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> String {
     let text = |blocks: &[Block]| text_within(blocks, columns);
     let mut table = errors(closure);
@@ -98,15 +111,22 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
     blocks.extend(to_know(problem, closure));
     blocks.push(Block::Table(table));
     blocks.extend(Some(gain(closure)).filter(|gain| !gain.is_empty()).map(Block::Text));
-    let end = remains(closure).map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
+    let end = remains(closure)
+        .map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
     let last = end.lines().count();
-    let found: Vec<&Found> = closure.effects.iter().filter(|found| !is_beside(closure, found)).collect();
+    let found: Vec<&Found> =
+        closure.effects.iter().filter(|found| !is_beside(closure, found)).collect();
     if !found.is_empty() {
         // A blank line and a heading, and perhaps how many more there are.
         let room = LINES.saturating_sub(text(&blocks).lines().count() + last + 3).max(1);
         let few = found.len() <= FEW;
-        let title =
-            |found| if few { called(closure, found) + &untold(closure, found) } else { cut(&called(closure, found)) };
+        let title = |found| {
+            if few {
+                called(closure, found) + &untold(closure, found)
+            } else {
+                cut(&called(closure, found))
+            }
+        };
         let titles = found.iter().map(|found| Point::from(title(found)));
         blocks.push(Block::heading("What was found"));
         blocks.push(Block::Ranking(titles.take(room).collect()));
@@ -119,7 +139,8 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
 
 /// What the data do not tell an effect from, in a few words.
 fn untold(closure: &ClosedLoop, found: &Found) -> String {
-    let others = named(found.alternatives.iter().map(|other| closure.before.describe(other)), 1, "");
+    let others =
+        named(found.alternatives.iter().map(|other| closure.before.describe(other)), 1, "");
     if others.is_empty() { others } else { format!("; not told from: {others}") }
 }
 
@@ -129,7 +150,11 @@ const FEW: usize = 3;
 /// The beginning of words that would not fit in a line.
 fn cut(words: &str) -> String {
     const MOST: usize = 100;
-    if words.chars().count() <= MOST { words.to_owned() } else { words.chars().take(MOST - 1).chain(['…']).collect() }
+    if words.chars().count() <= MOST {
+        words.to_owned()
+    } else {
+        words.chars().take(MOST - 1).chain(['…']).collect()
+    }
 }
 
 /// What was gained.
@@ -137,9 +162,12 @@ fn gain(closure: &ClosedLoop) -> String {
     let [before, after] = [&closure.before.fit, &closure.after].map(|fit| fit.reduced_chi2);
     let chi2 = match (before, after) {
         (Some(before), Some(after)) if !closure.effects.is_empty() => {
-            let too_large = if closure.after.sigma_scale < 1.0 { " The declared σ is too large." } else { "" };
+            let too_large =
+                if closure.after.sigma_scale < 1.0 { " The declared σ is too large." } else { "" };
             let (before, after) = (short(before), short(after));
-            format!("χ²/ν of the residual falls from {before} to {after}; noise alone: 1.{too_large}")
+            format!(
+                "χ²/ν of the residual falls from {before} to {after}; noise alone: 1.{too_large}"
+            )
         }
         (Some(before), _) => format!("χ²/ν of the residual is {}; noise alone: 1.", short(before)),
         _ => String::new(),
@@ -151,7 +179,9 @@ fn gain(closure: &ClosedLoop) -> String {
     let of = &closure.after.fitted.held_out;
     let [value, low, high] = [gain.value, gain.low, gain.high].map(|value| shown(of, value));
     let (rows, unit) = (if of.kind == "position" { "poses" } else { "rows" }, unit(of));
-    format!("Gain on the held-out {rows} {value} {unit} in the mean (95 % interval {low} to {high} {unit}). {chi2}")
+    format!(
+        "Gain on the held-out {rows} {value} {unit} in the mean (95 % interval {low} to {high} {unit}). {chi2}"
+    )
 }
 
 /// What is left, in a sentence.
@@ -160,8 +190,10 @@ fn remains(closure: &ClosedLoop) -> Option<String> {
     let is_left = closure.verdict == Verdict::Unexplained && size_alone(closure).is_none();
     let places = if is_left { places(closure) } else { Vec::new() };
     let places = named(places.iter().map(|place| cut(place)), 1, "");
-    let structure = (!places.is_empty()).then(|| format!("structure without a known law ({places})"));
+    let structure =
+        (!places.is_empty()).then(|| format!("structure without a known law ({places})"));
     let checks = (failed > 0).then(|| format!("{} failed", counted(failed, "check")));
     let parts: Vec<String> = structure.into_iter().chain(checks).collect();
-    (!parts.is_empty()).then(|| format!("What remains: {}; -v lists it, report.html shows it.", parts.join(", ")))
+    (!parts.is_empty())
+        .then(|| format!("What remains: {}; -v lists it, report.html shows it.", parts.join(", ")))
 }

@@ -10,7 +10,7 @@ use super::quantity::{counted, mm};
 use super::render::text;
 use super::{detection, json};
 use crate::design::{Check, Elsewhere, Expected, Forecast, Prediction};
-use crate::identify::rows_of_kind;
+use crate::fit::rows_of_kind;
 use crate::problem::Problem;
 
 fn lengths(own: &Prediction) -> impl Serialize + use<> {
@@ -21,7 +21,8 @@ fn lengths(own: &Prediction) -> impl Serialize + use<> {
 pub fn check_json(problem: &Problem, check: &Check) -> String {
     let (forecast, noise) = (&check.forecast, check.noise);
     let found = &forecast.identifiability;
-    let with_noise = noise.filter(|_| positions(check)).map(|noise| check.prediction.rms.hypot(noise) * 1e3);
+    let with_noise =
+        noise.filter(|_| positions(check)).map(|noise| check.prediction.rms.hypot(noise) * 1e3);
     to_text(&object! {
         problem: &problem.name,
         poses: forecast.poses,
@@ -32,7 +33,8 @@ pub fn check_json(problem: &Problem, check: &Check) -> String {
         ..json::conditioning(found, check.coordinates),
         parameters: list(&forecast.expected, expected),
         unidentified: unidentified(&found.unidentifiable, |k| forecast.expected[k].name.as_str()),
-        // Root mean square length of the error of one position measured with the σ of the poses; of tilts alone none.
+        // Root mean square length of the error of one position measured with the σ of the poses; of
+        // tilts alone none.
         noise_mm: noise.map(|noise| noise * 1e3),
         prediction: object! {
             judged_in: match check.elsewhere {
@@ -51,7 +53,8 @@ pub fn check_json(problem: &Problem, check: &Check) -> String {
             well_identified: own.well_identified,
             ..lengths(&own.prediction),
         }),
-        // Least number of poses that see everything and predict as exactly as one position is measured.
+        // Least number of poses that see everything and predict as exactly as one position is
+        // measured.
         enough: check.growth.enough,
         // From what size on each effect of the catalogue would be found.
         detectable: detection::entry(&check.detection),
@@ -61,7 +64,8 @@ pub fn check_json(problem: &Problem, check: &Check) -> String {
 /// A check in words, ending in a line break.
 pub fn check_text(problem: &Problem, check: &Check) -> String {
     let forecast = &check.forecast;
-    let names: Vec<String> = forecast.expected.iter().map(|expected| expected.name.clone()).collect();
+    let names: Vec<String> =
+        forecast.expected.iter().map(|expected| expected.name.clone()).collect();
     let rows = forecast.expected.iter().map(|expected| {
         let (mut row, unit) = cells(expected, &[expected.prior, expected.std_error]);
         row.extend([unit, share(expected)]);
@@ -103,7 +107,8 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
 /// Shares of the data that differ by more than this are shown both.
 const APART: f64 = 0.05;
 
-/// Whether the poses hardly tell a parameter at the nominal arm, and tell it at arms drawn from the priors.
+/// Whether the poses hardly tell a parameter at the nominal arm, and tell it at arms drawn from the
+/// priors.
 fn goes_with_others(expected: &Expected) -> bool {
     let nominal = expected.identified_at_nominal;
     nominal < Forecast::WELL && expected.identified - nominal > APART
@@ -173,12 +178,17 @@ fn positions(check: &Check) -> bool {
 fn growth(check: &Check) -> Table {
     let rows = check.growth.steps.iter().map(|step| {
         let Prediction { median, most, rms } = step.prediction;
-        let mut row: Vec<String> = [step.poses, step.rank, step.well_identified].iter().map(usize::to_string).collect();
+        let mut row: Vec<String> =
+            [step.poses, step.rank, step.well_identified].iter().map(usize::to_string).collect();
         row.extend([median, most, rms].map(|length| mm(length, 3)));
         row.push(if step.poses == check.forecast.poses { "these" } else { "" }.to_owned());
         row
     });
-    Table::new(&["poses", "rank", "≥ 90 %", "median, mm", "95 %, mm", "rms, mm", ""], rows.collect(), &[6])
+    Table::new(
+        &["poses", "rank", "≥ 90 %", "median, mm", "95 %, mm", "rms, mm", ""],
+        rows.collect(),
+        &[6],
+    )
 }
 
 fn enough(check: &Check) -> String {

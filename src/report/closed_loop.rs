@@ -4,11 +4,13 @@ use std::fmt::Write as _;
 
 use super::document::{Block, Headline, Point, Table, code, named, some_of};
 use super::errors::{
-    NOMINAL, both_parts, held_out_rows, in_unit, mean_and_rms, measure, row, rows_of, shown, unit, unpredicted,
-    with_unit,
+    NOMINAL, both_parts, held_out_rows, in_unit, mean_and_rms, measure, row, rows_of, shown, unit,
+    unpredicted, with_unit,
 };
 use super::figures::{self, PlotData};
-use super::identify::{BEFORE, all_told, beware, fitted_parameters, mean, poses, spread, why_not_trusted};
+use super::identify::{
+    BEFORE, all_told, beware, fitted_parameters, mean, poses, spread, why_not_trusted,
+};
 use super::noise::{carried, size};
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{counted, decimals, number, or_dash, p_value};
@@ -17,9 +19,9 @@ use super::trace::percent;
 use super::unexplained::{correction, not_looked_for, unexplained, wrong_limits};
 use super::verdict::{called, counts, is_beside, stand_in, verdict, verdict_word};
 use super::{effect, findings, trace};
-use crate::diagnose::{ClosedLoop, Found, Round, Witness, WitnessVerdict};
-use crate::identify::{ErrorSummary, Errors, Identification};
+use crate::fit::{ErrorSummary, Errors, Identification};
 use crate::problem::Problem;
+use crate::select::{ClosedLoop, Found, Round, Witness, WitnessVerdict};
 
 /// Alternatives that are named in words; the page names twice as many.
 const SHOWN_ALTERNATIVES: usize = 4;
@@ -30,7 +32,8 @@ const SHOWN_ROWS: usize = 3;
 /// Limits of the declared problem that are named.
 const LIMITS: usize = 3;
 
-/// What to know before one reads what was found: rows that carry the misfit, cautions, what was not looked for, rows set aside.
+/// What to know before one reads what was found: rows that carry the misfit, cautions, what was not
+/// looked for, rows set aside.
 pub(super) fn to_know<'a>(problem: &Problem, closure: &ClosedLoop) -> Vec<Block<'a>> {
     let mut blocks: Vec<Block> = carried(&closure.before.fit).into_iter().collect();
     blocks.extend(cautions(closure));
@@ -94,8 +97,11 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
         rows_of(fit, |errors| errors.identification),
         rows_of(fit, |errors| errors.held_out)
     );
-    let mut blocks =
-        vec![Block::Headline(headline(problem, closure)), Block::Text(verdict(closure)), Block::Text(counts)];
+    let mut blocks = vec![
+        Block::Headline(headline(problem, closure)),
+        Block::Text(verdict(closure)),
+        Block::Text(counts),
+    ];
     blocks.extend(to_know(problem, closure));
     blocks.extend(beware(after, plots));
     blocks.extend([
@@ -116,7 +122,9 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     blocks.push(Block::Words(found(closure, SHOWN_ALTERNATIVES)));
     blocks.push(Block::Page(found(closure, 2 * SHOWN_ALTERNATIVES)));
     let causes = plots.causes.iter().zip(1..);
-    blocks.push(Block::figures(causes.map(|(cause, number)| Some(cause.draw_effect(number, &plots.shown)))));
+    blocks.push(Block::figures(
+        causes.map(|(cause, number)| Some(cause.draw_effect(number, &plots.shown))),
+    ));
     blocks.push(Block::heading("What remains"));
     let unexplained = unexplained(problem, closure).into_iter().map(Point::from);
     let (tests, page) = (findings::all(&closure.findings), findings::each(&closure.findings));
@@ -158,26 +166,35 @@ fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
         size("Residual after", after),
         ("Held out, after", spread(&last)),
     ];
-    facts.extend(correction.map(|_| ("Without the correction", format!("{} {}", mean(&last), unit(&last)))));
+    facts.extend(
+        correction.map(|_| ("Without the correction", format!("{} {}", mean(&last), unit(&last)))),
+    );
     facts.extend((!closure.effects.is_empty() && gain.value.is_finite()).then(|| {
-        let [value, low, high] = [gain.value, gain.low, gain.high].map(|value| number(in_unit(&last, value), digits));
+        let [value, low, high] =
+            [gain.value, gain.low, gain.high].map(|value| number(in_unit(&last, value), digits));
         let unit = unit(&last);
         ("Gain of the effects", format!("{value} {unit}, 95 % interval {low} to {high} {unit}"))
     }));
-    facts.extend((!problem.effects.is_empty()).then(|| ("Effects declared", problem.effects.len().to_string())));
+    facts.extend(
+        (!problem.effects.is_empty())
+            .then(|| ("Effects declared", problem.effects.len().to_string())),
+    );
     let of = format!("{}{with}", held_out_rows(after));
-    let mut states = vec![(BEFORE, mean(&fit.registered.held_out)), ("as declared, fitted", mean(&first))];
+    let mut states =
+        vec![(BEFORE, mean(&fit.registered.held_out)), ("as declared, fitted", mean(&first))];
     if !closure.effects.is_empty() || correction.is_some() {
         states.push(("with what was found", mean(&best)));
     }
     Headline { states, unit: unit(&last), of, facts }
 }
 
-/// Why the final fit is not to be trusted, and limits of the declared problem that effects may stand for.
+/// Why the final fit is not to be trusted, and limits of the declared problem that effects may
+/// stand for.
 fn cautions<'a>(closure: &ClosedLoop) -> Vec<Block<'a>> {
     let (before, after) = (&closure.before.fit, &closure.after);
     let untrusted = (!after.is_trusted()).then(|| format!("Beware: {}.", why_not_trusted(after)));
-    let bounds = before.estimates.iter().filter(|own| own.at_bound.is_some()).map(|own| own.name.clone());
+    let bounds =
+        before.estimates.iter().filter(|own| own.at_bound.is_some()).map(|own| own.name.clone());
     let held = bounds.chain(before.active_constraints.iter().map(|own| own.words.clone()));
     let held = named(held, LIMITS, ", ");
     let limits = (!held.is_empty() && !closure.effects.is_empty()).then(|| {
@@ -225,17 +242,25 @@ fn gain(closure: &ClosedLoop) -> String {
     let (before, after) = (&closure.before, &closure.after);
     let another = findings::another_size(&before.findings, before.fit.reduced_chi2)
         .or_else(|| findings::another_size(&closure.findings, after.reduced_chi2));
-    let mut arms =
-        vec![("the nominal arm", &before.fit.registered), ("the arm as declared, fitted", &before.fit.fitted)];
+    let mut arms = vec![
+        ("the nominal arm", &before.fit.registered),
+        ("the arm as declared, fitted", &before.fit.fitted),
+    ];
     arms.extend((!closure.effects.is_empty()).then_some(("what was found", &after.fitted)));
     let unknown = unpredicted(&arms);
-    let chi2 = "χ²/ν is the residual's size against the declared noise: 1 where only noise is left.";
-    let notes = [Some(chi2.to_owned()), another, unknown].into_iter().flatten().collect::<Vec<_>>().join(" ");
+    let chi2 =
+        "χ²/ν is the residual's size against the declared noise: 1 where only noise is left.";
+    let notes = [Some(chi2.to_owned()), another, unknown]
+        .into_iter()
+        .flatten()
+        .collect::<Vec<_>>()
+        .join(" ");
     let (gain, of) = (closure.gain, &after.fitted.held_out);
     if closure.effects.is_empty() || !gain.value.is_finite() {
         return notes;
     }
-    let (takes, off, what) = if gain.value < 0.0 { ("adds", "to", "; below 0 it adds") } else { ("takes", "off", "") };
+    let (takes, off, what) =
+        if gain.value < 0.0 { ("adds", "to", "; below 0 it adds") } else { ("takes", "off", "") };
     format!(
         "What was found {takes} {} {off} the mean error of the {} (95 % interval of what it takes off {} to {}{what}). They took no \
          part in any choice. {notes}",
@@ -253,7 +278,9 @@ fn found<'a>(closure: &ClosedLoop, alternatives: usize) -> Vec<Block<'a>> {
     }
     let mut blocks = vec![
         Block::heading("What was found"),
-        Block::Ranking(closure.effects.iter().map(|found| point(closure, found, alternatives)).collect()),
+        Block::Ranking(
+            closure.effects.iter().map(|found| point(closure, found, alternatives)).collect(),
+        ),
     ];
     if let Some(prior) = &closure.harmonic_prior {
         let sigmas = || prior.by_order.iter().map(|own| own.1.to_degrees());
@@ -272,22 +299,29 @@ fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
     let mut details: Vec<String> = stand_in(closure, found).into_iter().collect();
     details.extend(effect::values(found));
     details.extend(found.claims.as_ref().map(trace::claimed));
+    details.extend(found.stability.map(|share| {
+        format!("named in {} % of weighings without a fifth of the poses", number(share * 100.0, 0))
+    }));
     details.extend(
         found
-            .stability
-            .map(|share| format!("named in {} % of weighings without a fifth of the poses", number(share * 100.0, 0))),
+            .witness
+            .as_ref()
+            .map(|own| format!("{} by {}, which took no part", says(own), own.data)),
     );
-    details.extend(found.witness.as_ref().map(|own| format!("{} by {}, which took no part", says(own), own.data)));
     let mut chance = if is_beside(closure, found) {
         format!(
             "p-value {}: nothing speaks for it by itself; it is in the model together with others",
             p_value(found.p_value)
         )
     } else {
-        format!("p-value {}: chance alone would do as well with that probability", p_value(found.p_value))
+        format!(
+            "p-value {}: chance alone would do as well with that probability",
+            p_value(found.p_value)
+        )
     };
     if let Some(then) = closure.held_out_once(found) {
-        let _ = write!(chance, "; held-out error once it was in the model: {}", mean_and_rms(&then));
+        let _ =
+            write!(chance, "; held-out error once it was in the model: {}", mean_and_rms(&then));
     }
     details.push(chance);
     if !found.alternatives.is_empty() {
@@ -313,10 +347,16 @@ fn rounds(closure: &ClosedLoop) -> Vec<Block<'_>> {
         return Vec::new();
     }
     let row = |(k, step): (usize, &Round)| {
-        let effects: Vec<String> = step.effects.iter().map(|effect| closure.before.describe(effect)).collect();
+        let effects: Vec<String> =
+            step.effects.iter().map(|effect| closure.before.describe(effect)).collect();
         let effects = if effects.is_empty() { "none".to_owned() } else { effects.join("; ") };
-        let errors = [step.identification.rms.norm, step.held_out.mean.norm, step.held_out.rms.norm];
-        [vec![(k + 1).to_string(), effects], errors.map(|error| shown(&step.held_out, error)).to_vec()].concat()
+        let errors =
+            [step.identification.rms.norm, step.held_out.mean.norm, step.held_out.rms.norm];
+        [
+            vec![(k + 1).to_string(), effects],
+            errors.map(|error| shown(&step.held_out, error)).to_vec(),
+        ]
+        .concat()
     };
     let is_angle = closure.after.fitted.held_out.is_angle();
     let rms = if is_angle { "identification rms, °" } else { "identification rms, mm" };
@@ -348,6 +388,7 @@ fn sureness<'a>(closure: &ClosedLoop) -> Option<Block<'a>> {
     let header = ["effect", "p by chance", "law", "resampled", "data that took no part", mean];
     let note = "law: its probability against every other at the same place; resampled: the share of weighings without a fifth of the poses \
                 that name it; held out mean: once it was in the model";
-    let table = Table::new(&header, closure.effects.iter().map(row).collect(), &[0, 4]).noted(&[note]);
+    let table =
+        Table::new(&header, closure.effects.iter().map(row).collect(), &[0, 4]).noted(&[note]);
     (!closure.effects.is_empty()).then_some(Block::Table(table))
 }

@@ -2,17 +2,20 @@
 
 use std::path::PathBuf;
 
-use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError, Value};
+use toml_edit::{
+    Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError,
+    Value,
+};
 
 use super::effect::values;
 use super::quantity::p_value;
 use super::verdict::is_beside;
-use crate::diagnose::{ClosedLoop, Found, HarmonicPrior, SelectionRules};
 use crate::error::one_line;
 use crate::problem::{Argument, Effect, Problem};
+use crate::select::{ClosedLoop, Found, HarmonicPrior, SelectionRules};
 
-/// The `text` of `problem` with the effects that were found declared and its data in `files`, as seen from where the text
-/// will stand; everything else stays as it was written, comments included.
+/// The `text` of `problem` with the effects that were found declared and its data in `files`, as
+/// seen from where the text will stand; everything else stays as it was written, comments included.
 ///
 /// # Errors
 /// The text is not TOML.
@@ -22,14 +25,21 @@ pub fn closed_problem(
     closure: &ClosedLoop,
     files: &[PathBuf],
 ) -> Result<String, TomlError> {
-    let declared: Vec<Effect> = problem.effects.iter().map(|declared| declared.effect.clone()).collect();
+    let declared: Vec<Effect> =
+        problem.effects.iter().map(|declared| declared.effect.clone()).collect();
     let of = |effect: &Effect| closure.effects.iter().find(|found| found.effect == *effect);
     // What data that took no part contradict is not declared.
-    let holds = |effect: &Effect| declared.contains(effect) || of(effect).is_none_or(|found| !found.is_contradicted());
-    let closed = closure.closed.effects.iter().filter(|declared| holds(&declared.effect)).map(|declared| {
-        let found = of(&declared.effect);
-        (declared.effect.clone(), found.map(|found| comments(found, closure)).unwrap_or_default())
-    });
+    let holds = |effect: &Effect| {
+        declared.contains(effect) || of(effect).is_none_or(|found| !found.is_contradicted())
+    };
+    let closed =
+        closure.closed.effects.iter().filter(|declared| holds(&declared.effect)).map(|declared| {
+            let found = of(&declared.effect);
+            (
+                declared.effect.clone(),
+                found.map(|found| comments(found, closure)).unwrap_or_default(),
+            )
+        });
     let edited = edited(text, &declared, &closed.collect::<Vec<_>>(), files)?;
     match &closure.harmonic_prior {
         Some(prior) => with_rules(&edited, prior),
@@ -49,18 +59,22 @@ fn with_rules(text: &str, prior: &HarmonicPrior) -> Result<String, TomlError> {
     }
     // A table in one line has no room for a comment.
     if let Some((first, _)) = prior.rules().next()
-        && let Some(mut key) =
-            document.get_mut("parameters").and_then(Item::as_table_mut).and_then(|all| all.key_mut(&first))
+        && let Some(mut key) = document
+            .get_mut("parameters")
+            .and_then(Item::as_table_mut)
+            .and_then(|all| all.key_mut(&first))
     {
-        key.leaf_decor_mut()
-            .set_prefix("# Found by flexcal loop: with this prior, what is left out is predicted best.\n");
+        key.leaf_decor_mut().set_prefix(
+            "# Found by flexcal loop: with this prior, what is left out is predicted best.\n",
+        );
     }
     Ok(document.to_string())
 }
 
 /// The text with the effects `closed`, each with comments, in the place of those `declared`.
 ///
-/// The loop keeps what was declared in its order, gives it further orders at most, and adds behind it.
+/// The loop keeps what was declared in its order, gives it further orders at most, and adds behind
+/// it.
 fn edited(
     text: &str,
     declared: &[Effect],
@@ -71,7 +85,8 @@ fn edited(
     if let Some(data) = document.get_mut("data").and_then(Item::as_table_like_mut) {
         name_files(data, files);
     }
-    let (customs, written): (Vec<_>, Vec<_>) = closed.iter().partition(|(effect, _)| effect.is_custom());
+    let (customs, written): (Vec<_>, Vec<_>) =
+        closed.iter().partition(|(effect, _)| effect.is_custom());
     let declared: Vec<&Effect> = declared.iter().filter(|effect| !effect.is_custom()).collect();
     for (k, (effect, comments)) in written.into_iter().enumerate() {
         match declared.get(k) {
@@ -91,7 +106,9 @@ fn say(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     let rest = document.trailing().as_str().unwrap_or_default();
     let lines: String = comments.iter().flat_map(|line| ["# ", line, "\n"]).collect();
     let own = one_line(&effect.name_and_place());
-    let more = format!("# {own} is an effect of one's own: no file declares it, only the program that defines it.\n");
+    let more = format!(
+        "# {own} is an effect of one's own: no file declares it, only the program that defines it.\n"
+    );
     document.set_trailing(format!("{rest}\n{lines}{more}"));
 }
 
@@ -112,7 +129,8 @@ fn name_files(data: &mut dyn TableLike, files: &[PathBuf]) {
 fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     let lines: String = comments.iter().flat_map(|line| ["# ", line, "\n"]).collect();
     if let Some(Item::Value(Value::Array(known))) = document.get_mut("effect") {
-        let mut value = Value::InlineTable(InlineTable::from_iter([(effect.name(), arguments(effect))]));
+        let mut value =
+            Value::InlineTable(InlineTable::from_iter([(effect.name(), arguments(effect))]));
         value.decor_mut().set_prefix(format!("\n{lines}"));
         known.push_formatted(value);
         return;
@@ -125,7 +143,8 @@ fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     table.decor_mut().set_prefix(format!("{rest}\n{lines}"));
     let last = document.iter().map(|(_, item)| last_position(item)).max().unwrap_or(0);
     table.set_position(Some(last + 1));
-    let known = document.entry("effect").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()));
+    let known =
+        document.entry("effect").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()));
     if let Some(known) = known.as_array_of_tables_mut() {
         known.push(table);
     }
@@ -147,10 +166,13 @@ fn last_position(item: &Item) -> isize {
 /// Gives the effect that was declared as number `k` other arguments.
 fn replace(document: &mut DocumentMut, k: usize, effect: &Effect) {
     let declared: Option<&mut dyn TableLike> = match document.get_mut("effect") {
-        Some(Item::ArrayOfTables(tables)) => tables.get_mut(k).map(|table| table as &mut dyn TableLike),
-        Some(Item::Value(Value::Array(values))) => {
-            values.get_mut(k).and_then(Value::as_inline_table_mut).map(|table| table as &mut dyn TableLike)
+        Some(Item::ArrayOfTables(tables)) => {
+            tables.get_mut(k).map(|table| table as &mut dyn TableLike)
         }
+        Some(Item::Value(Value::Array(values))) => values
+            .get_mut(k)
+            .and_then(Value::as_inline_table_mut)
+            .map(|table| table as &mut dyn TableLike),
         _ => None,
     };
     if let Some(declared) = declared {
@@ -168,7 +190,9 @@ fn arguments(effect: &Effect) -> Value {
     let value = |(key, argument): (&'static str, Argument)| {
         let value = match argument {
             Argument::Joint(joint) => whole(joint),
-            Argument::Orders(orders) => Value::Array(orders.into_iter().map(i64::from).collect::<Array>()),
+            Argument::Orders(orders) => {
+                Value::Array(orders.into_iter().map(i64::from).collect::<Array>())
+            }
             Argument::Name(name) => Value::from(name),
             Argument::Number(number) | Argument::Length(number) => Value::from(number),
             Argument::Point(point) => Value::Array(point.into_iter().collect::<Array>()),
@@ -192,7 +216,10 @@ fn comments(found: &Found, closure: &ClosedLoop) -> Vec<String> {
         p_value(found.p_value)
     );
     // A custom effect may say of itself what it likes, in several lines.
-    std::iter::once(first).chain(values(found)).map(|line| one_line(&line.replace('\n', " "))).collect()
+    std::iter::once(first)
+        .chain(values(found))
+        .map(|line| one_line(&line.replace('\n', " ")))
+        .collect()
 }
 
 #[cfg(test)]
@@ -202,7 +229,8 @@ mod tests {
     const FILES: [&str; 1] = ["../data.csv"];
 
     fn edit(text: &str, declared: &[Effect], closed: &[Effect]) -> String {
-        let closed: Vec<_> = closed.iter().map(|effect| (effect.clone(), vec!["found".to_owned()])).collect();
+        let closed: Vec<_> =
+            closed.iter().map(|effect| (effect.clone(), vec!["found".to_owned()])).collect();
         edited(text, declared, &closed, &FILES.map(PathBuf::from)).unwrap()
     }
 
@@ -212,8 +240,7 @@ mod tests {
 
     #[test]
     fn what_was_written_stays() {
-        let text =
-            "name = \"x\" # a name\n\n[data]\nfiles = [\"data.csv\"] # measured in May\nsigma = 1\n\n# the end\n";
+        let text = "name = \"x\" # a name\n\n[data]\nfiles = [\"data.csv\"] # measured in May\nsigma = 1\n\n# the end\n";
         let expected = "name = \"x\" # a name\n\n[data]\nfiles = [\"../data.csv\"] # measured in May\nsigma = 1\n\n# the end\n\n\
                         # found\n[[effect]]\ngear-ratio = { joint = 3 }\n\n# found\n[[effect]]\nhoist-force = true\n";
         assert_eq!(edit(text, &[], &[gear(), Effect::HoistForce]), expected);
@@ -239,7 +266,8 @@ mod tests {
             }
         }
         let own = || Effect::custom(Creep);
-        let text = "[[effect]]\njoint-harmonic = { joint = 1, orders = [1] }\n\n[data]\nfiles = []\n";
+        let text =
+            "[[effect]]\njoint-harmonic = { joint = 1, orders = [1] }\n\n[data]\nfiles = []\n";
         let harmonic = |orders: &[u32]| Effect::JointHarmonic { joint: 1, orders: orders.to_vec() };
         let expected = "[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 2] }\n\n[data]\nfiles = [\"../data.csv\"]\n\n\
                         # found\n[[effect]]\ngear-ratio = { joint = 3 }\n\n# found\n\
@@ -256,8 +284,7 @@ mod tests {
         let expected = "[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 2] }\n\n[[effect]]\npayload-mass = true\n\n[data]\n\
                         files = [\"../data.csv\"]\n\n# found\n[[effect]]\ngear-ratio = { joint = 3 }\n";
         assert_eq!(edit(text, &declared, &closed), expected);
-        let text =
-            "effect = [{ joint-harmonic = { joint = 1, orders = [1] } }, { payload-mass = true }]\ndata.files = []\n";
+        let text = "effect = [{ joint-harmonic = { joint = 1, orders = [1] } }, { payload-mass = true }]\ndata.files = []\n";
         let edited = edit(text, &declared, &closed);
         let read: toml::Table = edited.parse().unwrap();
         assert_eq!(read["effect"].as_array().unwrap().len(), 3, "{edited}");

@@ -1,11 +1,12 @@
-//! Tables about rows of measurements, column by column: what CSV files and the Python package have in common.
+//! Tables about rows of measurements, column by column: what CSV files and the Python package have
+//! in common.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::quantity::fixed;
 use super::table;
 use crate::files::csv;
-use crate::identify::Residual;
+use crate::fit::Residual;
 use crate::measurement::{Labels, Measurements};
 use crate::problem::{Observation, Problem};
 
@@ -17,7 +18,8 @@ pub enum Column {
     Words(Labels),
     /// Whole numbers.
     Counts(Vec<usize>),
-    /// Numbers, NaN where a row has none, and their decimals in a text: as many as they need where nothing is said.
+    /// Numbers, NaN where a row has none, and their decimals in a text: as many as they need where
+    /// nothing is said.
     Numbers(Vec<f64>, Option<usize>),
     /// True or false.
     Flags(Vec<bool>),
@@ -48,18 +50,26 @@ pub(super) fn to_csv(columns: &Columns, rows: usize) -> String {
 /// What names the rows `picked`: file, line, and the words and numbers of their table that do.
 pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) -> Columns {
     let of_row = |of: &dyn Fn(usize) -> usize| picked.iter().map(|&row| of(row)).collect();
-    let labels =
-        |all: &Labels| Column::Words(Labels { names: all.names.clone(), of_row: of_row(&|row| all.of_row[row]) });
+    let labels = |all: &Labels| {
+        Column::Words(Labels { names: all.names.clone(), of_row: of_row(&|row| all.of_row[row]) })
+    };
     let files: Labels = rows.files.iter().map(|file| file.display().to_string()).collect();
-    let file = Labels { of_row: of_row(&|row| files.of_row[rows.origin[row].0 as usize]), names: files.names.clone() };
+    let file = Labels {
+        of_row: of_row(&|row| files.of_row[rows.origin[row].0 as usize]),
+        names: files.names.clone(),
+    };
     let line = of_row(&|row| rows.location(row).line.unwrap_or(0));
-    let mut columns = vec![("file".to_owned(), Column::Words(file)), ("line".to_owned(), Column::Counts(line))];
+    let mut columns =
+        vec![("file".to_owned(), Column::Words(file)), ("line".to_owned(), Column::Counts(line))];
     let mut add = |name: &str, column| columns.push((name.to_owned(), column));
     if let Some(pose) = &rows.pose {
         add("pose", Column::Numbers(picked.iter().map(|&row| pose[row]).collect(), None));
     }
-    let words =
-        [("pose", rows.pose_names.as_ref()), ("session", table::sessions(rows)), ("target", rows.target.as_ref())];
+    let words = [
+        ("pose", rows.pose_names.as_ref()),
+        ("session", table::sessions(rows)),
+        ("target", rows.target.as_ref()),
+    ];
     for (name, all) in words {
         if let Some(all) = all {
             add(name, labels(all));
@@ -74,17 +84,21 @@ pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) ->
         }
     }
     for word in known {
-        let named = |row: usize| fixture(row).filter(|own| own.kind.word() == word).map_or("", |own| own.name.as_str());
+        let named = |row: usize| {
+            fixture(row).filter(|own| own.kind.word() == word).map_or("", |own| own.name.as_str())
+        };
         add(word, Column::Words(picked.iter().map(|&row| named(row)).collect()));
     }
     columns
 }
 
 /// A word for what is predicted or left, that of a residual, and its rotation vector.
-type Part<'a> = (&'static str, fn(&Residual) -> Vector3<f64>, &'a dyn Fn(&Residual) -> Option<Vector3<f64>>);
+type Part<'a> =
+    (&'static str, fn(&Residual) -> Vector3<f64>, &'a dyn Fn(&Residual) -> Option<Vector3<f64>>);
 
-/// What an arm leaves of measurements, a row for each residual: what names it; predicted and left, in mm and ° and the columns of what
-/// some row measures; the length of what is left in units of σ, whether it is an outlier, and held out.
+/// What an arm leaves of measurements, a row for each residual: what names it; predicted and left,
+/// in mm and ° and the columns of what some row measures; the length of what is left in units of σ,
+/// whether it is an outlier, and held out.
 pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Residual]) -> Columns {
     let picked: Vec<usize> = residuals.iter().map(|residual| residual.row).collect();
     let mut columns = names(problem, rows, &picked);
@@ -103,20 +117,30 @@ pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Res
     };
     for (word, value, turn) in both {
         for (kind, axes) in &kinds {
-            let (unit, factor) = if *kind == "tilt" { ("deg", 180.0 / std::f64::consts::PI) } else { ("mm", 1e3) };
+            let (unit, factor) =
+                if *kind == "tilt" { ("deg", 180.0 / std::f64::consts::PI) } else { ("mm", 1e3) };
             for (k, axis) in axes.iter().enumerate() {
                 let is_own = |own: &Residual| columns_of(rows.observation(own.row)).0 == *kind;
-                let cell = |own: &Residual| if is_own(own) { value(own)[k] * factor } else { f64::NAN };
+                let cell =
+                    |own: &Residual| if is_own(own) { value(own)[k] * factor } else { f64::NAN };
                 add(format!("{word}_{axis}_{unit}"), 6, &cell);
             }
         }
         for (k, axis) in ["rx", "ry", "rz"].into_iter().enumerate().filter(|_| turned) {
-            add(format!("{word}_{axis}_deg"), 7, &|own| turn(own).map_or(f64::NAN, |turn| turn[k].to_degrees()));
+            add(format!("{word}_{axis}_deg"), 7, &|own| {
+                turn(own).map_or(f64::NAN, |turn| turn[k].to_degrees())
+            });
         }
     }
     add("whitened".to_owned(), 4, &Residual::length);
-    columns.push(("outlier".to_owned(), Column::Flags(residuals.iter().map(|own| own.outlier).collect())));
-    columns.push(("held_out".to_owned(), Column::Flags(residuals.iter().map(|own| own.held_out).collect())));
+    columns.push((
+        "outlier".to_owned(),
+        Column::Flags(residuals.iter().map(|own| own.outlier).collect()),
+    ));
+    columns.push((
+        "held_out".to_owned(),
+        Column::Flags(residuals.iter().map(|own| own.held_out).collect()),
+    ));
     columns
 }
 
@@ -125,7 +149,8 @@ pub fn residuals_csv(problem: &Problem, rows: &Measurements, residuals: &[Residu
     to_csv(&residual_columns(problem, rows, residuals), residuals.len())
 }
 
-/// The columns of a kind of rows, and how that is called: positions and contacts with points share theirs.
+/// The columns of a kind of rows, and how that is called: positions and contacts with points share
+/// theirs.
 fn columns_of(observation: Observation) -> (&'static str, &'static [&'static str]) {
     match observation {
         Observation::Position | Observation::Point(_) => ("position", &["x", "y", "z"]),

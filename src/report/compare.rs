@@ -1,4 +1,5 @@
-//! What `compare` says and writes: every strategy, solver and ablation, and the paper's tables 2 and 3 from each procedure.
+//! What `compare` says and writes: every strategy, solver and ablation, and the paper's tables 2
+//! and 3 from each procedure.
 
 use std::borrow::Cow;
 
@@ -7,19 +8,30 @@ use serde::{Serialize, Serializer};
 use super::document::{Block, Headline, Table, code};
 use super::errors::{both_parts, held_out_rows, noun, shown, unit};
 use super::figures::{self, PlotData};
-use super::identify::{BEFORE, beware, counts, errors, fitted_parameters, mean, no_errors, poses, remainder};
+use super::identify::{
+    BEFORE, beware, counts, errors, fitted_parameters, mean, no_errors, poses, remainder,
+};
 use super::json::{both, list, object, to_text};
 use super::noise::size;
 use super::paper_tables::{table_2, table_3, tables, title};
 use super::quantity::{counted, number, or_dash};
 use super::render::{Report, report, text};
-use crate::identify::{Baseline, Comparison, Errors, Identification, SolverChoice};
+use crate::fit::{Baseline, Comparison, Errors, Identification, SolverChoice};
 use crate::model::Ablation;
 use crate::problem::Problem;
 
 /// Columns of the rows of a comparison, after the first; the time differs from run to run.
-const ROWS: [&str; 9] =
-    ["solver", "held out mean", "rms, mm", "fitted rms", "steps", "evaluations", "ms", "condition", "termination"];
+const ROWS: [&str; 9] = [
+    "solver",
+    "held out mean",
+    "rms, mm",
+    "fitted rms",
+    "steps",
+    "evaluations",
+    "ms",
+    "condition",
+    "termination",
+];
 /// Place of the time among all columns.
 const TIME: usize = 7;
 
@@ -79,7 +91,12 @@ fn errors_of_both<S: Serializer>(errors: &Errors, serializer: S) -> Result<S::Ok
 
 /// Every strategy and solver, the paper's own last.
 fn fits(comparison: &Comparison) -> Vec<Row<'_>> {
-    comparison.strategies.iter().map(Row::from).chain(comparison.paper.iter().map(Row::from)).collect()
+    comparison
+        .strategies
+        .iter()
+        .map(Row::from)
+        .chain(comparison.paper.iter().map(Row::from))
+        .collect()
 }
 
 /// A comparison as JSON text, ending in a line break.
@@ -125,8 +142,13 @@ fn of_positions(found: &Identification) -> bool {
 
 /// Tables 2 and 3 from each procedure.
 fn in_the_papers_shape(comparison: &Comparison) -> Vec<Block<'_>> {
-    let tables =
-        |own| [Block::heading(&title(own)), Block::Table(table_2(own)), Block::Table(table_3(comparison, own))];
+    let tables = |own| {
+        [
+            Block::heading(&title(own)),
+            Block::Table(table_2(own)),
+            Block::Table(table_3(comparison, own)),
+        ]
+    };
     comparison.procedures.iter().flat_map(tables).collect()
 }
 
@@ -135,7 +157,11 @@ pub fn comparison_report(problem: &Problem, comparison: &Comparison, plots: &Plo
     report(problem, "comparison", &blocks(problem, comparison, plots))
 }
 
-fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData) -> Vec<Block<'a>> {
+fn blocks<'a>(
+    problem: &Problem,
+    comparison: &'a Comparison,
+    plots: &'a PlotData,
+) -> Vec<Block<'a>> {
     let joint = &comparison.joint;
     let held_out = joint.fitted.held_out;
     let head = Headline {
@@ -143,12 +169,19 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
         unit: unit(&held_out),
         of: format!(
             "{}, everything fitted at once",
-            if of_positions(joint) { format!("{} held-out poses", held_out.n) } else { held_out_rows(joint) }
+            if of_positions(joint) {
+                format!("{} held-out poses", held_out.n)
+            } else {
+                held_out_rows(joint)
+            }
         ),
         facts: vec![
             poses(joint),
             fitted_parameters(joint),
-            ("Elasticity ignored", format!("{} {}", mean(&comparison.rigid.fitted.held_out), unit(&held_out))),
+            (
+                "Elasticity ignored",
+                format!("{} {}", mean(&comparison.rigid.fitted.held_out), unit(&held_out)),
+            ),
             size("Residual against σ", joint),
         ],
     };
@@ -166,25 +199,38 @@ fn blocks<'a>(problem: &Problem, comparison: &'a Comparison, plots: &'a PlotData
         Block::Table(untimed(parts(comparison))),
     ];
     if !comparison.procedures.is_empty() {
-        blocks.push(Block::heading("From each procedure, as in tables 2 and 3 and figure 13 of the paper"));
+        blocks.push(Block::heading(
+            "From each procedure, as in tables 2 and 3 and figure 13 of the paper",
+        ));
     }
     for own in &comparison.procedures {
         blocks.push(Block::Text(format!("{}.", title(own))));
         blocks.extend([Block::Table(table_2(own)), Block::Table(table_3(comparison, own))]);
         // The errors of the joint fit stand further below.
-        blocks.extend(own.paper.map(|_| Block::Figures(vec![figures::of_procedure(&comparison.before, own)])));
+        blocks.extend(
+            own.paper.map(|_| Block::Figures(vec![figures::of_procedure(&comparison.before, own)])),
+        );
     }
     blocks.push(Block::heading("Everything fitted at once"));
     blocks.extend(errors(joint));
     blocks.push(Block::figures([figures::errors(plots), figures::vectors(plots)]));
     blocks.push(Block::Poses(plots));
-    blocks.extend(remainder(problem, joint, plots, &format!("the estimate.json of {}", code("flexcal identify"))));
+    blocks.extend(remainder(
+        problem,
+        joint,
+        plots,
+        &format!("the estimate.json of {}", code("flexcal identify")),
+    ));
     blocks
 }
 
 /// One row for each strategy and solver.
 fn strategies(comparison: &Comparison) -> Table {
-    side_by_side(comparison, "strategy", fits(comparison).iter().map(|fit| cells(&fit.strategy, fit)).collect())
+    side_by_side(
+        comparison,
+        "strategy",
+        fits(comparison).iter().map(|fit| cells(&fit.strategy, fit)).collect(),
+    )
 }
 
 /// The same without times, with further errors.

@@ -6,8 +6,8 @@ use super::document::{Block, Table, code};
 use super::effect;
 use super::forecast::size as shown;
 use super::json::{list, object};
-use crate::diagnose::{Detectable, Detection, Size};
 use crate::problem::Effect;
+use crate::select::{Detectable, Detection, Size};
 
 /// Effects of a family on a screen.
 const SHOWN: usize = 3;
@@ -26,7 +26,8 @@ pub(super) fn entry(detection: &Detection) -> impl Serialize {
     object! {
         power: detection.power,
         level: detection.level,
-        // Whether the poses have no times yet: effects that remember what was before a pose need them.
+        // Whether the poses have no times yet: effects that remember what was before a pose need
+        // them.
         times_assumed: detection.times_assumed,
         effects: list(&detection.effects, |own| object! { ..&own.effect, sizes: list(&own.sizes, size) }),
         untestable: effect::untestable(detection.untestable.clone()),
@@ -36,12 +37,15 @@ pub(super) fn entry(detection: &Detection) -> impl Serialize {
 /// The hardest of each family, and what is not to be seen.
 pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
     let seen = |own: &&Detectable| own.sizes.iter().any(Size::is_within_prior);
-    let (mut visible, mut hidden): (Vec<&Detectable>, Vec<&Detectable>) = detection.effects.iter().partition(seen);
+    let (mut visible, mut hidden): (Vec<&Detectable>, Vec<&Detectable>) =
+        detection.effects.iter().partition(seen);
     // Of an argument that is searched, as a time, one that is seen is enough.
     let places: Vec<String> = visible.iter().map(|own| own.effect.name_and_place()).collect();
-    hidden.retain(|own| !own.effect.is_searched() || !places.contains(&own.effect.name_and_place()));
+    hidden
+        .retain(|own| !own.effect.is_searched() || !places.contains(&own.effect.name_and_place()));
     let needs_times = |own: &&Detectable| detection.times_assumed && own.effect.has_memory();
-    let if_timed: Vec<&Effect> = visible.iter().copied().filter(needs_times).map(|own| &own.effect).collect();
+    let if_timed: Vec<&Effect> =
+        visible.iter().copied().filter(needs_times).map(|own| &own.effect).collect();
     visible.retain(|own| !needs_times(own));
     let mut families: Vec<&str> = Vec::new();
     for own in &visible {
@@ -49,7 +53,8 @@ pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
             families.push(own.effect.name());
         }
     }
-    let rows: Vec<Vec<String>> = families.into_iter().flat_map(|family| hardest(&visible, family)).collect();
+    let rows: Vec<Vec<String>> =
+        families.into_iter().flat_map(|family| hardest(&visible, family)).collect();
     let mut blocks = vec![Block::Text(format!(
         "How large an effect must be to be found (in {:.0} of 100 such sets, at the level of the loop), the {SHOWN} hardest of \
          each family:",
@@ -68,7 +73,9 @@ pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
     }
     if !hidden.is_empty() {
         let list = effect::listed(hidden.into_iter().map(|own| &own.effect)).join("; ");
-        blocks.push(Block::Text(format!("Not with these poses, even at the size of their prior: {list}.")));
+        blocks.push(Block::Text(format!(
+            "Not with these poses, even at the size of their prior: {list}."
+        )));
     }
     if !detection.untestable.is_empty() {
         blocks.push(Block::heading("Not with measurements of this kind"));
@@ -82,7 +89,8 @@ fn hardest(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
     let mut own: Vec<(&Detectable, f64)> = Vec::new();
     for effect in shown.iter().filter(|effect| effect.effect.name() == family) {
         let sizes = effect.sizes.iter();
-        let part = sizes.map(|size| size.worst.unwrap_or(f64::INFINITY) / size.prior).fold(0.0, f64::max);
+        let part =
+            sizes.map(|size| size.worst.unwrap_or(f64::INFINITY) / size.prior).fold(0.0, f64::max);
         own.push((effect, part));
     }
     own.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -94,7 +102,9 @@ fn hardest(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
         places.push(place);
         new
     });
-    rows.take(SHOWN).flat_map(|(effect, _)| effect.sizes.iter().map(|size| row(&effect.effect, size))).collect()
+    rows.take(SHOWN)
+        .flat_map(|(effect, _)| effect.sizes.iter().map(|size| row(&effect.effect, size)))
+        .collect()
 }
 
 fn row(effect: &Effect, size: &Size) -> Vec<String> {

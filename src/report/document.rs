@@ -1,11 +1,12 @@
 //! A report in blocks: told once, shown on terminals, as Markdown and as a page.
 //!
-//! Words come with [`code`] marked. Figures, folds and the like are shown by the page alone; [`Block::Page`] and
-//! [`Block::Words`] hold what only one kind of reader gets.
+//! Words come with [`code`] marked. Figures, folds and the like are shown by the page alone;
+//! [`Block::Page`] and [`Block::Words`] hold what only one kind of reader gets.
 
 use super::figures::{Drawing, PlotData};
 
-/// Marks of code in words: control characters, so that no title has them on purpose and terminals drop them.
+/// Marks of code in words: control characters, so that no title has them on purpose and terminals
+/// drop them.
 pub(super) const CODE: (char, char) = ('\u{2}', '\u{3}');
 
 /// A part of a report.
@@ -33,7 +34,8 @@ pub(super) enum Block<'a> {
     Figures(Vec<Drawing>),
     /// Every pose that the figures draw, to look at one by one; on the page alone.
     Poses(&'a PlotData),
-    /// What a page shows on demand: its title, what it holds, and where it is found on paper; on the page alone.
+    /// What a page shows on demand: its title, what it holds, and where it is found on paper; on
+    /// the page alone.
     Folded(String, Vec<Block<'a>>, String),
     /// On the page alone.
     Page(Vec<Block<'a>>),
@@ -135,7 +137,11 @@ pub(super) fn code(words: &str) -> String {
 }
 
 /// The first `most` of some words, and where the others are.
-pub(super) fn first_of(words: impl IntoIterator<Item = String>, most: usize, file: &str) -> Vec<String> {
+pub(super) fn first_of(
+    words: impl IntoIterator<Item = String>,
+    most: usize,
+    file: &str,
+) -> Vec<String> {
     let (mut shown, more) = some_of(words, most);
     shown.extend((more > 0).then(|| format!("and {more} more in {file}")));
     shown
@@ -149,7 +155,10 @@ pub(super) fn named(words: impl IntoIterator<Item = String>, most: usize, betwee
 }
 
 /// The first `most` of some words, and how many more there are.
-pub(super) fn some_of(words: impl IntoIterator<Item = String>, most: usize) -> (Vec<String>, usize) {
+pub(super) fn some_of(
+    words: impl IntoIterator<Item = String>,
+    most: usize,
+) -> (Vec<String>, usize) {
     let mut all: Vec<String> = words.into_iter().collect();
     let more = all.len().saturating_sub(most);
     all.truncate(most);

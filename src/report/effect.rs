@@ -5,9 +5,9 @@ use serde::Serialize;
 use super::document::{Point, code};
 use super::json::{list, object};
 use super::quantity::{decimals, number};
-use crate::diagnose::{Found, Trace};
-use crate::identify::Estimate;
+use crate::fit::Estimate;
 use crate::problem::Effect;
+use crate::select::{Found, Trace};
 
 /// Decimals of a value at most.
 const MOST: usize = 6;
@@ -24,12 +24,15 @@ pub(super) fn untestable(all: Vec<(Effect, &'static str)>) -> Vec<impl Serialize
 /// In words and, unless that is long, as a problem declares it.
 pub(super) fn both(effect: &Effect, trace: &Trace) -> String {
     match effect {
-        Effect::JointHarmonic { orders, .. } if orders.len() > MOST_LISTED => trace.describe(effect),
+        Effect::JointHarmonic { orders, .. } if orders.len() > MOST_LISTED => {
+            trace.describe(effect)
+        }
         _ => format!("{}: {}", trace.describe(effect), code(&effect.declaration())),
     }
 }
 
-/// The parameters of an effect that was found with their values, a line each; of many waves the highest, by their height.
+/// The parameters of an effect that was found with their values, a line each; of many waves the
+/// highest, by their height.
 pub(super) fn values(found: &Found) -> Vec<String> {
     let line = |name: &str, estimate: &Estimate| format!("{name} = {}", value(estimate));
     let estimates = &found.estimates;
@@ -37,15 +40,19 @@ pub(super) fn values(found: &Found) -> Vec<String> {
     if estimates.len() <= MOST_LISTED || estimates.len() != 2 * orders.len() {
         return estimates.iter().map(|estimate| line(&estimate.name, estimate)).collect();
     }
-    let mut waves: Vec<(u32, Estimate)> = orders.iter().copied().zip(estimates.chunks_exact(2).map(height)).collect();
+    let mut waves: Vec<(u32, Estimate)> =
+        orders.iter().copied().zip(estimates.chunks_exact(2).map(height)).collect();
     waves.sort_by(|(_, a), (_, b)| b.estimate.total_cmp(&a.estimate));
-    let highest =
-        waves.iter().take(SHOWN_WAVES).map(|(order, height)| line(&format!("amplitude of order {order}"), height));
+    let highest = waves
+        .iter()
+        .take(SHOWN_WAVES)
+        .map(|(order, height)| line(&format!("amplitude of order {order}"), height));
     let lower = waves.len().saturating_sub(SHOWN_WAVES);
     highest.chain((lower > 0).then(|| format!("and {lower} lower ones, in loop.json"))).collect()
 }
 
-/// Height of a sine and a cosine of one order, with its standard error; the two taken as uncorrelated.
+/// Height of a sine and a cosine of one order, with its standard error; the two taken as
+/// uncorrelated.
 fn height(pair: &[Estimate]) -> Estimate {
     let (sine, cosine) = (&pair[0], &pair[1]);
     let height = sine.estimate.hypot(cosine.estimate);
@@ -70,17 +77,25 @@ fn value(estimate: &Estimate) -> String {
 
 /// Points of effects in groups, each with its reason.
 pub(super) fn reasons<'a>(effects: impl IntoIterator<Item = (Effect, &'a str)>) -> Vec<Point> {
-    grouped(effects).into_iter().map(|(words, why)| Point::from(format!("{words}: {why}"))).collect()
+    grouped(effects)
+        .into_iter()
+        .map(|(words, why)| Point::from(format!("{words}: {why}")))
+        .collect()
 }
 
 /// Effects in groups, in one line.
 pub(super) fn listed<'a>(effects: impl IntoIterator<Item = &'a Effect>) -> Vec<String> {
-    grouped(effects.into_iter().map(|effect| (effect.clone(), ()))).into_iter().map(|(words, ())| words).collect()
+    grouped(effects.into_iter().map(|effect| (effect.clone(), ())))
+        .into_iter()
+        .map(|(words, ())| words)
+        .collect()
 }
 
-/// Effects that are parts of one, as the harmonics of a joint, taken together where they share a reason, in the order in which
-/// they come.
-pub(super) fn joined<R: Copy + PartialEq>(effects: impl IntoIterator<Item = (Effect, R)>) -> Vec<(Effect, R)> {
+/// Effects that are parts of one, as the harmonics of a joint, taken together where they share a
+/// reason, in the order in which they come.
+pub(super) fn joined<R: Copy + PartialEq>(
+    effects: impl IntoIterator<Item = (Effect, R)>,
+) -> Vec<(Effect, R)> {
     let mut all: Vec<(Effect, R)> = Vec::new();
     for (effect, reason) in effects {
         let same = |(known, why): &mut (Effect, R)| {
@@ -95,11 +110,15 @@ pub(super) fn joined<R: Copy + PartialEq>(effects: impl IntoIterator<Item = (Eff
 }
 
 /// Effects in one line for each family and reason: "`backlash` at joints 1, 2, 3".
-fn grouped<R: Copy + PartialEq>(effects: impl IntoIterator<Item = (Effect, R)>) -> Vec<(String, R)> {
+fn grouped<R: Copy + PartialEq>(
+    effects: impl IntoIterator<Item = (Effect, R)>,
+) -> Vec<(String, R)> {
     let mut groups: Vec<(Vec<Effect>, R)> = Vec::new();
     for (effect, reason) in joined(effects) {
         let alike = |(members, why): &&mut (Vec<Effect>, R)| {
-            *why == reason && members[0].name() == effect.name() && orders(&members[0]) == orders(&effect)
+            *why == reason
+                && members[0].name() == effect.name()
+                && orders(&members[0]) == orders(&effect)
         };
         match groups.iter_mut().find(alike) {
             Some((members, _)) => members.push(effect),
@@ -116,7 +135,10 @@ fn orders(effect: &Effect) -> Option<&[u32]> {
 /// Effects of many time constants or distances, by their places alone.
 fn of_places(members: &[Effect]) -> String {
     let mut places: Vec<String> = Vec::new();
-    for place in members.iter().filter_map(|effect| effect.arguments().first().and_then(|(_, own)| own.place())) {
+    for place in members
+        .iter()
+        .filter_map(|effect| effect.arguments().first().and_then(|(_, own)| own.place()))
+    {
         if !places.contains(&place) {
             places.push(place);
         }
@@ -125,7 +147,12 @@ fn of_places(members: &[Effect]) -> String {
         Some(("link", _)) => "link",
         _ => "joint",
     };
-    format!("{} of {kind}{} {}", code(members[0].name()), if places.len() > 1 { "s" } else { "" }, places.join(", "))
+    format!(
+        "{} of {kind}{} {}",
+        code(members[0].name()),
+        if places.len() > 1 { "s" } else { "" },
+        places.join(", ")
+    )
 }
 
 fn group(members: &[Effect]) -> String {
@@ -143,7 +170,9 @@ fn group(members: &[Effect]) -> String {
     let place = |effect: &Effect| match effect {
         Effect::JointCoupling { joint, from } => format!("{joint} by {from}"),
         Effect::JointWave { joint, order } => format!("{joint} (order {order})"),
-        Effect::StationShift { at_time } | Effect::StationMove { at_time } => format!("{at_time} s"),
+        Effect::StationShift { at_time } | Effect::StationMove { at_time } => {
+            format!("{at_time} s")
+        }
         Effect::TrackerSettling { time_constant } => format!("{time_constant} s"),
         other => other.place(),
     };
@@ -161,7 +190,9 @@ fn group(members: &[Effect]) -> String {
         Some(all @ [first, .., last]) if (last - first) as usize + 1 == all.len() => {
             format!(", orders {first} to {last}")
         }
-        Some(all) => format!(", orders {}", all.iter().map(u32::to_string).collect::<Vec<_>>().join(", ")),
+        Some(all) => {
+            format!(", orders {}", all.iter().map(u32::to_string).collect::<Vec<_>>().join(", "))
+        }
         None => String::new(),
     };
     format!("{} {of}{places}{orders}", code(name))
@@ -173,8 +204,9 @@ mod tests {
 
     #[test]
     fn many_effects_take_one_line() {
-        let harmonics =
-            (1..=2).flat_map(|joint| (1..=60).map(move |order| Effect::JointHarmonic { joint, orders: vec![order] }));
+        let harmonics = (1..=2).flat_map(|joint| {
+            (1..=60).map(move |order| Effect::JointHarmonic { joint, orders: vec![order] })
+        });
         let others = [Effect::Backlash { joint: 3 }, Effect::JointCoupling { joint: 2, from: 1 }];
         let lines = grouped(harmonics.chain(others).map(|effect| (effect, ())));
         let words: Vec<String> = lines.into_iter().map(|(words, ())| words).collect();

@@ -1,7 +1,7 @@
 //! Errors of arms in words: before and after, and poses whose errors nobody knows.
 
 use super::quantity::{about_three_digits, counted, number};
-use crate::identify::{ErrorSummary, Errors, Identification, rows_of_kind};
+use crate::fit::{ErrorSummary, Errors, Identification, rows_of_kind};
 
 /// The arm before anything was identified.
 pub(super) const NOMINAL: &str = "nominal arm, base and tool fitted";
@@ -18,7 +18,8 @@ pub(super) fn measure(of: &ErrorSummary) -> &'static str {
     }
 }
 
-/// An error, or the difference of two, of the kind of rows of `of` in the unit in which it is shown: mm, of tilts °.
+/// An error, or the difference of two, of the kind of rows of `of` in the unit in which it is
+/// shown: mm, of tilts °.
 pub(super) fn in_unit(of: &ErrorSummary, value: f64) -> f64 {
     if of.is_angle() { value.to_degrees() } else { value * 1e3 }
 }
@@ -67,11 +68,13 @@ pub(super) fn mean_and_rms(of: &ErrorSummary) -> String {
     format!("mean {}, rms {}", with_unit(of, of.mean.norm), with_unit(of, of.rms.norm))
 }
 
-/// How many rows of each kind there are on one part of the data: "50 poses", "71 contacts with points, 47 distances". Known
-/// distances between points are none of the arm's.
+/// How many rows of each kind there are on one part of the data: "50 poses", "71 contacts with
+/// points, 47 distances". Known distances between points are none of the arm's.
 pub(super) fn rows_of(found: &Identification, part: fn(&Errors) -> ErrorSummary) -> String {
-    let parts: Vec<String> =
-        measured_kinds(found, part).filter(|of| of.n > 0).map(|of| counted_rows(found, &of, "")).collect();
+    let parts: Vec<String> = measured_kinds(found, part)
+        .filter(|of| of.n > 0)
+        .map(|of| counted_rows(found, &of, ""))
+        .collect();
     if parts.is_empty() { counted_rows(found, &part(&found.fitted), "") } else { parts.join(", ") }
 }
 
@@ -85,7 +88,8 @@ pub(super) fn both_parts(found: &Identification) -> String {
     format!("{} to identify, {held_out} held out", rows_of(found, |errors| errors.identification))
 }
 
-/// How many held-out rows the errors speak of: "50 held-out poses", "16 held-out contacts with points".
+/// How many held-out rows the errors speak of: "50 held-out poses", "16 held-out contacts with
+/// points".
 pub(super) fn held_out_rows(found: &Identification) -> String {
     counted_rows(found, &found.fitted.held_out, "held-out ")
 }
@@ -122,16 +126,22 @@ fn measured_kinds(
     part: fn(&Errors) -> ErrorSummary,
 ) -> impl Iterator<Item = ErrorSummary> + use<'_> {
     let alone = found.kinds.is_empty().then(|| part(&found.fitted));
-    let each = found.kinds.iter().map(move |(_, fitted)| part(fitted)).filter(|of| of.kind != "known distance");
+    let each = found
+        .kinds
+        .iter()
+        .map(move |(_, fitted)| part(fitted))
+        .filter(|of| of.kind != "known distance");
     alone.into_iter().chain(each)
 }
 
-/// For each arm by name the poses that have no equilibrium with it, so that no mean over their errors exists; `None` where
-/// all errors are known.
+/// For each arm by name the poses that have no equilibrium with it, so that no mean over their
+/// errors exists; `None` where all errors are known.
 pub(super) fn unpredicted(arms: &[(&str, &Errors)]) -> Option<String> {
     let mut parts = Vec::new();
     for (arm, errors) in arms {
-        for (poses, of) in [("held-out", &errors.held_out), ("identification", &errors.identification)] {
+        for (poses, of) in
+            [("held-out", &errors.held_out), ("identification", &errors.identification)]
+        {
             if of.unpredicted > 0 {
                 parts.push(format!("{} with {arm}", without_equilibrium(of, poses)));
             }
@@ -149,5 +159,9 @@ pub(super) fn unpredicted(arms: &[(&str, &Errors)]) -> Option<String> {
 /// "3 of 50 held-out poses have no equilibrium".
 pub(super) fn without_equilibrium(of: &ErrorSummary, poses: &str) -> String {
     let have = if of.unpredicted == 1 { "has" } else { "have" };
-    format!("{} of {} {have} no equilibrium", of.unpredicted, counted(of.n, &format!("{poses} pose")))
+    format!(
+        "{} of {} {have} no equilibrium",
+        of.unpredicted,
+        counted(of.n, &format!("{poses} pose"))
+    )
 }

@@ -9,10 +9,10 @@ use super::errors;
 use super::json::{list, object, summary, to_text};
 use super::quantity::{mm, number};
 use super::render::text;
-use crate::identify::{ErrorSummary, Placement, SavedEstimate, rows_of_kind};
+use crate::fit::{ErrorSummary, Placement, SavedEstimate, rows_of_kind};
 use crate::measurement::Dataset;
 use crate::model::Model;
-use crate::model::parameter::Slot;
+use crate::model::parameter::ParameterSite;
 use crate::problem::Problem;
 use crate::urdf::MovedOrigin;
 
@@ -30,9 +30,14 @@ pub struct ExportErrors {
 }
 
 impl ExportErrors {
-    /// On the held-out rows of `data`; `x` are the deviations that were identified, in the order of the model's parameters, in a
-    /// `saved` estimate or from the same data.
-    pub fn of(model: &Model, x: &DVector<f64>, data: &Dataset, saved: Option<&SavedEstimate>) -> Self {
+    /// On the held-out rows of `data`; `x` are the deviations that were identified, in the order of
+    /// the model's parameters, in a `saved` estimate or from the same data.
+    pub fn of(
+        model: &Model,
+        x: &DVector<f64>,
+        data: &Dataset,
+        saved: Option<&SavedEstimate>,
+    ) -> Self {
         let Dataset { measurements, split } = data;
         let placement = Placement::of(measurements);
         let mut poses = placement.poses(measurements, &split.held_out, 1.0);
@@ -41,7 +46,9 @@ impl ExportErrors {
         }
         let rigid = model.geometric_residuals(&poses, x.as_slice());
         let whole = model.residuals(poses, x);
-        let of = |errors: &[Vector3<f64>]| ErrorSummary::of_rows(measurements, split.held_out.iter().copied(), errors);
+        let of = |errors: &[Vector3<f64>]| {
+            ErrorSummary::of_rows(measurements, split.held_out.iter().copied(), errors)
+        };
         Self { whole: of(&whole), rigid: of(&rigid) }
     }
 }
@@ -94,10 +101,15 @@ fn left_out(exported: &Exported) -> Vec<String> {
     }
     left_out.extend(exported.problem.effects.iter().map(|own| own.effect.declaration()));
     let set_up = |parameter: &&crate::model::parameter::Parameter| {
-        matches!(parameter.slot, Slot::Base { .. } | Slot::Target { .. })
+        matches!(parameter.site, ParameterSite::Base { .. } | ParameterSite::Target { .. })
     };
-    let set_up: Vec<&str> =
-        exported.model.parameters.iter().filter(set_up).map(|parameter| parameter.name.as_str()).collect();
+    let set_up: Vec<&str> = exported
+        .model
+        .parameters
+        .iter()
+        .filter(set_up)
+        .map(|parameter| parameter.name.as_str())
+        .collect();
     if !set_up.is_empty() {
         left_out.push(format!("base and target of the set-up ({})", set_up.join(", ")));
     }
@@ -108,7 +120,9 @@ fn left_out(exported: &Exported) -> Vec<String> {
 pub fn export_text(exported: &Exported) -> String {
     let mut blocks = Vec::new();
     if let Some(moved) = exported.moved {
-        let row = |own: &MovedOrigin| vec![own.joint.clone(), mm(own.distance, 4), number(own.angle.to_degrees(), 5)];
+        let row = |own: &MovedOrigin| {
+            vec![own.joint.clone(), mm(own.distance, 4), number(own.angle.to_degrees(), 5)]
+        };
         blocks.push(Block::Table(Table::new(
             &["origin of", "moved, mm", "turned, °"],
             moved.iter().map(row).collect(),

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::document::{Block, Mark, Point};
 use super::json::{list, object};
 use super::quantity::number;
-use crate::diagnose::{Covariate, Findings, ResidualTest, Test};
+use crate::select::{Covariate, Findings, ResidualTest, Test};
 
 /// What a test is about: the order of the rows in the plural.
 fn named(covariate: &Covariate) -> String {
@@ -36,7 +36,13 @@ pub(super) fn failed(findings: &Findings) -> Vec<String> {
 
 /// Why the tests name another χ²/ν than the fit's own `chi2`; nothing where both read the same.
 pub(super) fn another_size(findings: &Findings, chi2: Option<f64>) -> Option<String> {
-    let size = findings.tests.iter().find(|check| check.test == Test::ReducedChiSquared)?.outcome.as_ref().ok()?;
+    let size = findings
+        .tests
+        .iter()
+        .find(|check| check.test == Test::ReducedChiSquared)?
+        .outcome
+        .as_ref()
+        .ok()?;
     (number(size.statistic, 2) != number(chi2?, 2)).then(|| {
         "The checks have a χ²/ν of their own: they leave outliers out and let stiffnesses that the problem holds equal \
          differ."
@@ -53,15 +59,20 @@ fn point(check: &ResidualTest) -> Point {
     Point { text: check.to_string(), mark: Some(mark), ..Point::default() }
 }
 
-/// Every test with its verdict: those that failed, those that passed, those that could not be made; covariates that nothing
-/// depends on in one line.
+/// Every test with its verdict: those that failed, those that passed, those that could not be made;
+/// covariates that nothing depends on in one line.
 pub(super) fn all(findings: &Findings) -> Vec<Point> {
     let of = |mark: Mark| {
-        findings.tests.iter().map(|check| (check, point(check))).filter(move |(_, own)| own.mark == Some(mark))
+        findings
+            .tests
+            .iter()
+            .map(|check| (check, point(check)))
+            .filter(move |(_, own)| own.mark == Some(mark))
     };
     let (free, other): (Vec<_>, Vec<_>) =
         of(Mark::Passed).partition(|(check, _)| matches!(check.test, Test::Dependence { .. }));
-    let free: Vec<String> = free.iter().filter_map(|(check, _)| Some(check.about()?.to_string())).collect();
+    let free: Vec<String> =
+        free.iter().filter_map(|(check, _)| Some(check.about()?.to_string())).collect();
     let free = (!free.is_empty()).then(|| Point {
         text: format!("residuals do not depend beyond chance on {}", free.join(", ")),
         mark: Some(Mark::Passed),

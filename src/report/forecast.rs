@@ -28,17 +28,31 @@ pub(super) fn expected(own: &Expected) -> impl Serialize {
 /// Nominal value and some errors \[SI\] of a parameter in a unit for display: cells, and the unit.
 pub(super) fn cells(expected: &Expected, errors: &[Option<f64>]) -> (Vec<String>, String) {
     let unit = expected.unit.display(expected.nominal);
-    let digits = errors.iter().flatten().map(|error| decimals(error * unit.factor, MOST)).min().unwrap_or(4).min(4);
+    let digits = errors
+        .iter()
+        .flatten()
+        .map(|error| decimals(error * unit.factor, MOST))
+        .min()
+        .unwrap_or(4)
+        .min(4);
     let mut cells = vec![expected.name.clone(), number(expected.nominal * unit.factor, digits)];
     cells.extend(errors.iter().map(|&error| size(error, &unit)));
     (cells, unit.symbol)
 }
 
-/// What figures about poses to come take for granted: that all of `fitted` poses are fitted, and where the target sits.
-pub(super) fn assumptions<'a>(problem: &Problem, expected: &[Expected], fitted: Option<usize>) -> Option<Block<'a>> {
+/// What figures about poses to come take for granted: that all of `fitted` poses are fitted, and
+/// where the target sits.
+pub(super) fn assumptions<'a>(
+    problem: &Problem,
+    expected: &[Expected],
+    fitted: Option<usize>,
+) -> Option<Block<'a>> {
     let mut points = Vec::new();
-    if let (Some(HeldOut::Fraction { fraction, .. }), Some(fitted)) = (&problem.data.held_out, fitted) {
-        let (share, measured) = (100.0 * fraction, (fitted as f64 / (1.0 - fraction) - 1e-9).ceil());
+    if let (Some(HeldOut::Fraction { fraction, .. }), Some(fitted)) =
+        (&problem.data.held_out, fitted)
+    {
+        let (share, measured) =
+            (100.0 * fraction, (fitted as f64 / (1.0 - fraction) - 1e-9).ceil());
         points.push(format!(
             "All {} are fitted; held_out in [data] takes {} % of what is measured from the fit, so that it takes {measured} \
              poses to fit as many.",

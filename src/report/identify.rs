@@ -7,10 +7,14 @@ use serde_json::value::{RawValue, to_raw_value};
 
 use super::around::around;
 use super::document::{Block, Headline, Table};
-use super::errors::{NOMINAL, axes, brief, held_out_rows, measure, row, rows_in, rows_of, shown, unit, unpredicted};
+use super::errors::{
+    NOMINAL, axes, brief, held_out_rows, measure, row, rows_in, rows_of, shown, unit, unpredicted,
+};
 use super::figures::{self, PlotData};
 use super::findings;
-use super::json::{self, both, keyed, kind, list, object, sizes, to_text, unidentified, unless_empty};
+use super::json::{
+    self, both, keyed, kind, list, object, sizes, to_text, unidentified, unless_empty,
+};
 use super::limits::{alternation, price_entry, shadow_prices};
 use super::noise::{carried, noise, outliers, size};
 use super::parameters::{
@@ -18,9 +22,9 @@ use super::parameters::{
 };
 use super::quantity::{counted, mm, number};
 use super::render::{Report, report, text};
-use crate::identify::{
-    ActiveConstraint, Carriers, ErrorSummary, Errors, Estimate, Identification, JointSources, Noise, OrientationErrors,
-    Outlier, PointSpread,
+use crate::fit::{
+    ActiveConstraint, ErrorSummary, Errors, Estimate, Identification, InfluentialRows,
+    JointSources, Noise, OrientationErrors, Outlier, PointSpread,
 };
 use crate::least_squares::solver::AtBound;
 use crate::problem::Problem;
@@ -70,7 +74,7 @@ fn document(problem: &Problem, found: &Identification) -> impl Serialize {
         }),
         active_constraints: list(&found.active_constraints, active_constraint),
         outliers: list(&found.outliers, outlier),
-        misfit_carried_by: found.carriers.as_ref().map(carriers),
+        misfit_carried_by: found.influential_rows.as_ref().map(influential_rows),
         cautions: found.reasons_to_ask(),
     }
 }
@@ -128,7 +132,7 @@ fn outlier(own: &Outlier) -> impl Serialize + use<> {
 }
 
 /// A few rows without which the fit would explain the others far better.
-pub(super) fn carriers(own: &Carriers) -> impl Serialize {
+pub(super) fn influential_rows(own: &InfluentialRows) -> impl Serialize {
     object! { rows: list(&own.rows, outlier), reduced_chi2_without: own.reduced_chi2 }
 }
 
@@ -136,15 +140,19 @@ fn side(bound: AtBound, [lower, upper]: [&'static str; 2]) -> &'static str {
     if bound == AtBound::Lower { lower } else { upper }
 }
 
-/// The result of an identification as JSON text, ending in a line break; SI units except where a key says otherwise.
+/// The result of an identification as JSON text, ending in a line break; SI units except where a
+/// key says otherwise.
 pub fn estimate_json(problem: &Problem, found: &Identification) -> String {
     to_text(&document(problem, found))
 }
 
 /// A result as a table with its story, ending in a line break.
 pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
-    let mut blocks =
-        vec![headline(problem, found), Block::Table(errors_by_axis(found)), Block::lines(noise(problem, found))];
+    let mut blocks = vec![
+        headline(problem, found),
+        Block::Table(errors_by_axis(found)),
+        Block::lines(noise(problem, found)),
+    ];
     blocks.extend(carried(found));
     blocks.extend(around(found));
     blocks.extend(orientation(found));
@@ -156,7 +164,11 @@ pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
 }
 
 /// The report of `identify`.
-pub fn identification_report(problem: &Problem, found: &Identification, plots: &PlotData) -> Report {
+pub fn identification_report(
+    problem: &Problem,
+    found: &Identification,
+    plots: &PlotData,
+) -> Report {
     report(problem, "identification", &blocks(problem, found, plots))
 }
 
@@ -213,7 +225,11 @@ pub(super) fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'
 
 /// What was fitted to what, and how it ended.
 pub(super) fn counts(found: &Identification) -> String {
-    let beware = if found.is_trusted() { String::new() } else { format!(" Beware: {}.", why_not_trusted(found)) };
+    let beware = if found.is_trusted() {
+        String::new()
+    } else {
+        format!(" Beware: {}.", why_not_trusted(found))
+    };
     format!(
         "{} from {}; {} held out. Strategy {}, solver {}: {}.{beware}",
         counted(found.unknowns.len(), "parameter"),
@@ -225,16 +241,22 @@ pub(super) fn counts(found: &Identification) -> String {
     )
 }
 
-/// What the terminal warns of, apart from a fit that is not to be trusted; nothing to say without any.
+/// What the terminal warns of, apart from a fit that is not to be trusted; nothing to say without
+/// any.
 pub(super) fn beware<'a>(found: &Identification, plots: &PlotData) -> Option<Block<'a>> {
-    let points: Vec<String> = plots.warnings.iter().map(ToString::to_string).chain(found.reasons_to_ask()).collect();
+    let points: Vec<String> =
+        plots.warnings.iter().map(ToString::to_string).chain(found.reasons_to_ask()).collect();
     (!points.is_empty()).then(|| Block::Lines("Warnings:".to_owned(), points))
 }
 
 /// What was fitted: several targets in one pose are points of it.
 fn measured(found: &Identification) -> String {
     let rows = rows_of(found, |errors| errors.identification);
-    if found.several_targets { format!("{rows} in {}", counted(found.poses, "different pose")) } else { rows }
+    if found.several_targets {
+        format!("{rows} in {}", counted(found.poses, "different pose"))
+    } else {
+        rows
+    }
 }
 
 fn steps(found: &Identification) -> String {
@@ -245,15 +267,21 @@ fn steps(found: &Identification) -> String {
 pub(super) fn errors_by_axis(found: &Identification) -> Table {
     let row = |poses: &str, when: &str, of: &ErrorSummary| {
         let axes = &[of.mean.x, of.mean.y, of.mean.z][..axes(of)];
-        let values = axes.iter().chain([&of.mean.norm, &of.rms.norm, &of.max.norm]).map(|value| shown(of, *value));
+        let values = axes
+            .iter()
+            .chain([&of.mean.norm, &of.rms.norm, &of.max.norm])
+            .map(|value| shown(of, *value));
         [poses.to_owned(), when.to_owned()].into_iter().chain(values).collect::<Vec<String>>()
     };
     let rows = before_and_after((&found.registered, &found.fitted), row);
     let of = &found.fitted.held_out;
-    let sizes = if axes(of) > 0 { ["mean norm", "rms norm", "max norm"] } else { ["mean", "rms", "max"] };
+    let sizes =
+        if axes(of) > 0 { ["mean norm", "rms norm", "max norm"] } else { ["mean", "rms", "max"] };
     let header = [&[measure(of), ""], &["mean x", "mean y", "mean z"][..axes(of)], &sizes].concat();
     let mut table = Table::new(&header, rows, &[0, 1]);
-    table.notes.push("before: nominal arm, with base and tool fitted where they are free".to_owned());
+    table
+        .notes
+        .push("before: nominal arm, with base and tool fitted where they are free".to_owned());
     table.notes.extend(no_errors(found).map(|words| format!("–: {words}")));
     table
 }
@@ -275,7 +303,8 @@ fn before_and_after(
 fn orientation<'a>(found: &Identification) -> Option<Block<'a>> {
     let OrientationErrors { registered, fitted, .. } = found.orientation.as_ref()?;
     let row = |poses: &str, when: &str, of: &ErrorSummary| {
-        let values = [of.mean.norm, of.rms.norm, of.max.norm].map(|value| number(value.to_degrees(), 4));
+        let values =
+            [of.mean.norm, of.rms.norm, of.max.norm].map(|value| number(value.to_degrees(), 4));
         [vec![poses.to_owned(), when.to_owned()], values.to_vec()].concat()
     };
     let rows = before_and_after((registered, fitted), row);
@@ -291,7 +320,11 @@ pub(super) fn errors<'a>(found: &Identification) -> Vec<Block<'a>> {
         row("identification", NOMINAL, &before.identification),
         row("", "as identified", &after.identification),
     ];
-    let table = Block::Table(Table::new(&[measure(&after.held_out), "", "mean", "rms", "max"], rows, &[0, 1]));
+    let table = Block::Table(Table::new(
+        &[measure(&after.held_out), "", "mean", "rms", "max"],
+        rows,
+        &[0, 1],
+    ));
     std::iter::once(table).chain(no_errors(found).map(Block::Note)).collect()
 }
 
@@ -310,7 +343,11 @@ pub(super) fn remainder<'a>(
     let mut blocks = vec![Block::heading("What is left"), Block::lines(noise(problem, found))];
     blocks.extend(carried(found));
     blocks.extend(outliers(problem, found));
-    blocks.push(Block::figures([figures::histogram(plots), figures::order(plots), figures::joint_map(plots)]));
+    blocks.push(Block::figures([
+        figures::histogram(plots),
+        figures::order(plots),
+        figures::joint_map(plots),
+    ]));
     blocks.extend(findings::blocks(&plots.findings));
     blocks.extend(findings::another_size(&plots.findings, found.reduced_chi2).map(Block::Text));
     blocks.push(Block::heading("Parameters"));
@@ -324,24 +361,31 @@ pub(super) fn remainder<'a>(
 
 /// What limits and turns of the stages did to a fit.
 fn limits<'a>(found: &Identification) -> Vec<Block<'a>> {
-    [active_constraints(found), shadow_prices(found), alternation(found)].into_iter().flatten().collect()
+    [active_constraints(found), shadow_prices(found), alternation(found)]
+        .into_iter()
+        .flatten()
+        .collect()
 }
 
 /// What the poses can tell, in figures and words.
 pub(super) fn all_told<'a>(found: &Identification, plots: &PlotData, file: &str) -> Vec<Block<'a>> {
-    let figures = [figures::correlation(&plots.correlations), figures::spectrum(found.identifiability())];
+    let figures =
+        [figures::correlation(&plots.correlations), figures::spectrum(found.identifiability())];
     let mut blocks = vec![Block::heading("What the poses can tell"), Block::figures(figures)];
     blocks.extend(told(found, file));
     blocks
 }
 
-/// Rows of the covariance in the order of the parameters, a row a line: entry (k, k) is the square of the standard error; null
-/// where one of the two parameters has none.
+/// Rows of the covariance in the order of the parameters, a row a line: entry (k, k) is the square
+/// of the standard error; null where one of the two parameters has none.
 fn covariance(found: &Identification) -> Vec<Box<RawValue>> {
     let n = found.estimates.len();
     let has_error = |k: usize| found.estimates[k].std_error.is_some();
-    let entry = |j: usize, k: usize| found.covariance.of(j, k).filter(|_| has_error(j) && has_error(k));
-    (0..n).filter_map(|j| to_raw_value(&(0..n).map(|k| entry(j, k)).collect::<Vec<_>>()).ok()).collect()
+    let entry =
+        |j: usize, k: usize| found.covariance.of(j, k).filter(|_| has_error(j) && has_error(k));
+    (0..n)
+        .filter_map(|j| to_raw_value(&(0..n).map(|k| entry(j, k)).collect::<Vec<_>>()).ok())
+        .collect()
 }
 
 /// What the poses can tell, in words.
@@ -393,17 +437,21 @@ pub(super) fn mean(of: &ErrorSummary) -> String {
 }
 
 pub(super) fn poses(found: &Identification) -> (&'static str, String) {
-    let (fitted, held_out) = (rows_in(found, |errors| errors.identification), rows_in(found, |errors| errors.held_out));
+    let (fitted, held_out) =
+        (rows_in(found, |errors| errors.identification), rows_in(found, |errors| errors.held_out));
     let what = if found.fitted.identification.kind == "position" { "Poses" } else { "Rows" };
     (what, format!("{fitted} fitted, {held_out} held out"))
 }
 
 pub(super) fn fitted_parameters(found: &Identification) -> (&'static str, String) {
-    ("Parameters", format!("{} fitted, rank {}", found.unknowns.len(), found.identifiability().rank))
+    (
+        "Parameters",
+        format!("{} fitted, rank {}", found.unknowns.len(), found.identifiability().rank),
+    )
 }
 
 pub(super) fn spread(errors: &ErrorSummary) -> String {
-    let [rms, max] =
-        [errors.rms.norm, errors.max.norm].map(|value| format!("{} {}", brief(errors, value), unit(errors)));
+    let [rms, max] = [errors.rms.norm, errors.max.norm]
+        .map(|value| format!("{} {}", brief(errors, value), unit(errors)));
     format!("rms {rms}, largest {max}")
 }

@@ -25,8 +25,12 @@ pub fn init_json(chain: &Chain, description: &Description, file: &Path) -> Strin
 pub fn init_text(chain: &Chain, description: &Description, folder: &Path) -> String {
     let (base, tip) = chain.ends();
     let joints = chain.joint_names();
-    let mut words =
-        format!("{}: {} moving joints from {base} to {tip}\n  {}\n", description.name, joints.len(), joints.join(", "));
+    let mut words = format!(
+        "{}: {} moving joints from {base} to {tip}\n  {}\n",
+        description.name,
+        joints.len(),
+        joints.join(", ")
+    );
     for note in &description.notes {
         let _ = writeln!(words, "  note: {note}");
     }

@@ -1,14 +1,15 @@
-//! What the JSON of several commands has in common: errors, conditioning, unidentified combinations.
+//! What the JSON of several commands has in common: errors, conditioning, unidentified
+//! combinations.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::identify::{AxisValues, ErrorSummary, Errors, PointSpread};
+use crate::fit::{AxisValues, ErrorSummary, Errors, PointSpread};
 use crate::least_squares::{Identifiability, UnidentifiableCombination};
 
-/// A JSON object: its keys and their values in the order of the file. `..other` stands for the keys of another object, `?key: value` for a
-/// key that is left out where there is no value.
+/// A JSON object: its keys and their values in the order of the file. `..other` stands for the keys
+/// of another object, `?key: value` for a key that is left out where there is no value.
 macro_rules! object {
     ($($key:ident: $value:expr),* $(,)?) => {{
         #[allow(non_camel_case_types, non_snake_case, reason = "keys of the file, the value of each of a type called as it is")]
@@ -39,7 +40,10 @@ macro_rules! object {
 pub(super) use object;
 
 /// A key that is left out where there is no value.
-pub(super) fn optional<T>(key: &'static str, value: Option<T>) -> Option<BTreeMap<&'static str, T>> {
+pub(super) fn optional<T>(
+    key: &'static str,
+    value: Option<T>,
+) -> Option<BTreeMap<&'static str, T>> {
     value.map(|value| BTreeMap::from([(key, value)]))
 }
 
@@ -96,14 +100,16 @@ pub(super) fn kind((registered, fitted): &(Errors, Errors)) -> impl Serialize + 
     object! { registered: both(registered), ..both(fitted) }
 }
 
-/// The spread of the target at a point: its mean, where it is largest, and the part of its squares there.
+/// The spread of the target at a point: its mean, where it is largest, and the part of its squares
+/// there.
 pub(super) fn spread(point: &PointSpread) -> impl Serialize + use<> {
     object! { mean_mm: point.mean * 1e3, along: <[f64; 3]>::from(point.along), share: point.share }
 }
 
 /// What poses tell of parameters.
 pub(super) fn conditioning(found: &Identifiability, coordinates: usize) -> impl Serialize + use<> {
-    let observability = ["O1", "O2", "O3", "O4", "O5"].into_iter().zip(found.observability(coordinates));
+    let observability =
+        ["O1", "O2", "O3", "O4", "O5"].into_iter().zip(found.observability(coordinates));
     object! {
         condition_number: found.condition_number(),
         observability: observability.collect::<BTreeMap<_, _>>(),
@@ -116,12 +122,14 @@ pub(super) fn unidentified<'a>(
     name: impl Fn(usize) -> &'a str,
 ) -> Vec<impl Serialize> {
     list(all, |own| {
-        let weights: BTreeMap<&str, f64> = own.weights.iter().map(|&(k, weight)| (name(k), weight)).collect();
+        let weights: BTreeMap<&str, f64> =
+            own.weights.iter().map(|&(k, weight)| (name(k), weight)).collect();
         object! { combination: weights, singular_value: own.singular_value }
     })
 }
 
-/// JSON text that ends in a line break; text keys and numbers always serialise, numbers that are not finite as null.
+/// JSON text that ends in a line break; text keys and numbers always serialise, numbers that are
+/// not finite as null.
 pub(super) fn to_text(document: &impl Serialize) -> String {
     let mut text = serde_json::to_string_pretty(document).unwrap_or_default();
     text.push('\n');

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::document::Block;
 use super::json::object;
 use super::quantity::{decimals, number, two_digits};
-use crate::identify::{ActiveConstraint, Alternation, Estimate, Identification, ShadowPrice};
+use crate::fit::{ActiveConstraint, Alternation, Estimate, Identification, ShadowPrice};
 use crate::least_squares::solver::AtBound;
 use crate::quantity::Unit;
 
@@ -23,11 +23,16 @@ pub(super) fn shadow_prices<'a>(found: &Identification) -> Option<Block<'a>> {
     };
     let bound = |estimate: &Estimate| {
         let side = if estimate.at_bound? == AtBound::Lower { "lower" } else { "upper" };
-        Some(line(&format!("{}, {side} bound", estimate.name), estimate.shadow_price?, estimate.unit))
+        Some(line(
+            &format!("{}, {side} bound", estimate.name),
+            estimate.shadow_price?,
+            estimate.unit,
+        ))
     };
     let constraint = |own: &ActiveConstraint| line(&own.words, own.shadow_price, own.unit);
     let bounds = found.estimates.iter().filter_map(bound);
-    let points: Vec<String> = bounds.chain(found.active_constraints.iter().map(constraint)).collect();
+    let points: Vec<String> =
+        bounds.chain(found.active_constraints.iter().map(constraint)).collect();
     let words =
         "What limits cost (moved out by so much, the rms residual of the fit would fall by so much):".to_owned();
     (!points.is_empty()).then_some(Block::Lines(words, points))
@@ -37,7 +42,12 @@ pub(super) fn shadow_prices<'a>(found: &Identification) -> Option<Block<'a>> {
 pub(super) fn alternation<'a>(found: &Identification) -> Option<Block<'a>> {
     let Alternation { sweeps, contraction } = found.alternation?;
     let slow = contraction.map_or_else(String::new, |rate| {
-        format!("; by itself each sweep would leave {} of the error", number(rate, decimals(1.0 - rate, 6)))
+        format!(
+            "; by itself each sweep would leave {} of the error",
+            number(rate, decimals(1.0 - rate, 6))
+        )
     });
-    Some(Block::lines(format!("Stiffness and geometry took turns in {sweeps} accelerated sweeps{slow}.")))
+    Some(Block::lines(format!(
+        "Stiffness and geometry took turns in {sweeps} accelerated sweeps{slow}."
+    )))
 }

@@ -4,19 +4,21 @@ use serde::Serialize;
 
 use super::closed_loop::says;
 use super::errors::in_unit;
-use super::identify::carriers;
+use super::identify::influential_rows;
 use super::json::{both, keyed, kind, list, object, summary, to_text, unless_empty};
 use super::unexplained::place;
 use super::verdict::verdict_word;
 use super::{findings, trace};
-use crate::diagnose::{ClosedLoop, Correction, Found, Trace, Unexplained};
-use crate::identify::Identification;
+use crate::fit::Identification;
 use crate::problem::Problem;
+use crate::select::{ClosedLoop, Correction, Found, Trace, Unexplained};
 
-/// What the loop came to as JSON text, ending in a line break; SI units except where a key says otherwise.
+/// What the loop came to as JSON text, ending in a line break; SI units except where a key says
+/// otherwise.
 pub fn loop_json(problem: &Problem, closure: &ClosedLoop) -> String {
     let (of, gain) = (&closure.after.fitted.held_out, closure.gain);
-    let mut unexplained = list(&closure.unexplained, |left| unexplained(left, &closure.before)).into_iter();
+    let mut unexplained =
+        list(&closure.unexplained, |left| unexplained(left, &closure.before)).into_iter();
     to_text(&object! {
         problem: &problem.name,
         verdict: verdict_word(closure.verdict),
@@ -28,7 +30,8 @@ pub fn loop_json(problem: &Problem, closure: &ClosedLoop) -> String {
         registered: both(&closure.before.fit.registered),
         before: fit(&closure.before.fit),
         after: fit(&closure.after),
-        // Mean reduction of the error on held-out poses; 95 of 100 such intervals hold the true one.
+        // Mean reduction of the error on held-out poses; 95 of 100 such intervals hold the true
+        // one.
         ..keyed("held_out_gain", of.is_angle(), object! {
             mean: in_unit(of, gain.value),
             interval_95: [in_unit(of, gain.low), in_unit(of, gain.high)],
@@ -57,7 +60,7 @@ fn fit(own: &Identification) -> impl Serialize {
     object! {
         ..both(&own.fitted),
         reduced_chi2: own.reduced_chi2,
-        misfit_carried_by: own.carriers.as_ref().map(carriers),
+        misfit_carried_by: own.influential_rows.as_ref().map(influential_rows),
         // Of each kind of rows, where there are several.
         ?kinds: unless_empty(list(&own.kinds, kind)),
     }

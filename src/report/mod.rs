@@ -1,7 +1,7 @@
 //! Results as people and programs read them.
 //!
-//! One file a command: its facts as JSON and as blocks (`document`), which `render` shows on terminals, as Markdown and
-//! as a page. `figures` draws what only a page shows.
+//! One file a command: its facts as JSON and as blocks (`document`), which `render` shows on
+//! terminals, as Markdown and as a page. `figures` draws what only a page shows.
 
 mod acceptance;
 mod around;
@@ -51,11 +51,16 @@ pub use columns::{Column, Columns, residual_columns, residuals_csv};
 pub use compare::{compare_json, compare_text, comparison_report};
 pub use compensate::{commands_csv, commands_json, commands_text};
 pub use export::{ExportErrors, Exported, export_json, export_text};
-pub use figures::{Cause, Contribution, Coverage, PlotData, Point, PoseError, Quantity, Stage, StageErrors, is_figure};
-pub use identify::{estimate_json, estimate_text, identification_report, joint_sources_text, why_not_trusted};
+pub use figures::{
+    Cause, Contribution, Coverage, PlotData, Point, PoseError, Quantity, Stage, StageErrors,
+    is_figure,
+};
+pub use identify::{
+    estimate_json, estimate_text, identification_report, joint_sources_text, why_not_trusted,
+};
 pub use init::{init_json, init_text};
 pub use loop_json::loop_json;
-pub use noise::{lacks_something, look_at_carriers};
+pub use noise::{lacks_something, show_influential_rows};
 pub use plan::{plan_json, plan_text};
 pub use poses::poses_csv;
 pub use predict::{errors_json, prediction_text, predictions_csv};

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::document::{Block, first_of, named};
 use super::errors::{brief, noun, rows_in, unit, with_unit};
 use super::quantity::{counted, decimals, mm, number};
-use crate::identify::{Identification, Noise, Outlier, QualityFlag, size_of_kind};
+use crate::fit::{Identification, Noise, Outlier, QualityFlag, size_of_kind};
 use crate::problem::Problem;
 
 /// Outliers that fit on a screen.
@@ -39,7 +39,8 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
             let declared =
                 declared.map_or_else(String::new, |s| format!(" ({} mm)", mm(s, decimals(s * 1e3, 12).max(4))));
             let size = number(found.noise_factor.sqrt(), if found.noise_factor > 1.0 { 1 } else { 3 });
-            // The σ of several kinds, which may have units of their own, are all multiplied by the same.
+            // The σ of several kinds, which may have units of their own, are all multiplied by the
+            // same.
             let taken = if found.kinds.is_empty() {
                 format!("a σ of {} {}", brief(of, found.sigma_taken), unit(of))
             } else {
@@ -49,7 +50,7 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
                 format!("; chance gives {} to {}", number(low, 2), number(high, 2))
             });
             let (size, cause) = if found.noise_factor > 1.0 {
-                let cause = match &found.carriers {
+                let cause = match &found.influential_rows {
                     Some(own) if own.rows.len() == 1 => {
                         format!("which 1 {} too far off to be noise carries", noun(found))
                     }
@@ -90,8 +91,10 @@ fn contradicted(found: &Identification) -> bool {
 
 /// Whether a fit leaves more than the declared noise explains.
 pub fn lacks_something(found: &Identification) -> bool {
-    let by_chi2 = || found.reduced_chi2.zip(found.chance).is_some_and(|(chi2, (_, high))| chi2 > high);
-    found.noise == Noise::Declared && if contradicted(found) { found.noise_factor > 1.0 } else { by_chi2() }
+    let by_chi2 =
+        || found.reduced_chi2.zip(found.chance).is_some_and(|(chi2, (_, high))| chi2 > high);
+    found.noise == Noise::Declared
+        && if contradicted(found) { found.noise_factor > 1.0 } else { by_chi2() }
 }
 
 /// A χ² / ν with two decimals, or two digits where it is small.
@@ -119,20 +122,32 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
     };
     let points = first_of(found.outliers.iter().map(point), SHOWN_OUTLIERS, FILE);
     let are = if n == 1 { "is" } else { "are" };
-    let words = format!("{n} of {} {are} too far off to be noise ({treatment}):", counted(all, noun(found)));
+    let words = format!(
+        "{n} of {} {are} too far off to be noise ({treatment}):",
+        counted(all, noun(found))
+    );
     (n > 0).then_some(Block::Lines(words, points))
 }
 
-/// The rows that carry what the fit does not explain, and what it would leave without them; nothing to say without any.
+/// The rows that carry what the fit does not explain, and what it would leave without them; nothing
+/// to say without any.
 pub(super) fn carried<'a>(found: &Identification) -> Option<Block<'a>> {
-    let own = found.carriers.as_ref()?;
-    let row = |own: &Outlier| format!("{} ({})", own.location, size_of_kind(own.kind, own.error.norm(), 3));
+    let own = found.influential_rows.as_ref()?;
+    let row = |own: &Outlier| {
+        format!("{} ({})", own.location, size_of_kind(own.kind, own.error.norm(), 3))
+    };
     let (carry, them) = if own.rows.len() == 1 { ("carries", "it") } else { ("carry", "them") };
     let of = &found.fitted.identification;
     let left = match (own.reduced_chi2, found.reduced_chi2) {
-        (Some(without), Some(all)) => format!("χ²/ν is {} instead of {}", short(without), short(all)),
+        (Some(without), Some(all)) => {
+            format!("χ²/ν is {} instead of {}", short(without), short(all))
+        }
         _ => {
-            format!("the scatter is {} instead of {}", with_unit(of, own.sigma_taken), with_unit(of, found.sigma_taken))
+            format!(
+                "the scatter is {} instead of {}",
+                with_unit(of, own.sigma_taken),
+                with_unit(of, found.sigma_taken)
+            )
         }
     };
     Some(Block::Text(format!(
@@ -143,10 +158,13 @@ pub(super) fn carried<'a>(found: &Identification) -> Option<Block<'a>> {
 }
 
 /// What to do about such rows, for a problem of that name, in one line.
-pub fn look_at_carriers(found: &Identification, problem: &Path) -> Option<String> {
-    let own = found.carriers.as_ref()?;
+pub fn show_influential_rows(found: &Identification, problem: &Path) -> Option<String> {
+    let own = found.influential_rows.as_ref()?;
     let rows = named(own.rows.iter().map(|own| own.location.to_string()), SHOWN_CARRIERS, ", ");
-    Some(format!("look at {rows}; a section [robust] in {} limits what such rows do", problem.display()))
+    Some(format!(
+        "look at {rows}; a section [robust] in {} limits what such rows do",
+        problem.display()
+    ))
 }
 
 /// How large the residual is, in brief.

@@ -1,4 +1,5 @@
-//! Tables 2 and 3 of the paper and the numbers of its figure 13, in its own terms, from any procedure.
+//! Tables 2 and 3 of the paper and the numbers of its figure 13, in its own terms, from any
+//! procedure.
 
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -6,7 +7,7 @@ use serde::Serialize;
 use super::document::Table;
 use super::json::{list, object, summary};
 use super::quantity::{mm, number, or_dash};
-use crate::identify::{AxisValues, Before, Comparison, ErrorSummary, Procedure, TableEntry};
+use crate::fit::{AxisValues, Before, Comparison, ErrorSummary, Procedure, TableEntry};
 use crate::paper::published::{BEFORE, IGNORING_IT, Published, WITH_ELASTICITY};
 use crate::paper::{Form, StiffnessStage};
 
@@ -65,7 +66,9 @@ fn by_pose(errors: &[Vector3<f64>]) -> Vec<[f64; 3]> {
 
 /// What a procedure is, in words.
 pub(super) fn title(own: &Procedure) -> String {
-    let Some((form, stage)) = own.paper else { return "Everything fitted at once (joint)".to_owned() };
+    let Some((form, stage)) = own.paper else {
+        return "Everything fitted at once (joint)".to_owned();
+    };
     let form = match form {
         Form::Printed => "as printed",
         _ => "misprints corrected",
@@ -79,7 +82,8 @@ pub(super) fn title(own: &Procedure) -> String {
     format!("The paper's closed forms and eq. 45, {form}, {stage} ({})", own.name())
 }
 
-/// Table 2: nominal, identified, error of each joint's geometry; what the data do not see by itself in brackets.
+/// Table 2: nominal, identified, error of each joint's geometry; what the data do not see by itself
+/// in brackets.
 pub(super) fn table_2(own: &Procedure) -> Table {
     let show = |place: usize, value: f64| {
         if place.is_multiple_of(2) { number(value.to_degrees(), 3) } else { mm(value, 2) }
@@ -91,7 +95,8 @@ pub(super) fn table_2(own: &Procedure) -> Table {
     let row = |(joint, entries): &(usize, [TableEntry; 5])| {
         let fields = || entries.iter().enumerate();
         let nominal = fields().map(|(place, entry)| show(place, entry.nominal));
-        let identified = fields().map(|(place, entry)| marked(entry, show(place, entry.identified)));
+        let identified =
+            fields().map(|(place, entry)| marked(entry, show(place, entry.identified)));
         let change = fields().map(|(place, entry)| {
             let text = show(place, entry.identified - entry.nominal);
             or_dash(entry.seen, |_| marked(entry, text))
@@ -99,16 +104,18 @@ pub(super) fn table_2(own: &Procedure) -> Table {
         std::iter::once(joint.to_string()).chain(nominal).chain(identified).chain(change).collect()
     };
     let rows = own.geometry.iter().map(row).collect();
-    let header = [&["joint"], &FIELDS[..], &["→ α °"], &FIELDS[1..], &["Δ α °"], &FIELDS[1..]].concat();
+    let header =
+        [&["joint"], &FIELDS[..], &["→ α °"], &FIELDS[1..], &["Δ α °"], &FIELDS[1..]].concat();
     Table::new(&header, rows, &[])
         .noted(&["( ): seen by these data in combination with others alone, or hardly; –: not identified, or fixed"])
 }
 
-/// Table 3: errors of the held-out poses before, with elasticity, ignoring it, and the reductions; for the paper's arm its
-/// figures beside them.
+/// Table 3: errors of the held-out poses before, with elasticity, ignoring it, and the reductions;
+/// for the paper's arm its figures beside them.
 pub(super) fn table_3(comparison: &Comparison, own: &Procedure) -> Table {
     let before = ErrorSummary::of(&comparison.before.errors);
-    let (after, ignoring) = (ErrorSummary::of(&own.after), own.ignoring.as_deref().map(ErrorSummary::of));
+    let (after, ignoring) =
+        (ErrorSummary::of(&own.after), own.ignoring.as_deref().map(ErrorSummary::of));
     let elastic = ignoring.is_some();
     let mut header = vec!["held out, mm", "axis", "before"];
     header.extend(if elastic { ["with elasticity", "− %"] } else { ["identified", "− %"] });
@@ -120,10 +127,15 @@ pub(super) fn table_3(comparison: &Comparison, own: &Procedure) -> Table {
     for (kind, of, printed) in KINDS {
         for (axis, name) in ["x", "y", "z", "sum"].into_iter().enumerate() {
             let value = |summary: &ErrorSummary| on(of(summary), axis) * 1e3;
-            let mut row = vec![if axis == 0 { kind.to_owned() } else { String::new() }, name.to_owned()];
-            row.extend(reduced(value(&before), [Some(value(&after)), ignoring.as_ref().map(value)]));
+            let mut row =
+                vec![if axis == 0 { kind.to_owned() } else { String::new() }, name.to_owned()];
+            row.extend(reduced(
+                value(&before),
+                [Some(value(&after)), ignoring.as_ref().map(value)],
+            ));
             if beside {
-                let [before, with, without] = [&BEFORE, &WITH_ELASTICITY, &IGNORING_IT].map(|own| printed(own)[axis]);
+                let [before, with, without] =
+                    [&BEFORE, &WITH_ELASTICITY, &IGNORING_IT].map(|own| printed(own)[axis]);
                 row.extend(reduced(before, [Some(with), Some(without)]));
             }
             rows.push(row);
@@ -135,17 +147,20 @@ pub(super) fn table_3(comparison: &Comparison, own: &Procedure) -> Table {
         (true, true) => {
             "before: nominal arm without elasticity, base and tool fitted first, since the problem leaves them open"
         }
-        (false, true) => "before: nominal arm, base and tool fitted first, since the problem leaves them open",
+        (false, true) => {
+            "before: nominal arm, base and tool fitted first, since the problem leaves them open"
+        }
     }];
-    notes.extend(
-        beside.then_some("paper: published in [Chen2021, table 3], measured on another specimen, under other loads"),
-    );
+    notes.extend(beside.then_some(
+        "paper: published in [Chen2021, table 3], measured on another specimen, under other loads",
+    ));
     Table::new(&header, rows, &[0, 1]).noted(&notes)
 }
 
 /// Which values of table 3: its word, ours, and the published ones.
 type Kind = (&'static str, fn(&ErrorSummary) -> &AxisValues, fn(&Published) -> [f64; 4]);
-const KINDS: [Kind; 2] = [("max", |own| &own.max, |own| own.max), ("mean", |own| &own.mean, |own| own.mean)];
+const KINDS: [Kind; 2] =
+    [("max", |own| &own.max, |own| own.max), ("mean", |own| &own.mean, |own| own.mean)];
 
 fn on(values: &AxisValues, axis: usize) -> f64 {
     [values.x, values.y, values.z, values.norm][axis]

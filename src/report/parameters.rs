@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use super::document::{Bar, Block, Table, first_of};
 use super::effect::{MOST_LISTED, SHOWN_WAVES};
 use super::quantity::{decimals, number, or_dash, two_digits};
-use crate::identify::{Estimate, Identification, PriorSize};
+use crate::fit::{Estimate, Identification, PriorSize};
 use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_BELOW};
 use crate::model::effect;
-use crate::model::parameter::Driver;
+use crate::model::parameter::Regressor;
 use crate::problem::Problem;
 use crate::quantity::Unit;
 
@@ -24,23 +24,31 @@ const MOST_NAMED: usize = 8;
 /// Unidentifiable combinations and correlations that fit on a screen.
 const SHOWN: usize = 12;
 /// Columns of the table of parameters.
-const HEADER: [&str; 7] = ["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"];
+const HEADER: [&str; 7] =
+    ["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"];
 
 /// A row of the table with its bar.
 type Line = (Vec<String>, Bar);
 
-/// Joint, from 1, and order of every coefficient of a harmonic that `problem` declares, by the parameter's name.
+/// Joint, from 1, and order of every coefficient of a harmonic that `problem` declares, by the
+/// parameter's name.
 fn harmonics(problem: &Problem) -> BTreeMap<String, (usize, u32)> {
-    let of = |driver: &Driver| match *driver {
-        Driver::Sine(joint, order) | Driver::Cosine(joint, order) => Some((joint + 1, order)),
+    let of = |regressor: &Regressor| match *regressor {
+        Regressor::Sine(joint, order) | Regressor::Cosine(joint, order) => Some((joint + 1, order)),
         _ => None,
     };
-    effect::parameters(problem).into_iter().filter_map(|own| Some((own.name, of(&own.driver)?))).collect()
+    effect::parameters(problem)
+        .into_iter()
+        .filter_map(|own| Some((own.name, of(&own.regressor)?)))
+        .collect()
 }
 
-/// The harmonics of joints that have more coefficients than are listed one by one: for each of these joints the orders that
-/// are shown, the highest waves, and how many lower ones there are.
-fn highest(estimates: &[Estimate], harmonics: &BTreeMap<String, (usize, u32)>) -> BTreeMap<usize, (Vec<u32>, usize)> {
+/// The harmonics of joints that have more coefficients than are listed one by one: for each of
+/// these joints the orders that are shown, the highest waves, and how many lower ones there are.
+fn highest(
+    estimates: &[Estimate],
+    harmonics: &BTreeMap<String, (usize, u32)>,
+) -> BTreeMap<usize, (Vec<u32>, usize)> {
     let mut joints: BTreeMap<usize, (usize, BTreeMap<u32, f64>)> = BTreeMap::new();
     for estimate in estimates {
         if let Some((joint, order)) = harmonics.get(&estimate.name) {
@@ -59,14 +67,20 @@ fn highest(estimates: &[Estimate], harmonics: &BTreeMap<String, (usize, u32)>) -
     joints.into_iter().map(shown).collect()
 }
 
-/// Nominal, estimate, change and standard error of every free parameter; of many waves of a joint the highest. The others are
-/// in `file`, and folded on the page.
-pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &str) -> Vec<Block<'a>> {
+/// Nominal, estimate, change and standard error of every free parameter; of many waves of a joint
+/// the highest. The others are in `file`, and folded on the page.
+pub(super) fn parameters<'a>(
+    problem: &Problem,
+    found: &Identification,
+    file: &str,
+) -> Vec<Block<'a>> {
     let harmonics = harmonics(problem);
     let high = highest(&found.estimates, &harmonics);
     let (mut shown, mut lower): (Vec<Line>, Vec<Line>) = Default::default();
     for (k, estimate) in found.estimates.iter().enumerate() {
-        let wave = harmonics.get(&estimate.name).and_then(|(joint, order)| Some((joint, order, high.get(joint)?)));
+        let wave = harmonics
+            .get(&estimate.name)
+            .and_then(|(joint, order)| Some((joint, order, high.get(joint)?)));
         let own = (row(estimate), bar(estimate));
         match wave {
             Some((_, order, (orders, _))) if !orders.contains(order) => lower.push(own),
@@ -74,7 +88,11 @@ pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &s
         }
         let Some((joint, _, (_, more))) = wave else { continue };
         let later = &found.estimates[k + 1..];
-        if *more > 0 && !later.iter().any(|other| harmonics.get(&other.name).is_some_and(|(own, _)| own == joint)) {
+        if *more > 0
+            && !later
+                .iter()
+                .any(|other| harmonics.get(&other.name).is_some_and(|(own, _)| own == joint))
+        {
             let mut cells = vec![String::new(); HEADER.len()];
             cells[0] = format!("and {more} lower harmonics of joint {joint}");
             shown.push((cells, Bar::default()));
@@ -82,10 +100,15 @@ pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &s
     }
     let table = |rows: Vec<Line>| {
         let (rows, bars) = rows.into_iter().unzip();
-        Table { minor: vec![1, 3, 6], bars: Some(("change / σ", bars)), ..Table::new(&HEADER, rows, &[0, 5, 6]) }
+        Table {
+            minor: vec![1, 3, 6],
+            bars: Some(("change / σ", bars)),
+            ..Table::new(&HEADER, rows, &[0, 5, 6])
+        }
     };
     let count = lower.len();
-    let mut notes: Vec<String> = (count > 0).then(|| format!("lower harmonics: in {file}")).into_iter().collect();
+    let mut notes: Vec<String> =
+        (count > 0).then(|| format!("lower harmonics: in {file}")).into_iter().collect();
     if found.estimates.iter().any(|estimate| estimate.std_error.is_none()) {
         notes.push(
             "–: no standard error: the data do not identify it, or only in a combination with others, a bound holds it, or \
@@ -103,7 +126,11 @@ pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &s
     if count > 0 {
         let on_paper = format!("The lower harmonics are left out on paper: they are in {file}.");
         let folded = vec![Block::Table(table(lower))];
-        blocks.push(Block::Folded(format!("The lower harmonics: {count} coefficients"), folded, on_paper));
+        blocks.push(Block::Folded(
+            format!("The lower harmonics: {count} coefficients"),
+            folded,
+            on_paper,
+        ));
     }
     blocks
 }
@@ -112,7 +139,8 @@ pub(super) fn parameters<'a>(problem: &Problem, found: &Identification, file: &s
 fn sizes(sizes: &[PriorSize]) -> Option<String> {
     let rule = |own: &PriorSize| {
         let unit = own.unit.display(own.declared);
-        let [found, declared] = [own.found, own.declared].map(|sigma| two_digits(sigma * unit.factor, MOST));
+        let [found, declared] =
+            [own.found, own.declared].map(|sigma| two_digits(sigma * unit.factor, MOST));
         format!("{} {found} {} instead of {declared}", own.pattern, unit.symbol)
     };
     let rules: Vec<String> = sizes.iter().map(rule).collect();
@@ -126,7 +154,11 @@ fn sizes(sizes: &[PriorSize]) -> Option<String> {
 }
 
 /// What Markdown says below the table where waves are left out.
-pub(super) fn lower_waves<'a>(problem: &Problem, found: &Identification, file: &str) -> Option<Block<'a>> {
+pub(super) fn lower_waves<'a>(
+    problem: &Problem,
+    found: &Identification,
+    file: &str,
+) -> Option<Block<'a>> {
     let some = highest(&found.estimates, &harmonics(problem)).values().any(|(_, more)| *more > 0);
     some.then(|| Block::Words(vec![Block::Text(format!("Lower harmonics: in {file}."))]))
 }
@@ -173,19 +205,26 @@ fn verdict(estimate: &Estimate) -> String {
     }
 }
 
-/// Whether the standard error is larger than any calibration would accept: 1°, 10 mm, or half the value of a stiffness.
+/// Whether the standard error is larger than any calibration would accept: 1°, 10 mm, or half the
+/// value of a stiffness.
 fn is_vague(estimate: &Estimate) -> bool {
     let limit = match estimate.unit {
         Unit::Angle => 1.0_f64.to_radians(),
         Unit::Length => 0.01,
-        Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => 0.5 * estimate.estimate,
+        Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => {
+            0.5 * estimate.estimate
+        }
         _ => f64::INFINITY,
     };
     estimate.std_error.is_none_or(|error| error > limit)
 }
 
 /// The combinations that no measurement sees; `file` holds them all.
-pub(super) fn unidentifiable<'a>(found: &Identifiability, unknowns: &[String], file: &str) -> Block<'a> {
+pub(super) fn unidentifiable<'a>(
+    found: &Identifiability,
+    unknowns: &[String],
+    file: &str,
+) -> Block<'a> {
     let unidentifiable = &found.unidentifiable;
     if unidentifiable.is_empty() {
         return Block::lines("Every combination of the parameters is identifiable there.");
@@ -197,31 +236,42 @@ pub(super) fn unidentifiable<'a>(found: &Identifiability, unknowns: &[String], f
         unidentifiable.len(),
         unknowns.len()
     );
-    let mut points = first_of(unidentifiable.iter().map(|own| combination_words(own, unknowns)), SHOWN, file);
+    let mut points =
+        first_of(unidentifiable.iter().map(|own| combination_words(own, unknowns)), SHOWN, file);
     points.extend(without_tracker(unidentifiable, unknowns).into_iter().map(str::to_owned));
     Block::Lines(words, points)
 }
 
 /// What contacts and distances leave open for want of a reference, in words.
-fn without_tracker(unidentifiable: &[UnidentifiableCombination], unknowns: &[String]) -> Vec<&'static str> {
+fn without_tracker(
+    unidentifiable: &[UnidentifiableCombination],
+    unknowns: &[String],
+) -> Vec<&'static str> {
     let of = |name: &str, words: &[&str]| words.iter().any(|word| name.starts_with(word));
     let is_around = |name: &str| of(name, &["point", "anchor", "surface"]);
     let field = |name: &'_ str| name.rsplit('.').next().unwrap_or_default().to_owned();
     let is_length = |name: &str| {
         let geometry = name.starts_with("joint") && ["a", "d"].contains(&&*field(name));
-        geometry || of(name, &["tool"]) || (is_around(name) && !["rx", "ry"].contains(&&*field(name)))
+        geometry
+            || of(name, &["tool"])
+            || (is_around(name) && !["rx", "ry"].contains(&&*field(name)))
     };
-    let holds =
-        |own: &UnidentifiableCombination, is: &dyn Fn(&str) -> bool| own.weights.iter().any(|&(k, _)| is(&unknowns[k]));
-    let all =
-        |own: &UnidentifiableCombination, is: &dyn Fn(&str) -> bool| own.weights.iter().all(|&(k, _)| is(&unknowns[k]));
+    let holds = |own: &UnidentifiableCombination, is: &dyn Fn(&str) -> bool| {
+        own.weights.iter().any(|&(k, _)| is(&unknowns[k]))
+    };
+    let all = |own: &UnidentifiableCombination, is: &dyn Fn(&str) -> bool| {
+        own.weights.iter().all(|&(k, _)| is(&unknowns[k]))
+    };
     let place = |own: &UnidentifiableCombination| {
-        holds(own, &|name| name.starts_with("base")) && all(own, &|name| name.starts_with("base") || is_around(name))
+        holds(own, &|name| name.starts_with("base"))
+            && all(own, &|name| name.starts_with("base") || is_around(name))
     };
     // What only shifts everything moves points along one axis; a scale moves them along all three.
     let size = |own: &UnidentifiableCombination| {
         let along = |axis: &str| holds(own, &|name| is_around(name) && field(name) == axis);
-        all(own, &is_length) && ["x", "y", "z"].into_iter().all(along) && holds(own, &|name| name.starts_with("joint"))
+        all(own, &is_length)
+            && ["x", "y", "z"].into_iter().all(along)
+            && holds(own, &|name| name.starts_with("joint"))
     };
     let mut words = Vec::new();
     if unidentifiable.iter().any(place) {
@@ -239,23 +289,28 @@ fn without_tracker(unidentifiable: &[UnidentifiableCombination], unknowns: &[Str
 /// The combinations that are seen too weakly; nothing to say without any.
 pub(super) fn weak<'a>(found: &Identification, file: &str) -> Option<Block<'a>> {
     let count = found.weak.len();
-    let (noun, hold) = if count == 1 { ("combination", "is held") } else { ("combinations", "are held") };
+    let (noun, hold) =
+        if count == 1 { ("combination", "is held") } else { ("combinations", "are held") };
     let words = format!(
         "{count} {noun} of parameters {hold} where the fit met {}: seen too weakly (moved by the arm's own size, 1 rad\n\
          or a factor of 100, all measured coordinates together change by less than {WEAK_BELOW} σ):",
         if count == 1 { "it" } else { "them" }
     );
-    let points = first_of(found.weak.iter().map(|own| combination_words(own, &found.unknowns)), SHOWN, file);
+    let points =
+        first_of(found.weak.iter().map(|own| combination_words(own, &found.unknowns)), SHOWN, file);
     (count > 0).then_some(Block::Lines(words, points))
 }
 
 /// Those that [`unidentifiable`] leaves out, on the page.
 pub(super) fn more_unidentifiable<'a>(found: &Identification, file: &str) -> Option<Block<'a>> {
     let unidentifiable = found.identifiability().unidentifiable.iter().skip(SHOWN);
-    let words: Vec<String> = unidentifiable.map(|own| combination_words(own, &found.unknowns)).collect();
+    let words: Vec<String> =
+        unidentifiable.map(|own| combination_words(own, &found.unknowns)).collect();
     let count = words.len();
     let on_paper = format!("{count} more are left out on paper: they are in {file}.");
-    (count > 0).then(|| Block::Folded(format!("{count} more combinations"), vec![Block::list(words)], on_paper))
+    (count > 0).then(|| {
+        Block::Folded(format!("{count} more combinations"), vec![Block::list(words)], on_paper)
+    })
 }
 
 fn combination_words(combination: &UnidentifiableCombination, unknowns: &[String]) -> String {
@@ -263,14 +318,17 @@ fn combination_words(combination: &UnidentifiableCombination, unknowns: &[String
     if let [(k, _)] = combination.weights[..] {
         return format!("{} alone", name(k));
     }
-    let mut named: Vec<&(usize, f64)> = combination.weights.iter().filter(|(_, weight)| weight.abs() > NAMED).collect();
+    let mut named: Vec<&(usize, f64)> =
+        combination.weights.iter().filter(|(_, weight)| weight.abs() > NAMED).collect();
     // Equal weights differ by rounding from machine to machine: sort by what is shown.
     let shown = |weight: f64| (weight.abs() * 100.0).round();
     named.sort_by(|a, b| shown(b.1).total_cmp(&shown(a.1)).then(a.0.cmp(&b.0)));
     let mut terms: Vec<String> = named
         .iter()
         .take(MOST_NAMED)
-        .map(|(k, weight)| format!("{} {:.2} {}", if *weight < 0.0 { '−' } else { '+' }, weight.abs(), name(*k)))
+        .map(|(k, weight)| {
+            format!("{} {:.2} {}", if *weight < 0.0 { '−' } else { '+' }, weight.abs(), name(*k))
+        })
         .collect();
     if named.len() > MOST_NAMED {
         terms.push(format!("… and {} smaller", named.len() - MOST_NAMED));
@@ -278,11 +336,13 @@ fn combination_words(combination: &UnidentifiableCombination, unknowns: &[String
     terms.join(" ")
 }
 
-/// Pairs of parameters that go together, but for those that one unidentifiable combination ties: that is told by itself.
+/// Pairs of parameters that go together, but for those that one unidentifiable combination ties:
+/// that is told by itself.
 pub(super) fn correlated(found: &Identification) -> Vec<(String, String, f64)> {
     let tied = |a: &str, b: &str| {
-        let holds =
-            |own: &UnidentifiableCombination, name: &str| own.weights.iter().any(|&(k, _)| found.unknowns[k] == name);
+        let holds = |own: &UnidentifiableCombination, name: &str| {
+            own.weights.iter().any(|&(k, _)| found.unknowns[k] == name)
+        };
         found.identifiability().unidentifiable.iter().any(|own| holds(own, a) && holds(own, b))
     };
     found.strong_correlations().into_iter().filter(|(a, b, _)| !tied(a, b)).collect()
@@ -303,7 +363,11 @@ pub(super) fn correlations<'a>(found: &Identification, file: &str) -> Block<'a> 
 }
 
 /// Rank, condition number and observability indices, in one line.
-pub(super) fn conditioning<'a>(found: &Identifiability, unknowns: usize, coordinates: usize) -> Block<'a> {
+pub(super) fn conditioning<'a>(
+    found: &Identifiability,
+    unknowns: usize,
+    coordinates: usize,
+) -> Block<'a> {
     let [o1, o2, o3, o4, o5] = found.observability(coordinates);
     Block::lines(format!(
         "At the nominal arm: rank {} of {unknowns}, condition number {:.3e}; observability O1 {o1:.3e}, O2 {o2:.3e}, O3 {o3:.3e}, O4 {o4:.3e}, O5 {o5:.3e}",
@@ -333,12 +397,14 @@ mod tests {
     #[test]
     fn the_highest_of_many_waves_are_shown() {
         let waves = [(1, 4_u32), (2, 10)].into_iter().flat_map(|(joint, orders)| {
-            (1..=orders)
-                .flat_map(move |order| ["sin", "cos"].map(|part| (format!("{joint}.{part}{order}"), (joint, order))))
+            (1..=orders).flat_map(move |order| {
+                ["sin", "cos"].map(|part| (format!("{joint}.{part}{order}"), (joint, order)))
+            })
         });
         let harmonics: BTreeMap<String, (usize, u32)> = waves.collect();
         let mut estimates = vec![estimate("tool.x", 1.0)];
-        estimates.extend(harmonics.iter().map(|(name, (_, order))| estimate(name, f64::from(*order))));
+        estimates
+            .extend(harmonics.iter().map(|(name, (_, order))| estimate(name, f64::from(*order))));
         // Of joint 1 all are shown.
         let expected = BTreeMap::from([(2, (vec![10, 9, 8, 7], 6))]);
         assert_eq!(highest(&estimates, &harmonics), expected);

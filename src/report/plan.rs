@@ -51,12 +51,16 @@ pub fn plan_json(
     })
 }
 
-/// That the poses are fewer than it takes to see all that such poses can; nothing to say where they are not.
+/// That the poses are fewer than it takes to see all that such poses can; nothing to say where they
+/// are not.
 fn too_few<'a>(plan: &Plan) -> Option<Block<'a>> {
     let Plan { attainable_rank, least_poses, .. } = *plan;
     let (rank, poses) = (plan.planned.identifiability.rank, plan.poses.len());
     let at_least = if least_poses > poses {
-        format!("it takes {} at least, and a few more to judge them by", counted(least_poses, "pose"))
+        format!(
+            "it takes {} at least, and a few more to judge them by",
+            counted(least_poses, "pose")
+        )
     } else {
         "more poses may see more".to_owned()
     };
@@ -70,10 +74,16 @@ fn too_few<'a>(plan: &Plan) -> Option<Block<'a>> {
 }
 
 /// A plan in words; `separated` where it tells two effects apart; ending in a line break.
-pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan, separated: Option<&Separated>) -> String {
+pub fn plan_text(
+    problem: &Problem,
+    criterion: &Criterion,
+    plan: &Plan,
+    separated: Option<&Separated>,
+) -> String {
     let planned = &plan.planned;
     let (poses, given) = (plan.poses.len(), plan.given);
-    let besides = if given > 0 { format!(" besides {given} that are measured") } else { String::new() };
+    let besides =
+        if given > 0 { format!(" besides {given} that are measured") } else { String::new() };
     let rows = planned.expected.iter().enumerate().map(|(k, expected)| {
         let random = plan.random_error(k);
         let (mut row, unit) = cells(expected, &[expected.prior, random, expected.std_error]);
@@ -95,7 +105,8 @@ pub fn plan_text(problem: &Problem, criterion: &Criterion, plan: &Plan, separate
             meaningful.len()
         ))
     });
-    let names: Vec<String> = planned.expected.iter().map(|expected| expected.name.clone()).collect();
+    let names: Vec<String> =
+        planned.expected.iter().map(|expected| expected.name.clone()).collect();
     let mut blocks = vec![Block::lines(format!(
         "{}\n{}{besides}, from {}; criterion {}, best of {}",
         problem.title,

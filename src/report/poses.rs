@@ -7,7 +7,8 @@ use crate::measurement::Measurements;
 use crate::problem::fixture::frame_word;
 use crate::problem::{HeldOut, Observation, Problem};
 
-/// Poses as CSV: the columns of measurements but for the positions; ready to be measured and completed.
+/// Poses as CSV: the columns of measurements but for the positions; ready to be measured and
+/// completed.
 ///
 /// Where the problem names a column that marks held-out rows, every pose is one to identify with.
 pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
@@ -17,14 +18,20 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
         _ => None,
     };
     let values = |values: &Option<Vec<f64>>, factor: f64| {
-        values.as_ref().map(|values| values.iter().map(|value| plain(value * factor)).collect::<Vec<String>>())
+        values
+            .as_ref()
+            .map(|values| values.iter().map(|value| plain(value * factor)).collect::<Vec<String>>())
     };
     let words = |labels| (0..poses.len()).map(|row| word(labels, row)).collect::<Vec<String>>();
-    let mut columns = vec![("pose".to_owned(), (1..=poses.len()).map(|row| row.to_string()).collect::<Vec<String>>())];
+    let mut columns = vec![(
+        "pose".to_owned(),
+        (1..=poses.len()).map(|row| row.to_string()).collect::<Vec<String>>(),
+    )];
     columns.extend(split.map(|name| (name, vec!["identification".to_owned(); poses.len()])));
     columns.extend(surroundings(problem, poses));
     columns.extend(joints.iter().map(|own| {
-        let commands = (0..poses.len()).map(|row| plain(poses.configuration(row)[own.joint] * own.factor()));
+        let commands =
+            (0..poses.len()).map(|row| plain(poses.configuration(row)[own.joint] * own.factor()));
         (own.column(), commands.collect())
     }));
     let optional = [
@@ -33,22 +40,29 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
         ("payload_kg", values(&poses.payload, 1.0)),
         ("hoist_N", values(&poses.hoist, 1.0)),
         ("temperature_C", values(&poses.temperature, 1.0)),
-        ("time_s", poses.time_measured.then(|| poses.time.iter().map(|&time| plain(time)).collect())),
+        (
+            "time_s",
+            poses.time_measured.then(|| poses.time.iter().map(|&time| plain(time)).collect()),
+        ),
         ("sigma_mm", sigmas(poses)),
     ];
-    columns.extend(optional.into_iter().filter_map(|(name, column)| Some((name.to_owned(), column?))));
+    columns
+        .extend(optional.into_iter().filter_map(|(name, column)| Some((name.to_owned(), column?))));
     let known = poses.covariates.len() == problem.data.covariates.len() * poses.len();
-    columns.extend(problem.data.covariates.iter().enumerate().filter(|_| known).map(|(which, own)| {
-        let values = (0..poses.len()).map(|row| plain(poses.covariates_of(row)[which]));
-        (own.name.clone(), values.collect())
-    }));
+    columns.extend(problem.data.covariates.iter().enumerate().filter(|_| known).map(
+        |(which, own)| {
+            let values = (0..poses.len()).map(|row| plain(poses.covariates_of(row)[which]));
+            (own.name.clone(), values.collect())
+        },
+    ));
     if let Some(approach) = &poses.approach {
         columns.extend(joints.iter().map(|Command { joint, .. }| {
             let sides = (0..poses.len()).map(|row| plain(approach[row * poses.joints + joint]));
             (format!("approach{}", joint + 1), sides.collect())
         }));
     }
-    let lines = (0..poses.len()).map(|row| columns.iter().map(|(_, cells)| cells[row].clone()).collect());
+    let lines =
+        (0..poses.len()).map(|row| columns.iter().map(|(_, cells)| cells[row].clone()).collect());
     csv(columns.iter().map(|(name, _)| name.clone()).collect(), lines)
 }
 
@@ -60,15 +74,23 @@ fn sigmas(poses: &Measurements) -> Option<Vec<String>> {
     poses.sigma.as_ref().map(|sigmas| sigmas.iter().enumerate().map(cell).collect())
 }
 
-/// The columns that say against what each row is to be measured: `point`, `anchor`, `surface`, `frame`, those that there are.
+/// The columns that say against what each row is to be measured: `point`, `anchor`, `surface`,
+/// `frame`, those that there are.
 fn surroundings(problem: &Problem, poses: &Measurements) -> Vec<(String, Vec<String>)> {
     let word = |row: usize| match poses.observation(row) {
-        Observation::Tilt(frame) => Some(("frame", frame_word(frame, &problem.joints, problem.tool.joint))),
-        own => own.fixture().and_then(|own| problem.fixtures.get(own)).map(|own| (own.kind.word(), own.name.clone())),
+        Observation::Tilt(frame) => {
+            Some(("frame", frame_word(frame, &problem.joints, problem.tool.joint)))
+        }
+        own => own
+            .fixture()
+            .and_then(|own| problem.fixtures.get(own))
+            .map(|own| (own.kind.word(), own.name.clone())),
     };
     let words: Vec<_> = (0..poses.len()).map(word).collect();
     let column = |kind: &str| -> Vec<String> {
-        let cell = |own: &Option<(&str, String)>| own.clone().filter(|(word, _)| *word == kind).unwrap_or_default().1;
+        let cell = |own: &Option<(&str, String)>| {
+            own.clone().filter(|(word, _)| *word == kind).unwrap_or_default().1
+        };
         words.iter().map(cell).collect()
     };
     let all = ["point", "anchor", "surface", "frame"].map(|kind| (kind.to_owned(), column(kind)));

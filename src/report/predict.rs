@@ -11,15 +11,18 @@ use super::json::{list, object, spread, summary, to_text, unless_empty};
 use super::quantity::counted;
 use super::render::text;
 use super::table;
-use crate::identify::{ErrorSummary, ErrorsBySession, PointSpread, Prediction};
+use crate::fit::{ErrorSummary, ErrorsBySession, PointSpread, Prediction};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
 
-/// Errors of all rows and of each session, and the spread at each point, as JSON text, ending in a line break.
+/// Errors of all rows and of each session, and the spread at each point, as JSON text, ending in a
+/// line break.
 pub fn errors_json(errors: &ErrorsBySession, spreads: &[PointSpread]) -> String {
     let spread = |own: &PointSpread| object! { n: own.n, ..spread(own) };
-    let spreads: BTreeMap<&str, _> = spreads.iter().map(|own| (own.point.as_str(), spread(own))).collect();
-    let sessions: BTreeMap<&str, _> = errors.sessions.iter().map(|(name, own)| (name.as_str(), summary(own))).collect();
+    let spreads: BTreeMap<&str, _> =
+        spreads.iter().map(|own| (own.point.as_str(), spread(own))).collect();
+    let sessions: BTreeMap<&str, _> =
+        errors.sessions.iter().map(|(name, own)| (name.as_str(), summary(own))).collect();
     to_text(&object! {
         all: summary(&errors.all),
         ?kinds: unless_empty(list(&errors.kinds, summary)),
@@ -28,12 +31,16 @@ pub fn errors_json(errors: &ErrorsBySession, spreads: &[PointSpread]) -> String 
     })
 }
 
-/// Predicted positions as CSV: file and line of each row, what names it, its commands, and where the arm will be.
+/// Predicted positions as CSV: file and line of each row, what names it, its commands, and where
+/// the arm will be.
 pub fn predictions_csv(problem: &Problem, rows: &Measurements, prediction: &Prediction) -> String {
     let all: Vec<usize> = (0..prediction.positions.len()).collect();
     let mut columns = columns::names(problem, rows, &all);
     let mut add = |name: String, decimals, of: &dyn Fn(usize) -> f64| {
-        columns.push((name, Column::Numbers(all.iter().map(|&row| of(row)).collect(), Some(decimals))));
+        columns.push((
+            name,
+            Column::Numbers(all.iter().map(|&row| of(row)).collect(), Some(decimals)),
+        ));
     };
     for own in table::commands(problem) {
         add(own.column(), 7, &|row| rows.configuration(row)[own.joint] * own.factor());
@@ -51,8 +58,16 @@ pub fn predictions_csv(problem: &Problem, rows: &Measurements, prediction: &Pred
 
 /// What came of a prediction, in words.
 pub fn prediction_text(problem: &Problem, arm: &str, prediction: &Prediction) -> String {
-    let mut words = format!("{}\n{} predicted for {arm}", problem.title, counted(prediction.positions.len(), "pose"));
-    let lost = prediction.positions.iter().filter(|position| !position.iter().all(|x| x.is_finite())).count();
+    let mut words = format!(
+        "{}\n{} predicted for {arm}",
+        problem.title,
+        counted(prediction.positions.len(), "pose")
+    );
+    let lost = prediction
+        .positions
+        .iter()
+        .filter(|position| !position.iter().all(|x| x.is_finite()))
+        .count();
     if lost > 0 {
         let _ = write!(words, "; {lost} of them have no equilibrium");
     }
@@ -62,16 +77,25 @@ pub fn prediction_text(problem: &Problem, arm: &str, prediction: &Prediction) ->
         blocks.push(Block::lines(format!("Fitted to these rows, with the arm as it is: {names}")));
     }
     if let Some(errors) = &prediction.errors {
-        let row =
-            |name: &str, of: &ErrorSummary| [vec![name.to_owned(), of.n.to_string()], sizes(of).to_vec()].concat();
+        let row = |name: &str, of: &ErrorSummary| {
+            [vec![name.to_owned(), of.n.to_string()], sizes(of).to_vec()].concat()
+        };
         let named = |(name, own): &(String, ErrorSummary)| {
-            let kind = if own.kind == errors.all.kind { String::new() } else { format!(": {}", measure(own)) };
+            let kind = if own.kind == errors.all.kind {
+                String::new()
+            } else {
+                format!(": {}", measure(own))
+            };
             row(&format!("session {name}{kind}"), own)
         };
         let mut rows = vec![row("all rows", &errors.all)];
         rows.extend(errors.kinds.iter().skip(1).map(|own| row(measure(own), own)));
         rows.extend(errors.sessions.iter().map(named));
-        blocks.push(Block::Table(Table::new(&[measure(&errors.all), "rows", "mean", "rms", "max"], rows, &[0])));
+        blocks.push(Block::Table(Table::new(
+            &[measure(&errors.all), "rows", "mean", "rms", "max"],
+            rows,
+            &[0],
+        )));
     }
     let unsteady = unsteady(&prediction.spreads);
     if !unsteady.is_empty() {

@@ -2,7 +2,8 @@
 
 /// From here on numbers are written with a power of ten.
 const HUGE: f64 = 1e12;
-/// p-values below this are not told apart: so small a one says more about the assumed distribution than about chance.
+/// p-values below this are not told apart: so small a one says more about the assumed distribution
+/// than about chance.
 const LEAST_P: f64 = 1e-16;
 
 /// Decimals that show `error` with two significant digits, at most `most`.
@@ -11,7 +12,11 @@ pub(super) fn decimals(error: f64, most: usize) -> usize {
         return most;
     }
     let wanted = 1.0 - error.log10().floor();
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=most")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to 0..=most"
+    )]
     let wanted = wanted.clamp(0.0, most as f64) as usize;
     wanted
 }
@@ -26,7 +31,8 @@ pub(super) fn about_three_digits(value: f64) -> String {
     number(value, (decimals(value, 4) + 1).min(4))
 }
 
-/// `value` with `decimals`, never as "-0"; as `1.234e300` where it is huge, "–" where there is none.
+/// `value` with `decimals`, never as "-0"; as `1.234e300` where it is huge, "–" where there is
+/// none.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     match value.abs() {
         size if size < HUGE => fixed(value, decimals),
@@ -35,7 +41,8 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     }
 }
 
-/// `value` with `decimals`, never as "-0", for tables that programs read; nothing where it is not finite.
+/// `value` with `decimals`, never as "-0", for tables that programs read; nothing where it is not
+/// finite.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return String::new();
@@ -85,6 +92,9 @@ mod tests {
         assert_eq!(number(-0.5, 1), "-0.5");
         assert_eq!(number(-1.5e300, 4), "-1.500e300");
         assert_eq!((fixed(f64::NAN, 2), fixed(f64::INFINITY, 2)), (String::new(), String::new()));
-        assert_eq!((number(f64::NAN, 2), number(f64::INFINITY, 2)), ("–".to_owned(), "–".to_owned()));
+        assert_eq!(
+            (number(f64::NAN, 2), number(f64::INFINITY, 2)),
+            ("–".to_owned(), "–".to_owned())
+        );
     }
 }

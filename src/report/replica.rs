@@ -7,13 +7,14 @@ use super::figures;
 use super::json::{list, object, summary, to_text};
 use super::quantity::{mm, number, or_dash};
 use super::render::{Report, report, text};
-use crate::identify::ErrorSummary;
-use crate::monte_carlo::{AlternativeModel, Case, Left, MisprintStudy, Replica, ReplicaResults, Spread};
+use crate::fit::ErrorSummary;
 use crate::paper::Misprint;
 use crate::paper::published::{BEFORE, IGNORING_IT, Published, WITH_ELASTICITY};
+use crate::study::{AlternativeModel, Case, Left, MisprintStudy, Replica, ReplicaResults, Spread};
 
 /// What a stage takes for the stiffness, in the order of a replica's results.
-const STAGES: [&str; 4] = ["stiffness known", "as declared", "from positions", "from load differences"];
+const STAGES: [&str; 4] =
+    ["stiffness known", "as declared", "from positions", "from load differences"];
 
 fn document(study: &MisprintStudy, found: &ReplicaResults) -> impl Serialize {
     let sizes = Misprint::ALL.iter().zip(&found.sizes);
@@ -129,20 +130,24 @@ fn tables<'a>(study: &MisprintStudy, found: &ReplicaResults) -> Vec<Block<'a>> {
 
 /// Mean ± standard deviation; how many converged where not all did.
 fn shown(spread: Option<Spread>, show: impl Fn(f64) -> String) -> String {
-    let Some(Spread { mean, deviation, count: (there, all) }) = spread else { return "diverges".to_owned() };
+    let Some(Spread { mean, deviation, count: (there, all) }) = spread else {
+        return "diverges".to_owned();
+    };
     let few = if there < all { format!(" ({there} of {all})") } else { String::new() };
     format!("{} ± {}{few}", show(mean), show(deviation))
 }
 
 fn procedures(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let main = main_case(study, found);
-    let row = |(place, named): (usize, &crate::monte_carlo::NamedReading)| {
-        let size = Misprint::ALL.iter().zip(&found.sizes).find(|(own, _)| Some(**own) == named.misprint);
+    let row = |(place, named): (usize, &crate::study::NamedReading)| {
+        let size =
+            Misprint::ALL.iter().zip(&found.sizes).find(|(own, _)| Some(**own) == named.misprint);
         let cell = |stage: usize| {
             let means = main.iter().map(|own| Some(own.left(place, stage)?.mean.norm));
             shown(Spread::of(means), |value| mm(value, 3))
         };
-        let head = [named.name.clone(), named.place.clone(), or_dash(size, |(_, size)| mm(*size, 3))];
+        let head =
+            [named.name.clone(), named.place.clone(), or_dash(size, |(_, size)| mm(*size, 3))];
         head.into_iter().chain((0..STAGES.len()).map(cell)).collect()
     };
     let rows = found.readings.iter().enumerate().map(row).collect();
@@ -157,11 +162,14 @@ fn others(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let main = main_case(study, found);
     let row = |name: &str, of: fn(&Replica) -> Left, published: Option<&Published>| {
         let of_kind = |kind: fn(&ErrorSummary) -> f64| {
-            shown(Spread::of(main.iter().map(|own| of(own).as_ref().map(kind))), |value| mm(value, 3))
+            shown(Spread::of(main.iter().map(|own| of(own).as_ref().map(kind))), |value| {
+                mm(value, 3)
+            })
         };
         let [mean, max] = [published.map(|own| own.mean[3]), published.map(|own| own.max[3])];
         let paper = [mean, max].map(|value| or_dash(value, |value| number(value, 3)));
-        let own = [of_kind(|own| own.mean.norm), of_kind(|own| own.max.norm), of_kind(|own| own.mean.z)];
+        let own =
+            [of_kind(|own| own.mean.norm), of_kind(|own| own.max.norm), of_kind(|own| own.mean.z)];
         let z = or_dash(published, |own| number(own.mean[2], 3));
         let [mean, max] = paper;
         [vec![name.to_owned()], own.to_vec(), vec![mean, max, z]].concat()
@@ -200,9 +208,13 @@ fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
         .enumerate()
         .map(|(place, named)| row(&named.name, &named.summary, &|own| own.left(place, 0)))
         .collect();
-    rows.extend(AlternativeModel::EACH.map(|rival| row(rival.words().0, rival.words().1, &|own| own.rival(rival))));
+    rows.extend(
+        AlternativeModel::EACH
+            .map(|rival| row(rival.words().0, rival.words().1, &|own| own.rival(rival))),
+    );
     let [with, without] = [&WITH_ELASTICITY, &IGNORING_IT];
-    let paper = [with.mean[3] / without.mean[3], with.mean[2] / with.mean[3], with.max[3] / without.max[3]];
+    let paper =
+        [with.mean[3] / without.mean[3], with.mean[2] / with.mean[3], with.max[3] / without.max[3]];
     let [ratio, along, largest] = paper;
     let mut last = vec!["the paper".to_owned(), "table 3".to_owned()];
     last.extend(study.cases.iter().map(|_| number(ratio, 3)));
@@ -212,8 +224,11 @@ fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     header.extend(std::iter::repeat_n("mean/mean", study.cases.len()));
     header.extend(["z/sum", "max/max"]);
     let words: Vec<String> = study.cases.iter().map(Case::name).collect();
-    let note =
-        format!("mean/mean: of {}; links: their flexibility over that of joints, as multiples", words.join(", "));
-    let rest = "of what is declared; one load: every pose under the same; z/sum and max/max: of the first";
+    let note = format!(
+        "mean/mean: of {}; links: their flexibility over that of joints, as multiples",
+        words.join(", ")
+    );
+    let rest =
+        "of what is declared; one load: every pose under the same; z/sum and max/max: of the first";
     Table::new(&header, rows, &[0, 1]).noted(&[&note, rest])
 }

@@ -7,12 +7,13 @@ use super::forecast::size as shown;
 use super::json::object;
 use super::quantity::{number, or_dash, p_value};
 use crate::design::Separated;
-use crate::diagnose::{Separation, Side};
+use crate::select::{Separation, Side};
 
 /// All of it as JSON: sizes in SI, beside each figure the median over random poses.
 pub(super) fn entry(separated: &Separated) -> impl Serialize {
     let side = |side: usize| {
-        let Figures { planned, random_found, random_told, size, p, random_p } = Figures::of(separated, side);
+        let Figures { planned, random_found, random_told, size, p, random_p } =
+            Figures::of(separated, side);
         object! {
             ..&separated.effects[side],
             parameters: &planned.found.parameters,
@@ -22,7 +23,8 @@ pub(super) fn entry(separated: &Separated) -> impl Serialize {
             // The other in its place is ruled out.
             told_from: planned.told.worst,
             random_told_from: random_told,
-            // The size of `p_value` and `random_p_value`: from which random poses find it, or its prior.
+            // The size of `p_value` and `random_p_value`: from which random poses find it, or its
+            // prior.
             size: size,
             p_value: p,
             random_p_value: random_p,
@@ -74,14 +76,26 @@ pub(super) fn blocks<'a>(separated: &Separated) -> Vec<Block<'a>> {
     let angle = |angle: Option<f64>| or_dash(angle, |angle| number(angle.to_degrees(), 1));
     let cells = |cells: [&str; 4]| cells.map(str::to_owned).to_vec();
     let planned = separated.planned.angle;
-    let mut rows = vec![cells(["angle between them", &angle(random_angle(separated)), &angle(planned), "°"])];
+    let mut rows =
+        vec![cells(["angle between them", &angle(random_angle(separated)), &angle(planned), "°"])];
     for (k, own) in separated.effects.iter().enumerate() {
-        let Figures { planned, random_found, random_told, size, p, random_p } = Figures::of(separated, k);
+        let Figures { planned, random_found, random_told, size, p, random_p } =
+            Figures::of(separated, k);
         let unit = planned.found.unit.display(planned.found.prior);
         let show = |value: Option<f64>| shown(value, &unit);
         rows.push(cells([&own.declaration(), "", "", ""]));
-        rows.push(cells(["  found from", &show(random_found), &show(planned.found.worst), &unit.symbol]));
-        rows.push(cells(["  told apart from", &show(random_told), &show(planned.told.worst), &unit.symbol]));
+        rows.push(cells([
+            "  found from",
+            &show(random_found),
+            &show(planned.found.worst),
+            &unit.symbol,
+        ]));
+        rows.push(cells([
+            "  told apart from",
+            &show(random_told),
+            &show(planned.told.worst),
+            &unit.symbol,
+        ]));
         let at = format!("  p beside the other at {} {}", show(Some(size)), unit.symbol);
         rows.push(cells([&at, &p_value(random_p), &p_value(p), ""]));
     }

@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-/// A path as a word of a command: in quotes where a shell would take it apart, or read it otherwise.
+/// A path as a word of a command: in quotes where a shell would take it apart, or read it
+/// otherwise.
 pub fn shell_word(path: &Path) -> String {
     let word = path.display().to_string();
     let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+,:=@%\\".contains(letter);

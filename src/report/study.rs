@@ -7,7 +7,7 @@ use super::json::{list, object, to_text};
 use super::quantity::{number, or_dash};
 use super::render::text;
 use crate::files;
-use crate::monte_carlo::{CellResult, Results, Source, Study};
+use crate::study::{CellResult, Results, Source, Study};
 
 /// First columns of every table.
 const CELL: &str = "cell,position_sigma_mm,identification_poses,strategy,solver";
@@ -61,7 +61,8 @@ fn millimetres(metres: f64) -> f64 {
     (metres * 1e15).round() / 1e12
 }
 
-/// A study as JSON text, ending in a line break; SI units except where a key says otherwise, and without times.
+/// A study as JSON text, ending in a line break; SI units except where a key says otherwise, and
+/// without times.
 pub fn study_json(study: &Study, results: &Results) -> String {
     to_text(&object! {
         study: &study.name,
@@ -175,8 +176,10 @@ pub fn study_parameters_csv(study: &Study, results: &Results) -> String {
 pub fn study_timing_csv(results: &Results) -> String {
     let line = |(index, cell): (usize, &CellResult)| {
         let timing = cell.timing();
-        let [median, slowest] = [timing.median, timing.slowest].map(|seconds| format!("{:.3}", seconds * 1e3));
-        let cells = vec![cell.seconds.len().to_string(), median, slowest, format!("{:.3}", timing.total)];
+        let [median, slowest] =
+            [timing.median, timing.slowest].map(|seconds| format!("{:.3}", seconds * 1e3));
+        let cells =
+            vec![cell.seconds.len().to_string(), median, slowest, format!("{:.3}", timing.total)];
         [leading(index, cell), cells].concat()
     };
     csv("fits,median_ms,slowest_ms,total_s", results.cells.iter().enumerate().map(line))

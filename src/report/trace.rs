@@ -12,10 +12,12 @@ use super::quantity::{counted, number, p_value};
 use super::render::text;
 use super::table::{Command, commands};
 use super::{effect, findings};
-use crate::diagnose::{Claims, Covariate, Evidence, Explanation, Hypothesis, Law, Ranked, TellingPose, Trace};
-use crate::identify::Identification;
+use crate::fit::Identification;
 use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
+use crate::select::{
+    Claims, Covariate, Evidence, Explanation, Hypothesis, Law, Ranked, TellingPose, Trace,
+};
 
 /// Candidates that fit on a screen.
 const SHOWN: usize = 6;
@@ -40,7 +42,8 @@ fn document(problem: &Problem, trace: &Trace) -> impl Serialize {
         // The p below which a candidate stands out.
         level: trace.level,
         ranking: list(&trace.ranking, |ranked| ranked_entry(ranked, trace)),
-        // Explanations weighed against each other, most probable first; without hypotheses: noise alone.
+        // Explanations weighed against each other, most probable first; without hypotheses: noise
+        // alone.
         explanations: list(explanations(trace), |one| object! {
             probability: one.probability,
             hypotheses: list(&one.hypotheses, |own| hypothesis(own, trace)),
@@ -61,7 +64,8 @@ fn ranked_entry(ranked: &Ranked, trace: &Trace) -> impl Serialize {
         p_value: ranked.p_value,
         f: ranked.f.0,
         freedom: ranked.f.1,
-        // Expected reduction of the root mean squared error on the identification poses, and on poses left out in turn.
+        // Expected reduction of the root mean squared error on the identification poses, and on
+        // poses left out in turn.
         ..keyed("expected_gain", of.is_angle(), in_unit(of, ranked.gain)),
         cross_validated_gain_mm: cross_validated.filter(|_| !of.is_angle()),
         ?cross_validated_gain_deg: cross_validated.filter(|_| of.is_angle()),
@@ -135,10 +139,15 @@ fn words(own: &Hypothesis, describe: impl Fn(&Effect) -> String) -> String {
     match &own.law {
         Law::Effect(effect) => describe(effect),
         Law::NearHarmonic(order) => {
-            let cycles = if *order == 1 { "once".to_owned() } else { format!("about {order} times") };
-            format!("{part}: a function of {on} that repeats {cycles} a revolution; its law is not known")
+            let cycles =
+                if *order == 1 { "once".to_owned() } else { format!("about {order} times") };
+            format!(
+                "{part}: a function of {on} that repeats {cycles} a revolution; its law is not known"
+            )
         }
-        Law::PerPose => format!("{part}: another error in every pose, by nothing that is known of the poses"),
+        Law::PerPose => {
+            format!("{part}: another error in every pose, by nothing that is known of the poses")
+        }
         Law::Wandering => {
             format!(
                 "{part}: wanders with {on}, as noise does in which one reading follows the last, or a drift that has no law"
@@ -192,18 +201,23 @@ pub(super) fn claimed(claims: &Claims) -> String {
         Some(effect) => format!("law {} {}", effect.name(), percent(claims.law.1)),
         None if claims.law.0.law == Law::Wandering => {
             let sure = percent(claims.law.1);
-            format!("no law: it wanders {sure}, as noise does in which one reading follows the last")
+            format!(
+                "no law: it wanders {sure}, as noise does in which one reading follows the last"
+            )
         }
         None => "its law is not known".to_owned(),
     };
     let on = match claims.depends_on.0.as_slice() {
         [] => String::new(),
-        some => format!("; there and depends on {} {}", depends_on(some), percent(claims.depends_on.1)),
+        some => {
+            format!("; there and depends on {} {}", depends_on(some), percent(claims.depends_on.1))
+        }
     };
     format!("{} {}{on}; {law}", claims.place.0, percent(claims.place.1))
 }
 
-/// Probability of a law from which on it is the most probable one, and of a place from which on something acts there.
+/// Probability of a law from which on it is the most probable one, and of a place from which on
+/// something acts there.
 pub(super) const EVEN: f64 = 0.5;
 
 /// A probability for people.
@@ -224,7 +238,9 @@ pub fn trace_json(problem: &Problem, trace: &Trace) -> String {
 pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
     let mut blocks = vec![
         Block::Text(headline(problem, &trace.fit)),
-        Block::heading("What the residual (measured − predicted) of the identification poses looks like"),
+        Block::heading(
+            "What the residual (measured − predicted) of the identification poses looks like",
+        ),
         Block::List(findings::all(&trace.findings)),
     ];
     blocks.extend(findings::another_size(&trace.findings, trace.fit.reduced_chi2).map(Block::Text));
@@ -236,7 +252,9 @@ pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
 
 fn headline(problem: &Problem, fit: &Identification) -> String {
     let held_out = &fit.fitted.held_out;
-    let size = fit.reduced_chi2.map_or_else(String::new, |chi2| format!("; χ²/ν {}, 1 for noise alone", short(chi2)));
+    let size = fit
+        .reduced_chi2
+        .map_or_else(String::new, |chi2| format!("; χ²/ν {}, 1 for noise alone", short(chi2)));
     let error = match held_out.unpredicted {
         0 => format!(
             "on {} the error is {} in the mean, rms {}",
@@ -255,10 +273,19 @@ fn headline(problem: &Problem, fit: &Identification) -> String {
 }
 
 /// The candidates that stand out, at most so many of them, how to read them, and `where_all` are.
-pub(super) fn ranking<'a>(problem: &Problem, trace: &Trace, most: usize, where_all: &str) -> Vec<Block<'a>> {
-    let all: Vec<&Ranked> = trace.ranking.iter().filter(|ranked| ranked.p_value < trace.level).collect();
+pub(super) fn ranking<'a>(
+    problem: &Problem,
+    trace: &Trace,
+    most: usize,
+    where_all: &str,
+) -> Vec<Block<'a>> {
+    let all: Vec<&Ranked> =
+        trace.ranking.iter().filter(|ranked| ranked.p_value < trace.level).collect();
     let Some(first) = trace.ranking.first() else {
-        return vec![Block::heading("What could explain it"), Block::Text("There is no candidate to try.".to_owned())];
+        return vec![
+            Block::heading("What could explain it"),
+            Block::Text("There is no candidate to try.".to_owned()),
+        ];
     };
     if all.is_empty() {
         return vec![
@@ -281,7 +308,11 @@ pub(super) fn ranking<'a>(problem: &Problem, trace: &Trace, most: usize, where_a
         trace.tried, trace.level
     );
     if all.len() > most {
-        let _ = write!(notes, " {} more that stand out are left out here; {where_all}.", all.len() - most);
+        let _ = write!(
+            notes,
+            " {} more that stand out are left out here; {where_all}.",
+            all.len() - most
+        );
     }
     if all.iter().take(most).any(|ranked| !ranked.alike.is_empty()) {
         notes.push_str(
@@ -290,7 +321,11 @@ pub(super) fn ranking<'a>(problem: &Problem, trace: &Trace, most: usize, where_a
              within the ranges that were measured.",
         );
     }
-    vec![Block::heading("What could explain it, best first"), Block::Ranking(shown), Block::Text(notes)]
+    vec![
+        Block::heading("What could explain it, best first"),
+        Block::Ranking(shown),
+        Block::Text(notes),
+    ]
 }
 
 fn point(problem: &Problem, trace: &Trace, ranked: &Ranked) -> Point {
@@ -312,8 +347,13 @@ fn point(problem: &Problem, trace: &Trace, ranked: &Ranked) -> Point {
     }
     let mut details = vec![gain];
     if !ranked.alike.is_empty() {
-        let alike = |(other, angle): &(Effect, f64)| format!("{} ({:.0}°)", trace.describe(other), angle.to_degrees());
-        details.push(format!("hard to tell from: {}", named(ranked.alike.iter().map(alike), SHOWN_ALIKE, "; ")));
+        let alike = |(other, angle): &(Effect, f64)| {
+            format!("{} ({:.0}°)", trace.describe(other), angle.to_degrees())
+        };
+        details.push(format!(
+            "hard to tell from: {}",
+            named(ranked.alike.iter().map(alike), SHOWN_ALIKE, "; ")
+        ));
     }
     if let Some(apart) = &ranked.telling_pose {
         let other = trace.describe(&apart.other);
@@ -348,7 +388,9 @@ pub(super) fn not_seen<'a>(trace: &Trace) -> Vec<Block<'a>> {
         blocks.push(Block::List(effect::reasons(trace.untestable.iter().cloned())));
     }
     if !trace.absorbed.is_empty() {
-        blocks.push(Block::heading("What the fitted parameters absorb completely, so that it would not show"));
+        blocks.push(Block::heading(
+            "What the fitted parameters absorb completely, so that it would not show",
+        ));
         blocks.push(Block::list(effect::listed(&trace.absorbed)));
     }
     blocks
@@ -357,20 +399,28 @@ pub(super) fn not_seen<'a>(trace: &Trace) -> Vec<Block<'a>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::Part;
     use crate::problem::Effect;
+    use crate::select::Part;
 
     /// Other explanations may depend on the same elsewhere: the probability is of both together.
     #[test]
     fn what_it_depends_on_is_said_of_its_place() {
         let law = Law::Effect(Effect::GearRatio { joint: 2 });
-        let own = Hypothesis { law, part: Part::Joint(1), slot: None, depends_on: vec![Covariate::Load] };
-        let claims =
-            Claims { place: (Part::Joint(1), 0.5), depends_on: (vec![Covariate::Load], 0.14), law: (own, 0.1) };
+        let own =
+            Hypothesis { law, part: Part::Joint(1), site: None, depends_on: vec![Covariate::Load] };
+        let claims = Claims {
+            place: (Part::Joint(1), 0.5),
+            depends_on: (vec![Covariate::Load], 0.14),
+            law: (own, 0.1),
+        };
         let words = claimed(&claims);
         assert_eq!(
             words,
-            format!("{} 50 %; there and depends on {} 14 %; law gear-ratio 10 %", Part::Joint(1), Covariate::Load)
+            format!(
+                "{} 50 %; there and depends on {} 14 %; law gear-ratio 10 %",
+                Part::Joint(1),
+                Covariate::Load
+            )
         );
     }
 }

@@ -6,12 +6,13 @@ use super::document::code;
 use super::errors::{shown, with_unit};
 use super::quantity::{number, p_value};
 use super::trace::EVEN;
-use crate::diagnose::{
-    Claims, ClosedLoop, Correction, Covariate, HELD_FIXED, Hypothesis, Law, Part, REFUSED, Unexplained,
-};
 use crate::model::effect::NO_REFERENCE;
 use crate::model::parameter::holds_all;
 use crate::problem::{Effect, JointKind, Problem};
+use crate::select::{
+    Claims, ClosedLoop, Correction, Covariate, HELD_FIXED, Hypothesis, Law, Part, REFUSED,
+    Unexplained,
+};
 
 /// The correction of structure without a law, if there is one.
 pub(super) fn correction(closure: &ClosedLoop) -> Option<&Correction> {
@@ -29,7 +30,8 @@ pub(super) fn place(left: &Unexplained) -> String {
     left.part.map_or_else(|| "nowhere in particular".to_owned(), |part| part.to_string())
 }
 
-/// Why a law was not tried: what its rules say comes before what the problem lacks, for a reference does not free what is held.
+/// Why a law was not tried: what its rules say comes before what the problem lacks, for a reference
+/// does not free what is held.
 fn untried(problem: &Problem, (effect, reason): &(Effect, &'static str)) -> &'static str {
     let is_held = *reason == NO_REFERENCE && holds_all(problem, &effect.parameters(problem));
     if is_held { HELD_FIXED } else { reason }
@@ -39,10 +41,13 @@ fn untried(problem: &Problem, (effect, reason): &(Effect, &'static str)) -> &'st
 pub(super) fn not_looked_for(problem: &Problem, closure: &ClosedLoop) -> Option<String> {
     let needs = closure.before.untestable.iter().any(|own| untried(problem, own) == NO_REFERENCE);
     let why = "The table has temperatures, and no law of them was looked for, only functions without one: declare";
-    needs.then(|| format!("{why} {}, at which the arm is as declared.", code("reference_temperature_C")))
+    needs.then(|| {
+        format!("{why} {}, at which the arm is as declared.", code("reference_temperature_C"))
+    })
 }
 
-/// Each place where structure is left whose law is not known, once for everything that would be said of it alike.
+/// Each place where structure is left whose law is not known, once for everything that would be
+/// said of it alike.
 pub(super) fn places(closure: &ClosedLoop) -> Vec<String> {
     let mut said: Vec<(String, String)> = Vec::new();
     for left in &closure.unexplained {
@@ -77,7 +82,8 @@ pub(super) fn unexplained(problem: &Problem, closure: &ClosedLoop) -> Vec<String
     if closure.unexplained.iter().all(|left| wrong_limit(left).is_some()) {
         return sentences;
     }
-    let mut catalogue = "No effect of the catalogue explains it better than a function without a law".to_owned();
+    let mut catalogue =
+        "No effect of the catalogue explains it better than a function without a law".to_owned();
     for (why, words) in [
         (HELD_FIXED, "[parameters] holds them fixed"),
         (REFUSED, "[parameters] speaks of them in another unit"),
@@ -85,7 +91,9 @@ pub(super) fn unexplained(problem: &Problem, closure: &ClosedLoop) -> Vec<String
     ] {
         match closure.before.untestable.iter().filter(|own| untried(problem, own) == why).count() {
             0 => {}
-            1 => _ = write!(catalogue, "; one was not tried because {}", words.replace("them", "it")),
+            1 => {
+                _ = write!(catalogue, "; one was not tried because {}", words.replace("them", "it"))
+            }
             count => _ = write!(catalogue, "; {count} were not tried because {words}"),
         }
     }
@@ -116,17 +124,25 @@ fn is_sag(left: &Unexplained) -> bool {
     left.claims.as_ref().is_some_and(|claims| claims.law.0.law == Law::Sag)
 }
 
-/// The limit of the declared problem that is wrong, in words, by what is left, and how probable that is.
+/// The limit of the declared problem that is wrong, in words, by what is left, and how probable
+/// that is.
 fn wrong_limit(left: &Unexplained) -> Option<(&str, f64)> {
-    let Claims { law: (Hypothesis { law: Law::Limit(limit), .. }, probability), .. } = left.claims.as_ref()? else {
+    let Claims { law: (Hypothesis { law: Law::Limit(limit), .. }, probability), .. } =
+        left.claims.as_ref()?
+    else {
         return None;
     };
     Some((limit, *probability))
 }
 
-/// Limits of the declared problem that are wrong, each with its probability, where that is more than even.
+/// Limits of the declared problem that are wrong, each with its probability, where that is more
+/// than even.
 pub(super) fn wrong_limits(closure: &ClosedLoop) -> impl Iterator<Item = (&str, f64)> {
-    closure.unexplained.iter().filter_map(wrong_limit).filter(|(_, probability)| *probability >= EVEN)
+    closure
+        .unexplained
+        .iter()
+        .filter_map(wrong_limit)
+        .filter(|(_, probability)| *probability >= EVEN)
 }
 
 /// One finding without a law.
@@ -160,7 +176,11 @@ fn located(left: &Unexplained) -> String {
             of(claims.depends_on.1)
         ),
         (None, "") => format!("Structure is left: {} (p {}).", place(left), p_value(left.p_value)),
-        (None, on) => format!("Structure is left: {}, depending on {on} (p {}).", place(left), p_value(left.p_value)),
+        (None, on) => format!(
+            "Structure is left: {}, depending on {on} (p {}).",
+            place(left),
+            p_value(left.p_value)
+        ),
     }
 }
 
@@ -182,9 +202,14 @@ fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -
     )];
     let range = |(covariate, range): &(Covariate, (f64, f64))| {
         let (factor, unit) = unit(problem, covariate);
-        format!("{covariate} from {} to {}{unit}", number(range.0 * factor, 2), number(range.1 * factor, 2))
+        format!(
+            "{covariate} from {} to {}{unit}",
+            number(range.0 * factor, 2),
+            number(range.1 * factor, 2)
+        )
     };
-    let ranges: Vec<String> = ranges.iter().filter(|(of, _)| *of != Covariate::Position).map(range).collect();
+    let ranges: Vec<String> =
+        ranges.iter().filter(|(of, _)| *of != Covariate::Position).map(range).collect();
     if !ranges.is_empty() {
         sentences.push(format!(
             "It holds for {}, as far as the identification poses reach; beyond, it keeps its last value ({beyond} of {} held-out poses).",
@@ -202,7 +227,9 @@ pub(super) fn unit(problem: &Problem, covariate: &Covariate) -> (f64, &'static s
         Covariate::Time => (1.0 / 3600.0, " h"),
         Covariate::Payload => (1.0, " kg"),
         Covariate::Hoist => (1.0, " N"),
-        Covariate::Command(joint) if problem.joints[*joint].kind == JointKind::Prismatic => (1e3, " mm"),
+        Covariate::Command(joint) if problem.joints[*joint].kind == JointKind::Prismatic => {
+            (1e3, " mm")
+        }
         Covariate::Command(_) => (180.0 / std::f64::consts::PI, " °"),
         _ => (1.0, ""),
     }

@@ -4,7 +4,7 @@ use super::effect;
 use super::quantity::{counted, number};
 use super::trace::{EVEN, percent};
 use super::unexplained::size_alone;
-use crate::diagnose::{Claims, ClosedLoop, Found, SelectionRules, Verdict};
+use crate::select::{Claims, ClosedLoop, Found, SelectionRules, Verdict};
 
 /// Probability of a law below which it is not even an example.
 const NONE: f64 = 0.005;
@@ -27,13 +27,19 @@ pub fn interrupted(closure: &ClosedLoop) -> String {
     format!("interrupted {rounds}: there may be more to find")
 }
 
-/// The outcome in a sentence or two, after a word that it is not the last one where the search ended early.
+/// The outcome in a sentence or two, after a word that it is not the last one where the search
+/// ended early.
 pub(super) fn verdict(closure: &ClosedLoop) -> String {
-    let end = if closure.interrupted { format!("Search {}. ", interrupted(closure)) } else { String::new() };
+    let end = if closure.interrupted {
+        format!("Search {}. ", interrupted(closure))
+    } else {
+        String::new()
+    };
     if closure.interrupted && closure.rounds.is_empty() && closure.effects.is_empty() {
-        return end + "What the residual holds was not weighed to the end: no cause is named, and none ruled out.";
+        return end
+            + "What the residual holds was not weighed to the end: no cause is named, and none ruled out.";
     }
-    let carried = closure.before.fit.carriers.is_some() && closure.after.is_trusted();
+    let carried = closure.before.fit.influential_rows.is_some() && closure.after.is_trusted();
     let first = if carried {
         "Look first at the rows that carry the misfit: wrong ones hide causes, and a cause that acts in them alone looks like wrong ones. "
     } else {
@@ -67,8 +73,8 @@ impl<'a> Kinds<'a> {
     }
 }
 
-/// Whether an effect is in the model with others, and nothing speaks for it by itself: evidence weighs it in no set, and chance does as
-/// well. Of many orders under one prior none may stand out.
+/// Whether an effect is in the model with others, and nothing speaks for it by itself: evidence
+/// weighs it in no set, and chance does as well. Of many orders under one prior none may stand out.
 pub(super) fn is_beside(closure: &ClosedLoop, found: &Found) -> bool {
     closure.harmonic_prior.is_none() && is_unsupported(found)
 }
@@ -81,7 +87,11 @@ fn is_unsupported(found: &Found) -> bool {
 /// How many effects were found, and how many causes whose laws are not sure.
 pub(super) fn counts(closure: &ClosedLoop) -> String {
     let Kinds { named, such, .. } = Kinds::of(closure);
-    if such.is_empty() { named.len().to_string() } else { format!("{}, and {} probable", named.len(), such.len()) }
+    if such.is_empty() {
+        named.len().to_string()
+    } else {
+        format!("{}, and {} probable", named.len(), such.len())
+    }
 }
 
 fn came_to(closure: &ClosedLoop) -> String {
@@ -95,7 +105,9 @@ fn came_to(closure: &ClosedLoop) -> String {
         let beside = if closure.findings.outliers.is_empty() { "" } else { ", outliers left out," };
         // What was interrupted has not looked everywhere.
         let seen = if closure.interrupted { "" } else { ", and no structure is seen in it" };
-        return format!("Unexplained: the residual{beside} is {size} × the declared σ{seen}. {found}.");
+        return format!(
+            "Unexplained: the residual{beside} is {size} × the declared σ{seen}. {found}."
+        );
     }
     match (closure.verdict, closure.findings.is_testable()) {
         (Verdict::Unexplained, _) if closure.unexplained.is_empty() => format!("Unexplained: {}.", lower(&found)),
@@ -135,18 +147,27 @@ fn found(closure: &ClosedLoop, kinds: &Kinds) -> String {
             (true, words) => format!("{named}; one more is probable: {words}"),
             (false, words) => format!("{named}; something more acts, {words}"),
         },
-        (several, true) => format!("No effect is sure; {} are probable, their laws not sure", several.len()),
-        (several, false) => format!("{named}; {} more are probable, their laws not sure", several.len()),
+        (several, true) => {
+            format!("No effect is sure; {} are probable, their laws not sure", several.len())
+        }
+        (several, false) => {
+            format!("{named}; {} more are probable, their laws not sure", several.len())
+        }
     };
     match kinds.contradicted.as_slice() {
         [] => found,
-        [one] => format!("{found}; {} is contradicted by data that took no part", closure.before.describe(&one.effect)),
-        several => format!("{found}; {} causes are contradicted by data that took no part", several.len()),
+        [one] => format!(
+            "{found}; {} is contradicted by data that took no part",
+            closure.before.describe(&one.effect)
+        ),
+        several => {
+            format!("{found}; {} causes are contradicted by data that took no part", several.len())
+        }
     }
 }
 
-/// That nothing was found where the residual is so many times the declared σ, fewer than chance makes it; whether the fit took a smaller
-/// σ instead.
+/// That nothing was found where the residual is so many times the declared σ, fewer than chance
+/// makes it; whether the fit took a smaller σ instead.
 fn nothing_below(ratio: f64, takes_less: bool) -> String {
     let against = if takes_less {
         ", which is too large; causes are weighed against what the fit leaves"
@@ -159,15 +180,22 @@ fn nothing_below(ratio: f64, takes_less: bool) -> String {
     )
 }
 
-/// A cause whose law is not sure, how probable it is, and what it may be instead; whether it is the most probable one.
+/// A cause whose law is not sure, how probable it is, and what it may be instead; whether it is the
+/// most probable one.
 fn probable(closure: &ClosedLoop, found: &Found) -> (bool, String) {
     let own = closure.before.describe(&found.effect);
     let rival = found.alternatives.first().map(|other| closure.before.describe(other));
-    let known = found.claims.as_ref().map(|claims| (claims.place.0.to_string(), claims.place.1, claims.law.1));
-    known.map_or((true, own.clone()), |(place, at, law)| doubted((&place, at, law), &own, rival.as_deref()))
+    let known = found
+        .claims
+        .as_ref()
+        .map(|claims| (claims.place.0.to_string(), claims.place.1, claims.law.1));
+    known.map_or((true, own.clone()), |(place, at, law)| {
+        doubted((&place, at, law), &own, rival.as_deref())
+    })
 }
 
-/// Words for a cause at a place and its law, each with its probability; whether they say what is most probable.
+/// Words for a cause at a place and its law, each with its probability; whether they say what is
+/// most probable.
 fn doubted((place, at, law): (&str, f64, f64), own: &str, rival: Option<&str>) -> (bool, String) {
     let or_else = rival.map_or_else(String::new, |rival| format!(", or else {rival}"));
     let there = format!("something at {place} ({}) whose law is not known", percent(at));
@@ -186,7 +214,9 @@ pub(super) fn called(closure: &ClosedLoop, found: &Found) -> String {
     let own = effect::both(&found.effect, &closure.before);
     match &found.claims {
         _ if found.is_contradicted() => format!("contradicted: {own}"),
-        _ if is_beside(closure, found) => format!("in the model beside the others, not found by itself: {own}"),
+        _ if is_beside(closure, found) => {
+            format!("in the model beside the others, not found by itself: {own}")
+        }
         Some(claims) if !found.is_named(SelectionRules::DEFAULT.stated) => {
             titled((&claims.place.0.to_string(), claims.place.1, claims.law.1), &own)
         }
@@ -208,8 +238,9 @@ fn titled((place, at, law): (&str, f64, f64), own: &str) -> String {
 /// What is in the model for a cause whose law is so little known that its title names none.
 pub(super) fn stand_in(closure: &ClosedLoop, found: &Found) -> Option<String> {
     let is_unknown = |claims: &Claims| claims.law.1 < NONE;
-    (found.claims.as_ref().is_some_and(is_unknown) && !found.is_contradicted())
-        .then(|| format!("in the model stands for it: {}", effect::both(&found.effect, &closure.before)))
+    (found.claims.as_ref().is_some_and(is_unknown) && !found.is_contradicted()).then(|| {
+        format!("in the model stands for it: {}", effect::both(&found.effect, &closure.before))
+    })
 }
 
 fn lower(words: &str) -> String {
@@ -220,7 +251,7 @@ fn lower(words: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::ErrorSummary;
+    use crate::fit::ErrorSummary;
     use crate::problem::Effect;
 
     #[test]
@@ -234,7 +265,10 @@ mod tests {
         assert_eq!(title(0.8, 0.39), "joint 2: its law is not known, such as: a wave");
         assert_eq!(words(0.45, 0.39), (false, "such as a wave (39 %), or else a drift".to_owned()));
         assert_eq!(title(0.45, 0.39), "place and law not known, such as: a wave");
-        assert_eq!(words(0.999, 0.0), (true, "something at joint 2 (over 99 %) whose law is not known".to_owned()));
+        assert_eq!(
+            words(0.999, 0.0),
+            (true, "something at joint 2 (over 99 %) whose law is not known".to_owned())
+        );
         assert_eq!(title(0.999, 0.0), "joint 2: its law is not known");
         assert!(!words(0.2, 0.001).1.contains("wave") && !title(0.2, 0.001).contains("wave"));
     }
@@ -257,7 +291,15 @@ mod tests {
     #[test]
     fn an_overstated_sigma_is_said_with_its_number() {
         let (near, far) = (nothing_below(0.94, false), nothing_below(0.012, true));
-        assert!(near.starts_with("Nothing found: the residual is 0.94 × the declared σ; causes are"), "{near}");
-        assert!(far.starts_with("Nothing found: the residual is 0.012 × the declared σ, which is too large;"), "{far}");
+        assert!(
+            near.starts_with("Nothing found: the residual is 0.94 × the declared σ; causes are"),
+            "{near}"
+        );
+        assert!(
+            far.starts_with(
+                "Nothing found: the residual is 0.012 × the declared σ, which is too large;"
+            ),
+            "{far}"
+        );
     }
 }

@@ -7,8 +7,8 @@ use crate::scalar::Scalar;
 
 /// A frame seen from another: its axes and its origin \[m\].
 ///
-/// Moving a frame multiplies its transform from the right, so motions are given in its own axes. Rotations about an
-/// axis turn two columns; no 4 × 4 product is ever formed.
+/// Moving a frame multiplies its transform from the right, so motions are given in its own axes.
+/// Rotations about an axis turn two columns; no 4 × 4 product is ever formed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame<S> {
     /// Unit axes x, y, z.
@@ -28,7 +28,11 @@ impl<S: Scalar> Frame<S> {
     pub fn identity() -> Self {
         let (zero, one) = (S::from(0.0), S::from(1.0));
         Self {
-            axes: [Vector3::new(one, zero, zero), Vector3::new(zero, one, zero), Vector3::new(zero, zero, one)],
+            axes: [
+                Vector3::new(one, zero, zero),
+                Vector3::new(zero, one, zero),
+                Vector3::new(zero, zero, one),
+            ],
             origin: Vector3::from_element(zero),
         }
     }

@@ -1,4 +1,5 @@
-//! Frames and rotations in three dimensions, generic over the scalar and differentiable everywhere they are used.
+//! Frames and rotations in three dimensions, generic over the scalar and differentiable everywhere
+//! they are used.
 
 mod frame;
 mod placement;

@@ -43,8 +43,9 @@ mod tests {
     #[test]
     fn angles_come_back_at_every_pitch() {
         let angles = [0.0, 0.3, -1.2, FRAC_PI_2, -FRAC_PI_2, FRAC_PI_2 - 1e-9, PI, 1.57, -2.9];
-        let all =
-            angles.iter().flat_map(|&roll| angles.iter().flat_map(move |&pitch| angles.map(|yaw| [roll, pitch, yaw])));
+        let all = angles.iter().flat_map(|&roll| {
+            angles.iter().flat_map(move |&pitch| angles.map(|yaw| [roll, pitch, yaw]))
+        });
         for rpy in all {
             let frame = Frame::placed(&Vector3::new(1.0, -2.0, 0.5), &rpy.into());
             let again = Frame::placed(&frame.origin, &frame.roll_pitch_yaw());

@@ -4,13 +4,14 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::scalar::Scalar;
 
-/// Below this squared angle \[rad²\] the exponential uses its power series, exact to rounding there.
+/// Below this squared angle \[rad²\] the exponential uses its power series, exact to rounding
+/// there.
 const SERIES_BELOW: f64 = 0.01;
 
 /// Rotates `vector` by the rotation vector `w` \[rad\]: exp(`[w]×`) v.
 ///
-/// exp(`[w]×`) v = v + A w×v + B w×(w×v), A = sin φ / φ, B = (1 − cos φ) / φ², φ = ‖w‖  (Rodrigues).
-/// Smooth at w = 0, with its derivative.
+/// exp(`[w]×`) v = v + A w×v + B w×(w×v), A = sin φ / φ, B = (1 − cos φ) / φ², φ = ‖w‖
+/// (Rodrigues). Smooth at w = 0, with its derivative.
 pub fn rotate<S: Scalar>(w: &Vector3<S>, vector: &Vector3<S>) -> Vector3<S> {
     let (a, b) = coefficients(w.dot(w));
     let first = w.cross(vector);
@@ -35,15 +36,18 @@ pub fn rotation_axes<S: Scalar>(w: &Vector3<S>) -> [Vector3<S>; 3] {
     ]
 }
 
-/// The rotation vector \[rad\], in the reference frame, that turns the axes `from` into `to`: log(R₂ R₁ᵀ), at most half a turn.
+/// The rotation vector \[rad\], in the reference frame, that turns the axes `from` into `to`:
+/// log(R₂ R₁ᵀ), at most half a turn.
 pub fn turn_between(from: &[Vector3<f64>; 3], to: &[Vector3<f64>; 3]) -> Vector3<f64> {
     let turn = Matrix3::from_columns(to) * Matrix3::from_columns(from).transpose();
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)).scaled_axis()
 }
 
-/// How log(exp(`[w]×`) exp(`[δ]×`)) changes with a small δ at 0: J⁻¹ = I + ½ `[w]×` + C `[w]×`², C = (1 − φ/2 cot φ/2) / φ².
+/// How log(exp(`[w]×`) exp(`[δ]×`)) changes with a small δ at 0: J⁻¹ = I + ½ `[w]×` + C `[w]×`², C
+/// = (1 − φ/2 cot φ/2) / φ².
 ///
-/// The inverse of the right Jacobian of SO(3) at a rotation vector w \[rad\] of less than a turn.      [Chirikjian 2012, ch. 10]
+/// The inverse of the right Jacobian of SO(3) at a rotation vector w \[rad\] of less than a turn.
+/// [Chirikjian 2012, ch. 10]
 pub fn logarithm_slope(w: &Vector3<f64>) -> Matrix3<f64> {
     let squared = w.norm_squared();
     let c = if squared < SERIES_BELOW {
@@ -87,7 +91,8 @@ fn turn<S: Scalar>((sin, cos): (S, S), u: f64, v: f64) -> (S, S) {
 fn coefficients<S: Scalar>(squared: S) -> (S, S) {
     if squared.re() < SERIES_BELOW {
         let horner = |c: [f64; 5]| {
-            (((squared * c[4] + S::from(c[3])) * squared + S::from(c[2])) * squared + S::from(c[1])) * squared
+            (((squared * c[4] + S::from(c[3])) * squared + S::from(c[2])) * squared + S::from(c[1]))
+                * squared
                 + S::from(c[0])
         };
         let a = horner([1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0]);

@@ -23,8 +23,8 @@ pub struct Chain<'a> {
     pub(super) end: Frame<f64>,
 }
 
-/// A moving joint: what lies between the axis frame before it and its own. An axis frame stands in a joint before it moves, its
-/// z along the axis.
+/// A moving joint: what lies between the axis frame before it and its own. An axis frame stands in
+/// a joint before it moves, its z along the axis.
 pub(super) struct Stage {
     /// Index of the joint in the robot.
     pub joint: usize,
@@ -42,8 +42,13 @@ impl<'a> Chain<'a> {
     /// The chain from `base` to `tip`; without them from the root to the only leaf below the base.
     ///
     /// # Errors
-    /// A tree that is none, several roots or leaves to choose from, a joint that no arm has, no joint that moves.
-    pub fn new(robot: &'a Robot, base: Option<&str>, tip: Option<&str>) -> Result<Self, InputError> {
+    /// A tree that is none, several roots or leaves to choose from, a joint that no arm has, no
+    /// joint that moves.
+    pub fn new(
+        robot: &'a Robot,
+        base: Option<&str>,
+        tip: Option<&str>,
+    ) -> Result<Self, InputError> {
         let above = parents(robot)?;
         let base = match base {
             Some(name) => robot.link(name)?,
@@ -53,11 +58,16 @@ impl<'a> Chain<'a> {
             Some(name) => robot.link(name)?,
             None => leaf(robot, &above, base)?,
         };
-        let name = |link: usize| robot.links.get(link).map_or(String::new(), |own| own.name.clone());
+        let name =
+            |link: usize| robot.links.get(link).map_or(String::new(), |own| own.name.clone());
         let (mut joints, mut passed, mut at) = (Vec::new(), Vec::new(), tip);
         while at != base {
             let Some((joint, parent)) = above.get(at).copied().flatten() else {
-                return Err(robot.error(UrdfMistake::NotBelow { base: name(base), tip: name(tip), above: passed }));
+                return Err(robot.error(UrdfMistake::NotBelow {
+                    base: name(base),
+                    tip: name(tip),
+                    above: passed,
+                }));
             };
             joints.push(joint);
             passed.push(name(parent));
@@ -65,9 +75,12 @@ impl<'a> Chain<'a> {
         }
         joints.reverse();
         if joints.len() > MOST_JOINTS {
-            return Err(robot.error(UrdfMistake::TooManyJoints { found: joints.len(), most: MOST_JOINTS }));
+            return Err(
+                robot.error(UrdfMistake::TooManyJoints { found: joints.len(), most: MOST_JOINTS })
+            );
         }
-        let mut chain = Self { robot, base, tip, joints, stages: Vec::new(), end: Frame::identity() };
+        let mut chain =
+            Self { robot, base, tip, joints, stages: Vec::new(), end: Frame::identity() };
         chain.walk()?;
         if chain.stages.is_empty() {
             return Err(robot.error(UrdfMistake::NothingMoves { base: name(base), tip: name(tip) }));
@@ -107,21 +120,24 @@ impl<'a> Chain<'a> {
         }
         self.end = step;
         let stage = |joint: usize| self.stages.iter().position(|stage| stage.joint == joint);
-        let mimics: Vec<_> =
-            leaders.into_iter().map(|leader| leader.and_then(|(joint, by)| Some((stage(joint)?, by)))).collect();
+        let mimics: Vec<_> = leaders
+            .into_iter()
+            .map(|leader| leader.and_then(|(joint, by)| Some((stage(joint)?, by))))
+            .collect();
         for (stage, mimic) in self.stages.iter_mut().zip(mimics) {
             stage.mimic = mimic;
         }
         Ok(())
     }
 
-    /// The first joint of the chain whose command a joint follows in the end, with factor and addend; none where no joint of the chain
-    /// leads it, so that it is commanded itself.
+    /// The first joint of the chain whose command a joint follows in the end, with factor and
+    /// addend; none where no joint of the chain leads it, so that it is commanded itself.
     fn leader(&self, index: usize) -> Result<(Option<(usize, f64)>, f64), InputError> {
         let (mut factor, mut addend, mut at) = (1.0, 0.0, index);
         let mut last = (None, 0.0);
         for _ in 0..=self.robot.joints.len() {
-            let Some((leader, by, plus)) = self.robot.joints.get(at).and_then(|own| own.mimic) else {
+            let Some((leader, by, plus)) = self.robot.joints.get(at).and_then(|own| own.mimic)
+            else {
                 return Ok(last);
             };
             addend += factor * plus;
@@ -136,7 +152,10 @@ impl<'a> Chain<'a> {
 
     /// Names of the moving joints.
     pub fn joint_names(&self) -> Vec<String> {
-        self.stages.iter().filter_map(|stage| Some(self.robot.joints.get(stage.joint)?.name.clone())).collect()
+        self.stages
+            .iter()
+            .filter_map(|stage| Some(self.robot.joints.get(stage.joint)?.name.clone()))
+            .collect()
     }
 
     /// Names of the first and the last link.
@@ -151,7 +170,8 @@ fn axis_frame(axis: &Vector3<f64>) -> Frame<f64> {
     let level = axis.x.hypot(axis.y);
     let mut frame = Frame::identity();
     if level > 0.0 || axis.z < 0.0 {
-        let about = if level > 0.0 { Vector3::new(-axis.y, axis.x, 0.0) / level } else { Vector3::x() };
+        let about =
+            if level > 0.0 { Vector3::new(-axis.y, axis.x, 0.0) / level } else { Vector3::x() };
         frame.rotate(&(about * level.atan2(axis.z)));
     }
     frame
@@ -194,12 +214,16 @@ fn parents(robot: &Robot) -> Result<Vec<Option<(usize, usize)>>, InputError> {
 }
 
 fn root(robot: &Robot, above: &[Option<(usize, usize)>]) -> Result<usize, InputError> {
-    let roots: Vec<usize> = (0..above.len()).filter(|&link| above.get(link).is_some_and(Option::is_none)).collect();
+    let roots: Vec<usize> =
+        (0..above.len()).filter(|&link| above.get(link).is_some_and(Option::is_none)).collect();
     match *roots.as_slice() {
         [root] => Ok(root),
         [] => Err(robot.error(UrdfMistake::NoLinks)),
         _ => {
-            let roots = roots.iter().filter_map(|&link| Some(robot.links.get(link)?.name.clone())).collect();
+            let roots = roots
+                .iter()
+                .filter_map(|&link| Some(robot.links.get(link)?.name.clone()))
+                .collect();
             Err(robot.error(UrdfMistake::Roots { roots }))
         }
     }
@@ -213,13 +237,15 @@ fn leaf(robot: &Robot, above: &[Option<(usize, usize)>], base: usize) -> Result<
         let (mut at, mut moving) = (link, 0);
         while at != base {
             let (joint, parent) = above.get(at).copied().flatten()?;
-            moving += usize::from(robot.joints.get(joint).is_some_and(|own| own.kind != Kind::Fixed));
+            moving +=
+                usize::from(robot.joints.get(joint).is_some_and(|own| own.kind != Kind::Fixed));
             at = parent;
         }
         Some(moving)
     };
     let ends = (0..robot.links.len()).filter(|&link| !is_parent(link));
-    let mut leaves: Vec<(usize, usize)> = ends.filter_map(|link| Some((depth(link)?, link))).collect();
+    let mut leaves: Vec<(usize, usize)> =
+        ends.filter_map(|link| Some((depth(link)?, link))).collect();
     if let [(_, leaf)] = *leaves.as_slice() {
         return Ok(leaf);
     }
@@ -229,5 +255,6 @@ fn leaf(robot: &Robot, above: &[Option<(usize, usize)>], base: usize) -> Result<
         Some(format!("{} ({moving} moving joint{plural})", robot.links.get(*link)?.name))
     };
     let base = robot.links.get(base).map_or(String::new(), |own| own.name.clone());
-    Err(robot.error(UrdfMistake::Leaves { base, leaves: leaves.iter().filter_map(named).collect() }))
+    Err(robot
+        .error(UrdfMistake::Leaves { base, leaves: leaves.iter().filter_map(named).collect() }))
 }

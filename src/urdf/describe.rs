@@ -17,9 +17,11 @@ use crate::problem::quoted::quoted;
 use crate::problem::read::BARRED_IN_NAMES;
 use crate::spatial::Frame;
 
-/// Smaller numbers than this are rounding, of a right angle written to eleven decimals as well \[rad\] or \[m\].
+/// Smaller numbers than this are rounding, of a right angle written to eleven decimals as well
+/// \[rad\] or \[m\].
 const ROUNDING: f64 = 1e-11;
-/// 1 σ of a measured coordinate where nobody has said it yet: of a laser tracker in a workshop \[mm\].
+/// 1 σ of a measured coordinate where nobody has said it yet: of a laser tracker in a workshop
+/// \[mm\].
 pub const SIGMA_MM: f64 = 0.05;
 /// Part of the poses that judge and are not fitted where nobody has said it yet.
 pub const HELD_OUT: f64 = 0.3;
@@ -62,7 +64,8 @@ pub fn describe(chain: &Chain) -> Result<Description, InputError> {
     let name = name(&chain.robot.name);
     let arm = arm(chain, &name, &rows);
     // What the arm cannot hold, the URDF cannot: numbers beyond any size.
-    let problem = Problem::parse(&arm, Path::new("problem.toml")).map_err(|error| chain.robot.as_problem(&error))?;
+    let problem = Problem::parse(&arm, Path::new("problem.toml"))
+        .map_err(|error| chain.robot.as_problem(&error))?;
     let free = told_apart(&problem)?;
     notes.extend(right_angles(chain));
     let text = format!("{arm}\n{}\n{}", parameters(&rows, &free), data(chain, &rows));
@@ -80,7 +83,9 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
     let mut rows = Vec::new();
     // The first axis may lie where no α and a reach it from the base.
     if let (Some(first), Some(stage)) = (steps.first_mut(), chain.stages.first())
-        && [first.theta_before, first.d_before, first.beta].iter().any(|value| value.abs() > ROUNDING)
+        && [first.theta_before, first.d_before, first.beta]
+            .iter()
+            .any(|value| value.abs() > ROUNDING)
     {
         *first = Step::default();
         rows.push(Row {
@@ -94,7 +99,8 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
     // What lies behind the last joint fits its θ and d, or is a joint of its own.
     let [x, _, z] = &chain.end.axes;
     let on_axis = z.xy().norm() + chain.end.origin.xy().norm() < ROUNDING && z.z > 0.0;
-    let end = Step { theta_before: x.y.atan2(x.x), d_before: chain.end.origin.z, ..Step::default() };
+    let end =
+        Step { theta_before: x.y.atan2(x.x), d_before: chain.end.origin.z, ..Step::default() };
     steps.push(if on_axis { end } else { Step::default() });
     for ((stage, own), next) in chain.stages.iter().zip(&steps).zip(steps.iter().skip(1)) {
         let Some(joint) = chain.robot.joints.get(stage.joint) else { continue };
@@ -103,7 +109,13 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
             kind: if joint.kind == Kind::Prismatic { "prismatic" } else { "revolute" },
             placement: None,
             mimic: stage.mimic.map(|(leader, ratio)| (leader + lead + 1, ratio)),
-            numbers: [own.alpha, own.a, own.theta + next.theta_before, own.d + next.d_before, next.beta],
+            numbers: [
+                own.alpha,
+                own.a,
+                own.theta + next.theta_before,
+                own.d + next.d_before,
+                next.beta,
+            ],
             limits: Some(joint.limits).filter(|_| stage.mimic.is_none()),
             bodies: Vec::new(),
         });
@@ -162,9 +174,12 @@ fn advanced(frame: &Frame<f64>, row: &Row) -> Frame<f64> {
 
 /// A name that is fit to name a folder.
 fn name(robot: &str) -> String {
+    let fit: String = robot
+        .chars()
+        .map(|c| if BARRED_IN_NAMES.contains(c) || c.is_whitespace() { '-' } else { c })
+        .collect();
     let fit: String =
-        robot.chars().map(|c| if BARRED_IN_NAMES.contains(c) || c.is_whitespace() { '-' } else { c }).collect();
-    let fit: String = fit.trim_matches(|c| c == '.' || c == '-').chars().take(LONGEST_NAME).collect();
+        fit.trim_matches(|c| c == '.' || c == '-').chars().take(LONGEST_NAME).collect();
     if fit.is_empty() || fit.chars().any(crate::error::is_hidden) { "arm".to_owned() } else { fit }
 }
 
@@ -182,7 +197,11 @@ fn limit_number(value: f64) -> String {
 fn degrees(angle: f64) -> String {
     let within = angle - (angle / TAU).round() * TAU;
     let right = (within / FRAC_PI_2).round();
-    number(if (within - right * FRAC_PI_2).abs() < ROUNDING { right * 90.0 } else { within.to_degrees() })
+    number(if (within - right * FRAC_PI_2).abs() < ROUNDING {
+        right * 90.0
+    } else {
+        within.to_degrees()
+    })
 }
 
 fn list(values: &Vector3<f64>, text: impl Fn(f64) -> String) -> String {
@@ -214,7 +233,12 @@ fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
         }
         if let Some(frame) = &row.placement {
             let rpy = frame.roll_pitch_yaw();
-            let _ = writeln!(text, "xyz_m = {}\nrpy_deg = {}", list(&frame.origin, number), list(&rpy, degrees));
+            let _ = writeln!(
+                text,
+                "xyz_m = {}\nrpy_deg = {}",
+                list(&frame.origin, number),
+                list(&rpy, degrees)
+            );
         }
         let [alpha, a, theta, d, beta] = row.numbers;
         let all = [
@@ -226,19 +250,29 @@ fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
         ];
         for (key, value, is_angle) in all {
             if value.abs() > ROUNDING {
-                let _ = writeln!(text, "{key} = {}", if is_angle { degrees(value) } else { number(value) });
+                let _ = writeln!(
+                    text,
+                    "{key} = {}",
+                    if is_angle { degrees(value) } else { number(value) }
+                );
             }
         }
         if let Some((min, max)) = row.limits {
-            let (unit, scale) =
-                if row.kind == "prismatic" { ("m", 1.0) } else { ("deg", 180.0 / std::f64::consts::PI) };
-            for (key, limit) in [("min", min), ("max", max)].into_iter().filter(|(_, limit)| limit.is_finite()) {
+            let (unit, scale) = if row.kind == "prismatic" {
+                ("m", 1.0)
+            } else {
+                ("deg", 180.0 / std::f64::consts::PI)
+            };
+            for (key, limit) in
+                [("min", min), ("max", max)].into_iter().filter(|(_, limit)| limit.is_finite())
+            {
                 let _ = writeln!(text, "{key}_{unit} = {}", limit_number(limit * scale));
             }
         }
         for (name, mass, com) in &row.bodies {
             let (name, com) = (quoted(name), list(com, number));
-            let _ = write!(text, "\n[[joint.body]]\nname = {name}\nmass_kg = {mass}\ncom_m = {com}\n");
+            let _ =
+                write!(text, "\n[[joint.body]]\nname = {name}\nmass_kg = {mass}\ncom_m = {com}\n");
         }
     }
     text.push_str(
@@ -257,10 +291,12 @@ fn parameters(rows: &[Row], free: &[String]) -> String {
                     \"joint*.beta\" = { fixed = true }\n"
         .to_owned();
     for (number, row) in (1..).zip(rows) {
-        let is_free = |field: &str| free.iter().any(|name| *name == format!("joint{number}.{field}"));
+        let is_free =
+            |field: &str| free.iter().any(|name| *name == format!("joint{number}.{field}"));
         let fields = ["alpha", "a", "theta", "d"];
         let held: Vec<&str> = fields.into_iter().filter(|field| !is_free(field)).collect();
-        let mut hold = |name: &str| _ = writeln!(text, "\"joint{number}.{name}\" = {{ fixed = true }}");
+        let mut hold =
+            |name: &str| _ = writeln!(text, "\"joint{number}.{name}\" = {{ fixed = true }}");
         if row.placement.is_some() || held.len() == fields.len() && !is_free("beta") {
             hold("*");
         } else {
@@ -276,7 +312,8 @@ fn parameters(rows: &[Row], free: &[String]) -> String {
 /// `[data]`.
 fn data(chain: &Chain, rows: &[Row]) -> String {
     let moving = rows.iter().filter(|row| row.kind != "fixed" && row.mimic.is_none());
-    let column = |row: &Row| format!("{}_{}", row.name, if row.kind == "prismatic" { "m" } else { "rad" });
+    let column =
+        |row: &Row| format!("{}_{}", row.name, if row.kind == "prismatic" { "m" } else { "rad" });
     let columns: Vec<String> = moving.map(column).collect();
     let mut text = "# Columns of the measurements (q1_deg, … and x_m, … do as well):\n".to_owned();
     columns.chunks(4).for_each(|some| _ = writeln!(text, "#   {},", some.join(", ")));

@@ -43,9 +43,11 @@ pub struct MovedOrigin {
     pub angle: f64,
 }
 
-/// Between the axes of an arm: what lies before each moving joint, seen from the one before, and behind the last.
+/// Between the axes of an arm: what lies before each moving joint, seen from the one before, and
+/// behind the last.
 ///
-/// Our transforms in another order: `C_k` = Ry(`β_{k−1}`) … Rx(`α_k`) Tx(`a_k`) Rz(`θ_k`) Tz(`d_k`), fixed joints in between.
+/// Our transforms in another order: `C_k` = Ry(`β_{k−1}`) … Rx(`α_k`) Tx(`a_k`) Rz(`θ_k`)
+/// Tz(`d_k`), fixed joints in between.
 pub(super) struct Steps {
     pub before: Vec<Frame<f64>>,
     pub end: Frame<f64>,
@@ -64,8 +66,8 @@ impl Steps {
         Self { before, end: step }
     }
 
-    /// Where each step leads that the chain's frames see: with the gauges of the nominal arm, so that an arm without errors
-    /// has the frames it had.
+    /// Where each step leads that the chain's frames see: with the gauges of the nominal arm, so
+    /// that an arm without errors has the frames it had.
     ///
     /// # Errors
     /// The nominal arm is not that of the chain.
@@ -78,9 +80,10 @@ impl Steps {
             gauge = stage.step.inverse().seen(&gauge).seen(own);
             let off = (gauge.axes[2].xy().norm(), gauge.origin.xy().norm());
             if off.0 > SAME || off.1 > SAME || gauge.axes[2].z < 0.0 {
-                return Err(chain
-                    .robot
-                    .error_at(stage.joint, UrdfMistake::OtherArm { joint: name.clone(), off: words(off) }));
+                return Err(chain.robot.error_at(
+                    stage.joint,
+                    UrdfMistake::OtherArm { joint: name.clone(), off: words(off) },
+                ));
             }
             gauges.push(gauge);
         }
@@ -96,8 +99,11 @@ impl Steps {
 /// Angle \[rad\] and distance \[m\] between two frames.
 fn difference(one: &Frame<f64>, other: &Frame<f64>) -> (f64, f64) {
     let rest = one.inverse().seen(other);
-    let sines =
-        Vector3::new(rest.axes[1].z - rest.axes[2].y, rest.axes[2].x - rest.axes[0].z, rest.axes[0].y - rest.axes[1].x);
+    let sines = Vector3::new(
+        rest.axes[1].z - rest.axes[2].y,
+        rest.axes[2].x - rest.axes[0].z,
+        rest.axes[0].y - rest.axes[1].x,
+    );
     let cos = 0.5 * (rest.axes[0].x + rest.axes[1].y + rest.axes[2].z - 1.0);
     ((0.5 * sines.norm()).atan2(cos), rest.origin.norm())
 }
@@ -108,11 +114,13 @@ fn words((angle, distance): (f64, f64)) -> String {
 
 /// `chain`, from which `problem` was made, with the geometry of `arm`.
 ///
-/// The pose of the tip is then that of the rigid arm in every configuration; what one joint's numbers hold behind it goes into
-/// the next origin. Inertial data and everything beside the chain stay.
+/// The pose of the tip is then that of the rigid arm in every configuration; what one joint's
+/// numbers hold behind it goes into the next origin. Inertial data and everything beside the chain
+/// stay.
 ///
 /// # Errors
-/// Problem and chain are not of one arm, or no origin is left behind the last joint that could hold what was identified there.
+/// Problem and chain are not of one arm, or no origin is left behind the last joint that could hold
+/// what was identified there.
 pub fn export(chain: &Chain, problem: &Problem, arm: &Arm<f64>) -> Result<Export, InputError> {
     problem.require_chain("export to a URDF")?;
     check_names(chain, problem)?;
@@ -121,11 +129,14 @@ pub fn export(chain: &Chain, problem: &Problem, arm: &Arm<f64>) -> Result<Export
     let mut patches = Patches { chain, text: Vec::new(), moved: Vec::new() };
     // From the axis frame before, in the frames of the chain: its own joint's frame first.
     let (mut from, mut fixed) = (Frame::identity(), Vec::new());
-    let mut stages = chain.stages.iter().zip(&steps.before).zip(gauges.iter().zip(gauges.iter().skip(1)));
+    let mut stages =
+        chain.stages.iter().zip(&steps.before).zip(gauges.iter().zip(gauges.iter().skip(1)));
     let mut next = stages.next();
     for &index in &chain.joints {
         let Some(joint) = chain.robot.joints.get(index) else { continue };
-        let Some(((stage, step), (before, own))) = next.filter(|((stage, _), _)| stage.joint == index) else {
+        let Some(((stage, step), (before, own))) =
+            next.filter(|((stage, _), _)| stage.joint == index)
+        else {
             fixed.push(index);
             continue;
         };
@@ -198,12 +209,18 @@ impl Patches<'_> {
             return;
         }
         let xyz = if shifted { frame.origin } else { joint.origin.xyz };
-        let rpy = if turned { nearest(&frame.roll_pitch_yaw(), &joint.origin.written) } else { joint.origin.written };
+        let rpy = if turned {
+            nearest(&frame.roll_pitch_yaw(), &joint.origin.written)
+        } else {
+            joint.origin.written
+        };
         let origin = &joint.origin;
-        let own = |name: &str, changed: bool, values: &Vector3<f64>, at: &Option<Range<usize>>| match at {
-            Some(at) if changed => (Some((at.clone(), triple(values))), String::new()),
-            None if changed => (None, format!(" {name}=\"{}\"", triple(values))),
-            _ => (None, String::new()),
+        let own = |name: &str, changed: bool, values: &Vector3<f64>, at: &Option<Range<usize>>| {
+            match at {
+                Some(at) if changed => (Some((at.clone(), triple(values))), String::new()),
+                None if changed => (None, format!(" {name}=\"{}\"", triple(values))),
+                _ => (None, String::new()),
+            }
         };
         let (first, more) = own("xyz", shifted, &xyz, &origin.xyz_value);
         let (second, further) = own("rpy", turned, &rpy, &origin.rpy_value);
@@ -219,7 +236,8 @@ impl Patches<'_> {
         self.moved.push(MovedOrigin { joint: joint.name.clone(), xyz, rpy, distance, angle });
     }
 
-    /// Where an `<origin>` may stand in a joint that has none, and its text: before the first child, with the same indent.
+    /// Where an `<origin>` may stand in a joint that has none, and its text: before the first
+    /// child, with the same indent.
     fn new_element(&self, joint: &Range<usize>, attributes: &str) -> (usize, String) {
         let text = self.chain.robot.source.text.get(joint.clone()).unwrap_or_default();
         // The start tag ends at the first bracket outside of quotes.
@@ -252,10 +270,13 @@ impl Patches<'_> {
     }
 }
 
-/// The same orientation in angles as near as can be to others: (r, p, y) and (r + π, π − p, y + π) are one.
+/// The same orientation in angles as near as can be to others: (r, p, y) and (r + π, π − p, y + π)
+/// are one.
 fn nearest(rpy: &Vector3<f64>, old: &Vector3<f64>) -> Vector3<f64> {
     let half = 0.5 * TAU;
-    let near = |angles: Vector3<f64>| angles.zip_map(old, |own, old| own - ((own - old) / TAU).round() * TAU);
+    let near = |angles: Vector3<f64>| {
+        angles.zip_map(old, |own, old| own - ((own - old) / TAU).round() * TAU)
+    };
     let [one, other] = [*rpy, Vector3::new(rpy.x + half, half - rpy.y, rpy.z + half)].map(near);
     if (one - old).norm() <= (other - old).norm() { one } else { other }
 }

@@ -7,7 +7,9 @@ use crate::error::{InputError, Location};
 use crate::least_squares::jacobian;
 use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose, PoseResiduals};
-use crate::problem::{Freedom, JointKind, Observation, ParameterRule, PoseView, Problem, Quantities};
+use crate::problem::{
+    Freedom, JointKind, Observation, ParameterRule, PoseView, Problem, Quantities,
+};
 use crate::random::stream;
 
 /// A column adds something if that much of it is left beside those before \[1\].
@@ -18,13 +20,16 @@ const SLIDE: f64 = 0.5;
 
 /// Names of the parameters that measured positions tell apart, of a target anywhere on the tool.
 ///
-/// Base and tool come first, then α, a, θ, d of all joints, then β: each is taken if it moves positions in a way that none
-/// before it does, in poses drawn from the limits of the joints.
+/// Base and tool come first, then α, a, θ, d of all joints, then β: each is taken if it moves
+/// positions in a way that none before it does, in poses drawn from the limits of the joints.
 pub(super) fn told_apart(problem: &Problem) -> Result<Vec<String>, InputError> {
     let mut problem = problem.clone();
     let location = Location::file(&problem.data.location.file);
-    let freedom =
-        Freedom::Free { sigma: Quantities::default(), min: Quantities::default(), max: Quantities::default() };
+    let freedom = Freedom::Free {
+        sigma: Quantities::default(),
+        min: Quantities::default(),
+        max: Quantities::default(),
+    };
     problem.parameters = vec![ParameterRule { pattern: "*".to_owned(), freedom, location }];
     problem.tool.target = Vector3::new(0.11, 0.07, 0.05);
     let unnamed = [String::new()];
@@ -40,7 +45,8 @@ pub(super) fn told_apart(problem: &Problem) -> Result<Vec<String>, InputError> {
         let (from, to) = (joint.limits.0.max(-reach), joint.limits.1.min(reach));
         from + (to - from) * random.random::<f64>()
     };
-    let configurations: Vec<Vec<f64>> = (0..count).map(|_| problem.joints.iter().map(&mut draw).collect()).collect();
+    let configurations: Vec<Vec<f64>> =
+        (0..count).map(|_| problem.joints.iter().map(&mut draw).collect()).collect();
     let measured = Vector3::zeros();
     let mut poses = Vec::with_capacity(count);
     for configuration in &configurations {
@@ -55,7 +61,8 @@ pub(super) fn told_apart(problem: &Problem) -> Result<Vec<String>, InputError> {
         });
     }
     let zero = DVector::zeros(count);
-    let columns = jacobian(&PoseResiduals::new(&model, poses, (0..count).collect(), zero.clone()), &zero);
+    let columns =
+        jacobian(&PoseResiduals::new(&model, poses, (0..count).collect(), zero.clone()), &zero);
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by_key(|&k| model.parameters.get(k).map_or(0, turn));
     let chosen = independent(&columns, &order);
@@ -66,7 +73,7 @@ pub(super) fn told_apart(problem: &Problem) -> Result<Vec<String>, InputError> {
 fn turn(parameter: &Parameter) -> usize {
     let field = parameter.name.rsplit('.').next().unwrap_or_default();
     let fields = ["alpha", "a", "theta", "d", "beta"];
-    if parameter.slot.is_placement() {
+    if parameter.site.is_placement() {
         0
     } else {
         1 + fields.iter().position(|own| *own == field).unwrap_or(fields.len())

@@ -9,7 +9,8 @@ const PARALLEL: f64 = 0.1;
 /// Shorter distances than this have no direction \[m\].
 const NO_DISTANCE: f64 = 1e-12;
 
-/// Rz(θ₀) Tz(d₀) Ry(β) Rx(α) Tx(a) Rz(θ) Tz(d): the first two move along the axis before, the last two along the axis behind.
+/// Rz(θ₀) Tz(d₀) Ry(β) Rx(α) Tx(a) Rz(θ) Tz(d): the first two move along the axis before, the last
+/// two along the axis behind.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Step {
     pub theta_before: f64,
@@ -22,11 +23,15 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// Of a frame on the axis behind, seen from one on the axis before: along the common normal, with β = 0, where the axes
-    /// cross; \[Hayati1983\] with d₀ = 0, so that it stays near, where they are parallel or nearly so.
+    /// Of a frame on the axis behind, seen from one on the axis before: along the common normal,
+    /// with β = 0, where the axes cross; \[Hayati1983\] with d₀ = 0, so that it stays near, where
+    /// they are parallel or nearly so.
     pub fn to(frame: &Frame<f64>) -> Self {
-        let mut step =
-            if frame.axes[2].x.hypot(frame.axes[2].y) > PARALLEL { crossing(frame) } else { parallel(frame) };
+        let mut step = if frame.axes[2].x.hypot(frame.axes[2].y) > PARALLEL {
+            crossing(frame)
+        } else {
+            parallel(frame)
+        };
         let mut line = Frame::identity();
         line.rotate_z(step.theta_before.sin_cos());
         line.translate_z(step.d_before);
@@ -77,7 +82,8 @@ fn parallel(frame: &Frame<f64>) -> Step {
     step
 }
 
-/// The angle of a line without direction that lies in (−90°, 90°], and whether that is the direction given (1) or the other (−1).
+/// The angle of a line without direction that lies in (−90°, 90°], and whether that is the
+/// direction given (1) or the other (−1).
 fn near_zero(angle: f64) -> (f64, f64) {
     const ROUNDING: f64 = 1e-9;
     if angle > FRAC_PI_2 + ROUNDING {
@@ -99,7 +105,12 @@ mod tests {
     fn every_line_is_reached() {
         let angles = [0.0, 1e-9, 0.02, -0.06, 0.09, 0.11, -1.0, FRAC_PI_2, 2.5, PI, PI - 0.01];
         for (roll, pitch) in angles.iter().flat_map(|roll| angles.map(|pitch| (*roll, pitch))) {
-            for xyz in [Vector3::zeros(), Vector3::new(0.3, -0.2, 0.5), Vector3::new(0.0, 0.0, 1.0), Vector3::y()] {
+            for xyz in [
+                Vector3::zeros(),
+                Vector3::new(0.3, -0.2, 0.5),
+                Vector3::new(0.0, 0.0, 1.0),
+                Vector3::y(),
+            ] {
                 let frame = Frame::placed(&xyz, &Vector3::new(roll, pitch, 0.7));
                 let step = Step::to(&frame);
                 let mut again = Frame::identity();
@@ -110,8 +121,12 @@ mod tests {
                 again.translate_x(step.a);
                 again.rotate_z(step.theta.sin_cos());
                 again.translate_z(step.d);
-                let off = (0..3).map(|k| (frame.axes[k] - again.axes[k]).norm()).fold(0.0, f64::max);
-                assert!(off + (frame.origin - again.origin).norm() < 1e-12, "{roll} {pitch} {xyz}: {step:?}");
+                let off =
+                    (0..3).map(|k| (frame.axes[k] - again.axes[k]).norm()).fold(0.0, f64::max);
+                assert!(
+                    off + (frame.origin - again.origin).norm() < 1e-12,
+                    "{roll} {pitch} {xyz}: {step:?}"
+                );
                 assert!(step.d_before.abs() + step.d.abs() < 200.0, "{step:?}");
             }
         }

@@ -116,7 +116,9 @@ impl Robot {
     /// A mistake at a joint.
     pub(super) fn error_at(&self, joint: usize, mistake: UrdfMistake) -> InputError {
         match self.joints.get(joint) {
-            Some(own) => self.source.locate(own.span.start..own.span.start + 1).error(mistake.into()),
+            Some(own) => {
+                self.source.locate(own.span.start..own.span.start + 1).error(mistake.into())
+            }
             None => self.error(mistake),
         }
     }
@@ -158,16 +160,25 @@ impl Reader<'_> {
 
     /// At the first line of a part of the text.
     fn fail_at<T>(&self, span: Range<usize>, mistake: UrdfMistake) -> Result<T, InputError> {
-        let line = self.source.text.get(span.clone()).and_then(|part| part.lines().next()).unwrap_or_default();
+        let line = self
+            .source
+            .text
+            .get(span.clone())
+            .and_then(|part| part.lines().next())
+            .unwrap_or_default();
         Err(self.source.locate(span.start..span.start + line.len()).error(mistake.into()))
     }
 
     fn robot(&self, root: Node<'_, '_>) -> Result<Robot, InputError> {
         if root.tag_name().name() != "robot" {
-            return self.fail(root, UrdfMistake::NotARobot { found: shortened(root.tag_name().name(), 40) });
+            return self.fail(
+                root,
+                UrdfMistake::NotARobot { found: shortened(root.tag_name().name(), 40) },
+            );
         }
-        if let Some(node) =
-            root.descendants().find(|node| node.tag_name().namespace().is_some_and(|own| own.contains("xacro")))
+        if let Some(node) = root
+            .descendants()
+            .find(|node| node.tag_name().namespace().is_some_and(|own| own.contains("xacro")))
         {
             return self.fail(node, UrdfMistake::Xacro);
         }
@@ -181,7 +192,8 @@ impl Reader<'_> {
             }
             links.push(link);
         }
-        let names: Vec<&str> = of("joint").map(|node| node.attribute("name").unwrap_or_default()).collect();
+        let names: Vec<&str> =
+            of("joint").map(|node| node.attribute("name").unwrap_or_default()).collect();
         let mut joints: Vec<Joint> = Vec::new();
         for node in of("joint") {
             let joint = self.joint(node, &links, &names)?;
@@ -209,20 +221,28 @@ impl Reader<'_> {
     }
 
     /// N numbers of an attribute, and where they stand; `None` where it is not there.
-    fn numbers<const N: usize>(&self, node: Node<'_, '_>, attribute: &str) -> Result<Option<Placed<N>>, InputError> {
+    fn numbers<const N: usize>(
+        &self,
+        node: Node<'_, '_>,
+        attribute: &str,
+    ) -> Result<Option<Placed<N>>, InputError> {
         let Some(found) = node.attribute_node(attribute) else { return Ok(None) };
         let span = found.range_value();
         match numbers(found.value()) {
             Some(values) => Ok(Some((values, span))),
             None if found.value().contains("${") => self.fail_at(span, UrdfMistake::Xacro),
-            None => self.fail_at(span, UrdfMistake::NotNumbers { text: shortened(found.value(), 40), count: N }),
+            None => self.fail_at(
+                span,
+                UrdfMistake::NotNumbers { text: shortened(found.value(), 40), count: N },
+            ),
         }
     }
 
     fn link(&self, node: Node<'_, '_>) -> Result<Link, InputError> {
         let name = self.name(node)?;
-        let child =
-            |node: Node<'_, '_>, tag: &str| node.children().find(|own| own.has_tag_name(tag)).map(|own| own.id());
+        let child = |node: Node<'_, '_>, tag: &str| {
+            node.children().find(|own| own.has_tag_name(tag)).map(|own| own.id())
+        };
         let get = |id| node.document().get_node(id);
         let Some(inertial) = child(node, "inertial").and_then(get) else {
             return Ok(Link { name, mass: 0.0, com: Vector3::zeros() });
@@ -230,7 +250,8 @@ impl Reader<'_> {
         let mass = match child(inertial, "mass").and_then(get) {
             Some(mass) => match self.numbers::<1>(mass, "value")? {
                 Some(([value], span)) if value < 0.0 => {
-                    return self.fail_at(span, UrdfMistake::NegativeMass { text: value.to_string() });
+                    return self
+                        .fail_at(span, UrdfMistake::NegativeMass { text: value.to_string() });
                 }
                 Some(([value], _)) => value,
                 None => 0.0,
@@ -244,7 +265,12 @@ impl Reader<'_> {
         Ok(Link { name, mass, com: com.into() })
     }
 
-    fn joint(&self, node: Node<'_, '_>, links: &[Link], names: &[&str]) -> Result<Joint, InputError> {
+    fn joint(
+        &self,
+        node: Node<'_, '_>,
+        links: &[Link],
+        names: &[&str],
+    ) -> Result<Joint, InputError> {
         let name = self.name(node)?;
         let child = |tag: &'static str| node.children().find(move |own| own.has_tag_name(tag));
         let kind = match self.attribute(node, "type")? {
@@ -254,12 +280,17 @@ impl Reader<'_> {
             other => Kind::Other(shortened(other, 40)),
         };
         let end = |tag: &'static str| {
-            let Some(element) = child(tag) else { return self.fail(node, UrdfMistake::NoElement { element: tag }) };
+            let Some(element) = child(tag) else {
+                return self.fail(node, UrdfMistake::NoElement { element: tag });
+            };
             let name = self.attribute(element, "link")?;
             let known = || links.iter().map(|link| link.name.clone()).collect();
             match links.iter().position(|link| link.name == name) {
                 Some(link) => Ok(link),
-                None => self.fail(element, UrdfMistake::NoLink { name: shortened(name, 80), known: known() }),
+                None => self.fail(
+                    element,
+                    UrdfMistake::NoLink { name: shortened(name, 80), known: known() },
+                ),
             }
         };
         let (parent, child_link) = (end("parent")?, end("child")?);
@@ -279,24 +310,34 @@ impl Reader<'_> {
         let turns_on = node.attribute("type") == Some("continuous");
         let written = match child("limit").filter(|_| moves && !turns_on) {
             Some(limit) => {
-                let one =
-                    |which| Ok::<_, InputError>(self.numbers::<1>(limit, which)?.map_or(0.0, |([value], _)| value));
+                let one = |which| {
+                    Ok::<_, InputError>(
+                        self.numbers::<1>(limit, which)?.map_or(0.0, |([value], _)| value),
+                    )
+                };
                 Some((one("lower")?, one("upper")?))
             }
             None => None,
         };
         // Both are 0 where they are left out; a range of nothing is none.
-        let limits = written.filter(|(lower, upper)| lower < upper).unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+        let limits = written
+            .filter(|(lower, upper)| lower < upper)
+            .unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
         let reversed_limits = written.filter(|(lower, upper)| lower > upper);
         let mimic = match child("mimic").filter(|_| moves) {
             Some(element) => {
                 let leader = self.attribute(element, "joint")?;
                 let Some(leader) = names.iter().position(|name| *name == leader) else {
                     let known = names.iter().map(|&name| name.to_owned()).collect();
-                    return self.fail(element, UrdfMistake::NoJoint { name: shortened(leader, 80), known });
+                    return self.fail(
+                        element,
+                        UrdfMistake::NoJoint { name: shortened(leader, 80), known },
+                    );
                 };
                 let one = |which, absent| {
-                    Ok::<_, InputError>(self.numbers::<1>(element, which)?.map_or(absent, |([value], _)| value))
+                    Ok::<_, InputError>(
+                        self.numbers::<1>(element, which)?.map_or(absent, |([value], _)| value),
+                    )
                 };
                 Some((leader, one("multiplier", 1.0)?, one("offset", 0.0)?))
             }
@@ -324,7 +365,8 @@ impl Reader<'_> {
         if let Some((rpy, span)) = self.numbers::<3>(node, "rpy")? {
             (origin.written, origin.rpy_value) = (rpy.into(), Some(span));
             let words = node.attribute("rpy").unwrap_or_default().split_ascii_whitespace();
-            let meant: Vec<f64> = words.zip(rpy).map(|(word, value)| meant_angle(word).unwrap_or(value)).collect();
+            let meant: Vec<f64> =
+                words.zip(rpy).map(|(word, value)| meant_angle(word).unwrap_or(value)).collect();
             origin.meant = Vector3::from_iterator(meant);
         }
         Ok(origin)

@@ -15,12 +15,14 @@ use super::export::Steps;
 use crate::spatial::Frame;
 
 /// Names in the file.
-pub(super) const LINKS: [&str; 6] = ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
+pub(super) const LINKS: [&str; 6] =
+    ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
 const ROLLS: [f64; 6] = [0.0, FRAC_PI_2, 0.0, 0.0, FRAC_PI_2, -FRAC_PI_2];
 /// How far the nominal arm may be from the form \[rad\] or \[m\].
 const SAME: f64 = 1e-6;
 
-/// Origins of the six links of an identified arm: its gauges are those that give the nominal arm the form above.
+/// Origins of the six links of an identified arm: its gauges are those that give the nominal arm
+/// the form above.
 ///
 /// # Errors
 /// What of the nominal arm is not of that form.
@@ -44,7 +46,9 @@ pub(super) fn origins(nominal: &Steps, identified: &Steps) -> Result<Vec<Frame<f
 fn gauges(nominal: &Steps, base: &Frame<f64>) -> Result<Vec<Frame<f64>>, String> {
     let mut gauges = vec![*base];
     let mut before = *base;
-    for (k, (step, (roll, link))) in nominal.before.iter().zip(ROLLS.into_iter().zip(LINKS)).enumerate() {
+    for (k, (step, (roll, link))) in
+        nominal.before.iter().zip(ROLLS.into_iter().zip(LINKS)).enumerate()
+    {
         let frame = before.seen(step);
         let mut turned = Frame::identity();
         turned.rotate_x(roll.sin_cos());
@@ -55,7 +59,8 @@ fn gauges(nominal: &Steps, base: &Frame<f64>) -> Result<Vec<Frame<f64>>, String>
         }
         let next = nominal.before.get(k + 1);
         let along = match k {
-            // Where the next axis comes nearest, so that the next origin has no shift along this one.
+            // Where the next axis comes nearest, so that the next origin has no shift along this
+            // one.
             0 | 3 | 4 => rest.origin.z + next.map_or(0.0, nearest),
             5 => rest.origin.z + nominal.end.origin.z,
             _ => 0.0,
@@ -74,7 +79,10 @@ fn gauges(nominal: &Steps, base: &Frame<f64>) -> Result<Vec<Frame<f64>>, String>
             _ => placed.xz().norm(),
         };
         if off > SAME {
-            return Err(format!("{link} lies {:.3} mm off where that maker's arms have it", off * 1e3));
+            return Err(format!(
+                "{link} lies {:.3} mm off where that maker's arms have it",
+                off * 1e3
+            ));
         }
     }
     Ok(gauges)

@@ -17,7 +17,8 @@ pub(super) struct Weight {
     pub at: Vector3<f64>,
 }
 
-/// Every link with a mass behind a joint of the chain, and the joints beside the chain that move some of them.
+/// Every link with a mass behind a joint of the chain, and the joints beside the chain that move
+/// some of them.
 pub(super) fn weights(chain: &Chain) -> (Vec<Weight>, Vec<String>) {
     let robot = chain.robot;
     let (mut weights, mut beside) = (Vec::new(), Vec::new());
@@ -27,9 +28,16 @@ pub(super) fn weights(chain: &Chain) -> (Vec<Weight>, Vec<String>) {
         if let (Some(stage), Some(own)) = (carrier, robot.links.get(link))
             && own.mass > 0.0
         {
-            weights.push(Weight { stage, name: own.name.clone(), mass: own.mass, at: frame.point(&own.com) });
+            weights.push(Weight {
+                stage,
+                name: own.name.clone(),
+                mass: own.mass,
+                at: frame.point(&own.com),
+            });
         }
-        for (index, joint) in robot.joints.iter().enumerate().filter(|(_, joint)| joint.parent == link) {
+        for (index, joint) in
+            robot.joints.iter().enumerate().filter(|(_, joint)| joint.parent == link)
+        {
             let mut next = frame.seen(&joint.origin.frame());
             let stage = chain.stages.iter().position(|stage| stage.joint == index);
             if let Some(own) = stage.and_then(|stage| chain.stages.get(stage)) {

@@ -33,25 +33,43 @@ pub struct JointOrigin {
 
 /// Origins of the joints of `arm`, which is `problem` as identified.
 ///
-/// For ROS the frames are those of the problem, and a last origin leads to the tip. For Universal Robots they are those of
-/// that maker's description, from base_link_inertia to wrist_3_link; zero positions are those of the problem.
+/// For ROS the frames are those of the problem, and a last origin leads to the tip. For Universal
+/// Robots they are those of that maker's description, from base_link_inertia to wrist_3_link; zero
+/// positions are those of the problem.
 ///
 /// # Errors
 /// For Universal Robots: the arm is not of that form.
-pub fn joint_origins(problem: &Problem, arm: &Arm<f64>, form: Yaml) -> Result<Vec<JointOrigin>, InputError> {
+pub fn joint_origins(
+    problem: &Problem,
+    arm: &Arm<f64>,
+    form: Yaml,
+) -> Result<Vec<JointOrigin>, InputError> {
     problem.require_chain("export to YAML")?;
     let steps = Steps::of(arm);
-    let origin =
-        |(name, frame): (String, Frame<f64>)| JointOrigin { name, xyz: frame.origin, rpy: frame.roll_pitch_yaw() };
+    let origin = |(name, frame): (String, Frame<f64>)| JointOrigin {
+        name,
+        xyz: frame.origin,
+        rpy: frame.roll_pitch_yaw(),
+    };
     if form == Yaml::UniversalRobots {
         let nominal = Steps::of(&Arm::nominal(problem));
         let found = universal_robots::origins(&nominal, &steps);
-        let mistake =
-            |why: String| Location::file(&problem.data.location.file).error(UrdfMistake::NotUr { why }.into());
+        let mistake = |why: String| {
+            Location::file(&problem.data.location.file).error(UrdfMistake::NotUr { why }.into())
+        };
         let frames = found.map_err(mistake)?;
-        return Ok(universal_robots::LINKS.map(str::to_owned).into_iter().zip(frames).map(origin).collect());
+        return Ok(universal_robots::LINKS
+            .map(str::to_owned)
+            .into_iter()
+            .zip(frames)
+            .map(origin)
+            .collect());
     }
-    let moving = problem.joints.iter().filter(|joint| joint.kind != JointKind::Fixed).map(|joint| joint.name.clone());
+    let moving = problem
+        .joints
+        .iter()
+        .filter(|joint| joint.kind != JointKind::Fixed)
+        .map(|joint| joint.name.clone());
     let mut all: Vec<JointOrigin> = moving.zip(steps.before).map(origin).collect();
     let tip = problem.urdf.as_ref().map_or("tip", |ends| ends.tip.as_str()).to_owned();
     all.push(origin((tip, steps.end)));
@@ -62,8 +80,8 @@ pub fn joint_origins(problem: &Problem, arm: &Arm<f64>, form: Yaml) -> Result<Ve
 pub fn yaml(origins: &[JointOrigin], form: Yaml) -> String {
     let mut text = match form {
         Yaml::UniversalRobots => {
-            "# hash: put in that of the controller (calibration/conf of the robot, or the driver's own file):\n\
-                                  # with another one the driver reports a mismatch.\n"
+            "# hash: put in that of the controller (calibration/conf of the robot, or the regressor's own file):\n\
+                                  # with another one the regressor reports a mismatch.\n"
                 .to_owned()
         }
         Yaml::Ros => {
@@ -74,7 +92,8 @@ pub fn yaml(origins: &[JointOrigin], form: Yaml) -> String {
     text.push_str("kinematics:\n");
     for JointOrigin { name, xyz, rpy } in origins {
         let _ = writeln!(text, "  {}:", key(name));
-        let fields = ["x", "y", "z", "roll", "pitch", "yaw"].into_iter().zip(xyz.iter().chain(rpy.iter()));
+        let fields =
+            ["x", "y", "z", "roll", "pitch", "yaw"].into_iter().zip(xyz.iter().chain(rpy.iter()));
         for (field, value) in fields {
             let _ = writeln!(text, "    {field}: {}", float(*value));
         }
@@ -96,5 +115,9 @@ fn float(value: f64) -> String {
 fn key(name: &str) -> String {
     let plain = name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c));
-    if plain { name.to_owned() } else { format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\"")) }
+    if plain {
+        name.to_owned()
+    } else {
+        format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
+    }
 }

@@ -5,10 +5,15 @@ use std::collections::BTreeMap;
 use super::source::Source;
 
 /// The file in which a path ends, what is passed on by `pub use` followed to where it is defined.
-fn target(sources: &[Source], of_module: &BTreeMap<&[String], usize>, path: &[String]) -> Option<usize> {
+fn target(
+    sources: &[Source],
+    of_module: &BTreeMap<&[String], usize>,
+    path: &[String],
+) -> Option<usize> {
     let mut path = path.to_vec();
     for _ in 0..8 {
-        let length = (0..=path.len()).rev().find(|&length| of_module.contains_key(&path[..length]))?;
+        let length =
+            (0..=path.len()).rev().find(|&length| of_module.contains_key(&path[..length]))?;
         let file = of_module[&path[..length]];
         match path.get(length).and_then(|name| sources[file].passed_on.get(name)) {
             Some(onward) => path = [onward.clone(), path[length + 1..].to_vec()].concat(),
@@ -18,17 +23,25 @@ fn target(sources: &[Source], of_module: &BTreeMap<&[String], usize>, path: &[St
     None
 }
 
-/// Files that use each other in a circle, each circle once; `main.rs` and `lib.rs` stand above the house.
+/// Files that use each other in a circle, each circle once; `main.rs` and `lib.rs` stand above the
+/// house.
 pub fn circles(sources: &[Source]) -> Vec<String> {
     let named = |source: &Source| !["lib", "main"].contains(&source.room());
-    let of_module: BTreeMap<&[String], usize> =
-        sources.iter().enumerate().filter(|(_, s)| named(s)).map(|(k, s)| (s.module.as_slice(), k)).collect();
+    let of_module: BTreeMap<&[String], usize> = sources
+        .iter()
+        .enumerate()
+        .filter(|(_, s)| named(s))
+        .map(|(k, s)| (s.module.as_slice(), k))
+        .collect();
     let uses: Vec<Vec<usize>> = sources
         .iter()
         .enumerate()
         .map(|(k, source)| {
-            let mut all: Vec<usize> =
-                source.uses.iter().filter_map(|(_, path)| target(sources, &of_module, path)).collect();
+            let mut all: Vec<usize> = source
+                .uses
+                .iter()
+                .filter_map(|(_, path)| target(sources, &of_module, path))
+                .collect();
             all.sort_unstable();
             all.dedup();
             all.retain(|&used| used != k && named(source));
@@ -42,11 +55,14 @@ pub fn circles(sources: &[Source]) -> Vec<String> {
         if told[one] || !reached[one][one] {
             continue;
         }
-        let circle: Vec<usize> = (0..sources.len()).filter(|&k| reached[one][k] && reached[k][one]).collect();
+        let circle: Vec<usize> =
+            (0..sources.len()).filter(|&k| reached[one][k] && reached[k][one]).collect();
         let arrows = circle.iter().flat_map(|&k| {
             let (uses, circle) = (&uses, &circle);
             let inner = uses[k].iter().filter(move |used| circle.contains(used));
-            inner.map(move |&used| format!("{} uses {}", sources[k].path.display(), sources[used].path.display()))
+            inner.map(move |&used| {
+                format!("{} uses {}", sources[k].path.display(), sources[used].path.display())
+            })
         });
         circles.push(arrows.collect::<Vec<_>>().join("\n  "));
         for &k in &circle {

@@ -1,4 +1,5 @@
-//! The rules of the house, read from the source: who may use whom, no circles, who prints, how long a file gets.
+//! The rules of the house, read from the source: who may use whom, no circles, who prints, how long
+//! a file gets.
 
 #![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that fails may panic")]
 
@@ -31,41 +32,43 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("least_squares", &[&["scalar", "error", "numeric"]]),
     // The physics knows no sensors; the test rig shares no physics.
     ("mechanics", &[&["scalar", "spatial", "error", "problem"]]),
-    ("simulate", &[&["scalar", "spatial", "quantity", "error", "problem", "files", "random"]]),
-    ("model", &[&["scalar", "spatial", "quantity", "error", "problem", "mechanics", "least_squares"]]),
+    ("rig", &[&["scalar", "spatial", "quantity", "error", "problem", "files", "random"]]),
+    (
+        "model",
+        &[&["scalar", "spatial", "quantity", "error", "problem", "mechanics", "least_squares"]],
+    ),
     // The paper checks the model, so it shares no physics with it.
     ("paper", &[&["spatial", "error", "problem", "least_squares"]]),
-    ("identify", &[GROUND, BELOW_IDENTIFY, &["files"]]),
-    ("diagnose", &[GROUND, BELOW_IDENTIFY, &["identify"]]),
+    ("fit", &[GROUND, BELOW_FIT, &["files"]]),
+    ("select", &[GROUND, BELOW_FIT, &["fit"]]),
     // Arms from URDF and back.
     ("urdf", &[&["spatial", "error", "problem", "mechanics", "model", "least_squares", "random"]]),
     // Which poses to measure, and what they will tell.
-    ("design", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose"]]),
+    ("design", &[GROUND, BELOW_FIT, &["fit", "select"]]),
     // Many fits to what model or rig measure.
-    ("monte_carlo", &[GROUND, BELOW_IDENTIFY, &["identify", "simulate", "files"]]),
-    ("report", &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo", "files", "urdf"]]),
+    ("study", &[GROUND, BELOW_FIT, &["fit", "rig", "files"]]),
+    ("report", &[GROUND, BELOW_FIT, &["fit", "select", "design", "study", "files", "urdf"]]),
     (
         "cli",
         &[
             GROUND,
-            BELOW_IDENTIFY,
-            &["identify", "diagnose", "design", "monte_carlo", "report", "simulate", "files", "urdf"],
+            BELOW_FIT,
+            &["fit", "select", "design", "study", "report", "rig", "files", "urdf"],
         ],
     ),
-    (
-        "main",
-        &[GROUND, BELOW_IDENTIFY, &["identify", "diagnose", "design", "monte_carlo", "report", "simulate", "cli"]],
-    ),
+    ("main", &[GROUND, BELOW_FIT, &["fit", "select", "design", "study", "report", "rig", "cli"]]),
 ];
-const BELOW_IDENTIFY: &[&str] = &["mechanics", "model", "paper", "least_squares", "numeric", "random"];
+const BELOW_FIT: &[&str] = &["mechanics", "model", "paper", "least_squares", "numeric", "random"];
 
 /// Rooms that read no files.
-const WITHOUT_FILES: &[&str] = &["scalar", "spatial", "quantity", "least_squares", "mechanics", "model"];
+const WITHOUT_FILES: &[&str] =
+    &["scalar", "spatial", "quantity", "least_squares", "mechanics", "model"];
 const FILES: &[&str] = &["std::fs", "std::path", "std::io", "csv::", "toml::", "serde_json::"];
 
 /// Rooms that print.
 const PRINTING: &[&str] = &["cli", "main"];
-const PRINTS: &[&str] = &["println!", "eprintln!", "print!", "eprint!", "dbg!", "io::stdout", "io::stderr"];
+const PRINTS: &[&str] =
+    &["println!", "eprintln!", "print!", "eprint!", "dbg!", "io::stdout", "io::stderr"];
 
 /// Uses of rooms that are not below.
 fn upward(source: &Source) -> Vec<String> {
@@ -74,7 +77,9 @@ fn upward(source: &Source) -> Vec<String> {
         return Vec::new();
     }
     let Some((_, below)) = STOREYS.iter().find(|(name, _)| *name == room) else {
-        return vec![source.at(1, &format!("{room} has no storey; give it one in tests/architecture"))];
+        return vec![
+            source.at(1, &format!("{room} has no storey; give it one in tests/architecture")),
+        ];
     };
     let is_room = |name: &str| STOREYS.iter().any(|(room, _)| *room == name);
     let allowed = |name: &str| name == room || below.iter().any(|rooms| rooms.contains(&name));
@@ -143,12 +148,16 @@ fn every_file_is_a_module_of_its_folder() {
     forbid(sources.iter().filter_map(|source| {
         let (name, folder) = source.module.split_last()?;
         let declares = |other: &&Source| {
-            let above =
-                if folder.is_empty() { ["lib", "main"].contains(&other.room()) } else { other.module == folder };
+            let above = if folder.is_empty() {
+                ["lib", "main"].contains(&other.room())
+            } else {
+                other.module == folder
+            };
             above && other.children.contains(name)
         };
         let is_top = folder.is_empty() && name == "main";
-        (!is_top && !sources.iter().any(|other| declares(&other))).then(|| source.at(1, "no module declares it"))
+        (!is_top && !sources.iter().any(|other| declares(&other)))
+            .then(|| source.at(1, "no module declares it"))
     }));
 }
 
@@ -157,7 +166,10 @@ fn circles_are_found() {
     let sources = [
         Source::new("a/mod.rs", "mod b;\nmod c;\npub use b::B;\npub struct A;\n"),
         Source::new("a/b.rs", "use super::c;\npub struct B;\nfn f() { c::g(); }\n"),
-        Source::new("a/c.rs", "pub fn g() -> crate::a::B {}\n#[cfg(test)]\nmod tests { use super::super::d; }\n"),
+        Source::new(
+            "a/c.rs",
+            "pub fn g() -> crate::a::B {}\n#[cfg(test)]\nmod tests { use super::super::d; }\n",
+        ),
         Source::new("a/d.rs", "use super::{A, B};\n"),
     ];
     assert_eq!(circles(&sources), ["a/b.rs uses a/c.rs\n  a/c.rs uses a/b.rs"]);
@@ -168,7 +180,7 @@ fn circles_are_found() {
 #[test]
 fn broken_rules_are_found_with_their_lines() {
     let source = Source::new;
-    let text = "//! use crate::identify;\nuse crate::{\n    error::X,\n    mechanics::{Arm, model},\n};\nuse super::super::super::identify::Y;\n\
+    let text = "//! use crate::fit;\nuse crate::{\n    error::X,\n    mechanics::{Arm, model},\n};\nuse super::super::super::fit::Y;\n\
                 fn f() { crate::report::g(); } // crate::cli\n";
     let broken = upward(&source("least_squares/solver/bounded.rs", text));
     let expected = [
@@ -183,7 +195,8 @@ fn broken_rules_are_found_with_their_lines() {
     );
     assert_eq!(upward(&source("cli/loop.rs", text)), [] as [&str; 0]);
     assert_eq!(upward(&source("attic.rs", "")).len(), 1);
-    let printing = source("identify/mod.rs", "fn f() {\n    eprintln!(\"x\");\n    sprint!();\n}\n");
+    let printing =
+        source("identify/mod.rs", "fn f() {\n    eprintln!(\"x\");\n    sprint!();\n}\n");
     assert_eq!(holding(&printing, PRINTS), ["src/identify/mod.rs:2: identify has eprintln!"]);
     let reading = source("mechanics/mod.rs", "use std::fs;\n");
     assert_eq!(holding(&reading, FILES), ["src/mechanics/mod.rs:1: mechanics has std::fs"]);

@@ -12,7 +12,8 @@ pub struct Source {
     pub text: String,
     /// Module path, `["mechanics", "beam"]`; empty for lib.rs.
     pub module: Vec<String>,
-    /// Paths from the root of the crate that the file uses, with their lines; what it only passes on is not among them.
+    /// Paths from the root of the crate that the file uses, with their lines; what it only passes
+    /// on is not among them.
     pub uses: Vec<(usize, Vec<String>)>,
     /// Names that it passes on (`pub use`), with the paths they stand for.
     pub passed_on: BTreeMap<String, Vec<String>>,
@@ -31,24 +32,35 @@ struct Import {
 impl Source {
     pub fn new(path: &str, text: &str) -> Self {
         let path = PathBuf::from(path);
-        let mut module: Vec<String> =
-            path.with_extension("").iter().map(|part| part.to_string_lossy().into_owned()).collect();
+        let mut module: Vec<String> = path
+            .with_extension("")
+            .iter()
+            .map(|part| part.to_string_lossy().into_owned())
+            .collect();
         if module.last().is_some_and(|last| last == "mod" || last == "lib") {
             module.pop();
         }
         let tokens: TokenStream = text.parse().expect("Rust");
-        let mut reader = Reader { module: &module, imports: Vec::new(), children: Vec::new(), paths: Vec::new() };
+        let mut reader = Reader {
+            module: &module,
+            imports: Vec::new(),
+            children: Vec::new(),
+            paths: Vec::new(),
+        };
         reader.read(tokens);
         let Reader { imports, children, paths, .. } = reader;
-        let mut known: BTreeMap<String, Vec<String>> =
-            children.iter().map(|child| (child.clone(), [module.clone(), vec![child.clone()]].concat())).collect();
+        let mut known: BTreeMap<String, Vec<String>> = children
+            .iter()
+            .map(|child| (child.clone(), [module.clone(), vec![child.clone()]].concat()))
+            .collect();
         known.extend(imports.iter().map(|import| (import.name.clone(), import.path.clone())));
         let (mut uses, mut passed_on) = (Vec::new(), BTreeMap::new());
         for import in imports {
             let head = import.path.first().and_then(|first| known.get(first).cloned());
             // A child module is named without its parents.
-            let is_child =
-                head.as_ref().is_some_and(|head| head.len() == module.len() + 1 && head.starts_with(&module));
+            let is_child = head
+                .as_ref()
+                .is_some_and(|head| head.len() == module.len() + 1 && head.starts_with(&module));
             let path = match head {
                 Some(head) if is_child => [head, import.path[1..].to_vec()].concat(),
                 _ => import.path,
@@ -79,9 +91,13 @@ impl Source {
         }
     }
 
-    /// Lines without comments, counted from 1. Texts with // in them count as comments from there on.
+    /// Lines without comments, counted from 1. Texts with // in them count as comments from there
+    /// on.
     pub fn code(&self) -> impl Iterator<Item = (usize, &str)> {
-        self.text.lines().enumerate().map(|(k, line)| (k + 1, line.split("//").next().unwrap_or_default()))
+        self.text
+            .lines()
+            .enumerate()
+            .map(|(k, line)| (k + 1, line.split("//").next().unwrap_or_default()))
     }
 
     pub fn at(&self, line: usize, what: &str) -> String {
@@ -126,10 +142,14 @@ impl Reader<'_> {
                     }
                     k += 2;
                 }
-                (_, Some(first)) if is(k + 1, ':') && is(k + 2, ':') && !(k > 0 && is(k - 1, ':')) => {
+                (_, Some(first))
+                    if is(k + 1, ':') && is(k + 2, ':') && !(k > 0 && is(k - 1, ':')) =>
+                {
                     let line = tokens[k].span().start().line;
                     let mut path = vec![first.to_owned()];
-                    while let (true, true, Some(next)) = (is(k + 1, ':'), is(k + 2, ':'), word(k + 3)) {
+                    while let (true, true, Some(next)) =
+                        (is(k + 1, ':'), is(k + 2, ':'), word(k + 3))
+                    {
                         path.push(next);
                         k += 3;
                     }
@@ -147,18 +167,20 @@ impl Reader<'_> {
     fn tree(&mut self, tokens: &[TokenTree], before: &[String], is_public: bool) {
         let mut path = before.to_vec();
         let line = tokens.first().map_or(0, |token| token.span().start().line);
-        let mut words =
-            tokens.iter().filter(|token| !matches!(token, TokenTree::Punct(punct) if punct.as_char() == ':'));
+        let mut words = tokens
+            .iter()
+            .filter(|token| !matches!(token, TokenTree::Punct(punct) if punct.as_char() == ':'));
         let mut name = None;
         while let Some(token) = words.next() {
             match token {
-                TokenTree::Ident(ident) if ident == "as" => name = words.next().map(ToString::to_string),
+                TokenTree::Ident(ident) if ident == "as" => {
+                    name = words.next().map(ToString::to_string)
+                }
                 TokenTree::Ident(ident) if ident == "self" && !path.is_empty() => {}
                 TokenTree::Ident(ident) => path.push(ident.to_string()),
                 TokenTree::Group(group) if group.delimiter() == Delimiter::Brace => {
                     let inner: Vec<TokenTree> = group.stream().into_iter().collect();
-                    let is_comma =
-                        |token: &TokenTree| matches!(token, TokenTree::Punct(punct) if punct.as_char() == ',');
+                    let is_comma = |token: &TokenTree| matches!(token, TokenTree::Punct(punct) if punct.as_char() == ',');
                     inner
                         .split(is_comma)
                         .filter(|one| !one.is_empty())
@@ -174,7 +196,8 @@ impl Reader<'_> {
         self.imports.push(Import { line, path, name, is_public });
     }
 
-    /// `super` and `self` told from the root of the crate; the library of the command line is the crate, too.
+    /// `super` and `self` told from the root of the crate; the library of the command line is the
+    /// crate, too.
     fn absolute(&self, path: Vec<String>) -> Vec<String> {
         let ups = path.iter().take_while(|word| *word == "super").count();
         let root = || vec!["crate".to_owned()];
@@ -201,7 +224,8 @@ pub fn sources() -> Vec<Source> {
                 folders.push(path);
             } else if path.extension().is_some_and(|extension| extension == "rs") {
                 let text = fs::read_to_string(&path).unwrap();
-                sources.push(Source::new(&path.strip_prefix(&root).unwrap().to_string_lossy(), &text));
+                sources
+                    .push(Source::new(&path.strip_prefix(&root).unwrap().to_string_lossy(), &text));
             }
         }
     }

@@ -4,13 +4,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use flexcal::identify::{Options, Placement, compensate, identify};
+use flexcal::fit::{Options, Placement, compensate, identify};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::mechanics::{Arm, Equilibrated, Workspace};
 use flexcal::model::Model;
 use flexcal::problem::{PoseView, Problem};
 use flexcal::report::{commands_csv, poses_csv};
-use flexcal::simulate::{Truth, simulate};
+use flexcal::rig::{Truth, simulate};
 use nalgebra::Vector3;
 
 fn case(name: &str) -> PathBuf {
@@ -39,14 +39,18 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
     let rows = &data.measurements;
     let found = identify(&problem, &data, &Options::default()).unwrap();
 
-    // Where the nominal arm would be in the held-out configurations is where the true arm should be.
+    // Where the nominal arm would be in the held-out configurations is where the true arm should
+    // be.
     let nominal = Arm::nominal(&problem);
     let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
     let mut targets = rows.clone();
     for row in 0..rows.len() {
         let set = &simulation.rows[row].conditions;
-        let setup =
-            PoseView { payload: set.payload.as_ref(), hoist: set.hoist.as_ref(), ..PoseView::of(&set.configuration) };
+        let setup = PoseView {
+            payload: set.payload.as_ref(),
+            hoist: set.hoist.as_ref(),
+            ..PoseView::of(&set.configuration)
+        };
         nominal.equilibrate(&setup, &mut ws, &mut rest).unwrap();
         targets.positions[row] = rest.frame.point(&problem.tool.target);
     }
@@ -77,7 +81,8 @@ fn changed(from: &str, to: &str) -> String {
 
 #[test]
 fn the_digest_is_of_what_predictions_depend_on() {
-    let digest = |from, to| Problem::parse(&changed(from, to), Path::new("problem.toml")).unwrap().digest();
+    let digest =
+        |from, to| Problem::parse(&changed(from, to), Path::new("problem.toml")).unwrap().digest();
     let own = digest("", "");
     // On every machine.
     assert_eq!(own, "843194ed2f0f49648c76b13cbc088316658d12dbee573d3f7cbb8807d2c1078b");
@@ -106,8 +111,8 @@ fn the_digest_is_of_what_predictions_depend_on() {
     ] {
         seen.push(digest(from, to));
     }
-    let warm =
-        changed("[parameters]", drift).replace("reference_temperature_C = 20.0", "reference_temperature_C = 25.0");
+    let warm = changed("[parameters]", drift)
+        .replace("reference_temperature_C = 20.0", "reference_temperature_C = 25.0");
     seen.push(Problem::parse(&warm, Path::new("problem.toml")).unwrap().digest());
     let count = seen.len();
     seen.sort_unstable();
@@ -125,11 +130,24 @@ fn targets_without_what_an_effect_follows_are_reached_without_it() {
         command.current_dir(folder.path()).args(arguments).assert().success()
     };
     let drift = |joint: u32| format!("[[effect]]\njoint-thermal-drift = {{ joint = {joint} }}\n\n");
-    fs::write(path("problem.toml"), changed("[parameters]", &(drift(2) + &drift(3) + "[parameters]"))).unwrap();
+    fs::write(
+        path("problem.toml"),
+        changed("[parameters]", &(drift(2) + &drift(3) + "[parameters]")),
+    )
+    .unwrap();
     fs::copy(case("a-none.csv"), path("a-none.csv")).unwrap();
     run(&["identify", ".", "--quiet", "--out", "."]);
     fs::write(path("targets.csv"), "q1_deg,q2_deg,q3_deg,q4_deg\n0,10,-40,5\n").unwrap();
-    let done = run(&["compensate", ".", "--estimate", "estimate.json", "--data", "targets.csv", "--out", "there"]);
+    let done = run(&[
+        "compensate",
+        ".",
+        "--estimate",
+        "estimate.json",
+        "--data",
+        "targets.csv",
+        "--out",
+        "there",
+    ]);
     let told = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
     // One for each of the two effects.
     assert_eq!(told.matches("commands leave out what depends on it").count(), 2, "{told}");
@@ -148,16 +166,33 @@ fn an_estimate_of_another_arm_is_refused() {
     fs::copy(case("a-none.csv"), path("a-none.csv")).unwrap();
     run(&["identify", ".", "--quiet", "--out", "."]).success();
     let text = fs::read_to_string(path("estimate.json")).unwrap();
-    let few: Vec<String> =
-        fs::read_to_string(path("a-none.csv")).unwrap().lines().take(4).map(|line| format!("{line}\n")).collect();
+    let few: Vec<String> = fs::read_to_string(path("a-none.csv"))
+        .unwrap()
+        .lines()
+        .take(4)
+        .map(|line| format!("{line}\n"))
+        .collect();
     fs::write(path("targets.csv"), few.concat()).unwrap();
-    let compensate =
-        || run(&["compensate", ".", "--estimate", "estimate.json", "--data", "targets.csv", "--out", "there"]);
+    let compensate = || {
+        run(&[
+            "compensate",
+            ".",
+            "--estimate",
+            "estimate.json",
+            "--data",
+            "targets.csv",
+            "--out",
+            "there",
+        ])
+    };
     compensate().success();
     fs::write(path("problem.toml"), changed("mass_kg = 4.2", "mass_kg = 4.3")).unwrap();
     let assert = compensate().code(2);
     let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
-    assert!(message.contains("estimate.json: was identified with another declared arm"), "{message}");
+    assert!(
+        message.contains("estimate.json: was identified with another declared arm"),
+        "{message}"
+    );
     // What older versions wrote says nothing of the arm.
     let mut old: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert!(old.as_object_mut().unwrap().remove("arm_digest").is_some());
@@ -178,8 +213,11 @@ fn limits_are_kept_and_targets_out_of_reach_are_named() {
     assert!(!commands[0].is_reached() && commands[0].miss.norm() > 4.0);
     assert!(commands.iter().all(|command| (-0.2..=0.3).contains(&command.configuration[1])));
     // Where the shoulder starts well inside its range, a correction is enough.
-    let inside = commands.iter().skip(1).filter(|command| (-0.15..=0.25).contains(&rows.configuration(command.row)[1]));
-    let inside: Vec<bool> = inside.map(flexcal::identify::Command::is_reached).collect();
+    let inside = commands
+        .iter()
+        .skip(1)
+        .filter(|command| (-0.15..=0.25).contains(&rows.configuration(command.row)[1]));
+    let inside: Vec<bool> = inside.map(flexcal::fit::Command::is_reached).collect();
     assert!(inside.len() > 10 && inside.iter().all(|reached| *reached));
 }
 
@@ -192,7 +230,13 @@ fn redundancy_stays_near_the_seed() {
     for command in compensate(&problem, &arm, &x, &rows).unwrap() {
         // Four joints and three coordinates: the way is a correction, not another posture.
         let seed = rows.configuration(command.row);
-        let step: f64 = command.configuration.iter().zip(seed).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        let step: f64 = command
+            .configuration
+            .iter()
+            .zip(seed)
+            .map(|(a, b)| (a - b).powi(2))
+            .sum::<f64>()
+            .sqrt();
         assert!(command.is_reached() && step < 0.2, "row {}: {step} rad", command.row);
     }
 }
@@ -205,8 +249,10 @@ fn a_joint_that_follows_moves_with_its_leader() {
                 [[joint]]\nkind = 'prismatic'\nmimic = { joint = 3, ratio = 0.1 }\n[tool]\ntarget_m = [0.1, 0.02, 0.05]\n\
                 [[effect]]\ngear-ratio = { joint = 2 }\n[parameters]\n'*gear-ratio*' = { free = true }\n";
     let problem = Problem::parse(text, Path::new("problem.toml")).unwrap();
-    let rows =
-        measured("q1_deg,q2_deg,q3_deg,x_m,y_m,z_m\n10,20,-15,0,0,0\n-80,-30,25,0,0,0\n45,55,0,0,0,0\n", &problem);
+    let rows = measured(
+        "q1_deg,q2_deg,q3_deg,x_m,y_m,z_m\n10,20,-15,0,0,0\n-80,-30,25,0,0,0\n45,55,0,0,0,0\n",
+        &problem,
+    );
     let arm = model(&problem, &rows);
     let all: Vec<usize> = (0..rows.len()).collect();
     let x = nalgebra::DVector::from_element(arm.parameters.len(), 2e-3);
@@ -218,7 +264,11 @@ fn a_joint_that_follows_moves_with_its_leader() {
     targets.positions = arm.predict(Placement::of(&wanted).poses(&wanted, &all, 1.0), &x);
     for command in compensate(&problem, &arm, &x, &targets).unwrap() {
         assert!(command.is_reached() && command.seed_miss > 0.01, "{command:?}");
-        let off = command.configuration.iter().zip(wanted.configuration(command.row)).map(|(a, b)| (a - b).abs());
+        let off = command
+            .configuration
+            .iter()
+            .zip(wanted.configuration(command.row))
+            .map(|(a, b)| (a - b).abs());
         assert!(off.fold(0.0, f64::max) < 1e-8, "{command:?}");
     }
     let commands = compensate(&problem, &arm, &x, &targets).unwrap();
@@ -228,7 +278,8 @@ fn a_joint_that_follows_moves_with_its_leader() {
 #[test]
 fn words_with_a_comma_stay_one_cell() {
     let problem = Problem::read(&case("problem.toml")).unwrap();
-    let mut targets = Measurements::read(&[case("a-none.csv")], &problem).unwrap().0.select(&[0, 1, 2]);
+    let mut targets =
+        Measurements::read(&[case("a-none.csv")], &problem).unwrap().0.select(&[0, 1, 2]);
     targets.session.names = vec!["bench \"A\", east".to_owned()];
     let arm = model(&problem, &targets);
     let x = nalgebra::DVector::zeros(arm.parameters.len());
@@ -236,7 +287,8 @@ fn words_with_a_comma_stay_one_cell() {
     for text in [commands_csv(&problem, &targets, &commands), poses_csv(&problem, &targets)] {
         let mut table = csv::Reader::from_reader(text.as_bytes());
         let place = table.headers().unwrap().iter().position(|name| name == "session").unwrap();
-        let words: Vec<String> = table.records().map(|row| row.unwrap()[place].to_owned()).collect();
+        let words: Vec<String> =
+            table.records().map(|row| row.unwrap()[place].to_owned()).collect();
         assert_eq!(words, ["bench \"A\", east"; 3], "{text}");
     }
 }
@@ -249,7 +301,8 @@ fn errors_of_the_instrument_are_no_errors_of_the_arm() {
     let rows = Measurements::read(&[case("a-none.csv")], &problem).unwrap().0.select(&[3, 40]);
     let model = model(&problem, &rows);
     let mut x = nalgebra::DVector::zeros(model.parameters.len());
-    let seen = |name: &str| model.parameters.iter().position(|parameter| parameter.name == name).unwrap();
+    let seen =
+        |name: &str| model.parameters.iter().position(|parameter| parameter.name == name).unwrap();
     x[seen("joint2.theta")] = 2e-3;
     let arm = x.clone();
     (x[seen("tracker-scale.error")], x[seen("tracker-drift.z")]) = (1e-3, 1e-6);
@@ -257,10 +310,13 @@ fn errors_of_the_instrument_are_no_errors_of_the_arm() {
     for command in compensate(&problem, &model, &x, &rows).unwrap() {
         assert!(command.is_reached());
         let n = rows.joints;
-        reached.configurations[command.row * n..(command.row + 1) * n].copy_from_slice(&command.configuration);
+        reached.configurations[command.row * n..(command.row + 1) * n]
+            .copy_from_slice(&command.configuration);
     }
     let placement = Placement::of(&rows);
-    for (target, there) in rows.positions.iter().zip(model.predict(placement.poses(&reached, &[0, 1], 1.0), &arm)) {
+    for (target, there) in
+        rows.positions.iter().zip(model.predict(placement.poses(&reached, &[0, 1], 1.0), &arm))
+    {
         assert!((target - there).norm() < 1e-8, "{} m off", (target - there).norm());
     }
 }

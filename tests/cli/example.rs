@@ -7,15 +7,20 @@ const LINES: usize = 30;
 #[test]
 fn thirty_lines_fit_predict_and_trace_an_effect_of_their_own() {
     let text = include_str!("../../examples/thirty_lines.rs");
-    let is_code =
-        |line: &&str| !line.trim().is_empty() && !["//", "#!["].iter().any(|mark| line.trim().starts_with(mark));
+    let is_code = |line: &&str| {
+        !line.trim().is_empty() && !["//", "#!["].iter().any(|mark| line.trim().starts_with(mark))
+    };
     let lines = text.lines().filter(is_code).count();
     assert!(lines <= LINES, "{lines} lines of code");
 
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let arguments = ["run", "--quiet", "--example", "thirty_lines"];
-    let output = Command::new(cargo).current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments).output();
+    let output =
+        Command::new(cargo).current_dir(env!("CARGO_MANIFEST_DIR")).args(arguments).output();
     let printed = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned());
     let printed = printed.unwrap_or_default();
-    assert!(printed.starts_with("joint 1 pulls at joint 2: 3.00 mrad; the tip is at "), "{printed}");
+    assert!(
+        printed.starts_with("joint 1 pulls at joint 2: 3.00 mrad; the tip is at "),
+        "{printed}"
+    );
 }

@@ -26,7 +26,11 @@ fn header(bench: &Bench) -> Vec<String> {
 
 fn run(bench: &Bench, arguments: &str) -> (i32, String, String) {
     let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let output = flexcal.current_dir(bench.folder.path()).args(arguments.split_whitespace()).output().unwrap();
+    let output = flexcal
+        .current_dir(bench.folder.path())
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap();
     (output.status.code().unwrap(), text(&output.stdout), text(&output.stderr))
 }
 
@@ -45,16 +49,22 @@ fn a_row_that_carries_the_misfit_is_named_and_to_be_looked_at() {
         assert!(words.contains(expected), "{expected} missing in:\n{out}");
     }
     assert!(!out.contains("lacks something"), "{out}");
-    let json: Value = serde_json::from_str(&fs::read_to_string(bench.path("out/estimate.json")).unwrap()).unwrap();
+    let json: Value =
+        serde_json::from_str(&fs::read_to_string(bench.path("out/estimate.json")).unwrap())
+            .unwrap();
     let carried = &json["misfit_carried_by"];
-    assert!(carried["rows"][0]["line"] == 16 && carried["rows"].as_array().unwrap().len() == 1, "{carried}");
+    assert!(
+        carried["rows"][0]["line"] == 16 && carried["rows"].as_array().unwrap().len() == 1,
+        "{carried}"
+    );
     let (with, without) = (&json["reduced_chi2"], &carried["reduced_chi2_without"]);
     assert!(with.as_f64().unwrap() > 1e3 && without.as_f64().unwrap() < 2.0, "{with} {without}");
 
     let (_, out, _) = run(&bench, "loop . --out out");
-    for expected in
-        ["Look first at the rows that carry the misfit", "Next: look at ./a-none.csv:16; a section [robust]"]
-    {
+    for expected in [
+        "Look first at the rows that carry the misfit",
+        "Next: look at ./a-none.csv:16; a section [robust]",
+    ] {
         assert!(out.contains(expected), "{expected} missing in:\n{out}");
     }
     // The robust loss that is advised leaves nothing to say.
@@ -80,11 +90,16 @@ fn copies_are_named_whatever_their_number_and_time_and_repeats_are_not() {
     let line = |number: usize, changes: &[(&str, &str)]| {
         let row = table.lines().nth(number - 1).unwrap();
         let change = |(name, cell): (&String, &str)| {
-            changes.iter().find(|(own, _)| own == name).map_or(cell.to_owned(), |(_, other)| (*other).to_owned())
+            changes
+                .iter()
+                .find(|(own, _)| own == name)
+                .map_or(cell.to_owned(), |(_, other)| (*other).to_owned())
         };
         names.iter().zip(row.split(',')).map(change).collect::<Vec<_>>().join(",")
     };
-    let with = |rows: &[String]| fs::write(bench.path("a-none.csv"), table.clone() + &rows.join("\n") + "\n").unwrap();
+    let with = |rows: &[String]| {
+        fs::write(bench.path("a-none.csv"), table.clone() + &rows.join("\n") + "\n").unwrap()
+    };
     let last = table.lines().count();
     with(&[line(6, &[("time_s", "90000"), ("pose", "201")]), line(9, &[])]);
     let (_, _, err) = run(&bench, "identify . --out out");
@@ -111,7 +126,10 @@ fn quiet_says_in_one_line_why_the_status_is_1() {
     for command in ["identify", "trace"] {
         let (status, out, err) = run(&bench, &format!("{command} . --quiet --out out"));
         assert!(status == 1 && out.is_empty(), "{status} {out}");
-        assert!(err.lines().count() == 1 && err.contains("the fit is not to be trusted: "), "{command}: {err}");
+        assert!(
+            err.lines().count() == 1 && err.contains("the fit is not to be trusted: "),
+            "{command}: {err}"
+        );
     }
 }
 
@@ -121,9 +139,17 @@ fn rows_that_an_effect_touches_alone_are_no_gross_ones() {
     let cases = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
     fs::copy(cases.join("e-payload-mass.csv"), bench.path("a-none.csv")).unwrap();
     let (_, out, _) = run(&bench, "identify . --out out");
-    assert!(!out.contains("carr") && out.contains("\nNext: flexcal loop . looks for what the model lacks"), "{out}");
-    let json: Value = serde_json::from_str(&fs::read_to_string(bench.path("out/estimate.json")).unwrap()).unwrap();
-    assert!(json["misfit_carried_by"].is_null() && !json["outliers"].as_array().unwrap().is_empty());
+    assert!(
+        !out.contains("carr")
+            && out.contains("\nNext: flexcal loop . looks for what the model lacks"),
+        "{out}"
+    );
+    let json: Value =
+        serde_json::from_str(&fs::read_to_string(bench.path("out/estimate.json")).unwrap())
+            .unwrap();
+    assert!(
+        json["misfit_carried_by"].is_null() && !json["outliers"].as_array().unwrap().is_empty()
+    );
 }
 
 #[test]

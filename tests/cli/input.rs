@@ -1,4 +1,5 @@
-//! What is asked for, and what is wrong with it: exit status, messages, and that bad input leaves nothing behind.
+//! What is asked for, and what is wrong with it: exit status, messages, and that bad input leaves
+//! nothing behind.
 
 use std::fs;
 use std::path::Path;
@@ -18,7 +19,10 @@ fn the_problem_may_stand_behind_the_data_or_in_the_current_folder() {
     run("identify --quiet --data a-none.csv problem.toml").success();
     run("identify --quiet").success();
     run("identify --quiet --data a-none.csv --out elsewhere").success();
-    assert!(bench.path("out/lunar-sampler/estimate.json").exists() && bench.path("elsewhere/estimate.json").exists());
+    assert!(
+        bench.path("out/lunar-sampler/estimate.json").exists()
+            && bench.path("elsewhere/estimate.json").exists()
+    );
     // A closed problem has a folder of its own.
     fs::copy(bench.path("problem.toml"), bench.path("problem.closed.toml")).unwrap();
     run("identify problem.closed.toml --quiet").success();
@@ -41,7 +45,10 @@ fn the_problem_may_stand_behind_the_data_or_in_the_current_folder() {
     };
     let (planned, measured) = (rows("plan/plan.csv"), rows("rig/measurements.csv"));
     assert_eq!(planned("q2_deg"), measured("q2_deg"));
-    assert!(measured("y_mm").iter().all(|y| *y > -100.0) && measured("x_mm").iter().all(|x| *x > -600.0));
+    assert!(
+        measured("y_mm").iter().all(|y| *y > -100.0)
+            && measured("x_mm").iter().all(|x| *x > -600.0)
+    );
     let assert = run("plan --truth truth.toml --poses 12 --workspace-mm 1,0,0,1,0,1").code(2);
     assert!(text(&assert.get_output().stderr).contains("the box is empty"));
 }
@@ -66,8 +73,10 @@ fn too_few_equations_are_not_trusted() {
     fs::write(bench.path("a-none.csv"), rows.join("\n")).unwrap();
     let assert = bench.identify(&[]).code(1);
     assert!(text(&assert.get_output().stderr).contains("15 measured coordinates for"));
-    let json: Value =
-        serde_json::from_str(&fs::read_to_string(bench.path("out/lunar-sampler/estimate.json")).unwrap()).unwrap();
+    let json: Value = serde_json::from_str(
+        &fs::read_to_string(bench.path("out/lunar-sampler/estimate.json")).unwrap(),
+    )
+    .unwrap();
     assert_eq!(json["trusted"], false);
 }
 
@@ -88,7 +97,10 @@ fn where_nothing_is_free_every_command_that_fits_says_so() {
         let mut run = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
         let assert = run.current_dir(bench.folder.path()).arg(command).assert();
         let said = text(&assert.get_output().stderr);
-        assert!(said.contains("nothing is free: the nominal arm is judged as it is"), "{command}: {said}");
+        assert!(
+            said.contains("nothing is free: the nominal arm is judged as it is"),
+            "{command}: {said}"
+        );
     }
 }
 
@@ -99,7 +111,11 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
         ("header only", |b| b.map_data(|_, _| None), &[DATA, "no rows"]),
         ("NaN", |b| b.edit(DATA, "1840.7678", "NaN"), &["a-none.csv:2", "x_mm", "finite"]),
         ("infinity", |b| b.edit(DATA, "1840.7678", "inf"), &["a-none.csv:2", "x_mm", "finite"]),
-        ("text in a number", |b| b.edit(DATA, "1840.7678", "far"), &["a-none.csv:2", "x_mm", "far"]),
+        (
+            "text in a number",
+            |b| b.edit(DATA, "1840.7678", "far"),
+            &["a-none.csv:2", "x_mm", "far"],
+        ),
         (
             "short row",
             |b| b.map_data(|n, l| Some(if n == 5 { "4,identification".into() } else { l.into() })),
@@ -113,25 +129,48 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
             |b| b.edit(PROBLEM, "alpha_deg = 90.0", "alpha = 90.0"),
             &["problem.toml:15", "alpha", "unit"],
         ),
-        ("no held-out rows", |b| b.map_data(|_, l| Some(l.replace("validation", "identification"))), &["held out"]),
+        (
+            "no held-out rows",
+            |b| b.map_data(|_, l| Some(l.replace("validation", "identification"))),
+            &["held out"],
+        ),
         (
             "no identification rows",
             |b| b.map_data(|_, l| Some(l.replace("identification", "validation"))),
             &["no rows are left to fit"],
         ),
-        ("unknown split word", |b| b.edit(DATA, ",validation,", ",test,"), &["a-none.csv:2", "split", "test"]),
-        ("binary junk", |b| fs::write(b.path(DATA), [0xff, 0xfe, 0x00, 0x80, b'\n']).unwrap(), &[DATA]),
+        (
+            "unknown split word",
+            |b| b.edit(DATA, ",validation,", ",test,"),
+            &["a-none.csv:2", "split", "test"],
+        ),
+        (
+            "binary junk",
+            |b| fs::write(b.path(DATA), [0xff, 0xfe, 0x00, 0x80, b'\n']).unwrap(),
+            &[DATA],
+        ),
         ("binary problem", |b| fs::write(b.path(PROBLEM), [0xff, 0xfe, 0x00]).unwrap(), &[PROBLEM]),
         (
             "unknown key",
             |b| b.edit(PROBLEM, "beam_elements = 1", "beam_pieces = 1"),
             &["problem.toml:7", "beam_pieces"],
         ),
-        ("negative mass", |b| b.edit(PROBLEM, "mass_kg = 4.2", "mass_kg = -4.2"), &["problem.toml:27", "mass_kg"]),
-        ("zero stiffness", |b| b.edit(PROBLEM, "5.2e4", "0.0"), &["problem.toml:17", "stiffness_N_m_per_rad"]),
+        (
+            "negative mass",
+            |b| b.edit(PROBLEM, "mass_kg = 4.2", "mass_kg = -4.2"),
+            &["problem.toml:27", "mass_kg"],
+        ),
+        (
+            "zero stiffness",
+            |b| b.edit(PROBLEM, "5.2e4", "0.0"),
+            &["problem.toml:17", "stiffness_N_m_per_rad"],
+        ),
         (
             "no joints",
-            |b| fs::write(b.path(PROBLEM), "name = \"none\"\n[data]\nfiles = [\"a-none.csv\"]\n").unwrap(),
+            |b| {
+                fs::write(b.path(PROBLEM), "name = \"none\"\n[data]\nfiles = [\"a-none.csv\"]\n")
+                    .unwrap()
+            },
             &[PROBLEM, "joint"],
         ),
         ("broken TOML", |b| b.edit(PROBLEM, "[statics]", "[statics"), &["problem.toml:5"]),
@@ -142,15 +181,31 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
         ),
         (
             "min above max",
-            |b| b.edit(PROBLEM, "\"tool.*\" = { sigma_mm = 5.0 }", "\"tool.*\" = { min_mm = 2, max_mm = -2 }"),
+            |b| {
+                b.edit(
+                    PROBLEM,
+                    "\"tool.*\" = { sigma_mm = 5.0 }",
+                    "\"tool.*\" = { min_mm = 2, max_mm = -2 }",
+                )
+            },
             &["problem.toml:78", "min"],
         ),
         (
             "σ of the wrong kind",
-            |b| b.edit(PROBLEM, "\"tool.*\" = { sigma_mm = 5.0 }", "\"tool.*\" = { sigma_deg = 5.0 }"),
+            |b| {
+                b.edit(
+                    PROBLEM,
+                    "\"tool.*\" = { sigma_mm = 5.0 }",
+                    "\"tool.*\" = { sigma_deg = 5.0 }",
+                )
+            },
             &["problem.toml:78", "tool.x", "_mm"],
         ),
-        ("missing data file", |b| fs::remove_file(b.path(DATA)).unwrap(), &["problem.toml:81", DATA]),
+        (
+            "missing data file",
+            |b| fs::remove_file(b.path(DATA)).unwrap(),
+            &["problem.toml:81", DATA],
+        ),
         (
             "no data file",
             |b| b.edit(PROBLEM, "files = [\"a-none.csv\"]\n", ""),
@@ -162,7 +217,11 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
             |b| b.edit(PROBLEM, "position_sigma_mm = 0.05", "position_sigma_mm = 0.0"),
             &["problem.toml:82", "position_sigma_mm"],
         ),
-        ("an arm too soft to stand", |b| b.edit(PROBLEM, "5.2e4", "1.0"), &["a-none.csv:2", "equilibrium"]),
+        (
+            "an arm too soft to stand",
+            |b| b.edit(PROBLEM, "5.2e4", "1.0"),
+            &["a-none.csv:2", "equilibrium"],
+        ),
     ];
     for (what, spoil, expected) in mistakes {
         let bench = Bench::new();
@@ -173,8 +232,14 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
         for word in *expected {
             assert!(message.contains(word), "{what}: {word:?} missing in: {message}");
         }
-        assert!(message.starts_with("error: ") && !message.contains("panicked"), "{what}: {message}");
-        assert!(output.stdout.is_empty() && !bench.path("out").exists(), "{what} left something behind");
+        assert!(
+            message.starts_with("error: ") && !message.contains("panicked"),
+            "{what}: {message}"
+        );
+        assert!(
+            output.stdout.is_empty() && !bench.path("out").exists(),
+            "{what} left something behind"
+        );
     }
 }
 

@@ -16,12 +16,18 @@ fn measured(folder: &Path) {
     let arm = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/lunar-sampler");
     let poses = (POSES + 20).to_string();
     let mut simulate = assert_cmd::Command::new(cargo_bin!("flexcal"));
-    simulate.current_dir(folder).arg("simulate").arg(&arm).arg("--truth").arg(arm.join("TRUTH.toml"));
+    simulate
+        .current_dir(folder)
+        .arg("simulate")
+        .arg(&arm)
+        .arg("--truth")
+        .arg(arm.join("TRUTH.toml"));
     simulate.args(["--poses", &poses, "--seed", "1", "--out", "rig"]).assert().success();
     let table = fs::read_to_string(folder.join("rig/measurements.csv")).unwrap();
     let lines = table.lines().enumerate();
-    let lines =
-        lines.map(|(k, line)| if k <= POSES { line.replace("validation", "identification") } else { line.to_owned() });
+    let lines = lines.map(|(k, line)| {
+        if k <= POSES { line.replace("validation", "identification") } else { line.to_owned() }
+    });
     fs::write(folder.join("data.csv"), lines.collect::<Vec<String>>().join("\n") + "\n").unwrap();
     fs::copy(arm.join("problem.toml"), folder.join("problem.toml")).unwrap();
 }
@@ -37,8 +43,10 @@ struct Terminal {
 impl Terminal {
     /// `script` gives it the terminal and passes on what it shows, after the number of its process.
     fn run(folder: &Path, arguments: &str) -> Self {
-        let command = format!("echo pid=$$.; exec '{}' {arguments}", cargo_bin!("flexcal").display());
-        // Where tests run in the background interrupts are ignored, and what they start would inherit that.
+        let command =
+            format!("echo pid=$$.; exec '{}' {arguments}", cargo_bin!("flexcal").display());
+        // Where tests run in the background interrupts are ignored, and what they start would
+        // inherit that.
         let mut script = Command::new("env")
             .args(["--default-signal=INT", "script", "-qefc", &command, "/dev/null"])
             .current_dir(folder)
@@ -63,7 +71,13 @@ impl Terminal {
 
     fn interrupt(&self) {
         let pid = self.shown.split_once("pid=").unwrap().1.split('.').next().unwrap();
-        assert!(Command::new("sh").args(["-c", &format!("kill -INT {pid}")]).status().unwrap().success());
+        assert!(
+            Command::new("sh")
+                .args(["-c", &format!("kill -INT {pid}")])
+                .status()
+                .unwrap()
+                .success()
+        );
     }
 
     /// Its exit status, and all that it has shown.
@@ -87,9 +101,13 @@ fn an_interrupted_loop_tells_what_it_has_found() {
     let (status, shown) = once.end();
     assert_eq!(status, Some(1), "{shown}");
     assert!(shown.contains("interrupted after 1 round: there may be more to find"), "{shown}");
-    let told: Value = serde_json::from_str(&fs::read_to_string(folder.join("once/loop.json")).unwrap()).unwrap();
+    let told: Value =
+        serde_json::from_str(&fs::read_to_string(folder.join("once/loop.json")).unwrap()).unwrap();
     assert_eq!(told["interrupted"], true);
-    assert_eq!((&told["trusted"], &told["effects"][0]["effect"]), (&true.into(), &"link-thermal-bending".into()));
+    assert_eq!(
+        (&told["trusted"], &told["effects"][0]["effect"]),
+        (&true.into(), &"link-thermal-bending".into())
+    );
     assert_eq!(told["steps"].as_array().unwrap().len(), 1);
     for name in ["problem.closed.toml", "residuals.csv", "report.md", "report.html"] {
         assert!(folder.join("once").join(name).is_file(), "{name}");
@@ -108,7 +126,8 @@ fn an_interrupted_loop_tells_what_it_has_found() {
     assert!(!folder.join("twice").exists());
 
     // Before there is anything to tell.
-    let mut early = Terminal::run(folder, "identify . --data data.csv --strategy sequential --out early");
+    let mut early =
+        Terminal::run(folder, "identify . --data data.csv --strategy sequential --out early");
     early.wait_for("step ");
     early.interrupt();
     let (status, shown) = early.end();

@@ -13,28 +13,60 @@ fn identify_prints_a_table_and_writes_the_estimate() {
     let bench = Bench::new();
     let assert = bench.identify(&["-v"]).success();
     let out = text(&assert.get_output().stdout);
-    for expected in ["joint2.stiffness", "held out", "mean norm", "Reduced χ²", "rank 31 of 32", "estimate.json"] {
+    for expected in [
+        "joint2.stiffness",
+        "held out",
+        "mean norm",
+        "Reduced χ²",
+        "rank 31 of 32",
+        "estimate.json",
+    ] {
         assert!(out.contains(expected), "{expected} missing in:\n{out}");
     }
     for name in ["report.md", "report.html"] {
-        assert!(out.contains(name) && bench.path("out/lunar-sampler").join(name).exists(), "{name}");
+        assert!(
+            out.contains(name) && bench.path("out/lunar-sampler").join(name).exists(),
+            "{name}"
+        );
     }
-    let json: Value =
-        serde_json::from_str(&fs::read_to_string(bench.path("out/lunar-sampler/estimate.json")).unwrap()).unwrap();
+    let json: Value = serde_json::from_str(
+        &fs::read_to_string(bench.path("out/lunar-sampler/estimate.json")).unwrap(),
+    )
+    .unwrap();
     assert_eq!(json["held_out"]["n"], 50);
-    assert_eq!((&json["solver"], &json["solver_reason"]), (&"levenberg-marquardt".into(), &"no bounds".into()));
+    assert_eq!(
+        (&json["solver"], &json["solver_reason"]),
+        (&"levenberg-marquardt".into(), &"no bounds".into())
+    );
     assert!(!out.contains("no standard error"), "every value has one:\n{out}");
     assert!(json["held_out"]["rms_mm"]["norm"].as_f64().unwrap() < 0.14);
-    for key in ["problem", "strategy", "solver", "termination", "iterations", "seconds", "reduced_chi2", "rank"] {
+    for key in [
+        "problem",
+        "strategy",
+        "solver",
+        "termination",
+        "iterations",
+        "seconds",
+        "reduced_chi2",
+        "rank",
+    ] {
         assert!(!json[key].is_null(), "{key}");
     }
-    let stiffness = json["parameters"].as_array().unwrap().iter().find(|p| p["name"] == "joint2.stiffness").unwrap();
+    let stiffness = json["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|p| p["name"] == "joint2.stiffness")
+        .unwrap();
     for key in ["unit", "nominal", "estimate", "std_error", "identified"] {
         assert!(!stiffness[key].is_null(), "{key}");
     }
     assert!(stiffness["at_bound"].is_null());
     let unidentifiable = &json["unidentified"][0];
-    assert!((unidentifiable["combination"]["joint1.beta"].as_f64().unwrap() - 0.5_f64.sqrt()).abs() < 1e-6);
+    assert!(
+        (unidentifiable["combination"]["joint1.beta"].as_f64().unwrap() - 0.5_f64.sqrt()).abs()
+            < 1e-6
+    );
     assert!(unidentifiable["singular_value"].as_f64().unwrap() < 1e-9);
 }
 
@@ -52,7 +84,13 @@ fn arms(folder: &Path) -> Vec<[String; 2]> {
         if !data.is_file() {
             let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
             let arguments = ["--poses", "80", "--seed", "1", "--quiet", "--out", arm];
-            flexcal.current_dir(folder).arg("simulate").arg(&problem).arg("--truth").arg(&problem).args(arguments);
+            flexcal
+                .current_dir(folder)
+                .arg("simulate")
+                .arg(&problem)
+                .arg("--truth")
+                .arg(&problem)
+                .args(arguments);
             flexcal.assert().success();
             data = folder.join(arm).join("measurements.csv");
         }
@@ -75,10 +113,16 @@ fn what_is_printed_fits_on_a_screen_unless_more_is_asked_for() {
             let arguments = [command, &problem, "-o", "out", "--data", &data];
             let (brief, whole) = (run(&arguments), run(&[&arguments[..], &["-v"]].concat()));
             let lines = |text: &str| text.lines().count();
-            assert!(lines(&brief) <= 25 && lines(&whole) > lines(&brief), "{command} {data}:\n{brief}");
+            assert!(
+                lines(&brief) <= 25 && lines(&whole) > lines(&brief),
+                "{command} {data}:\n{brief}"
+            );
             // But for the next command, whose paths are as long as they are.
             let own = brief.lines().filter(|line| !line.starts_with("Next: "));
-            assert!(own.map(|line| line.chars().count()).all(|width| width <= 110), "{command} {data}:\n{brief}");
+            assert!(
+                own.map(|line| line.chars().count()).all(|width| width <= 110),
+                "{command} {data}:\n{brief}"
+            );
             for words in ["held out", "Written to out: ", "\nNext: flexcal "] {
                 assert!(brief.contains(words), "{words:?} missing in:\n{brief}");
             }
@@ -103,7 +147,8 @@ fn commands_to_copy_keep_paths_whole_and_one_is_no_plural() {
     fs::write(bench.path("my arm/a-none.csv"), kept.collect::<Vec<_>>().join("\n") + "\n").unwrap();
     fs::copy(bench.path("problem.toml"), bench.path("my arm/problem.toml")).unwrap();
     let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let run = flexcal.current_dir(bench.folder.path()).args(["identify", "my arm"]).output().unwrap();
+    let run =
+        flexcal.current_dir(bench.folder.path()).args(["identify", "my arm"]).output().unwrap();
     let out = text(&run.stdout);
     assert!(out.contains("'my arm'") && out.contains(", 1 pose held out;"), "{out}");
 }
@@ -126,7 +171,10 @@ fn the_readme_shows_what_is_printed() {
     let refills = std::env::var_os("FLEXCAL_REFILL").is_some();
     // The third line of a fit ends in the time it took.
     let timeless = |text: &str| -> Vec<String> {
-        text.trim_end().lines().map(|line| line.split(" steps, ").next().unwrap().to_owned()).collect()
+        text.trim_end()
+            .lines()
+            .map(|line| line.split(" steps, ").next().unwrap().to_owned())
+            .collect()
     };
     let compare = |mark: &str, printed: &str| {
         let fence = format!("<!-- {mark} -->\n```text\n");
@@ -142,10 +190,20 @@ fn the_readme_shows_what_is_printed() {
     let folder = tempfile::tempdir().unwrap();
     let printed = |command: &str, problem: &Path, more: &[&str]| {
         let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        text(&flexcal.current_dir(folder.path()).arg(command).arg(problem).args(more).output().unwrap().stdout)
+        text(
+            &flexcal
+                .current_dir(folder.path())
+                .arg(command)
+                .arg(problem)
+                .args(more)
+                .output()
+                .unwrap()
+                .stdout,
+        )
     };
     compare("loop", &printed("loop", &root.join("problems/lunar-sampler"), &[]));
-    let drawn = fs::read_to_string(folder.path().join("out/lunar-sampler/figures/effect-1.svg")).unwrap();
+    let drawn =
+        fs::read_to_string(folder.path().join("out/lunar-sampler/figures/effect-1.svg")).unwrap();
     if refills {
         fs::write(root.join("docs/effect.svg"), &drawn).unwrap();
     }
@@ -155,7 +213,11 @@ fn the_readme_shows_what_is_printed() {
     assert_eq!(shapes(&kept), shapes(&drawn), "FLEXCAL_REFILL=1 draws it anew");
     compare(
         "lunar",
-        &printed("identify", Path::new("out/lunar-sampler/problem.closed.toml"), &["--out", "out/closed"]),
+        &printed(
+            "identify",
+            Path::new("out/lunar-sampler/problem.closed.toml"),
+            &["--out", "out/closed"],
+        ),
     );
     if refills {
         fs::write(root.join("README.md"), &*readme.borrow()).unwrap();
@@ -183,11 +245,13 @@ fn the_screen_of_a_loop_says_what_an_effect_is_not_told_from() {
 #[test]
 fn limits_that_hold_the_declared_fit_are_said_beside_what_was_found() {
     let printed = screen(&["loop", "tests/cases/bounded/stiffness.toml"]);
-    let expected = "Limits hold the fit as declared (joint3.stiffness, A.GJ): where one is wrong, an effect";
+    let expected =
+        "Limits hold the fit as declared (joint3.stiffness, A.GJ): where one is wrong, an effect";
     assert!(printed.contains(expected) && printed.contains("What was found"), "{printed}");
     // Where nothing was found no effect stands for a limit; one that is wrong is said to be.
     let printed = screen(&["loop", "problems/service-arm"]);
-    let expected = "The limit of joint4.a, which holds the fit, is most probably wrong, or hides a cause";
+    let expected =
+        "The limit of joint4.a, which holds the fit, is most probably wrong, or hides a cause";
     assert!(printed.contains(expected) && !printed.contains("Limits hold"), "{printed}");
     let printed = screen(&["loop", "tests/cases", "--data", "tests/cases/a-none.csv"]);
     assert!(!printed.contains("Limits hold"), "{printed}");

@@ -11,7 +11,8 @@ use super::{Bench, text};
 fn results_repeat_to_the_byte_but_for_the_time() {
     let bench = Bench::new();
     let run = || {
-        let mut json: Value = serde_json::from_slice(&bench.identify(&["--json"]).get_output().stdout).unwrap();
+        let mut json: Value =
+            serde_json::from_slice(&bench.identify(&["--json"]).get_output().stdout).unwrap();
         json["seconds"] = Value::Null;
         json
     };
@@ -44,9 +45,14 @@ fn new_results_are_for_whom_files_are_and_older_ones_keep_their_permissions() {
     bench.identify(&["--quiet", "--out", "out"]).success();
     assert_eq!(mode("out/estimate.json"), mode("made"), "new");
     assert_eq!(mode("out/report.html"), mode("made"), "new");
-    fs::set_permissions(bench.path("out/estimate.json"), fs::Permissions::from_mode(0o640)).unwrap();
+    fs::set_permissions(bench.path("out/estimate.json"), fs::Permissions::from_mode(0o640))
+        .unwrap();
     bench.identify(&["--quiet", "--out", "out"]).success();
-    assert_eq!((mode("out/estimate.json"), mode("out/report.html")), (0o640, mode("made")), "older");
+    assert_eq!(
+        (mode("out/estimate.json"), mode("out/report.html")),
+        (0o640, mode("made")),
+        "older"
+    );
 }
 
 #[test]
@@ -63,8 +69,11 @@ fn figures_of_an_older_page_go_and_other_files_stay() {
     ["effect-mine.svg", "mine.svg", "ranking.txt"].into_iter().for_each(write);
     flexcal("identify").success();
     assert!(!there("strategies.svg") && !there("ablations.svg"));
-    assert!(["effect-mine.svg", "mine.svg", "ranking.txt", "residual-order.svg"].into_iter().all(there));
-    // One that some page may have and that is not flexcal's keeps all of them away, before any work is done.
+    assert!(
+        ["effect-mine.svg", "mine.svg", "ranking.txt", "residual-order.svg"].into_iter().all(there)
+    );
+    // One that some page may have and that is not flexcal's keeps all of them away, before any work
+    // is done.
     write("effect-1.svg");
     let error = text(&flexcal("identify").code(2).get_output().stderr);
     assert!(error.contains("figures/effect-1.svg is there and not as flexcal wrote it"), "{error}");

@@ -53,7 +53,8 @@ pub fn helical_valley<D: Scalar>(x: &[D]) -> Vec<D> {
 }
 
 pub fn bard<D: Scalar>(x: &[D]) -> Vec<D> {
-    const Y: [f64; 15] = [0.14, 0.18, 0.22, 0.25, 0.29, 0.32, 0.35, 0.39, 0.37, 0.58, 0.73, 0.96, 1.34, 2.10, 4.39];
+    const Y: [f64; 15] =
+        [0.14, 0.18, 0.22, 0.25, 0.29, 0.32, 0.35, 0.39, 0.37, 0.58, 0.73, 0.96, 1.34, 2.10, 4.39];
     Y.iter()
         .zip(1..)
         .map(|(&y, i)| {
@@ -76,10 +77,13 @@ pub fn gaussian<D: Scalar>(x: &[D]) -> Vec<D> {
 
 pub fn meyer<D: Scalar>(x: &[D]) -> Vec<D> {
     const Y: [f64; 16] = [
-        34780.0, 28610.0, 23650.0, 19630.0, 16370.0, 13720.0, 11540.0, 9744.0, 8261.0, 7030.0, 6005.0, 5147.0, 4427.0,
-        3820.0, 3307.0, 2872.0,
+        34780.0, 28610.0, 23650.0, 19630.0, 16370.0, 13720.0, 11540.0, 9744.0, 8261.0, 7030.0,
+        6005.0, 5147.0, 4427.0, 3820.0, 3307.0, 2872.0,
     ];
-    Y.iter().zip(1..).map(|(&y, i)| x[0] * (x[1] / (x[2] + 45.0 + 5.0 * f64::from(i))).exp() - y).collect()
+    Y.iter()
+        .zip(1..)
+        .map(|(&y, i)| x[0] * (x[1] / (x[2] + 45.0 + 5.0 * f64::from(i))).exp() - y)
+        .collect()
 }
 
 pub fn gulf<D: Scalar>(x: &[D]) -> Vec<D> {
@@ -126,9 +130,13 @@ pub fn wood<D: Scalar>(x: &[D]) -> Vec<D> {
 }
 
 pub fn kowalik_osborne<D: Scalar>(x: &[D]) -> Vec<D> {
-    const Y: [f64; 11] = [0.1957, 0.1947, 0.1735, 0.1600, 0.0844, 0.0627, 0.0456, 0.0342, 0.0323, 0.0235, 0.0246];
+    const Y: [f64; 11] =
+        [0.1957, 0.1947, 0.1735, 0.1600, 0.0844, 0.0627, 0.0456, 0.0342, 0.0323, 0.0235, 0.0246];
     const U: [f64; 11] = [4.0, 2.0, 1.0, 0.5, 0.25, 0.167, 0.125, 0.1, 0.0833, 0.0714, 0.0625];
-    Y.iter().zip(U).map(|(&y, u)| -(x[0] * (x[1] * u + u * u)) / (x[2] * u + x[3] + u * u) + y).collect()
+    Y.iter()
+        .zip(U)
+        .map(|(&y, u)| -(x[0] * (x[1] * u + u * u)) / (x[2] * u + x[3] + u * u) + y)
+        .collect()
 }
 
 pub fn brown_dennis<D: Scalar>(x: &[D]) -> Vec<D> {
@@ -144,9 +152,9 @@ pub fn brown_dennis<D: Scalar>(x: &[D]) -> Vec<D> {
 
 pub fn osborne1<D: Scalar>(x: &[D]) -> Vec<D> {
     const Y: [f64; 33] = [
-        0.844, 0.908, 0.932, 0.936, 0.925, 0.908, 0.881, 0.850, 0.818, 0.784, 0.751, 0.718, 0.685, 0.658, 0.628, 0.603,
-        0.580, 0.558, 0.538, 0.522, 0.506, 0.490, 0.478, 0.467, 0.457, 0.448, 0.438, 0.431, 0.424, 0.420, 0.414, 0.411,
-        0.406,
+        0.844, 0.908, 0.932, 0.936, 0.925, 0.908, 0.881, 0.850, 0.818, 0.784, 0.751, 0.718, 0.685,
+        0.658, 0.628, 0.603, 0.580, 0.558, 0.538, 0.522, 0.506, 0.490, 0.478, 0.467, 0.457, 0.448,
+        0.438, 0.431, 0.424, 0.420, 0.414, 0.411, 0.406,
     ];
     Y.iter()
         .zip(0..)
@@ -169,11 +177,11 @@ pub fn biggs<D: Scalar>(x: &[D]) -> Vec<D> {
 
 pub fn osborne2<D: Scalar>(x: &[D]) -> Vec<D> {
     const Y: [f64; 65] = [
-        1.366, 1.191, 1.112, 1.013, 0.991, 0.885, 0.831, 0.847, 0.786, 0.725, 0.746, 0.679, 0.608, 0.655, 0.616, 0.606,
-        0.602, 0.626, 0.651, 0.724, 0.649, 0.649, 0.694, 0.644, 0.624, 0.661, 0.612, 0.558, 0.533, 0.495, 0.500, 0.423,
-        0.395, 0.375, 0.372, 0.391, 0.396, 0.405, 0.428, 0.429, 0.523, 0.562, 0.607, 0.653, 0.672, 0.708, 0.633, 0.668,
-        0.645, 0.632, 0.591, 0.559, 0.597, 0.625, 0.739, 0.710, 0.729, 0.720, 0.636, 0.581, 0.428, 0.292, 0.162, 0.098,
-        0.054,
+        1.366, 1.191, 1.112, 1.013, 0.991, 0.885, 0.831, 0.847, 0.786, 0.725, 0.746, 0.679, 0.608,
+        0.655, 0.616, 0.606, 0.602, 0.626, 0.651, 0.724, 0.649, 0.649, 0.694, 0.644, 0.624, 0.661,
+        0.612, 0.558, 0.533, 0.495, 0.500, 0.423, 0.395, 0.375, 0.372, 0.391, 0.396, 0.405, 0.428,
+        0.429, 0.523, 0.562, 0.607, 0.653, 0.672, 0.708, 0.633, 0.668, 0.645, 0.632, 0.591, 0.559,
+        0.597, 0.625, 0.739, 0.710, 0.729, 0.720, 0.636, 0.581, 0.428, 0.292, 0.162, 0.098, 0.054,
     ];
     Y.iter()
         .zip(0..)
@@ -183,8 +191,10 @@ pub fn osborne2<D: Scalar>(x: &[D]) -> Vec<D> {
                 let d = -centre + t;
                 height * (-d * d * width).exp()
             };
-            let model =
-                x[0] * (-x[4] * t).exp() + peak(x[1], x[5], x[8]) + peak(x[2], x[6], x[9]) + peak(x[3], x[7], x[10]);
+            let model = x[0] * (-x[4] * t).exp()
+                + peak(x[1], x[5], x[8])
+                + peak(x[2], x[6], x[9])
+                + peak(x[3], x[7], x[10]);
             -model + y
         })
         .collect()
@@ -194,7 +204,8 @@ pub fn watson<D: Scalar>(x: &[D]) -> Vec<D> {
     let mut rows: Vec<D> = (1..=29)
         .map(|i| {
             let t = f64::from(i) / 29.0;
-            let slope = sum(x.iter().zip(0..).skip(1).map(|(&x, j)| x * (f64::from(j) * t.powi(j - 1))));
+            let slope =
+                sum(x.iter().zip(0..).skip(1).map(|(&x, j)| x * (f64::from(j) * t.powi(j - 1))));
             let value = sum(x.iter().zip(0..).map(|(&x, j)| x * t.powi(j)));
             slope - value * value - 1.0
         })
@@ -239,7 +250,10 @@ pub fn variable<D: Scalar>(x: &[D]) -> Vec<D> {
 pub fn trigonometric<D: Scalar>(x: &[D]) -> Vec<D> {
     let n = x.len() as f64;
     let cosines = sum(x.iter().map(DualNum::cos));
-    x.iter().zip(1..).map(|(x, i)| -cosines + n + (-x.cos() + 1.0) * f64::from(i) - x.sin()).collect()
+    x.iter()
+        .zip(1..)
+        .map(|(x, i)| -cosines + n + (-x.cos() + 1.0) * f64::from(i) - x.sin())
+        .collect()
 }
 
 pub fn brown_almost_linear<D: Scalar>(x: &[D]) -> Vec<D> {
@@ -258,7 +272,9 @@ pub fn boundary_value<D: Scalar>(x: &[D]) -> Vec<D> {
     let h = 1.0 / (x.len() as f64 + 1.0);
     let x = padded(x);
     (1..x.len() - 1)
-        .map(|i| x[i] * 2.0 - x[i - 1] - x[i + 1] + (x[i] + (i as f64 * h + 1.0)).powi(3) * (0.5 * h * h))
+        .map(|i| {
+            x[i] * 2.0 - x[i - 1] - x[i + 1] + (x[i] + (i as f64 * h + 1.0)).powi(3) * (0.5 * h * h)
+        })
         .collect()
 }
 
@@ -318,7 +334,9 @@ pub fn linear_rank_one_50<D: Scalar>(x: &[D]) -> Vec<D> {
 fn linear_zeros<D: Scalar>(x: &[D], m: i32) -> Vec<D> {
     let last = x.len() - 1;
     let total = sum(x[..last].iter().zip(1..).skip(1).map(|(&x, j)| x * f64::from(j)));
-    (1..=m).map(|i| if i == 1 || i == m { c(-1.0) } else { total * f64::from(i - 1) - 1.0 }).collect()
+    (1..=m)
+        .map(|i| if i == 1 || i == m { c(-1.0) } else { total * f64::from(i - 1) - 1.0 })
+        .collect()
 }
 
 pub fn linear_zeros_10<D: Scalar>(x: &[D]) -> Vec<D> {
@@ -329,7 +347,8 @@ pub fn linear_zeros_50<D: Scalar>(x: &[D]) -> Vec<D> {
     linear_zeros(x, 50)
 }
 
-/// Means of the shifted Chebyshev polynomials T₁ … `T_m` over the points, minus their integrals over [0, 1].
+/// Means of the shifted Chebyshev polynomials T₁ … `T_m` over the points, minus their integrals
+/// over [0, 1].
 fn chebyshev_means<D: Scalar>(x: &[D], m: usize) -> Vec<D> {
     let mut rows = vec![c::<D>(0.0); m];
     for &x in x {
@@ -341,7 +360,10 @@ fn chebyshev_means<D: Scalar>(x: &[D], m: usize) -> Vec<D> {
         }
     }
     let n = x.len() as f64;
-    rows.iter().zip(1..).map(|(&row, i)| row / n + if i % 2 == 0 { 1.0 / f64::from(i * i - 1) } else { 0.0 }).collect()
+    rows.iter()
+        .zip(1..)
+        .map(|(&row, i)| row / n + if i % 2 == 0 { 1.0 / f64::from(i * i - 1) } else { 0.0 })
+        .collect()
 }
 
 pub fn chebyquad<D: Scalar>(x: &[D]) -> Vec<D> {

@@ -1,7 +1,11 @@
-//! Collections of least-squares problems with known minima, which tests and benches share: residual functions written
-//! once, generic over the scalar, as problems with exact derivatives.
+//! Collections of least-squares problems with known minima, which tests and benches share: residual
+//! functions written once, generic over the scalar, as problems with exact derivatives.
 
-#![allow(dead_code, clippy::unwrap_used, reason = "each test takes what it needs; stored data can be read")]
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    reason = "each test takes what it needs; stored data can be read"
+)]
 
 pub mod functions;
 pub mod more_garbow_hillstrom;

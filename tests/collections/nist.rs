@@ -1,5 +1,6 @@
 //! The 27 nonlinear regression problems of the NIST Statistical Reference Datasets (public domain),
-//! <https://www.itl.nist.gov/div898/strd/nls/nls_main.shtml>: certified values to 11 digits, two starts each.
+//! <https://www.itl.nist.gov/div898/strd/nls/nls_main.shtml>: certified values to 11 digits, two
+//! starts each.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -54,7 +55,9 @@ impl LeastSquares for Dataset {
         let mut dual: Vec<Dual64> = b.iter().map(|&b| Dual64::from(b)).collect();
         for j in 0..b.len() {
             dual[j] = dual[j].derivative();
-            for (out, (_, x)) in block.column_mut(j).iter_mut().zip(&self.observations[items.clone()]) {
+            for (out, (_, x)) in
+                block.column_mut(j).iter_mut().zip(&self.observations[items.clone()])
+            {
                 *out = -(self.dual)(&dual, x).eps;
             }
             dual[j] = Dual64::from(b[j]);
@@ -165,9 +168,12 @@ macro_rules! dataset {
 }
 
 fn parse(name: &'static str, text: &str, value: Model<f64>, dual: Model<Dual64>) -> Dataset {
-    let numbers = |line: &str| -> Vec<f64> { line.split_whitespace().map(|v| v.parse().unwrap()).collect() };
+    let numbers =
+        |line: &str| -> Vec<f64> { line.split_whitespace().map(|v| v.parse().unwrap()).collect() };
     let entry = |key: &str| numbers(text.lines().find_map(|line| line.strip_prefix(key)).unwrap());
-    let rows = text.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '.'));
+    let rows = text
+        .lines()
+        .filter(|line| line.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '.'));
     Dataset {
         name,
         starts: [DVector::from_vec(entry("start1")), DVector::from_vec(entry("start2"))],

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use flexcal::measurement::Measurements;
 use flexcal::mechanics::{Angle, Arm};
-use flexcal::model::parameter::{JointField, Parameter, Slot};
+use flexcal::model::parameter::{JointField, Parameter, ParameterSite};
 use flexcal::problem::Problem;
 use nalgebra::DVector;
 
@@ -19,11 +19,12 @@ pub const TABLE_2: [[f64; 5]; 4] = [
     [-0.019, 1.766, -0.790, -0.092, 0.005],
 ];
 
-/// An arm with everything that the lunar sampler lacks: a fixed and a prismatic joint, a link along −x, bending
-/// stiffnesses that differ, a rope that leans, a payload away from the target.
+/// An arm with everything that the lunar sampler lacks: a fixed and a prismatic joint, a link along
+/// −x, bending stiffnesses that differ, a rope that leans, a payload away from the target.
 pub const ODD: &str = include_str!("odd.toml");
 
-/// A tree of joints: branches of branches, one on the base, beams, a rope, a target in the midst of the arm.
+/// A tree of joints: branches of branches, one on the base, beams, a rope, a target in the midst of
+/// the arm.
 pub const TREE: &str = include_str!("tree.toml");
 
 /// A path below the package's folder.
@@ -52,7 +53,8 @@ pub fn with_parameters(file: &str, rules: &str) -> Problem {
     let (before, after) = text.split_once("[parameters]\n").unwrap();
     let (_, after) = after.split_once("\n[data]\n").unwrap();
     let mut problem = parse(&format!("{before}[parameters]\n{rules}\n[data]\n{after}"));
-    problem.data.files = problem.data.files.iter().map(|data| path(file).with_file_name(data)).collect();
+    problem.data.files =
+        problem.data.files.iter().map(|data| path(file).with_file_name(data)).collect();
     problem
 }
 
@@ -75,7 +77,7 @@ pub fn table_2(mut arm: Arm<f64>) -> Arm<f64> {
 /// Table 2 as deviations of free parameters; zero for what it does not hold.
 pub fn table_2_deviations(parameters: &[Parameter]) -> DVector<f64> {
     let of = |parameter: &Parameter| {
-        let Slot::Joint { joint, field } = parameter.slot else { return 0.0 };
+        let ParameterSite::Joint { joint, field } = parameter.site else { return 0.0 };
         let [alpha, a, theta, d, beta] = TABLE_2[joint];
         let value = match field {
             JointField::Alpha => alpha.to_radians(),

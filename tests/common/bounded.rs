@@ -1,10 +1,11 @@
-//! The lunar sampler within bounds and constraints, as solvers see it: σ as declared, from nominal values.
+//! The lunar sampler within bounds and constraints, as solvers see it: σ as declared, from nominal
+//! values.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
 use std::path::Path;
 
-use flexcal::identify::Placement;
+use flexcal::fit::Placement;
 use flexcal::least_squares::solver::{Bounds, Inequalities};
 use flexcal::least_squares::{Fit, LinearRows};
 use flexcal::measurement::Dataset;
@@ -38,20 +39,28 @@ impl Bounded {
         let placement = Placement::of(&data.measurements);
         let model = Model::new(&problem, &placement.bases, &placement.targets).unwrap();
         let (n, m) = (model.parameters.len(), model.constraints.len());
-        let limit = |of: fn(&Parameter) -> f64| DVector::from_iterator(n, model.parameters.iter().map(of));
+        let limit =
+            |of: fn(&Parameter) -> f64| DVector::from_iterator(n, model.parameters.iter().map(of));
         let bounds = Bounds::new(limit(|own| own.lower), limit(|own| own.upper)).unwrap();
         let mut matrix = DMatrix::zeros(m, n);
         for (i, constraint) in model.constraints.iter().enumerate() {
             constraint.terms.iter().for_each(|&(k, coefficient)| matrix[(i, k)] = coefficient);
         }
-        let side = |of: fn(&LinearConstraint) -> f64| DVector::from_iterator(m, model.constraints.iter().map(of));
+        let side = |of: fn(&LinearConstraint) -> f64| {
+            DVector::from_iterator(m, model.constraints.iter().map(of))
+        };
         let rows = Inequalities::new(matrix, side(|own| own.lower), side(|own| own.upper)).unwrap();
         Self { problem, data, model, bounds, rows, placement }
     }
 
     /// The same with gross errors among its measurements.
     pub fn spoilt(mut self) -> Self {
-        self.data.measurements.positions.iter_mut().step_by(SPOILT.0).for_each(|position| position.x += SPOILT.1);
+        self.data
+            .measurements
+            .positions
+            .iter_mut()
+            .step_by(SPOILT.0)
+            .for_each(|position| position.x += SPOILT.1);
         self
     }
 
@@ -61,13 +70,20 @@ impl Bounded {
 
     pub fn residuals(&self) -> PoseResiduals<'_> {
         let sigma = self.problem.data.position_sigma.unwrap();
-        let poses = self.placement.poses(&self.data.measurements, &self.data.split.identification, sigma);
-        PoseResiduals::new(&self.model, poses, (0..self.model.parameters.len()).collect(), self.nominal())
+        let poses =
+            self.placement.poses(&self.data.measurements, &self.data.split.identification, sigma);
+        PoseResiduals::new(
+            &self.model,
+            poses,
+            (0..self.model.parameters.len()).collect(),
+            self.nominal(),
+        )
     }
 
     pub fn priors(&self) -> LinearRows {
         let weights = self.model.parameters.iter().map(|own| own.sigma.map_or(0.0, f64::recip));
-        let matrix = DMatrix::from_diagonal(&DVector::from_iterator(self.model.parameters.len(), weights));
+        let matrix =
+            DMatrix::from_diagonal(&DVector::from_iterator(self.model.parameters.len(), weights));
         LinearRows { matrix, constant: self.nominal() }
     }
 

@@ -2,7 +2,7 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
-use flexcal::identify::Placement;
+use flexcal::fit::Placement;
 use flexcal::measurement::{Dataset, Labels, Measurements, Split};
 use flexcal::model::Model;
 use flexcal::problem::{JointKind, Problem};
@@ -12,23 +12,30 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-/// `count` configurations, angles within ±`reach` [rad] and offsets within ±0.3 m; positions are still to be measured.
-pub fn at_random(problem: &Problem, count: usize, reach: f64, rng: &mut ChaCha8Rng) -> Measurements {
+/// `count` configurations, angles within ±`reach` [rad] and offsets within ±0.3 m; positions are
+/// still to be measured.
+pub fn at_random(
+    problem: &Problem,
+    count: usize,
+    reach: f64,
+    rng: &mut ChaCha8Rng,
+) -> Measurements {
     let kinds: Vec<JointKind> = problem.joints.iter().map(|joint| joint.kind).collect();
     let drawn = |rng: &mut ChaCha8Rng, kind: &JointKind| match kind {
         JointKind::Revolute => rng.random_range(-reach..reach),
         JointKind::Prismatic => rng.random_range(-0.3..0.3),
         JointKind::Fixed => 0.0,
     };
-    let configurations = (0..count).map(|_| kinds.iter().map(|kind| drawn(rng, kind)).collect::<Vec<f64>>());
+    let configurations =
+        (0..count).map(|_| kinds.iter().map(|kind| drawn(rng, kind)).collect::<Vec<f64>>());
     Dataset::builder(configurations, vec![Vector3::zeros(); count]).measurements().unwrap()
 }
 
 /// The same, with the targets of the problem measured one after the other.
 pub fn of_targets(problem: &Problem, rows: Measurements) -> Measurements {
     let words = problem.target_words();
-    let target =
-        (!problem.targets.is_empty()).then(|| labels(words.iter().cycle().map(String::as_str).take(rows.len())));
+    let target = (!problem.targets.is_empty())
+        .then(|| labels(words.iter().cycle().map(String::as_str).take(rows.len())));
     Measurements { target, ..rows }
 }
 
@@ -52,7 +59,11 @@ pub fn model_of(problem: &Problem, measurements: &Measurements) -> Model {
 }
 
 /// Positions of every row at the full parameter vector `x` [m].
-pub fn predicted(problem: &Problem, measurements: &Measurements, x: &DVector<f64>) -> Vec<Vector3<f64>> {
+pub fn predicted(
+    problem: &Problem,
+    measurements: &Measurements,
+    x: &DVector<f64>,
+) -> Vec<Vector3<f64>> {
     let model = model_of(problem, measurements);
     let rows: Vec<usize> = (0..measurements.len()).collect();
     let poses = Placement::of(measurements).poses(measurements, &rows, 1.0);
@@ -60,7 +71,13 @@ pub fn predicted(problem: &Problem, measurements: &Measurements, x: &DVector<f64
 }
 
 /// Measures every row on the arm at `x`, with noise of 1 σ = `sigma` [m] on each coordinate.
-pub fn measure(problem: &Problem, rows: &mut Measurements, x: &DVector<f64>, sigma: f64, rng: &mut ChaCha8Rng) {
+pub fn measure(
+    problem: &Problem,
+    rows: &mut Measurements,
+    x: &DVector<f64>,
+    sigma: f64,
+    rng: &mut ChaCha8Rng,
+) {
     rows.positions = predicted(problem, rows, x);
     for position in &mut rows.positions {
         *position += Vector3::from_fn(|_, _| sigma * normal(rng));
@@ -85,15 +102,21 @@ pub fn split_at(count: usize, measurements: &Measurements) -> Split {
     Split { identification: (0..count).collect(), held_out: (count..measurements.len()).collect() }
 }
 
-/// Rows as a table to read: joints, positions, the split, and sessions and targets where there are any.
+/// Rows as a table to read: joints, positions, the split, and sessions and targets where there are
+/// any.
 pub fn csv(problem: &Problem, Dataset { measurements: rows, split }: &Dataset) -> String {
     let unit = |kind: JointKind| if kind == JointKind::Prismatic { "m" } else { "rad" };
-    let mut header: Vec<String> =
-        problem.joints.iter().enumerate().map(|(k, joint)| format!("q{}_{}", k + 1, unit(joint.kind))).collect();
+    let mut header: Vec<String> = problem
+        .joints
+        .iter()
+        .enumerate()
+        .map(|(k, joint)| format!("q{}_{}", k + 1, unit(joint.kind)))
+        .collect();
     header.extend(["x_m", "y_m", "z_m", "split"].map(str::to_owned));
     let sessions = Some(&rows.session).filter(|own| own.names.iter().any(|name| !name.is_empty()));
     let labels = [("session", sessions), ("target", rows.target.as_ref())];
-    let labels: Vec<(&str, &Labels)> = labels.into_iter().filter_map(|(name, own)| Some((name, own?))).collect();
+    let labels: Vec<(&str, &Labels)> =
+        labels.into_iter().filter_map(|(name, own)| Some((name, own?))).collect();
     header.extend(labels.iter().map(|(name, _)| (*name).to_owned()));
     let mut text = header.join(",") + "\n";
     for (row, position) in rows.positions.iter().enumerate() {

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use flexcal::identify::{Identification, Options, identify};
+use flexcal::fit::{Identification, Options, identify};
 use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::problem::{PoseConditions, PoseRanges, Problem};
-use flexcal::simulate::{Rig, Truth, simulate};
+use flexcal::rig::{Rig, Truth, simulate};
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
@@ -23,8 +23,14 @@ pub fn lunar() -> (Problem, Truth) {
 /// The same arm with orientations fitted beside positions.
 pub fn oriented() -> Problem {
     let text = std::fs::read_to_string(path("tests/cases/problem.toml")).unwrap();
-    let text = text.replace("\"tool.*\" = { sigma_mm = 5.0 }", "\"tool.*\" = { sigma_mm = 5.0, sigma_deg = 1.0 }");
-    let text = text.replace("position_sigma_mm = 0.05", "position_sigma_mm = 0.05\norientation_sigma_deg = 0.005");
+    let text = text.replace(
+        "\"tool.*\" = { sigma_mm = 5.0 }",
+        "\"tool.*\" = { sigma_mm = 5.0, sigma_deg = 1.0 }",
+    );
+    let text = text.replace(
+        "position_sigma_mm = 0.05",
+        "position_sigma_mm = 0.05\norientation_sigma_deg = 0.005",
+    );
     let problem = Problem::parse(&text, Path::new("problem.toml")).unwrap();
     assert!(problem.data.fits_orientation);
     problem
@@ -42,13 +48,21 @@ pub fn fit(problem: &Problem, rows: &Measurements) -> Identification {
     identify(problem, &Dataset::new(rows.clone(), split), &Options::default()).unwrap()
 }
 
-/// A true arm on the test rig, drawn from `seed`, and its deviations from nominal as the model counts them.
-pub fn true_arm(problem: &Problem, truth: &Truth, rows: &Measurements, seed: u64) -> (Rig, DVector<f64>) {
+/// A true arm on the test rig, drawn from `seed`, and its deviations from nominal as the model
+/// counts them.
+pub fn true_arm(
+    problem: &Problem,
+    truth: &Truth,
+    rows: &Measurements,
+    seed: u64,
+) -> (Rig, DVector<f64>) {
     let simulation = simulate(problem, truth, 1, seed).unwrap();
     let value = |name: &str| {
         // One EI in the model is an EIy and an EIz on the rig; the first stands for both.
-        let known =
-            simulation.parameters.iter().find(|p| p.name == name || (name.ends_with("EI") && p.name.starts_with(name)));
+        let known = simulation
+            .parameters
+            .iter()
+            .find(|p| p.name == name || (name.ends_with("EI") && p.name.starts_with(name)));
         known.map(|parameter| parameter.value)
     };
     let x = model_of(problem, rows).vector_of(value).unwrap();

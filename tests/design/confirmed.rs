@@ -2,7 +2,7 @@
 
 use flexcal::design::{Candidates, Criterion, Extremes, Plan, PlanOptions, plan};
 use flexcal::problem::Problem;
-use flexcal::simulate::Truth;
+use flexcal::rig::Truth;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -14,7 +14,8 @@ struct Fitted {
     stated: DVector<f64>,
 }
 
-/// Fits of arms drawn from TRUTH.toml, each measured anew: in the planned poses, and in as many drawn anew.
+/// Fits of arms drawn from TRUTH.toml, each measured anew: in the planned poses, and in as many
+/// drawn anew.
 fn fits(problem: &Problem, truth: &Truth, plan: &Plan, arms: u64) -> [Vec<Fitted>; 2] {
     let within = ranges(truth);
     [true, false].map(|planned| {
@@ -34,9 +35,15 @@ fn fits(problem: &Problem, truth: &Truth, plan: &Plan, arms: u64) -> [Vec<Fitted
     })
 }
 
-/// Geometric mean over parameters of something after random poses over the same after planned ones, root mean squares.
-fn gain(fits: &[Vec<Fitted>; 2], of: impl Fn(&Fitted) -> &DVector<f64>, parameters: &[usize]) -> f64 {
-    let [planned, random] = fits.each_ref().map(|all| all.iter().map(|own| of(own).clone()).collect::<Vec<_>>());
+/// Geometric mean over parameters of something after random poses over the same after planned ones,
+/// root mean squares.
+fn gain(
+    fits: &[Vec<Fitted>; 2],
+    of: impl Fn(&Fitted) -> &DVector<f64>,
+    parameters: &[usize],
+) -> f64 {
+    let [planned, random] =
+        fits.each_ref().map(|all| all.iter().map(|own| of(own).clone()).collect::<Vec<_>>());
     let logs = parameters.iter().map(|&k| (rms(&random, k) / rms(&planned, k)).ln());
     (logs.sum::<f64>() / parameters.len() as f64).exp()
 }
@@ -44,7 +51,13 @@ fn gain(fits: &[Vec<Fitted>; 2], of: impl Fn(&Fitted) -> &DVector<f64>, paramete
 #[test]
 fn planned_poses_give_smaller_errors_than_random_ones() {
     let (problem, truth) = lunar();
-    let options = PlanOptions { poses: 28, criterion: &Criterion::S, seed: 1, progress: None, workspace: None };
+    let options = PlanOptions {
+        poses: 28,
+        criterion: &Criterion::S,
+        seed: 1,
+        progress: None,
+        workspace: None,
+    };
     let plan = plan(&problem, &Candidates::Within(ranges(&truth)), None, &options).unwrap();
     let meaningful = plan.meaningful();
     assert!(meaningful.len() > 12, "{meaningful:?}");
@@ -62,11 +75,19 @@ fn planned_poses_halve_the_errors() {
     let mut halved = Vec::new();
     for criterion in [Criterion::S, Criterion::A, Criterion::D, Criterion::E] {
         for seed in [1, 2] {
-            let options = PlanOptions { poses: 28, criterion: &criterion, seed, progress: None, workspace: None };
+            let options = PlanOptions {
+                poses: 28,
+                criterion: &criterion,
+                seed,
+                progress: None,
+                workspace: None,
+            };
             let plan = plan(&problem, &Candidates::Within(ranges(&truth)), None, &options).unwrap();
-            let (meaningful, all) = (plan.meaningful(), (0..plan.planned.expected.len()).collect::<Vec<_>>());
+            let (meaningful, all) =
+                (plan.meaningful(), (0..plan.planned.expected.len()).collect::<Vec<_>>());
             let found = fits(&problem, &truth, &plan, 1000);
-            let (promised, measured) = (plan.gain(&meaningful).unwrap(), gain(&found, |own| &own.error, &meaningful));
+            let (promised, measured) =
+                (plan.gain(&meaningful).unwrap(), gain(&found, |own| &own.error, &meaningful));
             let stated = gain(&found, |own| &own.stated, &meaningful);
             println!(
                 "{} seed {seed}: promised {promised:.3}, measured {measured:.3}, stated {stated:.3} over {} parameters; over all {:.3}, \

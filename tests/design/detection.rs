@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use flexcal::design::Extremes;
-use flexcal::diagnose::{detectable, trace};
-use flexcal::identify::Options;
+use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::problem::{Effect, Freedom, Problem};
+use flexcal::select::{detectable, trace};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -38,7 +38,8 @@ fn is_found(problem: &Problem, rows: &Measurements, effect: &Effect, size: f64, 
     let mut x = draw(&model, |_| 0.0, &mut random);
     let own = effect.parameters(&with);
     let sign = if seed.is_multiple_of(2) { size } else { -size };
-    for (k, parameter) in model.parameters.iter().enumerate().filter(|(_, p)| p.name == own[0].name) {
+    for (k, parameter) in model.parameters.iter().enumerate().filter(|(_, p)| p.name == own[0].name)
+    {
         assert!(parameter.sigma.is_some());
         x[k] = sign;
     }
@@ -52,8 +53,12 @@ fn is_found(problem: &Problem, rows: &Measurements, effect: &Effect, size: f64, 
 fn written(effect: &Effect) -> String {
     match effect {
         Effect::GearRatio { joint } => format!("gear-ratio = {{ joint = {joint} }}"),
-        Effect::JointThermalDrift { joint } => format!("joint-thermal-drift = {{ joint = {joint} }}"),
-        Effect::LinkThermalExpansion { link } => format!("link-thermal-expansion = {{ link = \"{link}\" }}"),
+        Effect::JointThermalDrift { joint } => {
+            format!("joint-thermal-drift = {{ joint = {joint} }}")
+        }
+        Effect::LinkThermalExpansion { link } => {
+            format!("link-thermal-expansion = {{ link = \"{link}\" }}")
+        }
         other => other.name().to_owned(),
     }
 }
@@ -63,8 +68,12 @@ fn power(factor: f64, sets: u64) -> Vec<(Effect, f64)> {
     let (problem, rows) = bench();
     let detection = detectable(&problem, &rows).unwrap();
     let of = |effect: Effect| {
-        let stated = detection.effects.iter().find(|own| own.effect == effect).unwrap().sizes[0].worst.unwrap();
-        let found = (0..sets).into_par_iter().filter(|&seed| is_found(&problem, &rows, &effect, factor * stated, seed));
+        let stated = detection.effects.iter().find(|own| own.effect == effect).unwrap().sizes[0]
+            .worst
+            .unwrap();
+        let found = (0..sets)
+            .into_par_iter()
+            .filter(|&seed| is_found(&problem, &rows, &effect, factor * stated, seed));
         (effect.clone(), found.count() as f64 / sets as f64)
     };
     let effects = [
@@ -106,7 +115,9 @@ fn effects_of_the_stated_size_are_found_as_often_as_stated() {
 fn what_the_fit_takes_up_is_not_to_be_seen() {
     let (problem, rows) = bench();
     let detection = detectable(&problem, &rows).unwrap();
-    let size = |effect: Effect| &detection.effects.iter().find(|own| own.effect == effect).unwrap().sizes[0];
+    let size = |effect: Effect| {
+        &detection.effects.iter().find(|own| own.effect == effect).unwrap().sizes[0]
+    };
     // No moment acts about the vertical axis of joint 1.
     assert!(!size(Effect::JointCompliance { joint: 1 }).is_within_prior());
     assert!(!size(Effect::TrackerScale).is_within_prior());
@@ -118,9 +129,15 @@ fn what_the_fit_takes_up_is_not_to_be_seen() {
     let more = ranges(&truth).draw(&problem, 112, Extremes::No, 4, 0);
     let finer = detectable(&problem, &more).unwrap();
     let effect = Effect::GearRatio { joint: 2 };
-    let fine = finer.effects.iter().find(|own| own.effect == effect).unwrap().sizes[0].worst.unwrap();
+    let fine =
+        finer.effects.iter().find(|own| own.effect == effect).unwrap().sizes[0].worst.unwrap();
     let ratio = size(effect).worst.unwrap() / fine;
     assert!((1.5..3.5).contains(&ratio), "{ratio}");
     // What needs a temperature says so.
-    assert!(finer.untestable.iter().any(|(effect, _)| matches!(effect, Effect::JointThermalDrift { .. })));
+    assert!(
+        finer
+            .untestable
+            .iter()
+            .any(|(effect, _)| matches!(effect, Effect::JointThermalDrift { .. }))
+    );
 }

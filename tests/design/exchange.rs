@@ -1,7 +1,9 @@
-//! The exchange: it never worsens, ends where no single exchange helps, and counts what its criterion says.
+//! The exchange: it never worsens, ends where no single exchange helps, and counts what its
+//! criterion says.
 
 use flexcal::design::{
-    Candidates, Criterion, DesignError, Exchange, Extremes, Forecast, PlanOptions, Sensitivity, Site, plan,
+    Candidates, Criterion, DesignError, Exchange, Extremes, Forecast, PlanOptions, Sensitivity,
+    Site, plan,
 };
 use flexcal::measurement::Measurements;
 use flexcal::model::parameter::Parameter;
@@ -14,7 +16,14 @@ const POSES: usize = 14;
 
 fn criteria() -> [Criterion; 6] {
     let some = || vec![10, 16, 24];
-    [Criterion::S, Criterion::D, Criterion::A, Criterion::E, Criterion::Subset(some()), Criterion::Each(some())]
+    [
+        Criterion::S,
+        Criterion::D,
+        Criterion::A,
+        Criterion::E,
+        Criterion::Subset(some()),
+        Criterion::Each(some()),
+    ]
 }
 
 /// Forty candidates of the lunar sampler.
@@ -32,13 +41,19 @@ fn candidates_of(problem: &Problem) -> (Vec<Parameter>, Sensitivity) {
 
 #[test]
 fn it_never_worsens_and_ends_where_no_exchange_of_one_pose_helps() {
-    for (criterion, problem) in criteria().into_iter().flat_map(|own| [(own.clone(), lunar().0), (own, oriented())]) {
+    for (criterion, problem) in
+        criteria().into_iter().flat_map(|own| [(own.clone(), lunar().0), (own, oriented())])
+    {
         let (parameters, candidates) = candidates_of(&problem);
         assert_eq!(candidates.coordinates, if problem.data.fits_orientation { 6 } else { 3 });
         let exchange = Exchange::new(&parameters, &candidates, None, POSES, &criterion).unwrap();
         let found = exchange.improve((0..POSES).collect(), |_, _| {});
         let name = criterion.as_str();
-        assert!(found.values.windows(2).all(|pair| pair[1] <= pair[0]), "{name}: {:?}", found.values);
+        assert!(
+            found.values.windows(2).all(|pair| pair[1] <= pair[0]),
+            "{name}: {:?}",
+            found.values
+        );
         assert!(found.value() < found.values[0] - 0.05, "{name}: {:?}", found.values);
         let mut distinct = found.chosen.clone();
         distinct.dedup();
@@ -69,12 +84,17 @@ fn criteria_measure_the_covariance_that_a_fit_has() {
         let exchange = Exchange::new(&parameters, &candidates, None, POSES, criterion).unwrap();
         exchange.value(&sets[0]) - exchange.value(&sets[1])
     };
-    let covariances = sets.clone().map(|set| Forecast::new(&parameters, &candidates.select(&set)).covariance);
-    let part = covariances.clone().map(|all| all.select_rows(&wanted).select_columns(&wanted).determinant().ln());
+    let covariances =
+        sets.clone().map(|set| Forecast::new(&parameters, &candidates.select(&set)).covariance);
+    let part = covariances
+        .clone()
+        .map(|all| all.select_rows(&wanted).select_columns(&wanted).determinant().ln());
     let subset = difference(&Criterion::Subset(wanted.to_vec()));
     assert!((subset - (part[0] - part[1]) / 3.0).abs() < 1e-3, "{subset} {part:?}");
-    let arm: Vec<usize> = (0..parameters.len()).filter(|&k| !parameters[k].slot.is_placement()).collect();
-    let logs = covariances.map(|all| arm.iter().map(|&k| all[(k, k)].ln()).sum::<f64>() / arm.len() as f64);
+    let arm: Vec<usize> =
+        (0..parameters.len()).filter(|&k| !parameters[k].site.is_placement()).collect();
+    let logs = covariances
+        .map(|all| arm.iter().map(|&k| all[(k, k)].ln()).sum::<f64>() / arm.len() as f64);
     let product = difference(&Criterion::S);
     assert!((product - (logs[0] - logs[1])).abs() < 1e-3, "{product} {logs:?}");
 }
@@ -83,7 +103,13 @@ fn criteria_measure_the_covariance_that_a_fit_has() {
 fn a_plan_counts_orientations_where_they_are_fitted() {
     let (problem, (_, truth)) = (oriented(), lunar());
     let rows = Candidates::Rows(Box::new(ranges(&truth).draw(&problem, 80, Extremes::No, 3, 0)));
-    let options = PlanOptions { poses: 10, criterion: &Criterion::S, seed: 4, progress: None, workspace: None };
+    let options = PlanOptions {
+        poses: 10,
+        criterion: &Criterion::S,
+        seed: 4,
+        progress: None,
+        workspace: None,
+    };
     let told_by = |poses: &Measurements| {
         let site = Site::new(&problem, &[poses]).unwrap();
         Forecast::new(&site.model.parameters, &site.sensitivity(poses, None))
@@ -91,7 +117,10 @@ fn a_plan_counts_orientations_where_they_are_fitted() {
     let judged = |problem: &Problem| {
         let planned = plan(problem, &rows, None, &options).unwrap();
         let errors = told_by(&planned.poses).expected;
-        let arm = errors.iter().filter(|own| !own.is_placement).filter_map(|own| own.std_error.map(f64::ln));
+        let arm = errors
+            .iter()
+            .filter(|own| !own.is_placement)
+            .filter_map(|own| own.std_error.map(f64::ln));
         arm.sum::<f64>()
     };
     let (with, without) = (judged(&problem), judged(&problem.positions_alone()));
@@ -110,7 +139,13 @@ fn poses_that_are_given_count() {
 fn a_plan_is_the_same_for_any_number_of_threads() {
     let (problem, truth) = lunar();
     let rows = Candidates::Rows(Box::new(ranges(&truth).draw(&problem, 80, Extremes::No, 3, 0)));
-    let options = PlanOptions { poses: 12, criterion: &Criterion::S, seed: 4, progress: None, workspace: None };
+    let options = PlanOptions {
+        poses: 12,
+        criterion: &Criterion::S,
+        seed: 4,
+        progress: None,
+        workspace: None,
+    };
     let run = |threads: usize| {
         let pool = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let plan = pool.install(|| plan(&problem, &rows, None, &options)).unwrap();

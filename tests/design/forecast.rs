@@ -13,8 +13,14 @@ use super::bench::{fit, lunar, ranges, rms};
 use super::common::arms::with_parameters;
 use super::common::made::{at_random, draw, measure, model_of, predicted};
 
-/// Errors of the estimates, in x, and of predictions in `elsewhere` [m], of arms drawn from the priors, each measured anew.
-fn errors(problem: &Problem, rows: &Measurements, elsewhere: &Measurements, runs: u64) -> (Vec<DVector<f64>>, f64) {
+/// Errors of the estimates, in x, and of predictions in `elsewhere` [m], of arms drawn from the
+/// priors, each measured anew.
+fn errors(
+    problem: &Problem,
+    rows: &Measurements,
+    elsewhere: &Measurements,
+    runs: u64,
+) -> (Vec<DVector<f64>>, f64) {
     let model = model_of(problem, rows);
     // Bases without a prior stand within 1 mm and 1 mrad of where the problem puts them.
     let free = |_: Unit| 1e-3;
@@ -24,8 +30,10 @@ fn errors(problem: &Problem, rows: &Measurements, elsewhere: &Measurements, runs
         let mut rows = rows.clone();
         measure(problem, &mut rows, &x, problem.data.position_sigma.unwrap(), &mut random);
         let found = fit(problem, &rows).x;
-        let (there, found_there) = (predicted(problem, elsewhere, &x), predicted(problem, elsewhere, &found));
-        let squares: f64 = there.iter().zip(&found_there).map(|(a, b)| (a - b).norm_squared()).sum();
+        let (there, found_there) =
+            (predicted(problem, elsewhere, &x), predicted(problem, elsewhere, &found));
+        let squares: f64 =
+            there.iter().zip(&found_there).map(|(a, b)| (a - b).norm_squared()).sum();
         (found - x, squares / elsewhere.len() as f64)
     };
     let all: Vec<_> = (0..runs).into_par_iter().map(of).collect();
@@ -42,19 +50,31 @@ fn expected_x(expected: &Expected) -> Option<f64> {
 /// Actual over expected standard errors, by name.
 fn ratios(check: &Check, errors: &[DVector<f64>]) -> Vec<(String, f64)> {
     let own = check.forecast.expected.iter().enumerate();
-    own.filter_map(|(k, expected)| Some((expected.name.clone(), rms(errors, k) / expected_x(expected)?))).collect()
+    own.filter_map(|(k, expected)| {
+        Some((expected.name.clone(), rms(errors, k) / expected_x(expected)?))
+    })
+    .collect()
 }
 
 /// Poses, a check of them, and what `runs` fits show.
-fn compare(problem: &Problem, rows: &Measurements, elsewhere: &Measurements, runs: u64) -> (Vec<(String, f64)>, f64) {
-    let judged =
-        Judged::Table { poses: Box::new(rows.clone()), within: None, held_out: Some(Box::new(elsewhere.clone())) };
+fn compare(
+    problem: &Problem,
+    rows: &Measurements,
+    elsewhere: &Measurements,
+    runs: u64,
+) -> (Vec<(String, f64)>, f64) {
+    let judged = Judged::Table {
+        poses: Box::new(rows.clone()),
+        within: None,
+        held_out: Some(Box::new(elsewhere.clone())),
+    };
     let check = check(problem, &judged, 3).unwrap();
     let (errors, prediction) = errors(problem, rows, elsewhere, runs);
     (ratios(&check, &errors), prediction / check.prediction.rms)
 }
 
-/// The lunar sampler, its stiffnesses known to 20 %: arms half as stiff as declared do not all stand.
+/// The lunar sampler, its stiffnesses known to 20 %: arms half as stiff as declared do not all
+/// stand.
 fn lunar_case(runs: u64) -> (Vec<(String, f64)>, f64) {
     let (mut problem, truth) = lunar();
     for rule in &mut problem.parameters {
@@ -100,7 +120,9 @@ fn expected_errors_are_those_of_many_fits() {
 #[test]
 #[ignore = "minutes: cargo test --release --test design -- --ignored --nocapture expected"]
 fn expected_errors_are_those_of_very_many_fits() {
-    for (name, (ratios, prediction)) in [("lunar sampler", lunar_case(1000)), ("UR10", ur10_case(2000))] {
+    for (name, (ratios, prediction)) in
+        [("lunar sampler", lunar_case(1000)), ("UR10", ur10_case(2000))]
+    {
         let (mean, furthest) = summary(&ratios);
         println!(
             "{name}: actual / expected {:.3} on average, furthest {furthest:?}; prediction {prediction:.3}",

@@ -1,13 +1,16 @@
-//! Poses planned to tell two effects apart, measured on the virtual test rig: does the loop name the right one?
+//! Poses planned to tell two effects apart, measured on the virtual test rig: does the loop name
+//! the right one?
 
 use std::path::Path;
 
-use flexcal::design::{Candidates, Criterion, DesignError, Extremes, Pair, PlanOptions, Separated, separate};
-use flexcal::diagnose::{close, separation};
-use flexcal::identify::Options;
+use flexcal::design::{
+    Candidates, Criterion, DesignError, Extremes, Pair, PlanOptions, Separated, separate,
+};
+use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::problem::{Effect, Problem};
-use flexcal::simulate::{Cause, TrueEffect, Truth};
+use flexcal::rig::{Cause, TrueEffect, Truth};
+use flexcal::select::{close, separation};
 use rayon::prelude::*;
 
 use super::bench::{lunar, measure, ranges, true_arm};
@@ -19,10 +22,16 @@ type Case = ([&'static str; 2], [&'static [f64]; 2]);
 
 /// What 28 random poses hardly tell apart (docs/sweep.md).
 const CASES: [Case; 3] = [
-    (["gear-ratio = { joint = 3 }", "joint-harmonic = { joint = 3, orders = [1] }"], [&[7e-4], &[0.0, 0.05 * DEGREE]]),
+    (
+        ["gear-ratio = { joint = 3 }", "joint-harmonic = { joint = 3, orders = [1] }"],
+        [&[7e-4], &[0.0, 0.05 * DEGREE]],
+    ),
     (["unmodelled-mass = { link = \"B\" }", "hoist-force"], [&[0.3, 0.8], &[0.03]]),
     (
-        ["joint-harmonic = { joint = 4, orders = [1] }", "joint-harmonic = { joint = 4, orders = [2] }"],
+        [
+            "joint-harmonic = { joint = 4, orders = [1] }",
+            "joint-harmonic = { joint = 4, orders = [2] }",
+        ],
         [&[0.16 * DEGREE, 0.0], &[0.0, 0.08 * DEGREE]],
     ),
 ];
@@ -31,29 +40,54 @@ fn pair(problem: &Problem, names: [&str; 2]) -> Result<Pair, DesignError> {
     Pair::new(problem, names.map(|name| problem.effect(name, Path::new("test")).unwrap()))
 }
 
-/// 28 poses that tell the two apart, chosen among candidates within the ranges of the rig, or among few of them.
-fn planned(problem: &Problem, truth: &Truth, names: [&str; 2], few: bool) -> (Measurements, Separated) {
+/// 28 poses that tell the two apart, chosen among candidates within the ranges of the rig, or among
+/// few of them.
+fn planned(
+    problem: &Problem,
+    truth: &Truth,
+    names: [&str; 2],
+    few: bool,
+) -> (Measurements, Separated) {
     let within = ranges(truth);
     let candidates = if few {
         Candidates::Rows(Box::new(within.draw(problem, 300, Extremes::Often, 1, 0)))
     } else {
         Candidates::Within(within)
     };
-    let options = PlanOptions { poses: 28, criterion: &Criterion::S, seed: 1, progress: None, workspace: None };
-    let (plan, told) = separate(&pair(problem, names).unwrap(), &candidates, None, &options).unwrap();
+    let options = PlanOptions {
+        poses: 28,
+        criterion: &Criterion::S,
+        seed: 1,
+        progress: None,
+        workspace: None,
+    };
+    let (plan, told) =
+        separate(&pair(problem, names).unwrap(), &candidates, None, &options).unwrap();
     (plan.poses, told)
 }
 
-/// Whether the loop names the effect that an arm drawn from TRUTH.toml has, and nothing else, from these poses.
-fn is_named(problem: &Problem, truth: &Truth, poses: &Measurements, own: &(Effect, &[f64]), seed: u64) -> bool {
+/// Whether the loop names the effect that an arm drawn from TRUTH.toml has, and nothing else, from
+/// these poses.
+fn is_named(
+    problem: &Problem,
+    truth: &Truth,
+    poses: &Measurements,
+    own: &(Effect, &[f64]),
+    seed: u64,
+) -> bool {
     let mut truth = truth.clone();
     let (effect, strengths) = own;
-    truth.effects = vec![TrueEffect::new(Cause::Catalogued(effect.clone()), strengths, &problem.joints).unwrap()];
+    truth.effects = vec![
+        TrueEffect::new(Cause::Catalogued(effect.clone()), strengths, &problem.joints).unwrap(),
+    ];
     let held_out = ranges(&truth).draw(problem, 4, Extremes::No, 700 + seed, 0);
     let mut rows = below(poses, &held_out);
     let (rig, _) = true_arm(problem, &truth, &rows, seed);
     measure(&rig, &mut rows, truth.noise_sigma, 5000 + seed);
-    let split = Split { identification: (0..poses.len()).collect(), held_out: (poses.len()..rows.len()).collect() };
+    let split = Split {
+        identification: (0..poses.len()).collect(),
+        held_out: (poses.len()..rows.len()).collect(),
+    };
     let closure = close(problem, &Dataset::new(rows, split), &Options::default()).unwrap();
     closure.effects.len() == 1 && closure.effects[0].effect == *effect
 }
@@ -76,8 +110,8 @@ fn below(one: &Measurements, other: &Measurements) -> Measurements {
     all
 }
 
-/// In how many of the seeds the loop names each of the two where it is at work: from planned poses, and from as many random
-/// ones, drawn anew for each seed.
+/// In how many of the seeds the loop names each of the two where it is at work: from planned poses,
+/// and from as many random ones, drawn anew for each seed.
 fn named(case: &Case, few: bool, seeds: u64) -> ([usize; 2], [usize; 2], Separated) {
     let (problem, truth) = lunar();
     let (names, strengths) = case;
@@ -147,15 +181,19 @@ fn a_pair_must_be_two_effects_that_poses_show() {
     assert!(problem.effect("gear-ratio = { joint = 9 }", Path::new("test")).is_err());
     let mut declared = problem.clone();
     declared.effects.push(problem.effect("hoist-force", Path::new("test")).unwrap());
-    assert!(pair(&declared, ["hoist-force", "payload-mass"]).unwrap_err().to_string().contains("already"));
+    assert!(
+        pair(&declared, ["hoist-force", "payload-mass"])
+            .unwrap_err()
+            .to_string()
+            .contains("already")
+    );
 }
 
 #[test]
 fn a_spring_is_told_from_a_wave_of_its_joint() {
     let (problem, truth) = lunar();
     let poses = ranges(&truth).draw(&problem, 40, Extremes::No, 1, 0);
-    let spring =
-        "gravity-compensator = { joint = 2, anchor_m = [0.1, -0.25], lever_m = [0.3, 0.15], free_length_m = 0 }";
+    let spring = "gravity-compensator = { joint = 2, anchor_m = [0.1, -0.25], lever_m = [0.3, 0.15], free_length_m = 0 }";
     let spring = problem.effect(spring, Path::new("test")).unwrap().effect;
     let wave = Effect::JointHarmonic { joint: 2, orders: vec![1] };
     // By its preload alone: its rate does what a wave does.

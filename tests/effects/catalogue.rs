@@ -8,7 +8,7 @@ use flexcal::model::Model;
 use flexcal::problem::{
     Effect, EffectDeclaration, Equilibrium, JointKind, Mount, OwnCovariate, PoseConditions, Problem,
 };
-use flexcal::simulate::{Cause, TrueEffect};
+use flexcal::rig::{Cause, TrueEffect};
 use nalgebra::DVector;
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
@@ -17,7 +17,8 @@ use crate::common::arms::{ODD, TREE, golden_problem, parse};
 use crate::common::effects::{Strong, compensator, of_lunar_sampler};
 use crate::common::made::{at_random, of_targets};
 
-/// The lunar sampler with an offset before its shoulder, which may bend, and everything that acts on it.
+/// The lunar sampler with an offset before its shoulder, which may bend, and everything that acts
+/// on it.
 pub fn lunar() -> (Problem, Vec<Strong>) {
     let mut arm = golden_problem();
     arm.joints[1].a = 0.3;
@@ -122,8 +123,11 @@ pub fn tree() -> (Problem, Vec<Strong>) {
 /// Columns of one's own.
 fn covariates(names: &[&str]) -> Vec<OwnCovariate> {
     let location = Location::file(Path::new("problem.toml"));
-    let own =
-        |name: &&str| OwnCovariate { name: (*name).to_owned(), meaning: String::new(), location: location.clone() };
+    let own = |name: &&str| OwnCovariate {
+        name: (*name).to_owned(),
+        meaning: String::new(),
+        location: location.clone(),
+    };
     names.iter().map(own).collect()
 }
 
@@ -134,7 +138,8 @@ pub fn declared(arm: &Problem, effects: &[Effect]) -> Problem {
         arm.statics.equilibrium = Equilibrium::Undeflected;
     }
     let location = Location::file(Path::new("problem.toml"));
-    let declare = |effect: &Effect| EffectDeclaration { effect: effect.clone(), location: location.clone() };
+    let declare =
+        |effect: &Effect| EffectDeclaration { effect: effect.clone(), location: location.clone() };
     arm.effects = effects.iter().map(declare).collect();
     arm
 }
@@ -144,16 +149,20 @@ pub fn in_truth(arm: &Problem, (effect, values): &Strong) -> TrueEffect {
     TrueEffect::new(Cause::Catalogued(effect.clone()), values, &arm.joints).unwrap()
 }
 
-/// Random poses in which every effect may act, of the targets one after the other, every second with directions of approach if wanted.
+/// Random poses in which every effect may act, of the targets one after the other, every second
+/// with directions of approach if wanted.
 pub fn poses(arm: &Problem, count: usize, approaches: bool, rng: &mut ChaCha8Rng) -> Measurements {
     let mut rows = of_targets(arm, at_random(arm, count, 1.5, rng));
     let n = arm.joints.len();
-    rows.payload = Some((0..count).map(|k| if k % 3 == 0 { 0.0 } else { rng.random_range(0.5..3.0) }).collect());
+    rows.payload = Some(
+        (0..count).map(|k| if k % 3 == 0 { 0.0 } else { rng.random_range(0.5..3.0) }).collect(),
+    );
     rows.hoist = Some((0..count).map(|_| rng.random_range(30.0..60.0)).collect());
     rows.temperature = Some((0..count).map(|_| rng.random_range(10.0..35.0)).collect());
     rows.time = (0..count).map(|k| 60.0 + 90.0 * k as f64).collect();
     rows.time_measured = true;
-    rows.covariates = (0..count * arm.data.covariates.len()).map(|_| rng.random_range(-3.0..9.0)).collect();
+    rows.covariates =
+        (0..count * arm.data.covariates.len()).map(|_| rng.random_range(-3.0..9.0)).collect();
     let side = |k: usize, rng: &mut ChaCha8Rng| match arm.joints[k % n].kind {
         JointKind::Fixed => 0.0,
         _ if rng.random() => 1.0,

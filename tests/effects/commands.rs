@@ -1,8 +1,8 @@
 //! Commands for an arm whose effects follow its commands, tried on the virtual rig.
 
-use flexcal::identify::compensate;
+use flexcal::fit::compensate;
 use flexcal::problem::Effect;
-use flexcal::simulate::Rig;
+use flexcal::rig::Rig;
 use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -22,14 +22,16 @@ fn a_gear_ratio_and_harmonics_are_taken_at_the_command() {
     let problem = declared(&arm, &effects.clone().map(|(effect, _)| effect));
     let mut targets = poses(&arm, 10, true, &mut ChaCha8Rng::seed_from_u64(1));
     // Where the arm without effects would be.
-    targets.positions = predicted(&arm, &targets, &DVector::zeros(model_of(&arm, &targets).parameters.len()));
+    targets.positions =
+        predicted(&arm, &targets, &DVector::zeros(model_of(&arm, &targets).parameters.len()));
     let model = model_of(&problem, &targets);
     let values: Vec<f64> = effects.iter().flat_map(|(_, values)| values.clone()).collect();
     let commands = compensate(&problem, &model, &strengths(&model, &values), &targets).unwrap();
     let rig = Rig::new(arm.clone(), effects.iter().map(|effect| in_truth(&arm, effect)).collect());
     for command in &commands {
         let mut set = conditions(&targets, command.row);
-        let miss = |set: &_| (rig.position(set).unwrap() - targets.positions[command.row]).norm() * 1e3;
+        let miss =
+            |set: &_| (rig.position(set).unwrap() - targets.positions[command.row]).norm() * 1e3;
         let before = miss(&set);
         set.configuration.clone_from(&command.configuration);
         println!("{before:.3} mm before, {:.5} mm after", miss(&set));

@@ -1,6 +1,6 @@
 //! Derivatives of effects by dual numbers against extrapolated differences.
 
-use flexcal::identify::Placement;
+use flexcal::fit::Placement;
 use flexcal::least_squares::{check_jacobian, jacobian};
 use flexcal::measurement::Measurements;
 use flexcal::model::{Model, PoseResiduals};
@@ -18,7 +18,8 @@ use crate::common::made::{labels, model_of};
 /// Largest difference of a column of the Jacobian, relative to its norm.
 const WORST: f64 = 1e-7;
 
-/// How far each parameter may move: thrice a realistic strength, or what the arm's own parameters vary by.
+/// How far each parameter may move: thrice a realistic strength, or what the arm's own parameters
+/// vary by.
 fn steps(model: &Model, values: &[f64]) -> DVector<f64> {
     let of_arm = |unit| match unit {
         Unit::Angle | Unit::Length => 0.1,
@@ -36,7 +37,8 @@ fn steps(model: &Model, values: &[f64]) -> DVector<f64> {
     step
 }
 
-/// Checks the columns of `unknowns` at `x`; the names of those without effect must be the ones in `silent`.
+/// Checks the columns of `unknowns` at `x`; the names of those without effect must be the ones in
+/// `silent`.
 fn check_at(
     what: &str,
     problem: &Problem,
@@ -64,20 +66,39 @@ fn check_at(
 }
 
 /// One effect at a time or all at once, at zero and off it.
-fn check(what: &str, arm: &Problem, effects: &[Strong], rows: &Measurements, everything: bool, silent: &[&str]) {
+fn check(
+    what: &str,
+    arm: &Problem,
+    effects: &[Strong],
+    rows: &Measurements,
+    everything: bool,
+    silent: &[&str],
+) {
     let kinds: Vec<Effect> = effects.iter().map(|(effect, _)| effect.clone()).collect();
     let values: Vec<f64> = effects.iter().flat_map(|(_, values)| values.clone()).collect();
     let problem = declared(arm, &kinds);
     let model = model_of(&problem, rows);
-    let unknowns = if everything { (0..model.parameters.len()).collect() } else { of_effects(&model) };
+    let unknowns =
+        if everything { (0..model.parameters.len()).collect() } else { of_effects(&model) };
     let step = steps(&model, &values);
     let zero = DVector::zeros(model.parameters.len());
-    let mut silent_at_zero: Vec<&str> =
-        unknowns.iter().map(|&k| model.parameters[k].name.as_str()).filter(|name| name.ends_with("].at")).collect();
+    let mut silent_at_zero: Vec<&str> = unknowns
+        .iter()
+        .map(|&k| model.parameters[k].name.as_str())
+        .filter(|name| name.ends_with("].at"))
+        .collect();
     silent_at_zero.extend(silent);
-    check_at(&format!("{what}, {kinds:?} at zero"), &problem, rows, (&zero, &step), &unknowns, &silent_at_zero);
+    check_at(
+        &format!("{what}, {kinds:?} at zero"),
+        &problem,
+        rows,
+        (&zero, &step),
+        &unknowns,
+        &silent_at_zero,
+    );
     let mut strong = strengths(&model, &values);
-    // Play that a moment takes up turns about within 1 N·m: where it counts, the arm's own parameters stay.
+    // Play that a moment takes up turns about within 1 N·m: where it counts, the arm's own
+    // parameters stay.
     for k in unknowns.iter().filter(|k| !of_effects(&model).contains(k)) {
         strong[*k] = 0.01;
     }
@@ -95,7 +116,8 @@ fn every_effect_on_elastic_arms() {
                 for equilibrium in [Equilibrium::Deflected, Equilibrium::Undeflected] {
                     arm.statics.equilibrium = equilibrium;
                     for effect in &all {
-                        let slides = matches!(effect.0, Effect::Backlash { joint: 4 }) && what == "odd arm";
+                        let slides =
+                            matches!(effect.0, Effect::Backlash { joint: 4 }) && what == "odd arm";
                         let silent: &[&str] = match &effect.0 {
                             _ if approaches => &[],
                             Effect::Backlash { .. } if slides => &["backlash[4].width"],
@@ -137,9 +159,13 @@ fn all_effects_at_once_with_everything_else_free_in_two_sessions() {
 
 #[test]
 fn a_spring_with_everything_else_free() {
-    // A spring whose moment changes with the joint by a tenth of the joint's own stiffness: what turns the joint changes its load.
+    // A spring whose moment changes with the joint by a tenth of the joint's own stiffness: what
+    // turns the joint changes its load.
     let soft = |mut arm: Problem| {
-        arm.joints.iter_mut().filter_map(|joint| joint.stiffness.as_mut()).for_each(|stiffness| *stiffness /= 8.0);
+        arm.joints
+            .iter_mut()
+            .filter_map(|joint| joint.stiffness.as_mut())
+            .for_each(|stiffness| *stiffness /= 8.0);
         arm
     };
     let cases = [
@@ -173,7 +199,10 @@ fn what_drives_the_joints_of_a_rigid_arm() {
     let mut arm = Problem::read(&path("problems/ur10-ipa")).unwrap();
     arm.data.reference_temperature = Some(20.0);
     let effects = [
-        (Effect::JointHarmonic { joint: 2, orders: vec![1, 2, 30] }, vec![1e-4, 2e-4, 3e-4, 4e-4, 1e-5, 2e-5]),
+        (
+            Effect::JointHarmonic { joint: 2, orders: vec![1, 2, 30] },
+            vec![1e-4, 2e-4, 3e-4, 4e-4, 1e-5, 2e-5],
+        ),
         (Effect::JointHarmonic { joint: 2, orders: vec![3] }, vec![1e-4, 2e-4]),
         (Effect::GearRatio { joint: 3 }, vec![4e-4]),
         (Effect::GearRatio { joint: 2 }, vec![4e-4]),
@@ -200,7 +229,8 @@ fn what_drives_the_joints_of_a_rigid_arm() {
     check("UR10 with play", &arm, &soft, &rows, false, &[]);
 }
 
-/// The arm and its poses with all loads and stiffnesses times `factor`: it bends as before, under other moments.
+/// The arm and its poses with all loads and stiffnesses times `factor`: it bends as before, under
+/// other moments.
 fn loaded(arm: &Problem, rows: &Measurements, factor: f64) -> (Problem, Measurements) {
     let (mut arm, mut rows) = (arm.clone(), rows.clone());
     arm.gravity *= factor;
@@ -237,12 +267,24 @@ fn every_effect_under_any_load() {
             let residuals = PoseResiduals::new(&model, rest, unknowns.clone(), x);
             let zero = DVector::zeros(unknowns.len());
             let exact = jacobian(&residuals, &zero);
-            assert!(exact.iter().all(|value| value.is_finite()), "{effect:?} at {moment} N·m: {exact}");
-            // Steps that move the target by a tenth of a millimetre; the place of a mass that is not there moves nothing.
+            assert!(
+                exact.iter().all(|value| value.is_finite()),
+                "{effect:?} at {moment} N·m: {exact}"
+            );
+            // Steps that move the target by a tenth of a millimetre; the place of a mass that is
+            // not there moves nothing.
             let norms: Vec<f64> = exact.column_iter().map(|column| column.norm()).collect();
-            let step = DVector::from_iterator(norms.len(), norms.iter().map(|norm| 1e-4 / norm.max(1e-12)));
-            for (column, norm) in check_jacobian(&residuals, &zero, &step).columns.iter().zip(&norms) {
-                assert!(*norm < 1e-12 || column.relative_error < WORST, "{effect:?} at {moment} N·m: {column:?}");
+            let step = DVector::from_iterator(
+                norms.len(),
+                norms.iter().map(|norm| 1e-4 / norm.max(1e-12)),
+            );
+            for (column, norm) in
+                check_jacobian(&residuals, &zero, &step).columns.iter().zip(&norms)
+            {
+                assert!(
+                    *norm < 1e-12 || column.relative_error < WORST,
+                    "{effect:?} at {moment} N·m: {column:?}"
+                );
             }
         }
     }

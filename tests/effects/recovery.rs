@@ -1,10 +1,10 @@
 //! Declared effects are found from 28 noisy poses, within their errors.
 
-use flexcal::identify::{Identification, Options, identify, identify_model};
+use flexcal::fit::{Identification, Options, identify, identify_model};
 use flexcal::measurement::Measurements;
 use flexcal::model::Ablation;
 use flexcal::problem::{Effect, Problem};
-use flexcal::simulate::Rig;
+use flexcal::rig::Rig;
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -24,7 +24,10 @@ fn check(problem: &Problem, rows: &Measurements, truth: &DVector<f64>, found: &I
         let (parameter, estimate) = (&model.parameters[k], &found.estimates[k]);
         let error = estimate.std_error.unwrap();
         let off = (estimate.estimate - parameter.value(truth[k])) / error;
-        println!("{:34} {:11.3e} ± {error:8.2e}, {off:5.2} σ off", estimate.name, estimate.estimate);
+        println!(
+            "{:34} {:11.3e} ± {error:8.2e}, {off:5.2} σ off",
+            estimate.name, estimate.estimate
+        );
         assert!(off.abs() < 4.0, "{}: {off} σ off", estimate.name);
         assert!(error < 0.9 * parameter.sigma.unwrap(), "{}: nothing learned", estimate.name);
     }
@@ -36,7 +39,8 @@ fn every_effect_is_found_beside_the_arm_s_own_errors() {
     // The lunar sampler has no slide.
     let (with_slide, more) = odd();
     let slides = more.iter().filter(|(effect, _)| matches!(effect, Effect::SlideBending { .. }));
-    let cases = all.iter().map(|strong| (&arm, strong)).chain(slides.map(|strong| (&with_slide, strong)));
+    let cases =
+        all.iter().map(|strong| (&arm, strong)).chain(slides.map(|strong| (&with_slide, strong)));
     for (number, (arm, (effect, values))) in cases.enumerate() {
         let mut arm = arm.clone();
         arm.data.position_sigma = Some(NOISE);
@@ -74,9 +78,12 @@ fn several_effects_of_the_rig_are_found_at_once() {
         let some: Vec<_> = all.into_iter().filter(|(effect, _)| chosen(effect)).collect();
         let effects: Vec<Effect> = some.iter().map(|(effect, _)| effect.clone()).collect();
         let values: Vec<f64> = some.iter().flat_map(|(_, values)| values.clone()).collect();
-        // The waves of a slide are long beside its travel: only a wide prior leaves room for what these poses say.
+        // The waves of a slide are long beside its travel: only a wide prior leaves room for what
+        // these poses say.
         if arm.name == "odd" {
-            arm.parameters.extend(parse(&format!("{ODD}\n\"*-harmonic.*\" = {{ sigma_mm = 5.0 }}")).parameters.pop());
+            arm.parameters.extend(
+                parse(&format!("{ODD}\n\"*-harmonic.*\" = {{ sigma_mm = 5.0 }}")).parameters.pop(),
+            );
         }
         let problem = declared(&arm, &effects);
         let mut rng = ChaCha8Rng::seed_from_u64(9);
@@ -95,8 +102,10 @@ fn several_effects_of_the_rig_are_found_at_once() {
 fn sessions_are_registered_with_the_effects_at_work() {
     let mut arm = Problem::read(&path("problems/ur10-ipa")).unwrap();
     arm.data.position_sigma = Some(NOISE);
-    let problem =
-        declared(&arm, &[Effect::GearRatio { joint: 3 }, Effect::JointHarmonic { joint: 2, orders: vec![1] }]);
+    let problem = declared(
+        &arm,
+        &[Effect::GearRatio { joint: 3 }, Effect::JointHarmonic { joint: 2, orders: vec![1] }],
+    );
     let mut rng = ChaCha8Rng::seed_from_u64(10);
     let mut rows = poses(&problem, 50, false, &mut rng);
     rows.session = labels((0..50).map(|k| ["A", "B", "C"][(k / 20).min(2)]));
@@ -136,12 +145,14 @@ fn every_part_of_the_elasticity_can_be_left_out_with_effects_declared() {
     measure(&problem, &mut rows, &truth, NOISE, &mut rng);
     let model = model_of(&problem, &rows);
     let identify = |ablation: Ablation| {
-        identify_model(&model.ablated(ablation), &problem, &divided(28, &rows), &Options::default()).unwrap()
+        identify_model(&model.ablated(ablation), &problem, &divided(28, &rows), &Options::default())
+            .unwrap()
     };
     let ablations = Ablation::EACH.map(|ablation| (ablation, identify(ablation)));
     for (ablation, found) in &ablations {
         let estimate = |name: &str| found.estimate(name);
-        let of_geometry = ["gear-ratio[3].error", "backlash[3].width", "link-thermal-expansion[B].strain"];
+        let of_geometry =
+            ["gear-ratio[3].error", "backlash[3].width", "link-thermal-expansion[B].strain"];
         for name in of_geometry {
             let learned = estimate(name).unwrap().identified;
             assert!(learned > 0.5, "{}: {name} is not seen: {learned}", ablation.as_str());
@@ -164,7 +175,8 @@ fn effects_that_the_columns_cannot_show_are_refused() {
         let problem = declared(&arm, &[effect]);
         let mut rows = poses(&problem, 20, false, &mut ChaCha8Rng::seed_from_u64(12));
         rows.temperature = None;
-        let error = identify(&problem, &divided(10, &rows), &Options::default()).unwrap_err().to_string();
+        let error =
+            identify(&problem, &divided(10, &rows), &Options::default()).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
     }
 }

@@ -1,8 +1,9 @@
-//! The model's effects do what those of the rig do, which shares no physics with it; and nothing at zero.
+//! The model's effects do what those of the rig do, which shares no physics with it; and nothing at
+//! zero.
 
 use flexcal::measurement::Measurements;
 use flexcal::problem::{Effect, JointKind, Problem};
-use flexcal::simulate::Rig;
+use flexcal::rig::Rig;
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -19,17 +20,20 @@ const FLOOR: f64 = 1e-6;
 fn measured(arm: &Problem, effects: &[Strong], rows: &Measurements) -> Vec<Vector3<f64>> {
     let effects = effects.iter().map(|effect| in_truth(arm, effect)).collect();
     let rig = Rig::new(arm.clone(), effects);
-    let word = |row: usize| rows.target.as_ref().map_or("", |own| own.names[own.of_row[row]].as_str());
+    let word =
+        |row: usize| rows.target.as_ref().map_or("", |own| own.names[own.of_row[row]].as_str());
     (0..rows.len()).map(|row| rig.pose_of(word(row), &conditions(rows, row)).unwrap().0).collect()
 }
 
-/// Compares what an effect changes: largest change, largest difference, and whether that is allowed.
+/// Compares what an effect changes: largest change, largest difference, and whether that is
+/// allowed.
 fn check(arm: &Problem, effect: &Strong, rows: &Measurements) {
     let with = declared(arm, std::slice::from_ref(&effect.0));
     let x = strengths(&model_of(&with, rows), &effect.1);
     let strong = predicted(&with, rows, &x);
     let rest = predicted(arm, rows, &DVector::zeros(model_of(arm, rows).parameters.len()));
-    let (rig_strong, rig_rest) = (measured(arm, std::slice::from_ref(effect), rows), measured(arm, &[], rows));
+    let (rig_strong, rig_rest) =
+        (measured(arm, std::slice::from_ref(effect), rows), measured(arm, &[], rows));
     let (mut change, mut difference) = (0.0_f64, 0.0_f64);
     for row in 0..rows.len() {
         let expected = rig_strong[row] - rig_rest[row];
@@ -44,7 +48,8 @@ fn check(arm: &Problem, effect: &Strong, rows: &Measurements) {
         (change, difference) = (change.max(expected.norm()), difference.max(off));
     }
     println!("{:8.4} mm, off by {:.5} mm  {:?}", change * 1e3, difference * 1e3, effect.0);
-    // No moment moves a joint along its slide: without a direction of approach its play does nothing.
+    // No moment moves a joint along its slide: without a direction of approach its play does
+    // nothing.
     let slides = |joint: usize| arm.joints[joint - 1].kind == JointKind::Prismatic;
     let silent = match effect.0 {
         Effect::DeflectedEquilibrium => true,
@@ -93,7 +98,8 @@ fn several_effects_at_once_are_those_of_the_rig() {
         let ours = predicted(&with, &rows, &strengths(&model_of(&with, &rows), &values));
         let (theirs, rest) = (measured(&arm, &all, &rows), measured(&arm, &[], &rows));
         for row in 0..rows.len() {
-            let (off, change) = ((ours[row] - theirs[row]).norm(), (theirs[row] - rest[row]).norm());
+            let (off, change) =
+                ((ours[row] - theirs[row]).norm(), (theirs[row] - rest[row]).norm());
             assert!(off < PART * change + FLOOR, "row {row}: {off} m off of {change} m");
         }
     }
@@ -109,10 +115,18 @@ fn every_effect_is_inert_at_zero() {
                 let mut without = with.clone();
                 without.effects.clear();
                 let zero = |problem: &Problem| {
-                    predicted(problem, &rows, &DVector::zeros(model_of(problem, &rows).parameters.len()))
+                    predicted(
+                        problem,
+                        &rows,
+                        &DVector::zeros(model_of(problem, &rows).parameters.len()),
+                    )
                 };
                 for (one, other) in zero(&with).iter().zip(zero(&without)) {
-                    assert!((one - other).norm() < 1e-12, "{effect:?}: {:e} m", (one - other).norm());
+                    assert!(
+                        (one - other).norm() < 1e-12,
+                        "{effect:?}: {:e} m",
+                        (one - other).norm()
+                    );
                 }
             }
         }

@@ -1,8 +1,8 @@
 //! What the rules of `[parameters]` make of the parameters of effects.
 
-use flexcal::diagnose::detectable;
 use flexcal::model::parameter::Parameter;
 use flexcal::problem::Problem;
+use flexcal::select::detectable;
 
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
@@ -71,17 +71,28 @@ fn without_rules_effects_are_free_with_the_prior_of_the_catalogue() {
     let parameters = resolved("").unwrap();
     let names: Vec<&str> = parameters.iter().map(|parameter| parameter.name.as_str()).collect();
     assert_eq!(names, NAMES);
-    assert!(parameters.iter().all(|parameter| parameter.sigma.is_some() && !parameter.is_bounded()));
+    assert!(
+        parameters.iter().all(|parameter| parameter.sigma.is_some() && !parameter.is_bounded())
+    );
     assert_eq!(find(&parameters, "gear-ratio[3].error").unwrap().sigma, Some(0.01));
 }
 
 #[test]
 fn rules_name_effects_with_or_without_their_place() {
-    let parameters = resolved("\"gear-ratio.*\" = { fixed = true }\n\"backlash[5].*\" = { fixed = true }").unwrap();
-    assert!(find(&parameters, "gear-ratio[3].error").is_none() && find(&parameters, "gear-ratio[5].error").is_none());
-    assert!(find(&parameters, "backlash[5].width").is_none() && find(&parameters, "backlash[4].width").is_some());
     let parameters =
-        resolved("\"gear-ratio.*\" = { fixed = true }\n\"gear-ratio[3].error\" = { free = true }").unwrap();
+        resolved("\"gear-ratio.*\" = { fixed = true }\n\"backlash[5].*\" = { fixed = true }")
+            .unwrap();
+    assert!(
+        find(&parameters, "gear-ratio[3].error").is_none()
+            && find(&parameters, "gear-ratio[5].error").is_none()
+    );
+    assert!(
+        find(&parameters, "backlash[5].width").is_none()
+            && find(&parameters, "backlash[4].width").is_some()
+    );
+    let parameters =
+        resolved("\"gear-ratio.*\" = { fixed = true }\n\"gear-ratio[3].error\" = { free = true }")
+            .unwrap();
     assert_eq!(find(&parameters, "gear-ratio[3].error").unwrap().sigma, None);
     assert!(find(&parameters, "gear-ratio[5].error").is_none());
 }
@@ -99,7 +110,12 @@ fn angles_and_lengths_take_priors_and_bounds() {
     assert_eq!((sliding.sigma, sliding.upper), (None, 2e-3));
     assert_eq!(find(&parameters, "station-shift[90].y").unwrap().sigma, Some(3e-3));
     assert_eq!(find(&parameters, "joint-harmonic[3].cos4").unwrap().sigma, Some(1e-3));
-    assert!((find(&parameters, "joint-harmonic[3].sin4").unwrap().sigma.unwrap() - 0.2_f64.to_radians()).abs() < 1e-15);
+    assert!(
+        (find(&parameters, "joint-harmonic[3].sin4").unwrap().sigma.unwrap()
+            - 0.2_f64.to_radians())
+        .abs()
+            < 1e-15
+    );
 }
 
 #[test]
@@ -121,7 +137,10 @@ fn rules_for_everything_reach_effects_as_far_as_they_fit_them() {
 #[test]
 fn rules_that_do_not_fit_are_mistakes() {
     for (rule, words) in [
-        ("\"gear-ratio.*\" = { sigma_mm = 1 }", "gear-ratio[3].error takes free = true or fixed = true"),
+        (
+            "\"gear-ratio.*\" = { sigma_mm = 1 }",
+            "gear-ratio[3].error takes free = true or fixed = true",
+        ),
         ("\"backlash[5].width\" = { sigma_mm = 1 }", "backlash[5].width takes _deg or _rad"),
         ("\"backlash[4].width\" = { sigma_deg = 1 }", "backlash[4].width takes _mm or _m"),
         ("\"gear-ratio[2].error\" = { free = true }", "matches no parameter"),
@@ -137,7 +156,10 @@ fn rules_that_do_not_fit_are_mistakes() {
             "\"link-th*\" = { free = true }",
             "those of link-thermal-bending, link-thermal-expansion, link-thermal-bending-lag, link-thermal-expansion-lag are there",
         ),
-        ("\"joint-com*[2].*\" = { free = true }", "declares it, as in joint-compliance = { joint = "),
+        (
+            "\"joint-com*[2].*\" = { free = true }",
+            "declares it, as in joint-compliance = { joint = ",
+        ),
     ] {
         let error = resolved(rule).unwrap_err();
         assert!(error.contains(words), "{rule}: {error}");
@@ -149,17 +171,26 @@ fn what_a_rule_could_not_take_is_not_looked_for() {
     let (arm, _) = ODD.split_once("[parameters]").unwrap();
     // In millimetres, for play of the slide: the other joints turn.
     let rule = "\"backlash.*\" = { sigma_mm = 1 }";
-    let text =
-        format!("{arm}[[effect]]\nbacklash = {{ joint = 4 }}\n[parameters]\n{rule}\n[data]\nposition_sigma_mm = 0.1\n");
+    let text = format!(
+        "{arm}[[effect]]\nbacklash = {{ joint = 4 }}\n[parameters]\n{rule}\n[data]\nposition_sigma_mm = 0.1\n"
+    );
     let problem = parse(&text);
     let poses = at_random(&problem, 60, 1.5, &mut ChaCha8Rng::seed_from_u64(1));
     let detection = detectable(&problem, &poses).unwrap();
-    let refused: Vec<&str> =
-        detection.untestable.iter().filter(|(_, why)| why.contains("in another unit")).map(|(e, _)| e.name()).collect();
+    let refused: Vec<&str> = detection
+        .untestable
+        .iter()
+        .filter(|(_, why)| why.contains("in another unit"))
+        .map(|(e, _)| e.name())
+        .collect();
     assert_eq!(refused, ["backlash"; 3], "{:?}", detection.untestable);
     // Whatever is looked for can be declared.
     for found in &detection.effects {
         let both = [problem.effects[0].effect.clone(), found.effect.clone()];
-        assert!(!model_of(&declared(&problem, &both), &poses).parameters.is_empty(), "{:?}", found.effect);
+        assert!(
+            !model_of(&declared(&problem, &both), &poses).parameters.is_empty(),
+            "{:?}",
+            found.effect
+        );
     }
 }

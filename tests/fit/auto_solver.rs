@@ -7,16 +7,17 @@ use std::fs;
 use crate::common::arms::{path, with_parameters};
 use crate::common::bounded::Bounded;
 use argmin::core::observers::Observe;
-use flexcal::identify::SolverChoice;
+use flexcal::fit::SolverChoice;
 use flexcal::least_squares::Loss;
 use flexcal::least_squares::solver::{
-    GaussNewtonSettings, PseudoInverseSettings, Settings, Solution, State, minimise, minimise_gauss_newton,
-    minimise_pseudo_inverse, minimise_within,
+    GaussNewtonSettings, PseudoInverseSettings, Settings, Solution, State, minimise,
+    minimise_gauss_newton, minimise_pseudo_inverse, minimise_within,
 };
 use flexcal::model::Model;
 use flexcal::problem::Problem;
 
-/// The solver of `auto` takes at most this many times as long, summed over a class, as the fastest that reaches every optimum.
+/// The solver of `auto` takes at most this many times as long, summed over a class, as the fastest
+/// that reaches every optimum.
 const SLOWER: f64 = 2.0;
 
 /// The classes of the table, and whether their models have bounds.
@@ -48,7 +49,9 @@ fn rows<'a>(page: &'a str, class: &str) -> Vec<Row<'a>> {
     let cells = cells.map(|line| line.split(" | ").collect::<Vec<&str>>()).skip(1);
     cells
         .map(|cells| {
-            let [problem, solver, optimum, .., time] = cells[..] else { panic!("{class}: {cells:?}") };
+            let [problem, solver, optimum, .., time] = cells[..] else {
+                panic!("{class}: {cells:?}")
+            };
             Row { solver, problem, optimum, time: time.parse().unwrap() }
         })
         .collect()
@@ -71,7 +74,8 @@ fn faults(rows: &[Row], pick: &str) -> Vec<String> {
     let of = |solver: &str| rows.iter().filter(|row| row.solver == solver).collect::<Vec<_>>();
     let missed = |rows: &[&Row]| rows.iter().filter(|row| !row.optimum.starts_with("yes")).count();
     let total = |rows: &[&Row], beside: &[&Row]| {
-        let both = rows.iter().filter(|row| beside.iter().any(|other| other.problem == row.problem));
+        let both =
+            rows.iter().filter(|row| beside.iter().any(|other| other.problem == row.problem));
         both.map(|row| row.time).sum::<f64>()
     };
     let picked = of(pick);
@@ -79,7 +83,8 @@ fn faults(rows: &[Row], pick: &str) -> Vec<String> {
         return vec![format!("{pick} is not in the table")];
     }
     let lost = picked.iter().filter(|row| !row.optimum.starts_with("yes"));
-    let mut faults: Vec<String> = lost.map(|row| format!("{pick} on {}: {}", row.problem, row.optimum)).collect();
+    let mut faults: Vec<String> =
+        lost.map(|row| format!("{pick} on {}: {}", row.problem, row.optimum)).collect();
     for row in rows {
         let others = of(row.solver);
         let [own, other] = [total(&picked, &others), total(&others, &picked)];
@@ -103,8 +108,8 @@ fn auto_takes_what_the_table_recommends() {
     assert_eq!(sections, CLASSES.len() + 1, "every section but the summary is a class");
 }
 
-/// As the table says, with fits made here: what `auto` takes comes to the optimum, by no more evaluations than twice those of the
-/// thriftiest that does.
+/// As the table says, with fits made here: what `auto` takes comes to the optimum, by no more
+/// evaluations than twice those of the thriftiest that does.
 #[test]
 fn auto_is_best_where_bounds_bind() {
     for (name, solvers) in [("stiffness", 4), ("tight-geometry", 4), ("mild-constraints", 2)] {
@@ -113,12 +118,23 @@ fn auto_is_best_where_bounds_bind() {
         let fit = own.fit(&residuals);
         let solve = |solver: SolverChoice| {
             let (within, limits) = (solver.within().unwrap(), (&own.bounds, &own.rows));
-            let found = minimise_within(within, &fit, own.nominal(), limits, &Settings::default(), None::<Silent>);
-            let (steps, count) = (found.iterations, found.evaluations());
-            println!("{name}, {}: {steps} steps, {count} evaluations, cost {:.12e}", solver.as_str(), found.cost);
-            assert!(
-                (0..found.x.len()).all(|j| own.bounds.lower()[j] <= found.x[j] && found.x[j] <= own.bounds.upper()[j])
+            let found = minimise_within(
+                within,
+                &fit,
+                own.nominal(),
+                limits,
+                &Settings::default(),
+                None::<Silent>,
             );
+            let (steps, count) = (found.iterations, found.evaluations());
+            println!(
+                "{name}, {}: {steps} steps, {count} evaluations, cost {:.12e}",
+                solver.as_str(),
+                found.cost
+            );
+            assert!((0..found.x.len()).all(
+                |j| own.bounds.lower()[j] <= found.x[j] && found.x[j] <= own.bounds.upper()[j]
+            ));
             found
         };
         let keeps = SolverChoice::EACH.into_iter().filter(|solver| solver.keeps(&own.model));
@@ -131,7 +147,11 @@ fn auto_is_best_where_bounds_bind() {
         let counts: Vec<u64> = reached.map(Solution::evaluations).collect();
         assert!(counts.len() + 1 >= solvers, "{name}: only the naive way may stop short");
         let least = counts.into_iter().min().unwrap();
-        assert!(auto.evaluations() <= 2 * least, "{name}: {} evaluations, the thriftiest {least}", auto.evaluations());
+        assert!(
+            auto.evaluations() <= 2 * least,
+            "{name}: {} evaluations, the thriftiest {least}",
+            auto.evaluations()
+        );
     }
 }
 
@@ -146,26 +166,38 @@ fn auto_is_best_under_robust_losses() {
         Loss::L1 { slope: Loss::L1_POSITION, smoothing: Loss::L1_SMOOTHING },
     ] {
         let fit = || own.fit(&residuals).with_loss(loss);
-        let found =
-            [SolverChoice::LevenbergMarquardt, SolverChoice::GaussNewton, SolverChoice::PseudoInverse].map(|solver| {
-                let found = match solver {
-                    SolverChoice::GaussNewton => {
-                        minimise_gauss_newton(fit(), own.nominal(), &GaussNewtonSettings::default())
-                    }
-                    SolverChoice::PseudoInverse => {
-                        minimise_pseudo_inverse(fit(), own.nominal(), &PseudoInverseSettings::default())
-                    }
-                    _ => minimise(fit(), own.nominal(), &Settings::default()),
-                };
-                let (steps, count, cost) = (found.iterations, found.evaluations(), found.cost);
-                println!("{loss:?}, {}: {steps} steps, {count} evaluations, cost {cost:.12e}", solver.as_str());
-                (solver, found)
-            });
+        let found = [
+            SolverChoice::LevenbergMarquardt,
+            SolverChoice::GaussNewton,
+            SolverChoice::PseudoInverse,
+        ]
+        .map(|solver| {
+            let found = match solver {
+                SolverChoice::GaussNewton => {
+                    minimise_gauss_newton(fit(), own.nominal(), &GaussNewtonSettings::default())
+                }
+                SolverChoice::PseudoInverse => {
+                    minimise_pseudo_inverse(fit(), own.nominal(), &PseudoInverseSettings::default())
+                }
+                _ => minimise(fit(), own.nominal(), &Settings::default()),
+            };
+            let (steps, count, cost) = (found.iterations, found.evaluations(), found.cost);
+            println!(
+                "{loss:?}, {}: {steps} steps, {count} evaluations, cost {cost:.12e}",
+                solver.as_str()
+            );
+            (solver, found)
+        });
         let best = found.iter().map(|(_, found)| found.cost).fold(f64::INFINITY, f64::min);
         let reached = found.iter().filter(|(_, found)| found.cost <= best * (1.0 + 1e-8));
         let least = reached.map(|(_, found)| found.evaluations()).min().unwrap();
-        let auto = found.iter().find(|(solver, _)| *solver == free).map(|(_, found)| found).unwrap();
-        assert!(auto.termination.converged() && auto.cost <= best * (1.0 + 1e-8), "{loss:?}: {:.12e}", auto.cost);
+        let auto =
+            found.iter().find(|(solver, _)| *solver == free).map(|(_, found)| found).unwrap();
+        assert!(
+            auto.termination.converged() && auto.cost <= best * (1.0 + 1e-8),
+            "{loss:?}: {:.12e}",
+            auto.cost
+        );
         assert!(
             auto.evaluations() <= 2 * least,
             "{loss:?}: {} evaluations, the thriftiest {least}",

@@ -2,7 +2,7 @@
 
 use crate::common::arms::{measured as read, parse, path, with_parameters};
 use crate::common::made::{at_random, divided, labels, measure, model_of, split_at};
-use flexcal::identify::{Estimate, Identification, Options, QualityFlag, Strategy, identify};
+use flexcal::fit::{Estimate, Identification, Options, QualityFlag, Strategy, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use nalgebra::DVector;
@@ -28,7 +28,8 @@ fn measured(problem: &Problem, truth: &[(&str, f64)]) -> Dataset {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut rows = at_random(problem, 90, 2.0, &mut rng);
     let parameters = model_of(problem, &rows).parameters;
-    let deviation = |name: &str| truth.iter().find(|(known, _)| *known == name).map_or(0.0, |(_, x)| *x);
+    let deviation =
+        |name: &str| truth.iter().find(|(known, _)| *known == name).map_or(0.0, |(_, x)| *x);
     let x = DVector::from_iterator(parameters.len(), parameters.iter().map(|p| deviation(&p.name)));
     measure(problem, &mut rows, &x, SIGMA, &mut rng);
     divided(60, &rows)
@@ -42,7 +43,11 @@ fn what_is_blind_at_nominal_is_fitted_once_it_is_seen() {
     let data = measured(&problem, &truth);
     let found = identify(&problem, &data, &Options::default()).unwrap();
     assert_eq!(found.identifiability().rank, 2);
-    assert!(found.is_trusted() && found.reduced_chi2.unwrap() < 1.4, "χ²/ν {:?}", found.reduced_chi2);
+    assert!(
+        found.is_trusted() && found.reduced_chi2.unwrap() < 1.4,
+        "χ²/ν {:?}",
+        found.reduced_chi2
+    );
     for (name, deviation) in truth {
         let estimate = estimate(&found, name);
         let miss = estimate.estimate - estimate.nominal - deviation;
@@ -52,12 +57,16 @@ fn what_is_blind_at_nominal_is_fitted_once_it_is_seen() {
 
 #[test]
 fn a_bound_that_cuts_a_blind_combination_leaves_the_rest_of_it_free() {
-    let problem = parallel("'joint2.d' = { min_mm = -0.5, max_mm = 0.5 }\n'joint3.d' = { free = true }");
+    let problem =
+        parallel("'joint2.d' = { min_mm = -0.5, max_mm = 0.5 }\n'joint3.d' = { free = true }");
     let data = measured(&problem, &[("joint2.d", 0.0005), ("joint3.d", 0.0035)]);
     let found = identify(&problem, &data, &Options::default()).unwrap();
     assert!(found.reduced_chi2.unwrap() < 1.4, "χ²/ν {:?}", found.reduced_chi2);
-    let sum: f64 =
-        ["joint2.d", "joint3.d"].iter().map(|name| estimate(&found, name)).map(|e| e.estimate - e.nominal).sum();
+    let sum: f64 = ["joint2.d", "joint3.d"]
+        .iter()
+        .map(|name| estimate(&found, name))
+        .map(|e| e.estimate - e.nominal)
+        .sum();
     assert!((sum - 0.004).abs() < 5.0 * SIGMA / 60.0_f64.sqrt(), "{sum}");
     if let Some(error) = estimate(&found, "joint3.d").std_error {
         assert!(error > 0.1 * SIGMA / 60.0_f64.sqrt(), "± {error:e}");
@@ -66,12 +75,17 @@ fn a_bound_that_cuts_a_blind_combination_leaves_the_rest_of_it_free() {
 
 #[test]
 fn parameters_of_a_blind_combination_have_no_error_of_their_own() {
-    let problem = parallel("'joint2.d' = { free = true }\n'joint3.d' = { free = true }\n'joint3.a' = { free = true }");
+    let problem = parallel(
+        "'joint2.d' = { free = true }\n'joint3.d' = { free = true }\n'joint3.a' = { free = true }",
+    );
     let data = measured(&problem, &[("joint2.d", 0.001)]);
     let found = identify(&problem, &data, &Options::default()).unwrap();
     for name in ["joint2.d", "joint3.d"] {
         let estimate = estimate(&found, name);
-        assert!(estimate.std_error.is_none() && (estimate.identified - 0.5).abs() < 1e-6, "{estimate:?}");
+        assert!(
+            estimate.std_error.is_none() && (estimate.identified - 0.5).abs() < 1e-6,
+            "{estimate:?}"
+        );
     }
     assert!(estimate(&found, "joint3.a").std_error.unwrap() < SIGMA);
 }
@@ -82,7 +96,8 @@ fn a_session_with_too_few_poses_is_not_trusted() {
     let mut data = measured(&problem, &[("joint3.a", 0.001)]);
     data.measurements.session = labels((0..90).map(|row| if row == 75 { "B" } else { "A" }));
     let found = identify(&problem, &data, &Options::default()).unwrap();
-    let expected = QualityFlag::TooFewEquations { of: "base[B]".to_owned(), coordinates: 3, unknowns: 6 };
+    let expected =
+        QualityFlag::TooFewEquations { of: "base[B]".to_owned(), coordinates: 3, unknowns: 6 };
     assert_eq!(found.quality_flag, Some(expected));
 }
 
@@ -94,7 +109,11 @@ fn an_arm_that_misses_is_not_trusted() {
         *q = -*q;
     }
     let found = identify(&problem, &data, &Options::default()).unwrap();
-    assert!(matches!(found.quality_flag, Some(QualityFlag::Misses { .. })), "{:?}", found.quality_flag);
+    assert!(
+        matches!(found.quality_flag, Some(QualityFlag::Misses { .. })),
+        "{:?}",
+        found.quality_flag
+    );
 }
 
 #[test]
@@ -119,7 +138,10 @@ fn a_wave_may_go_far_beyond_its_prior_and_an_angle_of_the_arm_may_not() {
         let data = measured(&problem, &[(truth, size)]);
         identify(&problem, &data, &Options::default()).unwrap().quality_flag
     };
-    assert_eq!(find("'joint-harmonic.*' = { sigma_deg = 0.01 }", "joint-harmonic[3].sin2", 0.02), None);
+    assert_eq!(
+        find("'joint-harmonic.*' = { sigma_deg = 0.01 }", "joint-harmonic[3].sin2", 0.02),
+        None
+    );
     let angle = find("'joint3.alpha' = { sigma_deg = 0.01 }", "joint3.alpha", 0.02);
     assert!(matches!(angle, Some(QualityFlag::BeyondPrior { .. })), "{angle:?}");
 }
@@ -132,12 +154,19 @@ fn stage_by_stage_settles_on_two_hundred_poses() {
     let options = Options::default().with_strategy(Strategy::Sequential);
     let found = identify(&problem, &data, &options).unwrap();
     assert!(found.is_trusted());
-    assert!(found.fitted.identification.rms.norm < 0.0865e-3, "{}", found.fitted.identification.rms.norm);
+    assert!(
+        found.fitted.identification.rms.norm < 0.0865e-3,
+        "{}",
+        found.fitted.identification.rms.norm
+    );
 }
 
 #[test]
 fn everything_free_and_no_prior_converges() {
-    let problem = with_parameters("tests/cases/problem.toml", "'joint*' = { free = true }\n'tool.*' = { free = true }");
+    let problem = with_parameters(
+        "tests/cases/problem.toml",
+        "'joint*' = { free = true }\n'tool.*' = { free = true }",
+    );
     let rows = read(&problem, &["tests/cases/h-none-large.csv"]);
     let data = Dataset::of(&problem, rows).unwrap();
     let found = identify(&problem, &data, &Options::default()).unwrap();
@@ -160,11 +189,14 @@ fn a_constraint_that_cuts_a_blind_combination_does_what_the_bound_does() {
 
 #[test]
 fn base_and_tool_of_a_held_out_session_count_together() {
-    let problem = parallel("'joint3.a' = { free = true }\n'base.*' = { free = true }\n'tool.*' = { free = true }");
+    let problem = parallel(
+        "'joint3.a' = { free = true }\n'base.*' = { free = true }\n'tool.*' = { free = true }",
+    );
     let mut data = measured(&problem, &[]);
     data.measurements.session = labels((0..90).map(|row| if row >= 88 { "B" } else { "A" }));
     let found = identify(&problem, &data, &Options::default()).unwrap();
-    let expected = QualityFlag::TooFewEquations { of: "base[B]".to_owned(), coordinates: 6, unknowns: 9 };
+    let expected =
+        QualityFlag::TooFewEquations { of: "base[B]".to_owned(), coordinates: 6, unknowns: 9 };
     assert_eq!(found.quality_flag, Some(expected));
 }
 
@@ -174,6 +206,9 @@ fn two_points_do_not_turn_a_base() {
     let mut data = measured(&problem, &[]);
     data.split = split_at(2, &data.measurements);
     let found = identify(&problem, &data, &Options::default()).unwrap();
-    let turned: f64 = ["base.rx", "base.ry", "base.rz"].iter().map(|name| estimate(&found, name).estimate.abs()).sum();
+    let turned: f64 = ["base.rx", "base.ry", "base.rz"]
+        .iter()
+        .map(|name| estimate(&found, name).estimate.abs())
+        .sum();
     assert!(turned < 0.01 && !found.identifiability().unidentifiable.is_empty(), "{turned} rad");
 }

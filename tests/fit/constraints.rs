@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 use crate::common::arms;
 use crate::common::bounded::Bounded;
 use argmin::core::observers::Observe;
-use flexcal::diagnose::trace;
-use flexcal::identify::{
+use flexcal::fit::{
     Estimate, Identification, IdentifyError, Options, SolverChoice, StageError, Strategy, identify,
 };
 use flexcal::least_squares::solver::{Settings, Solution, State, Within, minimise_within};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use flexcal::report::{estimate_json, estimate_text};
+use flexcal::select::trace;
 
 struct Silent;
 
@@ -54,7 +54,10 @@ fn an_inactive_constraint_changes_nothing() {
     let stiffer = constraint("\"A.EI\" = 1.0, \"B.EI\" = -1.0", "at_least = 0.0");
     let long = constraint("\"joint3.a\" = 1, \"joint4.a\" = 1", "at_most_mm = 4000");
     let bounded = identified(&(stiffer + &long));
-    assert_eq!((free.solver, bounded.solver), (SolverChoice::LevenbergMarquardt, SolverChoice::Bounded));
+    assert_eq!(
+        (free.solver, bounded.solver),
+        (SolverChoice::LevenbergMarquardt, SolverChoice::Bounded)
+    );
     assert!(bounded.active_constraints.is_empty() && bounded.is_trusted());
     let change = (&bounded.x - &free.x).amax();
     assert!(change <= 1e-8 * free.x.amax(), "{change}");
@@ -69,10 +72,12 @@ fn an_active_constraint_holds_exactly_and_is_named() {
     let free = identified("");
     let ratio = estimate(&free, "A.EI").estimate / estimate(&free, "B.EI").estimate;
     let limit = 1.3 * ratio;
-    let stiffer = constraint("\"A.EI\" = 1.0, \"B.EI\" = -1.0", &format!("at_least = {}", limit.ln()));
+    let stiffer =
+        constraint("\"A.EI\" = 1.0, \"B.EI\" = -1.0", &format!("at_least = {}", limit.ln()));
     let stiff = identified(&stiffer);
     let reach = estimate(&stiff, "joint3.a").estimate + estimate(&stiff, "joint4.a").estimate;
-    let short = constraint("\"joint3.a\" = 1, \"joint4.a\" = 1", &format!("at_most_m = {}", reach - 2e-5));
+    let short =
+        constraint("\"joint3.a\" = 1, \"joint4.a\" = 1", &format!("at_most_m = {}", reach - 2e-5));
     let problem = problem(&(stiffer + &short));
     let held = run(&problem, &Options::default()).unwrap();
     assert!(held.is_trusted(), "{}", held.termination);
@@ -81,16 +86,19 @@ fn an_active_constraint_holds_exactly_and_is_named() {
     assert!((held_ratio / limit - 1.0).abs() < 1e-9, "{held_ratio} on {limit}, free {ratio}");
     let sum = estimate(&held, "joint3.a").estimate + estimate(&held, "joint4.a").estimate;
     assert!((sum - reach + 2e-5).abs() < 1e-9 * reach, "{sum} on {}", reach - 2e-5);
-    // Along the constraints both vary together: the logarithms alike, the lengths against each other.
+    // Along the constraints both vary together: the logarithms alike, the lengths against each
+    // other.
     let relative = |of: &Estimate| of.std_error.unwrap() / of.estimate;
     assert!((relative(a) / relative(b) - 1.0).abs() < 1e-6, "{} {}", relative(a), relative(b));
     let length = |name| estimate(&held, name).std_error.unwrap();
     assert!((length("joint3.a") / length("joint4.a") - 1.0).abs() < 1e-6);
     assert!(length("joint3.a") < estimate(&free, "joint3.a").std_error.unwrap());
-    let words: Vec<&str> = held.active_constraints.iter().map(|active| active.words.as_str()).collect();
+    let words: Vec<&str> =
+        held.active_constraints.iter().map(|active| active.words.as_str()).collect();
     assert_eq!(words.len(), 2);
     assert!(
-        words[0].starts_with("ln A.EI − ln B.EI ≥ ") && words[1].starts_with("joint3.a + joint4.a ≤ "),
+        words[0].starts_with("ln A.EI − ln B.EI ≥ ")
+            && words[1].starts_with("joint3.a + joint4.a ≤ "),
         "{words:?}"
     );
     let text = estimate_text(&problem, &held);
@@ -105,7 +113,9 @@ fn an_active_constraint_holds_exactly_and_is_named() {
     let stiffness = Options::default().with_strategy(Strategy::StiffnessOnly);
     let alone = run(&problem, &stiffness).unwrap();
     assert!(alone.active_constraints.iter().all(|active| active.words == words[0]));
-    assert!(estimate(&alone, "A.EI").estimate / estimate(&alone, "B.EI").estimate / limit > 1.0 - 1e-9);
+    assert!(
+        estimate(&alone, "A.EI").estimate / estimate(&alone, "B.EI").estimate / limit > 1.0 - 1e-9
+    );
 }
 
 #[test]
@@ -114,8 +124,11 @@ fn a_constraint_on_one_parameter_is_a_bound() {
     let file = cases().join("problem.toml");
     let text = fs::read_to_string(&file).unwrap();
     let bound = format!("{rule}\n\"A.EI\" = {{ sigma_relative = 0.5, max_relative = 1.0 }}");
-    let bounded = run(&Problem::parse(&text.replace(rule, &bound), &file).unwrap(), &Options::default()).unwrap();
-    let held = identified(&constraint("\"A.EI\" = 2.0", &format!("at_most = {}", 2.0 * 2.6e4_f64.ln())));
+    let bounded =
+        run(&Problem::parse(&text.replace(rule, &bound), &file).unwrap(), &Options::default())
+            .unwrap();
+    let held =
+        identified(&constraint("\"A.EI\" = 2.0", &format!("at_most = {}", 2.0 * 2.6e4_f64.ln())));
     let change = (&bounded.x - &held.x).amax();
     assert!(change < 1e-6 * bounded.x.amax(), "{change} of {}", bounded.x.amax());
     assert!(estimate(&bounded, "A.EI").at_bound.is_some() && held.active_constraints.len() == 1);
@@ -139,12 +152,36 @@ fn what_cannot_be_is_refused() {
     assert!(matches!(refused, Err(IdentifyError::BoundsIgnored { .. })));
 
     let mistakes: [(&str, &str, &[&str]); 7] = [
-        ("\"C.EI\" = 1", "at_least = 0", &["problem.toml:87", "\"C.EI\"", "no such parameter", "B.EI"]),
-        ("\"A.EI\" = 1, \"joint3.a\" = 1", "at_least = 0", &["problem.toml:87", "does not add up with A.EI"]),
-        ("\"A.EI\" = 1", "at_least_mm = 0", &["problem.toml:88", "at_least_mm", "A.EI takes at_least"]),
-        ("\"joint3.a\" = 1", "at_most = 0", &["problem.toml:88", "at_most", "joint3.a takes at_least_mm"]),
-        ("\"joint3.alpha\" = 1", "at_most_mm = 0", &["problem.toml:88", "at_most_mm", "at_most_rad"]),
-        ("\"base.x\" = 1", "at_most_mm = 0", &["problem.toml:86", "constraint[1]", "none of its parameters is free"]),
+        (
+            "\"C.EI\" = 1",
+            "at_least = 0",
+            &["problem.toml:87", "\"C.EI\"", "no such parameter", "B.EI"],
+        ),
+        (
+            "\"A.EI\" = 1, \"joint3.a\" = 1",
+            "at_least = 0",
+            &["problem.toml:87", "does not add up with A.EI"],
+        ),
+        (
+            "\"A.EI\" = 1",
+            "at_least_mm = 0",
+            &["problem.toml:88", "at_least_mm", "A.EI takes at_least"],
+        ),
+        (
+            "\"joint3.a\" = 1",
+            "at_most = 0",
+            &["problem.toml:88", "at_most", "joint3.a takes at_least_mm"],
+        ),
+        (
+            "\"joint3.alpha\" = 1",
+            "at_most_mm = 0",
+            &["problem.toml:88", "at_most_mm", "at_most_rad"],
+        ),
+        (
+            "\"base.x\" = 1",
+            "at_most_mm = 0",
+            &["problem.toml:86", "constraint[1]", "none of its parameters is free"],
+        ),
         ("\"base.x\" = 1, \"tool.x\" = 1", "at_least_mm = 100", &[]),
     ];
     for (terms, limits, words) in mistakes {
@@ -165,16 +202,19 @@ fn checks_are_of_what_a_constraint_leaves() {
     let data = Dataset::of(&problem, measurements).unwrap();
     let trace = trace(&problem, &data, &Options::default()).unwrap();
     assert_eq!(trace.fit.active_constraints.len(), 1);
-    let check = trace.findings.tests.iter().find(|check| check.name() == "reduced-chi-squared").unwrap();
-    let (checked, fitted) = (check.outcome.as_ref().unwrap().statistic, trace.fit.reduced_chi2.unwrap());
+    let check =
+        trace.findings.tests.iter().find(|check| check.name() == "reduced-chi-squared").unwrap();
+    let (checked, fitted) =
+        (check.outcome.as_ref().unwrap().statistic, trace.fit.reduced_chi2.unwrap());
     assert!(check.failed() && fitted > 100.0, "{fitted}");
     assert!((checked / fitted - 1.0).abs() < 0.1, "{checked} of {fitted}");
 }
 
-/// Optima at the declared σ: bounds and constraints that bind a little, and against the truth, where residuals stay hundreds of σ long.
+/// Optima at the declared σ: bounds and constraints that bind a little, and against the truth,
+/// where residuals stay hundreds of σ long.
 ///
-/// Reached alike by the active set, the interior point and other starts; steps were 428 and over 500 without second derivatives, 113 and
-/// 70 with steps measured by the columns of J.
+/// Reached alike by the active set, the interior point and other starts; steps were 428 and over
+/// 500 without second derivatives, 113 and 70 with steps measured by the columns of J.
 #[test]
 fn bounds_against_the_truth_are_fitted_to_the_optimum() {
     let cases = [
@@ -190,9 +230,18 @@ fn bounds_against_the_truth_are_fitted_to_the_optimum() {
         let fit = own.fit(&residuals);
         for (within, most) in [(Within::ActiveSet, most), (Within::InteriorPoint, most.max(20))] {
             let limits = (&own.bounds, &own.rows);
-            let found = minimise_within(within, &fit, own.nominal(), limits, &Settings::default(), None::<Silent>);
+            let found = minimise_within(
+                within,
+                &fit,
+                own.nominal(),
+                limits,
+                &Settings::default(),
+                None::<Silent>,
+            );
             let Solution { iterations, cost, termination, .. } = found;
-            println!("{name}, {within:?}: {termination} after {iterations} steps, cost {cost:.12e}");
+            println!(
+                "{name}, {within:?}: {termination} after {iterations} steps, cost {cost:.12e}"
+            );
             assert!(termination.converged(), "{name}, {within:?}: {termination}");
             assert!((cost / optimum - 1.0).abs() < 1e-8, "{name}, {within:?}: {cost:.12e}");
             assert!(iterations <= most, "{name}, {within:?}: {iterations} steps");
@@ -200,15 +249,23 @@ fn bounds_against_the_truth_are_fitted_to_the_optimum() {
         // What users get: the σ that the residual speaks for.
         let fitted = identify(&own.problem, &own.data, &Options::default()).unwrap();
         println!("  identified after {} steps", fitted.iterations);
-        assert!(fitted.termination.converged() && fitted.iterations < 60, "{name}: {} steps", fitted.iterations);
+        assert!(
+            fitted.termination.converged() && fitted.iterations < 60,
+            "{name}: {} steps",
+            fitted.iterations
+        );
     }
 }
 
 /// The price of a limit is what moving it gains.
 #[test]
 fn shadow_prices_are_differences_of_fits() {
-    let at =
-        |limit: f64| identified(&constraint("\"joint3.a\" = 1, \"joint4.a\" = 1", &format!("at_most_mm = {limit}")));
+    let at = |limit: f64| {
+        identified(&constraint(
+            "\"joint3.a\" = 1, \"joint4.a\" = 1",
+            &format!("at_most_mm = {limit}"),
+        ))
+    };
     let (tight, loose) = (at(3739.0), at(3739.01));
     let [active] = &tight.active_constraints[..] else { panic!("{:?}", tight.active_constraints) };
     let fall = |found: &Identification| found.fitted.identification.rms.norm;

@@ -1,10 +1,11 @@
-//! Standard errors mean what they say: over many made-up data sets, they cover the truth at the nominal rate.
+//! Standard errors mean what they say: over many made-up data sets, they cover the truth at the
+//! nominal rate.
 
 #![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
 
 use crate::common::arms::{measured, parse, path};
 use crate::common::made::{at_random, divided, draw, measure, model_of, part};
-use flexcal::identify::{Options, Placement, identify};
+use flexcal::fit::{Options, Placement, identify};
 use flexcal::least_squares::{Identifiability, jacobian};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::model::{Model, PoseResiduals};
@@ -49,8 +50,15 @@ impl Trial {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let truth = draw(&self.model, self.spread, &mut rng);
         let mut rows = self.rows.clone();
-        measure(&self.problem, &mut rows, &truth, self.problem.data.position_sigma.unwrap(), &mut rng);
-        let found = identify(&self.problem, &divided(rows.len(), &rows), &Options::default()).unwrap();
+        measure(
+            &self.problem,
+            &mut rows,
+            &truth,
+            self.problem.data.position_sigma.unwrap(),
+            &mut rng,
+        );
+        let found =
+            identify(&self.problem, &divided(rows.len(), &rows), &Options::default()).unwrap();
         if !found.is_trusted() {
             println!("seed {seed}: {:?}", found.termination);
             return None;
@@ -65,7 +73,8 @@ impl Trial {
 
     /// Scores `fits` fits and holds them against the normal distribution.
     fn check(&self, what: &str, fits: u64) {
-        let scores: Vec<Score> = (0..fits).into_par_iter().filter_map(|seed| self.score(seed)).collect();
+        let scores: Vec<Score> =
+            (0..fits).into_par_iter().filter_map(|seed| self.score(seed)).collect();
         let failed = fits as f64 - scores.len() as f64;
         assert!(failed <= FAILURES * fits as f64, "{what}: {failed} fits of {fits} failed");
         let chi2: Vec<f64> = scores.iter().map(|score| score.reduced_chi2).collect();
@@ -81,11 +90,15 @@ impl Trial {
                 100.0 * error,
                 100.0 * nominal
             );
-            assert!((mean - nominal).abs() < LIMIT * error, "{what}: {mean} ± {error} within {within} σ");
+            assert!(
+                (mean - nominal).abs() < LIMIT * error,
+                "{what}: {mean} ± {error} within {within} σ"
+            );
         }
         for (k, parameter) in self.model.parameters.iter().enumerate() {
             let z: Vec<f64> = scores.iter().filter_map(|score| score.z[k]).collect();
-            let shares = NORMAL.map(|(within, nominal)| (share(z.iter().copied(), within), nominal));
+            let shares =
+                NORMAL.map(|(within, nominal)| (share(z.iter().copied(), within), nominal));
             let (bias, _) = mean_and_error(&z);
             println!(
                 "  {:16} {:5} fits, bias {bias:6.2} σ, {:.1} %, {:.1} %",
@@ -97,7 +110,10 @@ impl Trial {
             for ((share, n), nominal) in shares {
                 let error = (nominal * (1.0 - nominal) / n).sqrt();
                 let name = &parameter.name;
-                assert!((share - nominal).abs() < LIMIT * error, "{what}: {name} is covered in {share}, not {nominal}");
+                assert!(
+                    (share - nominal).abs() < LIMIT * error,
+                    "{what}: {name} is covered in {share}, not {nominal}"
+                );
             }
         }
     }
@@ -135,14 +151,20 @@ fn lunar_sampler() -> Trial {
 fn ur10() -> Trial {
     let text = std::fs::read_to_string(path("problems/ur10-ipa/problem.toml")).unwrap();
     let (arm, _) = text.split_once("[parameters]").unwrap();
-    let with = |rules: &str| parse(&format!("{arm}[parameters]\n{rules}\n[data]\nposition_sigma_mm = 0.1\n"));
+    let with = |rules: &str| {
+        parse(&format!("{arm}[parameters]\n{rules}\n[data]\nposition_sigma_mm = 0.1\n"))
+    };
     let all = with("\"*\" = { free = true }");
     let rows = at_random(&all, 60, 2.8, &mut ChaCha8Rng::seed_from_u64(17));
     let model = model_of(&all, &rows);
     let n = model.parameters.len();
-    // From the tool inwards, each parameter that the nominal arm shows apart from those already chosen.
+    // From the tool inwards, each parameter that the nominal arm shows apart from those already
+    // chosen.
     let poses = Placement::of(&rows).poses(&rows, &(0..rows.len()).collect::<Vec<_>>(), 1.0);
-    let columns = jacobian(&PoseResiduals::new(&model, poses, (0..n).collect(), DVector::zeros(n)), &DVector::zeros(n));
+    let columns = jacobian(
+        &PoseResiduals::new(&model, poses, (0..n).collect(), DVector::zeros(n)),
+        &DVector::zeros(n),
+    );
     let mut chosen: Vec<usize> = Vec::new();
     for k in (0..n).rev() {
         chosen.push(k);
@@ -151,8 +173,10 @@ fn ur10() -> Trial {
             chosen.pop();
         }
     }
-    let free: Vec<String> =
-        chosen.iter().map(|&k| format!("\"{}\" = {{ free = true }}", model.parameters[k].name)).collect();
+    let free: Vec<String> = chosen
+        .iter()
+        .map(|&k| format!("\"{}\" = {{ free = true }}", model.parameters[k].name))
+        .collect();
     assert!((25..=30).contains(&free.len()), "{} parameters are identifiable", free.len());
     Trial::new(with(&free.join("\n")), rows, |_| 5e-3)
 }

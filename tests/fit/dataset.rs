@@ -1,7 +1,7 @@
 //! Data sets from plain arrays.
 
 use crate::common::arms::path;
-use flexcal::identify::{Options, identify, jacobian};
+use flexcal::fit::{Options, identify, jacobian};
 use flexcal::measurement::{ColumnTable, ColumnValues, Dataset, DatasetBuilder, DatasetError};
 use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
@@ -12,16 +12,27 @@ fn three() -> DatasetBuilder {
 
 #[test]
 fn columns_stand_as_given_and_the_others_as_if_a_file_had_none() {
-    let data = three().payload(vec![1.0, 2.0, 3.0]).session(["a", "b", "a"]).held_out([2]).build().unwrap();
+    let data = three()
+        .payload(vec![1.0, 2.0, 3.0])
+        .session(["a", "b", "a"])
+        .held_out([2])
+        .build()
+        .unwrap();
     let rows = &data.measurements;
     assert_eq!((rows.joints, rows.configuration(1), rows.len()), (2, [0.3, 0.4].as_slice(), 3));
     assert_eq!(rows.payload, Some(vec![1.0, 2.0, 3.0]));
     assert_eq!((rows.session.names.len(), rows.session.of_row.clone()), (2, vec![0, 1, 0]));
-    assert_eq!((rows.time.clone(), rows.time_measured, rows.target.clone()), (vec![0.0, 1.0, 2.0], false, None));
+    assert_eq!(
+        (rows.time.clone(), rows.time_measured, rows.target.clone()),
+        (vec![0.0, 1.0, 2.0], false, None)
+    );
     assert_eq!((data.split.identification, data.split.held_out), (vec![0, 1], vec![2]));
     assert_eq!(rows.location(2).line, Some(3), "rows count as lines");
     let plain = three().build().unwrap();
-    assert_eq!((plain.measurements.session.names, plain.split.held_out), (vec![String::new()], vec![]));
+    assert_eq!(
+        (plain.measurements.session.names, plain.split.held_out),
+        (vec![String::new()], vec![])
+    );
 }
 
 #[test]
@@ -29,18 +40,30 @@ fn arrays_that_do_not_fit_are_told() {
     let wrong = |builder: DatasetBuilder| builder.build().unwrap_err();
     let short = DatasetError::Length { column: "sigma", expected: 3, found: 1 };
     assert_eq!(wrong(three().sigma(vec![1e-4])), short);
-    assert_eq!(wrong(three().time(vec![0.0, f64::NAN, 1.0])), DatasetError::NotFinite { column: "time", row: 1 });
+    assert_eq!(
+        wrong(three().time(vec![0.0, f64::NAN, 1.0])),
+        DatasetError::NotFinite { column: "time", row: 1 }
+    );
     assert_eq!(wrong(three().held_out([3])), DatasetError::NoSuchRow { row: 3, rows: 3 });
-    assert!(matches!(wrong(three().sigma(vec![1.0, 0.0, 1.0])), DatasetError::OutOfRange { row: 1, .. }));
+    assert!(matches!(
+        wrong(three().sigma(vec![1.0, 0.0, 1.0])),
+        DatasetError::OutOfRange { row: 1, .. }
+    ));
     assert!(matches!(
         wrong(three().approach([[1.0, 0.0], [-1.0, 0.5], [0.0, 0.0]])),
         DatasetError::OutOfRange { column: "approach", row: 1, .. }
     ));
-    assert!(matches!(wrong(three().temperature(vec![1e160; 3])), DatasetError::OutOfRange { row: 0, .. }));
+    assert!(matches!(
+        wrong(three().temperature(vec![1e160; 3])),
+        DatasetError::OutOfRange { row: 0, .. }
+    ));
     let ragged = Dataset::builder([vec![0.1, 0.2], vec![0.3]], vec![Vector3::zeros(); 2]);
     assert_eq!(wrong(ragged), DatasetError::Joints { row: 1, expected: 2, found: 1 });
     let positions = Dataset::builder([[0.1]], Vec::new());
-    assert_eq!(wrong(positions), DatasetError::Length { column: "positions", expected: 1, found: 0 });
+    assert_eq!(
+        wrong(positions),
+        DatasetError::Length { column: "positions", expected: 1, found: 0 }
+    );
 }
 
 #[test]
@@ -75,8 +98,14 @@ fn a_table_in_memory_is_read_as_the_file_is() {
     let (memory, _) = read(in_memory()).unwrap();
     assert_eq!(memory.split, file.split);
     let (memory, file) = (memory.measurements, file.measurements);
-    assert_eq!((&memory.configurations, &memory.positions), (&file.configurations, &file.positions));
-    assert_eq!((&memory.time, &memory.approach, &memory.origin), (&file.time, &file.approach, &file.origin));
+    assert_eq!(
+        (&memory.configurations, &memory.positions),
+        (&file.configurations, &file.positions)
+    );
+    assert_eq!(
+        (&memory.time, &memory.approach, &memory.origin),
+        (&file.time, &file.approach, &file.origin)
+    );
     let replaced = |name: &str, values: ColumnValues| {
         let mut columns = in_memory();
         columns.iter_mut().find(|(own, _)| own == name).unwrap().1 = values;
@@ -87,14 +116,22 @@ fn a_table_in_memory_is_read_as_the_file_is() {
         numbers[row] = value;
         ColumnValues::Numbers(numbers)
     };
-    let words = |row: usize, word| ColumnValues::Words((0..78).map(|k| if k == row { word } else { "1" }).collect());
+    let words = |row: usize, word| {
+        ColumnValues::Words((0..78).map(|k| if k == row { word } else { "1" }).collect())
+    };
     let told = [
-        (replaced("x_mm", numbers(5, f64::NAN)), "memory:7: column x_mm: NaN is not a finite number"),
+        (
+            replaced("x_mm", numbers(5, f64::NAN)),
+            "memory:7: column x_mm: NaN is not a finite number",
+        ),
         (replaced("x_mm", numbers(77, 1e200)), "memory:79: column x_mm: 1e200 is larger than"),
         (replaced("x_mm", words(0, "a,\"b")), "memory:2: column x_mm: \"a,\"b\" is not a number"),
         (replaced("split", words(1, "")), "memory:2: column split: \"1\" is neither"),
         (replaced("z_mm", words(3, "")), "memory:5: column z_mm: the cell is empty"),
-        (replaced("z_mm", ColumnValues::Numbers(vec![0.0])), "memory: column z_mm: 1 values for 78 rows"),
+        (
+            replaced("z_mm", ColumnValues::Numbers(vec![0.0])),
+            "memory: column z_mm: 1 values for 78 rows",
+        ),
     ];
     for (found, expected) in told {
         assert!(found.starts_with(expected), "{found}, not {expected}");
@@ -117,7 +154,10 @@ fn jacobians_are_the_derivatives_of_predictions() {
         };
         for ((jacobian, ahead), behind) in all.iter().zip(moved(step)).zip(moved(-step)) {
             let difference = (ahead - behind) / (2.0 * step);
-            assert!((jacobian.column(joint) - difference).norm() < 1e-8, "joint {joint}: {jacobian} {difference}");
+            assert!(
+                (jacobian.column(joint) - difference).norm() < 1e-8,
+                "joint {joint}: {jacobian} {difference}"
+            );
         }
     }
 }

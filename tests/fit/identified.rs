@@ -6,7 +6,9 @@ use std::path::Path;
 
 use crate::common::arms::path;
 use assert_cmd::Command;
-use flexcal::identify::{Identification, IdentifyError, Options, SavedEstimate, SavedEstimateError, identify, predict};
+use flexcal::fit::{
+    Identification, IdentifyError, Options, SavedEstimate, SavedEstimateError, identify, predict,
+};
 use flexcal::measurement::Dataset;
 use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
@@ -32,12 +34,19 @@ fn the_covariance_is_that_of_the_standard_errors() {
             continue;
         };
         let variance = found.covariance.of(k, k).unwrap();
-        assert!((variance / error.powi(2) - 1.0).abs() < 1e-12, "{}: {variance} and {error}", estimate.name);
+        assert!(
+            (variance / error.powi(2) - 1.0).abs() < 1e-12,
+            "{}: {variance} and {error}",
+            estimate.name
+        );
         assert_eq!(told[k].as_f64(), Some(variance));
     }
     let matrix = &found.covariance.matrix;
     assert!((matrix - matrix.transpose()).amax() <= 1e-12 * matrix.amax());
-    assert!(found.covariance.correlation().symmetric_eigenvalues().min() > -1e-9, "positive semidefinite");
+    assert!(
+        found.covariance.correlation().symmetric_eigenvalues().min() > -1e-9,
+        "positive semidefinite"
+    );
 }
 
 #[test]
@@ -52,7 +61,12 @@ fn an_active_constraint_is_in_the_correlations() {
     let all = found.correlations();
     let place = |name: &str| all.names.iter().position(|own| own == name).unwrap();
     assert!(all.matrix[(place("A.EI"), place("B.EI"))] > 0.999_999);
-    assert!(found.strong_correlations().iter().any(|(a, b, rho)| a == "A.EI" && b == "B.EI" && *rho > 0.999_999));
+    assert!(
+        found
+            .strong_correlations()
+            .iter()
+            .any(|(a, b, rho)| a == "A.EI" && b == "B.EI" && *rho > 0.999_999)
+    );
 }
 
 #[test]
@@ -74,7 +88,10 @@ fn predictions_are_measurements_less_residuals() {
     // The same poses as plain arrays.
     let rows = &data.measurements;
     let poses = Dataset::poses((0..rows.len()).map(|row| rows.configuration(row)));
-    let poses = poses.payload(rows.payload.clone().unwrap()).hoist(rows.hoist.clone().unwrap()).time(rows.time.clone());
+    let poses = poses
+        .payload(rows.payload.clone().unwrap())
+        .hoist(rows.hoist.clone().unwrap())
+        .time(rows.time.clone());
     let poses = match &rows.temperature {
         Some(temperature) => poses.temperature(temperature.clone()),
         None => poses,
@@ -87,17 +104,27 @@ fn predictions_are_measurements_less_residuals() {
 #[test]
 fn what_was_not_identified_predicts_nothing() {
     let (mut problem, data, mut found) = lunar();
-    assert!(found.estimate("joint2.stiffness").is_some() && found.estimate("joint9.stiffness").is_none());
-    let gone = found.estimates.iter().position(|estimate| estimate.name == "joint2.stiffness").unwrap();
+    assert!(
+        found.estimate("joint2.stiffness").is_some()
+            && found.estimate("joint9.stiffness").is_none()
+    );
+    let gone =
+        found.estimates.iter().position(|estimate| estimate.name == "joint2.stiffness").unwrap();
     found.estimates[gone].name = "another".to_owned();
     let error = found.predict(&problem, &data.measurements).unwrap_err();
-    assert!(matches!(&error, IdentifyError::NoEstimate { name } if name == "joint2.stiffness"), "{error}");
+    assert!(
+        matches!(&error, IdentifyError::NoEstimate { name } if name == "joint2.stiffness"),
+        "{error}"
+    );
     // Nor does a problem that lacks what was identified.
     found.estimates[gone].name = "joint2.stiffness".to_owned();
     assert!(found.predict(&problem, &data.measurements).is_ok());
     problem.parameters.clear();
     let error = found.predict(&problem, &data.measurements).unwrap_err();
-    assert!(matches!(&error, IdentifyError::NotInModel { name } if name == "joint1.alpha"), "{error}");
+    assert!(
+        matches!(&error, IdentifyError::NotInModel { name } if name == "joint1.alpha"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -107,7 +134,8 @@ fn time_counts_from_the_first_pose_that_was_identified() {
     let found = identify(&problem, &data, &Options::default()).unwrap();
     let late: Vec<usize> = (data.measurements.len() / 2..data.measurements.len()).collect();
     let (whole, half) = (&data.measurements, data.measurements.select(&late));
-    let (all, some) = (found.predict(&problem, whole).unwrap(), found.predict(&problem, &half).unwrap());
+    let (all, some) =
+        (found.predict(&problem, whole).unwrap(), found.predict(&problem, &half).unwrap());
     for (position, &row) in some.iter().zip(&late) {
         let apart: Vector3<f64> = position - all[row];
         assert!(apart.norm() < 1e-12, "{apart}");
@@ -117,8 +145,10 @@ fn time_counts_from_the_first_pose_that_was_identified() {
 #[test]
 fn configurations_of_another_arm_are_an_error() {
     let (problem, _, found) = lunar();
-    let few = Dataset::builder([[0.1, 0.2], [0.3, 0.4]], [Vector3::x(), Vector3::y()]).build().unwrap();
-    let wrong = |error: IdentifyError| matches!(error, IdentifyError::JointCount { found: 2, joints: 4 });
+    let few =
+        Dataset::builder([[0.1, 0.2], [0.3, 0.4]], [Vector3::x(), Vector3::y()]).build().unwrap();
+    let wrong =
+        |error: IdentifyError| matches!(error, IdentifyError::JointCount { found: 2, joints: 4 });
     assert!(identify(&problem, &few, &Options::default()).is_err_and(wrong));
     assert!(found.predict(&problem, &few.measurements).is_err_and(wrong));
 }
@@ -129,16 +159,20 @@ fn a_saved_estimate_predicts_what_the_fit_predicts() {
     let json = estimate_json(&problem, &found);
     let saved = SavedEstimate::parse(&json, Path::new("estimate.json")).unwrap();
     let again = predict(&problem, Some(&saved), &data.measurements, Some(&data.split)).unwrap();
-    let (own, residuals) = (found.predict(&problem, &data.measurements).unwrap(), again.residuals.unwrap());
+    let (own, residuals) =
+        (found.predict(&problem, &data.measurements).unwrap(), again.residuals.unwrap());
     for ((one, other), residual) in own.iter().zip(&again.positions).zip(&residuals) {
         assert!((one - other).norm() < 1e-12, "{one}{other}");
         assert_eq!(residual.held_out, data.split.held_out.contains(&residual.row));
     }
     // Rows without positions are predicted, and judge nothing.
     let rows = &data.measurements;
-    let bare = Dataset::poses((0..rows.len()).map(|row| rows.configuration(row))).measurements().unwrap();
+    let bare =
+        Dataset::poses((0..rows.len()).map(|row| rows.configuration(row))).measurements().unwrap();
     let bare = predict(&problem, Some(&saved), &bare, None).unwrap();
-    assert!(bare.residuals.is_none() && bare.errors.is_none() && bare.positions.len() == rows.len());
+    assert!(
+        bare.residuals.is_none() && bare.errors.is_none() && bare.positions.len() == rows.len()
+    );
     // Without an estimate it is the nominal arm.
     let nominal = predict(&problem, None, rows, None).unwrap().errors.unwrap();
     let (own, other) = (&found.registered.identification, &found.registered.held_out);
@@ -151,11 +185,13 @@ fn a_saved_estimate_predicts_what_the_fit_predicts() {
     // An estimate of another arm is refused.
     let other = Problem { gravity: Vector3::zeros(), ..problem.clone() };
     let error = predict(&other, Some(&saved), rows, None).unwrap_err();
-    let expected = matches!(error, flexcal::identify::PredictError::Estimate(SavedEstimateError::OtherArm { .. }));
+    let expected =
+        matches!(error, flexcal::fit::PredictError::Estimate(SavedEstimateError::OtherArm { .. }));
     assert!(expected, "{error}");
 }
 
-/// A rigid arm of three joints and the tables of two sessions whose bases differ; session B holds a gross error.
+/// A rigid arm of three joints and the tables of two sessions whose bases differ; session B holds a
+/// gross error.
 fn two_sessions(folder: &Path) -> impl Fn(&str) -> assert_cmd::assert::Assert + '_ {
     let problem = "name = 'arm'\n[[joint]]\nd_m = 0.4\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = 0.6\n\
                    [tool]\ntarget_m = [0.5, 0.1, 0.0]\n[parameters]\n'joint3.a' = { sigma_mm = 3 }\n'base.*' = { free = true }\n\
@@ -187,29 +223,48 @@ fn an_estimate_applies_to_another_session_without_a_refit() {
     let run = two_sessions(folder.path());
     let read = |name: &str| fs::read_to_string(folder.path().join(name)).unwrap();
     run("identify problem.toml --quiet --out fit --data A.csv").success();
-    let assert = run("predict problem.toml --estimate fit/estimate.json --out there --data A.csv B.csv").success();
+    let assert =
+        run("predict problem.toml --estimate fit/estimate.json --out there --data A.csv B.csv")
+            .success();
     let told = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
     assert!(told.contains("Fitted to these rows, with the arm as it is: base[B].x"), "{told}");
     let errors: Value = serde_json::from_str(&read("there/errors.json")).unwrap();
-    assert_eq!((errors["all"]["n"].as_u64(), errors["sessions"]["B"]["n"].as_u64()), (Some(80), Some(40)));
+    assert_eq!(
+        (errors["all"]["n"].as_u64(), errors["sessions"]["B"]["n"].as_u64()),
+        (Some(80), Some(40))
+    );
     assert!(errors["sessions"]["A"]["max_mm"]["norm"].as_f64().unwrap() < 0.1, "{errors}");
-    assert!((errors["sessions"]["B"]["max_mm"]["norm"].as_f64().unwrap() - 0.6).abs() < 0.2, "{errors}");
+    assert!(
+        (errors["sessions"]["B"]["max_mm"]["norm"].as_f64().unwrap() - 0.6).abs() < 0.2,
+        "{errors}"
+    );
     let residuals = read("there/residuals.csv");
     let (header, rows) = residuals.split_once('\n').unwrap();
     let expected = "file,line,pose,session,target,predicted_x_mm,predicted_y_mm,predicted_z_mm,residual_x_mm,residual_y_mm,\
                     residual_z_mm,whitened,outlier,held_out";
     assert_eq!(header, expected);
-    let outliers: Vec<&str> = rows.lines().filter(|line| line.split(',').rev().nth(1) == Some("true")).collect();
-    assert!(matches!(outliers[..], [line] if line.starts_with("B.csv,9,7,B,ball,")), "{outliers:?}");
+    let outliers: Vec<&str> =
+        rows.lines().filter(|line| line.split(',').rev().nth(1) == Some("true")).collect();
     assert!(
-        read("there/predictions.csv").starts_with("file,line,pose,session,target,q1_deg,q2_deg,q3_deg,predicted_x_mm,")
+        matches!(outliers[..], [line] if line.starts_with("B.csv,9,7,B,ball,")),
+        "{outliers:?}"
+    );
+    assert!(
+        read("there/predictions.csv")
+            .starts_with("file,line,pose,session,target,q1_deg,q2_deg,q3_deg,predicted_x_mm,")
     );
     assert_eq!(read("fit/residuals.csv").lines().count(), 41);
     // Where nothing was measured, nobody knows where the arm of a new session stands.
-    let bare: Vec<String> =
-        read("B.csv").lines().map(|line| line.splitn(7, ',').take(6).collect::<Vec<_>>().join(",")).collect();
+    let bare: Vec<String> = read("B.csv")
+        .lines()
+        .map(|line| line.splitn(7, ',').take(6).collect::<Vec<_>>().join(","))
+        .collect();
     fs::write(folder.path().join("bare.csv"), bare.join("\n")).unwrap();
-    let assert = run("predict problem.toml --estimate fit/estimate.json --out bare --data bare.csv").code(2);
+    let assert =
+        run("predict problem.toml --estimate fit/estimate.json --out bare --data bare.csv").code(2);
     let message = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
-    assert!(message.contains("has no estimate of base[B].x") && !folder.path().join("bare").exists(), "{message}");
+    assert!(
+        message.contains("has no estimate of base[B].x") && !folder.path().join("bare").exists(),
+        "{message}"
+    );
 }

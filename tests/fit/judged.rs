@@ -1,9 +1,9 @@
-//! What cannot be meant is said: held-out rows that do not belong to the fit, sessions that are not tied down, gross mistakes
-//! without priors, targets counted as poses.
+//! What cannot be meant is said: held-out rows that do not belong to the fit, sessions that are not
+//! tied down, gross mistakes without priors, targets counted as poses.
 
 use crate::common::arms::parse;
 use crate::common::made::{at_random, divided, draw, labels, measure, model_of};
-use flexcal::identify::{Caution, Identification, Misreading, Options, QualityFlag, identify};
+use flexcal::fit::{Caution, Identification, Misreading, Options, QualityFlag, identify};
 use flexcal::measurement::{CommandColumn, Dataset};
 use flexcal::problem::{Problem, Robust, RobustLoss};
 use flexcal::quantity::Unit;
@@ -13,7 +13,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 pub const SIGMA: f64 = 5e-5;
-pub const PRIORS: &str = "'joint*' = { sigma_deg = 0.3, sigma_mm = 2 }\n'tool.*' = { sigma_mm = 2 }";
+pub const PRIORS: &str =
+    "'joint*' = { sigma_deg = 0.3, sigma_mm = 2 }\n'tool.*' = { sigma_mm = 2 }";
 pub const FREE: &str = "'joint*.a' = { free = true }\n'joint*.d' = { free = true }\n'joint*.theta' = { free = true }\n\
                     'joint*.alpha' = { free = true }\n'tool.*' = { free = true }\n'base.*' = { free = true }";
 
@@ -48,14 +49,23 @@ fn held_out_rows_are_judged() {
     let problem = arm(PRIORS);
     let clean = measured(&problem, 1);
     let found = fit(&problem, &clean);
-    assert!(found.is_trusted() && found.cautions.is_empty(), "{:?} {:?}", found.quality_flag, found.cautions);
+    assert!(
+        found.is_trusted() && found.cautions.is_empty(),
+        "{:?} {:?}",
+        found.quality_flag,
+        found.cautions
+    );
     let with = |edit: &dyn Fn(&mut Dataset)| {
         let mut data = clean.clone();
         edit(&mut data);
         fit(&problem, &data)
     };
     let shifted = with(&|data| data.measurements.positions[60..].rotate_left(1));
-    assert!(matches!(shifted.quality_flag, Some(QualityFlag::HeldOutMisses { .. })), "{:?}", shifted.quality_flag);
+    assert!(
+        matches!(shifted.quality_flag, Some(QualityFlag::HeldOutMisses { .. })),
+        "{:?}",
+        shifted.quality_flag
+    );
     let copied = with(&|data| {
         let rows: Vec<usize> = (0..60).chain(0..30).collect();
         data.measurements = data.measurements.select(&rows);
@@ -74,13 +84,17 @@ fn held_out_rows_are_judged() {
         };
         assert!(rows.len() == 1 && rows[0].row == 77 && wrong.is_trusted(), "{by}: {rows:?}");
         let words = wrong.cautions[0].to_string();
-        assert!(words.contains("1 of 30 held-out poses is too far off") && words.len() < 200, "{words}");
+        assert!(
+            words.contains("1 of 30 held-out poses is too far off") && words.len() < 200,
+            "{words}"
+        );
         let text = estimate_text(&problem, &wrong);
         assert!(!text.contains("NaN") && !text.contains("inf "), "{text}");
     }
 }
 
-/// An arm of which the model lacks something that the few poses at one end of the range turn into wrong parameters.
+/// An arm of which the model lacks something that the few poses at one end of the range turn into
+/// wrong parameters.
 pub fn worse_than_none() -> (String, Dataset) {
     let text = text("'joint*' = { sigma_deg = 1, sigma_mm = 20 }\n'tool.*' = { sigma_mm = 20 }");
     let problem = parse(&text);
@@ -94,7 +108,8 @@ pub fn worse_than_none() -> (String, Dataset) {
     measure(&problem, &mut rows, &zero, SIGMA, &mut rng);
     for row in 0..60 {
         let q = rows.configuration(row)[1];
-        rows.positions[row] += 4e-4 * Vector3::new((9.0 * q).sin(), (7.0 * q).cos(), (8.0 * q).sin());
+        rows.positions[row] +=
+            4e-4 * Vector3::new((9.0 * q).sin(), (7.0 * q).cos(), (8.0 * q).sin());
     }
     (text, divided(20, &rows))
 }
@@ -103,7 +118,11 @@ pub fn worse_than_none() -> (String, Dataset) {
 fn a_fit_that_is_worse_than_none_where_it_was_not_made_is_not_trusted() {
     let (text, data) = worse_than_none();
     let found = fit(&parse(&text), &data);
-    assert!(matches!(found.quality_flag, Some(QualityFlag::HeldOutWorse { .. })), "{:?}", found.quality_flag);
+    assert!(
+        matches!(found.quality_flag, Some(QualityFlag::HeldOutWorse { .. })),
+        "{:?}",
+        found.quality_flag
+    );
     assert!(found.fitted.held_out.rms.norm > 1.5 * found.registered.held_out.rms.norm);
 }
 
@@ -119,7 +138,8 @@ fn a_session_needs_points_that_tie_its_base_down() {
         data.measurements.target = Some(labels((0..90).map(|_| "t")));
         fit(&problem, &data).quality_flag
     };
-    let few = QualityFlag::TooFewEquations { of: "base[B]".to_owned(), coordinates: 6, unknowns: 6 };
+    let few =
+        QualityFlag::TooFewEquations { of: "base[B]".to_owned(), coordinates: 6, unknowns: 6 };
     assert_eq!(with(&[70, 71]), Some(few));
     assert_eq!(with(&[70, 71, 72]), None);
     let open = QualityFlag::Undetermined { of: "base[B]".to_owned(), poses: 2 };
@@ -133,16 +153,26 @@ fn gross_mistakes_are_asked_about_without_priors_too() {
     let problem = arm(FREE);
     let clean = measured(&problem, 3);
     let found = fit(&problem, &clean);
-    assert!(found.is_trusted() && found.cautions.is_empty(), "{:?} {:?}", found.quality_flag, found.cautions);
+    assert!(
+        found.is_trusted() && found.cautions.is_empty(),
+        "{:?} {:?}",
+        found.quality_flag,
+        found.cautions
+    );
     let edited = |edit: &dyn Fn(&mut Vector3<f64>)| {
         let mut data = clean.clone();
         data.measurements.positions.iter_mut().for_each(edit);
         fit(&problem, &data)
     };
-    for (what, factor) in [("inches", 1.0 / 25.4), ("metres", 1e-3), ("nothing", 0.0), ("micrometres", 1e3)] {
+    for (what, factor) in
+        [("inches", 1.0 / 25.4), ("metres", 1e-3), ("nothing", 0.0), ("micrometres", 1e3)]
+    {
         let found = edited(&|position| *position *= factor);
         assert!(
-            matches!(found.quality_flag, Some(QualityFlag::OtherSize { .. } | QualityFlag::Misses { .. })),
+            matches!(
+                found.quality_flag,
+                Some(QualityFlag::OtherSize { .. } | QualityFlag::Misses { .. })
+            ),
             "{what}: {:?}",
             found.quality_flag
         );
@@ -151,8 +181,11 @@ fn gross_mistakes_are_asked_about_without_priors_too() {
     let mut standard = problem.clone();
     let n = standard.joints.len();
     for joint in 0..n {
-        let before =
-            if joint == 0 { (0.0, 0.0) } else { (problem.joints[joint - 1].alpha, problem.joints[joint - 1].a) };
+        let before = if joint == 0 {
+            (0.0, 0.0)
+        } else {
+            (problem.joints[joint - 1].alpha, problem.joints[joint - 1].a)
+        };
         (standard.joints[joint].alpha, standard.joints[joint].a) = before;
     }
     let found = fit(&standard, &clean);
@@ -179,17 +212,21 @@ fn what_may_have_been_misread_is_said() {
         }
     };
     let sized = |factor: f64| {
-        move |_: &mut Problem, data: &mut Dataset| data.measurements.positions.iter_mut().for_each(|own| *own *= factor)
+        move |_: &mut Problem, data: &mut Dataset| {
+            data.measurements.positions.iter_mut().for_each(|own| *own *= factor)
+        }
     };
     let degree = std::f64::consts::PI / 180.0;
     assert_eq!(with(&scaled(degree)), [Misreading::Radians]);
     assert_eq!(with(&scaled(1.0 / degree)), [Misreading::Degrees]);
     assert_eq!(with(&sized(1e3)), [Misreading::Millimetres]);
     assert_eq!(with(&sized(1e-3)), [Misreading::Metres]);
-    let mirrored = with(&|_, data| data.measurements.positions.iter_mut().for_each(|own| own.swap_rows(0, 2)));
+    let mirrored =
+        with(&|_, data| data.measurements.positions.iter_mut().for_each(|own| own.swap_rows(0, 2)));
     assert_eq!(mirrored, [Misreading::Mirrored]);
-    let reversed =
-        with(&|_, data| data.measurements.configurations.iter_mut().skip(2).step_by(5).for_each(|q| *q = -*q));
+    let reversed = with(&|_, data| {
+        data.measurements.configurations.iter_mut().skip(2).step_by(5).for_each(|q| *q = -*q)
+    });
     assert_eq!(reversed, [Misreading::Reversed { joint: 3 }]);
     // A tool that is free goes where it belongs, far beyond its prior.
     let held = arm("'joint*' = { sigma_deg = 0.3, sigma_mm = 2 }\n'base.*' = { free = true }");
@@ -198,14 +235,18 @@ fn what_may_have_been_misread_is_said() {
         problem.tool.target *= 1e3;
     });
     assert_eq!(far, [Misreading::TargetInMillimetres]);
-    // Lengths of the arm in millimetres: that the angles leave less than they are explains it no better.
+    // Lengths of the arm in millimetres: that the angles leave less than they are explains it no
+    // better.
     let long = |problem: &mut Problem, data: &mut Dataset, unit: f64| {
         problem.joints[2].a *= 1e3;
         let column = |joint| CommandColumn { joint, name: format!("q{}", joint + 1), unit };
         data.measurements.command_columns = (0..5).map(column).collect();
     };
     for unit in [degree, 1.0] {
-        assert_eq!(with(&|problem, data| long(problem, data, unit)), [Misreading::ArmInMillimetres]);
+        assert_eq!(
+            with(&|problem, data| long(problem, data, unit)),
+            [Misreading::ArmInMillimetres]
+        );
     }
     let all = with(&|problem, _| {
         let lengths = problem.joints.iter_mut().flat_map(|own| [&mut own.a, &mut own.d]);
@@ -238,7 +279,12 @@ fn what_a_robust_loss_sets_aside_is_no_reason_for_distrust() {
     assert!(matches!(fit(&problem, &data).quality_flag, Some(QualityFlag::Misses { .. })));
     problem.robust = Some(Robust { loss: RobustLoss::Huber, threshold: None });
     let found = fit(&problem, &data);
-    assert!(found.is_trusted() && found.outliers.len() == 3, "{:?} {:?}", found.quality_flag, found.outliers);
+    assert!(
+        found.is_trusted() && found.outliers.len() == 3,
+        "{:?} {:?}",
+        found.quality_flag,
+        found.outliers
+    );
     assert!(found.fitted.held_out.rms.norm < 3.0 * SIGMA);
 }
 
@@ -248,8 +294,10 @@ fn targets_of_one_pose_are_points_not_poses() {
     let problem = arm(&format!("{PRIORS}\n'base.*' = {{ free = true }}"));
     let mut rng = ChaCha8Rng::seed_from_u64(6);
     let poses = at_random(&problem, 17, 2.0, &mut rng);
-    let configurations: Vec<Vec<f64>> = (0..51).map(|row| poses.configuration(row / 3).to_vec()).collect();
-    let mut rows = Dataset::builder(configurations, vec![Vector3::zeros(); 51]).measurements().unwrap();
+    let configurations: Vec<Vec<f64>> =
+        (0..51).map(|row| poses.configuration(row / 3).to_vec()).collect();
+    let mut rows =
+        Dataset::builder(configurations, vec![Vector3::zeros(); 51]).measurements().unwrap();
     rows.target = Some(labels((0..51).map(|row| ["left", "right", "top"][row % 3])));
     let model = model_of(&problem, &rows);
     let truth = draw(&model, |_| 1e-3, &mut rng);

@@ -4,13 +4,15 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::arms::path;
-use flexcal::diagnose::close;
-use flexcal::identify::{Identification, Options, Placement, compensate, identify, seen_from_base, waypoints};
+use flexcal::fit::{
+    Identification, Options, Placement, compensate, identify, seen_from_base, waypoints,
+};
 use flexcal::least_squares::check_jacobian;
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::{Effect, Problem};
-use flexcal::simulate::{Simulation, Truth, simulate};
+use flexcal::rig::{Simulation, Truth, simulate};
+use flexcal::select::close;
 use nalgebra::{DVector, UnitQuaternion, Vector3};
 
 /// The UR10 with all of its geometry, base and tool free, orientations measured to 0.02°.
@@ -27,7 +29,8 @@ fn ur10() -> Problem {
 }
 
 fn rig(problem: &Problem, poses: usize, seed: u64, more: &str) -> (Simulation, Dataset) {
-    let ranges: Vec<String> = (1..=problem.joints.len()).map(|k| format!("q{k}_deg = [-100, 100]\n")).collect();
+    let ranges: Vec<String> =
+        (1..=problem.joints.len()).map(|k| format!("q{k}_deg = [-100, 100]\n")).collect();
     let ranges = ranges.concat();
     let truth = format!(
         "[random]\n'*' = {{ sigma_deg = 0.2, sigma_mm = 1.0, sigma_relative = 0.1 }}\n[noise]\nposition_sigma_mm = 0.05\n[poses]\n{ranges}{more}"
@@ -56,9 +59,13 @@ fn derivatives_of_orientations_are_those_of_differences() {
         "\"tool.*\" = { sigma_mm = 5.0 }",
         "\"tool.*\" = { sigma_mm = 5.0, sigma_deg = 1.0 }\n\"base.*\" = { free = true }",
     );
-    let lunar = lunar.replace("position_sigma_mm = 0.05", "position_sigma_mm = 0.05\norientation_sigma_deg = 0.02");
+    let lunar = lunar.replace(
+        "position_sigma_mm = 0.05",
+        "position_sigma_mm = 0.05\norientation_sigma_deg = 0.02",
+    );
     let lunar = Problem::parse(&lunar, Path::new("problem.toml")).unwrap();
-    let bent = lunar.with_effect(Effect::GearRatio { joint: 2 }).with_effect(Effect::BaseCompliance);
+    let bent =
+        lunar.with_effect(Effect::GearRatio { joint: 2 }).with_effect(Effect::BaseCompliance);
     for problem in [ur10(), lunar, bent] {
         let (_, mut data) = rig(&problem, 6, 3, "held_out = 0.3\n");
         data.measurements.session = ["A", "B", "A", "B", "B", "A"].into_iter().collect();
@@ -69,7 +76,7 @@ fn derivatives_of_orientations_are_those_of_differences() {
         let poses = placement.oriented_poses(&data.measurements, &rows, (1e-3, Some(1e-3)));
         let residuals = PoseResiduals::new(&model, poses, (0..n).collect(), DVector::zeros(n));
         // Bases turned by some 0.3 rad.
-        let size = |k: usize| if model.parameters[k].slot.is_placement() { 0.3 } else { 2e-3 };
+        let size = |k: usize| if model.parameters[k].site.is_placement() { 0.3 } else { 2e-3 };
         let at = DVector::from_fn(n, |k, _| size(k) * (k as f64 + 0.5).sin());
         let checked = check_jacobian(&residuals, &at, &DVector::from_element(n, 1e-2));
         let (k, worst) = checked.worst().unwrap();
@@ -82,8 +89,16 @@ fn orientations_lower_the_errors_of_the_wrist_as_theory_says() {
     let problem = ur10();
     let (_, data) = rig(&problem, 60, 1, "held_out = 0.3\n");
     let (both, alone) = (fit(&problem, &data), fit(&problem.positions_alone(), &data));
-    assert!(both.is_trusted() && both.estimate("tool.rx").is_some() && alone.estimate("tool.rx").is_none());
-    assert!(both.reduced_chi2.is_some_and(|chi2| (0.75..1.3).contains(&chi2)), "{:?}", both.reduced_chi2);
+    assert!(
+        both.is_trusted()
+            && both.estimate("tool.rx").is_some()
+            && alone.estimate("tool.rx").is_none()
+    );
+    assert!(
+        both.reduced_chi2.is_some_and(|chi2| (0.75..1.3).contains(&chi2)),
+        "{:?}",
+        both.reduced_chi2
+    );
     // (JᵀJ + P)⁻¹ of both kinds of rows, at the nominal arm.
     let expected = |problem: &Problem| {
         let site = flexcal::design::Site::new(problem, &[&data.measurements]).unwrap();
@@ -100,9 +115,16 @@ fn orientations_lower_the_errors_of_the_wrist_as_theory_says() {
     };
     let (with, without) = (expected(&problem), expected(&problem.positions_alone()));
     let mut compared = 0;
-    for name in
-        ["joint4.alpha", "joint5.alpha", "joint5.a", "joint5.theta", "joint6.alpha", "joint6.a", "tool.x", "tool.y"]
-    {
+    for name in [
+        "joint4.alpha",
+        "joint5.alpha",
+        "joint5.a",
+        "joint5.theta",
+        "joint6.alpha",
+        "joint6.a",
+        "tool.x",
+        "tool.y",
+    ] {
         let estimates = [&alone, &both].map(|found| found.estimate(name).unwrap());
         let [Some(before), Some(after)] = estimates.map(|own| own.std_error) else { continue };
         let (fell, theory) = (before / after, without(name) / with(name));
@@ -116,10 +138,17 @@ fn orientations_lower_the_errors_of_the_wrist_as_theory_says() {
     }
     assert!(compared >= 3, "{compared}");
     let held_out = |found: &Identification| {
-        found.orientation.as_ref().map(|own| (own.registered.held_out.mean.norm, own.fitted.held_out.mean.norm))
+        found
+            .orientation
+            .as_ref()
+            .map(|own| (own.registered.held_out.mean.norm, own.fitted.held_out.mean.norm))
     };
     let (before, after) = held_out(&both).unwrap();
-    println!("held-out orientation {:.4}° before, {:.4}° after", before.to_degrees(), after.to_degrees());
+    println!(
+        "held-out orientation {:.4}° before, {:.4}° after",
+        before.to_degrees(),
+        after.to_degrees()
+    );
     assert!(after < 0.2 * before && after.to_degrees() < 0.06);
 }
 
@@ -130,18 +159,17 @@ fn standard_errors_cover_the_truth() {
     for seed in 0..24 {
         let (simulation, data) = rig(&problem, 40, seed, "held_out = 0.1\n");
         let found = fit(&problem, &data);
-        for (estimate, truth) in found
-            .estimates
-            .iter()
-            .filter_map(|own| Some((own, simulation.parameters.iter().find(|truth| truth.name == own.name)?)))
-        {
+        for (estimate, truth) in found.estimates.iter().filter_map(|own| {
+            Some((own, simulation.parameters.iter().find(|truth| truth.name == own.name)?))
+        }) {
             if let (Some(error), true) = (estimate.std_error, estimate.identified > 0.99) {
                 count += 1;
                 inside += usize::from((estimate.estimate - truth.value).abs() < 1.96 * error);
             }
         }
     }
-    let share = f64::from(u32::try_from(inside).unwrap()) / f64::from(u32::try_from(count).unwrap());
+    let share =
+        f64::from(u32::try_from(inside).unwrap()) / f64::from(u32::try_from(count).unwrap());
     println!("{inside} of {count} within 1.96 σ");
     // 0.95; of 24 fits with some 12 independent directions each, chance leaves 0.91 to 0.99 (3 σ).
     assert!(count > 300 && (0.91..0.99).contains(&share), "{inside} of {count}");
@@ -156,20 +184,33 @@ fn base_and_tool_are_found_from_poses_without_a_guess() {
         data.measurements.positions.iter_mut().zip(data.measurements.orientations.as_mut().unwrap())
     {
         *position = turn * *position + Vector3::new(3.0, -2.0, 1.0);
-        *orientation = turn * *orientation * UnitQuaternion::from_scaled_axis(Vector3::new(1.0, 0.0, 2.0));
+        *orientation =
+            turn * *orientation * UnitQuaternion::from_scaled_axis(Vector3::new(1.0, 0.0, 2.0));
     }
     let text = "'tool.*' = { free = true }\n'base.*' = { free = true }";
-    let rules =
-        Problem::parse(&format!("name = 'arm'\n[[joint]]\n[parameters]\n{text}\n"), Path::new("rules.toml")).unwrap();
-    problem.parameters.retain(|rule| !rule.pattern.starts_with("tool") && !rule.pattern.starts_with("base"));
+    let rules = Problem::parse(
+        &format!("name = 'arm'\n[[joint]]\n[parameters]\n{text}\n"),
+        Path::new("rules.toml"),
+    )
+    .unwrap();
+    problem
+        .parameters
+        .retain(|rule| !rule.pattern.starts_with("tool") && !rule.pattern.starts_with("base"));
     problem.parameters.extend(rules.parameters);
     let found = fit(&problem, &data);
     assert!(found.is_trusted(), "{:?}", found.quality_flag);
-    assert!(found.reduced_chi2.is_some_and(|chi2| (0.6..1.5).contains(&chi2)), "{:?}", found.reduced_chi2);
+    assert!(
+        found.reduced_chi2.is_some_and(|chi2| (0.6..1.5).contains(&chi2)),
+        "{:?}",
+        found.reduced_chi2
+    );
     // What is to be fitted has to be measured.
     data.measurements.orientations = None;
     let error = identify(&problem, &data, &Options::default()).unwrap_err().to_string();
-    assert!(error.contains("orientation is to be fitted, and the measurements hold none"), "{error}");
+    assert!(
+        error.contains("orientation is to be fitted, and the measurements hold none"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -188,26 +229,39 @@ fn commands_keep_orientations() {
         let there = |configuration: &[f64]| {
             let mut set = simulation.rows[command.row].conditions.clone();
             set.configuration = configuration.to_vec();
-            simulation.rig.pose(&set).unwrap().1.angle_to(&targets.orientations.as_ref().unwrap()[command.row])
+            simulation
+                .rig
+                .pose(&set)
+                .unwrap()
+                .1
+                .angle_to(&targets.orientations.as_ref().unwrap()[command.row])
         };
         before.push(there(rows.configuration(command.row)));
         after.push(there(&command.configuration));
     }
     let mean = |all: &[f64]| (all.iter().sum::<f64>() / all.len() as f64).to_degrees();
-    println!("{} targets: turned by {:.4}° before, {:.4}° after", after.len(), mean(&before), mean(&after));
+    println!(
+        "{} targets: turned by {:.4}° before, {:.4}° after",
+        after.len(),
+        mean(&before),
+        mean(&after)
+    );
     assert!(after.len() > 50 && mean(&before) > 0.2 && mean(&after) < 0.05);
     // The same targets as the base sees them.
     let base = model.base_frames(found.x.as_slice())[0];
     let mut of_base = targets.clone();
     let turn = UnitQuaternion::from_matrix(&nalgebra::Matrix3::from_columns(&base.axes));
-    for (position, orientation) in of_base.positions.iter_mut().zip(of_base.orientations.as_mut().unwrap()) {
+    for (position, orientation) in
+        of_base.positions.iter_mut().zip(of_base.orientations.as_mut().unwrap())
+    {
         *position = base.resolve(&(*position - base.origin));
         *orientation = turn.inverse() * *orientation;
     }
     let seen = seen_from_base(&model, &found.x, &of_base);
     for row in 0..rows.len() {
         assert!((seen.positions[row] - targets.positions[row]).norm() < 1e-9);
-        let apart = seen.orientations.as_ref().unwrap()[row].angle_to(&targets.orientations.as_ref().unwrap()[row]);
+        let apart = seen.orientations.as_ref().unwrap()[row]
+            .angle_to(&targets.orientations.as_ref().unwrap()[row]);
         assert!(apart < 1e-7, "{apart}");
     }
 }

@@ -1,10 +1,11 @@
 //! Exact measurements give back the arm that made them.
 
 use crate::common::arms::{
-    golden, golden_problem, measured, parse, path, table_2_deviations, with_parameters, without_elasticity,
+    golden, golden_problem, measured, parse, path, table_2_deviations, with_parameters,
+    without_elasticity,
 };
 use crate::common::made::{at_random, draw, labels, measure, model_of, part, predicted, split_at};
-use flexcal::identify::{Identification, Options, Strategy, identify};
+use flexcal::fit::{Identification, Options, Strategy, identify};
 use flexcal::least_squares::solver::AtBound;
 use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::model::parameter::Parameter;
@@ -18,7 +19,12 @@ fn fit(problem: &Problem, rows: &Measurements, split: &Split) -> Identification 
     fit_by(Strategy::Joint, problem, rows, split)
 }
 
-fn fit_by(strategy: Strategy, problem: &Problem, rows: &Measurements, split: &Split) -> Identification {
+fn fit_by(
+    strategy: Strategy,
+    problem: &Problem,
+    rows: &Measurements,
+    split: &Split,
+) -> Identification {
     let options = Options::default().with_strategy(strategy);
     let found = identify(problem, &Dataset::new(rows.clone(), split.clone()), &options).unwrap();
     assert!(found.is_trusted(), "{:?} {:?}", found.quality_flag, found.termination);
@@ -33,20 +39,29 @@ fn rng() -> ChaCha8Rng {
 fn cost(problem: &Problem, rows: &Measurements, split: &Split, x: &DVector<f64>) -> f64 {
     let rows = part(rows, split.identification.iter().copied());
     let sigma = problem.data.position_sigma.unwrap();
-    let data: f64 = predicted(problem, &rows, x).iter().zip(&rows.positions).map(|(a, b)| (a - b).norm_squared()).sum();
+    let data: f64 = predicted(problem, &rows, x)
+        .iter()
+        .zip(&rows.positions)
+        .map(|(a, b)| (a - b).norm_squared())
+        .sum();
     let parameters = model_of(problem, &rows).parameters;
-    let priors = parameters.iter().zip(x).filter_map(|(p, x)| Some((x / p.sigma?).powi(2))).sum::<f64>();
+    let priors =
+        parameters.iter().zip(x).filter_map(|(p, x)| Some((x / p.sigma?).powi(2))).sum::<f64>();
     0.5 * (data / sigma.powi(2) + priors)
 }
 
 /// Rigid lunar sampler with the measured positions of Table 2's arm, rounded to a nanometre.
 fn rigid_rows(problem: &Problem) -> Measurements {
     let mut reader = csv::Reader::from_path(golden("rigid.csv")).unwrap();
-    let table: Vec<Vec<f64>> =
-        reader.records().map(|record| record.unwrap().iter().map(|cell| cell.parse().unwrap()).collect()).collect();
+    let table: Vec<Vec<f64>> = reader
+        .records()
+        .map(|record| record.unwrap().iter().map(|cell| cell.parse().unwrap()).collect())
+        .collect();
     let mut rows = at_random(problem, table.len(), 1.0, &mut rng());
-    rows.configurations = table.iter().flat_map(|row| row[..4].iter().map(|q| q.to_radians())).collect();
-    rows.positions = table.iter().map(|row| Vector3::new(row[9], row[10], row[11]) * 1e-3).collect();
+    rows.configurations =
+        table.iter().flat_map(|row| row[..4].iter().map(|q| q.to_radians())).collect();
+    rows.positions =
+        table.iter().map(|row| Vector3::new(row[9], row[10], row[11]) * 1e-3).collect();
     rows
 }
 
@@ -64,18 +79,27 @@ fn all_that_rigid_positions_tell_of_table_2_comes_back() {
         .iter()
         .map(|own| own.weights.iter().map(|&(j, _)| found.unknowns[j].as_str()).collect())
         .collect();
-    assert_eq!(unidentifiable, [["joint1.beta", "joint2.theta"], ["joint2.d", "joint4.d"], ["joint3.d", "joint4.d"]]);
+    assert_eq!(
+        unidentifiable,
+        [["joint1.beta", "joint2.theta"], ["joint2.d", "joint4.d"], ["joint3.d", "joint4.d"]]
+    );
     let model = model_of(&problem, &rows);
     let error = &found.x - table_2_deviations(&model.parameters);
-    let of = |name: &str| error[found.estimates.iter().position(|estimate| estimate.name == name).unwrap()];
+    let of = |name: &str| {
+        error[found.estimates.iter().position(|estimate| estimate.name == name).unwrap()]
+    };
     for (estimate, error) in found.estimates.iter().zip(&error) {
-        // The unidentifiable ones stay near nominal; what is left of them after the first order others make up for.
+        // The unidentifiable ones stay near nominal; what is left of them after the first order
+        // others make up for.
         let limit = if estimate.identified > 0.999_999 { 2e-5 } else { 0.01 };
         assert!(error.abs() < limit, "{}: off by {error:e}", estimate.name);
     }
     assert!((of("joint1.beta") - of("joint2.theta")).abs() < 1e-6);
     assert!((of("joint2.d") + of("joint3.d") + of("joint4.d")).abs() < 1e-8);
-    assert!(of("joint2.d").abs() > 1e-3, "the parts of an unidentifiable combination are not known");
+    assert!(
+        of("joint2.d").abs() > 1e-3,
+        "the parts of an unidentifiable combination are not known"
+    );
 }
 
 #[test]
@@ -108,7 +132,10 @@ fn stiffnesses_come_back_from_exact_positions() {
     let stiffnesses = found.estimates.iter().filter(|estimate| estimate.unit.is_relative());
     assert_eq!(stiffnesses.filter(|estimate| estimate.identified > 0.999_999).count(), 9);
     let worst = (&found.x - &truth).amax();
-    println!("stiffnesses, worst {worst:.1e} relative; held out {:.1e} m", found.fitted.held_out.max.norm);
+    println!(
+        "stiffnesses, worst {worst:.1e} relative; held out {:.1e} m",
+        found.fitted.held_out.max.norm
+    );
     assert!(worst < 1e-6, "{:e}", found.x - truth);
     assert!(found.fitted.held_out.max.norm < 1e-9);
 }
@@ -116,7 +143,8 @@ fn stiffnesses_come_back_from_exact_positions() {
 #[test]
 fn geometry_and_stiffness_come_back_together() {
     // The stretch of a link is hardly seen: without a prior its EA may run away.
-    let rules = "\"joint*\" = { free = true }\n\"*.EI\" = { free = true }\n\"*.GJ\" = { free = true }";
+    let rules =
+        "\"joint*\" = { free = true }\n\"*.EI\" = { free = true }\n\"*.GJ\" = { free = true }";
     let problem = with_parameters("tests/golden/problem.toml", rules);
     let mut rows = measured(&problem, &["tests/cases/h-none-large.csv"]);
     let model = model_of(&problem, &rows);
@@ -125,22 +153,31 @@ fn geometry_and_stiffness_come_back_together() {
     measure(&problem, &mut rows, &truth, 0.0, &mut rng());
     let found = fit(&problem, &rows, &split_at(100, &rows));
     assert!(found.fitted.held_out.max.norm < 1e-9, "{:?}", found.fitted.held_out);
-    for (k, estimate) in found.estimates.iter().enumerate().filter(|(_, estimate)| estimate.unit.is_relative()) {
+    for (k, estimate) in
+        found.estimates.iter().enumerate().filter(|(_, estimate)| estimate.unit.is_relative())
+    {
         let error = (found.x[k] - truth[k]).abs();
         println!("{} off by {error:.1e}", estimate.name);
-        assert!(estimate.identified > 0.999_999 && error < 1e-6, "{}: off by {error:e}", estimate.name);
+        assert!(
+            estimate.identified > 0.999_999 && error < 1e-6,
+            "{}: off by {error:e}",
+            estimate.name
+        );
     }
 }
 
-/// A UR10 whose poses of two sessions were measured from two sides, with two targets, a row in three of the first session
-/// with the other session's target.
+/// A UR10 whose poses of two sessions were measured from two sides, with two targets, a row in
+/// three of the first session with the other session's target.
 fn two_sessions(problem: &Problem, per_session: usize, sigma: f64) -> (Measurements, DVector<f64>) {
     let mut rng = rng();
     let mut rows = at_random(problem, 2 * per_session, 2.8, &mut rng);
     rows.session = labels((0..2 * per_session).map(|k| if k < per_session { "A" } else { "B" }));
     let model = model_of(problem, &rows);
     let mut truth = draw(&model, |unit| if unit == Unit::Length { 2e-3 } else { 4e-3 }, &mut rng);
-    let bases = [("base[A]", [4.0, -3.0, 0.5, 0.1, -0.2, 0.3]), ("base[B]", [-5.0, 2.0, 1.5, 0.0, 0.1, 3.1])];
+    let bases = [
+        ("base[A]", [4.0, -3.0, 0.5, 0.1, -0.2, 0.3]),
+        ("base[B]", [-5.0, 2.0, 1.5, 0.0, 0.1, 3.1]),
+    ];
     for (base, pose) in bases {
         for (suffix, value) in ["x", "y", "z", "rx", "ry", "rz"].iter().zip(pose) {
             truth[index(&model.parameters, &format!("{base}.{suffix}"))] = value;
@@ -186,16 +223,24 @@ fn a_session_held_out_is_fitted_on_its_own_rows_alone() {
     let problem = ur10("held_out = { session = \"B\" }");
     let (rows, truth) = two_sessions(&problem, 40, 5e-5);
     let split = Split::new(&problem, &rows).unwrap();
-    assert_eq!((split.identification.clone(), split.held_out.clone()), ((0..40).collect(), (40..80).collect()));
+    assert_eq!(
+        (split.identification.clone(), split.held_out.clone()),
+        ((0..40).collect(), (40..80).collect())
+    );
     let found = fit(&problem, &rows, &split);
     let parameters = model_of(&problem, &rows).parameters;
 
-    let placed: Vec<usize> = (0..parameters.len()).filter(|&k| parameters[k].name.contains("[B]")).collect();
+    let placed: Vec<usize> =
+        (0..parameters.len()).filter(|&k| parameters[k].name.contains("[B]")).collect();
     assert_eq!(placed.len(), 6 + 3);
     for &k in &placed {
         let (estimate, error) = (&found.estimates[k], (found.x[k] - truth[k]).abs());
         assert!(estimate.fitted && !found.unknowns.contains(&estimate.name));
-        assert!(error < 5.0 * estimate.std_error.unwrap(), "{}: {error:e} {estimate:?}", estimate.name);
+        assert!(
+            error < 5.0 * estimate.std_error.unwrap(),
+            "{}: {error:e} {estimate:?}",
+            estimate.name
+        );
     }
     let rms = found.fitted.held_out.rms.norm / 5e-5;
     assert!((1.2..2.2).contains(&rms), "held-out rms {rms} σ");
@@ -212,7 +257,14 @@ fn a_session_held_out_is_fitted_on_its_own_rows_alone() {
     let alone = fit(&problem, &alone, &split);
     for (k, parameter) in parameters.iter().enumerate() {
         let same = with_other.x[k].to_bits() == found.x[k].to_bits();
-        assert_eq!(same, !placed.contains(&k), "{} {:e} {:e}", parameter.name, with_other.x[k], found.x[k]);
+        assert_eq!(
+            same,
+            !placed.contains(&k),
+            "{} {:e} {:e}",
+            parameter.name,
+            with_other.x[k],
+            found.x[k]
+        );
         let Some(estimate) = alone.estimate(&parameter.name) else {
             continue;
         };
@@ -226,10 +278,12 @@ fn a_target_seen_in_held_out_rows_alone_does_not_touch_the_arm() {
     let problem = ur10("");
     let (mut rows, _) = two_sessions(&problem, 30, 5e-5);
     rows.target = Some(labels((0..60).map(|k| if k % 3 == 0 { "late" } else { "early" })));
-    let (held_out, identification): (Vec<usize>, Vec<usize>) = (0..60).partition(|row| row % 3 == 0);
+    let (held_out, identification): (Vec<usize>, Vec<usize>) =
+        (0..60).partition(|row| row % 3 == 0);
     let split = Split { identification, held_out };
     let parameters = model_of(&problem, &rows).parameters;
-    let late: Vec<bool> = parameters.iter().map(|parameter| parameter.name.starts_with("tool[late]")).collect();
+    let late: Vec<bool> =
+        parameters.iter().map(|parameter| parameter.name.starts_with("tool[late]")).collect();
     let truth = DVector::from_fn(parameters.len(), |k, _| if late[k] { 0.04 } else { 0.0 });
     rows.positions = predicted(&problem, &rows, &truth);
     let found = fit(&problem, &rows, &split);
@@ -243,13 +297,14 @@ fn a_target_seen_in_held_out_rows_alone_does_not_touch_the_arm() {
     }
 }
 
-/// The lunar sampler's example poses, measured on an arm off nominal by these parts of the priors' sizes.
+/// The lunar sampler's example poses, measured on an arm off nominal by these parts of the priors'
+/// sizes.
 fn slightly_off(problem: &Problem, geometry: f64, stiffness: f64) -> (Measurements, Split) {
     let mut rows = measured(problem, &["tests/cases/a-none.csv"]);
     let model = model_of(problem, &rows);
     let mut truth = draw(&model, |_| 0.0, &mut rng());
     for (x, parameter) in truth.iter_mut().zip(&model.parameters) {
-        *x *= if parameter.slot.is_elastic() { stiffness } else { geometry };
+        *x *= if parameter.site.is_elastic() { stiffness } else { geometry };
     }
     measure(problem, &mut rows, &truth, 5e-5, &mut rng());
     let split = Split::new(problem, &rows).unwrap();
@@ -285,14 +340,15 @@ fn stage_by_stage_settles_where_everything_at_once_does() {
 #[test]
 fn strategies_leave_the_others_at_nominal() {
     let problem = golden_problem();
-    let strategies = [(Strategy::GeometryOnly, false, 0.1, 1e-3), (Strategy::StiffnessOnly, true, 1e-3, 0.1)];
+    let strategies =
+        [(Strategy::GeometryOnly, false, 0.1, 1e-3), (Strategy::StiffnessOnly, true, 1e-3, 0.1)];
     for (strategy, elastic, geometry, stiffness) in strategies {
         let (rows, split) = slightly_off(&problem, geometry, stiffness);
         let parameters = model_of(&problem, &rows).parameters;
         let found = fit_by(strategy, &problem, &rows, &split);
         assert!(found.fitted.identification.rms.norm < found.registered.identification.rms.norm);
         for (k, (parameter, estimate)) in parameters.iter().zip(&found.estimates).enumerate() {
-            let varied = parameter.slot.is_placement() || parameter.slot.is_elastic() == elastic;
+            let varied = parameter.site.is_placement() || parameter.site.is_elastic() == elastic;
             assert_eq!(estimate.fitted, varied, "{strategy:?} {}", parameter.name);
             assert_eq!(found.unknowns.contains(&parameter.name), varied);
             if varied {
@@ -335,7 +391,11 @@ fn a_bound_that_binds_is_kept_exactly_and_reported() {
     measure(&problem, &mut rows, &truth, 0.0, &mut rng());
     let found = fit(&problem, &rows, &split_at(40, &rows));
     assert!(found.estimates.iter().all(|estimate| estimate.at_bound.is_none()));
-    assert!((found.x[a] - 0.004).abs() < 1e-5 && (found.x[ei] - truth[ei]).abs() < 1e-3, "{}", found.x);
+    assert!(
+        (found.x[a] - 0.004).abs() < 1e-5 && (found.x[ei] - truth[ei]).abs() < 1e-3,
+        "{}",
+        found.x
+    );
 }
 
 #[test]

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use flexcal::diagnose::{Verdict, close};
-use flexcal::identify::{Identification, Options, identify};
+use flexcal::fit::{Identification, Options, identify};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::{Effect, Problem, Robust, RobustLoss};
+use flexcal::select::{Verdict, close};
 use nalgebra::Vector3;
 
 /// Length of a gross error [m].
@@ -25,7 +25,8 @@ fn spoil(Dataset { measurements, split }: &mut Dataset) -> Vec<usize> {
     let rows: Vec<usize> = split.identification.iter().copied().skip(7).step_by(33).collect();
     for (k, &row) in rows.iter().enumerate() {
         let angle = 2.4 * k as f64;
-        measurements.positions[row] += GROSS * Vector3::new(0.6 * angle.cos(), 0.6 * angle.sin(), 0.8);
+        measurements.positions[row] +=
+            GROSS * Vector3::new(0.6 * angle.cos(), 0.6 * angle.sin(), 0.8);
     }
     rows
 }
@@ -46,7 +47,11 @@ fn a_robust_loss_keeps_gross_errors_from_ruling_the_fit() {
 
     let squares = identify(&problem, &data, &Options::default()).unwrap();
     let ratio = squares.fitted.held_out.rms.norm / clean_rms;
-    println!("clean {:.4} mm; squares {ratio:.3} times that, {:?}", clean_rms * 1e3, rows(&squares));
+    println!(
+        "clean {:.4} mm; squares {ratio:.3} times that, {:?}",
+        clean_rms * 1e3,
+        rows(&squares)
+    );
     assert!(ratio > 1.3);
     for loss in [RobustLoss::Huber, RobustLoss::L1] {
         problem.robust = Some(Robust { loss, threshold: None });
@@ -68,7 +73,8 @@ fn a_robust_loss_keeps_gross_errors_from_ruling_the_fit() {
             assert_eq!(outlier.location, data.measurements.location(outlier.row));
         }
         assert!((robust.reduced_chi2.unwrap() - 1.0).abs() < 0.25 && robust.noise_factor < 1.5);
-        // Errors of a robust fit are a little larger than those of a clean one, by what the loss gives away.
+        // Errors of a robust fit are a little larger than those of a clean one, by what the loss
+        // gives away.
         for (robust, clean) in robust.estimates.iter().zip(&clean.estimates) {
             if let (Some(robust_error), Some(error)) = (robust.std_error, clean.std_error) {
                 let ratio = robust_error / error;
@@ -96,7 +102,10 @@ fn a_robust_loss_costs_little_on_clean_data() {
 #[test]
 fn gross_errors_hide_no_effect_from_the_loop() {
     let (mut problem, mut data) = lunar("b-joint-harmonic.csv");
-    for (row, along) in [(data.split.identification[5], Vector3::x()), (data.split.identification[19], Vector3::z())] {
+    for (row, along) in [
+        (data.split.identification[5], Vector3::x()),
+        (data.split.identification[19], Vector3::z()),
+    ] {
         data.measurements.positions[row] += 10.0 * GROSS * along;
     }
     let found = |problem: &Problem| close(problem, &data, &Options::default()).unwrap();
@@ -108,5 +117,9 @@ fn gross_errors_hide_no_effect_from_the_loop() {
     problem.robust = Some(Robust { loss: RobustLoss::Huber, threshold: None });
     let robust = found(&problem);
     assert_eq!(robust.verdict, Verdict::Explained);
-    assert!(robust.effects.len() == 1 && is_wave(&robust.effects[0].effect), "{:?}", robust.effects);
+    assert!(
+        robust.effects.len() == 1 && is_wave(&robust.effects[0].effect),
+        "{:?}",
+        robust.effects
+    );
 }

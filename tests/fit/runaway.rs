@@ -1,8 +1,9 @@
-//! Nothing runs off: combinations that data see too weakly are held and named, and no trusted parameter leaves the arm.
+//! Nothing runs off: combinations that data see too weakly are held and named, and no trusted
+//! parameter leaves the arm.
 
 use crate::common::arms::parse;
 use crate::common::made::{at_random, divided, draw, measure, model_of};
-use flexcal::identify::{Identification, Options, QualityFlag, SolverChoice, identify};
+use flexcal::fit::{Identification, Options, QualityFlag, SolverChoice, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use flexcal::quantity::Unit;
@@ -43,7 +44,10 @@ pub fn measured(problem: &Problem, seed: u64) -> Dataset {
 
 /// Lengths by name that moved by more than a centimetre.
 fn far(found: &Identification) -> Vec<String> {
-    let lengths = found.estimates.iter().filter(|own| own.unit == Unit::Length && !own.name.starts_with("base"));
+    let lengths = found
+        .estimates
+        .iter()
+        .filter(|own| own.unit == Unit::Length && !own.name.starts_with("base"));
     let moved = lengths.filter(|own| (own.estimate - own.nominal).abs() > 0.01);
     moved.map(|own| format!("{}: {}", own.name, own.estimate)).collect()
 }
@@ -52,16 +56,30 @@ fn far(found: &Identification) -> Vec<String> {
 fn what_is_seen_too_weakly_is_held_and_named() {
     let free = format!("{PRIORS}'joint*.d' = {{ free = true }}\n'tool.*' = {{ free = true }}");
     // Blind at the nominal arm, or hardly seen there; with bounds as without.
-    for (twist, bound) in [(0.0, ""), (0.002, ""), (0.0, "\n'joint1.a' = { sigma_mm = 3, min_mm = -50 }")] {
+    for (twist, bound) in
+        [(0.0, ""), (0.002, ""), (0.0, "\n'joint1.a' = { sigma_mm = 3, min_mm = -50 }")]
+    {
         let problem = elbow(twist, &format!("{free}{bound}"));
         for seed in 1..=3 {
             let found = identify(&problem, &measured(&problem, seed), &Options::default()).unwrap();
             let at = format!("{twist}° {bound} seed {seed}");
             assert_eq!(found.solver == SolverChoice::Bounded, !bound.is_empty());
-            assert!(found.is_trusted() && far(&found).is_empty(), "{at}: {:?} {:?}", found.quality_flag, far(&found));
-            assert!(found.reduced_chi2.unwrap() < 1.4 && found.fitted.held_out.rms.norm < 3.0 * SIGMA, "{at}");
-            let named: Vec<&str> =
-                found.weak.iter().flat_map(|own| &own.weights).map(|(k, _)| found.unknowns[*k].as_str()).collect();
+            assert!(
+                found.is_trusted() && far(&found).is_empty(),
+                "{at}: {:?} {:?}",
+                found.quality_flag,
+                far(&found)
+            );
+            assert!(
+                found.reduced_chi2.unwrap() < 1.4 && found.fitted.held_out.rms.norm < 3.0 * SIGMA,
+                "{at}"
+            );
+            let named: Vec<&str> = found
+                .weak
+                .iter()
+                .flat_map(|own| &own.weights)
+                .map(|(k, _)| found.unknowns[*k].as_str())
+                .collect();
             assert!(named.contains(&"joint3.d") && !named.contains(&"joint1.a"), "{at}: {named:?}");
             assert_eq!(found.estimate("joint3.d").unwrap().std_error, None);
             assert!(found.estimate("joint5.d").unwrap().std_error.unwrap() < 1e-3, "{at}");
@@ -72,7 +90,10 @@ fn what_is_seen_too_weakly_is_held_and_named() {
 
 #[test]
 fn what_is_seen_well_enough_is_not_held() {
-    let problem = elbow(5.0, &format!("{PRIORS}'joint*.d' = {{ free = true }}\n'joint4.d' = {{ fixed = true }}"));
+    let problem = elbow(
+        5.0,
+        &format!("{PRIORS}'joint*.d' = {{ free = true }}\n'joint4.d' = {{ fixed = true }}"),
+    );
     let found = identify(&problem, &measured(&problem, 1), &Options::default()).unwrap();
     assert!(found.weak.is_empty(), "{:?}", found.weak);
     let own = found.estimate("joint3.d").unwrap();
@@ -82,7 +103,8 @@ fn what_is_seen_well_enough_is_not_held() {
 
 #[test]
 fn no_trusted_parameter_leaves_the_arm() {
-    // The measuring frame is three metres above the arm's base, and nothing but a link may take that up.
+    // The measuring frame is three metres above the arm's base, and nothing but a link may take
+    // that up.
     let problem = elbow(0.0, "'joint1.d' = { free = true }");
     let mut data = measured(&problem, 1);
     for position in &mut data.measurements.positions {

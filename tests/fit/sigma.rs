@@ -1,12 +1,13 @@
-//! A declared σ that the residual contradicts decides nothing: priors and data are weighed by the scatter there is.
+//! A declared σ that the residual contradicts decides nothing: priors and data are weighed by the
+//! scatter there is.
 
 use crate::common::arms::{measured, parse, path};
-use flexcal::diagnose::{Verdict, close};
-use flexcal::identify::{Identification, Options, identify};
+use flexcal::fit::{Identification, Options, identify};
 use flexcal::measurement::{Dataset, Split};
 use flexcal::problem::Problem;
 use flexcal::report::estimate_text;
-use flexcal::simulate::{Truth, simulate};
+use flexcal::rig::{Truth, simulate};
+use flexcal::select::{Verdict, close};
 
 /// The lunar sampler with another declared σ [m], and the measurements of a case.
 fn case(name: &str, sigma: f64) -> (Problem, Dataset) {
@@ -23,10 +24,12 @@ fn fit(name: &str, sigma: f64) -> (Problem, Identification) {
     (problem, found)
 }
 
-/// Largest difference of two fits in standard errors of the first, and largest ratio of the standard errors.
+/// Largest difference of two fits in standard errors of the first, and largest ratio of the
+/// standard errors.
 fn apart(one: &Identification, other: &Identification) -> (f64, f64) {
     let pairs = one.estimates.iter().zip(&other.estimates);
-    let both = pairs.filter_map(|(a, b)| Some((a.estimate - b.estimate, a.std_error?, b.std_error?)));
+    let both =
+        pairs.filter_map(|(a, b)| Some((a.estimate - b.estimate, a.std_error?, b.std_error?)));
     both.fold((0.0_f64, 1.0_f64), |(far, ratio), (difference, a, b)| {
         (far.max(difference.abs() / a), ratio.max(a / b).max(b / a))
     })
@@ -44,21 +47,36 @@ fn a_sigma_that_fits_is_taken_as_declared() {
 
 #[test]
 fn a_sigma_that_is_wrong_changes_no_estimate() {
-    for (name, right) in
-        [("a-none", 5e-5), ("h-none-large", 5e-5), ("c-link-thermal-bending", 3e-4), ("e-payload-mass", 4.5e-4)]
-    {
+    for (name, right) in [
+        ("a-none", 5e-5),
+        ("h-none-large", 5e-5),
+        ("c-link-thermal-bending", 3e-4),
+        ("e-payload-mass", 4.5e-4),
+    ] {
         let (_, expected) = fit(name, right);
-        assert!((0.5..2.0).contains(&expected.reduced_chi2.unwrap()), "{name}: {:?}", expected.reduced_chi2);
+        assert!(
+            (0.5..2.0).contains(&expected.reduced_chi2.unwrap()),
+            "{name}: {:?}",
+            expected.reduced_chi2
+        );
         for factor in [0.01, 0.1, 10.0, 100.0] {
             let (problem, found) = fit(name, factor * right);
             let (far, ratio) = apart(&expected, &found);
             // The scatter is known to about 10 %.
             assert!(far < 0.4 && ratio < 1.3, "{name} × {factor}: {far} σ, {ratio}");
-            assert!((found.sigma_taken / right - 1.0).abs() < 0.25, "{name} × {factor}: {}", found.sigma_taken);
+            assert!(
+                (found.sigma_taken / right - 1.0).abs() < 0.25,
+                "{name} × {factor}: {}",
+                found.sigma_taken
+            );
             let chi2 = found.reduced_chi2.unwrap();
-            assert!((chi2 * factor * factor / expected.reduced_chi2.unwrap() - 1.0).abs() < 0.2, "{name}: {chi2}");
+            assert!(
+                (chi2 * factor * factor / expected.reduced_chi2.unwrap() - 1.0).abs() < 0.2,
+                "{name}: {chi2}"
+            );
             let text = estimate_text(&problem, &found);
-            let cause = if factor > 1.0 { "which is too large" } else { "the model lacks something" };
+            let cause =
+                if factor > 1.0 { "which is too large" } else { "the model lacks something" };
             assert!(text.contains(cause) && text.contains("; chance gives "), "{text}");
         }
     }
@@ -108,7 +126,7 @@ pub fn simulated(seed: u64) -> Dataset {
     let truth = Truth::parse(TRUTH, std::path::Path::new("truth.toml"), &problem).unwrap();
     let rows = simulate(&problem, &truth, 110, seed).unwrap().rows;
     let (held_out, identification) = (0..rows.len()).partition(|&row| rows[row].held_out);
-    Dataset::new(flexcal::monte_carlo::table(&rows), Split { identification, held_out })
+    Dataset::new(flexcal::study::table(&rows), Split { identification, held_out })
 }
 
 #[test]
@@ -117,7 +135,12 @@ fn a_sigma_too_large_makes_the_loop_invent_nothing() {
         let data = simulated(seed);
         for factor in [1.0, 10.0, 100.0] {
             let closed = close(&parse(&elbow(0.05 * factor)), &data, &Options::default()).unwrap();
-            assert_eq!(closed.verdict, Verdict::NothingFound, "seed {seed} × {factor}: {:?}", closed.effects);
+            assert_eq!(
+                closed.verdict,
+                Verdict::NothingFound,
+                "seed {seed} × {factor}: {:?}",
+                closed.effects
+            );
             let size = closed.findings.tests.first().unwrap();
             assert_eq!(size.to_string().contains("overstated"), factor > 1.0, "{size}");
         }

@@ -1,4 +1,5 @@
-//! What the command line says of fits that cannot be meant, and that the estimates of those that can stay near the arm.
+//! What the command line says of fits that cannot be meant, and that the estimates of those that
+//! can stay near the arm.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -15,7 +16,8 @@ use crate::common::made::{at_random, csv, divided, draw, labels, measure, model_
 use crate::{judged, runaway, sigma};
 
 /// Free lengths take up any unit.
-const LENGTHS: &str = "'joint*.a' = { free = true }\n'joint*.d' = { free = true }\n'tool.*' = { free = true }";
+const LENGTHS: &str =
+    "'joint*.a' = { free = true }\n'joint*.d' = { free = true }\n'tool.*' = { free = true }";
 
 /// What a command prints.
 struct Told {
@@ -31,11 +33,20 @@ impl Told {
     fn by(command: &str, problem: &str, table: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
-        write("problem.toml", &format!("{problem}files = ['rows.csv']\nheld_out = {{ column = 'split' }}\n"));
+        write(
+            "problem.toml",
+            &format!("{problem}files = ['rows.csv']\nheld_out = {{ column = 'split' }}\n"),
+        );
         write("rows.csv", table);
         let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        let output = flexcal.current_dir(folder.path()).args([command, ".", "--out", "out"]).output().unwrap();
-        let read = |name: &str| fs::read_to_string(folder.path().join("out").join(name)).unwrap_or_default();
+        let output = flexcal
+            .current_dir(folder.path())
+            .args([command, ".", "--out", "out"])
+            .output()
+            .unwrap();
+        let read = |name: &str| {
+            fs::read_to_string(folder.path().join("out").join(name)).unwrap_or_default()
+        };
         let json = read(if command == "loop" { "loop.json" } else { "estimate.json" });
         Self {
             status: output.status.code().unwrap(),
@@ -49,14 +60,21 @@ impl Told {
         let number = |own: &Value, key: &str| own[key].as_f64();
         self.json["parameters"].as_array().into_iter().flatten().map(move |own| {
             let value = |key| number(own, key).unwrap();
-            (own["name"].as_str().unwrap(), value("estimate"), value("nominal"), number(own, "std_error"))
+            (
+                own["name"].as_str().unwrap(),
+                value("estimate"),
+                value("nominal"),
+                number(own, "std_error"),
+            )
         })
     }
 
     /// Parameters of the arm that moved by more than 0.1 m or rad.
     fn far(&self) -> Vec<String> {
         self.parameters()
-            .filter(|(name, estimate, nominal, _)| !name.starts_with("base") && (estimate - nominal).abs() > 0.1)
+            .filter(|(name, estimate, nominal, _)| {
+                !name.starts_with("base") && (estimate - nominal).abs() > 0.1
+            })
             .map(|(name, estimate, nominal, _)| format!("{name} {nominal} → {estimate}"))
             .collect()
     }
@@ -110,8 +128,10 @@ fn three_targets() -> Case {
     let problem = parse(&text);
     let mut rng = ChaCha8Rng::seed_from_u64(6);
     let poses = at_random(&problem, 14, 2.0, &mut rng);
-    let configurations: Vec<Vec<f64>> = (0..42).map(|row| poses.configuration(row / 3).to_vec()).collect();
-    let mut rows = Dataset::builder(configurations, vec![Vector3::zeros(); 42]).measurements().unwrap();
+    let configurations: Vec<Vec<f64>> =
+        (0..42).map(|row| poses.configuration(row / 3).to_vec()).collect();
+    let mut rows =
+        Dataset::builder(configurations, vec![Vector3::zeros(); 42]).measurements().unwrap();
     rows.target = Some(labels((0..42).map(|row| ["left", "right", "top"][row % 3])));
     let truth = draw(&model_of(&problem, &rows), |_| 1e-3, &mut rng);
     measure(&problem, &mut rows, &truth, judged::SIGMA, &mut rng);
@@ -121,11 +141,15 @@ fn three_targets() -> Case {
 fn spoiled_ones() -> Vec<Case> {
     let (priors, free) = (judged::PRIORS, judged::FREE);
     let based = &format!("{priors}\n'base.*' = {{ free = true }}");
-    let scaled = |factor: f64| move |data: &mut Dataset| positions(data).iter_mut().for_each(|own| *own *= factor);
+    let scaled = |factor: f64| {
+        move |data: &mut Dataset| positions(data).iter_mut().for_each(|own| *own *= factor)
+    };
     let off = |by: f64| move |data: &mut Dataset| positions(data)[77].y += by;
-    let gross = |data: &mut Dataset| [3, 20, 41].into_iter().for_each(|row| positions(data)[row].x += 2.0);
+    let gross =
+        |data: &mut Dataset| [3, 20, 41].into_iter().for_each(|row| positions(data)[row].x += 2.0);
     let (worse, held_out) = judged::worse_than_none();
-    let mut robust = spoiled("gross errors that a loss sets aside", priors, 0, "rows.csv:22", gross);
+    let mut robust =
+        spoiled("gross errors that a loss sets aside", priors, 0, "rows.csv:22", gross);
     robust.1 = robust.1.replacen("[parameters]", "[robust]\nloss = 'huber'\n[parameters]", 1);
     // Rz(θ) Tz(d) Tx(a) Rx(α): what stands in a joint belongs to the next.
     let standard = |mut case: Case| {
@@ -137,13 +161,33 @@ fn spoiled_ones() -> Vec<Case> {
     };
     vec![
         spoiled("nothing wrong", priors, 0, "explains the data", |_| ()),
-        spoiled("held-out rows shifted", priors, 1, "held-out", |data| positions(data)[60..].rotate_left(1)),
+        spoiled("held-out rows shifted", priors, 1, "held-out", |data| {
+            positions(data)[60..].rotate_left(1)
+        }),
         spoiled("one wrong held-out row", priors, 0, "rows.csv:79", off(0.3)),
         spoiled("a held-out cell of 1e150", priors, 0, "rows.csv:79", off(1e149)),
-        spoiled("held-out rows are identification rows", priors, 1, "identification rows again", copied(30)),
-        spoiled("some of them are", priors, 0, "10 of 30 held-out rows are identification rows again", copied(10)),
+        spoiled(
+            "held-out rows are identification rows",
+            priors,
+            1,
+            "identification rows again",
+            copied(30),
+        ),
+        spoiled(
+            "some of them are",
+            priors,
+            0,
+            "10 of 30 held-out rows are identification rows again",
+            copied(10),
+        ),
         spoiled("two poses for a base", based, 1, "leaves a turn", session(&[10, 11])),
-        spoiled("two held-out poses for a base", based, 1, "6 measured coordinates for 6", session(&[70, 71])),
+        spoiled(
+            "two held-out poses for a base",
+            based,
+            1,
+            "6 measured coordinates for 6",
+            session(&[70, 71]),
+        ),
         spoiled("inches", LENGTHS, 1, "units", scaled(1.0 / 25.4)),
         spoiled("metres for millimetres", LENGTHS, 1, "units", scaled(1e-3)),
         spoiled("millimetres for metres", LENGTHS, 1, "units", scaled(1e3)),
@@ -157,7 +201,8 @@ fn spoiled_ones() -> Vec<Case> {
 
 /// Free offsets along parallel axes, and what the measuring frame is off by.
 fn running_off() -> Vec<Case> {
-    let free = format!("{}'joint*.d' = {{ free = true }}\n'tool.*' = {{ free = true }}", runaway::PRIORS);
+    let free =
+        format!("{}'joint*.d' = {{ free = true }}\n'tool.*' = {{ free = true }}", runaway::PRIORS);
     let elbow = |name, twist, rules: &str, seed| {
         let text = runaway::text(twist, &format!("{free}{rules}"));
         let data = runaway::measured(&parse(&text), seed);
@@ -182,7 +227,12 @@ fn running_off() -> Vec<Case> {
         elbow("an elbow arm", 0.0, "", 1),
         elbow("the same, hardly seen", 0.002, "", 2),
         elbow("the same with a bound", 0.0, "\n'joint1.a' = { sigma_mm = 3, min_mm = -50 }", 1),
-        elbow("with a bound, hardly seen", 0.002, "\n'joint1.a' = { sigma_mm = 3, min_mm = -50 }", 3),
+        elbow(
+            "with a bound, hardly seen",
+            0.002,
+            "\n'joint1.a' = { sigma_mm = 3, min_mm = -50 }",
+            3,
+        ),
         ur10(),
         raised(),
     ]
@@ -212,9 +262,11 @@ fn a_declared_sigma_that_is_wrong_changes_nothing() {
         let problem = fs::read_to_string(path("tests/cases/problem.toml")).unwrap();
         let table = fs::read_to_string(path(&format!("tests/cases/{name}.csv"))).unwrap();
         let fit = |sigma: f64| {
-            let problem =
-                problem.replace("files = [\"a-none.csv\"]\n", "").replace("held_out = { column = \"split\" }\n", "");
-            let declared = problem.replace("position_sigma_mm = 0.05", &format!("position_sigma_mm = {sigma}"));
+            let problem = problem
+                .replace("files = [\"a-none.csv\"]\n", "")
+                .replace("held_out = { column = \"split\" }\n", "");
+            let declared = problem
+                .replace("position_sigma_mm = 0.05", &format!("position_sigma_mm = {sigma}"));
             Told::by("identify", &declared, &table)
         };
         let expected = fit(right);
@@ -239,7 +291,8 @@ fn a_declared_sigma_that_is_wrong_changes_nothing() {
     for (seed, factor) in [(2, 10.0), (2, 100.0), (4, 10.0), (4, 100.0)] {
         let problem = sigma::elbow(0.05 * factor);
         let told = Told::by("loop", &problem, &csv(&parse(&problem), &sigma::simulated(seed)));
-        let found: Vec<&Value> = told.json["effects"].as_array().unwrap().iter().map(|own| &own["effect"]).collect();
+        let found: Vec<&Value> =
+            told.json["effects"].as_array().unwrap().iter().map(|own| &own["effect"]).collect();
         if !found.is_empty() {
             let _ = writeln!(wrong, "seed {seed} × {factor}: finds {found:?}");
         }

@@ -1,13 +1,13 @@
 //! Two arms on one torso, measured on the virtual test rig: what a fit and the loop make of it.
 
-use flexcal::diagnose::{Verdict, close};
-use flexcal::identify::{Options, Placement, compensate, identify, seen_in_base, waypoints};
+use flexcal::fit::{Options, Placement, compensate, identify, seen_in_base, waypoints};
 use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::model::Model;
-use flexcal::monte_carlo::table;
 use flexcal::problem::{Observation, Problem};
 use flexcal::report::commands_csv;
-use flexcal::simulate::{Simulation, Truth, simulate};
+use flexcal::rig::{Simulation, Truth, simulate};
+use flexcal::select::{Verdict, close};
+use flexcal::study::table;
 use std::path::Path;
 
 use crate::common::arms::{parse, path};
@@ -23,7 +23,8 @@ fn two_arms(problem: (&str, &str), truth: (&str, &str)) -> (Problem, Truth) {
         text.replacen(old, new, 1)
     };
     let declared = parse(&read("problem.toml", problem));
-    let truth = Truth::parse(&read("TRUTH.toml", truth), Path::new("TRUTH.toml"), &declared).unwrap();
+    let truth =
+        Truth::parse(&read("TRUTH.toml", truth), Path::new("TRUTH.toml"), &declared).unwrap();
     (declared, truth)
 }
 
@@ -43,9 +44,15 @@ fn the_truth_of_both_arms_comes_back_within_its_standard_errors() {
         assert!(found.is_trusted(), "{:?}", found.quality_flag);
         chi2.push(found.reduced_chi2.unwrap());
         for estimate in &found.estimates {
-            let Some(own) = simulation.parameters.iter().find(|own| own.name == estimate.name) else { continue };
+            let Some(own) = simulation.parameters.iter().find(|own| own.name == estimate.name)
+            else {
+                continue;
+            };
             // Waist and base say the same, and the truth of the waist is not nominal.
-            let Some(error) = estimate.std_error.filter(|_| !estimate.name.starts_with("base")) else { continue };
+            let Some(error) = estimate.std_error.filter(|_| !estimate.name.starts_with("base"))
+            else {
+                continue;
+            };
             let off = if estimate.unit.is_relative() {
                 (estimate.estimate / own.value).ln() / (error / estimate.estimate)
             } else {
@@ -56,21 +63,35 @@ fn the_truth_of_both_arms_comes_back_within_its_standard_errors() {
     }
     let share = |limit: f64| z.iter().filter(|own| **own < limit).count() as f64 / z.len() as f64;
     let mean = chi2.iter().sum::<f64>() / chi2.len() as f64;
-    println!("{} errors: {:.3} within 1 σ, {:.3} within 2 σ; mean χ²/ν {mean:.3}", z.len(), share(1.0), share(2.0));
+    println!(
+        "{} errors: {:.3} within 1 σ, {:.3} within 2 σ; mean χ²/ν {mean:.3}",
+        z.len(),
+        share(1.0),
+        share(2.0)
+    );
     // Errors of one fit hang together: the limits are those of some 15 independent ones a fit.
-    assert!(z.len() > 40 * chi2.len() && (share(1.0) - 0.683).abs() < 0.08 && (share(2.0) - 0.954).abs() < 0.04);
+    assert!(
+        z.len() > 40 * chi2.len()
+            && (share(1.0) - 0.683).abs() < 0.08
+            && (share(2.0) - 0.954).abs() < 0.04
+    );
     assert!((mean - 1.0).abs() < 0.1);
 }
 
 /// The chest is declared rigid: the loads of both arms lean it, and both hands show it.
 #[test]
 fn a_torso_that_gives_way_under_both_arms_is_named() {
-    let effect = "[[effect]]\njoint-compliance = { joint = 2 }\ncompliance_rad_per_N_m = 8.3e-5\n\n[noise]";
+    let effect =
+        "[[effect]]\njoint-compliance = { joint = 2 }\ncompliance_rad_per_N_m = 8.3e-5\n\n[noise]";
     let (problem, truth) = two_arms(("stiffness_N_m_per_rad = 1.2e4\n", ""), ("[noise]", effect));
     let simulation = simulate(&problem, &truth, 120, 3).unwrap();
     let closure = close(&problem, &dataset(&simulation), &Options::default()).unwrap();
-    let named: Vec<String> = closure.effects.iter().map(|found| found.effect.declaration()).collect();
-    assert_eq!((closure.verdict, named), (Verdict::Explained, vec!["joint-compliance = { joint = 2 }".to_owned()]));
+    let named: Vec<String> =
+        closure.effects.iter().map(|found| found.effect.declaration()).collect();
+    assert_eq!(
+        (closure.verdict, named),
+        (Verdict::Explained, vec!["joint-compliance = { joint = 2 }".to_owned()])
+    );
 }
 
 #[test]
@@ -91,7 +112,10 @@ fn commands_are_corrected_in_the_branch_of_their_target_alone() {
         let (row, target) = (&simulation.rows[command.row], &simulation.rows[command.row].target);
         let mut set = row.conditions.clone();
         let others = if target == "left" { 6..11 } else { 2..6 };
-        assert_eq!(command.configuration[others.clone()], wanted.configuration(command.row)[others]);
+        assert_eq!(
+            command.configuration[others.clone()],
+            wanted.configuration(command.row)[others]
+        );
         assert!(command.is_reached(), "{target}: {command:?}");
         set.configuration = command.configuration;
         let (reached, _) = simulation.rig.pose_of(target, &set).unwrap();
@@ -114,14 +138,25 @@ fn waypoints_keep_the_orientation_of_the_targets_that_can_have_one() {
     let commands = compensate(&problem, &model, &x, &wanted).unwrap();
     let csv = commands_csv(&problem, &shown, &commands);
     let mut cells = csv::Reader::from_reader(csv.as_bytes());
-    for (command, cells) in commands.iter().zip(cells.deserialize::<std::collections::BTreeMap<String, String>>()) {
+    for (command, cells) in
+        commands.iter().zip(cells.deserialize::<std::collections::BTreeMap<String, String>>())
+    {
         let (row, cells) = (command.row, cells.unwrap());
         let is_right = cells["target"] == "right";
-        assert_eq!((wanted.orientation(row).is_some(), command.turn.is_some()), (is_right, is_right), "row {row}");
-        assert_eq!((cells["rx_deg"].is_empty(), cells["turn_deg"].is_empty()), (!is_right, !is_right), "{csv}");
+        assert_eq!(
+            (wanted.orientation(row).is_some(), command.turn.is_some()),
+            (is_right, is_right),
+            "row {row}"
+        );
+        assert_eq!(
+            (cells["rx_deg"].is_empty(), cells["turn_deg"].is_empty()),
+            (!is_right, !is_right),
+            "{csv}"
+        );
         assert!(command.is_reached() && !csv.contains("NaN"), "{command:?}");
     }
-    let left: Vec<usize> = (0..rows.len()).filter(|&row| wanted.orientation(row).is_none()).collect();
+    let left: Vec<usize> =
+        (0..rows.len()).filter(|&row| wanted.orientation(row).is_none()).collect();
     assert_eq!(left.len(), 3);
     let alone = waypoints(&problem, &model, &x, &rows.select(&left)).unwrap();
     assert_eq!(alone.orientations, None);
@@ -140,14 +175,23 @@ fn each_target_of_a_tree_meets_everything_that_is_measured_against() {
         let simulation = simulate(&problem, &truth, 60 + rows, 4).unwrap();
         for fixture in 0..anchors.len() {
             for target in ["left", "right"] {
-                let met = |row: &&flexcal::simulate::Row| {
+                let met = |row: &&flexcal::rig::Row| {
                     row.target == target && row.observation == Observation::Distance(fixture)
                 };
-                assert_eq!(simulation.rows.iter().filter(met).count(), 20, "{target} and anchor {fixture}");
+                assert_eq!(
+                    simulation.rows.iter().filter(met).count(),
+                    20,
+                    "{target} and anchor {fixture}"
+                );
             }
         }
         let before = &simulation.rows[..60];
-        assert!(before.iter().zip(["left", "right"].iter().cycle()).all(|(row, target)| row.target == *target));
+        assert!(
+            before
+                .iter()
+                .zip(["left", "right"].iter().cycle())
+                .all(|(row, target)| row.target == *target)
+        );
         (problem, simulation)
     };
     rig("tilts = [\"tool\"]\n", 200);
@@ -158,7 +202,11 @@ fn each_target_of_a_tree_meets_everything_that_is_measured_against() {
     let data = Dataset::read_files(&[file], &problem).unwrap().0;
     let found = identify(&problem, &data, &Options::default()).unwrap();
     let chi2 = found.reduced_chi2.unwrap();
-    assert!(found.is_trusted() && (chi2 - 1.0).abs() < 0.25, "{:?}, reduced χ² {chi2}", found.quality_flag);
+    assert!(
+        found.is_trusted() && (chi2 - 1.0).abs() < 0.25,
+        "{:?}, reduced χ² {chi2}",
+        found.quality_flag
+    );
 }
 
 #[test]
@@ -167,7 +215,8 @@ fn rows_of_tilts_need_no_target() {
     let (problem, _) = two_arms(("[data]\n", declared), ("", ""));
     let q = "q1_deg,q2_deg,q4_deg,q5_deg,q6_deg,q8_deg,q9_deg,q10_deg,q11_deg";
     let here = "10,5,-60,30,20,-70,10,40,-30";
-    let (tilts, both) = ("frame,tilt_x_deg,tilt_y_deg", "x_mm,y_mm,z_mm,target,frame,tilt_x_deg,tilt_y_deg");
+    let (tilts, both) =
+        ("frame,tilt_x_deg,tilt_y_deg", "x_mm,y_mm,z_mm,target,frame,tilt_x_deg,tilt_y_deg");
     let read = |tables: &[String]| -> Result<Vec<String>, String> {
         let folder = tempfile::tempdir().unwrap();
         let name = |(k, text): (usize, &String)| {
@@ -205,5 +254,9 @@ fn rows_of_tilts_need_no_target() {
     }
     let unnamed = format!("{q},x_mm,y_mm,z_mm,{tilts}\n{here},1,2,3,,,\n");
     let error = read(&[unnamed]).unwrap_err();
-    assert!(error.contains("0.csv:2: the rows name no target; each of them measures one of left, right"), "{error}");
+    assert!(
+        error
+            .contains("0.csv:2: the rows name no target; each of them measures one of left, right"),
+        "{error}"
+    );
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::Output;
 
 use assert_cmd::Command;
-use flexcal::identify::{Options, QualityFlag, identify};
+use flexcal::fit::{Options, QualityFlag, identify};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use serde_json::Value;
@@ -37,7 +37,8 @@ translation_m = [1.5, -0.3, 0.2]
 rotation_deg = [0, 0, 20]
 ";
 const DATA: &str = "[data]\nposition_sigma_mm = 0.02\nfiles = ['m.csv']\n";
-const PRIORS: &str = "[parameters]\n'joint*.*' = { sigma_deg = 0.3, sigma_mm = 1 }\n'tool.*' = { sigma_mm = 2 }\n";
+const PRIORS: &str =
+    "[parameters]\n'joint*.*' = { sigma_deg = 0.3, sigma_mm = 1 }\n'tool.*' = { sigma_mm = 2 }\n";
 const BASE: &str = "[parameters]\n'base.*' = { free = true }\n";
 const TRUTH: &str = "[random]\n'*' = { sigma_deg = 0.05, sigma_mm = 0.3 }
 [[effect]]\njoint-coupling = { joint = 3, from = 4 }\nfactor_relative = 0.0005
@@ -57,7 +58,9 @@ impl Bench {
         fs::write(bench.path("problem.toml"), format!("{ARM}{parameters}{DATA}")).unwrap();
         fs::write(bench.path("TRUTH.toml"), TRUTH).unwrap();
         // The folder that holds it is as good as the file.
-        let out = bench.run(&["simulate", ".", "--truth", ".", "--poses", "60", "--seed", "3", "--out", "rig"]);
+        let out = bench.run(&[
+            "simulate", ".", "--truth", ".", "--poses", "60", "--seed", "3", "--out", "rig",
+        ]);
         assert_eq!(out.status.code(), Some(0), "{out:?}");
         let text = fs::read_to_string(bench.path("rig/measurements.csv")).unwrap();
         fs::write(bench.path("m.csv"), edit(text.lines().collect()).join("\n")).unwrap();
@@ -85,9 +88,12 @@ impl Bench {
     }
 }
 
-/// Header, `count` identification rows, each of the first `poses` ones again and again, and the held-out rows.
+/// Header, `count` identification rows, each of the first `poses` ones again and again, and the
+/// held-out rows.
 fn repeated(lines: &[&str], poses: usize, count: usize) -> Vec<String> {
-    let of = |word: &str| lines.iter().filter(|line| line.contains(word)).map(|line| (*line).to_owned()).collect();
+    let of = |word: &str| {
+        lines.iter().filter(|line| line.contains(word)).map(|line| (*line).to_owned()).collect()
+    };
     let (fitted, held_out): (Vec<String>, Vec<String>) = (of("identification"), of("validation"));
     let again = (0..count).map(|row| fitted[row % poses].clone());
     std::iter::once(lines[0].to_owned()).chain(again).chain(held_out).collect()
@@ -107,9 +113,15 @@ fn poses_measured_again_decide_nothing() {
     assert!(three.command("identify", &[]).2.contains("3 different poses measure 9 coordinates"));
     let one = Bench::new(BASE, |lines| repeated(&lines, 1, 30));
     let (status, _, err) = one.command("identify", &[]);
-    assert!(status == 1 && err.contains("3 measured coordinates for 6 parameters without a prior"), "{err}");
+    assert!(
+        status == 1 && err.contains("3 measured coordinates for 6 parameters without a prior"),
+        "{err}"
+    );
     // Enough of them need no word, and so do those that are measured again.
-    for all in [Bench::new(PRIORS, |lines| repeated(&lines, 8, 30)), Bench::new(BASE, |lines| repeated(&lines, 3, 3))] {
+    for all in [
+        Bench::new(PRIORS, |lines| repeated(&lines, 8, 30)),
+        Bench::new(BASE, |lines| repeated(&lines, 3, 3)),
+    ] {
         let (status, _, err) = all.command("identify", &[]);
         assert!(status == 0 && !err.contains("coordinates"), "{err}");
     }
@@ -117,12 +129,16 @@ fn poses_measured_again_decide_nothing() {
 
 #[test]
 fn a_check_does_not_trust_what_a_fit_would_not() {
-    let again =
-        |lines: &[&str]| repeated(lines, 1, 30).into_iter().filter(|line| !line.contains("validation")).collect();
+    let again = |lines: &[&str]| {
+        repeated(lines, 1, 30).into_iter().filter(|line| !line.contains("validation")).collect()
+    };
     let one = Bench::new(BASE, |lines| again(&lines));
     let check = |bench: &Bench| bench.command("check", &["--candidates", "m.csv"]);
     let (status, _, err) = check(&one);
-    assert!(status == 1 && err.contains("leave 3 combinations of parameters without a prior undecided"), "{err}");
+    assert!(
+        status == 1 && err.contains("leave 3 combinations of parameters without a prior undecided"),
+        "{err}"
+    );
     assert_eq!(one.json("check.json")["sufficient"], false);
     let without_limits = |text: String| -> String {
         text.lines()
@@ -131,7 +147,10 @@ fn a_check_does_not_trust_what_a_fit_would_not() {
     };
     fs::write(one.path("problem.toml"), without_limits(format!("{ARM}{BASE}{DATA}"))).unwrap();
     let (status, _, err) = check(&one);
-    assert!(status == 1 && err.contains("1 of the 30 poses differ and measure 3 coordinates"), "{err}");
+    assert!(
+        status == 1 && err.contains("1 of the 30 poses differ and measure 3 coordinates"),
+        "{err}"
+    );
     // The second joint never moves: what it would tell, poses within its limits would.
     let free = "[parameters]\n'joint1.theta' = { free = true }\n'joint2.theta' = { free = true }\n'joint3.a' = { free = true }\n";
     let still = |lines: Vec<&str>| {
@@ -158,11 +177,13 @@ fn poses_are_different_where_it_matters() {
         let path = bench.path("problem.toml");
         fs::write(&path, problem).unwrap();
         let text = fs::read_to_string(bench.path("m.csv")).unwrap();
-        let edited = text.lines().filter(|line| !line.contains("validation")).enumerate().map(|(row, line)| {
-            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
-            edit(row, &mut cells);
-            cells.join(",")
-        });
+        let edited = text.lines().filter(|line| !line.contains("validation")).enumerate().map(
+            |(row, line)| {
+                let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+                edit(row, &mut cells);
+                cells.join(",")
+            },
+        );
         fs::write(bench.path("edited.csv"), edited.collect::<Vec<_>>().join("\n")).unwrap();
         let problem = Problem::read(&path).unwrap();
         let (rows, _) = Measurements::read(&[bench.path("edited.csv")], &problem).unwrap();
@@ -196,13 +217,16 @@ fn poses_are_different_where_it_matters() {
 #[test]
 fn wrong_units_are_told_before_anything_else() {
     let metres = Bench::new(&format!("{PRIORS}'base.*' = {{ free = true }}\n"), |lines| {
-        let header = ["x", "y", "z"]
-            .iter()
-            .fold(lines[0].to_owned(), |all, axis| all.replace(&format!("{axis}_mm"), &format!("{axis}_m")));
+        let header = ["x", "y", "z"].iter().fold(lines[0].to_owned(), |all, axis| {
+            all.replace(&format!("{axis}_mm"), &format!("{axis}_m"))
+        });
         std::iter::once(header).chain(lines[1..].iter().map(|line| (*line).to_owned())).collect()
     });
     let (status, _, err) = metres.command("identify", &[]);
-    assert!(status == 1 && err.contains("misses the measurements by") && err.contains("check units"), "{err}");
+    assert!(
+        status == 1 && err.contains("misses the measurements by") && err.contains("check units"),
+        "{err}"
+    );
     // Also where the fit did not converge.
     let problem = Problem::read(&metres.path("problem.toml")).unwrap();
     let fit = |table: &str, max_steps| {
@@ -210,18 +234,31 @@ fn wrong_units_are_told_before_anything_else() {
         identify(&problem, &data, &Options::default().with_max_steps(max_steps)).unwrap()
     };
     let stopped = fit("m.csv", Some(2));
-    assert!(matches!(stopped.quality_flag, Some(QualityFlag::Misses { .. })), "{:?}", stopped.quality_flag);
-    assert!(!stopped.termination.converged(), "otherwise this shows nothing: {}", stopped.termination);
+    assert!(
+        matches!(stopped.quality_flag, Some(QualityFlag::Misses { .. })),
+        "{:?}",
+        stopped.quality_flag
+    );
+    assert!(
+        !stopped.termination.converged(),
+        "otherwise this shows nothing: {}",
+        stopped.termination
+    );
     // An arm that was near is not blamed for a solver that is stopped.
     let near = fit("rig/measurements.csv", Some(1));
-    assert!(matches!(near.quality_flag, Some(QualityFlag::NotConverged(_))), "{:?}", near.quality_flag);
+    assert!(
+        matches!(near.quality_flag, Some(QualityFlag::NotConverged(_))),
+        "{:?}",
+        near.quality_flag
+    );
     let radians = Bench::new(PRIORS, |lines| {
         let header = lines[0].replace("q1_deg", "q1_rad");
         std::iter::once(header).chain(lines[1..].iter().map(|line| (*line).to_owned())).collect()
     });
     let (_, _, err) = radians.command("identify", &[]);
     let text = fs::read_to_string(radians.path("m.csv")).unwrap();
-    let commands = text.lines().skip(1).map(|line| line.split(',').nth(2).unwrap().parse::<f64>().unwrap());
+    let commands =
+        text.lines().skip(1).map(|line| line.split(',').nth(2).unwrap().parse::<f64>().unwrap());
     let beyond = commands.clone().filter(|q| q.abs() > 130_f64.to_radians()).count();
     let (line, worst) = (2..).zip(commands).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap();
     let expected = format!(
@@ -242,7 +279,9 @@ fn a_factor_between_a_turn_and_a_slide_has_their_units() {
     let json = bench.json("estimate.json");
     let parameters = json["parameters"].as_array().unwrap();
     let of = |name: &str| parameters.iter().find(|own| own["name"] == name).unwrap();
-    for (name, unit, shown) in [("[3,4]", "m/rad", "mm/rad"), ("[2,3]", "rad/m", "°/m"), ("[2,1]", "1", "‰")] {
+    for (name, unit, shown) in
+        [("[3,4]", "m/rad", "mm/rad"), ("[2,3]", "rad/m", "°/m"), ("[2,1]", "1", "‰")]
+    {
         let name = format!("joint-coupling{name}.factor");
         assert_eq!(of(&name)["unit"], unit);
         let line = out.lines().find(|line| line.contains(&name)).unwrap();
@@ -260,9 +299,12 @@ fn a_mistyped_column_is_an_error_and_other_warnings_are_in_the_report() {
             lines.iter().enumerate().map(|(row, line)| format!("{line},{}", cell(row))).collect()
         })
     };
-    for (name, meant) in [("temprature_C", "temperature_C"), ("Session_", "session"), ("sgima_mm", "sigma_mm")] {
+    for (name, meant) in
+        [("temprature_C", "temperature_C"), ("Session_", "session"), ("sgima_mm", "sigma_mm")]
+    {
         let (status, _, err) = with(name).command("identify", &[]);
-        let expected = format!("m.csv:1: column {name}: not a column that is known; a letter off {meant}");
+        let expected =
+            format!("m.csv:1: column {name}: not a column that is known; a letter off {meant}");
         assert!(status == 2 && err.contains(&expected), "{name}: {err}");
     }
     // Of another name, or of what decides nothing, it is passed over.
@@ -273,7 +315,10 @@ fn a_mistyped_column_is_an_error_and_other_warnings_are_in_the_report() {
         assert!(status == 0 && err.contains(&expected), "{name}: {err}");
         for file in ["report.md", "report.html"] {
             let report = fs::read_to_string(bench.path("out").join(file)).unwrap();
-            assert!(report.contains(&format!("column {name}: not a column that is known")), "{file}: {report}");
+            assert!(
+                report.contains(&format!("column {name}: not a column that is known")),
+                "{file}: {report}"
+            );
         }
     }
 }
@@ -283,21 +328,34 @@ fn nothing_that_is_printed_is_infinite() {
     let bench = Bench::new(PRIORS, |lines| lines.into_iter().map(str::to_owned).collect());
     assert_eq!(bench.command("identify", &[]).0, 0);
     let numbers = |text: &str| {
-        let words = text.split(|c: char| !(c.is_alphanumeric() || "+-.".contains(c))).map(str::to_lowercase);
-        words.filter(|word| ["nan", "inf", "-inf", "+inf", "infinity"].contains(&word.as_str())).count()
+        let words = text
+            .split(|c: char| !(c.is_alphanumeric() || "+-.".contains(c)))
+            .map(str::to_lowercase);
+        words
+            .filter(|word| ["nan", "inf", "-inf", "+inf", "infinity"].contains(&word.as_str()))
+            .count()
     };
     let estimate = fs::read_to_string(bench.path("out/estimate.json")).unwrap();
-    fs::write(bench.path("targets.csv"), "q1_deg,q2_deg,q3_mm,q4_deg,x_mm,y_mm,z_mm\n0,10,50,0,1900,100,400\n")
-        .unwrap();
-    fs::write(bench.path("far.csv"), "q1_deg,q2_deg,q3_mm,q4_deg,x_mm,y_mm,z_mm\n0,10,50,0,1e153,100,400\n").unwrap();
+    fs::write(
+        bench.path("targets.csv"),
+        "q1_deg,q2_deg,q3_mm,q4_deg,x_mm,y_mm,z_mm\n0,10,50,0,1900,100,400\n",
+    )
+    .unwrap();
+    fs::write(
+        bench.path("far.csv"),
+        "q1_deg,q2_deg,q3_mm,q4_deg,x_mm,y_mm,z_mm\n0,10,50,0,1e153,100,400\n",
+    )
+    .unwrap();
     let value: Value = serde_json::from_str(&estimate).unwrap();
-    for (huge, targets) in [("1e300", "targets.csv"), ("-1e200", "targets.csv"), ("1.0", "far.csv")] {
+    for (huge, targets) in [("1e300", "targets.csv"), ("-1e200", "targets.csv"), ("1.0", "far.csv")]
+    {
         let mut edited = value.clone();
         for parameter in edited["parameters"].as_array_mut().unwrap() {
             parameter["estimate"] = huge.parse::<f64>().unwrap().into();
         }
         fs::write(bench.path("huge.json"), edited.to_string()).unwrap();
-        let (status, out, err) = bench.command("compensate", &["--estimate", "huge.json", "--data", targets]);
+        let (status, out, err) =
+            bench.command("compensate", &["--estimate", "huge.json", "--data", targets]);
         assert!(status != 0 && numbers(&out) + numbers(&err) == 0, "{huge}: {out} {err}");
         if status == 1 {
             let csv = fs::read_to_string(bench.path("out/commands.csv")).unwrap();

@@ -1,5 +1,5 @@
-//! The whole program on mutated inputs: exit status, time, memory, JSON, finite numbers, nothing written on bad input, the same for
-//! any number of threads.
+//! The whole program on mutated inputs: exit status, time, memory, JSON, finite numbers, nothing
+//! written on bad input, the same for any number of threads.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -28,9 +28,15 @@ const COMMANDS: [(&str, &[&str]); 18] = [
     ("trace .", &["rows.csv", "problem.toml"]),
     ("loop .", &["rows.csv", "problem.toml"]),
     ("compare . --paper", &["rows.csv", "problem.toml"]),
-    ("compensate . --estimate estimate.json --data targets.csv", &["targets.csv", "estimate.json", "problem.toml"]),
+    (
+        "compensate . --estimate estimate.json --data targets.csv",
+        &["targets.csv", "estimate.json", "problem.toml"],
+    ),
     ("compensate . --estimate estimate.json --data targets.csv", &["estimate.json", "targets.csv"]),
-    ("predict . --estimate estimate.json --data rows.csv", &["rows.csv", "estimate.json", "problem.toml"]),
+    (
+        "predict . --estimate estimate.json --data rows.csv",
+        &["rows.csv", "estimate.json", "problem.toml"],
+    ),
     ("check .", &["rows.csv", "problem.toml"]),
     ("check . --truth TRUTH.toml --poses 12", &["TRUTH.toml", "problem.toml"]),
     ("plan . --truth TRUTH.toml --poses 8", &["problem.toml", "TRUTH.toml"]),
@@ -89,12 +95,20 @@ fn tried(k: u64, arms: &Arms, place: &Path) -> Result<(i32, Duration), String> {
         arguments.push("--json");
     }
     let ran = flexcal(place, &arguments, 2);
-    let said =
-        |what: &str| format!("input {k}: flexcal {}: {what}\n{:.600}\n{:.600}", arguments.join(" "), ran.err, ran.out);
+    let said = |what: &str| {
+        format!(
+            "input {k}: flexcal {}: {what}\n{:.600}\n{:.600}",
+            arguments.join(" "),
+            ran.err,
+            ran.out
+        )
+    };
     let status = match ran.status {
         Some(status @ 0..=2) => status,
         None => {
-            return Err(said(&format!("is ended from outside: more than {LONGEST} s of the processors, or aborted")));
+            return Err(said(&format!(
+                "is ended from outside: more than {LONGEST} s of the processors, or aborted"
+            )));
         }
         Some(other) => return Err(said(&format!("exit status {other}"))),
     };
@@ -114,15 +128,21 @@ fn tried(k: u64, arms: &Arms, place: &Path) -> Result<(i32, Duration), String> {
     if let Some(word) = not_finite(&ran.out).or_else(|| not_finite(&ran.err)) {
         return Err(said(&format!("prints {word}")));
     }
-    if [&ran.out, &ran.err].into_iter().any(|text| text.chars().any(|own| own != '\n' && is_hidden(own))) {
+    if [&ran.out, &ran.err]
+        .into_iter()
+        .any(|text| text.chars().any(|own| own != '\n' && is_hidden(own)))
+    {
         return Err(said("prints what is not seen"));
     }
     for path in &written {
-        let text = fs::read_to_string(path).map_err(|error| said(&format!("{}: {error}", path.display())))?;
+        let text = fs::read_to_string(path)
+            .map_err(|error| said(&format!("{}: {error}", path.display())))?;
         if let Some(word) = not_finite(&text) {
             return Err(said(&format!("writes {word} to {}", path.display())));
         }
-        if path.extension().is_some_and(|own| own == "json") && serde_json::from_str::<Value>(&text).is_err() {
+        if path.extension().is_some_and(|own| own == "json")
+            && serde_json::from_str::<Value>(&text).is_err()
+        {
             return Err(said(&format!("writes no JSON to {}", path.display())));
         }
     }
@@ -164,7 +184,8 @@ fn not_finite(text: &str) -> Option<&'static str> {
     ["NaN", "inf"].into_iter().find(|word| is_word(word))
 }
 
-/// Tries so many inputs from `from` on, on every core; says what came of them, and keeps what failed.
+/// Tries so many inputs from `from` on, on every core; says what came of them, and keeps what
+/// failed.
 fn run(from: u64, count: u64) {
     let folder = tempfile::tempdir().unwrap();
     let arms = Arms::new(folder.path());
@@ -197,7 +218,12 @@ fn run(from: u64, count: u64) {
             }
             let done: u64 = tally.0.values().sum::<u64>() + tally.2.len() as u64;
             if done.is_multiple_of(1000) {
-                eprintln!("{done} of {count}: {:?}, slowest {:.1?}, failed {}", tally.0, tally.1, tally.2.len());
+                eprintln!(
+                    "{done} of {count}: {:?}, slowest {:.1?}, failed {}",
+                    tally.0,
+                    tally.1,
+                    tally.2.len()
+                );
             }
         }
     };
@@ -209,8 +235,16 @@ fn run(from: u64, count: u64) {
         }
     });
     let (statuses, slowest, failed) = tally.into_inner().unwrap();
-    println!("{count} inputs from {from}: by exit status {statuses:?}, slowest {slowest:.1?}, failed {}", failed.len());
-    assert!(failed.is_empty(), "{} of {count} inputs failed, the first:\n{}", failed.len(), failed[0]);
+    println!(
+        "{count} inputs from {from}: by exit status {statuses:?}, slowest {slowest:.1?}, failed {}",
+        failed.len()
+    );
+    assert!(
+        failed.is_empty(),
+        "{} of {count} inputs failed, the first:\n{}",
+        failed.len(),
+        failed[0]
+    );
     assert!(statuses.len() == 3, "mutations that say something: {statuses:?}");
 }
 
@@ -223,5 +257,8 @@ fn commands_stand_a_few_mutated_inputs() {
 #[ignore = "takes from minutes to hours; FLEXCAL_MUTATIONS says how many inputs, FLEXCAL_MUTATIONS_FROM from which on"]
 fn commands_stand_many_mutated_inputs() {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse().ok());
-    run(number("FLEXCAL_MUTATIONS_FROM").unwrap_or(0), number("FLEXCAL_MUTATIONS").unwrap_or(50_000));
+    run(
+        number("FLEXCAL_MUTATIONS_FROM").unwrap_or(0),
+        number("FLEXCAL_MUTATIONS").unwrap_or(50_000),
+    );
 }

@@ -50,7 +50,8 @@ pub fn flexcal(folder: &Path, arguments: &[&str], threads: usize) -> Ran {
         }
     };
     let time = clock.elapsed();
-    let [out, err] = printed.map(|path| String::from_utf8_lossy(&fs::read(path).unwrap()).into_owned());
+    let [out, err] =
+        printed.map(|path| String::from_utf8_lossy(&fs::read(path).unwrap()).into_owned());
     Ran { status, time, out, err }
 }
 

@@ -1,17 +1,18 @@
-//! Each reader of the library on mutations of its corpus: it accepts them, or says what is wrong on one line.
+//! Each reader of the library on mutations of its corpus: it accepts them, or says what is wrong on
+//! one line.
 
 use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use flexcal::error::{InputError, is_hidden};
-use flexcal::identify::{Options, PredictError, SavedEstimate, identify, predict};
+use flexcal::fit::{Options, PredictError, SavedEstimate, identify, predict};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::mechanics::Arm;
 use flexcal::model::Model;
-use flexcal::monte_carlo::Study;
 use flexcal::problem::Problem;
-use flexcal::simulate::{Truth, simulate};
+use flexcal::rig::{Truth, simulate};
+use flexcal::study::Study;
 use flexcal::urdf::{Chain, Robot, describe, export};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -87,8 +88,10 @@ fn study(text: &[u8], bench: &Bench) -> Said {
 }
 
 fn targets(text: &[u8], bench: &Bench) -> Said {
-    let problem =
-        Problem { data: flexcal::problem::Data { held_out: None, ..bench.arm.data.clone() }, ..bench.arm.clone() };
+    let problem = Problem {
+        data: flexcal::problem::Data { held_out: None, ..bench.arm.data.clone() },
+        ..bench.arm.clone()
+    };
     Measurements::read(&[bench.file("targets.csv", text)], &problem)?;
     Ok(())
 }
@@ -104,7 +107,8 @@ fn estimate(text: &[u8], bench: &Bench) -> Said {
 
 fn urdf(text: &[u8], bench: &Bench) -> Said {
     let robot = Robot::read(&bench.file("arm.urdf", text))?;
-    let chain = Chain::new(&robot, None, None).or_else(|_| Chain::new(&robot, None, Some("tool")))?;
+    let chain =
+        Chain::new(&robot, None, None).or_else(|_| Chain::new(&robot, None, Some("tool")))?;
     let problem = Problem::parse(&describe(&chain)?.text, Path::new("problem.toml"))?;
     export(&chain, &problem, &Arm::nominal(&problem))?;
     Ok(())
@@ -113,14 +117,16 @@ fn urdf(text: &[u8], bench: &Bench) -> Said {
 /// The files that a reader begins with.
 fn corpus(name: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(name);
-    let mut paths: Vec<PathBuf> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut paths: Vec<PathBuf> =
+        fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     paths.sort();
     paths.into_iter().map(|path| (path.clone(), fs::read(&path).unwrap())).collect()
 }
 
 #[test]
 fn readers_stand_what_they_are_given() {
-    let rounds = std::env::var("FLEXCAL_MUTATIONS").ok().and_then(|text| text.parse().ok()).unwrap_or(SHORT);
+    let rounds =
+        std::env::var("FLEXCAL_MUTATIONS").ok().and_then(|text| text.parse().ok()).unwrap_or(SHORT);
     let bench = Bench::new();
     for (name, target) in TARGETS {
         let files = corpus(name);
@@ -134,7 +140,8 @@ fn readers_stand_what_they_are_given() {
                     Ok(()) => accepted += 1,
                     Err(error) => {
                         let message = error.to_string();
-                        let clean = message.chars().all(|own| !is_hidden(own)) && !message.contains('\n');
+                        let clean =
+                            message.chars().all(|own| !is_hidden(own)) && !message.contains('\n');
                         let named = match error.downcast_ref::<InputError>() {
                             Some(error) => error.location.file.file_name().is_some(),
                             None => message.contains("estimate.json: "),

@@ -1,4 +1,5 @@
-//! `trace` and `loop` as users meet them: what they write, key by key, and that the closed problem is input again.
+//! `trace` and `loop` as users meet them: what they write, key by key, and that the closed problem
+//! is input again.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -28,7 +29,11 @@ impl Bench {
         let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
         fs::create_dir(folder.path().join("arm")).unwrap();
         let problem = fs::read_to_string(cases.join("problem.toml")).unwrap();
-        fs::write(folder.path().join("arm/problem.toml"), problem.replace("a-none.csv", "data.csv")).unwrap();
+        fs::write(
+            folder.path().join("arm/problem.toml"),
+            problem.replace("a-none.csv", "data.csv"),
+        )
+        .unwrap();
         fs::copy(cases.join(case), folder.path().join("arm/data.csv")).unwrap();
         Self { folder }
     }
@@ -45,7 +50,10 @@ impl Bench {
     }
 
     fn run(&self, arguments: &[&str]) -> Assert {
-        Command::new(assert_cmd::cargo::cargo_bin!("flexcal")).current_dir(self.folder.path()).args(arguments).assert()
+        Command::new(assert_cmd::cargo::cargo_bin!("flexcal"))
+            .current_dir(self.folder.path())
+            .args(arguments)
+            .assert()
     }
 
     /// The JSON of a run that succeeds.
@@ -75,7 +83,10 @@ fn is_summary(value: &Value, poses: u64) {
     assert_eq!(value["n"], poses, "{value:#}");
     for kind in ["mean_mm", "max_mm", "rms_mm"] {
         for axis in ["x", "y", "z", "norm"] {
-            assert!(value[kind][axis].as_f64().is_some_and(|value| value > 0.0), "{kind} {axis} in {value:#}");
+            assert!(
+                value[kind][axis].as_f64().is_some_and(|value| value > 0.0),
+                "{kind} {axis} in {value:#}"
+            );
         }
     }
 }
@@ -105,7 +116,10 @@ fn the_loop_writes_what_the_format_says() {
         is_summary(&json[fit]["identification"], 28);
         is_summary(&json[fit]["held_out"], 50);
     }
-    assert!(json["before"]["reduced_chi2"].as_f64().unwrap() > json["after"]["reduced_chi2"].as_f64().unwrap());
+    assert!(
+        json["before"]["reduced_chi2"].as_f64().unwrap()
+            > json["after"]["reduced_chi2"].as_f64().unwrap()
+    );
     assert!(held_out_rms(&json["registered"]) > held_out_rms(&json["before"]));
     assert!(held_out_rms(&json["before"]) > 1.5 * held_out_rms(&json["after"]));
     let effects = json["effects"].as_array().unwrap();
@@ -114,13 +128,20 @@ fn the_loop_writes_what_the_format_says() {
     assert_eq!((&found["effect"], &found["link"]), (&"link-thermal-bending".into(), &"B".into()));
     assert!(found["p_value"].as_f64().unwrap() < 1e-6 && found["alternatives"].is_array());
     is_summary(&found["held_out_after"], 50);
-    let names: Vec<&str> =
-        found["parameters"].as_array().unwrap().iter().map(|own| own["name"].as_str().unwrap()).collect();
+    let names: Vec<&str> = found["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|own| own["name"].as_str().unwrap())
+        .collect();
     assert_eq!(names, ["link-thermal-bending[B].about_y", "link-thermal-bending[B].about_z"]);
     assert_eq!(found["parameters"][0]["unit"], "1/(m·K)");
-    assert!(found["parameters"][0]["estimate"].is_f64() && found["parameters"][0]["std_error"].is_f64());
+    assert!(
+        found["parameters"][0]["estimate"].is_f64() && found["parameters"][0]["std_error"].is_f64()
+    );
     assert!(json["unexplained"].is_null());
-    let [low, high] = [0, 1].map(|end| json["held_out_gain_mm"]["interval_95"][end].as_f64().unwrap());
+    let [low, high] =
+        [0, 1].map(|end| json["held_out_gain_mm"]["interval_95"][end].as_f64().unwrap());
     assert!(0.0 < low && low < json["held_out_gain_mm"]["mean"].as_f64().unwrap() && high > low);
     has(&json["steps"][0], &["effects", "identification", "held_out"]);
     for name in ["loop.json", "problem.closed.toml", "report.md"] {
@@ -138,25 +159,44 @@ fn the_closed_problem_is_input_again() {
     let expected = original.replace("\"data.csv\"", "\"../../../arm/data.csv\"");
     assert!(text.starts_with(&expected), "{text}");
     assert!(text.ends_with("[[effect]]\nlink-thermal-bending = { link = \"B\" }\n"), "{text}");
-    assert!(text.contains("# link-thermal-bending[B].about_y = ") && text.contains(" ± "), "{text}");
+    assert!(
+        text.contains("# link-thermal-bending[B].about_y = ") && text.contains(" ± "),
+        "{text}"
+    );
     let again = bench.json(&["identify", "results/of/may/problem.closed.toml"]);
     for part in ["identification", "held_out", "reduced_chi2"] {
         are_alike(&again[part], &before["after"][part]);
     }
     let closed = bench.json(&["loop", "results/of/may/problem.closed.toml"]);
-    assert_eq!((&closed["verdict"], &closed["effects"]), (&"nothing-found".into(), &Value::Array(Vec::new())));
+    assert_eq!(
+        (&closed["verdict"], &closed["effects"]),
+        (&"nothing-found".into(), &Value::Array(Vec::new()))
+    );
 }
 
 #[test]
 fn a_declared_compensator_stays_as_it_is_and_is_not_looked_for() {
     let bench = Bench::new(NONE);
-    let spring =
-        "gravity-compensator = { joint = 2, anchor_mm = [100, -250], lever_m = [0.3, 0.15], free_length_m = 0.2 }";
+    let spring = "gravity-compensator = { joint = 2, anchor_mm = [100, -250], lever_m = [0.3, 0.15], free_length_m = 0.2 }";
     let cases = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
     let truth = fs::read_to_string(cases.join("truth.toml")).unwrap();
     let strengths = "rate_N_per_m = 900\npreload_N = 80\n[[effect]]\ngear-ratio = { joint = 3 }\nerror_relative = 1e-3";
-    fs::write(bench.path("truth.toml"), format!("{truth}\n[[effect]]\n{spring}\n{strengths}\n")).unwrap();
-    bench.run(&["simulate", "arm", "--truth", "truth.toml", "--poses", "78", "--seed", "5", "--out", "sim"]).success();
+    fs::write(bench.path("truth.toml"), format!("{truth}\n[[effect]]\n{spring}\n{strengths}\n"))
+        .unwrap();
+    bench
+        .run(&[
+            "simulate",
+            "arm",
+            "--truth",
+            "truth.toml",
+            "--poses",
+            "78",
+            "--seed",
+            "5",
+            "--out",
+            "sim",
+        ])
+        .success();
     fs::copy(bench.path("sim/measurements.csv"), bench.path("arm/data.csv")).unwrap();
     let untried = bench.json(&["trace", "arm"]);
     assert!(!untried.to_string().contains("gravity-compensator"), "{untried:#}");
@@ -171,7 +211,8 @@ fn a_declared_compensator_stays_as_it_is_and_is_not_looked_for() {
     for (name, truth) in [("rate", 900.0), ("preload", 80.0)] {
         let name = format!("gravity-compensator[2].{name}");
         let own = estimates.iter().find(|own| own["name"] == name.as_str()).unwrap();
-        let (value, error) = (own["estimate"].as_f64().unwrap(), own["std_error"].as_f64().unwrap());
+        let (value, error) =
+            (own["estimate"].as_f64().unwrap(), own["std_error"].as_f64().unwrap());
         assert!((value - truth).abs() < 4.0 * error, "{name}: {value} ± {error}");
     }
 }
@@ -180,12 +221,20 @@ fn a_declared_compensator_stays_as_it_is_and_is_not_looked_for() {
 fn orientations_that_are_fitted_take_no_part_in_the_loop() {
     let bench = Bench::new(NONE);
     bench.edit("arm/problem.toml", |text| {
-        let free = text.replace("sigma_mm = 5.0 }", "sigma_mm = 5.0, sigma_deg = 90 }\n\"tool.r*\" = { free = true }");
-        free.replace("position_sigma_mm = 0.05", "position_sigma_mm = 0.05\norientation_sigma_deg = 0.01")
+        let free = text.replace(
+            "sigma_mm = 5.0 }",
+            "sigma_mm = 5.0, sigma_deg = 90 }\n\"tool.r*\" = { free = true }",
+        );
+        free.replace(
+            "position_sigma_mm = 0.05",
+            "position_sigma_mm = 0.05\norientation_sigma_deg = 0.01",
+        )
     });
     let truth = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/truth.toml");
     let truth = truth.to_str().unwrap();
-    bench.run(&["simulate", "arm", "--truth", truth, "--poses", "78", "--seed", "5", "--out", "sim"]).success();
+    bench
+        .run(&["simulate", "arm", "--truth", truth, "--poses", "78", "--seed", "5", "--out", "sim"])
+        .success();
     fs::copy(bench.path("sim/measurements.csv"), bench.path("arm/data.csv")).unwrap();
     bench.run(&["identify", "arm"]).success();
     let closed = bench.json(&["loop", "arm"]);
@@ -210,11 +259,15 @@ fn structure_without_a_name_is_said_to_be_left() {
     assert_eq!(json["verdict"], "unexplained");
     let left = &json["unexplained"];
     has(left, &["where", "depends_on", "p_value", "held_out_with_empirical_correction"]);
-    assert!(left["where"].is_string() && left["depends_on"][0].is_string() && left["p_value"].is_f64());
+    assert!(
+        left["where"].is_string() && left["depends_on"][0].is_string() && left["p_value"].is_f64()
+    );
     is_summary(&left["held_out_with_empirical_correction"], 50);
     // Lines break anywhere.
     let told = bench.told(&["loop", "arm", "-v"]).split_whitespace().collect::<Vec<_>>().join(" ");
-    for words in ["Unexplained", "What remains", left["where"].as_str().unwrap(), "it keeps its last value"] {
+    for words in
+        ["Unexplained", "What remains", left["where"].as_str().unwrap(), "it keeps its last value"]
+    {
         assert!(told.contains(words), "{words:?} missing in:\n{told}");
     }
 }
@@ -224,14 +277,23 @@ fn the_loop_tells_its_story() {
     let bench = Bench::new(THERMAL);
     let told = bench.told(&["loop", "arm", "-v"]);
     let report = fs::read_to_string(bench.path("out/lunar-sampler/report.md")).unwrap();
-    for words in
-        ["Explained", "link B bows with temperature", "95 % interval", "link-thermal-bending = { link = \"B\" }"]
-    {
+    for words in [
+        "Explained",
+        "link B bows with temperature",
+        "95 % interval",
+        "link-thermal-bending = { link = \"B\" }",
+    ] {
         assert!(told.contains(words), "{words:?} missing in:\n{told}");
         assert!(report.contains(words), "{words:?} missing in:\n{report}");
     }
     assert!(told.contains("µrad/(m·K)") && told.contains("problem.closed.toml"), "{told}");
-    for words in ["# Surface sampling arm", "| joint2.stiffness |", "## Rounds", "## What remains", "| :-- |"] {
+    for words in [
+        "# Surface sampling arm",
+        "| joint2.stiffness |",
+        "## Rounds",
+        "## What remains",
+        "| :-- |",
+    ] {
         assert!(report.contains(words), "{words:?} missing in:\n{report}");
     }
     let bench = Bench::new(NONE);
@@ -244,19 +306,30 @@ fn what_keeps_the_loop_from_finding_is_said() {
     let bench = Bench::new(NONE);
     bench.edit("arm/problem.toml", |text| text.replace("reference_temperature_C = 20.0", ""));
     let told = bench.told(&["loop", "arm", "--out", "cold"]);
-    assert!(told.contains("no law of them was looked for") && told.contains("reference_temperature_C"), "{told}");
+    assert!(
+        told.contains("no law of them was looked for") && told.contains("reference_temperature_C"),
+        "{told}"
+    );
     bench.edit("arm/problem.toml", |text| {
         text.replace("[parameters]\n", "[parameters]\n\"*thermal*\" = { fixed = true }\n")
     });
     let told = bench.told(&["loop", "arm", "--out", "held"]);
     assert!(!told.contains("reference_temperature_C"), "{told}");
     bench.edit("arm/problem.toml", |text| text.replace("\"*thermal*\" = { fixed = true }\n", ""));
-    bench.edit("arm/problem.toml", |text| text.replace("position_sigma_mm = 0.05", "position_sigma_mm = 50"));
+    bench.edit("arm/problem.toml", |text| {
+        text.replace("position_sigma_mm = 0.05", "position_sigma_mm = 50")
+    });
     let told = bench.told(&["loop", "arm", "--out", "coarse"]);
-    assert!(told.contains("× the declared σ, which is too large;") && !told.contains("looks like noise"), "{told}");
+    assert!(
+        told.contains("× the declared σ, which is too large;")
+            && !told.contains("looks like noise"),
+        "{told}"
+    );
     bench.edit("arm/problem.toml", |text| {
         let text = text.replace("[data]", "[data]\nreference_temperature_C = 20.0");
-        format!("{text}\n[[effect]]\njoint-thermal-drift-lag = {{ joint = 1, time_constant_s = 600 }}\n")
+        format!(
+            "{text}\n[[effect]]\njoint-thermal-drift-lag = {{ joint = 1, time_constant_s = 600 }}\n"
+        )
     });
     bench.edit("arm/data.csv", |text| text.replace("time_s", "note"));
     let refused = bench.run(&["identify", "arm", "--out", "untimed"]).code(2);
@@ -274,7 +347,9 @@ fn a_declared_sigma_that_is_too_large_hides_no_cause() {
         json["effects"].as_array().unwrap().iter().map(|own| own["effect"].to_string()).collect()
     };
     let expected = own(&bench.json(&["loop", "arm", "--out", "right"]));
-    bench.edit("arm/problem.toml", |text| text.replace("position_sigma_mm = 0.05", "position_sigma_mm = 1.0"));
+    bench.edit("arm/problem.toml", |text| {
+        text.replace("position_sigma_mm = 0.05", "position_sigma_mm = 1.0")
+    });
     let json = bench.json(&["loop", "arm", "--out", "large"]);
     assert_eq!((own(&json), &json["verdict"]), (expected, &"explained".into()));
     let told = bench.told(&["loop", "arm", "--out", "told"]);
@@ -288,7 +363,10 @@ fn laws_that_were_not_tried_for_want_of_a_reference_are_said() {
     bench.edit("arm/problem.toml", |text| text.replace("reference_temperature_C = 20.0", ""));
     let told = bench.told(&["loop", "arm", "-v"]);
     let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(told.contains("were not tried because the problem declares no reference_temperature_C"), "{told}");
+    assert!(
+        told.contains("were not tried because the problem declares no reference_temperature_C"),
+        "{told}"
+    );
 }
 
 #[test]
@@ -297,41 +375,75 @@ fn the_trace_ranks_and_says_why_not() {
     let json = bench.json(&["trace", "arm"]);
     assert_eq!((&json["problem"], &json["structured"]), (&"lunar-sampler".into(), &true.into()));
     is_summary(&json["held_out"], 50);
-    has(&json["checks"][0], &["check", "about", "statistic", "bounds", "p_value", "failed", "words"]);
+    has(
+        &json["checks"][0],
+        &["check", "about", "statistic", "bounds", "p_value", "failed", "words"],
+    );
     let best = &json["ranking"][0];
     assert_eq!((&best["effect"], &best["link"]), (&"link-thermal-bending".into(), &"B".into()));
     has(best, &["p_value", "f", "freedom", "expected_gain_mm", "cross_validated_gain_mm", "alike"]);
-    let alike = json["ranking"].as_array().unwrap().iter().flat_map(|ranked| ranked["alike"].as_array().unwrap());
+    let alike = json["ranking"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .flat_map(|ranked| ranked["alike"].as_array().unwrap());
     for other in alike {
-        assert!(other["effect"].is_string() && other["angle_deg"].as_f64().is_some_and(|a| (0.0..=90.0).contains(&a)));
+        assert!(
+            other["effect"].is_string()
+                && other["angle_deg"].as_f64().is_some_and(|a| (0.0..=90.0).contains(&a))
+        );
     }
     let told = bench.told(&["trace", "arm"]);
-    for words in ["1. link B bows with temperature", "failed: residuals", "passed: ", "p below 1e-16"] {
+    for words in
+        ["1. link B bows with temperature", "failed: residuals", "passed: ", "p below 1e-16"]
+    {
         assert!(told.contains(words), "{words:?} missing in:\n{told}");
     }
     assert!(!bench.path("out/lunar-sampler/problem.closed.toml").exists());
     bench.edit("arm/problem.toml", |text| text.replace("reference_temperature_C = 20.0", ""));
     let json = bench.json(&["trace", "arm"]);
     let untestable = json["untestable"].as_array().unwrap();
-    assert!(untestable.iter().any(|other| other["effect"] == "link-thermal-bending" && other["reason"].is_string()));
+    assert!(
+        untestable
+            .iter()
+            .any(|other| other["effect"] == "link-thermal-bending" && other["reason"].is_string())
+    );
     let told = bench.told(&["trace", "arm"]);
     assert!(
-        told.contains("- joint-thermal-drift of joints 1, 2, 3, 4: the problem declares no reference_temp"),
+        told.contains(
+            "- joint-thermal-drift of joints 1, 2, 3, 4: the problem declares no reference_temp"
+        ),
         "{told}"
     );
     let told = Bench::new(NONE).told(&["trace", "arm"]);
     assert!(told.contains("candidates stands out"), "{told}");
     let told = Bench::new(TWO).told(&["trace", "arm"]);
-    assert!(told.contains("more that stand out are left out here; trace.json holds them all."), "{told}");
+    assert!(
+        told.contains("more that stand out are left out here; trace.json holds them all."),
+        "{told}"
+    );
 }
 
 #[test]
 fn rows_stand_for_times_that_nobody_measured() {
     let bench = Bench::new(NONE);
-    let truth = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/truth.toml")).unwrap();
+    let truth =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/truth.toml"))
+            .unwrap();
     let moved = "[[effect]]\nstation-shift = { at_time_s = 3000 }\nx_mm = 2\ny_mm = 1\nz_mm = 0\n";
     fs::write(bench.path("TRUTH.toml"), format!("{truth}\n{moved}")).unwrap();
-    bench.told(&["simulate", "arm", "--truth", "TRUTH.toml", "--poses", "78", "--seed", "3", "--out", "."]);
+    bench.told(&[
+        "simulate",
+        "arm",
+        "--truth",
+        "TRUTH.toml",
+        "--poses",
+        "78",
+        "--seed",
+        "3",
+        "--out",
+        ".",
+    ]);
     bench.edit("measurements.csv", |text| text.replace(",time_s", ",seconds"));
     let trace = ["trace", "arm", "--data", "measurements.csv"];
     let told = bench.told(&trace);
@@ -346,12 +458,16 @@ fn commands_beyond_the_limits_are_named_joint_by_joint() {
     let limits = "name = \"shoulder\"\nmin_deg = -10\nmax_deg = 60\n";
     bench.edit("arm/problem.toml", |text| text.replace("name = \"shoulder\"\n", limits));
     let data = fs::read_to_string(bench.path("arm/data.csv")).unwrap();
-    let outside = |line: &str| !(-10.0..=60.0).contains(&line.split(',').nth(3).unwrap().parse::<f64>().unwrap());
+    let outside = |line: &str| {
+        !(-10.0..=60.0).contains(&line.split(',').nth(3).unwrap().parse::<f64>().unwrap())
+    };
     let angle = |line: &str| line.split(',').nth(3).unwrap().parse::<f64>().unwrap();
     let beyond = |line: &str| (-10.0 - angle(line)).max(angle(line) - 60.0);
     let furthest = data.lines().skip(1).map(beyond).fold(0.0, f64::max);
-    let (first, worst) = (1..).zip(data.lines()).skip(1).find(|(_, line)| beyond(line) >= furthest).unwrap();
-    let lines: Vec<usize> = data.lines().enumerate().skip(1).filter(|(_, l)| outside(l)).map(|(k, _)| k + 1).collect();
+    let (first, worst) =
+        (1..).zip(data.lines()).skip(1).find(|(_, line)| beyond(line) >= furthest).unwrap();
+    let lines: Vec<usize> =
+        data.lines().enumerate().skip(1).filter(|(_, l)| outside(l)).map(|(k, _)| k + 1).collect();
     assert!(lines.len() > 3);
     for command in ["identify", "trace"] {
         let warned = text(&bench.run(&[command, "arm"]).success().get_output().stderr);
@@ -371,7 +487,10 @@ fn quiet_is_quiet_and_bad_input_leaves_nothing() {
     for command in ["trace", "loop"] {
         let assert = bench.run(&[command, "arm", "--quiet", "--out", "there"]).success();
         assert!(assert.get_output().stdout.is_empty() && assert.get_output().stderr.is_empty());
-        assert!(bench.path("there").join(format!("{command}.json")).exists() && !bench.path("out").exists());
+        assert!(
+            bench.path("there").join(format!("{command}.json")).exists()
+                && !bench.path("out").exists()
+        );
         bench.run(&[command, "--help"]).success();
         bench.run(&[command, "arm", "--guess"]).code(2);
         bench.run(&[command, "elsewhere"]).code(2);
@@ -389,15 +508,20 @@ fn fits_that_are_not_trusted_end_with_status_one() {
     let bench = Bench::new(NONE);
     let free = "[parameters]\n\"*\" = { free = true }\n[data]\nfiles = [\"data.csv\"]\nposition_sigma_mm = 0.05\n\
                 held_out = { column = \"split\" }\n";
-    bench.edit("arm/problem.toml", |text| format!("{}{free}", text.split_once("[parameters]").unwrap().0));
+    bench.edit("arm/problem.toml", |text| {
+        format!("{}{free}", text.split_once("[parameters]").unwrap().0)
+    });
     bench.edit("arm/data.csv", |text| {
-        let (fitted, others): (Vec<&str>, Vec<&str>) = text.lines().partition(|line| line.contains("identification"));
+        let (fitted, others): (Vec<&str>, Vec<&str>) =
+            text.lines().partition(|line| line.contains("identification"));
         [&others[..], &fitted[..5]].concat().join("\n")
     });
     for command in ["trace", "loop"] {
         let assert = bench.run(&[command, "arm"]).code(1);
         assert!(text(&assert.get_output().stderr).contains("15 measured coordinates for"));
-        let json = fs::read_to_string(bench.path("out/lunar-sampler").join(format!("{command}.json"))).unwrap();
+        let json =
+            fs::read_to_string(bench.path("out/lunar-sampler").join(format!("{command}.json")))
+                .unwrap();
         assert_eq!(serde_json::from_str::<Value>(&json).unwrap()["trusted"], false);
     }
 }

@@ -1,22 +1,23 @@
-//! An effect that no catalogue holds, added by a user of the library without touching it: declared, fitted, traced and found
-//! by the loop. The walk-through of docs/effects.md.
+//! An effect that no catalogue holds, added by a user of the library without touching it: declared,
+//! fitted, traced and found by the loop. The walk-through of docs/effects.md.
 
 use crate::common::arms::golden_problem;
 use crate::common::made::{at_random, divided, normal};
-use flexcal::diagnose::{close, trace};
 use flexcal::error::InputErrorKind;
-use flexcal::identify::{Options, Placement, identify};
+use flexcal::fit::{Options, Placement, identify};
 use flexcal::least_squares::jacobian;
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::effect::{CustomEffect, DataCoverage, Term};
-use flexcal::model::parameter::{ArmField, Driver, JointField, Quantity, Slot};
+use flexcal::model::parameter::{ArmField, JointField, ParameterSite, Quantity, Regressor};
 use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::{Effect, Problem};
+use flexcal::select::{close, trace};
 use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// A motor that warms up while the arm works: its joint creeps with time, and sags by a bump of the payload that it carries.
+/// A motor that warms up while the arm works: its joint creeps with time, and sags by a bump of the
+/// payload that it carries.
 #[derive(Debug)]
 struct Creep {
     /// Number of the joint, from 1.
@@ -33,9 +34,12 @@ impl CustomEffect for Creep {
     }
 
     fn terms(&self, problem: &Problem) -> Vec<Term> {
-        let slot = Slot::coordinate(problem, self.joint);
-        let heavy = Driver::Spline { of: Quantity::Payload, begin: 0.0, step: 0.5 };
-        vec![Term::driven("rate", slot, Driver::Elapsed, 1e-6), Term::driven("sag", slot, heavy, 1e-3)]
+        let site = ParameterSite::coordinate(problem, self.joint);
+        let heavy = Regressor::Spline { of: Quantity::Payload, begin: 0.0, step: 0.5 };
+        vec![
+            Term::driven("rate", site, Regressor::Elapsed, 1e-6),
+            Term::driven("sag", site, heavy, 1e-3),
+        ]
     }
 
     fn describe(&self) -> String {
@@ -95,7 +99,11 @@ fn crept(rate: f64, sag: f64) -> (Problem, Dataset) {
     let values = |name: &str| match name {
         "joint-creep[3].rate" => Some(rate),
         "joint-creep[3].sag" => Some(sag),
-        _ => model.parameters.iter().find(|parameter| parameter.name == name).map(|parameter| parameter.nominal),
+        _ => model
+            .parameters
+            .iter()
+            .find(|parameter| parameter.name == name)
+            .map(|parameter| parameter.nominal),
     };
     let truth = model.vector_of(values).unwrap();
     let all: Vec<usize> = (0..rows.len()).collect();
@@ -116,7 +124,10 @@ fn an_effect_of_one_s_own_is_fitted_beside_the_declared_model() {
     for (name, truth) in [("joint-creep[3].rate", 1.5e-7), ("joint-creep[3].sag", -4e-4)] {
         let own = found.estimates.iter().find(|estimate| estimate.name == name).unwrap();
         let (estimate, error) = (own.estimate, own.std_error.unwrap());
-        assert!((estimate - truth).abs() < 4.0 * error && error < 0.1 * truth.abs(), "{estimate} ± {error}");
+        assert!(
+            (estimate - truth).abs() < 4.0 * error && error < 0.1 * truth.abs(),
+            "{estimate} ± {error}"
+        );
     }
 }
 
@@ -133,8 +144,16 @@ fn trace_and_loop_find_it() {
     // What it says of itself stays a comment of the closed problem, in however many lines it does.
     let text = std::fs::read_to_string(crate::common::arms::golden("problem.toml")).unwrap();
     let closed = flexcal::report::closed_problem(&text, &problem, &closure, &[]).unwrap();
-    assert!(closed.contains("\n# Found by flexcal loop: the motor of joint 3 creeps and = [sags, p-value"), "{closed}");
-    assert!(Problem::parse(&closed, std::path::Path::new("problem.closed.toml")).is_ok(), "{closed}");
+    assert!(
+        closed.contains(
+            "\n# Found by flexcal loop: the motor of joint 3 creeps and = [sags, p-value"
+        ),
+        "{closed}"
+    );
+    assert!(
+        Problem::parse(&closed, std::path::Path::new("problem.closed.toml")).is_ok(),
+        "{closed}"
+    );
     let (before, after) = (&closure.before.fit.fitted.held_out, &closure.after.fitted.held_out);
     assert!(after.rms.norm < 0.5 * before.rms.norm);
 }
@@ -163,39 +182,56 @@ fn rules_may_speak_of_it() {
 fn what_the_model_has_no_room_for_is_refused() {
     let (problem, rows) = bench();
     let refused = |terms: Vec<Term>| model(&problem.with_effect(own(terms)), &rows).unwrap_err();
-    let theta = Slot::of_joint(3, JointField::Theta);
-    assert!(matches!(refused(vec![Term::constant("x", theta, 1.0)]), InputErrorKind::Occupied { .. }));
-    let nowhere = |slot, driver| {
-        let kind = refused(vec![Term::driven("x", slot, driver, 1.0)]);
-        assert!(matches!(kind, InputErrorKind::EntersNowhere { .. }), "{driver:?}: {kind}");
+    let theta = ParameterSite::of_joint(3, JointField::Theta);
+    assert!(matches!(
+        refused(vec![Term::constant("x", theta, 1.0)]),
+        InputErrorKind::Occupied { .. }
+    ));
+    let nowhere = |site, regressor| {
+        let kind = refused(vec![Term::driven("x", site, regressor, 1.0)]);
+        assert!(matches!(kind, InputErrorKind::EntersNowhere { .. }), "{regressor:?}: {kind}");
     };
-    nowhere(Slot::of_joint(8, JointField::Theta), Driver::Elapsed);
-    nowhere(Slot::of_joint(0, JointField::Theta), Driver::Elapsed);
+    nowhere(ParameterSite::of_joint(8, JointField::Theta), Regressor::Elapsed);
+    nowhere(ParameterSite::of_joint(0, JointField::Theta), Regressor::Elapsed);
     let of = Quantity::Command(9);
-    nowhere(theta, Driver::Command(9));
-    nowhere(theta, Driver::Sine(9, 1));
-    nowhere(theta, Driver::Spline { of, begin: 0.0, step: 1.0 });
-    nowhere(theta, Driver::Bump { of, centre: 0.0, width: 1.0 });
-    nowhere(theta, Driver::Step { of, centre: 0.0, width: 1.0 });
-    let length = Slot::of_joint(3, JointField::A);
-    let driven = Term::driven("x", length, Driver::Elapsed, 1.0);
+    nowhere(theta, Regressor::Command(9));
+    nowhere(theta, Regressor::Sine(9, 1));
+    nowhere(theta, Regressor::Spline { of, begin: 0.0, step: 1.0 });
+    nowhere(theta, Regressor::Bump { of, centre: 0.0, width: 1.0 });
+    nowhere(theta, Regressor::Step { of, centre: 0.0, width: 1.0 });
+    let length = ParameterSite::of_joint(3, JointField::A);
+    let driven = Term::driven("x", length, Regressor::Elapsed, 1.0);
     assert!(matches!(refused(vec![driven]), InputErrorKind::NotDrivable { .. }));
-    let twice = vec![Term::constant("x", Slot::Scale, 1.0), Term::constant("y", Slot::Scale, 1.0)];
+    let twice = vec![
+        Term::constant("x", ParameterSite::Scale, 1.0),
+        Term::constant("y", ParameterSite::Scale, 1.0),
+    ];
     assert!(matches!(refused(twice), InputErrorKind::Occupied { .. }));
     let beside = problem.with_effect(Effect::TrackerScale);
-    let scale = own(vec![Term::constant("x", Slot::Scale, 1.0)]);
-    assert!(matches!(model(&beside.with_effect(scale), &rows), Err(InputErrorKind::Occupied { .. })));
+    let scale = own(vec![Term::constant("x", ParameterSite::Scale, 1.0)]);
+    assert!(matches!(
+        model(&beside.with_effect(scale), &rows),
+        Err(InputErrorKind::Occupied { .. })
+    ));
     let reserved = Effect::custom(Terms("gear-ratio", Vec::new()));
-    assert!(matches!(model(&problem.with_effect(reserved), &rows), Err(InputErrorKind::ReservedName { .. })));
+    assert!(matches!(
+        model(&problem.with_effect(reserved), &rows),
+        Err(InputErrorKind::ReservedName { .. })
+    ));
 }
 
 #[test]
 fn any_free_slot_of_the_catalogue_serves() {
     let (problem, rows) = bench();
     let terms = vec![
-        Term::constant("compliance", Slot::of_joint(1, JointField::LateralX), 1e-4),
-        Term::constant("gravity", Slot::Arm(ArmField::GravityX), 0.1),
-        Term::driven("tracker", Slot::Shift { axis: 2 }, Driver::Warming { reference: 20.0 }, 1e-4),
+        Term::constant("compliance", ParameterSite::of_joint(1, JointField::LateralX), 1e-4),
+        Term::constant("gravity", ParameterSite::Arm(ArmField::GravityX), 0.1),
+        Term::driven(
+            "tracker",
+            ParameterSite::Shift { axis: 2 },
+            Regressor::Warming { reference: 20.0 },
+            1e-4,
+        ),
     ];
     let mut warm = rows;
     warm.temperature = Some((0..40).map(|k| 15.0 + f64::from(k % 7)).collect());

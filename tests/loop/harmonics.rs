@@ -1,17 +1,17 @@
-//! Joints with harmonics of many orders: all orders, one prior, no harm where nothing was measured; and as much is found from any
-//! number of poses in any order.
+//! Joints with harmonics of many orders: all orders, one prior, no harm where nothing was measured;
+//! and as much is found from any number of poses in any order.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
 use crate::common::arms::parse;
 use crate::common::made::{normal, predicted};
-use flexcal::diagnose::{Verdict, close};
-use flexcal::identify::{Identification, Options};
+use flexcal::fit::{Identification, Options};
 use flexcal::measurement::{Dataset, Measurements, Split};
-use flexcal::monte_carlo::table;
 use flexcal::problem::{Effect, EffectDeclaration, Freedom, Problem};
-use flexcal::simulate::{Truth, simulate};
+use flexcal::rig::{Truth, simulate};
+use flexcal::select::{Verdict, close};
+use flexcal::study::table;
 use rand::seq::SliceRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -33,12 +33,14 @@ fn arm() -> Problem {
 
 /// The arm as it is, measured: waves of joints 1 and 2, high orders smaller than low ones.
 fn measured(problem: &Problem, random: &mut ChaCha8Rng) -> Measurements {
-    let mut text = "[random]\n'joint*.theta' = { sigma_deg = 0.1 }\n[noise]\nposition_sigma_mm = 0.05\n\
+    let mut text =
+        "[random]\n'joint*.theta' = { sigma_deg = 0.1 }\n[noise]\nposition_sigma_mm = 0.05\n\
                     [poses]\nq1_deg = [-75, 75]\nq2_deg = [-75, 75]\nq3_deg = [-75, 75]\n"
-        .to_owned();
+            .to_owned();
     for joint in 1..=2 {
         let orders: Vec<u32> = (1..=ORDERS).collect();
-        writeln!(text, "[[effect]]\njoint-harmonic = {{ joint = {joint}, orders = {orders:?} }}").unwrap();
+        writeln!(text, "[[effect]]\njoint-harmonic = {{ joint = {joint}, orders = {orders:?} }}")
+            .unwrap();
         for order in orders {
             let size = 0.02 / f64::from(order).sqrt();
             let [sine, cosine] = [size * normal(random), size * normal(random)];
@@ -65,7 +67,8 @@ fn is_dense(orders: &[u32]) -> bool {
 /// Root mean square of the length of errors at some rows [m].
 fn rms(problem: &Problem, measured: &Measurements, found: &Identification, rows: &[usize]) -> f64 {
     let predicted = predicted(problem, measured, &found.x);
-    let squares: f64 = rows.iter().map(|&row| (measured.positions[row] - predicted[row]).norm_squared()).sum();
+    let squares: f64 =
+        rows.iter().map(|&row| (measured.positions[row] - predicted[row]).norm_squared()).sum();
     (squares / rows.len() as f64).sqrt()
 }
 
@@ -76,24 +79,36 @@ fn many_waves_fade_out_where_nothing_was_measured() {
     let measured = measured(&problem, &mut random);
     let (beyond, within): (Vec<usize>, Vec<usize>) =
         (0..POSES).partition(|&row| measured.configuration(row)[0] > BEYOND);
-    let (among, identification): (Vec<usize>, Vec<usize>) = within.into_iter().partition(|_| random.random_bool(0.1));
+    let (among, identification): (Vec<usize>, Vec<usize>) =
+        within.into_iter().partition(|_| random.random_bool(0.1));
     let held_out = beyond.iter().chain(&among).copied().collect();
     let split = Split { identification, held_out };
 
-    let closure = close(&problem, &Dataset::new(measured.clone(), split), &Options::default()).unwrap();
+    let closure =
+        close(&problem, &Dataset::new(measured.clone(), split), &Options::default()).unwrap();
     let prior = closure.harmonic_prior.as_ref().unwrap();
     let (order, sigma) = *prior.by_order.last().unwrap();
     let rule = closure.closed.parameters.last().unwrap();
     assert_eq!(rule.pattern, format!("joint-harmonic.cos{order}"));
-    assert!(matches!(&rule.freedom, Freedom::Free { sigma: prior, .. } if prior.angle == Some(sigma)));
+    assert!(
+        matches!(&rule.freedom, Freedom::Free { sigma: prior, .. } if prior.angle == Some(sigma))
+    );
     let waves: Vec<&Vec<u32>> = closure.closed.effects.iter().filter_map(orders).collect();
     println!("{prior:?}, orders {waves:?}");
-    assert!(waves.len() >= 2 && waves.iter().filter(|orders| is_dense(orders)).count() >= 2, "{waves:?}");
+    assert!(
+        waves.len() >= 2 && waves.iter().filter(|orders| is_dense(orders)).count() >= 2,
+        "{waves:?}"
+    );
 
     let errors = |rows: &[usize]| {
         let before = rms(&problem, &measured, &closure.before.fit, rows);
         let after = rms(&closure.closed, &measured, &closure.after, rows);
-        println!("{} poses: rms {:.4} mm before, {:.4} mm after", rows.len(), before * 1e3, after * 1e3);
+        println!(
+            "{} poses: rms {:.4} mm before, {:.4} mm after",
+            rows.len(),
+            before * 1e3,
+            after * 1e3
+        );
         (before, after)
     };
     let (before, after) = errors(&among);
@@ -112,8 +127,13 @@ fn two_joints() -> Problem {
     )
 }
 
-/// The verdict and the effects by name, place and orders, on the first `identification` rows; the last hundred are held out.
-fn found(problem: &Problem, measured: &Measurements, identification: Vec<usize>) -> (Verdict, Vec<Effect>) {
+/// The verdict and the effects by name, place and orders, on the first `identification` rows; the
+/// last hundred are held out.
+fn found(
+    problem: &Problem,
+    measured: &Measurements,
+    identification: Vec<usize>,
+) -> (Verdict, Vec<Effect>) {
     let held_out = (measured.len() - 100..measured.len()).collect();
     let data = Dataset::new(measured.clone(), Split { identification, held_out });
     let closed = close(problem, &data, &Options::default()).unwrap();
@@ -126,12 +146,14 @@ fn found(problem: &Problem, measured: &Measurements, identification: Vec<usize>)
 fn the_number_and_the_order_of_poses_decide_nothing() {
     let problem = two_joints();
     let mut random = ChaCha8Rng::seed_from_u64(5);
-    let mut text = "[random]\n'joint*.theta' = { sigma_deg = 0.1 }\n[noise]\nposition_sigma_mm = 0.05\n\
+    let mut text =
+        "[random]\n'joint*.theta' = { sigma_deg = 0.1 }\n[noise]\nposition_sigma_mm = 0.05\n\
                     [poses]\nq1_deg = [-150, 150]\nq2_deg = [-75, 75]\n"
-        .to_owned();
+            .to_owned();
     let orders: Vec<u32> = (1..=12).collect();
     for joint in 1..=2 {
-        writeln!(text, "[[effect]]\njoint-harmonic = {{ joint = {joint}, orders = {orders:?} }}").unwrap();
+        writeln!(text, "[[effect]]\njoint-harmonic = {{ joint = {joint}, orders = {orders:?} }}")
+            .unwrap();
         for order in &orders {
             let [sine, cosine] = [0.1 * normal(&mut random), 0.1 * normal(&mut random)];
             writeln!(text, "sin{order}_deg = {sine}\ncos{order}_deg = {cosine}").unwrap();
@@ -142,12 +164,19 @@ fn the_number_and_the_order_of_poses_decide_nothing() {
     let expected = found(&problem, &measured, (0..1000).collect());
     assert!(expected.0 == Verdict::Explained && expected.1.len() == 2, "{expected:?}");
     for (joint, effect) in (1..).zip(&expected.1) {
-        assert!(effect.covers(&Effect::JointHarmonic { joint, orders: orders.clone() }), "{effect:?}");
+        assert!(
+            effect.covers(&Effect::JointHarmonic { joint, orders: orders.clone() }),
+            "{effect:?}"
+        );
     }
     for poses in [990, 1010] {
         assert_eq!(found(&problem, &measured, (0..poses).collect()), expected, "{poses} poses");
     }
     let mut rows: Vec<usize> = (0..1110).collect();
     rows[..1000].shuffle(&mut random);
-    assert_eq!(found(&problem, &measured.select(&rows), (0..1000).collect()), expected, "rows in another order");
+    assert_eq!(
+        found(&problem, &measured.select(&rows), (0..1000).collect()),
+        expected,
+        "rows in another order"
+    );
 }

@@ -2,16 +2,17 @@
 
 use std::path::Path;
 
-use flexcal::diagnose::{Law, close};
-use flexcal::identify::Options;
+use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, Split};
-use flexcal::monte_carlo::table;
 use flexcal::problem::Problem;
 use flexcal::report::loop_text;
-use flexcal::simulate::{Truth, simulate};
+use flexcal::rig::{Truth, simulate};
+use flexcal::select::{Law, close};
+use flexcal::study::table;
 
 fn service_arm() -> Problem {
-    Problem::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/service-arm/problem.toml")).unwrap()
+    Problem::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/service-arm/problem.toml"))
+        .unwrap()
 }
 
 #[test]
@@ -24,9 +25,15 @@ fn a_link_longer_than_its_tolerance_is_no_effect() {
     assert_eq!(claims.law.0.law, Law::Limit("of joint4.a".to_owned()));
     assert!(claims.law.1 > 0.5, "{claims:?}");
     let said = loop_text(&problem, &closed).replace('\n', " ");
-    assert!(said.contains("The limit of joint4.a, which holds the fit, is most probably wrong"), "{said}");
+    assert!(
+        said.contains("The limit of joint4.a, which holds the fit, is most probably wrong"),
+        "{said}"
+    );
     // Nothing was tried in its place.
-    assert!(!said.contains("No effect of the catalogue") && !said.contains("No empirical correction"), "{said}");
+    assert!(
+        !said.contains("No effect of the catalogue") && !said.contains("No empirical correction"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -39,12 +46,13 @@ fn an_effect_beside_limits_that_hold_is_named() {
     for seed in [1, 2, 3] {
         let rows = simulate(&problem, &truth, 40, seed).unwrap().rows;
         let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
-        let closed = close(&problem, &Dataset::new(table(&rows), split), &Options::default()).unwrap();
+        let closed =
+            close(&problem, &Dataset::new(table(&rows), split), &Options::default()).unwrap();
         let names: Vec<&str> = closed.effects.iter().map(|found| found.effect.name()).collect();
         assert_eq!(names, ["joint-coupling"], "{seed}");
         let before = &closed.before.fit;
-        let limits =
-            before.estimates.iter().filter(|own| own.at_bound.is_some()).count() + before.active_constraints.len();
+        let limits = before.estimates.iter().filter(|own| own.at_bound.is_some()).count()
+            + before.active_constraints.len();
         assert!(limits > 0, "{seed}: no limit holds this fit");
     }
 }

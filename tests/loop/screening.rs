@@ -1,13 +1,14 @@
-//! Score screening: a candidate whose derivative is not a number is named as such, and the others are judged without it.
+//! Score screening: a candidate whose derivative is not a number is named as such, and the others
+//! are judged without it.
 
 use std::path::Path;
 
-use flexcal::diagnose::{NOT_FINITE, trace};
-use flexcal::identify::Options;
+use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::effect::{CustomEffect, Term};
-use flexcal::model::parameter::{Driver, Slot};
+use flexcal::model::parameter::{ParameterSite, Regressor};
 use flexcal::problem::{Effect, Problem};
+use flexcal::select::{NOT_FINITE, trace};
 
 /// A drift with the temperature above one that no thermometer shows.
 #[derive(Debug)]
@@ -19,8 +20,8 @@ impl CustomEffect for Endless {
     }
 
     fn terms(&self, problem: &Problem) -> Vec<Term> {
-        let driver = Driver::Warming { reference: f64::NEG_INFINITY };
-        vec![Term::driven("rate", Slot::coordinate(problem, 2), driver, 1e-3)]
+        let regressor = Regressor::Warming { reference: f64::NEG_INFINITY };
+        vec![Term::driven("rate", ParameterSite::coordinate(problem, 2), regressor, 1e-3)]
     }
 
     fn describe(&self) -> String {
@@ -39,10 +40,11 @@ fn a_derivative_that_is_not_finite_spoils_no_other_candidate() {
     options.candidates = vec![Effect::custom(Endless)];
     let endless = trace(&problem, &data, &options).unwrap();
     assert!(plain.untestable.iter().all(|(_, why)| *why != NOT_FINITE));
-    let refused = |(effect, why): &&(Effect, &str)| effect.name() == "endless-drift" && *why == NOT_FINITE;
+    let refused =
+        |(effect, why): &&(Effect, &str)| effect.name() == "endless-drift" && *why == NOT_FINITE;
     assert_eq!(endless.untestable.iter().filter(refused).count(), 1);
     assert_eq!(endless.tried, plain.tried);
-    let names = |effects: &[flexcal::diagnose::Ranked]| -> Vec<(Effect, f64)> {
+    let names = |effects: &[flexcal::select::Ranked]| -> Vec<(Effect, f64)> {
         effects.iter().map(|ranked| (ranked.effect.clone(), ranked.p_value)).collect()
     };
     assert_eq!(names(&endless.ranking), names(&plain.ranking));

@@ -3,21 +3,29 @@
 use std::fs;
 use std::path::Path;
 
-use flexcal::diagnose::{SelectionRules, close_by, trace_by};
-use flexcal::identify::Options;
+use flexcal::fit::Options;
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
+use flexcal::select::{SelectionRules, close_by, trace_by};
 
 #[test]
 fn the_page_has_every_number() {
-    let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/selection.md")).unwrap_or_default();
-    let cells = page.lines().filter_map(|line| line.strip_prefix("| `")).filter_map(|row| row.split_once("` | "));
-    let told: Vec<String> =
-        cells.filter_map(|(name, rest)| Some(format!("{name}: {}", rest.split_once(" |")?.0))).collect();
+    let page = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/selection.md"))
+        .unwrap_or_default();
+    let cells = page
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `"))
+        .filter_map(|row| row.split_once("` | "));
+    let told: Vec<String> = cells
+        .filter_map(|(name, rest)| Some(format!("{name}: {}", rest.split_once(" |")?.0)))
+        .collect();
     let rules = format!("{:?}", SelectionRules::default());
     let rules = rules.trim_start_matches("SelectionRules { ").trim_end_matches(" }");
     for one in &told {
-        assert!(format!("{rules}, ").contains(&format!("{one}, ")), "docs/selection.md says {one}: {rules}");
+        assert!(
+            format!("{rules}, ").contains(&format!("{one}, ")),
+            "docs/selection.md says {one}: {rules}"
+        );
     }
     // Every field has one colon.
     assert_eq!(told.len(), rules.matches(": ").count());
@@ -27,7 +35,9 @@ type Change = fn(&mut SelectionRules);
 
 #[test]
 fn rules_that_make_no_sense_are_refused() {
-    let problem = Problem::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/lunar-sampler")).unwrap();
+    let problem =
+        Problem::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/lunar-sampler"))
+            .unwrap();
     let (data, _) = Dataset::read(&problem).unwrap();
     let change: [(&str, Change); 11] = [
         ("resamples", |rules| rules.resamples = 0),

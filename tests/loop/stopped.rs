@@ -3,11 +3,11 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use flexcal::diagnose::close;
-use flexcal::identify::{Options, Progress, ProgressSink, Stop};
+use flexcal::fit::{Options, Progress, ProgressSink, Stop};
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use flexcal::report::{loop_brief, loop_text};
+use flexcal::select::close;
 
 #[test]
 fn stopped_in_its_first_round_it_names_no_cause_and_rules_none_out() {
@@ -23,13 +23,21 @@ fn stopped_in_its_first_round_it_names_no_cause_and_rules_none_out() {
             }
         })
     };
-    let closed = close(&problem, &data, &Options::default().with_stop(stop.clone()).with_progress(sink)).unwrap();
-    assert!(stop.is_requested() && closed.interrupted && closed.rounds.is_empty() && closed.effects.is_empty());
+    let closed =
+        close(&problem, &data, &Options::default().with_stop(stop.clone()).with_progress(sink))
+            .unwrap();
+    assert!(
+        stop.is_requested()
+            && closed.interrupted
+            && closed.rounds.is_empty()
+            && closed.effects.is_empty()
+    );
     for said in [loop_text(&problem, &closed), loop_brief(&problem, &closed, 100)] {
         let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(said.contains("Search interrupted before the first round was done"), "{said}");
         assert!(
-            said.contains("no cause is named, and none ruled out") && !said.contains("No effect was found"),
+            said.contains("no cause is named, and none ruled out")
+                && !said.contains("No effect was found"),
             "{said}"
         );
     }

@@ -1,10 +1,11 @@
-//! Arms of several kinds, what each may do beyond its declared parameters, and what they are measured against.
+//! Arms of several kinds, what each may do beyond its declared parameters, and what they are
+//! measured against.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
 use flexcal::problem::{PoseConditions, Problem};
-use flexcal::simulate::Rig;
+use flexcal::rig::Rig;
 use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -14,7 +15,8 @@ pub type Strength = (&'static str, f64);
 /// An effect as TRUTH.toml declares it, and its strengths.
 pub type Lacking = (&'static str, &'static [Strength]);
 
-/// An arm, where its joints go, and effects as TRUTH.toml writes them at a size that nobody overlooks.
+/// An arm, where its joints go, and effects as TRUTH.toml writes them at a size that nobody
+/// overlooks.
 pub struct Kind {
     pub name: &'static str,
     /// Its problem up to `[data]`.
@@ -134,8 +136,14 @@ pub const ARMS: [Kind; 5] = [
         ],
         effects: &[
             ("gear-ratio = { joint = 3 }", &[("error_relative", 6e-4)]),
-            ("joint-harmonic = { joint = 2, orders = [1] }", &[("sin1_deg", 0.04), ("cos1_deg", 0.02)]),
-            ("joint-harmonic = { joint = 4, orders = [2] }", &[("sin2_deg", 0.06), ("cos2_deg", 0.04)]),
+            (
+                "joint-harmonic = { joint = 2, orders = [1] }",
+                &[("sin1_deg", 0.04), ("cos1_deg", 0.02)],
+            ),
+            (
+                "joint-harmonic = { joint = 4, orders = [2] }",
+                &[("sin2_deg", 0.06), ("cos2_deg", 0.04)],
+            ),
             ("backlash = { joint = 3 }", &[("width_deg", 0.05)]),
             ("joint-compliance = { joint = 4 }", &[("compliance_rad_per_N_m", 5e-5)]),
             ("joint-thermal-drift = { joint = 2 }", &[("rate_deg_per_C", 0.004)]),
@@ -159,8 +167,14 @@ pub const ARMS: [Kind; 5] = [
         effects: &[
             ("gear-ratio = { joint = 2 }", &[("error_relative", 6e-4)]),
             ("gear-ratio = { joint = 5 }", &[("error_relative", 1.5e-3)]),
-            ("joint-harmonic = { joint = 3, orders = [2] }", &[("sin2_deg", 0.04), ("cos2_deg", 0.02)]),
-            ("joint-harmonic = { joint = 4, orders = [3] }", &[("sin3_deg", 0.03), ("cos3_deg", 0.03)]),
+            (
+                "joint-harmonic = { joint = 3, orders = [2] }",
+                &[("sin2_deg", 0.04), ("cos2_deg", 0.02)],
+            ),
+            (
+                "joint-harmonic = { joint = 4, orders = [3] }",
+                &[("sin3_deg", 0.03), ("cos3_deg", 0.03)],
+            ),
             ("backlash = { joint = 3 }", &[("width_deg", 0.06)]),
             ("backlash = { joint = 6 }", &[("width_deg", 0.12)]),
             ("joint-thermal-drift = { joint = 2 }", &[("rate_deg_per_C", 0.004)]),
@@ -181,8 +195,14 @@ pub const ARMS: [Kind; 5] = [
         ],
         effects: &[
             ("gear-ratio = { joint = 2 }", &[("error_relative", 4e-4)]),
-            ("joint-harmonic = { joint = 1, orders = [2] }", &[("sin2_deg", 0.02), ("cos2_deg", 0.02)]),
-            ("joint-harmonic = { joint = 3, orders = [1] }", &[("sin1_deg", 0.03), ("cos1_deg", 0.03)]),
+            (
+                "joint-harmonic = { joint = 1, orders = [2] }",
+                &[("sin2_deg", 0.02), ("cos2_deg", 0.02)],
+            ),
+            (
+                "joint-harmonic = { joint = 3, orders = [1] }",
+                &[("sin1_deg", 0.03), ("cos1_deg", 0.03)],
+            ),
             ("backlash = { joint = 2 }", &[("width_deg", 0.04)]),
             ("backlash = { joint = 4 }", &[("width_deg", 0.1)]),
             ("joint-compliance = { joint = 2 }", &[("compliance_rad_per_N_m", 5e-6)]),
@@ -194,12 +214,23 @@ pub const ARMS: [Kind; 5] = [
     Kind {
         name: "scara",
         text: SCARA,
-        ranges: &["q1_deg = [-130, 130]", "q2_deg = [-140, 140]", "q3_mm = [0, 200]", "q4_deg = [-180, 180]"],
+        ranges: &[
+            "q1_deg = [-130, 130]",
+            "q2_deg = [-140, 140]",
+            "q3_mm = [0, 200]",
+            "q4_deg = [-180, 180]",
+        ],
         effects: &[
             ("gear-ratio = { joint = 1 }", &[("error_relative", 4e-4)]),
             ("gear-ratio = { joint = 3 }", &[("error_relative", 2e-3)]),
-            ("joint-harmonic = { joint = 1, orders = [2] }", &[("sin2_deg", 0.02), ("cos2_deg", 0.01)]),
-            ("joint-harmonic = { joint = 2, orders = [1] }", &[("sin1_deg", 0.04), ("cos1_deg", 0.03)]),
+            (
+                "joint-harmonic = { joint = 1, orders = [2] }",
+                &[("sin2_deg", 0.02), ("cos2_deg", 0.01)],
+            ),
+            (
+                "joint-harmonic = { joint = 2, orders = [1] }",
+                &[("sin1_deg", 0.04), ("cos1_deg", 0.03)],
+            ),
             ("backlash = { joint = 2 }", &[("width_deg", 0.05)]),
             ("joint-thermal-drift = { joint = 1 }", &[("rate_deg_per_C", 0.004)]),
             ("joint-coupling = { joint = 2, from = 1 }", &[("factor_relative", 8e-4)]),
@@ -218,7 +249,10 @@ pub const ARMS: [Kind; 5] = [
         effects: &[
             ("gear-ratio = { joint = 2 }", &[("error_relative", 2e-4)]),
             ("gear-ratio = { joint = 5 }", &[("error_relative", 1e-3)]),
-            ("joint-harmonic = { joint = 5, orders = [1] }", &[("sin1_deg", 0.06), ("cos1_deg", 0.04)]),
+            (
+                "joint-harmonic = { joint = 5, orders = [1] }",
+                &[("sin1_deg", 0.06), ("cos1_deg", 0.04)],
+            ),
             ("backlash = { joint = 3 }", &[("width_mm", 0.2)]),
             ("backlash = { joint = 6 }", &[("width_deg", 0.08)]),
             ("joint-thermal-drift = { joint = 4 }", &[("rate_mm_per_C", 0.02)]),
@@ -270,7 +304,11 @@ impl Kind {
                     held_out = { column = \"split\" }\nreference_temperature_C = 20\n";
         let tilts = if how == Measured::Tilts { "tilt_sigma_deg = 0.002\n" } else { "" };
         let rules = format!("{}{base}{beta}", self.text);
-        Problem::parse(&format!("{rules}{}[data]\n{data}{tilts}", around.declared), Path::new("problem.toml")).unwrap()
+        Problem::parse(
+            &format!("{rules}{}[data]\n{data}{tilts}", around.declared),
+            Path::new("problem.toml"),
+        )
+        .unwrap()
     }
 
     /// Where it truly stands, and the poses: text of TRUTH.toml.
@@ -279,7 +317,10 @@ impl Kind {
         let random = |line: &&str| line.contains("sigma") || line.contains("fixed");
         let still = |line: &str| line.replace("fixed = true", "sigma_deg = 0, sigma_mm = 0");
         // What the data cannot tell is true as declared.
-        let random: String = geometry.lines().filter(random).fold(String::new(), |all, line| all + &still(line) + "\n");
+        let random: String = geometry
+            .lines()
+            .filter(random)
+            .fold(String::new(), |all, line| all + &still(line) + "\n");
         let more = match how {
             Measured::Mixed => "positions = 10\n",
             Measured::Tilts => "tilts = [\"joint3\", \"tool\"]\n",
@@ -294,22 +335,25 @@ impl Kind {
         )
     }
 
-    /// What surrounds it for one way of measuring: places that the nominal arm reaches, drawn from the seed.
+    /// What surrounds it for one way of measuring: places that the nominal arm reaches, drawn from
+    /// the seed.
     pub fn around(&self, how: Measured, seed: u64) -> Around {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let nothing = Around { declared: String::new(), truth: String::new() };
         let bare = self.problem(Measured::Positions, &nothing);
         let poses = self.truth(Measured::Positions, &nothing, "");
-        let truth = flexcal::simulate::Truth::parse(&poses, Path::new("truth.toml"), &bare).unwrap();
+        let truth = flexcal::rig::Truth::parse(&poses, Path::new("truth.toml"), &bare).unwrap();
         let rig = Rig::new(bare, Vec::new());
         let mut reached = || {
-            let one = |&(from, to): &(f64, f64)| from + (to - from) * random.random_range(0.15..0.85);
+            let one =
+                |&(from, to): &(f64, f64)| from + (to - from) * random.random_range(0.15..0.85);
             let configuration = truth.poses.joints.iter().map(one).collect();
             rig.position(&PoseConditions { configuration, ..PoseConditions::default() }).unwrap()
         };
         let cloud: Vec<Vector3<f64>> = (0..400).map(|_| reached()).collect();
         let middle = cloud.iter().sum::<Vector3<f64>>() / 400.0;
-        let reach = (cloud.iter().map(|at| (at - middle).norm_squared()).sum::<f64>() / 400.0).sqrt();
+        let reach =
+            (cloud.iter().map(|at| (at - middle).norm_squared()).sum::<f64>() / 400.0).sqrt();
         let mut around = Around { declared: String::new(), truth: String::new() };
         let mut places: Vec<Vector3<f64>> = Vec::new();
         for at in cloud.iter().filter(|at| (*at - middle).norm() < 1.2 * reach) {
@@ -322,7 +366,8 @@ impl Kind {
             Measured::Sockets => around.sockets(&places),
             Measured::Tilts => around.sockets(&places[..3]),
             Measured::Wires => {
-                let corners = [[1.5, 0.5, 0.9], [-1.3, 1.2, 0.2], [0.3, -1.6, 1.2], [-0.9, -1.0, -0.8]];
+                let corners =
+                    [[1.5, 0.5, 0.9], [-1.3, 1.2, 0.2], [0.3, -1.6, 1.2], [-0.9, -1.0, -0.8]];
                 for (k, corner) in corners.into_iter().enumerate() {
                     around.anchor(k, middle + Vector3::from(corner) * reach * 1.5);
                 }
@@ -359,7 +404,10 @@ impl Around {
             self.at(&format!("point[p{k}]"), &at.map(|x| (x * 1e9).round() / 1e9));
         }
         let apart = (places[0] - places[1]).norm() * 1e3;
-        let _ = writeln!(self.declared, "[[distance]]\nbetween = [\"p0\", \"p1\"]\nmm = {apart:.6}\nsigma_mm = 0.01");
+        let _ = writeln!(
+            self.declared,
+            "[[distance]]\nbetween = [\"p0\", \"p1\"]\nmm = {apart:.6}\nsigma_mm = 0.01"
+        );
     }
 
     fn anchor(&mut self, k: usize, at: Vector3<f64>) {
@@ -368,7 +416,10 @@ impl Around {
     }
 
     fn sphere(&mut self, k: usize, at: Vector3<f64>, radius: f64) {
-        let _ = writeln!(self.declared, "[[surface]]\nname = \"s{k}\"\nkind = \"sphere\"\nradius_m = {radius:.6}");
+        let _ = writeln!(
+            self.declared,
+            "[[surface]]\nname = \"s{k}\"\nkind = \"sphere\"\nradius_m = {radius:.6}"
+        );
         self.at(&format!("surface[s{k}]"), &at);
     }
 
@@ -377,7 +428,10 @@ impl Around {
         let normal = nalgebra::Rotation3::new(Vector3::new(rx, ry, 0.0)) * Vector3::z();
         let _ = writeln!(self.declared, "[[surface]]\nname = \"{name}\"\nkind = \"plane\"");
         let name = format!("surface[{name}]");
-        let _ = writeln!(self.truth, "\"{name}.rx\" = {{ rad = {rx} }}\n\"{name}.ry\" = {{ rad = {ry} }}");
+        let _ = writeln!(
+            self.truth,
+            "\"{name}.rx\" = {{ rad = {rx} }}\n\"{name}.ry\" = {{ rad = {ry} }}"
+        );
         let _ = writeln!(self.truth, "\"{name}.d\" = {{ mm = {:.6} }}", normal.dot(through) * 1e3);
     }
 

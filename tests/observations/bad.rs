@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use flexcal::identify::{Caution, Options, QualityFlag, identify};
+use flexcal::fit::{Caution, Options, QualityFlag, identify};
 use flexcal::least_squares::UnidentifiableCombination;
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
-use flexcal::simulate::Truth;
+use flexcal::rig::Truth;
 
 use crate::bench::{ARM, AROUND, Bench, LINE, problem, read, true_arm};
 
@@ -28,17 +28,27 @@ fn sections() {
         ("[[anchor]]\nname = \"a\"\nat = [1, 2, 3]\n", "needs a unit"),
         ("[[surface]]\nname = \"a\"\n", "surface[1].kind: missing"),
         ("[[surface]]\nname = \"a\"\nkind = \"cone\"\n", "none of plane, sphere"),
-        ("[[surface]]\nname = \"a\"\nkind = \"plane\"\nnormal = [0, 0, 0]\n", "a direction has a length"),
+        (
+            "[[surface]]\nname = \"a\"\nkind = \"plane\"\nnormal = [0, 0, 0]\n",
+            "a direction has a length",
+        ),
         ("[[surface]]\nname = \"a\"\nkind = \"sphere\"\nradius_mm = 0\n", "not above zero"),
-        ("[[point]]\nname = \"a\"\n[[distance]]\nbetween = [\"a\", \"b\"]\nmm = 50\n", "no point is called \"b\""),
-        ("[[point]]\nname = \"a\"\n[[distance]]\nbetween = [\"a\", \"a\"]\nmm = 50\n", "two different points"),
+        (
+            "[[point]]\nname = \"a\"\n[[distance]]\nbetween = [\"a\", \"b\"]\nmm = 50\n",
+            "no point is called \"b\"",
+        ),
+        (
+            "[[point]]\nname = \"a\"\n[[distance]]\nbetween = [\"a\", \"a\"]\nmm = 50\n",
+            "two different points",
+        ),
         (
             "[[point]]\nname = \"a\"\n[[point]]\nname = \"b\"\n[[distance]]\nbetween = [\"a\", \"b\"]\n",
             "distance[1].mm: missing",
         ),
     ] {
         let text = format!("{ARM}{more}");
-        let error = Problem::parse(&text, Path::new("problem.toml")).map(|_| ()).unwrap_err().to_string();
+        let error =
+            Problem::parse(&text, Path::new("problem.toml")).map(|_| ()).unwrap_err().to_string();
         assert!(error.contains(words) && error.contains("problem.toml:"), "{more}: {error}");
     }
 }
@@ -47,7 +57,11 @@ fn sections() {
 fn rows() {
     let q = "0.1,0.2,0.3,0.4,0.5,0.6";
     for (columns, cells, words) in [
-        ("point", "middle", ":2: column point: no point is called \"middle\"; there are left, right, top"),
+        (
+            "point",
+            "middle",
+            ":2: column point: no point is called \"middle\"; there are left, right, top",
+        ),
         ("anchor,distance_mm", "C,800", ":2: column anchor: no anchor is called \"C\""),
         ("surface", "wall", ":2: column surface: no surface is called \"wall\""),
         ("anchor,distance_mm", "A,", ":2: column anchor: an anchor without a distance"),
@@ -58,35 +72,55 @@ fn rows() {
         ("point", "", ":2: nothing is measured in this row"),
         ("point,x_mm,y_mm,z_mm", ",1,2,", ":2: column z_mm: the cell is empty"),
         ("point", "left", ":2: column point: the point \"left\" is measured by 1 row alone"),
-        ("anchor,distance_mm", "A,800", ":2: column anchor: the anchor \"A\" is measured by 1 row alone"),
+        (
+            "anchor,distance_mm",
+            "A,800",
+            ":2: column anchor: the anchor \"A\" is measured by 1 row alone",
+        ),
     ] {
         let text = format!("q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,{columns}\n{q},{cells}\n");
-        let around =
-            AROUND.replace("[[distance]]\nbetween = [\"left\", \"right\"]\nmm = 593.717104\nsigma_mm = 0.01\n", "");
+        let around = AROUND.replace(
+            "[[distance]]\nbetween = [\"left\", \"right\"]\nmm = 593.717104\nsigma_mm = 0.01\n",
+            "",
+        );
         let error = table(&around, &text);
         assert!(error.contains(words), "{columns} {cells}: {error}");
     }
     // A word of which the problem declares nothing, beside others of which it does and alone.
-    let surface = "[[surface]]\nname = \"table\"\nkind = \"plane\"\n[data]\nsurface_sigma_mm = 0.05\n";
+    let surface =
+        "[[surface]]\nname = \"table\"\nkind = \"plane\"\n[data]\nsurface_sigma_mm = 0.05\n";
     for (around, location) in [(surface, ":2: column point"), ("", ":1: column point")] {
         let text = format!("q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,point,surface\n{q},left,\n");
         let error = table(around, &text);
-        assert!(error.contains(location) && error.contains("does not declare [[point]]"), "{error}");
+        assert!(
+            error.contains(location) && error.contains("does not declare [[point]]"),
+            "{error}"
+        );
     }
-    let two = format!("q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,point,anchor,distance_mm\n{q},left,A,800\n");
+    let two = format!(
+        "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,point,anchor,distance_mm\n{q},left,A,800\n"
+    );
     let error = table(&AROUND.replace("distance_sigma_mm = 0.05\n", ""), &two);
     assert!(error.contains("write distance_sigma_mm in [data]"), "{error}");
 }
 
-/// Without a known length the size of everything is open, and without a tracker the place of the base: both are named.
+/// Without a known length the size of everything is open, and without a tracker the place of the
+/// base: both are named.
 #[test]
 fn what_contacts_cannot_tell_is_named() {
-    let free = AROUND.replace("[[distance]]\nbetween = [\"left\", \"right\"]\nmm = 593.717104\nsigma_mm = 0.01\n", "");
+    let free = AROUND.replace(
+        "[[distance]]\nbetween = [\"left\", \"right\"]\nmm = 593.717104\nsigma_mm = 0.01\n",
+        "",
+    );
     let own = format!("\"base.*\" = {{ free = true }}\n{free}");
     let problem = problem(&own);
     let (arm, _) = true_arm(&problem, 2);
-    let found =
-        identify(&problem, &read(&problem, &Bench::new(arm, 7).table(&["point"], 90)), &Options::default()).unwrap();
+    let found = identify(
+        &problem,
+        &read(&problem, &Bench::new(arm, 7).table(&["point"], 90)),
+        &Options::default(),
+    )
+    .unwrap();
     assert!(found.is_trusted(), "{:?}", found.quality_flag);
     for name in ["base.x", "base.y", "base.z", "base.rx", "base.ry", "base.rz"] {
         assert_eq!(found.estimate(name).unwrap().std_error, None, "{name}");
@@ -94,13 +128,18 @@ fn what_contacts_cannot_tell_is_named() {
     assert!(found.identifiability().unidentifiable.len() >= 6);
 }
 
-/// Distances to anchors on a line, wherever these are known to be, leave a turn of the base about the line open.
+/// Distances to anchors on a line, wherever these are known to be, leave a turn of the base about
+/// the line open.
 #[test]
 fn collinear_anchors_leave_a_turn_of_the_base_open() {
-    let at = |(name, [x, y, z]): &(&str, [f64; 3])| format!("[[anchor]]\nname = \"{name}\"\nat_m = [{x}, {y}, {z}]\n");
+    let at = |(name, [x, y, z]): &(&str, [f64; 3])| {
+        format!("[[anchor]]\nname = \"{name}\"\nat_m = [{x}, {y}, {z}]\n")
+    };
     let around: String = LINE.iter().map(at).collect();
     let held_out = "held_out = { fraction = 0.2, seed = 1 }";
-    let own = format!("\"base.*\" = {{ free = true }}\n{around}[data]\ndistance_sigma_mm = 0.05\n{held_out}\n");
+    let own = format!(
+        "\"base.*\" = {{ free = true }}\n{around}[data]\ndistance_sigma_mm = 0.05\n{held_out}\n"
+    );
     let problem = problem(&own);
     let (arm, _) = true_arm(&problem, 2);
     let data = read(&problem, &Bench::new(arm, 7).table(&["distance on a line"], 150));
@@ -120,13 +159,18 @@ fn what_nobody_knows_is_neither_held_nor_about_zero() {
     for rule in ["{ fixed = true }", "{ sigma_mm = 2 }"] {
         let problem = problem(&format!("\"anchor[A].x\" = {rule}\n{AROUND}"));
         let data = read(&problem, &Bench::new(problem.clone(), 7).table(&["distance"], 40));
-        let error = identify(&problem, &data, &Options::default()).map(|_| ()).unwrap_err().to_string();
-        assert!(error.contains("nobody knows where anchor[A].x is") && error.contains("at_m"), "{error}");
+        let error =
+            identify(&problem, &data, &Options::default()).map(|_| ()).unwrap_err().to_string();
+        assert!(
+            error.contains("nobody knows where anchor[A].x is") && error.contains("at_m"),
+            "{error}"
+        );
     }
 }
 
-/// Names that were exchanged in some rows leave misses that no noise explains, whatever the rows measure; the nominal arm, which
-/// puts a single point in places millimetres apart, is no reason to ask.
+/// Names that were exchanged in some rows leave misses that no noise explains, whatever the rows
+/// measure; the nominal arm, which puts a single point in places millimetres apart, is no reason to
+/// ask.
 #[test]
 fn exchanged_names_are_not_trusted() {
     let alone = "[[point]]\nname = \"left\"\n[data]\npoint_sigma_mm = 0.05\nheld_out = { fraction = 0.2, seed = 1 }\n";
@@ -139,10 +183,9 @@ fn exchanged_names_are_not_trusted() {
         let problem = problem(around);
         let (arm, _) = true_arm(&problem, 3);
         let text = Bench::new(arm, 5).table(&[kind], 120);
-        let rows = text
-            .lines()
-            .enumerate()
-            .filter(|(_, line)| around != alone || !line.contains("right,") && !line.contains("top,"));
+        let rows = text.lines().enumerate().filter(|(_, line)| {
+            around != alone || !line.contains("right,") && !line.contains("top,")
+        });
         let row = |(k, line): (usize, &str)| match exchanged {
             Some([one, other]) if k > 0 && k % 12 < 3 => {
                 let cell = |cell: &str| match cell {
@@ -154,11 +197,18 @@ fn exchanged_names_are_not_trusted() {
             }
             _ => format!("{line}\n"),
         };
-        let found =
-            identify(&problem, &read(&problem, &rows.map(row).collect::<String>()), &Options::default()).unwrap();
+        let found = identify(
+            &problem,
+            &read(&problem, &rows.map(row).collect::<String>()),
+            &Options::default(),
+        )
+        .unwrap();
         if exchanged.is_some() {
             let flag = found.quality_flag.as_ref();
-            assert!(matches!(flag, Some(QualityFlag::Misses { kind: of, .. }) if *of == kind), "{kind}: {flag:?}");
+            assert!(
+                matches!(flag, Some(QualityFlag::Misses { kind: of, .. }) if *of == kind),
+                "{kind}: {flag:?}"
+            );
             continue;
         }
         assert!(found.is_trusted(), "{:?}", found.quality_flag);
@@ -170,7 +220,8 @@ fn exchanged_names_are_not_trusted() {
 /// The rig needs no σ of positions where none is measured and nothing scatters like one.
 #[test]
 fn noise_of_what_is_measured() {
-    let around = "[[anchor]]\nname = \"A\"\nat_m = [1.5, 0.5, 1.2]\n[data]\ntilt_sigma_deg = 0.002\n";
+    let around =
+        "[[anchor]]\nname = \"A\"\nat_m = [1.5, 0.5, 1.2]\n[data]\ntilt_sigma_deg = 0.002\n";
     let problem = problem(around);
     let poses = "[poses]\nq1_deg = [-90, 90]\nq2_deg = [-60, 60]\nq3_deg = [-60, 60]\nq4_deg = [-90, 90]\nq5_deg = [-90, 90]\n\
                  q6_deg = [-90, 90]\ntilts = [\"tool\"]\n";
@@ -182,7 +233,10 @@ fn noise_of_what_is_measured() {
         let text = format!("[noise]\n{noise}\n{poses}{more}");
         match Truth::parse(&text, Path::new("TRUTH.toml"), &problem) {
             Ok(_) => assert!(is_enough, "{text}"),
-            Err(error) => assert!(!is_enough && error.to_string().contains("position_sigma_mm: missing"), "{error}"),
+            Err(error) => assert!(
+                !is_enough && error.to_string().contains("position_sigma_mm: missing"),
+                "{error}"
+            ),
         }
     }
 }

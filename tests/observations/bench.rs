@@ -5,7 +5,7 @@ use std::path::Path;
 
 use flexcal::measurement::Dataset;
 use flexcal::problem::{PoseConditions, Problem};
-use flexcal::simulate::Rig;
+use flexcal::rig::Rig;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -82,7 +82,8 @@ pub const RADIUS: f64 = 0.2;
 const SIGMA: f64 = 5e-5;
 
 /// Anchors on a line.
-pub const LINE: [(&str, [f64; 3]); 3] = [("A", [1.5, 0.5, 1.2]), ("B", [1.5, -0.5, 1.2]), ("C", [1.5, -1.5, 1.2])];
+pub const LINE: [(&str, [f64; 3]); 3] =
+    [("A", [1.5, 0.5, 1.2]), ("B", [1.5, -0.5, 1.2]), ("C", [1.5, -1.5, 1.2])];
 
 /// A problem with this arm.
 pub fn problem(more: &str) -> Problem {
@@ -151,10 +152,15 @@ impl Bench {
     fn anywhere(&mut self) -> Vec<f64> {
         let reach = [1.5, 0.8, 0.8, 1.5, 1.2, 2.0];
         let middle = [0.0, 0.5, -0.5, 0.0, 0.5, 0.0];
-        reach.iter().zip(middle).map(|(reach, middle)| middle + reach * self.random.random_range(-1.0..1.0)).collect()
+        reach
+            .iter()
+            .zip(middle)
+            .map(|(reach, middle)| middle + reach * self.random.random_range(-1.0..1.0))
+            .collect()
     }
 
-    /// A configuration in which `miss` of the target's position is nothing, near one drawn at random.
+    /// A configuration in which `miss` of the target's position is nothing, near one drawn at
+    /// random.
     pub fn contact(&mut self, miss: &dyn Fn(&Vector3<f64>) -> Vec<f64>) -> Vec<f64> {
         loop {
             let mut q = DVector::from_vec(self.anywhere());

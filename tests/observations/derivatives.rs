@@ -1,6 +1,6 @@
 //! Derivatives of every kind of row against extrapolated differences.
 
-use flexcal::identify::Placement;
+use flexcal::fit::Placement;
 use flexcal::least_squares::{check_jacobian, jacobian};
 use flexcal::model::PoseResiduals;
 use flexcal::problem::Observation;
@@ -22,8 +22,8 @@ fn derivatives_of_every_kind() {
     rigid.joints.iter_mut().for_each(|joint| joint.stiffness = None);
     rigid.parameters.retain(|rule| !rule.pattern.contains("stiffness"));
     for (what, problem) in [("elastic", elastic), ("rigid", rigid)] {
-        let table =
-            Bench::new(problem.clone(), 3).table(&["position", "point", "distance", "plane", "sphere", "tilt"], 8);
+        let table = Bench::new(problem.clone(), 3)
+            .table(&["position", "point", "distance", "plane", "sphere", "tilt"], 8);
         let rows = read(&problem, &table).measurements;
         // Tilts of every frame, the base among them.
         let mut rows = rows;
@@ -37,9 +37,11 @@ fn derivatives_of_every_kind() {
         let poses = Placement::of(&rows).poses(&rows, &(0..rows.len()).collect::<Vec<_>>(), 1e-3);
         let kinds: Vec<usize> = poses.iter().map(|pose| pose.observation.coordinates()).collect();
         assert!(kinds.contains(&1) && kinds.contains(&3));
-        let residuals = PoseResiduals::new(&model, poses, (0..model.parameters.len()).collect(), x.clone());
+        let residuals =
+            PoseResiduals::new(&model, poses, (0..model.parameters.len()).collect(), x.clone());
         let step = |unit| if matches!(unit, Unit::Angle | Unit::Length) { 0.1 } else { 0.5 };
-        let step = DVector::from_iterator(x.len(), model.parameters.iter().map(|own| step(own.unit())));
+        let step =
+            DVector::from_iterator(x.len(), model.parameters.iter().map(|own| step(own.unit())));
         let check = check_jacobian(&residuals, &x, &step);
         let (worst, column) = check.worst().unwrap();
         println!(
@@ -48,7 +50,11 @@ fn derivatives_of_every_kind() {
             column.relative_error,
             model.parameters[worst].name
         );
-        assert!(column.relative_error < WORST, "{what}: {} {column:?}", model.parameters[worst].name);
+        assert!(
+            column.relative_error < WORST,
+            "{what}: {} {column:?}",
+            model.parameters[worst].name
+        );
         // Every fixture is seen.
         let exact = jacobian(&residuals, &x);
         for (k, parameter) in model.parameters.iter().enumerate() {

@@ -1,18 +1,19 @@
-//! Effects that arms of several kinds lack, named from rows of every kind without a tracker; the same poses measured with one are the
-//! control.
+//! Effects that arms of several kinds lack, named from rows of every kind without a tracker; the
+//! same poses measured with one are the control.
 //!
-//! A case is *distinguishable* from its rows where one who knows the effect sees it: declared, it lowers the squares of the fit, priors among
-//! them, by more than 30, and no other effect of the catalogue comes within 6 of that, each in a fit of its own.
+//! A case is *distinguishable* from its rows where one who knows the effect sees it: declared, it
+//! lowers the squares of the fit, priors among them, by more than 30, and no other effect of the
+//! catalogue comes within 6 of that, each in a fit of its own.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use flexcal::diagnose::{ClosedLoop, Part, close};
-use flexcal::identify::{Identification, Options, identify};
+use flexcal::fit::{Identification, Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{Effect, Problem};
-use flexcal::simulate::{Cause, Simulation, Truth, simulate, simulate_poses};
+use flexcal::rig::{Cause, Simulation, Truth, simulate, simulate_poses};
+use flexcal::select::{ClosedLoop, Part, close};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -69,23 +70,41 @@ fn sets(otherwise: u64) -> u64 {
 /// Σ r²/σ² of the rows and priors.
 fn squares(found: &Identification, problem: &Problem, data: &Dataset) -> f64 {
     let model = model_of(problem, &data.measurements);
-    let pull = |(k, x): (usize, &f64)| model.parameters[k].sigma.map_or(0.0, |sigma| (x / sigma).powi(2));
-    let freedom = found.coordinates as f64 - found.estimates.iter().map(|own| own.identified).sum::<f64>();
+    let pull =
+        |(k, x): (usize, &f64)| model.parameters[k].sigma.map_or(0.0, |sigma| (x / sigma).powi(2));
+    let freedom =
+        found.coordinates as f64 - found.estimates.iter().map(|own| own.identified).sum::<f64>();
     found.reduced_chi2.unwrap() * freedom + found.x.iter().enumerate().map(pull).sum::<f64>()
 }
 
 /// Whether an effect is seen and no other of the ranking comes near it, and by how much.
-fn distinguishable(problem: &Problem, data: &Dataset, truth: &Effect, closed: &ClosedLoop) -> (f64, f64) {
+fn distinguishable(
+    problem: &Problem,
+    data: &Dataset,
+    truth: &Effect,
+    closed: &ClosedLoop,
+) -> (f64, f64) {
     let plain = &closed.before.fit;
-    let start: Vec<(String, f64)> = plain.estimates.iter().map(|own| (own.name.clone(), own.estimate)).collect();
+    let start: Vec<(String, f64)> =
+        plain.estimates.iter().map(|own| (own.name.clone(), own.estimate)).collect();
     let with = |effect: &Effect| {
         let problem = problem.with_effect(effect.clone());
-        let found = identify(&problem, data, &Options::default().with_start(start.clone()).with_max_steps(10)).ok()?;
+        let found = identify(
+            &problem,
+            data,
+            &Options::default().with_start(start.clone()).with_max_steps(10),
+        )
+        .ok()?;
         Some(squares(&found, &problem, data))
     };
     let without = squares(plain, problem, data);
     let own = with(truth).unwrap();
-    let others = closed.before.ranking.iter().map(|ranked| &ranked.effect).filter(|other| !is_the_same(other, truth));
+    let others = closed
+        .before
+        .ranking
+        .iter()
+        .map(|ranked| &ranked.effect)
+        .filter(|other| !is_the_same(other, truth));
     let others: Vec<Effect> = others.cloned().collect();
     let nearest = others.par_iter().filter_map(with).reduce(|| f64::INFINITY, f64::min);
     (without - own, nearest - own)
@@ -94,26 +113,33 @@ fn distinguishable(problem: &Problem, data: &Dataset, truth: &Effect, closed: &C
 /// Family and place, the true orders among those of a harmonic.
 fn is_the_same(named: &Effect, truth: &Effect) -> bool {
     match (named, truth) {
-        (Effect::JointHarmonic { joint, orders }, Effect::JointHarmonic { joint: own, orders: wanted }) => {
-            joint == own && wanted.iter().all(|order| orders.contains(order))
-        }
+        (
+            Effect::JointHarmonic { joint, orders },
+            Effect::JointHarmonic { joint: own, orders: wanted },
+        ) => joint == own && wanted.iter().all(|order| orders.contains(order)),
         _ => named == truth,
     }
 }
 
 fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Judged {
-    let part = |effect: &Effect| effect.terms(problem).first().map(|term| Part::of(term.slot));
+    let part = |effect: &Effect| effect.terms(problem).first().map(|term| Part::of(term.site));
     let is_true = |effect: &Effect| truth.is_some_and(|truth| is_the_same(effect, truth));
     let at_place = |at: Option<Part>| truth.is_some_and(|truth| at.is_some() && part(truth) == at);
-    let (named, such): (Vec<_>, Vec<_>) = closed.effects.iter().partition(|found| found.is_named(STATED));
+    let (named, such): (Vec<_>, Vec<_>) =
+        closed.effects.iter().partition(|found| found.is_named(STATED));
     let wrong = named.iter().filter(|found| !is_true(&found.effect)).count();
-    let listed = closed.effects.iter().any(|found| found.alternatives.iter().chain([&found.effect]).any(is_true));
+    let listed = closed
+        .effects
+        .iter()
+        .any(|found| found.alternatives.iter().chain([&found.effect]).any(is_true));
     let structure = || closed.unexplained.iter().filter(|left| left.claims.is_some());
     let outcome = match () {
         () if named.iter().any(|found| is_true(&found.effect)) => Outcome::Named,
         () if wrong > 0 => Outcome::Wrong,
         () if listed => Outcome::Listed,
-        () if structure().any(|left| at_place(left.part)) || such.iter().any(|own| at_place(part(&own.effect))) => {
+        () if structure().any(|left| at_place(left.part))
+            || such.iter().any(|own| at_place(part(&own.effect))) =>
+        {
             Outcome::Located
         }
         () if structure().next().is_some() || !such.is_empty() => Outcome::Elsewhere,
@@ -132,10 +158,21 @@ fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Jud
     for left in structure() {
         let claims = left.claims.as_ref().unwrap();
         let of: Vec<String> = left.depends_on.iter().map(ToString::to_string).collect();
-        said.push(format!("{} of {} {:.2} {:?}", claims.place.0, of.join(" "), claims.law.1, claims.law.0.law));
+        said.push(format!(
+            "{} of {} {:.2} {:?}",
+            claims.place.0,
+            of.join(" "),
+            claims.law.1,
+            claims.law.0.law
+        ));
     }
     let chi2 = |found: &Identification| found.reduced_chi2.unwrap_or(f64::NAN);
-    let said = format!("{} (χ² {:.2} → {:.2})", said.join(", "), chi2(&closed.before.fit), chi2(&closed.after));
+    let said = format!(
+        "{} (χ² {:.2} → {:.2})",
+        said.join(", "),
+        chi2(&closed.before.fit),
+        chi2(&closed.after)
+    );
     Judged { outcome, ghosts: wrong, said }
 }
 
@@ -144,12 +181,14 @@ fn rows(problem: &Problem, simulated: &Simulation) -> Dataset {
     read(problem, &simulated.csv())
 }
 
-/// The effect with its strengths as TRUTH.toml writes it, of a size from a quarter of the listed one to twice it.
+/// The effect with its strengths as TRUTH.toml writes it, of a size from a quarter of the listed
+/// one to twice it.
 fn written(effect: Option<&Lacking>, seed: u64) -> (String, f64) {
     let factor = 2.0_f64.powf(ChaCha8Rng::seed_from_u64(seed ^ 0x517e).random_range(-2.0..1.0));
     let line = |&(key, value): &Strength| format!("{key} = {}\n", value * factor);
-    let text =
-        effect.map(|(effect, values)| format!("[[effect]]\n{effect}\n{}", values.iter().map(line).collect::<String>()));
+    let text = effect.map(|(effect, values)| {
+        format!("[[effect]]\n{effect}\n{}", values.iter().map(line).collect::<String>())
+    });
     (text.unwrap_or_default(), factor)
 }
 
@@ -160,18 +199,26 @@ fn one(arm: &Kind, (how, count): (Measured, usize), effect: Option<&Lacking>, se
     let truth_of = |how: Measured, around: &Around, problem: &Problem| -> Truth {
         Truth::parse(&arm.truth(how, around, &text), Path::new("truth.toml"), problem).unwrap()
     };
-    let name = format!("{} {how:?} {} ×{factor:.2} seed {seed}", arm.name, effect.map_or("nothing", |own| own.0));
+    let name = format!(
+        "{} {how:?} {} ×{factor:.2} seed {seed}",
+        arm.name,
+        effect.map_or("nothing", |own| own.0)
+    );
     // The true arm may not reach what the nominal one does: then other places are drawn.
     let (problem, contacts) = (0..10)
         .find_map(|attempt| {
             let around = arm.around(how, seed + 100_000 * attempt);
             let problem = arm.problem(how, &around);
-            let contacts = simulate(&problem, &truth_of(how, &around, &problem), count, seed).ok()?;
+            let contacts =
+                simulate(&problem, &truth_of(how, &around, &problem), count, seed).ok()?;
             Some((problem, contacts))
         })
         .unwrap();
-    let poses = contacts.rows.iter().map(|row| (row.conditions.clone(), row.target.clone())).collect();
-    let tracker = simulate_poses(&bare, &truth_of(Measured::Positions, &nothing, &bare), poses, seed).unwrap();
+    let poses =
+        contacts.rows.iter().map(|row| (row.conditions.clone(), row.target.clone())).collect();
+    let tracker =
+        simulate_poses(&bare, &truth_of(Measured::Positions, &nothing, &bare), poses, seed)
+            .unwrap();
     let lacking = contacts.truth.effects.first().and_then(|own| match own.cause() {
         Cause::Catalogued(effect) => Some(effect.clone()),
         _ => None,
@@ -183,8 +230,10 @@ fn one(arm: &Kind, (how, count): (Measured, usize), effect: Option<&Lacking>, se
         (judged(problem, &closed, lacking.as_ref()), apart)
     });
     let [(contacts, by_contacts), (tracker, by_tracker)] = all;
-    let shown = |apart: Option<(f64, f64)>| apart.is_some_and(|(seen, apart)| seen > SEEN && apart > APART);
-    let figures = |apart: Option<(f64, f64)>| apart.map_or(String::new(), |(a, b)| format!("{a:.0}, {b:.0}"));
+    let shown =
+        |apart: Option<(f64, f64)>| apart.is_some_and(|(seen, apart)| seen > SEEN && apart > APART);
+    let figures =
+        |apart: Option<(f64, f64)>| apart.map_or(String::new(), |(a, b)| format!("{a:.0}, {b:.0}"));
     println!(
         "{name}\n    contacts [{}] {:?}: {}\n    tracker  [{}] {:?}: {}",
         figures(by_contacts),
@@ -204,7 +253,8 @@ fn one(arm: &Kind, (how, count): (Measured, usize), effect: Option<&Lacking>, se
     }
 }
 
-/// Figures of some sets: how many, how many are distinguishable, and of these named, listed, located, wrong, elsewhere, nothing.
+/// Figures of some sets: how many, how many are distinguishable, and of these named, listed,
+/// located, wrong, elsewhere, nothing.
 #[derive(Default, Clone)]
 struct Row {
     sets: usize,
@@ -229,12 +279,14 @@ impl Row {
 
     fn line(&self) -> String {
         use Outcome::{Elsewhere, Listed, Located, Named, Nothing, Wrong};
-        let own = [Named, Listed, Located, Elsewhere, Nothing, Wrong].map(|outcome| self.count(outcome).to_string());
+        let own = [Named, Listed, Located, Elsewhere, Nothing, Wrong]
+            .map(|outcome| self.count(outcome).to_string());
         format!("{} | {} | {} | {}", self.sets, self.shown, own.join(" | "), self.ghosts)
     }
 }
 
-/// Every effect of every arm, and none, once for each seed: those whose name holds the words of `FLEXCAL_ONLY`, in a table.
+/// Every effect of every arm, and none, once for each seed: those whose name holds the words of
+/// `FLEXCAL_ONLY`, in a table.
 fn run(seeds: Range<u64>) -> (Row, Row) {
     let only = std::env::var("FLEXCAL_ONLY").unwrap_or_default();
     let mut work = Vec::new();
@@ -242,8 +294,14 @@ fn run(seeds: Range<u64>) -> (Row, Row) {
         for (a, arm) in (0..).zip(&ARMS) {
             for (e, effect) in (0..).zip(arm.effects.iter().map(Some).chain([None])) {
                 // With each seed the next way of measuring, so that six have all of them.
-                let measured = WITHOUT_TRACKER[usize::try_from(a + e + seed).unwrap() % WITHOUT_TRACKER.len()];
-                let name = format!("{} {:?} {}", arm.name, measured.0, effect.map_or("nothing", |own| own.0));
+                let measured =
+                    WITHOUT_TRACKER[usize::try_from(a + e + seed).unwrap() % WITHOUT_TRACKER.len()];
+                let name = format!(
+                    "{} {:?} {}",
+                    arm.name,
+                    measured.0,
+                    effect.map_or("nothing", |own| own.0)
+                );
                 if only.split(',').all(|word| name.contains(word)) {
                     work.push((arm, measured, effect, 10_000 * seed + 1000 * a + e));
                 }
@@ -254,10 +312,14 @@ fn run(seeds: Range<u64>) -> (Row, Row) {
         .into_par_iter()
         .map(|(arm, measured, effect, seed)| (one(arm, measured, effect, seed), effect.is_some()))
         .collect();
-    let (mut rows, mut quiet): (BTreeMap<String, [Row; 2]>, [Row; 2]) = (BTreeMap::new(), Default::default());
+    let (mut rows, mut quiet): (BTreeMap<String, [Row; 2]>, [Row; 2]) =
+        (BTreeMap::new(), Default::default());
     let mut total: [Row; 2] = Default::default();
     for (case, has_effect) in &all {
-        let both = [(case.is_distinguishable, &case.contacts), (case.is_distinguishable_to_tracker, &case.tracker)];
+        let both = [
+            (case.is_distinguishable, &case.contacts),
+            (case.is_distinguishable_to_tracker, &case.tracker),
+        ];
         for (k, (shown, judged)) in both.into_iter().enumerate() {
             if *has_effect {
                 for key in [format!("arm {}", case.arm), format!("rows {:?}", case.how)] {
@@ -290,13 +352,19 @@ fn an_effect_is_named_and_nothing_else() {
         (arm("elbow"), (Measured::Tilts, 150), Some(3), 3),
         // The x axis of the third frame stands upright, where its tilt has no derivative.
         (arm("gantry"), (Measured::Tilts, 150), Some(1), 54001),
-        // A slide that alone moves along its axis: beside each socket its commands differ by noise alone.
+        // A slide that alone moves along its axis: beside each socket its commands differ by noise
+        // alone.
         (arm("scara"), (Measured::Sockets, 120), None, 3007),
     ];
     cases.into_par_iter().for_each(|(arm, measured, effect, seed)| {
         let case = one(arm, measured, effect.map(|effect: usize| &arm.effects[effect]), seed);
         let expected = if effect.is_some() { Outcome::Named } else { Outcome::Nothing };
-        assert_eq!((case.contacts.outcome, case.contacts.ghosts), (expected, 0), "{}", case.contacts.said);
+        assert_eq!(
+            (case.contacts.outcome, case.contacts.ghosts),
+            (expected, 0),
+            "{}",
+            case.contacts.said
+        );
     });
 }
 

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use flexcal::diagnose::close;
-use flexcal::identify::Options;
+use flexcal::fit::Options;
 use flexcal::problem::Problem;
-use flexcal::simulate::{Truth, simulate};
+use flexcal::rig::{Truth, simulate};
+use flexcal::select::close;
 
 use crate::bench::read;
 
@@ -80,8 +80,8 @@ fn the_sigma_that_a_fit_supports_speaks_for_no_effect() {
         let (law, own) = (found.claims.as_ref().unwrap().law.1, found.effect.name_and_place());
         let share = 1.0 / (1 + found.alternatives.len()) as f64;
         println!("{seed}: {own} {law:.3}, an even share {share:.3}");
-        // What is held is the most probable, and has more than its even share: two rigidities, a compliance and a stiffness that changes
-        // do nearly as well.
+        // What is held is the most probable, and has more than its even share: two rigidities, a
+        // compliance and a stiffness that changes do nearly as well.
         assert!(law > share, "{seed}: {own} {law}, {:?}", found.alternatives);
         assert!(law > 0.3 && !(law >= 0.9 && own != "joint-compliance 2"), "{seed}: {own} {law}");
     }

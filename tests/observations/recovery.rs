@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use flexcal::identify::{Identification, Options, PointSpread, identify};
+use flexcal::fit::{Identification, Options, PointSpread, identify};
 use nalgebra::Vector3;
 
 use crate::bench::{ANCHORS, AROUND, Bench, CENTRE, POINTS, problem, read, true_arm};
@@ -18,7 +18,10 @@ fn deviations(found: &Identification, truth: &[(String, f64)]) -> Vec<(String, f
 
 fn fixtures() -> Vec<(String, f64)> {
     let of = |word: &'static str, (name, place): (&'static str, [f64; 3])| {
-        ["x", "y", "z"].into_iter().zip(place).map(move |(axis, value)| (format!("{word}[{name}].{axis}"), value))
+        ["x", "y", "z"]
+            .into_iter()
+            .zip(place)
+            .map(move |(axis, value)| (format!("{word}[{name}].{axis}"), value))
     };
     let points = POINTS.into_iter().flat_map(|own| of("point", own));
     let anchors = ANCHORS.into_iter().flat_map(|own| of("anchor", own));
@@ -48,14 +51,22 @@ fn each_kind_and_all_together_find_the_arm() {
         }
         let worst = all.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).unwrap();
         let rms = (all.iter().map(|(_, z)| z * z).sum::<f64>() / all.len() as f64).sqrt();
-        println!("{kinds:?}: {} deviations, rms {rms:.2} σ, worst {:.1} σ at {}", all.len(), worst.1, worst.0);
+        println!(
+            "{kinds:?}: {} deviations, rms {rms:.2} σ, worst {:.1} σ at {}",
+            all.len(),
+            worst.1,
+            worst.0
+        );
         assert!(all.len() >= 3 * least, "{kinds:?}: {}", all.len());
-        assert!((0.7..1.35).contains(&rms) && worst.1.abs() < 4.5, "{kinds:?}: rms {rms}, worst {worst:?}");
+        assert!(
+            (0.7..1.35).contains(&rms) && worst.1.abs() < 4.5,
+            "{kinds:?}: rms {rms}, worst {worst:?}"
+        );
     }
 }
 
-/// How often one and two standard errors hold the truth, over arms drawn anew: 68.3 and 95.4 % of the estimates of each kind of
-/// rows.
+/// How often one and two standard errors hold the truth, over arms drawn anew: 68.3 and 95.4 % of
+/// the estimates of each kind of rows.
 #[test]
 #[ignore = "a study of some minutes"]
 fn coverage_of_each_kind() {
@@ -72,13 +83,15 @@ fn coverage_of_each_kind() {
         for seed in 1..=60 {
             let (arm, mut truth) = true_arm(&problem, 1000 + seed);
             truth.extend(fixtures());
-            let data = read(&problem, &Bench::new(arm, 2000 + seed).table(kinds, 150 / kinds.len()));
+            let data =
+                read(&problem, &Bench::new(arm, 2000 + seed).table(kinds, 150 / kinds.len()));
             let found = identify(&problem, &data, &Options::default()).unwrap();
             assert!(found.is_trusted(), "{kinds:?}, seed {seed}: {:?}", found.quality_flag);
             all.extend(deviations(&found, &truth).into_iter().map(|own| own.1.abs()));
             chi2.extend(found.reduced_chi2);
         }
-        let within = |sigmas: f64| all.iter().filter(|own| **own < sigmas).count() as f64 / all.len() as f64;
+        let within =
+            |sigmas: f64| all.iter().filter(|own| **own < sigmas).count() as f64 / all.len() as f64;
         let (one, two) = (within(1.0), within(2.0));
         let mean = chi2.iter().sum::<f64>() / chi2.len() as f64;
         println!(
@@ -88,7 +101,10 @@ fn coverage_of_each_kind() {
             100.0 * two
         );
         // Estimates of one arm move together: 60 arms count.
-        assert!((one - 0.683).abs() < 0.05 && (two - 0.954).abs() < 0.025, "{kinds:?}: {one} {two}");
+        assert!(
+            (one - 0.683).abs() < 0.05 && (two - 0.954).abs() < 0.025,
+            "{kinds:?}: {one} {two}"
+        );
         assert!((mean - 1.0).abs() < 0.03, "{kinds:?}: {mean}");
     }
 }
@@ -108,7 +124,9 @@ fn a_point_of_held_out_rows_alone_is_found_on_them() {
             _ => format!("{line},identification"),
         })
         .collect();
-    let found = identify(&problem, &read(&problem, &(marked.join("\n") + "\n")), &Options::default()).unwrap();
+    let found =
+        identify(&problem, &read(&problem, &(marked.join("\n") + "\n")), &Options::default())
+            .unwrap();
     assert!(found.is_trusted(), "{:?}", found.quality_flag);
     assert_eq!((found.fitted.held_out.n, found.fitted.held_out.kind), (30, "point"));
     assert!(found.fitted.held_out.rms.norm < 0.3e-3, "{:?}", found.fitted.held_out);
@@ -122,7 +140,8 @@ fn a_point_of_held_out_rows_alone_is_found_on_them() {
 fn a_point_that_gives_way_is_named() {
     let text = AROUND.replace("{ fraction = 0.2, seed = 1 }", "{ column = \"split\" }");
     let places = [[0.5, -0.5, 0.4], [0.8, 0.0, 0.6]];
-    let points: String = ["near", "soft"].map(|name| format!("[[point]]\nname = \"{name}\"\n")).concat();
+    let points: String =
+        ["near", "soft"].map(|name| format!("[[point]]\nname = \"{name}\"\n")).concat();
     let problem = problem(&text.replace("[data]\n", &format!("{points}[data]\n")));
     let (arm, _) = true_arm(&problem, 6);
     let mut bench = Bench::new(arm, 13);
@@ -142,11 +161,14 @@ fn a_point_that_gives_way_is_named() {
     let found = identify(&problem, &read(&problem, &table), &Options::default()).unwrap();
     let unsteady = PointSpread::unsteady(found.spreads.iter().map(|own| &own.1));
     let [(own, times)] = unsteady.as_slice() else { panic!("{unsteady:?}") };
-    assert!(own.point == "soft" && own.along.y > 0.95 && own.share > 0.9 && *times > 3.0, "{own:?} {times}");
+    assert!(
+        own.point == "soft" && own.along.y > 0.95 && own.share > 0.9 && *times > 3.0,
+        "{own:?} {times}"
+    );
 }
 
-/// Horizontal planes above and below the arm's base, touched with and without offsets; a declared normal that is freed decides the
-/// side.
+/// Horizontal planes above and below the arm's base, touched with and without offsets; a declared
+/// normal that is freed decides the side.
 #[test]
 fn planes_of_either_side_are_found() {
     for (height, up) in [(0.2, 1.0), (0.2, -1.0), (-0.2, 1.0), (-0.2, -1.0)] {
@@ -170,7 +192,8 @@ fn planes_of_either_side_are_found() {
             let found = identify(&problem, &read(&problem, &table), &Options::default()).unwrap();
             let what = format!("{height} m, up {up}, step {step}, declared {declared}");
             assert!(found.is_trusted(), "{what}: {:?}", found.quality_flag);
-            let value = |field: &str| found.estimate(&format!("surface[table].{field}")).unwrap().estimate;
+            let value =
+                |field: &str| found.estimate(&format!("surface[table].{field}")).unwrap().estimate;
             let lean = [value("rx"), value("ry")];
             let own = flexcal::spatial::plane_normal(lean[0], lean[1]);
             assert!(

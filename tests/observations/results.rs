@@ -13,7 +13,12 @@ use crate::bench::{ARM, AROUND, Bench, LINE, problem, read, true_arm};
 /// Runs a command in a folder; what it prints.
 fn run(folder: &Path, command: &str, out: &str, more: &[&str]) -> String {
     let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let assert = flexcal.current_dir(folder).args([command, ".", "--out", out]).args(more).assert().success();
+    let assert = flexcal
+        .current_dir(folder)
+        .args([command, ".", "--out", out])
+        .args(more)
+        .assert()
+        .success();
     String::from_utf8(assert.get_output().stdout.clone()).unwrap()
 }
 
@@ -21,14 +26,16 @@ fn json(folder: &Path, name: &str) -> Value {
     serde_json::from_str(&fs::read_to_string(folder.join(name)).unwrap()).unwrap()
 }
 
-/// Lengths of the residuals of residuals.csv by kind of rows, part of the data and session \[mm\] or \[°\].
+/// Lengths of the residuals of residuals.csv by kind of rows, part of the data and session \[mm\]
+/// or \[°\].
 struct Residuals(Vec<(&'static str, String, String, f64)>);
 
 impl Residuals {
     fn read(folder: &Path, name: &str) -> Self {
         let mut rows = csv::Reader::from_path(folder.join(name)).unwrap();
         let of_row = |row: BTreeMap<String, String>| {
-            let cell = |name: &str| row.get(name).map(String::as_str).unwrap_or_default().to_owned();
+            let cell =
+                |name: &str| row.get(name).map(String::as_str).unwrap_or_default().to_owned();
             let numbers: Vec<f64> = row
                 .iter()
                 .filter(|(name, _)| name.starts_with("residual_"))
@@ -48,10 +55,15 @@ impl Residuals {
         Self(rows.deserialize().map(|row| of_row(row.unwrap())).collect())
     }
 
-    /// The summary `err` is of the rows of `kind` for which `part` holds, given whether they are held out and their session.
+    /// The summary `err` is of the rows of `kind` for which `part` holds, given whether they are
+    /// held out and their session.
     fn agree(&self, err: &Value, kind: &str, part: impl Fn(&str, &str) -> bool, what: &str) {
-        let own: Vec<f64> =
-            self.0.iter().filter(|row| row.0 == kind && part(&row.1, &row.2)).map(|row| row.3).collect();
+        let own: Vec<f64> = self
+            .0
+            .iter()
+            .filter(|row| row.0 == kind && part(&row.1, &row.2))
+            .map(|row| row.3)
+            .collect();
         let n = own.len();
         assert_eq!(err["n"], n, "{what}: {err}");
         assert_eq!(err["kind"].as_str().unwrap_or("position"), kind, "{what}");
@@ -86,7 +98,8 @@ fn error_summaries_are_of_the_rows_own_residuals_and_say_their_kind() {
     ] {
         let folder = tempfile::tempdir().unwrap();
         let folder = folder.path();
-        fs::write(folder.join("problem.toml"), format!("{ARM}{AROUND}files = [\"rows.csv\"]\n")).unwrap();
+        fs::write(folder.join("problem.toml"), format!("{ARM}{AROUND}files = [\"rows.csv\"]\n"))
+            .unwrap();
         let (arm, _) = true_arm(&problem(AROUND), 3);
         // A session B holds every second row, or the tilts alone.
         let session = |(k, line): (usize, &str)| match k {
@@ -95,7 +108,11 @@ fn error_summaries_are_of_the_rows_own_residuals_and_say_their_kind() {
             _ => format!("{line},{}\n", if line.contains("flange") { "B" } else { "A" }),
         };
         let table = Bench::new(arm, 5).table(measured, 120 / measured.len());
-        fs::write(folder.join("rows.csv"), table.lines().enumerate().map(session).collect::<String>()).unwrap();
+        fs::write(
+            folder.join("rows.csv"),
+            table.lines().enumerate().map(session).collect::<String>(),
+        )
+        .unwrap();
 
         let text = [
             run(folder, "identify", "fit", &[]),
@@ -121,13 +138,20 @@ fn error_summaries_are_of_the_rows_own_residuals_and_say_their_kind() {
         assert_eq!(all["held_out_gain_mm"].is_object(), !is_angle);
 
         run(folder, "predict", "there", &["--estimate", "fit/estimate.json"]);
-        let (errors, there) = (json(folder, "there/errors.json"), Residuals::read(folder, "there/residuals.csv"));
+        let (errors, there) =
+            (json(folder, "there/errors.json"), Residuals::read(folder, "there/residuals.csv"));
         there.agree(&errors["all"], kinds[0], |_, _| true, "errors.json");
         for (name, kind) in [("A", kinds[0]), ("B", kinds[kinds.len() - 1])] {
-            there.agree(&errors["sessions"][name], kind, |_, session| session == name, &format!("session {name}"));
+            there.agree(
+                &errors["sessions"][name],
+                kind,
+                |_, session| session == name,
+                &format!("session {name}"),
+            );
         }
 
-        // Several kinds: each in every file; the first in what is printed, with its number and unit.
+        // Several kinds: each in every file; the first in what is printed, with its number and
+        // unit.
         let own = |file: &Value| file["kinds"].as_array().map_or(0, Vec::len);
         let expected = if kinds.len() > 1 { kinds.len() + 1 } else { 0 };
         let known = usize::from(kinds == ["point"]);
@@ -154,16 +178,17 @@ fn error_summaries_are_of_the_rows_own_residuals_and_say_their_kind() {
     }
 }
 
-/// What is measured against something that is not there, or by too little, ends with exit status 2 and where it stands.
+/// What is measured against something that is not there, or by too little, ends with exit status 2
+/// and where it stands.
 #[test]
 fn bad_references_end_with_status_2_and_write_nothing() {
     let q = "0.1,0.2,0.3,0.4,0.5,0.6";
-    let header =
-        "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,point,anchor,distance_mm,surface,frame,tilt_x_deg,tilt_y_deg";
+    let header = "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,point,anchor,distance_mm,surface,frame,tilt_x_deg,tilt_y_deg";
     let contacts: Vec<String> = (0..40).map(|k| format!("0.{k},{},left,,,,,,", &q[4..])).collect();
     let contacts = contacts.join("\n");
     let at = |(name, _): &(&str, [f64; 3])| format!("[[anchor]]\nname = \"{name}\"\n");
-    let around = format!("{}{AROUND}files = [\"rows.csv\"]\n", LINE[2..].iter().map(at).collect::<String>());
+    let around =
+        format!("{}{AROUND}files = [\"rows.csv\"]\n", LINE[2..].iter().map(at).collect::<String>());
     for (cells, words) in [
         (",D,800,,,,", "rows.csv:42: column anchor: no anchor is called \"D\""),
         (",,,wall,,,", "rows.csv:42: column surface: no surface is called \"wall\""),
@@ -173,7 +198,8 @@ fn bad_references_end_with_status_2_and_write_nothing() {
     ] {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("problem.toml"), format!("{ARM}{around}")).unwrap();
-        fs::write(folder.path().join("rows.csv"), format!("{header}\n{contacts}\n{q},{cells}\n")).unwrap();
+        fs::write(folder.path().join("rows.csv"), format!("{header}\n{contacts}\n{q},{cells}\n"))
+            .unwrap();
         for command in ["identify", "loop", "trace", "predict"] {
             // To predict, too few rows leave open where a point is.
             let words = match cells {
@@ -186,7 +212,11 @@ fn bad_references_end_with_status_2_and_write_nothing() {
                 _ => words,
             };
             let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-            let assert = flexcal.current_dir(folder.path()).args([command, ".", "--out", "out"]).assert().code(2);
+            let assert = flexcal
+                .current_dir(folder.path())
+                .args([command, ".", "--out", "out"])
+                .assert()
+                .code(2);
             let error = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
             let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
             assert!(error.contains(words), "{command} {cells}: {error}");
@@ -200,7 +230,8 @@ fn bad_references_end_with_status_2_and_write_nothing() {
 fn a_plan_of_contacts_says_what_to_touch() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    fs::write(folder.join("problem.toml"), format!("{ARM}{AROUND}files = [\"rows.csv\"]\n")).unwrap();
+    fs::write(folder.join("problem.toml"), format!("{ARM}{AROUND}files = [\"rows.csv\"]\n"))
+        .unwrap();
     let (arm, _) = true_arm(&problem(AROUND), 3);
     let table = Bench::new(arm, 5).table(&["point", "distance", "plane", "tilt"], 40);
     fs::write(folder.join("rows.csv"), &table).unwrap();
@@ -211,8 +242,10 @@ fn a_plan_of_contacts_says_what_to_touch() {
     let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
     for row in plan.deserialize::<BTreeMap<String, String>>() {
         let row = row.unwrap();
-        let told: Vec<&str> =
-            ["point", "anchor", "surface", "frame"].into_iter().filter(|kind| !row[*kind].is_empty()).collect();
+        let told: Vec<&str> = ["point", "anchor", "surface", "frame"]
+            .into_iter()
+            .filter(|kind| !row[*kind].is_empty())
+            .collect();
         assert_eq!(told.len(), 1, "{row:?}");
         assert_eq!(row["sigma_mm"].is_empty(), told == ["frame"], "{row:?}");
         *kinds.entry(told[0]).or_default() += 1;
@@ -222,19 +255,32 @@ fn a_plan_of_contacts_says_what_to_touch() {
     // Contacts with a plane are one number each, tilts two.
     let problem = problem(AROUND);
     let rows = read(&problem, &table).measurements;
-    let of_kind = |kind: &str| (0..rows.len()).filter(|&row| rows.observation(row).kind() == kind).collect::<Vec<_>>();
+    let of_kind = |kind: &str| {
+        (0..rows.len()).filter(|&row| rows.observation(row).kind() == kind).collect::<Vec<_>>()
+    };
     for (kind, numbers) in [("surface", 30), ("tilt", 60)] {
         let candidates = Candidates::Rows(Box::new(rows.select(&of_kind(kind))));
         let criterion = Criterion::D;
-        let options = PlanOptions { poses: 30, criterion: &criterion, seed: 1, workspace: None, progress: None };
-        assert_eq!(design::plan(&problem, &candidates, None, &options).unwrap().coordinates, numbers, "{kind}");
+        let options = PlanOptions {
+            poses: 30,
+            criterion: &criterion,
+            seed: 1,
+            workspace: None,
+            progress: None,
+        };
+        assert_eq!(
+            design::plan(&problem, &candidates, None, &options).unwrap().coordinates,
+            numbers,
+            "{kind}"
+        );
     }
 }
 
 /// A problem of the bench in a folder, and so many rows of each of `kinds`.
 fn bench(around: &str, kinds: &[&str], rows: usize) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("problem.toml"), format!("{ARM}{around}files = [\"rows.csv\"]\n")).unwrap();
+    fs::write(folder.path().join("problem.toml"), format!("{ARM}{around}files = [\"rows.csv\"]\n"))
+        .unwrap();
     let (arm, _) = true_arm(&problem(AROUND), 3);
     fs::write(folder.path().join("rows.csv"), Bench::new(arm, 5).table(kinds, rows)).unwrap();
     folder
@@ -245,32 +291,40 @@ fn bench(around: &str, kinds: &[&str], rows: usize) -> tempfile::TempDir {
 fn positions_alone_are_accepted() {
     let folder = bench(AROUND, &["point", "plane", "tilt"], 40);
     let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let refused = flexcal.current_dir(folder.path()).args(["accept", ".", "--out", "out"]).assert().code(2);
+    let refused =
+        flexcal.current_dir(folder.path()).args(["accept", ".", "--out", "out"]).assert().code(2);
     let error = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
     let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(error.contains("problem.toml:") && error.contains("no held-out row measures a position"), "{error}");
+    assert!(
+        error.contains("problem.toml:") && error.contains("no held-out row measures a position"),
+        "{error}"
+    );
     assert!(!folder.path().join("out").exists());
 
     let folder = bench(AROUND, &["position", "plane", "tilt"], 40);
     let folder = folder.path();
     run(folder, "identify", "fit", &[]);
     run(folder, "accept", "signed", &[]);
-    let (estimate, record) = (json(folder, "fit/estimate.json"), json(folder, "signed/acceptance.json"));
+    let (estimate, record) =
+        (json(folder, "fit/estimate.json"), json(folder, "signed/acceptance.json"));
     let kinds = estimate["kinds"].as_array().unwrap();
     let all: u64 = kinds.iter().map(|own| own["identification"]["n"].as_u64().unwrap()).sum();
     assert_eq!(record["identification_rows"], all);
     assert_eq!([&record["poses"], &record["held_out_rows"]], [&estimate["held_out"]["n"]; 2]);
-    let [accepted, fitted] = [&record["after"]["rms_mm"], &estimate["held_out"]["rms_mm"]["norm"]].map(Value::as_f64);
+    let [accepted, fitted] =
+        [&record["after"]["rms_mm"], &estimate["held_out"]["rms_mm"]["norm"]].map(Value::as_f64);
     assert!((accepted.unwrap() / fitted.unwrap() - 1.0).abs() < 1e-9, "{record}");
     let page = fs::read_to_string(folder.join("signed/acceptance.html")).unwrap();
     assert!(page.contains(&format!("Rows that were fitted: {all}.")), "{page}");
 }
 
-/// The geometry that is exported is judged with points, anchors and surfaces where they were found: of an arm that does not give way it
-/// is the whole model, whatever is measured.
+/// The geometry that is exported is judged with points, anchors and surfaces where they were found:
+/// of an arm that does not give way it is the whole model, whatever is measured.
 #[test]
 fn an_exported_geometry_is_judged_by_what_rows_measure() {
-    for kinds in [["point", "plane"], ["distance", "tilt"], ["plane", "distance"], ["tilt", "point"]] {
+    for kinds in
+        [["point", "plane"], ["distance", "tilt"], ["plane", "distance"], ["tilt", "point"]]
+    {
         let folder = bench(AROUND, &kinds, 60);
         let folder = folder.path();
         let fitted = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"))
@@ -304,13 +358,15 @@ fn an_exported_geometry_is_judged_by_what_rows_measure() {
                 "{kinds:?}"
             );
             let unit = if of["rms_deg"].is_object() { "rms_deg" } else { "rms_mm" };
-            let [own, fitted] = [of, &estimate["held_out"]].map(|of| of[unit]["norm"].as_f64().unwrap());
+            let [own, fitted] =
+                [of, &estimate["held_out"]].map(|of| of[unit]["norm"].as_f64().unwrap());
             assert!((own / fitted - 1.0).abs() < 1e-6, "{kinds:?}, {arm}: {own} {fitted}");
         }
     }
 }
 
-/// Sockets of unknown places say nothing of where the base is: targets in the measuring frame are not promised without a word.
+/// Sockets of unknown places say nothing of where the base is: targets in the measuring frame are
+/// not promised without a word.
 #[test]
 fn commands_from_sockets_alone_are_for_the_frame_of_the_base() {
     let around = AROUND.replace("[[anchor]]", "[[anchor]]\nat_m = [1, 1, 1]");
@@ -326,7 +382,16 @@ fn commands_from_sockets_alone_are_for_the_frame_of_the_base() {
         let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
         let output = flexcal
             .current_dir(folder)
-            .args(["compensate", ".", "--estimate", "fit/estimate.json", "--data", "targets.csv", "--frame", frame])
+            .args([
+                "compensate",
+                ".",
+                "--estimate",
+                "fit/estimate.json",
+                "--data",
+                "targets.csv",
+                "--frame",
+                frame,
+            ])
             .output()
             .unwrap();
         let error = String::from_utf8(output.stderr).unwrap();
@@ -335,12 +400,17 @@ fn commands_from_sockets_alone_are_for_the_frame_of_the_base() {
     }
     // What to give comes before what is missing of poses that nobody touches anything in.
     let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let refused = flexcal.current_dir(folder).args(["check", ".", "--poses", "80", "--out", "check"]).assert().code(2);
+    let refused = flexcal
+        .current_dir(folder)
+        .args(["check", ".", "--poses", "80", "--out", "check"])
+        .assert()
+        .code(2);
     let error = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
     assert!(error.contains("write --candidates FILE.csv") || error.contains("min_deg"), "{error}");
 }
 
-/// Lengths and angles have no σ together, rows of one number no axes, and rows without positions no place in figures of positions.
+/// Lengths and angles have no σ together, rows of one number no axes, and rows without positions no
+/// place in figures of positions.
 #[test]
 fn every_kind_is_told_in_its_own_terms() {
     let small = AROUND.replace("0.05", "0.01").replace("0.002", "0.0004");
@@ -352,15 +422,23 @@ fn every_kind_is_told_in_its_own_terms() {
     assert!(told.contains("distance, mm mean rms max") && !told.contains("mean y"), "{told}");
     let estimate = json(folder, "fit/estimate.json");
     let number = |key: &str| estimate[key].as_f64().unwrap();
-    assert!((number("sigma_taken_mm") / 0.01 / number("noise_factor").sqrt() - 1.0).abs() < 1e-6, "{estimate}");
+    assert!(
+        (number("sigma_taken_mm") / 0.01 / number("noise_factor").sqrt() - 1.0).abs() < 1e-6,
+        "{estimate}"
+    );
     let page = fs::read_to_string(folder.join("fit/report.html")).unwrap();
-    assert!(page.contains("no row measures a position") && page.contains("The largest residuals of 60 rows"), "{page}");
+    assert!(
+        page.contains("no row measures a position")
+            && page.contains("The largest residuals of 60 rows"),
+        "{page}"
+    );
     assert!(!folder.join("fit/figures/residual-vectors.svg").exists());
 
     // √3 of the σ of distances, which tilts do not blur.
     let checked = run(folder, "check", "check", &[]);
     let checked = checked.split_whitespace().collect::<Vec<_>>().join(" ");
-    let words = "One position measured with the σ of the distances would have 0.017 mm of noise (rms).";
+    let words =
+        "One position measured with the σ of the distances would have 0.017 mm of noise (rms).";
     assert!(checked.contains(words), "{checked}");
 
     let folder = bench(AROUND, &["point"], 60);
@@ -374,5 +452,8 @@ fn every_kind_is_told_in_its_own_terms() {
 
     // The paper's tables are of positions.
     let compared = run(folder, "compare", "compare", &[]);
-    assert!(!compared.contains("max x") && compared.contains("contacts with points to identify"), "{compared}");
+    assert!(
+        !compared.contains("max x") && compared.contains("contacts with points to identify"),
+        "{compared}"
+    );
 }

@@ -37,7 +37,8 @@ pub fn rows(name: &str) -> Vec<Row> {
     reader.records().map(|record| row(record.unwrap())).collect()
 }
 
-/// The lunar sampler with loads on the rigid arm, every parameter of the arm free and without prior.
+/// The lunar sampler with loads on the rigid arm, every parameter of the arm free and without
+/// prior.
 pub fn problem() -> Problem {
     prepared(golden_problem())
 }
@@ -60,7 +61,9 @@ fn prepared(mut problem: Problem) -> Problem {
 /// A prepared problem without elasticity.
 pub fn rigid(problem: Problem) -> Problem {
     let mut problem = without_elasticity(problem);
-    problem.parameters.retain(|rule| rule.pattern.starts_with("joint") && rule.pattern != "joint*.stiffness");
+    problem
+        .parameters
+        .retain(|rule| rule.pattern.starts_with("joint") && rule.pattern != "joint*.stiffness");
     problem
 }
 
@@ -102,7 +105,12 @@ pub fn both(problem: &Problem) -> [Parameters; 2] {
     [nominal.clone(), Parameters { geometry: table_2(), ..nominal }]
 }
 
-pub fn end(problem: &Problem, parameters: &Parameters, row: &Row, reading: impl Into<Reading>) -> EndPoint {
+pub fn end(
+    problem: &Problem,
+    parameters: &Parameters,
+    row: &Row,
+    reading: impl Into<Reading>,
+) -> EndPoint {
     EndPoint::new(problem, parameters, &row.setup(), &reading.into())
 }
 

@@ -1,9 +1,9 @@
 //! Eq. 3-27: deflections of links and joints, and what they do to the end point.
 
-use flexcal::model::parameter::{BeamField, JointField, Slot};
+use flexcal::model::parameter::{BeamField, JointField, ParameterSite};
 use flexcal::paper::{
-    Chain, Flexibility, Form, LinkTerms, Loads, Misprint, Parameters, Reading, inertial_link_transfer, joint,
-    joint_transfer, link_transfer, transfer,
+    Chain, Flexibility, Form, LinkTerms, Loads, Misprint, Parameters, Reading,
+    inertial_link_transfer, joint, joint_transfer, link_transfer, transfer,
 };
 use nalgebra::{DVector, Matrix4, Vector6};
 
@@ -29,7 +29,8 @@ fn link_b_of_eq_3_to_5_from_forces_resolved_by_hand() {
     let m_4 = 3.6 + payload;
     let (g_r, g_n) = (-m_4 * g * phi_3.sin(), -m_4 * g * phi_3.cos());
     let m_v = -g * (3.6 * 0.13 + payload * 0.22) * phi_4.cos();
-    // Levers along z, from link B's axis: d_4 − 0.06 for the sampler and d_4 − 0.09 for the payload.
+    // Levers along z, from link B's axis: d_4 − 0.06 for the sampler and d_4 − 0.09 for the
+    // payload.
     let lever = (3.6 * -0.16 + payload * -0.19) / m_4;
     let (q_r, q_n) = (-3.1 * g / l * phi_3.sin(), -3.1 * g / l * phi_3.cos());
     let (c_r, c_n, r, r_z) = (-0.85 * g * phi_3.sin(), -0.85 * g * phi_3.cos(), 1.15, 0.11);
@@ -42,7 +43,10 @@ fn link_b_of_eq_3_to_5_from_forces_resolved_by_hand() {
     let f_y1 = q_n * l.powi(4) + 4.0 * (m_v * l * l + c_n * r * r * (l - r));
     near(terms.bend_y.0, f_y1 / 8.0 + (c_n * r.powi(3) + g_n * l.powi(3)) / 3.0 + hoist);
     let hoist = f_n * s * s / 2.0 + m_f * s;
-    near(terms.bend_y.1, q_n * l.powi(3) / 6.0 + (c_n * r * r + g_n * l * l + 2.0 * m_v * l) / 2.0 + hoist);
+    near(
+        terms.bend_y.1,
+        q_n * l.powi(3) / 6.0 + (c_n * r * r + g_n * l * l + 2.0 * m_v * l) / 2.0 + hoist,
+    );
     // What bends towards +z: −M_y, from weights along x with levers along z.
     let (mc_n, m4_n) = (-r_z * c_r, -lever * g_r);
     near(terms.bend_z.0, (mc_n * r * r + m4_n * l * l + 2.0 * mc_n * r * (l - r)) / 2.0);
@@ -50,7 +54,12 @@ fn link_b_of_eq_3_to_5_from_forces_resolved_by_hand() {
     near(terms.twist, -r_z * c_n * r - lever * g_n * l);
 
     let motion = terms.motion(&parameters.links[3], &Form::Corrected.into());
-    let expected = [terms.stretch / 2.6e7, terms.bend_y.0 / 1.5e4, terms.bend_z.0 / 1.5e4, terms.twist / 1.15e4];
+    let expected = [
+        terms.stretch / 2.6e7,
+        terms.bend_y.0 / 1.5e4,
+        terms.bend_z.0 / 1.5e4,
+        terms.twist / 1.15e4,
+    ];
     let slopes = [-terms.bend_z.1 / 1.5e4, terms.bend_y.1 / 1.5e4];
     expected.iter().chain(&slopes).zip(&motion).for_each(|(a, b)| near(*a, *b));
 }
@@ -66,9 +75,13 @@ fn link_a_of_eq_6_and_7_is_eq_4_without_loads_in_between() {
     assert!(link.points.is_empty());
     let terms = LinkTerms::new(link, &Form::Corrected.into());
     let (l, q) = (1.95, link.spread);
-    let (force, moment) = (link.tip.force + link.tip_hoist.force, link.tip.moment + link.tip_hoist.moment);
+    let (force, moment) =
+        (link.tip.force + link.tip_hoist.force, link.tip.moment + link.tip_hoist.moment);
     near(terms.stretch, q.x * l * l / 2.0 + force.x * l);
-    near(terms.bend_y.0, q.y * l.powi(4) / 8.0 + force.y * l.powi(3) / 3.0 + moment.z * l * l / 2.0);
+    near(
+        terms.bend_y.0,
+        q.y * l.powi(4) / 8.0 + force.y * l.powi(3) / 3.0 + moment.z * l * l / 2.0,
+    );
     near(terms.bend_y.1, q.y * l.powi(3) / 6.0 + force.y * l * l / 2.0 + moment.z * l);
     near(terms.bend_z.0, -moment.y * l * l / 2.0);
     near(terms.bend_z.1, -moment.y * l);
@@ -103,7 +116,10 @@ fn torsion_of_eq_8_to_11_with_the_arm_stretched_out() {
     let reading = Reading::default();
     let angle = joint::torsion(1, &joints[1], 1.0 / 5.2e4, &chain.links, &reading);
     near(angle, (joints[1].weights + joints[1].hoists) / 5.2e4);
-    assert_eq!(joint::motion(angle, &chain.links[1], &reading), Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, angle));
+    assert_eq!(
+        joint::motion(angle, &chain.links[1], &reading),
+        Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, angle)
+    );
 }
 
 /// Δ as a 4 × 4 matrix, eq. 5.
@@ -137,7 +153,11 @@ fn transfers_of_eq_12_to_26_are_the_products_of_matrices_they_stand_for() {
         let dt = chain.before[k + 1] * differential(&d) * u;
         same(joint_transfer(&chain, k, &reading) * d, whole_inverse * dt);
         // Eq. 20-22 corrected: dT = T₁ … T_i1 Δ T_i2 … T_n = T Δ_L.
-        let dt = chain.before[k] * chain.links[k].to_tip() * differential(&d) * chain.links[k].from_tip() * u;
+        let dt = chain.before[k]
+            * chain.links[k].to_tip()
+            * differential(&d)
+            * chain.links[k].from_tip()
+            * u;
         same(link_transfer(&chain, k, &reading) * d, whole_inverse * dt);
         // Eq. 21 and 22 as printed are dT = (V Δ V⁻¹) T, eq. 24 in the inertial frame.
         let inertial = differential(&(inertial_link_transfer(&chain, k) * d));
@@ -168,7 +188,10 @@ fn d_f_of_eq_27_agrees_with_the_independent_simulator_only_when_corrected() {
         }
         println!("{form:?}: joints, link A, link B, all: {worst:.5?} mm");
         // What the paper prints of joints is right while β = 0.
-        assert!(worst[0] < 0.003 && worst[1..].iter().all(|worst| if good { *worst < 0.003 } else { *worst > 3.0 }));
+        assert!(
+            worst[0] < 0.003
+                && worst[1..].iter().all(|worst| if good { *worst < 0.003 } else { *worst > 3.0 })
+        );
     }
 }
 
@@ -191,7 +214,9 @@ fn elastic_columns_equal_dual_numbers_in_the_limit_of_small_deflection() {
         let x = DVector::from_iterator(
             model.parameters.len(),
             model.parameters.iter().map(|parameter| match super::arm::place_in_e(parameter) {
-                Some(place) => *geometry[place / 5].clone().fields_mut()[place % 5] - parameter.nominal,
+                Some(place) => {
+                    *geometry[place / 5].clone().fields_mut()[place % 5] - parameter.nominal
+                }
                 None => -soft.ln(),
             }),
         );
@@ -199,9 +224,11 @@ fn elastic_columns_equal_dual_numbers_in_the_limit_of_small_deflection() {
             let dual = dual_jacobian(&model, row, &x);
             let end = end(problem, &parameters, row, Form::Corrected);
             for (parameter, column) in model.parameters.iter().zip(dual.column_iter()) {
-                let which = match parameter.slot {
-                    Slot::Joint { joint, field: JointField::Stiffness } => Flexibility::Joint(joint),
-                    Slot::Beam { joint, field } => match field {
+                let which = match parameter.site {
+                    ParameterSite::Joint { joint, field: JointField::Stiffness } => {
+                        Flexibility::Joint(joint)
+                    }
+                    ParameterSite::Beam { joint, field } => match field {
                         BeamField::Axial => Flexibility::Axial(joint),
                         BeamField::Bending => Flexibility::Bending(joint),
                         BeamField::BendingY => Flexibility::BendingY(joint),
@@ -212,7 +239,8 @@ fn elastic_columns_equal_dual_numbers_in_the_limit_of_small_deflection() {
                     _ => continue,
                 };
                 // ∂p/∂x = −c ∂p/∂c, at c = nominal · soft.
-                let closed = end.displacement(&end.elastic.derivative(which)) * parameters.get(which);
+                let closed =
+                    end.displacement(&end.elastic.derivative(which)) * parameters.get(which);
                 worst = worst.max((closed + column / soft).amax());
             }
         }

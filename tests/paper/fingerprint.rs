@@ -14,7 +14,8 @@ const ERRORS: [[f64; 5]; 4] = [
     [-0.019, 0.016, -0.790, 0.008, 0.005],
 ];
 
-/// What eq. 45 makes of exact positions of the rigid lunar sampler in its 28 poses: errors [α a θ d β] of each joint [° and m].
+/// What eq. 45 makes of exact positions of the rigid lunar sampler in its 28 poses: errors [α a θ d
+/// β] of each joint [° and m].
 fn identified(alpha_2: f64) -> Vec<[f64; 5]> {
     let mut problem = Problem::read(&path("problems/lunar-sampler")).unwrap();
     let (data, _) = Dataset::read(&problem).unwrap();
@@ -32,18 +33,22 @@ fn identified(alpha_2: f64) -> Vec<[f64; 5]> {
         let q = data.measurements.configuration(row);
         q.iter().enumerate().map(|(k, q)| if k > 0 && alpha_2 > 0.0 { -q } else { *q }).collect()
     };
-    let configurations: Vec<Vec<f64>> = data.split.identification.iter().map(|&row| turned(row)).collect();
+    let configurations: Vec<Vec<f64>> =
+        data.split.identification.iter().map(|&row| turned(row)).collect();
     assert_eq!(configurations.len(), 28);
     let measured = |q: &'_ [f64]| Chain::new(&problem, &truth.geometry, q).position();
-    let poses: Vec<Measured> =
-        configurations.iter().map(|q| Measured { setup: PoseView::of(q), position: measured(q) }).collect();
+    let poses: Vec<Measured> = configurations
+        .iter()
+        .map(|q| Measured { setup: PoseView::of(q), position: measured(q) })
+        .collect();
     let options = Options::new(Form::Corrected, StiffnessStage::Nominal);
     let found = identify(&problem, &poses, &options).unwrap();
     assert!(found.iteration.termination.converged() && found.iteration.cost < 1e-18);
     let pairs = found.parameters.geometry.into_iter().zip(nominal.geometry);
     pairs
         .map(|(mut found, mut nominal)| {
-            let (found, nominal) = (found.fields_mut().map(|v| *v), nominal.fields_mut().map(|v| *v));
+            let (found, nominal) =
+                (found.fields_mut().map(|v| *v), nominal.fields_mut().map(|v| *v));
             std::array::from_fn(|k| {
                 let error = found[k] - nominal[k];
                 if k % 2 == 0 { error.to_degrees() } else { error }
@@ -58,10 +63,16 @@ fn equal_errors_of_beta_1_and_theta_2_speak_for_alpha_2_of_minus_90() {
     let down = identified(-90.0);
     println!("α₂ = −90°: Δβ₁ = {:.5}°, Δθ₂ = {:.5}°", down[0][beta], down[1][theta]);
     assert!((down[0][beta] - down[1][theta]).abs() < 1e-3);
-    assert!((down[0][beta] - 0.304).abs() < 1e-3, "their sum is seen, and a step of least length shares it evenly");
+    assert!(
+        (down[0][beta] - 0.304).abs() < 1e-3,
+        "their sum is seen, and a step of least length shares it evenly"
+    );
     let up = identified(90.0);
     println!("α₂ = +90°: Δβ₁ = {:.5}°, Δθ₂ = {:.5}°", up[0][beta], up[1][theta]);
-    assert!((up[0][beta] + up[1][theta]).abs() < 1e-3 && up[0][beta].abs() > 0.1, "their difference is seen");
+    assert!(
+        (up[0][beta] + up[1][theta]).abs() < 1e-3 && up[0][beta].abs() > 0.1,
+        "their difference is seen"
+    );
     // Against it: offsets along parallel axes share as evenly, where table 2 has 16, 5 and 8 mm.
     let d = 3;
     for found in [down, up] {

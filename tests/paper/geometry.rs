@@ -4,7 +4,8 @@ use flexcal::paper::{Chain, Form, Parameters, least_squares};
 use nalgebra::{DMatrix, DVector};
 
 use super::arm::{
-    both, dual_jacobian, end, model, odd_problem, odd_rows, place_in_e, problem, rigid, rows, table_2, table_2_errors,
+    both, dual_jacobian, end, model, odd_problem, odd_rows, place_in_e, problem, rigid, rows,
+    table_2, table_2_errors,
 };
 
 #[test]
@@ -32,12 +33,15 @@ fn j_g_of_eq_31_to_38_equals_dual_numbers() {
         problem
     };
     let rows = rows("rigid.csv");
-    for (problem, rows) in [(sampler, &rows), (at_table_2, &rows), (rigid(odd_problem()), &odd_rows("rigid.csv"))] {
+    for (problem, rows) in
+        [(sampler, &rows), (at_table_2, &rows), (rigid(odd_problem()), &odd_rows("rigid.csv"))]
+    {
         let model = model(&problem);
         let zero = DVector::zeros(model.parameters.len());
         assert_eq!(zero.len(), 5 * problem.joints.len());
         for row in rows {
-            let closed = end(&problem, &Parameters::nominal(&problem), row, Form::Corrected).jacobian();
+            let closed =
+                end(&problem, &Parameters::nominal(&problem), row, Form::Corrected).jacobian();
             let dual = dual_jacobian(&model, row, &zero);
             for (parameter, column) in model.parameters.iter().zip(dual.column_iter()) {
                 worst = worst.max((closed.column(place_in_e(parameter).unwrap()) - column).amax());
@@ -63,15 +67,17 @@ fn error_of_eq_39_to_41_drops_second_order_and_the_coupling() {
             }
             let there = end(&problem, &moved, &row, Form::Corrected);
             // D_End(E') of eq. 40 with the geometry exact, without and with the deflection at E'.
-            let with_old_deflection =
-                there.chain.position() - at_nominal.chain.position() + at_nominal.deflection(&nominal);
+            let with_old_deflection = there.chain.position() - at_nominal.chain.position()
+                + at_nominal.deflection(&nominal);
             let exact = there.position(&moved) - at_nominal.chain.position();
             let first_order = at_nominal.error(&nominal, &(&e * h));
             curvature[k] = curvature[k].max((with_old_deflection - first_order).norm() * 1e3);
             coupling[k] = coupling[k].max((exact - with_old_deflection).norm() * 1e3);
         }
     }
-    println!("eq. 41 at table 2: curvature {curvature:.3?} mm, coupling dropped {coupling:.3?} mm (e and e/2)");
+    println!(
+        "eq. 41 at table 2: curvature {curvature:.3?} mm, coupling dropped {coupling:.3?} mm (e and e/2)"
+    );
     let ratio = |pair: [f64; 2]| pair[0] / pair[1];
     assert!((ratio(curvature) - 4.0).abs() < 0.1, "second order in e");
     assert!((ratio(coupling) - 2.0).abs() < 0.1, "first order in e, times the deflection");
@@ -91,8 +97,14 @@ fn least_squares_of_eq_43_and_44_is_the_pseudo_inverse() {
     let x = least_squares(&twice, &b, 1e-10).unwrap();
     assert!((x[0] - x[3]).abs() < 1e-13 && twice.tr_mul(&(&twice * &x - &b)).amax() < 1e-13);
     assert_eq!(least_squares(&a, &DVector::zeros(8), 0.0), None);
-    assert_eq!(least_squares(&DMatrix::from_element(3, 1, f64::NAN), &DVector::zeros(3), 0.0), None);
-    assert_eq!(least_squares(&DMatrix::zeros(3, 2), &DVector::zeros(3), 0.0), Some(DVector::zeros(2)));
+    assert_eq!(
+        least_squares(&DMatrix::from_element(3, 1, f64::NAN), &DVector::zeros(3), 0.0),
+        None
+    );
+    assert_eq!(
+        least_squares(&DMatrix::zeros(3, 2), &DVector::zeros(3), 0.0),
+        Some(DVector::zeros(2))
+    );
 }
 
 #[test]
@@ -102,13 +114,16 @@ fn the_end_point_of_eq_2_hides_theta_4_and_beta_4() {
         let nominal = Parameters::nominal(problem);
         let rows = rows("rigid.csv");
         let largest = |place: usize| {
-            let norms = rows.iter().map(|row| end(problem, &nominal, row, Form::Corrected).jacobian());
+            let norms =
+                rows.iter().map(|row| end(problem, &nominal, row, Form::Corrected).jacobian());
             norms.map(|jacobian| jacobian.column(place).norm()).fold(0.0, f64::max)
         };
         [largest(17), largest(19)]
     };
     let [theta, beta] = columns(&problem);
-    println!("table 2, joint 4: an offset target moves {theta:.3} m per rad of θ₄ and {beta:.3} m per rad of β₄");
+    println!(
+        "table 2, joint 4: an offset target moves {theta:.3} m per rad of θ₄ and {beta:.3} m per rad of β₄"
+    );
     assert!(theta > 0.2 && beta > 0.2);
     problem.tool.target.fill(0.0);
     assert!(columns(&problem).iter().all(|size| *size < 1e-15));

@@ -3,7 +3,8 @@
 use flexcal::least_squares::solver::Termination;
 use flexcal::mechanics::{Equilibrated, Workspace};
 use flexcal::paper::{
-    Form, Identified, IdentifyError, Measured, Misprint, Options, Parameters, Reading, StiffnessStage, identify,
+    Form, Identified, IdentifyError, Measured, Misprint, Options, Parameters, Reading,
+    StiffnessStage, identify,
 };
 use flexcal::problem::Problem;
 use nalgebra::{DVector, Vector3};
@@ -13,11 +14,20 @@ use super::arm::{Row, end, model, place_in_e, problem, rows, table_2_errors};
 /// Poses fitted; the others judge.
 const FITTED: usize = 28;
 
-/// Positions of the sampler with `part` of the errors of table 2 and stiffnesses multiplied by `stiffness`.
-fn measured<'a>(problem: &Problem, rows: &'a [Row], part: f64, stiffness: f64) -> Vec<Measured<'a>> {
+/// Positions of the sampler with `part` of the errors of table 2 and stiffnesses multiplied by
+/// `stiffness`.
+fn measured<'a>(
+    problem: &Problem,
+    rows: &'a [Row],
+    part: f64,
+    stiffness: f64,
+) -> Vec<Measured<'a>> {
     let model = model(problem);
     let e = table_2_errors(problem);
-    let x = model.parameters.iter().map(|p| place_in_e(p).map_or(stiffness.ln(), |place| part * e[place]));
+    let x = model
+        .parameters
+        .iter()
+        .map(|p| place_in_e(p).map_or(stiffness.ln(), |place| part * e[place]));
     let x = DVector::from_iterator(model.parameters.len(), x);
     let arm = model.arm(|k| x[k]);
     let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
@@ -30,11 +40,16 @@ fn measured<'a>(problem: &Problem, rows: &'a [Row], part: f64, stiffness: f64) -
 }
 
 /// Mean distance [mm] between measured and expected positions.
-fn mean_error(problem: &Problem, rows: &[Row], poses: &[Measured], parameters: &Parameters, reading: Reading) -> f64 {
-    let errors = rows
-        .iter()
-        .zip(poses)
-        .map(|(row, pose)| (pose.position - end(problem, parameters, row, reading).position(parameters)).norm() * 1e3);
+fn mean_error(
+    problem: &Problem,
+    rows: &[Row],
+    poses: &[Measured],
+    parameters: &Parameters,
+    reading: Reading,
+) -> f64 {
+    let errors = rows.iter().zip(poses).map(|(row, pose)| {
+        (pose.position - end(problem, parameters, row, reading).position(parameters)).norm() * 1e3
+    });
     errors.sum::<f64>() / rows.len() as f64
 }
 
@@ -72,7 +87,10 @@ fn stiffness_first_works_where_the_geometry_is_nominal() {
     assert!(error < 0.2 && found.iteration.termination.converged());
     // What is left is of second order: positions bend round corners, D_f does not.
     let (_, error) = case.run(corrected(StiffnessStage::Nominal));
-    assert!((1.0..2.5).contains(&error), "a stiffness known wrongly by a fifth is made up for by geometry, in part");
+    assert!(
+        (1.0..2.5).contains(&error),
+        "a stiffness known wrongly by a fifth is made up for by geometry, in part"
+    );
 }
 
 #[test]
@@ -81,7 +99,9 @@ fn geometry_is_found_with_the_stiffness_known() {
     let case = Case { problem: &problem, rows: &rows, poses: measured(&problem, &rows, 1.0, 1.0) };
     assert!(case.judge(&Parameters::nominal(&problem), Reading::default()) > 40.0);
     let (found, error) = case.run(corrected(StiffnessStage::Nominal));
-    assert!(error < 0.1 && found.iteration.termination.converged() && found.iteration.iterations <= 10);
+    assert!(
+        error < 0.1 && found.iteration.termination.converged() && found.iteration.iterations <= 10
+    );
 }
 
 #[test]
@@ -101,7 +121,8 @@ fn one_sweep_takes_geometric_errors_for_deflection() {
     let (found, error) = case.run(corrected(StiffnessStage::Positions));
     assert!((5.0..15.0).contains(&error));
     let nominal = Parameters::nominal(&problem);
-    let times: Vec<f64> = nominal.flexibilities().iter().map(|&c| found.parameters.get(c) / nominal.get(c)).collect();
+    let times: Vec<f64> =
+        nominal.flexibilities().iter().map(|&c| found.parameters.get(c) / nominal.get(c)).collect();
     println!("flexibilities over nominal {times:.2?}");
     assert!(times.iter().any(|&c| c > 5.0) && times.iter().any(|&c| c < 0.0));
 }
@@ -120,7 +141,11 @@ fn printed_forms_find_the_arm_less_well() {
         let (found, error) = case.run(Options::new(misprint, StiffnessStage::Nominal));
         assert!(error > 0.9 * right);
         let hopeless = [Misprint::GeometricSide, Misprint::EndFrame];
-        assert_eq!(found.iteration.termination.converged(), !hopeless.contains(&misprint), "{misprint:?}");
+        assert_eq!(
+            found.iteration.termination.converged(),
+            !hopeless.contains(&misprint),
+            "{misprint:?}"
+        );
     }
 }
 
@@ -128,12 +153,20 @@ fn printed_forms_find_the_arm_less_well() {
 fn load_differences_find_the_stiffness_beside_geometric_errors() {
     let (problem, rows) = (problem(), rows("equilibrium.csv"));
     // Every pose again under a load that lifts the arm.
-    let lifted = |row: &Row| Row { q: row.q.clone(), payload: 0.0, hoist: row.hoist + 15.0, values: Vec::new() };
+    let lifted = |row: &Row| Row {
+        q: row.q.clone(),
+        payload: 0.0,
+        hoist: row.hoist + 15.0,
+        values: Vec::new(),
+    };
     let again = rows.iter().map(lifted);
     let twice: Vec<Row> = again.collect();
     let poses = measured(&problem, &rows, 1.0, 0.8);
     let both = [&poses[..FITTED], &measured(&problem, &twice[..FITTED], 1.0, 0.8)].concat();
-    let (case, options) = (Case { problem: &problem, rows: &rows, poses }, corrected(StiffnessStage::LoadDifferences));
+    let (case, options) = (
+        Case { problem: &problem, rows: &rows, poses },
+        corrected(StiffnessStage::LoadDifferences),
+    );
     let found = identify(&problem, &both, &options).unwrap();
     let error = case.judge(&found.parameters, options.reading);
     let positions = identify(&problem, &both, &corrected(StiffnessStage::Positions)).unwrap();

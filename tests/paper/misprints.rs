@@ -13,7 +13,8 @@ fn largest(of: impl Iterator<Item = f64>) -> f64 {
 /// Largest change [mm] of `D_f` by one misprint over the golden poses.
 fn elastic(problem: &Problem, parameters: &Parameters, rows: &[Row], misprint: Misprint) -> f64 {
     let size = |row: &Row| {
-        let deflection = |reading: Reading| end(problem, parameters, row, reading).deflection(parameters);
+        let deflection =
+            |reading: Reading| end(problem, parameters, row, reading).deflection(parameters);
         let corrected = Reading::from(Form::Corrected);
         (deflection(corrected.with(misprint, Form::Printed)) - deflection(corrected)).norm() * 1e3
     };
@@ -35,8 +36,9 @@ fn geometric(problem: &Problem, rows: &[Row], misprint: Misprint) -> f64 {
 fn misprints_of_the_elastic_formulas_have_these_sizes() {
     let problem = problem();
     let (rows, [nominal, table_2]) = (rows("first_order.csv"), both(&problem));
-    let whole =
-        largest(rows.iter().map(|row| end(&problem, &nominal, row, Form::Corrected).deflection(&nominal).norm() * 1e3));
+    let whole = largest(rows.iter().map(|row| {
+        end(&problem, &nominal, row, Form::Corrected).deflection(&nominal).norm() * 1e3
+    }));
     println!("largest deflection: {whole:.3} mm");
     // Limits in mm for the nominal geometry, then for that of table 2.
     let limits = [
@@ -53,9 +55,13 @@ fn misprints_of_the_elastic_formulas_have_these_sizes() {
         (Misprint::EndFrame, 90.0..94.0, 92.0..97.0),
     ];
     for (misprint, at_nominal, at_table_2) in limits {
-        let sizes = [&nominal, &table_2].map(|parameters| elastic(&problem, parameters, &rows, misprint));
+        let sizes =
+            [&nominal, &table_2].map(|parameters| elastic(&problem, parameters, &rows, misprint));
         println!("{misprint:?}: {:.5} mm nominal, {:.5} mm table 2", sizes[0], sizes[1]);
-        assert!(at_nominal.contains(&sizes[0]) && at_table_2.contains(&sizes[1]), "{misprint:?} {sizes:?}");
+        assert!(
+            at_nominal.contains(&sizes[0]) && at_table_2.contains(&sizes[1]),
+            "{misprint:?} {sizes:?}"
+        );
     }
 }
 
@@ -65,7 +71,9 @@ fn misprints_of_the_geometric_formulas_have_these_sizes() {
     let rows = rows("rigid.csv");
     let (nominal, e) = (Parameters::nominal(&problem), table_2_errors(&problem));
     let whole =
-        largest(rows.iter().map(|row| (end(&problem, &nominal, row, Form::Corrected).jacobian() * &e).norm() * 1e3));
+        largest(rows.iter().map(|row| {
+            (end(&problem, &nominal, row, Form::Corrected).jacobian() * &e).norm() * 1e3
+        }));
     println!("largest geometric error: {whole:.3} mm");
     let limits = [(Misprint::GeometricSide, 99.0..104.0), (Misprint::EndFrame, 90.0..94.0)];
     for (misprint, limit) in limits {
@@ -75,9 +83,9 @@ fn misprints_of_the_geometric_formulas_have_these_sizes() {
     }
     // What β alone moves at table 2 is what an E_j without β cannot follow by itself.
     let only_beta = e.map_with_location(|k, _, e| if k % 5 == 4 { e } else { 0.0 });
-    let size = largest(
-        rows.iter().map(|row| (end(&problem, &nominal, row, Form::Corrected).jacobian() * &only_beta).norm() * 1e3),
-    );
+    let size = largest(rows.iter().map(|row| {
+        (end(&problem, &nominal, row, Form::Corrected).jacobian() * &only_beta).norm() * 1e3
+    }));
     println!("BetaLeftOut: β of table 2 moves the end point by {size:.5} mm");
     assert!((20.0..21.5).contains(&size));
 }
@@ -108,15 +116,16 @@ fn lengths_of_the_tables_are_metres() {
     let largest = rows("rigid.csv").iter().map(|row| row.values[0].norm()).fold(0.0, f64::max);
     println!("tables 1 and 2: links of {reach:.3} m, not mm; errors of 49 mm need them");
     assert!(reach > 3.7 && largest < reach + 0.7);
-    // Read in mm, the angles of table 2 move the end point by micrometres, not by the 49 mm of table 3.
+    // Read in mm, the angles of table 2 move the end point by micrometres, not by the 49 mm of
+    // table 3.
     let mut small = problem.clone();
     for joint in &mut small.joints {
         (joint.a, joint.d) = (joint.a * 1e-3, joint.d * 1e-3);
     }
     small.tool.target *= 1e-3;
     let nominal = Parameters::nominal(&small);
-    let angles =
-        table_2_errors(&problem).map_with_location(|k, _, e| if [0, 2, 4].contains(&(k % 5)) { e } else { 0.0 });
+    let angles = table_2_errors(&problem)
+        .map_with_location(|k, _, e| if [0, 2, 4].contains(&(k % 5)) { e } else { 0.0 });
     let moved = rows("rigid.csv")
         .iter()
         .map(|row| (end(&small, &nominal, row, Form::Corrected).jacobian() * &angles).norm() * 1e3)
@@ -128,7 +137,10 @@ fn lengths_of_the_tables_are_metres() {
 fn reductions_of_table_3_from_its_own_numbers() {
     let reduction = |before: f64, after: f64| 100.0 * (1.0 - after / before);
     let [max, mean] = [|own: &Published| own.max[3], |own: &Published| own.mean[3]];
-    assert!((reduction(max(&BEFORE), max(&WITH_ELASTICITY)) - 88.68).abs() < 0.005, "the text prints 88.63 %");
+    assert!(
+        (reduction(max(&BEFORE), max(&WITH_ELASTICITY)) - 88.68).abs() < 0.005,
+        "the text prints 88.63 %"
+    );
     assert!((reduction(mean(&BEFORE), mean(&WITH_ELASTICITY)) - 92.16).abs() < 0.005, "as printed");
 }
 

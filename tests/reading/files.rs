@@ -1,4 +1,5 @@
-//! What commands do to files that are there: what they replace, what they leave, and what they read.
+//! What commands do to files that are there: what they replace, what they leave, and what they
+//! read.
 
 #![cfg(unix)]
 use std::ffi::OsStr;
@@ -29,7 +30,8 @@ impl Bench {
         fs::write(bench.path("arm/problem.toml"), ARM).unwrap();
         fs::write(bench.path("arm/TRUTH.toml"), TRUTH).unwrap();
         bench.flexcal(SIMULATE).success();
-        fs::rename(bench.path("made/measurements.csv"), bench.path("arm/measurements.csv")).unwrap();
+        fs::rename(bench.path("made/measurements.csv"), bench.path("arm/measurements.csv"))
+            .unwrap();
         bench
     }
 
@@ -91,16 +93,21 @@ fn what_is_read_is_not_replaced() {
     let simulate = "simulate arm --truth arm/TRUTH.toml --poses 9 --seed 2 --out arm";
     let error = bench.refused(simulate, "arm");
     assert!(
-        error.contains("arm/measurements.csv is an input of this command or belongs to its problem")
+        error
+            .contains("arm/measurements.csv is an input of this command or belongs to its problem")
             && error.contains("--force"),
         "{error}"
     );
     // Under whatever name: a link to the folder, and one to the file.
     symlink(bench.path("arm"), bench.path("other")).unwrap();
-    assert!(bench.refused(&simulate.replace("--out arm", "--out other"), "arm").contains("an input"));
+    assert!(
+        bench.refused(&simulate.replace("--out arm", "--out other"), "arm").contains("an input")
+    );
     fs::create_dir(bench.path("linked")).unwrap();
     symlink("../arm/measurements.csv", bench.path("linked/measurements.csv")).unwrap();
-    assert!(bench.refused(&simulate.replace("--out arm", "--out linked"), "arm").contains("an input"));
+    assert!(
+        bench.refused(&simulate.replace("--out arm", "--out linked"), "arm").contains("an input")
+    );
     // The problem that the loop wrote is one that it reads the next time.
     bench.flexcal("loop arm --out closed");
     let error = bench.refused("loop closed/problem.closed.toml --out closed", "closed");
@@ -117,11 +124,16 @@ fn what_flexcal_did_not_write_is_not_replaced() {
     for name in ["estimate.json", "report.md", "report.html"] {
         fs::write(bench.path("out").join(name), "mine").unwrap();
         let error = bench.refused("identify arm --out out", "out");
-        assert!(error.contains(&format!("out/{name} is there and not as flexcal wrote it")), "{error}");
+        assert!(
+            error.contains(&format!("out/{name} is there and not as flexcal wrote it")),
+            "{error}"
+        );
         fs::remove_file(bench.path("out").join(name)).unwrap();
     }
     // What it wrote it replaces, its own and that of another command, which it says.
-    for (command, said) in [("identify", None), ("identify", None), ("compare", Some("the report of identify"))] {
+    for (command, said) in
+        [("identify", None), ("identify", None), ("compare", Some("the report of identify"))]
+    {
         let done = bench.flexcal(&format!("{command} arm --out out")).success();
         let error = text(&done.get_output().stderr);
         assert_eq!(said.map(|said| error.contains(said)), said.map(|_| true), "{error}");
@@ -130,7 +142,11 @@ fn what_flexcal_did_not_write_is_not_replaced() {
     // Until somebody has worked on it.
     fs::write(bench.path("out/report.md"), bench.read("out/report.md") + "and a remark").unwrap();
     for command in ["identify", "compare", "loop"] {
-        assert!(bench.refused(&format!("{command} arm --out out"), "out").contains("out/report.md is there"));
+        assert!(
+            bench
+                .refused(&format!("{command} arm --out out"), "out")
+                .contains("out/report.md is there")
+        );
     }
     bench.flexcal("identify arm --out out --force").success();
     assert!(!bench.read("out/report.md").contains("remark"));
@@ -144,7 +160,9 @@ fn results_of_an_earlier_table_do_not_stay_beside_those_of_another() {
     let bench = Bench::new();
     fs::write(bench.path("poses.csv"), "q1_deg,q2_deg\n10,20\n").unwrap();
     let there = || {
-        let names = fs::read_dir(bench.path("out")).unwrap().map(|own| own.unwrap().file_name().into_string().unwrap());
+        let names = fs::read_dir(bench.path("out"))
+            .unwrap()
+            .map(|own| own.unwrap().file_name().into_string().unwrap());
         let mut names: Vec<String> = names.filter(|name| !name.starts_with('.')).collect();
         names.sort();
         names
@@ -173,20 +191,24 @@ fn links_are_not_followed() {
     let error = bench.refused("identify arm --out out", ".");
     assert!(error.contains("symbolic link"), "{error}");
     fs::remove_file(bench.path("out/figures")).unwrap();
-    // A result that is a link is not what flexcal wrote; with --force the link goes and what it led to stays.
+    // A result that is a link is not what flexcal wrote; with --force the link goes and what it led
+    // to stays.
     fs::write(bench.path("elsewhere/mine"), "mine").unwrap();
     symlink("../elsewhere/mine", bench.path("out/report.md")).unwrap();
     assert!(bench.refused("identify arm --out out", ".").contains("out/report.md is there"));
     bench.flexcal("identify arm --out out --force").success();
     assert_eq!(bench.read("elsewhere/mine"), "mine");
-    assert!(!bench.path("out/report.md").is_symlink() && bench.read("out/report.md").starts_with("# "));
+    assert!(
+        !bench.path("out/report.md").is_symlink() && bench.read("out/report.md").starts_with("# ")
+    );
 }
 
 #[test]
 fn a_command_that_is_killed_leaves_no_litter() {
     let bench = Bench::new();
     let whole = |folder: &str| -> Vec<String> {
-        let names = |path: &Path| path.strip_prefix(bench.path(folder)).unwrap().display().to_string();
+        let names =
+            |path: &Path| path.strip_prefix(bench.path(folder)).unwrap().display().to_string();
         bench.listing(folder).iter().map(|(path, _)| names(path)).collect()
     };
     bench.flexcal("identify arm --out whole").success();
@@ -200,8 +222,14 @@ fn a_command_that_is_killed_leaves_no_litter() {
         process.wait().unwrap();
         let left = whole("killed");
         // Between the two calls that replace a file it has another name.
-        let is_passing = |name: &String| name.rsplit('/').next().is_some_and(|last| last.starts_with(".flexcal-"));
-        assert!(left.iter().filter(|name| is_passing(name)).count() <= 1, "after {} ms: {left:?}", 4 * delay);
+        let is_passing = |name: &String| {
+            name.rsplit('/').next().is_some_and(|last| last.starts_with(".flexcal-"))
+        };
+        assert!(
+            left.iter().filter(|name| is_passing(name)).count() <= 1,
+            "after {} ms: {left:?}",
+            4 * delay
+        );
         let known = |name: &String| expected.contains(name) || is_passing(name);
         assert!(left.iter().all(known), "after {} ms: {left:?}", 4 * delay);
     }
@@ -221,23 +249,29 @@ fn a_command_that_is_killed_leaves_no_litter() {
 fn pipes_are_read_or_refused_at_once() {
     let bench = Bench::new();
     let table = fs::read(bench.path("arm/measurements.csv")).unwrap();
-    let json =
-        |assert: Assert| -> serde_json::Value { serde_json::from_slice(&assert.code(0).get_output().stdout).unwrap() };
+    let json = |assert: Assert| -> serde_json::Value {
+        serde_json::from_slice(&assert.code(0).get_output().stdout).unwrap()
+    };
     let from_file = json(bench.flexcal("identify arm --json --out a"));
     for name in ["/dev/stdin", "/proc/self/fd/0"] {
         let mut command = bench.command(&format!("identify arm --json --out b --data {name}"));
         let from_pipe = json(command.write_stdin(table.clone()).assert());
         assert_eq!(from_pipe["parameters"], from_file["parameters"], "{name}");
     }
-    let problem =
-        bench.command("identify /dev/stdin --json --out c --data arm/measurements.csv").write_stdin(ARM).assert();
+    let problem = bench
+        .command("identify /dev/stdin --json --out c --data arm/measurements.csv")
+        .write_stdin(ARM)
+        .assert();
     assert_eq!(json(problem)["parameters"], from_file["parameters"]);
     let mut looped = bench.command("loop arm --out d --data /dev/stdin");
     let error = text(&looped.write_stdin(table).assert().code(2).get_output().stderr);
     assert!(error.contains("/dev/stdin: loop names its data in problem.closed.toml"), "{error}");
     assert!(!bench.path("d").exists());
     // A problem from a pipe is closed as well.
-    let closed = bench.command("loop /dev/stdin --out e --data arm/measurements.csv").write_stdin(ARM).assert();
+    let closed = bench
+        .command("loop /dev/stdin --out e --data arm/measurements.csv")
+        .write_stdin(ARM)
+        .assert();
     assert!(closed.get_output().status.code().unwrap() < 2);
     bench.flexcal("identify e/problem.closed.toml --out f").success();
 }
@@ -247,7 +281,9 @@ fn names_need_not_be_utf8() {
     let bench = Bench::new();
     let (data, out) = (OsStr::from_bytes(b"d\xff.csv"), OsStr::from_bytes(b"out\xfe"));
     fs::copy(bench.path("arm/measurements.csv"), bench.path(data)).unwrap();
-    let run = |command: &str| bench.command(command).arg("arm").arg("--data").arg(data).arg("--out").arg(out).assert();
+    let run = |command: &str| {
+        bench.command(command).arg("arm").arg("--data").arg(data).arg("--out").arg(out).assert()
+    };
     run("identify").success();
     assert!(bench.path(out).join("estimate.json").is_file());
     run("identify").success();
@@ -266,40 +302,61 @@ fn the_same_rows_under_two_names_are_said() {
     fs::hard_link(bench.path("arm/measurements.csv"), bench.path("hard.csv")).unwrap();
     for name in ["link.csv", "hard.csv", "./arm/../arm/measurements.csv"] {
         let error = text(
-            &bench.flexcal(&format!("identify arm --data arm/measurements.csv {name}")).code(2).get_output().stderr,
+            &bench
+                .flexcal(&format!("identify arm --data arm/measurements.csv {name}"))
+                .code(2)
+                .get_output()
+                .stderr,
         );
-        assert!(error.contains(&format!("error: {name}: named twice on the command line")), "{error}");
+        assert!(
+            error.contains(&format!("error: {name}: named twice on the command line")),
+            "{error}"
+        );
     }
     // The problem names it too, and is not to blame.
     let twice = "identify arm --data arm/measurements.csv arm/measurements.csv";
     let error = text(&bench.flexcal(twice).code(2).get_output().stderr);
     assert!(
-        error.contains("arm/measurements.csv: named twice on the command line") && !error.contains(".toml"),
+        error.contains("arm/measurements.csv: named twice on the command line")
+            && !error.contains(".toml"),
         "{error}"
     );
-    let said = |data: &str| text(&bench.flexcal(&format!("identify arm --data {data}")).get_output().stderr);
+    let said = |data: &str| {
+        text(&bench.flexcal(&format!("identify arm --data {data}")).get_output().stderr)
+    };
     let error = said("arm/measurements.csv copy.csv");
     assert!(
-        error.contains("copy.csv:2: the same as arm/measurements.csv:2 to the last digit, and 39 further rows"),
+        error.contains(
+            "copy.csv:2: the same as arm/measurements.csv:2 to the last digit, and 39 further rows"
+        ),
         "{error}"
     );
     let rows: Vec<&str> = table.lines().collect();
-    fs::write(bench.path("doubled.csv"), [rows.as_slice(), &rows[7..8]].concat().join("\n")).unwrap();
+    fs::write(bench.path("doubled.csv"), [rows.as_slice(), &rows[7..8]].concat().join("\n"))
+        .unwrap();
     let error = said("doubled.csv");
-    assert!(error.contains("doubled.csv:42: the same as doubled.csv:8 to the last digit;"), "{error}");
+    assert!(
+        error.contains("doubled.csv:42: the same as doubled.csv:8 to the last digit;"),
+        "{error}"
+    );
     assert!(!said("arm/measurements.csv").contains("to the last digit"));
 }
 
 #[test]
 fn a_fraction_holds_out_the_same_rows_in_any_order() {
     let bench = Bench::new();
-    fs::write(bench.path("arm/problem.toml"), format!("{ARM}held_out = {{ fraction = 0.3, seed = 1 }}\n")).unwrap();
+    fs::write(
+        bench.path("arm/problem.toml"),
+        format!("{ARM}held_out = {{ fraction = 0.3, seed = 1 }}\n"),
+    )
+    .unwrap();
     let table = bench.read("arm/measurements.csv");
     let (header, rows) = table.split_once('\n').unwrap();
     let reversed: Vec<&str> = std::iter::once(header).chain(rows.lines().rev()).collect();
     fs::write(bench.path("reversed.csv"), reversed.join("\n")).unwrap();
     let held_out = |data: &str| {
-        let run = bench.flexcal(&format!("identify arm --json --out {data}.out --data {data}")).success();
+        let run =
+            bench.flexcal(&format!("identify arm --json --out {data}.out --data {data}")).success();
         let json: serde_json::Value = serde_json::from_slice(&run.get_output().stdout).unwrap();
         ["mean_mm", "rms_mm", "max_mm"].map(|key| json["held_out"][key]["norm"].as_f64().unwrap())
     };
@@ -311,12 +368,14 @@ fn a_fraction_holds_out_the_same_rows_in_any_order() {
 fn an_estimate_with_a_name_twice_is_refused() {
     let bench = Bench::new();
     bench.flexcal("identify arm --out out").success();
-    let mut json: serde_json::Value = serde_json::from_str(&bench.read("out/estimate.json")).unwrap();
+    let mut json: serde_json::Value =
+        serde_json::from_str(&bench.read("out/estimate.json")).unwrap();
     let parameters = json["parameters"].as_array_mut().unwrap();
     let again = parameters[0].clone();
     parameters.push(again);
     fs::write(bench.path("twice.json"), json.to_string()).unwrap();
-    let error = bench.refused("compensate arm --estimate twice.json --data arm/measurements.csv", ".");
+    let error =
+        bench.refused("compensate arm --estimate twice.json --data arm/measurements.csv", ".");
     assert!(error.contains("twice.json: joint1.theta stands there twice"), "{error}");
 }
 
@@ -338,22 +397,42 @@ fn an_acceptance_is_of_the_files_that_were_read() {
         lines.push(cells.join(","));
     }
     fs::write(bench.path("arm/measurements.csv"), lines.join("\n") + "\n").unwrap();
-    let told = text(&bench.flexcal("accept arm --instrument tracker --out signed").success().get_output().stdout);
+    let told = text(
+        &bench
+            .flexcal("accept arm --instrument tracker --out signed")
+            .success()
+            .get_output()
+            .stdout,
+    );
     assert!(told.contains("pose accuracy AP, mm") && told.contains("acceptance.html"), "{told}");
-    let record: serde_json::Value = serde_json::from_str(&bench.read("signed/acceptance.json")).unwrap();
+    let record: serde_json::Value =
+        serde_json::from_str(&bench.read("signed/acceptance.json")).unwrap();
     for (k, name) in ["arm/problem.toml", "arm/measurements.csv"].into_iter().enumerate() {
         let own = &record["inputs"][k];
         assert!(own["file"].as_str().unwrap().ends_with(name), "{own}");
         assert_eq!(own["sha256"], flexcal::files::digest(&fs::read(bench.path(name)).unwrap()));
     }
-    assert_eq!((&record["instrument"], &record["commit"]), (&"tracker".into(), &serde_json::Value::Null));
+    assert_eq!(
+        (&record["instrument"], &record["commit"]),
+        (&"tracker".into(), &serde_json::Value::Null)
+    );
     // Distances of 0.3, 0 and 0.3 mm from the middle: mean 0.2, spread √0.03.
     assert_eq!(record["repeated_poses"], 1);
-    assert!((record["repeatability_max_mm"].as_f64().unwrap() - (0.2 + 3.0 * 0.03_f64.sqrt())).abs() < 1e-4);
+    assert!(
+        (record["repeatability_max_mm"].as_f64().unwrap() - (0.2 + 3.0 * 0.03_f64.sqrt())).abs()
+            < 1e-4
+    );
     let of = |state: &str, key: &str| record[state][key].as_f64().unwrap();
     let [low, high] = [0, 1].map(|end| record["after"]["interval_95_mm"][end].as_f64().unwrap());
-    assert!(low < of("after", "mean_mm") && of("after", "mean_mm") < high && high < of("before", "mean_mm"));
-    assert!(of("after", "mean_mm") <= of("after", "rms_mm") && of("after", "rms_mm") <= of("after", "max_mm"));
+    assert!(
+        low < of("after", "mean_mm")
+            && of("after", "mean_mm") < high
+            && high < of("before", "mean_mm")
+    );
+    assert!(
+        of("after", "mean_mm") <= of("after", "rms_mm")
+            && of("after", "rms_mm") <= of("after", "max_mm")
+    );
     assert_eq!(record["held_out_rows"].as_u64().unwrap(), record["poses"].as_u64().unwrap() + 2);
     let page = bench.read("signed/acceptance.html");
     for words in [

@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 
 use flexcal::error::{InputError, Warning};
 use flexcal::measurement::{Measurements, Split};
-use flexcal::problem::{Effect, Equilibrium, FreeLength, Freedom, HeldOut, JointKind, Problem, Quantities};
+use flexcal::problem::{
+    Effect, Equilibrium, FreeLength, Freedom, HeldOut, JointKind, Problem, Quantities,
+};
 use nalgebra::Vector3;
 use tempfile::TempDir;
 
@@ -21,7 +23,8 @@ fn parse(text: &str) -> Problem {
 /// Reads tables that are given as texts.
 fn read(problem: &Problem, tables: &[&str]) -> Result<(Measurements, Vec<Warning>), InputError> {
     let folder = TempDir::new().unwrap();
-    let files: Vec<PathBuf> = (1..=tables.len()).map(|number| folder.path().join(format!("{number}.csv"))).collect();
+    let files: Vec<PathBuf> =
+        (1..=tables.len()).map(|number| folder.path().join(format!("{number}.csv"))).collect();
     for (file, table) in files.iter().zip(tables) {
         fs::write(file, table).unwrap();
     }
@@ -87,7 +90,9 @@ fn the_example_of_the_format_is_valid() {
     let problem = parse(&text.replacen("[tool]", "[[joint]]\n[[joint]]\n[tool]", 1));
     assert_eq!(problem.statics.equilibrium, Equilibrium::Deflected);
     assert_eq!(problem.effects[0].effect, Effect::JointHarmonic { joint: 3, orders: vec![1] });
-    let Freedom::Free { sigma, min, max } = &problem.parameters[1].freedom else { panic!("joint*.a is free") };
+    let Freedom::Free { sigma, min, max } = &problem.parameters[1].freedom else {
+        panic!("joint*.a is free")
+    };
     assert_eq!(sigma.length, Some(0.03));
     assert_eq!((min.length, max.length), (Some(-0.05), Some(0.05)));
     assert!(matches!(problem.parameters.last().unwrap().freedom, Freedom::Fixed));
@@ -99,9 +104,16 @@ fn what_is_left_out_has_its_default() {
     assert_eq!(problem.title, "arm");
     assert_eq!(problem.gravity, Vector3::new(0.0, 0.0, -9.80665));
     assert_eq!(problem.statics.beam_elements, 1);
-    assert_eq!((problem.joints[0].name.as_str(), problem.joints[0].kind), ("joint 1", JointKind::Revolute));
+    assert_eq!(
+        (problem.joints[0].name.as_str(), problem.joints[0].kind),
+        ("joint 1", JointKind::Revolute)
+    );
     assert_eq!(problem.tool.target, Vector3::zeros());
-    assert!(problem.parameters.is_empty() && problem.data.files.is_empty() && problem.data.held_out.is_none());
+    assert!(
+        problem.parameters.is_empty()
+            && problem.data.files.is_empty()
+            && problem.data.held_out.is_none()
+    );
 }
 
 #[test]
@@ -117,7 +129,9 @@ fn either_unit_of_a_kind_will_do() {
     assert_eq!(degrees.tool.target, Vector3::new(1e-3, 2e-3, 3e-3));
     assert_eq!(degrees.base.rotation, Vector3::new(0.0, 0.0, 1.5));
     assert_eq!(degrees.data.position_sigma, Some(1e-5));
-    let Freedom::Free { sigma, min, .. } = &degrees.parameters[0].freedom else { panic!("joint* is free") };
+    let Freedom::Free { sigma, min, .. } = &degrees.parameters[0].freedom else {
+        panic!("joint* is free")
+    };
     assert_eq!(*sigma, Quantities { angle: Some(1.0), length: Some(1.0), relative: None });
     assert_eq!(min.length, Some(-1e-3));
 }
@@ -130,8 +144,12 @@ fn rules_say_what_is_free() {
     };
     assert!(matches!(rule("{ fixed = true }"), Freedom::Fixed));
     assert!(matches!(rule("{ free = false }"), Freedom::Fixed));
-    for free in ["{ free = true }", "{ fixed = false }", "{ min_mm = 0, max_mm = 0 }", "{ free = true, sigma_mm = 1 }"]
-    {
+    for free in [
+        "{ free = true }",
+        "{ fixed = false }",
+        "{ min_mm = 0, max_mm = 0 }",
+        "{ free = true, sigma_mm = 1 }",
+    ] {
         assert!(matches!(rule(free), Freedom::Free { .. }), "{free}");
     }
 }
@@ -140,7 +158,10 @@ fn rules_say_what_is_free() {
 fn every_effect_has_its_arguments() {
     let effects = [
         ("joint-compliance = { joint = 1 }", Effect::JointCompliance { joint: 1 }),
-        ("joint-harmonic = { joint = 2, orders = [1, 3] }", Effect::JointHarmonic { joint: 2, orders: vec![1, 3] }),
+        (
+            "joint-harmonic = { joint = 2, orders = [1, 3] }",
+            Effect::JointHarmonic { joint: 2, orders: vec![1, 3] },
+        ),
         ("joint-wave = { joint = 1, order = 7.37 }", Effect::JointWave { joint: 1, order: 7.37 }),
         ("gear-ratio = { joint = 1 }", Effect::GearRatio { joint: 1 }),
         ("backlash = { joint = 1 }", Effect::Backlash { joint: 1 }),
@@ -156,7 +177,10 @@ fn every_effect_has_its_arguments() {
             },
         ),
         ("joint-thermal-drift = { joint = 1 }", Effect::JointThermalDrift { joint: 1 }),
-        ("joint-hysteresis = { joint = 1, distance_rad = 0.5 }", Effect::JointHysteresis { joint: 1, distance: 0.5 }),
+        (
+            "joint-hysteresis = { joint = 1, distance_rad = 0.5 }",
+            Effect::JointHysteresis { joint: 1, distance: 0.5 },
+        ),
         (
             "joint-thermal-drift-lag = { joint = 1, time_constant_s = 90 }",
             Effect::JointThermalDriftLag { joint: 1, time_constant: 90.0 },
@@ -174,7 +198,10 @@ fn every_effect_has_its_arguments() {
         ("slide-bending = { joint = 3 }", Effect::SlideBending { joint: 3 }),
         ("twist-bending = { link = 'A' }", Effect::TwistBending { link: "A".into() }),
         ("link-thermal-bending = { link = 'A' }", Effect::LinkThermalBending { link: "A".into() }),
-        ("link-thermal-expansion = { link = 'A' }", Effect::LinkThermalExpansion { link: "A".into() }),
+        (
+            "link-thermal-expansion = { link = 'A' }",
+            Effect::LinkThermalExpansion { link: "A".into() },
+        ),
         ("unmodelled-mass = { link = 'A' }", Effect::UnmodelledMass { link: "A".into() }),
         ("payload-mass = {}", Effect::PayloadMass),
         ("hoist-force = true", Effect::HoistForce),
@@ -185,7 +212,10 @@ fn every_effect_has_its_arguments() {
         ("tracker-scale = {}", Effect::TrackerScale),
         ("frame-strain = {}", Effect::FrameStrain),
         ("payload-backlash = { joint = 1 }", Effect::PayloadBacklash { joint: 1 }),
-        ("tracker-settling = { time_constant_s = 600 }", Effect::TrackerSettling { time_constant: 600.0 }),
+        (
+            "tracker-settling = { time_constant_s = 600 }",
+            Effect::TrackerSettling { time_constant: 600.0 },
+        ),
         ("tracker-drift = {}", Effect::TrackerDrift),
         ("station-shift = { at_time_s = 60 }", Effect::StationShift { at_time: 60.0 }),
         ("station-move = { at_time_s = 60 }", Effect::StationMove { at_time: 60.0 }),
@@ -197,7 +227,8 @@ fn every_effect_has_its_arguments() {
         tables.concat()
     );
     let problem = parse(&text);
-    let declared: Vec<_> = problem.effects.iter().map(|declaration| declaration.effect.clone()).collect();
+    let declared: Vec<_> =
+        problem.effects.iter().map(|declaration| declaration.effect.clone()).collect();
     assert_eq!(declared, effects.map(|(_, effect)| effect));
     // They are written as they are read.
     let bare = parse(text.split("[[effect]]").next().unwrap());
@@ -205,22 +236,31 @@ fn every_effect_has_its_arguments() {
         assert_eq!(bare.effect(&effect.declaration(), Path::new("again")).unwrap().effect, *effect);
     }
     let alone = bare.with_effect(Effect::JointCompliance { joint: 1 });
-    let compensator = declared.iter().find(|effect| effect.name() == "gravity-compensator").unwrap();
-    assert_eq!(alone.effect(&compensator.declaration(), Path::new("again")).unwrap().effect, *compensator);
-    let error =
-        |problem: &Problem| problem.effect(&compensator.declaration(), Path::new("again")).unwrap_err().to_string();
+    let compensator =
+        declared.iter().find(|effect| effect.name() == "gravity-compensator").unwrap();
+    assert_eq!(
+        alone.effect(&compensator.declaration(), Path::new("again")).unwrap().effect,
+        *compensator
+    );
+    let error = |problem: &Problem| {
+        problem.effect(&compensator.declaration(), Path::new("again")).unwrap_err().to_string()
+    };
     assert!(error(&bare).contains("gives way about the axis of joint 1"), "{}", error(&bare));
     let twice = alone.with_effect(compensator.clone());
     assert!(error(&twice).contains("has a compensator already"), "{}", error(&twice));
 }
 
-const MIXED: &str = "name = 'arm'\n[[joint]]\nkind = 'fixed'\n[[joint]]\n[[joint]]\nkind = 'prismatic'\n";
+const MIXED: &str =
+    "name = 'arm'\n[[joint]]\nkind = 'fixed'\n[[joint]]\n[[joint]]\nkind = 'prismatic'\n";
 
 #[test]
 fn fixed_joints_take_no_column() {
     let problem = parse(MIXED);
     let by_number = read(&problem, &["q2_deg,q3_mm,x_m,y_m,z_m\n90,250,1,2,3\n"]).unwrap().0;
-    let by_order = read(&problem, &["q1_rad,q2_m,x_mm,y_m,z_m\n1.5707963267948966,0.25,1000,2,3\n"]).unwrap().0;
+    let by_order =
+        read(&problem, &["q1_rad,q2_m,x_mm,y_m,z_m\n1.5707963267948966,0.25,1000,2,3\n"])
+            .unwrap()
+            .0;
     for measurements in [by_number, by_order] {
         assert!(close(measurements.configuration(0)[1], FRAC_PI_2));
         assert_eq!(measurements.configuration(0)[2], 0.25);
@@ -247,7 +287,10 @@ fn columns_nobody_knows_are_passed_over_with_a_warning() {
     ];
     assert_eq!(warnings.len(), words.len());
     for (warning, words) in warnings.iter().zip(words) {
-        assert!(warning.contains("1.csv:1: column ") && words.iter().all(|word| warning.contains(word)), "{warning}");
+        assert!(
+            warning.contains("1.csv:1: column ") && words.iter().all(|word| warning.contains(word)),
+            "{warning}"
+        );
     }
 }
 
@@ -263,10 +306,16 @@ fn sessions_and_targets_are_words() {
         (&["C".into(), "D".into()][..], &[0, 1, 0][..])
     );
     let target = measurements.target.as_ref().unwrap();
-    assert_eq!((&*target.names, &*target.of_row), (&["near".into(), "far".into()][..], &[0, 1, 1][..]));
+    assert_eq!(
+        (&*target.names, &*target.of_row),
+        (&["near".into(), "far".into()][..], &[0, 1, 1][..])
+    );
     assert_eq!(measurements.sigma.as_ref().unwrap()[1], 2e-4);
     assert_eq!((measurements.time[2], measurements.time_measured), (2.0, false));
-    assert_eq!(Split::new(&problem, &measurements).unwrap(), Split { identification: vec![0, 2], held_out: vec![1] });
+    assert_eq!(
+        Split::new(&problem, &measurements).unwrap(),
+        Split { identification: vec![0, 2], held_out: vec![1] }
+    );
 }
 
 #[test]
@@ -294,7 +343,9 @@ fn line_ends_marks_and_quotes_do_not_matter() {
 #[test]
 fn a_fraction_keeps_rows_of_one_configuration_together() {
     let problem = |seed: u64| {
-        parse(&format!("name = 'arm'\n[[joint]]\n[data]\nheld_out = {{ fraction = 0.3, seed = {seed} }}\n"))
+        parse(&format!(
+            "name = 'arm'\n[[joint]]\n[data]\nheld_out = {{ fraction = 0.3, seed = {seed} }}\n"
+        ))
     };
     // Four rows of each configuration, apart by less than a hundredth of a degree.
     let angle = |row: i32| f64::from(row % 25) + 0.001 * f64::from(row / 25);
@@ -312,7 +363,8 @@ fn a_fraction_keeps_rows_of_one_configuration_together() {
 
 #[test]
 fn a_fraction_does_not_depend_on_the_order_of_rows() {
-    let problem = parse("name = 'arm'\n[[joint]]\n[data]\nheld_out = { fraction = 0.3, seed = 1 }\n");
+    let problem =
+        parse("name = 'arm'\n[[joint]]\n[data]\nheld_out = { fraction = 0.3, seed = 1 }\n");
     for columns in ["", ",pose", ",time_s", ",session"] {
         let row = |k: i32| match columns {
             "" => format!("{},{k},0,0\n", k / 2),
@@ -321,9 +373,11 @@ fn a_fraction_does_not_depend_on_the_order_of_rows() {
         };
         let held_out = |order: &dyn Fn(i32) -> i32| {
             let rows: String = (0..101).map(|k| row(order(k))).collect();
-            let measurements = read(&problem, &[&format!("q1_deg,x_m,y_m,z_m{columns}\n{rows}")]).unwrap().0;
+            let measurements =
+                read(&problem, &[&format!("q1_deg,x_m,y_m,z_m{columns}\n{rows}")]).unwrap().0;
             let rows = Split::new(&problem, &measurements).unwrap().held_out;
-            let mut positions: Vec<f64> = rows.iter().map(|&row| measurements.positions[row].x).collect();
+            let mut positions: Vec<f64> =
+                rows.iter().map(|&row| measurements.positions[row].x).collect();
             positions.sort_by(f64::total_cmp);
             positions
         };
@@ -370,7 +424,11 @@ fn rows_of_one_configuration_stay_together_across_rounding() {
     let split = Split::new(&problem, &rows).unwrap();
     assert_eq!(split.held_out.len(), 40);
     for pair in 0..40 {
-        assert_eq!(split.held_out.contains(&(2 * pair)), split.held_out.contains(&(2 * pair + 1)), "pair {pair}");
+        assert_eq!(
+            split.held_out.contains(&(2 * pair)),
+            split.held_out.contains(&(2 * pair + 1)),
+            "pair {pair}"
+        );
     }
 }
 
@@ -396,7 +454,8 @@ fn readings_stand_beside_commands_and_nests_apart() {
     assert!(read(&readings, &[alone]).unwrap().0.by_other_joints().is_none());
     let error = read(&commanded, &[alone]).unwrap_err().to_string();
     assert!(error.contains("column q1: missing; add q1_deg or q1_rad"), "{error}");
-    let error = read(&readings, &["q1_deg,q2_deg,x_m,y_m,z_m\n1,2,3,4,5\n"]).unwrap_err().to_string();
+    let error =
+        read(&readings, &["q1_deg,q2_deg,x_m,y_m,z_m\n1,2,3,4,5\n"]).unwrap_err().to_string();
     assert!(error.contains("column q1_read: missing; add q1_read_deg or q1_read_rad"), "{error}");
     assert!(read(&commanded, &["q1_deg,q2_deg,q1_read_mm,x_m,y_m,z_m\n1,2,3,4,5,6\n"]).is_err());
 }

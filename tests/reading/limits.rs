@@ -1,4 +1,5 @@
-//! Inputs that no arm has: too large, too many, too long. Each ends at once with status 2 and says so.
+//! Inputs that no arm has: too large, too many, too long. Each ends at once with status 2 and says
+//! so.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -34,7 +35,8 @@ impl Bench {
     fn run(&self, arguments: &str) -> (i32, String) {
         let clock = Instant::now();
         let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        let output = command.current_dir(self.0.path()).args(arguments.split(' ')).output().unwrap();
+        let output =
+            command.current_dir(self.0.path()).args(arguments.split(' ')).output().unwrap();
         assert!(clock.elapsed() < PATIENCE, "{arguments}: {:?}", clock.elapsed());
         let said = String::from_utf8(output.stderr).unwrap();
         assert!(!said.contains("panicked"), "{arguments}: {said}");
@@ -50,7 +52,11 @@ fn tables_beyond_any_size() {
         let mut rows = table.lines();
         let more = (0..columns).map(|k| format!(",extra{k}")).collect::<Vec<_>>().concat();
         let header = format!("{}{more}\n", rows.next().unwrap());
-        header + &rows.map(|row| format!("{row}{}\n", ",1".repeat(columns))).collect::<Vec<_>>().concat()
+        header
+            + &rows
+                .map(|row| format!("{row}{}\n", ",1".repeat(columns)))
+                .collect::<Vec<_>>()
+                .concat()
     };
     let cases: [(&str, String, i32, &str); 6] = [
         ("wide", widened(9900), 0, "column extra9899: not a column that is known"),
@@ -62,13 +68,26 @@ fn tables_beyond_any_size() {
             "long-name.csv:1: the line is longer than 1024 KiB",
         ),
         ("no-line", "1,".repeat(30_000_000), 2, "no-line.csv:1: the line is longer than 1024 KiB"),
-        ("quote", format!("{}\"{}", table, "1,\n".repeat(3_000_000)), 2, "quote.csv:80: the line is longer"),
-        ("near", format!("{},{}\n1\n", "q1".repeat(200_000), "p1".repeat(200_000)), 2, "column q1: missing"),
+        (
+            "quote",
+            format!("{}\"{}", table, "1,\n".repeat(3_000_000)),
+            2,
+            "quote.csv:80: the line is longer",
+        ),
+        (
+            "near",
+            format!("{},{}\n1\n", "q1".repeat(200_000), "p1".repeat(200_000)),
+            2,
+            "column q1: missing",
+        ),
     ];
     for (name, text, status, said) in cases {
         fs::write(bench.path(&format!("{name}.csv")), text).unwrap();
         let (found, message) = bench.run(&format!("identify . --data {name}.csv"));
-        assert!(found == status && message.contains(said), "{name}: status {found}, {message:.2000}");
+        assert!(
+            found == status && message.contains(said),
+            "{name}: status {found}, {message:.2000}"
+        );
     }
     #[cfg(unix)]
     for arguments in ["identify . --data /dev/zero", "identify /dev/zero"] {
@@ -81,17 +100,27 @@ fn problems_beyond_any_size() {
     let bench = Bench::new();
     let joint = "[[joint]]\n";
     let arm = "name = 'arm'\n[[joint]]\n";
-    let effects =
-        (1..=500).map(|k| format!("[[effect]]\nstation-shift = {{ at_time_s = {k} }}\n")).collect::<Vec<_>>().concat();
+    let effects = (1..=500)
+        .map(|k| format!("[[effect]]\nstation-shift = {{ at_time_s = {k} }}\n"))
+        .collect::<Vec<_>>()
+        .concat();
     let orders: Vec<String> = (1..=1000).map(|k| k.to_string()).collect();
-    let rules =
-        (0..3000).map(|k| format!("'joint1.a{}' = {{ free = true }}\n", "*".repeat(k))).collect::<Vec<_>>().concat();
+    let rules = (0..3000)
+        .map(|k| format!("'joint1.a{}' = {{ free = true }}\n", "*".repeat(k)))
+        .collect::<Vec<_>>()
+        .concat();
     let cases = [
-        (format!("name = 'arm'\n{}", joint.repeat(300_000)), "problem.toml:2: joint: 300000 tables; at most 100"),
+        (
+            format!("name = 'arm'\n{}", joint.repeat(300_000)),
+            "problem.toml:2: joint: 300000 tables; at most 100",
+        ),
         (format!("name = 'arm'\n{}", joint.repeat(1_000_000)), "problem.toml: larger than 4 MiB"),
         (format!("{arm}{effects}"), "problem.toml:3: effect: 500 tables; at most 100"),
         (
-            format!("{arm}[[effect]]\njoint-harmonic = {{ joint = 1, orders = [{}] }}\n", orders.join(", ")),
+            format!(
+                "{arm}[[effect]]\njoint-harmonic = {{ joint = 1, orders = [{}] }}\n",
+                orders.join(", ")
+            ),
             "problem.toml:4: effect[1].joint-harmonic.orders: 1000 orders; at most 100",
         ),
         (format!("{arm}[parameters]\n{}", &rules[..2_400_000]), "problem.toml:"),
@@ -131,7 +160,10 @@ fn a_coordinate_beyond_all_measure_is_no_panic() {
         fs::write(bench.path("huge.csv"), rows.collect::<String>()).unwrap();
         for command in ["identify", "trace", "loop", "compare"] {
             let (status, message) = bench.run(&format!("{command} . --data huge.csv --out out"));
-            assert!(statuses.contains(&status), "{command} with {value}: status {status}, {message}");
+            assert!(
+                statuses.contains(&status),
+                "{command} with {value}: status {status}, {message}"
+            );
             let named = format!("huge.csv:{}: column x_mm: {value} is larger than 1e150", line + 1);
             assert!(status == 1 || message.contains(&named), "{message}");
             assert!(!message.contains("inf ") && !message.contains("NaN"), "{message}");

@@ -6,8 +6,10 @@ use std::path::PathBuf;
 use assert_cmd::Command;
 use flexcal::error::is_hidden;
 
-/// Escape sequences in both widths, a bell, a line break, a mark of writing direction, a tag, no character at all.
-const HIDDEN: [&str; 8] = ["\u{1b}[2J", "\u{9b}31m", "\u{7}", "\n", "\u{202e}", "\u{200f}", "\u{e0041}", "\u{ffff}"];
+/// Escape sequences in both widths, a bell, a line break, a mark of writing direction, a tag, no
+/// character at all.
+const HIDDEN: [&str; 8] =
+    ["\u{1b}[2J", "\u{9b}31m", "\u{7}", "\n", "\u{202e}", "\u{200f}", "\u{e0041}", "\u{ffff}"];
 
 /// Names that can be seen and would do something in Markdown, HTML or SVG.
 const ACTIVE: [&str; 8] = [
@@ -41,11 +43,13 @@ impl Bench {
         let row = |k: i32| {
             let (one, other) = (f64::from(k * 37 % 180), f64::from(k * 71 % 120 - 60));
             let (a, b) = (one.to_radians(), (one + other).to_radians());
-            let (x, y) = (400.0 + 301.0 * a.cos() + 500.0 * b.cos(), 301.0 * a.sin() + 500.0 * b.sin());
+            let (x, y) =
+                (400.0 + 301.0 * a.cos() + 500.0 * b.cos(), 301.0 * a.sin() + 500.0 * b.sin());
             let split = if k % 3 == 0 { "validation" } else { "identification" };
             format!("{one},{other},{x:.3},{y:.3},{}.0,{name},{name},{split}\n", k % 2)
         };
-        fs::write(bench.path("rows.csv"), TABLE.to_owned() + &(0..30).map(row).collect::<String>()).unwrap();
+        fs::write(bench.path("rows.csv"), TABLE.to_owned() + &(0..30).map(row).collect::<String>())
+            .unwrap();
         bench
     }
 
@@ -56,7 +60,8 @@ impl Bench {
     /// Status and everything that is printed.
     fn run(&self, arguments: &str) -> (i32, String) {
         let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        let output = command.current_dir(self.0.path()).args(arguments.split(' ')).output().unwrap();
+        let output =
+            command.current_dir(self.0.path()).args(arguments.split(' ')).output().unwrap();
         let printed = [output.stdout, output.stderr].concat();
         (output.status.code().unwrap(), String::from_utf8(printed).unwrap())
     }
@@ -65,7 +70,8 @@ impl Bench {
 #[test]
 fn what_is_not_seen_is_refused_by_name_and_never_printed() {
     for hidden in HIDDEN {
-        let (name, code) = (format!("A{hidden}B"), format!("U+{:04X}", u32::from(hidden.chars().next().unwrap())));
+        let (name, code) =
+            (format!("A{hidden}B"), format!("U+{:04X}", u32::from(hidden.chars().next().unwrap())));
         for (bench, place) in [
             (Bench::new(&name, "A"), "problem.toml:2: title: "),
             (Bench::new("arm", &name), "rows.csv:2: column session: "),
@@ -81,22 +87,38 @@ fn what_is_not_seen_is_refused_by_name_and_never_printed() {
             }
         }
     }
-    // Where the name is one of a file, a key, a column or a word that is wrong in itself, it is shown without what is hidden.
+    // Where the name is one of a file, a key, a column or a word that is wrong in itself, it is
+    // shown without what is hidden.
     let bench = Bench::new("arm", "A");
     for hidden in HIDDEN.iter().filter(|hidden| **hidden != "\n") {
         let (key, column) = (format!("k{hidden}k"), format!("c{hidden}c"));
         let problem = fs::read_to_string(bench.path("problem.toml")).unwrap();
         let quoted = toml::Value::String(key).to_string();
-        fs::write(bench.path("wrong.toml"), problem.replace("[tool]", &format!("[tool]\n{quoted} = 1"))).unwrap();
+        fs::write(
+            bench.path("wrong.toml"),
+            problem.replace("[tool]", &format!("[tool]\n{quoted} = 1")),
+        )
+        .unwrap();
         let table = fs::read_to_string(bench.path("rows.csv")).unwrap();
-        fs::write(bench.path(&format!("{column}.csv")), table.replacen("split", &format!("split,{column}"), 1))
-            .unwrap();
-        for arguments in
-            ["identify wrong.toml".to_owned(), format!("identify . --data {column}.csv"), format!("identify {column}")]
-        {
+        fs::write(
+            bench.path(&format!("{column}.csv")),
+            table.replacen("split", &format!("split,{column}"), 1),
+        )
+        .unwrap();
+        for arguments in [
+            "identify wrong.toml".to_owned(),
+            format!("identify . --data {column}.csv"),
+            format!("identify {column}"),
+        ] {
             let (status, printed) = bench.run(&arguments);
-            assert!(status == 2 && printed.contains("error: "), "{arguments:?}: {status} {printed:?}");
-            assert!(printed.chars().all(|own| own == '\n' || !is_hidden(own)), "{arguments:?}: {printed:?}");
+            assert!(
+                status == 2 && printed.contains("error: "),
+                "{arguments:?}: {status} {printed:?}"
+            );
+            assert!(
+                printed.chars().all(|own| own == '\n' || !is_hidden(own)),
+                "{arguments:?}: {printed:?}"
+            );
         }
     }
 }
@@ -146,7 +168,9 @@ fn ill_formed(text: &str) -> Option<String> {
     let mut rest = text;
     while let Some((before, after)) = rest.split_once('<') {
         if let Some((_, entity)) = before.split_once('&')
-            && !["lt;", "gt;", "amp;", "quot;", "apos;", "#"].iter().any(|known| entity.starts_with(known))
+            && !["lt;", "gt;", "amp;", "quot;", "apos;", "#"]
+                .iter()
+                .any(|known| entity.starts_with(known))
         {
             return Some(format!("&{entity}"));
         }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use flexcal::problem::{Effect, PoseConditions, Problem};
-use flexcal::simulate::{Cause, Rig, TrueEffect};
+use flexcal::rig::{Cause, Rig, TrueEffect};
 use nalgebra::Vector3;
 
 pub const ROOT: &str = env!("CARGO_MANIFEST_DIR");
@@ -21,7 +21,11 @@ pub fn effect(arm: &Problem, effect: Effect, values: &[f64]) -> TrueEffect {
     TrueEffect::new(Cause::Catalogued(effect), values, &arm.joints).unwrap()
 }
 
-pub fn position(arm: &Problem, effects: Vec<TrueEffect>, conditions: &PoseConditions) -> Vector3<f64> {
+pub fn position(
+    arm: &Problem,
+    effects: Vec<TrueEffect>,
+    conditions: &PoseConditions,
+) -> Vector3<f64> {
     Rig::new(arm.clone(), effects).position(conditions).unwrap()
 }
 
@@ -39,7 +43,8 @@ impl Golden {
 }
 
 pub fn golden(name: &str) -> Vec<Golden> {
-    let mut reader = csv::Reader::from_path(Path::new(ROOT).join("tests/golden").join(name)).unwrap();
+    let mut reader =
+        csv::Reader::from_path(Path::new(ROOT).join("tests/golden").join(name)).unwrap();
     let row = |record: Result<csv::StringRecord, _>| {
         let v: Vec<f64> = record.unwrap().iter().map(|cell| cell.parse().unwrap()).collect();
         let conditions = PoseConditions {
@@ -64,7 +69,8 @@ const TABLE_2: [[f64; 5]; 4] = [
 pub fn table_2() -> Problem {
     let mut arm = lunar_sampler();
     for (joint, [alpha, a, theta, d, beta]) in arm.joints.iter_mut().zip(TABLE_2) {
-        (joint.alpha, joint.theta, joint.beta) = (alpha.to_radians(), theta.to_radians(), beta.to_radians());
+        (joint.alpha, joint.theta, joint.beta) =
+            (alpha.to_radians(), theta.to_radians(), beta.to_radians());
         (joint.a, joint.d) = (a, d);
     }
     arm
@@ -72,7 +78,9 @@ pub fn table_2() -> Problem {
 
 /// The arm with every joint and beam stiffer by a factor; 0 makes it rigid.
 pub fn stiffer(mut arm: Problem, joints: f64, link_a: f64, link_b: f64) -> Problem {
-    let by = |factor: f64, value: Option<f64>| value.map(|value| value * factor).filter(|value| *value > 0.0);
+    let by = |factor: f64, value: Option<f64>| {
+        value.map(|value| value * factor).filter(|value| *value > 0.0)
+    };
     for joint in &mut arm.joints {
         joint.stiffness = by(joints, joint.stiffness);
         if let Some(beam) = &mut joint.beam {

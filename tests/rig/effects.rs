@@ -1,7 +1,7 @@
 //! Every effect is inert at zero, moves positions when it is not, and does what its law says.
 
 use flexcal::problem::{Effect, PoseConditions, Problem};
-use flexcal::simulate::{Cause, Shape, TrueEffect};
+use flexcal::rig::{Cause, Shape, TrueEffect};
 use nalgebra::Vector3;
 
 use super::bench::{effect, golden, lunar_sampler, position};
@@ -20,7 +20,10 @@ fn bench() -> (Problem, PoseConditions) {
 
 /// Every effect of the catalogue with a strength, but one: the rig is always in equilibrium.
 fn catalogue() -> Vec<Strong> {
-    of_lunar_sampler().into_iter().filter(|(effect, _)| *effect != Effect::DeflectedEquilibrium).collect()
+    of_lunar_sampler()
+        .into_iter()
+        .filter(|(effect, _)| *effect != Effect::DeflectedEquilibrium)
+        .collect()
 }
 
 #[test]
@@ -30,7 +33,9 @@ fn every_effect_is_inert_at_zero_and_moves_positions_when_it_is_not() {
     for (cause, strength) in catalogue() {
         let zero = effect(&arm, cause.clone(), &vec![0.0; strength.len()]);
         assert!((position(&arm, vec![zero], &conditions) - without).norm() < 1e-15, "{cause:?}");
-        let moved = (position(&arm, vec![effect(&arm, cause.clone(), &strength)], &conditions) - without).norm();
+        let moved = (position(&arm, vec![effect(&arm, cause.clone(), &strength)], &conditions)
+            - without)
+            .norm();
         println!("{:6.3} mm  {cause:?}", moved * 1e3);
         assert!(moved > 1e-5, "{cause:?} moves the target by {moved} m");
         // Each value matters by itself.
@@ -43,7 +48,9 @@ fn every_effect_is_inert_at_zero_and_moves_positions_when_it_is_not() {
             if matches!(cause, Effect::UnmodelledMass { .. }) {
                 alone[1] = strength[1];
             }
-            let moved = (position(&arm, vec![effect(&arm, cause.clone(), &alone)], &conditions) - without).norm();
+            let moved = (position(&arm, vec![effect(&arm, cause.clone(), &alone)], &conditions)
+                - without)
+                .norm();
             assert!(moved > 1e-7, "value {k} of {cause:?} moves the target by {moved} m");
         }
     }
@@ -81,7 +88,9 @@ fn errors_of_a_joint_are_errors_of_its_angle() {
     check(
         &Effect::JointHarmonic { joint: 2, orders: vec![1, 3] },
         &[1e-4, 2e-4, 3e-4, 4e-4],
-        turn(2, |q| 1e-4 * q.sin() + 2e-4 * q.cos() + 3e-4 * (3.0 * q).sin() + 4e-4 * (3.0 * q).cos()),
+        turn(2, |q| {
+            1e-4 * q.sin() + 2e-4 * q.cos() + 3e-4 * (3.0 * q).sin() + 4e-4 * (3.0 * q).cos()
+        }),
     );
     check(&Effect::Backlash { joint: 2 }, &[6e-4], turn(2, |_| -3e-4));
     check(&Effect::JointThermalDrift { joint: 1 }, &[1e-5], turn(1, |_| 8e-5));
@@ -91,10 +100,13 @@ fn errors_of_a_joint_are_errors_of_its_angle() {
     let (arm, conditions) = bench();
     for (shape, error) in [(Shape::Bump, (-0.5_f64 * 0.25).exp()), (Shape::Step, 0.5_f64.tanh())] {
         let centre = conditions.configuration[1] - 0.1;
-        let outside = TrueEffect::new(Cause::Outside { joint: 2, shape }, &[1e-3, centre, 0.2], &arm.joints).unwrap();
+        let outside =
+            TrueEffect::new(Cause::Outside { joint: 2, shape }, &[1e-3, centre, 0.2], &arm.joints)
+                .unwrap();
         let mut set = conditions.clone();
         set.configuration[1] += 1e-3 * error;
-        let difference = position(&arm, vec![outside], &conditions) - position(&arm, Vec::new(), &set);
+        let difference =
+            position(&arm, vec![outside], &conditions) - position(&arm, Vec::new(), &set);
         assert!(difference.norm() < 1e-11);
     }
 }
@@ -140,8 +152,10 @@ fn effects_on_loads_are_other_loads() {
 #[test]
 fn the_rope_of_a_trolley_leans_with_its_hook() {
     let (arm, conditions) = bench();
-    let trolley = position(&arm, vec![effect(&arm, Effect::HoistDirection, &[0.0, 0.0, 0.03])], &conditions);
-    // Lean the rope by hand, from where the straight arm holds the hook: 30 mm of deflection change it by 0.001.
+    let trolley =
+        position(&arm, vec![effect(&arm, Effect::HoistDirection, &[0.0, 0.0, 0.03])], &conditions);
+    // Lean the rope by hand, from where the straight arm holds the hook: 30 mm of deflection change
+    // it by 0.001.
     let stiff = super::bench::stiffer(arm.clone(), 0.0, 0.0, 0.0);
     let mut hook = stiff.clone();
     hook.joints[3].theta = -conditions.configuration[3];
@@ -159,6 +173,7 @@ fn without_approaches_backlash_follows_the_moment() {
     let (arm, mut conditions) = bench();
     conditions.approach = None;
     let without = position(&arm, Vec::new(), &conditions);
-    let with = position(&arm, vec![effect(&arm, Effect::Backlash { joint: 2 }, &[1e-3])], &conditions);
+    let with =
+        position(&arm, vec![effect(&arm, Effect::Backlash { joint: 2 }, &[1e-3])], &conditions);
     assert!(with.z < without.z - 1e-4, "the shoulder drops into its play");
 }

@@ -3,13 +3,14 @@
 use std::time::Instant;
 
 use flexcal::problem::Problem;
-use flexcal::simulate::Rig;
+use flexcal::rig::Rig;
 
 use super::bench::{Golden, golden, lunar_sampler, position, stiffer, table_2};
 
 /// Largest distance [mm] from vector `k` of the rows.
 fn worst(arm: &Problem, rows: &[Golden], k: usize) -> f64 {
-    let distance = |row: &Golden| (position(arm, Vec::new(), &row.conditions) - row.vector(k)).norm() * 1e3;
+    let distance =
+        |row: &Golden| (position(arm, Vec::new(), &row.conditions) - row.vector(k)).norm() * 1e3;
     rows.iter().map(distance).fold(0.0, f64::max)
 }
 
@@ -26,7 +27,8 @@ fn rigid_positions_agree_to_a_nanometre() {
 fn small_displacements_agree_for_each_part() {
     let rows = golden("first_order.csv");
     let straight = stiffer(lunar_sampler(), 0.0, 0.0, 0.0);
-    // Deflections ten thousand times smaller are in the linear limit; scaled back they keep eleven digits.
+    // Deflections ten thousand times smaller are in the linear limit; scaled back they keep eleven
+    // digits.
     let scale = 1e4;
     let parts = [
         ("joints", [scale, 0.0, 0.0]),
@@ -58,7 +60,10 @@ fn equilibrium_positions_agree() {
 fn the_error_falls_with_the_square_of_the_number_of_segments() {
     let rows = golden("equilibrium.csv");
     let at = |segments: usize, row: &Golden| {
-        Rig::new(lunar_sampler(), Vec::new()).with_segments(segments).position(&row.conditions).unwrap()
+        Rig::new(lunar_sampler(), Vec::new())
+            .with_segments(segments)
+            .position(&row.conditions)
+            .unwrap()
     };
     let error = |segments| {
         let distance = |row: &Golden| (at(segments, row) - at(256, row)).norm() * 1e3;

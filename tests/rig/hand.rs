@@ -29,7 +29,11 @@ fn rigid() -> Problem {
 }
 
 fn at(payload: f64) -> PoseConditions {
-    PoseConditions { configuration: vec![0.0; 2], payload: Some(payload), ..PoseConditions::default() }
+    PoseConditions {
+        configuration: vec![0.0; 2],
+        payload: Some(payload),
+        ..PoseConditions::default()
+    }
 }
 
 fn near(is: f64, expected: f64, relative: f64) {
@@ -95,7 +99,7 @@ fn a_hanging_soft_joint_comes_to_rest_and_a_column_that_buckles_does_not() {
     let angle = end.z.atan2(end.x);
     near(angle - (-80.0_f64).to_radians(), -10.0 * G * 2.0 * angle.cos() / 20.0, 1e-9);
     arm.joints[0].theta = 100.0_f64.to_radians();
-    let standing = flexcal::simulate::Rig::new(arm, Vec::new()).position(&at(10.0));
+    let standing = flexcal::rig::Rig::new(arm, Vec::new()).position(&at(10.0));
     if let Ok(end) = standing {
         // It may fall over and hang.
         assert!(end.z < 0.0);
@@ -111,7 +115,8 @@ fn warmth_lengthens_and_bows_a_link() {
         let longer = effect(&arm, Effect::LinkThermalExpansion { link: link() }, &[12e-6]);
         near(position(&arm, vec![longer.clone()], &warm).x, a * (1.0 + 12e-6 * 15.0), 1e-14);
         assert_eq!(position(&arm, vec![longer], &at(0.0)).x, a);
-        // A bow is an arc: κ = k (T − T₀), z = −(1 − cos κL)/κ, the same on either side of the clamp.
+        // A bow is an arc: κ = k (T − T₀), z = −(1 − cos κL)/κ, the same on either side of the
+        // clamp.
         let bowed = effect(&arm, Effect::LinkThermalBending { link: link() }, &[1e-5, -2e-5]);
         let end = position(&arm, vec![bowed], &warm);
         let height = |curvature: f64| -(1.0 - (curvature * LENGTH).cos()) / curvature;
@@ -125,12 +130,17 @@ fn compliances_tilt_by_the_moment() {
     let arm = rigid();
     let (weight, arm_length) = (3.0 * G, 2.0);
     let moment = weight * arm_length;
-    let drop = |cause, values: &[f64]| -position(&arm, vec![effect(&arm, cause, values)], &at(3.0)).z;
+    let drop =
+        |cause, values: &[f64]| -position(&arm, vec![effect(&arm, cause, values)], &at(3.0)).z;
     // The moment of the payload is about +y of the base, which is −z of joint 1.
     near(drop(Effect::BaseCompliance, &[0.0, 1e-7]), 1e-7 * moment * arm_length, 1e-9);
     assert!(drop(Effect::BaseCompliance, &[1e-7, 0.0]).abs() < 1e-15);
     near(drop(Effect::JointCompliance { joint: 1 }, &[1e-7]), 1e-7 * moment * arm_length, 1e-9);
-    near(drop(Effect::JointNonlinearStiffness { joint: 1 }, &[1e-11]), 1e-11 * moment.powi(3) * arm_length, 1e-9);
+    near(
+        drop(Effect::JointNonlinearStiffness { joint: 1 }, &[1e-11]),
+        1e-11 * moment.powi(3) * arm_length,
+        1e-9,
+    );
     // Joint 1's own x and y feel nothing.
     assert!(drop(Effect::JointLateralCompliance { joint: 1 }, &[1e-7, 1e-7]).abs() < 1e-15);
     // Seen from joint 2, whose z points along −y as well; its y is up, its x along the link.
@@ -142,11 +152,16 @@ fn compliances_tilt_by_the_moment() {
 
 #[test]
 fn a_spring_lifts_what_a_joint_carries() {
-    // A right angle of 0.3, 0.4 and 0.5 m at the joint, whose y is up: the spring is 0.3 m longer than free, its line 0.24 m from the axis.
+    // A right angle of 0.3, 0.4 and 0.5 m at the joint, whose y is up: the spring is 0.3 m longer
+    // than free, its line 0.24 m from the axis.
     let mut arm = rigid();
     arm.joints[0].stiffness = Some(1e7);
-    let spring =
-        |anchor| Effect::GravityCompensator { joint: 1, anchor, lever: [0.3, 0.0], free_length: FreeLength(0.2) };
+    let spring = |anchor| Effect::GravityCompensator {
+        joint: 1,
+        anchor,
+        lever: [0.3, 0.0],
+        free_length: FreeLength(0.2),
+    };
     let turned = |cause, values: &[f64]| {
         let end = position(&arm, vec![effect(&arm, cause, values)], &at(3.0));
         end.z.atan2(end.x) * 1e7 + 3.0 * G * 2.0
@@ -156,7 +171,8 @@ fn a_spring_lifts_what_a_joint_carries() {
     near(turned(spring([0.0, -0.4]), &[500.0, 70.0]), -(500.0 * 0.3 + 70.0) * 0.24, 1e-4);
     // A spring where nothing gives way does nothing.
     let stiff = rigid();
-    let still = position(&stiff, vec![effect(&stiff, spring([0.0, 0.4]), &[500.0, 70.0])], &at(3.0));
+    let still =
+        position(&stiff, vec![effect(&stiff, spring([0.0, 0.4]), &[500.0, 70.0])], &at(3.0));
     assert!(still.z.abs() < 1e-15);
 }
 
@@ -167,7 +183,9 @@ fn the_tracker_scales_drifts_and_shifts() {
     let shift = |cause, values: &[f64], conditions| {
         position(&arm, vec![effect(&arm, cause, values)], conditions) - Vector3::new(2.0, 0.0, 0.0)
     };
-    let is = |found: Vector3<f64>, expected: [f64; 3]| assert!((found - Vector3::from(expected)).norm() < 1e-14);
+    let is = |found: Vector3<f64>, expected: [f64; 3]| {
+        assert!((found - Vector3::from(expected)).norm() < 1e-14)
+    };
     is(shift(Effect::TrackerScale, &[1e-4], &late), [2e-4, 0.0, 0.0]);
     is(shift(Effect::TrackerDrift, &[1e-6, 0.0, 2e-6], &late), [4e-4, 0.0, 8e-4]);
     let step = [1e-4, 2e-4, 3e-4];
@@ -175,6 +193,9 @@ fn the_tracker_scales_drifts_and_shifts() {
     is(shift(Effect::StationShift { at_time: 501.0 }, &step, &late), [0.0; 3]);
     // A quarter turn about z brings (2, 0, 0) to (0, 2, 0), and then it is moved.
     let quarter = [1e-4, 2e-4, 3e-4, 0.0, 0.0, std::f64::consts::FRAC_PI_2];
-    is(shift(Effect::StationMove { at_time: 500.0 }, &quarter, &late), [1e-4 - 2.0, 2.0 + 2e-4, 3e-4]);
+    is(
+        shift(Effect::StationMove { at_time: 500.0 }, &quarter, &late),
+        [1e-4 - 2.0, 2.0 + 2e-4, 3e-4],
+    );
     is(shift(Effect::StationMove { at_time: 501.0 }, &quarter, &late), [0.0; 3]);
 }

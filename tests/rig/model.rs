@@ -64,8 +64,11 @@ payload_at_m = [0.1, 0.0, 0.3]
 fn closed_form(problem: &Problem, set: &PoseConditions) -> Vector3<f64> {
     let mut arm = Arm::nominal(problem);
     arm.beam_elements = 12;
-    let setup =
-        PoseView { payload: set.payload.as_ref(), hoist: set.hoist.as_ref(), ..PoseView::of(&set.configuration) };
+    let setup = PoseView {
+        payload: set.payload.as_ref(),
+        hoist: set.hoist.as_ref(),
+        ..PoseView::of(&set.configuration)
+    };
     let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
     arm.equilibrate(&setup, &mut ws, &mut rest).unwrap();
     rest.frame.point(&problem.tool.target)
@@ -90,6 +93,8 @@ fn closed_forms_and_segments_agree_on_every_kind_of_arm() {
         let straight = super::bench::stiffer(arm.clone(), 0.0, 0.0, 0.0);
         deflection = deflection.max((seen - position(&straight, Vec::new(), &set)).norm() * 1e3);
     }
-    println!("closed forms and segments differ by {worst:.5} mm; the arm deflects by {deflection:.1} mm");
+    println!(
+        "closed forms and segments differ by {worst:.5} mm; the arm deflects by {deflection:.1} mm"
+    );
     assert!(worst < 0.003, "{worst} mm");
 }

@@ -1,4 +1,5 @@
-//! Simulated measurements: the same for the same seed, valid input of the rest, and their mistakes named.
+//! Simulated measurements: the same for the same seed, valid input of the rest, and their mistakes
+//! named.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +7,7 @@ use std::path::Path;
 use assert_cmd::Command;
 use flexcal::measurement::Measurements;
 use flexcal::problem::{PoseConditions, Problem};
-use flexcal::simulate::{Rig, Simulation, Truth, simulate};
+use flexcal::rig::{Rig, Simulation, Truth, simulate};
 use serde_json::Value;
 
 use super::bench::{ROOT, problem};
@@ -55,7 +56,10 @@ fn what_is_written_is_what_was_measured() {
     let simulation = simulate(&problem, &truth, 30, 5).unwrap();
     let measurements = read(&simulation, &problem);
     assert_eq!(measurements.len(), 30);
-    assert_eq!(measurements.marked_held_out.as_ref().unwrap().iter().filter(|held_out| **held_out).count(), 2);
+    assert_eq!(
+        measurements.marked_held_out.as_ref().unwrap().iter().filter(|held_out| **held_out).count(),
+        2
+    );
     for (k, row) in simulation.rows.iter().enumerate() {
         let set = &row.conditions;
         assert_eq!(measurements.configuration(k), set.configuration);
@@ -63,7 +67,10 @@ fn what_is_written_is_what_was_measured() {
         assert_eq!(measurements.hoist.as_ref().unwrap()[k], set.hoist.unwrap());
         assert_eq!(measurements.temperature.as_ref().unwrap()[k], set.temperature.unwrap());
         assert_eq!(measurements.time[k], set.time);
-        assert_eq!(&measurements.approach.as_ref().unwrap()[4 * k..4 * k + 4], set.approach.as_deref().unwrap());
+        assert_eq!(
+            &measurements.approach.as_ref().unwrap()[4 * k..4 * k + 4],
+            set.approach.as_deref().unwrap()
+        );
         assert!((measurements.positions[k] - row.position).norm() < 1e-9);
     }
 }
@@ -73,7 +80,12 @@ fn noise_has_its_spread_and_deviations_are_given_or_drawn() {
     let (problem, truth) = cases();
     let noisy = simulate(&problem, &truth, 1000, 1).unwrap();
     let exact = simulate(&problem, &Truth { noise_sigma: 0.0, ..truth.clone() }, 1000, 1).unwrap();
-    let squares: f64 = noisy.rows.iter().zip(&exact.rows).map(|(a, b)| (a.position - b.position).norm_squared()).sum();
+    let squares: f64 = noisy
+        .rows
+        .iter()
+        .zip(&exact.rows)
+        .map(|(a, b)| (a.position - b.position).norm_squared())
+        .sum();
     let sigma = (squares / 3000.0).sqrt() * 1e3;
     assert!((sigma - 0.05).abs() < 0.003, "{sigma} mm");
     let of = |simulation: &Simulation, name: &str| {
@@ -101,14 +113,19 @@ fn prismatic_and_fixed_joints_have_their_columns() {
     assert_eq!(read(&simulation, &problem).len(), 5);
     let row = &simulation.rows[0];
     let (q, side) = (row.conditions.configuration[0], row.conditions.approach.as_ref().unwrap()[0]);
-    let straight =
-        PoseConditions { configuration: vec![0.0, 0.0, row.conditions.configuration[2]], ..PoseConditions::default() };
+    let straight = PoseConditions {
+        configuration: vec![0.0, 0.0, row.conditions.configuration[2]],
+        ..PoseConditions::default()
+    };
     let rest = Rig::new(problem, Vec::new()).position(&straight).unwrap();
     assert!((row.position.z - rest.z - q - 1e-4 * side).abs() < 1e-12);
 }
 
 fn flexcal(folder: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
-    Command::new(assert_cmd::cargo::cargo_bin!("flexcal")).current_dir(folder).args(arguments).assert()
+    Command::new(assert_cmd::cargo::cargo_bin!("flexcal"))
+        .current_dir(folder)
+        .args(arguments)
+        .assert()
 }
 
 #[test]
@@ -128,8 +145,11 @@ fn the_command_writes_what_identify_reads() {
     assert_eq!((&told["poses"], &told["held_out"]), (&Value::from(78), &Value::from(50)));
     assert_eq!(told["effects"], Value::Array(Vec::new()));
     assert!(folder.path().join("out/lunar-sampler/truth.json").exists());
-    let quiet = flexcal(folder.path(), &[&arguments[..], &["--quiet", "--out", "b"]].concat()).success();
-    assert!(quiet.get_output().stdout.is_empty() && folder.path().join("b/measurements.csv").exists());
+    let quiet =
+        flexcal(folder.path(), &[&arguments[..], &["--quiet", "--out", "b"]].concat()).success();
+    assert!(
+        quiet.get_output().stdout.is_empty() && folder.path().join("b/measurements.csv").exists()
+    );
 
     let fit = flexcal(folder.path(), &["identify", &cases, "--data", data, "--json"]).success();
     let fit: Value = serde_json::from_slice(&fit.get_output().stdout).unwrap();
@@ -141,16 +161,21 @@ fn the_command_writes_what_identify_reads() {
 #[test]
 fn mistakes_leave_nothing_behind_and_name_their_place() {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("TRUTH.toml"), "[poses]\nq1_deg = [0, 1]\nq2_deg = [1, 0]\n").unwrap();
+    fs::write(folder.path().join("TRUTH.toml"), "[poses]\nq1_deg = [0, 1]\nq2_deg = [1, 0]\n")
+        .unwrap();
     let cases = format!("{ROOT}/tests/cases");
     let arguments = ["simulate", &cases, "--truth", "TRUTH.toml", "--poses", "5", "--seed", "1"];
     let failed = flexcal(folder.path(), &arguments).code(2);
     let message = String::from_utf8(failed.get_output().stderr.clone()).unwrap();
     assert!(message.contains("TRUTH.toml:3: poses.q2_deg: 1 is above 0"), "{message}");
-    fs::write(folder.path().join("TRUTH.toml"), "[poses]\nq1_deg = [0, 1]\nq2_deg = 12.5\n").unwrap();
+    fs::write(folder.path().join("TRUTH.toml"), "[poses]\nq1_deg = [0, 1]\nq2_deg = 12.5\n")
+        .unwrap();
     let failed = flexcal(folder.path(), &arguments).code(2);
     let message = String::from_utf8(failed.get_output().stderr.clone()).unwrap();
-    assert!(message.contains("TRUTH.toml:3: poses.q2_deg: ") && message.contains("write [12.5, 12.5]"), "{message}");
+    assert!(
+        message.contains("TRUTH.toml:3: poses.q2_deg: ") && message.contains("write [12.5, 12.5]"),
+        "{message}"
+    );
     assert!(!folder.path().join("out").exists());
 }
 
@@ -169,7 +194,10 @@ fn measurements_that_nothing_can_be_identified_from_say_so() {
         let run = flexcal(folder.path(), &arguments).code(0);
         let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
         let (out, err) = (text(&run.get_output().stdout), text(&run.get_output().stderr));
-        assert!(out.contains("Next: flexcal identify") == useful && err.is_empty() == useful, "{out}{err}");
+        assert!(
+            out.contains("Next: flexcal identify") == useful && err.is_empty() == useful,
+            "{out}{err}"
+        );
         assert!(err.contains(expected), "{err}");
     }
 }
@@ -178,9 +206,11 @@ fn measurements_that_nothing_can_be_identified_from_say_so() {
 fn ranges_go_by_the_names_of_joints_as_columns_do() {
     let arm = "name = 'a'\n[[joint]]\nname = 'waist'\n[[joint]]\nname = 'left arm'\nkind = 'prismatic'\n               [[joint]]\nname = 'twin'\n[[joint]]\nname = 'twin'\n[[joint]]\nname = 'hoist'\n";
     let problem = problem(arm);
-    let read = |text: &str| Truth::parse(&format!("[poses]\n{text}"), Path::new("TRUTH.toml"), &problem);
+    let read =
+        |text: &str| Truth::parse(&format!("[poses]\n{text}"), Path::new("TRUTH.toml"), &problem);
     let others = "q3_deg = [0, 1]\nq4_deg = [0, 1]\nq5_deg = [0, 1]";
-    let named = read(&format!("waist_deg = [-10, 20]\n\"left arm_mm\" = [5, 6]\n{others}")).unwrap();
+    let named =
+        read(&format!("waist_deg = [-10, 20]\n\"left arm_mm\" = [5, 6]\n{others}")).unwrap();
     let numbered = read(&format!("q1_deg = [-10, 20]\nq2_m = [0.005, 0.006]\n{others}")).unwrap();
     assert_eq!(named.poses.joints, numbered.poses.joints);
     for (text, words) in [
@@ -189,7 +219,10 @@ fn ranges_go_by_the_names_of_joints_as_columns_do() {
         ("waist_mm = [0, 1]", "poses.waist_mm: an angle is not given in mm"),
         ("wast_deg = [0, 1]", "poses.q1: missing; write q1_deg or q1_rad = [from, to]"),
         ("q1_deg = [0, 1]\nq2_m = [0, 1]\ntwin_deg = [0, 1]", "poses.q3: missing"),
-        ("q1_deg = [0, 1]\nq2_m = [0, 1]\nq3_deg = [0, 1]\nq4_deg = [0, 1]\nhoist_deg = [0, 1]", "poses.q5: missing"),
+        (
+            "q1_deg = [0, 1]\nq2_m = [0, 1]\nq3_deg = [0, 1]\nq4_deg = [0, 1]\nhoist_deg = [0, 1]",
+            "poses.q5: missing",
+        ),
     ] {
         let error = read(text).expect_err(text).to_string();
         assert!(error.contains(words), "{error}");
@@ -201,7 +234,8 @@ fn every_mistake_says_where_it_is() {
     let (problem, _) = cases();
     let poses = "[poses]\nq1_deg = [0, 1]\nq2_deg = [0, 1]\nq3_deg = [0, 1]\nq4_deg = [0, 1]\n";
     let fails = |text: &str, words: &[&str]| {
-        let error = Truth::parse(text, Path::new("TRUTH.toml"), &problem).expect_err(text).to_string();
+        let error =
+            Truth::parse(text, Path::new("TRUTH.toml"), &problem).expect_err(text).to_string();
         for word in ["TRUTH.toml"].iter().chain(words) {
             assert!(error.contains(word), "no `{word}` in: {error}");
         }
@@ -214,7 +248,10 @@ fn every_mistake_says_where_it_is() {
     fails("[poses]\nq1_deg = '3'", &["poses.q1_deg: expected a list"]);
     for (line, words) in [
         ("held_out = 1.5", &["poses.held_out: 1.5 is not between 0 and 1"][..]),
-        ("held_out = 0.5\nidentification = 3", &["poses.identification: given already as held_out"]),
+        (
+            "held_out = 0.5\nidentification = 3",
+            &["poses.identification: given already as held_out"],
+        ),
         ("payload_kg = [-1]", &["poses.payload_kg[1]: -1 is below zero"]),
         ("payload_kg = []", &["poses.payload_kg: empty"]),
         ("time_step_s = [5, 2]", &["poses.time_step_s: "]),
@@ -226,12 +263,18 @@ fn every_mistake_says_where_it_is() {
             &["parameters.\"joint9.a\": no such parameter (did you mean joint1.a?)", "joint4.a"],
         ),
         ("[parameters]\ntool.x = { mm = 1 }", &["stands in quotes"]),
-        ("[parameters]\n\"tool.x\" = { deg = 1 }", &["parameters.\"tool.x\".deg: unknown key", "mm"]),
+        (
+            "[parameters]\n\"tool.x\" = { deg = 1 }",
+            &["parameters.\"tool.x\".deg: unknown key", "mm"],
+        ),
         ("[parameters]\n\"tool.x\" = {}", &["missing", "m = … or mm = …"]),
         ("[parameters]\n\"tool.x\" = { m = 1, mm = 1 }", &["given already as m"]),
         ("[parameters]\n\"A.EI\" = { relative = 0 }", &["0 is not above zero"]),
         ("[random]\n\"joint9*\" = { sigma_mm = 1 }", &["matches no parameter"]),
-        ("[random]\n\"tool.*\" = { sigma_deg = 1 }", &["random.\"tool.*\".sigma: missing", "sigma_mm"]),
+        (
+            "[random]\n\"tool.*\" = { sigma_deg = 1 }",
+            &["random.\"tool.*\".sigma: missing", "sigma_mm"],
+        ),
         ("[random]\n\"tool.*\" = { sigma_mm = -1 }", &["-1 is below zero"]),
         ("[noise]\nposition_sigma_mm = -1", &["noise.position_sigma_mm: -1 is below zero"]),
         ("[noise]", &["noise.position_sigma_mm: missing"]),
@@ -242,11 +285,17 @@ fn every_mistake_says_where_it_is() {
             &["effect[1].gear-ration: unknown effect (did you mean gear-ratio?)"],
         ),
         ("[[effect]]\ngear-ratio = { joint = 1 }", &["no strength; write error_relative"]),
-        ("[[effect]]\ngear-ratio = { joint = 1 }\nerror = 1", &["effect[1].error: a ratio needs a unit"]),
+        (
+            "[[effect]]\ngear-ratio = { joint = 1 }\nerror = 1",
+            &["effect[1].error: a ratio needs a unit"],
+        ),
         ("[[effect]]\ngear-ratio = { joint = 1 }\nwidth_deg = 1", &["unknown key"]),
         ("[[effect]]\ngear-ratio = { joint = 7 }\nerror_relative = 1", &["no joint 7"]),
         ("[[effect]]\ngear-ratio = { joint = 1 }\npayload-mass = {}", &["found 2"]),
-        ("[[effect]]\ndeflected-equilibrium = {}\nlambda_relative = 0.5", &["always in equilibrium; write 1"]),
+        (
+            "[[effect]]\ndeflected-equilibrium = {}\nlambda_relative = 0.5",
+            &["always in equilibrium; write 1"],
+        ),
         ("[[effect]]\noutside = { joint = 2 }\nheight_deg = 1", &["a width above 0"]),
         ("[[effect]]\noutside = { joint = 0 }\nheight_deg = 1", &["no joint 0"]),
         ("[[effect]]\noutside = { joint = 1, shape = \"x\" }\n", &["none of bump, step"]),
@@ -258,7 +307,10 @@ fn every_mistake_says_where_it_is() {
             "[[effect]]\ngravity-compensator = { joint = 2, anchor_m = [0, 1], lever_m = [1, 0], free_length_m = 0 }\nrate_N = 1",
             &["effect[1].rate_N: "],
         ),
-        ("[[effect]]\njoint-thermal-drift = { joint = 2 }\nrate_deg_per_C = 1", &["needs temperatures"]),
+        (
+            "[[effect]]\njoint-thermal-drift = { joint = 2 }\nrate_deg_per_C = 1",
+            &["needs temperatures"],
+        ),
     ] {
         fails(&format!("{poses}{line}\n"), words);
     }
@@ -266,8 +318,9 @@ fn every_mistake_says_where_it_is() {
 
 #[test]
 fn too_soft_an_arm_is_an_error_with_its_pose() {
-    let problem =
-        problem("name = 'x'\n[[joint]]\nalpha_deg = 90\nstiffness_N_m_per_rad = 1\n[tool]\ntarget_m = [1, 0, 0]\n");
+    let problem = problem(
+        "name = 'x'\n[[joint]]\nalpha_deg = 90\nstiffness_N_m_per_rad = 1\n[tool]\ntarget_m = [1, 0, 0]\n",
+    );
     let text = "[poses]\nq1_deg = [80, 80]\npayload_kg = [1e5]\n";
     let truth = Truth::parse(text, Path::new("TRUTH.toml"), &problem).unwrap();
     let error = simulate(&problem, &truth, 3, 1).unwrap_err().to_string();

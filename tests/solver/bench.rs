@@ -22,7 +22,12 @@ pub fn vector(values: &[f64]) -> DVector<f64> {
 }
 
 pub fn tight() -> Settings {
-    Settings { gradient_tolerance: 1e-13, cost_tolerance: 1e-15, step_tolerance: 1e-13, ..Settings::default() }
+    Settings {
+        gradient_tolerance: 1e-13,
+        cost_tolerance: 1e-15,
+        step_tolerance: 1e-13,
+        ..Settings::default()
+    }
 }
 
 /// Fails the test when it is evaluated outside of bounds, or of rows by more than rounding.
@@ -35,7 +40,10 @@ pub struct Guarded<'a, O> {
 impl<O: Objective> Guarded<'_, O> {
     fn check(&self, x: &DVector<f64>) {
         for (j, x) in x.iter().enumerate() {
-            assert!((self.bounds.lower()[j]..=self.bounds.upper()[j]).contains(x), "unknown {j} = {x} out of bounds");
+            assert!(
+                (self.bounds.lower()[j]..=self.bounds.upper()[j]).contains(x),
+                "unknown {j} = {x} out of bounds"
+            );
         }
         let Some(rows) = self.rows else { return };
         let values = rows.matrix() * x;

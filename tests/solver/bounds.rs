@@ -1,8 +1,10 @@
-//! Bounded Levenberg–Marquardt: agreement without active bounds, exact active bounds, and the answers of `SciPy`.
+//! Bounded Levenberg–Marquardt: agreement without active bounds, exact active bounds, and the
+//! answers of `SciPy`.
 
 use argmin::core::observers::Observe;
 use flexcal::least_squares::solver::{
-    AtBound, Bounds, Inequalities, State, Termination, Within, minimise, minimise_bounded, minimise_within,
+    AtBound, Bounds, Inequalities, State, Termination, Within, minimise, minimise_bounded,
+    minimise_within,
 };
 use flexcal::least_squares::{Fit, Linearisation, Objective};
 use nalgebra::DVector;
@@ -18,7 +20,10 @@ fn without_active_bounds_as_without_bounds() {
     let cases = [
         (analytic!(bard, 3, 15), vec![1.0, 1.0, 1.0]),
         (analytic!(osborne1, 5, 33), vec![0.5, 1.5, -1.0, 0.01, 0.02]),
-        (analytic!(osborne2, 11, 65), vec![1.3, 0.65, 0.65, 0.7, 0.6, 3.0, 5.0, 7.0, 2.0, 4.5, 5.5]),
+        (
+            analytic!(osborne2, 11, 65),
+            vec![1.3, 0.65, 0.65, 0.7, 0.6, 3.0, 5.0, 7.0, 2.0, 4.5, 5.5],
+        ),
         (analytic!(watson, 6, 31), vec![0.0; 6]),
         (analytic!(kowalik_osborne, 4, 11), vec![0.25, 0.39, 0.415, 0.39]),
     ];
@@ -28,7 +33,12 @@ fn without_active_bounds_as_without_bounds() {
         let guarded = Guarded { objective: Fit::new(&problem), bounds: &wide, rows: None };
         let bounded = minimise_bounded(guarded, vector(&start), &wide, &tight());
         assert!(bounded.termination.converged());
-        assert!((&bounded.x - &free.x).amax() <= 1e-8 * free.x.amax(), "{} against {}", bounded.x, free.x);
+        assert!(
+            (&bounded.x - &free.x).amax() <= 1e-8 * free.x.amax(),
+            "{} against {}",
+            bounded.x,
+            free.x
+        );
         assert!(bounded.at_bound.iter().all(Option::is_none));
         let none = Bounds::none(start.len());
         assert_eq!(minimise_bounded(Fit::new(&problem), vector(&start), &none, &tight()).x, free.x);
@@ -83,19 +93,34 @@ fn several_active_bounds_as_scipy() {
         let bounds = Bounds::new(vector(&lower), vector(&upper)).unwrap();
         let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: None };
         let solution = minimise_bounded(guarded, vector(&start), &bounds, &tight());
-        println!("{} iterations, {}, cost {:.15}", solution.iterations, solution.termination, solution.cost);
+        println!(
+            "{} iterations, {}, cost {:.15}",
+            solution.iterations, solution.termination, solution.cost
+        );
         assert!(solution.termination.converged());
         assert_eq!(solution.at_bound, active);
         let none = Inequalities::none(x.len());
         for within in [Within::InteriorPoint, Within::Reflective, Within::Clamped] {
             let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: None };
             let start = vector(&start);
-            let other = minimise_within(within, guarded, start, (&bounds, &none), &tight(), None::<Silent>);
-            println!("  {within:?}: {} iterations, {}, cost {:.15}", other.iterations, other.termination, other.cost);
+            let other =
+                minimise_within(within, guarded, start, (&bounds, &none), &tight(), None::<Silent>);
+            println!(
+                "  {within:?}: {} iterations, {}, cost {:.15}",
+                other.iterations, other.termination, other.cost
+            );
             assert!(other.cost >= cost * (1.0 - 1e-9), "{within:?}: {}", other.cost);
             // The naive way may stop short.
-            assert!(within == Within::Clamped || other.cost <= cost * (1.0 + 1e-8), "{within:?}: {}", other.cost);
-            assert!(within == Within::Clamped || other.at_bound == active, "{within:?}: {:?}", other.at_bound);
+            assert!(
+                within == Within::Clamped || other.cost <= cost * (1.0 + 1e-8),
+                "{within:?}: {}",
+                other.cost
+            );
+            assert!(
+                within == Within::Clamped || other.at_bound == active,
+                "{within:?}: {:?}",
+                other.at_bound
+            );
         }
         assert!((solution.cost / cost - 1.0).abs() < 1e-9, "{}", solution.cost);
         assert!((&solution.x - vector(&x)).amax() < 1e-6, "{}", solution.x);
@@ -111,7 +136,8 @@ fn several_active_bounds_as_scipy() {
 
 #[test]
 fn optimality_conditions_on_many_boxes() {
-    // Boxes around random-looking centres: the projected gradient vanishes and no multiplier has the wrong sign.
+    // Boxes around random-looking centres: the projected gradient vanishes and no multiplier has
+    // the wrong sign.
     let problem = analytic!(osborne2, 11, 65);
     let start = vector(&[1.3, 0.65, 0.65, 0.7, 0.6, 3.0, 5.0, 7.0, 2.0, 4.5, 5.5]);
     for case in 0..20 {
@@ -128,8 +154,12 @@ fn optimality_conditions_on_many_boxes() {
             let cosine = gradient[j] / triangle.column(j).norm() / (2.0 * cost).sqrt();
             match solution.at_bound[j] {
                 None => assert!(cosine.abs() < 1e-6, "case {case}, unknown {j}: {cosine}"),
-                Some(AtBound::Lower) => assert!(cosine > -1e-6, "case {case}, unknown {j}: {cosine}"),
-                Some(AtBound::Upper) => assert!(cosine < 1e-6, "case {case}, unknown {j}: {cosine}"),
+                Some(AtBound::Lower) => {
+                    assert!(cosine > -1e-6, "case {case}, unknown {j}: {cosine}")
+                }
+                Some(AtBound::Upper) => {
+                    assert!(cosine < 1e-6, "case {case}, unknown {j}: {cosine}")
+                }
             }
         }
     }
@@ -145,7 +175,8 @@ fn a_corner_and_a_fixed_unknown() {
     assert_eq!(solution.termination, Termination::Gradient);
     assert_eq!(solution.at_bound, [Some(AtBound::Upper), Some(AtBound::Upper)]);
 
-    let held = Bounds::new(vector(&[f64::NEG_INFINITY, 4.0]), vector(&[f64::INFINITY, 4.0])).unwrap();
+    let held =
+        Bounds::new(vector(&[f64::NEG_INFINITY, 4.0]), vector(&[f64::INFINITY, 4.0])).unwrap();
     let solution = minimise_bounded(Fit::new(&problem), vector(&[3.0, 0.0]), &held, &tight());
     assert!(solution.termination.converged());
     assert_eq!(solution.x[1].to_bits(), 4.0_f64.to_bits());
@@ -161,6 +192,7 @@ fn impossible_bounds_are_refused() {
     assert!(Bounds::new(vector(&[0.0, 2.0]), vector(&[1.0, 1.0])).is_err());
     assert!(Bounds::new(vector(&[f64::NAN]), vector(&[1.0])).is_err());
     let problem = analytic!(rosenbrock, 2, 2);
-    let solution = minimise_bounded(Fit::new(&problem), vector(&[0.0, 0.0]), &Bounds::none(3), &tight());
+    let solution =
+        minimise_bounded(Fit::new(&problem), vector(&[0.0, 0.0]), &Bounds::none(3), &tight());
     assert_eq!(solution.termination, Termination::SizeMismatch);
 }

@@ -40,7 +40,8 @@ impl<P: LeastSquares> LeastSquares for Planted<P> {
 }
 
 fn osborne() -> (Analytic, DVector<f64>) {
-    let problem = Analytic { unknowns: 11, rows: 65, value: f::osborne2::<f64>, dual: f::osborne2::<Dual64> };
+    let problem =
+        Analytic { unknowns: 11, rows: 65, value: f::osborne2::<f64>, dual: f::osborne2::<Dual64> };
     (problem, DVector::from_vec(vec![1.3, 0.65, 0.65, 0.7, 0.6, 3.0, 5.0, 7.0, 2.0, 4.5, 5.5]))
 }
 
@@ -73,10 +74,12 @@ fn an_unknown_without_effect_and_one_with_little() {
         vec![x[0].sin() + x[1] * 0.0, x[0].exp() + x[2].sin() * 1e-8]
     }
     let problem = Analytic { unknowns: 3, rows: 2, value: rows::<f64>, dual: rows::<Dual64> };
-    let check = check_jacobian(&problem, &DVector::from_element(3, 0.3), &DVector::from_element(3, 1.0));
+    let check =
+        check_jacobian(&problem, &DVector::from_element(3, 0.3), &DVector::from_element(3, 1.0));
     assert!(check.columns[1].relative_error <= 0.0);
     assert!(check.columns[2].relative_error < 1e-5);
     let planted = Planted { problem, column: 2, factor: 1.5 };
-    let check = check_jacobian(&planted, &DVector::from_element(3, 0.3), &DVector::from_element(3, 1.0));
+    let check =
+        check_jacobian(&planted, &DVector::from_element(3, 0.3), &DVector::from_element(3, 1.0));
     assert!(check.columns[2].relative_error > 0.4);
 }

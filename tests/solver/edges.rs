@@ -116,11 +116,13 @@ impl LeastSquares for Logarithm {
 #[test]
 fn steps_out_of_the_domain_are_taken_back() {
     for start in [3.0, 10.0, 1e6, 1e-6] {
-        let solution = minimise(Fit::new(&Logarithm), DVector::from_element(1, start), &Settings::default());
+        let solution =
+            minimise(Fit::new(&Logarithm), DVector::from_element(1, start), &Settings::default());
         assert!(solution.termination.converged(), "{start}: {}", solution.termination);
         assert!((solution.x[0] - 1.0).abs() < 1e-9, "{start}: {}", solution.x[0]);
     }
-    let outside = minimise(Fit::new(&Logarithm), DVector::from_element(1, -1.0), &Settings::default());
+    let outside =
+        minimise(Fit::new(&Logarithm), DVector::from_element(1, -1.0), &Settings::default());
     assert_eq!(outside.termination, Termination::OutsideDomainAtStart);
     assert!(!outside.termination.converged());
     let flat = minimise(Fit::new(&Logarithm), DVector::zeros(1), &Settings::default());
@@ -168,7 +170,8 @@ impl Observe<State> for Watch {
 fn an_observer_sees_every_iteration_and_may_stop() {
     let seen = std::sync::Arc::new(std::sync::atomic::AtomicU64::new(0));
     let start = DVector::from_element(1, 3.0);
-    let solution = minimise_observed(Fit::new(&Logarithm), start, &Settings::default(), Watch(seen.clone()));
+    let solution =
+        minimise_observed(Fit::new(&Logarithm), start, &Settings::default(), Watch(seen.clone()));
     assert_eq!(seen.load(std::sync::atomic::Ordering::Relaxed), solution.iterations);
     let problem = crate::collections::Analytic {
         unknowns: 2,

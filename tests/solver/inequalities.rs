@@ -1,7 +1,9 @@
-//! Linear inequalities: agreement where none is active, exact active ones, never outside, and the answers of `SciPy`.
+//! Linear inequalities: agreement where none is active, exact active ones, never outside, and the
+//! answers of `SciPy`.
 
 use flexcal::least_squares::solver::{
-    AtBound, Bounds, Inequalities, Termination, minimise, minimise_bounded, minimise_constrained, nearest,
+    AtBound, Bounds, Inequalities, Termination, minimise, minimise_bounded, minimise_constrained,
+    nearest,
 };
 use flexcal::least_squares::{Fit, Linearisation, Objective};
 use nalgebra::{DMatrix, DVector};
@@ -31,10 +33,16 @@ fn without_active_rows_as_without_rows() {
         let bounds = Bounds::none(start.len());
         for room in [100.0, 4.0] {
             let rows = rows_around(&free.x, room);
-            let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: Some(&rows) };
+            let guarded =
+                Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: Some(&rows) };
             let found = minimise_constrained(guarded, vector(&start), &bounds, &rows, &tight());
             assert!(found.termination.converged());
-            assert!((&found.x - &free.x).amax() <= 1e-8 * free.x.amax(), "{} against {}", found.x, free.x);
+            assert!(
+                (&found.x - &free.x).amax() <= 1e-8 * free.x.amax(),
+                "{} against {}",
+                found.x,
+                free.x
+            );
             assert!(found.at_limit.iter().all(Option::is_none));
         }
     }
@@ -91,7 +99,14 @@ fn active_rows_as_scipy() {
             vec![0.0; 6],
             Bounds::new(vector(&lower), vector(&[FREE; 6])).unwrap(),
             first.unwrap(),
-            vec![-0.01, 1.007_343_372_84, -0.062_303_562_58, 0.554_960_189_74, -0.554_960_189_74, 0.582_465_751_28],
+            vec![
+                -0.01,
+                1.007_343_372_84,
+                -0.062_303_562_58,
+                0.554_960_189_74,
+                -0.554_960_189_74,
+                0.582_465_751_28,
+            ],
             0.004_429_300_410_245_213,
             vec![Some(Lower), Some(Upper), None],
         ),
@@ -136,7 +151,11 @@ fn active_rows_as_scipy() {
         let start = DVector::from_fn(x.len(), |j, _| 3.0 - j as f64);
         let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: Some(&rows) };
         let again = minimise_constrained(guarded, start, &bounds, &rows, &tight());
-        assert!(again.termination.converged() && (again.cost / cost - 1.0).abs() < 1e-9, "{}", again.cost);
+        assert!(
+            again.termination.converged() && (again.cost / cost - 1.0).abs() < 1e-9,
+            "{}",
+            again.cost
+        );
     }
 }
 
@@ -148,10 +167,13 @@ fn optimality_conditions_on_many_polyhedra() {
     let bounds = Bounds::none(11);
     let mut seen = 0;
     for case in 0..20 {
-        let matrix =
-            DMatrix::from_fn(5, 11, |i, j| (1.3 * f64::from(case) + 2.1 * j as f64 + 0.7 * (i * i) as f64).sin());
+        let matrix = DMatrix::from_fn(5, 11, |i, j| {
+            (1.3 * f64::from(case) + 2.1 * j as f64 + 0.7 * (i * i) as f64).sin()
+        });
         let centre = &matrix * &start;
-        let lower = DVector::from_fn(5, |i, _| centre[i] - 0.1 * (1.0 + (i as f64 + f64::from(case)).cos()));
+        let lower = DVector::from_fn(5, |i, _| {
+            centre[i] - 0.1 * (1.0 + (i as f64 + f64::from(case)).cos())
+        });
         let rows = Inequalities::new(matrix.clone(), lower, centre.add_scalar(0.1)).unwrap();
         let fit = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: Some(&rows) };
         let found = minimise_constrained(&fit, start.clone(), &bounds, &rows, &tight());
@@ -165,7 +187,11 @@ fn optimality_conditions_on_many_polyhedra() {
             let normals = matrix.select_rows(&active).transpose();
             let multipliers = normals.clone().svd(true, true).solve(&gradient, 1e-12).unwrap();
             for (&i, multiplier) in active.iter().zip(&multipliers) {
-                let outwards = if found.at_limit[i] == Some(AtBound::Lower) { -multiplier } else { *multiplier };
+                let outwards = if found.at_limit[i] == Some(AtBound::Lower) {
+                    -multiplier
+                } else {
+                    *multiplier
+                };
                 assert!(outwards < 1e-6, "case {case}, row {i}: {outwards}");
             }
             left -= normals * multipliers;
@@ -181,23 +207,38 @@ fn optimality_conditions_on_many_polyhedra() {
 #[test]
 fn a_row_on_one_unknown_is_a_bound() {
     let problem = analytic!(watson, 6, 31);
-    let upper = Bounds::new(vector(&[-FREE; 6]), vector(&[FREE, 0.9, 0.5, FREE, 0.5, FREE])).unwrap();
+    let upper =
+        Bounds::new(vector(&[-FREE; 6]), vector(&[FREE, 0.9, 0.5, FREE, 0.5, FREE])).unwrap();
     let bounded = minimise_bounded(Fit::new(&problem), DVector::zeros(6), &upper, &tight());
     let matrix = DMatrix::from_fn(3, 6, |i, j| f64::from(u8::from(j == [1, 2, 4][i])));
     // One of them twice over: dependent rows do no harm.
     let matrix = matrix.insert_row(3, 0.0);
-    let matrix = DMatrix::from_fn(4, 6, |i, j| if i == 3 { 2.0 * matrix[(0, j)] } else { matrix[(i, j)] });
-    let rows = Inequalities::new(matrix, vector(&[-FREE; 4]), vector(&[0.9, 0.5, 0.5, 1.8])).unwrap();
-    let found = minimise_constrained(Fit::new(&problem), DVector::zeros(6), &Bounds::none(6), &rows, &tight());
+    let matrix =
+        DMatrix::from_fn(4, 6, |i, j| if i == 3 { 2.0 * matrix[(0, j)] } else { matrix[(i, j)] });
+    let rows =
+        Inequalities::new(matrix, vector(&[-FREE; 4]), vector(&[0.9, 0.5, 0.5, 1.8])).unwrap();
+    let found = minimise_constrained(
+        Fit::new(&problem),
+        DVector::zeros(6),
+        &Bounds::none(6),
+        &rows,
+        &tight(),
+    );
     assert!(found.termination.converged());
-    assert!((&found.x - &bounded.x).amax() < 1e-8 * bounded.x.amax(), "{} against {}", found.x, bounded.x);
+    assert!(
+        (&found.x - &bounded.x).amax() < 1e-8 * bounded.x.amax(),
+        "{} against {}",
+        found.x,
+        bounded.x
+    );
     assert_eq!(found.at_limit[0], bounded.at_bound[1]);
 }
 
 #[test]
 fn impossible_rows_are_refused() {
-    let one =
-        |lower: f64, upper: f64, matrix: DMatrix<f64>| Inequalities::new(matrix, vector(&[lower]), vector(&[upper]));
+    let one = |lower: f64, upper: f64, matrix: DMatrix<f64>| {
+        Inequalities::new(matrix, vector(&[lower]), vector(&[upper]))
+    };
     assert!(one(1.0, 0.0, DMatrix::from_element(1, 2, 1.0)).is_err());
     assert!(one(0.0, 1.0, DMatrix::zeros(1, 2)).is_err());
     assert!(one(f64::NAN, 1.0, DMatrix::from_element(1, 2, 1.0)).is_err());

@@ -1,5 +1,5 @@
-//! The least-squares problems of Moré, Garbow & Hillstrom, each from its standard start and from 10 and 100 times it, as
-//! the driver of MINPACK does.
+//! The least-squares problems of Moré, Garbow & Hillstrom, each from its standard start and from 10
+//! and 100 times it, as the regressor of MINPACK does.
 
 use crate::collections::more_garbow_hillstrom::problems;
 use flexcal::least_squares::Fit;
@@ -14,8 +14,8 @@ const LOST: [(&str, u32); 9] = [
     ("Jennrich–Sampson (6)", 100),
     // Every derivative is zero at the start.
     ("Gulf (11)", 100),
-    // Polynomials of degree n far outside [0, 1]: ‖r‖² falls by orders of magnitude, but not within the limit.
-    // MINPACK's driver tries these from the standard start only.
+    // Polynomials of degree n far outside [0, 1]: ‖r‖² falls by orders of magnitude, but not within
+    // the limit. MINPACK's regressor tries these from the standard start only.
     ("Chebyquad, n = 8 (35)", 10),
     ("Chebyquad, n = 8 (35)", 100),
     ("Chebyquad, n = 9 (35)", 10),
@@ -24,9 +24,12 @@ const LOST: [(&str, u32); 9] = [
     ("Chebyquad, n = 10 (35)", 100),
 ];
 
-/// Whether ‖r‖² is one of the known minima to six digits (zero: to rounding of a residual of order one).
+/// Whether ‖r‖² is one of the known minima to six digits (zero: to rounding of a residual of order
+/// one).
 fn is_minimum(squares: f64, minima: &[f64]) -> bool {
-    minima.iter().any(|&m| if m == 0.0 { squares < 1e-14 } else { (squares / m - 1.0).abs() < 1e-5 })
+    minima
+        .iter()
+        .any(|&m| if m == 0.0 { squares < 1e-14 } else { (squares / m - 1.0).abs() < 1e-5 })
 }
 
 #[test]
@@ -41,9 +44,10 @@ fn known_minima_from_three_starts() {
     let mut lost = Vec::new();
     for problem in problems() {
         for factor in [1_u32, 10, 100] {
-            // A start at zero is its own multiple; the driver of MINPACK uses the factor itself.
+            // A start at zero is its own multiple; the regressor of MINPACK uses the factor itself.
             let zero = factor > 1 && problem.start.iter().all(|&x| x == 0.0);
-            let start = problem.start.iter().map(|&x| f64::from(factor) * if zero { 1.0 } else { x });
+            let start =
+                problem.start.iter().map(|&x| f64::from(factor) * if zero { 1.0 } else { x });
             let start = DVector::from_iterator(problem.start.len(), start);
             let solution = minimise(Fit::new(&problem.analytic), start, &settings);
             let squares = 2.0 * solution.cost;

@@ -6,10 +6,16 @@ use nalgebra::DVector;
 
 use crate::collections::nist::{Dataset, datasets};
 
-/// Digits that agree with the certified value, the worst parameter counting: −log₁₀ of the relative error.
+/// Digits that agree with the certified value, the worst parameter counting: −log₁₀ of the relative
+/// error.
 fn digits(solution: &Solution, certified: &DVector<f64>) -> f64 {
     let error = |(x, c): (&f64, &f64)| -((x - c).abs() / c.abs()).max(1e-11).log10();
-    solution.x.iter().zip(certified).map(error).fold(11.0, |a, b| if b.is_nan() { 0.0 } else { f64::min(a, b) })
+    solution
+        .x
+        .iter()
+        .zip(certified)
+        .map(error)
+        .fold(11.0, |a, b| if b.is_nan() { 0.0 } else { f64::min(a, b) })
 }
 
 #[expect(clippy::print_stdout, reason = "the table of results, shown on request")]
@@ -43,7 +49,11 @@ fn certified_values_are_a_minimum_of_the_stored_data() {
     for dataset in datasets() {
         let rss = 2.0 * Fit::new(&dataset).cost(&dataset.certified);
         // Eleven certified digits cannot reach the residual of Lanczos1, 1.4e-25.
-        let expected = if dataset.name == "lanczos1" { rss < 1e-20 } else { (rss / dataset.rss - 1.0).abs() < 1e-9 };
+        let expected = if dataset.name == "lanczos1" {
+            rss < 1e-20
+        } else {
+            (rss / dataset.rss - 1.0).abs() < 1e-9
+        };
         assert!(expected, "{}: {rss} against {}", dataset.name, dataset.rss);
     }
 }

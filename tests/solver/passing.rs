@@ -29,7 +29,8 @@ impl LeastSquares for Waves {
     fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
         for (out, t) in out.iter_mut().zip(items.map(|i| i as f64 / 900.0)) {
             let waves: f64 = (0..MANY).map(|k| x[k] * (3.0 * k as f64 * t).cos()).sum();
-            *out = (waves + 5.0 * x[MANY] * (x[MANY + 1] * t).sin() - (700.0 * t * t).cos()) / self.unit;
+            *out = (waves + 5.0 * x[MANY] * (x[MANY + 1] * t).sin() - (700.0 * t * t).cos())
+                / self.unit;
         }
     }
 
@@ -40,14 +41,15 @@ impl LeastSquares for Waves {
                 block.column_mut(k)[row] = (3.0 * k as f64 * t).cos() / self.unit;
             }
             block.column_mut(MANY)[row] = 5.0 * (x[MANY + 1] * t).sin() / self.unit;
-            block.column_mut(MANY + 1)[row] = 5.0 * x[MANY] * t * (x[MANY + 1] * t).cos() / self.unit;
+            block.column_mut(MANY + 1)[row] =
+                5.0 * x[MANY] * t * (x[MANY + 1] * t).cos() / self.unit;
         }
     }
 }
 
 #[test]
 fn in_passing_derivatives_of_the_start_serve_in_any_unit() {
-    let memory = Memory::in_passing();
+    let memory = Memory::provisional();
     let gradient = |found: &Linearisation| found.triangle.tr_mul(&found.projected);
     let at = |height: f64| {
         let mut x = DVector::from_element(MANY + 2, 0.01);
@@ -57,10 +59,14 @@ fn in_passing_derivatives_of_the_start_serve_in_any_unit() {
     let (start, near) = (at(0.2), at(0.2004));
     for (x, unit) in [(&start, 0.1), (&near, 0.1), (&near, 0.3), (&start, 0.3)] {
         let waves = Waves { unit };
-        let (fit, plain) = (Fit::new(&waves).remembering(&memory, 1, unit), Fit::new(&waves).linearise(x));
+        let (fit, plain) =
+            (Fit::new(&waves).remembering(&memory, 1, unit), Fit::new(&waves).linearise(x));
         let found = fit.linearise(x);
         assert!((found.cost / plain.cost - 1.0).abs() < 1e-9, "{unit}");
-        assert!((gradient(&found) - gradient(&plain)).norm() < 0.01 * gradient(&plain).norm(), "{unit}");
+        assert!(
+            (gradient(&found) - gradient(&plain)).norm() < 0.01 * gradient(&plain).norm(),
+            "{unit}"
+        );
         // Differences are of the derivatives of each point.
         let second = |fit: &Fit<Waves>| fit.curvature(x, &|_| true).unwrap();
         assert_eq!(second(&fit), second(&Fit::new(&waves)));
@@ -69,7 +75,7 @@ fn in_passing_derivatives_of_the_start_serve_in_any_unit() {
 
 #[test]
 fn in_passing_what_had_no_effect_is_looked_at_again() {
-    let memory = Memory::in_passing();
+    let memory = Memory::provisional();
     let mut x = DVector::from_element(MANY + 2, 0.01);
     x[MANY] = 0.0;
     let waves = Waves { unit: 0.1 };

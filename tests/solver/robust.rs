@@ -1,4 +1,5 @@
-//! Robust losses: the gradient is that of the cost, threads change nothing, and the answers are those of `SciPy`.
+//! Robust losses: the gradient is that of the cost, threads change nothing, and the answers are
+//! those of `SciPy`.
 
 use std::ops::Range;
 
@@ -62,7 +63,10 @@ fn gradient_and_curvature_are_those_of_the_cost() {
             assert!((slope / loss.weight(s) - 1.0).abs() < 1e-6, "{loss:?} at {s}");
             let influence = |s: f64| loss.weight(s) * s;
             let curvature = (influence(s + h) - influence(s - h)) / (2.0 * h);
-            assert!((curvature - loss.curvature(s)).abs() < 1e-5 * loss.weight(s), "{loss:?} at {s}");
+            assert!(
+                (curvature - loss.curvature(s)).abs() < 1e-5 * loss.weight(s),
+                "{loss:?} at {s}"
+            );
         }
     }
     let problem = Decay { items: 20, rows: 3 };
@@ -79,7 +83,11 @@ fn gradient_and_curvature_are_those_of_the_cost() {
                 fit.cost(&x)
             };
             let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
-            assert!((gradient[j] / difference - 1.0).abs() < 1e-7, "{loss:?}: {} {difference}", gradient[j]);
+            assert!(
+                (gradient[j] / difference - 1.0).abs() < 1e-7,
+                "{loss:?}: {} {difference}",
+                gradient[j]
+            );
         }
     }
 }
@@ -119,7 +127,10 @@ fn answers_of_scipy() {
     for (loss, x, cost) in cases {
         let start = DVector::from_vec(vec![15.0, 0.5]);
         let solution = minimise(Fit::new(&problem).with_loss(loss), start, &Settings::default());
-        println!("{loss:?}: {} in {} steps, cost {:.12}", solution.termination, solution.iterations, solution.cost);
+        println!(
+            "{loss:?}: {} in {} steps, cost {:.12}",
+            solution.termination, solution.iterations, solution.cost
+        );
         assert!(solution.termination.converged());
         assert!((solution.cost / cost - 1.0).abs() < 1e-9);
         assert!((&solution.x - DVector::from_column_slice(&x)).amax() < 1e-5, "{}", solution.x);

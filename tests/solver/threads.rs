@@ -3,7 +3,9 @@
 use std::ops::Range;
 
 use flexcal::least_squares::solver::{Settings, minimise};
-use flexcal::least_squares::{Block, CHUNK_ITEMS, Fit, LeastSquares, Objective, jacobian, residual_vector};
+use flexcal::least_squares::{
+    Block, CHUNK_ITEMS, Fit, LeastSquares, Objective, jacobian, residual_vector,
+};
 use nalgebra::DVector;
 
 /// Damped waves sampled at many times, three residuals each.
@@ -13,7 +15,13 @@ struct Waves {
 }
 
 impl Waves {
-    fn row(&self, x: &DVector<f64>, item: usize, axis: usize, mut derivative: impl FnMut(usize, f64)) -> f64 {
+    fn row(
+        &self,
+        x: &DVector<f64>,
+        item: usize,
+        axis: usize,
+        mut derivative: impl FnMut(usize, f64),
+    ) -> f64 {
         let t = item as f64 / self.items as f64;
         let mut value = -(3.0 * t + axis as f64).cos();
         for j in 0..self.unknowns {
@@ -86,7 +94,10 @@ fn chunks_equal_the_dense_problem() {
         let reduced = Fit::new(&problem).linearise(&x);
         let gram = j.tr_mul(&j);
         assert!((reduced.triangle.tr_mul(&reduced.triangle) - &gram).amax() < 1e-12 * gram.amax());
-        assert!((reduced.triangle.tr_mul(&reduced.projected) - j.tr_mul(&r)).amax() < 1e-12 * gram.amax());
+        assert!(
+            (reduced.triangle.tr_mul(&reduced.projected) - j.tr_mul(&r)).amax()
+                < 1e-12 * gram.amax()
+        );
         assert!((2.0 * reduced.cost - r.norm_squared()).abs() < 1e-12 * r.norm_squared());
     }
 }
@@ -94,7 +105,8 @@ fn chunks_equal_the_dense_problem() {
 #[test]
 fn many_items_converge_as_few() {
     let settings = Settings::default();
-    let solution = minimise(Fit::new(&Waves { items: 2000, unknowns: 3 }), DVector::zeros(3), &settings);
+    let solution =
+        minimise(Fit::new(&Waves { items: 2000, unknowns: 3 }), DVector::zeros(3), &settings);
     assert!(solution.termination.converged());
     println!("{solution:?}");
 }

@@ -1,6 +1,8 @@
 //! What the tests of this theme share.
 
-use flexcal::mechanics::{Angle, Arm, Beam, Equilibrated, Flexibility, Joint, StaticsError, Workspace};
+use flexcal::mechanics::{
+    Angle, Arm, Beam, Equilibrated, Flexibility, Joint, StaticsError, Workspace,
+};
 use flexcal::problem::PoseView;
 use flexcal::problem::{Equilibrium, JointKind, Tree};
 use flexcal::spatial::Frame;
@@ -39,7 +41,8 @@ pub fn joint(a: f64) -> Joint<f64> {
 }
 
 pub fn beam(a: f64, mass: f64, flexibility: Flexibility<f64>) -> Joint<f64> {
-    let beam = Beam { mass, flexibility, masses: Vec::new(), hoist: None, strain: None, added: None };
+    let beam =
+        Beam { mass, flexibility, masses: Vec::new(), hoist: None, strain: None, added: None };
     Joint { beam: Some(beam), ..joint(a) }
 }
 
@@ -88,7 +91,8 @@ pub fn softer(arm: &Arm<f64>, factor: f64) -> Arm<f64> {
     for joint in &mut arm.joints {
         joint.flexibility = joint.flexibility.map(|flexibility| flexibility * factor);
         if let Some(Beam { flexibility: all, .. }) = &mut joint.beam {
-            for flexibility in [&mut all.axial, &mut all.about_y, &mut all.about_z, &mut all.twist] {
+            for flexibility in [&mut all.axial, &mut all.about_y, &mut all.about_z, &mut all.twist]
+            {
                 *flexibility *= factor;
             }
         }

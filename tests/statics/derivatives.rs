@@ -1,10 +1,11 @@
-//! Derivatives by dual numbers against extrapolated differences, for every parameter that can be free.
+//! Derivatives by dual numbers against extrapolated differences, for every parameter that can be
+//! free.
 
 #![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
 
 use crate::common::arms::{ODD, TREE, golden_problem, measured, parse, path, with_parameters};
 use crate::common::made::{at_random, draw, labels, model_of, of_targets, part};
-use flexcal::identify::Placement;
+use flexcal::fit::Placement;
 use flexcal::least_squares::{check_jacobian, jacobian};
 use flexcal::measurement::Measurements;
 use flexcal::model::PoseResiduals;
@@ -16,7 +17,8 @@ use rand_chacha::ChaCha8Rng;
 
 /// Largest difference of a column of the Jacobian, relative to its norm.
 const WORST: f64 = 1e-7;
-/// A column whose whole effect is below this part of the largest is that of a parameter without effect.
+/// A column whose whole effect is below this part of the largest is that of a parameter without
+/// effect.
 const WITHOUT_EFFECT: f64 = 1e-12;
 
 /// Unknowns vary by some hundredths of these.
@@ -27,13 +29,24 @@ fn size(unit: Unit) -> f64 {
     }
 }
 
-/// Checks every column at `x`; the names of parameters without effect must be those in `without_effect`.
-fn check_at(what: &str, problem: &Problem, rows: &Measurements, x: &DVector<f64>, without_effect: &[&str]) {
+/// Checks every column at `x`; the names of parameters without effect must be those in
+/// `without_effect`.
+fn check_at(
+    what: &str,
+    problem: &Problem,
+    rows: &Measurements,
+    x: &DVector<f64>,
+    without_effect: &[&str],
+) {
     let model = model_of(problem, rows);
     let all: Vec<usize> = (0..rows.len()).collect();
     let poses = Placement::of(rows).poses(rows, &all, 1e-3);
-    let residuals = PoseResiduals::new(&model, poses, (0..model.parameters.len()).collect(), x.clone());
-    let step = DVector::from_iterator(x.len(), model.parameters.iter().map(|parameter| size(parameter.unit())));
+    let residuals =
+        PoseResiduals::new(&model, poses, (0..model.parameters.len()).collect(), x.clone());
+    let step = DVector::from_iterator(
+        x.len(),
+        model.parameters.iter().map(|parameter| size(parameter.unit())),
+    );
     let exact = jacobian(&residuals, x);
     let effect = |j: usize| exact.column(j).norm() * step[j];
     let largest = (0..x.len()).map(effect).fold(0.0, f64::max);
@@ -48,7 +61,8 @@ fn check_at(what: &str, problem: &Problem, rows: &Measurements, x: &DVector<f64>
             assert!(column.relative_error < 1e-3, "{what}: {name} has an effect: {column:?}");
             continue;
         }
-        let error = if column.relative_error.is_nan() { f64::INFINITY } else { column.relative_error };
+        let error =
+            if column.relative_error.is_nan() { f64::INFINITY } else { column.relative_error };
         if error > worst.0 {
             worst = (error, name);
         }
@@ -59,9 +73,21 @@ fn check_at(what: &str, problem: &Problem, rows: &Measurements, x: &DVector<f64>
 }
 
 /// At zero, and at deviations drawn from the priors.
-fn check(what: &str, problem: &Problem, rows: &Measurements, silent_at_zero: &[&str], silent: &[&str]) {
+fn check(
+    what: &str,
+    problem: &Problem,
+    rows: &Measurements,
+    silent_at_zero: &[&str],
+    silent: &[&str],
+) {
     let model = model_of(problem, rows);
-    check_at(&format!("{what}, nominal"), problem, rows, &DVector::zeros(model.parameters.len()), silent_at_zero);
+    check_at(
+        &format!("{what}, nominal"),
+        problem,
+        rows,
+        &DVector::zeros(model.parameters.len()),
+        silent_at_zero,
+    );
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let x = draw(&model, |unit| 0.1 * size(unit), &mut rng);
     check_at(&format!("{what}, off nominal"), problem, rows, &x, silent);
@@ -77,7 +103,13 @@ fn every_parameter_of_the_lunar_sampler() {
             problem.statics.beam_elements = elements;
             let rows = part(&measured(&problem, &["tests/cases/a-none.csv"]), (0..78).step_by(8));
             assert_eq!(model_of(&problem, &rows).parameters.len(), 20 + 3 + 8 + 6 + 3 - 2);
-            check(&format!("lunar sampler, {equilibrium:?}, {elements} elements"), &problem, &rows, &[], &[]);
+            check(
+                &format!("lunar sampler, {equilibrium:?}, {elements} elements"),
+                &problem,
+                &rows,
+                &[],
+                &[],
+            );
         }
     }
 }
@@ -93,20 +125,30 @@ fn every_parameter_of_an_arm_with_every_kind_of_joint_and_link() {
             let mut rows = at_random(&problem, 10, 2.5, &mut rng);
             rows.payload = Some((0..10).map(|k| if k % 2 == 0 { 0.0 } else { 2.5 }).collect());
             rows.hoist = Some((0..10).map(|k| 10.0 * f64::from(k)).collect());
-            check(&format!("odd arm, {equilibrium:?}, {elements} elements"), &problem, &rows, &[], &[]);
+            check(
+                &format!("odd arm, {equilibrium:?}, {elements} elements"),
+                &problem,
+                &rows,
+                &[],
+                &[],
+            );
         }
     }
 }
 
-/// Fixed joints given by xyz and rpy, and a joint that follows another, behind whatever stands before.
+/// Fixed joints given by xyz and rpy, and a joint that follows another, behind whatever stands
+/// before.
 const PLACED: &str = "[[joint]]\nkind = \"fixed\"\nxyz_m = [0.1, -0.2, 0.3]\nrpy_deg = [10, -80, 200]\n[[joint.body]]\nmass_kg = 1.5\n\
                       com_m = [0.1, 0, 0.2]\n[[joint]]\na_m = 0.2\nmimic = { joint = 1, ratio = -0.5 }\n[[joint]]\nkind = \"fixed\"\n\
                       xyz_m = [0, 0.1, 0]\n";
 
 #[test]
 fn every_parameter_of_an_arm_with_placements() {
-    let rules = ["x", "y", "z"].map(|own| format!("'joint*.{own}' = {{ sigma_mm = 30.0 }}\n")).concat()
-        + &["roll", "pitch", "yaw"].map(|own| format!("'joint*.{own}' = {{ sigma_deg = 1.0 }}\n")).concat();
+    let rules =
+        ["x", "y", "z"].map(|own| format!("'joint*.{own}' = {{ sigma_mm = 30.0 }}\n")).concat()
+            + &["roll", "pitch", "yaw"]
+                .map(|own| format!("'joint*.{own}' = {{ sigma_deg = 1.0 }}\n"))
+                .concat();
     let odd = parse(&format!("{ODD}{rules}{PLACED}"));
     let everything = "[parameters]\n\"*\" = { sigma_deg = 1.0, sigma_mm = 30.0 }\n";
     let rigid = parse(&format!(
@@ -114,11 +156,18 @@ fn every_parameter_of_an_arm_with_placements() {
     ));
     for (problem, silent) in [(odd, &[][..]), (rigid, &[])] {
         let mut rows = at_random(&problem, 10, 2.5, &mut ChaCha8Rng::seed_from_u64(3));
-        let (n, follower) =
-            (problem.joints.len(), problem.joints.iter().position(|joint| joint.mimic.is_some()).unwrap());
+        let (n, follower) = (
+            problem.joints.len(),
+            problem.joints.iter().position(|joint| joint.mimic.is_some()).unwrap(),
+        );
         rows.configurations.chunks_exact_mut(n).for_each(|row| row[follower] = 0.0);
-        let names: Vec<String> = model_of(&problem, &rows).parameters.into_iter().map(|own| own.name).collect();
-        assert!(names.contains(&format!("joint{n}.pitch")) && !names.contains(&format!("joint{n}.alpha")), "{names:?}");
+        let names: Vec<String> =
+            model_of(&problem, &rows).parameters.into_iter().map(|own| own.name).collect();
+        assert!(
+            names.contains(&format!("joint{n}.pitch"))
+                && !names.contains(&format!("joint{n}.alpha")),
+            "{names:?}"
+        );
         check(&problem.name, &problem, &rows, silent, silent);
     }
 }
@@ -155,7 +204,9 @@ fn some_parameters_among_many_have_the_same_columns() {
 
 #[test]
 fn every_parameter_of_a_tree_with_targets_on_all_of_its_branches() {
-    for (what, mut problem) in [("tree", parse(TREE)), ("two arms", free(&path("problems/two-arms/problem.toml")))] {
+    for (what, mut problem) in
+        [("tree", parse(TREE)), ("two arms", free(&path("problems/two-arms/problem.toml")))]
+    {
         let mut random = ChaCha8Rng::seed_from_u64(8);
         let mut rows = of_targets(&problem, at_random(&problem, 15, 1.2, &mut random));
         rows.payload = Some((0..rows.len()).map(|row| row as f64 * 0.1).collect());
@@ -164,7 +215,13 @@ fn every_parameter_of_a_tree_with_targets_on_all_of_its_branches() {
             for equilibrium in [Equilibrium::Deflected, Equilibrium::Undeflected] {
                 problem.statics.equilibrium = equilibrium;
                 let x = draw(&model_of(&problem, &rows), |unit| 0.1 * size(unit), &mut random);
-                check_at(&format!("{what}, {elements} elements, {equilibrium:?}"), &problem, &rows, &x, &[]);
+                check_at(
+                    &format!("{what}, {elements} elements, {equilibrium:?}"),
+                    &problem,
+                    &rows,
+                    &x,
+                    &[],
+                );
             }
         }
         for joint in &mut problem.joints {

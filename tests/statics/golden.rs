@@ -1,4 +1,5 @@
-//! Positions from an independent finite-segment simulator (`tests/golden`): no formula in common with the closed forms.
+//! Positions from an independent finite-segment simulator (`tests/golden`): no formula in common
+//! with the closed forms.
 
 use crate::common::arms::{golden, golden_problem, table_2};
 use flexcal::mechanics::{Arm, Equilibrated, Workspace};
@@ -55,7 +56,9 @@ fn position(arm: &Arm<f64>, problem: &Problem, row: &Row) -> Vector3<f64> {
 
 /// Largest distance [mm] between the arm's positions and column group `k` of the rows.
 fn worst(arm: &Arm<f64>, problem: &Problem, rows: &[Row], k: usize) -> f64 {
-    rows.iter().map(|row| (position(arm, problem, row) - row.vector(k)).norm() * 1e3).fold(0.0, f64::max)
+    rows.iter()
+        .map(|row| (position(arm, problem, row) - row.vector(k)).norm() * 1e3)
+        .fold(0.0, f64::max)
 }
 
 #[test]
@@ -72,7 +75,8 @@ fn first_order_displacements_agree_for_each_part() {
     let problem = golden_problem();
     let nominal = Arm::nominal(&problem);
     let rows = rows("first_order.csv");
-    // Deflections a million times smaller are in the linear limit; scaled back they keep ten digits.
+    // Deflections a million times smaller are in the linear limit; scaled back they keep ten
+    // digits.
     let soft = 1e-6;
     let parts = [
         ("joints", true, false, false),
@@ -89,7 +93,9 @@ fn first_order_displacements_agree_for_each_part() {
                 let keep = if i == 2 { link_a } else { link_b };
                 let factor = if keep { soft } else { 0.0 };
                 let all = &mut beam.flexibility;
-                for flexibility in [&mut all.axial, &mut all.about_y, &mut all.about_z, &mut all.twist] {
+                for flexibility in
+                    [&mut all.axial, &mut all.about_y, &mut all.about_z, &mut all.twist]
+                {
                     *flexibility *= factor;
                 }
             }
@@ -98,7 +104,8 @@ fn first_order_displacements_agree_for_each_part() {
         let worst = rows
             .iter()
             .map(|row| {
-                let moved = (position(&arm, &problem, row) - position(&straight, &problem, row)) / soft;
+                let moved =
+                    (position(&arm, &problem, row) - position(&straight, &problem, row)) / soft;
                 (moved - row.vector(k)).norm() * 1e3
             })
             .fold(0.0, f64::max);
@@ -114,7 +121,12 @@ fn equilibrium_positions_agree_with_one_element_and_better_with_more() {
     for (elements, limit) in [(1, 0.02), (2, 0.006), (8, 0.003)] {
         let mut nominal = Arm::nominal(&problem);
         nominal.beam_elements = elements;
-        let worst = worst(&nominal, &problem, &rows, 0).max(worst(&table_2(nominal.clone()), &problem, &rows, 1));
+        let worst = worst(&nominal, &problem, &rows, 0).max(worst(
+            &table_2(nominal.clone()),
+            &problem,
+            &rows,
+            1,
+        ));
         println!("equilibrium, {elements} elements: {worst:.5} mm");
         assert!(worst < limit, "{elements} elements: {worst} mm");
     }

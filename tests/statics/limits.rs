@@ -1,6 +1,6 @@
 //! Many elements, no loads, small deflections, and loads too great for an equilibrium.
 
-use flexcal::identify::Placement;
+use flexcal::fit::Placement;
 use flexcal::mechanics::{Arm, Equilibrated, StaticsError, Workspace};
 use flexcal::model::PoseResiduals;
 use flexcal::problem::Equilibrium;
@@ -24,7 +24,10 @@ fn twice_the_elements_come_four_times_closer() {
         let finest: Vec<Vector3<f64>> = configurations.iter().map(|q| at(64, q)).collect();
         let errors: Vec<f64> = [1, 2, 4, 8]
             .map(|elements| {
-                let worst = configurations.iter().zip(&finest).map(|(q, fine)| (at(elements, q) - fine).norm());
+                let worst = configurations
+                    .iter()
+                    .zip(&finest)
+                    .map(|(q, fine)| (at(elements, q) - fine).norm());
                 worst.fold(0.0, f64::max)
             })
             .to_vec();
@@ -38,7 +41,10 @@ fn twice_the_elements_come_four_times_closer() {
 fn without_gravity_and_rope_nothing_bends() {
     for (mut arm, configurations) in arms() {
         arm.gravity = Vector3::zeros();
-        arm.joints.iter_mut().filter_map(|joint| joint.beam.as_mut()).for_each(|beam| beam.hoist = None);
+        arm.joints
+            .iter_mut()
+            .filter_map(|joint| joint.beam.as_mut())
+            .for_each(|beam| beam.hoist = None);
         let straight = rigid(&arm);
         for equilibrium in [Equilibrium::Deflected, Equilibrium::Undeflected] {
             arm.equilibrium = equilibrium;
@@ -80,7 +86,10 @@ fn an_arm_too_soft_for_its_loads_is_an_error() {
         println!("settled of {}: {fates:?}", configurations.len());
         assert_eq!(fates[0], configurations.len());
         assert_eq!(fates[15], 0, "{fates:?}");
-        assert_eq!(frame(&softer(&nominal, 1e9), &configurations[0]).unwrap_err(), StaticsError::NotSettled);
+        assert_eq!(
+            frame(&softer(&nominal, 1e9), &configurations[0]).unwrap_err(),
+            StaticsError::NotSettled
+        );
     }
 }
 
@@ -90,7 +99,10 @@ fn a_pose_without_equilibrium_has_no_residual() {
     let rows = at_random(&problem, 3, 1.0, &mut ChaCha8Rng::seed_from_u64(1));
     let model = model_of(&problem, &rows);
     // Stiffnesses 10⁻⁹ of nominal.
-    let soft = model.parameters.iter().map(|parameter| if parameter.slot.is_elastic() { 1e-9_f64.ln() } else { 0.0 });
+    let soft = model
+        .parameters
+        .iter()
+        .map(|parameter| if parameter.site.is_elastic() { 1e-9_f64.ln() } else { 0.0 });
     let x = DVector::from_iterator(model.parameters.len(), soft);
     let poses = Placement::of(&rows).poses(&rows, &[0, 1, 2], 1e-3);
     let residuals = PoseResiduals::new(&model, poses, (0..x.len()).collect(), x.clone());

@@ -41,7 +41,8 @@ fn an_arm_in_a_mirror_is_its_mirror_image() {
         let mut image = arm.clone();
         (image.gravity, image.payload_at) = (mirror * arm.gravity, mirror * arm.payload_at);
         for joint in &mut image.joints {
-            (joint.a, joint.theta, joint.beta) = (-joint.a, -joint.theta, Angle::new(-joint.beta.value));
+            (joint.a, joint.theta, joint.beta) =
+                (-joint.a, -joint.theta, Angle::new(-joint.beta.value));
             joint.bodies.iter_mut().for_each(|body| body.at.x = -body.at.x);
             let Some(beam) = &mut joint.beam else { continue };
             beam.masses.iter_mut().for_each(|carried| carried.at.x = -carried.at.x);
@@ -49,15 +50,18 @@ fn an_arm_in_a_mirror_is_its_mirror_image() {
                 (hoist.at, hoist.direction) = (mirror * hoist.at, mirror * hoist.direction);
             }
         }
-        for (equilibrium, elements) in
-            [(Equilibrium::Deflected, 1), (Equilibrium::Deflected, 3), (Equilibrium::Undeflected, 1)]
-        {
+        for (equilibrium, elements) in [
+            (Equilibrium::Deflected, 1),
+            (Equilibrium::Deflected, 3),
+            (Equilibrium::Undeflected, 1),
+        ] {
             (image.equilibrium, image.beam_elements) = (equilibrium, elements);
             let arm = Arm { equilibrium, beam_elements: elements, ..arm.clone() };
             for q in &configurations {
                 let joints = arm.joints.iter().zip(q);
-                let mirrored: Vec<f64> =
-                    joints.map(|(joint, q)| if joint.kind == JointKind::Revolute { -q } else { *q }).collect();
+                let mirrored: Vec<f64> = joints
+                    .map(|(joint, q)| if joint.kind == JointKind::Revolute { -q } else { *q })
+                    .collect();
                 let seen = mirror * position(&arm, q, &TARGET);
                 assert!((position(&image, &mirrored, &(mirror * TARGET)) - seen).norm() < 1e-12);
             }

@@ -30,7 +30,8 @@ fn a_hanging_beam_stretches_under_its_own_weight() {
 
 #[test]
 fn a_horizontal_beam_sags_as_in_the_textbook() {
-    // q L⁴/(8 EI) with the slope q L³/(6 EI); F L³/(3 EI) with F L²/(2 EI); F s² (3 L − s)/(6 EI) with F s²/(2 EI).
+    // q L⁴/(8 EI) with the slope q L³/(6 EI); F L³/(3 EI) with F L²/(2 EI); F s² (3 L − s)/(6 EI)
+    // with F s²/(2 EI).
     let (weight, s) = (12.0 * GRAVITY, 0.7);
     for (alpha, flexibility) in [(0.0, STIFF.about_y), (FRAC_PI_2, STIFF.about_z)] {
         for elements in [1, 4] {
@@ -46,17 +47,31 @@ fn a_horizontal_beam_sags_as_in_the_textbook() {
                 near(-tip.axes[0].z, slope, 1e-6, what);
             };
             let (l, k) = (LENGTH, flexibility);
-            check(&made(12.0), weight * l.powi(3) * k / 8.0, weight * l.powi(2) * k / 6.0, "own weight");
+            check(
+                &made(12.0),
+                weight * l.powi(3) * k / 8.0,
+                weight * l.powi(2) * k / 6.0,
+                "own weight",
+            );
             let mut loaded = made(0.0);
             loaded.payload_mass = 12.0;
-            check(&loaded, weight * l.powi(3) * k / 3.0, weight * l.powi(2) * k / 2.0, "load at the tip");
+            check(
+                &loaded,
+                weight * l.powi(3) * k / 3.0,
+                weight * l.powi(2) * k / 2.0,
+                "load at the tip",
+            );
             let mut carrying = made(0.0);
             let carried = PointMass { mass: 12.0, at: Vector3::new(s, 0.0, 0.0) };
             carrying.joints[0].beam.as_mut().unwrap().masses.push(carried);
             let (sag, slope) = (weight * s * s * (3.0 * l - s) * k / 6.0, weight * s * s * k / 2.0);
             check(&carrying, sag, slope, "load on the beam");
             let mut hoisted = made(0.0);
-            let hoist = Hoist { at: Vector3::new(s, 0.0, 0.0), force: weight, direction: Vector3::new(0.0, 0.0, -1.0) };
+            let hoist = Hoist {
+                at: Vector3::new(s, 0.0, 0.0),
+                force: weight,
+                direction: Vector3::new(0.0, 0.0, -1.0),
+            };
             hoisted.joints[0].beam.as_mut().unwrap().hoist = Some(hoist);
             check(&hoisted, sag, slope, "rope that pulls down");
         }
@@ -76,8 +91,9 @@ fn a_mass_beside_the_beam_twists_it() {
 
 #[test]
 fn twist_and_bending_are_coupled_both_ways() {
-    // A load W at the lever e beside the tip: M_x = −W e all along, M_y = W (L − x). About y the torsional moment adds −k_y W e to the
-    // curvature, about z −k_z W e; the bending moment turns the tip by k_y W L²/2 about x.
+    // A load W at the lever e beside the tip: M_x = −W e all along, M_y = W (L − x). About y the
+    // torsional moment adds −k_y W e to the curvature, about z −k_z W e; the bending moment turns
+    // the tip by k_y W L²/2 about x.
     let (weight, lever, l, [k_y, k_z]) = (3.0 * GRAVITY, 0.4, LENGTH, [2e-7, -3e-7]);
     for elements in [1, 4] {
         for along in [1.0, -1.0] {
@@ -87,7 +103,12 @@ fn twist_and_bending_are_coupled_both_ways() {
             (arm.payload_mass, arm.payload_at) = (3.0, Vector3::new(0.0, lever, 0.0));
             let tip = frame(&arm, &[]).unwrap();
             let torsion = weight * lever * l * l / 2.0;
-            near(-tip.origin.z, weight * l.powi(3) * STIFF.about_y / 3.0 - along * k_y * torsion, 1e-4, "sag");
+            near(
+                -tip.origin.z,
+                weight * l.powi(3) * STIFF.about_y / 3.0 - along * k_y * torsion,
+                1e-4,
+                "sag",
+            );
             near(tip.origin.y, -along * k_z * torsion, 1e-4, "sideways");
             let twist = weight * (along * k_y * l * l / 2.0 - STIFF.twist * lever * l);
             near(tip.axes[1].z, twist, 1e-4, "twist");
@@ -97,11 +118,13 @@ fn twist_and_bending_are_coupled_both_ways() {
 
 #[test]
 fn a_slide_sags_as_a_cantilever_as_long_as_it_is_out() {
-    // F L³/(3 EI) + M L²/(2 EI) with the slope F L²/(2 EI) + M L/(EI), L = |d + q|, whichever way it runs.
+    // F L³/(3 EI) + M L²/(2 EI) with the slope F L²/(2 EI) + M L/(EI), L = |d + q|, whichever way
+    // it runs.
     let (weight, lever, l, k) = (12.0 * GRAVITY, 0.3, LENGTH, 3e-7);
     for (d, q) in [(l, 0.0), (0.2, l - 0.2), (-l, 0.0), (0.4, -l - 0.4)] {
         let turned = Angle::new(FRAC_PI_2);
-        let slide = Joint { kind: JointKind::Prismatic, alpha: turned, d, slide: Some(k), ..joint(0.0) };
+        let slide =
+            Joint { kind: JointKind::Prismatic, alpha: turned, d, slide: Some(k), ..joint(0.0) };
         let mut arm = arm(vec![slide]);
         let along = (d + q).signum();
         (arm.payload_mass, arm.payload_at) = (12.0, Vector3::new(0.0, 0.0, lever * along));
@@ -113,8 +136,9 @@ fn a_slide_sags_as_a_cantilever_as_long_as_it_is_out() {
 
 #[test]
 fn a_spring_takes_off_part_of_the_moment() {
-    // A horizontal axis, a load at the lever L: M = −W L cos φ. A spring of no free length from the height h above the axis to the
-    // lever b along the link lifts it by k b h cos φ; with free length and preload by (k (l − l₀) + F₀) b h cos φ / l.
+    // A horizontal axis, a load at the lever L: M = −W L cos φ. A spring of no free length from the
+    // height h above the axis to the lever b along the link lifts it by k b h cos φ; with free
+    // length and preload by (k (l − l₀) + F₀) b h cos φ / l.
     let (stiffness, mass, h, b, k) = (1e7, 4.0, 0.5, 0.4, 150.0);
     for (free_length, preload) in [(0.0, 0.0), (0.3, 20.0), (0.0, -15.0)] {
         for q in [-0.7_f64, 0.0, 0.4] {
@@ -122,7 +146,8 @@ fn a_spring_takes_off_part_of_the_moment() {
             let spring = Compensator { anchor, lever, free_length, rate: k, preload };
             let (alpha, flexibility) = (Angle::new(FRAC_PI_2), Some(1.0 / stiffness));
             let kind = JointKind::Revolute;
-            let sprung = Joint { kind, alpha, flexibility, compensator: Some(spring), ..joint(0.0) };
+            let sprung =
+                Joint { kind, alpha, flexibility, compensator: Some(spring), ..joint(0.0) };
             let mut arm = arm(vec![sprung, joint(LENGTH)]);
             arm.payload_mass = mass;
             let length = (b * b + h * h - 2.0 * b * h * q.sin()).sqrt();
@@ -138,7 +163,8 @@ fn a_spring_takes_off_part_of_the_moment() {
 fn a_flexible_joint_turns_by_moment_over_stiffness() {
     // A horizontal axis, a load at the lever L: the load sinks by F L²/k.
     let (stiffness, mass) = (1e7, 4.0);
-    let axis = Joint { alpha: Angle::new(FRAC_PI_2), flexibility: Some(1.0 / stiffness), ..joint(0.0) };
+    let axis =
+        Joint { alpha: Angle::new(FRAC_PI_2), flexibility: Some(1.0 / stiffness), ..joint(0.0) };
     let mut arm = arm(vec![axis, joint(LENGTH)]);
     arm.payload_mass = mass;
     let sag = -position(&arm, &[], &Vector3::zeros()).z;

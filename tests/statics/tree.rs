@@ -1,6 +1,6 @@
 //! Two arms on a torso: where both hands rest, from transforms multiplied and moments summed here.
 
-use flexcal::identify::Placement;
+use flexcal::fit::Placement;
 use flexcal::least_squares::jacobian;
 use flexcal::measurement::Measurements;
 use flexcal::model::PoseResiduals;
@@ -22,7 +22,8 @@ fn shift(x: f64, y: f64, z: f64) -> Isometry3<f64> {
 
 /// The joint's own frame before it turns, and behind it, with its coordinate and a twist.
 fn step(joint: &Joint, q: f64, twist: f64) -> (Isometry3<f64>, Isometry3<f64>) {
-    let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| move |angle: f64| turn(axis, angle));
+    let [x, y, z] =
+        [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| move |angle: f64| turn(axis, angle));
     let placed = joint.placement.map_or(Isometry3::identity(), |own| {
         shift(own.xyz.x, own.xyz.y, own.xyz.z) * z(own.rpy.z) * y(own.rpy.y) * x(own.rpy.x)
     });
@@ -35,8 +36,8 @@ fn step(joint: &Joint, q: f64, twist: f64) -> (Isometry3<f64>, Isometry3<f64>) {
     (before, z(joint.theta + q + twist) * shift(0.0, 0.0, joint.d + way) * y(joint.beta))
 }
 
-/// Where the frame of every joint rests in the frame of the base, after so many passes: each joint turns by the moment about its axis
-/// of all that stands on it, over its stiffness.
+/// Where the frame of every joint rests in the frame of the base, after so many passes: each joint
+/// turns by the moment about its axis of all that stands on it, over its stiffness.
 fn at_rest(problem: &Problem, q: &[f64], payload: f64, passes: usize) -> Vec<Isometry3<f64>> {
     let joints = &problem.joints;
     let stands_on = |mut own: usize, other: usize| loop {
@@ -47,7 +48,8 @@ fn at_rest(problem: &Problem, q: &[f64], payload: f64, passes: usize) -> Vec<Iso
         }
     };
     let mut twists = vec![0.0; joints.len()];
-    let (mut axes, mut frames): (Vec<Isometry3<f64>>, Vec<Isometry3<f64>>) = (Vec::new(), Vec::new());
+    let (mut axes, mut frames): (Vec<Isometry3<f64>>, Vec<Isometry3<f64>>) =
+        (Vec::new(), Vec::new());
     for _ in 0..=passes {
         (axes, frames) = (Vec::new(), Vec::new());
         for (k, joint) in joints.iter().enumerate() {
@@ -66,8 +68,9 @@ fn at_rest(problem: &Problem, q: &[f64], payload: f64, passes: usize) -> Vec<Iso
         for (k, joint) in joints.iter().enumerate() {
             let (at, axis) = (axes[k].translation.vector, axes[k] * Vector3::z());
             let own = masses.iter().filter(|(carrier, ..)| stands_on(*carrier, k));
-            let moment: f64 =
-                own.map(|(_, place, mass)| axis.dot(&(place - at).cross(&(problem.gravity * *mass)))).sum();
+            let moment: f64 = own
+                .map(|(_, place, mass)| axis.dot(&(place - at).cross(&(problem.gravity * *mass))))
+                .sum();
             twists[k] = joint.stiffness.map_or(0.0, |stiffness| moment / stiffness);
         }
     }
@@ -116,7 +119,8 @@ fn both_hands_rest_where_the_moments_of_both_arms_put_them() {
         let sag = farthest(&theirs, &by_hand(&problem, &heavy, 0));
         let off = farthest(&ours, &theirs);
         // What the load of the right hand does to the left one.
-        let (ours_light, theirs_light) = (by_model(&problem, &light), by_hand(&problem, &light, passes));
+        let (ours_light, theirs_light) =
+            (by_model(&problem, &light), by_hand(&problem, &light, passes));
         let (mut worst, mut least, mut most) = (0.0_f64, f64::INFINITY, 0.0_f64);
         for row in (0..ours.len()).filter(|row| row % 2 == 0) {
             let (moved, expected) = (ours[row] - ours_light[row], theirs[row] - theirs_light[row]);
@@ -134,7 +138,8 @@ fn both_hands_rest_where_the_moments_of_both_arms_put_them() {
     }
 }
 
-/// A chain whose joints say on which they stand, and one with a second branch of nothing, are the chain to the last bit.
+/// A chain whose joints say on which they stand, and one with a second branch of nothing, are the
+/// chain to the last bit.
 #[test]
 fn a_chain_by_parents_is_the_chain() {
     let text = std::fs::read_to_string(golden("problem.toml")).unwrap();
@@ -165,7 +170,8 @@ fn a_chain_by_parents_is_the_chain() {
     let of_chain = at_random(&chain, 12, 1.5, &mut ChaCha8Rng::seed_from_u64(3));
     let mut of_branched = of_chain.clone();
     of_branched.joints = 6;
-    of_branched.configurations = of_chain.configurations.chunks(4).flat_map(|q| [q, &[0.3, -0.4]].concat()).collect();
+    of_branched.configurations =
+        of_chain.configurations.chunks(4).flat_map(|q| [q, &[0.3, -0.4]].concat()).collect();
     let columns = |problem: &Problem, rows: &Measurements| {
         let model = model_of(problem, rows);
         let own: Vec<usize> = (0..model.parameters.len())
@@ -175,7 +181,8 @@ fn a_chain_by_parents_is_the_chain() {
             })
             .collect();
         let poses = Placement::of(rows).poses(rows, &(0..rows.len()).collect::<Vec<_>>(), 1e-3);
-        let residuals = PoseResiduals::new(&model, poses, own.clone(), DVector::zeros(model.parameters.len()));
+        let residuals =
+            PoseResiduals::new(&model, poses, own.clone(), DVector::zeros(model.parameters.len()));
         jacobian(&residuals, &DVector::zeros(own.len()))
     };
     for equilibrium in [Equilibrium::Deflected, Equilibrium::Undeflected] {

@@ -1,10 +1,11 @@
-//! Replicas of the paper's experiment: what they show, that they repeat, and what docs/paper.md says of them.
+//! Replicas of the paper's experiment: what they show, that they repeat, and what docs/paper.md
+//! says of them.
 
 use std::path::Path;
 
 use assert_cmd::Command;
-use flexcal::monte_carlo::{MisprintStudy, ReplicaResults, Request, Spread, replicate};
 use flexcal::report;
+use flexcal::study::{MisprintStudy, ReplicaResults, Request, Spread, replicate};
 
 const FILE: &str = "problems/lunar-sampler/MISPRINTS.toml";
 
@@ -40,7 +41,8 @@ fn replicas_repeat_and_tell_readings_and_stages_apart() {
     for own in &found.replicas {
         assert!((own.rigid.unwrap().mean.norm / study.rigid_leaves - 1.0).abs() < 1e-3);
     }
-    let [known, declared, positions, differences] = [0, 1, 2, 3].map(|stage| ratio(&found, "corrected", stage));
+    let [known, declared, positions, differences] =
+        [0, 1, 2, 3].map(|stage| ratio(&found, "corrected", stage));
     println!(
         "corrected: known {known:.3}, declared {declared:.3}, positions {positions:.3}, differences {differences:.3}"
     );
@@ -54,7 +56,10 @@ fn replicas_repeat_and_tell_readings_and_stages_apart() {
 #[test]
 fn mistakes_in_a_study_of_misprints_are_named() {
     let text = std::fs::read_to_string(root().join(FILE)).unwrap();
-    let text = text.replace("\"problem.toml\"", &format!("\"{}\"", root().join("problems/lunar-sampler").display()));
+    let text = text.replace(
+        "\"problem.toml\"",
+        &format!("\"{}\"", root().join("problems/lunar-sampler").display()),
+    );
     let cases = [
         ("\"misprints\"", "\"mistakes\"", "kind: \"mistakes\" is none of fits, misprints"),
         ("specimens = 8", "specimens = 0", "specimens"),
@@ -78,7 +83,8 @@ fn mistakes_in_a_study_of_misprints_are_named() {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().display().to_string();
         let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-        let assert = flexcal.current_dir(root()).args(arguments).args(["--out", &out]).assert().code(2);
+        let assert =
+            flexcal.current_dir(root()).args(arguments).args(["--out", &out]).assert().code(2);
         assert!(String::from_utf8_lossy(&assert.get_output().stderr).contains("done at once"));
     }
 }
@@ -90,7 +96,8 @@ fn the_page_on_the_paper_shows_what_the_study_prints() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().display().to_string();
     let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
-    let assert = flexcal.current_dir(root()).args(["study", FILE, "--out", &out]).assert().success();
+    let assert =
+        flexcal.current_dir(root()).args(["study", FILE, "--out", &out]).assert().success();
     let printed = String::from_utf8(assert.get_output().stdout.clone()).unwrap();
     let (printed, _) = printed.split_once("\nWritten to").unwrap();
     let page = root().join("docs/paper.md");

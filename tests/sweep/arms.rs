@@ -1,9 +1,9 @@
-//! Arms of all kinds, with parameters free and with priors at random: nothing that is trusted runs off, and standard errors
-//! cover.
+//! Arms of all kinds, with parameters free and with priors at random: nothing that is trusted runs
+//! off, and standard errors cover.
 
 use std::fmt::Write as _;
 
-use flexcal::identify::{Identification, Options, identify};
+use flexcal::fit::{Identification, Options, identify};
 use flexcal::model::parameter::Parameter;
 use flexcal::problem::Problem;
 use flexcal::quantity::Unit;
@@ -25,17 +25,22 @@ const WITHIN: f64 = 5.0;
 /// Share of a normal variable within one and two standard deviations.
 const NORMAL: [(f64, f64); 2] = [(1.0, 0.682_689), (2.0, 0.954_500)];
 
-/// An arm with three to seven joints, most of them parallel or at right angles, a third of its parameters fixed, a third with a
-/// prior, a third free; the declared σ is the true one, ten times larger or ten times smaller.
+/// An arm with three to seven joints, most of them parallel or at right angles, a third of its
+/// parameters fixed, a third with a prior, a third free; the declared σ is the true one, ten times
+/// larger or ten times smaller.
 fn arm(rng: &mut ChaCha8Rng) -> Problem {
     let joints = rng.random_range(3..=7);
     let mut text = "name = 'arm'\n".to_owned();
     for joint in 0..joints {
-        let alpha = *[0.0, 0.0, 90.0, -90.0, 180.0, rng.random_range(-180.0..180.0)].choose(rng).unwrap();
-        let length = |rng: &mut ChaCha8Rng, p: f64| if rng.random_bool(p) { rng.random_range(-0.8..0.8) } else { 0.0 };
+        let alpha =
+            *[0.0, 0.0, 90.0, -90.0, 180.0, rng.random_range(-180.0..180.0)].choose(rng).unwrap();
+        let length = |rng: &mut ChaCha8Rng, p: f64| {
+            if rng.random_bool(p) { rng.random_range(-0.8..0.8) } else { 0.0 }
+        };
         let (a, d) = (length(rng, 0.5), length(rng, 0.5));
         let kind = if joint > 0 && rng.random_bool(0.1) { "prismatic" } else { "revolute" };
-        let _ = writeln!(text, "[[joint]]\nkind = '{kind}'\nalpha_deg = {alpha}\na_m = {a}\nd_m = {d}");
+        let _ =
+            writeln!(text, "[[joint]]\nkind = '{kind}'\nalpha_deg = {alpha}\na_m = {a}\nd_m = {d}");
         if kind == "revolute" && rng.random_bool(0.2) {
             let stiffness = 10_f64.powf(rng.random_range(4.0..6.0));
             let _ = writeln!(
@@ -122,7 +127,7 @@ fn one(seed: u64) -> Option<Outcome> {
 }
 
 fn deviations(found: &Identification, truth: &DVector<f64>) -> Vec<f64> {
-    let z = |(k, estimate): (usize, &flexcal::identify::Estimate)| {
+    let z = |(k, estimate): (usize, &flexcal::fit::Estimate)| {
         // Of x, which is a logarithm for stiffnesses.
         let scale = if estimate.unit.is_relative() { estimate.estimate } else { 1.0 };
         estimate.std_error.map(|error| (found.x[k] - truth[k]) / (error / scale))
@@ -136,7 +141,8 @@ fn run(seeds: std::ops::Range<u64>) {
     let trusted: Vec<&Outcome> = all.iter().filter(|own| own.trusted).collect();
     let beyond: Vec<&String> = trusted.iter().flat_map(|own| &own.beyond).collect();
     let z: Vec<f64> = trusted.iter().flat_map(|own| own.z.iter().copied()).collect();
-    let covered = NORMAL.map(|(within, _)| z.iter().filter(|z| z.abs() < within).count() as f64 / z.len() as f64);
+    let covered = NORMAL
+        .map(|(within, _)| z.iter().filter(|z| z.abs() < within).count() as f64 / z.len() as f64);
     let worst = trusted.iter().map(|own| own.held_out).fold(0.0, f64::max);
     let mut held_out: Vec<f64> = trusted.iter().map(|own| own.held_out).collect();
     held_out.sort_by(f64::total_cmp);

@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use flexcal::measurement::{Dataset, Split};
-use flexcal::monte_carlo::table;
 use flexcal::problem::{Effect, Problem};
-use flexcal::simulate::{Cause, Shape, TrueEffect, Truth, simulate};
+use flexcal::rig::{Cause, Shape, TrueEffect, Truth, simulate};
+use flexcal::study::table;
 
 use crate::common::arms::path;
 
@@ -85,8 +85,9 @@ pub struct Set {
     pub data: Dataset,
 }
 
-/// Measures an arm with these effects: Table 2's geometric errors at even seeds, others at odd ones; stiffnesses 18 % off
-/// nominal, each by itself, `EI_y` and `EI_z` too, although the problem declares them equal.
+/// Measures an arm with these effects: Table 2's geometric errors at even seeds, others at odd
+/// ones; stiffnesses 18 % off nominal, each by itself, `EI_y` and `EI_z` too, although the problem
+/// declares them equal.
 pub fn measured(effects: &[TrueEffect], size: Size, seed: u64) -> Set {
     with_noise(effects, size, seed, DRAWN)
 }
@@ -103,9 +104,10 @@ fn with_noise(effects: &[TrueEffect], size: Size, seed: u64, drawn: &str) -> Set
         beam.ei_z = beam.ei_y.map(|ei| ei * (1.0 + 1e-12));
     }
     let given = if seed.is_multiple_of(2) { TABLE_2 } else { "" };
-    let mut truth = Truth::parse(&format!("{given}{drawn}"), Path::new("truth.toml"), &arm).unwrap();
+    let mut truth =
+        Truth::parse(&format!("{given}{drawn}"), Path::new("truth.toml"), &arm).unwrap();
     truth.effects = effects.to_vec();
-    truth.held_out = flexcal::simulate::HeldOutRows::AllBut(size.identification);
+    truth.held_out = flexcal::rig::HeldOutRows::AllBut(size.identification);
     let simulated = simulate(&arm, &truth, size.identification + size.held_out, seed).unwrap();
     let rows = simulated.rows;
     let (held_out, identification) = (0..rows.len()).partition(|&row| rows[row].held_out);
@@ -119,5 +121,6 @@ pub fn catalogued(effect: &Effect, values: &[f64]) -> TrueEffect {
 
 /// A bump or step of a joint's coordinate; height, centre, width in degrees.
 pub fn outside(joint: usize, shape: Shape, values: [f64; 3]) -> TrueEffect {
-    TrueEffect::new(Cause::Outside { joint, shape }, &values.map(f64::to_radians), &lunar().joints).unwrap()
+    TrueEffect::new(Cause::Outside { joint, shape }, &values.map(f64::to_radians), &lunar().joints)
+        .unwrap()
 }

@@ -1,10 +1,11 @@
-//! Whether what is stated is true as often as its probability says, and whether noise of many kinds is taken for an effect:
-//! `cargo test --release --test sweep calibration -- --ignored --nocapture`; `FLEXCAL_SWEEP=1 FLEXCAL_FIRST=5027` judges one set.
+//! Whether what is stated is true as often as its probability says, and whether noise of many kinds
+//! is taken for an effect: `cargo test --release --test sweep calibration -- --ignored
+//! --nocapture`; `FLEXCAL_SWEEP=1 FLEXCAL_FIRST=5027` judges one set.
 
-use flexcal::diagnose::{Part, Verdict, close};
-use flexcal::identify::Options;
+use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::{Effect, Problem};
+use flexcal::select::{Part, Verdict, close};
 use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -22,7 +23,8 @@ const STATED: f64 = 0.9;
 /// One statement: its probability, and whether it is true.
 type Statement = (f64, bool);
 
-/// One to three effects of different families, the first one of those `first`, the others of the catalogue.
+/// One to three effects of different families, the first one of those `first`, the others of the
+/// catalogue.
 fn drawn(first: &[Lacking], seed: u64) -> Vec<Lacking> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (others, count) = (catalogue(), rng.random_range(1..=3));
@@ -33,7 +35,10 @@ fn drawn(first: &[Lacking], seed: u64) -> Vec<Lacking> {
         // From half the size to twice it, where it has one.
         let factor = 2.0_f64.powf(rng.random_range(-1.0..1.0));
         let is_size = !matches!(one.effect, Effect::UnmodelledMass { .. });
-        one.values.iter_mut().take(if is_size { usize::MAX } else { 1 }).for_each(|value| *value *= factor);
+        one.values
+            .iter_mut()
+            .take(if is_size { usize::MAX } else { 1 })
+            .for_each(|value| *value *= factor);
         if !chosen.iter().any(|known| known.effect.name() == one.effect.name()) {
             chosen.push(one);
         }
@@ -67,7 +72,12 @@ impl Set {
         if std::env::var_os("FLEXCAL_FIRST").is_some() {
             for found in &judged.closure.effects {
                 let others: Vec<String> = found.alternatives.iter().map(named).collect();
-                println!("  {} instead of {}: {:?}", named(&found.effect), others.join(", "), found.claims);
+                println!(
+                    "  {} instead of {}: {:?}",
+                    named(&found.effect),
+                    others.join(", "),
+                    found.claims
+                );
             }
         }
         if let Some(flag) = &judged.closure.after.quality_flag {
@@ -75,7 +85,7 @@ impl Set {
         }
         let true_law = |effect: &Effect| truth.iter().any(|own| is_the_same(effect, own));
         let found = &judged.closure.effects;
-        let part = |effect: &Effect| effect.terms(problem).first().map(|term| Part::of(term.slot));
+        let part = |effect: &Effect| effect.terms(problem).first().map(|term| Part::of(term.site));
         let true_place = |place: Part| truth.iter().any(|own| part(own) == Some(place));
         let claims = || found.iter().filter_map(|found| Some((found, found.claims.as_ref()?)));
         let others = judged.closure.unexplained.iter().filter_map(|left| left.claims.as_ref());
@@ -132,7 +142,8 @@ pub fn calibrated(judge: impl Fn(u64) -> Set + Sync + Send, seed: u64, count: u6
             println!("{what} {low} to {high}: {right} of {} true", within.len());
         }
     }
-    let (shown, named, stated) = (count(&|set| set.shown), count(&|set| set.named), count(&|set| set.stated));
+    let (shown, named, stated) =
+        (count(&|set| set.shown), count(&|set| set.named), count(&|set| set.stated));
     let part = |of: &dyn Fn(&Set) -> bool| all.iter().filter(|set| of(set)).count();
     println!("{shown} distinguishable, {named} named, {stated} named or stated as alternatives");
     println!(
@@ -143,7 +154,8 @@ pub fn calibrated(judge: impl Fn(u64) -> Set + Sync + Send, seed: u64, count: u6
         part(&|set| set.close[0]),
         part(&|set| set.close[1])
     );
-    let sure: Vec<Statement> = all.iter().flat_map(|set| set.laws.clone()).filter(|(p, _)| *p >= STATED).collect();
+    let sure: Vec<Statement> =
+        all.iter().flat_map(|set| set.laws.clone()).filter(|(p, _)| *p >= STATED).collect();
     let right = sure.iter().filter(|(_, right)| *right).count();
     assert!(100 * right >= 95 * sure.len(), "{right} of {} laws that were stated", sure.len());
 }
@@ -169,17 +181,25 @@ fn disturbed(data: Dataset, kind: Kind, seed: u64) -> Dataset {
         let kept: Vec<usize> = (0..measurements.len()).collect();
         let thrice: Vec<usize> = kept.iter().flat_map(|&row| [row; 3]).collect();
         measurements = measurements.select(&thrice);
-        let rows = |rows: Vec<usize>| rows.into_iter().flat_map(|row| [3 * row, 3 * row + 1, 3 * row + 2]).collect();
-        split =
-            flexcal::measurement::Split { identification: rows(split.identification), held_out: rows(split.held_out) };
+        let rows = |rows: Vec<usize>| {
+            rows.into_iter().flat_map(|row| [3 * row, 3 * row + 1, 3 * row + 2]).collect()
+        };
+        split = flexcal::measurement::Split {
+            identification: rows(split.identification),
+            held_out: rows(split.held_out),
+        };
     }
     let normal = |rng: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(rng) };
-    let three = |rng: &mut ChaCha8Rng, of: &dyn Fn(&mut ChaCha8Rng) -> f64| Vector3::from_fn(|_, _| of(rng));
+    let three = |rng: &mut ChaCha8Rng, of: &dyn Fn(&mut ChaCha8Rng) -> f64| {
+        Vector3::from_fn(|_, _| of(rng))
+    };
     let (mut last, mut shared) = (three(&mut rng, &normal), Vector3::zeros());
     for row in 0..measurements.len() {
         let white = three(&mut rng, &normal);
         let noise = match kind {
-            Kind::HeavyTails => three(&mut rng, &|rng| StudentT::new(3.0).unwrap().sample(rng) / 3.0_f64.sqrt()),
+            Kind::HeavyTails => {
+                three(&mut rng, &|rng| StudentT::new(3.0).unwrap().sample(rng) / 3.0_f64.sqrt())
+            }
             Kind::Correlated => {
                 last = last * 0.8 + white * 0.6;
                 last
@@ -222,14 +242,24 @@ fn noise_of_many_kinds_is_no_effect() {
     ];
     for kind in kinds {
         let one = |seed: u64| {
-            let size = if seed.is_multiple_of(2) { SMALL } else { Size { identification: 60, held_out: 20 } };
-            let closure =
-                close(&problem, &disturbed(noiseless(size, seed).data, kind, seed), &Options::default()).unwrap();
+            let size = if seed.is_multiple_of(2) {
+                SMALL
+            } else {
+                Size { identification: 60, held_out: 20 }
+            };
+            let closure = close(
+                &problem,
+                &disturbed(noiseless(size, seed).data, kind, seed),
+                &Options::default(),
+            )
+            .unwrap();
             let named = closure.effects.iter().filter(|found| found.is_named(STATED)).count();
             let such = closure.effects.len() - named;
             let located = closure.unexplained.iter().any(|left| left.claims.is_some());
-            let names: Vec<String> = closure.effects.iter().map(|found| crate::judged::named(&found.effect)).collect();
-            let left: Vec<String> = closure.unexplained.iter().map(crate::judged::located).collect();
+            let names: Vec<String> =
+                closure.effects.iter().map(|found| crate::judged::named(&found.effect)).collect();
+            let left: Vec<String> =
+                closure.unexplained.iter().map(crate::judged::located).collect();
             if closure.verdict != Verdict::NothingFound {
                 println!("{kind:?} {seed}: {names:?} {left:?}");
             }
@@ -241,13 +271,16 @@ fn noise_of_many_kinds_is_no_effect() {
             ]
         };
         let (begin, count) = (first(6000), sets(100));
-        let sums =
-            (begin..begin + count).into_par_iter().map(one).reduce(|| [0; 4], |a, b| [0, 1, 2, 3].map(|k| a[k] + b[k]));
+        let sums = (begin..begin + count)
+            .into_par_iter()
+            .map(one)
+            .reduce(|| [0; 4], |a, b| [0, 1, 2, 3].map(|k| a[k] + b[k]));
         println!(
             "{kind:?}: of {count} sets {} name an effect, {} one such as, {} locate structure, {} are not nothing-found",
             sums[0], sums[1], sums[2], sums[3]
         );
-        let most = if let Kind::White = kind { count.div_ceil(100) + 1 } else { count * 3 / 100 + 2 };
+        let most =
+            if let Kind::White = kind { count.div_ceil(100) + 1 } else { count * 3 / 100 + 2 };
         assert!(sums[0] as u64 <= most, "{kind:?}: {} of {count}", sums[0]);
     }
 }

@@ -1,7 +1,8 @@
-//! Every family at a realistic size: what is true on the rig, and how the declared problem lacks it.
+//! Every family at a realistic size: what is true on the rig, and how the declared problem lacks
+//! it.
 
 use flexcal::problem::{Effect, Equilibrium, Problem};
-use flexcal::simulate::TrueEffect;
+use flexcal::rig::TrueEffect;
 
 use crate::bench::{catalogued, lunar};
 
@@ -29,7 +30,9 @@ impl Lacking {
     pub fn leave_out(&self, problem: &mut Problem) {
         match &self.effect {
             Effect::DeflectedEquilibrium => problem.statics.equilibrium = Equilibrium::Undeflected,
-            Effect::JointCompliance { joint } if self.values.is_empty() => problem.joints[joint - 1].stiffness = None,
+            Effect::JointCompliance { joint } if self.values.is_empty() => {
+                problem.joints[joint - 1].stiffness = None
+            }
             Effect::LinkBending { joint } if self.values.is_empty() => {
                 if let Some(beam) = &mut problem.joints[joint - 1].beam {
                     (beam.ei_y, beam.ei_z) = (None, None);
@@ -54,7 +57,10 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 /// One effect at a time.
 pub fn catalogue() -> Vec<Lacking> {
     let harmonic = |joint, order, sin: f64, cos: f64| {
-        Lacking::new(Effect::JointHarmonic { joint, orders: vec![order] }, &[sin * DEGREE, cos * DEGREE])
+        Lacking::new(
+            Effect::JointHarmonic { joint, orders: vec![order] },
+            &[sin * DEGREE, cos * DEGREE],
+        )
     };
     let link = |name: &str| name.to_owned();
     let mut all = vec![
@@ -68,7 +74,10 @@ pub fn catalogue() -> Vec<Lacking> {
     ];
     for joint in 1..=4 {
         all.push(Lacking::new(Effect::Backlash { joint }, &[0.03 * DEGREE]));
-        all.push(Lacking::new(Effect::GearRatio { joint }, &[if joint == 4 { 1.5e-3 } else { 7e-4 }]));
+        all.push(Lacking::new(
+            Effect::GearRatio { joint },
+            &[if joint == 4 { 1.5e-3 } else { 7e-4 }],
+        ));
     }
     all.push(Lacking::new(Effect::GearRatio { joint: 2 }, &[1.5e-3]));
     all.push(Lacking::new(Effect::GearRatio { joint: 3 }, &[5e-4]));
@@ -116,31 +125,47 @@ pub fn catalogue() -> Vec<Lacking> {
     all.push(Lacking::new(Effect::PayloadBacklash { joint: 2 }, &[0.04 * DEGREE]));
     all.push(Lacking::new(Effect::PayloadBacklash { joint: 3 }, &[0.04 * DEGREE]));
     let per_hour = 1e-3 / 3600.0;
-    all.push(Lacking::new(Effect::TrackerDrift, &[0.1 * per_hour, -0.1 * per_hour, 0.05 * per_hour]));
+    all.push(Lacking::new(
+        Effect::TrackerDrift,
+        &[0.1 * per_hour, -0.1 * per_hour, 0.05 * per_hour],
+    ));
     all.push(Lacking::new(Effect::TrackerDrift, &[0.3 * per_hour, 0.2 * per_hour, 0.0]));
     all.push(Lacking::new(Effect::StationShift { at_time: 3000.0 }, &[3e-4, 0.0, 1e-4]));
     all.push(Lacking::new(Effect::StationShift { at_time: 4500.0 }, &[0.0, 2e-4, 2e-4]));
     all
 }
 
-/// Effects with an argument that is searched, and a section that couples: what the catalogue took in last.
+/// Effects with an argument that is searched, and a section that couples: what the catalogue took
+/// in last.
 pub fn newest() -> Vec<Lacking> {
     let link = |name: &str| name.to_owned();
     let mut all = Vec::new();
     for (joint, order) in [(1, 2.43), (2, 7.37), (3, 4.6), (4, 11.5), (2, 100.5)] {
-        all.push(Lacking::new(Effect::JointWave { joint, order }, &[0.016 * DEGREE, 0.012 * DEGREE]));
+        all.push(Lacking::new(
+            Effect::JointWave { joint, order },
+            &[0.016 * DEGREE, 0.012 * DEGREE],
+        ));
     }
     for (joint, distance) in [(2, 1.0), (3, 0.5), (1, 1.5)] {
         all.push(Lacking::new(Effect::JointHysteresis { joint, distance }, &[0.03 * DEGREE]));
     }
     for (name, part) in [("A", 1.0), ("B", 3.0)] {
         let time_constant = 400.0 * part;
-        all.push(Lacking::new(Effect::LinkThermalBendingLag { link: link(name), time_constant }, &[3e-5, -2e-5]));
-        all.push(Lacking::new(Effect::LinkThermalExpansionLag { link: link(name), time_constant }, &[4e-5]));
+        all.push(Lacking::new(
+            Effect::LinkThermalBendingLag { link: link(name), time_constant },
+            &[3e-5, -2e-5],
+        ));
+        all.push(Lacking::new(
+            Effect::LinkThermalExpansionLag { link: link(name), time_constant },
+            &[4e-5],
+        ));
         all.push(Lacking::new(Effect::TwistBending { link: link(name) }, &[5e-6, -3e-6]));
     }
     for joint in [2, 3] {
-        all.push(Lacking::new(Effect::JointThermalDriftLag { joint, time_constant: 600.0 }, &[6e-5]));
+        all.push(Lacking::new(
+            Effect::JointThermalDriftLag { joint, time_constant: 600.0 },
+            &[6e-5],
+        ));
     }
     all
 }
@@ -150,7 +175,10 @@ pub fn pairs() -> Vec<Vec<Lacking>> {
     let per_hour = 1e-3 / 3600.0;
     let b = || "B".to_owned();
     let harmonic = |joint, order| {
-        Lacking::new(Effect::JointHarmonic { joint, orders: vec![order] }, &[0.016 * DEGREE, 0.012 * DEGREE])
+        Lacking::new(
+            Effect::JointHarmonic { joint, orders: vec![order] },
+            &[0.016 * DEGREE, 0.012 * DEGREE],
+        )
     };
     let drift = || Lacking::new(Effect::TrackerDrift, &[0.3 * per_hour, 0.2 * per_hour, 0.0]);
     let backlash = |joint| Lacking::new(Effect::Backlash { joint }, &[0.03 * DEGREE]);
@@ -161,7 +189,10 @@ pub fn pairs() -> Vec<Vec<Lacking>> {
         vec![Lacking::new(Effect::BaseCompliance, &[2e-6, 1e-6]), backlash(3)],
         vec![Lacking::new(Effect::HoistForce, &[0.1]), Lacking::new(Effect::TrackerScale, &[3e-4])],
         vec![harmonic(3, 2), Lacking::new(Effect::JointThermalDrift { joint: 2 }, &[3e-5])],
-        vec![Lacking::new(Effect::StationShift { at_time: 3000.0 }, &[3e-4, 0.0, 1e-4]), harmonic(1, 2)],
+        vec![
+            Lacking::new(Effect::StationShift { at_time: 3000.0 }, &[3e-4, 0.0, 1e-4]),
+            harmonic(1, 2),
+        ],
         vec![
             Lacking::new(Effect::JointCompliance { joint: 3 }, &[]),
             Lacking::new(Effect::JointCoupling { joint: 2, from: 1 }, &[1e-3]),

@@ -3,7 +3,7 @@
 use std::env;
 use std::ops::Range;
 
-use flexcal::diagnose::Verdict;
+use flexcal::select::Verdict;
 use rayon::prelude::*;
 
 use crate::bench::{LARGE, SMALL, Size};
@@ -27,7 +27,8 @@ fn seeds(from: u64, otherwise: u64) -> Range<u64> {
     from..from + sets(otherwise)
 }
 
-/// Most distinguishable effects are named, nearly all named or stated as alternatives; noise alone says next to nothing.
+/// Most distinguishable effects are named, nearly all named or stated as alternatives; noise alone
+/// says next to nothing.
 fn run(kinds: &[Vec<Lacking>], size: Size, seeds: Range<u64>) {
     let all: Vec<(&Vec<Lacking>, u64)> =
         kinds.iter().flat_map(|kind| seeds.clone().map(move |seed| (kind, seed))).collect();
@@ -35,7 +36,12 @@ fn run(kinds: &[Vec<Lacking>], size: Size, seeds: Range<u64>) {
         let judged = Judged::of(lacking, size, seed);
         println!("{}", judged.line(&name(lacking), size, seed));
         let [shown, named, stated] = judged.counts();
-        [shown, named, stated, usize::from(lacking.is_empty() && judged.closure.verdict != Verdict::NothingFound)]
+        [
+            shown,
+            named,
+            stated,
+            usize::from(lacking.is_empty() && judged.closure.verdict != Verdict::NothingFound),
+        ]
     };
     let sets = all.len();
     let add = |a: [usize; 4], b: [usize; 4]| [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]];
@@ -87,8 +93,10 @@ fn three_effects() {
 #[ignore = "minutes"]
 fn what_no_catalogue_holds() {
     for (size, first) in [(SMALL, 400), (LARGE, 420)] {
-        let all: Vec<_> =
-            KINDS.iter().flat_map(|kind| (first..first + sets(4)).map(move |seed| (*kind, seed))).collect();
+        let all: Vec<_> = KINDS
+            .iter()
+            .flat_map(|kind| (first..first + sets(4)).map(move |seed| (*kind, seed)))
+            .collect();
         let sets = all.len();
         let located = all.into_par_iter().filter(|&(kind, seed)| {
             let left = Left::of(kind, size, seed);

@@ -1,12 +1,13 @@
-//! A heavy six-joint arm of rigid links and rigid joints as declared, with one to three effects that industrial arms have:
-//! `cargo test --release --test sweep industrial -- --ignored --nocapture`.
+//! A heavy six-joint arm of rigid links and rigid joints as declared, with one to three effects
+//! that industrial arms have: `cargo test --release --test sweep industrial -- --ignored
+//! --nocapture`.
 
 use std::path::Path;
 
 use flexcal::measurement::{Dataset, Split};
-use flexcal::monte_carlo::table;
 use flexcal::problem::{Effect, Problem};
-use flexcal::simulate::{Cause, HeldOutRows, TrueEffect, Truth, simulate};
+use flexcal::rig::{Cause, HeldOutRows, TrueEffect, Truth, simulate};
+use flexcal::study::table;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -72,7 +73,9 @@ fn judge(seed: u64) -> Stated {
     let size = Size { identification: [40, 80, 150][(seed % 3) as usize], held_out: 50 };
     let effects: Vec<Effect> = lacking.iter().map(|one| one.effect.clone()).collect();
     let mut truth = Truth::parse(DRAWN, Path::new("truth.toml"), &arm).unwrap();
-    let of = |one: &Lacking| TrueEffect::new(Cause::Catalogued(one.effect.clone()), &one.values, &arm.joints).unwrap();
+    let of = |one: &Lacking| {
+        TrueEffect::new(Cause::Catalogued(one.effect.clone()), &one.values, &arm.joints).unwrap()
+    };
     truth.effects = lacking.iter().map(of).collect();
     truth.held_out = HeldOutRows::AllBut(size.identification);
     let rows = simulate(&arm, &truth, size.identification + size.held_out, seed).unwrap().rows;

@@ -1,8 +1,8 @@
 //! One set through the loop, and what the loop makes of it beside the truth.
 
-use flexcal::diagnose::{ClosedLoop, Covariate, Unexplained, Verdict, close};
-use flexcal::identify::{Identification, Options, identify};
+use flexcal::fit::{Identification, Options, identify};
 use flexcal::problem::{Effect, EffectDeclaration, Problem};
+use flexcal::select::{ClosedLoop, Covariate, Unexplained, Verdict, close};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use crate::bench::{NOISE, SIGMA, Set, Size, measured};
@@ -32,9 +32,11 @@ pub struct Judged {
     pub places: Vec<Place>,
     /// Whether the first effect found is the true one.
     pub first: bool,
-    /// For each true effect: probability by chance of what the fit gains when it is declared after all others.
+    /// For each true effect: probability by chance of what the fit gains when it is declared after
+    /// all others.
     pub chance: Vec<f64>,
-    /// Held-out rms of the position error over that of the noise: before, after, and with the true effects declared.
+    /// Held-out rms of the position error over that of the noise: before, after, and with the true
+    /// effects declared.
     pub before: f64,
     pub after: f64,
     pub best: f64,
@@ -56,12 +58,17 @@ impl Judged {
         let closure = close(&problem, &set.data, &Options::default()).unwrap();
         let full = Squares::of(&problem, all, set);
         let without = |k: usize| {
-            let others: Vec<Effect> =
-                all.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, effect)| effect.clone()).collect();
+            let others: Vec<Effect> = all
+                .iter()
+                .enumerate()
+                .filter(|(other, _)| *other != k)
+                .map(|(_, effect)| effect.clone())
+                .collect();
             Squares::of(&problem, &others, set).chance_beside(&full)
         };
         let found: Vec<&Effect> = closure.effects.iter().map(|found| &found.effect).collect();
-        let others: Vec<&Effect> = closure.effects.iter().flat_map(|found| &found.alternatives).collect();
+        let others: Vec<&Effect> =
+            closure.effects.iter().flat_map(|found| &found.alternatives).collect();
         let place = |truth: &Effect| match () {
             () if found.iter().any(|effect| is_the_same(effect, truth)) => Place::Found,
             () if others.iter().any(|effect| is_the_same(effect, truth)) => Place::Alternative,
@@ -71,7 +78,9 @@ impl Judged {
         let ratio = |found: &Identification| found.fitted.held_out.rms.norm / NOISE;
         Self {
             places: all.iter().map(place).collect(),
-            first: found.first().is_some_and(|effect| all.iter().any(|truth| is_the_same(effect, truth))),
+            first: found
+                .first()
+                .is_some_and(|effect| all.iter().any(|truth| is_the_same(effect, truth))),
             chance: (0..all.len()).map(without).collect(),
             before: ratio(&closure.before.fit),
             after: ratio(&closure.after),
@@ -81,18 +90,25 @@ impl Judged {
         }
     }
 
-    /// How many true effects are distinguishable, and of those named, and named or stated as alternatives.
+    /// How many true effects are distinguishable, and of those named, and named or stated as
+    /// alternatives.
     pub fn counts(&self) -> [usize; 3] {
-        let shown = self.places.iter().zip(&self.chance).filter(|(_, chance)| **chance < DISTINGUISHABLE);
+        let shown =
+            self.places.iter().zip(&self.chance).filter(|(_, chance)| **chance < DISTINGUISHABLE);
         let places: Vec<Place> = shown.map(|(place, _)| *place).collect();
         let named = places.iter().filter(|place| **place == Place::Found).count();
-        let stated = places.iter().filter(|place| matches!(place, Place::Found | Place::Alternative)).count();
+        let stated = places
+            .iter()
+            .filter(|place| matches!(place, Place::Found | Place::Alternative))
+            .count();
         [places.len(), named, stated]
     }
 
     /// One line of figures.
     pub fn line(&self, name: &str, size: Size, seed: u64) -> String {
-        let names = |effects: &mut dyn Iterator<Item = &Effect>| effects.map(named).collect::<Vec<_>>().join(" + ");
+        let names = |effects: &mut dyn Iterator<Item = &Effect>| {
+            effects.map(named).collect::<Vec<_>>().join(" + ")
+        };
         let closure = &self.closure;
         let cause = closure.unexplained.first().map_or_else(String::new, located);
         let failed: Vec<String> = closure
@@ -148,7 +164,9 @@ impl Squares {
         let found = identify(&problem, &set.data, &Options::default()).unwrap();
         let errors = found.fitted.identification;
         let model = model_of(&problem, &set.data.measurements);
-        let pull = |(k, x): (usize, &f64)| model.parameters[k].sigma.map_or(0.0, |sigma| (x / sigma).powi(2));
+        let pull = |(k, x): (usize, &f64)| {
+            model.parameters[k].sigma.map_or(0.0, |sigma| (x / sigma).powi(2))
+        };
         let priors = found.x.iter().enumerate().map(pull);
         let given: f64 = found.estimates.iter().map(|estimate| estimate.identified).sum();
         Self {
@@ -170,22 +188,25 @@ impl Squares {
 /// A problem with some effects declared.
 fn with(mut problem: Problem, effects: &[Effect]) -> Problem {
     let location = problem.data.location.clone();
-    let declare = |effect: &Effect| EffectDeclaration { effect: effect.clone(), location: location.clone() };
+    let declare =
+        |effect: &Effect| EffectDeclaration { effect: effect.clone(), location: location.clone() };
     problem.effects = effects.iter().map(declare).collect();
     problem
 }
 
-/// Whether an effect that was named is the true one: family and place, orders among others, orders of waves within a third of a cycle, times
-/// within a few poses, time constants and distances within a factor of two.
+/// Whether an effect that was named is the true one: family and place, orders among others, orders
+/// of waves within a third of a cycle, times within a few poses, time constants and distances
+/// within a factor of two.
 pub fn is_the_same(named: &Effect, truth: &Effect) -> bool {
     let within_two = |one: &f64, other: &f64| (one / other).ln().abs() < std::f64::consts::LN_2;
     match (named, truth) {
         (Effect::JointWave { joint, order }, Effect::JointWave { joint: own, order: wanted }) => {
             joint == own && (order - wanted).abs() < 1.0 / 3.0
         }
-        (Effect::JointHysteresis { joint, distance }, Effect::JointHysteresis { joint: own, distance: wanted }) => {
-            joint == own && within_two(distance, wanted)
-        }
+        (
+            Effect::JointHysteresis { joint, distance },
+            Effect::JointHysteresis { joint: own, distance: wanted },
+        ) => joint == own && within_two(distance, wanted),
         (
             Effect::JointThermalDriftLag { joint, time_constant },
             Effect::JointThermalDriftLag { joint: own, time_constant: wanted },
@@ -198,13 +219,17 @@ pub fn is_the_same(named: &Effect, truth: &Effect) -> bool {
             Effect::LinkThermalExpansionLag { link, time_constant },
             Effect::LinkThermalExpansionLag { link: own, time_constant: wanted },
         ) => link == own && within_two(time_constant, wanted),
-        (Effect::JointHarmonic { joint, orders }, Effect::JointHarmonic { joint: own, orders: wanted }) => {
-            joint == own && wanted.iter().all(|order| orders.contains(order))
+        (
+            Effect::JointHarmonic { joint, orders },
+            Effect::JointHarmonic { joint: own, orders: wanted },
+        ) => joint == own && wanted.iter().all(|order| orders.contains(order)),
+        (Effect::StationShift { at_time }, Effect::StationShift { at_time: own }) => {
+            (at_time - own).abs() < 900.0
         }
-        (Effect::StationShift { at_time }, Effect::StationShift { at_time: own }) => (at_time - own).abs() < 900.0,
-        (Effect::TrackerSettling { time_constant }, Effect::TrackerSettling { time_constant: own }) => {
-            within_two(time_constant, own)
-        }
+        (
+            Effect::TrackerSettling { time_constant },
+            Effect::TrackerSettling { time_constant: own },
+        ) => within_two(time_constant, own),
         _ => named == truth,
     }
 }

@@ -1,8 +1,8 @@
 //! What no catalogue holds: a bump or a step of one joint's coordinate.
 
-use flexcal::diagnose::{ClosedLoop, Part, close};
-use flexcal::identify::Options;
-use flexcal::simulate::Shape;
+use flexcal::fit::Options;
+use flexcal::rig::Shape;
+use flexcal::select::{ClosedLoop, Part, close};
 
 use crate::bench::{NOISE, Size, lunar, measured, outside};
 use crate::judged::{located, named, words};
@@ -44,7 +44,8 @@ impl Left {
         let closure = close(&lunar(), &set.data, &Options::default()).unwrap();
         let left = closure.unexplained.first();
         let located = left.is_some_and(|left| {
-            left.part == Some(Part::Joint(joint - 1)) && words(&left.depends_on) == format!("q{joint}")
+            left.part == Some(Part::Joint(joint - 1))
+                && words(&left.depends_on) == format!("q{joint}")
         });
         let correction = left.and_then(|left| left.correction.as_ref());
         Self {
@@ -58,7 +59,8 @@ impl Left {
     /// One line of figures.
     pub fn line(&self, (joint, shape, values): Outside, size: Size, seed: u64) -> String {
         let place = self.closure.unexplained.first().map_or_else(String::new, located);
-        let effects: Vec<String> = self.closure.effects.iter().map(|found| named(&found.effect)).collect();
+        let effects: Vec<String> =
+            self.closure.effects.iter().map(|found| named(&found.effect)).collect();
         format!(
             "outside {joint} {shape:?} {values:?};{};{seed};{:?};{};{place};{};{:.3};{:.3};{}",
             size.identification,

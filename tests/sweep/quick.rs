@@ -1,10 +1,10 @@
 //! A representative part of the sweep, and the cases of `tests/cases`.
 
-use flexcal::diagnose::{Covariate, Part, Verdict, close};
-use flexcal::identify::{Options, identify};
+use flexcal::fit::{Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{Effect, EffectDeclaration};
-use flexcal::simulate::Shape;
+use flexcal::rig::Shape;
+use flexcal::select::{Covariate, Part, Verdict, close};
 use rayon::prelude::*;
 
 use crate::bench::{NOISE, SMALL, lunar};
@@ -29,21 +29,33 @@ fn noise_alone_says_nothing() {
     assert!(wrong.len() <= 2, "{wrong:#?}");
 }
 
-/// Runs the loop on sets that lack something: how many true effects are distinguishable, named, and named or alternatives.
+/// Runs the loop on sets that lack something: how many true effects are distinguishable, named, and
+/// named or alternatives.
 fn named_of(kinds: &[Vec<Lacking>], seed: u64) -> [usize; 3] {
     let one = |(k, kind): (usize, &Vec<Lacking>)| {
         let seed = seed + k as u64;
         let judged = Judged::of(kind, SMALL, seed);
         println!("{}", judged.line(&name(kind), SMALL, seed));
-        assert!(judged.after < judged.before + 1.0, "{}: {} from {}", name(kind), judged.after, judged.before);
+        assert!(
+            judged.after < judged.before + 1.0,
+            "{}: {} from {}",
+            name(kind),
+            judged.after,
+            judged.before
+        );
         judged.counts()
     };
-    kinds.par_iter().enumerate().map(one).reduce(|| [0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
+    kinds
+        .par_iter()
+        .enumerate()
+        .map(one)
+        .reduce(|| [0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
 }
 
 #[test]
 fn one_effect_is_named() {
-    let every_fifth: Vec<Vec<Lacking>> = catalogue().into_iter().step_by(5).map(|one| vec![one]).collect();
+    let every_fifth: Vec<Vec<Lacking>> =
+        catalogue().into_iter().step_by(5).map(|one| vec![one]).collect();
     let [shown, named, stated] = named_of(&every_fifth, 700);
     println!("{shown} distinguishable, {named} named, {stated} named or stated as alternatives");
     assert!(shown >= 7);
@@ -52,12 +64,28 @@ fn one_effect_is_named() {
 
 #[test]
 fn a_law_that_bends_the_fit_is_weighed_at_a_fit_of_its_own() {
-    // Linear about the fit without it, a function of the same command does better than the harmonic.
-    let harmonic = |sin| Lacking::new(Effect::JointHarmonic { joint: 2, orders: vec![3] }, &[sin, 0.0]);
+    // Linear about the fit without it, a function of the same command does better than the
+    // harmonic.
+    let harmonic =
+        |sin| Lacking::new(Effect::JointHarmonic { joint: 2, orders: vec![3] }, &[sin, 0.0]);
     let coupling = |factor| Lacking::new(Effect::JointCoupling { joint: 4, from: 3 }, &[factor]);
     let kinds = [
-        (5199, vec![harmonic(5.39e-4), coupling(5.14e-4), Lacking::new(Effect::GearRatio { joint: 3 }, &[7.8e-4])]),
-        (5211, vec![coupling(5.97e-4), harmonic(6.38e-4), Lacking::new(Effect::LinkBending { joint: 4 }, &[])]),
+        (
+            5199,
+            vec![
+                harmonic(5.39e-4),
+                coupling(5.14e-4),
+                Lacking::new(Effect::GearRatio { joint: 3 }, &[7.8e-4]),
+            ],
+        ),
+        (
+            5211,
+            vec![
+                coupling(5.97e-4),
+                harmonic(6.38e-4),
+                Lacking::new(Effect::LinkBending { joint: 4 }, &[]),
+            ],
+        ),
     ];
     for (seed, kind) in kinds {
         let judged = Judged::of(&kind, SMALL, seed);
@@ -88,16 +116,18 @@ fn what_no_catalogue_holds_is_located_and_corrected() {
     });
 }
 
-/// A case of `tests/cases` through the loop: these effects and no others, the held-out rms of a fit for which they are
-/// declared, and that below `limit_mm`.
+/// A case of `tests/cases` through the loop: these effects and no others, the held-out rms of a fit
+/// for which they are declared, and that below `limit_mm`.
 fn case(file: &str, effects: &[Effect], limit_mm: f64) {
     let mut problem = lunar();
     let measurements = read(&problem, &[&format!("tests/cases/{file}.csv")]);
     let data = Dataset::of(&problem, measurements).unwrap();
     let closure = close(&problem, &data, &Options::default()).unwrap();
     let location = problem.data.location.clone();
-    problem.effects =
-        effects.iter().map(|effect| EffectDeclaration { effect: effect.clone(), location: location.clone() }).collect();
+    problem.effects = effects
+        .iter()
+        .map(|effect| EffectDeclaration { effect: effect.clone(), location: location.clone() })
+        .collect();
     let known = identify(&problem, &data, &Options::default()).unwrap().fitted.held_out.rms.norm;
     let found: Vec<&Effect> = closure.effects.iter().map(|found| &found.effect).collect();
     let after = closure.after.fitted.held_out.rms.norm;
@@ -113,7 +143,10 @@ fn case(file: &str, effects: &[Effect], limit_mm: f64) {
     }
     let verdict = if effects.is_empty() { Verdict::NothingFound } else { Verdict::Explained };
     assert_eq!(closure.verdict, verdict, "{file}");
-    assert!(after < 1.01 * known && after < limit_mm * 1e-3, "{file}: {after} m, {known} m with the truth declared");
+    assert!(
+        after < 1.01 * known && after < limit_mm * 1e-3,
+        "{file}: {after} m, {known} m with the truth declared"
+    );
 }
 
 #[test]
@@ -138,8 +171,16 @@ fn a_case_of_what_no_catalogue_holds() {
     let data = Dataset::of(&problem, measurements).unwrap();
     let closure = close(&problem, &data, &Options::default()).unwrap();
     let [left] = closure.unexplained.as_slice() else { panic!("{:?}", closure.unexplained) };
-    assert_eq!((left.part, left.depends_on.as_slice()), (Some(Part::Joint(1)), [Covariate::Command(1)].as_slice()));
-    let (before, after) = (closure.before.fit.fitted.held_out, left.correction.as_ref().unwrap().held_out);
-    println!("g-not-in-catalogue: {:.4} mm, corrected {:.4} mm", before.rms.norm * 1e3, after.rms.norm * 1e3);
+    assert_eq!(
+        (left.part, left.depends_on.as_slice()),
+        (Some(Part::Joint(1)), [Covariate::Command(1)].as_slice())
+    );
+    let (before, after) =
+        (closure.before.fit.fitted.held_out, left.correction.as_ref().unwrap().held_out);
+    println!(
+        "g-not-in-catalogue: {:.4} mm, corrected {:.4} mm",
+        before.rms.norm * 1e3,
+        after.rms.norm * 1e3
+    );
     assert!(2.0 * after.rms.norm < before.rms.norm);
 }

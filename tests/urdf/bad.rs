@@ -4,7 +4,8 @@ use std::fs;
 
 use assert_cmd::Command;
 
-const JOINT: &str = "<joint name=\"j\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/></joint>";
+const JOINT: &str =
+    "<joint name=\"j\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/></joint>";
 
 fn with(links: &str, joints: &str) -> String {
     format!("<robot name=\"r\">\n{links}\n{joints}\n</robot>\n")
@@ -16,11 +17,14 @@ fn mistakes_are_named_with_their_place() {
     let chain = |attributes: &str, inner: &str| {
         with(
             links,
-            &format!("<joint name=\"j\" {attributes}>\n<parent link=\"a\"/><child link=\"b\"/>\n{inner}\n</joint>"),
+            &format!(
+                "<joint name=\"j\" {attributes}>\n<parent link=\"a\"/><child link=\"b\"/>\n{inner}\n</joint>"
+            ),
         )
     };
     let revolute = |inner: &str| chain("type=\"revolute\"", inner);
-    let bomb = "<!DOCTYPE r [<!ENTITY a \"aaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]>\n<robot name=\"&b;\"/>";
+    let bomb =
+        "<!DOCTYPE r [<!ENTITY a \"aaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]>\n<robot name=\"&b;\"/>";
     let deep = format!("{}{}", "<robot>".repeat(100_000), "</robot>".repeat(100_000));
     let cases: Vec<(&str, String, &str)> = vec![
         ("empty", String::new(), "not valid XML"),
@@ -83,8 +87,14 @@ fn mistakes_are_named_with_their_place() {
     for (name, text, says) in cases {
         let (file, out) = (folder.path().join("arm.urdf"), folder.path().join("out"));
         fs::write(&file, text).unwrap();
-        let run =
-            Command::cargo_bin("flexcal").unwrap().arg("init").arg(&file).arg("--out").arg(&out).output().unwrap();
+        let run = Command::cargo_bin("flexcal")
+            .unwrap()
+            .arg("init")
+            .arg(&file)
+            .arg("--out")
+            .arg(&out)
+            .output()
+            .unwrap();
         let error = String::from_utf8_lossy(&run.stderr).into_owned();
         assert_eq!(run.status.code(), Some(2), "{name}: {error}");
         assert!(error.contains("arm.urdf") && error.contains(says), "{name}: {error}");

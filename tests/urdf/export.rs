@@ -12,13 +12,15 @@ use super::{apart, problem_of, robot, tips};
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 
-/// The text without what stands in its `<origin>`s, and without origins that have a line of their own.
+/// The text without what stands in its `<origin>`s, and without origins that have a line of their
+/// own.
 fn without_origins(text: &str) -> String {
     let mut kept = String::new();
     for (k, part) in text.split("<origin").enumerate() {
         kept.push_str(if k == 0 { part } else { part.split_once("/>").unwrap().1 });
     }
-    let lines: Vec<&str> = kept.lines().map(str::trim_end).filter(|line| !line.trim().is_empty()).collect();
+    let lines: Vec<&str> =
+        kept.lines().map(str::trim_end).filter(|line| !line.trim().is_empty()).collect();
     lines.join("\n")
 }
 
@@ -32,7 +34,8 @@ fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
     problem.parameters.retain(|rule| !matches!(rule.freedom, flexcal::problem::Freedom::Fixed));
     let configurations: Vec<Vec<f64>> = (0..100)
         .map(|_| {
-            let mut q: Vec<f64> = problem.joints.iter().map(|_| rng.random_range(-2.0..2.0)).collect();
+            let mut q: Vec<f64> =
+                problem.joints.iter().map(|_| rng.random_range(-2.0..2.0)).collect();
             (q[0], q[4], q[6]) = (0.0, 0.0, 0.0);
             q
         })
@@ -41,7 +44,9 @@ fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
     let arm_only = |x: &DVector<f64>| {
         DVector::from_iterator(
             x.len(),
-            x.iter().zip(&model.parameters).map(|(x, own)| if own.name.starts_with("joint") { *x } else { 0.0 }),
+            x.iter()
+                .zip(&model.parameters)
+                .map(|(x, own)| if own.name.starts_with("joint") { *x } else { 0.0 }),
         )
     };
     let x = arm_only(&draw(&model, |_| 0.0, &mut rng));
@@ -51,13 +56,17 @@ fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
     std::fs::write(&file, &exported.text).unwrap();
     let moved = Robot::read(&file).unwrap();
     let again = problem_of(&Chain::new(&moved, None, Some("tool")).unwrap());
-    let nominal =
-        DVector::zeros(model_of(&again, &Dataset::poses(&configurations).measurements().unwrap()).parameters.len());
+    let nominal = DVector::zeros(
+        model_of(&again, &Dataset::poses(&configurations).measurements().unwrap()).parameters.len(),
+    );
     let off = apart(&tips(&problem, &configurations, &x), &tips(&again, &configurations, &nominal));
     assert!(off < 1e-9, "{off:e}");
     let text = std::fs::read_to_string(path("tests/urdf/odd.urdf")).unwrap();
     assert_eq!(without_origins(&text), without_origins(&exported.text));
-    assert!(exported.text.contains("<!-- the comment stays -->") && exported.text.contains("    <origin xyz=\""));
+    assert!(
+        exported.text.contains("<!-- the comment stays -->")
+            && exported.text.contains("    <origin xyz=\"")
+    );
     let names: Vec<&str> = exported.moved.iter().map(|origin| origin.joint.as_str()).collect();
     assert_eq!(names, ["stand", "rail", "shoulder", "elbow", "level", "wrist", "flange"]);
 
@@ -65,7 +74,11 @@ fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
     let same = export(&chain, &problem, &Arm::nominal(&problem)).unwrap();
     let rounded: Vec<&str> = same.moved.iter().map(|origin| origin.joint.as_str()).collect();
     assert_eq!(rounded, ["stand", "flange"]);
-    assert!(same.moved.iter().all(|origin| origin.distance < 3e-6 && origin.angle < 4e-6), "{:?}", same.moved);
+    assert!(
+        same.moved.iter().all(|origin| origin.distance < 3e-6 && origin.angle < 4e-6),
+        "{:?}",
+        same.moved
+    );
     let mut other = problem.clone();
     other.joints[3].a += 1e-3;
     let error = export(&chain, &other, &Arm::nominal(&other)).unwrap_err().to_string();
@@ -94,7 +107,8 @@ fn universal_robots_get_their_six_links() {
         ([0.0, 0.0922, 0.0], -half),
     ];
     for (origin, (xyz, roll)) in origins.iter().zip(expected) {
-        let off = (origin.xyz - Vector3::from(xyz)).norm() + (origin.rpy - Vector3::new(roll, 0.0, 0.0)).norm();
+        let off = (origin.xyz - Vector3::from(xyz)).norm()
+            + (origin.rpy - Vector3::new(roll, 0.0, 0.0)).norm();
         assert!(off < 1e-9, "{origin:?}");
     }
     let text = yaml(&origins, Yaml::UniversalRobots);
@@ -105,9 +119,17 @@ fn universal_robots_get_their_six_links() {
     );
     let odd = robot("odd.urdf");
     let other = problem_of(&Chain::new(&odd, None, Some("tool")).unwrap());
-    let error = joint_origins(&other, &Arm::nominal(&other), Yaml::UniversalRobots).unwrap_err().to_string();
-    assert!(error.contains("not an arm of Universal Robots' form: it has 5 moving joints, not 6"), "{error}");
+    let error = joint_origins(&other, &Arm::nominal(&other), Yaml::UniversalRobots)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("not an arm of Universal Robots' form: it has 5 moving joints, not 6"),
+        "{error}"
+    );
     let tree = Problem::read(&path("problems/two-arms")).unwrap();
     let error = joint_origins(&tree, &Arm::nominal(&tree), Yaml::Ros).unwrap_err().to_string();
-    assert!(error.contains(":53: joint[7].parent: export to YAML takes one chain of joints"), "{error}");
+    assert!(
+        error.contains(":53: joint[7].parent: export to YAML takes one chain of joints"),
+        "{error}"
+    );
 }

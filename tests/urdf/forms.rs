@@ -1,17 +1,21 @@
-//! Joints by xyz and rpy, standard DH, joints that follow others, the base by rpy, columns by joint names.
+//! Joints by xyz and rpy, standard DH, joints that follow others, the base by rpy, columns by joint
+//! names.
 
 use std::path::Path;
 
 use flexcal::measurement::Measurements;
 use flexcal::problem::{PoseConditions, Problem};
-use flexcal::simulate::Rig;
+use flexcal::rig::Rig;
 use nalgebra::{DVector, Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::common::arms::parse;
 use super::tips;
 
 fn turn(axis: Vector3<f64>, degrees: f64) -> Isometry3<f64> {
-    Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_scaled_axis(axis * degrees.to_radians()))
+    Isometry3::from_parts(
+        Translation3::identity(),
+        UnitQuaternion::from_scaled_axis(axis * degrees.to_radians()),
+    )
 }
 
 fn shift(x: f64, y: f64, z: f64) -> Isometry3<f64> {
@@ -29,7 +33,10 @@ fn standard_tables_are_read_in_their_order() {
     let problem = parse(text);
     let q: [f64; 3] = [0.3, -0.8, 0.15];
     let row = |theta: f64, d, a, alpha| {
-        turn(Vector3::z(), theta) * shift(0.0, 0.0, d) * shift(a, 0.0, 0.0) * turn(Vector3::x(), alpha)
+        turn(Vector3::z(), theta)
+            * shift(0.0, 0.0, d)
+            * shift(a, 0.0, 0.0)
+            * turn(Vector3::x(), alpha)
     };
     let first = row(10.0 + q[0].to_degrees(), 0.4, 0.1, 90.0);
     let expected = first * row(q[1].to_degrees(), 0.0, 0.5, 0.0) * row(0.0, q[2], 0.2, -30.0);
@@ -40,7 +47,10 @@ fn standard_tables_are_read_in_their_order() {
     let body = &problem.joints[0].bodies[0];
     let before = turn(Vector3::z(), 10.0) * shift(0.0, 0.0, 0.4) * Point3::from(body.position);
     assert!((before - row(10.0, 0.4, 0.1, 90.0) * Point3::new(0.1, 0.2, 0.3)).norm() < 1e-12);
-    assert_eq!((problem.joints.len(), problem.joints[3].name.as_str(), problem.joints[3].a), (4, "flange", 0.2));
+    assert_eq!(
+        (problem.joints.len(), problem.joints[3].name.as_str(), problem.joints[3].a),
+        (4, "flange", 0.2)
+    );
     let placed = parse(
         "name = 's'\ndh = 'standard'\n[[joint]]\na_m = 0.3\nalpha_deg = 40\n[[joint]]\nkind = 'fixed'\nxyz_m = [0.1, 0.2, 0]\nrpy_deg = [5, 0, 9]\n",
     );
@@ -55,8 +65,9 @@ fn placements_and_followers_are_the_same_in_model_and_rig() {
                 [base]\nxyz_m = [1, 2, 3]\nrpy_deg = [180, 0, 45]\n";
     let problem = parse(text);
     let (q1, q4) = (0.7, -0.4);
-    let rpy =
-        |[roll, pitch, yaw]: [f64; 3]| turn(Vector3::z(), yaw) * turn(Vector3::y(), pitch) * turn(Vector3::x(), roll);
+    let rpy = |[roll, pitch, yaw]: [f64; 3]| {
+        turn(Vector3::z(), yaw) * turn(Vector3::y(), pitch) * turn(Vector3::x(), roll)
+    };
     let about = |q: f64| turn(Vector3::z(), q.to_degrees());
     let base = shift(1.0, 2.0, 3.0) * rpy([180.0, 0.0, 45.0]);
     let placed = about(q1) * shift(0.0, 0.0, 0.3) * shift(0.1, -0.2, 0.3) * rpy([10.0, 20.0, 30.0]);
@@ -69,7 +80,10 @@ fn placements_and_followers_are_the_same_in_model_and_rig() {
         * about(q4);
     assert!((position(&problem, &[q1, 0.0, 0.0, q4]) - expected.translation.vector).norm() < 1e-12);
     let at_rest = Rig::new(problem.clone(), Vec::new())
-        .position(&PoseConditions { configuration: vec![q1, 0.0, 0.0, q4], ..PoseConditions::default() })
+        .position(&PoseConditions {
+            configuration: vec![q1, 0.0, 0.0, q4],
+            ..PoseConditions::default()
+        })
         .unwrap();
     assert!((at_rest - (expected * Point3::new(0.05, 0.1, 0.2)).coords).norm() < 1e-12);
 
@@ -106,7 +120,10 @@ fn columns_may_be_called_by_the_names_of_joints() {
     };
     let pi = std::f64::consts::PI;
     // x_mm is the measured position, whatever joints are called.
-    assert_eq!(read("shoulder_pan_joint_deg,q2_m,b c_rad,x_mm,y_mm,z_mm"), Ok((vec![pi, 2.0, 3.0, 0.0], 0)));
+    assert_eq!(
+        read("shoulder_pan_joint_deg,q2_m,b c_rad,x_mm,y_mm,z_mm"),
+        Ok((vec![pi, 2.0, 3.0, 0.0], 0))
+    );
     assert_eq!(read("q1_deg,q2_m,q3_rad,x_mm,y_mm,z_mm"), Ok((vec![pi, 2.0, 3.0, 0.0], 0)));
     for (header, says) in [
         (
@@ -114,7 +131,10 @@ fn columns_may_be_called_by_the_names_of_joints() {
             "an angle needs a unit; write shoulder_pan_joint_deg or shoulder_pan_joint_rad",
         ),
         ("shoulder_pan_joint_mm,q2_m,q3_rad,x_mm,y_mm,z_mm", "is not given in mm"),
-        ("shoulder_pan_joint_deg,q1_rad,q2_m,x_mm,y_mm,z_mm", "given already as column shoulder_pan_joint_deg"),
+        (
+            "shoulder_pan_joint_deg,q1_rad,q2_m,x_mm,y_mm,z_mm",
+            "given already as column shoulder_pan_joint_deg",
+        ),
         (
             "shoulder_pan_joint_dg,q2_m,q3_rad,x_mm,y_mm,z_mm",
             "add q1_deg or q1_rad or shoulder_pan_joint_deg or shoulder_pan_joint_rad (is it column shoulder_pan_joint_dg?)",

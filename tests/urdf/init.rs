@@ -9,8 +9,8 @@ use nalgebra::{DVector, Vector3};
 
 use super::{apart, problem_of, robot, tips};
 
-/// q of rail, shoulder, elbow and wrist \[m, rad\], then origin, x and z axis of the link `tool` in `world`: pinocchio 3, π/2 for
-/// 1.5708.
+/// q of rail, shoulder, elbow and wrist \[m, rad\], then origin, x and z axis of the link `tool` in
+/// `world`: pinocchio 3, π/2 for 1.5708.
 const STORED: [([f64; 4], [[f64; 3]; 3]); 6] = [
     (
         [0.009, 1.802, -1.423, 1.795],
@@ -74,7 +74,8 @@ fn a_chain_with_everything_is_as_another_program_has_it() {
     let robot = robot("odd.urdf");
     let chain = Chain::new(&robot, None, Some("tool")).unwrap();
     let problem = problem_of(&chain);
-    let kinds: Vec<(&str, JointKind)> = problem.joints.iter().map(|joint| (joint.name.as_str(), joint.kind)).collect();
+    let kinds: Vec<(&str, JointKind)> =
+        problem.joints.iter().map(|joint| (joint.name.as_str(), joint.kind)).collect();
     let expected = [
         ("mounting", Fixed),
         ("rail", Prismatic),
@@ -86,11 +87,17 @@ fn a_chain_with_everything_is_as_another_program_has_it() {
     ];
     assert_eq!(kinds, expected);
     assert_eq!(problem.joints[4].mimic, Some(Mimic { joint: 2, ratio: -0.5 }));
-    assert!((problem.joints[2].limits.1 - 2.5).abs() < 1e-8 && (problem.joints[1].limits.0 + 0.4).abs() < 1e-12);
+    assert!(
+        (problem.joints[2].limits.1 - 2.5).abs() < 1e-8
+            && (problem.joints[1].limits.0 + 0.4).abs() < 1e-12
+    );
     assert_eq!(problem.joints[3].limits, (f64::NEG_INFINITY, f64::INFINITY), "continuous");
-    let all = |[rail, shoulder, elbow, wrist]: [f64; 4]| vec![0.0, rail, shoulder, elbow, 0.0, wrist, 0.0];
+    let all = |[rail, shoulder, elbow, wrist]: [f64; 4]| {
+        vec![0.0, rail, shoulder, elbow, 0.0, wrist, 0.0]
+    };
     let configurations: Vec<Vec<f64>> = STORED.iter().map(|(q, _)| all(*q)).collect();
-    let stored: Vec<[Vector3<f64>; 3]> = STORED.iter().map(|(_, frame)| frame.map(Vector3::from)).collect();
+    let stored: Vec<[Vector3<f64>; 3]> =
+        STORED.iter().map(|(_, frame)| frame.map(Vector3::from)).collect();
     let free = super::common::made::model_of(
         &problem,
         &flexcal::measurement::Dataset::poses(&configurations).measurements().unwrap(),
@@ -106,16 +113,23 @@ fn a_chain_with_everything_is_as_another_program_has_it() {
         "fore is the fourth; the base carries itself"
     );
     for (name, mass, at) in MASSES {
-        let carrier =
-            problem.joints.iter().position(|joint| joint.bodies.iter().any(|body| body.name == name)).unwrap();
+        let carrier = problem
+            .joints
+            .iter()
+            .position(|joint| joint.bodies.iter().any(|body| body.name == name))
+            .unwrap();
         let body = problem.joints[carrier].bodies.iter().find(|body| body.name == name).unwrap();
         let mut cut = problem.clone();
         cut.parameters.clear();
         cut.joints.truncate(carrier + 1);
         let frames = tips(&cut, &[all(STORED[0].0)[..=carrier].to_vec()], &DVector::zeros(0));
         let [origin, x, z] = frames[0];
-        let place = origin + x * body.position.x + z.cross(&x) * body.position.y + z * body.position.z;
-        assert!((place - Vector3::from(at)).norm() < 1e-9 && (body.mass - mass).abs() < 1e-12, "{name}: {place}");
+        let place =
+            origin + x * body.position.x + z.cross(&x) * body.position.y + z * body.position.z;
+        assert!(
+            (place - Vector3::from(at)).norm() < 1e-9 && (body.mass - mass).abs() < 1e-12,
+            "{name}: {place}"
+        );
     }
 }
 
@@ -123,38 +137,65 @@ fn a_chain_with_everything_is_as_another_program_has_it() {
 fn a_problem_frees_what_positions_tell_apart_and_says_what_was_rounded() {
     let robot = robot("odd.urdf");
     let description = describe(&Chain::new(&robot, Some("base"), Some("tool")).unwrap()).unwrap();
-    assert!(description.notes.iter().any(|note| note.starts_with("1.5708 [rad] taken")), "{:?}", description.notes);
+    assert!(
+        description.notes.iter().any(|note| note.starts_with("1.5708 [rad] taken")),
+        "{:?}",
+        description.notes
+    );
     let text = description.text;
     let held = |name: &str| text.contains(&format!("\"{name}\" = {{ fixed = true }}"));
     assert!(held("joint*.beta") && text.contains("base = \"base\""), "{text}");
-    let problem = flexcal::problem::Problem::parse(&text, std::path::Path::new("problem.toml")).unwrap();
+    let problem =
+        flexcal::problem::Problem::parse(&text, std::path::Path::new("problem.toml")).unwrap();
     let q = vec![vec![0.0; problem.joints.len()]];
-    let model =
-        super::common::made::model_of(&problem, &flexcal::measurement::Dataset::poses(&q).measurements().unwrap());
-    // Six of the base, three of the target, four between turning axes, one slide whose place does not matter.
+    let model = super::common::made::model_of(
+        &problem,
+        &flexcal::measurement::Dataset::poses(&q).measurements().unwrap(),
+    );
+    // Six of the base, three of the target, four between turning axes, one slide whose place does
+    // not matter.
     assert!(model.parameters.len() < 35, "{}", model.parameters.len());
-    let chain = |base, tip| Chain::new(&robot, base, tip).err().map(|error| error.to_string()).unwrap_or_default();
-    assert!(chain(None, None).contains("tool (5 moving joints), camera (4 moving joints)"), "{}", chain(None, None));
+    let chain = |base, tip| {
+        Chain::new(&robot, base, tip).err().map(|error| error.to_string()).unwrap_or_default()
+    };
+    assert!(
+        chain(None, None).contains("tool (5 moving joints), camera (4 moving joints)"),
+        "{}",
+        chain(None, None)
+    );
     assert!(chain(None, Some("tol")).contains("(did you mean tool?)"));
-    assert!(chain(Some("hand"), Some("camera")).contains("is not below link \"hand\"; above it are plate, fore"));
+    assert!(
+        chain(Some("hand"), Some("camera"))
+            .contains("is not below link \"hand\"; above it are plate, fore")
+    );
     assert!(chain(Some("world"), Some("base")).contains("no joint moves"));
 }
 
 #[test]
 fn limits_that_exclude_each_other_are_said_to_be_none() {
-    for (limits, is_said) in [("lower=\"1\" upper=\"-1\"", true), ("lower=\"-1\" upper=\"1\"", false), ("", false)] {
+    for (limits, is_said) in
+        [("lower=\"1\" upper=\"-1\"", true), ("lower=\"-1\" upper=\"1\"", false), ("", false)]
+    {
         let text = format!(
             "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><joint name=\"j\" type=\"revolute\"><parent link=\"a\"/>\
              <child link=\"b\"/><limit {limits}/></joint></robot>"
         );
         let robot = Robot::parse(&text, Path::new("r.urdf")).unwrap();
         let described = describe(&Chain::new(&robot, None, None).unwrap()).unwrap();
-        let said = described.notes.iter().any(|note| note.starts_with("j: the limits 1 to -1 exclude each other"));
-        assert_eq!((said, described.text.contains("min_deg")), (is_said, limits.contains("\"-1\" upper")), "{limits}");
+        let said = described
+            .notes
+            .iter()
+            .any(|note| note.starts_with("j: the limits 1 to -1 exclude each other"));
+        assert_eq!(
+            (said, described.text.contains("min_deg")),
+            (is_said, limits.contains("\"-1\" upper")),
+            "{limits}"
+        );
     }
 }
 
-/// Two joints of the chain follow one another, the first a joint outside of it; and joints bear the names of rows that are no joints.
+/// Two joints of the chain follow one another, the first a joint outside of it; and joints bear the
+/// names of rows that are no joints.
 const FOLLOWERS: &str = r#"<robot name="followers">
 <link name="base"/><link name="side"/><link name="one"/><link name="two"/><link name="tip"/>
 <joint name="aside" type="revolute"><parent link="base"/><child link="side"/><limit lower="-1" upper="1"/></joint>

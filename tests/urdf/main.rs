@@ -17,10 +17,10 @@ mod public;
 use std::path::Path;
 
 use common::made::model_of;
-use flexcal::identify::{Options, Placement, identify};
+use flexcal::fit::{Options, Placement, identify};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
-use flexcal::simulate::{Truth, simulate};
+use flexcal::rig::{Truth, simulate};
 use flexcal::urdf::{Chain, Robot, describe};
 use nalgebra::{DVector, Vector3};
 
@@ -34,8 +34,13 @@ pub(crate) fn problem_of(chain: &Chain) -> Problem {
     Problem::parse(&describe(chain).unwrap().text, Path::new("problem.toml")).unwrap()
 }
 
-/// Origin, x and z axis of the last frame at configurations of all joints, with the parameters at `x`.
-pub(crate) fn tips(problem: &Problem, configurations: &[Vec<f64>], x: &DVector<f64>) -> Vec<[Vector3<f64>; 3]> {
+/// Origin, x and z axis of the last frame at configurations of all joints, with the parameters at
+/// `x`.
+pub(crate) fn tips(
+    problem: &Problem,
+    configurations: &[Vec<f64>],
+    x: &DVector<f64>,
+) -> Vec<[Vector3<f64>; 3]> {
     let rows = Dataset::poses(configurations).measurements().unwrap();
     let all: Vec<usize> = (0..rows.len()).collect();
     let at = |target: Vector3<f64>| {
@@ -50,7 +55,11 @@ pub(crate) fn tips(problem: &Problem, configurations: &[Vec<f64>], x: &DVector<f
 /// The largest difference of some frames.
 pub(crate) fn apart(one: &[[Vector3<f64>; 3]], other: &[[Vector3<f64>; 3]]) -> f64 {
     assert_eq!(one.len(), other.len());
-    one.iter().flatten().zip(other.iter().flatten()).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+    one.iter()
+        .flatten()
+        .zip(other.iter().flatten())
+        .map(|(a, b)| (a - b).norm())
+        .fold(0.0, f64::max)
 }
 
 /// Every arm of `problems` with a truth of its own is simulated and identified.

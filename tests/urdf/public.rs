@@ -19,7 +19,12 @@ fn public_arms_are_as_pinocchio_has_them() {
         .arg(path("tests/urdf/public.py"))
         .arg(env!("CARGO_BIN_EXE_flexcal"))
         .arg(folder.path())
-        .args(env::var("FLEXCAL_URDF_FILES").unwrap_or_default().split(':').filter(|file| !file.is_empty()))
+        .args(
+            env::var("FLEXCAL_URDF_FILES")
+                .unwrap_or_default()
+                .split(':')
+                .filter(|file| !file.is_empty()),
+        )
         .status()
         .unwrap();
     assert!(run.success());

@@ -1,4 +1,5 @@
-//! Bounded Levenberg–Marquardt: every step is a linear least-squares problem in a box, or in a polyhedron; three ways to solve it.
+//! Bounded Levenberg–Marquardt: every step is a linear least-squares problem in a box, or in a
+//! polyhedron; three ways to solve it.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -25,11 +26,12 @@ pub fn bounded_levenberg_marquardt(bounds: Bounds, settings: Settings) -> TrustR
 ///
 /// min ½‖J p + r‖² + ½λ‖D p‖² subject to the bounds and inequalities on x + p
 ///
-/// The unconstrained step is tried first, then the one in the polyhedron (a box without inequalities), each without damping
-/// if that respects the radius: on a guess of the faces that hold, corrected until the optimality conditions do. After a step that limits
-/// held back the one in the polyhedron is tried first. The problem is never evaluated outside (inequalities: beyond rounding);
-/// a start outside is moved to the [`nearest`] point within. Converged when the gradient vanishes along all directions that
-/// bounds and inequalities leave open.
+/// The unconstrained step is tried first, then the one in the polyhedron (a box without
+/// inequalities), each without damping if that respects the radius: on a guess of the faces that
+/// hold, corrected until the optimality conditions do. After a step that limits held back the one
+/// in the polyhedron is tried first. The problem is never evaluated outside (inequalities: beyond
+/// rounding); a start outside is moved to the [`nearest`] point within. Converged when the gradient
+/// vanishes along all directions that bounds and inequalities leave open.
 pub fn constrained_levenberg_marquardt(
     bounds: Bounds,
     rows: Inequalities,
@@ -38,7 +40,8 @@ pub fn constrained_levenberg_marquardt(
     Constrained::solver(Steps::ActiveSet, bounds, rows, settings)
 }
 
-/// The same with every step that leaves the polyhedron by Clarabel's interior-point method, ‖D p‖ ≤ Δ as a second-order cone.
+/// The same with every step that leaves the polyhedron by Clarabel's interior-point method, ‖D p‖ ≤
+/// Δ as a second-order cone.
 pub fn interior_point_levenberg_marquardt(
     bounds: Bounds,
     rows: Inequalities,
@@ -47,7 +50,8 @@ pub fn interior_point_levenberg_marquardt(
     Constrained::solver(Steps::InteriorPoint, bounds, rows, settings)
 }
 
-/// Levenberg–Marquardt whose unbounded steps are moved to the nearest point within the bounds: what one would write first.
+/// Levenberg–Marquardt whose unbounded steps are moved to the nearest point within the bounds: what
+/// one would write first.
 ///
 /// It may stop where a bound keeps it from a lower cost: a clamped step need not lead downhill.
 pub fn clamped_levenberg_marquardt(bounds: Bounds, settings: Settings) -> TrustRegion<Constrained> {
@@ -68,7 +72,8 @@ pub fn nearest(x: &DVector<f64>, bounds: &Bounds, rows: &Inequalities) -> Option
     }
     let factor = Factor::new(DMatrix::identity(n, n), DVector::zeros(n), f64::EPSILON);
     let polyhedron = Polyhedron::around(x, bounds, rows, &DVector::from_element(n, 1.0));
-    let solution = PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone()).solve(0.0);
+    let solution =
+        PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone()).solve(0.0);
     let mut point = x + &solution.q;
     bounds.hold(&mut point, &solution.faces.bounds);
     let kept = |i| rows.at(&point, i).is_some() || rows.holds(&point, i);
@@ -104,15 +109,23 @@ impl Constrained {
         let model = self.model.as_ref()?;
         let undamped = self.undamped.get_or_insert_with(|| {
             let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
-            PolyhedronProblem::new(&model.factor, &polyhedron, polyhedron.touched.clone()).solve(0.0)
+            PolyhedronProblem::new(&model.factor, &polyhedron, polyhedron.touched.clone())
+                .solve(0.0)
         });
-        let alone = !undamped.faces.is_empty() && undamped.q.norm() <= (1.0 + RADIUS_SLACK) * radius;
+        let alone =
+            !undamped.faces.is_empty() && undamped.q.norm() <= (1.0 + RADIUS_SLACK) * radius;
         let solution = alone.then(|| undamped.clone())?;
         Some(self.along(x, solution, 0.0))
     }
 
-    /// The step of a solution, exactly on the bounds that hold; the next problem from the same x begins with its faces.
-    fn along(&mut self, x: &DVector<f64>, PolyhedronSolution { q, faces }: PolyhedronSolution, damping: f64) -> Step {
+    /// The step of a solution, exactly on the bounds that hold; the next problem from the same x
+    /// begins with its faces.
+    fn along(
+        &mut self,
+        x: &DVector<f64>,
+        PolyhedronSolution { q, faces }: PolyhedronSolution,
+        damping: f64,
+    ) -> Step {
         let Some(model) = &self.model else { return Step::none(x) };
         let mut point = x + q.component_div(&model.scale);
         self.bounds.hold(&mut point, &faces.bounds);
@@ -122,7 +135,12 @@ impl Constrained {
         Step { point, length: q.norm(), slope, predicted, damping }
     }
 
-    fn solver(steps: Steps, bounds: Bounds, rows: Inequalities, settings: Settings) -> TrustRegion<Self> {
+    fn solver(
+        steps: Steps,
+        bounds: Bounds,
+        rows: Inequalities,
+        settings: Settings,
+    ) -> TrustRegion<Self> {
         TrustRegion::new(
             Self { steps, bounds, rows, model: None, guess: None, undamped: None, confined: false },
             settings,
@@ -145,7 +163,13 @@ impl Subproblem for Constrained {
         true
     }
 
-    fn prepare(&mut self, _x: &DVector<f64>, linearisation: &Linearisation, scale: &DVector<f64>, settings: &Settings) {
+    fn prepare(
+        &mut self,
+        _x: &DVector<f64>,
+        linearisation: &Linearisation,
+        scale: &DVector<f64>,
+        settings: &Settings,
+    ) {
         self.model = Some(Model::new(linearisation, scale, settings));
         (self.guess, self.undamped) = (None, None);
     }
@@ -172,12 +196,22 @@ impl Subproblem for Constrained {
         self.confined && self.steps != Steps::Clamped
     }
 
-    fn pressed(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &DVector<f64>) -> DMatrix<f64> {
+    fn pressed(
+        &self,
+        x: &DVector<f64>,
+        scale: &DVector<f64>,
+        gradient: &DVector<f64>,
+    ) -> DMatrix<f64> {
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, scale);
         polyhedron.normals_of(&polyhedron.pressed(gradient).0)
     }
 
-    fn bent(&mut self, x: &DVector<f64>, bend: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+    fn bent(
+        &mut self,
+        x: &DVector<f64>,
+        bend: &DVector<f64>,
+        damping: f64,
+    ) -> Option<DVector<f64>> {
         let model = self.model.as_ref()?;
         let factor = model.bent(bend)?;
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
@@ -214,7 +248,8 @@ impl Subproblem for Constrained {
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
         let (solution, damping) = match self.steps {
             Steps::ActiveSet => {
-                let known = self.undamped.as_ref().map_or(&polyhedron.touched, |undamped| &undamped.faces);
+                let known =
+                    self.undamped.as_ref().map_or(&polyhedron.touched, |undamped| &undamped.faces);
                 let mut problem = PolyhedronProblem::new(&model.factor, &polyhedron, known.clone());
                 problem.begin_at(&(&step.point - x).component_mul(&model.scale));
                 let (size, undamped) = (problem.gradient_norm(), &mut self.undamped);
@@ -225,7 +260,8 @@ impl Subproblem for Constrained {
                 limited(solve, step.damping, size, radius)
             }
             Steps::InteriorPoint => {
-                let found = interior_point(&model.factor, 0.0, &polyhedron.half_spaces(), Some(radius));
+                let found =
+                    interior_point(&model.factor, 0.0, &polyhedron.half_spaces(), Some(radius));
                 let (q, damping) = found.unwrap_or_else(|| (DVector::zeros(x.len()), 0.0));
                 (polyhedron.within(q, NEAR), damping)
             }
@@ -238,11 +274,11 @@ impl Subproblem for Constrained {
     }
 }
 
-/// The constrained step with ‖q‖ ≤ Δ to within 10 %, and its damping λ; `solve` gives it for any λ, `size` is ‖Bᵀc‖, `first` is the λ > 0
-/// that it would need without constraints.
+/// The constrained step with ‖q‖ ≤ Δ to within 10 %, and its damping λ; `solve` gives it for any λ,
+/// `size` is ‖Bᵀc‖, `first` is the λ > 0 that it would need without constraints.
 ///
-/// ‖q(λ)‖ falls with λ and is at most ‖Bᵀc‖/λ (compare q with staying put), which brackets λ; within the bracket
-/// Hebden's model ‖q(λ)‖ ≈ a/(b + λ) is fitted to the last two values.
+/// ‖q(λ)‖ falls with λ and is at most ‖Bᵀc‖/λ (compare q with staying put), which brackets λ;
+/// within the bracket Hebden's model ‖q(λ)‖ ≈ a/(b + λ) is fitted to the last two values.
 fn limited(
     mut solve: impl FnMut(f64) -> PolyhedronSolution,
     first: f64,

@@ -61,7 +61,10 @@ impl Bounds {
 
     /// No bounds on any of `n` unknowns.
     pub fn none(n: usize) -> Self {
-        Self { lower: DVector::from_element(n, f64::NEG_INFINITY), upper: DVector::from_element(n, f64::INFINITY) }
+        Self {
+            lower: DVector::from_element(n, f64::NEG_INFINITY),
+            upper: DVector::from_element(n, f64::INFINITY),
+        }
     }
 
     /// lo.

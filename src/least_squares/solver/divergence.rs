@@ -2,8 +2,8 @@
 
 /// When an undamped iteration counts as diverging.
 ///
-/// It does when ½‖r‖² > `growth` · (lowest ½‖r‖² so far) in `patience` iterations one after another, or as soon as
-/// ½‖r‖² is not finite.
+/// It does when ½‖r‖² > `growth` · (lowest ½‖r‖² so far) in `patience` iterations one after
+/// another, or as soon as ½‖r‖² is not finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Divergence {
     /// Factor above the lowest cost so far, at least 1; default 10.

@@ -43,7 +43,8 @@ pub(super) fn run<O: Objective, S: Solver<O, State> + Ends>(
     // The executor fails only when an observer does.
     let Ok(mut result) = executor.run() else { return solution };
     let count = |what: &str| result.problem.counts.get(what).copied().unwrap_or(0);
-    // A bend takes a residual and a linearisation, second derivatives one linearisation more than there are unknowns.
+    // A bend takes a residual and a linearisation, second derivatives one linearisation more than
+    // there are unknowns.
     let bends = count("bend_count");
     solution.cost_evaluations = count("cost_count") + bends;
     solution.linearisations =
@@ -51,7 +52,9 @@ pub(super) fn run<O: Objective, S: Solver<O, State> + Ends>(
     solution.iterations = result.state.get_iter();
     solution.termination = match (result.solver.end(), result.state.get_termination_status()) {
         (Some(termination), _) => termination,
-        (None, TerminationStatus::Terminated(TerminationReason::MaxItersReached)) => Termination::IterationLimit,
+        (None, TerminationStatus::Terminated(TerminationReason::MaxItersReached)) => {
+            Termination::IterationLimit
+        }
         (None, _) => Termination::Interrupted,
     };
     solution.cost = result.state.get_cost();

@@ -10,8 +10,9 @@ use super::spectrum::Spectrum;
 /// min ‖B q + c‖ factorised once, when first it is needed, to be solved for any damping.
 ///
 /// A column-pivoted QR of B with its columns brought to length one decides whether B has full rank:
-/// `|Rₙₙ| > tolerance·|R₁₁|`. If so, all steps come from it. Otherwise they come from B = U Σ Vᵀ, where singular values `σ ≤ tolerance·σ₁` are dropped (less for columns much shorter than the longest):
-/// combinations that the rows cannot see stay where they are.
+/// `|Rₙₙ| > tolerance·|R₁₁|`. If so, all steps come from it. Otherwise they come from B = U Σ Vᵀ,
+/// where singular values `σ ≤ tolerance·σ₁` are dropped (less for columns much shorter than the
+/// longest): combinations that the rows cannot see stay where they are.
 #[derive(Debug, Clone)]
 pub struct Factor {
     matrix: DMatrix<f64>,
@@ -70,7 +71,8 @@ impl Factor {
         self.spectrum().solution(lambda, n)
     }
 
-    /// By how much the minimiser of ‖B q + c‖² + λ‖q‖² moves where its gradient is larger by g; nothing where B lacks rank.
+    /// By how much the minimiser of ‖B q + c‖² + λ‖q‖² moves where its gradient is larger by g;
+    /// nothing where B lacks rank.
     pub fn response(&self, gradient: &DVector<f64>, lambda: f64) -> Option<DVector<f64>> {
         self.pivoted()?.response(gradient, lambda)
     }
@@ -84,7 +86,8 @@ impl Factor {
         (self.damped(lambda), lambda)
     }
 
-    /// Whether B is for certain an upper triangle so well conditioned that any of its columns can do without pivots.
+    /// Whether B is for certain an upper triangle so well conditioned that any of its columns can
+    /// do without pivots.
     pub(super) fn is_well_conditioned(&self) -> bool {
         *self.well_conditioned.get_or_init(|| match self.pivoted.get() {
             Some(found) => found.as_ref().is_some_and(|pivoted| pivoted.is_plain),
@@ -93,11 +96,14 @@ impl Factor {
     }
 
     fn pivoted(&self) -> Option<&Pivoted> {
-        self.pivoted.get_or_init(|| Pivoted::new(&self.matrix, &self.constant, self.tolerance)).as_ref()
+        self.pivoted
+            .get_or_init(|| Pivoted::new(&self.matrix, &self.constant, self.tolerance))
+            .as_ref()
     }
 
     fn spectrum(&mut self) -> &Spectrum {
-        let cut = if self.pivoted().is_some() { 0.0 } else { spectral_cut(&self.matrix, self.tolerance) };
+        let cut =
+            if self.pivoted().is_some() { 0.0 } else { spectral_cut(&self.matrix, self.tolerance) };
         let Self { matrix, constant, spectrum, .. } = self;
         spectrum.get_or_insert_with(|| Spectrum::new(matrix, constant, cut))
     }
@@ -117,8 +123,9 @@ mod tests {
     use super::*;
 
     fn example(n: usize) -> (DMatrix<f64>, DVector<f64>) {
-        let matrix =
-            DMatrix::from_fn(n, n, |i, j| if i <= j { ((1 + 3 * i + 7 * j + i * j) as f64).sin() } else { 0.0 });
+        let matrix = DMatrix::from_fn(n, n, |i, j| {
+            if i <= j { ((1 + 3 * i + 7 * j + i * j) as f64).sin() } else { 0.0 }
+        });
         (matrix, DVector::from_fn(n, |i, _| (i as f64 + 0.5).cos()))
     }
 
@@ -148,7 +155,9 @@ mod tests {
     fn responses_are_differences_of_solutions() {
         let (matrix, constant) = example(6);
         let more = DVector::from_fn(6, |i, _| 0.3 - i as f64);
-        for (matrix, lambda) in [(matrix.clone(), 0.0), (matrix.clone(), 0.7), (matrix.transpose(), 0.2)] {
+        for (matrix, lambda) in
+            [(matrix.clone(), 0.0), (matrix.clone(), 0.7), (matrix.transpose(), 0.2)]
+        {
             let mut first = Factor::new(matrix.clone(), constant.clone(), 1e-13);
             let mut second = Factor::new(matrix.clone(), &constant + &more, 1e-13);
             let expected = second.damped(lambda) - first.damped(lambda);
@@ -171,6 +180,9 @@ mod tests {
         assert!((short.norm() / step.norm() - 0.1).abs() < 0.0101 && lambda > 0.0);
         let normal = factor.matrix().tr_mul(&(factor.image(&short) + &constant)) + lambda * &short;
         assert!(normal.norm() <= 1e-10 * factor.gradient().norm());
-        assert_eq!(Factor::new(DMatrix::zeros(5, 5), constant, 1e-12).gauss_newton(), DVector::zeros(5));
+        assert_eq!(
+            Factor::new(DMatrix::zeros(5, 5), constant, 1e-12).gauss_newton(),
+            DVector::zeros(5)
+        );
     }
 }

@@ -2,7 +2,10 @@
 
 use std::cell::RefCell;
 
-use argmin::core::{Error, Executor, IterState, Jacobian, Operator, State as _, TerminationReason, TerminationStatus};
+use argmin::core::{
+    Error, Executor, IterState, Jacobian, Operator, State as _, TerminationReason,
+    TerminationStatus,
+};
 use argmin::solver::gaussnewton::GaussNewton;
 use nalgebra::{DMatrix, DVector};
 
@@ -13,7 +16,8 @@ use crate::least_squares::{Linearisation, Objective};
 /// When to stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaussNewtonSettings {
-    /// argmin's test: | ‖Qᵀr‖ₖ₋₁ − ‖Qᵀr‖ₖ | < `tolerance`, above 0, in the units of r; default √ε ≈ 1.5e-8.
+    /// argmin's test: | ‖Qᵀr‖ₖ₋₁ − ‖Qᵀr‖ₖ | < `tolerance`, above 0, in the units of r; default √ε ≈
+    /// 1.5e-8.
     pub tolerance: f64,
     /// Largest number of steps; default 100.
     pub max_iterations: u64,
@@ -23,15 +27,20 @@ pub struct GaussNewtonSettings {
 
 impl Default for GaussNewtonSettings {
     fn default() -> Self {
-        Self { tolerance: f64::EPSILON.sqrt(), max_iterations: 100, divergence: Divergence::default() }
+        Self {
+            tolerance: f64::EPSILON.sqrt(),
+            max_iterations: 100,
+            divergence: Divergence::default(),
+        }
     }
 }
 
 /// Minimises ½‖r(x)‖² from `start` by argmin's Gauss–Newton method: full steps −(RᵀR)⁻¹Rᵀ(Qᵀr).
 ///
-/// argmin sees the operator Qᵀr and the Jacobian R, whose steps are those of r and J = Q R. It inverts JᵀJ, which squares
-/// the condition number; a singular one ends the run as [`Termination::Singular`]. Where the run does not converge, x is
-/// the best point it has seen, which may be `start`.
+/// argmin sees the operator Qᵀr and the Jacobian R, whose steps are those of r and J = Q R. It
+/// inverts JᵀJ, which squares the condition number; a singular one ends the run as
+/// [`Termination::Singular`]. Where the run does not converge, x is the best point it has seen,
+/// which may be `start`.
 pub fn minimise_gauss_newton<O: Objective>(
     objective: O,
     start: DVector<f64>,
@@ -53,16 +62,23 @@ pub fn minimise_gauss_newton<O: Objective>(
     let method = GaussNewton::new();
     let method = method.clone().with_tolerance(settings.tolerance).unwrap_or(method);
     let result = Executor::new(&adapter, method)
-        .configure(|state: GaussNewtonState| state.param(solution.x.clone()).max_iters(settings.max_iterations))
+        .configure(|state: GaussNewtonState| {
+            state.param(solution.x.clone()).max_iters(settings.max_iterations)
+        })
         .ctrlc(false)
         .timer(false)
         .run();
-    // argmin counts the steps it has finished; a run that fails has evaluated the start and then a point a step.
+    // argmin counts the steps it has finished; a run that fails has evaluated the start and then a
+    // point a step.
     let (finished, iterations) = match result {
         Ok(result) => {
             let finished = match result.state.get_termination_status() {
-                TerminationStatus::Terminated(TerminationReason::SolverConverged) => Termination::Unchanged,
-                TerminationStatus::Terminated(TerminationReason::MaxItersReached) => Termination::IterationLimit,
+                TerminationStatus::Terminated(TerminationReason::SolverConverged) => {
+                    Termination::Unchanged
+                }
+                TerminationStatus::Terminated(TerminationReason::MaxItersReached) => {
+                    Termination::IterationLimit
+                }
                 _ => Termination::Interrupted,
             };
             (finished, Some(result.state.get_iter()))
@@ -114,7 +130,12 @@ impl<O: Objective> Adapter<O> {
         let cost = linearisation.cost;
         seen.termination = if seen.watch.diverges(cost) {
             Some(if first { Termination::OutsideDomainAtStart } else { Termination::Diverged })
-        } else if linearisation.triangle.iter().chain(&linearisation.projected).all(|value| value.is_finite()) {
+        } else if linearisation
+            .triangle
+            .iter()
+            .chain(&linearisation.projected)
+            .all(|value| value.is_finite())
+        {
             None
         } else {
             Some(Termination::DerivativesNotFinite)

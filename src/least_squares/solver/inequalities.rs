@@ -48,7 +48,11 @@ impl Inequalities {
     ///
     /// # Errors
     /// When the sizes differ, or a row is empty, or its limits leave no value.
-    pub fn new(matrix: DMatrix<f64>, lower: DVector<f64>, upper: DVector<f64>) -> Result<Self, InequalitiesError> {
+    pub fn new(
+        matrix: DMatrix<f64>,
+        lower: DVector<f64>,
+        upper: DVector<f64>,
+    ) -> Result<Self, InequalitiesError> {
         let rows = matrix.nrows();
         if lower.len() != rows || upper.len() != rows {
             return Err(InequalitiesError::Sizes { rows, lower: lower.len(), upper: upper.len() });
@@ -97,7 +101,8 @@ impl Inequalities {
     pub fn at(&self, x: &DVector<f64>, i: usize) -> Option<AtBound> {
         let (value, size) = self.value(x, i);
         let size = size + self.matrix.row(i).amax() * x.amax();
-        let on = |limit: f64| limit.is_finite() && (value - limit).abs() <= NEAR * (size + limit.abs());
+        let on =
+            |limit: f64| limit.is_finite() && (value - limit).abs() <= NEAR * (size + limit.abs());
         if on(self.lower[i]) {
             Some(AtBound::Lower)
         } else if on(self.upper[i]) {
@@ -111,7 +116,8 @@ impl Inequalities {
     pub(super) fn holds(&self, x: &DVector<f64>, i: usize) -> bool {
         let (value, size) = self.value(x, i);
         let (lower, upper) = (self.lower[i], self.upper[i]);
-        lower - value <= ROUNDING * (size + lower.abs()) && value - upper <= ROUNDING * (size + upper.abs())
+        lower - value <= ROUNDING * (size + lower.abs())
+            && value - upper <= ROUNDING * (size + upper.abs())
     }
 
     /// Whether every row holds to within rounding.
@@ -122,6 +128,9 @@ impl Inequalities {
     /// `aᵢᵀx` and Σ |aᵢⱼ xⱼ|.
     fn value(&self, x: &DVector<f64>, i: usize) -> (f64, f64) {
         let terms = self.matrix.row(i);
-        terms.iter().zip(x.iter()).fold((0.0, 0.0), |(sum, size), (a, x)| (sum + a * x, size + (a * x).abs()))
+        terms
+            .iter()
+            .zip(x.iter())
+            .fold((0.0, 0.0), |(sum, size), (a, x)| (sum + a * x, size + (a * x).abs()))
     }
 }

@@ -2,7 +2,8 @@
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
-    DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SupportedConeT, ZeroConeT,
+    DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SupportedConeT,
+    ZeroConeT,
 };
 use nalgebra::DVector;
 
@@ -18,9 +19,11 @@ pub(super) struct HalfSpace {
     pub(super) least: f64,
 }
 
-/// min ½‖B q + c‖² + ½λ‖q‖² within all half-spaces and, if there is a `radius`, ‖q‖ ≤ Δ; and the damping that stands for Δ.
+/// min ½‖B q + c‖² + ½λ‖q‖² within all half-spaces and, if there is a `radius`, ‖q‖ ≤ Δ; and the
+/// damping that stands for Δ.
 ///
-/// In unknowns whose columns have length one: z = S q and y = B q + c, so that `BᵀB` is never formed; normals are brought to length one.
+/// In unknowns whose columns have length one: z = S q and y = B q + c, so that `BᵀB` is never
+/// formed; normals are brought to length one.
 pub(super) fn interior_point(
     factor: &Factor,
     lambda: f64,
@@ -65,9 +68,11 @@ pub(super) fn interior_point(
         }
     }
     let constraints = CscMatrix::new_from_triplets(right.len(), n + rows, is, js, values);
-    let diagonal: Vec<f64> = sizes.iter().map(|s| lambda / (s * s)).chain(std::iter::repeat_n(1.0, rows)).collect();
+    let diagonal: Vec<f64> =
+        sizes.iter().map(|s| lambda / (s * s)).chain(std::iter::repeat_n(1.0, rows)).collect();
     let indices: Vec<usize> = (0..n + rows).collect();
-    let quadratic = CscMatrix::new_from_triplets(n + rows, n + rows, indices.clone(), indices, diagonal);
+    let quadratic =
+        CscMatrix::new_from_triplets(n + rows, n + rows, indices.clone(), indices, diagonal);
     let mut cones: Vec<SupportedConeT<f64>> = vec![ZeroConeT(rows), NonnegativeConeT(spaces.len())];
     cones.extend(radius.map(|_| SecondOrderConeT(n + 1)));
     let settings = DefaultSettings {
@@ -79,12 +84,14 @@ pub(super) fn interior_point(
         ..DefaultSettings::default()
     };
     let linear = vec![0.0; n + rows];
-    let mut solver = DefaultSolver::new(&quadratic, &linear, &constraints, &right, &cones, settings).ok()?;
+    let mut solver =
+        DefaultSolver::new(&quadratic, &linear, &constraints, &right, &cones, settings).ok()?;
     solver.solve();
     let z = solver.solution.x.get(..n)?;
     let q = DVector::from_iterator(n, z.iter().zip(&sizes).map(|(z, size)| z * scale / size));
     // The multiplier of the cone is λ q, in length λ Δ.
-    let damping = radius.and_then(|radius| Some(solver.solution.z.get(rows + spaces.len())? * scale / radius));
+    let damping = radius
+        .and_then(|radius| Some(solver.solution.z.get(rows + spaces.len())? * scale / radius));
     let damping = damping.filter(|lambda| *lambda > TOLERANCE).unwrap_or(0.0);
     q.iter().all(|v| v.is_finite()).then_some((q, damping))
 }

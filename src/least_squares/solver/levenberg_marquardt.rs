@@ -7,11 +7,12 @@ use crate::least_squares::{Linearisation, MANY_UNKNOWNS};
 
 /// Levenberg–Marquardt in its trust-region form, for unknowns without bounds.
 ///
-/// min ‖J p + r‖ subject to ‖D p‖ ≤ Δ, that is `(JᵀJ + λD²) p = −Jᵀr` with λ ≥ 0            [Moré 1978]
+/// min ‖J p + r‖ subject to ‖D p‖ ≤ Δ, that is `(JᵀJ + λD²) p = −Jᵀr` with λ ≥ 0            [Moré
+/// 1978]
 ///
-/// Needs an [`Objective`](crate::least_squares::Objective); solved from the n × n factor of J alone. Redundant unknowns are
-/// allowed: what the data cannot see does not move. Of many unknowns steps that miss their forecast follow the bend of the way
-/// [Transtrum & Sethna 2012].
+/// Needs an [`Objective`](crate::least_squares::Objective); solved from the n × n factor of J
+/// alone. Redundant unknowns are allowed: what the data cannot see does not move. Of many unknowns
+/// steps that miss their forecast follow the bend of the way [Transtrum & Sethna 2012].
 pub fn levenberg_marquardt(settings: Settings) -> TrustRegion<Unconstrained> {
     TrustRegion::new(Unconstrained::default(), settings)
 }
@@ -32,7 +33,11 @@ pub(super) struct Model {
 }
 
 impl Model {
-    pub(super) fn new(linearisation: &Linearisation, scale: &DVector<f64>, settings: &Settings) -> Self {
+    pub(super) fn new(
+        linearisation: &Linearisation,
+        scale: &DVector<f64>,
+        settings: &Settings,
+    ) -> Self {
         let matrix = scaled_triangle(linearisation, scale);
         let factor = Factor::new(matrix, linearisation.projected.clone(), settings.rank_tolerance);
         Self { factor, scale: scale.clone() }
@@ -45,7 +50,11 @@ impl Model {
         if !shift.iter().all(|value| value.is_finite()) {
             return None;
         }
-        Some(Factor::new(self.factor.matrix().clone(), self.factor.constant() + shift, self.factor.tolerance()))
+        Some(Factor::new(
+            self.factor.matrix().clone(),
+            self.factor.constant() + shift,
+            self.factor.tolerance(),
+        ))
     }
 
     /// p = D⁻¹ q from x, with what the linearised problem says of it.
@@ -78,7 +87,13 @@ impl Subproblem for Unconstrained {
         true
     }
 
-    fn prepare(&mut self, _x: &DVector<f64>, linearisation: &Linearisation, scale: &DVector<f64>, settings: &Settings) {
+    fn prepare(
+        &mut self,
+        _x: &DVector<f64>,
+        linearisation: &Linearisation,
+        scale: &DVector<f64>,
+        settings: &Settings,
+    ) {
         self.model = Some(Model::new(linearisation, scale, settings));
     }
 
@@ -91,7 +106,12 @@ impl Subproblem for Unconstrained {
         self.model.as_ref().is_some_and(|model| model.scale.len() >= MANY_UNKNOWNS)
     }
 
-    fn bent(&mut self, x: &DVector<f64>, bend: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+    fn bent(
+        &mut self,
+        x: &DVector<f64>,
+        bend: &DVector<f64>,
+        damping: f64,
+    ) -> Option<DVector<f64>> {
         let Model { factor, scale } = self.model.as_ref()?;
         let turned = factor.response(&(0.5 * bend.component_div(scale)), damping)?;
         Some(x + &self.straight + turned.component_div(scale))

@@ -1,6 +1,7 @@
 //! Solvers of nonlinear least-squares problems, run by argmin's executor; one file a solver.
 //!
-//! Every solver sees the problem through [`Objective`](crate::least_squares::Objective) only: a cost and an n × n triangular linearisation.
+//! Every solver sees the problem through [`Objective`](crate::least_squares::Objective) only: a
+//! cost and an n × n triangular linearisation.
 
 mod bounded;
 mod bounds;
@@ -26,8 +27,8 @@ mod termination;
 mod trust_region;
 
 pub use bounded::{
-    Constrained, bounded_levenberg_marquardt, clamped_levenberg_marquardt, constrained_levenberg_marquardt,
-    interior_point_levenberg_marquardt, nearest,
+    Constrained, bounded_levenberg_marquardt, clamped_levenberg_marquardt,
+    constrained_levenberg_marquardt, interior_point_levenberg_marquardt, nearest,
 };
 pub use bounds::{AtBound, Bounds, BoundsError};
 pub use divergence::Divergence;
@@ -36,10 +37,13 @@ pub use gauss_newton::{GaussNewtonSettings, minimise_gauss_newton};
 pub use inequalities::{Inequalities, InequalitiesError};
 pub use levenberg_marquardt::{Unconstrained, levenberg_marquardt};
 pub use pseudo_inverse::{
-    PseudoInverse, PseudoInverseSettings, minimise_pseudo_inverse, minimise_pseudo_inverse_observed, minimum_norm_step,
+    PseudoInverse, PseudoInverseSettings, minimise_pseudo_inverse,
+    minimise_pseudo_inverse_observed, minimum_norm_step,
 };
 pub use reflective::{Reflective, reflective_levenberg_marquardt};
-pub use run::{Within, minimise, minimise_bounded, minimise_constrained, minimise_observed, minimise_within};
+pub use run::{
+    Within, minimise, minimise_bounded, minimise_constrained, minimise_observed, minimise_within,
+};
 pub use settings::Settings;
 pub use solution::Solution;
 pub use termination::Termination;

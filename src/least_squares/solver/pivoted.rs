@@ -11,8 +11,8 @@ const SECULAR_ITERATIONS: usize = 20;
 /// A triangle none of whose singular values is below this part of the largest needs no pivots.
 const WELL_CONDITIONED: f64 = 1e-8;
 
-/// min ‖B q + c‖ with B S⁻¹ P = Q R of full rank; S holds the lengths of the columns of B. Well-conditioned upper triangles B are their own
-/// factor.
+/// min ‖B q + c‖ with B S⁻¹ P = Q R of full rank; S holds the lengths of the columns of B.
+/// Well-conditioned upper triangles B are their own factor.
 #[derive(Debug, Clone)]
 pub(super) struct Pivoted {
     /// R.
@@ -30,16 +30,28 @@ pub(super) struct Pivoted {
 
 impl Pivoted {
     /// Decomposes B, or gives nothing when `|Rₙₙ| ≤ tolerance·|R₁₁|`.
-    pub(super) fn new(matrix: &DMatrix<f64>, constant: &DVector<f64>, tolerance: f64) -> Option<Self> {
+    pub(super) fn new(
+        matrix: &DMatrix<f64>,
+        constant: &DVector<f64>,
+        tolerance: f64,
+    ) -> Option<Self> {
         let n = matrix.ncols();
         if n == 0 || matrix.nrows() < n {
             return None;
         }
         let (unit, mut inverse_sizes) = with_unit_columns(matrix);
         if tolerance <= WELL_CONDITIONED && regular_inverse(&unit, WELL_CONDITIONED).is_some() {
-            let (projected, permutation) = (constant.clone(), PermutationSequence::<Dyn>::identity_generic(Dyn(n)));
+            let (projected, permutation) =
+                (constant.clone(), PermutationSequence::<Dyn>::identity_generic(Dyn(n)));
             let solution = solve(&unit, &projected, &inverse_sizes)?;
-            return Some(Self { triangle: unit, projected, inverse_sizes, permutation, solution, is_plain: true });
+            return Some(Self {
+                triangle: unit,
+                projected,
+                inverse_sizes,
+                permutation,
+                solution,
+                is_plain: true,
+            });
         }
         let qr = unit.col_piv_qr();
         let triangle = qr.r();
@@ -61,9 +73,11 @@ impl Pivoted {
         self.in_order(self.solution.clone())
     }
 
-    /// The minimiser with ‖q‖ = Δ to within the slack and its λ > 0, if Newton's method settles soon.
+    /// The minimiser with ‖q‖ = Δ to within the slack and its λ > 0, if Newton's method settles
+    /// soon.
     ///
-    /// λ ← λ + (‖q‖ − Δ) / (Δ ‖w‖²), `Rᵀw` = S⁻¹ q/‖q‖, with R of the damped problem      [Moré 1978, eqs. 5.8 and 5.9]
+    /// λ ← λ + (‖q‖ − Δ) / (Δ ‖w‖²), `Rᵀw` = S⁻¹ q/‖q‖, with R of the damped problem      [Moré
+    /// 1978, eqs. 5.8 and 5.9]
     pub(super) fn limited(&self, radius: f64) -> Option<(DVector<f64>, f64)> {
         let mut lambda = 0.0;
         let mut q = self.solution.clone();
@@ -78,7 +92,11 @@ impl Pivoted {
                 return None;
             }
             lambda += (length - radius) / radius / w.norm_squared();
-            let damped = Triangle::damped(&self.triangle, &self.projected, &(&self.inverse_sizes * lambda.sqrt()));
+            let damped = Triangle::damped(
+                &self.triangle,
+                &self.projected,
+                &(&self.inverse_sizes * lambda.sqrt()),
+            );
             q = solve(&damped.triangle, &damped.projected, &self.inverse_sizes)?;
             triangle = damped.triangle;
         }
@@ -91,10 +109,16 @@ impl Pivoted {
         self.permutation.permute_rows(&mut q);
         q.component_mul_assign(&self.inverse_sizes);
         let damped = (lambda > 0.0).then(|| {
-            Triangle::damped(&self.triangle, &self.projected, &(&self.inverse_sizes * lambda.sqrt())).triangle
+            Triangle::damped(
+                &self.triangle,
+                &self.projected,
+                &(&self.inverse_sizes * lambda.sqrt()),
+            )
+            .triangle
         });
         let triangle = damped.as_ref().unwrap_or(&self.triangle);
-        let solved = triangle.tr_solve_upper_triangular_mut(&mut q) && triangle.solve_upper_triangular_mut(&mut q);
+        let solved = triangle.tr_solve_upper_triangular_mut(&mut q)
+            && triangle.solve_upper_triangular_mut(&mut q);
         q.component_mul_assign(&self.inverse_sizes);
         let found = self.in_order(-q);
         (solved && found.iter().all(|value| value.is_finite())).then_some(found)
@@ -106,10 +130,11 @@ impl Pivoted {
     }
 }
 
-/// Whether B is a well-conditioned upper triangle, by columns brought to length one; then so is the factor of any of its columns, with
-/// damping or without.
+/// Whether B is a well-conditioned upper triangle, by columns brought to length one; then so is the
+/// factor of any of its columns, with damping or without.
 pub(super) fn is_well_conditioned(matrix: &DMatrix<f64>, tolerance: f64) -> bool {
-    tolerance <= WELL_CONDITIONED && regular_inverse(&with_unit_columns(matrix).0, WELL_CONDITIONED).is_some()
+    tolerance <= WELL_CONDITIONED
+        && regular_inverse(&with_unit_columns(matrix).0, WELL_CONDITIONED).is_some()
 }
 
 /// B S⁻¹, and 1/S.
@@ -127,7 +152,11 @@ fn with_unit_columns(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
 }
 
 /// −S⁻¹ R⁻¹ c.
-fn solve(triangle: &DMatrix<f64>, projected: &DVector<f64>, inverse_sizes: &DVector<f64>) -> Option<DVector<f64>> {
+fn solve(
+    triangle: &DMatrix<f64>,
+    projected: &DVector<f64>,
+    inverse_sizes: &DVector<f64>,
+) -> Option<DVector<f64>> {
     let mut q = triangle.solve_upper_triangular(projected)?;
     for (q, inverse) in q.iter_mut().zip(inverse_sizes) {
         *q *= -inverse;

@@ -1,4 +1,5 @@
-//! The polyhedron that bounds and inequalities leave to a step; a box where there are no inequalities.
+//! The polyhedron that bounds and inequalities leave to a step; a box where there are no
+//! inequalities.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -60,7 +61,8 @@ impl Faces {
     pub(super) fn take_last_of(&mut self, other: &Self) {
         if let Some(i) = (0..self.rows.len()).rfind(|&i| self.rows[i] != other.rows[i]) {
             self.rows[i] = other.rows[i];
-        } else if let Some(j) = (0..self.bounds.len()).rfind(|&j| self.bounds[j] != other.bounds[j]) {
+        } else if let Some(j) = (0..self.bounds.len()).rfind(|&j| self.bounds[j] != other.bounds[j])
+        {
             self.bounds[j] = other.bounds[j];
         }
     }
@@ -73,7 +75,12 @@ impl Faces {
 
 impl Polyhedron {
     /// The steps q = D p from `x` that keep bounds and rows; D is `scale`.
-    pub(super) fn around(x: &DVector<f64>, bounds: &Bounds, rows: &Inequalities, scale: &DVector<f64>) -> Self {
+    pub(super) fn around(
+        x: &DVector<f64>,
+        bounds: &Bounds,
+        rows: &Inequalities,
+        scale: &DVector<f64>,
+    ) -> Self {
         let mut spaces: Vec<(DVector<f64>, f64, bool)> = Vec::new();
         for i in 0..rows.len() {
             let row = rows.matrix().row(i).transpose();
@@ -110,7 +117,8 @@ impl Polyhedron {
         left
     }
 
-    /// The touched faces that a step against `gradient` at q = 0 would leave, and the gradient without the half-spaces among them.
+    /// The touched faces that a step against `gradient` at q = 0 would leave, and the gradient
+    /// without the half-spaces among them.
     pub(super) fn pressed(&self, gradient: &DVector<f64>) -> (Faces, DVector<f64>) {
         let mut faces = self.touched.clone();
         loop {
@@ -126,29 +134,48 @@ impl Polyhedron {
     /// Normals of some faces, one a row.
     pub(super) fn normals_of(&self, faces: &Faces) -> DMatrix<f64> {
         let n = faces.bounds.len();
-        let (chosen, held) = (faces.chosen(), (0..n).filter(|&j| faces.bounds[j].is_some()).collect::<Vec<_>>());
+        let (chosen, held) =
+            (faces.chosen(), (0..n).filter(|&j| faces.bounds[j].is_some()).collect::<Vec<_>>());
         let bounds = DMatrix::from_fn(held.len(), n, |i, j| f64::from(u8::from(held[i] == j)));
         let mut rows = bounds.insert_rows(held.len(), chosen.len(), 0.0);
         rows.rows_mut(held.len(), chosen.len()).copy_from(&self.normals.select_rows(&chosen));
         rows
     }
 
-    /// μ of the half-spaces among `faces`, the shortest where several do, and what they leave of `force`: the multipliers of
-    /// the bounds, and nothing else where the faces hold all of it.
-    pub(super) fn multipliers(&self, faces: &Faces, force: &DVector<f64>) -> (DVector<f64>, Vec<(usize, f64)>) {
+    /// μ of the half-spaces among `faces`, the shortest where several do, and what they leave of
+    /// `force`: the multipliers of the bounds, and nothing else where the faces hold all of it.
+    pub(super) fn multipliers(
+        &self,
+        faces: &Faces,
+        force: &DVector<f64>,
+    ) -> (DVector<f64>, Vec<(usize, f64)>) {
         let (chosen, free) = (faces.chosen(), faces.free());
         if chosen.is_empty() {
             return (force.clone(), Vec::new());
         }
         let normals = self.normals.select_rows(&chosen).transpose();
-        let multipliers = Factor::new(normals.select_rows(&free), -force.select_rows(&free), DEPENDENT).gauss_newton();
-        (force - normals * &multipliers, chosen.into_iter().zip(multipliers.iter().copied()).collect())
+        let multipliers =
+            Factor::new(normals.select_rows(&free), -force.select_rows(&free), DEPENDENT)
+                .gauss_newton();
+        (
+            force - normals * &multipliers,
+            chosen.into_iter().zip(multipliers.iter().copied()).collect(),
+        )
     }
 
-    /// The faces whose multiplier does not pull inwards by more than `slack`; an unknown with one value only keeps it.
-    pub(super) fn kept(&self, faces: &Faces, bounds: &DVector<f64>, rows: &[(usize, f64)], slack: f64) -> Faces {
+    /// The faces whose multiplier does not pull inwards by more than `slack`; an unknown with one
+    /// value only keeps it.
+    pub(super) fn kept(
+        &self,
+        faces: &Faces,
+        bounds: &DVector<f64>,
+        rows: &[(usize, f64)],
+        slack: f64,
+    ) -> Faces {
         let mut kept = faces.clone();
-        for (j, bound) in kept.bounds.iter_mut().enumerate().filter(|&(j, _)| self.lower[j] < self.upper[j]) {
+        for (j, bound) in
+            kept.bounds.iter_mut().enumerate().filter(|&(j, _)| self.lower[j] < self.upper[j])
+        {
             *bound = bound.filter(|side| match side {
                 AtBound::Lower => bounds[j] >= -slack,
                 AtBound::Upper => bounds[j] <= slack,
@@ -160,8 +187,8 @@ impl Polyhedron {
         kept
     }
 
-    /// The shortest q on some faces, and orthonormal columns that span the directions of the free unknowns along the
-    /// half-spaces among them; none where there are no such half-spaces.
+    /// The shortest q on some faces, and orthonormal columns that span the directions of the free
+    /// unknowns along the half-spaces among them; none where there are no such half-spaces.
     pub(super) fn flat(&self, faces: &Faces) -> (DVector<f64>, Option<DMatrix<f64>>) {
         let mut corner = DVector::from_fn(faces.bounds.len(), |j, _| match faces.bounds[j] {
             Some(AtBound::Lower) => self.lower[j],
@@ -177,28 +204,37 @@ impl Polyhedron {
         let normals = normals.select_columns(&free);
         let qr = normals.transpose().col_piv_qr();
         let r = qr.r();
-        let rank = (0..r.nrows()).filter(|&i| r[(i, i)].abs() > DEPENDENT * r[(0, 0)].abs()).count();
+        let rank =
+            (0..r.nrows()).filter(|&i| r[(i, i)].abs() > DEPENDENT * r[(0, 0)].abs()).count();
         let mut all = DMatrix::identity(free.len(), free.len());
         qr.q_tr_mul(&mut all);
         let mut shortest = Factor::new(normals.clone(), -&least, DEPENDENT).gauss_newton();
-        shortest += Factor::new(normals.clone(), normals * &shortest - least, DEPENDENT).gauss_newton();
+        shortest +=
+            Factor::new(normals.clone(), normals * &shortest - least, DEPENDENT).gauss_newton();
         free.iter().zip(shortest.iter()).for_each(|(&j, value)| corner[j] = *value);
         (corner, Some(all.rows(rank, free.len() - rank).transpose()))
     }
 
     /// Whether half-space `i` is left, beyond rounding.
     pub(super) fn leaves(&self, i: usize, q: &DVector<f64>) -> bool {
-        self.normals.row(i).transpose().dot(q) < self.least[i] - TOUCH * (q.norm() + self.least[i].abs())
+        self.normals.row(i).transpose().dot(q)
+            < self.least[i] - TOUCH * (q.norm() + self.least[i].abs())
     }
 
     /// The bounds that are finite, and all others.
     pub(super) fn half_spaces(&self) -> Vec<HalfSpace> {
         let side = |bounds: &DVector<f64>, sign: f64| -> Vec<HalfSpace> {
             let finite = bounds.iter().enumerate().filter(|(_, bound)| bound.is_finite());
-            finite.map(|(j, bound)| HalfSpace { normal: vec![(j, sign)], least: sign * bound }).collect()
+            finite
+                .map(|(j, bound)| HalfSpace { normal: vec![(j, sign)], least: sign * bound })
+                .collect()
         };
-        let normal = |i: usize| self.normals.row(i).iter().copied().enumerate().filter(|&(_, g)| g != 0.0).collect();
-        let rows = (0..self.least.len()).map(|i| HalfSpace { normal: normal(i), least: self.least[i] }).collect();
+        let normal = |i: usize| {
+            self.normals.row(i).iter().copied().enumerate().filter(|&(_, g)| g != 0.0).collect()
+        };
+        let rows = (0..self.least.len())
+            .map(|i| HalfSpace { normal: normal(i), least: self.least[i] })
+            .collect();
         [side(&self.lower, 1.0), side(&self.upper, -1.0), rows].concat()
     }
 
@@ -210,8 +246,11 @@ impl Polyhedron {
             value if self.upper[j] - value <= distance => Some(AtBound::Upper),
             _ => None,
         };
-        let rows =
-            (&self.normals * q).iter().zip(&self.least).map(|(along, least)| along - least <= distance).collect();
+        let rows = (&self.normals * q)
+            .iter()
+            .zip(&self.least)
+            .map(|(along, least)| along - least <= distance)
+            .collect();
         Faces { bounds: (0..q.len()).map(bound).collect(), rows }
     }
 
@@ -221,8 +260,8 @@ impl Polyhedron {
         q
     }
 
-    /// The part within the half-spaces of a step that is brought into the box, on the faces that are `near`; the way back to q = 0
-    /// is inside.
+    /// The part within the half-spaces of a step that is brought into the box, on the faces that
+    /// are `near`; the way back to q = 0 is inside.
     pub(super) fn within(&self, q: DVector<f64>, near: f64) -> PolyhedronSolution {
         let q = self.clamped(q);
         let part = (&self.normals * &q)

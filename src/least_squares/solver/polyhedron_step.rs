@@ -11,8 +11,8 @@ use crate::least_squares::{Linearisation, Triangle};
 
 /// Distance to a face, relative to the step's size, below which the interior point is on the face.
 pub(super) const NEAR: f64 = 1e-6;
-/// Corrections of the active set allowed to a guess, of all faces at once and then of one at a time: each costs a factorisation, the
-/// interior point some twenty and more.
+/// Corrections of the active set allowed to a guess, of all faces at once and then of one at a
+/// time: each costs a factorisation, the interior point some twenty and more.
 const GUESSES: usize = 10;
 const ONE_BY_ONE: usize = 40;
 /// Corrections allowed to the faces near the interior point.
@@ -48,24 +48,30 @@ impl<'a> PolyhedronProblem<'a> {
 
     /// The minimiser for damping λ, exact on its faces.
     pub(super) fn solve(&mut self, lambda: f64) -> PolyhedronSolution {
-        let solution = self.polish(self.guess.clone(), lambda, (GUESSES, ONE_BY_ONE)).unwrap_or_else(|| {
-            let interior = interior_point(self.factor, lambda, &self.polyhedron.half_spaces(), None).map(|(q, _)| q);
-            let near = |q: &DVector<f64>| self.polyhedron.faces_near(q, NEAR);
-            let polished = interior.as_ref().and_then(|q| self.polish(near(q), lambda, (CORRECTIONS, 0)));
-            polished.unwrap_or_else(|| {
-                let q = interior.unwrap_or_else(|| DVector::zeros(self.gradient.len()));
-                self.polyhedron.within(q, 0.0)
-            })
-        });
+        let solution =
+            self.polish(self.guess.clone(), lambda, (GUESSES, ONE_BY_ONE)).unwrap_or_else(|| {
+                let interior =
+                    interior_point(self.factor, lambda, &self.polyhedron.half_spaces(), None)
+                        .map(|(q, _)| q);
+                let near = |q: &DVector<f64>| self.polyhedron.faces_near(q, NEAR);
+                let polished =
+                    interior.as_ref().and_then(|q| self.polish(near(q), lambda, (CORRECTIONS, 0)));
+                polished.unwrap_or_else(|| {
+                    let q = interior.unwrap_or_else(|| DVector::zeros(self.gradient.len()));
+                    self.polyhedron.within(q, 0.0)
+                })
+            });
         self.guess.clone_from(&solution.faces);
         solution
     }
 
-    /// Solves on some faces and corrects the choice until the optimality conditions hold, within so many rounds.
+    /// Solves on some faces and corrects the choice until the optimality conditions hold, within so
+    /// many rounds.
     ///
-    /// Each round leaves the faces whose multiplier has the wrong sign and adds those that are passed: all of them, as long as in so many
-    /// rounds `at_once` fewer become wrong, for that may run in circles; else the last of them alone, which does not, but for rounding, where
-    /// the problem is strictly convex and its faces independent [Murty 1974; Júdice & Pires 1994].
+    /// Each round leaves the faces whose multiplier has the wrong sign and adds those that are
+    /// passed: all of them, as long as in so many rounds `at_once` fewer become wrong, for that may
+    /// run in circles; else the last of them alone, which does not, but for rounding, where the
+    /// problem is strictly convex and its faces independent [Murty 1974; Júdice & Pires 1994].
     fn polish(
         &self,
         mut faces: Faces,
@@ -96,8 +102,10 @@ impl<'a> PolyhedronProblem<'a> {
     }
 
     fn corrected(&self, faces: &Faces, q: &DVector<f64>, lambda: f64) -> Faces {
-        // Multipliers w = Bᵀ(B q + c) + λ q − Gᵀμ: w ≥ 0 at a lower bound, w ≤ 0 at an upper one, μ ≥ 0.
-        let force = self.factor.matrix().tr_mul(&self.factor.image(q)) + &self.gradient + lambda * q;
+        // Multipliers w = Bᵀ(B q + c) + λ q − Gᵀμ: w ≥ 0 at a lower bound, w ≤ 0 at an upper one, μ
+        // ≥ 0.
+        let force =
+            self.factor.matrix().tr_mul(&self.factor.image(q)) + &self.gradient + lambda * q;
         let slack = ROUNDING * (self.gradient.amax() + lambda * q.amax());
         let (bounds, rows) = self.polyhedron.multipliers(faces, &force);
         let mut corrected = self.polyhedron.kept(faces, &bounds, &rows, slack);
@@ -131,9 +139,11 @@ impl<'a> PolyhedronProblem<'a> {
                 let (mut triangle, mut projected) = reduced(open, constant);
                 if lambda > 0.0 {
                     let diagonal = DVector::from_element(projected.len(), lambda.sqrt());
-                    Linearisation { triangle, projected, .. } = Triangle::damped(&triangle, &projected, &diagonal);
+                    Linearisation { triangle, projected, .. } =
+                        Triangle::damped(&triangle, &projected, &diagonal);
                 }
-                solved(&triangle, &projected).unwrap_or_else(|| self.minimiser(triangle, projected, 0.0))
+                solved(&triangle, &projected)
+                    .unwrap_or_else(|| self.minimiser(triangle, projected, 0.0))
             }
             None => self.minimiser(open, constant, lambda),
         };
@@ -143,12 +153,14 @@ impl<'a> PolyhedronProblem<'a> {
 
     /// The minimiser of ‖A y + c‖² + λ‖y‖².
     fn minimiser(&self, matrix: DMatrix<f64>, constant: DVector<f64>, lambda: f64) -> DVector<f64> {
-        // The damping as further rows √λ y = 0: the corner is orthogonal to every direction along the faces.
+        // The damping as further rows √λ y = 0: the corner is orthogonal to every direction along
+        // the faces.
         let (n, count) = matrix.shape();
         let extra = if lambda > 0.0 { count } else { 0 };
         let mut matrix = matrix.resize_vertically(n + extra, 0.0);
         matrix.view_mut((n, 0), (extra, extra)).fill_diagonal(lambda.sqrt());
-        Factor::new(matrix, constant.resize_vertically(n + extra, 0.0), self.factor.tolerance()).gauss_newton()
+        Factor::new(matrix, constant.resize_vertically(n + extra, 0.0), self.factor.tolerance())
+            .gauss_newton()
     }
 }
 
@@ -167,26 +179,32 @@ mod tests {
     fn interior_point_and_polish_agree_on_a_badly_scaled_box_and_polyhedron() {
         let n = 8;
         let spread = |j: usize| 10.0_f64.powf(0.75 * j as f64);
-        let matrix =
-            DMatrix::from_fn(
-                n,
-                n,
-                |i, j| if i <= j { spread(j) * ((5 * i + 3 * j + 2 * i * j) as f64).cos() } else { 0.0 },
-            );
+        let matrix = DMatrix::from_fn(n, n, |i, j| {
+            if i <= j { spread(j) * ((5 * i + 3 * j + 2 * i * j) as f64).cos() } else { 0.0 }
+        });
         let constant = DVector::from_fn(n, |i, _| 1.0 + i as f64);
         let factor = Factor::new(matrix, constant, 1e-13);
         let mut lower = DVector::from_fn(n, |j, _| -0.5 / spread(j));
-        let upper = DVector::from_fn(n, |j, _| if j == 1 { f64::INFINITY } else { 0.25 / spread(j) });
+        let upper =
+            DVector::from_fn(n, |j, _| if j == 1 { f64::INFINITY } else { 0.25 / spread(j) });
         lower[2] = f64::NEG_INFINITY;
         let bounds = Bounds::new(lower, upper).unwrap();
         let row = DMatrix::from_fn(1, n, |_, j| spread(j));
         let check = |rows: &Inequalities, lambda: f64| {
-            let polyhedron = Polyhedron::around(&DVector::zeros(n), &bounds, rows, &DVector::from_element(n, 1.0));
-            let mut problem = PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone());
-            let interior = interior_point(&factor, lambda, &polyhedron.half_spaces(), None).unwrap().0;
+            let polyhedron = Polyhedron::around(
+                &DVector::zeros(n),
+                &bounds,
+                rows,
+                &DVector::from_element(n, 1.0),
+            );
+            let mut problem =
+                PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone());
+            let interior =
+                interior_point(&factor, lambda, &polyhedron.half_spaces(), None).unwrap().0;
             let solution = problem.solve(lambda);
-            let cost =
-                |q: &DVector<f64>| (factor.image(q) + factor.constant()).norm_squared() + lambda * q.norm_squared();
+            let cost = |q: &DVector<f64>| {
+                (factor.image(q) + factor.constant()).norm_squared() + lambda * q.norm_squared()
+            };
             assert!((cost(&solution.q) / cost(&interior) - 1.0).abs() < 1e-8, "{lambda}");
             assert!(solution.faces.bounds.iter().any(Option::is_some));
             assert_eq!(problem.corrected(&solution.faces, &solution.q, lambda), solution.faces);
@@ -203,13 +221,19 @@ mod tests {
 
     #[test]
     fn faces_that_run_in_circles_are_corrected_one_by_one() {
-        let hessian = DMatrix::from_row_slice(3, 3, &[4.0, 5.0, -5.0, 5.0, 9.0, -5.0, -5.0, -5.0, 7.0]);
+        let hessian =
+            DMatrix::from_row_slice(3, 3, &[4.0, 5.0, -5.0, 5.0, 9.0, -5.0, -5.0, -5.0, 7.0]);
         let lower = hessian.cholesky().unwrap().unpack();
-        let constant = lower.solve_lower_triangular(&DVector::from_vec(vec![2.0, 1.0, -3.0])).unwrap();
+        let constant =
+            lower.solve_lower_triangular(&DVector::from_vec(vec![2.0, 1.0, -3.0])).unwrap();
         let factor = Factor::new(lower.transpose(), constant, 1e-13);
         let bounds = Bounds::new(DVector::repeat(3, f64::NEG_INFINITY), DVector::zeros(3)).unwrap();
-        let polyhedron =
-            Polyhedron::around(&DVector::zeros(3), &bounds, &Inequalities::none(3), &DVector::repeat(3, 1.0));
+        let polyhedron = Polyhedron::around(
+            &DVector::zeros(3),
+            &bounds,
+            &Inequalities::none(3),
+            &DVector::repeat(3, 1.0),
+        );
         let problem = PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone());
         let begins = (0..8).map(|set| Faces {
             bounds: (0..3).map(|j| (set >> j & 1 == 1).then_some(AtBound::Upper)).collect(),

@@ -1,4 +1,5 @@
-//! The pseudo-inverse iteration: full Gauss–Newton steps of minimum norm, neither damped nor scaled.
+//! The pseudo-inverse iteration: full Gauss–Newton steps of minimum norm, neither damped nor
+//! scaled.
 
 use argmin::core::observers::Observe;
 use argmin::core::{Error, KV, Problem, Solver};
@@ -15,7 +16,8 @@ use crate::least_squares::{Linearisation, Objective};
 /// When to stop, and which directions count as seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PseudoInverseSettings {
-    /// Singular values σᵢ ≤ `tolerance`·σ₁ of J are dropped; 0 keeps every one that is not zero. Default 1e-8.
+    /// Singular values σᵢ ≤ `tolerance`·σ₁ of J are dropped; 0 keeps every one that is not zero.
+    /// Default 1e-8.
     pub tolerance: f64,
     /// Smallest step worth another: ‖p‖ ≤ `step_tolerance` (‖x‖ + `step_tolerance`); default 1e-10.
     pub step_tolerance: f64,
@@ -27,16 +29,23 @@ pub struct PseudoInverseSettings {
 
 impl Default for PseudoInverseSettings {
     fn default() -> Self {
-        Self { tolerance: 1e-8, step_tolerance: 1e-10, max_iterations: 100, divergence: Divergence::default() }
+        Self {
+            tolerance: 1e-8,
+            step_tolerance: 1e-10,
+            max_iterations: 100,
+            divergence: Divergence::default(),
+        }
     }
 }
 
 /// The pseudo-inverse iteration of the paper.
 ///
-/// xₖ₊₁ = xₖ − J(xₖ)⁺ r(xₖ),  J⁺r = R⁺Qᵀr = Σ vᵢ (uᵢᵀQᵀr)/σᵢ over σᵢ > `tolerance`·σ₁            [Chen2021, eq. 45]
+/// xₖ₊₁ = xₖ − J(xₖ)⁺ r(xₖ),  J⁺r = R⁺Qᵀr = Σ vᵢ (uᵢᵀQᵀr)/σᵢ over σᵢ > `tolerance`·σ₁
+/// [Chen2021, eq. 45]
 ///
-/// R = U Σ Vᵀ is the n × n triangular factor of J = ∂r/∂x, in the units of the unknowns as they come: the paper scales
-/// nothing, so which directions are dropped depends on those units. Every step is taken in full.
+/// R = U Σ Vᵀ is the n × n triangular factor of J = ∂r/∂x, in the units of the unknowns as they
+/// come: the paper scales nothing, so which directions are dropped depends on those units. Every
+/// step is taken in full.
 #[derive(Debug, Clone)]
 pub struct PseudoInverse {
     settings: PseudoInverseSettings,
@@ -48,7 +57,12 @@ pub struct PseudoInverse {
 impl PseudoInverse {
     /// The iteration with these settings.
     pub fn new(settings: PseudoInverseSettings) -> Self {
-        Self { settings, watch: Watch::new(settings.divergence), linearisation: None, termination: None }
+        Self {
+            settings,
+            watch: Watch::new(settings.divergence),
+            linearisation: None,
+            termination: None,
+        }
     }
 
     /// Why it stopped, once it has.
@@ -84,7 +98,8 @@ impl Ends for PseudoInverse {
     }
 }
 
-/// p = −J⁺ r = −R⁺ Qᵀr, the shortest minimiser of ‖J p + r‖; singular values up to `tolerance`·σ₁ are dropped.
+/// p = −J⁺ r = −R⁺ Qᵀr, the shortest minimiser of ‖J p + r‖; singular values up to `tolerance`·σ₁
+/// are dropped.
 ///
 /// R and Qᵀr must be finite.
 pub fn minimum_norm_step(linearisation: &Linearisation, tolerance: f64) -> DVector<f64> {
@@ -97,10 +112,17 @@ impl<O: Objective> Solver<O, State> for PseudoInverse {
         "pseudo-inverse"
     }
 
-    fn init(&mut self, problem: &mut Problem<O>, mut state: State) -> Result<(State, Option<KV>), Error> {
+    fn init(
+        &mut self,
+        problem: &mut Problem<O>,
+        mut state: State,
+    ) -> Result<(State, Option<KV>), Error> {
         let x = take_point(&mut state)?;
         if problem.problem.as_ref().map(Objective::parameters) != Some(x.len()) {
-            return Ok((self.stop(state.param(x).cost(f64::INFINITY), Termination::SizeMismatch), None));
+            return Ok((
+                self.stop(state.param(x).cost(f64::INFINITY), Termination::SizeMismatch),
+                None,
+            ));
         }
         let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&x)))?;
         let cost = linearisation.cost;
@@ -112,7 +134,11 @@ impl<O: Objective> Solver<O, State> for PseudoInverse {
         Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), None))
     }
 
-    fn next_iter(&mut self, problem: &mut Problem<O>, mut state: State) -> Result<(State, Option<KV>), Error> {
+    fn next_iter(
+        &mut self,
+        problem: &mut Problem<O>,
+        mut state: State,
+    ) -> Result<(State, Option<KV>), Error> {
         let x = take_point(&mut state)?;
         let step = self.linearisation.take().map_or_else(
             || DVector::zeros(x.len()),

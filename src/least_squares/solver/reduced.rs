@@ -1,4 +1,5 @@
-//! A matrix made triangular at the price of what stands below its diagonal: a triangular factor that some columns have left.
+//! A matrix made triangular at the price of what stands below its diagonal: a triangular factor
+//! that some columns have left.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -7,9 +8,13 @@ use crate::least_squares::triangle::reflector;
 
 /// Rᵀ R = `Bᵀ B` and Rᵀ c′ = `Bᵀ c`, for B with no fewer rows than columns.
 ///
-/// A reflector reaches as far down as its column and those before it do: of an n × n triangle that d columns have left, over d + 1 rows
-/// at most. All of them cost 2 (d + 1) n², a factorisation of all rows 4/3 n³.
-pub(super) fn reduced(mut matrix: DMatrix<f64>, mut constant: DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+/// A reflector reaches as far down as its column and those before it do: of an n × n triangle that
+/// d columns have left, over d + 1 rows at most. All of them cost 2 (d + 1) n², a factorisation of
+/// all rows 4/3 n³.
+pub(super) fn reduced(
+    mut matrix: DMatrix<f64>,
+    mut constant: DVector<f64>,
+) -> (DMatrix<f64>, DVector<f64>) {
     let (rows, n) = matrix.shape();
     let mut end = 0;
     let (values, right) = (matrix.as_mut_slice(), constant.as_mut_slice());
@@ -48,12 +53,22 @@ mod tests {
         let constant = DVector::from_fn(n, |i, _| wave(i, n));
         let some = |columns: &[usize]| triangle.select_columns(columns);
         let gone = DMatrix::from_fn(n, 3, |i, j| if j == 1 { 0.0 } else { wave(i, j) });
-        for matrix in [some(&[0, 2, 3, 7, 11]), some(&[5]), some(&[]), triangle.clone(), dense, gone] {
+        for matrix in
+            [some(&[0, 2, 3, 7, 11]), some(&[5]), some(&[]), triangle.clone(), dense, gone]
+        {
             let (factor, right) = reduced(matrix.clone(), constant.clone());
             assert_eq!(factor.shape(), (matrix.ncols(), matrix.ncols()));
             assert_eq!(factor, factor.upper_triangle());
-            assert!((factor.tr_mul(&factor) - matrix.tr_mul(&matrix)).iter().all(|error| error.abs() < 1e-13));
-            assert!((factor.tr_mul(&right) - matrix.tr_mul(&constant)).iter().all(|error| error.abs() < 1e-13));
+            assert!(
+                (factor.tr_mul(&factor) - matrix.tr_mul(&matrix))
+                    .iter()
+                    .all(|error| error.abs() < 1e-13)
+            );
+            assert!(
+                (factor.tr_mul(&right) - matrix.tr_mul(&constant))
+                    .iter()
+                    .all(|error| error.abs() < 1e-13)
+            );
         }
         assert_eq!(reduced(triangle.clone(), constant.clone()), (triangle, constant));
     }

@@ -1,4 +1,5 @@
-//! The interior reflective method within a box: steps that bounds slow down, turned back where they meet one.
+//! The interior reflective method within a box: steps that bounds slow down, turned back where they
+//! meet one.
 
 use nalgebra::DVector;
 
@@ -10,13 +11,18 @@ const WAY: f64 = 0.995;
 /// Distance that a start keeps from its bounds, relative to their size.
 const INSIDE: f64 = 1e-10;
 
-/// Levenberg–Marquardt within bounds lo < x < hi by reflections, never on a bound itself [Branch, Coleman & Li 1999].
+/// Levenberg–Marquardt within bounds lo < x < hi by reflections, never on a bound itself [Branch,
+/// Coleman & Li 1999].
 ///
-/// With v the distance to the bound that lies down the gradient g (1 without one), unknowns are measured by √v: the optimality
-/// conditions are V g = 0, and min ½‖J p + r‖² + ½ pᵀ V⁻¹|g| p is solved within a radius. Of the step to the bound, its reflection
-/// there and the steepest descent the best is taken, as by SciPy's `trf`. What ends beside a bound that it presses against is put on
-/// it by [`minimise_within`](super::minimise_within).
-pub fn reflective_levenberg_marquardt(bounds: Bounds, settings: Settings) -> TrustRegion<Reflective> {
+/// With v the distance to the bound that lies down the gradient g (1 without one), unknowns are
+/// measured by √v: the optimality conditions are V g = 0, and min ½‖J p + r‖² + ½ pᵀ V⁻¹|g| p is
+/// solved within a radius. Of the step to the bound, its reflection there and the steepest descent
+/// the best is taken, as by SciPy's `trf`. What ends beside a bound that it presses against is put
+/// on it by [`minimise_within`](super::minimise_within).
+pub fn reflective_levenberg_marquardt(
+    bounds: Bounds,
+    settings: Settings,
+) -> TrustRegion<Reflective> {
     TrustRegion::new(Reflective { bounds, model: None }, settings)
 }
 
@@ -53,7 +59,13 @@ impl Scaled {
     }
 
     /// The best of `from` + t `along` for low ≤ t ≤ high.
-    fn best_along(&self, from: &DVector<f64>, along: &DVector<f64>, low: f64, high: f64) -> Candidate {
+    fn best_along(
+        &self,
+        from: &DVector<f64>,
+        along: &DVector<f64>,
+        low: f64,
+        high: f64,
+    ) -> Candidate {
         let image = self.factor.image(along);
         let slope = self.gradient.dot(along) + image.dot(&self.factor.image(from));
         let best = (-slope / image.norm_squared()).clamp(low, high);
@@ -64,7 +76,11 @@ impl Scaled {
 impl Reflective {
     /// Distance to the bound that lies down the gradient, if there is one.
     fn distance(&self, x: &DVector<f64>, j: usize, gradient: f64) -> Option<f64> {
-        let distance = if gradient < 0.0 { self.bounds.upper()[j] - x[j] } else { x[j] - self.bounds.lower()[j] };
+        let distance = if gradient < 0.0 {
+            self.bounds.upper()[j] - x[j]
+        } else {
+            x[j] - self.bounds.lower()[j]
+        };
         (distance.is_finite() && gradient != 0.0).then_some(distance.max(0.0))
     }
 
@@ -81,7 +97,13 @@ impl Reflective {
     }
 
     /// The best of three ways, where p̂ leaves the box.
-    fn turned(&self, model: &Scaled, x: &DVector<f64>, hat: &DVector<f64>, radius: f64) -> Candidate {
+    fn turned(
+        &self,
+        model: &Scaled,
+        x: &DVector<f64>,
+        hat: &DVector<f64>,
+        radius: f64,
+    ) -> Candidate {
         let (stride, hits) = self.to_bound(x, &model.step(hat));
         let on_bound = hat * stride;
         let mut mirrored = hat.clone();
@@ -100,9 +122,12 @@ impl Reflective {
         let down = -&model.gradient;
         let to_radius = radius / down.norm().max(f64::MIN_POSITIVE);
         let (to_bound, _) = self.to_bound(x, &model.step(&down));
-        let descent = model.best_along(&DVector::zeros(x.len()), &down, 0.0, (WAY * to_bound).min(to_radius));
+        let descent =
+            model.best_along(&DVector::zeros(x.len()), &down, 0.0, (WAY * to_bound).min(to_radius));
         let best = if descent.value < straight.value { descent } else { straight };
-        reflected.into_iter().fold(best, |best, own| if own.value < best.value { own } else { best })
+        reflected
+            .into_iter()
+            .fold(best, |best, own| if own.value < best.value { own } else { best })
     }
 }
 
@@ -127,14 +152,22 @@ impl Subproblem for Reflective {
         self.bounds.clamp(start);
         for j in 0..n {
             let (lower, upper) = (self.bounds.lower()[j], self.bounds.upper()[j]);
-            let room = |bound: f64| if bound.is_finite() { INSIDE * bound.abs().max(1.0) } else { 0.0 };
+            let room =
+                |bound: f64| if bound.is_finite() { INSIDE * bound.abs().max(1.0) } else { 0.0 };
             let (least, most) = (lower + room(lower), upper - room(upper));
-            start[j] = if least <= most { start[j].clamp(least, most) } else { 0.5 * (lower + upper) };
+            start[j] =
+                if least <= most { start[j].clamp(least, most) } else { 0.5 * (lower + upper) };
         }
         true
     }
 
-    fn prepare(&mut self, x: &DVector<f64>, found: &Linearisation, scale: &DVector<f64>, settings: &Settings) {
+    fn prepare(
+        &mut self,
+        x: &DVector<f64>,
+        found: &Linearisation,
+        scale: &DVector<f64>,
+        settings: &Settings,
+    ) {
         let n = x.len();
         let gradient = found.triangle.tr_mul(&found.projected);
         let mut size = DVector::zeros(n);
@@ -177,7 +210,8 @@ impl Subproblem for Reflective {
         let Some(mut model) = self.model.take() else { return Step::none(x) };
         let (hat, damping) = model.factor.limited(radius);
         let inside = self.bounds.contain(&(x + model.step(&hat)));
-        let Candidate { hat, value } = if inside { model.value(hat) } else { self.turned(&model, x, &hat, radius) };
+        let Candidate { hat, value } =
+            if inside { model.value(hat) } else { self.turned(&model, x, &hat, radius) };
         let mut point = x + model.step(&hat);
         self.bounds.clamp(&mut point);
         let slope = -model.gradient.dot(&hat);

@@ -6,8 +6,9 @@ use nalgebra::DVector;
 use super::execute::{Silent, run};
 use super::{Bounds, Inequalities, Settings, Solution, State, Termination};
 use super::{
-    clamped_levenberg_marquardt, constrained_levenberg_marquardt, interior_point_levenberg_marquardt,
-    levenberg_marquardt, nearest, reflective_levenberg_marquardt,
+    clamped_levenberg_marquardt, constrained_levenberg_marquardt,
+    interior_point_levenberg_marquardt, levenberg_marquardt, nearest,
+    reflective_levenberg_marquardt,
 };
 use crate::least_squares::Objective;
 
@@ -90,7 +91,13 @@ pub fn minimise_bounded<O: Objective>(
     bounds: &Bounds,
     settings: &Settings,
 ) -> Solution {
-    minimise_constrained(objective, start, bounds, &Inequalities::none(bounds.lower().len()), settings)
+    minimise_constrained(
+        objective,
+        start,
+        bounds,
+        &Inequalities::none(bounds.lower().len()),
+        settings,
+    )
 }
 
 /// Minimises ½‖r(x)‖² within `bounds` and inequalities `rows` from `start`.
@@ -125,10 +132,20 @@ pub fn minimise_within<O: Objective>(
             let solver = interior_point_levenberg_marquardt(box_alone, rows.clone(), *settings);
             run(&objective, start, solver, limit, observer)
         }
-        Within::Reflective => {
-            run(&objective, start, reflective_levenberg_marquardt(box_alone, *settings), limit, observer)
-        }
-        Within::Clamped => run(&objective, start, clamped_levenberg_marquardt(box_alone, *settings), limit, observer),
+        Within::Reflective => run(
+            &objective,
+            start,
+            reflective_levenberg_marquardt(box_alone, *settings),
+            limit,
+            observer,
+        ),
+        Within::Clamped => run(
+            &objective,
+            start,
+            clamped_levenberg_marquardt(box_alone, *settings),
+            limit,
+            observer,
+        ),
     };
     if infeasible {
         solution.termination = Termination::Infeasible;
@@ -143,7 +160,12 @@ pub fn minimise_within<O: Objective>(
 }
 
 /// Puts unknowns on bounds that they are near where that does not raise the cost, each by itself.
-fn settle<O: Objective>(objective: &O, bounds: &Bounds, rows: &Inequalities, solution: &mut Solution) {
+fn settle<O: Objective>(
+    objective: &O,
+    bounds: &Bounds,
+    rows: &Inequalities,
+    solution: &mut Solution,
+) {
     for j in 0..solution.x.len() {
         for bound in [bounds.lower()[j], bounds.upper()[j]] {
             let (value, width) = (solution.x[j], bounds.upper()[j] - bounds.lower()[j]);

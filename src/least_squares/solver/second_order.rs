@@ -8,15 +8,16 @@ use crate::least_squares::Linearisation;
 const FORECAST: std::ops::RangeInclusive<f64> = 0.5..=1.5;
 /// The same of an undamped step with S, which near an optimum knows all there is.
 const CLOSE_FORECAST: std::ops::RangeInclusive<f64> = 0.9..=1.1;
-/// Misses after which steps are bent, until one without damping is bent by no more than a part of its length: the way is straight then, up to
-/// the next miss.
+/// Misses after which steps are bent, until one without damping is bent by no more than a part of
+/// its length: the way is straight then, up to the next miss.
 const BENDING_MISSES: usize = 2;
 const STRAIGHT: f64 = 0.01;
-/// Misses of linearised residuals after which S is formed; for many unknowns, such a part of their number, since forming S costs about as
-/// many linearisations as there are unknowns.
+/// Misses of linearised residuals after which S is formed; for many unknowns, such a part of their
+/// number, since forming S costs about as many linearisations as there are unknowns.
 const MISSES: usize = 15;
 const MISSES_PER_UNKNOWN: f64 = 1.0 / 6.0;
-/// Slow steps in a row after which S is formed, if without it more steps would follow than it costs, or than are left; no fewer must be left.
+/// Slow steps in a row after which S is formed, if without it more steps would follow than it
+/// costs, or than are left; no fewer must be left.
 const SLOW_STEPS: usize = 3;
 /// Steps for each unknown after which S may be formed again.
 const STEPS_PER_UNKNOWN: f64 = 1.0 / 40.0;
@@ -32,10 +33,11 @@ const LEAST_DAMPING: f64 = 1e-10;
 
 /// Second derivatives, once linearised residuals have missed too often.
 ///
-/// Two things make JᵀJ forecast badly. The way may be a curved valley: then a step follows its bend, from the second derivative of
-/// r along the step [Transtrum & Sethna 2012]. And residuals may stay large: then S = Σ rᵢ ∇²rᵢ is added to JᵀJ
-/// [Dennis, Gay & Welsch 1981], which costs as many linearisations as there are unknowns, so that S is kept from point to point
-/// while steps keep to its forecast and get shorter as they should.
+/// Two things make JᵀJ forecast badly. The way may be a curved valley: then a step follows its
+/// bend, from the second derivative of r along the step [Transtrum & Sethna 2012]. And residuals
+/// may stay large: then S = Σ rᵢ ∇²rᵢ is added to JᵀJ [Dennis, Gay & Welsch 1981], which costs as
+/// many linearisations as there are unknowns, so that S is kept from point to point while steps
+/// keep to its forecast and get shorter as they should.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SecondOrder {
     misses: usize,
@@ -82,8 +84,8 @@ impl SecondOrder {
         self.straight = damping == 0.0 && share <= STRAIGHT;
     }
 
-    /// Ends it where steps gain nothing more, and says whether S was at work: what is left is better seen by linearised residuals,
-    /// whose condition is not squared.
+    /// Ends it where steps gain nothing more, and says whether S was at work: what is left is
+    /// better seen by linearised residuals, whose condition is not squared.
     pub fn retire(&mut self) -> bool {
         self.retired = true;
         self.matrix.take().is_some()
@@ -99,8 +101,9 @@ impl SecondOrder {
         self.straight &= FORECAST.contains(&ratio);
     }
 
-    /// Takes in a step of length ‖D p‖, `left` others being left; whether S should be formed at the point where the solver is now. The
-    /// forecast of its gain was `worth` times the gain below which no step is worth it.
+    /// Takes in a step of length ‖D p‖, `left` others being left; whether S should be formed at the
+    /// point where the solver is now. The forecast of its gain was `worth` times the gain below
+    /// which no step is worth it.
     pub fn judge(
         &mut self,
         (ratio, taken): (f64, bool),
@@ -129,10 +132,13 @@ impl SecondOrder {
         (missed || slow) && enough && !self.fresh && !self.retired && self.times < MOST_TIMES
     }
 
-    /// Steps that follow slow ones: steps that shrink by a factor s gain s² times what the one before did, so that a gain of `worth` times the
-    /// least is followed by ln(worth) / (2 ln 1/s) others; 0 where the last ones were not slow.
+    /// Steps that follow slow ones: steps that shrink by a factor s gain s² times what the one
+    /// before did, so that a gain of `worth` times the least is followed by ln(worth) / (2 ln 1/s)
+    /// others; 0 where the last ones were not slow.
     fn to_come(&self, worth: f64) -> f64 {
-        let Some(last) = self.lengths.len().checked_sub(SLOW_STEPS + 1).map(|first| &self.lengths[first..]) else {
+        let Some(last) =
+            self.lengths.len().checked_sub(SLOW_STEPS + 1).map(|first| &self.lengths[first..])
+        else {
             return 0.0;
         };
         if !last.windows(2).all(|pair| pair[1] > SLOW * pair[0]) {
@@ -151,9 +157,11 @@ impl SecondOrder {
         }
     }
 
-    /// The model with S, in unknowns scaled by D; `pressed` are normals of the faces that x presses against.
+    /// The model with S, in unknowns scaled by D; `pressed` are normals of the faces that x presses
+    /// against.
     ///
-    /// D⁻¹(JᵀJ + S)D⁻¹ + ρ NᵀN + μ, with ρ and μ zero unless they are needed to make it positive definite.
+    /// D⁻¹(JᵀJ + S)D⁻¹ + ρ NᵀN + μ, with ρ and μ zero unless they are needed to make it positive
+    /// definite.
     pub fn model(
         &self,
         found: &Linearisation,
@@ -185,7 +193,8 @@ impl SecondOrder {
         let root = if let Some(root) = found_root {
             root
         } else {
-            damping = BEYOND * hessian.symmetric_eigenvalues().min().abs() + LEAST_DAMPING * largest;
+            damping =
+                BEYOND * hessian.symmetric_eigenvalues().min().abs() + LEAST_DAMPING * largest;
             (0..n).for_each(|j| hessian[(j, j)] += damping);
             hessian.cholesky()?.unpack()
         };
@@ -201,7 +210,8 @@ impl SecondOrder {
 mod tests {
     use super::*;
 
-    /// Whether S is formed after undamped steps that shrink by a factor, so many being left after each, of so many unknowns.
+    /// Whether S is formed after undamped steps that shrink by a factor, so many being left after
+    /// each, of so many unknowns.
     fn forms(shrinks: f64, left: u64, unknowns: usize) -> bool {
         let mut own = SecondOrder::default();
         (0..8).any(|k| {
@@ -237,7 +247,8 @@ mod tests {
         // By 0.6: 18 steps; by 0.9: 87 and more.
         assert!(!forms(0.4, 100, 10) && !forms(0.6, 100, 30) && forms(0.6, 100, 10));
         assert!(forms(0.9, 100, 30) && forms(1.0, 100, 30));
-        // For so many unknowns it costs more steps than would follow, unless those end the fit before.
+        // For so many unknowns it costs more steps than would follow, unless those end the fit
+        // before.
         assert!(!forms(0.9, 100, 500) && forms(0.9, 40, 500) && !forms(0.9, 2, 500));
     }
 }

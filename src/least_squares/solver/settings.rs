@@ -9,11 +9,13 @@ pub struct Settings {
     pub cost_tolerance: f64,
     /// Smallest step worth taking, relative to x, both scaled; default 1e-10.
     pub step_tolerance: f64,
-    /// Singular values of the scaled Jacobian up to this fraction of the largest count as zero; default 1e-12.
+    /// Singular values of the scaled Jacobian up to this fraction of the largest count as zero;
+    /// default 1e-12.
     pub rank_tolerance: f64,
     /// First radius as a multiple of ‖D x‖ (of 1 where x = 0), but no less than ‖r‖; default 100.
     ///
-    /// Where x is near zero its size says nothing; ‖r‖ is the length that orthogonal columns would need.
+    /// Where x is near zero its size says nothing; ‖r‖ is the length that orthogonal columns would
+    /// need.
     pub initial_radius: f64,
     /// Largest number of steps tried, taken or not; default 500.
     pub max_iterations: u64,

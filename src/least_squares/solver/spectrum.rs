@@ -35,7 +35,8 @@ impl Term {
 impl Spectrum {
     /// Decomposes B and drops σ ≤ `cut`·σ₁.
     pub(super) fn new(matrix: &DMatrix<f64>, constant: &DVector<f64>, cut: f64) -> Self {
-        let Decomposition { columns, singular, projected } = Decomposition::new(matrix, Some(constant), cut);
+        let Decomposition { columns, singular, projected } =
+            Decomposition::new(matrix, Some(constant), cut);
         let largest = singular.iter().copied().fold(0.0, f64::max);
         let terms = (0..singular.len())
             .filter(|&i| singular[i] > cut * largest && singular[i].is_normal())
@@ -59,7 +60,8 @@ impl Spectrum {
 
     /// λ ≥ 0 with ‖q(λ)‖ = Δ to within the slack, or zero if ‖q(0)‖ is no longer than that.
     ///
-    /// Newton's method on 1/‖q(λ)‖ = 1/Δ from λ = 0, which approaches from one side        [Hebden 1973; Moré 1978]
+    /// Newton's method on 1/‖q(λ)‖ = 1/Δ from λ = 0, which approaches from one side        [Hebden
+    /// 1973; Moré 1978]
     pub(super) fn secular_root(&self, radius: f64) -> f64 {
         let mut lambda = 0.0;
         for _ in 0..SECULAR_ITERATIONS {

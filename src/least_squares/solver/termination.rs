@@ -4,17 +4,19 @@ use std::fmt;
 
 /// Why a solver stopped, with the inequality that held.
 ///
-/// The tests on cost and step are those of MINPACK (info 1 to 8), with one exception: a step that only the radius kept
-/// short and that went as predicted (λ > 0 and ρ ≥ ¾) is not judged, since the next one will be longer.
+/// The tests on cost and step are those of MINPACK (info 1 to 8), with one exception: a step that
+/// only the radius kept short and that went as predicted (λ > 0 and ρ ≥ ¾) is not judged, since the
+/// next one will be longer.
 ///
-/// g = Jᵀr, D the scaling, p the last step tried, Δ the radius, ρ actual over predicted reduction of ½‖r‖²; ε = 2⁻⁵².
+/// g = Jᵀr, D the scaling, p the last step tried, Δ the radius, ρ actual over predicted reduction
+/// of ½‖r‖²; ε = 2⁻⁵².
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Termination {
     /// The residual is orthogonal to every column: max |gⱼ| / (‖Jⱼ‖ ‖r‖) ≤ `gradient_tolerance`.
     Gradient,
-    /// The cost no longer falls: |actual| ≤ `cost_tolerance`·½‖r‖², predicted ≤ `cost_tolerance`·½‖r‖², and ρ ≤ 2 or |actual| ≤ 1000 ε·½‖r‖²,
-    /// which is rounding.
+    /// The cost no longer falls: |actual| ≤ `cost_tolerance`·½‖r‖², predicted ≤
+    /// `cost_tolerance`·½‖r‖², and ρ ≤ 2 or |actual| ≤ 1000 ε·½‖r‖², which is rounding.
     Cost,
     /// The step is negligible: ‖D p‖ ≤ `step_tolerance` ‖D x‖.
     Step,
@@ -34,13 +36,15 @@ pub enum Termination {
     OutsideDomainAtStart,
     /// The cost is finite at x, but ∂r/∂x is not.
     DerivativesNotFinite,
-    /// Every step left the domain, down to the smallest: ½‖r(x + p)‖² = ∞ and ‖D p‖ ≤ `step_tolerance` ‖D x‖.
+    /// Every step left the domain, down to the smallest: ½‖r(x + p)‖² = ∞ and ‖D p‖ ≤
+    /// `step_tolerance` ‖D x‖.
     DomainEdge,
     /// No point satisfies all bounds and inequalities.
     Infeasible,
     /// The start, the bounds and the problem differ in their number of unknowns.
     SizeMismatch,
-    /// An undamped iteration went astray: ½‖r‖² > `growth`·(lowest ½‖r‖² so far) in `patience` iterations in a row, or ∞.
+    /// An undamped iteration went astray: ½‖r‖² > `growth`·(lowest ½‖r‖² so far) in `patience`
+    /// iterations in a row, or ∞.
     Diverged,
     /// JᵀJ has no inverse where argmin's Gauss–Newton method asks for it.
     Singular,

@@ -1,6 +1,9 @@
-//! The outer loop that every solver here shares: try a step, compare with the prediction, move or shrink.
+//! The outer loop that every solver here shares: try a step, compare with the prediction, move or
+//! shrink.
 
-use argmin::core::{ArgminError, Error, IterState, KV, Problem, Solver, State as _, TerminationReason};
+use argmin::core::{
+    ArgminError, Error, IterState, KV, Problem, Solver, State as _, TerminationReason,
+};
 use argmin::kv;
 use nalgebra::{DMatrix, DVector};
 
@@ -13,7 +16,8 @@ pub type State = IterState<DVector<f64>, (), (), (), (), f64>;
 
 /// A step is taken when ρ reaches this.
 const ACCEPT: f64 = 1e-4;
-/// A step may be bent by this part of its length, and is made longer towards the other; shorter ones are tried so often.
+/// A step may be bent by this part of its length, and is made longer towards the other; shorter
+/// ones are tried so often.
 const BENT: f64 = 0.75;
 const WELL_BENT: f64 = 0.03;
 const BENDINGS: usize = 6;
@@ -53,12 +57,19 @@ pub trait Subproblem {
     fn admit(&self, start: &mut DVector<f64>) -> bool;
 
     /// Takes in the linearised problem at x; D is `scale`.
-    fn prepare(&mut self, x: &DVector<f64>, linearisation: &Linearisation, scale: &DVector<f64>, settings: &Settings);
+    fn prepare(
+        &mut self,
+        x: &DVector<f64>,
+        linearisation: &Linearisation,
+        scale: &DVector<f64>,
+        settings: &Settings,
+    );
 
     /// Component j of the gradient g, or zero where a constraint holds x back.
     fn free_gradient(&self, x: &DVector<f64>, j: usize, gradient: f64) -> f64;
 
-    /// Takes out of a gradient whose columns are divided by `scale` what constraints at x hold back.
+    /// Takes out of a gradient whose columns are divided by `scale` what constraints at x hold
+    /// back.
     fn hold_back(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &mut DVector<f64>) {
         let _ = scale;
         (0..x.len()).for_each(|j| gradient[j] = self.free_gradient(x, j, gradient[j]));
@@ -80,15 +91,26 @@ pub trait Subproblem {
         false
     }
 
-    /// Normals, one a row and of length one in unknowns scaled by `scale`, of the constraints at x that a step against the scaled
-    /// gradient would leave.
-    fn pressed(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &DVector<f64>) -> DMatrix<f64> {
+    /// Normals, one a row and of length one in unknowns scaled by `scale`, of the constraints at x
+    /// that a step against the scaled gradient would leave.
+    fn pressed(
+        &self,
+        x: &DVector<f64>,
+        scale: &DVector<f64>,
+        gradient: &DVector<f64>,
+    ) -> DMatrix<f64> {
         let _ = (scale, gradient);
         DMatrix::zeros(0, x.len())
     }
 
-    /// The point that a step leads to whose model has a gradient larger by ½ `bend`, for the same damping.
-    fn bent(&mut self, x: &DVector<f64>, bend: &DVector<f64>, damping: f64) -> Option<DVector<f64>> {
+    /// The point that a step leads to whose model has a gradient larger by ½ `bend`, for the same
+    /// damping.
+    fn bent(
+        &mut self,
+        x: &DVector<f64>,
+        bend: &DVector<f64>,
+        damping: f64,
+    ) -> Option<DVector<f64>> {
         let _ = (x, bend, damping);
         None
     }
@@ -99,10 +121,11 @@ pub trait Subproblem {
 
 /// Trust-region least squares after Moré, over any choice of step.
 ///
-/// Dⱼ is the largest ‖Jⱼ‖ seen so far, so the path does not depend on the units of the unknowns. Radius and gain
-/// ratio follow MINPACK's `lmder` [Moré 1978]. From the first step that limits hold back, Dⱼ is 1 over how far unknown j may
-/// plausibly go, where that is known: residuals that limits keep large go with combinations of which they say little, and ‖Jⱼ‖ would let
-/// these run where linearised residuals are not valid.
+/// Dⱼ is the largest ‖Jⱼ‖ seen so far, so the path does not depend on the units of the unknowns.
+/// Radius and gain ratio follow MINPACK's `lmder` [Moré 1978]. From the first step that limits hold
+/// back, Dⱼ is 1 over how far unknown j may plausibly go, where that is known: residuals that
+/// limits keep large go with combinations of which they say little, and ‖Jⱼ‖ would let these run
+/// where linearised residuals are not valid.
 #[derive(Debug, Clone)]
 pub struct TrustRegion<S> {
     subproblem: S,
@@ -112,7 +135,8 @@ pub struct TrustRegion<S> {
     /// Whether D has been taken from what unknowns may plausibly do.
     measured: bool,
     second_order: SecondOrder,
-    /// The linearised problem at x, and the model with second derivatives that steps come from instead.
+    /// The linearised problem at x, and the model with second derivatives that steps come from
+    /// instead.
     linearisation: Option<Linearisation>,
     convex: Option<Convex>,
     termination: Option<Termination>,
@@ -149,7 +173,8 @@ impl<S: Subproblem> TrustRegion<S> {
         stopped(state, termination)
     }
 
-    /// Scales, judges the gradient, and hands the linearisation on; the reason to stop, if there is one.
+    /// Scales, judges the gradient, and hands the linearisation on; the reason to stop, if there is
+    /// one.
     fn take_in(&mut self, x: &DVector<f64>, linearisation: Linearisation) -> Option<Termination> {
         let Linearisation { cost, triangle, projected } = &linearisation;
         if !triangle.iter().chain(projected.iter()).all(|v| v.is_finite()) {
@@ -169,7 +194,8 @@ impl<S: Subproblem> TrustRegion<S> {
             self.scale = self.scale.sup(&norms);
         }
         let residual = (2.0 * cost).sqrt();
-        let mut gradient = DVector::from_fn(x.len(), |j, _| triangle.column(j).dot(projected) / lengths[j]);
+        let mut gradient =
+            DVector::from_fn(x.len(), |j, _| triangle.column(j).dot(projected) / lengths[j]);
         self.subproblem.hold_back(x, &lengths, &mut gradient);
         let cosine = gradient.amax() / residual;
         if cosine <= self.settings.gradient_tolerance {
@@ -190,14 +216,16 @@ impl<S: Subproblem> TrustRegion<S> {
     /// Hands the subproblem the model that steps come from.
     fn prepare(&mut self, x: &DVector<f64>) {
         let Some(linearisation) = &self.linearisation else { return };
-        let gradient = || linearisation.triangle.tr_mul(&linearisation.projected).component_div(&self.scale);
+        let gradient =
+            || linearisation.triangle.tr_mul(&linearisation.projected).component_div(&self.scale);
         let pressed = || self.subproblem.pressed(x, &self.scale, &gradient());
         self.convex = self.second_order.model(linearisation, &self.scale, pressed);
         let model = self.convex.as_ref().map_or(linearisation, |convex| &convex.linearisation);
         self.subproblem.prepare(x, model, &self.scale, &self.settings);
     }
 
-    /// The step from x, bent where that is called for, and by which part of its length; the radius becomes that which it took.
+    /// The step from x, bent where that is called for, and by which part of its length; the radius
+    /// becomes that which it took.
     fn step<O: Objective>(
         &mut self,
         problem: &mut Problem<O>,
@@ -215,7 +243,8 @@ impl<S: Subproblem> TrustRegion<S> {
             }
             let straight = &step.point - x;
             let bend = problem.problem("bend_count", |o| Ok(o.bend(x, &straight)))?;
-            let Some(point) = bend.and_then(|bend| self.subproblem.bent(x, &bend, step.damping)) else {
+            let Some(point) = bend.and_then(|bend| self.subproblem.bent(x, &bend, step.damping))
+            else {
                 return Ok((step, None));
             };
             let share = (&point - &step.point).component_mul(&self.scale).norm() / step.length;
@@ -232,18 +261,26 @@ impl<S: Subproblem> TrustRegion<S> {
         }
     }
 
-    /// Takes D from how far each unknown may plausibly go; one of which that is not known, from what takes away all of the residual.
+    /// Takes D from how far each unknown may plausibly go; one of which that is not known, from
+    /// what takes away all of the residual.
     ///
     /// False where nothing is known and D stays as it is.
-    fn measure<O: Objective>(&mut self, problem: &mut Problem<O>, x: &DVector<f64>) -> Result<bool, Error> {
+    fn measure<O: Objective>(
+        &mut self,
+        problem: &mut Problem<O>,
+        x: &DVector<f64>,
+    ) -> Result<bool, Error> {
         let reach = problem.problem("reach_count", |o| Ok(o.reach()))?;
-        let Some(Linearisation { cost, triangle, .. }) = &self.linearisation else { return Ok(false) };
+        let Some(Linearisation { cost, triangle, .. }) = &self.linearisation else {
+            return Ok(false);
+        };
         if reach.iter().all(Option::is_none) {
             return Ok(false);
         }
         let residual = (2.0 * cost).sqrt();
         let lengths = reach.iter().zip(triangle.column_iter());
-        let lengths = lengths.map(|(reach, column)| reach.map_or(column.norm() / residual, f64::recip));
+        let lengths =
+            lengths.map(|(reach, column)| reach.map_or(column.norm() / residual, f64::recip));
         let lengths = lengths.map(|length| if length.is_normal() { length } else { 1.0 });
         self.scale = DVector::from_iterator(x.len(), lengths);
         self.measured = true;
@@ -259,18 +296,28 @@ impl<S: Subproblem> TrustRegion<S> {
             return None;
         }
         let foreseen = 0.5 * trial.ratio <= 1.0 || trial.actual.abs() <= ROUNDING;
-        let settled = |tolerance: f64| trial.actual.abs() <= tolerance && trial.predicted <= tolerance && foreseen;
+        let settled = |tolerance: f64| {
+            trial.actual.abs() <= tolerance && trial.predicted <= tolerance && foreseen
+        };
         if settled(settings.cost_tolerance) {
             return Some(Termination::Cost);
         }
         if trial.length <= settings.step_tolerance * size {
-            return Some(if trial.cost.is_finite() { Termination::Step } else { Termination::DomainEdge });
+            return Some(if trial.cost.is_finite() {
+                Termination::Step
+            } else {
+                Termination::DomainEdge
+            });
         }
         if settled(f64::EPSILON) {
             return Some(Termination::CostPrecision);
         }
         if self.radius.is_some_and(|radius| radius <= f64::EPSILON * size) {
-            return Some(if trial.cost.is_finite() { Termination::StepPrecision } else { Termination::DomainEdge });
+            return Some(if trial.cost.is_finite() {
+                Termination::StepPrecision
+            } else {
+                Termination::DomainEdge
+            });
         }
         None
     }
@@ -307,16 +354,23 @@ impl Trial {
         }
     }
 
-    /// ρ as far as it speaks of the model: a difference that would not be worth a step is rounding of the cost.
+    /// ρ as far as it speaks of the model: a difference that would not be worth a step is rounding
+    /// of the cost.
     fn forecast(&self, tolerance: f64) -> f64 {
         if (self.actual - self.predicted).abs() <= tolerance { 1.0 } else { self.ratio }
     }
 
     fn next_radius(&self, radius: f64) -> f64 {
         if self.ratio <= 0.25 {
-            // The minimum of the parabola through the two costs and the slope, between a tenth and a half.
-            let shrink = if self.actual >= 0.0 { 0.5 } else { 0.5 * self.slope / (self.slope - self.actual) };
-            let shrink = if self.actual <= -1.0 || shrink.is_nan() { 0.1 } else { shrink.clamp(0.1, 0.5) };
+            // The minimum of the parabola through the two costs and the slope, between a tenth and
+            // a half.
+            let shrink = if self.actual >= 0.0 {
+                0.5
+            } else {
+                0.5 * self.slope / (self.slope - self.actual)
+            };
+            let shrink =
+                if self.actual <= -1.0 || shrink.is_nan() { 0.1 } else { shrink.clamp(0.1, 0.5) };
             shrink * radius.min(10.0 * self.length)
         } else if self.ratio >= GOOD || self.damping == 0.0 {
             self.growth * self.length
@@ -346,16 +400,26 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         self.subproblem.name()
     }
 
-    fn init(&mut self, problem: &mut Problem<O>, mut state: State) -> Result<(State, Option<KV>), Error> {
+    fn init(
+        &mut self,
+        problem: &mut Problem<O>,
+        mut state: State,
+    ) -> Result<(State, Option<KV>), Error> {
         let mut x = take_point(&mut state)?;
         let parameters = problem.problem.as_ref().map(Objective::parameters);
         if parameters != Some(x.len()) || !self.subproblem.admit(&mut x) {
-            return Ok((self.stop(state.param(x).cost(f64::INFINITY), Termination::SizeMismatch), None));
+            return Ok((
+                self.stop(state.param(x).cost(f64::INFINITY), Termination::SizeMismatch),
+                None,
+            ));
         }
         let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&x)))?;
         let cost = linearisation.cost;
-        let termination =
-            if cost.is_finite() { self.take_in(&x, linearisation) } else { Some(Termination::OutsideDomainAtStart) };
+        let termination = if cost.is_finite() {
+            self.take_in(&x, linearisation)
+        } else {
+            Some(Termination::OutsideDomainAtStart)
+        };
         if termination.is_none() {
             self.prepare(&x);
         }
@@ -363,7 +427,11 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), None))
     }
 
-    fn next_iter(&mut self, problem: &mut Problem<O>, mut state: State) -> Result<(State, Option<KV>), Error> {
+    fn next_iter(
+        &mut self,
+        problem: &mut Problem<O>,
+        mut state: State,
+    ) -> Result<(State, Option<KV>), Error> {
         let x = take_point(&mut state)?;
         let cost = state.get_cost();
         let first = state.get_iter() == 0;
@@ -377,7 +445,8 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
             radius = radius.min(step.length);
         }
         let after = problem.problem("cost_count", |o| Ok(o.cost(&step.point)))?;
-        let trial = Trial::new((&step, share), cost, if after.is_nan() { f64::INFINITY } else { after });
+        let trial =
+            Trial::new((&step, share), cost, if after.is_nan() { f64::INFINITY } else { after });
         self.radius = Some(trial.next_radius(radius));
         let taken = trial.ratio >= ACCEPT;
         let size = self.scale.component_mul(if taken { &step.point } else { &x }).norm();
@@ -388,7 +457,8 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
             termination = None;
         }
         if taken && termination.is_none() {
-            let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&step.point)))?;
+            let linearisation =
+                problem.problem("linearise_count", |o| Ok(o.linearise(&step.point)))?;
             termination = self.take_in(&step.point, linearisation);
         }
         let (x, cost) = if taken { (step.point, trial.cost) } else { (x, cost) };
@@ -410,7 +480,8 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
                 );
             if renew {
                 let within = |x: &DVector<f64>| self.subproblem.admits(x);
-                self.second_order.renew(problem.problem("curvature_count", |o| Ok(o.curvature(&x, &within)))?);
+                self.second_order
+                    .renew(problem.problem("curvature_count", |o| Ok(o.curvature(&x, &within)))?);
             }
             if taken || renew || retired {
                 self.prepare(&x);

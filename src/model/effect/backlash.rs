@@ -3,7 +3,7 @@
 use super::coverage::NO_LOADS;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::place::{commanded, slides};
-use crate::model::parameter::{JointField, Slot};
+use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::Effect;
 
 /// The family.
@@ -13,8 +13,8 @@ pub(super) const FAMILY: Family = Family {
         Effect::Backlash { joint } => {
             let slides = slides(problem, *joint);
             let field = if slides { JointField::SlidingPlay } else { JointField::Play };
-            let slot = Slot::Joint { joint: joint - 1, field };
-            vec![Term::constant("width", slot, 0.01)]
+            let site = ParameterSite::Joint { joint: joint - 1, field };
+            vec![Term::constant("width", site, 0.01)]
         }
         _ => Vec::new(),
     },
@@ -25,7 +25,11 @@ pub(super) const FAMILY: Family = Family {
                 let both = data.both_sides.get(joint - 1).copied().unwrap_or(false);
                 Candidate::needing(effect, both, "the joint was not approached from both sides")
             } else if slides(problem, joint) {
-                Candidate::needing(effect, false, "no directions of approach, and moments move nothing along a slide")
+                Candidate::needing(
+                    effect,
+                    false,
+                    "no directions of approach, and moments move nothing along a slide",
+                )
             } else {
                 Candidate::needing(effect, data.weighs(), NO_LOADS)
             }
@@ -37,7 +41,9 @@ pub(super) const FAMILY: Family = Family {
         _ => String::new(),
     },
     missing_column: |effect, problem, columns| match effect {
-        Effect::Backlash { joint } if slides(problem, *joint) && !columns.approach => Some("columns approach1, …"),
+        Effect::Backlash { joint } if slides(problem, *joint) && !columns.approach => {
+            Some("columns approach1, …")
+        }
         _ => None,
     },
     ..USUAL

@@ -2,7 +2,7 @@
 
 use super::coverage::NO_LOADS;
 use super::family::{Candidate, Family, Term, USUAL};
-use crate::model::parameter::{ArmField, Slot};
+use crate::model::parameter::{ArmField, ParameterSite};
 use crate::problem::Effect;
 
 /// The family.
@@ -10,8 +10,10 @@ pub(super) const FAMILY: Family = Family {
     name: "base-compliance",
     terms: |effect, _| match effect {
         Effect::BaseCompliance => vec![
-            Term::constant("about_x", Slot::Arm(ArmField::MountingX), 1e-4).never_negative(),
-            Term::constant("about_y", Slot::Arm(ArmField::MountingY), 1e-4).never_negative(),
+            Term::constant("about_x", ParameterSite::Arm(ArmField::MountingX), 1e-4)
+                .never_negative(),
+            Term::constant("about_y", ParameterSite::Arm(ArmField::MountingY), 1e-4)
+                .never_negative(),
         ],
         _ => Vec::new(),
     },

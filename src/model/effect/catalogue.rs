@@ -4,11 +4,12 @@ use super::coverage::{Columns, DataCoverage};
 use super::custom::custom;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::{
-    backlash, base_compliance, covariate, deflected_equilibrium, frame_strain, gear_ratio, gravity_compensator,
-    gravity_direction, hoist_direction, hoist_force, joint_compliance, joint_coupling, joint_harmonic,
-    joint_hysteresis, joint_lateral_compliance, joint_nonlinear_stiffness, joint_thermal_drift, joint_wave,
-    link_bending, link_thermal_bending, link_thermal_expansion, payload_backlash, payload_mass, slide_bending,
-    station_move, station_shift, thermal_lag, tracker_drift, tracker_scale, tracker_settling, twist_bending,
+    backlash, base_compliance, covariate, deflected_equilibrium, frame_strain, gear_ratio,
+    gravity_compensator, gravity_direction, hoist_direction, hoist_force, joint_compliance,
+    joint_coupling, joint_harmonic, joint_hysteresis, joint_lateral_compliance,
+    joint_nonlinear_stiffness, joint_thermal_drift, joint_wave, link_bending, link_thermal_bending,
+    link_thermal_expansion, payload_backlash, payload_mass, slide_bending, station_move,
+    station_shift, thermal_lag, tracker_drift, tracker_scale, tracker_settling, twist_bending,
     unmodelled_mass,
 };
 use crate::model::parameter::EffectParameter;
@@ -52,7 +53,8 @@ pub const FAMILIES: [&Family; 34] = [
     &covariate::FAMILY,
 ];
 
-/// Every effect of the catalogue that is conceivable on an arm, with the reason why these data cannot show it.
+/// Every effect of the catalogue that is conceivable on an arm, with the reason why these data
+/// cannot show it.
 pub fn candidates(problem: &Problem, data: &DataCoverage) -> Vec<Candidate> {
     FAMILIES.iter().flat_map(|family| (family.candidates)(problem, data)).collect()
 }
@@ -85,8 +87,8 @@ impl Effect {
         let parameter = |term: Term| EffectParameter {
             name: format!("{name}{bracket}.{}", term.name),
             plain: format!("{name}.{}", term.name),
-            slot: term.slot,
-            driver: term.driver,
+            site: term.site,
+            regressor: term.regressor,
             nominal: term.nominal,
             sigma: term.size,
         };
@@ -101,7 +103,8 @@ impl Effect {
         }
     }
 
-    /// The same where times may not have been measured: the order of the rows stands for them then, counted from 1.
+    /// The same where times may not have been measured: the order of the rows stands for them then,
+    /// counted from 1.
     pub fn describe_in(&self, time_measured: bool) -> String {
         let by_row = if time_measured { None } else { (self.family().describe_by_row)(self) };
         by_row.unwrap_or_else(|| self.describe())
@@ -111,11 +114,13 @@ impl Effect {
     pub fn name_and_place(&self) -> String {
         let searched = self.family().searched;
         let known = self.arguments().into_iter().filter(|(key, _)| Some(*key) != searched);
-        let place = known.filter_map(|(_, argument)| argument.place()).collect::<Vec<_>>().join(",");
+        let place =
+            known.filter_map(|(_, argument)| argument.place()).collect::<Vec<_>>().join(",");
         if place.is_empty() { self.name().to_owned() } else { format!("{} {place}", self.name()) }
     }
 
-    /// Whether an argument of it is searched, as a time: those that [`Self::name_and_place`] calls the same are one effect.
+    /// Whether an argument of it is searched, as a time: those that [`Self::name_and_place`] calls
+    /// the same are one effect.
     pub fn is_searched(&self) -> bool {
         self.family().searched.is_some()
     }
@@ -123,21 +128,25 @@ impl Effect {
     /// Whether it is the same effect, whatever the value of the argument that is searched.
     pub(crate) fn is_but_for_search(&self, other: &Self) -> bool {
         // Names without places are compared first: they are at hand.
-        let is_alike = || self.name() == other.name() && self.name_and_place() == other.name_and_place();
+        let is_alike =
+            || self.name() == other.name() && self.name_and_place() == other.name_and_place();
         self == other || (self.is_searched() && is_alike())
     }
 
-    /// Whether it remembers the poses before, as another effect of its family at the same place does for another time or distance.
+    /// Whether it remembers the poses before, as another effect of its family at the same place
+    /// does for another time or distance.
     pub(crate) fn remembers_like(&self, other: &Self) -> bool {
         self.has_memory() && self.name_and_place() == other.name_and_place()
     }
 
-    /// The same with its searched argument multiplied; `None` where values between those of the candidates tell nothing.
+    /// The same with its searched argument multiplied; `None` where values between those of the
+    /// candidates tell nothing.
     pub(crate) fn scaled(&self, factor: f64) -> Option<Self> {
         (self.family().scaled)(self, factor)
     }
 
-    /// How often chance has a try at it: one over the share of its family's chance, whose `members` are the candidates.
+    /// How often chance has a try at it: one over the share of its family's chance, whose `members`
+    /// are the candidates.
     pub fn tries(&self, members: &[&Self], problem: &Problem) -> f64 {
         (self.family().tries)(self, members, problem)
     }
@@ -157,17 +166,20 @@ impl Effect {
         (self.family().covers)(self, other)
     }
 
-    /// The joint at which it is a function of a command alone, and the joint commanded, both from 1.
+    /// The joint at which it is a function of a command alone, and the joint commanded, both from
+    /// 1.
     pub fn function_of(&self) -> Option<(usize, usize)> {
         (self.family().function_of)(self)
     }
 
-    /// The column without which it cannot be fitted, if measurements with these columns lack it, as a message names it.
+    /// The column without which it cannot be fitted, if measurements with these columns lack it, as
+    /// a message names it.
     pub fn missing_column(&self, problem: &Problem, columns: Columns) -> Option<&'static str> {
         (self.family().missing_column)(self, problem, columns)
     }
 
-    /// Why these data cannot show a custom effect, if they cannot; those of the catalogue come with their reason.
+    /// Why these data cannot show a custom effect, if they cannot; those of the catalogue come with
+    /// their reason.
     pub fn untestable(&self, problem: &Problem, data: &DataCoverage) -> Option<&'static str> {
         custom(self).and_then(|own| own.untestable(problem, data))
     }

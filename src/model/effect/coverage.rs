@@ -4,10 +4,11 @@ use nalgebra::Vector3;
 
 use crate::problem::{Effect, Problem};
 
-/// Which drivers of effects the poses at hand have, and vary.
+/// Which regressors of effects the poses at hand have, and vary.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DataCoverage {
-    /// Why effects of the temperature cannot be shown; `None` where it is known, beside the one that the problem refers to, and changes.
+    /// Why effects of the temperature cannot be shown; `None` where it is known, beside the one
+    /// that the problem refers to, and changes.
     pub no_temperature: Option<&'static str>,
     /// Whether directions of approach are known.
     pub approach: bool,
@@ -19,8 +20,8 @@ pub struct DataCoverage {
     pub ranges: Vec<(f64, f64)>,
     /// Times between which a station may have moved \[s\], ascending.
     pub times: Vec<f64>,
-    /// Usual time between two poses of a session, and that of the longest session from end to end \[s\]; `None` where times were not
-    /// measured: what was before a pose is not known.
+    /// Usual time between two poses of a session, and that of the longest session from end to end
+    /// \[s\]; `None` where times were not measured: what was before a pose is not known.
     pub clock: Option<(f64, f64)>,
     /// For each of the problem's own covariates, whether it is known and changes.
     pub covariates: Vec<bool>,
@@ -76,6 +77,10 @@ pub struct Columns {
 }
 
 /// The column that an effect of the temperature needs, where it is not there.
-pub(super) fn without_temperature(_: &Effect, _: &Problem, columns: Columns) -> Option<&'static str> {
+pub(super) fn without_temperature(
+    _: &Effect,
+    _: &Problem,
+    columns: Columns,
+) -> Option<&'static str> {
     (!columns.temperature).then_some("a column temperature_C")
 }

@@ -8,22 +8,25 @@ use super::coverage::DataCoverage;
 use super::family::Term;
 use crate::problem::{Custom, Effect, Problem};
 
-/// An effect that no catalogue holds: declared in a problem by [`Effect::custom`], it is fitted, traced and added by the loop
-/// like those of the catalogue. `tests/loop/custom_effect.rs` is the example.
+/// An effect that no catalogue holds: declared in a problem by [`Effect::custom`], it is fitted,
+/// traced and added by the loop like those of the catalogue. `tests/loop/custom_effect.rs` is the
+/// example.
 pub trait CustomEffect: Debug + Send + Sync {
     /// Name, by which parameters go: that of no effect of the catalogue and of no beam.
     fn name(&self) -> &str;
 
-    /// Where it is: a joint's number, a link, empty for the whole arm. Name and place together say which effect it is.
+    /// Where it is: a joint's number, a link, empty for the whole arm. Name and place together say
+    /// which effect it is.
     fn place(&self) -> String {
         String::new()
     }
 
-    /// Its parameters: where each enters, what it is multiplied by, and a size that no realistic effect exceeds by much.
+    /// Its parameters: where each enters, what it is multiplied by, and a size that no realistic
+    /// effect exceeds by much.
     ///
-    /// Every one must be inert at zero. Joints of a [`Slot`](crate::model::parameter::Slot) and of a
-    /// [`Driver`](crate::model::parameter::Driver) are counted from 0; `Slot::of_joint`, `Slot::coordinate` and
-    /// `Driver::command` take the numbers of files.
+    /// Every one must be inert at zero. Joints of a [`ParameterSite`](crate::model::parameter::ParameterSite) and of
+    /// a [`Regressor`](crate::model::parameter::Regressor) are counted from 0; `ParameterSite::of_joint`,
+    /// `ParameterSite::coordinate` and `Regressor::command` take the numbers of files.
     fn terms(&self, problem: &Problem) -> Vec<Term>;
 
     /// What it is, in words for people: "the belt of joint 2 slackens".

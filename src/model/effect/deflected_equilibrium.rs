@@ -2,7 +2,7 @@
 
 use super::coverage::NO_LOADS;
 use super::family::{Candidate, Family, Term, USUAL};
-use crate::model::parameter::{ArmField, Slot};
+use crate::model::parameter::{ArmField, ParameterSite};
 use crate::problem::{Effect, Equilibrium};
 
 /// The family.
@@ -10,14 +10,20 @@ pub(super) const FAMILY: Family = Family {
     name: "deflected-equilibrium",
     terms: |effect, _| match effect {
         Effect::DeflectedEquilibrium => {
-            vec![Term::constant("lambda", Slot::Arm(ArmField::Mixing), 1.0).never_negative()]
+            vec![
+                Term::constant("lambda", ParameterSite::Arm(ArmField::Mixing), 1.0)
+                    .never_negative(),
+            ]
         }
         _ => Vec::new(),
     },
     candidates: |problem, data| {
         let first_order = problem.statics.equilibrium == Equilibrium::Undeflected;
         let effect = Effect::DeflectedEquilibrium;
-        first_order.then(|| Candidate::needing(effect, data.weighs(), NO_LOADS)).into_iter().collect()
+        first_order
+            .then(|| Candidate::needing(effect, data.weighs(), NO_LOADS))
+            .into_iter()
+            .collect()
     },
     describe: |effect| match effect {
         Effect::DeflectedEquilibrium => "the loads act on the bent arm".to_owned(),

@@ -1,7 +1,7 @@
 //! What a family of effects says of itself.
 
 use super::coverage::{Columns, DataCoverage};
-use crate::model::parameter::{Driver, Slot};
+use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::{Effect, Problem};
 
 /// A kind of effect. The functions on effects are asked about those of this family alone.
@@ -12,13 +12,16 @@ pub struct Family {
     pub name: &'static str,
     /// The parameters of an effect.
     pub terms: fn(&Effect, &Problem) -> Vec<Term>,
-    /// The effects that are conceivable on an arm, each with the reason why these data cannot show it.
+    /// The effects that are conceivable on an arm, each with the reason why these data cannot show
+    /// it.
     pub candidates: fn(&Problem, &DataCoverage) -> Vec<Candidate>,
     /// What an effect is, in words for people: "transmission ratio of joint 3".
     pub describe: fn(&Effect) -> String,
-    /// The same where times were not measured and the order of the rows, counted from 1, stands for them; `None`: the same.
+    /// The same where times were not measured and the order of the rows, counted from 1, stands for
+    /// them; `None`: the same.
     pub describe_by_row: fn(&Effect) -> Option<String>,
-    /// One over the share of a family's chance that falls to one of its members among the candidates.
+    /// One over the share of a family's chance that falls to one of its members among the
+    /// candidates.
     pub tries: fn(&Effect, &[&Effect], &Problem) -> f64,
     /// Parts that are tested one by one.
     pub parts: fn(&Effect) -> Vec<Effect>,
@@ -26,14 +29,17 @@ pub struct Family {
     pub joined: fn(&Effect, &Effect) -> Option<Effect>,
     /// Whether the first holds all of the second.
     pub covers: fn(&Effect, &Effect) -> bool,
-    /// The joint at which the effect is a function of a command alone, and the joint commanded, both from 1.
+    /// The joint at which the effect is a function of a command alone, and the joint commanded,
+    /// both from 1.
     pub function_of: fn(&Effect) -> Option<(usize, usize)>,
-    /// The column without which an effect cannot be fitted, if measurements with these columns lack it, as a message names it.
+    /// The column without which an effect cannot be fitted, if measurements with these columns lack
+    /// it, as a message names it.
     pub missing_column: fn(&Effect, &Problem, Columns) -> Option<&'static str>,
-    /// The key of an argument that is searched, as a time: those of the family that differ in nothing else are one effect that is not yet
-    /// found.
+    /// The key of an argument that is searched, as a time: those of the family that differ in
+    /// nothing else are one effect that is not yet found.
     pub searched: Option<&'static str>,
-    /// The same effect with that argument multiplied, to three digits, where values between those of the candidates tell.
+    /// The same effect with that argument multiplied, to three digits, where values between those
+    /// of the candidates tell.
     pub scaled: fn(&Effect, f64) -> Option<Effect>,
 }
 
@@ -60,9 +66,9 @@ pub struct Term {
     /// Name after the dot.
     pub name: String,
     /// Where it enters.
-    pub slot: Slot,
+    pub site: ParameterSite,
     /// What it is multiplied by there.
-    pub driver: Driver,
+    pub regressor: Regressor,
     /// Its value where the effect has no size, SI.
     pub nominal: f64,
     /// A size that no realistic effect exceeds by much, SI: 1 σ of its prior.
@@ -73,13 +79,13 @@ pub struct Term {
 
 impl Term {
     /// A parameter that acts the same in every pose.
-    pub fn constant(name: &str, slot: Slot, size: f64) -> Self {
-        Self::driven(name, slot, Driver::Constant, size)
+    pub fn constant(name: &str, site: ParameterSite, size: f64) -> Self {
+        Self::driven(name, site, Regressor::Constant, size)
     }
 
     /// A parameter that is multiplied by what is known of a pose.
-    pub fn driven(name: &str, slot: Slot, driver: Driver, size: f64) -> Self {
-        Self { name: name.to_owned(), slot, driver, nominal: 0.0, size, never_negative: false }
+    pub fn driven(name: &str, site: ParameterSite, regressor: Regressor, size: f64) -> Self {
+        Self { name: name.to_owned(), site, regressor, nominal: 0.0, size, never_negative: false }
     }
 
     /// The same, never negative.
@@ -99,7 +105,8 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// An effect that needs something from the data: `reason` says what is missing, unless it is there.
+    /// An effect that needs something from the data: `reason` says what is missing, unless it is
+    /// there.
     pub(super) fn needing(effect: Effect, there: bool, reason: &'static str) -> Self {
         Self { effect, untestable: (!there).then_some(reason) }
     }

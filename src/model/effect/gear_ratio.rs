@@ -3,7 +3,7 @@
 use super::coverage::STANDS_STILL;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::place::commanded;
-use crate::model::parameter::{Driver, Slot};
+use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::Effect;
 
 /// The family.
@@ -11,12 +11,19 @@ pub(super) const FAMILY: Family = Family {
     name: "gear-ratio",
     terms: |effect, problem| match effect {
         Effect::GearRatio { joint } => {
-            vec![Term::driven("error", Slot::coordinate(problem, *joint), Driver::command(problem, *joint), 0.01)]
+            vec![Term::driven(
+                "error",
+                ParameterSite::coordinate(problem, *joint),
+                Regressor::command(problem, *joint),
+                0.01,
+            )]
         }
         _ => Vec::new(),
     },
     candidates: |problem, data| {
-        let candidate = |joint| Candidate::needing(Effect::GearRatio { joint }, data.moves(joint - 1), STANDS_STILL);
+        let candidate = |joint| {
+            Candidate::needing(Effect::GearRatio { joint }, data.moves(joint - 1), STANDS_STILL)
+        };
         commanded(problem).map(candidate).collect()
     },
     describe: |effect| match effect {

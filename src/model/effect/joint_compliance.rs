@@ -2,7 +2,7 @@
 
 use super::coverage::NO_LOADS;
 use super::family::{Candidate, Family, Term, USUAL};
-use crate::model::parameter::{JointField, Slot};
+use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::Effect;
 
 /// The family.
@@ -10,13 +10,14 @@ pub(super) const FAMILY: Family = Family {
     name: "joint-compliance",
     terms: |effect, _| match effect {
         Effect::JointCompliance { joint } => {
-            let slot = Slot::Joint { joint: joint - 1, field: JointField::Compliance };
-            vec![Term::constant("compliance", slot, 1e-3).never_negative()]
+            let site = ParameterSite::Joint { joint: joint - 1, field: JointField::Compliance };
+            vec![Term::constant("compliance", site, 1e-3).never_negative()]
         }
         _ => Vec::new(),
     },
     candidates: |problem, data| {
-        let rigid = problem.joints.iter().enumerate().filter(|(_, joint)| joint.stiffness.is_none());
+        let rigid =
+            problem.joints.iter().enumerate().filter(|(_, joint)| joint.stiffness.is_none());
         let effect = |(index, _)| Effect::JointCompliance { joint: index + 1 };
         rigid.map(|joint| Candidate::needing(effect(joint), data.weighs(), NO_LOADS)).collect()
     },

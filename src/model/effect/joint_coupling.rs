@@ -3,7 +3,7 @@
 use super::coverage::STANDS_STILL;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::place::commanded;
-use crate::model::parameter::{Driver, Slot};
+use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::Effect;
 
 /// The family.
@@ -11,16 +11,26 @@ pub(super) const FAMILY: Family = Family {
     name: "joint-coupling",
     terms: |effect, problem| match effect {
         Effect::JointCoupling { joint, from } => {
-            vec![Term::driven("factor", Slot::coordinate(problem, *joint), Driver::command(problem, *from), 0.01)]
+            vec![Term::driven(
+                "factor",
+                ParameterSite::coordinate(problem, *joint),
+                Regressor::command(problem, *from),
+                0.01,
+            )]
         }
         _ => Vec::new(),
     },
     candidates: |problem, data| {
-        let pairs = commanded(problem).flat_map(|joint| commanded(problem).map(move |from| (joint, from)));
+        let pairs =
+            commanded(problem).flat_map(|joint| commanded(problem).map(move |from| (joint, from)));
         pairs
             .filter(|(joint, from)| joint != from)
             .map(|(joint, from)| {
-                Candidate::needing(Effect::JointCoupling { joint, from }, data.moves(from - 1), STANDS_STILL)
+                Candidate::needing(
+                    Effect::JointCoupling { joint, from },
+                    data.moves(from - 1),
+                    STANDS_STILL,
+                )
             })
             .collect()
     },

@@ -1,10 +1,11 @@
-//! `joint-harmonic`: an error that repeats with the joint, Δθ = Σ_k a_k sin kθ + b_k cos kθ with θ = q as commanded.
+//! `joint-harmonic`: an error that repeats with the joint, Δθ = Σ_k a_k sin kθ + b_k cos kθ with θ
+//! = q as commanded.
 
 use std::collections::BTreeSet;
 
 use super::coverage::STANDS_STILL;
 use super::family::{Candidate, Family, Term, USUAL};
-use crate::model::parameter::{Driver, Slot};
+use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::{Effect, JointKind};
 
 /// Highest order that is a candidate by itself.
@@ -15,19 +16,29 @@ pub(super) const FAMILY: Family = Family {
     name: "joint-harmonic",
     terms: |effect, problem| match effect {
         Effect::JointHarmonic { joint, orders } => {
-            let slot = Slot::coordinate(problem, *joint);
+            let site = ParameterSite::coordinate(problem, *joint);
             let pair = |&order: &u32| {
-                [("sin", Driver::Sine(joint - 1, order)), ("cos", Driver::Cosine(joint - 1, order))]
-                    .map(|(wave, driver)| Term::driven(&format!("{wave}{order}"), slot, driver, 1e-3))
+                [
+                    ("sin", Regressor::Sine(joint - 1, order)),
+                    ("cos", Regressor::Cosine(joint - 1, order)),
+                ]
+                .map(|(wave, regressor)| {
+                    Term::driven(&format!("{wave}{order}"), site, regressor, 1e-3)
+                })
             };
             orders.iter().flat_map(pair).collect()
         }
         _ => Vec::new(),
     },
     candidates: |problem, data| {
-        let revolute = problem.joints.iter().enumerate().filter(|(_, joint)| joint.commanded() == JointKind::Revolute);
+        let revolute = problem
+            .joints
+            .iter()
+            .enumerate()
+            .filter(|(_, joint)| joint.commanded() == JointKind::Revolute);
         let effects = |(index, _)| {
-            (1..=HIGHEST_ORDER).map(move |order| Effect::JointHarmonic { joint: index + 1, orders: vec![order] })
+            (1..=HIGHEST_ORDER)
+                .map(move |order| Effect::JointHarmonic { joint: index + 1, orders: vec![order] })
         };
         let moves = |effect: &Effect| matches!(effect, Effect::JointHarmonic { joint, .. } if data.moves(joint - 1));
         let candidate = |effect: Effect| {
@@ -45,9 +56,10 @@ pub(super) const FAMILY: Family = Family {
     },
     tries: |effect, members, _| tries(effect, members),
     parts: |effect| match effect {
-        Effect::JointHarmonic { joint, orders } => {
-            orders.iter().map(|&order| Effect::JointHarmonic { joint: *joint, orders: vec![order] }).collect()
-        }
+        Effect::JointHarmonic { joint, orders } => orders
+            .iter()
+            .map(|&order| Effect::JointHarmonic { joint: *joint, orders: vec![order] })
+            .collect(),
         other => vec![other.clone()],
     },
     joined: |one, other| {
@@ -75,9 +87,12 @@ fn orders_of(effect: &Effect) -> Option<(usize, &[u32])> {
 
 /// Of order k of each of n joints n π²/6 k²: low orders have causes, high ones are found by trying.
 fn tries(effect: &Effect, members: &[&Effect]) -> f64 {
-    let joints: BTreeSet<usize> = members.iter().filter_map(|member| Some(orders_of(member)?.0)).collect();
+    let joints: BTreeSet<usize> =
+        members.iter().filter_map(|member| Some(orders_of(member)?.0)).collect();
     let order = orders_of(effect).and_then(|(_, orders)| orders.iter().copied().max()).unwrap_or(1);
-    joints.len().max(1) as f64 * std::f64::consts::PI.powi(2) / 6.0 * f64::from(order) * f64::from(order)
+    joints.len().max(1) as f64 * std::f64::consts::PI.powi(2) / 6.0
+        * f64::from(order)
+        * f64::from(order)
 }
 
 /// Ascending orders in words; three and more in a row as "1 to 5".

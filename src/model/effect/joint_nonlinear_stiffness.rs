@@ -3,7 +3,7 @@
 use super::coverage::NO_LOADS;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::place::{LEAST_MOMENT, greatest_moment};
-use crate::model::parameter::{JointField, Slot};
+use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::Effect;
 
 /// More than any joint turns under the greatest conceivable moment \[rad\].
@@ -14,8 +14,12 @@ pub(super) const FAMILY: Family = Family {
     name: "joint-nonlinear-stiffness",
     terms: |effect, problem| match effect {
         Effect::JointNonlinearStiffness { joint } => {
-            let slot = Slot::Joint { joint: joint - 1, field: JointField::Cubic };
-            vec![Term::constant("cubic", slot, MOST / greatest_moment(problem, *joint).max(LEAST_MOMENT).powi(3))]
+            let site = ParameterSite::Joint { joint: joint - 1, field: JointField::Cubic };
+            vec![Term::constant(
+                "cubic",
+                site,
+                MOST / greatest_moment(problem, *joint).max(LEAST_MOMENT).powi(3),
+            )]
         }
         _ => Vec::new(),
     },
@@ -25,7 +29,9 @@ pub(super) const FAMILY: Family = Family {
         (1..=problem.joints.len()).map(candidate).collect()
     },
     describe: |effect| match effect {
-        Effect::JointNonlinearStiffness { joint } => format!("stiffness of joint {joint} changes with its load"),
+        Effect::JointNonlinearStiffness { joint } => {
+            format!("stiffness of joint {joint} changes with its load")
+        }
         _ => String::new(),
     },
     ..USUAL

@@ -3,7 +3,7 @@
 use super::coverage::without_temperature;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::place::{commanded, warming};
-use crate::model::parameter::Slot;
+use crate::model::parameter::ParameterSite;
 use crate::problem::Effect;
 
 /// The family.
@@ -11,16 +11,25 @@ pub(super) const FAMILY: Family = Family {
     name: "joint-thermal-drift",
     terms: |effect, problem| match effect {
         Effect::JointThermalDrift { joint } => {
-            vec![Term::driven("rate", Slot::coordinate(problem, *joint), warming(problem), 1e-3)]
+            vec![Term::driven(
+                "rate",
+                ParameterSite::coordinate(problem, *joint),
+                warming(problem),
+                1e-3,
+            )]
         }
         _ => Vec::new(),
     },
     candidates: |problem, data| {
         let effect = |joint| Effect::JointThermalDrift { joint };
-        commanded(problem).map(|joint| Candidate { effect: effect(joint), untestable: data.no_temperature }).collect()
+        commanded(problem)
+            .map(|joint| Candidate { effect: effect(joint), untestable: data.no_temperature })
+            .collect()
     },
     describe: |effect| match effect {
-        Effect::JointThermalDrift { joint } => format!("zero of joint {joint} drifts with temperature"),
+        Effect::JointThermalDrift { joint } => {
+            format!("zero of joint {joint} drifts with temperature")
+        }
         _ => String::new(),
     },
     missing_column: without_temperature,

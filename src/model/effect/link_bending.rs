@@ -2,7 +2,7 @@
 
 use super::coverage::NO_LOADS;
 use super::family::{Candidate, Family, Term, USUAL};
-use crate::model::parameter::{BeamField, Slot};
+use crate::model::parameter::{BeamField, ParameterSite};
 use crate::problem::Effect;
 
 /// The family.
@@ -10,8 +10,8 @@ pub(super) const FAMILY: Family = Family {
     name: "link-bending",
     terms: |effect, _| match effect {
         Effect::LinkBending { joint } => {
-            let slot = Slot::Beam { joint: joint - 1, field: BeamField::Flexibility };
-            vec![Term::constant("flexibility", slot, 1e-2).never_negative()]
+            let site = ParameterSite::Beam { joint: joint - 1, field: BeamField::Flexibility };
+            vec![Term::constant("flexibility", site, 1e-2).never_negative()]
         }
         _ => Vec::new(),
     },
@@ -19,7 +19,8 @@ pub(super) const FAMILY: Family = Family {
         let bends = |joint: &crate::problem::Joint| {
             joint.beam.as_ref().is_some_and(|beam| beam.ei_y.is_some() || beam.ei_z.is_some())
         };
-        let rigid = problem.joints.iter().enumerate().filter(|(_, joint)| joint.a != 0.0 && !bends(joint));
+        let rigid =
+            problem.joints.iter().enumerate().filter(|(_, joint)| joint.a != 0.0 && !bends(joint));
         let effect = |(index, _)| Effect::LinkBending { joint: index + 1 };
         rigid.map(|link| Candidate::needing(effect(link), data.weighs(), NO_LOADS)).collect()
     },

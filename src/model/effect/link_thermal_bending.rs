@@ -3,7 +3,7 @@
 use super::coverage::without_temperature;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::place::{carrier, links, warming};
-use crate::model::parameter::{BeamField, Slot};
+use crate::model::parameter::{BeamField, ParameterSite};
 use crate::problem::Effect;
 
 /// The family.
@@ -12,8 +12,9 @@ pub(super) const FAMILY: Family = Family {
     terms: |effect, problem| match effect {
         Effect::LinkThermalBending { link } => {
             let slots = |joint| {
-                [("about_y", BeamField::BowY), ("about_z", BeamField::BowZ)]
-                    .map(|(name, field)| Term::driven(name, Slot::Beam { joint, field }, warming(problem), 1e-3))
+                [("about_y", BeamField::BowY), ("about_z", BeamField::BowZ)].map(|(name, field)| {
+                    Term::driven(name, ParameterSite::Beam { joint, field }, warming(problem), 1e-3)
+                })
             };
             carrier(problem, link).map_or_else(Vec::new, |joint| slots(joint).to_vec())
         }
@@ -21,7 +22,9 @@ pub(super) const FAMILY: Family = Family {
     },
     candidates: |problem, data| {
         let effect = |link| Effect::LinkThermalBending { link };
-        links(problem).map(|link| Candidate { effect: effect(link), untestable: data.no_temperature }).collect()
+        links(problem)
+            .map(|link| Candidate { effect: effect(link), untestable: data.no_temperature })
+            .collect()
     },
     describe: |effect| match effect {
         Effect::LinkThermalBending { link } => format!("link {link} bows with temperature"),

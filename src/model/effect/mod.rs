@@ -1,13 +1,16 @@
 //! Effects: what an arm and its measurement may do that its declared parameters do not say.
 //!
-//! One family a file. A family says where in the model its parameters enter (a [`Slot`](crate::model::parameter::Slot)), what
-//! each is multiplied by there (a [`Driver`](crate::model::parameter::Driver)), which effects of its kind are conceivable on an
-//! arm, and what the search for effects has to know of it. The laws themselves are physics and live in `mechanics`, once,
-//! generic over the scalar; every effect is inert at zero, so that its derivatives exist before it is fitted.
+//! One family a file. A family says where in the model its parameters enter (a
+//! [`ParameterSite`](crate::model::parameter::ParameterSite)), what each is multiplied by there (a
+//! [`Regressor`](crate::model::parameter::Regressor)), which effects of its kind are conceivable on an
+//! arm, and what the search for effects has to know of it. The laws themselves are physics and live
+//! in `mechanics`, once, generic over the scalar; every effect is inert at zero, so that its
+//! derivatives exist before it is fitted.
 //!
-//! To add a family: a line with its name and arguments in the table of `problem/effect.rs`, a file like `gear_ratio.rs` here,
-//! a line in [`FAMILIES`]; if it enters at a new place, a slot and its law in `mechanics` (docs/effects.md walks through it).
-//! An effect of one's own needs none of this: it implements [`CustomEffect`].
+//! To add a family: a line with its name and arguments in the table of `problem/effect.rs`, a file
+//! like `gear_ratio.rs` here, a line in [`FAMILIES`]; if it enters at a new place, a site and its
+//! law in `mechanics` (docs/effects.md walks through it). An effect of one's own needs none of
+//! this: it implements [`CustomEffect`].
 
 mod backlash;
 mod base_compliance;

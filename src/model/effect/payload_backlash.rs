@@ -2,7 +2,7 @@
 
 use super::family::{Candidate, Family, Term, USUAL};
 use super::place::commanded;
-use crate::model::parameter::{Driver, Slot};
+use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::Effect;
 
 /// The family.
@@ -12,8 +12,8 @@ pub(super) const FAMILY: Family = Family {
         Effect::PayloadBacklash { joint } => {
             vec![Term::driven(
                 "width",
-                Slot::coordinate(problem, *joint),
-                Driver::LoadedSide { joint: joint - 1, declared: problem.tool.payload_mass },
+                ParameterSite::coordinate(problem, *joint),
+                Regressor::LoadedSide { joint: joint - 1, declared: problem.tool.payload_mass },
                 0.01,
             )]
         }
@@ -32,7 +32,9 @@ pub(super) const FAMILY: Family = Family {
         commanded(problem).map(candidate).collect()
     },
     describe: |effect| match effect {
-        Effect::PayloadBacklash { joint } => format!("play in joint {joint} that opens with the payload"),
+        Effect::PayloadBacklash { joint } => {
+            format!("play in joint {joint} that opens with the payload")
+        }
         _ => String::new(),
     },
     missing_column: |_, _, columns| (!columns.approach).then_some("columns approach1, …"),

@@ -1,18 +1,24 @@
 //! `payload-mass`: the payload is heavier by m whenever one is carried.
 
 use super::family::{Candidate, Family, Term, USUAL};
-use crate::model::parameter::{ArmField, Slot};
+use crate::model::parameter::{ArmField, ParameterSite};
 use crate::problem::Effect;
 
 /// The family.
 pub(super) const FAMILY: Family = Family {
     name: "payload-mass",
     terms: |effect, _| match effect {
-        Effect::PayloadMass => vec![Term::constant("mass", Slot::Arm(ArmField::Payload), 2.0)],
+        Effect::PayloadMass => {
+            vec![Term::constant("mass", ParameterSite::Arm(ArmField::Payload), 2.0)]
+        }
         _ => Vec::new(),
     },
     candidates: |_, data| {
-        vec![Candidate::needing(Effect::PayloadMass, data.carries() && data.weighs(), "no payload is carried")]
+        vec![Candidate::needing(
+            Effect::PayloadMass,
+            data.carries() && data.weighs(),
+            "no payload is carried",
+        )]
     },
     describe: |effect| match effect {
         Effect::PayloadMass => "payloads are heavier than declared".to_owned(),

@@ -1,21 +1,28 @@
 //! Places of an arm that effects are about; joints are counted from 1, as in files.
 
-use crate::model::parameter::{Driver, JointField, Slot};
+use crate::model::parameter::{JointField, ParameterSite, Regressor};
 use crate::problem::{Body, Joint, JointKind, Problem};
 
 /// Whether a joint, counted from 1, slides.
 pub(super) fn slides(problem: &Problem, joint: usize) -> bool {
-    joint.checked_sub(1).and_then(|index| problem.joints.get(index)).is_some_and(|own| own.kind == JointKind::Prismatic)
+    joint
+        .checked_sub(1)
+        .and_then(|index| problem.joints.get(index))
+        .is_some_and(|own| own.kind == JointKind::Prismatic)
 }
 
-impl Slot {
-    /// What an error of a joint adds to: d where it slides, else θ. The joint is numbered from 1, as in files.
+impl ParameterSite {
+    /// What an error of a joint adds to: d where it slides, else θ. The joint is numbered from 1,
+    /// as in files.
     pub fn coordinate(problem: &Problem, joint: usize) -> Self {
-        Self::of_joint(joint, if slides(problem, joint) { JointField::D } else { JointField::Theta })
+        Self::of_joint(
+            joint,
+            if slides(problem, joint) { JointField::D } else { JointField::Theta },
+        )
     }
 }
 
-impl Driver {
+impl Regressor {
     /// What a joint is told: q \[rad\] or \[m\]. The joint is numbered from 1, as in files.
     pub fn command(problem: &Problem, joint: usize) -> Self {
         let index = joint.wrapping_sub(1);
@@ -25,26 +32,42 @@ impl Driver {
 
 /// Numbers, from 1, of the joints that take a command.
 pub(super) fn commanded(problem: &Problem) -> impl Iterator<Item = usize> + '_ {
-    let takes = |&(_, joint): &(usize, &crate::problem::Joint)| joint.commanded() != JointKind::Fixed;
+    let takes =
+        |&(_, joint): &(usize, &crate::problem::Joint)| joint.commanded() != JointKind::Fixed;
     problem.joints.iter().enumerate().filter(takes).map(|(index, _)| index + 1)
 }
 
 /// Moment below which arms are not told apart [N·m].
 pub(super) const LEAST_MOMENT: f64 = 10.0;
 
-/// The weight of everything that is declared beyond a joint, counted from 1, at the length of the arm beyond it, that of the longest
-/// branch [N·m].
+/// The weight of everything that is declared beyond a joint, counted from 1, at the length of the
+/// arm beyond it, that of the longest branch [N·m].
 pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
     let all = |bodies: &[Body]| bodies.iter().map(|body| body.mass).sum::<f64>();
-    let beam = |joint: &Joint| joint.beam.as_ref().map_or(0.0, |beam| beam.mass + all(&beam.masses));
+    let beam =
+        |joint: &Joint| joint.beam.as_ref().map_or(0.0, |beam| beam.mass + all(&beam.masses));
     let tree = problem.tree();
     let own = &problem.joints[joint - 1];
-    let beyond = || problem.joints.iter().enumerate().skip(joint).filter(|(k, _)| tree.leads_through(joint - 1, *k));
-    let mass = all(&own.bodies) + beyond().map(|(_, joint)| all(&joint.bodies) + beam(joint)).sum::<f64>();
-    let payload = if tree.leads_through(joint - 1, problem.tool.joint) { problem.tool.payload_mass } else { 0.0 };
+    let beyond = || {
+        problem
+            .joints
+            .iter()
+            .enumerate()
+            .skip(joint)
+            .filter(|(k, _)| tree.leads_through(joint - 1, *k))
+    };
+    let mass =
+        all(&own.bodies) + beyond().map(|(_, joint)| all(&joint.bodies) + beam(joint)).sum::<f64>();
+    let payload = if tree.leads_through(joint - 1, problem.tool.joint) {
+        problem.tool.payload_mass
+    } else {
+        0.0
+    };
     let carried = |joint: usize| {
         let targets = problem.targets.iter().map(|own| (own.joint, own.at));
-        let all = targets.chain([(problem.tool.joint, problem.tool.target)]).filter(|(carrier, _)| *carrier == joint);
+        let all = targets
+            .chain([(problem.tool.joint, problem.tool.target)])
+            .filter(|(carrier, _)| *carrier == joint);
         all.map(|(_, at)| at.norm()).fold(0.0, f64::max)
     };
     let reach = |tip: usize| {
@@ -57,12 +80,15 @@ pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
 
 /// Index of the joint whose beam has that name.
 pub(super) fn carrier(problem: &Problem, link: &str) -> Option<usize> {
-    problem.joints.iter().position(|joint| joint.beam.as_ref().is_some_and(|beam| beam.name == link))
+    problem
+        .joints
+        .iter()
+        .position(|joint| joint.beam.as_ref().is_some_and(|beam| beam.name == link))
 }
 
 /// T − T₀.
-pub(super) fn warming(problem: &Problem) -> Driver {
-    Driver::Warming { reference: problem.data.reference_temperature.unwrap_or(0.0) }
+pub(super) fn warming(problem: &Problem) -> Regressor {
+    Regressor::Warming { reference: problem.data.reference_temperature.unwrap_or(0.0) }
 }
 
 /// Names of all beams.
@@ -87,11 +113,24 @@ mod tests {
     #[test]
     fn a_moment_is_of_what_a_joint_carries_at_the_longest_branch() {
         let problem = Problem::parse(ARM, "problem.toml".as_ref()).unwrap();
-        let chain =
-            Problem::parse(&ARM.replace("parent = 1, ", "").replace("'a'\njoint = 3", "'a'"), "problem.toml".as_ref());
-        let tree: [f64; 5] = [10.0 * 5.0 * 0.9, 10.0 * 2.0 * 0.6, 10.0 * 2.0 * 0.2, 10.0 * 3.0 * 0.2, 10.0 * 3.0 * 0.1];
-        let serial: [f64; 5] =
-            [10.0 * 5.0 * 1.6, 10.0 * 5.0 * 1.3, 10.0 * 5.0 * 0.9, 10.0 * 3.0 * 0.3, 10.0 * 3.0 * 0.2];
+        let chain = Problem::parse(
+            &ARM.replace("parent = 1, ", "").replace("'a'\njoint = 3", "'a'"),
+            "problem.toml".as_ref(),
+        );
+        let tree: [f64; 5] = [
+            10.0 * 5.0 * 0.9,
+            10.0 * 2.0 * 0.6,
+            10.0 * 2.0 * 0.2,
+            10.0 * 3.0 * 0.2,
+            10.0 * 3.0 * 0.1,
+        ];
+        let serial: [f64; 5] = [
+            10.0 * 5.0 * 1.6,
+            10.0 * 5.0 * 1.3,
+            10.0 * 5.0 * 0.9,
+            10.0 * 3.0 * 0.3,
+            10.0 * 3.0 * 0.2,
+        ];
         for (problem, expected) in [(problem, tree), (chain.unwrap(), serial)] {
             for (joint, moment) in (1..).zip(expected) {
                 let found = greatest_moment(&problem, joint);

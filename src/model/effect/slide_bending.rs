@@ -1,9 +1,10 @@
-//! `slide-bending`: a prismatic joint's slide, a cantilever as long as the joint's d, of uniform flexibility 1/EI.
+//! `slide-bending`: a prismatic joint's slide, a cantilever as long as the joint's d, of uniform
+//! flexibility 1/EI.
 
 use super::coverage::{NO_LOADS, STANDS_STILL};
 use super::family::{Candidate, Family, Term, USUAL};
 use super::place::{commanded, slides};
-use crate::model::parameter::{JointField, Slot};
+use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::Effect;
 
 /// The family.
@@ -11,8 +12,8 @@ pub(super) const FAMILY: Family = Family {
     name: "slide-bending",
     terms: |effect, _| match effect {
         Effect::SlideBending { joint } => {
-            let slot = Slot::of_joint(*joint, JointField::SlideFlexibility);
-            vec![Term::constant("flexibility", slot, 1e-2).never_negative()]
+            let site = ParameterSite::of_joint(*joint, JointField::SlideFlexibility);
+            vec![Term::constant("flexibility", site, 1e-2).never_negative()]
         }
         _ => Vec::new(),
     },

@@ -1,7 +1,7 @@
 //! `station-shift`: measured positions are moved by d from a time on.
 
 use super::family::{Candidate, Family, Term, USUAL};
-use crate::model::parameter::{Driver, Slot};
+use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::Effect;
 
 /// The family.
@@ -11,17 +11,23 @@ pub(super) const FAMILY: Family = Family {
         Effect::StationShift { at_time } => ["x", "y", "z"]
             .into_iter()
             .enumerate()
-            .map(|(axis, name)| Term::driven(name, Slot::Shift { axis }, Driver::Since(*at_time), 5e-3))
+            .map(|(axis, name)| {
+                Term::driven(name, ParameterSite::Shift { axis }, Regressor::Since(*at_time), 5e-3)
+            })
             .collect(),
         _ => Vec::new(),
     },
-    candidates: |_, data| data.times.iter().map(|&at_time| Candidate::of(Effect::StationShift { at_time })).collect(),
+    candidates: |_, data| {
+        data.times.iter().map(|&at_time| Candidate::of(Effect::StationShift { at_time })).collect()
+    },
     describe: |effect| match effect {
         Effect::StationShift { at_time } => format!("the measuring station moved at {at_time} s"),
         _ => String::new(),
     },
     describe_by_row: |effect| match effect {
-        Effect::StationShift { at_time } => Some(format!("the measuring station moved after row {}", at_time.ceil())),
+        Effect::StationShift { at_time } => {
+            Some(format!("the measuring station moved after row {}", at_time.ceil()))
+        }
         _ => None,
     },
     searched: Some("at_time_s"),

@@ -1,7 +1,7 @@
 //! `tracker-drift`: measured positions move by v (t − t_first).
 
 use super::family::{Candidate, Family, Term, USUAL};
-use crate::model::parameter::{Driver, Slot};
+use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::Effect;
 
 /// The family.
@@ -11,13 +11,19 @@ pub(super) const FAMILY: Family = Family {
         Effect::TrackerDrift => ["x", "y", "z"]
             .into_iter()
             .enumerate()
-            .map(|(axis, name)| Term::driven(name, Slot::Shift { axis }, Driver::Elapsed, 1e-5))
+            .map(|(axis, name)| {
+                Term::driven(name, ParameterSite::Shift { axis }, Regressor::Elapsed, 1e-5)
+            })
             .collect(),
         _ => Vec::new(),
     },
     candidates: |_, data| {
         let there = !data.times.is_empty();
-        vec![Candidate::needing(Effect::TrackerDrift, there, "too few poses before or after any time")]
+        vec![Candidate::needing(
+            Effect::TrackerDrift,
+            there,
+            "too few poses before or after any time",
+        )]
     },
     describe: |effect| match effect {
         Effect::TrackerDrift => "the measuring station drifts".to_owned(),

@@ -1,10 +1,11 @@
 //! `tracker-settling`: what measures settles, positions move by d (1 − exp(−(t − t_first)/τ)).
 
 use super::family::{Candidate, Family, Term, USUAL, to_three_digits};
-use crate::model::parameter::{Driver, Slot};
+use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::Effect;
 
-/// Time constants that are looked for, as parts of the time measured: shorter ones act on few poses, longer ones are drifts.
+/// Time constants that are looked for, as parts of the time measured: shorter ones act on few
+/// poses, longer ones are drifts.
 const SHORTEST: f64 = 0.03;
 const LONGEST: f64 = 0.6;
 /// Each over the one before.
@@ -17,15 +18,24 @@ pub(super) const FAMILY: Family = Family {
         Effect::TrackerSettling { time_constant } => ["x", "y", "z"]
             .into_iter()
             .enumerate()
-            .map(|(axis, name)| Term::driven(name, Slot::Shift { axis }, Driver::Settling(*time_constant), 5e-3))
+            .map(|(axis, name)| {
+                Term::driven(
+                    name,
+                    ParameterSite::Shift { axis },
+                    Regressor::Settling(*time_constant),
+                    5e-3,
+                )
+            })
             .collect(),
         _ => Vec::new(),
     },
     candidates: |_, data| {
-        let (Some(first), Some(last)) = (data.times.first(), data.times.last()) else { return Vec::new() };
+        let (Some(first), Some(last)) = (data.times.first(), data.times.last()) else {
+            return Vec::new();
+        };
         let time = last - first;
-        let constants =
-            std::iter::successors(Some(SHORTEST), |part| Some(part * STEP)).take_while(|part| *part <= LONGEST);
+        let constants = std::iter::successors(Some(SHORTEST), |part| Some(part * STEP))
+            .take_while(|part| *part <= LONGEST);
         constants
             .filter_map(|part| to_three_digits(part * time))
             .map(|time_constant| Candidate::of(Effect::TrackerSettling { time_constant }))
@@ -45,9 +55,9 @@ pub(super) const FAMILY: Family = Family {
     },
     searched: Some("time_constant_s"),
     scaled: |effect, factor| match effect {
-        Effect::TrackerSettling { time_constant } => {
-            Some(Effect::TrackerSettling { time_constant: to_three_digits(factor * time_constant)? })
-        }
+        Effect::TrackerSettling { time_constant } => Some(Effect::TrackerSettling {
+            time_constant: to_three_digits(factor * time_constant)?,
+        }),
         _ => None,
     },
     ..USUAL

@@ -3,7 +3,7 @@
 use super::coverage::NO_LOADS;
 use super::family::{Candidate, Family, Term, USUAL};
 use super::place::{carrier, links};
-use crate::model::parameter::{BeamField, Slot};
+use crate::model::parameter::{BeamField, ParameterSite};
 use crate::problem::Effect;
 
 /// The family.
@@ -11,12 +11,12 @@ pub(super) const FAMILY: Family = Family {
     name: "unmodelled-mass",
     terms: |effect, problem| match effect {
         Effect::UnmodelledMass { link } => {
-            let slot = |joint, field| Slot::Beam { joint, field };
+            let site = |joint, field| ParameterSite::Beam { joint, field };
             let terms = |joint: usize| {
                 let length = problem.joints[joint].a.abs();
-                let at = Term::constant("at", slot(joint, BeamField::AddedAt), length / 2.0);
+                let at = Term::constant("at", site(joint, BeamField::AddedAt), length / 2.0);
                 vec![
-                    Term::constant("mass", slot(joint, BeamField::AddedMass), 5.0).never_negative(),
+                    Term::constant("mass", site(joint, BeamField::AddedMass), 5.0).never_negative(),
                     Term { nominal: length / 2.0, ..at },
                 ]
             };
@@ -26,10 +26,14 @@ pub(super) const FAMILY: Family = Family {
     },
     candidates: |problem, data| {
         let effect = |link| Effect::UnmodelledMass { link };
-        links(problem).map(|link| Candidate::needing(effect(link), data.weighs(), NO_LOADS)).collect()
+        links(problem)
+            .map(|link| Candidate::needing(effect(link), data.weighs(), NO_LOADS))
+            .collect()
     },
     describe: |effect| match effect {
-        Effect::UnmodelledMass { link } => format!("link {link} carries a mass that is not declared"),
+        Effect::UnmodelledMass { link } => {
+            format!("link {link} carries a mass that is not declared")
+        }
         _ => String::new(),
     },
     ..USUAL

@@ -8,8 +8,9 @@ use crate::quantity::Unit;
 
 /// lower ≤ Σ cₖ xₖ ≤ upper over unknowns xₖ; infinite where there is no limit.
 ///
-/// Geometry enters by its value, Σ cₖ (nominalₖ + xₖ), stiffness and rigidity by its logarithm, Σ cₖ (ln nominalₖ + xₖ) in
-/// SI units: both are linear in x. The nominal part, fixed parameters with it, is taken off the limits.
+/// Geometry enters by its value, Σ cₖ (nominalₖ + xₖ), stiffness and rigidity by its logarithm, Σ
+/// cₖ (ln nominalₖ + xₖ) in SI units: both are linear in x. The nominal part, fixed parameters with
+/// it, is taken off the limits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearConstraint {
     /// Free parameters and their coefficients.
@@ -27,7 +28,8 @@ pub struct LinearConstraint {
 }
 
 impl LinearConstraint {
-    /// The same constraint on the parameters listed in `kept`, counted anew; `None` where it speaks of another one.
+    /// The same constraint on the parameters listed in `kept`, counted anew; `None` where it speaks
+    /// of another one.
     pub fn on(&self, kept: &[usize]) -> Option<Self> {
         let place = |&(k, c): &(usize, f64)| Some((kept.iter().position(|&other| other == k)?, c));
         let terms = self.terms.iter().map(place).collect::<Option<Vec<_>>>()?;
@@ -38,7 +40,8 @@ impl LinearConstraint {
 /// The constraints of `problem` on its free `parameters`.
 ///
 /// # Errors
-/// A name that is not a parameter, kinds that do not add up, a limit of another kind, or nothing free.
+/// A name that is not a parameter, kinds that do not add up, a limit of another kind, or nothing
+/// free.
 pub fn constrain(
     problem: &Problem,
     bases: &[String],
@@ -47,7 +50,8 @@ pub fn constrain(
     parameters: &[Parameter],
 ) -> Result<Vec<LinearConstraint>, InputError> {
     let all = candidates(problem, bases, targets, effects);
-    let known: Vec<(String, Unit, f64)> = all.into_iter().map(|c| (c.name.clone(), c.unit(), c.nominal)).collect();
+    let known: Vec<(String, Unit, f64)> =
+        all.into_iter().map(|c| (c.name.clone(), c.unit(), c.nominal)).collect();
     problem.constraints.iter().map(|constraint| one(constraint, &known, parameters)).collect()
 }
 
@@ -88,18 +92,29 @@ fn one(
             (false, true) => " − ",
         };
         let logarithm = if kind == LimitKind::Logarithm { "ln " } else { "" };
-        let size = Some(coefficient.abs().to_string()).filter(|size| size != "1").map_or_else(String::new, |s| s + " ");
+        let size = Some(coefficient.abs().to_string())
+            .filter(|size| size != "1")
+            .map_or_else(String::new, |s| s + " ");
         sum.extend([sign, &size, logarithm, name]);
     }
     let Some((parameter, kind)) = first.filter(|_| !terms.is_empty()) else {
         return Err(constraint.location.clone().error(InputErrorKind::NothingConstrained));
     };
-    if let Some(limit) = constraint.at_least.iter().chain(&constraint.at_most).find(|limit| limit.kind != kind) {
-        let kind = InputErrorKind::LimitOfAnotherKind { parameter: parameter.to_owned(), write: spelled(kind) };
+    if let Some(limit) =
+        constraint.at_least.iter().chain(&constraint.at_most).find(|limit| limit.kind != kind)
+    {
+        let kind = InputErrorKind::LimitOfAnotherKind {
+            parameter: parameter.to_owned(),
+            write: spelled(kind),
+        };
         return Err(limit.location.clone().error(kind));
     }
-    let value = |limit: &Option<Limit>, none: f64| limit.as_ref().map_or(none, |limit| limit.value - nominal);
-    let words = |limit: &Option<Limit>, relation: &str| Some(format!("{relation} {}", shown(limit.as_ref()?)));
+    let value = |limit: &Option<Limit>, none: f64| {
+        limit.as_ref().map_or(none, |limit| limit.value - nominal)
+    };
+    let words = |limit: &Option<Limit>, relation: &str| {
+        Some(format!("{relation} {}", shown(limit.as_ref()?)))
+    };
     Ok(LinearConstraint {
         terms,
         lower: value(&constraint.at_least, f64::NEG_INFINITY),

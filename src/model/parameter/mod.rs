@@ -1,17 +1,18 @@
 //! Free parameters: names, units, priors and bounds, resolved from the problem's rules.
 //!
-//! An unknown x is a deviation from nominal: additive for angles \[rad\] and lengths \[m\], ln(value / nominal) for
-//! stiffnesses and rigidities, so that x = 0 is nominal everywhere and a stiffness never turns negative.
+//! An unknown x is a deviation from nominal: additive for angles \[rad\] and lengths \[m\],
+//! ln(value / nominal) for stiffnesses and rigidities, so that x = 0 is nominal everywhere and a
+//! stiffness never turns negative.
 
 mod constraint;
-mod driver;
 mod name;
+mod regressor;
 mod resolve;
 
 pub use constraint::{LinearConstraint, constrain};
-pub(crate) use driver::Waves;
-pub use driver::{Driver, Quantity};
-pub use name::{ArmField, BeamField, JointField, Slot};
+pub use name::{ArmField, BeamField, JointField, ParameterSite};
+pub(crate) use regressor::Waves;
+pub use regressor::{Quantity, Regressor};
 pub use resolve::{EffectParameter, resolve};
 pub(crate) use resolve::{holds_all, refuses, rule_of};
 
@@ -23,9 +24,9 @@ pub struct Parameter {
     /// Name as in the problem file: `joint2.alpha`, `A.EI`, `base[B].rx`.
     pub name: String,
     /// Where it enters the model.
-    pub slot: Slot,
+    pub site: ParameterSite,
     /// What it is multiplied by there.
-    pub driver: Driver,
+    pub regressor: Regressor,
     /// Nominal value, SI.
     pub nominal: f64,
     /// 1 σ of the Gaussian prior on x about 0.
@@ -39,7 +40,7 @@ pub struct Parameter {
 impl Parameter {
     /// Kind of quantity.
     pub fn unit(&self) -> Unit {
-        unit(self.slot, self.driver)
+        unit(self.site, self.regressor)
     }
 
     /// Value at x, SI.
@@ -63,23 +64,23 @@ impl Parameter {
     }
 }
 
-/// Kind of a quantity that is multiplied by `driver` before it enters at `slot`.
-pub(crate) fn unit(slot: Slot, driver: Driver) -> Unit {
-    match (driver, slot.unit()) {
-        (Driver::Warming { .. } | Driver::Lagging { .. }, of) => match of {
+/// Kind of a quantity that is multiplied by `regressor` before it enters at `site`.
+pub(crate) fn unit(site: ParameterSite, regressor: Regressor) -> Unit {
+    match (regressor, site.unit()) {
+        (Regressor::Warming { .. } | Regressor::Lagging { .. }, of) => match of {
             Unit::Angle => Unit::AnglePerDegree,
             Unit::PerLength => Unit::CurvaturePerDegree,
             Unit::Ratio => Unit::PerDegree,
             _ => Unit::LengthPerDegree,
         },
-        (Driver::LoadedSide { .. }, Unit::Angle) => Unit::AnglePerMass,
-        (Driver::LoadedSide { .. }, _) => Unit::LengthPerMass,
-        (Driver::Elapsed, _) => Unit::Speed,
-        (Driver::Covariate(_), Unit::Angle) => Unit::AnglePerUnit,
-        (Driver::Covariate(_), _) => Unit::LengthPerUnit,
-        (Driver::Command(_), Unit::Length) => Unit::LengthPerAngle,
-        (Driver::Travel(_), Unit::Angle) => Unit::AnglePerLength,
-        (Driver::Command(_) | Driver::Travel(_), _) => Unit::Ratio,
+        (Regressor::LoadedSide { .. }, Unit::Angle) => Unit::AnglePerMass,
+        (Regressor::LoadedSide { .. }, _) => Unit::LengthPerMass,
+        (Regressor::Elapsed, _) => Unit::Speed,
+        (Regressor::Covariate(_), Unit::Angle) => Unit::AnglePerUnit,
+        (Regressor::Covariate(_), _) => Unit::LengthPerUnit,
+        (Regressor::Command(_), Unit::Length) => Unit::LengthPerAngle,
+        (Regressor::Travel(_), Unit::Angle) => Unit::AnglePerLength,
+        (Regressor::Command(_) | Regressor::Travel(_), _) => Unit::Ratio,
         (_, unit) => unit,
     }
 }

@@ -3,10 +3,11 @@
 use crate::problem::FixtureKind;
 use crate::quantity::Unit;
 
-/// Where a parameter enters the model; joints are counted from 0, [`Slot::of_joint`] takes the numbers of files.
+/// Where a parameter enters the model; joints are counted from 0, [`ParameterSite::of_joint`] takes the
+/// numbers of files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum Slot {
+pub enum ParameterSite {
     /// A field of a joint.
     Joint {
         /// Index of the joint.
@@ -30,7 +31,8 @@ pub enum Slot {
         /// 0..6.
         axis: usize,
     },
-    /// A coordinate of a target in the frame that carries it: x, y, z, then the rotation vector of its orientation x, y, z.
+    /// A coordinate of a target in the frame that carries it: x, y, z, then the rotation vector of
+    /// its orientation x, y, z.
     Target {
         /// Index of the target.
         target: usize,
@@ -51,21 +53,24 @@ pub enum Slot {
         /// 0..3.
         axis: usize,
     },
-    /// A turn of every base about an axis of the measuring frame, through that frame's origin; a driver's alone.
+    /// A turn of every base about an axis of the measuring frame, through that frame's origin; a
+    /// regressor's alone.
     Turn {
         /// 0..3.
         axis: usize,
     },
     /// A relative error of every measured coordinate.
     Scale,
-    /// An entry of the strain E of the measuring frame, in which p is measured as p + E p, E triangular: xx, yy, zz, xy, xz, yz.
+    /// An entry of the strain E of the measuring frame, in which p is measured as p + E p, E
+    /// triangular: xx, yy, zz, xy, xz, yz.
     Strain {
         /// 0..6.
         entry: usize,
     },
 }
 
-/// A field of a joint that may be free: first the letters of [Chen2021, eq. 1], then what effects add.
+/// A field of a joint that may be free: first the letters of [Chen2021, eq. 1], then what effects
+/// add.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[expect(missing_docs, reason = "letters need no words")]
 #[non_exhaustive]
@@ -80,7 +85,8 @@ pub enum JointField {
     Compliance,
     /// Angle per cube of the moment [rad/(N·m)³].
     Cubic,
-    /// Play: half of it each way, as the direction of approach says, or the moment where that is not known \[rad\].
+    /// Play: half of it each way, as the direction of approach says, or the moment where that is
+    /// not known \[rad\].
     Play,
     /// Play of a joint that slides, which only a direction of approach takes up \[m\].
     SlidingPlay,
@@ -176,7 +182,8 @@ impl JointField {
     pub const GEOMETRY: [Self; 5] = [Self::Alpha, Self::A, Self::Theta, Self::D, Self::Beta];
 
     /// The fields of a placement by xyz and rpy, in the order of files.
-    pub const PLACEMENT: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Roll, Self::Pitch, Self::Yaw];
+    pub const PLACEMENT: [Self; 6] =
+        [Self::X, Self::Y, Self::Z, Self::Roll, Self::Pitch, Self::Yaw];
 
     /// Its place in a placement: x, y, z, roll, pitch, yaw.
     pub fn placement(self) -> Option<usize> {
@@ -257,7 +264,7 @@ impl BeamField {
     }
 }
 
-impl Slot {
+impl ParameterSite {
     /// A field of a joint that is numbered from 1, as in files.
     pub fn of_joint(number: usize, field: JointField) -> Self {
         Self::Joint { joint: number.wrapping_sub(1), field }
@@ -281,7 +288,9 @@ impl Slot {
                 | JointField::Y
                 | JointField::Z => Unit::Length,
                 JointField::Stiffness => Unit::TorsionalStiffness,
-                JointField::Compliance | JointField::LateralX | JointField::LateralY => Unit::Compliance,
+                JointField::Compliance | JointField::LateralX | JointField::LateralY => {
+                    Unit::Compliance
+                }
                 JointField::Cubic => Unit::CubicCompliance,
                 JointField::SlideFlexibility => Unit::Flexibility,
                 JointField::SpringRate => Unit::ForcePerLength,
@@ -289,11 +298,14 @@ impl Slot {
             },
             Self::Beam { field, .. } => match field {
                 BeamField::Axial => Unit::AxialRigidity,
-                BeamField::Bending | BeamField::BendingY | BeamField::BendingZ | BeamField::Twist => {
-                    Unit::FlexuralRigidity
-                }
+                BeamField::Bending
+                | BeamField::BendingY
+                | BeamField::BendingZ
+                | BeamField::Twist => Unit::FlexuralRigidity,
                 BeamField::Anisotropy | BeamField::Stretch => Unit::Ratio,
-                BeamField::Flexibility | BeamField::CouplingY | BeamField::CouplingZ => Unit::Flexibility,
+                BeamField::Flexibility | BeamField::CouplingY | BeamField::CouplingZ => {
+                    Unit::Flexibility
+                }
                 BeamField::BowY | BeamField::BowZ => Unit::PerLength,
                 BeamField::AddedMass => Unit::Mass,
                 BeamField::AddedAt => Unit::Length,
@@ -314,7 +326,7 @@ impl Slot {
         }
     }
 
-    /// Whether the slot describes elasticity or loads rather than geometry.
+    /// Whether the site describes elasticity or loads rather than geometry.
     pub fn is_elastic(self) -> bool {
         match self {
             Self::Joint { field, .. } => {
@@ -337,7 +349,7 @@ impl Slot {
         matches!(self, Self::Target { axis: 3.., .. })
     }
 
-    /// Whether the slot belongs to the set-up (base, target, fixture) rather than to the arm.
+    /// Whether the site belongs to the set-up (base, target, fixture) rather than to the arm.
     pub fn is_placement(self) -> bool {
         matches!(self, Self::Base { .. } | Self::Target { .. } | Self::Fixture { .. })
     }

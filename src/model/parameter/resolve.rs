@@ -1,6 +1,6 @@
 //! From the rules of `[parameters]` to free parameters.
 
-use super::{BeamField, Driver, JointField, Parameter, Slot, unit};
+use super::{BeamField, JointField, Parameter, ParameterSite, Regressor, unit};
 use crate::error::{InputError, InputErrorKind};
 use crate::problem::effect;
 use crate::problem::pattern::matches;
@@ -12,8 +12,8 @@ pub(super) struct Candidate {
     pub(super) name: String,
     /// The name without the session or target in brackets, which patterns may use as well.
     plain: String,
-    pub(super) slot: Slot,
-    pub(super) driver: Driver,
+    pub(super) site: ParameterSite,
+    pub(super) regressor: Regressor,
     pub(super) nominal: f64,
     /// For a parameter of an effect, which is free with this prior where no rule speaks of it.
     of_effect: Option<f64>,
@@ -23,7 +23,7 @@ pub(super) struct Candidate {
 
 impl Candidate {
     pub(super) fn unit(&self) -> Unit {
-        unit(self.slot, self.driver)
+        unit(self.site, self.regressor)
     }
 
     fn matches(&self, rule: &ParameterRule) -> bool {
@@ -39,9 +39,9 @@ pub struct EffectParameter {
     /// The name without the place in brackets: `gear-ratio.error`.
     pub plain: String,
     /// Where it enters.
-    pub slot: Slot,
+    pub site: ParameterSite,
     /// What it is multiplied by there.
-    pub driver: Driver,
+    pub regressor: Regressor,
     /// Value of no effect, or where an effect of no size would be.
     pub nominal: f64,
     /// 1 σ of a prior that leaves every realistic size possible.
@@ -51,7 +51,7 @@ pub struct EffectParameter {
 impl EffectParameter {
     /// Kind of quantity.
     pub fn unit(&self) -> Unit {
-        unit(self.slot, self.driver)
+        unit(self.site, self.regressor)
     }
 
     fn is_named(&self, rule: &ParameterRule) -> bool {
@@ -59,7 +59,8 @@ impl EffectParameter {
     }
 }
 
-/// Free parameters of `problem` with one base per name in `bases` and one target per name in `targets`.
+/// Free parameters of `problem` with one base per name in `bases` and one target per name in
+/// `targets`.
 ///
 /// A single unnamed base or target (the empty word) goes without brackets: `base.x`.
 ///
@@ -96,36 +97,44 @@ pub fn resolve(
             if undeclared.is_some() && matches!(rule.freedom, Freedom::Fixed) {
                 continue;
             }
-            let kind = undeclared.unwrap_or(InputErrorKind::MatchesNothing { pattern: rule.pattern.clone(), known });
+            let kind = undeclared
+                .unwrap_or(InputErrorKind::MatchesNothing { pattern: rule.pattern.clone(), known });
             return Err(rule.location.clone().error(kind));
         }
         check_kinds(rule, &candidates)?;
     }
     let mut parameters = Vec::new();
     for (candidate, rule) in candidates.into_iter().zip(decided) {
-        if let (true, Some(rule), Slot::Fixture { kind, axis, .. }) = (candidate.unknown, rule, candidate.slot)
+        if let (true, Some(rule), ParameterSite::Fixture { kind, axis, .. }) =
+            (candidate.unknown, rule, candidate.site)
             && !matches!(&rule.freedom, Freedom::Free { sigma, .. } if of_kind(sigma, candidate.unit()).is_none())
         {
-            let kind = InputErrorKind::HeldUnknown { parameter: candidate.name, write: kind.declared_by(axis) };
+            let kind = InputErrorKind::HeldUnknown {
+                parameter: candidate.name,
+                write: kind.declared_by(axis),
+            };
             return Err(rule.location.clone().error(kind));
         }
         let none = Quantities::default();
         let (sigma, min, max) = match (rule.map(|rule| &rule.freedom), candidate.of_effect) {
-            (Some(Freedom::Free { sigma, min, max }), _) => (of_kind(sigma, candidate.unit()), min, max),
+            (Some(Freedom::Free { sigma, min, max }), _) => {
+                (of_kind(sigma, candidate.unit()), min, max)
+            }
             // Of a unit that nobody knows there is no size that is too great.
             (None, Some(sigma)) => (Some(sigma).filter(|sigma| sigma.is_finite()), &none, &none),
             (None, None) if candidate.unknown => (None, &none, &none),
             (Some(Freedom::Fixed), _) | (None, None) => continue,
         };
-        if candidate.slot.turns_target() && !problem.data.fits_orientation {
+        if candidate.site.turns_target() && !problem.data.fits_orientation {
             continue;
         }
         let unit = candidate.unit();
-        let bound = |q: &Quantities| of_kind(q, unit).map(|v| if unit.is_relative() { v.ln() } else { v });
+        let bound =
+            |q: &Quantities| of_kind(q, unit).map(|v| if unit.is_relative() { v.ln() } else { v });
         parameters.push(Parameter {
             name: candidate.name,
-            slot: candidate.slot,
-            driver: candidate.driver,
+            site: candidate.site,
+            regressor: candidate.regressor,
             nominal: candidate.nominal,
             sigma,
             lower: bound(min).unwrap_or(f64::NEG_INFINITY),
@@ -137,7 +146,11 @@ pub fn resolve(
 
 /// The rule of `problem` that decides on a parameter of an effect, declared or not.
 pub fn rule_of<'a>(problem: &'a Problem, parameter: &EffectParameter) -> Option<&'a ParameterRule> {
-    problem.parameters.iter().rev().find(|rule| parameter.is_named(rule) && fits(rule, parameter.unit()))
+    problem
+        .parameters
+        .iter()
+        .rev()
+        .find(|rule| parameter.is_named(rule) && fits(rule, parameter.unit()))
 }
 
 /// The mistake of a pattern that is about effects which nothing declares, if it is one.
@@ -148,26 +161,36 @@ fn undeclared(problem: &Problem, pattern: &str, known: &[String]) -> Option<Inpu
     if known.iter().any(|name| matches(&wanted, &head(name))) {
         return None;
     }
-    let effects: Vec<&str> = effect::NAMES.iter().copied().filter(|name| matches(&wanted, name)).collect();
+    let effects: Vec<&str> =
+        effect::NAMES.iter().copied().filter(|name| matches(&wanted, name)).collect();
     let write = effect::example(effects.first()?, problem);
     Some(InputErrorKind::EffectNotDeclared { effects: effects.join(", "), write })
 }
 
-/// Whether the rules of `problem` hold all of these parameters of an effect that it does not declare.
+/// Whether the rules of `problem` hold all of these parameters of an effect that it does not
+/// declare.
 pub fn holds_all(problem: &Problem, parameters: &[EffectParameter]) -> bool {
-    let held = |parameter| rule_of(problem, parameter).is_some_and(|rule| matches!(rule.freedom, Freedom::Fixed));
+    let held = |parameter| {
+        rule_of(problem, parameter).is_some_and(|rule| matches!(rule.freedom, Freedom::Fixed))
+    };
     !parameters.is_empty() && parameters.iter().all(held)
 }
 
-/// Whether a rule of `problem` for effects alone would be a mistake with these parameters, for it gives none of their kind.
+/// Whether a rule of `problem` for effects alone would be a mistake with these parameters, for it
+/// gives none of their kind.
 pub fn refuses(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     let none = [String::new()];
-    let is_for_arm = |rule| candidates(problem, &none, &none, &[]).iter().any(|candidate| candidate.matches(rule));
-    let misses = |rule: &ParameterRule| parameters.iter().any(|own| own.is_named(rule) && !fits(rule, own.unit()));
+    let is_for_arm = |rule| {
+        candidates(problem, &none, &none, &[]).iter().any(|candidate| candidate.matches(rule))
+    };
+    let misses = |rule: &ParameterRule| {
+        parameters.iter().any(|own| own.is_named(rule) && !fits(rule, own.unit()))
+    };
     problem.parameters.iter().any(|rule| misses(rule) && !is_for_arm(rule))
 }
 
-/// Every scalar of the model, in a fixed order: joints, their beams, bases, targets, fixtures, effects.
+/// Every scalar of the model, in a fixed order: joints, their beams, bases, targets, fixtures,
+/// effects.
 pub(super) fn candidates(
     problem: &Problem,
     bases: &[String],
@@ -175,26 +198,30 @@ pub(super) fn candidates(
     effects: &[EffectParameter],
 ) -> Vec<Candidate> {
     let mut out = Vec::new();
-    let declared = |name: String, plain: String, slot, nominal| Candidate {
+    let declared = |name: String, plain: String, site, nominal| Candidate {
         name,
         plain,
-        slot,
-        driver: Driver::Constant,
+        site,
+        regressor: Regressor::Constant,
         nominal,
         of_effect: None,
         unknown: false,
     };
     for (joint, own) in problem.joints.iter().enumerate() {
         let geometry: Vec<(JointField, f64)> = match &own.placement {
-            Some(Placement { xyz, rpy }) => {
-                JointField::PLACEMENT.into_iter().zip(xyz.iter().chain(rpy.iter()).copied()).collect()
-            }
-            None => JointField::GEOMETRY.into_iter().zip([own.alpha, own.a, own.theta, own.d, own.beta]).collect(),
+            Some(Placement { xyz, rpy }) => JointField::PLACEMENT
+                .into_iter()
+                .zip(xyz.iter().chain(rpy.iter()).copied())
+                .collect(),
+            None => JointField::GEOMETRY
+                .into_iter()
+                .zip([own.alpha, own.a, own.theta, own.d, own.beta])
+                .collect(),
         };
         let stiffness = own.stiffness.map(|k| (JointField::Stiffness, k));
         for (field, nominal) in geometry.into_iter().chain(stiffness) {
             let name = format!("joint{}.{}", joint + 1, field.name());
-            out.push(declared(name.clone(), name, Slot::Joint { joint, field }, nominal));
+            out.push(declared(name.clone(), name, ParameterSite::Joint { joint, field }, nominal));
         }
     }
     for (joint, own) in problem.joints.iter().enumerate() {
@@ -204,19 +231,29 @@ pub(super) fn candidates(
         } else {
             [(BeamField::BendingY, beam.ei_y), (BeamField::BendingZ, beam.ei_z)]
         };
-        let all = [(BeamField::Axial, beam.ea), bending[0], bending[1], (BeamField::Twist, beam.gj)];
+        let all =
+            [(BeamField::Axial, beam.ea), bending[0], bending[1], (BeamField::Twist, beam.gj)];
         for (field, nominal) in all {
             let Some(nominal) = nominal else { continue };
             let name = format!("{}.{}", beam.name, field.name());
-            out.push(declared(name.clone(), name, Slot::Beam { joint, field }, nominal));
+            out.push(declared(name.clone(), name, ParameterSite::Beam { joint, field }, nominal));
         }
     }
-    let label = |what: &str, word: &str| if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") };
+    let label = |what: &str, word: &str| {
+        if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") }
+    };
     let pose = problem.base.translation.iter().chain(problem.base.rotation.iter());
     for (base, word) in bases.iter().enumerate() {
-        for (axis, (suffix, &nominal)) in ["x", "y", "z", "rx", "ry", "rz"].iter().zip(pose.clone()).enumerate() {
+        for (axis, (suffix, &nominal)) in
+            ["x", "y", "z", "rx", "ry", "rz"].iter().zip(pose.clone()).enumerate()
+        {
             let name = format!("{}.{suffix}", label("base", word));
-            out.push(declared(name, format!("base.{suffix}"), Slot::Base { base, axis }, nominal));
+            out.push(declared(
+                name,
+                format!("base.{suffix}"),
+                ParameterSite::Base { base, axis },
+                nominal,
+            ));
         }
     }
     for (target, word) in targets.iter().enumerate() {
@@ -224,24 +261,36 @@ pub(super) fn candidates(
         let Ok(own) = problem.target(word) else { continue };
         let turned = own.rotation.iter().filter(|_| problem.data.orientation_sigma.is_some());
         let pose = own.at.iter().chain(turned);
-        for (axis, (suffix, &nominal)) in ["x", "y", "z", "rx", "ry", "rz"].iter().zip(pose).enumerate() {
+        for (axis, (suffix, &nominal)) in
+            ["x", "y", "z", "rx", "ry", "rz"].iter().zip(pose).enumerate()
+        {
             let name = format!("{}.{suffix}", label("tool", word));
-            out.push(declared(name, format!("tool.{suffix}"), Slot::Target { target, axis }, nominal));
+            out.push(declared(
+                name,
+                format!("tool.{suffix}"),
+                ParameterSite::Target { target, axis },
+                nominal,
+            ));
         }
     }
     for (fixture, Fixture { name, kind, known, .. }) in problem.fixtures.iter().enumerate() {
         for (axis, (field, known)) in kind.fields().iter().zip(known).enumerate() {
-            let slot = Slot::Fixture { fixture, kind: *kind, axis };
+            let site = ParameterSite::Fixture { fixture, kind: *kind, axis };
             let (word, nominal) = (kind.word(), known.unwrap_or(0.0));
-            let own = declared(format!("{word}[{name}].{field}"), format!("{word}.{field}"), slot, nominal);
+            let own = declared(
+                format!("{word}[{name}].{field}"),
+                format!("{word}.{field}"),
+                site,
+                nominal,
+            );
             out.push(Candidate { unknown: known.is_none(), ..own });
         }
     }
     out.extend(effects.iter().cloned().map(|effect| Candidate {
         name: effect.name,
         plain: effect.plain,
-        slot: effect.slot,
-        driver: effect.driver,
+        site: effect.site,
+        regressor: effect.regressor,
         nominal: effect.nominal,
         of_effect: Some(effect.sigma),
         unknown: false,
@@ -249,7 +298,8 @@ pub(super) fn candidates(
     out
 }
 
-/// Every quantity of a rule must fit a parameter that it matches, and every such parameter one quantity, if there are any.
+/// Every quantity of a rule must fit a parameter that it matches, and every such parameter one
+/// quantity, if there are any.
 fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), InputError> {
     let Freedom::Free { sigma, min, max } = &rule.freedom else { return Ok(()) };
     let fail = |kind| Err(rule.location.clone().error(kind));
@@ -258,11 +308,13 @@ fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), Inp
     if !kinds.iter().any(|&unit| given(unit)) {
         return Ok(());
     }
-    let matched: Vec<&Candidate> = candidates.iter().filter(|candidate| candidate.matches(rule)).collect();
+    let matched: Vec<&Candidate> =
+        candidates.iter().filter(|candidate| candidate.matches(rule)).collect();
     // A rule that speaks of others as well leaves the effects that it does not fit as they are.
     let all_of_effects = matched.iter().all(|candidate| candidate.of_effect.is_some());
-    let missing =
-        |candidate: &&&Candidate| (all_of_effects || candidate.of_effect.is_none()) && !given(candidate.unit());
+    let missing = |candidate: &&&Candidate| {
+        (all_of_effects || candidate.of_effect.is_none()) && !given(candidate.unit())
+    };
     if let Some(candidate) = matched.iter().find(missing) {
         let (parameter, suffixes) = (candidate.name.clone(), suffixes(candidate.unit()));
         return fail(InputErrorKind::QuantityMissing { parameter, suffixes });
@@ -276,11 +328,13 @@ fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), Inp
     Ok(())
 }
 
-/// Whether a rule can be meant for a quantity of this kind: it holds it, frees it, or gives its unit.
+/// Whether a rule can be meant for a quantity of this kind: it holds it, frees it, or gives its
+/// unit.
 fn fits(rule: &ParameterRule, unit: Unit) -> bool {
     let Freedom::Free { sigma, min, max } = &rule.freedom else { return true };
     let all = [sigma, min, max];
-    all.iter().all(|q| **q == Quantities::default()) || all.iter().any(|q| of_kind(q, unit).is_some())
+    all.iter().all(|q| **q == Quantities::default())
+        || all.iter().any(|q| of_kind(q, unit).is_some())
 }
 
 fn suffixes(unit: Unit) -> &'static str {
@@ -296,7 +350,9 @@ fn of_kind(quantities: &Quantities, unit: Unit) -> Option<f64> {
     match unit {
         Unit::Angle => quantities.angle,
         Unit::Length => quantities.length,
-        Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => quantities.relative,
+        Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => {
+            quantities.relative
+        }
         _ => None,
     }
 }

@@ -2,14 +2,15 @@
 
 use nalgebra::{DVector, Vector3};
 
-use crate::identify::{Identification, IdentifyError, Placement};
+use crate::fit::{Identification, IdentifyError, Placement};
 use crate::least_squares::jacobian;
 use crate::measurement::{Dataset, Measurements, Split};
-use crate::model::parameter::Slot;
+use crate::model::parameter::ParameterSite;
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::Problem;
 
-/// A pose whose position moves by less than this part of the most is left out: it says little about the coordinate.
+/// A pose whose position moves by less than this part of the most is left out: it says little about
+/// the coordinate.
 pub const LEAST_LEVER: f64 = 0.1;
 
 /// Measurements with what their poses need.
@@ -49,12 +50,19 @@ impl<'a> Poses<'a> {
         self.placement.poses(self.measurements, &self.rows(), sigma)
     }
 
-    /// Where some poses were measured, or where an arm has its target in those that measure no position, measuring frame \[m\].
+    /// Where some poses were measured, or where an arm has its target in those that measure no
+    /// position, measuring frame \[m\].
     pub fn places(arm: &Arm, poses: &[Pose]) -> Vec<Vector3<f64>> {
-        let (others, places): (Vec<Pose>, Vec<usize>) =
-            poses.iter().copied().zip(0..).filter(|(pose, _)| !pose.observation.is_position()).unzip();
+        let (others, places): (Vec<Pose>, Vec<usize>) = poses
+            .iter()
+            .copied()
+            .zip(0..)
+            .filter(|(pose, _)| !pose.observation.is_position())
+            .unzip();
         let mut at: Vec<Vector3<f64>> = poses.iter().map(|pose| *pose.measured).collect();
-        for (place, target) in places.into_iter().zip(arm.model.target_places(&others, arm.x.as_slice())) {
+        for (place, target) in
+            places.into_iter().zip(arm.model.target_places(&others, arm.x.as_slice()))
+        {
             at[place] = target;
         }
         at
@@ -66,19 +74,21 @@ impl<'a> Poses<'a> {
     }
 
     /// ∂p/∂(coordinate) of all rows, of one coordinate after the other [m/rad] or [m/m].
-    pub fn levers(&self, arm: &Arm, slots: &[Slot]) -> Vec<Vec<Vector3<f64>>> {
+    pub fn levers(&self, arm: &Arm, slots: &[ParameterSite]) -> Vec<Vec<Vector3<f64>>> {
         let (first, count) = (arm.x.len(), slots.len());
         if slots.is_empty() {
             return Vec::new();
         }
-        let model = arm.model.probing(&slots.iter().map(|&slot| (slot, 0.0)).collect::<Vec<_>>());
+        let model = arm.model.probing(&slots.iter().map(|&site| (site, 0.0)).collect::<Vec<_>>());
         let x = arm.x.clone().resize_vertically(first + count, 0.0);
         let poses = self.all(1.0);
         let sigmas: Vec<f64> = poses.iter().map(|pose| pose.sigma).collect();
         let residuals = PoseResiduals::new(&model, poses, (first..first + count).collect(), x);
         let columns = jacobian(&residuals, &DVector::zeros(count));
         let of_slot = |place: usize| {
-            let lever = |(k, sigma): (usize, &f64)| Vector3::from_fn(|axis, _| -columns[(3 * k + axis, place)] * sigma);
+            let lever = |(k, sigma): (usize, &f64)| {
+                Vector3::from_fn(|axis, _| -columns[(3 * k + axis, place)] * sigma)
+            };
             sigmas.iter().enumerate().map(lever).collect()
         };
         (0..count).map(of_slot).collect()

@@ -1,7 +1,9 @@
-//! The residual against what drives an effect: each pose's own measurement of the effect, and the law that was fitted.
+//! The residual against what drives an effect: each pose's own measurement of the effect, and the
+//! law that was fitted.
 //!
-//! Shown is the partial residual: what the fit leaves, with the effect's own part put back. At a joint it is turned into the
-//! error of the joint's coordinate by the lever of each pose; elsewhere it is the part along the effect's displacement.
+//! Shown is the partial residual: what the fit leaves, with the effect's own part put back. At a
+//! joint it is turned into the error of the joint's coordinate by the lever of each pose; elsewhere
+//! it is the part along the effect's displacement.
 
 use nalgebra::Vector3;
 
@@ -9,11 +11,11 @@ use super::arm::{Arm, LEAST_LEVER, Poses};
 use super::pose::{thin, thinned};
 use super::prelude::*;
 use super::reach::{beyond, reach};
-use crate::diagnose::{Covariate, PartialResidual, Unexplained};
 use crate::measurement::Split;
-use crate::model::parameter::{Driver, EffectParameter, JointField, Slot};
+use crate::model::parameter::{EffectParameter, JointField, ParameterSite, Regressor};
 use crate::problem::{Effect, JointKind, Mount, PoseView, Problem};
 use crate::quantity::Unit;
+use crate::select::{Covariate, PartialResidual, Unexplained};
 
 /// Steps of a curve.
 const STEPS: u32 = 160;
@@ -123,9 +125,12 @@ pub struct Closed<'a> {
 }
 
 /// The coordinate of every joint.
-pub fn coordinates(problem: &Problem) -> Vec<Slot> {
-    let field = |joint: usize| if slides(problem, joint) { JointField::D } else { JointField::Theta };
-    (1..=problem.joints.len()).map(|joint| Slot::Joint { joint: joint - 1, field: field(joint) }).collect()
+pub fn coordinates(problem: &Problem) -> Vec<ParameterSite> {
+    let field =
+        |joint: usize| if slides(problem, joint) { JointField::D } else { JointField::Theta };
+    (1..=problem.joints.len())
+        .map(|joint| ParameterSite::Joint { joint: joint - 1, field: field(joint) })
+        .collect()
 }
 
 /// An effect over its cause, before it is known which poses say something.
@@ -152,9 +157,16 @@ struct Rows<'a> {
 }
 
 /// The cause of an effect at the fit of `problem`, which declares it.
-pub fn of(found: &Effect, problem: &Problem, Closed { arm, left, levers }: Closed, poses: &Poses) -> Option<Cause> {
+pub fn of(
+    found: &Effect,
+    problem: &Problem,
+    Closed { arm, left, levers }: Closed,
+    poses: &Poses,
+) -> Option<Cause> {
     let parameters = found.parameters(problem);
-    let place = |parameter: &EffectParameter| arm.model.parameters.iter().position(|own| own.name == parameter.name);
+    let place = |parameter: &EffectParameter| {
+        arm.model.parameters.iter().position(|own| own.name == parameter.name)
+    };
     let places: Vec<usize> = parameters.iter().map(place).collect::<Option<_>>()?;
     let mut without = arm.clone();
     for &k in &places {
@@ -169,7 +181,8 @@ pub fn of(found: &Effect, problem: &Problem, Closed { arm, left, levers }: Close
         parameters: &parameters,
         values: &values,
     };
-    let view = at_joint(found, problem, &rows, levers, poses).unwrap_or_else(|| elsewhere(found, problem, &rows));
+    let view = at_joint(found, problem, &rows, levers, poses)
+        .unwrap_or_else(|| elsewhere(found, problem, &rows));
     let most = view.levers.iter().map(Vector3::norm).fold(0.0, f64::max);
     let point = |k: usize| Point {
         x: view.x[k],
@@ -181,7 +194,8 @@ pub fn of(found: &Effect, problem: &Problem, Closed { arm, left, levers }: Close
     let points: Vec<Point> = telling.map(point).collect();
     let (low, high) = range(points.iter().map(|point| point.x));
     let at = |step: u32| low + (high - low) * f64::from(step) / f64::from(STEPS);
-    let curve: Vec<(f64, f64)> = (0..=STEPS).filter(|_| low <= high).map(at).map(|x| (x, (view.law)(x))).collect();
+    let curve: Vec<(f64, f64)> =
+        (0..=STEPS).filter(|_| low <= high).map(at).map(|x| (x, (view.law)(x))).collect();
     let up = (view.up)(largest(&points, &curve));
     let title = found.describe_in(poses.measurements.time_measured);
     Some(Cause { title, across: view.across, up, points, curve, reading: view.reading })
@@ -206,13 +220,18 @@ fn at_joint<'a>(
     poses: &Poses,
 ) -> Option<View<'a>> {
     let first = rows.values.first().copied().unwrap_or_default();
-    let each = |value: &dyn Fn(&PoseView) -> f64| -> Vec<f64> { rows.poses.iter().map(value).collect() };
+    let each =
+        |value: &dyn Fn(&PoseView) -> f64| -> Vec<f64> { rows.poses.iter().map(value).collect() };
     let command = |joint: usize| each(&|pose| pose.configuration[joint - 1]);
     let lever = |joint: usize| &levers[joint - 1];
     let moment = |joint: usize| Quantity::new(format!("moment about joint {joint} [N·m]"), 1.0);
     // Δθ = c M, c₃ M³: the moment follows from the law itself.
     let moments = |joint: usize, of: fn(f64) -> f64| -> Vec<f64> {
-        lever(joint).iter().zip(&rows.own).map(|(lever, own)| of(along(lever, own) / first)).collect()
+        lever(joint)
+            .iter()
+            .zip(&rows.own)
+            .map(|(lever, own)| of(along(lever, own) / first))
+            .collect()
     };
     let in_proportion: Law = Box::new(move |x| first * x);
     let of_command: Law = Box::new(|q: f64| {
@@ -220,12 +239,17 @@ fn at_joint<'a>(
         rows.driven(&PoseView::of(&configuration))
     });
     let (joint, across, x, law): (_, _, _, Law) = match *found {
-        Effect::JointHarmonic { joint, .. } | Effect::JointWave { joint, .. } | Effect::GearRatio { joint } => {
+        Effect::JointHarmonic { joint, .. }
+        | Effect::JointWave { joint, .. }
+        | Effect::GearRatio { joint } => {
             (joint, Quantity::command(problem, joint), command(joint), of_command)
         }
-        Effect::JointCoupling { joint, from } => (joint, Quantity::command(problem, from), command(from), of_command),
+        Effect::JointCoupling { joint, from } => {
+            (joint, Quantity::command(problem, from), command(from), of_command)
+        }
         Effect::JointThermalDrift { joint } => {
-            let law = Box::new(|t| rows.driven(&PoseView { temperature: Some(&t), ..PoseView::of(&[]) }));
+            let law =
+                Box::new(|t| rows.driven(&PoseView { temperature: Some(&t), ..PoseView::of(&[]) }));
             (joint, Quantity::temperature(), rows.temperatures(), law)
         }
         Effect::Covariate { joint: Mount::Joint(joint), ref of } => {
@@ -234,29 +258,47 @@ fn at_joint<'a>(
             (joint, Quantity::new(of, 1.0), values, in_proportion)
         }
         Effect::Backlash { joint } if poses.measurements.approach.is_some() => {
-            let across = Quantity::new(format!("side from which joint {joint} came [−1 … +1]"), 1.0);
+            let across =
+                Quantity::new(format!("side from which joint {joint} came [−1 … +1]"), 1.0);
             let sides = each(&|pose| pose.approach.map_or(0.0, |all| all[joint - 1]));
             (joint, across, sides, Box::new(move |side| 0.5 * first * side))
         }
         Effect::PayloadBacklash { joint } => {
-            let across = Quantity::new(format!("half the payload × side from which joint {joint} came [kg]"), 1.0);
-            let driver = Driver::LoadedSide { joint: joint - 1, declared: problem.tool.payload_mass };
-            (joint, across, each(&|pose| driver.value(pose)), in_proportion)
+            let across = Quantity::new(
+                format!("half the payload × side from which joint {joint} came [kg]"),
+                1.0,
+            );
+            let regressor =
+                Regressor::LoadedSide { joint: joint - 1, declared: problem.tool.payload_mass };
+            (joint, across, each(&|pose| regressor.value(pose)), in_proportion)
         }
         Effect::JointHysteresis { joint, distance } => {
-            let across = Quantity::new(format!("part of its friction that pulls joint {joint} back [−1 … +1]"), 1.0);
-            let driver = Driver::Dragged { joint: joint - 1, distance };
-            (joint, across, each(&|pose| driver.value(pose)), in_proportion)
+            let across = Quantity::new(
+                format!("part of its friction that pulls joint {joint} back [−1 … +1]"),
+                1.0,
+            );
+            let regressor = Regressor::Dragged { joint: joint - 1, distance };
+            (joint, across, each(&|pose| regressor.value(pose)), in_proportion)
         }
         Effect::JointThermalDriftLag { joint, time_constant } => {
             let reference = problem.data.reference_temperature.unwrap_or_default();
             let felt = rows.felt(reference, time_constant);
-            (joint, Quantity::lagging(time_constant), felt, Box::new(move |felt| first * (felt - reference)))
+            (
+                joint,
+                Quantity::lagging(time_constant),
+                felt,
+                Box::new(move |felt| first * (felt - reference)),
+            )
         }
-        Effect::JointCompliance { joint } => (joint, moment(joint), moments(joint, |moment| moment), in_proportion),
-        Effect::JointNonlinearStiffness { joint } => {
-            (joint, moment(joint), moments(joint, f64::cbrt), Box::new(move |moment| first * moment.powi(3)))
+        Effect::JointCompliance { joint } => {
+            (joint, moment(joint), moments(joint, |moment| moment), in_proportion)
         }
+        Effect::JointNonlinearStiffness { joint } => (
+            joint,
+            moment(joint),
+            moments(joint, f64::cbrt),
+            Box::new(move |moment| first * moment.powi(3)),
+        ),
         _ => return None,
     };
     let unit = if slides(problem, joint) { Unit::Length } else { Unit::Angle };
@@ -267,15 +309,19 @@ fn at_joint<'a>(
 type Law<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
 
 impl Rows<'_> {
-    /// Σ value · driver.
+    /// Σ value · regressor.
     fn driven(&self, pose: &PoseView) -> f64 {
-        self.parameters.iter().zip(self.values).map(|(own, value)| value * own.driver.value(pose)).sum()
+        self.parameters
+            .iter()
+            .zip(self.values)
+            .map(|(own, value)| value * own.regressor.value(pose))
+            .sum()
     }
 
     /// Temperatures that lag.
     fn felt(&self, reference: f64, time_constant: f64) -> Vec<f64> {
-        let driver = Driver::Lagging { reference, time_constant };
-        self.poses.iter().map(|pose| driver.value(pose) + reference).collect()
+        let regressor = Regressor::Lagging { reference, time_constant };
+        self.poses.iter().map(|pose| regressor.value(pose) + reference).collect()
     }
 
     fn temperatures(&self) -> Vec<f64> {
@@ -284,7 +330,9 @@ impl Rows<'_> {
 
     /// The effect's displacement over its size in each row; none where that is 0.
     fn over(&self, sizes: impl Iterator<Item = f64>) -> Vec<Vector3<f64>> {
-        let lever = |(own, size): (&Vector3<f64>, f64)| if size == 0.0 { Vector3::zeros() } else { own / size };
+        let lever = |(own, size): (&Vector3<f64>, f64)| {
+            if size == 0.0 { Vector3::zeros() } else { own / size }
+        };
         self.own.iter().zip(sizes).map(lever).collect()
     }
 }
@@ -295,7 +343,10 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
     let norm = rows.values.iter().map(|value| value * value).sum::<f64>().sqrt();
     let elapsed: Vec<f64> = rows.poses.iter().map(|pose| pose.elapsed).collect();
     let last = elapsed.iter().copied().fold(0.0, f64::max);
-    let most = rows.own.iter().fold(Vector3::zeros(), |a: Vector3<f64>, b| if b.norm() > a.norm() { *b } else { a });
+    let most = rows
+        .own
+        .iter()
+        .fold(Vector3::zeros(), |a: Vector3<f64>, b| if b.norm() > a.norm() { *b } else { a });
     let measured = |_| Quantity::new("displacement, measured [mm]", 1e3);
     // Of the measuring frame: every pose moves in one direction.
     let of_time = |law: Law<'a>| View {
@@ -319,14 +370,19 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
                 }
                 _ => (Quantity::temperature(), rows.temperatures()),
             };
-            let bends = matches!(found, Effect::LinkThermalBending { .. } | Effect::LinkThermalBendingLag { .. });
+            let bends = matches!(
+                found,
+                Effect::LinkThermalBending { .. } | Effect::LinkThermalBendingLag { .. }
+            );
             let link = link.clone();
             // An expansion has one coefficient with a sign; a bending's two make one size.
             let size = if bends { norm } else { sum };
             View {
                 across,
                 up: if bends {
-                    Box::new(move |most| Quantity::small(&format!("curvature of link {link}"), "rad/m", most))
+                    Box::new(move |most| {
+                        Quantity::small(&format!("curvature of link {link}"), "rad/m", most)
+                    })
                 } else {
                     Box::new(move |_| Quantity::new(format!("strain of link {link} [10⁻⁶]"), 1e6))
                 },
@@ -368,11 +424,12 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
     }
 }
 
-/// The correction of structure without a cause, less its mean; none where it is no function of one covariate, or of the order of the
-/// rows.
+/// The correction of structure without a cause, less its mean; none where it is no function of one
+/// covariate, or of the order of the rows.
 pub fn unexplained(left: &Unexplained, problem: &Problem, split: &Split) -> Option<Cause> {
     let of = left.correction.as_ref()?.curve.as_ref()?;
-    let mut curve: Vec<(f64, f64)> = of.points.iter().map(|point| (point.covariate, point.correction)).collect();
+    let mut curve: Vec<(f64, f64)> =
+        of.points.iter().map(|point| (point.covariate, point.correction)).collect();
     curve.sort_by(|a, b| a.0.total_cmp(&b.0));
     let trapezoid = |pair: &[(f64, f64)]| (pair[1].0 - pair[0].0) * 0.5 * (pair[0].1 + pair[1].1);
     let width = curve.last()?.0 - curve.first()?.0;
@@ -391,7 +448,8 @@ pub fn unexplained(left: &Unexplained, problem: &Problem, split: &Split) -> Opti
         _ => return None,
     };
     let most = of.points.iter().map(|point| point.lever).fold(0.0, f64::max);
-    let telling = of.points.iter().enumerate().filter(|(_, point)| point.lever > LEAST_LEVER * most);
+    let telling =
+        of.points.iter().enumerate().filter(|(_, point)| point.lever > LEAST_LEVER * most);
     let point = |(k, point): (usize, &PartialResidual)| Point {
         x: point.covariate,
         y: point.value - mean,
@@ -418,7 +476,12 @@ fn at_law(curve: &[(f64, f64)], x: f64) -> f64 {
 impl Cause {
     /// Of an effect that was found, with its number.
     pub fn draw_effect(&self, number: usize, shown: &[usize]) -> Drawing {
-        self.draw(shown, &format!("effect-{number}"), "fitted law", "Found by the loop; the line is the fitted law.")
+        self.draw(
+            shown,
+            &format!("effect-{number}"),
+            "fitted law",
+            "Found by the loop; the line is the fitted law.",
+        )
     }
 
     /// Of structure that no effect explains.
@@ -436,7 +499,8 @@ impl Cause {
         let known = |k: &usize| all[*k].row.is_none_or(|row| shown.binary_search(&row).is_ok());
         let known: Vec<usize> = (0..all.len()).filter(known).collect();
         let kept = thin(&known, MOST, |k| all[k].y - at_law(&self.curve, all[k].x));
-        let points: Vec<((f64, f64), &Point)> = kept.iter().map(|&k| (at(all[k].x, all[k].y), all[k])).collect();
+        let points: Vec<((f64, f64), &Point)> =
+            kept.iter().map(|&k| (at(all[k].x, all[k].y), all[k])).collect();
         let curve: Vec<(f64, f64)> = self.curve.iter().map(|&(x, y)| at(x, y)).collect();
         let every_point = || points.iter().map(|(at, _)| *at).chain(curve.iter().copied());
         let x = with_margin(range(every_point().map(|at| at.0)), 0.04);
@@ -454,25 +518,41 @@ impl Cause {
             let dots = dots.into_iter().take(if held_out { 2 } else { 1 });
             let entries: Vec<_> = dots.chain([(law, ACCENT, Mark::Line)]).collect();
             let body = legend(area, 20, &entries)?;
-            let mut chart = chart(&body, &Axis::linear(x, &self.across.label), &Axis::linear(y, &self.up.label))?;
+            let mut chart = chart(
+                &body,
+                &Axis::linear(x, &self.across.label),
+                &Axis::linear(y, &self.up.label),
+            )?;
             if y.0 < 0.0 && y.1 > 0.0 {
-                chart.draw_series([PathElement::new(vec![(x.0, 0.0), (x.1, 0.0)], line(FAINT, 1.0))])?;
+                chart.draw_series([PathElement::new(
+                    vec![(x.0, 0.0), (x.1, 0.0)],
+                    line(FAINT, 1.0),
+                )])?;
             }
             for (only, colour) in [(false, FAINT), (true, INK)] {
                 for (at, point) in points.iter().filter(|(_, point)| point.held_out == only) {
                     let style = if is_beyond(at) { line(WARM, 1.4) } else { colour.filled() };
                     tags.pose(point.row);
-                    chart.draw_series([Circle::new((at.0, at.1.clamp(y.0, y.1)), pixels(2.2), style)])?;
+                    chart.draw_series([Circle::new(
+                        (at.0, at.1.clamp(y.0, y.1)),
+                        pixels(2.2),
+                        style,
+                    )])?;
                 }
             }
             chart.draw_series(LineSeries::new(curve.iter().copied(), line(ACCENT, 2.2)))?;
             note_beyond(&body, outside)
         });
         let mut letters = self.title.chars();
-        let title = letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect());
-        let caption = format!("{lead} {}{}{}", self.reading, beyond(outside), thinned(kept.len(), all.len()));
+        let title = letters
+            .next()
+            .map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect());
+        let caption =
+            format!("{lead} {}{}{}", self.reading, beyond(outside), thinned(kept.len(), all.len()));
         let columns = ["held_out", self.across.label.as_str(), self.up.label.as_str()];
-        let row = |(at, point): &((f64, f64), &Point)| vec![point.held_out.to_string(), fixed(at.0, 6), fixed(at.1, 9)];
+        let row = |(at, point): &((f64, f64), &Point)| {
+            vec![point.held_out.to_string(), fixed(at.0, 6), fixed(at.1, 9)]
+        };
         let sheet = Sheet::new(&columns, points.iter().map(row).collect());
         Drawing::new(name, &title, caption, tags.put(&svg)).with(sheet)
     }

@@ -3,7 +3,7 @@
 use super::arm::{Arm, Poses};
 use super::pose::thin;
 use super::prelude::*;
-use crate::identify::Identification;
+use crate::fit::Identification;
 use crate::problem::Problem;
 
 /// Poses over which it is taken.
@@ -24,7 +24,8 @@ pub struct Contribution {
     pub name: String,
     /// Whether it is an effect.
     pub is_effect: bool,
-    /// Root mean square of how far predicted positions move where it is taken back to nominal and all else stays \[m\].
+    /// Root mean square of how far predicted positions move where it is taken back to nominal and
+    /// all else stays \[m\].
     pub moved: f64,
 }
 
@@ -42,8 +43,13 @@ pub fn of(
         for &k in places {
             without.x[k] = found.registered_x[k];
         }
-        let changes = poses.errors(&without, &rows).into_iter().zip(&with).map(|(without, with)| without - with);
-        let squares: Vec<f64> = changes.map(|change| change.norm_squared()).filter(|own| own.is_finite()).collect();
+        let changes = poses
+            .errors(&without, &rows)
+            .into_iter()
+            .zip(&with)
+            .map(|(without, with)| without - with);
+        let squares: Vec<f64> =
+            changes.map(|change| change.norm_squared()).filter(|own| own.is_finite()).collect();
         (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
     };
     let parameters = &arm.model.parameters;
@@ -55,7 +61,11 @@ pub fn of(
         let (places, others): (Vec<usize>, Vec<usize>) = rest.iter().partition(|k| is_own(k));
         rest = others;
         let name = format!("{} {}", effect.name(), effect.place()).trim_end().to_owned();
-        all.extend((!places.is_empty()).then(|| Contribution { name, is_effect: true, moved: moved(&places) }));
+        all.extend((!places.is_empty()).then(|| Contribution {
+            name,
+            is_effect: true,
+            moved: moved(&places),
+        }));
     }
     all.extend(rest.into_iter().map(|k| Contribution {
         name: parameters[k].name.clone(),
@@ -72,34 +82,55 @@ pub fn contributions(all: &[Contribution]) -> Option<Drawing> {
         all.iter().filter(|own| own.moved > 0.0).partition(|own| own.is_effect);
     effects.truncate(MOST / 2);
     let room = MOST - effects.len();
-    let mut shown: Vec<&Contribution> = effects.into_iter().chain(parameters.into_iter().take(room)).collect();
+    let mut shown: Vec<&Contribution> =
+        effects.into_iter().chain(parameters.into_iter().take(room)).collect();
     shown.sort_by(|a, b| b.moved.total_cmp(&a.moved));
     let most = (shown.first()?.moved * 1e3).log10();
-    let least = shown.last().map_or(most, |own| (own.moved * 1e3).log10()).max(most - DECADES) - 0.25;
+    let least =
+        shown.last().map_or(most, |own| (own.moved * 1e3).log10()).max(most - DECADES) - 0.25;
     let count = i32::try_from(shown.len()).unwrap_or_default();
     let bottom = 26 + ROW * count;
     let room = f64::from(WIDTH - NAMES - NUMBERS);
     let place = |value: f64| px(NAMES) + pixels((value.max(least) - least) / (most - least) * room);
-    let svg = figure((WIDTH, bottom + BELOW - 16), "What each parameter and effect contributes", |area| {
-        let entries = [("parameter", FAINT, Mark::Bar), ("effect", ACCENT, Mark::Bar)];
-        let has_effects = shown.iter().any(|own| own.is_effect);
-        legend(area, 22, if has_effects { &entries } else { &entries[..1] })?;
-        for (k, own) in (0..).zip(&shown) {
-            let y = 24 + ROW * k + ROW / 2;
-            let value = own.moved * 1e3;
-            let colour = if own.is_effect { ACCENT } else { FAINT };
-            write(area, &own.name, (NAMES - 8, y), if own.is_effect { INK } else { MUTED }, HPos::Right)?;
-            let end = place(value.log10()).max(px(NAMES) + px(1));
-            area.draw(&Rectangle::new([(px(NAMES), px(y - 5)), (end, px(y + 5))], colour.filled()))?;
-            if value.log10() < least {
-                area.draw(&Circle::new((px(NAMES), px(y)), px(2), WARM.filled()))?;
+    let svg = figure(
+        (WIDTH, bottom + BELOW - 16),
+        "What each parameter and effect contributes",
+        |area| {
+            let entries = [("parameter", FAINT, Mark::Bar), ("effect", ACCENT, Mark::Bar)];
+            let has_effects = shown.iter().any(|own| own.is_effect);
+            legend(area, 22, if has_effects { &entries } else { &entries[..1] })?;
+            for (k, own) in (0..).zip(&shown) {
+                let y = 24 + ROW * k + ROW / 2;
+                let value = own.moved * 1e3;
+                let colour = if own.is_effect { ACCENT } else { FAINT };
+                write(
+                    area,
+                    &own.name,
+                    (NAMES - 8, y),
+                    if own.is_effect { INK } else { MUTED },
+                    HPos::Right,
+                )?;
+                let end = place(value.log10()).max(px(NAMES) + px(1));
+                area.draw(&Rectangle::new(
+                    [(px(NAMES), px(y - 5)), (end, px(y + 5))],
+                    colour.filled(),
+                ))?;
+                if value.log10() < least {
+                    area.draw(&Circle::new((px(NAMES), px(y)), px(2), WARM.filled()))?;
+                }
+                let words = format!("{} mm", two_digits(value, 4));
+                write(area, &words, (end / px(1) + 6, y), MUTED, HPos::Left)?;
             }
-            let words = format!("{} mm", two_digits(value, 4));
-            write(area, &words, (end / px(1) + 6, y), MUTED, HPos::Left)?;
-        }
-        let label = "rms move of the predicted position [mm], logarithmic";
-        write(area, label, (NAMES + (WIDTH - NAMES - NUMBERS) / 2, bottom + 12), INK, HPos::Center)
-    });
+            let label = "rms move of the predicted position [mm], logarithmic";
+            write(
+                area,
+                label,
+                (NAMES + (WIDTH - NAMES - NUMBERS) / 2, bottom + 12),
+                INK,
+                HPos::Center,
+            )
+        },
+    );
     let part = if all.len() > shown.len() {
         format!(" {} of {} are drawn, the largest.", shown.len(), all.len())
     } else {
@@ -110,7 +141,12 @@ pub fn contributions(all: &[Contribution]) -> Option<Drawing> {
          nominal value (base and tool: to where the nominal arm has them), or one effect goes, and all else stays. Parameters \
          that make up for each other are long together.{part}"
     );
-    let rows = all.iter().map(|own| vec![own.name.clone(), own.is_effect.to_string(), fixed(own.moved * 1e3, 6)]);
+    let rows = all
+        .iter()
+        .map(|own| vec![own.name.clone(), own.is_effect.to_string(), fixed(own.moved * 1e3, 6)]);
     let sheet = Sheet::new(&["name", "is_effect", "rms_move_mm"], rows.collect());
-    Some(Drawing::new("contributions", "What each parameter and effect contributes", caption, svg).with(sheet))
+    Some(
+        Drawing::new("contributions", "What each parameter and effect contributes", caption, svg)
+            .with(sheet),
+    )
 }

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::prelude::*;
-use crate::identify::Correlations;
+use crate::fit::Correlations;
 
 /// Parameters that are drawn at most.
 const MOST: usize = 20;
@@ -23,7 +23,8 @@ pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
     }
     let shown = partners(matrix);
     let count = i32::try_from(shown.len()).unwrap_or(1);
-    let longest = shown.iter().map(|&i| correlations.names[i].chars().count()).max().unwrap_or_default();
+    let longest =
+        shown.iter().map(|&i| correlations.names[i].chars().count()).max().unwrap_or_default();
     let letters_of = |cell: i32| (0.85 * f64::from(cell)).min(TEXT);
     let cell_of = |names: i32| ((WIDTH - names - 4) / count).clamp(8, 26);
     #[expect(clippy::cast_possible_truncation, reason = "a place on the paper")]
@@ -57,14 +58,20 @@ pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
             let value = f64::from(k) / 5.0 - 1.0;
             let colour = if value < 0.0 { WARM.mix(-value) } else { ACCENT.mix(value) };
             let left = names + 14 * k;
-            area.draw(&Rectangle::new([(px(left), px(y - 6)), (px(left + 14), px(y + 6))], colour.filled()))?;
+            area.draw(&Rectangle::new(
+                [(px(left), px(y - 6)), (px(left + 14), px(y + 6))],
+                colour.filled(),
+            ))?;
         }
         write(area, "−1", (names - 6, y), MUTED, HPos::Right)?;
         write(area, "+1   correlation", (names + 14 * 11 + 6, y), MUTED, HPos::Left)
     });
     let left_out = all - shown.len();
-    let part =
-        if left_out > 0 { format!(" Of {all} parameters the {MOST} that go together most.") } else { String::new() };
+    let part = if left_out > 0 {
+        format!(" Of {all} parameters the {MOST} that go together most.")
+    } else {
+        String::new()
+    };
     let caption = format!(
         "Correlation of every pair of estimates, columns in the order of the rows, those that go together side \
              by side. Deep colours off the diagonal: only the \
@@ -80,12 +87,15 @@ pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
     Some(Drawing::new("correlations", "Which estimates go together", caption, svg).with(sheet))
 }
 
-/// The parameters of the largest correlations, at most so many, ordered so that partners stand side by side: groups are joined
-/// from the largest correlation down, end to end (single linkage).
+/// The parameters of the largest correlations, at most so many, ordered so that partners stand side
+/// by side: groups are joined from the largest correlation down, end to end (single linkage).
 fn partners(matrix: &DMatrix<f64>) -> Vec<usize> {
     let all = matrix.ncols();
-    let size = |&(i, j): &(usize, usize)| Some(matrix[(i, j)].abs()).filter(|size| size.is_finite()).unwrap_or(0.0);
-    let mut pairs: Vec<(usize, usize)> = (0..all).flat_map(|j| (0..j).map(move |i| (i, j))).collect();
+    let size = |&(i, j): &(usize, usize)| {
+        Some(matrix[(i, j)].abs()).filter(|size| size.is_finite()).unwrap_or(0.0)
+    };
+    let mut pairs: Vec<(usize, usize)> =
+        (0..all).flat_map(|j| (0..j).map(move |i| (i, j))).collect();
     pairs.sort_by(|a, b| size(b).total_cmp(&size(a)).then(a.cmp(b)));
     let mut strongest: Vec<usize> = Vec::new();
     for i in pairs.iter().flat_map(|&(i, j)| [i, j]) {
@@ -101,7 +111,8 @@ fn partners(matrix: &DMatrix<f64>) -> Vec<usize> {
             let (first, last) = (one.min(other), one.max(other));
             let mut joined = groups.remove(last);
             // The partner's end of each group comes to the middle.
-            let near = |group: &[usize], k: usize| group.iter().position(|&own| own == k).unwrap_or(0);
+            let near =
+                |group: &[usize], k: usize| group.iter().position(|&own| own == k).unwrap_or(0);
             let (a, b) = if groups[first].contains(&i) { (i, j) } else { (j, i) };
             if 2 * near(&groups[first], a) + 1 < groups[first].len() {
                 groups[first].reverse();
@@ -128,7 +139,10 @@ mod tests {
         }
         let order = partners(&matrix);
         let place = |k: usize| order.iter().position(|&own| own == k).unwrap_or(9);
-        assert_eq!((order.len(), place(0).abs_diff(place(3)), place(1).abs_diff(place(4))), (5, 1, 1));
+        assert_eq!(
+            (order.len(), place(0).abs_diff(place(3)), place(1).abs_diff(place(4))),
+            (5, 1, 1)
+        );
         assert_eq!(place(2).abs_diff(place(4)), 1, "{order:?}");
     }
 }

@@ -17,7 +17,8 @@ const PRIMES: [u32; 10] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29];
 /// The workspace and what of it was measured.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Coverage {
-    /// Positions that the arm reaches, with no fitted pose near, measuring frame of the first session \[m\].
+    /// Positions that the arm reaches, with no fitted pose near, measuring frame of the first
+    /// session \[m\].
     pub uncovered: Vec<Vector3<f64>>,
     /// Positions that were tried.
     pub tried: usize,
@@ -25,7 +26,8 @@ pub struct Coverage {
     pub near: f64,
 }
 
-/// Radical inverse of k: its digits behind the point, so that k = 1, 2, … fill 0…1 evenly (van der Corput).
+/// Radical inverse of k: its digits behind the point, so that k = 1, 2, … fill 0…1 evenly (van der
+/// Corput).
 fn inverse(mut k: u32, base: u32) -> f64 {
     let (mut sum, mut part) = (0.0, 1.0);
     while k > 0 {
@@ -36,7 +38,8 @@ fn inverse(mut k: u32, base: u32) -> f64 {
     sum
 }
 
-/// Over configurations within the limits of the joints, or where one has none within its measured range.
+/// Over configurations within the limits of the joints, or where one has none within its measured
+/// range.
 pub fn of(problem: &Problem, poses: &Poses, arm: &Arm) -> Coverage {
     let all = poses.all(1.0);
     let of_arm = poses.split.identification.iter().filter_map(|&row| all.get(row));
@@ -52,7 +55,8 @@ pub fn of(problem: &Problem, poses: &Poses, arm: &Arm) -> Coverage {
     };
     let ends: Vec<(f64, f64)> = problem.joints.iter().enumerate().map(ends).collect();
     let configuration = |k: u32| -> Vec<f64> {
-        let value = |((low, high), base): (&(f64, f64), &u32)| low + (high - low) * inverse(k, *base);
+        let value =
+            |((low, high), base): (&(f64, f64), &u32)| low + (high - low) * inverse(k, *base);
         ends.iter().zip(PRIMES.iter().cycle()).map(value).collect()
     };
     let configurations: Vec<Vec<f64>> = (1..=TRIED).map(configuration).collect();
@@ -77,8 +81,11 @@ pub fn of(problem: &Problem, poses: &Poses, arm: &Arm) -> Coverage {
         let own = &bases[pose.base];
         bases[first.base].point(&own.resolve(&(at - own.origin)))
     };
-    let fitted: Vec<Vector3<f64>> = fitted.iter().zip(Poses::places(arm, &fitted)).map(there).collect();
-    let covered = |at: &Vector3<f64>| fitted.iter().any(|own| (own - at).norm_squared() <= near * near);
-    let uncovered: Vec<Vector3<f64>> = positions.iter().filter(|at| !covered(at)).copied().collect();
+    let fitted: Vec<Vector3<f64>> =
+        fitted.iter().zip(Poses::places(arm, &fitted)).map(there).collect();
+    let covered =
+        |at: &Vector3<f64>| fitted.iter().any(|own| (own - at).norm_squared() <= near * near);
+    let uncovered: Vec<Vector3<f64>> =
+        positions.iter().filter(|at| !covered(at)).copied().collect();
     Coverage { uncovered, tried: positions.len(), near }
 }

@@ -1,4 +1,5 @@
-//! What the figures of a report show, as numbers: errors pose by pose, correlations, residuals against their cause.
+//! What the figures of a report show, as numbers: errors pose by pose, correlations, residuals
+//! against their cause.
 
 use std::path::PathBuf;
 
@@ -10,13 +11,15 @@ use super::cause::{self, Cause, Closed};
 use super::contribution::{self, Contribution};
 use super::coverage::{self, Coverage};
 use super::pose::{PoseError, weighted};
-use crate::diagnose::{ClosedLoop, Findings, Found, examine};
 use crate::error::{Location, Warning};
-use crate::identify::{Before, Comparison, Correlations, Identification, IdentifyError, Procedure, Strategy};
+use crate::fit::{
+    Before, Comparison, Correlations, Identification, IdentifyError, Procedure, Strategy,
+};
 use crate::measurement::Dataset;
 use crate::model::{Model, Pose, Shape};
 use crate::problem::Problem;
 use crate::report::table::{Command, commands};
+use crate::select::{ClosedLoop, Findings, Found, examine};
 
 /// Poses that a page knows one by one at most.
 const MOST: usize = 600;
@@ -27,7 +30,8 @@ const MOST: usize = 600;
 pub enum Stage {
     /// Nothing but to find where base and target are, where these are free.
     Registered,
-    /// Nothing: the nominal arm, without elasticity, in the measured frames; what the paper calls before.
+    /// Nothing: the nominal arm, without elasticity, in the measured frames; what the paper calls
+    /// before.
     Before,
     /// Geometry identified, elasticity ignored: the model is rigid.
     Ignoring,
@@ -55,14 +59,15 @@ pub struct PlotData {
     pub stages: Vec<StageErrors>,
     /// What the best leaves, pose by pose, in the order of the rows.
     pub residuals: Vec<PoseError>,
-    /// The rows among them that figures may draw, ascending: all in which the target has a place, or evenly many of these with the
-    /// largest residuals among them.
+    /// The rows among them that figures may draw, ascending: all in which the target has a place,
+    /// or evenly many of these with the largest residuals among them.
     pub shown: Vec<usize>,
     /// How many rows each of `shown` stands for.
     pub stand_for: Vec<f64>,
     /// Joints that take a command.
     pub commands: Vec<Command>,
-    /// What the change of each parameter, and each effect, does to the predicted positions, the largest first.
+    /// What the change of each parameter, and each effect, does to the predicted positions, the
+    /// largest first.
     pub contributions: Vec<Contribution>,
     /// What of the workspace was measured.
     pub coverage: Coverage,
@@ -87,18 +92,27 @@ impl PlotData {
     ///
     /// # Errors
     /// Problem and data do not fit each other.
-    pub fn of_identification(problem: &Problem, data: &Dataset, found: &Identification) -> Result<Self, IdentifyError> {
+    pub fn of_identification(
+        problem: &Problem,
+        data: &Dataset,
+        found: &Identification,
+    ) -> Result<Self, IdentifyError> {
         let poses = Poses::new(data);
         let fitted = poses.arm(problem, found)?;
         let stages = vec![registered(&poses, &fitted, found), identified(&poses, &fitted, found)];
         Ok(Self::of(problem, &poses, stages, (&fitted, found), examine(problem, data, found)?))
     }
 
-    /// Of a comparison: of its joint fit, beside what the paper calls before and ignoring elasticity.
+    /// Of a comparison: of its joint fit, beside what the paper calls before and ignoring
+    /// elasticity.
     ///
     /// # Errors
     /// Problem and data do not fit each other.
-    pub fn of_comparison(problem: &Problem, data: &Dataset, comparison: &Comparison) -> Result<Self, IdentifyError> {
+    pub fn of_comparison(
+        problem: &Problem,
+        data: &Dataset,
+        comparison: &Comparison,
+    ) -> Result<Self, IdentifyError> {
         let (poses, joint) = (Poses::new(data), &comparison.joint);
         let fitted = poses.arm(problem, joint)?;
         let stages = comparison.procedures.first().map(|own| own_stages(&comparison.before, own));
@@ -110,25 +124,45 @@ impl PlotData {
     ///
     /// # Errors
     /// Problem and data do not fit each other.
-    pub fn of_loop(problem: &Problem, data: &Dataset, closure: &ClosedLoop) -> Result<Self, IdentifyError> {
+    pub fn of_loop(
+        problem: &Problem,
+        data: &Dataset,
+        closure: &ClosedLoop,
+    ) -> Result<Self, IdentifyError> {
         let (poses, fit) = (Poses::new(data), &closure.before.fit);
         // Loops fit positions alone.
-        let (before, after) =
-            (poses.arm(&problem.positions_alone(), fit)?, poses.arm(&closure.closed, &closure.after)?);
+        let (before, after) = (
+            poses.arm(&problem.positions_alone(), fit)?,
+            poses.arm(&closure.closed, &closure.after)?,
+        );
         let stages = vec![
             registered(&poses, &before, fit),
             identified(&poses, &before, fit),
             stage(&poses, Stage::Closed, &after),
         ];
         let left = poses.errors(&after, &poses.rows());
-        let coordinates = if closure.effects.is_empty() { Vec::new() } else { cause::coordinates(&closure.closed) };
-        let closed = Closed { arm: &after, left: &left, levers: &poses.levers(&after, &coordinates) };
+        let coordinates = if closure.effects.is_empty() {
+            Vec::new()
+        } else {
+            cause::coordinates(&closure.closed)
+        };
+        let closed =
+            Closed { arm: &after, left: &left, levers: &poses.levers(&after, &coordinates) };
         let cause = |found: &Found| cause::of(&found.effect, &closure.closed, closed, &poses);
         let causes: Vec<Option<Cause>> = closure.effects.par_iter().map(cause).collect();
         Ok(Self {
             causes: causes.into_iter().flatten().collect(),
-            trend: closure.unexplained.iter().find_map(|left| cause::unexplained(left, &closure.closed, poses.split)),
-            ..Self::of(&closure.closed, &poses, stages, (&after, &closure.after), closure.findings.clone())
+            trend: closure
+                .unexplained
+                .iter()
+                .find_map(|left| cause::unexplained(left, &closure.closed, poses.split)),
+            ..Self::of(
+                &closure.closed,
+                &poses,
+                stages,
+                (&after, &closure.after),
+                closure.findings.clone(),
+            )
         })
     }
 
@@ -143,7 +177,8 @@ impl PlotData {
         let rows = poses.rows();
         let before = poses.errors(&untouched(best, found), &rows);
         let names: Vec<_> = measurements.files.iter().map(|file| file.file_name()).collect();
-        let distinct = names.iter().enumerate().all(|(k, name)| name.is_some() && !names[..k].contains(name));
+        let distinct =
+            names.iter().enumerate().all(|(k, name)| name.is_some() && !names[..k].contains(name));
         let place = |row: usize| {
             let whole = measurements.location(row);
             let name = whole.file.file_name().filter(|_| distinct).map(PathBuf::from);
@@ -157,26 +192,37 @@ impl PlotData {
             Some(base) if pose.observation.is_point() => base.point(&error) - base.origin,
             _ => error,
         };
-        let residual = |((row, pose), (error, before)): ((usize, Pose), (Vector3<f64>, Vector3<f64>))| PoseError {
-            place: place(row),
-            configuration: pose.setup.configuration.to_vec(),
-            held_out: poses.split.held_out.binary_search(&row).is_ok(),
-            observation: pose.observation,
-            position: places[row],
-            error: turned(&pose, error),
-            before: turned(&pose, before),
-            sigma: pose.sigma,
-            time: if measurements.time_measured { pose.setup.time } else { (row + 1) as f64 },
-        };
+        let residual =
+            |((row, pose), (error, before)): ((usize, Pose), (Vector3<f64>, Vector3<f64>))| {
+                PoseError {
+                    place: place(row),
+                    configuration: pose.setup.configuration.to_vec(),
+                    held_out: poses.split.held_out.binary_search(&row).is_ok(),
+                    observation: pose.observation,
+                    position: places[row],
+                    error: turned(&pose, error),
+                    before: turned(&pose, before),
+                    sigma: pose.sigma,
+                    time: if measurements.time_measured {
+                        pose.setup.time
+                    } else {
+                        (row + 1) as f64
+                    },
+                }
+            };
         let errors = poses.errors(best, &rows).into_iter().zip(before);
-        let residuals: Vec<PoseError> = all.iter().copied().enumerate().zip(errors).map(residual).collect();
+        let residuals: Vec<PoseError> =
+            all.iter().copied().enumerate().zip(errors).map(residual).collect();
         // The few of one kind are not crowded out by the many of the other.
         let placed = rows.iter().filter(|&&row| residuals[row].has_place());
-        let (held_out, fitted): (Vec<usize>, Vec<usize>) = placed.partition(|&&row| residuals[row].held_out);
+        let (held_out, fitted): (Vec<usize>, Vec<usize>) =
+            placed.partition(|&&row| residuals[row].held_out);
         let few = held_out.len().min(fitted.len()).min(MOST / 2);
         let room = |kind: &[usize]| if kind.len() <= few { few } else { MOST - few };
         let size = |row: usize| residuals[row].error.norm();
-        let mut drawn = [weighted(&fitted, room(&fitted), size), weighted(&held_out, room(&held_out), size)].concat();
+        let mut drawn =
+            [weighted(&fitted, room(&fitted), size), weighted(&held_out, room(&held_out), size)]
+                .concat();
         drawn.sort_unstable_by_key(|own| own.0);
         let (shown, stand_for): (Vec<usize>, Vec<f64>) = drawn.into_iter().unzip();
         let drawn: Vec<Pose> = shown.iter().map(|&row| all[row]).collect();
@@ -234,7 +280,10 @@ pub(super) fn own_stages(before: &Before, own: &Procedure) -> Vec<StageErrors> {
     let of = |stage, errors: &Vec<Vector3<f64>>| StageErrors { stage, errors: errors.clone() };
     let mut stages = vec![of(Stage::Before, &before.errors)];
     stages.extend(own.ignoring.iter().map(|errors| of(Stage::Ignoring, errors)));
-    stages.push(of(if own.ignoring.is_some() { Stage::Elastic } else { Stage::Identified }, &own.after));
+    stages.push(of(
+        if own.ignoring.is_some() { Stage::Elastic } else { Stage::Identified },
+        &own.after,
+    ));
     stages
 }
 
@@ -253,5 +302,5 @@ fn identified(poses: &Poses, fitted: &Arm, found: &Identification) -> StageError
 
 /// Whether stiffnesses or rigidities are free.
 fn is_elastic(model: &Model) -> bool {
-    model.parameters.iter().any(|parameter| parameter.slot.is_elastic())
+    model.parameters.iter().any(|parameter| parameter.site.is_elastic())
 }

@@ -1,4 +1,5 @@
-//! Paper and axes of every figure: sizes in pixels as shown, ticks at round numbers, colours that a page may exchange.
+//! Paper and axes of every figure: sizes in pixels as shown, ticks at round numbers, colours that a
+//! page may exchange.
 
 use std::io;
 use std::ops::Range;
@@ -55,7 +56,13 @@ pub struct Drawing {
 
 impl Drawing {
     pub fn new(name: &str, title: &str, caption: impl Into<String>, svg: String) -> Self {
-        Self { name: name.to_owned(), title: title.to_owned(), caption: caption.into(), svg, data: Sheet::default() }
+        Self {
+            name: name.to_owned(),
+            title: title.to_owned(),
+            caption: caption.into(),
+            svg,
+            data: Sheet::default(),
+        }
     }
 
     /// With its numbers.
@@ -140,7 +147,8 @@ impl<'a> Axis<'a> {
             let parts: &[f64] = if high - low > 2.0 { &[1.0] } else { &[1.0, 3.0] };
             let every = ((high - low) / self.numbers as f64).floor().max(1.0);
             let decades = (0..=64).map(|k| (low / every).floor() * every + f64::from(k) * every);
-            let all = decades.flat_map(|decade| parts.iter().map(move |part| decade + part.log10()));
+            let all =
+                decades.flat_map(|decade| parts.iter().map(move |part| decade + part.log10()));
             return all.filter(|tick| (low - 1e-9..=high + 1e-9).contains(tick)).collect();
         }
         let step = step(high - low, self.numbers);
@@ -160,7 +168,8 @@ impl<'a> Axis<'a> {
             return crate::report::quantity::number(plain, whole(decimals));
         }
         let step = step(self.range.1 - self.range.0, self.numbers.max(1));
-        crate::report::quantity::number(value, whole((-step.log10()).ceil().max(0.0))).replace('-', "−")
+        crate::report::quantity::number(value, whole((-step.log10()).ceil().max(0.0)))
+            .replace('-', "−")
     }
 }
 
@@ -175,7 +184,11 @@ fn power_of_ten(exponent: f64) -> String {
 
 /// A small number without its fraction.
 fn whole(value: f64) -> usize {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=12")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to 0..=12"
+    )]
     let whole = value.clamp(0.0, 12.0) as usize;
     whole
 }
@@ -190,7 +203,11 @@ pub fn round_numbers(range: (f64, f64), count: usize) -> Vec<(f64, String)> {
 fn step(range: f64, count: usize) -> f64 {
     let raw = range / count as f64;
     let power = 10.0_f64.powf(raw.log10().floor());
-    [1.0, 2.0, 5.0, 10.0].map(|part| part * power).into_iter().find(|step| *step >= raw).unwrap_or(10.0 * power)
+    [1.0, 2.0, 5.0, 10.0]
+        .map(|part| part * power)
+        .into_iter()
+        .find(|step| *step >= raw)
+        .unwrap_or(10.0 * power)
 }
 
 /// A range that is one, even of a single value or none.
@@ -205,7 +222,9 @@ fn widened((low, high): (f64, f64)) -> (f64, f64) {
 /// Smallest and largest of some values.
 pub fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let finite = values.into_iter().filter(|value| value.is_finite());
-    finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+    finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
+    })
 }
 
 /// A range with a margin of this part on both sides.
@@ -243,7 +262,13 @@ fn printable(text: &str) -> String {
 }
 
 /// Writes text at a place in pixels as shown.
-pub fn write(area: &Area, text: &str, at: (i32, i32), colour: RGBColor, side: HPos) -> Result<(), Failure> {
+pub fn write(
+    area: &Area,
+    text: &str,
+    at: (i32, i32),
+    colour: RGBColor,
+    side: HPos,
+) -> Result<(), Failure> {
     write_sized(area, text, at, (colour, TEXT), side)
 }
 
@@ -260,12 +285,21 @@ pub fn write_sized(
 }
 
 /// Draws an upright line at a place as drawn, between two heights as shown.
-pub fn upright(area: &Area, at: i32, (from, to): (i32, i32), colour: RGBColor) -> Result<(), Failure> {
+pub fn upright(
+    area: &Area,
+    at: i32,
+    (from, to): (i32, i32),
+    colour: RGBColor,
+) -> Result<(), Failure> {
     area.draw(&PathElement::new(vec![(at, px(from)), (at, px(to))], line(colour, 1.0)))
 }
 
 /// Draws a figure of some size as shown; `label` says what it is to who cannot see it.
-pub fn figure(size: (i32, i32), label: &str, paint: impl FnOnce(&Area) -> Result<(), Failure>) -> String {
+pub fn figure(
+    size: (i32, i32),
+    label: &str,
+    paint: impl FnOnce(&Area) -> Result<(), Failure>,
+) -> String {
     let drawn = (px(size.0).unsigned_abs(), px(size.1).unsigned_abs());
     let mut text = String::new();
     {
@@ -276,9 +310,14 @@ pub fn figure(size: (i32, i32), label: &str, paint: impl FnOnce(&Area) -> Result
     }
     let body = text.split_once('>').map_or("", |(_, body)| body);
     // What every element says of itself and is so anyway.
-    let body = [" opacity=\"1\"", " stroke=\"none\"", " stroke-width=\"1\"", " font-family=\"sans-serif\""]
-        .into_iter()
-        .fold(body.to_owned(), |body, default| body.replace(default, ""));
+    let body = [
+        " opacity=\"1\"",
+        " stroke=\"none\"",
+        " stroke-width=\"1\"",
+        " font-family=\"sans-serif\"",
+    ]
+    .into_iter()
+    .fold(body.to_owned(), |body, default| body.replace(default, ""));
     let label = printable(label).replace('&', "&amp;").replace('"', "&quot;").replace('<', "&lt;");
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"{} 0 {} {}\" width=\"{}\" height=\"{}\" role=\"img\" aria-label=\"{label}\" font-family=\"system-ui, sans-serif\">{body}",
@@ -290,7 +329,8 @@ pub fn figure(size: (i32, i32), label: &str, paint: impl FnOnce(&Area) -> Result
     )
 }
 
-/// Axes in an area, with room for their numbers and labels; an axis without a label takes none below.
+/// Axes in an area, with room for their numbers and labels; an axis without a label takes none
+/// below.
 pub fn chart<'a, 'b>(area: &'a Area<'b>, x: &Axis, y: &Axis) -> Result<Chart<'a, 'b>, Failure> {
     let below = match (x.label.is_empty(), x.numbers) {
         (true, 0) => 6,
@@ -339,9 +379,13 @@ pub fn band(colour: RGBColor) -> ShapeStyle {
     colour.mix(PALE).filled()
 }
 
-/// Entries of a legend, from left to right along the top of an area, each with the mark that it stands for, and the area
-/// from `height` on.
-pub fn legend<'a>(area: &Area<'a>, height: i32, entries: &[(&str, RGBColor, Mark)]) -> Result<Area<'a>, Failure> {
+/// Entries of a legend, from left to right along the top of an area, each with the mark that it
+/// stands for, and the area from `height` on.
+pub fn legend<'a>(
+    area: &Area<'a>,
+    height: i32,
+    entries: &[(&str, RGBColor, Mark)],
+) -> Result<Area<'a>, Failure> {
     let mut at = LEFT;
     for &(name, colour, mark) in entries {
         let middle = (px(at + 4), px(10));
@@ -349,9 +393,10 @@ pub fn legend<'a>(area: &Area<'a>, height: i32, entries: &[(&str, RGBColor, Mark
         match mark {
             Mark::Dot => area.draw(&Circle::new(middle, pixels(3.2), colour.filled())),
             Mark::Ring => area.draw(&Circle::new(middle, pixels(3.2), line(colour, 1.2))),
-            Mark::Line => {
-                area.draw(&PathElement::new(vec![(px(at - 2), px(10)), (px(at + 9), px(10))], line(colour, 2.2)))
-            }
+            Mark::Line => area.draw(&PathElement::new(
+                vec![(px(at - 2), px(10)), (px(at + 9), px(10))],
+                line(colour, 2.2),
+            )),
             Mark::Bar => area.draw(&Rectangle::new(corners(4), colour.filled())),
             Mark::Band => area.draw(&Rectangle::new(corners(4), band(colour))),
         }?;

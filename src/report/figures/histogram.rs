@@ -6,8 +6,8 @@ use super::prelude::*;
 use crate::numeric::median;
 
 const HEIGHT: i32 = 280;
-/// Least that the axis reaches \[σ\]; else four times what most residuals scatter. What lies beyond is counted into the outermost
-/// bars.
+/// Least that the axis reaches \[σ\]; else four times what most residuals scatter. What lies beyond
+/// is counted into the outermost bars.
 const REACH: f64 = 5.0;
 
 /// The numbers that a row measures, in units of σ.
@@ -30,29 +30,44 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
     let mut counts = vec![0_usize; 2 * half];
     for value in &values {
         let shifted = ((value + reach) / width).floor().clamp(0.0, (2 * half - 1) as f64);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the bars")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped to the bars"
+        )]
         let bar = shifted as usize;
         counts[bar] += 1;
     }
     let scale = values.len() as f64 * width;
     let normal = |u: f64| scale * (-0.5 * u * u).exp() / (2.0 * std::f64::consts::PI).sqrt();
     let tallest = counts.iter().map(|count| *count as f64).fold(normal(0.0), f64::max) * 1.08;
-    let beyond =
-        [values.iter().filter(|value| **value < -reach).count(), values.iter().filter(|value| **value > reach).count()];
+    let beyond = [
+        values.iter().filter(|value| **value < -reach).count(),
+        values.iter().filter(|value| **value > reach).count(),
+    ];
     let svg = figure((WIDTH, HEIGHT), "Histogram of the residuals", |area| {
-        let body = legend(area, 20, &[("fitted poses", FAINT, Mark::Bar), ("noise alone", ACCENT, Mark::Line)])?;
+        let body = legend(
+            area,
+            20,
+            &[("fitted poses", FAINT, Mark::Bar), ("noise alone", ACCENT, Mark::Line)],
+        )?;
         let x = Axis::linear((-reach, reach), "residual coordinate [σ]").numbers(10);
         let mut chart = chart(&body, &x, &Axis::linear((0.0, tallest), "number of coordinates"))?;
         let bars = counts.iter().enumerate().filter(|(_, count)| **count > 0).map(|(k, count)| {
             let left = k as f64 * width - reach;
             let outermost = (k == 0 && beyond[0] > 0) || (k + 1 == 2 * half && beyond[1] > 0);
             let colour = if outermost { WARM } else { FAINT };
-            Rectangle::new([(left + 0.04 * width, 0.0), (left + 0.96 * width, *count as f64)], colour.filled())
+            Rectangle::new(
+                [(left + 0.04 * width, 0.0), (left + 0.96 * width, *count as f64)],
+                colour.filled(),
+            )
         });
         chart.draw_series(bars)?;
         let curve = (-60..=60).map(|k| reach * f64::from(k) / 60.0).map(|u| (u, normal(u)));
         chart.draw_series(LineSeries::new(curve, line(ACCENT, 2.0)))?;
-        for (count, at, side) in [(beyond[0], LEFT + 6, HPos::Left), (beyond[1], WIDTH - 16, HPos::Right)] {
+        for (count, at, side) in
+            [(beyond[0], LEFT + 6, HPos::Left), (beyond[1], WIDTH - 16, HPos::Right)]
+        {
             if count > 0 {
                 write(&body, &format!("{count} beyond"), (at, 18), WARM, side)?;
             }

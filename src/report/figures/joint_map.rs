@@ -11,7 +11,8 @@ const NAMES: i32 = 40;
 const ENDS: i32 = 52;
 const CELL: i32 = (WIDTH - NAMES - 2 * ENDS) / 12;
 
-/// A range of a joint: its ends, and the root mean square of the residuals there \[m\] over how many poses.
+/// A range of a joint: its ends, and the root mean square of the residuals there \[m\] over how
+/// many poses.
 struct Part {
     ends: (f64, f64),
     rms: f64,
@@ -20,7 +21,8 @@ struct Part {
 
 /// Residuals of a joint's ranges, from the lowest to the highest.
 fn parts(data: &PlotData, joint: usize) -> Vec<Part> {
-    let of = || data.residuals.iter().filter(|pose| pose.has_place() && pose.error.norm().is_finite());
+    let of =
+        || data.residuals.iter().filter(|pose| pose.has_place() && pose.error.norm().is_finite());
     let (low, high) = range(of().map(|pose| pose.configuration[joint]));
     if high - low <= 0.0 || !(high - low).is_finite() {
         return Vec::new();
@@ -28,8 +30,13 @@ fn parts(data: &PlotData, joint: usize) -> Vec<Part> {
     let width = (high - low) / PARTS as f64;
     let mut sums = vec![(0.0, 0_usize); PARTS];
     for pose in of() {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the parts")]
-        let part = ((pose.configuration[joint] - low) / width).clamp(0.0, PARTS as f64 - 1.0) as usize;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "clamped to the parts"
+        )]
+        let part =
+            ((pose.configuration[joint] - low) / width).clamp(0.0, PARTS as f64 - 1.0) as usize;
         sums[part].0 += pose.error.norm_squared();
         sums[part].1 += 1;
     }
@@ -43,15 +50,21 @@ fn parts(data: &PlotData, joint: usize) -> Vec<Part> {
 
 /// A row a joint, a box a range, darker where the residual is larger.
 pub fn joint_map(data: &PlotData) -> Option<Drawing> {
-    let joints: Vec<_> =
-        data.commands.iter().map(|own| (own, parts(data, own.joint))).filter(|own| !own.1.is_empty()).collect();
+    let joints: Vec<_> = data
+        .commands
+        .iter()
+        .map(|own| (own, parts(data, own.joint)))
+        .filter(|own| !own.1.is_empty())
+        .collect();
     let rms = |part: &Part| Some(part.rms).filter(|_| part.count > 0);
     let (least, most) = range(joints.iter().flat_map(|(_, parts)| parts).filter_map(rms));
     if least > most {
         return None;
     }
     let count = i32::try_from(joints.len()).unwrap_or_default();
-    let shade = |value: f64| if most > least { 0.08 + 0.92 * (value - least) / (most - least) } else { 0.5 };
+    let shade = |value: f64| {
+        if most > least { 0.08 + 0.92 * (value - least) / (most - least) } else { 0.5 }
+    };
     let tags = Tags::of_boxes();
     let mut rows = Vec::new();
     let svg = figure((WIDTH, 34 + ROW * count), "Residual by ranges of each joint", |area| {
@@ -67,13 +80,16 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
                     unit.symbol
                 )
             };
-            let (first, last) =
-                (parts.first().map_or(0.0, |own| own.ends.0), parts.last().map_or(0.0, |own| own.ends.1));
+            let (first, last) = (
+                parts.first().map_or(0.0, |own| own.ends.0),
+                parts.last().map_or(0.0, |own| own.ends.1),
+            );
             write(area, &end(first), (NAMES + ENDS - 6, middle), MUTED, HPos::Right)?;
             write(area, &end(last), (NAMES + ENDS + 12 * CELL + 6, middle), MUTED, HPos::Left)?;
             for (k, part) in (0..).zip(parts) {
                 let left = NAMES + ENDS + CELL * k;
-                let corners = [(px(left) + 2, px(top + 2)), (px(left + CELL) - 2, px(top + ROW - 2))];
+                let corners =
+                    [(px(left) + 2, px(top + 2)), (px(left + CELL) - 2, px(top + ROW - 2))];
                 let (low, high) = (part.ends.0 * unit.factor, part.ends.1 * unit.factor);
                 rows.push(vec![
                     command.name(),
@@ -83,9 +99,14 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
                     part.count.to_string(),
                     rms(part).map_or_else(String::new, |rms| fixed(rms * 1e3, 6)),
                 ]);
-                tags.own(format!(" data-joint=\"{}\" data-low=\"{low:.6}\" data-high=\"{high:.6}\"", command.joint));
+                tags.own(format!(
+                    " data-joint=\"{}\" data-low=\"{low:.6}\" data-high=\"{high:.6}\"",
+                    command.joint
+                ));
                 match rms(part) {
-                    Some(rms) => area.draw(&Rectangle::new(corners, WARM.mix(shade(rms)).filled()))?,
+                    Some(rms) => {
+                        area.draw(&Rectangle::new(corners, WARM.mix(shade(rms)).filled()))?
+                    }
                     None => area.draw(&Rectangle::new(corners, line(FAINT, 0.5)))?,
                 }
             }
@@ -100,7 +121,12 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
     );
     let header = ["joint", "unit", "from", "to", "poses", "rms_mm"];
     Some(
-        Drawing::new("residual-joints", "What is left, by ranges of each joint", caption, tags.put(&svg))
-            .with(Sheet::new(&header, rows)),
+        Drawing::new(
+            "residual-joints",
+            "What is left, by ranges of each joint",
+            caption,
+            tags.put(&svg),
+        )
+        .with(Sheet::new(&header, rows)),
     )
 }

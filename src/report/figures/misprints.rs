@@ -1,8 +1,8 @@
 //! What each misprint and each rival leaves, over what the rigid fit leaves.
 
 use super::prelude::*;
-use crate::monte_carlo::{AlternativeModel, Case, Left, MisprintStudy, Replica, ReplicaResults, Spread};
 use crate::paper::published::{IGNORING_IT, WITH_ELASTICITY};
+use crate::study::{AlternativeModel, Case, Left, MisprintStudy, Replica, ReplicaResults, Spread};
 
 const ROW: i32 = 19;
 /// Room for names.
@@ -22,9 +22,13 @@ pub fn misprints(study: &MisprintStudy, found: &ReplicaResults) -> Drawing {
         study.cases.iter().map(ratio).collect()
     };
     let named = found.readings.iter().enumerate();
-    let mut rows: Vec<Row> =
-        named.map(|(place, named)| (named.name.clone(), spreads(&|own| own.left(place, 0)))).collect();
-    rows.extend(AlternativeModel::EACH.map(|rival| (rival.words().0.to_owned(), spreads(&|own| own.rival(rival)))));
+    let mut rows: Vec<Row> = named
+        .map(|(place, named)| (named.name.clone(), spreads(&|own| own.left(place, 0))))
+        .collect();
+    rows.extend(
+        AlternativeModel::EACH
+            .map(|rival| (rival.words().0.to_owned(), spreads(&|own| own.rival(rival)))),
+    );
     let caption = "Mean error of the held-out poses over that of the rigid fit, mean and standard deviation over specimens, stiffness \
                    known: each misprint alone, their combinations, and below them other explanations. Colours: how links and joints \
                    share the flexibility, and one load in place of many. The line is the paper's 2.136/3.967; a misprint \
@@ -39,8 +43,11 @@ fn draw(study: &MisprintStudy, rows: &[Row]) -> String {
     let colour = |k: usize| COLOURS[k % COLOURS.len()];
     let words: Vec<String> = study.cases.iter().map(Case::name).collect();
     figure((WIDTH, bottom + BELOW), "Error of every reading over that of the rigid fit", |area| {
-        let mut marks: Vec<(&str, RGBColor, Mark)> =
-            words.iter().enumerate().map(|(k, word)| (word.as_str(), colour(k), Mark::Dot)).collect();
+        let mut marks: Vec<(&str, RGBColor, Mark)> = words
+            .iter()
+            .enumerate()
+            .map(|(k, word)| (word.as_str(), colour(k), Mark::Dot))
+            .collect();
         marks.push(("the paper", WARM, Mark::Line));
         legend(area, TOP, &marks)?;
         for value in [0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0] {
@@ -58,7 +65,9 @@ fn draw(study: &MisprintStudy, rows: &[Row]) -> String {
             for (j, spread) in spreads.iter().enumerate() {
                 let Some(Spread { mean, deviation, .. }) = *spread else { continue };
                 let shift = px(4)
-                    * (2 * i32::try_from(j).unwrap_or_default() - i32::try_from(spreads.len()).unwrap_or_default() + 1)
+                    * (2 * i32::try_from(j).unwrap_or_default()
+                        - i32::try_from(spreads.len()).unwrap_or_default()
+                        + 1)
                     / 2;
                 let at = px(y) + shift;
                 let ends = vec![(place(mean - deviation), at), (place(mean + deviation), at)];
@@ -67,7 +76,13 @@ fn draw(study: &MisprintStudy, rows: &[Row]) -> String {
             }
         }
         let middle = NAMES + (WIDTH - NAMES) / 2;
-        write(area, "held-out mean over that of the rigid fit", (middle, bottom + 28), INK, HPos::Center)
+        write(
+            area,
+            "held-out mean over that of the rigid fit",
+            (middle, bottom + 28),
+            INK,
+            HPos::Center,
+        )
     })
 }
 

@@ -63,8 +63,11 @@ const NAMES: [&str; 14] = [
 /// Whether a file of this name is a figure that some page may have: `effect-1.svg`.
 pub fn is_figure(file: &str) -> bool {
     let Some(name) = file.strip_suffix(".svg") else { return false };
-    let numbered = |number: &str| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
-    let named = |word: &str| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'-');
+    let numbered =
+        |number: &str| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+    let named = |word: &str| {
+        !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'-')
+    };
     NAMES.contains(&name)
         || name.strip_prefix("effect-").is_some_and(numbered)
         || name.strip_prefix("held-out-errors-").is_some_and(named)

@@ -11,13 +11,20 @@ const PANEL: i32 = 92;
 
 /// Residual coordinates of positions in the order of time, with the band of ±2 σ.
 pub fn order(data: &PlotData) -> Option<Drawing> {
-    let fitted = data.residuals.iter().filter(|residual| !residual.held_out && residual.observation.is_position());
-    let (finite, lost): (Vec<&PoseError>, Vec<&PoseError>) = fitted.partition(|own| own.error.norm().is_finite());
-    let is_fitted =
-        |row: &usize| data.is_position(*row) && !data.residuals[*row].held_out && data.size(*row).is_finite();
+    let fitted = data
+        .residuals
+        .iter()
+        .filter(|residual| !residual.held_out && residual.observation.is_position());
+    let (finite, lost): (Vec<&PoseError>, Vec<&PoseError>) =
+        fitted.partition(|own| own.error.norm().is_finite());
+    let is_fitted = |row: &usize| {
+        data.is_position(*row) && !data.residuals[*row].held_out && data.size(*row).is_finite()
+    };
     let known: Vec<usize> = data.shown.iter().copied().filter(is_fitted).collect();
-    let shown: Vec<(usize, &PoseError)> =
-        thin(&known, MOST, |row| data.size(row)).into_iter().map(|row| (row, &data.residuals[row])).collect();
+    let shown: Vec<(usize, &PoseError)> = thin(&known, MOST, |row| data.size(row))
+        .into_iter()
+        .map(|row| (row, &data.residuals[row]))
+        .collect();
     let first = range(shown.iter().map(|(_, residual)| residual.time));
     if shown.len() < 2 {
         return None;
@@ -28,21 +35,37 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
         (true, _) => (1.0, "time [s]"),
     };
     let across = with_margin((first.0 * factor, first.1 * factor), 0.02);
-    let sigma = shown.iter().map(|(_, residual)| residual.sigma).sum::<f64>() / shown.len() as f64 * 1e3;
-    let most = reach(shown.iter().flat_map(|(_, own)| own.error.iter().map(|x| x * 1e3))).max(2.2 * sigma) * 1.08;
+    let sigma =
+        shown.iter().map(|(_, residual)| residual.sigma).sum::<f64>() / shown.len() as f64 * 1e3;
+    let most = reach(shown.iter().flat_map(|(_, own)| own.error.iter().map(|x| x * 1e3)))
+        .max(2.2 * sigma)
+        * 1.08;
     let is_beyond = |own: &PoseError, axis: usize| (own.error[axis] * 1e3).abs() > most;
     let outside = |axis: usize| shown.iter().filter(|(_, own)| is_beyond(own, axis)).count();
     let tags = Tags::of_dots();
     let svg = figure((WIDTH, 22 + 3 * PANEL + 36), "Residuals in order", |area| {
-        let entries = [("fitted pose", FAINT, Mark::Dot), ("noise alone: ±2 σ of the measurement", ACCENT, Mark::Band)];
+        let entries = [
+            ("fitted pose", FAINT, Mark::Dot),
+            ("noise alone: ±2 σ of the measurement", ACCENT, Mark::Band),
+        ];
         let panels = stacked(&legend(area, 20, &entries)?, &[PANEL, PANEL, PANEL + 36]);
-        for (axis, (name, panel)) in ["x [mm]", "y [mm]", "z [mm]"].into_iter().zip(&panels).enumerate() {
+        for (axis, (name, panel)) in
+            ["x [mm]", "y [mm]", "z [mm]"].into_iter().zip(&panels).enumerate()
+        {
             let last = axis == 2;
-            let bottom = Axis::linear(across, if last { label } else { "" }).numbers(if last { 7 } else { 0 });
+            let bottom = Axis::linear(across, if last { label } else { "" }).numbers(if last {
+                7
+            } else {
+                0
+            });
             let mut chart = chart(panel, &bottom, &Axis::linear((-most, most), name).numbers(5))?;
-            let noise = Rectangle::new([(across.0, -2.0 * sigma), (across.1, 2.0 * sigma)], band(ACCENT));
+            let noise =
+                Rectangle::new([(across.0, -2.0 * sigma), (across.1, 2.0 * sigma)], band(ACCENT));
             chart.draw_series([noise])?;
-            chart.draw_series([PathElement::new(vec![(across.0, 0.0), (across.1, 0.0)], line(FAINT, 1.0))])?;
+            chart.draw_series([PathElement::new(
+                vec![(across.0, 0.0), (across.1, 0.0)],
+                line(FAINT, 1.0),
+            )])?;
             for (row, own) in &shown {
                 let at = (own.time * factor, (own.error[axis] * 1e3).clamp(-most, most));
                 let style = if is_beyond(own, axis) { line(WARM, 1.4) } else { FAINT.filled() };
@@ -60,8 +83,18 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
         left_out(lost.len()),
         thinned(shown.len(), finite.len())
     );
-    let row = |own: &PoseError| std::iter::once(own.time * factor).chain(own.error.iter().map(|x| x * 1e3)).collect();
-    let columns = [if label == "row" { "number" } else { label }, "residual_x_mm", "residual_y_mm", "residual_z_mm"];
+    let row = |own: &PoseError| {
+        std::iter::once(own.time * factor).chain(own.error.iter().map(|x| x * 1e3)).collect()
+    };
+    let columns = [
+        if label == "row" { "number" } else { label },
+        "residual_x_mm",
+        "residual_y_mm",
+        "residual_z_mm",
+    ];
     let sheet = Sheet::of_poses(&columns, shown.iter().map(|&(_, own)| (own, row(own))));
-    Some(Drawing::new("residual-order", "The residuals one after another", caption, tags.put(&svg)).with(sheet))
+    Some(
+        Drawing::new("residual-order", "The residuals one after another", caption, tags.put(&svg))
+            .with(sheet),
+    )
 }

@@ -15,9 +15,11 @@ pub struct PoseError {
     pub held_out: bool,
     /// What was measured.
     pub observation: Observation,
-    /// Measured position, or where the best arm has its target in a row that measures none, measuring frame \[m\].
+    /// Measured position, or where the best arm has its target in a row that measures none,
+    /// measuring frame \[m\].
     pub position: Vector3<f64>,
-    /// Residual measured − predicted, measuring frame \[m\]; of one number along x, of tilts \[rad\].
+    /// Residual measured − predicted, measuring frame \[m\]; of one number along x, of tilts
+    /// \[rad\].
     pub error: Vector3<f64>,
     /// The same of the nominal arm, with base and tool fitted where they are free \[m\].
     pub before: Vector3<f64>,
@@ -37,13 +39,15 @@ impl PoseError {
 /// Of those that are drawn, one in so many is there because its value is among the largest.
 const LARGEST: usize = 10;
 
-/// At most `most` of some rows, ascending: those of the largest `size`, and others evenly among the rest.
+/// At most `most` of some rows, ascending: those of the largest `size`, and others evenly among the
+/// rest.
 pub fn thin(rows: &[usize], most: usize, size: impl Fn(usize) -> f64) -> Vec<usize> {
     weighted(rows, most, size).into_iter().map(|(row, _)| row).collect()
 }
 
-/// The same, each with the number of rows that it stands for: 1 of the largest, as many as there are for one that is drawn of the
-/// others, so that sums over all rows can be told from those that are drawn [Horvitz & Thompson 1952].
+/// The same, each with the number of rows that it stands for: 1 of the largest, as many as there
+/// are for one that is drawn of the others, so that sums over all rows can be told from those that
+/// are drawn [Horvitz & Thompson 1952].
 pub fn weighted(rows: &[usize], most: usize, size: impl Fn(usize) -> f64) -> Vec<(usize, f64)> {
     if rows.len() <= most {
         return rows.iter().map(|&row| (row, 1.0)).collect();
@@ -56,8 +60,11 @@ pub fn weighted(rows: &[usize], most: usize, size: impl Fn(usize) -> f64) -> Vec
     let every = rest.len().div_ceil((most - largest.len()).max(1));
     let drawn: Vec<usize> = rest.iter().copied().step_by(every).collect();
     let each = rest.len() as f64 / drawn.len().max(1) as f64;
-    let mut kept: Vec<(usize, f64)> =
-        largest.iter().map(|&row| (row, 1.0)).chain(drawn.into_iter().map(|row| (row, each))).collect();
+    let mut kept: Vec<(usize, f64)> = largest
+        .iter()
+        .map(|&row| (row, 1.0))
+        .chain(drawn.into_iter().map(|row| (row, each)))
+        .collect();
     kept.sort_unstable_by_key(|own| own.0);
     kept
 }

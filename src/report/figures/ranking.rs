@@ -1,8 +1,8 @@
 //! Candidates by what they explain.
 
 use super::prelude::*;
-use crate::diagnose::{Ranked, Trace};
 use crate::problem::Effect;
+use crate::select::{Ranked, Trace};
 
 /// Candidates that are drawn.
 const MOST: usize = 12;
@@ -23,10 +23,14 @@ fn named(found: &Effect, trace: &Trace) -> String {
     };
     let name = found.name();
     match found {
-        Effect::StationShift { at_time } | Effect::StationMove { at_time } if trace.time_measured => {
+        Effect::StationShift { at_time } | Effect::StationMove { at_time }
+            if trace.time_measured =>
+        {
             format!("{name} {at_time:.0} s")
         }
-        Effect::StationShift { at_time } | Effect::StationMove { at_time } => format!("{name} row {}", at_time.ceil()),
+        Effect::StationShift { at_time } | Effect::StationMove { at_time } => {
+            format!("{name} row {}", at_time.ceil())
+        }
         Effect::JointWave { joint, order } => format!("{name} {joint} ×{order}"),
         Effect::TrackerSettling { time_constant } => format!("{name} {time_constant} s"),
         own if own.has_memory() => own.name_and_place(),
@@ -40,7 +44,11 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
     let shown: Vec<&Ranked> = trace.ranking.iter().take(MOST).collect();
     let first = shown.first()?;
     let evidence = |ranked: &Ranked| -ranked.p_value.max(LEAST_P).log10();
-    let most = shown.iter().map(|ranked| evidence(ranked)).fold(1.0, f64::max).max(-2.0 * trace.level.log10());
+    let most = shown
+        .iter()
+        .map(|ranked| evidence(ranked))
+        .fold(1.0, f64::max)
+        .max(-2.0 * trace.level.log10());
     let alike = |ranked: &Ranked| first.alike.iter().any(|(other, _)| *other == ranked.effect);
     let count = i32::try_from(shown.len()).unwrap_or_default();
     let (top, bottom) = (10, 10 + ROW * count);
@@ -72,7 +80,13 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
         }
         let level = place(-trace.level.log10());
         upright(area, level, (top - 4, bottom), INK)?;
-        write(area, "evidence, −log₁₀ p", (NAMES + (WIDTH - NAMES - 96) / 2, bottom + 28), INK, HPos::Center)
+        write(
+            area,
+            "evidence, −log₁₀ p",
+            (NAMES + (WIDTH - NAMES - 96) / 2, bottom + 28),
+            INK,
+            HPos::Center,
+        )
     });
     let caption = format!(
         "{} candidates were tried on the fit of the declared model; these are the best. The longer the bar, the less chance \
@@ -81,8 +95,13 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
         trace.tried, trace.level
     );
     let row = |ranked: &&Ranked| {
-        vec![named(&ranked.effect, trace), format!("{:e}", ranked.p_value), fixed(ranked.gain * 1e3, 6)]
+        vec![
+            named(&ranked.effect, trace),
+            format!("{:e}", ranked.p_value),
+            fixed(ranked.gain * 1e3, 6),
+        ]
     };
-    let sheet = Sheet::new(&["effect", "p_value", "expected_gain_mm"], shown.iter().map(row).collect());
+    let sheet =
+        Sheet::new(&["effect", "p_value", "expected_gain_mm"], shown.iter().map(row).collect());
     Some(Drawing::new("ranking", "Which effects the residual points to", caption, svg).with(sheet))
 }

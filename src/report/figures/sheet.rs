@@ -19,7 +19,10 @@ impl Sheet {
     }
 
     /// Of poses: the file and line of each, whether it was held out, and further columns.
-    pub fn of_poses<'a>(further: &[&str], rows: impl IntoIterator<Item = (&'a PoseError, Vec<f64>)>) -> Self {
+    pub fn of_poses<'a>(
+        further: &[&str],
+        rows: impl IntoIterator<Item = (&'a PoseError, Vec<f64>)>,
+    ) -> Self {
         let header = [&["row", "held_out"], further].concat();
         let cells = |(pose, values): (&PoseError, Vec<f64>)| {
             let own = [pose.place.clone(), pose.held_out.to_string()];

@@ -1,9 +1,9 @@
 //! Strategies and parts of the elasticity side by side.
 
 use super::prelude::*;
-use crate::diagnose::{ClosedLoop, Round};
-use crate::identify::{Comparison, Errors};
+use crate::fit::{Comparison, Errors};
 use crate::problem::Effect;
+use crate::select::{ClosedLoop, Round};
 
 const ROW: i32 = 22;
 /// Room for names.
@@ -22,7 +22,8 @@ struct Entry {
     errors: Errors,
 }
 
-/// Held-out and identification error of every strategy with every solver, and of the paper's own procedure.
+/// Held-out and identification error of every strategy with every solver, and of the paper's own
+/// procedure.
 pub fn strategies(comparison: &Comparison) -> Drawing {
     let mut entries: Vec<Entry> = Vec::new();
     for found in &comparison.strategies {
@@ -53,11 +54,15 @@ fn entry(strategy: String, errors: Errors) -> Entry {
 
 /// The same for every part of the elasticity that is kept; nothing for an arm without any.
 pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
-    let entries: Vec<Entry> =
-        comparison.ablations.iter().map(|(part, found)| entry(part.as_str().to_owned(), found.fitted)).collect();
+    let entries: Vec<Entry> = comparison
+        .ablations
+        .iter()
+        .map(|(part, found)| entry(part.as_str().to_owned(), found.fitted))
+        .collect();
     let caption = "Mean position error with only this part of the elasticity in the model, everything else fitted at once: from \
                    rigid to complete, on a logarithmic scale.";
-    let titles = ("What each part of the elasticity is worth", "Error with parts of the elasticity");
+    let titles =
+        ("What each part of the elasticity is worth", "Error with parts of the elasticity");
     (entries.len() > 1).then(|| drawn("ablations", titles, caption, &entries))
 }
 
@@ -71,7 +76,8 @@ pub fn rounds(closure: &ClosedLoop) -> Option<Drawing> {
     entries.extend(closure.rounds.iter().enumerate().map(after));
     let caption = "Mean position error after each round of the loop, on the fitted poses and on those held out, which took part in \
                    no choice, on a logarithmic scale. Where the two part, a round has learned noise.";
-    (entries.len() > 1).then(|| drawn("rounds", ("Round by round", "Error after every round"), caption, &entries))
+    (entries.len() > 1)
+        .then(|| drawn("rounds", ("Round by round", "Error after every round"), caption, &entries))
 }
 
 /// Entries with a title, and a label for who cannot see them.
@@ -83,10 +89,13 @@ fn drawn(name: &str, (title, label): (&str, &str), caption: &str, entries: &[Ent
 fn round_name(closure: &ClosedLoop, k: usize) -> String {
     let before = k.checked_sub(1).map_or(&[][..], |last| closure.rounds[last].effects.as_slice());
     let own = &closure.rounds[k].effects;
-    let named = |effect: &Effect| format!("{} {}", effect.name(), effect.place()).trim_end().to_owned();
+    let named =
+        |effect: &Effect| format!("{} {}", effect.name(), effect.place()).trim_end().to_owned();
     let added: Vec<&Effect> = own.iter().filter(|effect| !before.contains(effect)).collect();
     let change = match added.as_slice() {
-        [] if own.len() < before.len() => format!("− {} of {}", before.len() - own.len(), before.len()),
+        [] if own.len() < before.len() => {
+            format!("− {} of {}", before.len() - own.len(), before.len())
+        }
         [] => "nothing more".to_owned(),
         [one] => format!("+ {}", named(one)),
         [one, rest @ ..] => format!("+ {} and {} more", named(one), rest.len()),
@@ -104,7 +113,8 @@ fn sheet(entries: &[Entry]) -> Sheet {
 
 fn rows(entries: &[Entry], label: &str) -> String {
     let of = |entry: &Entry| {
-        [entry.errors.identification.mean.norm, entry.errors.held_out.mean.norm].map(|e| (e * 1e3).max(1e-9).log10())
+        [entry.errors.identification.mean.norm, entry.errors.held_out.mean.norm]
+            .map(|e| (e * 1e3).max(1e-9).log10())
     };
     let (low, high) = range(entries.iter().flat_map(of));
     let (low, high) = if low < high { ((low - 0.1), (high + 0.1)) } else { (low - 0.5, low + 0.5) };
@@ -143,8 +153,20 @@ fn rows(entries: &[Entry], label: &str) -> String {
             area.draw(&Circle::new((place(fitted), px(y)), pixels(3.4), FAINT.filled()))?;
             area.draw(&Circle::new((place(held_out), px(y)), pixels(3.4), colour.filled()))?;
             let value = entry.errors.held_out.mean.norm * 1e3;
-            write(area, &number(value, decimals(value, 4) + 1), (WIDTH - 6, y), colour, HPos::Right)?;
+            write(
+                area,
+                &number(value, decimals(value, 4) + 1),
+                (WIDTH - 6, y),
+                colour,
+                HPos::Right,
+            )?;
         }
-        write(area, "mean position error [mm]", (NAMES + (WIDTH - NAMES - NUMBERS) / 2, bottom + 28), INK, HPos::Center)
+        write(
+            area,
+            "mean position error [mm]",
+            (NAMES + (WIDTH - NAMES - NUMBERS) / 2, bottom + 28),
+            INK,
+            HPos::Center,
+        )
     })
 }

@@ -1,4 +1,5 @@
-//! What elements of a drawing stand for, as data beside them: `<circle data-p="12" …>` is the pose of row 12.
+//! What elements of a drawing stand for, as data beside them: `<circle data-p="12" …>` is the pose
+//! of row 12.
 
 use std::cell::RefCell;
 
@@ -39,7 +40,9 @@ impl Tags {
         for (k, part) in parts.into_iter().enumerate() {
             if k > 0 {
                 text.push_str(self.element);
-                text.extend(k.checked_sub(untagged + 1).and_then(|tag| all.get(tag)).map(String::as_str));
+                text.extend(
+                    k.checked_sub(untagged + 1).and_then(|tag| all.get(tag)).map(String::as_str),
+                );
             }
             text.push_str(part);
         }
@@ -57,6 +60,9 @@ mod tests {
         tags.pose(Some(7));
         tags.pose(None);
         let svg = "<circle cx=\"1\"/><text/><circle cx=\"2\"/><circle cx=\"3\"/>";
-        assert_eq!(tags.put(svg), "<circle cx=\"1\"/><text/><circle data-p=\"7\" cx=\"2\"/><circle cx=\"3\"/>");
+        assert_eq!(
+            tags.put(svg),
+            "<circle cx=\"1\"/><text/><circle data-p=\"7\" cx=\"2\"/><circle cx=\"3\"/>"
+        );
     }
 }

@@ -1,5 +1,5 @@
-//! Blocks as a page that needs nothing else: nothing to load, and no script to be read; its own adds what one can do with poses.
-//! Its figures are files of their own as well.
+//! Blocks as a page that needs nothing else: nothing to load, and no script to be read; its own
+//! adds what one can do with poses. Its figures are files of their own as well.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -64,7 +64,8 @@ pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block])
             }
         }
     };
-    let files = figures.iter().map(|own| (format!("{}.svg", own.name), printable(&style::alone(&own.svg))));
+    let files =
+        figures.iter().map(|own| (format!("{}.svg", own.name), printable(&style::alone(&own.svg))));
     let html = printable(&page.into_string());
     Report { markdown: markdown(&problem.title, blocks), figures: files.collect(), html }
 }
@@ -72,7 +73,8 @@ pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block])
 /// What stands before the first heading, then a section for each heading.
 fn sections<'a>(blocks: &'a [Block], figures: &mut Vec<&'a Drawing>) -> Markup {
     let shown = on_page(blocks);
-    let starts: Vec<usize> = (1..shown.len()).filter(|&k| matches!(shown[k], Block::Heading(_))).collect();
+    let starts: Vec<usize> =
+        (1..shown.len()).filter(|&k| matches!(shown[k], Block::Heading(_))).collect();
     let ends = starts.iter().copied().chain([shown.len()]);
     let parts = std::iter::once(0).chain(starts.iter().copied()).zip(ends);
     html! {
@@ -124,7 +126,8 @@ fn one<'a>(block: &'a Block, figures: &mut Vec<&'a Drawing>) -> Markup {
 fn words(text: &str) -> Markup {
     let mut parts = Vec::new();
     for (k, part) in text.split(CODE.0).enumerate() {
-        let (code, plain) = if k == 0 { ("", part) } else { part.split_once(CODE.1).unwrap_or((part, "")) };
+        let (code, plain) =
+            if k == 0 { ("", part) } else { part.split_once(CODE.1).unwrap_or((part, "")) };
         parts.push([code, plain]);
     }
     html! {
@@ -132,7 +135,8 @@ fn words(text: &str) -> Markup {
     }
 }
 
-/// Without control characters, which no page may have, and others that are not seen but do something.
+/// Without control characters, which no page may have, and others that are not seen but do
+/// something.
 fn printable(text: &str) -> String {
     text.chars().filter(|&c| c == '\n' || !is_hidden(c)).collect()
 }
@@ -177,7 +181,9 @@ fn table(table: &Table) -> Markup {
         (false, false) => None,
     };
     // A minus is wider than a hyphen, and names keep their hyphens.
-    let cell = |k: usize, text: &str| if table.left.contains(&k) { text.to_owned() } else { text.replace('-', "−") };
+    let cell = |k: usize, text: &str| {
+        if table.left.contains(&k) { text.to_owned() } else { text.replace('-', "−") }
+    };
     let bars = table.bars.as_ref();
     html! {
         @for note in &table.notes { p.o { (words(note)) } }
@@ -221,8 +227,11 @@ fn bar(own: &Bar) -> Markup {
 
 /// A table as an address that holds it.
 fn address(csv: &str) -> String {
-    let escapes = [("%", "%25"), ("#", "%23"), ("\n", "%0A"), ("\r", ""), (" ", "%20"), ("/", "%2F")];
-    let csv = escapes.into_iter().fold(csv.to_owned(), |text, (letter, escape)| text.replace(letter, escape));
+    let escapes =
+        [("%", "%25"), ("#", "%23"), ("\n", "%0A"), ("\r", ""), (" ", "%20"), ("/", "%2F")];
+    let csv = escapes
+        .into_iter()
+        .fold(csv.to_owned(), |text, (letter, escape)| text.replace(letter, escape));
     format!("data:text/csv;charset=utf-8,{csv}")
 }
 

@@ -24,7 +24,10 @@ pub(in crate::report) fn markdown(title: &str, blocks: &[Block]) -> String {
             }
             Block::List(points) => points.iter().for_each(|own| point(&mut text, "- ", own)),
             Block::Ranking(points) => {
-                points.iter().enumerate().for_each(|(k, own)| point(&mut text, &format!("{}. ", k + 1), own));
+                points
+                    .iter()
+                    .enumerate()
+                    .for_each(|(k, own)| point(&mut text, &format!("{}. ", k + 1), own));
             }
             Block::Table(own) => {
                 table(&mut text, own);
@@ -48,7 +51,9 @@ fn point(text: &mut String, mark: &str, point: &Point) {
 }
 
 fn table(text: &mut String, table: &Table) {
-    let row = |cells: &mut dyn Iterator<Item = String>| format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "));
+    let row = |cells: &mut dyn Iterator<Item = String>| {
+        format!("| {} |\n", cells.collect::<Vec<_>>().join(" | "))
+    };
     let cell = |cell: &str| escaped(&one_line(cell)).replace('|', "\\|");
     let rule = |k: usize| if table.left.contains(&k) { ":--" } else { "--:" };
     text.push_str(&row(&mut table.header.iter().map(|words| cell(words))));
@@ -79,15 +84,19 @@ fn escaped(words: &str) -> String {
     text
 }
 
-/// Words of which Markdown makes nothing: no code, emphasis, tag, entity, link, picture, address or heading.
+/// Words of which Markdown makes nothing: no code, emphasis, tag, entity, link, picture, address or
+/// heading.
 fn plain(text: &mut String, words: &str) {
     let words: Vec<char> = words.chars().filter(|&c| c == '\n' || !is_hidden(c)).collect();
-    let follows = |k: usize, word: &str| word.chars().zip(k + 1..).all(|(c, k)| words.get(k) == Some(&c));
+    let follows =
+        |k: usize, word: &str| word.chars().zip(k + 1..).all(|(c, k)| words.get(k) == Some(&c));
     for (k, &c) in words.iter().enumerate() {
         let before = k.checked_sub(1).and_then(|k| words.get(k)).copied();
         let in_word = |c: Option<&char>| c.is_some_and(|c| c.is_alphanumeric());
-        // Marks at the beginning of a line may begin a heading, a list, a quotation, a rule or a fence.
-        let begins = before.map_or(text.is_empty() || text.ends_with(['\n', ' ']), |before| before == '\n');
+        // Marks at the beginning of a line may begin a heading, a list, a quotation, a rule or a
+        // fence.
+        let begins =
+            before.map_or(text.is_empty() || text.ends_with(['\n', ' ']), |before| before == '\n');
         let marks = match c {
             '*' | '<' | '\\' | '`' | '~' | '@' => true,
             '_' => !(in_word(before.as_ref()) && in_word(words.get(k + 1))),
@@ -96,9 +105,16 @@ fn plain(text: &mut String, words: &str) {
             ']' => ["(", "[", ":"].iter().any(|next| follows(k, next)),
             '!' => follows(k, "["),
             ':' => follows(k, "//"),
-            '.' => k >= 3 && words.get(k - 3..k).is_some_and(|www| www.iter().all(|w| w.eq_ignore_ascii_case(&'w'))),
+            '.' => {
+                k >= 3
+                    && words
+                        .get(k - 3..k)
+                        .is_some_and(|www| www.iter().all(|w| w.eq_ignore_ascii_case(&'w')))
+            }
             '#' | '>' | '=' => begins,
-            '+' | '-' => begins && words.get(k + 1).is_none_or(|next| next.is_whitespace() || *next == c),
+            '+' | '-' => {
+                begins && words.get(k + 1).is_none_or(|next| next.is_whitespace() || *next == c)
+            }
             _ => false,
         };
         if marks {

@@ -1,4 +1,5 @@
-//! Pose by pose: the arm in three dimensions, ranges of joints to choose by, the largest residuals, and what the script knows.
+//! Pose by pose: the arm in three dimensions, ranges of joints to choose by, the largest residuals,
+//! and what the script knows.
 
 use maud::{Markup, PreEscaped, html};
 use nalgebra::Vector3;
@@ -68,7 +69,11 @@ fn rigid(arm: &Shape) -> Vec<i64> {
 
 /// How far they give \[mm\].
 fn give(arm: &Shape) -> Vec<f64> {
-    arm.bent.iter().zip(&arm.rigid).flat_map(|(bent, rigid)| millimetres(&(bent - rigid), 2)).collect()
+    arm.bent
+        .iter()
+        .zip(&arm.rigid)
+        .flat_map(|(bent, rigid)| millimetres(&(bent - rigid), 2))
+        .collect()
 }
 
 impl Store {
@@ -112,7 +117,10 @@ impl Store {
 
 /// The data of a page for its script; nothing in it ends the element that holds it.
 fn store(data: &PlotData) -> String {
-    serde_json::to_string(&Store::of(data)).unwrap_or_default().replace('<', "\\u003c").replace("//", "/\\/")
+    serde_json::to_string(&Store::of(data))
+        .unwrap_or_default()
+        .replace('<', "\\u003c")
+        .replace("//", "/\\/")
 }
 
 /// The section.
@@ -143,16 +151,24 @@ fn without_positions(data: &PlotData) -> String {
     if data.residuals.iter().all(|own| own.observation.is_position()) {
         return String::new();
     }
-    let figures =
-        if data.has_positions() { "show positions alone" } else { "are left out: no row measures a position" };
-    let tilts = if data.residuals.iter().any(|own| own.observation.is_angle()) { "; tilts have no place" } else { "" };
+    let figures = if data.has_positions() {
+        "show positions alone"
+    } else {
+        "are left out: no row measures a position"
+    };
+    let tilts = if data.residuals.iter().any(|own| own.observation.is_angle()) {
+        "; tilts have no place"
+    } else {
+        ""
+    };
     format!(
         "Figures of errors along axes, of residual vectors and of residuals in order {figures}. In the view of the arm, contacts and \
          distances stand where the fitted arm has its target, those of one number without a stroke{tilts}."
     )
 }
 
-/// The arm in its poses; shown by the script where there is WebGL. The figure of residual vectors is the same without.
+/// The arm in its poses; shown by the script where there is WebGL. The figure of residual vectors
+/// is the same without.
 fn view(data: &PlotData) -> Markup {
     let coverage = &data.coverage;
     let share = 100.0 * (1.0 - coverage.uncovered.len() as f64 / coverage.tried.max(1) as f64);
@@ -201,7 +217,8 @@ fn ranges(data: &PlotData) -> Markup {
 
 /// The largest residuals with their rows.
 fn largest(data: &PlotData) -> Markup {
-    let mut rows: Vec<usize> = data.shown.iter().copied().filter(|&row| data.size(row).is_finite()).collect();
+    let mut rows: Vec<usize> =
+        data.shown.iter().copied().filter(|&row| data.size(row).is_finite()).collect();
     rows.sort_by(|&a, &b| data.size(b).total_cmp(&data.size(a)));
     rows.truncate(LISTED);
     html! {

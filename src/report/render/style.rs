@@ -30,7 +30,10 @@ fn themes() -> String {
     for (light, name, _) in COLOURS {
         let _ = write!(text, ";--{name}:{}", hex(light));
     }
-    let _ = write!(text, "}}\n@media screen and (prefers-color-scheme:dark){{:root{{--paper:{DARK_PAPER}");
+    let _ = write!(
+        text,
+        "}}\n@media screen and (prefers-color-scheme:dark){{:root{{--paper:{DARK_PAPER}"
+    );
     for (_, name, dark) in COLOURS {
         let _ = write!(text, ";--{name}:{dark}");
     }
@@ -43,7 +46,10 @@ fn exchanged(colour: impl Fn(&'static str, &'static str) -> String) -> String {
     let mut text = String::new();
     for (light, name, dark) in COLOURS {
         let (light, colour) = (hex(light), colour(name, dark));
-        let _ = writeln!(text, "[fill=\"{light}\"]{{fill:{colour}}}[stroke=\"{light}\"]{{stroke:{colour}}}");
+        let _ = writeln!(
+            text,
+            "[fill=\"{light}\"]{{fill:{colour}}}[stroke=\"{light}\"]{{stroke:{colour}}}"
+        );
     }
     text
 }
@@ -53,7 +59,8 @@ pub(super) fn sheet() -> String {
     format!("{}{LAYOUT}{}", themes(), exchanged(|name, _| format!("var(--{name})")))
 }
 
-/// A figure that stands alone: drawn on paper, its colours written out where it is dark, and light for who reads no styles.
+/// A figure that stands alone: drawn on paper, its colours written out where it is dark, and light
+/// for who reads no styles.
 pub(super) fn alone(svg: &str) -> String {
     let style = format!(
         "<style>@media screen and (prefers-color-scheme:dark){{\n[fill=\"{LIGHT_PAPER}\"]{{fill:{DARK_PAPER}}}\n{}}}</style>",

@@ -25,14 +25,19 @@ pub(in crate::report) fn text_within(blocks: &[Block], most: usize) -> String {
         follows_heading = matches!(block, Block::Heading(_));
         match block {
             Block::Heading(words) => text.push_str(&wrapped(words, ("", ""), width)),
-            Block::Text(words) | Block::Note(words) => text.push_str(&wrapped(words, (indent, indent), width)),
+            Block::Text(words) | Block::Note(words) => {
+                text.push_str(&wrapped(words, (indent, indent), width))
+            }
             Block::Lines(words, points) => {
                 text.extend(words.lines().map(|line| wrapped(line, ("", ""), width)));
                 text.extend(points.iter().map(|point| wrapped(point, ("  ", "    "), width)));
             }
             Block::List(points) => points.iter().for_each(|own| point(&mut text, "- ", own, width)),
             Block::Ranking(points) => {
-                points.iter().enumerate().for_each(|(k, own)| point(&mut text, &format!("{}. ", k + 1), own, width));
+                points
+                    .iter()
+                    .enumerate()
+                    .for_each(|(k, own)| point(&mut text, &format!("{}. ", k + 1), own, width));
             }
             Block::Table(own) => {
                 text.push_str(&table(own));
@@ -120,14 +125,16 @@ mod tests {
     #[test]
     fn a_story_is_shown_both_ways() {
         let details = vec!["2 < 3".to_owned()];
-        let point = Point { text: format!("found {}", code("a*b")), details, mark: Some(Mark::Passed) };
+        let point =
+            Point { text: format!("found {}", code("a*b")), details, mark: Some(Mark::Passed) };
         let rows = vec![vec!["a|b".to_owned(), "1".to_owned()]];
         let story = [
             Block::heading("Found"),
             Block::Ranking(vec![point]),
             Block::Table(Table::new(&["name", "value"], rows, &[0])),
         ];
-        let expected = "Found\n  1. passed: found a*b\n     2 < 3\n\n  name  value\n  a|b       1\n";
+        let expected =
+            "Found\n  1. passed: found a*b\n     2 < 3\n\n  name  value\n  a|b       1\n";
         assert_eq!(text(&story), expected);
         let expected = "# The \\*arm\\*\n\n## Found\n\n1. passed: found `a*b`\n   - 2 \\< 3\n\n\
                         | name | value |\n| :-- | --: |\n| a\\|b | 1 |\n";
@@ -147,9 +154,17 @@ mod tests {
     fn long_text_is_wrapped_under_its_mark() {
         let words = "word ".repeat(40);
         let narrow = text_within(&[Block::list([words.clone()])], 50);
-        assert!(narrow.lines().count() == 5 && narrow.lines().all(|line| line.len() <= 50), "{narrow}");
+        assert!(
+            narrow.lines().count() == 5 && narrow.lines().all(|line| line.len() <= 50),
+            "{narrow}"
+        );
         let text = text(&[Block::list([words])]);
         let lines: Vec<&str> = text.lines().collect();
-        assert!(lines.len() == 2 && lines[0].starts_with("  - word") && lines[1].starts_with("    word"), "{text}");
+        assert!(
+            lines.len() == 2
+                && lines[0].starts_with("  - word")
+                && lines[1].starts_with("    word"),
+            "{text}"
+        );
     }
 }

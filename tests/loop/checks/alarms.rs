@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use flexcal::diagnose::{Covariate, CovariateValues, Findings, ResidualTest};
+use flexcal::select::{Covariate, CovariateValues, Findings, ResidualTest};
 use nalgebra::DVector;
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
@@ -28,15 +28,25 @@ impl Rates {
             .collect();
         let mut p_values: Vec<(String, Vec<f64>)> = Vec::new();
         for (k, check) in all[0].tests.iter().enumerate() {
-            let values = all.iter().filter_map(|f| f.tests[k].outcome.as_ref().ok()).map(|outcome| outcome.p_value);
+            let values = all
+                .iter()
+                .filter_map(|f| f.tests[k].outcome.as_ref().ok())
+                .map(|outcome| outcome.p_value);
             p_values.push((
-                format!("{} {}", check.name(), check.about().map_or_else(String::new, |of| of.to_string())),
+                format!(
+                    "{} {}",
+                    check.name(),
+                    check.about().map_or_else(String::new, |of| of.to_string())
+                ),
                 values.collect(),
             ));
         }
         Self {
             structured: all.iter().filter(|findings| findings.is_structured()).count(),
-            failed: all.iter().filter(|findings| findings.tests.iter().any(ResidualTest::failed)).count(),
+            failed: all
+                .iter()
+                .filter(|findings| findings.tests.iter().any(ResidualTest::failed))
+                .count(),
             p_values,
         }
     }
@@ -47,7 +57,8 @@ impl Rates {
 
     /// The check that most often has p ≤ `level`, and the share.
     fn worst(&self, level: f64) -> (&str, f64) {
-        let shares = self.p_values.iter().map(|(name, values)| (name.as_str(), Self::share(values, level)));
+        let shares =
+            self.p_values.iter().map(|(name, values)| (name.as_str(), Self::share(values, level)));
         shares.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap()
     }
 
@@ -55,7 +66,10 @@ impl Rates {
         println!("{what}: structured {}, any failure {}", self.structured, self.failed);
         for (name, values) in &self.p_values {
             let [a, b, c, d] = [0.5, 0.05, 0.01, 0.001].map(|level| Self::share(values, level));
-            println!("  {name:24} p ≤ 0.5: {a:.3}  0.05: {b:.4}  0.01: {c:.4}  0.001: {d:.5}  of {}", values.len());
+            println!(
+                "  {name:24} p ≤ 0.5: {a:.3}  0.05: {b:.4}  0.01: {c:.4}  0.001: {d:.5}  of {}",
+                values.len()
+            );
         }
     }
 }
@@ -96,7 +110,9 @@ fn rates_and_times() {
         (100, 32, None, 500),
     ] {
         let rates = Rates::of(problems, noise_only(poses, unknowns, prior));
-        rates.print(&format!("{poses} poses, {unknowns} unknowns, prior {prior:?}, {problems} problems"));
+        rates.print(&format!(
+            "{poses} poses, {unknowns} unknowns, prior {prior:?}, {problems} problems"
+        ));
         assert!(rates.failed <= at_most(problems, 0.01), "{} of {problems}", rates.failed);
     }
     let heavy = Rates::of(2000, heavy_tails(28, 32));
@@ -105,8 +121,11 @@ fn rates_and_times() {
     let uneven = Rates::of(2000, uneven);
     uneven.print("noise twice as large at every other pose, 2000 problems");
     assert!(uneven.structured <= at_most(2000, 0.01), "{} of 2000", uneven.structured);
-    for (poses, unknowns, size) in [(28, 32, 3.0), (28, 32, 6.0), (28, 20, 3.0), (60, 20, 1.0), (200, 32, 0.5)] {
-        let all: Vec<Findings> = (0..200).into_par_iter().map(|seed| driven(poses, unknowns, size, seed)).collect();
+    for (poses, unknowns, size) in
+        [(28, 32, 3.0), (28, 32, 6.0), (28, 20, 3.0), (60, 20, 1.0), (200, 32, 0.5)]
+    {
+        let all: Vec<Findings> =
+            (0..200).into_par_iter().map(|seed| driven(poses, unknowns, size, seed)).collect();
         let structured = all.iter().filter(|findings| findings.is_structured()).count();
         let on_q2 = all
             .iter()

@@ -1,6 +1,6 @@
 //! What cannot be tested says why, odd inputs are taken, and threads change nothing.
 
-use flexcal::diagnose::{Covariate, CovariateValues, Findings, Sequence, Test, Untestable};
+use flexcal::select::{Covariate, CovariateValues, Findings, Sequence, Test, Untestable};
 use nalgebra::DVector;
 use rayon::ThreadPoolBuilder;
 
@@ -67,8 +67,12 @@ fn odd_inputs_are_taken() {
         for residual in [residual, zero] {
             for check in linear.check(&residual).tests {
                 if let Ok(outcome) = &check.outcome {
-                    let numbers = [outcome.statistic, outcome.p_value, outcome.bounds.0, outcome.bounds.1];
-                    assert!(numbers.iter().all(|number| number.is_finite()), "{check}: {outcome:?}");
+                    let numbers =
+                        [outcome.statistic, outcome.p_value, outcome.bounds.0, outcome.bounds.1];
+                    assert!(
+                        numbers.iter().all(|number| number.is_finite()),
+                        "{check}: {outcome:?}"
+                    );
                     assert!((0.0..=1.0).contains(&outcome.p_value));
                 }
             }
@@ -80,9 +84,15 @@ fn odd_inputs_are_taken() {
     let residual = linear.leaves(noise);
     linear.time[3] = f64::NAN;
     let findings = linear.check(&residual);
-    assert_eq!(find(&findings, &Test::Runs { sequence: Sequence::Time }).outcome, Err(Untestable::NotFinite));
+    assert_eq!(
+        find(&findings, &Test::Runs { sequence: Sequence::Time }).outcome,
+        Err(Untestable::NotFinite)
+    );
     assert!(find(&findings, &Test::Runs { sequence: Sequence::Rows }).outcome.is_ok());
     linear.session = (0..20).collect();
     let findings = linear.check(&residual);
-    assert_eq!(find(&findings, &Test::Runs { sequence: Sequence::Rows }).outcome, Err(Untestable::TooFewPoses));
+    assert_eq!(
+        find(&findings, &Test::Runs { sequence: Sequence::Rows }).outcome,
+        Err(Untestable::TooFewPoses)
+    );
 }

@@ -1,6 +1,8 @@
 //! Linear fits with known structure in what they leave.
 
-use flexcal::diagnose::{Covariate, CovariateValues, Findings, FitResidual, ResidualTest, Test, test_residual};
+use flexcal::select::{
+    Covariate, CovariateValues, Findings, FitResidual, ResidualTest, Test, test_residual,
+};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -28,16 +30,20 @@ impl Linear {
     pub fn new(poses: usize, unknowns: usize, prior: Option<f64>, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let joints = 6;
-        let angles: Vec<Vec<f64>> =
-            (0..joints).map(|_| (0..poses).map(|_| random.random_range(-1.5..1.5)).collect()).collect();
+        let angles: Vec<Vec<f64>> = (0..joints)
+            .map(|_| (0..poses).map(|_| random.random_range(-1.5..1.5)).collect())
+            .collect();
         let reach: Vec<f64> = (0..poses).map(|_| (0.7 * normal(&mut random)).exp()).collect();
         let mut jacobian = DMatrix::zeros(3 * poses, unknowns);
         for j in 0..unknowns {
-            let waves: [[f64; 6]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| 0.8 * normal(&mut random)));
+            let waves: [[f64; 6]; 3] =
+                std::array::from_fn(|_| std::array::from_fn(|_| 0.8 * normal(&mut random)));
             let phases: [f64; 3] = std::array::from_fn(|_| random.random_range(0.0..6.3));
             for pose in 0..poses {
                 for axis in 0..3 {
-                    let phase: f64 = (0..joints).map(|k| waves[axis][k] * angles[k][pose]).sum::<f64>() + phases[axis];
+                    let phase: f64 =
+                        (0..joints).map(|k| waves[axis][k] * angles[k][pose]).sum::<f64>()
+                            + phases[axis];
                     jacobian[(3 * pose + axis, j)] = phase.sin() * reach[pose];
                 }
             }
@@ -54,7 +60,17 @@ impl Linear {
         let time: Vec<f64> = (0..poses).map(|pose| pose as f64).collect();
         covariates.push(CovariateValues { covariate: Covariate::Time, values: time.clone() });
         let (session, setup) = (vec![0; poses], (0..poses).collect());
-        Self { jacobian, prior, fitted, covariates, time, session, setup, sigma_is_declared: true, random }
+        Self {
+            jacobian,
+            prior,
+            fitted,
+            covariates,
+            time,
+            session,
+            setup,
+            sigma_is_declared: true,
+            random,
+        }
     }
 
     pub fn poses(&self) -> usize {
@@ -121,7 +137,11 @@ pub fn factor(jacobian: &DMatrix<f64>, prior: Option<f64>) -> DMatrix<f64> {
     stack.qr().q().rows(0, rows).into_owned()
 }
 
-pub fn noise_only(poses: usize, unknowns: usize, prior: Option<f64>) -> impl Fn(u64) -> (Linear, DVector<f64>) + Sync {
+pub fn noise_only(
+    poses: usize,
+    unknowns: usize,
+    prior: Option<f64>,
+) -> impl Fn(u64) -> (Linear, DVector<f64>) + Sync {
     move |seed| {
         let mut linear = Linear::new(poses, unknowns, prior, 1000 + seed);
         let noise = linear.noise();
@@ -147,7 +167,11 @@ pub fn uneven(seed: u64) -> (Linear, DVector<f64>) {
     let mut linear = Linear::new(28, 32, None, 3000 + seed);
     linear.sigma_is_declared = false;
     let mut noise = linear.noise();
-    noise.iter_mut().enumerate().filter(|(row, _)| row / 3 % 2 == 0).for_each(|(_, value)| *value *= 2.0);
+    noise
+        .iter_mut()
+        .enumerate()
+        .filter(|(row, _)| row / 3 % 2 == 0)
+        .for_each(|(_, value)| *value *= 2.0);
     let residual = linear.leaves(noise);
     (linear, residual)
 }
@@ -158,7 +182,9 @@ pub fn driven(poses: usize, unknowns: usize, size: f64, seed: u64) -> Findings {
     linear.sigma_is_declared = false;
     let mut data = linear.noise();
     let covariate = linear.covariate(&Covariate::Command(1)).to_vec();
-    Linear::displace(&mut data, |pose| size * (2.0 * covariate[pose]).sin() * Vector3::new(1.0, 0.5, -1.0));
+    Linear::displace(&mut data, |pose| {
+        size * (2.0 * covariate[pose]).sin() * Vector3::new(1.0, 0.5, -1.0)
+    });
     let residual = linear.leaves(data);
     linear.check(&residual)
 }
@@ -171,7 +197,8 @@ pub fn outliers(findings: &Findings) -> &ResidualTest {
     findings.tests.iter().find(|check| check.name() == "outliers").unwrap()
 }
 
-/// How many of `problems` may have what happens with probability `rate`: exceeded once in some 10 000 tests.
+/// How many of `problems` may have what happens with probability `rate`: exceeded once in some 10
+/// 000 tests.
 pub fn at_most(problems: u64, rate: f64) -> usize {
     let binomial = Binomial::new(rate, problems).unwrap();
     usize::try_from(binomial.inverse_cdf(1.0 - 1e-4)).unwrap()

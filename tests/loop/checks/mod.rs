@@ -1,6 +1,7 @@
 //! Checks of what a fit leaves: no false alarms on noise, and structure found and named.
 //!
-//! `cargo test --release --test loop checks -- --ignored --nocapture` prints rates over many more problems, and times.
+//! `cargo test --release --test loop checks -- --ignored --nocapture` prints rates over many more
+//! problems, and times.
 
 #![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
 

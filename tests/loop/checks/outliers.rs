@@ -1,6 +1,6 @@
 //! Poses that are far off, and noise with heavy tails, are named and are not structure.
 
-use flexcal::diagnose::{Findings, Test};
+use flexcal::select::{Findings, Test};
 use nalgebra::{DVector, Vector3};
 
 use super::linear::{Linear, count, find, heavy_tails, outliers};
@@ -32,11 +32,18 @@ fn left_out_poses_leave_no_trace() {
     let mut linear = Linear::new(60, 20, Some(0.5), 9);
     let mut data = linear.noise();
     let p_values = |findings: &Findings| -> Vec<f64> {
-        let rest = findings.tests.iter().filter(|check| !matches!(check.test, Test::Outliers { .. } | Test::Normality));
-        rest.filter_map(|check| check.outcome.as_ref().ok()).map(|outcome| outcome.p_value).collect()
+        let rest = findings
+            .tests
+            .iter()
+            .filter(|check| !matches!(check.test, Test::Outliers { .. } | Test::Normality));
+        rest.filter_map(|check| check.outcome.as_ref().ok())
+            .map(|outcome| outcome.p_value)
+            .collect()
     };
     let at = |size: f64, data: &mut DVector<f64>| {
-        Linear::displace(data, |pose| if pose == 30 { Vector3::new(size, 0.0, size) } else { Vector3::zeros() });
+        Linear::displace(data, |pose| {
+            if pose == 30 { Vector3::new(size, 0.0, size) } else { Vector3::zeros() }
+        });
         let taken = linear.fitted.tr_mul(data);
         let residual = &*data - &linear.fitted * taken;
         linear.check(&residual)

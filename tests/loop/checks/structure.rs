@@ -1,6 +1,6 @@
 //! Structure in what a fit leaves is found and named.
 
-use flexcal::diagnose::{Covariate, Findings, ResidualTest, Sequence, Test};
+use flexcal::select::{Covariate, Findings, ResidualTest, Sequence, Test};
 use nalgebra::Vector3;
 use rand::RngExt as _;
 use rayon::prelude::*;
@@ -10,7 +10,9 @@ use super::linear::{Linear, at_most, count, driven, factor, find, normal};
 #[test]
 fn a_driver_is_found_and_named() {
     let on_q2 = Test::Dependence { covariate: Covariate::Command(1) };
-    let named = count(30, |seed| driven(60, 20, 1.5, seed).strongest().is_some_and(|check| check.test == on_q2));
+    let named = count(30, |seed| {
+        driven(60, 20, 1.5, seed).strongest().is_some_and(|check| check.test == on_q2)
+    });
     println!("q2 is named in {named} of 30");
     assert!(named >= 25);
     let findings = driven(60, 20, 3.0, 1);
@@ -52,10 +54,13 @@ fn following(shuffled: bool, seed: u64) -> Findings {
 #[test]
 fn noise_that_follows_itself_is_found_in_its_order() {
     for shuffled in [false, true] {
-        let all: Vec<Findings> = (0..30).into_par_iter().map(|seed| following(shuffled, seed)).collect();
-        let failing = |test: &Test| all.iter().filter(|findings| find(findings, test).failed()).count();
+        let all: Vec<Findings> =
+            (0..30).into_par_iter().map(|seed| following(shuffled, seed)).collect();
+        let failing =
+            |test: &Test| all.iter().filter(|findings| find(findings, test).failed()).count();
         let time = Sequence::Time;
-        let (runs, correlated) = (failing(&Test::Runs { sequence: time }), failing(&Test::LjungBox { sequence: time }));
+        let (runs, correlated) =
+            (failing(&Test::Runs { sequence: time }), failing(&Test::LjungBox { sequence: time }));
         println!("shuffled {shuffled}: runs {runs}, Ljung–Box {correlated} of 30");
         assert!(runs >= 25 && correlated >= 27);
         let by_rows = Test::LjungBox { sequence: Sequence::Rows };
@@ -72,7 +77,8 @@ fn an_understated_sigma_fails_chi_squared_and_nothing_else() {
     let mut linear = Linear::new(28, 20, None, 6);
     let noise = linear.noise();
     let residual = linear.leaves(noise);
-    let [as_declared, understated, overstated] = [1.0, 3.0, 0.2].map(|scale| linear.check(&(&residual * scale)));
+    let [as_declared, understated, overstated] =
+        [1.0, 3.0, 0.2].map(|scale| linear.check(&(&residual * scale)));
     assert!(!as_declared.is_structured());
     let check = understated.strongest().unwrap();
     println!("{check}");
@@ -84,11 +90,16 @@ fn an_understated_sigma_fails_chi_squared_and_nothing_else() {
     assert!(small.to_string().contains("overstated"));
     let statistics = |findings: &Findings| -> Vec<(f64, f64)> {
         let rest = findings.tests.iter().filter(|check| check.test != Test::ReducedChiSquared);
-        rest.filter_map(|check| check.outcome.as_ref().ok()).map(|o| (o.statistic, o.p_value)).collect()
+        rest.filter_map(|check| check.outcome.as_ref().ok())
+            .map(|o| (o.statistic, o.p_value))
+            .collect()
     };
     for other in [&understated, &overstated] {
         for (a, b) in statistics(&as_declared).iter().zip(statistics(other)) {
-            assert!((a.0 - b.0).abs() < 1e-9 * a.0.abs() && (a.1 - b.1).abs() < 1e-6, "{a:?} {b:?}");
+            assert!(
+                (a.0 - b.0).abs() < 1e-9 * a.0.abs() && (a.1 - b.1).abs() < 1e-6,
+                "{a:?} {b:?}"
+            );
         }
     }
 }
@@ -97,7 +108,8 @@ fn an_understated_sigma_fails_chi_squared_and_nothing_else() {
 fn repeats_show_a_lack_of_fit_without_sigma() {
     let repeated = |seed: u64, size: f64| {
         let mut linear = Linear::new(60, 12, None, 7000 + seed);
-        // Three poses of each setup: rows of the Jacobian are the same, and so is what the model lacks.
+        // Three poses of each setup: rows of the Jacobian are the same, and so is what the model
+        // lacks.
         linear.setup = (0..60).map(|pose| pose / 3).collect();
         linear.sigma_is_declared = false;
         for row in 0..180 {
@@ -107,7 +119,9 @@ fn repeats_show_a_lack_of_fit_without_sigma() {
         linear.fitted = factor(&linear.jacobian, None);
         let mut data = linear.noise() * 4.0;
         let lacking: Vec<f64> = (0..60).map(|_| 4.0 * size * normal(&mut linear.random)).collect();
-        Linear::displace(&mut data, |pose| Vector3::from_fn(|axis, _| lacking[3 * (pose / 3) + axis]));
+        Linear::displace(&mut data, |pose| {
+            Vector3::from_fn(|axis, _| lacking[3 * (pose / 3) + axis])
+        });
         let residual = linear.leaves(data);
         let findings = linear.check(&residual);
         find(&findings, &Test::LackOfFit).clone()

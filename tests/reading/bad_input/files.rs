@@ -24,7 +24,10 @@ fn whole_problems() {
         ("name = 'arm'\n\n[[joint]", &[":3: not valid TOML"]),
         ("name = 'arm", &[":1: not valid TOML"]),
         ("name = 'arm'\nmass_kg = 3\n[[joint]]", &[":2: mass_kg: unknown key", "gravity_m_s2"]),
-        ("name = 'arm'\ngravity = [0, 0, 1]\n[[joint]]", &[":2: gravity: ", "needs a unit", "gravity_m_s2"]),
+        (
+            "name = 'arm'\ngravity = [0, 0, 1]\n[[joint]]",
+            &[":2: gravity: ", "needs a unit", "gravity_m_s2"],
+        ),
     ];
     for (text, words) in mistakes {
         check(&problem(text).expect_err(text), text, words);
@@ -46,7 +49,11 @@ fn files_that_cannot_be_read() {
         Measurements::read(&problem.data.files, &problem).unwrap_err()
     };
     let named = format!("{ARM}[data]\nfiles = ['nowhere.csv']");
-    check(&read(&named), "missing data file", &["problem.toml:4: data.files: no such file: nowhere.csv"]);
+    check(
+        &read(&named),
+        "missing data file",
+        &["problem.toml:4: data.files: no such file: nowhere.csv"],
+    );
     check(&read(&format!("{ARM}[data]")), "no files", &["problem.toml:3: data: no measurements"]);
     check(&read(ARM), "no data", &["problem.toml: data: no measurements"]);
 
@@ -66,25 +73,47 @@ fn files_that_differ() {
     let read = |first: &str, second: &str| {
         fs::write(
             &files[0],
-            format!("q1_deg,x_m,y_m,z_m{first}\n0,0,0,0{}\n", if first.is_empty() { "" } else { ",1" }),
+            format!(
+                "q1_deg,x_m,y_m,z_m{first}\n0,0,0,0{}\n",
+                if first.is_empty() { "" } else { ",1" }
+            ),
         )
         .unwrap();
         fs::write(
             &files[1],
-            format!("q1_rad,z_m,y_m,x_m{second}\n0,0,0,0{}\n", if second.is_empty() { "" } else { ",1" }),
+            format!(
+                "q1_rad,z_m,y_m,x_m{second}\n0,0,0,0{}\n",
+                if second.is_empty() { "" } else { ",1" }
+            ),
         )
         .unwrap();
         Measurements::read(&files, &problem)
     };
-    check(&read("", ",session").unwrap_err(), "more", &["2.csv:1: column session: ", "1.csv does not have it"]);
-    check(&read(",hoist_N", "").unwrap_err(), "fewer", &["2.csv:1: column hoist_N: ", "1.csv has it"]);
+    check(
+        &read("", ",session").unwrap_err(),
+        "more",
+        &["2.csv:1: column session: ", "1.csv does not have it"],
+    );
+    check(
+        &read(",hoist_N", "").unwrap_err(),
+        "fewer",
+        &["2.csv:1: column hoist_N: ", "1.csv has it"],
+    );
     assert!(read("", "").is_ok() && read(",pose", "").is_ok() && read(",note", "").is_ok());
     let twice = [files[0].clone(), files[0].clone()];
-    check(&Measurements::read(&twice, &problem).unwrap_err(), "twice", &["1.csv: named twice on the command line"]);
+    check(
+        &Measurements::read(&twice, &problem).unwrap_err(),
+        "twice",
+        &["1.csv: named twice on the command line"],
+    );
     let own = folder.path().join("problem.toml");
     fs::write(&own, format!("{ARM}\n[data]\nfiles = [\"1.csv\", \"./1.csv\"]\n")).unwrap();
     let line = fs::read_to_string(&own).unwrap().lines().count();
     let named = Problem::read(&own).unwrap();
     let error = Measurements::read(&named.data.files, &named).unwrap_err();
-    check(&error, "twice in the problem", &[&format!("problem.toml:{line}: data.files: "), "1.csv is named twice"]);
+    check(
+        &error,
+        "twice in the problem",
+        &[&format!("problem.toml:{line}: data.files: "), "1.csv is named twice"],
+    );
 }

@@ -1,4 +1,5 @@
-//! Mistakes in the input: each message names file, line and key; `tests/fuzz` has those changed at random.
+//! Mistakes in the input: each message names file, line and key; `tests/fuzz` has those changed at
+//! random.
 
 #![expect(clippy::expect_used, reason = "a test that fails may panic")]
 

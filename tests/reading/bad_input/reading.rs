@@ -23,7 +23,8 @@ pub fn check(error: &InputError, mistake: &str, words: &[&str]) {
     }
 }
 
-/// Checks that each piece of text, put below the first joint, is a mistake whose message holds the words.
+/// Checks that each piece of text, put below the first joint, is a mistake whose message holds the
+/// words.
 pub fn check_problems(mistakes: &[(&str, &[&str])]) {
     for (text, words) in mistakes {
         let error = problem(&format!("{ARM}{text}\n")).expect_err(text);

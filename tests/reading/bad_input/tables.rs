@@ -10,9 +10,18 @@ fn headers() {
         ("q1_deg,x_m,y_m,z_m\n", &["rows.csv:1: no rows below the header"]),
         ("x_m,y_m,z_m\n1,2,3\n", &["rows.csv:1: column q1: missing; add q1_deg or q1_rad"]),
         ("q1_deg,x_m,z_m\n1,2,3\n", &["rows.csv:1: column y: missing; add y_m or y_mm"]),
-        ("q1_deg,X_mm,y_m,z_m\n", &["rows.csv:1: column x: missing; add x_m or x_mm (is it column X_mm?)"]),
-        ("q1deg,x_m,y_m,z_m\n", &["rows.csv:1: column q1: missing; add q1_deg or q1_rad (is it column q1deg?)"]),
-        ("q1,x_m,y_m,z_m\n", &["rows.csv:1: column q1: an angle needs a unit; write q1_deg or q1_rad"]),
+        (
+            "q1_deg,X_mm,y_m,z_m\n",
+            &["rows.csv:1: column x: missing; add x_m or x_mm (is it column X_mm?)"],
+        ),
+        (
+            "q1deg,x_m,y_m,z_m\n",
+            &["rows.csv:1: column q1: missing; add q1_deg or q1_rad (is it column q1deg?)"],
+        ),
+        (
+            "q1,x_m,y_m,z_m\n",
+            &["rows.csv:1: column q1: an angle needs a unit; write q1_deg or q1_rad"],
+        ),
         ("q1_mm,x_m,y_m,z_m\n", &["rows.csv:1: column q1_mm: an angle is not given in mm"]),
         ("\nq1_deg,x,y_m,z_m\n", &["rows.csv:2: column x: a length needs a unit"]),
         ("q1_deg,x_m,x_mm,y_m,z_m\n", &["rows.csv:1: column x_mm: given already as column x_m"]),
@@ -23,7 +32,10 @@ fn headers() {
             &["rows.csv:1: columns are set apart by '|'; write delimiter = \"|\" in [data.format]"],
         ),
         ("q1_deg,x_m,y_m,z_m,sigma\n", &["rows.csv:1: column sigma: a length needs a unit"]),
-        ("q1_deg,x_m,y_m,z_m,sigma_deg\n", &["rows.csv:1: column sigma_deg: a length is not given in deg"]),
+        (
+            "q1_deg,x_m,y_m,z_m,sigma_deg\n",
+            &["rows.csv:1: column sigma_deg: a length is not given in deg"],
+        ),
         ("q1_deg,x_m,y_m,z_m,rx_mm\n", &["rows.csv:1: column rx_mm: an angle is not given in mm"]),
     ];
     for (text, words) in headers {
@@ -47,9 +59,15 @@ fn a_name_that_joints_share_is_no_column() {
     let both = "several joints are called \"wrist\"; write q1_deg or q1_rad and q2_deg or q2_rad";
     for (header, words) in [
         ("wrist_deg,q2_deg,q3_deg,x_m,y_m,z_m\n", format!("rows.csv:1: column wrist_deg: {both}")),
-        ("q1_deg,wrist_rad,hand_rad,x_m,y_m,z_m\n", format!("rows.csv:1: column wrist_rad: {both}")),
+        (
+            "q1_deg,wrist_rad,hand_rad,x_m,y_m,z_m\n",
+            format!("rows.csv:1: column wrist_rad: {both}"),
+        ),
         ("q2_deg,q3_deg,x_m,y_m,z_m\n", "column q1: missing; add q1_deg or q1_rad".to_owned()),
-        ("q1_deg,q2_deg,x_m,y_m,z_m\n", "column q3: missing; add q3_deg or q3_rad or hand_deg or hand_rad".to_owned()),
+        (
+            "q1_deg,q2_deg,x_m,y_m,z_m\n",
+            "column q3: missing; add q3_deg or q3_rad or hand_deg or hand_rad".to_owned(),
+        ),
     ] {
         check(&table(arm, header.as_bytes()).expect_err(header), header, &[&words]);
     }
@@ -69,7 +87,10 @@ fn rows() {
         ("1,2,3,\"4,5", &["rows.csv:3: a quote is opened and never closed"]),
         ("\0\0\0", &["rows.csv:3: the row has 1 fields"]),
         ("\0,1,2,3,", &["rows.csv:3: column q1_deg: \"\\u{0}\" is not a number"]),
-        ("1,1,2,3,train|split", &["rows.csv:3: column split: \"train\" is neither identification nor validation"]),
+        (
+            "1,1,2,3,train|split",
+            &["rows.csv:3: column split: \"train\" is neither identification nor validation"],
+        ),
         ("1,1,2,3,|split", &["rows.csv:3: column split: the cell is empty"]),
         ("1,1,2,3,|session", &["rows.csv:3: column session: the cell is empty"]),
         ("1,1,2,3,|target", &["rows.csv:3: column target: the cell is empty"]),
@@ -104,13 +125,37 @@ fn splits() {
     let session = held_out("session = 'D'");
     let place = "problem.toml:4: data.held_out: ";
     let cases: [(&str, String, &[&str]); 9] = [
-        (&column, rows("note", ["", ""]), &["rows.csv:1: column split: missing", "problem.toml:4: data.held_out"]),
-        (&column, rows("split", ["validation"; 2]), &[place, "no rows are left to fit", "column split", "validation"]),
-        (&column, rows("split", ["identification"; 2]), &[place, "no rows are held out", "column split"]),
-        (&session, rows("session", ["A", "B"]), &[place, "no session is called \"D\"; there is A, B"]),
+        (
+            &column,
+            rows("note", ["", ""]),
+            &["rows.csv:1: column split: missing", "problem.toml:4: data.held_out"],
+        ),
+        (
+            &column,
+            rows("split", ["validation"; 2]),
+            &[place, "no rows are left to fit", "column split", "validation"],
+        ),
+        (
+            &column,
+            rows("split", ["identification"; 2]),
+            &[place, "no rows are held out", "column split"],
+        ),
+        (
+            &session,
+            rows("session", ["A", "B"]),
+            &[place, "no session is called \"D\"; there is A, B"],
+        ),
         (&session, rows("note", ["A", "B"]), &[place, "no column session"]),
-        (&session, rows("session", ["D", "D"]), &[place, "no rows are left to fit", "session \"D\""]),
-        (&held_out("fraction = 0.5"), rows("note", ["", ""]), &[place, "2 rows have 1 joint configurations"]),
+        (
+            &session,
+            rows("session", ["D", "D"]),
+            &[place, "no rows are left to fit", "session \"D\""],
+        ),
+        (
+            &held_out("fraction = 0.5"),
+            rows("note", ["", ""]),
+            &[place, "2 rows have 1 joint configurations"],
+        ),
         (ARM, rows("note", ["", ""]), &["problem.toml: data: no row is said to be held out"]),
         (ARM, rows("split", ["validation"; 2]), &["problem.toml: data: no rows are left to fit"]),
     ];

@@ -1,0 +1,55 @@
+//! Constraints on the unknowns of a stage.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::active::Held;
+use super::stage::{Stage, StageError};
+use crate::least_squares::solver::{Inequalities, InequalitiesError};
+
+impl Stage<'_> {
+    /// The model's constraints on the unknowns, with the other parameters as in `at`; which they
+    /// are, and their rows.
+    pub fn constraints(
+        &self,
+        at: &DVector<f64>,
+    ) -> Result<(Vec<usize>, Inequalities), InequalitiesError> {
+        let n = self.unknowns.len();
+        let (mut which, mut rows, mut lower, mut upper) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for (index, constraint) in self.model.constraints.iter().enumerate() {
+            let varies = |&(k, _): &(usize, f64)| self.unknowns.contains(&k);
+            if !self.counts_fixed && !constraint.terms.iter().all(varies) {
+                continue;
+            }
+            let (mut row, mut rest) = (vec![0.0; n], 0.0);
+            for &(k, coefficient) in &constraint.terms {
+                match self.unknowns.iter().position(|&unknown| unknown == k) {
+                    Some(j) => row[j] += coefficient,
+                    None => rest += coefficient * at[k],
+                }
+            }
+            if row.iter().any(|coefficient| *coefficient != 0.0) {
+                which.push(index);
+                rows.extend(row);
+                lower.push(constraint.lower - rest);
+                upper.push(constraint.upper - rest);
+            }
+        }
+        let matrix = DMatrix::from_row_slice(which.len(), n, &rows);
+        Ok((which, Inequalities::new(matrix, DVector::from_vec(lower), DVector::from_vec(upper))?))
+    }
+
+    /// The constraints that hold the unknowns back at the full parameter vector `at`.
+    ///
+    /// # Errors
+    /// Constraints make no sense.
+    pub fn held(&self, at: &DVector<f64>) -> Result<Vec<Held>, StageError> {
+        let (which, rows) = self.constraints(at)?;
+        let x = DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| at[k]));
+        let held = |(i, constraint)| {
+            let row = rows.matrix().row(i).iter().copied().collect();
+            Some(Held { constraint, side: rows.at(&x, i)?, row })
+        };
+        Ok(which.into_iter().enumerate().filter_map(held).collect())
+    }
+}

@@ -1,0 +1,487 @@
+//! From measurements to estimates with their errors.
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, OnceLock};
+use std::time::Instant;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::active::ActiveConstraint;
+use super::covariance::Collected;
+use super::fitting::{FitEnd, Fitting};
+use super::influential_rows::influential_rows;
+use super::judgement::Judgement;
+use super::needed::check_columns;
+use super::noise::{fitted, taken};
+use super::noise_model::{LEAST_NOISE, NoiseModel};
+use super::outcome::{Estimate, Identification, Noise, enter};
+use super::placement::UNKNOWN_SIGMA;
+use super::pose_sufficiency::PoseSufficiency;
+use super::prior_sizes::prior_sizes;
+use super::quality::QualityFlag;
+use super::stage::StageError;
+use super::statistics::Statistics;
+use super::warm_start::WarmStart;
+use super::{Errors, Placement, Progress, ProgressSink, SolverChoice, Stop, Strategy};
+use crate::error::{InputError, InputErrorKind};
+use crate::least_squares::{Loss, Memory};
+use crate::measurement::{Dataset, Measurements, Split};
+use crate::model::Model;
+use crate::model::parameter::Parameter;
+use crate::problem::{Effect, Problem, Robust, RobustLoss};
+
+/// How to identify: [`Options::default()`] with what the `with_…` methods change.
+#[derive(Clone, Default)]
+#[non_exhaustive]
+pub struct Options {
+    /// Which parameters are fitted together.
+    pub strategy: Strategy,
+    /// By which solver.
+    pub solver: SolverChoice,
+    /// Told of every step.
+    pub progress: Option<ProgressSink>,
+    /// Asks for an early end: of a fit with [`StageError::Interrupted`], of a loop with what it has
+    /// found until then.
+    pub stop: Option<Stop>,
+    /// Values \[SI\] by name from which the fit starts; the registered nominal arm gives the
+    /// others.
+    pub start: Vec<(String, f64)>,
+    /// Steps after which a fit is stopped; `None`: those of the solver's own settings.
+    pub max_steps: Option<u64>,
+    /// Effects that trace and loop look for besides those of the catalogue: effects of one's own
+    /// ([`Effect::custom`]). A fit alone does not use them.
+    pub candidates: Vec<Effect>,
+    /// What a fit of the same problem with other effects to the same data leaves to this one.
+    pub(crate) predecessor: Option<Arc<WarmStart>>,
+    /// Whether another fit follows, so that nobody asks of this one what it can be trusted in.
+    pub(crate) provisional: bool,
+    /// Whether rows are looked for that carry what the fit does not explain, by further fits.
+    pub(crate) influential_rows: bool,
+}
+
+impl Options {
+    /// The same with another choice of what is fitted together.
+    #[must_use]
+    pub fn with_strategy(self, strategy: Strategy) -> Self {
+        Self { strategy, ..self }
+    }
+
+    /// The same with another solver.
+    #[must_use]
+    pub fn with_solver(self, solver: SolverChoice) -> Self {
+        Self { solver, ..self }
+    }
+
+    /// The same, with a look at whether a few rows carry what the fit does not explain
+    /// ([`Identification::influential_rows`]), by further fits; of a loop at the problem as declared.
+    #[must_use]
+    pub fn with_influential_rows(self) -> Self {
+        Self { influential_rows: true, ..self }
+    }
+
+    /// The same, telling `progress` of every step; `None`: nobody.
+    #[must_use]
+    pub fn with_progress(self, progress: impl Into<Option<ProgressSink>>) -> Self {
+        Self { progress: progress.into(), ..self }
+    }
+
+    /// The same, ending early once `stop` asks for it; `None`: never.
+    #[must_use]
+    pub fn with_stop(self, stop: impl Into<Option<Stop>>) -> Self {
+        Self { stop: stop.into(), ..self }
+    }
+
+    /// Tells of progress, if anybody listens.
+    pub(crate) fn tell(&self, progress: impl FnOnce() -> Progress) {
+        if let Some(sink) = &self.progress {
+            sink(progress());
+        }
+    }
+
+    /// The same, starting from these values \[SI\] by name.
+    #[must_use]
+    pub fn with_start(self, start: Vec<(String, f64)>) -> Self {
+        Self { start, ..self }
+    }
+
+    /// The same, looking for these effects besides those of the catalogue.
+    #[must_use]
+    pub fn with_candidates(self, candidates: Vec<Effect>) -> Self {
+        Self { candidates, ..self }
+    }
+
+    /// The same, stopped after so many steps.
+    #[must_use]
+    pub fn with_max_steps(self, max_steps: impl Into<Option<u64>>) -> Self {
+        Self { max_steps: max_steps.into(), ..self }
+    }
+
+    /// Full parameter vector from which the fit begins: `x`, with the values of `start`.
+    fn begin(&self, model: &Model, x: &DVector<f64>) -> DVector<f64> {
+        let given =
+            |parameter: &Parameter| self.start.iter().find(|(name, _)| *name == parameter.name);
+        let own = model.parameters.iter().zip(x);
+        let value = |(parameter, x): (&Parameter, &f64)| {
+            given(parameter).map_or(*x, |(_, value)| parameter.deviation(*value))
+        };
+        DVector::from_iterator(x.len(), own.map(value))
+    }
+}
+
+/// Why an identification could not be made, or not be applied.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum IdentifyError {
+    /// There is no row to identify from.
+    #[error("no pose to identify from")]
+    NoPoses,
+    /// Problem and data do not fit each other.
+    #[error("{0}")]
+    Input(#[from] InputError),
+    /// A fit could not be set up.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+    /// Bounds or constraints were declared for a solver that cannot keep them.
+    #[error(
+        "{solver} does not keep the bounds of [parameters] and constraints: take the solver bounded, interior-point or auto, or leave out \
+         min, max and [[constraint]]"
+    )]
+    BoundsIgnored {
+        /// The solver that was asked for.
+        solver: &'static str,
+    },
+    /// A strategy has nothing to vary.
+    #[error(
+        "strategy {strategy} has nothing to fit: no parameter of its kind is free in [parameters]"
+    )]
+    NothingToFit {
+        /// The strategy that was asked for.
+        strategy: &'static str,
+    },
+    /// A rule of the search for effects has a value that makes no sense.
+    #[error(
+        "the rule {rule} of the search for effects has a value that makes no sense; docs/selection.md says what it stands for"
+    )]
+    Rule {
+        /// Its name.
+        rule: &'static str,
+    },
+    /// Data have a configuration of another length than the arm.
+    #[error("configurations of {found} joints for an arm of {joints}")]
+    JointCount {
+        /// Of the data.
+        found: usize,
+        /// Of the problem, fixed ones among them.
+        joints: usize,
+    },
+    /// The model lacks a parameter that was identified.
+    #[error(
+        "{name} was identified, and the problem has no such parameter: it is another than the one identified"
+    )]
+    NotInModel {
+        /// Its name.
+        name: String,
+    },
+    /// A parameter is needed that was not identified.
+    #[error("{name} was not identified: the sessions, targets or effects are others")]
+    NoEstimate {
+        /// Its name.
+        name: String,
+    },
+}
+
+impl IdentifyError {
+    /// The work was stopped from outside.
+    pub(crate) fn interrupted() -> Self {
+        Self::Stage(StageError::Interrupted)
+    }
+
+    /// Whether the work was stopped from outside.
+    pub fn is_interrupted(&self) -> bool {
+        matches!(self, Self::Stage(StageError::Interrupted))
+    }
+}
+
+/// Identifies the free parameters of `problem` from the identification rows; held-out rows decide
+/// nothing.
+///
+/// # Errors
+/// Problem, data, strategy and solver do not fit each other.
+pub fn identify(
+    problem: &Problem,
+    data: &Dataset,
+    options: &Options,
+) -> Result<Identification, IdentifyError> {
+    let placement = Placement::of(&data.measurements);
+    let model = options.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
+    identify_model(&model, problem, data, options)
+}
+
+/// Data without a row to fit and configurations of another arm are mistakes, and what is declared
+/// and not measured.
+fn check_data(
+    problem: &Problem,
+    measurements: &Measurements,
+    split: &Split,
+) -> Result<(), IdentifyError> {
+    let (found, joints) = (measurements.joints, problem.joints.len());
+    if found != joints {
+        return Err(IdentifyError::JointCount { found, joints });
+    }
+    if problem.data.fits_orientation {
+        let error = |kind| IdentifyError::from(problem.data.location.clone().error(kind));
+        if measurements.orientations.is_none() {
+            return Err(error(InputErrorKind::NoOrientation));
+        }
+        if problem.data.position_sigma.is_none() && !measurements.knows_sigma() {
+            return Err(error(InputErrorKind::NoPositionSigma));
+        }
+    }
+    check_columns(problem, measurements)?;
+    if split.identification.is_empty() { Err(IdentifyError::NoPoses) } else { Ok(()) }
+}
+
+/// As [`identify`], with a model of the problem that the caller has changed, as [`Strategy::model`]
+/// does for a strategy.
+///
+/// # Errors
+/// Problem, data, strategy and solver do not fit each other.
+pub fn identify_model(
+    model: &Model,
+    problem: &Problem,
+    data: &Dataset,
+    options: &Options,
+) -> Result<Identification, IdentifyError> {
+    let Dataset { measurements, split } = data;
+    let mut found = fit_rows(model, problem, (measurements, split), options)?;
+    // A robust loss sets such rows aside by itself.
+    if options.influential_rows && !options.provisional && problem.robust.is_none() {
+        let start = found.estimates.iter().map(|own| (own.name.clone(), own.estimate)).collect();
+        let predecessor = Some(Arc::new(found.predecessor(true)));
+        let passing =
+            Options { progress: None, predecessor, provisional: true, start, ..options.clone() };
+        let without = |rows: &[usize]| {
+            let left_out: BTreeSet<usize> = rows.iter().copied().collect();
+            let kept = split
+                .identification
+                .iter()
+                .copied()
+                .filter(|row| !left_out.contains(row))
+                .collect();
+            let split = Split { identification: kept, held_out: split.held_out.clone() };
+            fit_rows(model, problem, (measurements, &split), &passing).ok()
+        };
+        found.influential_rows = influential_rows(&found, without);
+    }
+    Ok(found)
+}
+
+/// Fits the identification rows of a split.
+fn fit_rows(
+    model: &Model,
+    problem: &Problem,
+    (measurements, split): (&Measurements, &Split),
+    options: &Options,
+) -> Result<Identification, IdentifyError> {
+    let clock = Instant::now();
+    let memory = if options.provisional { Memory::provisional() } else { Memory::default() };
+    check_data(problem, measurements, split)?;
+    let placement = Placement::of(measurements);
+    let (strategy, solver) = (options.strategy, options.solver.decide(model));
+    if !solver.keeps(model) {
+        return Err(IdentifyError::BoundsIgnored { solver: solver.as_str() });
+    }
+    let (declared, noise_is_declared) =
+        (problem.data.position_sigma, measurements.noise_is_declared(problem));
+    let mut fitting = Fitting {
+        model,
+        measurements,
+        split,
+        placement: &placement,
+        held_out_only: placement.held_out_only(model, measurements, split),
+        strategy,
+        solver,
+        loss: problem.robust.map_or(Loss::Squares, loss),
+        progress: options.progress.as_ref(),
+        stop: options.stop.as_ref(),
+        max_steps: options.max_steps,
+        provisional: options.provisional,
+        to_be_judged: false,
+        sigma: declared.unwrap_or(UNKNOWN_SIGMA),
+        turn_sigma: problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation),
+        noise_model: NoiseModel::DECLARED,
+        turn_noise_model: NoiseModel::DECLARED,
+        memory: &memory,
+        known: options
+            .predecessor
+            .as_ref()
+            .and_then(|predecessor| predecessor.derivatives.as_ref()),
+    };
+    let unknowns = fitted_parameters(&fitting)?;
+    let (start, registered) =
+        prepared(&mut fitting, options.predecessor.as_deref(), noise_is_declared)?;
+    let begin = options.begin(model, &start);
+    let enough = PoseSufficiency::of(&fitting, problem, &unknowns, &start);
+    let judged = enough.too_few.is_none()
+        && !matches!(enough.flag, Some(QualityFlag::TooFewEquations { .. }));
+    let (mut end, statistics, noise) = fitted(&mut fitting, &begin, (noise_is_declared, judged))?;
+    let errors = fitting.position_errors(&split.identification, &end.x);
+    let outliers = statistics.lengths.list(&split.identification, &errors, measurements);
+    let asked = !options.provisional;
+    // Before fits of other rows: the first linearisation of this one is still known.
+    let sight = if asked { fitting.whole().data_triangle(&start) } else { DMatrix::zeros(0, 0) };
+    let (estimates, covariance, not_converged) = estimated(&fitting, &mut end, &statistics, noise)?;
+    let (fitted, whole) = (fitting.errors(&end.x), fitting.whole());
+    let (noise_factor, sigma_taken) = taken(&whole, measurements.leading());
+    let judgement = Judgement {
+        fitting: &fitting,
+        start: &start,
+        end: &end,
+        errors: (&registered, &fitted),
+        outliers: &outliers,
+        whole: &whole,
+        noise_is_declared,
+    };
+    let quality_flag = if asked {
+        judgement.flag(enough.flag, not_converged, enough.poses)
+    } else {
+        not_converged
+    };
+    let cautions = || judgement.cautions(problem, &whole.unknowns, &statistics.covariance);
+    let told = asked && noise != Noise::Unknown && end.termination.converged();
+    let values: Vec<f64> = whole.unknowns.iter().map(|&k| end.x[k]).collect();
+    let sizes = || prior_sizes(&unknowns, &values, &statistics.covariance);
+    Ok(Identification {
+        provisional: options.provisional,
+        quality_flag,
+        too_few_poses: enough.too_few,
+        poses: enough.poses,
+        several_targets: enough.several_targets,
+        cautions: if asked { cautions() } else { Vec::new() },
+        strategy,
+        solver,
+        solver_reason: options.solver.reason(model),
+        termination: end.termination,
+        iterations: end.iterations,
+        evaluations: end.evaluations,
+        alternation: end.alternation,
+        noise,
+        registered,
+        fitted,
+        reduced_chi2: statistics.reduced_chi2.filter(|_| noise_is_declared),
+        chance: statistics.chance.filter(|_| noise_is_declared),
+        noise_factor,
+        sigma_taken,
+        sigma_scale: fitting.noise_model.scale.min(1.0),
+        noise_models: (fitting.noise_model, fitting.turn_noise_model),
+        kinds: fitting.errors_by_kind(&start, &end.x),
+        spreads: fitting.spreads(&problem.fixtures, &start, &end.x),
+        weak: end.gauge.weak.clone(),
+        orientation: fitting.orientation(&start, &end.x),
+        coordinates: whole.count(),
+        sight: (sight, OnceLock::new()),
+        estimates,
+        covariance: covariance.finish(),
+        prior_sizes: if told { sizes() } else { Vec::new() },
+        unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
+        active_constraints: ActiveConstraint::all(
+            &statistics.constraints,
+            &statistics.prices.constraints,
+            model,
+        ),
+        outliers,
+        influential_rows: None,
+        x: end.x,
+        registered_x: start,
+        first_time: measurements.time.iter().copied().fold(f64::INFINITY, f64::min),
+        sigma: fitting.sigma,
+        seconds: clock.elapsed().as_secs_f64(),
+    })
+}
+
+/// The full parameter vector of the registered nominal arm and its errors; the fit begins with the
+/// σ that it takes from there, or from its predecessor.
+fn prepared(
+    fitting: &mut Fitting,
+    predecessor: Option<&WarmStart>,
+    noise_is_declared: bool,
+) -> Result<(DVector<f64>, Errors), StageError> {
+    let (start, registered) = match predecessor {
+        Some(known) => (known.registered(fitting.model), known.errors),
+        None => fitting.registered().map(|start| (start.clone(), fitting.errors(&start)))?,
+    };
+    if !noise_is_declared {
+        let scatter = registered.identification.rms.norm / fitting.measurements.leading().root();
+        fitting.sigma = scatter.max(LEAST_NOISE);
+    }
+    if let Some(noise) = predecessor.and_then(|known| known.noise) {
+        (fitting.noise_model, fitting.turn_noise_model) = noise;
+    }
+    Ok((start, registered))
+}
+
+/// What the strategy varies; a row without equilibrium and a strategy that varies nothing of its
+/// own are mistakes.
+fn fitted_parameters<'a>(fitting: &Fitting<'a>) -> Result<Vec<&'a Parameter>, IdentifyError> {
+    if let Some(row) = fitting.without_equilibrium() {
+        return Err(fitting.measurements.location(row).error(InputErrorKind::NoEquilibrium).into());
+    }
+    let unknowns: Vec<&Parameter> = fitting.whole().parameters().collect();
+    if fitting.strategy != Strategy::Joint
+        && unknowns.iter().all(|parameter| parameter.site.is_placement())
+    {
+        return Err(IdentifyError::NothingToFit { strategy: fitting.strategy.as_str() });
+    }
+    Ok(unknowns)
+}
+
+/// Estimates of all parameters and their covariance, and what did not converge. Bases and targets
+/// of held-out sessions are fitted to their rows, with the arm as it ended.
+fn estimated(
+    fitting: &Fitting,
+    end: &mut FitEnd,
+    statistics: &Statistics,
+    noise: Noise,
+) -> Result<(Vec<Estimate>, Collected, Option<QualityFlag>), StageError> {
+    let (model, time_measured) = (fitting.model, fitting.measurements.time_measured);
+    let mut estimates: Vec<Estimate> =
+        model.parameters.iter().map(|own| Estimate::unfitted(own, time_measured)).collect();
+    let mut covariance = Collected::new(estimates.len());
+    enter((&mut estimates, &mut covariance), &fitting.whole(), end, statistics);
+    let mut not_converged =
+        (!end.termination.converged()).then_some(QualityFlag::NotConverged(end.termination));
+    if let Some(stage) = fitting.held_out_stage() {
+        let placed: FitEnd = stage.run(&end.x)?.into();
+        end.iterations += placed.iterations;
+        end.evaluations += placed.evaluations;
+        let statistics = Statistics::of(
+            &stage,
+            &placed,
+            (noise == Noise::Declared).then_some(fitting.noise_model),
+        )?;
+        enter((&mut estimates, &mut covariance), &stage, &placed, &statistics);
+        let held_out = (!placed.termination.converged())
+            .then_some(QualityFlag::HeldOutNotConverged(placed.termination));
+        not_converged = not_converged.or(held_out);
+        end.x = placed.x;
+    }
+    if noise == Noise::Unknown {
+        for own in &mut estimates {
+            own.std_error = None;
+        }
+    }
+    Ok((estimates, covariance, not_converged))
+}
+
+/// The loss that `[robust]` stands for, on the three coordinates of a position.
+fn loss(robust: Robust) -> Loss {
+    match robust.loss {
+        RobustLoss::Huber => {
+            Loss::Huber { threshold: robust.threshold.unwrap_or(Loss::HUBER_POSITION) }
+        }
+        RobustLoss::L1 => Loss::L1 {
+            slope: Loss::L1_POSITION,
+            smoothing: robust.threshold.unwrap_or(Loss::L1_SMOOTHING),
+        },
+    }
+}

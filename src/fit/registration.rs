@@ -1,0 +1,181 @@
+//! Where the arm stands: a base pose from measured points, with no guess to start from.
+
+use nalgebra::{DVector, Matrix3, Matrix4, Quaternion, Rotation3, UnitQuaternion, Vector3};
+
+use crate::model::parameter::{Parameter, ParameterSite};
+use crate::model::{Model, Pose};
+use crate::spatial::{Frame, rotate};
+
+/// Points whose second squared spread is below this part of the first lie on a line.
+const ON_A_LINE: f64 = 1e-12;
+
+/// Sets every base that is wholly free and has no prior to the best rigid motion from the arm's own
+/// frame to the measured positions of `poses`, in the full parameter vector `x`, and then every
+/// orientation of a target that is wholly free and has no prior to the best one. What no pose uses
+/// stays as it is.
+///
+/// min over R, t of Σ ‖y − R p − t‖²: the unit quaternion of R is the eigenvector of a symmetric 4
+/// × 4 matrix  [Horn 1987].
+pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
+    let poses: Vec<Pose> =
+        poses.iter().filter(|pose| pose.observation.is_position()).copied().collect();
+    let poses = &poses[..];
+    let points = model.points(poses, x.as_slice());
+    let has_orientation = poses.iter().any(|pose| pose.orientation.is_some());
+    let frames = if has_orientation { model.frames(poses, x.as_slice()) } else { Vec::new() };
+    let oriented: Vec<(&Pose, Frame<f64>)> =
+        poses.iter().zip(frames).filter_map(|(pose, last)| Some((pose, last?))).collect();
+    let turned: Vec<Frame<f64>> = model
+        .target_rotations(x.as_slice())
+        .iter()
+        .map(|rotation| Frame::from_rotation_vector(Vector3::zeros(), rotation))
+        .collect();
+    let turns = |target: usize| {
+        let own = |parameter: &&Parameter| matches!(parameter.site, ParameterSite::Target { target: own, axis: 3.. } if own == target);
+        let free = |parameter: &&Parameter| parameter.sigma.is_none() && !parameter.is_bounded();
+        model.parameters.iter().filter(own).filter(free).count() == 3
+    };
+    let nominal = model.base_poses(DVector::zeros(x.len()).as_slice());
+    for (base, nominal) in nominal.iter().enumerate() {
+        let columns: Vec<(usize, usize)> = model
+            .parameters
+            .iter()
+            .enumerate()
+            .filter(|(_, parameter)| parameter.sigma.is_none() && !parameter.is_bounded())
+            .filter_map(|(k, parameter)| match parameter.site {
+                ParameterSite::Base { base: own, axis } if own == base => Some((axis, k)),
+                _ => None,
+            })
+            .collect();
+        let of_base = |pose: &&Pose| pose.base == base;
+        let pairs = poses.iter().zip(&points).filter(|(pose, _)| of_base(pose));
+        let points: Vec<_> =
+            pairs.filter_map(|(pose, point)| Some(((*point)?, *pose.measured))).collect();
+        if columns.len() < 6 || points.is_empty() {
+            continue;
+        }
+        let seen = oriented.iter().filter(|(pose, _)| of_base(pose) && !turns(pose.target));
+        let seen = seen
+            .filter_map(|(pose, last)| Some((last.seen(&turned[pose.target]).axes, axes(pose)?)));
+        let nominal_rotation = mean_turn(seen).unwrap_or(nominal.rotation);
+        let (rotation, translation) = rigid_motion(&points, &nominal_rotation);
+        let rotation = rotation - nominal.rotation;
+        let translation = translation - nominal.translation;
+        for (axis, k) in columns {
+            x[k] = if axis < 3 { translation[axis] } else { rotation[axis - 3] };
+        }
+    }
+    turn_targets(model, &oriented, x, turns);
+}
+
+/// The axes of a measured orientation.
+fn axes(pose: &Pose) -> Option<[Vector3<f64>; 3]> {
+    pose.orientation?.axes()
+}
+
+/// Sets the orientations of the targets of which `turns` says so, from poses with the last frames
+/// of the arm in its base frame.
+fn turn_targets(
+    model: &Model,
+    poses: &[(&Pose, Frame<f64>)],
+    x: &mut DVector<f64>,
+    turns: impl Fn(usize) -> bool,
+) {
+    let bases = model.base_frames(x.as_slice());
+    let nominal = model.target_rotations(DVector::zeros(x.len()).as_slice());
+    for (target, nominal) in nominal.iter().enumerate().filter(|(target, _)| turns(*target)) {
+        // R of the target turns the axes of the last frame into the measured ones, both seen from
+        // the last frame.
+        let seen =
+            poses.iter().filter(|(pose, _)| pose.target == target).filter_map(|(pose, last)| {
+                let last = bases[pose.base].seen(last);
+                Some((
+                    [Vector3::x(), Vector3::y(), Vector3::z()],
+                    axes(pose)?.map(|axis| last.resolve(&axis)),
+                ))
+            });
+        let Some(rotation) = mean_turn(seen) else { continue };
+        for (k, parameter) in model.parameters.iter().enumerate() {
+            if let ParameterSite::Target { target: own, axis: axis @ 3.. } = parameter.site
+                && own == target
+            {
+                x[k] = rotation[axis - 3] - nominal[axis - 3];
+            }
+        }
+    }
+}
+
+/// The rotation vector \[rad\] that turns the first of some pairs of axes into the second ones
+/// best; `None` without any.
+///
+/// min over R of Σ ‖R A − B‖²: R = U diag(1, 1, ±1) Vᵀ of Σ B Aᵀ = U Σ Vᵀ  [Arun, Huang & Blostein
+/// 1987].
+fn mean_turn(
+    pairs: impl Iterator<Item = ([Vector3<f64>; 3], [Vector3<f64>; 3])>,
+) -> Option<Vector3<f64>> {
+    let product = |(from, to): ([Vector3<f64>; 3], [Vector3<f64>; 3])| {
+        Matrix3::from_columns(&to) * Matrix3::from_columns(&from).transpose()
+    };
+    let sum = pairs.map(product).reduce(|a, b| a + b)?;
+    let svd = sum.svd(true, true);
+    let (u, v) = (svd.u?, svd.v_t?);
+    let handed = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v).determinant().signum()));
+    Some(
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * handed * v))
+            .scaled_axis(),
+    )
+}
+
+/// The rotation vector \[rad\] and translation \[m\] that carry the first points of the pairs to
+/// the second ones best; the `nominal` rotation where the points lie on a line, about which they
+/// leave the turn open.
+fn rigid_motion(
+    pairs: &[(Vector3<f64>, Vector3<f64>)],
+    nominal: &Vector3<f64>,
+) -> (Vector3<f64>, Vector3<f64>) {
+    let n = pairs.len() as f64;
+    let (from, to) = pairs
+        .iter()
+        .fold((Vector3::zeros(), Vector3::zeros()), |(a, b), (p, y)| (a + p / n, b + y / n));
+    let s: Matrix3<f64> = pairs.iter().map(|(p, y)| (p - from) * (y - to).transpose()).sum();
+    let mut spread = (s.transpose() * s).symmetric_eigenvalues();
+    spread.as_mut_slice().sort_by(f64::total_cmp);
+    if spread[1] <= ON_A_LINE * spread[2] {
+        return (*nominal, to - rotate(nominal, &from));
+    }
+    let skew = Vector3::new(s[(1, 2)] - s[(2, 1)], s[(2, 0)] - s[(0, 2)], s[(0, 1)] - s[(1, 0)]);
+    let symmetric = s + s.transpose() - Matrix3::identity() * s.trace();
+    let mut normal = Matrix4::zeros();
+    normal[(0, 0)] = s.trace();
+    normal.fixed_view_mut::<3, 1>(1, 0).copy_from(&skew);
+    normal.fixed_view_mut::<1, 3>(0, 1).copy_from(&skew.transpose());
+    normal.fixed_view_mut::<3, 3>(1, 1).copy_from(&symmetric);
+    let eigen = normal.symmetric_eigen();
+    let q = eigen.eigenvectors.column(eigen.eigenvalues.imax());
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]));
+    (rotation.scaled_axis(), to - rotation * from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_motion_is_found_from_points_in_a_plane() {
+        for w in [
+            Vector3::zeros(),
+            Vector3::new(0.0, 0.0, 3.1),
+            Vector3::new(1.0, -2.0, 0.5),
+            Vector3::new(2.2, 2.2, 0.0),
+        ] {
+            let shift = Vector3::new(3.0, -1.0, 0.2);
+            let points = [[0.0, 0.0], [1.0, 0.0], [0.0, 2.0], [1.5, 1.0]]
+                .map(|[x, y]| Vector3::new(x, y, 0.3));
+            let pairs = points.map(|p| (p, rotate(&w, &p) + shift));
+            let (found, translation) = rigid_motion(&pairs, &Vector3::zeros());
+            for (p, y) in pairs {
+                assert!((rotate(&found, &p) + translation - y).norm() < 1e-12, "{w}");
+            }
+        }
+    }
+}

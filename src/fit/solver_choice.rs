@@ -1,0 +1,142 @@
+//! By which solver parameters are fitted.
+
+use crate::least_squares::solver::Within;
+use crate::model::Model;
+
+/// A solver by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum SolverChoice {
+    /// Bounded Levenberg–Marquardt where there are bounds or constraints, plain otherwise;
+    /// `docs/solvers.md` says why.
+    #[default]
+    Auto,
+    /// Levenberg–Marquardt without bounds.
+    LevenbergMarquardt,
+    /// argmin's Gauss–Newton method: undamped.
+    GaussNewton,
+    /// The paper's iteration by a truncated pseudo-inverse [Chen2021, eq. 45]: undamped.
+    PseudoInverse,
+    /// Levenberg–Marquardt within the bounds of `[parameters]` and every `[[constraint]]`: faces
+    /// that hold are guessed and corrected.
+    Bounded,
+    /// The same, every step by an interior-point method.
+    InteriorPoint,
+    /// Levenberg–Marquardt within bounds by reflections [Branch, Coleman & Li 1999].
+    Reflective,
+    /// Levenberg–Marquardt whose steps are moved to the nearest point within bounds.
+    Clamped,
+}
+
+impl SolverChoice {
+    /// Every choice: what fits the problem, or a solver.
+    pub const CHOICES: [Self; 8] = [
+        Self::Auto,
+        Self::LevenbergMarquardt,
+        Self::GaussNewton,
+        Self::PseudoInverse,
+        Self::Bounded,
+        Self::InteriorPoint,
+        Self::Reflective,
+        Self::Clamped,
+    ];
+    /// Every solver.
+    pub const EACH: [Self; Self::CHOICES.len() - 1] = {
+        let mut each = [Self::Auto; Self::CHOICES.len() - 1];
+        let mut k = 0;
+        while k < each.len() {
+            each[k] = Self::CHOICES[k + 1];
+            k += 1;
+        }
+        each
+    };
+
+    /// Their names.
+    pub const NAMES: [&str; Self::CHOICES.len()] = {
+        let mut names = [""; Self::CHOICES.len()];
+        let mut k = 0;
+        while k < names.len() {
+            names[k] = Self::CHOICES[k].as_str();
+            k += 1;
+        }
+        names
+    };
+
+    /// Name in results, files and arguments, and what it does in a few words.
+    const fn words(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Auto => {
+                ("auto", "Bounded where there are bounds or constraints, else levenberg-marquardt")
+            }
+            Self::LevenbergMarquardt => {
+                ("levenberg-marquardt", "Levenberg-Marquardt without bounds")
+            }
+            Self::GaussNewton => ("gauss-newton", "Gauss-Newton: undamped steps"),
+            Self::PseudoInverse => {
+                ("pseudo-inverse", "Undamped steps by a truncated pseudo-inverse, as in the paper")
+            }
+            Self::Bounded => (
+                "bounded",
+                "Levenberg-Marquardt within the bounds of [parameters] and every [[constraint]]",
+            ),
+            Self::InteriorPoint => {
+                ("interior-point", "The same, each step by an interior-point method")
+            }
+            Self::Reflective => {
+                ("reflective", "Levenberg-Marquardt within bounds by reflections; no constraints")
+            }
+            Self::Clamped => {
+                ("clamped", "Levenberg-Marquardt with steps cut at the bounds; no constraints")
+            }
+        }
+    }
+
+    /// Name in results, files and arguments.
+    pub const fn as_str(self) -> &'static str {
+        self.words().0
+    }
+
+    /// What it does, in a few words.
+    pub const fn summary(self) -> &'static str {
+        self.words().1
+    }
+
+    /// How it keeps bounds, if it does.
+    pub fn within(self) -> Option<Within> {
+        match self {
+            Self::Bounded => Some(Within::ActiveSet),
+            Self::InteriorPoint => Some(Within::InteriorPoint),
+            Self::Reflective => Some(Within::Reflective),
+            Self::Clamped => Some(Within::Clamped),
+            Self::Auto | Self::LevenbergMarquardt | Self::GaussNewton | Self::PseudoInverse => None,
+        }
+    }
+
+    /// Whether it keeps the bounds and constraints of a model.
+    pub fn keeps(self, model: &Model) -> bool {
+        match self.within() {
+            None => !model.is_bounded(),
+            Some(Within::Reflective | Within::Clamped) => model.constraints.is_empty(),
+            Some(_) => true,
+        }
+    }
+
+    /// The solver that `auto` stands for with this model.
+    #[must_use]
+    pub fn decide(self, model: &Model) -> Self {
+        match self {
+            Self::Auto if model.is_bounded() => Self::Bounded,
+            Self::Auto => Self::LevenbergMarquardt,
+            chosen => chosen,
+        }
+    }
+
+    /// Why [`decide`](Self::decide) takes what it takes, where the choice is left to it.
+    pub fn reason(self, model: &Model) -> Option<&'static str> {
+        match self {
+            Self::Auto if model.is_bounded() => Some("bounds to keep"),
+            Self::Auto => Some("no bounds"),
+            _ => None,
+        }
+    }
+}

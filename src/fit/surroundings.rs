@@ -1,0 +1,235 @@
+//! Where points, anchors and surfaces are, in closed form from what the arm predicts, with no guess
+//! to start from.
+
+use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
+
+use crate::model::parameter::{Parameter, ParameterSite};
+use crate::model::{Model, Pose};
+use crate::problem::FixtureKind;
+use crate::problem::fixture::lean;
+use crate::spatial::plane_normal;
+
+/// Points whose spread across a plane is below this part of that within it are taken to lie in it.
+const IN_A_PLANE: f64 = 1e-3;
+/// Offsets tell the side of a plane where they differ by this \[m\] …
+const OFFSETS_DIFFER: f64 = 1e-4;
+/// … and the arm's base does where it is so far from it \[m\].
+const BASE_IS_OFF: f64 = 0.05;
+
+/// Sets the free numbers without a prior, of which the problem says nothing, of the fixtures that
+/// `chosen` parameters belong to, in the full parameter vector `x`, from `poses` that measure
+/// against them. What no pose touches stays as it is.
+pub(crate) fn locate(
+    model: &Model,
+    poses: &[Pose],
+    chosen: impl Fn(usize) -> bool,
+    x: &mut DVector<f64>,
+) {
+    let free = |(k, parameter): (usize, &Parameter)| match parameter.site {
+        ParameterSite::Fixture { fixture, kind, axis }
+            if parameter.sigma.is_none()
+                && !parameter.is_bounded()
+                && !model.is_declared(fixture, axis)
+                && chosen(k) =>
+        {
+            Some((fixture, kind, axis, k))
+        }
+        _ => None,
+    };
+    let free: Vec<(usize, FixtureKind, usize, usize)> =
+        model.parameters.iter().enumerate().filter_map(free).collect();
+    if free.is_empty() {
+        return;
+    }
+    let bases = model.base_frames(x.as_slice());
+    let points = model.points(poses, x.as_slice());
+    let mut first = 0;
+    while let Some(&(fixture, kind, ..)) = free.get(first) {
+        let own: Vec<_> = free.iter().filter(|(of, ..)| *of == fixture).collect();
+        first += own.len();
+        let touches = |(pose, point): (&Pose, &Option<Vector3<f64>>)| {
+            (pose.observation.fixture() == Some(fixture))
+                .then(|| Some((bases[pose.base].point(point.as_ref()?), pose.measured.x)))?
+        };
+        let contacts: Vec<(Vector3<f64>, f64)> =
+            poses.iter().zip(&points).filter_map(touches).collect();
+        let base = poses.iter().find(|pose| pose.observation.fixture() == Some(fixture));
+        let base = base.map_or(Vector3::zeros(), |pose| bases[pose.base].origin);
+        let Some(mut found) = found(kind, &contacts, &base) else { continue };
+        if kind == FixtureKind::Plane && model.is_declared(fixture, 0) {
+            // Its normal is declared.
+            let [rx, ry, ..] = model.fixtures(x.as_slice())[fixture].numbers;
+            found[2] = height(&contacts, &plane_normal(rx, ry));
+        }
+        for &&(_, _, axis, k) in &own {
+            x[k] = found[axis] - model.parameters[k].nominal;
+        }
+    }
+}
+
+/// The numbers of a fixture that fit contacts best: predicted points \[m\] with what is measured
+/// there \[m\].
+fn found(
+    kind: FixtureKind,
+    contacts: &[(Vector3<f64>, f64)],
+    base: &Vector3<f64>,
+) -> Option<[f64; 4]> {
+    if contacts.is_empty() {
+        return None;
+    }
+    let numbers = |place: Vector3<f64>, last: f64| [place.x, place.y, place.z, last];
+    let all = match kind {
+        FixtureKind::Point => numbers(centre(contacts), 0.0),
+        FixtureKind::Anchor => numbers(anchor(contacts), 0.0),
+        FixtureKind::Sphere => {
+            let (place, radius) = sphere(contacts);
+            numbers(place, radius)
+        }
+        FixtureKind::Plane => plane(contacts, base),
+    };
+    all.iter().all(|number| number.is_finite()).then_some(all)
+}
+
+fn centre(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
+    contacts.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / contacts.len() as f64
+}
+
+/// Principal directions of points about their centre, widest spread first, with the sums of squares
+/// along them.
+fn principal(contacts: &[(Vector3<f64>, f64)], centre: &Vector3<f64>) -> [(Vector3<f64>, f64); 3] {
+    let spread: Matrix3<f64> =
+        contacts.iter().map(|(point, _)| (point - centre) * (point - centre).transpose()).sum();
+    let eigen = SymmetricEigen::new(spread);
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    order.map(|k| (eigen.eigenvectors.column(k).into_owned(), eigen.eigenvalues[k]))
+}
+
+/// The least-squares solution of rows (a, b) of a·u = b.
+fn least_squares(rows: &[(Vec<f64>, f64)]) -> Option<DVector<f64>> {
+    let n = rows.first()?.0.len();
+    let matrix = DMatrix::from_fn(rows.len(), n, |i, j| rows[i].0[j]);
+    let right = DVector::from_iterator(rows.len(), rows.iter().map(|(_, b)| *b));
+    let size = matrix.amax();
+    matrix.svd(true, true).solve(&right, 1e-12 * size).ok()
+}
+
+/// The anchor of some distances: ‖p‖² − ℓ² = 2 p·A − ‖A‖² is linear in A and ‖A‖². Of points in a
+/// plane, its distance from that follows from the lengths, on the side that fits, or the upper one.
+fn anchor(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
+    let centre = centre(contacts);
+    let axes = principal(contacts, &centre);
+    let flat = axes[2].1 < IN_A_PLANE * IN_A_PLANE * axes[1].1;
+    let used = if flat { &axes[..2] } else { &axes[..] };
+    let row = |(point, length): &(Vector3<f64>, f64)| {
+        let p = point - centre;
+        let mut row: Vec<f64> = used.iter().map(|(axis, _)| 2.0 * axis.dot(&p)).collect();
+        row.push(-1.0);
+        (row, p.norm_squared() - length * length)
+    };
+    let Some(solved) = least_squares(&contacts.iter().map(row).collect::<Vec<_>>()) else {
+        return centre;
+    };
+    let within: Vector3<f64> = used.iter().zip(solved.iter()).map(|((axis, _), &u)| axis * u).sum();
+    if !flat {
+        return centre + within;
+    }
+    let height = (solved[2] - within.norm_squared()).max(0.0).sqrt();
+    let up = if axes[2].0.z < 0.0 { -axes[2].0 } else { axes[2].0 };
+    let misfit = |at: &Vector3<f64>| -> f64 {
+        contacts.iter().map(|(point, length)| ((point - at).norm() - length).powi(2)).sum()
+    };
+    let sides = [centre + within + up * height, centre + within - up * height];
+    if misfit(&sides[1]) < misfit(&sides[0]) { sides[1] } else { sides[0] }
+}
+
+/// The sphere through some points: ‖p‖² = 2 p·C + (ρ² − ‖C‖²) is linear in C and the bracket;
+/// offsets go out from it.
+fn sphere(contacts: &[(Vector3<f64>, f64)]) -> (Vector3<f64>, f64) {
+    let middle = centre(contacts);
+    let row = |(point, _): &(Vector3<f64>, f64)| {
+        let p = point - middle;
+        (vec![2.0 * p.x, 2.0 * p.y, 2.0 * p.z, 1.0], p.norm_squared())
+    };
+    let Some(solved) = least_squares(&contacts.iter().map(row).collect::<Vec<_>>()) else {
+        return (middle, 0.0);
+    };
+    let place = middle + Vector3::new(solved[0], solved[1], solved[2]);
+    let radius =
+        contacts.iter().map(|(point, offset)| (point - place).norm() - offset).sum::<f64>();
+    (place, radius / contacts.len() as f64)
+}
+
+/// The plane of least spread, its normal to the side of larger offsets; where these do not differ,
+/// to the arm's base, or else up.
+fn plane(contacts: &[(Vector3<f64>, f64)], base: &Vector3<f64>) -> [f64; 4] {
+    let n = contacts.len() as f64;
+    let middle = centre(contacts);
+    let offset = contacts.iter().map(|(_, offset)| offset).sum::<f64>() / n;
+    let normal = principal(contacts, &middle)[2].0;
+    let along: f64 = contacts
+        .iter()
+        .map(|(point, own)| normal.dot(&(point - middle)) * (own - offset))
+        .sum::<f64>()
+        / n;
+    let differ =
+        contacts.iter().map(|(_, own)| (own - offset).abs()).fold(0.0, f64::max) > OFFSETS_DIFFER;
+    let to_base = normal.dot(&(base - middle));
+    let side = match differ {
+        true => along,
+        false if to_base.abs() > BASE_IS_OFF => to_base,
+        false => normal.z,
+    };
+    let normal = if side < 0.0 { -normal } else { normal };
+    let [rx, ry] = lean(&normal);
+    [rx, ry, height(contacts, &normal), 0.0]
+}
+
+/// The number d of a plane with this normal \[m\].
+fn height(contacts: &[(Vector3<f64>, f64)], normal: &Vector3<f64>) -> f64 {
+    contacts.iter().map(|(point, offset)| normal.dot(point) - offset).sum::<f64>()
+        / contacts.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points() -> Vec<Vector3<f64>> {
+        (0..12_u8)
+            .map(f64::from)
+            .map(|k| {
+                Vector3::new((1.3 * k).sin(), (2.1 * k).cos(), 0.4 * (0.7 * k).sin())
+                    + Vector3::new(0.2, 0.3, 0.5)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_kind_is_found_from_exact_contacts() {
+        let at = Vector3::new(0.4, -1.1, 1.7);
+        let distances: Vec<_> = points().into_iter().map(|p| (p, (p - at).norm())).collect();
+        assert!((anchor(&distances) - at).norm() < 1e-9);
+        let flat: Vec<_> = points()
+            .into_iter()
+            .map(|p| Vector3::new(p.x, p.y, 0.5))
+            .map(|p| (p, (p - at).norm()))
+            .collect();
+        assert!((anchor(&flat) - at).norm() < 1e-6, "{}", anchor(&flat));
+        let ball: Vec<_> =
+            points().iter().map(|p| (at + (p - at).normalize() * 0.3, 0.0)).collect();
+        let (place, radius) = sphere(&ball);
+        assert!((place - at).norm() < 1e-9 && (radius - 0.3).abs() < 1e-9);
+        let normal = Vector3::new(0.2, -0.3, -0.9).normalize();
+        for offset in [0.0, 0.004] {
+            let touch = |(k, p): (usize, &Vector3<f64>)| {
+                let own = offset * k as f64;
+                (p - normal * (normal.dot(p) - 0.7 - own), own)
+            };
+            let wall: Vec<_> = points().iter().enumerate().map(touch).collect();
+            let [rx, ry, d, _] = plane(&wall, &(normal * 3.0));
+            let found = plane_normal(rx, ry);
+            assert!((found - normal).norm() < 0.05 && (d - 0.7).abs() < 0.05, "{found} {d}");
+        }
+    }
+}

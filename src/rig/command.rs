@@ -1,0 +1,147 @@
+//! Where a joint really goes when it is told to go to q.
+
+use super::Rig;
+use super::effect::{Cause, Shape, TrueEffect};
+use crate::problem::{Effect, Mount, PoseConditions};
+
+impl Rig {
+    /// By how much the coordinate of the joint with this number misses its command, without any
+    /// load \[rad\] or \[m\].
+    ///
+    /// Errors of a prismatic joint add to its d.
+    pub(super) fn miss(&self, number: usize, conditions: &PoseConditions) -> f64 {
+        let of = |joint: usize| conditions.configuration.get(joint - 1).copied().unwrap_or(0.0);
+        let q = of(number);
+        let part = |effect: &TrueEffect| match (effect.cause(), effect.values()) {
+            (Cause::Outside { joint, shape }, [height, centre, width]) if *joint == number => {
+                let u = (q - centre) / width;
+                height
+                    * match shape {
+                        Shape::Bump => (-0.5 * u * u).exp(),
+                        Shape::Step => u.tanh(),
+                    }
+            }
+            (Cause::Catalogued(effect), values) => match (effect, values) {
+                (Effect::JointHarmonic { joint, orders }, values) if *joint == number => orders
+                    .iter()
+                    .zip(values.chunks_exact(2))
+                    .map(|(order, wave)| {
+                        let (sin, cos) = (f64::from(*order) * q).sin_cos();
+                        wave[0] * sin + wave[1] * cos
+                    })
+                    .sum(),
+                (Effect::JointWave { joint, order }, [a, b]) if *joint == number => {
+                    a * (q * order).sin() + b * (q * order).cos()
+                }
+                (Effect::GearRatio { joint }, [error]) if *joint == number => error * q,
+                (Effect::Backlash { joint }, [width]) if *joint == number => {
+                    0.5 * width
+                        * conditions
+                            .approach
+                            .as_ref()
+                            .and_then(|sides| sides.get(number - 1))
+                            .copied()
+                            .unwrap_or(0.0)
+                }
+                (Effect::PayloadBacklash { joint }, [width]) if *joint == number => {
+                    let sides =
+                        conditions.approach.as_ref().and_then(|sides| sides.get(number - 1));
+                    let payload = conditions.payload.unwrap_or(self.arm.tool.payload_mass);
+                    sides.map_or(0.0, |side| payload * width * side / 2.0)
+                }
+                (Effect::JointThermalDrift { joint }, [rate]) if *joint == number => {
+                    rate * self.warming(conditions)
+                }
+                (Effect::JointThermalDriftLag { joint, time_constant }, [rate])
+                    if *joint == number =>
+                {
+                    rate * self.felt(conditions, *time_constant)
+                }
+                (Effect::JointHysteresis { joint, distance }, [amplitude]) if *joint == number => {
+                    amplitude * friction(conditions, number - 1, *distance)
+                }
+                (Effect::Covariate { joint: Mount::Joint(joint), of }, [rate])
+                    if *joint == number =>
+                {
+                    rate * self.covariate(of, conditions)
+                }
+                (Effect::JointCoupling { joint, from }, [factor]) if *joint == number => {
+                    factor * of(*from)
+                }
+                _ => 0.0,
+            },
+            _ => 0.0,
+        };
+        self.effects.iter().map(part).sum()
+    }
+
+    /// One of the problem's own covariates, in its unit; 0 where nobody knows.
+    pub(super) fn covariate(&self, name: &str, conditions: &PoseConditions) -> f64 {
+        let own = self.arm.data.covariates.iter().zip(&conditions.covariates);
+        own.filter(|(own, _)| own.name == name).map(|(_, value)| *value).sum()
+    }
+
+    /// T − T₀ [°C].
+    pub(super) fn warming(&self, conditions: &PoseConditions) -> f64 {
+        match (conditions.temperature, self.arm.data.reference_temperature) {
+            (Some(temperature), Some(reference)) => temperature - reference,
+            _ => 0.0,
+        }
+    }
+
+    /// T̃ − T₀ [°C] of what takes on the temperature within a time constant \[s\]: pose by pose,
+    /// along straight lines between readings.
+    pub(super) fn felt(&self, conditions: &PoseConditions, time_constant: f64) -> f64 {
+        let past = &conditions.past;
+        let Some(now) = conditions.temperature else { return 0.0 };
+        let reference = self.arm.data.reference_temperature.unwrap_or(now);
+        let before = past.times.iter().copied().zip(past.temperatures.iter().copied());
+        let mut readings = before.chain([(conditions.time, now)]);
+        let Some((mut time, mut air)) = readings.next() else { return now - reference };
+        let mut felt = air;
+        for (next, reading) in readings {
+            let passed = next - time;
+            // Behind air that warms at a steady rate it stays by rate × τ.
+            let behind = if passed > 0.0 { (reading - air) / passed * time_constant } else { 0.0 };
+            let start = if passed > 0.0 { felt - air } else { felt - reading };
+            felt = reading - behind + (start + behind) * (-passed / time_constant).exp();
+            (time, air) = (next, reading);
+        }
+        felt - reference
+    }
+}
+
+/// z of the friction of a joint, counted from 0, pose by pose.
+/// [Dahl 1968]
+fn friction(conditions: &PoseConditions, joint: usize, distance: f64) -> f64 {
+    let past = &conditions.past;
+    let joints = conditions.configuration.len();
+    let nowhere = vec![0.0; joints];
+    let sides_now = conditions.approach.as_ref().unwrap_or(&nowhere);
+    let sides = past
+        .approaches
+        .chunks(joints)
+        .chain(std::iter::repeat(nowhere.as_slice()))
+        .take(past.times.len());
+    let earlier = past.configurations.chunks(joints).zip(sides);
+    let mut way: Option<(f64, f64)> = None;
+    for (configuration, sides) in
+        earlier.chain([(conditions.configuration.as_slice(), sides_now.as_slice())])
+    {
+        let (q, side) = (configuration[joint], sides[joint]);
+        way = Some(match way {
+            None => (q, side),
+            Some((last, z)) => {
+                let step = q - last;
+                let towards = match side {
+                    0.0 if step > 0.0 => 1.0,
+                    0.0 => -1.0,
+                    side => side,
+                };
+                let kept = 1.0 / (step.abs() / distance).exp();
+                (q, towards * (1.0 - kept) + z * kept)
+            }
+        });
+    }
+    way.map_or(0.0, |(_, z)| z)
+}

@@ -1,0 +1,176 @@
+//! Effects that the rig injects: what the catalogue names, one thing that it does not, and how
+//! strong they are.
+
+use crate::problem::{Effect, Joint, JointKind, Mount};
+use crate::quantity::Unit;
+
+/// What makes the arm differ from its declared model.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Cause {
+    /// An effect of the catalogue.
+    Catalogued(Effect),
+    /// Something that no catalogue holds: a smooth error of one joint's coordinate.
+    Outside {
+        /// Number of the joint, from 1.
+        joint: usize,
+        /// Its course over q.
+        shape: Shape,
+    },
+}
+
+/// Course of an error over q, with u = (q − centre)/width.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Shape {
+    /// height · exp(−u²/2)
+    Bump,
+    /// height · tanh u
+    Step,
+}
+
+/// A cause and its strength.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrueEffect {
+    cause: Cause,
+    values: Vec<f64>,
+}
+
+/// A strength of the wrong shape.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the effect takes {expected} values, not {found}")]
+pub struct ValueCount {
+    expected: usize,
+    found: usize,
+}
+
+impl TrueEffect {
+    /// A cause with its values in SI units, in the order of [`TrueEffect::keys`].
+    ///
+    /// # Errors
+    /// Too many values or too few.
+    pub fn new(cause: Cause, values: &[f64], joints: &[Joint]) -> Result<Self, ValueCount> {
+        let expected = keys(&cause, joints).len();
+        if values.len() == expected {
+            Ok(Self { cause, values: values.to_vec() })
+        } else {
+            Err(ValueCount { expected, found: values.len() })
+        }
+    }
+
+    /// The cause.
+    pub fn cause(&self) -> &Cause {
+        &self.cause
+    }
+
+    /// Its values, SI.
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Names of the values in the order of the law, with the suffix of their SI unit.
+    pub fn keys(cause: &Cause, joints: &[Joint]) -> Vec<String> {
+        keys(cause, joints)
+            .into_iter()
+            .map(|(name, unit)| format!("{name}_{}", unit.si_suffix()))
+            .collect()
+    }
+
+    /// The effect of the catalogue with its values, where it is one.
+    pub(super) fn parts(&self) -> Option<(&Effect, &[f64])> {
+        match &self.cause {
+            Cause::Catalogued(effect) => Some((effect, &self.values)),
+            Cause::Outside { .. } => None,
+        }
+    }
+}
+
+/// What the values of a cause are called and measured in, in the order of the law in FORMAT.
+pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
+    let slides = |joint: &usize| {
+        joints.get(joint - 1).is_some_and(|joint| joint.kind == JointKind::Prismatic)
+    };
+    let coordinate = |joint| if slides(joint) { Unit::Length } else { Unit::Angle };
+    let about_xy = |unit| named(&[("about_x", unit), ("about_y", unit)]);
+    let xyz = |unit| named(&[("x", unit), ("y", unit), ("z", unit)]);
+    let effect = match cause {
+        Cause::Outside { joint, .. } => {
+            let unit = coordinate(joint);
+            return named(&[("height", unit), ("centre", unit), ("width", unit)]);
+        }
+        Cause::Catalogued(effect) => effect,
+    };
+    match effect {
+        Effect::JointHarmonic { joint, orders } => orders
+            .iter()
+            .flat_map(|order| {
+                ["sin", "cos"].map(|wave| (format!("{wave}{order}"), coordinate(joint)))
+            })
+            .collect(),
+        Effect::JointWave { joint, .. } => {
+            named(&[("sin", coordinate(joint)), ("cos", coordinate(joint))])
+        }
+        Effect::JointCompliance { .. } => named(&[("compliance", Unit::Compliance)]),
+        Effect::GearRatio { .. } | Effect::HoistForce | Effect::TrackerScale => {
+            named(&[("error", Unit::Ratio)])
+        }
+        Effect::Backlash { joint } => named(&[("width", coordinate(joint))]),
+        Effect::PayloadBacklash { joint } => named(&[(
+            "width",
+            if slides(joint) { Unit::LengthPerMass } else { Unit::AnglePerMass },
+        )]),
+        Effect::JointNonlinearStiffness { .. } => named(&[("cubic", Unit::CubicCompliance)]),
+        Effect::JointLateralCompliance { .. } | Effect::BaseCompliance => {
+            about_xy(Unit::Compliance)
+        }
+        Effect::GravityCompensator { .. } => {
+            named(&[("rate", Unit::ForcePerLength), ("preload", Unit::Force)])
+        }
+        Effect::JointHysteresis { .. } => named(&[("amplitude", Unit::Angle)]),
+        Effect::JointThermalDrift { joint } | Effect::JointThermalDriftLag { joint, .. } => named(
+            &[("rate", if slides(joint) { Unit::LengthPerDegree } else { Unit::AnglePerDegree })],
+        ),
+        Effect::JointCoupling { .. } => named(&[("factor", Unit::Ratio)]),
+        Effect::LinkBending { .. } | Effect::SlideBending { .. } => {
+            named(&[("flexibility", Unit::Flexibility)])
+        }
+        Effect::TwistBending { .. } => {
+            named(&[("about_y", Unit::Flexibility), ("about_z", Unit::Flexibility)])
+        }
+        Effect::LinkThermalBending { .. } | Effect::LinkThermalBendingLag { .. } => {
+            named(&[("about_y", Unit::CurvaturePerDegree), ("about_z", Unit::CurvaturePerDegree)])
+        }
+        Effect::LinkThermalExpansion { .. } | Effect::LinkThermalExpansionLag { .. } => {
+            named(&[("strain", Unit::PerDegree)])
+        }
+        Effect::UnmodelledMass { .. } => named(&[("mass", Unit::Mass), ("at", Unit::Length)]),
+        Effect::PayloadMass => named(&[("mass", Unit::Mass)]),
+        Effect::HoistDirection => {
+            named(&[("lean_x", Unit::Ratio), ("lean_y", Unit::Ratio), ("trolley", Unit::PerLength)])
+        }
+        Effect::GravityDirection => about_xy(Unit::Angle),
+        Effect::DeflectedEquilibrium => named(&[("lambda", Unit::Ratio)]),
+        Effect::TrackerDrift => xyz(Unit::Speed),
+        Effect::StationShift { .. } | Effect::TrackerSettling { .. } => xyz(Unit::Length),
+        Effect::StationMove { .. } => {
+            let turns = ["rx", "ry", "rz"].map(|name| (name, Unit::Angle));
+            named(&[["x", "y", "z"].map(|name| (name, Unit::Length)), turns].concat())
+        }
+        Effect::FrameStrain => {
+            named(&["xx", "yy", "zz", "xy", "xz", "yz"].map(|name| (name, Unit::Ratio)))
+        }
+        Effect::Covariate { joint: Mount::Joint(joint), .. } => {
+            named(&[("rate", if slides(joint) { Unit::LengthPerUnit } else { Unit::AnglePerUnit })])
+        }
+        Effect::Covariate { joint: Mount::Base, .. } => {
+            let turns = ["rx", "ry", "rz"].map(|name| (name, Unit::AnglePerUnit));
+            named(&[turns, ["x", "y", "z"].map(|name| (name, Unit::LengthPerUnit))].concat())
+        }
+        // The rig knows the laws of the catalogue alone.
+        Effect::Custom(_) => Vec::new(),
+    }
+}
+
+fn named(keys: &[(&str, Unit)]) -> Vec<(String, Unit)> {
+    keys.iter().map(|(name, unit)| ((*name).to_owned(), *unit)).collect()
+}

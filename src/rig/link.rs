@@ -1,0 +1,189 @@
+//! A link as segments of rigid parts and springs.
+
+use nalgebra::{Vector2, Vector3};
+
+use super::Rig;
+use super::build::{Part, softness};
+use super::chain::{Chain, Force, Hinge};
+use crate::problem::{Beam, Effect, Joint, PoseConditions};
+
+/// A load on a link, at a point of the straight link's frame \[m\].
+type LinkLoad = (Vector3<f64>, Force);
+/// Part of a segment before its first hinge and behind its second: they sit at the points of Gauss
+/// and Legendre, so that bending moments that change with up to the cube of the station are summed
+/// exactly.
+const OUTER: f64 = 0.211_324_865_405_187_1;
+
+impl Rig {
+    /// The link along a joint's a: segments with two hinges each, or one rigid piece.
+    ///
+    /// The link is cut where it carries something, so that bending is smooth along every segment.
+    pub(super) fn link(
+        &self,
+        joint: &Joint,
+        number: usize,
+        gravity: &Vector3<f64>,
+        conditions: &PoseConditions,
+        chain: &mut Chain,
+    ) {
+        let beam = joint.beam.as_ref();
+        if beam.is_none() && self.hinge(beam, number, joint.a, conditions).is_rigid() {
+            return chain.end().translate_x(joint.a);
+        }
+        let mut loads =
+            beam.map_or_else(Vec::new, |beam| self.link_loads(beam, joint.a, gravity, conditions));
+        // From the root outwards; what lies beyond either end hangs on that end.
+        let station = |at: &Vector3<f64>| (at.x * joint.a.signum()).clamp(0.0, joint.a.abs());
+        loads.sort_by(|(one, _), (other, _)| station(one).total_cmp(&station(other)));
+        let weight = gravity * beam.map_or(0.0, |beam| beam.mass);
+        let mut from = 0.0;
+        for (at, force) in loads {
+            let to = station(&at);
+            self.span(&weight, joint, number, to - from, conditions, chain);
+            chain.load(&Vector3::new(at.x - to * joint.a.signum(), at.y, at.z), force);
+            from = to;
+        }
+        self.span(&weight, joint, number, joint.a.abs() - from, conditions, chain);
+    }
+
+    /// A part of a link, `reach` \[m\] long: its share of the link's segments.
+    fn span(
+        &self,
+        weight: &Vector3<f64>,
+        joint: &Joint,
+        number: usize,
+        reach: f64,
+        conditions: &PoseConditions,
+        chain: &mut Chain,
+    ) {
+        let share = reach / joint.a.abs();
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a part of a count"
+        )]
+        let segments = (share * self.segments as f64).ceil() as usize;
+        let length = joint.a * share / segments as f64;
+        let hinge = self.hinge(joint.beam.as_ref(), number, length / 2.0, conditions);
+        let rigid = |part: f64, chain: &mut Chain| {
+            let weight = Force::Constant(weight * (part * length / joint.a));
+            chain.load(&Vector3::new(part * length / 2.0, 0.0, 0.0), weight);
+            chain.end().translate_x(part * length);
+        };
+        for _ in 0..segments {
+            rigid(OUTER, chain);
+            chain.hinge(hinge);
+            rigid(1.0 - 2.0 * OUTER, chain);
+            chain.hinge(hinge);
+            rigid(OUTER, chain);
+        }
+    }
+
+    /// The slide of a joint, `length` \[m\] along z, negative along −z: segments with two hinges
+    /// each, or one rigid piece.
+    pub(super) fn slide(&self, number: usize, length: f64, chain: &mut Chain) {
+        let bends = |part: Part<'_>| match part {
+            (Effect::SlideBending { joint }, &[flexibility]) if *joint == number => flexibility,
+            _ => 0.0,
+        };
+        let flexibility: f64 = self.parts().map(bends).sum();
+        if flexibility == 0.0 {
+            return chain.end().translate_z(length);
+        }
+        let segment = length / self.segments as f64;
+        let across = flexibility * segment.abs() / 2.0;
+        let hinge = Hinge { compliance: Vector3::new(across, across, 0.0), ..Hinge::default() };
+        for _ in 0..self.segments {
+            chain.end().translate_z(OUTER * segment);
+            chain.hinge(hinge);
+            chain.end().translate_z((1.0 - 2.0 * OUTER) * segment);
+            chain.hinge(hinge);
+            chain.end().translate_z(OUTER * segment);
+        }
+    }
+
+    /// The hinge that stands for `length` \[m\] of a link, which is negative along −x.
+    fn hinge(
+        &self,
+        beam: Option<&Beam>,
+        number: usize,
+        length: f64,
+        conditions: &PoseConditions,
+    ) -> Hinge {
+        let mut hinge = Hinge::default();
+        let between = length.abs();
+        if let Some(beam) = beam {
+            let softness =
+                Vector3::new(softness(beam.gj), softness(beam.ei_y), softness(beam.ei_z));
+            hinge.compliance = softness * between;
+            hinge.stretch = self::softness(beam.ea) * between;
+        }
+        let is_this = |link: &String| beam.is_some_and(|beam| beam.name == *link);
+        for part in self.parts() {
+            match part {
+                (Effect::LinkBending { joint }, [flexibility]) if *joint == number => {
+                    hinge.compliance += Vector3::new(0.0, *flexibility, *flexibility) * between;
+                }
+                (Effect::TwistBending { link }, [y, z]) if is_this(link) => {
+                    hinge.coupling += Vector2::new(*y, *z) * between;
+                }
+                (Effect::LinkThermalBending { link }, [y, z]) if is_this(link) => {
+                    hinge.free_rotation +=
+                        Vector3::new(0.0, *y, *z) * (self.warming(conditions) * length);
+                }
+                (Effect::LinkThermalBendingLag { link, time_constant }, [y, z])
+                    if is_this(link) =>
+                {
+                    let warm = self.felt(conditions, *time_constant);
+                    hinge.free_rotation += Vector3::new(0.0, *y, *z) * (warm * length);
+                }
+                (Effect::LinkThermalExpansion { link }, [strain]) if is_this(link) => {
+                    hinge.free_stretch += strain * self.warming(conditions) * length;
+                }
+                (Effect::LinkThermalExpansionLag { link, time_constant }, [strain])
+                    if is_this(link) =>
+                {
+                    hinge.free_stretch += strain * self.felt(conditions, *time_constant) * length;
+                }
+                _ => {}
+            }
+        }
+        hinge
+    }
+
+    /// What a beam of signed length `a` \[m\] carries besides its own weight.
+    fn link_loads(
+        &self,
+        beam: &Beam,
+        a: f64,
+        gravity: &Vector3<f64>,
+        conditions: &PoseConditions,
+    ) -> Vec<LinkLoad> {
+        let weight = |mass: f64| Force::Constant(gravity * mass);
+        let mut loads: Vec<LinkLoad> =
+            beam.masses.iter().map(|carried| (carried.position, weight(carried.mass))).collect();
+        for part in self.parts() {
+            if let (Effect::UnmodelledMass { link }, &[mass, at]) = part
+                && *link == beam.name
+            {
+                loads.push((Vector3::new(at.copysign(a), 0.0, 0.0), weight(mass)));
+            }
+        }
+        if let Some(hoist) = &beam.hoist {
+            let mut tension = conditions.hoist.unwrap_or(hoist.force);
+            let (mut direction, mut trolley) = (hoist.direction, 0.0);
+            for part in self.parts() {
+                match part {
+                    (Effect::HoistForce, [error]) => tension *= 1.0 + error,
+                    (Effect::HoistDirection, &[x, y, per_metre]) => {
+                        direction += Vector3::new(x, y, 0.0);
+                        trolley += per_metre;
+                    }
+                    _ => {}
+                }
+            }
+            loads.push((hoist.at, Force::Rope { tension, direction, trolley }));
+        }
+        loads
+    }
+}

@@ -1,0 +1,265 @@
+//! From the text of `TRUTH.toml` to a [`Truth`].
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::SEGMENTS;
+use super::parameters::{self, TrueParameter};
+use super::ranges::{self, Poses};
+use super::strengths;
+use super::truth::{Deviation, RandomRule, Truth};
+use crate::error::{InputError, InputErrorKind};
+use crate::problem::item::{Document, Item, join};
+use crate::problem::pattern::matches;
+use crate::problem::section::Section;
+use crate::problem::{HeldOut, Joint, JointKind, Observation, Problem};
+use crate::quantity::Unit;
+
+impl Truth {
+    /// Reads a `TRUTH.toml` about a problem, or the one in a folder.
+    ///
+    /// # Errors
+    /// The first mistake found, a file that cannot be read among them.
+    pub fn read(path: &Path, problem: &Problem) -> Result<Self, InputError> {
+        let inside = path.is_dir().then(|| path.join("TRUTH.toml"));
+        truth(
+            &Document::read(inside.as_deref().unwrap_or(path), InputErrorKind::TruthMissing)?,
+            problem,
+        )
+    }
+
+    /// Reads it from its text; `file` names it in messages.
+    ///
+    /// # Errors
+    /// The first mistake found.
+    pub fn parse(text: &str, file: &Path, problem: &Problem) -> Result<Self, InputError> {
+        truth(&Document { file: file.to_owned(), text: Arc::from(text) }, problem)
+    }
+
+    /// Reads its sections but `[noise]` where they stand in another document; no noise.
+    pub(crate) fn of_sections(
+        root: &mut Section<'_, '_>,
+        problem: &Problem,
+    ) -> Result<Self, InputError> {
+        sections(root, problem)
+    }
+}
+
+fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
+    let table = document.table()?;
+    let mut root = Section::new(document, String::new(), 0..0, table.get_ref());
+    let noise = root.section("noise")?.map_or(Ok(Noise::default()), noise)?;
+    let truth = sections(&mut root, problem)?;
+    root.finish()?;
+    let Noise { position, contacts, turn, tilt, missing } = noise;
+    let things = truth.positions + problem.fixtures.len() + truth.tilts.len();
+    let needed =
+        truth.observations(&problem.fixtures, things.max(1)).into_iter().any(|own| match own {
+            Observation::Point(_) => contacts[0].is_none(),
+            Observation::Distance(_) => contacts[1].is_none(),
+            Observation::Surface(_) => contacts[2].is_none(),
+            Observation::Tilt(_) => false,
+            _ => true,
+        });
+    if let Some(error) = missing.filter(|_| needed) {
+        return Err(error);
+    }
+    let noise_sigma = position.unwrap_or(0.0);
+    let contact_sigmas = contacts.map(|own| own.unwrap_or(noise_sigma));
+    if let Some(HeldOut::Session(session)) = &problem.data.held_out {
+        let location = problem.data.held_out_location.clone();
+        return Err(location.error(InputErrorKind::NoSessions { session: session.clone() }));
+    }
+    let orientation_sigma = problem.data.orientation_sigma.map(|declared| turn.unwrap_or(declared));
+    let tilt_sigma = tilt.or(problem.data.tilt_sigma).unwrap_or(0.0);
+    Ok(Truth { noise_sigma, contact_sigmas, tilt_sigma, orientation_sigma, ..truth })
+}
+
+/// The sections that say what is true, without noise.
+fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, InputError> {
+    let known = parameters::nominal(problem);
+    let parameters = match root.section("parameters")? {
+        Some(section) => {
+            section.entries().iter().map(|(name, item)| deviation(name, item, &known)).collect()
+        }
+        None => Ok(Vec::new()),
+    }?;
+    let random = match root.section("random")? {
+        Some(section) => {
+            section.entries().iter().map(|(pattern, item)| random(pattern, item, &known)).collect()
+        }
+        None => Ok(Vec::new()),
+    }?;
+    check_places(root, problem, &parameters, &random)?;
+    let segments = root.section("rig")?.map_or(Ok(SEGMENTS), segments)?;
+    let section =
+        root.section("poses")?.ok_or_else(|| root.missing("poses", example(&problem.joints)))?;
+    let Poses { ranges: poses, time_step, held_out, positions, tilts } =
+        ranges::read(section, problem)?;
+    let effects = strengths::read(root, problem, &poses)?;
+    Ok(Truth {
+        parameters,
+        random,
+        effects,
+        noise_sigma: 0.0,
+        contact_sigmas: [0.0; 3],
+        positions,
+        tilts,
+        tilt_sigma: 0.0,
+        orientation_sigma: None,
+        poses,
+        time_step,
+        held_out,
+        segments,
+    })
+}
+
+/// Everything that the rig measures against stands somewhere.
+fn check_places(
+    root: &Section<'_, '_>,
+    problem: &Problem,
+    parameters: &[Deviation],
+    random: &[RandomRule],
+) -> Result<(), InputError> {
+    for own in &problem.fixtures {
+        for (field, _) in
+            own.kind.fields().iter().zip(&own.known).filter(|(_, known)| known.is_none())
+        {
+            let name = format!("{}[{}].{field}", own.kind.word(), own.name);
+            let is_said = parameters.iter().any(|own| own.name == name);
+            if !is_said && !random.iter().any(|rule| matches(&rule.pattern, &name)) {
+                let write = format!("where it truly is: \"{name}\" in [parameters]");
+                let location = root.location().with_key(join("parameters", &name));
+                return Err(location.error(InputErrorKind::MissingKey { write, near: None }));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// How the section `[poses]` may be written for these joints.
+fn example(joints: &[Joint]) -> String {
+    let range = |(number, joint): (usize, &Joint)| match joint.commanded() {
+        JointKind::Revolute => Some(format!("q{number}_deg = [-90, 90]")),
+        JointKind::Prismatic => Some(format!("q{number}_mm = [0, 500]")),
+        JointKind::Fixed => None,
+    };
+    let ranges: Vec<String> = (1..).zip(joints).filter_map(range).collect();
+    format!("[poses] with the range of each joint: {}", ranges.join(", "))
+}
+
+/// `[noise]`.
+#[derive(Default)]
+struct Noise {
+    /// 1 σ of a position \[m\], if it is given.
+    position: Option<f64>,
+    /// The same of a contact with a point, of a distance, and of a contact with a surface.
+    contacts: [Option<f64>; 3],
+    /// 1 σ of an orientation \[rad\], if it is given.
+    turn: Option<f64>,
+    /// 1 σ of a tilt \[rad\], if it is given.
+    tilt: Option<f64>,
+    /// What is wrong if positions are measured, or contacts that scatter as they do.
+    missing: Option<InputError>,
+}
+
+/// The section; contacts scatter as positions do where it says nothing else.
+fn noise(mut section: Section<'_, '_>) -> Result<Noise, InputError> {
+    let position = section.not_negative("position_sigma", Unit::Length)?;
+    let contact = |section: &mut Section<'_, '_>, base| section.not_negative(base, Unit::Length);
+    let contacts = [
+        contact(&mut section, "point_sigma")?,
+        contact(&mut section, "distance_sigma")?,
+        contact(&mut section, "surface_sigma")?,
+    ];
+    let turn = section.not_negative("orientation_sigma", Unit::Angle)?;
+    let tilt = section.not_negative("tilt_sigma", Unit::Angle)?;
+    section.finish()?;
+    let missing = || section.missing("position_sigma_mm", Unit::Length.spelled("position_sigma"));
+    let missing = position.is_none().then(missing);
+    Ok(Noise { position, contacts, turn, tilt, missing })
+}
+
+fn segments(mut section: Section<'_, '_>) -> Result<usize, InputError> {
+    let segments =
+        section.get("segments").map_or(Ok(SEGMENTS), |item| item.small().map(usize::from))?;
+    section.finish()?;
+    Ok(segments)
+}
+
+/// `"joint2.stiffness" = { relative = 0.83 }`.
+fn deviation(
+    name: &str,
+    item: &Item<'_, '_>,
+    known: &[TrueParameter],
+) -> Result<Deviation, InputError> {
+    let mut section = named(name, item)?;
+    let Some(parameter) = known.iter().find(|parameter| parameter.name == name) else {
+        let known = known.iter().map(|parameter| parameter.name.clone()).collect();
+        return Err(item.error(InputErrorKind::UnknownParameter { name: name.to_owned(), known }));
+    };
+    let units = parameter.unit.of_deviation().suffixes();
+    let given: Vec<_> =
+        units.iter().filter_map(|unit| section.get(unit.name).map(|item| (item, unit))).collect();
+    section.finish()?;
+    let value = match given.as_slice() {
+        [] => {
+            let keys: Vec<_> = units.iter().map(|unit| format!("{} = …", unit.name)).collect();
+            return Err(
+                section.missing(units.first().map_or("", |unit| unit.name), keys.join(" or "))
+            );
+        }
+        [(item, unit)] => (unit.to_si)(item.number()?),
+        [(_, first), (item, _), ..] => {
+            return Err(item.error(InputErrorKind::GivenTwice { first: first.name.to_owned() }));
+        }
+    };
+    if parameter.unit.is_relative() && value <= 0.0 {
+        return Err(item.error(InputErrorKind::NotPositive { value }));
+    }
+    Ok(Deviation { name: name.to_owned(), value })
+}
+
+/// `"joint*.alpha" = { sigma_deg = 0.3 }`.
+fn random(
+    pattern: &str,
+    item: &Item<'_, '_>,
+    known: &[TrueParameter],
+) -> Result<RandomRule, InputError> {
+    let mut section = named(pattern, item)?;
+    let mut sigma = |unit: Unit| match section.pick("sigma", unit)? {
+        Some((item, suffix)) => match item.number()? {
+            value if value < 0.0 => Err(item.error(InputErrorKind::Negative { value })),
+            value => Ok(Some((suffix.to_si)(value))),
+        },
+        None => Ok(None),
+    };
+    let (angle, length, relative) =
+        (sigma(Unit::Angle)?, sigma(Unit::Length)?, sigma(Unit::Ratio)?);
+    section.finish()?;
+    let matched: Vec<_> =
+        known.iter().filter(|parameter| matches(pattern, &parameter.name)).collect();
+    let Some(first) = matched.first() else {
+        let known = known.iter().map(|parameter| parameter.name.clone()).collect();
+        return Err(
+            item.error(InputErrorKind::MatchesNothing { pattern: pattern.to_owned(), known })
+        );
+    };
+    let rule = RandomRule { pattern: pattern.to_owned(), angle, length, relative };
+    if matched.iter().all(|parameter| rule.sigma(parameter.unit).is_none()) {
+        let write = first.unit.of_deviation().spelled("sigma");
+        return Err(section.missing("sigma", write));
+    }
+    Ok(rule)
+}
+
+/// The table of a name; `tool.x = { … }` without quotes is a table `tool` that holds a table `x`.
+fn named<'a, 'i>(name: &str, item: &Item<'a, 'i>) -> Result<Section<'a, 'i>, InputError> {
+    let section = item.section()?;
+    match section.entries().into_iter().find(|(_, inner)| inner.holds_tables()) {
+        Some((inner, _)) => {
+            Err(item.error(InputErrorKind::UnquotedName { name: format!("{name}.{inner}") }))
+        }
+        None => Ok(section),
+    }
+}

@@ -1,0 +1,276 @@
+//! The identification poses as a diagnosis sees them.
+
+use std::collections::BTreeMap;
+
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
+use rand_chacha::ChaCha8Rng;
+
+use super::covariate::Covariate;
+use super::residual_tests::CovariateValues;
+use super::rules::SelectionRules;
+use crate::fit::Stop;
+use crate::measurement::{Dataset, Measurements, Split};
+use crate::model::effect::{DataCoverage, NO_REFERENCE, NO_TEMPERATURE};
+use crate::problem::{Effect, JointKind, Problem};
+
+/// Measurements and which of their rows take part.
+#[derive(Debug, Clone)]
+pub(super) struct Data<'a> {
+    /// What is fitted again.
+    pub dataset: &'a Dataset,
+    pub measurements: &'a Measurements,
+    pub split: &'a Split,
+    pub rules: &'a SelectionRules,
+    /// Number of the conditions of each identification row; rows with the same are repeats.
+    pub setup: Vec<usize>,
+    /// Block of each identification row; repeats share one.
+    pub block: Vec<usize>,
+    /// Effects that are looked for besides those of the catalogue.
+    pub candidates: &'a [Effect],
+    /// The wish that the search end early.
+    pub stop: Stop,
+}
+
+impl<'a> Data<'a> {
+    pub fn new(dataset: &'a Dataset, rules: &'a SelectionRules) -> Self {
+        let Dataset { measurements, split } = dataset;
+        let rows = &split.identification;
+        let setup = number(rows.iter().map(|&row| conditions_of(measurements, row)));
+        let configurations = number(rows.iter().map(|&row| bits(measurements.configuration(row))));
+        let count = configurations.iter().max().map_or(0, |last| last + 1);
+        let mut order: Vec<usize> = (0..count).collect();
+        order.shuffle(&mut ChaCha8Rng::seed_from_u64(rules.seed));
+        let mut block_of = vec![0; count];
+        for (place, configuration) in order.into_iter().enumerate() {
+            block_of[configuration] = place % rules.blocks.min(count.max(1));
+        }
+        let block =
+            configurations.into_iter().map(|configuration| block_of[configuration]).collect();
+        Self {
+            dataset,
+            measurements,
+            split,
+            rules,
+            setup,
+            block,
+            candidates: &[],
+            stop: Stop::default(),
+        }
+    }
+
+    /// The same with more effects to look for.
+    pub fn with_candidates(self, candidates: &'a [Effect]) -> Self {
+        Self { candidates, ..self }
+    }
+
+    /// The same, whose hypotheses are weighed until `stop` asks for the end.
+    pub fn with_stop(self, stop: Stop) -> Self {
+        Self { stop, ..self }
+    }
+
+    /// The identification rows.
+    pub fn rows(&self) -> &'a [usize] {
+        &self.split.identification
+    }
+
+    /// A column at the identification rows.
+    fn pick(&self, column: &[f64]) -> Vec<f64> {
+        self.rows().iter().map(|&row| column[row]).collect()
+    }
+
+    /// The same with no more than `most` identification rows, taken evenly.
+    pub fn thinned(&self, most: usize) -> Vec<usize> {
+        let rows = self.rows();
+        let taken = rows.len().min(most);
+        (0..taken).map(|k| rows[k * rows.len() / taken]).collect()
+    }
+
+    /// Whether evidence leads the choice of effects, weighed on all rows.
+    pub fn is_led(&self) -> bool {
+        self.rows().len() <= self.rules.led_poses
+    }
+
+    /// Rows on which hypotheses are weighed: all where evidence leads, else some, taken evenly.
+    pub fn weighed(&self) -> Vec<usize> {
+        self.thinned(if self.is_led() { self.rules.led_poses } else { self.rules.weighed_poses })
+    }
+
+    /// Time of each identification row \[s\].
+    pub fn time(&self) -> Vec<f64> {
+        self.pick(&self.measurements.time)
+    }
+
+    /// Session of each identification row.
+    pub fn session(&self) -> Vec<usize> {
+        self.rows().iter().map(|&row| self.measurements.session.of_row[row]).collect()
+    }
+
+    /// What the identification poses have and vary.
+    pub fn conditions(&self, problem: &Problem) -> DataCoverage {
+        fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                (low.min(value), high.max(value))
+            })
+        }
+        let measurements = self.measurements;
+        let column = |joint: usize| {
+            range(self.rows().iter().map(move |&row| measurements.configuration(row)[joint]))
+        };
+        let varies =
+            |values: Vec<f64>| values.iter().any(|value| value.to_bits() != values[0].to_bits());
+        let payload = measurements.payload.as_deref().map(|all| self.pick(all));
+        let temperature = measurements.temperature.as_deref().map(|all| self.pick(all));
+        let n = measurements.joints;
+        let from = |joint: usize, side: f64| {
+            let came =
+                |all: &Vec<f64>| self.rows().iter().any(|&row| all[row * n + joint] * side > 0.0);
+            measurements.approach.as_ref().is_some_and(came)
+        };
+        DataCoverage {
+            no_temperature: match temperature {
+                Some(all) if varies(all.clone()) => {
+                    problem.data.reference_temperature.is_none().then_some(NO_REFERENCE)
+                }
+                _ => Some(NO_TEMPERATURE),
+            },
+            approach: measurements.approach.is_some(),
+            both_sides: (0..n).map(|joint| from(joint, 1.0) && from(joint, -1.0)).collect(),
+            payload: payload
+                .map_or([problem.tool.payload_mass; 2].into(), |all| range(all.into_iter())),
+            ranges: (0..n).map(column).collect(),
+            covariates: self.own_covariates().map(varies).collect(),
+            times: self.shift_times(),
+            clock: measurements.clock(),
+            gravity: problem.gravity,
+        }
+    }
+
+    /// The problem's own covariates, one value per identification row.
+    fn own_covariates(&self) -> impl Iterator<Item = Vec<f64>> {
+        let count =
+            self.rows().first().map_or(0, |&row| self.measurements.covariates_of(row).len());
+        (0..count).map(|which| {
+            self.rows().iter().map(|&row| self.measurements.covariates_of(row)[which]).collect()
+        })
+    }
+
+    /// Times about half way between poses that leave enough of them on either side, in few digits,
+    /// thinned evenly.
+    pub fn shift_times(&self) -> Vec<f64> {
+        let mut times = self.time();
+        times.sort_by(f64::total_cmp);
+        let (count, side) = (times.len(), self.rules.least_side);
+        let between =
+            |k: usize| (times[k] > times[k - 1]).then(|| half_way(times[k - 1], times[k]));
+        let all: Vec<f64> =
+            (side..count).take_while(|k| k + side <= count).filter_map(between).collect();
+        let every = all.len().div_ceil(self.rules.shift_times).max(1);
+        all.into_iter().step_by(every).collect()
+    }
+
+    /// Everything that the residual may depend on, one value per identification row.
+    pub fn covariates(&self, problem: &Problem) -> Vec<CovariateValues> {
+        let measurements = self.measurements;
+        let moving = problem
+            .joints
+            .iter()
+            .enumerate()
+            .filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
+        let joint = |(index, _): (usize, _)| CovariateValues {
+            covariate: Covariate::Command(index),
+            values: self.rows().iter().map(|&row| measurements.configuration(row)[index]).collect(),
+        };
+        let mut covariates: Vec<CovariateValues> = moving.clone().map(joint).collect();
+        let columns = [
+            (Covariate::Temperature, &measurements.temperature),
+            (Covariate::Payload, &measurements.payload),
+            (Covariate::Hoist, &measurements.hoist),
+        ];
+        for (covariate, column) in columns {
+            if let Some(column) = column {
+                covariates.push(CovariateValues { covariate, values: self.pick(column) });
+            }
+        }
+        let own = self.own_covariates().enumerate();
+        covariates.extend(own.map(|(which, values)| CovariateValues {
+            covariate: Covariate::own(which, problem),
+            values,
+        }));
+        covariates.push(CovariateValues { covariate: Covariate::Time, values: self.time() });
+        if let Some(approach) = &measurements.approach {
+            let n = measurements.joints;
+            covariates.extend(moving.map(|(joint, _)| CovariateValues {
+                covariate: Covariate::Approach(joint),
+                values: self.rows().iter().map(|&row| approach[row * n + joint]).collect(),
+            }));
+        }
+        covariates
+    }
+}
+
+/// What one row was measured under, to the bit.
+fn conditions_of(measurements: &Measurements, row: usize) -> Vec<u64> {
+    let mut key = bits(measurements.configuration(row));
+    let n = measurements.joints;
+    for column in [&measurements.payload, &measurements.hoist, &measurements.temperature]
+        .into_iter()
+        .flatten()
+    {
+        key.push(column[row].to_bits());
+    }
+    if let Some(approach) = &measurements.approach {
+        key.extend(bits(&approach[row * n..(row + 1) * n]));
+    }
+    key.extend(bits(measurements.covariates_of(row)));
+    key.push(measurements.session.of_row[row] as u64);
+    key.extend(measurements.observation(row).key().map(|word| word as u64));
+    key.extend(measurements.target.as_ref().map(|target| target.of_row[row] as u64));
+    key
+}
+
+pub(super) fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+/// Numbers keys in order of appearance.
+pub(super) fn number<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
+    let mut known = BTreeMap::new();
+    keys.map(|key| {
+        let next = known.len();
+        *known.entry(key).or_insert(next)
+    })
+    .collect()
+}
+
+/// A number about half way between two, in no more decimals than it takes to be within a twentieth
+/// of their distance of the middle.
+fn half_way(low: f64, high: f64) -> f64 {
+    let middle = 0.5 * (low + high);
+    let unit = 10.0_f64.powf(((high - low) / 10.0).log10().floor());
+    // Divided by a whole number, what is below one has the digits that it is written in.
+    let near = if unit < 1.0 {
+        (middle / unit).round() / unit.recip().round()
+    } else {
+        (middle / unit).round() * unit
+    };
+    if low < near && near < high { near } else { middle }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_way_takes_few_digits() {
+        let cases = [
+            (3200.0, 3221.2, 3211.0),
+            (3.0, 4.0, 3.5),
+            (0.0, 0.002, 0.001),
+            (1000.0, 61000.0, 31000.0),
+        ];
+        for (low, high, expected) in cases {
+            assert_eq!(half_way(low, high).to_bits(), f64::to_bits(expected), "{low} {high}");
+        }
+    }
+}

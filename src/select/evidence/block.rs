@@ -1,0 +1,304 @@
+//! Columns of one hypothesis, and what a residual says about them: a few for all poses together, or
+//! one in every pose.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::marginal::{Coefficients, Normal, of_block};
+use crate::least_squares::kernel::products;
+use crate::select::neighbourhood::LinearNeighbourhood;
+use crate::select::rules::SelectionRules;
+
+/// Columns on either side from which on a product of tall matrices is worth rearranging them.
+const MANY: usize = 24;
+
+/// Columns A of a hypothesis, shape = (3 N, k).
+#[derive(Debug, Clone)]
+pub(super) enum Design {
+    /// All of them.
+    Dense(DMatrix<f64>),
+    /// For each lever, shape = (3 N), one column of each group of poses: the lever there, 0
+    /// elsewhere. Levers are orthogonal in every pose, so that AᵀA is diagonal.
+    Grouped { levers: DMatrix<f64>, groups: Vec<Option<usize>> },
+}
+
+impl Design {
+    /// Another error in every pose along one lever.
+    pub fn per_pose(lever: &DVector<f64>) -> Self {
+        let levers = DMatrix::from_columns(std::slice::from_ref(lever));
+        Self::Grouped { levers, groups: (0..lever.len() / 3).map(Some).collect() }
+    }
+
+    /// What is kept in numbers: the columns, or the levers.
+    fn values(&self) -> &DMatrix<f64> {
+        match self {
+            Self::Dense(values) | Self::Grouped { levers: values, .. } => values,
+        }
+    }
+
+    fn values_mut(&mut self) -> &mut DMatrix<f64> {
+        match self {
+            Self::Dense(values) | Self::Grouped { levers: values, .. } => values,
+        }
+    }
+
+    /// The same of root mean square 1 over the first poses, all columns together; `None` where
+    /// nothing is to be seen there.
+    pub fn scaled(mut self, poses: usize) -> Option<Self> {
+        let first = self.values().rows(0, 3 * poses);
+        let size = (first.norm_squared() / first.nrows().max(1) as f64).sqrt();
+        let is_seen = size > 0.0 && size.is_finite();
+        *self.values_mut() /= if is_seen { size } else { 1.0 };
+        is_seen.then_some(self)
+    }
+
+    /// The same without some poses.
+    pub fn without(mut self, poses: &[usize]) -> Self {
+        for &pose in poses {
+            self.values_mut().rows_mut(3 * pose, 3).fill(0.0);
+        }
+        self
+    }
+
+    /// All columns.
+    pub fn columns(&self) -> Cow<'_, DMatrix<f64>> {
+        match self {
+            Self::Dense(columns) => Cow::Borrowed(columns),
+            Self::Grouped { levers, groups } => {
+                let count = count(groups);
+                Cow::Owned(DMatrix::from_fn(levers.nrows(), levers.ncols() * count, |row, j| {
+                    if groups[row / 3] == Some(j % count) { levers[(row, j / count)] } else { 0.0 }
+                }))
+            }
+        }
+    }
+}
+
+fn count(groups: &[Option<usize>]) -> usize {
+    groups.iter().flatten().max().map_or(0, |last| last + 1)
+}
+
+/// Sum over the poses of each group of some row vectors times the levers: M A, shape = (rows of M,
+/// k).
+fn along(rows: &DMatrix<f64>, levers: &DMatrix<f64>, groups: &[Option<usize>]) -> DMatrix<f64> {
+    let count = count(groups);
+    let mut all = DMatrix::zeros(rows.nrows(), levers.ncols() * count);
+    for (pose, group) in
+        groups.iter().enumerate().filter_map(|(pose, group)| Some((pose, (*group)?)))
+    {
+        let here = rows.columns(3 * pose, 3);
+        for (k, lever) in levers.column_iter().enumerate() {
+            all.column_mut(k * count + group).gemv(1.0, &here, &lever.rows(3 * pose, 3), 1.0);
+        }
+    }
+    all
+}
+
+/// Products of columns of groups of poses, everything fitted projected out.
+fn grouped(levers: &DMatrix<f64>, groups: &[Option<usize>], fit: &LinearNeighbourhood) -> Normal {
+    let squares = levers.map(|value| value * value);
+    let diagonal = along(&DMatrix::repeat(1, squares.nrows(), 1.0), &squares, groups).transpose();
+    let residual = fit.residual().rows(0, levers.nrows()).transpose();
+    let product = along(&DMatrix::from_rows(&[residual]), levers, groups).transpose();
+    let normal = Normal::LessFew {
+        diagonal: diagonal.column(0).into_owned(),
+        less: along(&fit.fitted().transpose(), levers, groups),
+        product: product.column(0).into_owned(),
+    };
+    normal.whole_if_less_work()
+}
+
+/// Columns of one hypothesis with everything fitted projected out, and the logarithm of its prior
+/// probability.
+#[derive(Debug, Clone)]
+pub(super) struct Block {
+    columns: Columns,
+    /// AᵀA and Aᵀr.
+    normal: Normal,
+    pub ln_prior: f64,
+    coefficients: Coefficients,
+    /// Whether it is of a function of several covariates.
+    pub is_surface: bool,
+    /// The family of its effect; `None` of a function without a law.
+    pub family: Option<String>,
+}
+
+#[derive(Debug, Clone)]
+enum Columns {
+    /// Everything fitted projected out.
+    Dense(Arc<DMatrix<f64>>),
+    /// As they are.
+    Grouped { levers: DMatrix<f64>, groups: Vec<Option<usize>> },
+}
+
+impl Block {
+    /// Of columns of root mean square 1 in the data.
+    #[cfg(test)]
+    pub fn new(
+        design: Design,
+        fit: &LinearNeighbourhood,
+        ln_prior: f64,
+        coefficients: Coefficients,
+    ) -> Self {
+        Self::all(vec![(design, ln_prior, coefficients)], fit).remove(0)
+    }
+
+    /// Of several designs of columns of root mean square 1 in the data, projected together: a
+    /// product of many columns is fast.
+    pub fn all(designs: Vec<(Design, f64, Coefficients)>, fit: &LinearNeighbourhood) -> Vec<Self> {
+        let dense = designs.iter().filter_map(|(design, ..)| {
+            if let Design::Dense(own) = design { Some(own) } else { None }
+        });
+        let rows = designs.first().map_or(0, |(design, ..)| design.values().nrows());
+        let mut all = DMatrix::zeros(rows, dense.clone().map(DMatrix::ncols).sum());
+        let columns = dense.flat_map(DMatrix::column_iter);
+        all.column_iter_mut().zip(columns).for_each(|(mut own, column)| own.copy_from(&column));
+        let left = fit.left_of(&all);
+        let mut first = 0;
+        let of = |(design, ln_prior, coefficients): (Design, f64, Coefficients)| {
+            let (columns, normal) = match design {
+                Design::Dense(columns) => {
+                    let own = left.columns(first, columns.ncols()).into_owned();
+                    first += columns.ncols();
+                    let mut gram = DMatrix::zeros(own.ncols(), own.ncols());
+                    // The narrow side is transposed: this is the product that is fast.
+                    gram.gemm(1.0, &own.transpose(), &own, 0.0);
+                    let product = own.tr_mul(fit.residual());
+                    (Columns::Dense(Arc::new(own)), Normal::Dense { product, gram })
+                }
+                Design::Grouped { levers, groups } => {
+                    let normal = grouped(&levers, &groups, fit);
+                    (Columns::Grouped { levers, groups }, normal)
+                }
+            };
+            Self { columns, normal, ln_prior, coefficients, is_surface: false, family: None }
+        };
+        designs.into_iter().map(of).collect()
+    }
+
+    /// Whether it is of an effect.
+    pub fn is_law(&self) -> bool {
+        self.family.is_some()
+    }
+
+    /// Whether it has more columns than a set that is extended may hold.
+    pub fn is_wide(&self, rules: &SelectionRules) -> bool {
+        matches!(&self.columns, Columns::Grouped { levers, groups } if levers.ncols() * count(groups) > rules.widest)
+    }
+
+    /// A, everything that was fitted projected out.
+    pub fn columns(&self, fit: &LinearNeighbourhood) -> Arc<DMatrix<f64>> {
+        match &self.columns {
+            Columns::Dense(columns) => Arc::clone(columns),
+            Columns::Grouped { levers, groups } => {
+                let design = Design::Grouped { levers: levers.clone(), groups: groups.clone() };
+                Arc::new(fit.left_of(&design.columns()))
+            }
+        }
+    }
+
+    /// Aᵀr.
+    pub fn product(&self) -> &DVector<f64> {
+        self.normal.product()
+    }
+
+    /// MᵀA of other columns M with everything fitted projected out, also transposed.
+    pub fn times(&self, (others, transposed): (&DMatrix<f64>, &DMatrix<f64>)) -> DMatrix<f64> {
+        match &self.columns {
+            Columns::Dense(columns) if columns.ncols().min(others.ncols()) < MANY => {
+                products(others, columns)
+            }
+            Columns::Dense(columns) => {
+                let mut all = DMatrix::zeros(others.ncols(), columns.ncols());
+                all.gemm(1.0, transposed, columns, 0.0);
+                all
+            }
+            Columns::Grouped { levers, groups } => along(transposed, levers, groups),
+        }
+    }
+
+    /// ln p(r | set and block) − ln p(r | set), and the most probable size, of a residual from
+    /// which a set takes Z r off, and Z A off the columns: with both, `None` for nothing. `left`
+    /// are the squares that the set leaves, and their degrees of freedom.
+    pub fn gain(
+        &self,
+        set: Option<(&DMatrix<f64>, &DVector<f64>)>,
+        (left, without): ((f64, f64), f64),
+        grid: &[(f64, f64)],
+        rules: &SelectionRules,
+    ) -> (f64, f64) {
+        let (with, size) = match set {
+            None => self.over_sizes(&self.normal, left, grid, rules),
+            Some((along, taken)) => {
+                self.over_sizes(&self.normal.beside(along, taken), left, grid, rules)
+            }
+        };
+        (with - without, size)
+    }
+
+    /// ln p(r | block) up to a constant, of columns and a residual of which `normal` and `left` are
+    /// what others leave, and the most probable size.
+    pub fn over_sizes(
+        &self,
+        normal: &Normal,
+        left: (f64, f64),
+        grid: &[(f64, f64)],
+        rules: &SelectionRules,
+    ) -> (f64, f64) {
+        of_block(normal, left, grid, (&rules.displacements, &self.coefficients))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::select::neighbourhood::Unknowns;
+
+    /// Numbers without pattern.
+    fn matrix(rows: usize, columns: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, columns, |i, j| {
+            (12.9898 * i as f64 + 78.233 * (j + 1) as f64).sin() * 43.7 % 1.0
+        })
+    }
+
+    #[test]
+    fn a_column_for_every_pose_weighs_the_same_written_out() {
+        let rules = SelectionRules::DEFAULT;
+        let (jacobian, residual) = (matrix(36, 4), matrix(36, 6).column(5) * 4.0);
+        let unknowns = Unknowns {
+            x: vec![0.0; 4],
+            priors: vec![None, Some(0.3), None, None],
+            active: DMatrix::zeros(0, 4),
+        };
+        let fit = LinearNeighbourhood::new(&jacobian, &residual, &unknowns, 0);
+        let (within, grid) = (
+            fit.left_of(&matrix(36, 9).columns(7, 2).into_owned()).transpose() * 0.2,
+            [(0.0, 0.5), (-1.0, 0.2)],
+        );
+        let taken = &within * fit.residual();
+        let others = within.transpose();
+        for is_beside in [true, false] {
+            let groups = (0..12).map(|pose| (pose != 5).then_some(pose / 2)).collect();
+            for grouped in [
+                Design::per_pose(&matrix(36, 1).column(0).into_owned()),
+                Design::Grouped { levers: matrix(36, 1), groups },
+            ] {
+                let grouped = grouped.scaled(12).unwrap().without(&[3]);
+                let dense = Design::Dense(grouped.columns().into_owned());
+                let [one, other] = [grouped, dense].map(|design| {
+                    let block = Block::new(design, &fit, 0.0, Coefficients::default());
+                    let along = block.times((&others, &within));
+                    let set = is_beside.then_some((&along, &taken));
+                    (block.gain(set, ((100.0, 30.0), 0.0), &grid, &rules), block.columns(&fit))
+                });
+                assert!(
+                    (one.0.0 - other.0.0).abs() < 1e-9 && (one.0.1 - other.0.1).abs() < 1e-12,
+                    "{one:?} {other:?}"
+                );
+                assert!((&*one.1 - &*other.1).amax() < 1e-12);
+            }
+        }
+    }
+}

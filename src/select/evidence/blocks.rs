@@ -1,0 +1,66 @@
+//! Hypotheses as blocks of columns beside one another, with what they explain.
+
+use rayon::prelude::*;
+
+use super::block::Block;
+use super::candidate::{Candidate, TOGETHER};
+use super::hypotheses::Hypotheses;
+use super::marginal;
+use super::products::{Products, Target};
+use super::waves::Waves;
+use crate::fit::Noise;
+use crate::problem::Effect;
+use crate::select::data::Data;
+use crate::select::fitted::Fitted;
+
+/// Hypotheses and the residual with everything that is fitted projected out, some poses left out;
+/// `None` where the residual is not a finite number, or the end was asked for.
+pub(super) fn blocks(
+    fitted: &Fitted,
+    data: &Data,
+    hypotheses: &Hypotheses,
+    own: &[&Candidate],
+    left_out: &[usize],
+) -> Option<(Vec<Block>, Target)> {
+    let linearised = hypotheses.linearised.without(left_out);
+    let neighbourhood = fitted.neighbourhood_without(&linearised, &hypotheses.unknowns);
+    if !neighbourhood.residual().iter().all(|value| value.is_finite()) {
+        return None;
+    }
+    // A declared σ that the residual contradicts as too large is no bound: the scatter about the
+    // fit is the σ, as where none is declared.
+    let holds = fitted.found.noise == Noise::Declared && fitted.found.sigma_scale >= 1.0;
+    let unless_stopped = |some: &[&Candidate]| {
+        (!data.stop.is_requested())
+            .then(|| Candidate::blocks(some, (fitted, &neighbourhood), left_out))
+    };
+    let blocks: Vec<Vec<Block>> =
+        own.par_chunks(TOGETHER).map(unless_stopped).collect::<Option<_>>()?;
+    let mut blocks: Vec<Block> = blocks.into_iter().flatten().collect();
+    let rows = data.weighed();
+    let is_aside = |&(pose, row): &(usize, &usize)| {
+        !left_out.contains(&pose) && fitted.set_aside.contains(row)
+    };
+    let numbers = |row: usize| data.measurements.observation(row).coordinates();
+    let without_weight = left_out.iter().map(|&pose| numbers(rows[pose])).sum::<usize>()
+        + rows.iter().enumerate().filter(is_aside).map(|(_, &row)| numbers(row)).sum::<usize>();
+    let noise = marginal::Noise {
+        freedom: (neighbourhood.sums().freedom() - without_weight as f64).max(1.0),
+        trust: if holds { data.rules.trust_declared } else { data.rules.trust_estimated },
+        least: if holds { 0.0 } else { f64::NEG_INFINITY },
+    };
+    let alike = (data.rules.of_a_kind.ln() - hypotheses.ln_family - 2.0_f64.ln()).max(0.0);
+    let target = Target { fit: neighbourhood, noise, alike, stop: data.stop.clone() };
+    let is_added = |&k: &usize| {
+        own[k].hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect))
+    };
+    let added: Vec<usize> = (0..own.len()).filter(is_added).collect();
+    let effects: Vec<&Effect> = added.iter().filter_map(|&k| own[k].hypothesis.effect()).collect();
+    let products = Products::new((&blocks, &target), data.rules);
+    let waves = Waves { hypotheses, products: &products, fitted, left_out };
+    let spreads = waves.spreads(&added, &effects);
+    for (k, ln_spread) in spreads {
+        blocks[k].ln_prior += ln_spread;
+    }
+    Some((blocks, target))
+}

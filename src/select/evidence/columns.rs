@@ -1,0 +1,656 @@
+//! Columns of the hypotheses: what each would do to every measured coordinate.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::block::Design;
+use super::candidate::{Candidate, even};
+use super::functions::{Known, basis, goes_with, growing, merge, products_of, rough_basis, times};
+use super::hypothesis::{Hypothesis, Law, Part};
+use super::marginal::Coefficients;
+use crate::model::Pose;
+use crate::model::effect::Term;
+use crate::model::parameter::{BeamField, JointField, ParameterSite, Regressor};
+use crate::problem::{Effect, JointKind, Observation, Problem};
+use crate::select::covariate::Covariate;
+use crate::select::data::{bits, number};
+use crate::select::neighbourhood::{Linearised, tries};
+use crate::select::rules::SelectionRules;
+
+/// Slots whose columns the hypotheses need beside those of effects.
+pub(super) fn slots(problem: &Problem) -> Vec<ParameterSite> {
+    let mut slots: Vec<ParameterSite> = places(problem).collect();
+    slots.extend(
+        (0..3).flat_map(|axis| [ParameterSite::Shift { axis }, ParameterSite::Turn { axis }]),
+    );
+    for joint in 0..problem.joints.len() {
+        slots.extend(
+            [JointField::Compliance, JointField::LateralX]
+                .map(|field| ParameterSite::Joint { joint, field }),
+        );
+        if problem.joints[joint].beam.is_some() && problem.data.reference_temperature.is_some() {
+            slots.extend(BeamField::STRAINS.map(|field| ParameterSite::Beam { joint, field }));
+        }
+    }
+    slots
+}
+
+/// Every coordinate of a joint or link that may be off.
+fn places(problem: &Problem) -> impl Iterator<Item = ParameterSite> + '_ {
+    (0..problem.joints.len()).flat_map(|joint| {
+        JointField::GEOMETRY.into_iter().map(move |field| ParameterSite::Joint { joint, field })
+    })
+}
+
+/// Whether the parameters of an effect stand for axes of the arm, as compliances about two of them,
+/// of which one alone may give way; a shift of what measures and the phase of a harmonic have no
+/// such axes.
+fn acts_along_axes(terms: &[Term]) -> bool {
+    let is_axis = |term: &Term| {
+        term.regressor == Regressor::Constant
+            && term.nominal == 0.0
+            && Part::of(term.site) != Part::Measurement
+    };
+    let distinct =
+        |(k, term): (usize, &Term)| terms[..k].iter().all(|other| other.site != term.site);
+    terms.len() > 1 && terms.iter().all(is_axis) && terms.iter().enumerate().all(distinct)
+}
+
+/// Commands in contact that differ by what moves the target by no more than this, in σ, may differ
+/// by noise alone.
+const NOISE_ALONE: f64 = 3.0;
+/// A contact that decides a command no better than by this \[rad or m\] decides none.
+const DECIDES: f64 = 0.02;
+
+/// Everything that may explain a residual.
+pub(super) struct Columns<'a, 'l> {
+    pub problem: &'a Problem,
+    pub linearised: &'a Linearised<'l>,
+    pub time_measured: bool,
+    pub rules: &'a SelectionRules,
+    /// Poses, the first ones, that hypotheses are weighed on; at those behind them they are
+    /// predicted.
+    pub weighed: usize,
+    /// Functions of one hypothesis alone are wanted.
+    only: Option<&'a Hypothesis>,
+    candidates: Vec<Candidate>,
+    /// Family of each candidate and its share of the family's chance.
+    shares: Vec<(String, f64)>,
+    /// What functions are functions of.
+    covariates: Vec<Known>,
+}
+
+impl<'a, 'l> Columns<'a, 'l> {
+    /// Effects with their columns and functions of unknown law, or those of one hypothesis alone;
+    /// the covariates of those functions; and ln of the chance of a family of effects.
+    pub fn all(
+        problem: &'a Problem,
+        linearised: &'a Linearised<'l>,
+        (time_measured, rules, weighed): (bool, &'a SelectionRules, usize),
+        effects: &[(Effect, DMatrix<f64>)],
+        only: Option<&'a Hypothesis>,
+    ) -> (Vec<Candidate>, Vec<Known>, f64) {
+        let (candidates, shares, covariates) = (Vec::new(), Vec::new(), Vec::new());
+        let mut all = Self {
+            problem,
+            linearised,
+            time_measured,
+            rules,
+            weighed,
+            only,
+            candidates,
+            shares,
+            covariates,
+        };
+        all.effects(effects);
+        all.functions();
+        all.weighted()
+    }
+
+    pub(super) fn add(
+        &mut self,
+        family: &str,
+        share: f64,
+        hypothesis: Hypothesis,
+        columns: impl FnOnce() -> DMatrix<f64>,
+    ) {
+        self.add_design(family, share, hypothesis, || Design::Dense(columns()));
+    }
+
+    fn add_design(
+        &mut self,
+        family: &str,
+        share: f64,
+        hypothesis: Hypothesis,
+        design: impl FnOnce() -> Design,
+    ) {
+        if self.only.is_some_and(|only| *only != hypothesis) {
+            return;
+        }
+        // Names of effects, one's own among them, have no space before them.
+        self.entered(&format!(" {family}"), share, hypothesis, design(), Coefficients::default());
+    }
+
+    fn entered(
+        &mut self,
+        family: &str,
+        share: f64,
+        hypothesis: Hypothesis,
+        design: Design,
+        coefficients: Coefficients,
+    ) {
+        if let Some(design) = design.scaled(self.weighed) {
+            let same = self.candidates.last().filter(|last| last.hypothesis == hypothesis);
+            let variant = same.map_or(0, |last| last.variant + 1);
+            self.candidates.push(Candidate {
+                hypothesis,
+                variant,
+                design,
+                ln_prior: 0.0,
+                coefficients,
+            });
+            self.shares.push((family.to_owned(), share));
+        }
+    }
+
+    /// One of the functions of a hypothesis, by a number that is the same whichever others there
+    /// are.
+    fn add_variant(
+        &mut self,
+        family: &str,
+        hypothesis: &Hypothesis,
+        variant: usize,
+        columns: impl FnOnce() -> DMatrix<f64>,
+    ) {
+        let known = self.candidates.len();
+        self.add(family, 1.0, hypothesis.clone(), columns);
+        if let Some(own) = self.candidates.get_mut(known) {
+            own.variant = variant;
+        }
+    }
+
+    fn effects(&mut self, effects: &[(Effect, DMatrix<f64>)]) {
+        let only: Vec<Effect> = effects.iter().map(|(effect, _)| effect.clone()).collect();
+        let (tries, _) = tries(&only, self.problem);
+        let approach = self.linearised.poses().iter().any(|pose| pose.setup.approach.is_some());
+        for ((effect, columns), tries) in effects.iter().zip(tries) {
+            let terms = effect.terms(self.problem);
+            let (columns, largest) = even(columns.clone(), &terms, self.weighed, self.rules);
+            let hypothesis =
+                Hypothesis::of_effect(effect, self.problem, approach, self.time_measured);
+            let coefficients = Coefficients {
+                never_negative: terms.iter().map(|term| term.never_negative).collect(),
+                alone: acts_along_axes(&terms),
+                largest,
+            };
+            self.entered(
+                effect.name(),
+                1.0 / tries,
+                hypothesis,
+                Design::Dense(columns),
+                coefficients,
+            );
+        }
+    }
+
+    fn functions(&mut self) {
+        let (known, loads) = (self.known(), self.loads());
+        // The shortest only of the coordinates that joints move: it takes many poses.
+        let lengths = self.rules.smooth_lengths;
+        for site in places(self.problem) {
+            let Some(at) = self.linearised.place(site) else { continue };
+            let moving = self.moving(site);
+            let (family, own) =
+                if moving { ("smooth", &lengths[..]) } else { ("smooth elsewhere", &lengths[..2]) };
+            for of in &known {
+                self.smooth(family, site, &[&at], of, own);
+            }
+            for of in &loads {
+                self.smooth(family, site, &[&at], of, &lengths[..2]);
+            }
+            if moving {
+                self.surfaces(site, &at, &known);
+                self.scaled_by(site, &at, &known);
+                self.per_pose(site, &at);
+                if let ParameterSite::Joint { joint, .. } = site {
+                    self.near_harmonics(site, &at, joint);
+                }
+            }
+        }
+        self.measurement(&known);
+        self.base(&known);
+        self.warming(&known);
+        self.repeats();
+        self.sag();
+        self.covariates.extend(known);
+    }
+
+    /// Whether a site is the coordinate that a joint moves.
+    fn moving(&self, site: ParameterSite) -> bool {
+        let ParameterSite::Joint { joint, field } = site else { return false };
+        match self.problem.joints[joint].kind {
+            JointKind::Revolute => field == JointField::Theta,
+            JointKind::Prismatic => field == JointField::D,
+            JointKind::Fixed => false,
+        }
+    }
+
+    /// What is known of every pose and varies.
+    fn known(&self) -> Vec<Known> {
+        let poses = self.linearised.poses();
+        let mut all: Vec<(Covariate, Vec<f64>)> = Vec::new();
+        let moving = self
+            .problem
+            .joints
+            .iter()
+            .enumerate()
+            .filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
+        for (joint, _) in moving.clone() {
+            all.push((Covariate::Command(joint), self.command(joint)));
+        }
+        for covariate in [Covariate::Temperature, Covariate::Payload, Covariate::Hoist] {
+            let of = |pose: &Pose| match covariate {
+                Covariate::Temperature => pose.setup.temperature.copied(),
+                Covariate::Payload => pose.setup.payload.copied(),
+                _ => pose.setup.hoist.copied(),
+            };
+            all.extend(
+                poses
+                    .iter()
+                    .map(of)
+                    .collect::<Option<Vec<f64>>>()
+                    .map(|values| (covariate, values)),
+            );
+        }
+        for which in 0..self.problem.data.covariates.len() {
+            let own = poses.iter().map(|pose| pose.setup.covariates.get(which).copied());
+            all.extend(
+                own.collect::<Option<Vec<f64>>>()
+                    .map(|values| (Covariate::own(which, self.problem), values)),
+            );
+        }
+        let time = if self.time_measured { Covariate::Time } else { Covariate::Row };
+        all.push((time, poses.iter().map(|pose| pose.setup.elapsed).collect()));
+        for (joint, _) in moving {
+            let sides = poses.iter().map(|pose| pose.setup.approach.map(|all| all[joint]));
+            all.extend(
+                sides.collect::<Option<Vec<f64>>>().map(|v| (Covariate::Approach(joint), v)),
+            );
+        }
+        all.into_iter()
+            .filter_map(|(covariate, values)| Known::of(covariate, values, self.weighed))
+            .collect()
+    }
+
+    /// The command of a joint in every pose, as what depends on it sees it.
+    ///
+    /// In contact the noise is in the command, not in what is measured: a joint without which the
+    /// target cannot come to its point has, beside each point, values that noise alone sets apart,
+    /// and a function of those is one of the noise. They are taken for one value.
+    fn command(&self, joint: usize) -> Vec<f64> {
+        let poses = self.linearised.poses();
+        let mut values: Vec<f64> =
+            poses.iter().map(|pose| pose.setup.configuration[joint]).collect();
+        let coordinate = match self.problem.joints[joint].kind {
+            JointKind::Prismatic => JointField::D,
+            _ => JointField::Theta,
+        };
+        let Some(at) = self.linearised.place(ParameterSite::Joint { joint, field: coordinate })
+        else {
+            return values;
+        };
+        // The column is in σ per rad or m.
+        let square = |pose: usize| at.rows(3 * pose, 3).norm_squared();
+        let is_contact = |pose: &Pose| {
+            matches!(pose.observation, Observation::Point(_) | Observation::Surface(_))
+        };
+        let contacts: Vec<usize> =
+            (0..poses.len()).filter(|&k| is_contact(&poses[k]) && square(k) > 0.0).collect();
+        let lever = (contacts.iter().map(|&k| square(k)).sum::<f64>()
+            / contacts.len().max(1) as f64)
+            .sqrt();
+        if NOISE_ALONE < DECIDES * lever {
+            merge(&mut values, contacts, NOISE_ALONE / lever);
+        }
+        values
+    }
+
+    /// Moments of the loads about each joint's axis, and about the axis of its twist α: what a
+    /// compliance there would do, over what an angle does.
+    fn loads(&self) -> Vec<Known> {
+        let pairs = [
+            (JointField::Compliance, JointField::Theta),
+            (JointField::LateralX, JointField::Alpha),
+        ];
+        let of = |joint: usize, (gives, turns): (JointField, JointField)| {
+            let at = |field| self.linearised.place(ParameterSite::Joint { joint, field });
+            let (gives, turns) = (at(gives)?, at(turns)?);
+            let lever = |k: usize| turns.rows(3 * k, 3).norm_squared();
+            let longest = (0..turns.len() / 3).map(lever).fold(0.0, f64::max);
+            let moment = |k: usize| {
+                let along = gives.rows(3 * k, 3).dot(&turns.rows(3 * k, 3));
+                if lever(k) > 1e-12 * longest { along / lever(k) } else { 0.0 }
+            };
+            Known::of(Covariate::Load, (0..turns.len() / 3).map(moment).collect(), self.weighed)
+                .filter(|known| known.levels > 3)
+        };
+        (0..self.problem.joints.len())
+            .flat_map(|joint| pairs.into_iter().filter_map(move |pair| of(joint, pair)))
+            .collect()
+    }
+
+    /// Whether an effect is looked for that is linear in a covariate there; of two values every one
+    /// is.
+    fn has_law(&self, site: ParameterSite, of: &Known) -> bool {
+        let is_line = |term: &Term| {
+            let is_linear = matches!(
+                term.regressor,
+                Regressor::Warming { .. } | Regressor::Elapsed | Regressor::Covariate(_)
+            );
+            term.site == site && (is_linear || of.levels < 3)
+        };
+        let acts = |own: &Candidate| {
+            let effect = own
+                .hypothesis
+                .effect()
+                .filter(|_| own.hypothesis.depends_on == [of.covariate.clone()]);
+            effect.is_some_and(|effect| effect.terms(self.problem).iter().any(is_line))
+        };
+        self.candidates.iter().any(acts)
+    }
+
+    /// Smooth functions of one covariate at some columns that belong together: any, which changes
+    /// over some length, and of what is no command, direction of approach or load a straight line,
+    /// unless that is a law.
+    fn smooth(
+        &mut self,
+        family: &str,
+        site: ParameterSite,
+        at: &[&DVector<f64>],
+        of: &Known,
+        lengths: &[f64],
+    ) {
+        let hypothesis = Hypothesis::smooth(site, vec![of.covariate.clone()]);
+        let [warped, line] = [lengths.len(), lengths.len() + 1];
+        // Of few values the longest alone.
+        let told = match of.levels {
+            ..3 => 0,
+            3 => 1,
+            _ => lengths.len(),
+        };
+        for (variant, &length) in lengths.iter().take(told).enumerate() {
+            self.add_variant(family, &hypothesis, variant, || {
+                times(at, &basis(&of.scaled, length))
+            });
+        }
+        if matches!(of.covariate, Covariate::Time | Covariate::Row) && of.levels > 2 {
+            // What settles changes fast at first.
+            let range = of.values[..self.weighed].iter().copied().fold(0.0, f64::max);
+            let logarithm = of.values.iter().map(|t| (t.max(0.0) + range / 30.0).ln()).collect();
+            if let Some(of) = Known::of(of.covariate.clone(), logarithm, self.weighed) {
+                self.add_variant(family, &hypothesis, warped, || {
+                    times(at, &basis(&of.scaled, 0.25))
+                });
+            }
+        }
+        // Of two values any function is a line.
+        let is_of_arm = matches!(
+            of.covariate,
+            Covariate::Command(_) | Covariate::Approach(_) | Covariate::Load
+        );
+        if !is_of_arm && !self.has_law(site, of) {
+            let column =
+                || times(at, &DMatrix::from_fn(of.scaled.len(), 1, |row, _| of.scaled[row] - 0.5));
+            self.add_variant(family, &hypothesis, line, column);
+        }
+    }
+
+    /// Functions of two covariates: of two commands, of a direction and something else, of
+    /// temperature and time.
+    fn surfaces(&mut self, site: ParameterSite, at: &DVector<f64>, known: &[Known]) {
+        for (k, one) in known.iter().enumerate() {
+            for other in &known[k + 1..] {
+                if goes_with(&one.covariate, &other.covariate) {
+                    self.surface("surface", site, &[at], (one, other));
+                }
+            }
+        }
+    }
+
+    /// Functions of a joint's own command that grow evenly, from zero, with what is no command: a
+    /// gear or a scale that warms, a payload held out. Where that hardly varies they are functions
+    /// of the command alone, and are not looked for.
+    fn scaled_by(&mut self, site: ParameterSite, at: &DVector<f64>, known: &[Known]) {
+        let ParameterSite::Joint { joint, .. } = site else { return };
+        let Some(own) = known.iter().find(|own| own.covariate == Covariate::Command(joint)) else {
+            return;
+        };
+        let reference = self.problem.data.reference_temperature;
+        for size in known.iter().filter(|of| of.is_size(reference)) {
+            let (zero, length) = (size.zero(reference), self.rules.slow_length);
+            let hypothesis =
+                Hypothesis::smooth(site, vec![own.covariate.clone(), size.covariate.clone()]);
+            self.add("surface", 1.0, hypothesis, || {
+                times(&[at], &growing(&own.scaled, size, zero, length))
+            });
+        }
+    }
+
+    fn surface(
+        &mut self,
+        family: &str,
+        site: ParameterSite,
+        at: &[&DVector<f64>],
+        (one, other): (&Known, &Known),
+    ) {
+        let mut depends_on = vec![one.covariate.clone(), other.covariate.clone()];
+        depends_on.sort();
+        let (hypothesis, length) =
+            (Hypothesis::smooth(site, depends_on), self.rules.surface_length);
+        self.add(family, 1.0, hypothesis, || {
+            times(at, &products_of(&[&one.scaled, &other.scaled], length))
+        });
+    }
+
+    /// Another error in every pose.
+    fn per_pose(&mut self, site: ParameterSite, at: &DVector<f64>) {
+        let hypothesis = Hypothesis {
+            law: Law::PerPose,
+            part: Part::of(site),
+            site: Some(site),
+            depends_on: Vec::new(),
+        };
+        self.add_design("per pose", 1.0, hypothesis, || Design::per_pose(at));
+    }
+
+    /// Harmonics whose height and phase change slowly: orders that are no whole numbers, and sums
+    /// of neighbouring ones.
+    fn near_harmonics(&mut self, site: ParameterSite, at: &DVector<f64>, joint: usize) {
+        if self.problem.joints[joint].commanded() != JointKind::Revolute {
+            return;
+        }
+        let Some(known) = Known::of(Covariate::Command(joint), self.command(joint), self.weighed)
+        else {
+            return;
+        };
+        let slow = basis(&known.scaled, self.rules.slow_length);
+        for order in 1..=self.rules.near_orders {
+            let waves = || {
+                let (k, mut waves) = (slow.ncols(), DMatrix::zeros(slow.nrows(), 2 * slow.ncols()));
+                for (row, q) in known.values.iter().enumerate() {
+                    let (sin, cos) = (f64::from(order) * q).sin_cos();
+                    for j in 0..k {
+                        waves[(row, j)] = slow[(row, j)] * sin;
+                        waves[(row, j + k)] = slow[(row, j)] * cos;
+                    }
+                }
+                waves
+            };
+            let (law, depends_on) = (Law::NearHarmonic(order), vec![known.covariate.clone()]);
+            let hypothesis =
+                Hypothesis { law, part: Part::Joint(joint), site: Some(site), depends_on };
+            self.add("near harmonic", 1.0 / f64::from(order * order), hypothesis, || {
+                times(&[at], &waves())
+            });
+        }
+    }
+
+    /// What moves every measured position: functions of one covariate, and of the position.
+    fn measurement(&mut self, known: &[Known]) {
+        let axes: Vec<DVector<f64>> = (0..3)
+            .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
+            .collect();
+        if axes.len() < 3 {
+            return;
+        }
+        let (site, at) = (ParameterSite::Shift { axis: 0 }, axes.iter().collect::<Vec<_>>());
+        let lengths = self.rules.smooth_lengths;
+        for of in known {
+            self.smooth("smooth in the measurement", site, &at, of, &lengths);
+        }
+        let is_time = |of: &&Known| matches!(of.covariate, Covariate::Time | Covariate::Row);
+        for of in known.iter().filter(is_time) {
+            self.wandering(site, &at, of);
+        }
+        let poses = self.linearised.poses();
+        let coordinate = |axis: usize| {
+            Known::of(
+                Covariate::Position,
+                poses.iter().map(|p| p.measured[axis]).collect(),
+                self.weighed,
+            )
+        };
+        let coordinates: Vec<Known> = (0..3).filter_map(coordinate).collect();
+        let linear = DMatrix::from_fn(poses.len(), coordinates.len(), |k, j| {
+            let scaled = &coordinates[j].scaled;
+            scaled[k] - scaled[..self.weighed].iter().sum::<f64>() / self.weighed.max(1) as f64
+        });
+        let hypothesis = |law| Hypothesis {
+            law,
+            part: Part::Measurement,
+            site: None,
+            depends_on: vec![Covariate::Position],
+        };
+        // Where the strain of the frame is looked for, that is the linear law.
+        let strain = |own: &Candidate| own.hypothesis.effect() == Some(&Effect::FrameStrain);
+        if !self.candidates.iter().any(strain) {
+            self.add("field", 1.0, hypothesis(Law::Linear), || times(&at, &linear));
+        }
+        if let [x, y, z] = coordinates.as_slice() {
+            let plane = products_of(&[&x.scaled, &y.scaled, &z.scaled], self.rules.slow_length);
+            self.add("field", 1.0, hypothesis(Law::Smooth), || times(&at, &plane));
+        }
+        self.covariates.extend(coordinates);
+    }
+
+    /// What measures wanders, or one reading errs as the last did.
+    fn wandering(&mut self, site: ParameterSite, at: &[&DVector<f64>], of: &Known) {
+        let (part, depends_on) = (Part::Measurement, vec![of.covariate.clone()]);
+        let hypothesis = Hypothesis { law: Law::Wandering, part, site: Some(site), depends_on };
+        for (variant, &length) in self.rules.rough_lengths.iter().enumerate() {
+            if let Some(basis) = rough_basis(&of.scaled, length, of.levels) {
+                self.add_variant("smooth in the measurement", &hypothesis, variant, || {
+                    times(at, &basis)
+                });
+            }
+        }
+    }
+
+    /// How the base leans by what is no command: it stands on a floor that warms, creeps or gives
+    /// way.
+    fn base(&mut self, known: &[Known]) {
+        let axes: Vec<DVector<f64>> =
+            (0..3).filter_map(|axis| self.linearised.place(ParameterSite::Turn { axis })).collect();
+        let (site, at) = (ParameterSite::Turn { axis: 0 }, axes.iter().collect::<Vec<_>>());
+        let is_command =
+            |of: &&Known| matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_));
+        for of in known.iter().filter(|of| axes.len() == 3 && !is_command(of)) {
+            self.smooth("smooth at the base", site, &at, of, &self.rules.smooth_lengths[..2]);
+        }
+    }
+
+    /// Another error in every configuration, which all positions measured in it share.
+    fn repeats(&mut self) {
+        let axes: Vec<DVector<f64>> = (0..3)
+            .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
+            .collect();
+        let poses = self.linearised.poses();
+        let configurations: Vec<Vec<u64>> =
+            poses.iter().map(|pose| bits(pose.setup.configuration)).collect();
+        let numbers = number(configurations[..self.weighed].iter().cloned());
+        let count = numbers.iter().max().map_or(0, |last| last + 1);
+        if count == self.weighed || axes.len() < 3 {
+            return;
+        }
+        let groups = (0..poses.len()).map(|row| numbers.get(row).copied()).collect();
+        let hypothesis =
+            Hypothesis { law: Law::PerPose, part: Part::Arm, site: None, depends_on: Vec::new() };
+        let design = || Design::Grouped { levers: DMatrix::from_columns(&axes), groups };
+        self.add_design("per pose", 1.0, hypothesis, design);
+    }
+
+    /// Curvature and strain of beams by other functions than the temperature's multiple.
+    fn warming(&mut self, known: &[Known]) {
+        if self.problem.data.reference_temperature.is_none() {
+            return;
+        }
+        for joint in 0..self.problem.joints.len() {
+            for fields in [&BeamField::STRAINS[1..], &BeamField::STRAINS[..1]] {
+                let column = |&field: &BeamField| {
+                    self.linearised
+                        .place(ParameterSite::Beam { joint, field })
+                        .filter(|column| column.norm_squared() > 0.0)
+                };
+                let columns: Vec<DVector<f64>> = fields.iter().filter_map(column).collect();
+                if columns.is_empty() {
+                    continue;
+                }
+                let (site, at) = (
+                    ParameterSite::Beam { joint, field: fields[0] },
+                    columns.iter().collect::<Vec<_>>(),
+                );
+                let of_covariate =
+                    |wanted: &Covariate| known.iter().find(|known| known.covariate == *wanted);
+                for of in
+                    known.iter().filter(|known| !matches!(known.covariate, Covariate::Approach(_)))
+                {
+                    self.smooth("smooth in a link", site, &at, of, &self.rules.smooth_lengths[..2]);
+                }
+                let time = if self.time_measured { Covariate::Time } else { Covariate::Row };
+                if let (Some(one), Some(other)) =
+                    (of_covariate(&Covariate::Temperature), of_covariate(&time))
+                {
+                    self.surface("surface in a link", site, &at, (one, other));
+                }
+            }
+        }
+    }
+
+    /// The candidates with their prior probabilities: odds of one to two for each further
+    /// hypothesis, then equal chances for all families and, but for harmonics, all members of a
+    /// family.
+    fn weighted(self) -> (Vec<Candidate>, Vec<Known>, f64) {
+        let mut families: Vec<(&str, f64, f64)> = Vec::new();
+        for ((family, share), candidate) in self.shares.iter().zip(&self.candidates) {
+            if let Some((_, _, sum)) =
+                families.iter_mut().find(|(known, ..)| *known == family.as_str())
+            {
+                *sum += share;
+            } else {
+                let weight = match candidate.hypothesis.effect() {
+                    Some(Effect::LinkBending { .. }) => self.rules.rigid_links,
+                    Some(_) => 1.0,
+                    None => self.rules.unknown_law,
+                };
+                families.push((family, weight, *share));
+            }
+        }
+        let all: f64 = families.iter().map(|(_, weight, _)| weight).sum();
+        let mut candidates = self.candidates;
+        for (candidate, (family, share)) in candidates.iter_mut().zip(&self.shares) {
+            let own = families.iter().find(|(known, ..)| *known == family.as_str());
+            let (weight, sum) = own.map_or((1.0, 1.0), |(_, weight, sum)| (*weight, *sum));
+            candidate.ln_prior = (share / sum * weight / all / 2.0).ln();
+        }
+        (candidates, self.covariates, -(2.0 * all.max(1.0)).ln())
+    }
+}

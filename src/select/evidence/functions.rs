@@ -1,0 +1,283 @@
+//! Functions of what is known of a pose, as sums of a few columns.
+
+use std::f64::consts::PI;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::select::covariate::Covariate;
+
+/// Margin beyond the range on either side, where functions need not be flat.
+const MARGIN: f64 = 0.25;
+/// Variance of a basis function, of that of the first, below which it is left out.
+const NEGLIGIBLE: f64 = 1e-3;
+/// The same of functions that are not smooth: what is below is little beside the noise.
+const SLIGHT: f64 = 0.1;
+
+/// A row of values wider than so many of the gaps that it may have is none that noise alone makes.
+const WIDEST: f64 = 4.0;
+
+/// Centres of single bumps and steps along the range.
+const CENTRES: u32 = 16;
+/// Their widths as parts of the range.
+const WIDTHS: [f64; 5] = [0.04, 0.07, 0.12, 0.2, 0.35];
+/// Steps of a finer search about one, of the centre as parts of the width, and factors of the
+/// width.
+const FINER: ([f64; 9], [f64; 5]) =
+    ([-0.6, -0.4, -0.2, -0.1, 0.0, 0.1, 0.2, 0.4, 0.6], [0.7, 0.85, 1.0, 1.2, 1.4]);
+
+/// A single bump exp(−u²/2) or step tanh u with u = (x − centre) / width, x from 0 to 1 over the
+/// range.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::select) struct Shape {
+    is_bump: bool,
+    centre: f64,
+    width: f64,
+}
+
+impl Shape {
+    /// All over the range.
+    pub fn all() -> Vec<Self> {
+        let centres = (0..CENTRES).map(|k| (f64::from(k) + 0.5) / f64::from(CENTRES));
+        let of_centre = |centre| {
+            WIDTHS
+                .into_iter()
+                .flat_map(move |width| [true, false].map(|is_bump| Self { is_bump, centre, width }))
+        };
+        centres.flat_map(of_centre).collect()
+    }
+
+    /// Those about this one.
+    pub fn finer(self) -> Vec<Self> {
+        let (steps, factors) = FINER;
+        let at = |step: f64| {
+            let centre = self.centre + step * self.width;
+            factors.map(|factor| Self { centre, width: self.width * factor, ..self })
+        };
+        steps.into_iter().flat_map(at).collect()
+    }
+
+    pub fn value(self, x: f64) -> f64 {
+        let u = (x - self.centre) / self.width;
+        if self.is_bump { (-0.5 * u * u).exp() } else { u.tanh() }
+    }
+}
+
+/// A covariate at every pose.
+pub(super) struct Known {
+    pub covariate: Covariate,
+    /// As measured.
+    pub values: Vec<f64>,
+    /// From 0 to 1 over the range; beyond it the nearer end.
+    pub scaled: Vec<f64>,
+    /// Of the poses that hypotheses are weighed on.
+    pub range: (f64, f64),
+    /// Different values among them.
+    pub levels: usize,
+}
+
+impl Known {
+    /// Where its size is zero, if that is known; a temperature counts from `reference` \[°C\].
+    pub(super) fn zero(&self, reference: Option<f64>) -> Option<f64> {
+        match self.covariate {
+            Covariate::Temperature => reference,
+            Covariate::Payload | Covariate::Hoist => Some(0.0),
+            _ => None,
+        }
+    }
+
+    /// Whether functions of a command may grow with its size: it varies by half its largest size,
+    /// where its zero is known.
+    pub(super) fn is_size(&self, reference: Option<f64>) -> bool {
+        use Covariate::{Hoist, Own, Payload, Temperature};
+        let (low, high) = self.range;
+        let varies = |zero: f64| 2.0 * (high - low) >= (high - zero).abs().max((low - zero).abs());
+        matches!(self.covariate, Temperature | Payload | Hoist | Own(_))
+            && self.zero(reference).is_none_or(varies)
+    }
+
+    /// A covariate that varies over the first `weighed` poses.
+    pub fn of(covariate: Covariate, values: Vec<f64>, weighed: usize) -> Option<Self> {
+        let low = values[..weighed].iter().copied().fold(f64::INFINITY, f64::min);
+        let high = values[..weighed].iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if !(high > low && (high - low).is_finite()) {
+            return None;
+        }
+        let mut sorted = values[..weighed].to_vec();
+        sorted.sort_by(f64::total_cmp);
+        sorted.dedup();
+        let scaled =
+            values.iter().map(|value| ((value - low) / (high - low)).clamp(0.0, 1.0)).collect();
+        Some(Self { covariate, values, scaled, range: (low, high), levels: sorted.len() })
+    }
+}
+
+/// Brings those of some values that lie in a row, each no further than `apart` from the next, to
+/// their mean: where the row is wider than noise alone makes one, its values differ.
+pub(super) fn merge(values: &mut [f64], mut some: Vec<usize>, apart: f64) {
+    some.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let rows: Vec<Vec<usize>> =
+        some.chunk_by(|&a, &b| values[b] - values[a] <= apart).map(<[usize]>::to_vec).collect();
+    for row in rows {
+        let (first, last) = (values[row[0]], values[row[row.len() - 1]]);
+        if last - first <= WIDEST * apart {
+            let mean = row.iter().map(|&k| values[k]).sum::<f64>() / row.len() as f64;
+            for k in row {
+                values[k] = mean;
+            }
+        }
+    }
+}
+
+/// Whether a function of these two is looked for.
+pub(super) fn goes_with(one: &Covariate, other: &Covariate) -> bool {
+    use Covariate::{Approach, Command, Row, Temperature, Time};
+    match (one, other) {
+        (Approach(_), other) | (other, Approach(_)) => !matches!(other, Approach(_)),
+        (Command(_), Command(_)) | (Temperature, Time | Row) | (Time | Row, Temperature) => true,
+        _ => false,
+    }
+}
+
+/// Cosines over the range and its margin, each with the deviation that a Gaussian process of
+/// squared-exponential covariance with that length has along it [Solin & Särkkä 2020]; shape =
+/// (poses, functions).
+pub(super) fn basis(scaled: &[f64], length: f64) -> DMatrix<f64> {
+    let weights = weights(length);
+    DMatrix::from_fn(scaled.len(), weights.len(), |row, k| weights[k] * cosine(k, scaled[row]))
+}
+
+/// The same of exponential covariance exp(−|Δ|/length), of what is anew at every moment and lasts a
+/// while: a station that wanders, noise in which one reading follows the last. `None` where more
+/// functions than half the `levels` were needed: those would be the noise itself.
+pub(super) fn rough_basis(scaled: &[f64], length: f64, levels: usize) -> Option<DMatrix<f64>> {
+    // Of the constant alone the mean square is 1 and not a half.
+    let of_constant = |k: usize| if k == 0 { 0.5 } else { 1.0 };
+    let variance =
+        |k: usize| of_constant(k) / (1.0 + (PI * k as f64 * length / (1.0 + 2.0 * MARGIN)).powi(2));
+    let count = (0..=levels / 2).find(|&k| variance(k) <= SLIGHT)?;
+    Some(DMatrix::from_fn(scaled.len(), count, |row, k| {
+        variance(k).sqrt() * cosine(k, scaled[row])
+    }))
+}
+
+fn cosine(k: usize, u: f64) -> f64 {
+    (PI * k as f64 * (u + MARGIN) / (1.0 + 2.0 * MARGIN)).cos()
+}
+
+/// Deviations along the cosines, down to a negligible variance.
+fn weights(length: f64) -> Vec<f64> {
+    let variance =
+        |k: usize| (-0.5 * (PI * k as f64 * length / (1.0 + 2.0 * MARGIN)).powi(2)).exp();
+    let count = (0..usize::MAX).find(|&k| variance(k) <= NEGLIGIBLE).unwrap_or(0);
+    (0..count).map(|k| variance(k).sqrt()).collect()
+}
+
+/// Functions of one covariate that change evenly with the size of another: those of the basis times
+/// that size; where its zero is not known, beside those of the basis.
+pub(super) fn growing(
+    scaled: &[f64],
+    size: &Known,
+    zero: Option<f64>,
+    length: f64,
+) -> DMatrix<f64> {
+    let plain = basis(scaled, length);
+    let (low, high) = size.range;
+    let (from, kept) =
+        (zero.unwrap_or(0.5 * (low + high)), if zero.is_some() { 0 } else { plain.ncols() });
+    let size = |row: usize| (size.values[row].clamp(low, high) - from) / (high - low);
+    DMatrix::from_fn(plain.nrows(), kept + plain.ncols(), |row, j| {
+        if j < kept { plain[(row, j)] } else { plain[(row, j - kept)] * size(row) }
+    })
+}
+
+/// Products of cosines, one of each covariate.
+pub(super) fn products_of(scaled: &[&[f64]], length: f64) -> DMatrix<f64> {
+    let weights = weights(length);
+    let mut indices: Vec<Vec<usize>> = vec![Vec::new()];
+    for _ in scaled {
+        let longer = |index: &Vec<usize>| {
+            (0..weights.len()).map(|k| [index.as_slice(), &[k]].concat()).collect::<Vec<_>>()
+        };
+        indices = indices.iter().flat_map(longer).collect();
+    }
+    let weight = |index: &[usize]| index.iter().map(|&k| weights[k]).product::<f64>();
+    indices.retain(|index| weight(index).powi(2) > NEGLIGIBLE);
+    DMatrix::from_fn(scaled[0].len(), indices.len(), |row, j| {
+        let index = &indices[j];
+        weight(index)
+            * index.iter().zip(scaled).map(|(&k, scaled)| cosine(k, scaled[row])).product::<f64>()
+    })
+}
+
+/// Columns times functions of the pose: every column with every function, shape = (3 N, columns ·
+/// functions).
+pub(super) fn times(at: &[&DVector<f64>], functions: &DMatrix<f64>) -> DMatrix<f64> {
+    let k = functions.ncols();
+    DMatrix::from_fn(3 * functions.nrows(), at.len() * k, |row, j| {
+        at[j / k][row] * functions[(row / 3, j % k)]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_wanders_forgets_within_its_length() {
+        let scaled: Vec<f64> = (0..=200).map(|k| f64::from(k) / 200.0).collect();
+        for (length, poses) in [(0.15, 30), (0.06, 12), (0.025, 5)] {
+            let basis = rough_basis(&scaled, length, 200).unwrap();
+            let covariance = |a: usize, b: usize| basis.row(a).dot(&basis.row(b));
+            for first in [20, 60, 100] {
+                // exp(−lengths), where what is left out smooths it over part of the first length.
+                for (lengths, expected, within) in
+                    [(1, 0.37, 0.16), (2, 0.14, 0.06), (3, 0.05, 0.06)]
+                {
+                    let correlation =
+                        covariance(first, first + lengths * poses) / covariance(first, first);
+                    assert!(
+                        (correlation - expected).abs() < within,
+                        "{length} {first} {lengths}: {correlation}"
+                    );
+                }
+            }
+        }
+        assert!(rough_basis(&scaled, 0.025, 60).is_none(), "that would be the noise itself");
+    }
+
+    #[test]
+    fn what_hardly_varies_from_its_zero_is_no_size_to_grow_with() {
+        let known = |values: &[f64]| {
+            Known::of(Covariate::Temperature, values.to_vec(), values.len()).unwrap()
+        };
+        assert!(
+            known(&[17.0, 20.0, 31.0]).is_size(Some(20.0)) && known(&[29.5, 30.5]).is_size(None)
+        );
+        assert!(!known(&[29.5, 30.5]).is_size(Some(20.0)));
+        let grown = growing(&[0.0, 0.5], &known(&[20.0, 31.0]), Some(20.0), 0.5);
+        assert!(
+            grown.row(0).iter().all(|own| *own == 0.0)
+                && grown.row(1).iter().any(|own| *own != 0.0),
+            "{grown}"
+        );
+    }
+
+    #[test]
+    fn values_in_a_short_row_are_one_and_others_stay() {
+        // The last is none of those that may be merged; neither are many in a long row.
+        let mut values: Vec<f64> = [3.0, 1.0, 1.2, 1.4, 2.0]
+            .into_iter()
+            .chain((0..20).map(|k| 5.0 + 0.2 * f64::from(k)))
+            .collect();
+        let long = values[5..].to_vec();
+        values.push(1.1);
+        let all = 0..values.len() - 1;
+        merge(&mut values, all.collect(), 0.25);
+        let expected: Vec<f64> =
+            [3.0, 1.2, 1.2, 1.2, 2.0].into_iter().chain(long).chain([1.1]).collect();
+        assert!(
+            values.iter().zip(&expected).all(|(own, expected)| (own - expected).abs() < 1e-12),
+            "{values:?}"
+        );
+    }
+}

@@ -1,0 +1,217 @@
+//! All hypotheses about what a fit leaves, with their columns at some poses.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::block::Design;
+use super::candidate::{Candidate, even, order_of};
+use super::columns::{Columns, slots};
+use super::explanation::Explanation;
+use super::functions::{Known, Shape};
+use super::hypothesis::Hypothesis;
+use super::limits::limits;
+use super::marginal::Coefficients;
+use crate::model::parameter::ParameterSite;
+use crate::problem::{Effect, Problem};
+use crate::select::candidates::Candidates;
+use crate::select::covariate::Covariate;
+use crate::select::data::Data;
+use crate::select::fitted::Fitted;
+use crate::select::neighbourhood::Linearised;
+use crate::select::rules::SelectionRules;
+
+/// A fit linearised at some rows, with every hypothesis.
+pub(in crate::select) struct Hypotheses<'a> {
+    pub linearised: Linearised<'a>,
+    /// Effects that the search added, part by part.
+    pub added: Vec<Effect>,
+    /// Their columns among those of the fit.
+    pub unknowns: Vec<usize>,
+    pub(super) all: Vec<Candidate>,
+    /// Poses, the first ones, that hypotheses are weighed on.
+    pub(super) weighed: usize,
+    /// ln of the chance of a family of effects.
+    pub(super) ln_family: f64,
+    covariates: Vec<Known>,
+    /// Times at which what measures may have moved.
+    pub(super) times: Vec<f64>,
+}
+
+impl<'a> Hypotheses<'a> {
+    /// About what the fit without what was `added` leaves of the first `weighed` of some rows.
+    pub fn of(
+        fitted: &'a Fitted,
+        data: &Data<'a>,
+        added: &[Effect],
+        rows: &[usize],
+        weighed: usize,
+    ) -> Self {
+        let candidates = Candidates::of(&fitted.problem, data).testable;
+        let added: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
+        let own: Vec<Vec<usize>> = added.iter().map(|part| fitted.unknowns_of(part)).collect();
+        let unknowns = own.concat();
+        let linearised = fitted.linearised_with(data, rows, &candidates, &slots(&fitted.problem));
+        let fit = linearised.fitted();
+        let known =
+            added.iter().zip(&own).map(|(part, own)| (part.clone(), fit.select_columns(own)));
+        // No list holds all waves and moves: each has its own chance, whichever others are looked
+        // at.
+        let is_unlisted = |effect: &Effect| {
+            order_of(effect).is_some() || matches!(effect, Effect::StationMove { .. })
+        };
+        let (unlisted, known): (Vec<_>, Vec<_>) =
+            known.partition(|(effect, _)| is_unlisted(effect));
+        let new =
+            candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect)));
+        let effects: Vec<(Effect, DMatrix<f64>)> = known.into_iter().chain(new).collect();
+        let how = (data.measurements.time_measured, data.rules, weighed);
+        let (all, covariates, ln_family) =
+            Columns::all(&fitted.problem, &linearised, how, &effects, None);
+        let times = data.shift_times();
+        let mut own =
+            Self { linearised, added, unknowns, all, weighed, ln_family, covariates, times };
+        let entered =
+            |(effect, columns)| own.entered(&effect, columns, (&fitted.problem, data.rules));
+        let unlisted: Vec<Candidate> = unlisted.into_iter().filter_map(entered).collect();
+        own.all.extend(unlisted);
+        own.all.extend(limits(fitted, &own.linearised, weighed, (own.ln_family, data.rules)));
+        own
+    }
+
+    /// The hypothesis of an effect that no list has, with its columns.
+    pub(super) fn entered(
+        &self,
+        effect: &Effect,
+        columns: DMatrix<f64>,
+        (problem, rules): (&Problem, &SelectionRules),
+    ) -> Option<Candidate> {
+        let (columns, largest) = even(columns, &effect.terms(problem), self.weighed, rules);
+        let design = Design::Dense(columns).scaled(self.weighed)?;
+        let coefficients = Coefficients { largest, ..Coefficients::default() };
+        let family = self
+            .all
+            .iter()
+            .filter_map(|own| own.hypothesis.effect())
+            .filter(|own| own.name() == effect.name());
+        let tries = match effect {
+            Effect::StationMove { .. } => self.times.len().max(1) as f64,
+            _ => effect.tries(&family.collect::<Vec<_>>(), problem),
+        };
+        let ln_prior = self.ln_family - tries.ln();
+        let hypothesis = Hypothesis::of_effect(effect, problem, true, true);
+        Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
+    }
+
+    /// The functions of one hypothesis alone, about what the whole fit leaves.
+    pub fn only(
+        fitted: &'a Fitted,
+        data: &Data<'a>,
+        rows: &[usize],
+        weighed: usize,
+        of: &Hypothesis,
+    ) -> Self {
+        let linearised = fitted.linearised_with(data, rows, &[], &slots(&fitted.problem));
+        let how = (data.measurements.time_measured, data.rules, weighed);
+        let (all, covariates, ln_family) =
+            Columns::all(&fitted.problem, &linearised, how, &[], Some(of));
+        let (added, unknowns, times) = (Vec::new(), Vec::new(), Vec::new());
+        Self { linearised, added, unknowns, all, weighed, ln_family, covariates, times }
+    }
+
+    /// The function of a hypothesis that an explanation holds.
+    pub(super) fn candidate(
+        &self,
+        explanation: &Explanation,
+        hypothesis: &Hypothesis,
+    ) -> Option<&Candidate> {
+        let mut members = explanation.hypotheses.iter().zip(&explanation.functions);
+        let (_, &(variant, _)) = members.find(|(known, _)| *known == hypothesis)?;
+        self.all.iter().find(|own| own.variant == variant && own.hypothesis == *hypothesis)
+    }
+
+    /// Columns of a function that an explanation holds at all poses, shape = (3 N, k): smooth, or
+    /// of one shape.
+    pub fn form(
+        &self,
+        explanation: &Explanation,
+        hypothesis: &Hypothesis,
+        (shape, weighed): (Option<Shape>, usize),
+    ) -> Option<DMatrix<f64>> {
+        let Some(shape) = shape else {
+            return Some(self.candidate(explanation, hypothesis)?.design.columns().into_owned());
+        };
+        let (_, own) = self.shaped(hypothesis, weighed, &[shape]).pop()?;
+        Some(own.design.columns().into_owned())
+    }
+
+    /// Single bumps and steps in the place of a function of one covariate at one coordinate; all
+    /// together as probable as the function.
+    pub(super) fn shaped(
+        &self,
+        hypothesis: &Hypothesis,
+        weighed: usize,
+        shapes: &[Shape],
+    ) -> Vec<(Shape, Candidate)> {
+        let Some((.., values, lever)) = self.coordinate(hypothesis) else { return Vec::new() };
+        let Some(known) = Known::of(Covariate::Position, values.to_vec(), weighed) else {
+            return Vec::new();
+        };
+        let ln_prior = -(Shape::all().len() as f64).ln();
+        let one = |shape: &Shape| {
+            let mut columns = DMatrix::from_columns(std::slice::from_ref(&lever));
+            for (pose, at) in known.scaled.iter().enumerate() {
+                columns.rows_mut(3 * pose, 3).scale_mut(shape.value(*at));
+            }
+            let design = Design::Dense(columns).scaled(weighed)?;
+            let coefficients = Coefficients::default();
+            Some((
+                *shape,
+                Candidate {
+                    hypothesis: hypothesis.clone(),
+                    variant: 0,
+                    design,
+                    ln_prior,
+                    coefficients,
+                },
+            ))
+        };
+        shapes.iter().filter_map(one).collect()
+    }
+
+    /// A covariate at every pose.
+    pub(super) fn known(&self, covariate: &Covariate) -> Option<&Known> {
+        self.covariates.iter().find(|known| known.covariate == *covariate)
+    }
+
+    /// The covariates that a hypothesis depends on.
+    fn covariates(&self, hypothesis: &Hypothesis) -> impl Iterator<Item = &Known> {
+        self.covariates.iter().filter(|known| hypothesis.depends_on.contains(&known.covariate))
+    }
+
+    /// Their ranges where hypotheses were weighed.
+    pub fn ranges(&self, hypothesis: &Hypothesis) -> Vec<(Covariate, (f64, f64))> {
+        self.covariates(hypothesis).map(|known| (known.covariate.clone(), known.range)).collect()
+    }
+
+    /// For each pose from number `first` on, whether it is within those ranges.
+    pub fn reached(&self, hypothesis: &Hypothesis, first: usize) -> Vec<bool> {
+        let within = |known: &Known, pose: usize| {
+            (known.range.0..=known.range.1).contains(&known.values[pose])
+        };
+        let poses = self.linearised.poses().len();
+        (first..poses)
+            .map(|pose| self.covariates(hypothesis).all(|known| within(known, pose)))
+            .collect()
+    }
+
+    /// Values of the only covariate of a function at one coordinate of a joint, and the lever of
+    /// that coordinate; `None` for others.
+    pub fn coordinate(
+        &self,
+        hypothesis: &Hypothesis,
+    ) -> Option<(Covariate, ParameterSite, &[f64], DVector<f64>)> {
+        let site = hypothesis.site.filter(|site| matches!(site, ParameterSite::Joint { .. }))?;
+        let mut covariates = self.covariates(hypothesis);
+        let (only, None) = (covariates.next()?, covariates.next()) else { return None };
+        Some((only.covariate.clone(), site, &only.values, self.linearised.place(site)?))
+    }
+}

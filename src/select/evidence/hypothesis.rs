@@ -1,0 +1,219 @@
+//! What may explain a residual: effects by their laws, and functions whose law nobody knows.
+
+use std::fmt;
+
+use crate::model::parameter::{JointField, ParameterSite, Quantity, Regressor};
+use crate::problem::{Effect, Problem};
+use crate::select::covariate::Covariate;
+
+/// A part of the arm or of its measurement; joints are counted from 0. Its `Display` is the name in
+/// files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Part {
+    /// A joint.
+    Joint(usize),
+    /// The link before a joint.
+    LinkBefore(usize),
+    /// The base, or what it stands on.
+    Base,
+    /// The payload.
+    Payload,
+    /// The hoist.
+    Hoist,
+    /// The arm as a whole.
+    Arm,
+    /// What measures.
+    Measurement,
+}
+
+impl Part {
+    /// The part that a site belongs to.
+    pub fn of(site: ParameterSite) -> Self {
+        match site {
+            ParameterSite::Joint { joint, field: JointField::Alpha | JointField::A }
+            | ParameterSite::Beam { joint, .. } => Self::LinkBefore(joint),
+            ParameterSite::Joint { joint, .. } => Self::Joint(joint),
+            ParameterSite::Arm(field) => {
+                use crate::model::parameter::ArmField as Field;
+                match field {
+                    Field::Payload => Self::Payload,
+                    Field::HoistForce
+                    | Field::HoistLeanX
+                    | Field::HoistLeanY
+                    | Field::HoistTrolley => Self::Hoist,
+                    Field::MountingX | Field::MountingY | Field::GravityX | Field::GravityY => {
+                        Self::Base
+                    }
+                    Field::Mixing => Self::Arm,
+                }
+            }
+            ParameterSite::Base { .. } | ParameterSite::Turn { .. } => Self::Base,
+            ParameterSite::Target { .. } => Self::Payload,
+            ParameterSite::Fixture { .. }
+            | ParameterSite::Shift { .. }
+            | ParameterSite::Scale
+            | ParameterSite::Strain { .. } => Self::Measurement,
+        }
+    }
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Joint(joint) => write!(f, "joint {}", joint + 1),
+            Self::LinkBefore(joint) => write!(f, "link before joint {}", joint + 1),
+            Self::Base => f.write_str("base"),
+            Self::Payload => f.write_str("payload"),
+            Self::Hoist => f.write_str("hoist"),
+            Self::Arm => f.write_str("arm"),
+            Self::Measurement => f.write_str("measurement"),
+        }
+    }
+}
+
+/// How a part's error follows from what it depends on.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Law {
+    /// As an effect says.
+    Effect(Effect),
+    /// Some smooth function.
+    Smooth,
+    /// Some function that repeats about so many times a turn of the joint, its height and phase
+    /// changing slowly.
+    NearHarmonic(u32),
+    /// Another value in every pose: nothing that is known of a pose tells it.
+    PerPose,
+    /// Wanders in time: near what it was a little before, and not smooth, as noise is in which one
+    /// reading follows the last.
+    Wandering,
+    /// Linear in the position.
+    Linear,
+    /// Gives way under the weight of links whose masses nobody declared.
+    Sag,
+    /// A limit of the declared problem, in words, that holds the fit is wrong.
+    Limit(String),
+}
+
+impl Law {
+    /// Whether it is the same law: of an effect whose time or order is searched with whatever one.
+    pub(super) fn is_of(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Effect(own), Self::Effect(other)) => own.is_but_for_search(other),
+            _ => self == other,
+        }
+    }
+}
+
+/// One explanation of a residual.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hypothesis {
+    /// The law, or what is known of it.
+    pub law: Law,
+    /// Where it acts.
+    pub part: Part,
+    /// The coordinate of the part, where the error is one of a single coordinate.
+    pub site: Option<ParameterSite>,
+    /// What it depends on, ascending.
+    pub depends_on: Vec<Covariate>,
+}
+
+impl Hypothesis {
+    /// An effect of the catalogue or of one's own: where its parameters enter and what drives them
+    /// say the rest.
+    pub fn of_effect(
+        effect: &Effect,
+        problem: &Problem,
+        approach_known: bool,
+        time_measured: bool,
+    ) -> Self {
+        let terms = effect.terms(problem);
+        let part = terms.first().map_or(Part::Arm, |term| Part::of(term.site));
+        let mut depends_on: Vec<Covariate> = terms
+            .iter()
+            .flat_map(|term| {
+                covariates(term.site, term.regressor, problem, (approach_known, time_measured))
+            })
+            .collect();
+        depends_on.sort();
+        depends_on.dedup();
+        Self { law: Law::Effect(effect.clone()), part, site: None, depends_on }
+    }
+
+    /// A smooth function of some covariates at a place.
+    pub(super) fn smooth(site: ParameterSite, depends_on: Vec<Covariate>) -> Self {
+        Self { law: Law::Smooth, part: Part::of(site), site: Some(site), depends_on }
+    }
+
+    /// Whether another says the same: the same law at the same part, of the same covariates.
+    pub fn says(&self, other: &Self) -> bool {
+        self.law == other.law && self.part == other.part && self.depends_on == other.depends_on
+    }
+
+    /// Whether it is that a limit of the declared problem is wrong.
+    pub(super) fn is_limit(&self) -> bool {
+        matches!(self.law, Law::Limit(_))
+    }
+
+    /// Its effect, if its law is one.
+    pub fn effect(&self) -> Option<&Effect> {
+        match &self.law {
+            Law::Effect(effect) => Some(effect),
+            _ => None,
+        }
+    }
+}
+
+/// The same of a parameter that two covariates drive, too.
+fn covariates(
+    site: ParameterSite,
+    regressor: Regressor,
+    problem: &Problem,
+    known: (bool, bool),
+) -> Vec<Covariate> {
+    match regressor {
+        Regressor::LoadedSide { joint, .. } => vec![Covariate::Approach(joint), Covariate::Payload],
+        Regressor::Lagging { .. } => {
+            vec![Covariate::Temperature, Covariate::of(Quantity::Elapsed, problem, known.1)]
+        }
+        Regressor::Dragged { joint, .. } if known.0 => {
+            vec![Covariate::Command(joint), Covariate::Approach(joint)]
+        }
+        _ => vec![covariate(site, regressor, problem, known)],
+    }
+}
+
+/// What a parameter depends on by what drives it, or by the physics of where it enters.
+fn covariate(
+    site: ParameterSite,
+    regressor: Regressor,
+    problem: &Problem,
+    (approach_known, time_measured): (bool, bool),
+) -> Covariate {
+    let time = Covariate::of(Quantity::Elapsed, problem, time_measured);
+    match regressor {
+        Regressor::Command(joint)
+        | Regressor::Travel(joint)
+        | Regressor::Sine(joint, _)
+        | Regressor::Cosine(joint, _)
+        | Regressor::Wave { joint, .. }
+        | Regressor::Dragged { joint, .. } => Covariate::Command(joint),
+        Regressor::Warming { .. } => Covariate::Temperature,
+        Regressor::Elapsed | Regressor::Since(_) | Regressor::Settling(_) => time,
+        Regressor::Covariate(which) => Covariate::own(which, problem),
+        Regressor::Spline { of, .. } | Regressor::Bump { of, .. } | Regressor::Step { of, .. } => {
+            Covariate::of(of, problem, time_measured)
+        }
+        _ => match site {
+            ParameterSite::Joint { joint, field: JointField::Play | JointField::SlidingPlay }
+                if approach_known =>
+            {
+                Covariate::Approach(joint)
+            }
+            ParameterSite::Arm(crate::model::parameter::ArmField::Payload) => Covariate::Payload,
+            ParameterSite::Scale | ParameterSite::Strain { .. } => Covariate::Position,
+            _ => Covariate::Load,
+        },
+    }
+}

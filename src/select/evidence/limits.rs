@@ -1,0 +1,89 @@
+//! Limits of the declared problem that hold a fit back: where one is wrong, what it holds back
+//! looks like an effect.
+//!
+//! Freed, a parameter p at its bound moves the poses along ∂r/∂p. Of active constraints with rows A
+//! the i-th, freed alone, lets the unknowns move along A⁺eᵢ, and the poses along J A⁺eᵢ; along what
+//! A leaves open they are fitted, so that units decide nothing. Rows that depend on others are
+//! freed together. How far a limit may be off is told by the priors: of a freed parameter by its σ
+//! from the bound on.
+
+use nalgebra::DMatrix;
+
+use super::block::Design;
+use super::candidate::Candidate;
+use super::hypothesis::{Hypothesis, Law, Part};
+use super::marginal::Coefficients;
+use crate::select::fitted::Fitted;
+use crate::select::neighbourhood::Linearised;
+use crate::select::rules::SelectionRules;
+
+/// Singular value of the rows of constraints below which one depends on others.
+const DEPENDENT: f64 = 1e-9;
+
+/// For each limit that holds a fit the hypothesis that it is wrong, all together with the chance of
+/// a family.
+pub(super) fn limits(
+    fitted: &Fitted,
+    linearised: &Linearised,
+    weighed: usize,
+    (ln_family, rules): (f64, &SelectionRules),
+) -> Vec<Candidate> {
+    let found = &fitted.found;
+    let is_held = |&k: &usize| {
+        found.estimates[k].at_bound.is_some() && found.unknowns.contains(&found.estimates[k].name)
+    };
+    let held: Vec<usize> = (0..found.estimates.len()).filter(is_held).collect();
+    let count = held.len() + fitted.active().nrows();
+    if count == 0 {
+        return Vec::new();
+    }
+    let ln_prior = ln_family - (count as f64).ln();
+    let candidate = |words: String, k: usize, columns: DMatrix<f64>, largest: f64| {
+        let site = fitted.model.parameters[k].site;
+        let length = columns.rows(0, 3 * weighed).norm() / ((3 * weighed) as f64).sqrt();
+        let coefficients =
+            Coefficients { largest: vec![largest * length], ..Coefficients::default() };
+        let hypothesis = Hypothesis {
+            law: Law::Limit(words),
+            part: Part::of(site),
+            site: None,
+            depends_on: Vec::new(),
+        };
+        let design = Design::Dense(columns).scaled(weighed)?;
+        Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
+    };
+    let freed = linearised.of_parameters(&fitted.model, &held, &found.x);
+    let sigma_of = |k: usize| fitted.model.parameters[k].sigma;
+    let bounds = held.iter().enumerate().filter_map(|(j, &k)| {
+        let largest = sigma_of(k).map_or(f64::INFINITY, |sigma| rules.plausible * sigma);
+        candidate(
+            format!("of {}", found.estimates[k].name),
+            k,
+            freed.columns(j, 1).into_owned(),
+            largest,
+        )
+    });
+    let own = linearised.fitted().columns(0, fitted.unknowns.len()).into_owned();
+    let active = fitted.active();
+    // Of no row there is no decomposition.
+    let directions =
+        if active.is_empty() { None } else { active.clone().pseudo_inverse(DEPENDENT).ok() };
+    let directions = directions.unwrap_or_default();
+    let constraints =
+        found.active_constraints.iter().zip(directions.column_iter()).zip(active.row_iter());
+    let constraints = constraints.filter_map(|((constraint, along), row)| {
+        let first = row.iter().position(|coefficient| *coefficient != 0.0)?;
+        let variance = |(&a, &k): (&f64, &usize)| {
+            if a == 0.0 { Some(0.0) } else { sigma_of(k).map(|sigma| (a * sigma).powi(2)) }
+        };
+        let variance: Option<f64> = row.iter().zip(&fitted.unknowns).map(variance).sum();
+        let largest = variance.map_or(f64::INFINITY, |variance| rules.plausible * variance.sqrt());
+        candidate(
+            constraint.words.clone(),
+            fitted.unknowns[first],
+            DMatrix::from_columns(&[&own * along]),
+            largest,
+        )
+    });
+    bounds.chain(constraints).collect()
+}

@@ -1,0 +1,332 @@
+//! The marginal likelihood of a linear model with unknown noise: how probable a residual is under
+//! some columns.
+//!
+//! r = A β + ε with β ~ N(0, c² f² I) and ε ~ N(0, f² I), all in units of the declared σ. With G =
+//! AᵀA = V diag(w) Vᵀ and b = Aᵀr the coefficients are integrated out in closed form,
+//!
+//! S(c) = rᵀr − Σ c² (Vᵀb)² / (1 + c² w),     ln p(r | c, f) = −½ Σ ln(1 + c² w) − ν ln f − S / (2
+//! f²) + const,
+//!
+//! and the size c of the columns (their root mean square displacement in units of σ) and the factor
+//! f of the noise are summed over a grid. c runs over what positions can show, from a third of σ to
+//! a hundred of it; ln f has a Cauchy distribution about 0: mostly a declared σ is right to a
+//! tenth, and where it is not, it may be far off.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::numeric::lower_factor;
+
+/// ln f is summed from −3.5 to 3.5, a factor of thirty either way, in steps of a twentieth, or
+/// closer: of half of what the likelihood of ν degrees of freedom is wide, 1/√(2ν).
+const REACH: f64 = 3.5;
+const STEP: f64 = 0.05;
+/// No closer than this: no data have more degrees of freedom.
+const LEAST_STEP: f64 = 1e-4;
+
+/// Degrees of freedom ν of a residual and the half width of the distribution of ln f.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Noise {
+    pub freedom: f64,
+    pub trust: f64,
+    /// The least ln f: that of a declared σ, for what is smaller is no effect that such an
+    /// instrument can show.
+    pub least: f64,
+}
+
+impl Noise {
+    /// For each factor f of the grid ln of its prior and of f^−ν, and 1 / (2 f²).
+    pub fn grid(self) -> Vec<(f64, f64)> {
+        let step = STEP.min(0.5 / (2.0 * self.freedom).sqrt()).max(LEAST_STEP);
+        let least = self.least.clamp(-REACH, REACH);
+        #[expect(clippy::cast_possible_truncation, reason = "few steps")]
+        let steps = (REACH / step).ceil() as i32;
+        let at = |number: i32| {
+            let ln_f = step * f64::from(number);
+            (-(ln_f / self.trust).powi(2).ln_1p() - self.freedom * ln_f, 0.5 * (-2.0 * ln_f).exp())
+        };
+        (-steps..=steps)
+            .filter(|&number| step * f64::from(number) >= least - 1e-9)
+            .map(at)
+            .collect()
+    }
+}
+
+/// ln of the likelihood of ν squares of sum S, summed over the noise factor f; up to a constant.
+pub(super) fn over_noise(squares: f64, grid: &[(f64, f64)]) -> f64 {
+    ln_sum(grid.iter().map(|(ln_weight, half)| ln_weight - half * squares))
+}
+
+/// ln Σ exp.
+pub(super) fn ln_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
+    let most = terms.clone().fold(f64::NEG_INFINITY, f64::max);
+    // What is e⁴⁰ times less probable adds nothing.
+    let sum: f64 = terms.map(|term| term - most).filter(|term| *term > -40.0).map(f64::exp).sum();
+    if most == f64::NEG_INFINITY { most } else { most + sum.ln() }
+}
+
+/// What a residual r says about columns A: G = AᵀA and b = Aᵀr.
+#[derive(Debug, Clone)]
+pub(super) enum Normal {
+    /// G, shape = (k, k), and b.
+    Dense { gram: DMatrix<f64>, product: DVector<f64> },
+    /// G = D − LᵀL with D diagonal and few rows in L, shape = (few, k): columns for every pose,
+    /// projected.
+    LessFew { diagonal: DVector<f64>, less: DMatrix<f64>, product: DVector<f64> },
+}
+
+impl Normal {
+    /// b.
+    pub fn product(&self) -> &DVector<f64> {
+        match self {
+            Self::Dense { product, .. } | Self::LessFew { product, .. } => product,
+        }
+    }
+
+    /// The same beside a set that takes Z A = `along` off the columns and `taken` = Z r off the
+    /// residual.
+    pub fn beside(&self, along: &DMatrix<f64>, taken: &DVector<f64>) -> Self {
+        match self {
+            Self::Dense { gram, product } => {
+                let (mut gram, mut product) = (gram.clone(), product.clone());
+                gram.gemm(-1.0, &along.transpose(), along, 1.0);
+                product.gemv_tr(-1.0, along, taken, 1.0);
+                Self::Dense { gram, product }
+            }
+            Self::LessFew { diagonal, less, product } => {
+                let mut product = product.clone();
+                product.gemv_tr(-1.0, along, taken, 1.0);
+                let (few, more) = (less.nrows(), along.nrows());
+                let mut less = less.clone().resize_vertically(few + more, 0.0);
+                less.rows_mut(few, more).copy_from(along);
+                Self::LessFew { diagonal: diagonal.clone(), less, product }.whole_if_less_work()
+            }
+        }
+    }
+
+    /// The same kept whole where rows in L are so many that this is less work for every size.
+    pub fn whole_if_less_work(self) -> Self {
+        match self {
+            Self::LessFew { diagonal, less, product } if 2 * less.nrows() > less.ncols() => {
+                let mut gram = DMatrix::from_diagonal(&diagonal);
+                gram.gemm(-1.0, &less.transpose(), &less, 1.0);
+                Self::Dense { gram, product }
+            }
+            other => other,
+        }
+    }
+
+    /// ½ ln det(1 + c² G) and bᵀ (1/c² + G)⁻¹ b, for a size c.
+    fn taken(&self, size: f64) -> Option<(f64, f64)> {
+        let precision = (size * size).recip();
+        match self {
+            Self::Dense { gram, product } => {
+                // 1/c² + G = L Lᵀ: det(1 + c² G) = c^2k det(L)², taken off are |L⁻¹ b|².
+                let lower = lower_factor(with_prior(gram, precision))?;
+                let mut taken = product.clone();
+                if !lower.solve_lower_triangular_mut(&mut taken) {
+                    return None;
+                }
+                Some((ln_product(&lower.diagonal(), size), taken.norm_squared()))
+            }
+            Self::LessFew { diagonal, less, product } => {
+                // E = 1/c² + D, K = 1 − L E⁻¹ Lᵀ: det(E − LᵀL) = det E det K,
+                // (E − LᵀL)⁻¹ = E⁻¹ + E⁻¹Lᵀ K⁻¹ L E⁻¹.
+                let root = diagonal.map(|own| (own + precision).sqrt());
+                let mut scaled = less.clone();
+                scaled.column_iter_mut().zip(&root).for_each(|(mut column, root)| column /= *root);
+                let along = product.component_div(&root);
+                let mut inner = DMatrix::identity(less.nrows(), less.nrows());
+                inner.gemm(-1.0, &scaled, &scaled.transpose(), 1.0);
+                let lower = lower_factor(inner)?;
+                let mut beside = scaled * &along;
+                if !lower.solve_lower_triangular_mut(&mut beside) {
+                    return None;
+                }
+                let determinant = ln_product(&root, size) + ln_product(&lower.diagonal(), 1.0);
+                Some((determinant, along.norm_squared() + beside.norm_squared()))
+            }
+        }
+    }
+}
+
+/// 1/c² + G, for a precision 1/c².
+fn with_prior(gram: &DMatrix<f64>, precision: f64) -> DMatrix<f64> {
+    let mut inner = gram.clone();
+    for j in 0..inner.nrows() {
+        inner[(j, j)] += precision;
+    }
+    inner
+}
+
+/// ln Π c dⱼ, a few factors at a time before their product runs out of range.
+fn ln_product(diagonal: &DVector<f64>, size: f64) -> f64 {
+    let all: Vec<f64> = diagonal.iter().map(|own| own * size).collect();
+    all.chunks(16).map(|some| some.iter().product::<f64>().ln()).sum()
+}
+
+/// What is known of the coefficients of a block before any data.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Coefficients {
+    /// For each whether it is never negative; empty: none.
+    pub never_negative: Vec<bool>,
+    /// Whether each may be at work without the others.
+    pub alone: bool,
+    /// For each the root mean square displacement, in units of σ, that the largest plausible value
+    /// causes; empty: any.
+    pub largest: Vec<f64>,
+}
+
+impl Coefficients {
+    /// Sizes that are plausible for some of them, of columns of that root mean square: larger ones
+    /// stand for the largest.
+    fn plausible(&self, sizes: &[f64], of: impl Iterator<Item = usize>, column: f64) -> Vec<f64> {
+        let largest = of
+            .filter_map(|j| self.largest.get(j))
+            .copied()
+            .reduce(f64::max)
+            .unwrap_or(f64::INFINITY);
+        sizes.iter().map(|size| size.min(largest / column)).collect()
+    }
+}
+
+/// A block of columns against a residual of squares S: ln p(r | block) summed over sizes, and the
+/// most probable of its sizes, that of all columns together.
+///
+/// Where its k columns may be at work one without the others, all together and each alone have the
+/// same chance 1/(k + 1): otherwise what one column of two explains would be held by another effect
+/// of that one column, for its prior is the narrower.
+pub(super) fn of_block(
+    normal: &Normal,
+    left: (f64, f64),
+    grid: &[(f64, f64)],
+    (sizes, coefficients): (&[f64], &Coefficients),
+) -> (f64, f64) {
+    let k = coefficients.largest.len().max(1);
+    // All columns together have a root mean square of 1, and so has each alone.
+    let column = (k as f64).sqrt().recip();
+    let plausible = coefficients.plausible(sizes, 0..k, column);
+    let (whole, size) = of_columns(normal, left, grid, (&plausible, &coefficients.never_negative));
+    let (gram, product) = match normal {
+        Normal::Dense { gram, product } if coefficients.alone && gram.ncols() > 1 => {
+            (gram, product)
+        }
+        _ => return (whole, size),
+    };
+    let one = |j: usize| {
+        let own = Normal::Dense {
+            gram: gram.view((j, j), (1, 1)).into_owned(),
+            product: product.rows(j, 1).into_owned(),
+        };
+        let sign = coefficients.never_negative.get(j).copied().unwrap_or(false);
+        let sizes: Vec<f64> = coefficients
+            .plausible(sizes, std::iter::once(j), 1.0)
+            .iter()
+            .map(|size| size / column)
+            .collect();
+        of_columns(&own, left, grid, (&sizes, &[sign])).0
+    };
+    let all: Vec<f64> = std::iter::once(whole).chain((0..gram.ncols()).map(one)).collect();
+    (ln_sum(all.iter().copied()) - (all.len() as f64).ln(), size)
+}
+
+/// The same of all columns together.
+///
+/// Of a parameter that is `never_negative` the prior is the half β ≥ 0 of its normal distribution:
+/// with the estimate m and its standard error s the likelihood changes by 2 Φ(m / s).
+fn of_columns(
+    normal: &Normal,
+    (squares, freedom): (f64, f64),
+    grid: &[(f64, f64)],
+    (sizes, never_negative): (&[f64], &[bool]),
+) -> (f64, f64) {
+    let at = |size: f64| {
+        let Some((determinant, taken)) = normal.taken(size) else { return f64::NEG_INFINITY };
+        let left = (squares - taken).max(0.0);
+        let signs = match normal {
+            Normal::Dense { gram, product } if never_negative.contains(&true) => {
+                with_prior(gram, (size * size).recip()).cholesky().map(|factor| {
+                    signs(
+                        &factor.inverse(),
+                        product,
+                        (left / freedom).sqrt().max(1.0),
+                        never_negative,
+                    )
+                })
+            }
+            _ => None,
+        };
+        signs.unwrap_or(0.0) - determinant + over_noise(left, grid)
+    };
+    let tried: Vec<(f64, f64)> = sizes.iter().map(|&size| (size, at(size))).collect();
+    let best =
+        tried.iter().copied().fold((1.0, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a });
+    (ln_sum(tried.iter().map(|(_, ln)| *ln)) - (sizes.len() as f64).ln(), best.0)
+}
+
+/// Σ ln 2 Φ(m / s) over the parameters that are never negative; columns are derivatives of the
+/// residual, so m = − (G + 1/c²)⁻¹ b.
+fn signs(
+    covariance: &DMatrix<f64>,
+    product: &DVector<f64>,
+    scatter: f64,
+    never_negative: &[bool],
+) -> f64 {
+    let mean = -(covariance * product);
+    let one = |j: usize| {
+        let t = mean[j] / (scatter * covariance[(j, j)].sqrt());
+        statrs::function::erf::erfc(-t / std::f64::consts::SQRT_2).max(f64::MIN_POSITIVE).ln()
+    };
+    (0..mean.len()).filter(|&j| never_negative.get(j) == Some(&true)).map(one).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZES: [f64; 6] = [0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
+
+    /// ln p(r | columns) − ln p(r) of r = 5 A₁ and noise, A of two columns or of the first alone.
+    fn gain(count: usize, coefficients: &Coefficients) -> f64 {
+        let column = |j: usize, i: usize| {
+            ((12.9898 + 3.77 * j as f64) * i as f64 + 0.5).sin() * 2.0_f64.sqrt()
+        };
+        let columns = DMatrix::from_fn(120, count, |i, j| column(j, i) / (count as f64).sqrt());
+        let residual = DVector::from_fn(120, |i, _| 5.0 * column(0, i) + column(7, i));
+        let normal = Normal::Dense {
+            gram: columns.transpose() * &columns,
+            product: columns.transpose() * &residual,
+        };
+        let noise = Noise { freedom: 120.0, trust: 0.1, least: 0.0 };
+        let (squares, grid) = (residual.norm_squared(), noise.grid());
+        of_block(&normal, (squares, 120.0), &grid, (&SIZES, coefficients)).0
+            - over_noise(squares, &grid)
+    }
+
+    #[test]
+    fn what_one_of_two_columns_explains_is_not_the_other_effects_of_that_column() {
+        let plausible = |count: usize| vec![f64::INFINITY; count];
+        let one = gain(1, &Coefficients { largest: plausible(1), ..Coefficients::default() });
+        let two = gain(2, &Coefficients { largest: plausible(2), ..Coefficients::default() });
+        let alone = gain(
+            2,
+            &Coefficients { largest: plausible(2), alone: true, ..Coefficients::default() },
+        );
+        assert!(one > 50.0 && one - two > 2.0, "{one} {two}");
+        assert!((one - alone - 3.0_f64.ln()).abs() < 0.2, "{one} {alone}");
+    }
+
+    #[test]
+    fn a_grid_is_bounded_whatever_the_degrees_of_freedom() {
+        let points =
+            |freedom: f64| Noise { freedom, trust: 0.1, least: f64::NEG_INFINITY }.grid().len();
+        assert_eq!((points(30.0), points(1e300)), (141, 70_001));
+    }
+
+    #[test]
+    fn what_needs_an_implausible_size_is_no_explanation() {
+        let any = gain(1, &Coefficients::default());
+        let plausible = gain(1, &Coefficients { largest: vec![5.0], ..Coefficients::default() });
+        let hardly = gain(1, &Coefficients { largest: vec![0.2], ..Coefficients::default() });
+        assert!(plausible > any && hardly < any - 50.0, "{any} {plausible} {hardly}");
+    }
+}

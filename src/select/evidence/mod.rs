@@ -1,0 +1,268 @@
+//! How probable each explanation of a residual is: effects, functions whose law nobody knows,
+//! several together, or nothing.
+//!
+//! Every hypothesis is a block of columns in the linear neighbourhood of a fit, with everything
+//! fitted projected out. One closed-form marginal likelihood ([`marginal`]) compares sets of them;
+//! the prior gives every family the same chance and every further member of a set the odds of one
+//! to two and its share of its family. An effect is a law; beside it stands, in the same sum, what
+//! knows no law: smooth functions of the same covariates at the same part, functions of two
+//! covariates, harmonics whose height and phase change, another value in every pose. So a law is
+//! probable only where it is better than what needs none.
+
+mod again;
+mod block;
+mod blocks;
+mod candidate;
+mod columns;
+mod explanation;
+mod finer;
+mod functions;
+mod hypotheses;
+mod hypothesis;
+mod limits;
+mod marginal;
+mod moves;
+mod posterior;
+mod products;
+mod sag;
+mod search;
+mod waves;
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
+use super::data::Data;
+use super::fitted::Fitted;
+use crate::problem::Effect;
+use again::carried_by_one;
+pub(super) use again::stability;
+use block::Block;
+use blocks::blocks;
+use candidate::Candidate;
+pub use explanation::Explanation;
+pub(super) use functions::Shape;
+pub(super) use hypotheses::Hypotheses;
+pub use hypothesis::{Hypothesis, Law, Part};
+pub(super) use posterior::odds_against;
+pub use posterior::{Claims, Evidence};
+use products::{Known, Products};
+use search::{Weighted, search};
+use waves::Waves;
+
+/// Shapes that are looked at more closely.
+const FINEST: usize = 4;
+
+/// ln of the marginal likelihood and prior of a fit's own explanation: the effects `added` by the
+/// search, and functions without a law.
+///
+/// The fit is linear about its own optimum: sets whose effects are strong are compared by this,
+/// each at a fit of its own. A fit divides its residual by a σ of its own; the density is that of
+/// the residual over the common `sigma` \[m\], of ν degrees of freedom: ln p(r/σ') = ln p(r/σ) − ν
+/// ln (σ/σ').
+pub(super) fn ln_posterior(
+    fitted: &Fitted,
+    data: &Data,
+    (added, left_out): (&[Effect], &[usize]),
+    (functions, sigma): (&[(Hypothesis, usize)], f64),
+) -> Option<f64> {
+    let rows = data.weighed();
+    let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
+    let is_own = |candidate: &&Candidate| match candidate.hypothesis.effect() {
+        Some(effect) => hypotheses.added.contains(effect),
+        None => functions
+            .iter()
+            .any(|(own, variant)| candidate.variant == *variant && candidate.hypothesis == *own),
+    };
+    let own: Vec<&Candidate> = hypotheses.all.iter().filter(is_own).collect();
+    let (blocks, target) = blocks(fitted, data, &hypotheses, &own, left_out)?;
+    Some(
+        search::ln_posterior(&Products::new((&blocks, &target), data.rules))?
+            - target.noise.freedom * (fitted.sigma / sigma).ln(),
+    )
+}
+
+/// The most probable form of a function without a law, beside what the fit holds, and 1 σ of the
+/// coefficients of its columns: one of `hypotheses`, smooth where it has no shape.
+pub(super) fn best_form(
+    fitted: &Fitted,
+    data: &Data,
+    hypotheses: &Hypotheses,
+    best: &Explanation,
+    hypothesis: &Hypothesis,
+) -> Option<(Option<Shape>, f64)> {
+    let smooth = hypotheses.candidate(best, hypothesis)?;
+    let weighed = hypotheses.linearised.poses().len();
+    let gains = |forms: &[&Candidate]| {
+        let (blocks, target) = blocks(fitted, data, hypotheses, forms, &[])?;
+        let all: Vec<usize> = (0..blocks.len()).collect();
+        let mut gains =
+            search::gains_beside(&[], &all, &Products::new((&blocks, &target), data.rules));
+        gains.sort_by(|a, b| b.1.total_cmp(&a.1));
+        Some(gains)
+    };
+    let mut shapes = Shape::all();
+    let coarse = hypotheses.shaped(hypothesis, weighed, &shapes);
+    let best_of = |(k, ..): &(usize, f64, f64)| coarse[*k].0.finer();
+    if !coarse.is_empty() {
+        let found = gains(&coarse.iter().map(|(_, own)| own).collect::<Vec<_>>())?;
+        shapes = found.iter().take(FINEST).flat_map(best_of).collect();
+    }
+    let finer = hypotheses.shaped(hypothesis, weighed, &shapes);
+    let forms: Vec<&Candidate> =
+        std::iter::once(smooth).chain(finer.iter().map(|(_, own)| own)).collect();
+    // Half of the chance for the smooth function, half for all shapes together.
+    let even = |(k, gain, size): (usize, f64, f64)| {
+        (k, if k == 0 { gain - smooth.ln_prior } else { gain }, size)
+    };
+    let (k, _, size) = gains(&forms)?.into_iter().map(even).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some((k.checked_sub(1).map(|shaped| finer[shaped].0), size))
+}
+
+/// Weighs what may explain the residual of a fit, the effects `added` by the search taken out of it
+/// again. A pose that alone carries an effect, however well, is left out: one row that is off shows
+/// no law.
+///
+/// `None` where the residual is not a finite number, as that of a pose without equilibrium, or the
+/// end was asked for.
+pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Evidence> {
+    let mut left_out = Vec::new();
+    loop {
+        let (evidence, hypotheses) = weighed_without(fitted, data, added, &left_out)?;
+        match carried_by_one(fitted, data, (&evidence, &hypotheses)) {
+            Some(pose) if left_out.len() < data.rules.mainstays => left_out.push(pose),
+            _ => return Some(evidence),
+        }
+    }
+}
+
+/// The same without some poses, and the hypotheses that were weighed.
+fn weighed_without<'a>(
+    fitted: &'a Fitted,
+    data: &Data<'a>,
+    added: &[Effect],
+    left_out: &[usize],
+) -> Option<(Evidence, Hypotheses<'a>)> {
+    let rows = data.weighed();
+    let mut hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
+    let (mut blocks, target) =
+        blocks(fitted, data, &hypotheses, &hypotheses.all.iter().collect::<Vec<_>>(), left_out)?;
+    let is_present = |own: &Candidate| {
+        own.hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect))
+    };
+    let present: Vec<usize> =
+        (0..blocks.len()).filter(|&k| is_present(&hypotheses.all[k])).collect();
+    let mut explanations: Vec<Explanation> = Vec::new();
+    let (mut weighted, unlisted, mut known) = {
+        let products = Products::new((&blocks, &target), data.rules);
+        let weighted = search(&products, &present);
+        if data.stop.is_requested() {
+            return None;
+        }
+        let waves = Waves { hypotheses: &hypotheses, products: &products, fitted, left_out }
+            .promising(&weighted);
+        let times = (&products, hypotheses.times.as_slice());
+        let moves = moves::promising(&hypotheses, &weighted, times, (fitted, left_out));
+        (weighted, [waves, moves].concat(), products.into_known())
+    };
+    let blocks_of = |some: &[Candidate]| {
+        Candidate::blocks(&some.iter().collect::<Vec<_>>(), (fitted, &target.fit), left_out)
+    };
+    let again = |known: Known, blocks: &[Block]| {
+        let products = Products::knowing(known, (blocks, &target), data.rules);
+        (search(&products, &present), products.into_known())
+    };
+    if !unlisted.is_empty() {
+        blocks.extend(blocks_of(&unlisted));
+        hypotheses.all.extend(unlisted);
+        (weighted, known) = again(known, &blocks);
+    }
+    let products = Products::knowing(known, (&blocks, &target), data.rules);
+    let finer = finer::finer(&hypotheses, &weighted, &products, blocks_of, &fitted.problem);
+    known = products.into_known();
+    if !finer.is_empty() {
+        blocks.extend(blocks_of(&finer));
+        hypotheses.all.extend(finer);
+        (weighted, known) = again(known, &blocks);
+    }
+    let of = |k: usize| &hypotheses.all[k].hypothesis;
+    if data.stop.is_requested() {
+        return None;
+    }
+    // Functions of one covariate that change over other lengths are one hypothesis.
+    let (mut numbers, mut distinct): (BTreeMap<usize, usize>, Vec<usize>) =
+        (BTreeMap::new(), Vec::new());
+    let mut number = |member: usize| {
+        *numbers.entry(member).or_insert_with(|| {
+            let known = distinct.iter().position(|&known| of(known).says(of(member)));
+            known.unwrap_or_else(|| {
+                distinct.push(member);
+                distinct.len() - 1
+            })
+        })
+    };
+    let mut places: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
+    for Weighted { members, sizes, probability } in
+        weighted.into_iter().filter(|set| set.probability > posterior::NEGLIGIBLE)
+    {
+        let mut own: Vec<usize> = members.iter().map(|&member| number(member)).collect();
+        own.sort_unstable();
+        match places.entry(own) {
+            Entry::Occupied(place) => explanations[*place.get()].probability += probability,
+            Entry::Vacant(place) => {
+                place.insert(explanations.len());
+                let own = members.iter().map(|&member| of(member).clone()).collect();
+                let variants = members.into_iter().map(|member| hypotheses.all[member].variant);
+                let functions = variants.zip(sizes).collect();
+                explanations.push(Explanation { hypotheses: own, probability, functions });
+            }
+        }
+    }
+    explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    let mut evidence =
+        Evidence { explanations, stand_ins: Vec::new(), left_out: left_out.to_vec() };
+    if let Some(best) = evidence.sure(data.rules.sure) {
+        let products = Products::knowing(known, (&blocks, &target), data.rules);
+        evidence.stand_ins = stand_ins(best, &hypotheses, &products);
+    }
+    Some((evidence, hypotheses))
+}
+
+/// For each hypothesis of an explanation the few other effects, one of a family at each place, that
+/// do best in its place, if at least half as well.
+fn stand_ins(
+    best: &Explanation,
+    hypotheses: &Hypotheses,
+    products: &Products,
+) -> Vec<(Hypothesis, Hypothesis)> {
+    let effect = |k: usize| hypotheses.all[k].hypothesis.effect();
+    let tried: Vec<usize> = (0..products.blocks.len()).filter(|&k| effect(k).is_some()).collect();
+    let number = |(own, (variant, _)): (&Hypothesis, &(usize, f64))| {
+        hypotheses
+            .all
+            .iter()
+            .position(|known| known.variant == *variant && known.hypothesis == *own)
+    };
+    let members: Vec<usize> =
+        best.hypotheses.iter().zip(&best.functions).filter_map(number).collect();
+    let mut all = Vec::new();
+    for &own in &members {
+        let others: Vec<usize> = members.iter().copied().filter(|&other| other != own).collect();
+        let mut gains = search::gains_beside(&others, &tried, products);
+        let of_own = search::gains_beside(&others, &[own], products);
+        let least = of_own.first().map_or(f64::INFINITY, |(_, gain, _)| 0.5 * gain);
+        gains.retain(|(k, gain, _)| *gain > least && !members.contains(k));
+        gains.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let name = |k: usize| effect(k).map(Effect::name_and_place).unwrap_or_default();
+        let mut known = vec![name(own)];
+        for (k, ..) in gains {
+            if !known.contains(&name(k)) && known.len() <= products.rules.stand_ins {
+                known.push(name(k));
+                all.push((
+                    hypotheses.all[own].hypothesis.clone(),
+                    hypotheses.all[k].hypothesis.clone(),
+                ));
+            }
+        }
+    }
+    all
+}

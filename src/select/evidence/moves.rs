@@ -1,0 +1,95 @@
+//! Times at which what measures may have moved and turned: looked for where explanations hold
+//! something that follows time, for a turn looks like many other things that change then.
+
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
+
+use super::candidate::{Candidate, TOGETHER};
+use super::hypotheses::Hypotheses;
+use super::products::Products;
+use super::search::{Weighted, left_by};
+use super::waves::is_free;
+use crate::problem::Effect;
+use crate::select::covariate::Covariate;
+use crate::select::fitted::Fitted;
+
+/// Probability of an explanation from which on its members are looked at.
+const WORTH_A_LOOK: f64 = 0.01;
+/// Rests of explanations that are looked at.
+const MOST: usize = 6;
+
+/// The move that does best in the place of what follows time in each of some `weighted`
+/// explanations: of one such member, and of all.
+pub(super) fn promising(
+    hypotheses: &Hypotheses,
+    weighted: &[Weighted],
+    (products, times): (&Products, &[f64]),
+    (fitted, left_out): (&Fitted, &[usize]),
+) -> Vec<Candidate> {
+    let of = |at_time: f64| Effect::StationMove { at_time };
+    let is_known =
+        |effect: &Effect| hypotheses.all.iter().any(|own| own.hypothesis.effect() == Some(effect));
+    let new: Vec<Effect> =
+        times.iter().map(|&time| of(time)).filter(|effect| !is_known(effect)).collect();
+    if !new.first().is_some_and(|effect| is_free(effect, &fitted.problem)) {
+        return Vec::new();
+    }
+    let follows_time = |member: &usize| {
+        let on = &hypotheses.all[*member].hypothesis.depends_on;
+        on.iter().any(|covariate| matches!(covariate, Covariate::Time | Covariate::Row))
+    };
+    let mut rests: BTreeSet<Vec<usize>> = BTreeSet::new();
+    for set in weighted.iter().filter(|set| set.probability > WORTH_A_LOOK) {
+        let gone: Vec<usize> = set.members.iter().copied().filter(follows_time).collect();
+        for gone in
+            gone.iter().map(std::slice::from_ref).chain((gone.len() > 1).then_some(gone.as_slice()))
+        {
+            let mut rest: Vec<usize> =
+                set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
+            rest.sort_unstable();
+            if rests.len() < MOST {
+                rests.insert(rest);
+            }
+        }
+    }
+    let left: Vec<_> = rests.iter().filter_map(|rest| left_by(rest, products)).collect();
+    if left.is_empty() {
+        return Vec::new();
+    }
+    let odds_of = |effects: &[Effect]| -> Vec<(Candidate, Vec<f64>)> {
+        if products.target.stop.is_requested() {
+            return Vec::new();
+        }
+        let entered = |effect: &Effect| {
+            hypotheses.entered(
+                effect,
+                hypotheses.linearised.columns(effect),
+                (&fitted.problem, products.rules),
+            )
+        };
+        let some: Vec<Candidate> = effects.iter().filter_map(entered).collect();
+        let blocks = Candidate::blocks(
+            &some.iter().collect::<Vec<_>>(),
+            (fitted, &products.target.fit),
+            left_out,
+        );
+        let odds: Vec<Vec<f64>> = left.iter().map(|left| left.odds_of(&blocks)).collect();
+        some.into_iter()
+            .enumerate()
+            .map(|(k, own)| (own, odds.iter().map(|of| of[k]).collect()))
+            .collect()
+    };
+    let all: Vec<(Candidate, Vec<f64>)> = new.par_chunks(TOGETHER).flat_map_iter(odds_of).collect();
+    let mut found: Vec<Candidate> = Vec::new();
+    for k in 0..left.len() {
+        let best =
+            all.iter().filter(|(_, odds)| odds[k] > 0.0).max_by(|a, b| a.1[k].total_cmp(&b.1[k]));
+        if let Some((best, _)) = best
+            && !found.iter().any(|known| known.hypothesis == best.hypothesis)
+        {
+            found.push(best.clone());
+        }
+    }
+    found
+}

@@ -1,0 +1,509 @@
+//! Products of the columns of hypotheses with one another and with the residual: what a set leaves,
+//! and what a further hypothesis gains beside it, is told by these alone. Each is made when the
+//! first set asks for it, and kept, further hypotheses or not.
+
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::block::Block;
+use super::marginal::{Noise, Normal, over_noise};
+use crate::fit::Stop;
+use crate::numeric::{inverse_factor, inverse_lower, lower_factor, lower_product};
+use crate::select::neighbourhood::LinearNeighbourhood;
+use crate::select::rules::SelectionRules;
+
+/// Hypotheses whose gains are worked out together: one product of many columns is fast.
+const TOGETHER: usize = 16;
+
+/// Size below which Pₖₖ⁻¹ is too close to 1 to tell what a member's columns are beside the others.
+const LEAST: f64 = 1e-3;
+
+/// What is explained: what a fit leaves, with its degrees of freedom, and how far its σ is trusted.
+#[derive(Debug, Clone)]
+pub(super) struct Target {
+    pub fit: LinearNeighbourhood,
+    pub noise: Noise,
+    /// ln of how much more often a further effect is of a family that is there than of any one of
+    /// the others.
+    pub alike: f64,
+    /// The wish that the search end early.
+    pub stop: Stop,
+}
+
+/// Columns of hypotheses, the residual they are to explain, and their products.
+pub(super) struct Products<'a> {
+    pub blocks: &'a [Block],
+    pub target: &'a Target,
+    pub rules: &'a SelectionRules,
+    /// rᵀr, everything fitted projected out.
+    pub squares: f64,
+    /// Of the noise.
+    grid: Vec<(f64, f64)>,
+    known: Known,
+}
+
+/// What was worked out of some hypotheses about one target by one set of rules, and stays true when
+/// further ones come behind them, as long as their own chances stay.
+#[derive(Default)]
+pub(super) struct Known {
+    /// Products, by the number of the hypothesis.
+    members: Vec<OnceLock<Member>>,
+    /// How many hypotheses there were each time that further ones had come; 0 first.
+    came: Vec<usize>,
+    /// What some hypotheses gain beside a set.
+    gains: Recalled<Beside, Vec<(f64, f64)>>,
+    /// What settled sets come to.
+    settled: Recalled<AtSizes, (Vec<f64>, f64)>,
+}
+
+/// A set: its members and their sizes, in the order in which they were taken.
+type AtSizes = Vec<(usize, u64)>;
+/// A set, and hypotheses that are tried beside it.
+type Beside = (AtSizes, Vec<usize>);
+
+fn at_sizes(members: &[usize], sizes: &[f64]) -> AtSizes {
+    members.iter().copied().zip(sizes.iter().map(|size| size.to_bits())).collect()
+}
+
+/// Results by what they are of.
+struct Recalled<K, V>(Mutex<BTreeMap<K, V>>);
+
+impl<K, V> Default for Recalled<K, V> {
+    fn default() -> Self {
+        Self(Mutex::default())
+    }
+}
+
+impl<K: Ord + Clone, V: Clone> Recalled<K, V> {
+    /// What is known of `key`, or what `make` makes of it; that is kept where there is any.
+    fn recall(&self, key: &K, make: impl FnOnce() -> Option<V>) -> Option<V> {
+        let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = all().get(key).cloned();
+        known.or_else(|| {
+            let new = make()?;
+            all().insert(key.clone(), new.clone());
+            Some(new)
+        })
+    }
+}
+
+/// A hypothesis of some set.
+pub(super) struct Member {
+    /// A, everything fitted projected out.
+    columns: Arc<DMatrix<f64>>,
+    /// Aᵀ.
+    transposed: DMatrix<f64>,
+    /// AᵀC of every one.
+    products: Vec<OnceLock<DMatrix<f64>>>,
+}
+
+impl<'a> Products<'a> {
+    pub fn new((blocks, target): (&'a [Block], &'a Target), rules: &'a SelectionRules) -> Self {
+        Self::knowing(Known::default(), (blocks, target), rules)
+    }
+
+    /// The same where much of the first of these hypotheses is known.
+    pub fn knowing(
+        mut known: Known,
+        (blocks, target): (&'a [Block], &'a Target),
+        rules: &'a SelectionRules,
+    ) -> Self {
+        let squares = target.fit.residual().norm_squared();
+        for member in known.members.iter_mut().filter_map(OnceLock::get_mut) {
+            member.products.resize_with(blocks.len(), OnceLock::new);
+        }
+        known.members.resize_with(blocks.len(), OnceLock::new);
+        if known.came.is_empty() {
+            known.came.push(0);
+        }
+        known.came.push(blocks.len());
+        Self { blocks, target, rules, squares, grid: target.noise.grid(), known }
+    }
+
+    /// What was worked out.
+    pub fn into_known(self) -> Known {
+        self.known
+    }
+
+    /// ln of the density of a residual of such squares, up to a constant.
+    pub fn over_noise(&self, squares: f64) -> f64 {
+        over_noise(squares, &self.grid)
+    }
+
+    /// ln of the chance of a hypothesis beside others.
+    pub fn ln_prior(&self, block: &Block, others: &[usize]) -> f64 {
+        let is_alike =
+            block.is_law() && others.iter().any(|&other| self.blocks[other].family == block.family);
+        block.ln_prior + if is_alike { self.target.alike } else { 0.0 }
+    }
+
+    fn member(&self, block: usize) -> &Member {
+        if let Some(known) = self.known.members[block].get() {
+            return known;
+        }
+        // Before the cell waits for it: a thread that helps others with this product may come to
+        // the same member.
+        let columns = self.blocks[block].columns(&self.target.fit);
+        let products = std::iter::repeat_with(OnceLock::new).take(self.blocks.len()).collect();
+        let new = Member { transposed: columns.transpose(), columns, products };
+        self.known.members[block].get_or_init(|| new)
+    }
+
+    /// AᵀC of a member of a set and another hypothesis.
+    fn product(&self, member: usize, other: usize) -> &DMatrix<f64> {
+        let member = self.member(member);
+        member.products[other]
+            .get_or_init(|| self.blocks[other].times((&member.columns, &member.transposed)))
+    }
+
+    /// What each hypothesis that is tried gains beside a set at some sizes, and its most probable
+    /// size; none where it is stopped, or the set leaves nothing that can be told.
+    pub fn gains(&self, members: &[usize], sizes: &[f64], tried: &[usize]) -> Vec<(f64, f64)> {
+        let left = OnceCell::new();
+        let mut all: Vec<Option<(f64, f64)>> = vec![None; tried.len()];
+        // Cut where hypotheses came, so that a list that was tried before is found again, and what
+        // is multiplied together, whose rounding it decides, does not depend on what other threads
+        // have found by now.
+        for came in self.known.came.windows(2) {
+            let own: Vec<usize> =
+                (0..tried.len()).filter(|&k| (came[0]..came[1]).contains(&tried[k])).collect();
+            if own.is_empty() {
+                continue;
+            }
+            let key =
+                (at_sizes(members, sizes), own.iter().map(|&k| tried[k]).collect::<Vec<usize>>());
+            let gains = self.known.gains.recall(&key, || {
+                let left = left.get_or_init(|| self.left(members, sizes)).as_ref()?;
+                Some(left.gains(&key.1)).filter(|gains| gains.len() == own.len())
+            });
+            own.into_iter()
+                .zip(gains.unwrap_or_default())
+                .for_each(|(k, gain)| all[k] = Some(gain));
+        }
+        all.into_iter().collect::<Option<_>>().unwrap_or_default()
+    }
+
+    /// What `settle` makes of a set at some sizes: the sizes that its members have beside one
+    /// another, and ln of its posterior.
+    pub fn settled(
+        &self,
+        (members, sizes): (&[usize], &[f64]),
+        settle: impl FnOnce() -> Option<(Vec<f64>, f64)>,
+    ) -> Option<(Vec<f64>, f64)> {
+        self.known.settled.recall(&at_sizes(members, sizes), settle)
+    }
+
+    /// What a set leaves at some sizes.
+    pub fn left(&self, members: &[usize], sizes: &[f64]) -> Option<Left<'_, 'a>> {
+        let mut scales = Vec::new();
+        let mut begins = Vec::new();
+        for (&member, &size) in members.iter().zip(sizes) {
+            begins.push(scales.len());
+            scales.extend(std::iter::repeat_n(size, self.member(member).columns.ncols()));
+        }
+        let n = scales.len();
+        let (mut inner, mut taken) = (DMatrix::identity(n, n), DVector::zeros(n));
+        for (i, (&one, &size)) in members.iter().zip(sizes).enumerate() {
+            let product = self.blocks[one].product();
+            taken.rows_mut(begins[i], product.len()).axpy(size, product, 0.0);
+            for j in 0..=i {
+                // The lower half alone is read.
+                let gram = self.product(one, members[j]);
+                inner.view_mut((begins[i], begins[j]), gram.shape()).zip_apply(
+                    gram,
+                    |own, value| {
+                        *own += size * sizes[j] * value;
+                    },
+                );
+            }
+        }
+        let mut within = inverse_factor(&inner)?;
+        let ln_determinant = -within.diagonal().iter().map(|value| value.ln()).sum::<f64>();
+        let taken = &within * taken;
+        within.column_iter_mut().zip(scales).for_each(|(mut column, scale)| column *= scale);
+        let squares = self.squares - taken.norm_squared();
+        let without = self.over_noise(squares);
+        Some(Left {
+            products: self,
+            members: members.to_vec(),
+            within,
+            taken,
+            squares,
+            without,
+            ln_determinant,
+            sizes: sizes.to_vec(),
+            begins,
+            reach: OnceLock::new(),
+        })
+    }
+}
+
+/// What a set leaves of the residual: with A of its members, D of their sizes, 1 + D AᵀA D = L Lᵀ
+/// and Z = L⁻¹D Aᵀ it leaves CᵀC − (Z C)ᵀ(Z C) and Cᵀr − (Z C)ᵀ(Z r) of further columns C.
+pub(super) struct Left<'p, 'a> {
+    products: &'p Products<'a>,
+    members: Vec<usize>,
+    sizes: Vec<f64>,
+    /// The first column of each member among all.
+    begins: Vec<usize>,
+    /// L⁻¹D.
+    within: DMatrix<f64>,
+    /// Z r.
+    taken: DVector<f64>,
+    squares: f64,
+    /// ln of the density of what is left.
+    without: f64,
+    /// ln det L.
+    ln_determinant: f64,
+    /// Z, made when columns of hypotheses that are none of these are asked for.
+    reach: OnceLock<DMatrix<f64>>,
+}
+
+impl Left<'_, '_> {
+    /// ln p(r | set) at its sizes.
+    pub fn ln_likelihood(&self) -> f64 {
+        self.without - self.ln_determinant
+    }
+
+    /// ln p(r | set), the size of the k-th member summed over, and its most probable size beside
+    /// the others at theirs.
+    ///
+    /// With P = (1 + D AᵀA D)⁻¹, t = P D Aᵀr and c the size of k: beside the others its columns
+    /// have G = (Pₖₖ⁻¹ − 1)/c² and b = Pₖₖ⁻¹tₖ/c; without it the set leaves tₖᵀPₖₖ⁻¹tₖ more
+    /// squares, and its determinant is det(1 + D AᵀA D) det Pₖₖ.
+    pub fn of_member(&self, k: usize) -> Option<(f64, f64)> {
+        let Products { blocks, target, grid, rules, .. } = self.products;
+        let (block, size) = (&blocks[self.members[k]], self.sizes[k]);
+        if size < LEAST {
+            let others = [&self.members[..k], &self.members[k + 1..]].concat();
+            let others =
+                self.products.left(&others, &[&self.sizes[..k], &self.sizes[k + 1..]].concat())?;
+            let (gain, size) = others.gain(self.members[k]);
+            return Some((others.ln_likelihood() + gain, size));
+        }
+        // Of the lower L⁻¹D, columns of k have rows from the first of these on.
+        let (first, count) = (self.begins[k], block.product().len());
+        let own = self.within.view((first, first), (self.within.nrows() - first, count)) / size;
+        let lower = lower_factor(own.transpose() * &own)?;
+        let ln_determinant = lower.diagonal().iter().map(|value| value.ln()).sum::<f64>();
+        let inverse = inverse_lower(&lower);
+        let along = own.tr_mul(&self.taken.rows_range(first..));
+        let product = inverse.tr_mul(&(&inverse * &along));
+        let squares = self.squares + along.dot(&product);
+        let mut gram = inverse.transpose() * inverse;
+        (0..count).for_each(|j| gram[(j, j)] -= 1.0);
+        let normal = Normal::Dense { gram: gram / (size * size), product: product / size };
+        let (ln_summed, size) =
+            block.over_sizes(&normal, (squares, target.noise.freedom), grid, rules);
+        Some((ln_summed - self.ln_determinant - ln_determinant, size))
+    }
+
+    /// What is left of the residual, everything fitted projected out.
+    pub fn residual(&self) -> DVector<f64> {
+        let mut left = self.products.target.fit.residual().clone();
+        let along = self.within.tr_mul(&self.taken);
+        let mut first = 0;
+        for &member in &self.members {
+            let columns = &self.products.member(member).columns;
+            left.gemv(-1.0, columns.as_ref(), &along.rows(first, columns.ncols()), 1.0);
+            first += columns.ncols();
+        }
+        left
+    }
+
+    /// Z.
+    fn reach(&self) -> &DMatrix<f64> {
+        self.reach.get_or_init(|| {
+            let mut all =
+                DMatrix::zeros(self.taken.len(), self.products.target.fit.residual().len());
+            let mut first = 0;
+            for &member in &self.members {
+                let transposed = &self.products.member(member).transposed;
+                // Of a lower triangle.
+                let below = self.within.nrows() - first;
+                let own = self.within.view((first, first), (below, transposed.nrows()));
+                all.rows_range_mut(first..).gemm(1.0, &own, transposed, 1.0);
+                first += transposed.nrows();
+            }
+            all
+        })
+    }
+
+    /// ln p(r | set and a hypothesis) − ln p(r | set), and its most probable size.
+    pub fn gain(&self, block: usize) -> (f64, f64) {
+        self.gains_together(&[block])[0]
+    }
+
+    /// The same of several; none where it is stopped.
+    pub fn gains(&self, tried: &[usize]) -> Vec<(f64, f64)> {
+        let stop = &self.products.target.stop;
+        let of = |some: &[usize]| {
+            if stop.is_requested() { Vec::new() } else { self.gains_together(some) }
+        };
+        let gains: Vec<(f64, f64)> = tried.par_chunks(TOGETHER).flat_map_iter(of).collect();
+        if gains.len() == tried.len() { gains } else { Vec::new() }
+    }
+
+    fn gains_together(&self, tried: &[usize]) -> Vec<(f64, f64)> {
+        let Products { blocks, .. } = *self.products;
+        let counts = || tried.iter().map(|&block| blocks[block].product().len());
+        let mut all = DMatrix::zeros(self.taken.len(), counts().sum());
+        let mut first = 0;
+        for &member in &self.members {
+            let count = self.products.member(member).columns.ncols();
+            let mut own = all.rows_mut(first, count);
+            let mut column = 0;
+            for &block in tried {
+                let with = self.products.product(member, block);
+                own.columns_mut(column, with.ncols()).copy_from(with);
+                column += with.ncols();
+            }
+            first += count;
+        }
+        self.gains_along(
+            tried.iter().map(|&block| &blocks[block]),
+            &lower_product(&self.within, &all),
+        )
+    }
+
+    /// The gains of hypotheses that are none of the others, with their priors.
+    pub fn odds_of(&self, blocks: &[Block]) -> Vec<f64> {
+        let columns: Vec<Arc<DMatrix<f64>>> =
+            blocks.iter().map(|block| block.columns(&self.products.target.fit)).collect();
+        let all: Vec<_> = columns.iter().flat_map(|own| own.column_iter()).collect();
+        if all.is_empty() {
+            return Vec::new();
+        }
+        let along = self.reach() * DMatrix::from_columns(&all);
+        let gains = self.gains_along(blocks.iter(), &along);
+        gains
+            .into_iter()
+            .zip(blocks)
+            .map(|((gain, _), block)| gain + self.products.ln_prior(block, &self.members))
+            .collect()
+    }
+
+    /// The gains of hypotheses of whose columns C, side by side, the set takes Z C = `along`.
+    fn gains_along<'b>(
+        &self,
+        blocks: impl Iterator<Item = &'b Block>,
+        along: &DMatrix<f64>,
+    ) -> Vec<(f64, f64)> {
+        let Products { target, grid, rules, .. } = self.products;
+        let left = ((self.squares, target.noise.freedom), self.without);
+        let mut first = 0;
+        let gain = |block: &Block| {
+            let own = along.columns(first, block.product().len()).into_owned();
+            first += own.ncols();
+            block.gain((!self.members.is_empty()).then_some((&own, &self.taken)), left, grid, rules)
+        };
+        blocks.map(gain).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::select::evidence::block::Design;
+    use crate::select::evidence::marginal::Coefficients;
+    use crate::select::neighbourhood::Unknowns;
+
+    /// Numbers without pattern.
+    fn matrix(rows: usize, columns: usize, seed: f64) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, columns, |i, j| {
+            (12.9898 * i as f64 + 78.233 * j as f64 + seed).sin() * 43.7 % 1.0
+        })
+    }
+
+    #[test]
+    fn products_tell_what_a_dense_solve_does() {
+        let rules = &SelectionRules::DEFAULT;
+        let (jacobian, residual) = (matrix(120, 4, 0.5), matrix(120, 1, 9.0).column(0) * 4.0);
+        let unknowns =
+            Unknowns { x: vec![0.0; 4], priors: vec![None; 4], active: DMatrix::zeros(0, 4) };
+        let fit = LinearNeighbourhood::new(&jacobian, &residual, &unknowns, 0);
+        let lever = matrix(120, 1, 3.0).column(0).into_owned();
+        let designs = [
+            Design::Dense(matrix(120, 2, 1.0)),
+            Design::per_pose(&lever),
+            Design::Dense(matrix(120, 30, 2.0)),
+        ];
+        let designs = designs.map(|own| (own.scaled(40).unwrap(), 0.0, Coefficients::default()));
+        let blocks = Block::all(designs.to_vec(), &fit);
+        let noise = Noise { freedom: 116.0, trust: 0.1, least: 0.0 };
+        let target = Target { fit, noise, alike: 0.0, stop: Stop::default() };
+        let products = Products::new((&blocks, &target), rules);
+        let (members, sizes) = ([0, 1, 2], [3.0, 0.3, 1.0]);
+        let left = products.left(&members, &sizes).unwrap();
+        let r = target.fit.residual();
+        let mut covariance = DMatrix::identity(r.len(), r.len());
+        for (&member, size) in members.iter().zip(sizes) {
+            let columns = blocks[member].columns(&target.fit);
+            covariance += &*columns * columns.transpose() * (size * size);
+        }
+        let factor = covariance.cholesky().unwrap();
+        let solved = factor.solve(r);
+        assert!((left.residual() - &solved).amax() < 1e-9);
+        assert!((left.squares / r.dot(&solved) - 1.0).abs() < 1e-9);
+        let ln_determinant: f64 = factor.l().diagonal().iter().map(|value| value.ln()).sum();
+        assert!((left.ln_determinant - ln_determinant).abs() < 1e-9);
+        // Of all together one is told from the others as of the others alone, also of next to no
+        // size.
+        for (k, least) in [(0, 1.0), (1, 1.0), (2, 1.0), (1, 1e-6)] {
+            let mut sizes = sizes;
+            sizes[k] *= least;
+            let others: Vec<usize> = (0..3).filter(|&other| other != k).collect();
+            let beside = products
+                .left(&others, &others.iter().map(|&other| sizes[other]).collect::<Vec<_>>())
+                .unwrap();
+            let (gain, size) = beside.gain(k);
+            let own = products.left(&members, &sizes).unwrap().of_member(k).unwrap();
+            let expected = beside.ln_likelihood() + gain;
+            assert!(
+                (own.0 / expected - 1.0).abs() < 1e-9 && (own.1 - size).abs() < 1e-12,
+                "{own:?} {expected} {size}"
+            );
+        }
+        // One more gains as much whether it is among the blocks or not.
+        let two = products.left(&members[..2], &sizes[..2]).unwrap();
+        for (block, (gain, size)) in
+            two.gains(&[2, 0, 1]).into_iter().zip([2, 0, 1]).map(|(own, block)| (block, own))
+        {
+            let alone = two.gain(block);
+            assert!((gain - alone.0).abs() < 1e-9 && (size - alone.1).abs() < 1e-12);
+        }
+        assert!((two.gain(2).0 - two.odds_of(&blocks[2..])[0]).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_further_effect_of_a_family_that_is_there_is_likelier() {
+        let (jacobian, residual) = (matrix(30, 1, 0.5), matrix(30, 1, 9.0).column(0).into_owned());
+        let unknowns = Unknowns { x: vec![0.0], priors: vec![None], active: DMatrix::zeros(0, 1) };
+        let fit = LinearNeighbourhood::new(&jacobian, &residual, &unknowns, 0);
+        let families =
+            [Some("joint-compliance"), Some("joint-compliance"), Some("link-bending"), None, None];
+        let block = |family: Option<&str>| {
+            let mut own =
+                Block::new(Design::Dense(matrix(30, 1, 1.0)), &fit, -3.0, Coefficients::default());
+            own.family = family.map(str::to_owned);
+            own
+        };
+        let blocks: Vec<Block> = families.map(block).to_vec();
+        let noise = Noise { freedom: 29.0, trust: 0.1, least: 0.0 };
+        let target = Target { fit: fit.clone(), noise, alike: 1.5, stop: Stop::default() };
+        let products = Products::new((&blocks, &target), &SelectionRules::DEFAULT);
+        let of = |block: usize, others: &[usize]| products.ln_prior(&blocks[block], others);
+        let is = |value: f64, expected: f64| {
+            assert!((value - expected).abs() < 1e-12, "{value} {expected}")
+        };
+        is(of(1, &[]), -3.0);
+        is(of(1, &[2, 3]), -3.0);
+        is(of(1, &[2, 0]), -1.5);
+        // Functions without a law are no family of effects.
+        is(of(4, &[3, 0]), -3.0);
+    }
+}

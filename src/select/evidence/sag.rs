@@ -1,0 +1,136 @@
+//! Sag under weight that nobody declared.
+//!
+//! A body of mass m with its centre at s in the frame of link k has about the axis z of joint j ≤ k
+//! the moment
+//!
+//! M = z · ((o_k + R_k s − o_j) × m g),
+//!
+//! linear in (m, m s). What gives way there by c M moves the arm by a sum of four known functions
+//! of the configuration for each link outboard of the joint, whatever the masses are: no law of the
+//! catalogue, for it takes masses, and yet no free function.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::columns::Columns;
+use super::hypothesis::{Hypothesis, Law, Part};
+use crate::mechanics::Arm;
+use crate::model::parameter::{JointField, ParameterSite};
+use crate::problem::{JointKind, Problem};
+use crate::select::covariate::Covariate;
+
+/// Functions whose size is below this part of the largest repeat others.
+const REPEATED: f64 = 1e-3;
+
+/// Whether gravity acts on an arm of which no mass is declared.
+pub(super) fn weight_is_unknown(problem: &Problem) -> bool {
+    let has_mass =
+        problem.joints.iter().any(|joint| !joint.bodies.is_empty() || joint.beam.is_some());
+    problem.gravity.norm() > 0.0 && !has_mass
+}
+
+impl Columns<'_, '_> {
+    /// Sag of each joint that turns, and of all of them.
+    pub(super) fn sag(&mut self) {
+        if !weight_is_unknown(self.problem) {
+            return;
+        }
+        let mut all: Vec<DMatrix<f64>> = Vec::new();
+        for joint in (0..self.problem.joints.len())
+            .filter(|&j| self.problem.joints[j].kind == JointKind::Revolute)
+        {
+            let site = ParameterSite::Joint { joint, field: JointField::Theta };
+            let Some(lever) = self.linearised.place(site) else { continue };
+            let Some(columns) = self.sags(joint, &lever) else { continue };
+            let part = Part::Joint(joint);
+            let own =
+                Hypothesis { law: Law::Sag, part, site: None, depends_on: vec![Covariate::Load] };
+            self.add("sag", 1.0, own, || columns.clone());
+            all.push(columns);
+        }
+        if all.len() > 1 {
+            let own = Hypothesis {
+                law: Law::Sag,
+                part: Part::Arm,
+                site: None,
+                depends_on: vec![Covariate::Load],
+            };
+            let columns: Vec<_> = all.iter().flat_map(DMatrix::column_iter).collect();
+            self.add("sag", all.len() as f64, own, || DMatrix::from_columns(&columns));
+        }
+    }
+
+    /// The lever of a joint times the moments about it, shape = (3 N, functions); `None` where
+    /// gravity has none.
+    fn sags(&self, joint: usize, lever: &DVector<f64>) -> Option<DMatrix<f64>> {
+        let moments = moments(
+            self.problem,
+            joint,
+            self.linearised.poses().iter().map(|pose| pose.setup.configuration),
+        );
+        // The same sum of functions by fewer: M = U Σ Vᵀ with coefficients of the same prior has
+        // those of U Σ.
+        let weighed = moments.rows(0, self.weighed).into_owned().svd(false, true);
+        let turned = weighed.v_t?.transpose();
+        let most = weighed.singular_values.max();
+        let kept: Vec<usize> = (0..turned.ncols())
+            .filter(|&k| most > 0.0 && weighed.singular_values[k] > REPEATED * most)
+            .collect();
+        let functions = moments * turned.select_columns(&kept);
+        let column = |row: usize, k: usize| lever[row] * functions[(row / 3, k)];
+        (!kept.is_empty()).then(|| DMatrix::from_fn(lever.len(), kept.len(), column))
+    }
+}
+
+/// Moments about the axis of `joint` of 1 kg at the origin of each link that stands on it and of
+/// what 1 kg there gains by moving by a link's length along x, y and z, shape = (N, functions).
+fn moments<'a>(
+    problem: &Problem,
+    joint: usize,
+    configurations: impl Iterator<Item = &'a [f64]>,
+) -> DMatrix<f64> {
+    let arm = Arm::nominal(problem);
+    let lengths = problem.joints.iter().map(|own| own.a.abs() + own.d.abs()).sum::<f64>();
+    let length = lengths / problem.joints.len() as f64;
+    let of_pose = |configuration: &[f64]| -> Vec<f64> {
+        let joints = arm.rigid_joints(configuration);
+        let (at, axis, _) = joints[joint];
+        let about = |place: Vector3<f64>| axis.dot(&place.cross(&problem.gravity));
+        let of_link = |frame: &crate::spatial::Frame<f64>| {
+            let along = frame.axes.map(|own| about(own * length));
+            std::iter::once(about(frame.origin - at)).chain(along).collect::<Vec<f64>>()
+        };
+        let outboard = joints.iter().enumerate().filter(|(k, _)| arm.tree.leads_through(joint, *k));
+        outboard.flat_map(|(_, (.., frame))| of_link(frame)).collect()
+    };
+    let rows: Vec<Vec<f64>> = configurations.map(of_pose).collect();
+    DMatrix::from_fn(rows.len(), rows.first().map_or(0, Vec::len), |pose, k| rows[pose][k])
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn moments_are_those_of_weights_at_levers() {
+        let text =
+            "name = 'arm'\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = 0.5\n[[joint]]\na_m = 0.5\n";
+        let problem = Problem::parse(text, Path::new("problem.toml")).unwrap();
+        assert!(weight_is_unknown(&problem));
+        let (first, second) = (0.3_f64, 0.4_f64);
+        let configuration = [first, second, 0.0];
+        // About joint 2, which lies level, the origin of frame 3 hangs half a metre out along the
+        // link.
+        let moments = moments(&problem, 1, std::iter::once(&configuration[..]));
+        assert_eq!(moments.shape(), (1, 8));
+        let g = problem.gravity.norm();
+        assert!(moments[(0, 0)].abs() < 1e-12);
+        assert!(
+            (moments[(0, 4)].abs() - 0.5 * g * (first + second).cos()).abs() < 1e-9,
+            "{moments}"
+        );
+        let heavy = format!("{text}[[joint.body]]\nmass_kg = 1\n");
+        assert!(!weight_is_unknown(&Problem::parse(&heavy, Path::new("problem.toml")).unwrap()));
+    }
+}

@@ -1,0 +1,447 @@
+//! Sets of hypotheses by their probability: a beam search over sets of blocks of columns.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
+
+use super::super::rules::SelectionRules;
+use super::block::Block;
+use super::products::{Left, Products};
+
+/// Passes over the sizes of a set until they are to one another as they stay.
+const SETTLING: usize = 4;
+/// Sets whose sizes are settled in the end, the most probable ones.
+const LIKELY: usize = 32;
+/// Sets in which a function of several covariates is taken apart, the most probable ones.
+const SPLIT: usize = 3;
+/// Sets of so many members at most have two taken out together.
+const FEW: usize = 6;
+/// Times that the best set is changed by more than one member, each time the best of those before.
+const CHANGES: usize = 4;
+
+/// A set of hypotheses, and its probability among all sets looked at.
+#[derive(Debug, Clone)]
+pub(super) struct Weighted {
+    /// Numbers of the hypotheses, in the order in which they were taken.
+    pub members: Vec<usize>,
+    /// The most probable size of each: 1 σ of its coefficients.
+    pub sizes: Vec<f64>,
+    pub probability: f64,
+}
+
+/// A set with the sizes of its members and ln of its posterior, up to a constant.
+#[derive(Debug, Clone)]
+struct Set {
+    members: Vec<usize>,
+    sizes: Vec<f64>,
+    ln_posterior: f64,
+}
+
+impl Set {
+    /// The set with one more, which gains so much at this size.
+    fn with(&self, block: usize, (gain, size): (f64, f64), products: &Products) -> Self {
+        Self {
+            members: [self.members.as_slice(), &[block]].concat(),
+            sizes: [self.sizes.as_slice(), &[size]].concat(),
+            ln_posterior: self.ln_posterior
+                + gain
+                + products.ln_prior(&products.blocks[block], &self.members),
+        }
+    }
+
+    /// Whether a member has another value in so many poses that the set is not extended.
+    fn has_wide(&self, blocks: &[Block], rules: &SelectionRules) -> bool {
+        self.members.iter().any(|&member| blocks[member].is_wide(rules))
+    }
+
+    /// The same with the size of each member beside all others, and its posterior at these sizes.
+    ///
+    /// Sizes are in units of the noise, which an effect that is not yet explained is taken for:
+    /// what was taken first would be held too tightly. ln p(r | set) = l + Σ (ln p(r | the others,
+    /// k) − l), l at the sizes of all, of k summed over its own.
+    fn settled(mut self, products: &Products) -> Self {
+        if self.members.len() < 2 || self.has_wide(products.blocks, products.rules) {
+            return self;
+        }
+        let settled = products.settled((&self.members, &self.sizes), || self.at_rest(products));
+        if let Some((sizes, ln_posterior)) = settled {
+            (self.sizes, self.ln_posterior) = (sizes, ln_posterior);
+        }
+        self
+    }
+
+    /// The sizes of its members beside all others, and ln of its posterior at these.
+    fn at_rest(&self, products: &Products) -> Option<(Vec<f64>, f64)> {
+        let (members, mut sizes) = (&self.members, self.sizes.clone());
+        let mut all = products.left(members, &sizes)?;
+        let mut summed = vec![0.0; members.len()];
+        // Beside others that stayed a size stays.
+        let mut stale = vec![true; members.len()];
+        for _ in 0..SETTLING {
+            for k in 0..members.len() {
+                if !std::mem::take(&mut stale[k]) {
+                    continue;
+                }
+                let (ln_summed, size) = all.of_member(k)?;
+                summed[k] = ln_summed;
+                if size.to_bits() != sizes[k].to_bits() {
+                    stale.fill(true);
+                    stale[k] = false;
+                    sizes[k] = size;
+                    all = products.left(members, &sizes)?;
+                }
+            }
+        }
+        let further = |(k, &member)| products.ln_prior(&products.blocks[member], &members[..k]);
+        let prior: f64 = members.iter().enumerate().map(further).sum();
+        let gains: f64 = summed.iter().map(|with| with - all.ln_likelihood()).sum();
+        let ln_posterior =
+            all.ln_likelihood() + gains - products.over_noise(products.squares) + prior;
+        Some((sizes, ln_posterior))
+    }
+}
+
+/// All sets that were looked at, most probable first; the empty set stands for "nothing".
+///
+/// The search starts from nothing and from the set `present`, whole and without one of its members:
+/// what was found before is judged again beside everything else. Stopped, it has looked at some
+/// sets only.
+pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
+    let Products { blocks, rules, .. } = *products;
+    let mut known: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
+    let without = |k: usize| [&present[..k], &present[k + 1..]].concat();
+    let starts = std::iter::once(Vec::new())
+        .chain((0..present.len()).map(without))
+        .chain([present.to_vec()]);
+    for start in starts {
+        if let Some(set) = assembled(&start, products) {
+            known.insert(sorted(&set.members), set);
+        }
+    }
+    // What holds more than the search goes to is judged as it is, and with one more.
+    let (longer, front): (usize, Vec<Set>) = match known.get(&sorted(present)) {
+        Some(all) if present.len() > rules.together => (1, vec![all.clone()]),
+        _ => (rules.together, known.values().cloned().collect()),
+    };
+    let (mut front, mut promising): (Vec<Set>, Option<Vec<usize>>) = (front, None);
+    let every: Vec<usize> = (0..blocks.len()).collect();
+    for _ in 0..longer {
+        let mut next: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
+        for (place, set) in front.iter().enumerate() {
+            let tried = promising.as_ref().filter(|_| place > 0).unwrap_or(&every);
+            for longer in extended(set, tried, products) {
+                let key = sorted(&longer.members);
+                let best = next.get(&key).or_else(|| known.get(&key));
+                if best.is_none_or(|other| longer.ln_posterior > other.ln_posterior) {
+                    next.insert(key, longer);
+                }
+            }
+        }
+        let best_known =
+            known.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+        let mut sets: Vec<Set> = next.values().cloned().collect();
+        known.extend(next);
+        sets.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+        promising.get_or_insert_with(|| {
+            let mut promising: Vec<usize> = Vec::new();
+            for last in sets.iter().filter_map(|set| set.members.last()) {
+                if promising.len() < rules.extending && !promising.contains(last) {
+                    promising.push(*last);
+                }
+            }
+            promising
+        });
+        let best = sets
+            .into_iter()
+            .filter(|set| !set.has_wide(blocks, rules))
+            .take(rules.extended)
+            .collect::<Vec<_>>();
+        front = best.into_par_iter().map(|set| set.settled(products)).collect();
+        front.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+        known.extend(front.iter().map(|set| (sorted(&set.members), set.clone())));
+        if front.first().is_none_or(|best| best.ln_posterior < best_known - rules.hopeless) {
+            break;
+        }
+    }
+    changed(&mut known, products);
+    let mut likely: Vec<&Set> = known.values().collect();
+    likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    let likely: Vec<Set> = likely.into_iter().take(LIKELY).cloned().collect();
+    let settled: Vec<Set> = likely.into_par_iter().map(|set| set.settled(products)).collect();
+    known.extend(settled.into_iter().map(|set| (sorted(&set.members), set)));
+    let most = known.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = known.values().map(|set| (set.ln_posterior - most).exp()).sum();
+    let weighted = |Set { members, sizes, ln_posterior }| {
+        let probability = (ln_posterior - most).exp() / total;
+        Weighted { members, sizes, probability }
+    };
+    let mut all: Vec<Weighted> = known.into_values().map(weighted).collect();
+    all.sort_by(|a, b| {
+        b.probability.total_cmp(&a.probability).then_with(|| a.members.cmp(&b.members))
+    });
+    all
+}
+
+/// A set with each of some further members.
+fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
+    let new: Vec<usize> =
+        tried.iter().copied().filter(|block| !set.members.contains(block)).collect();
+    let gains = products.gains(&set.members, &set.sizes, &new);
+    new.into_iter().zip(gains).map(|(block, gain)| set.with(block, gain, products)).collect()
+}
+
+/// Adds sets that steps by one further hypothesis lead to only past sets that explain less: likely
+/// sets without their function of several covariates, the best one without one or two of its
+/// members, with another in their place, and with two others there. So two things that act beside
+/// one another are found where a third, or a function of several covariates, does for both as well
+/// as one hypothesis can, or a third with a function beside it. In the place of two members effects
+/// alone are tried: any function does for two better than for one.
+fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
+    let Products { blocks, rules, .. } = *products;
+    let every: Vec<usize> = (0..blocks.len()).collect();
+    let of = |is_of: &dyn Fn(&Block) -> bool| -> Vec<usize> {
+        every.iter().copied().filter(|&block| is_of(&blocks[block])).collect()
+    };
+    let (plain, laws) = (of(&|block| !block.is_surface), of(&|block| block.is_law()));
+    // What is tried first and second in the place of a function of several covariates, of any other
+    // hypothesis, and of two.
+    let instead: [[&[usize]; 2]; 3] = [[&every, &plain], [&every, &laws], [&laws, &laws]];
+    let mut tried: BTreeSet<(Vec<usize>, usize)> = BTreeSet::new();
+    for _ in 0..CHANGES {
+        let mut likely: Vec<&Set> =
+            known.values().filter(|set| !set.has_wide(blocks, rules)).collect();
+        likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+        let Some(best) = likely.first().map(|set| set.ln_posterior) else { return };
+        likely.retain(|set| set.ln_posterior > best - rules.hopeless);
+        let is_surface = |member: &usize| blocks[*member].is_surface;
+        let surfaces = likely
+            .iter()
+            .filter_map(|set| Some((vec![set.members.iter().copied().find(is_surface)?], *set)));
+        let of_best = likely
+            .iter()
+            .take(1)
+            .flat_map(|set| one_or_two(&set.members).into_iter().map(move |gone| (gone, *set)));
+        let mut rests: Vec<(Vec<usize>, Vec<usize>, usize)> = Vec::new();
+        for (gone, set) in surfaces.take(SPLIT).chain(of_best) {
+            let rest: Vec<usize> =
+                set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
+            let kind = if gone.len() > 1 { 2 } else { usize::from(!gone.iter().any(is_surface)) };
+            let key = sorted(&rest);
+            // Most pairs of laws were tried there among others.
+            let is_tried = kind == 2 && tried.contains(&(key.clone(), 1));
+            if !is_tried && tried.insert((key, kind)) {
+                rests.push((rest, gone, kind));
+            }
+        }
+        if rests.is_empty() {
+            return;
+        }
+        let least = best - rules.hopeless;
+        let of_rest = |(rest, gone, kind): (Vec<usize>, Vec<usize>, usize)| {
+            replaced((&rest, &gone), instead[kind], least, products)
+        };
+        let new: Vec<Vec<Set>> = rests.into_par_iter().map(of_rest).collect();
+        if products.target.stop.is_requested() {
+            return;
+        }
+        for set in new.into_iter().flatten() {
+            let own = known.entry(sorted(&set.members)).or_insert_with(|| set.clone());
+            if set.ln_posterior > own.ln_posterior {
+                *own = set;
+            }
+        }
+    }
+}
+
+/// The rest of a set whose members are `gone`, and beside it one and two others in their place,
+/// those of more than the `least` ln of the posterior.
+fn replaced(
+    (rest, gone): (&[usize], &[usize]),
+    [first, second]: [&[usize]; 2],
+    least: f64,
+    products: &Products,
+) -> Vec<Set> {
+    let Products { blocks, rules, .. } = *products;
+    let rest = if products.target.stop.is_requested() { None } else { assembled(rest, products) };
+    let Some(rest) = rest else { return Vec::new() };
+    let mut one = extended(&rest, first, products);
+    one.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    let second: BTreeSet<usize> =
+        second.iter().copied().filter(|other| !gone.contains(other)).collect();
+    let is_near = |set: &&Set| set.members.last().is_some_and(|last| second.contains(last));
+    let near: Vec<&Set> = one.iter().filter(is_near).take(rules.extending).collect();
+    let promising: Vec<usize> = near.iter().filter_map(|set| set.members.last().copied()).collect();
+    let second: Vec<usize> = second.into_iter().collect();
+    let narrow = near
+        .into_iter()
+        .filter(|set| !set.has_wide(blocks, rules))
+        .take(rules.extended)
+        .enumerate();
+    let longer = |(place, set): (usize, &Set)| {
+        extended(set, if place == 0 { &second } else { &promising }, products)
+    };
+    let two: Vec<Set> = narrow.flat_map(longer).collect();
+    let mut new: Vec<Set> = one.into_iter().chain(two).collect();
+    new.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
+    // At settled sizes a set may be far more probable than with its members taken one after the
+    // other.
+    let rest_of_new = new.split_off(new.len().min(rules.extended));
+    let settled: Vec<Set> = new.into_par_iter().map(|set| set.settled(products)).collect();
+    let probable = rest_of_new.into_iter().filter(|set| set.ln_posterior > least);
+    std::iter::once(rest).chain(settled).chain(probable).collect()
+}
+
+/// Each member, and each two of them where they are few.
+fn one_or_two(members: &[usize]) -> Vec<Vec<usize>> {
+    let single = members.iter().map(|&member| vec![member]);
+    let few = if members.len() <= FEW { members } else { &[] };
+    let pairs = few
+        .iter()
+        .enumerate()
+        .flat_map(|(k, &one)| few[k + 1..].iter().map(move |&other| vec![one, other]));
+    single.chain(pairs).collect()
+}
+
+/// ln p(r | all blocks) and of their prior.
+pub(super) fn ln_posterior(products: &Products) -> Option<f64> {
+    let all: Vec<usize> = (0..products.blocks.len()).collect();
+    Some(assembled(&all, products)?.ln_posterior + products.over_noise(products.squares))
+}
+
+/// What a set with these members leaves, at their most probable sizes.
+pub(super) fn left_by<'p, 'a>(
+    members: &[usize],
+    products: &'p Products<'a>,
+) -> Option<Left<'p, 'a>> {
+    let set = assembled(members, products)?;
+    products.left(&set.members, &set.sizes)
+}
+
+/// For each hypothesis that is tried the gain beside some others, its prior among it, and its most
+/// probable size.
+pub(super) fn gains_beside(
+    others: &[usize],
+    tried: &[usize],
+    products: &Products,
+) -> Vec<(usize, f64, f64)> {
+    let Some(left) = left_by(others, products) else { return Vec::new() };
+    let gain = |(&block, (gain, size)): (&usize, (f64, f64))| {
+        (block, gain + products.ln_prior(&products.blocks[block], others), size)
+    };
+    tried.iter().zip(left.gains(tried)).map(gain).collect()
+}
+
+/// A set with these members, one after the other.
+fn assembled(members: &[usize], products: &Products) -> Option<Set> {
+    let mut set = Set { members: Vec::new(), sizes: Vec::new(), ln_posterior: 0.0 };
+    for &member in members {
+        let gain = products.left(&set.members, &set.sizes)?.gain(member);
+        set = set.with(member, gain, products);
+    }
+    Some(set.settled(products))
+}
+
+fn sorted(members: &[usize]) -> Vec<usize> {
+    let mut members = members.to_vec();
+    members.sort_unstable();
+    members
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::fit::Stop;
+    use crate::select::evidence::block::Design;
+    use crate::select::evidence::marginal::{Coefficients, Noise};
+    use crate::select::evidence::products::Target;
+    use crate::select::neighbourhood::{LinearNeighbourhood, Unknowns};
+
+    /// Numbers without pattern, of root mean square 1 about.
+    fn matrix(rows: usize, columns: usize, seed: f64) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, columns, |i, j| {
+            let value =
+                ((12.9898 * i as f64 + 78.233 * j as f64 + seed).sin() * 43_758.545_3).fract();
+            2.0 * 3.0_f64.sqrt() * (value.abs() - 0.5)
+        })
+    }
+
+    /// Two strong effects and a third, each of two columns, in a residual with noise.
+    fn three(names: [usize; 3]) -> (Vec<Block>, Target) {
+        let columns: Vec<DMatrix<f64>> =
+            (0..3).map(|k| matrix(90, 2, 7.0 * f64::from(k))).collect();
+        let residual = columns[0].column(0) * 60.0
+            + columns[1].column(1) * 25.0
+            + matrix(90, 1, 99.0).column(0);
+        let unknowns = Unknowns { x: vec![0.0], priors: vec![None], active: DMatrix::zeros(0, 1) };
+        let fit = LinearNeighbourhood::new(&matrix(90, 1, 55.0), &residual, &unknowns, 0);
+        let block = |&k: &usize| {
+            let design = Design::Dense(columns[k].clone()).scaled(30).unwrap();
+            Block::new(design, &fit, -5.0, Coefficients::default())
+        };
+        let blocks = names.iter().map(block).collect();
+        let noise = Noise { freedom: 89.0, trust: 0.1, least: 0.0 };
+        (blocks, Target { fit, noise, alike: 0.0, stop: Stop::default() })
+    }
+
+    #[test]
+    fn a_set_is_as_probable_in_whatever_order_it_was_taken() {
+        let rules = &SelectionRules::DEFAULT;
+        let of = |names: [usize; 3], members: &[usize]| {
+            let (blocks, target) = three(names);
+            assembled(members, &Products::new((&blocks, &target), rules)).unwrap().ln_posterior
+        };
+        let first = of([0, 1, 2], &[0, 1]);
+        assert!(
+            (first - of([1, 0, 2], &[0, 1])).abs() < 1e-6,
+            "{first} {}",
+            of([1, 0, 2], &[0, 1])
+        );
+        // Beside two strong effects, each of the size that it has, one that is not there gains
+        // nothing.
+        assert!(of([0, 1, 2], &[0, 1, 2]) < first - 4.0);
+    }
+
+    #[test]
+    fn two_that_a_third_does_for_are_found_where_one_alone_is_followed() {
+        let rules = &SelectionRules { extended: 1, ..SelectionRules::DEFAULT };
+        let (one, other, noise) = (matrix(90, 1, 3.0), matrix(90, 1, 11.0), matrix(90, 1, 99.0));
+        let residual = (&one * 20.0 + &other * 20.0 + noise).column(0).into_owned();
+        let unknowns = Unknowns { x: vec![0.0], priors: vec![None], active: DMatrix::zeros(0, 1) };
+        let fit = LinearNeighbourhood::new(&matrix(90, 1, 55.0), &residual, &unknowns, 0);
+        // The third is nearly the sum of both, and nothing of it is there.
+        let third = &one + &other + matrix(90, 1, 40.0) * 0.2;
+        let block = |columns: &DMatrix<f64>| {
+            let design = Design::Dense(columns.clone()).scaled(30).unwrap();
+            let mut block = Block::new(design, &fit, -5.0, Coefficients::default());
+            block.family = Some(String::new());
+            block
+        };
+        let blocks = [&third, &one, &other].map(block);
+        let target = Target {
+            fit: fit.clone(),
+            noise: Noise { freedom: 89.0, trust: 0.1, least: 0.0 },
+            alike: 0.0,
+            stop: Stop::default(),
+        };
+        let found = search(&Products::new((&blocks, &target), rules), &[]);
+        assert_eq!(sorted(&found[0].members), [1, 2], "{found:?}");
+        assert!(found[0].probability > 0.9, "{}", found[0].probability);
+    }
+
+    #[test]
+    fn what_was_worked_out_before_further_hypotheses_came_changes_nothing() {
+        let rules = &SelectionRules::DEFAULT;
+        let (blocks, target) = three([2, 0, 1]);
+        let fewer = Products::new((&blocks[..2], &target), rules);
+        assert!(!search(&fewer, &[0]).is_empty());
+        let again = search(&Products::knowing(fewer.into_known(), (&blocks, &target), rules), &[0]);
+        let anew = search(&Products::new((&blocks, &target), rules), &[0]);
+        assert_eq!(again.len(), anew.len());
+        for (own, other) in again.iter().zip(&anew) {
+            assert_eq!(own.members, other.members);
+            assert!((own.probability - other.probability).abs() < 1e-9);
+        }
+    }
+}

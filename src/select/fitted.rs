@@ -1,0 +1,425 @@
+//! A problem with its effects, fitted, and its linear neighbourhood.
+
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use super::data::Data;
+use super::neighbourhood::{Derivatives, LinearNeighbourhood, Linearised, Unknowns};
+use crate::fit::{Identification, IdentifyError, Noise, Options, Placement, identify};
+use crate::least_squares::MANY_UNKNOWNS;
+use crate::model::parameter::{BeamField, EffectParameter, ParameterSite};
+use crate::model::{Model, Pose};
+use crate::problem::{Effect, EffectDeclaration, Problem};
+
+/// Factor of σ that takes all weight from a position: an outlier of a robust fit takes no part in
+/// the choice of effects.
+const WITHOUT_WEIGHT: f64 = 1e6;
+
+/// Median of |r|² of one, two and three normal coordinates of unit scatter.
+const MEDIAN: [f64; 3] = [0.455, 1.386, 2.366];
+/// Fits without what was set aside before; an outlier bends the fit to itself and away from others.
+const TIMES: usize = 10;
+/// Part of the variance of a pose that is left where it decides a direction alone.
+const DECIDED: f64 = 1e-3;
+
+/// A fitted problem.
+#[derive(Clone)]
+pub(super) struct Fitted {
+    pub problem: Problem,
+    pub model: Model,
+    pub found: Identification,
+    /// Parameters that were fitted to the identification rows and rest on no bound.
+    pub unknowns: Vec<usize>,
+    /// Rows of the active constraints, shape = (constraints, unknowns).
+    active: DMatrix<f64>,
+    /// 1 σ of a coordinate in rows without one of their own \[m\].
+    pub sigma: f64,
+    /// Rows that take no part in the choice of effects: outliers.
+    pub set_aside: Vec<usize>,
+    /// The linear neighbourhood at the identification rows, once it was asked for.
+    around: OnceLock<Arc<LinearNeighbourhood>>,
+    /// The derivatives there that were taken last.
+    derivatives: Arc<Mutex<Option<Arc<Derivatives>>>>,
+}
+
+impl Fitted {
+    /// Fits `problem` to the identification rows.
+    pub fn new(problem: Problem, data: &Data, options: &Options) -> Result<Self, IdentifyError> {
+        let found = identify(&problem, data.dataset, options)?;
+        Self::of(problem, data, found)
+    }
+
+    /// A problem that was fitted to the identification rows before.
+    pub fn of(problem: Problem, data: &Data, found: Identification) -> Result<Self, IdentifyError> {
+        let placement = Placement::of(data.measurements);
+        let model =
+            found.strategy.model(Model::new(&problem, &placement.bases, &placement.targets)?);
+        let free = |&k: &usize| {
+            let name = &model.parameters[k].name;
+            found.unknowns.contains(name) && found.estimates[k].at_bound.is_none()
+        };
+        let unknowns: Vec<usize> = (0..model.parameters.len()).filter(free).collect();
+        let coefficient = |i: usize, j: usize| -> f64 {
+            let terms = &model.constraints[found.active_constraints[i].constraint].terms;
+            terms
+                .iter()
+                .filter(|(k, _)| *k == unknowns[j])
+                .map(|(_, coefficient)| coefficient)
+                .sum()
+        };
+        let active = DMatrix::from_fn(found.active_constraints.len(), unknowns.len(), coefficient);
+        let sigma = match found.noise {
+            Noise::Estimated(sigma) => sigma,
+            // A σ that is too large would leave everything to the priors.
+            Noise::Declared | Noise::Unknown => {
+                found.sigma_scale * placement.sigma(data.measurements, data.rows(), &problem)
+            }
+        };
+        let outliers_of_fit: Vec<usize> =
+            found.outliers.iter().map(|outlier| outlier.row).collect();
+        let (around, derivatives) = (OnceLock::new(), Arc::default());
+        let mut fitted = Self {
+            problem,
+            model,
+            found,
+            unknowns,
+            active,
+            sigma,
+            set_aside: Vec::new(),
+            around,
+            derivatives,
+        };
+        // Rounds on many poses fit too often to look for them.
+        let looks = fitted.problem.robust.is_none() && data.is_led();
+        fitted.set_aside = if looks { outliers(&fitted, data) } else { outliers_of_fit };
+        if !fitted.set_aside.is_empty() {
+            fitted.derivatives = Arc::default();
+        }
+        Ok(fitted)
+    }
+
+    /// Fits on until it converges, if it was stopped before that or fitted in passing.
+    pub fn settled(self, data: &Data, options: &Options) -> Result<Self, IdentifyError> {
+        if self.found.termination.converged() && !self.found.provisional {
+            return Ok(self);
+        }
+        let onwards = if self.found.provisional {
+            self.succeeding(options, true)
+        } else {
+            self.onwards(options)
+        };
+        Self::new(self.problem.clone(), data, &onwards)
+    }
+
+    /// Options to fit a problem that differs by a few effects: from where this fit ended.
+    pub fn onwards(&self, options: &Options) -> Options {
+        let values =
+            self.found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
+        Options { start: values.collect(), influential_rows: false, ..options.clone() }
+    }
+
+    /// The same, with what need not be found anew: the registered nominal arm, derivatives where
+    /// this one ended, and of a fit that is `alike` the σ that this one took.
+    pub fn succeeding(&self, options: &Options, alike: bool) -> Options {
+        let derivatives = self.derivatives.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let at = (self.model.parameters.as_slice(), &self.found.x);
+        let known = derivatives.map(|derivatives| derivatives.known(at, &self.unknowns));
+        let predecessor = self.found.predecessor(alike).with_derivatives(known);
+        Options { predecessor: Some(Arc::new(predecessor)), ..self.onwards(options) }
+    }
+
+    /// The same problem with other effects declared.
+    pub fn with_effects(&self, effects: &[Effect]) -> Problem {
+        let mut problem = self.problem.clone();
+        let location = problem.data.location.clone();
+        problem.effects = effects
+            .iter()
+            .map(|effect| EffectDeclaration { effect: effect.clone(), location: location.clone() })
+            .collect();
+        problem
+    }
+
+    /// Declared effects.
+    pub fn effects(&self) -> Vec<Effect> {
+        self.problem.effects.iter().map(|declared| declared.effect.clone()).collect()
+    }
+
+    /// The poses of some rows.
+    pub fn poses<'a>(&self, data: &Data<'a>, rows: &[usize]) -> Vec<Pose<'a>> {
+        let mut poses = Placement::of(data.measurements).poses(data.measurements, rows, self.sigma);
+        if data.measurements.sigma.is_some() {
+            for pose in &mut poses {
+                pose.sigma *= self.found.sigma_scale;
+            }
+        }
+        poses
+    }
+
+    /// Rows of the active constraints, shape = (constraints, unknowns).
+    pub fn active(&self) -> &DMatrix<f64> {
+        &self.active
+    }
+
+    /// Residuals of some rows, measuring frame \[m\].
+    pub fn errors(&self, data: &Data, rows: &[usize]) -> Vec<Vector3<f64>> {
+        self.model.residuals(self.poses(data, rows), &self.found.x)
+    }
+
+    /// The model about the fit at the identification rows, with every place where `effects` enter.
+    ///
+    /// Of many unknowns the derivatives are kept for who asks next; `data` are those that were
+    /// fitted.
+    pub fn linearised<'a>(&'a self, data: &Data<'a>, effects: &[Effect]) -> Linearised<'a> {
+        if self.unknowns.len() < MANY_UNKNOWNS {
+            return self.linearised_at(data, data.rows(), effects);
+        }
+        let kept = || self.derivatives.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = kept().clone();
+        let found = self.linearised_knowing(known, (data, data.rows()), effects, &[]);
+        *kept() = Some(found.derivatives());
+        found
+    }
+
+    /// The same at other rows.
+    pub fn linearised_at<'a>(
+        &'a self,
+        data: &Data<'a>,
+        rows: &[usize],
+        effects: &[Effect],
+    ) -> Linearised<'a> {
+        self.linearised_with(data, rows, effects, &[])
+    }
+
+    /// The same with further slots.
+    pub fn linearised_with<'a>(
+        &'a self,
+        data: &Data<'a>,
+        rows: &[usize],
+        effects: &[Effect],
+        slots: &[ParameterSite],
+    ) -> Linearised<'a> {
+        self.linearised_knowing(None, (data, rows), effects, slots)
+    }
+
+    fn linearised_knowing<'a>(
+        &'a self,
+        known: Option<Arc<Derivatives>>,
+        (data, rows): (&Data<'a>, &[usize]),
+        effects: &[Effect],
+        slots: &[ParameterSite],
+    ) -> Linearised<'a> {
+        let mut poses = self.poses(data, rows);
+        let aside = poses.iter_mut().zip(rows).filter(|(_, row)| self.set_aside.contains(row));
+        aside.for_each(|(pose, _)| pose.sigma *= WITHOUT_WEIGHT);
+        Linearised::new(
+            (&self.problem, known),
+            &self.model,
+            poses,
+            &self.unknowns,
+            &self.found.x,
+            (effects, slots),
+        )
+    }
+
+    /// The fit in its linear neighbourhood.
+    pub fn neighbourhood(&self, linearised: &Linearised) -> LinearNeighbourhood {
+        self.neighbourhood_without(linearised, &[])
+    }
+
+    /// The same at the identification rows, made once: all of a loop is of the same rows.
+    pub fn around(&self, data: &Data) -> Arc<LinearNeighbourhood> {
+        if let Some(known) = self.around.get() {
+            return Arc::clone(known);
+        }
+        let new = Arc::new(self.neighbourhood(&self.linearised(data, &[])));
+        Arc::clone(self.around.get_or_init(|| new))
+    }
+
+    /// The same fit, in which every row counts.
+    pub fn with_all_rows(&self) -> Self {
+        Self {
+            set_aside: Vec::new(),
+            around: OnceLock::new(),
+            derivatives: Arc::default(),
+            ..self.clone()
+        }
+    }
+
+    /// The same weighed as the fit was: where that took a σ larger than the declared one, its
+    /// priors counted for more.
+    pub fn neighbourhood_as_fitted(&self, linearised: Linearised) -> LinearNeighbourhood {
+        let unknowns =
+            self.unknowns_without(&linearised, &[], self.found.noise_factor.max(1.0).sqrt());
+        let empty = linearised.empty();
+        let (columns, residual) = linearised.into_fitted();
+        LinearNeighbourhood::in_place_of(columns, residual, &unknowns, empty)
+    }
+
+    /// The unknowns but those `without`, those that the data let go last; 1 σ of their priors is
+    /// divided by `weight`.
+    fn unknowns_without(
+        &self,
+        linearised: &Linearised,
+        without: &[usize],
+        weight: f64,
+    ) -> Unknowns {
+        let kept: Vec<usize> = (0..self.unknowns.len()).filter(|j| !without.contains(j)).collect();
+        let relaxed = linearised.relaxed().iter().copied();
+        let own = kept.iter().map(|&j| self.model.parameters[self.unknowns[j]].sigma);
+        Unknowns {
+            x: kept
+                .iter()
+                .map(|&j| self.found.x[self.unknowns[j]])
+                .chain(relaxed.clone().map(|_| 0.0))
+                .collect(),
+            priors: own.chain(relaxed).map(|sigma| Some(sigma? / weight)).collect(),
+            active: self.active.select_columns(&kept),
+        }
+    }
+
+    /// The same with some unknowns left out of the fit.
+    pub fn neighbourhood_without(
+        &self,
+        linearised: &Linearised,
+        without: &[usize],
+    ) -> LinearNeighbourhood {
+        let (columns, n) = (linearised.fitted(), self.unknowns.len());
+        let mut residual = linearised.residual().clone();
+        // Of two parameters that are multiplied together one brings it down to nothing.
+        let is_place = |site: ParameterSite| {
+            matches!(site, ParameterSite::Beam { field: BeamField::AddedAt, .. })
+        };
+        for &j in
+            without.iter().filter(|&&j| !is_place(self.model.parameters[self.unknowns[j]].site))
+        {
+            residual.axpy(-self.found.x[self.unknowns[j]], &columns.column(j), 1.0);
+        }
+        let unknowns = self.unknowns_without(linearised, without, 1.0);
+        if without.is_empty() {
+            return LinearNeighbourhood::new(columns, &residual, &unknowns, linearised.empty());
+        }
+        let kept: Vec<usize> =
+            (0..columns.ncols()).filter(|j| *j >= n || !without.contains(j)).collect();
+        LinearNeighbourhood::new(
+            &columns.select_columns(&kept),
+            &residual,
+            &unknowns,
+            linearised.empty(),
+        )
+    }
+
+    /// 1 σ of the priors of an effect's parameters in a problem with other effects than this one;
+    /// `None` where one of them is not free.
+    pub fn priors_in(
+        &self,
+        problem: &Problem,
+        data: &Data,
+        effect: &Effect,
+    ) -> Option<Vec<Option<f64>>> {
+        let placement = Placement::of(data.measurements);
+        let model = Model::new(problem, &placement.bases, &placement.targets).ok()?;
+        let model = self.found.strategy.model(model);
+        let sigma = |own: EffectParameter| {
+            model.parameters.iter().find(|k| k.name == own.name).map(|k| k.sigma)
+        };
+        effect.parameters(problem).into_iter().map(sigma).collect()
+    }
+
+    /// Numbers of an effect's parameters among the unknowns.
+    pub fn unknowns_of(&self, effect: &Effect) -> Vec<usize> {
+        let parameters = self.parameters_of(effect);
+        parameters
+            .iter()
+            .filter_map(|k| self.unknowns.iter().position(|unknown| unknown == k))
+            .collect()
+    }
+
+    /// Numbers of an effect's parameters in the model.
+    pub fn parameters_of(&self, effect: &Effect) -> Vec<usize> {
+        let own = effect.parameters(&self.problem);
+        let is_own = |&k: &usize| {
+            own.iter().any(|parameter| parameter.name == self.model.parameters[k].name)
+        };
+        (0..self.model.parameters.len()).filter(is_own).collect()
+    }
+}
+
+/// Identification rows whose residual is no noise of the others' size, in the linear neighbourhood
+/// of the fit without them.
+///
+/// From the fit to all on, as many rows as may be outliers, those farthest off, are left out until
+/// they stay the same, as in one start of the trimmed squares of [Rousseeuw and Van Driessen 2006]:
+/// that shows what bends a fit to itself; those beyond `gross` then leave, and no others.
+fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
+    let rows = data.rows();
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a part of a count"
+    )]
+    let most = (data.rules.few * rows.len() as f64) as usize;
+    let linearised = fitted.linearised(data, &[]);
+    let distances = |aside: &[usize]| distances(fitted, &linearised, aside);
+    let worst = |squares: &[f64], count: usize| -> Vec<usize> {
+        let mut order: Vec<usize> = (0..squares.len()).collect();
+        order.sort_by(|&a, &b| squares[b].total_cmp(&squares[a]));
+        order.truncate(count);
+        order.sort_unstable();
+        order
+    };
+    let mut aside = Vec::new();
+    for _ in 0..TIMES {
+        let next = worst(&distances(&aside), most);
+        if next == aside {
+            break;
+        }
+        aside = next;
+    }
+    for _ in 0..TIMES {
+        let squares = distances(&aside);
+        let far = squares.iter().filter(|square| **square > data.rules.gross).count();
+        if far > most {
+            return Vec::new();
+        }
+        let next = worst(&squares, far);
+        if next == aside {
+            break;
+        }
+        aside = next;
+    }
+    aside.into_iter().map(|k| rows[k]).collect()
+}
+
+/// |r|² of each pose in units of the others' scatter, in the fit without those `aside`: rᵀ C⁻¹ r with C = 1 − H of a pose in the fit and
+/// 1 + A (AᵀA)⁻¹ Aᵀ of one beside it, over the median of all.
+fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f64> {
+    let (whole, residual) = (linearised.fitted(), linearised.residual());
+    let (mut columns, mut here) = (whole.clone(), residual.clone());
+    for &pose in aside {
+        columns.rows_mut(3 * pose, 3).unscale_mut(WITHOUT_WEIGHT);
+        here.rows_mut(3 * pose, 3).unscale_mut(WITHOUT_WEIGHT);
+    }
+    let unknowns = fitted.unknowns_without(linearised, &[], 1.0);
+    let fit = LinearNeighbourhood::new(&columns, &here, &unknowns, linearised.empty());
+    let (left, along) = (residual + whole * fit.step(), fit.fitted());
+    let square = |pose: usize| {
+        let (own, r) = (along.rows(3 * pose, 3), left.fixed_rows::<3>(3 * pose).into_owned());
+        let hat = Matrix3::from_fn(|i, j| own.row(i).dot(&own.row(j)));
+        let covariance = if aside.contains(&pose) {
+            Matrix3::identity() + hat * WITHOUT_WEIGHT.powi(2)
+        } else {
+            Matrix3::identity() * (1.0 + DECIDED) - hat
+        };
+        covariance.cholesky().map_or(0.0, |factor| r.dot(&factor.solve(&r)))
+    };
+    let numbers = |pose: usize| linearised.poses()[pose].observation.coordinates();
+    let squares: Vec<f64> = (0..left.len() / 3).map(square).collect();
+    let mut ratios: Vec<f64> =
+        squares.iter().enumerate().map(|(pose, own)| own / MEDIAN[numbers(pose) - 1]).collect();
+    ratios.sort_by(|a, b| b.total_cmp(a));
+    // No less than a σ that was declared: beside rounding everything is far off.
+    let least = if fitted.found.noise == Noise::Declared { 1.0 } else { 0.0 };
+    let scatter = ratios.get(ratios.len() / 2).copied().unwrap_or(0.0).max(least);
+    squares.into_iter().map(|own| if scatter > 0.0 { own / scatter } else { 0.0 }).collect()
+}

@@ -1,0 +1,552 @@
+//! A fit in its linear neighbourhood: what its residual can still give to columns that were not
+//! fitted, and what each fitted parameter gives it.
+
+use std::borrow::Cow;
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::estimated::Estimated;
+use super::orthonormal::{open, orthonormal, orthonormal_above};
+use super::score::{Score, Sums};
+use crate::numeric::{gram, inverse_factor, product, product_along, zeros};
+
+/// A direction is decided by a block of poses alone when less than this part of its length² is left
+/// without the block: then the others say nothing of it.
+pub(in crate::select) const LEAST_DECIDED: f64 = 1e-6;
+
+/// So many columns at most are projected out by one direction of the basis after the other: it is
+/// gone through once for all of them.
+const NARROW: usize = 4;
+/// Part of a column that is left from which on what one projection leaves along a basis is
+/// rounding. Of less, two are enough [Giraud, Langou & Rozložník 2005].
+const MOSTLY: f64 = 0.1;
+
+/// The unknowns of a fit as it ended.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Unknowns {
+    /// Their values, deviations from nominal.
+    pub x: Vec<f64>,
+    /// 1 σ of their priors.
+    pub priors: Vec<Option<f64>>,
+    /// Rows of the constraints that hold them, shape = (constraints, unknowns); may be narrower,
+    /// the rest being 0.
+    pub active: DMatrix<f64>,
+}
+
+/// Residual r and fitted columns A = [J; P] of N poses, with a row P for each prior below the
+/// data's 3 N.
+///
+/// All is kept in an orthonormal basis Q = A T of what was fitted, T of shape (unknowns, rank): the
+/// covariance of the unknowns is T Tᵀ, the step to their common optimum − T Qᵀr. Unknowns that
+/// columns before them take up wholly have no part in T and stay where they are.
+#[derive(Debug)]
+pub(crate) struct LinearNeighbourhood {
+    /// Whitened residual at the optimum, priors below.
+    residual: DVector<f64>,
+    /// Q, shape = (3 N + priors, rank).
+    basis: DMatrix<f64>,
+    /// T.
+    root: DMatrix<f64>,
+    /// Values of the unknowns at the optimum.
+    optimum: DVector<f64>,
+    /// From where the derivatives were taken to the optimum.
+    step: DVector<f64>,
+    /// Rows that are data.
+    rows: usize,
+    /// Those of them that are 0 because nothing is measured there.
+    empty: usize,
+    /// Sums of squares, with priors and of the data alone, and degrees of freedom of the data.
+    sums: Sums,
+}
+
+/// On every core: most of its time is that of new memory.
+impl Clone for LinearNeighbourhood {
+    fn clone(&self) -> Self {
+        Self {
+            residual: self.residual.clone(),
+            basis: lengthened(&self.basis, 0),
+            root: self.root.clone(),
+            optimum: self.optimum.clone(),
+            step: self.step.clone(),
+            ..*self
+        }
+    }
+}
+
+/// What some unknowns alone give a fit.
+#[derive(Debug, Clone)]
+pub(crate) struct Share {
+    /// Orthonormal directions that only they fit, shape = (3 N + priors, k).
+    pub directions: DMatrix<f64>,
+    /// Part of the residual along them that they take off: without them the sum of squares is
+    /// larger by its square.
+    pub part: DVector<f64>,
+}
+
+impl LinearNeighbourhood {
+    /// From the Jacobian ∂r/∂x, shape = (3 N, n), and the residual r of a fit that ended at the
+    /// unknowns given; so many rows are `empty`: 0, since poses measure fewer numbers than three.
+    pub fn new(
+        jacobian: &DMatrix<f64>,
+        residual: &DVector<f64>,
+        unknowns: &Unknowns,
+        empty: usize,
+    ) -> Self {
+        Self::of(Cow::Borrowed(jacobian), residual.clone(), unknowns, empty)
+    }
+
+    /// The same of a Jacobian that nobody else needs, in its place.
+    pub fn in_place_of(
+        jacobian: DMatrix<f64>,
+        residual: DVector<f64>,
+        unknowns: &Unknowns,
+        empty: usize,
+    ) -> Self {
+        Self::of(Cow::Owned(jacobian), residual, unknowns, empty)
+    }
+
+    fn of(
+        jacobian: Cow<DMatrix<f64>>,
+        residual: DVector<f64>,
+        unknowns: &Unknowns,
+        empty: usize,
+    ) -> Self {
+        let (rows, n) = jacobian.shape();
+        let priors = unknowns.priors.iter().enumerate();
+        let known: Vec<(usize, f64)> = priors.filter_map(|(j, &sigma)| Some((j, sigma?))).collect();
+        let mut long = residual.resize_vertically(rows + known.len(), 0.0);
+        known
+            .iter()
+            .enumerate()
+            .for_each(|(row, &(j, sigma))| long[rows + row] = unknowns.x[j] / sigma);
+        let below: Vec<(usize, f64)> = known.iter().map(|&(j, sigma)| (j, sigma.recip())).collect();
+        let (basis, root) = if unknowns.active.is_empty() {
+            orthonormal_above(jacobian, &below, None)
+        } else {
+            held(&jacobian, &below, &unknowns.active.clone().resize_horizontally(n, 0.0))
+        };
+        let mut fit = Self {
+            residual: long,
+            basis,
+            root,
+            optimum: DVector::from_column_slice(&unknowns.x),
+            step: DVector::zeros(n),
+            rows,
+            empty,
+            sums: Sums::default(),
+        };
+        fit.settle(0);
+        fit
+    }
+
+    /// Fits the directions of the basis from `first` on.
+    fn settle(&mut self, first: usize) {
+        let new = self.basis.columns_range(first..);
+        let along = new.tr_mul(&self.residual);
+        self.residual.gemv(-1.0, &new, &along, 1.0);
+        let step = -(self.root.columns_range(first..) * along);
+        self.optimum += &step;
+        self.step += step;
+        let before =
+            if first == 0 { (self.rows - self.empty) as f64 } else { self.sums.data_freedom };
+        let taken = new.rows(0, self.rows).norm_squared();
+        self.sums = Sums::of(&self.residual, self.rows, before - taken);
+    }
+
+    /// What columns of the data, shape = (3 N, k) or as long as the basis, have along it, the
+    /// orthonormal directions that they add to it, and these in terms of what the basis leaves of
+    /// the columns.
+    fn directions(&self, columns: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
+        let lengths: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
+        let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
+        let mut along = DMatrix::zeros(self.basis.ncols(), columns.ncols());
+        for _ in 0..2 {
+            let more = product_along(&self.basis, &left);
+            left -= product(&self.basis, &more);
+            along += more;
+            if most_is_left(&left, &lengths) {
+                break;
+            }
+        }
+        let (new, within) = orthonormal(&left, Some(&lengths));
+        (along, new, within)
+    }
+
+    /// Takes further columns of the data into the fit, shape = (3 N, k) or as long as the basis,
+    /// with unknowns of their own behind the others; gives the new orthonormal directions.
+    pub fn add(&mut self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let (first, n, k) = (self.basis.ncols(), self.root.nrows(), columns.ncols());
+        let (along, new, within) = self.directions(columns);
+        let rank = new.ncols();
+        self.basis = std::mem::take(&mut self.basis).resize_horizontally(first + rank, 0.0);
+        self.basis.columns_range_mut(first..).copy_from(&new);
+        let turned = -(&self.root * (along * &within));
+        self.root = std::mem::take(&mut self.root).resize(n + k, first + rank, 0.0);
+        self.root.view_mut((0, first), (n, rank)).copy_from(&turned);
+        self.root.view_mut((n, first), (k, rank)).copy_from(&within);
+        self.optimum = std::mem::take(&mut self.optimum).resize_vertically(n + k, 0.0);
+        self.step = std::mem::take(&mut self.step).resize_vertically(n + k, 0.0);
+        self.settle(first);
+        new
+    }
+
+    /// The same fit with further columns.
+    pub fn with(&self, columns: &DMatrix<f64>) -> Self {
+        let mut with = self.clone();
+        with.add(columns);
+        with
+    }
+
+    /// The same fit with further columns of the data, shape = (3 N, k), whose coefficients have a
+    /// prior of 1 σ about 0.
+    pub fn with_priors(&self, columns: &DMatrix<f64>, sigma: f64) -> Self {
+        let (rows, k) = (self.basis.nrows(), columns.ncols());
+        let mut columns = columns.clone().resize_vertically(rows + k, 0.0);
+        columns.view_mut((rows, 0), (k, k)).fill_diagonal(sigma.recip());
+        let mut with = Self {
+            basis: lengthened(&self.basis, k),
+            residual: self.residual.clone().resize_vertically(rows + k, 0.0),
+            root: self.root.clone(),
+            optimum: self.optimum.clone(),
+            step: self.step.clone(),
+            ..*self
+        };
+        with.add(&columns);
+        with
+    }
+
+    /// The fit as its optimum and covariance.
+    pub fn estimated(&self) -> Estimated {
+        Estimated::new(&self.root, self.optimum.clone(), self.sums.squares)
+    }
+
+    /// What is left in numbers.
+    pub fn sums(&self) -> Sums {
+        self.sums
+    }
+
+    /// What would be left without some unknowns.
+    pub fn sums_without(&self, share: &Share) -> Sums {
+        let freed = share.directions.rows(0, self.rows).norm_squared();
+        Sums::of(
+            &(&self.residual + &share.directions * &share.part),
+            self.rows,
+            self.sums.data_freedom + freed,
+        )
+    }
+
+    /// Number of unknowns, those of added columns among them.
+    pub fn unknowns(&self) -> usize {
+        self.root.nrows()
+    }
+
+    /// Data rows, 3 N.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Q, the data's rows of the orthonormal factor: H = Q Qᵀ.
+    pub fn fitted(&self) -> DMatrix<f64> {
+        self.basis.rows(0, self.rows).into_owned()
+    }
+
+    /// The same and whitened residuals of the data, without a copy.
+    pub fn into_fitted(self) -> (DMatrix<f64>, DVector<f64>) {
+        (
+            self.basis.resize_vertically(self.rows, 0.0),
+            self.residual.resize_vertically(self.rows, 0.0),
+        )
+    }
+
+    /// From where the derivatives were taken to the optimum, all unknowns, those of added columns
+    /// last.
+    pub fn step(&self) -> &DVector<f64> {
+        &self.step
+    }
+
+    /// What the degrees of freedom are to be expected to be where the priors are true: rows, priors
+    /// included, less rank.
+    pub fn expected_freedom(&self) -> f64 {
+        (self.basis.nrows() - self.empty - self.basis.ncols()) as f64
+    }
+
+    /// What some unknowns x alone give the fit; `None` where the fit does not tell them from
+    /// others.
+    ///
+    /// With T_x their rows of T and T_xᵀ = U S its QR factors, only they fit the directions Q U,
+    /// and take − S⁻ᵀ x off along them.
+    pub fn share(&self, unknowns: &[usize]) -> Option<Share> {
+        self.share_within(unknowns)
+            .map(|(turned, part)| Share { directions: product(&self.basis, &turned), part })
+    }
+
+    /// U and − S⁻ᵀ x.
+    fn share_within(&self, unknowns: &[usize]) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let own = self.root.select_rows(unknowns).transpose();
+        // U = T_xᵀ W with W = S⁻¹.
+        let (turned, within) = orthonormal(&own, None);
+        let x = self.optimum.select_rows(unknowns);
+        (turned.ncols() == unknowns.len()).then(|| (turned, -within.tr_mul(&x)))
+    }
+
+    /// By how much the sum of squares is larger without some unknowns; `None` where the fit does
+    /// not tell them from others.
+    pub fn loss_without(&self, unknowns: &[usize]) -> Option<f64> {
+        self.share_within(unknowns).map(|(_, part)| part.norm_squared())
+    }
+
+    /// Columns of the data, shape = (3 N, k), with everything fitted projected out, shape = (3 N +
+    /// priors, k).
+    pub fn left_of(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
+        // Below the data there is nothing at first.
+        self.take_off(&mut left, self.rows);
+        let is_short = |k: &usize| left.column(*k).norm() < MOSTLY * columns.column(*k).norm();
+        let short: Vec<usize> = (0..columns.ncols()).filter(is_short).collect();
+        if !short.is_empty() {
+            let mut again = left.select_columns(&short);
+            self.take_off(&mut again, self.residual.len());
+            short
+                .iter()
+                .zip(again.column_iter())
+                .for_each(|(&k, column)| left.set_column(k, &column));
+        }
+        left
+    }
+
+    /// Takes off columns what of them is along the basis, nothing of them being behind so many
+    /// rows.
+    fn take_off(&self, left: &mut DMatrix<f64>, filled: usize) {
+        if left.ncols() > NARROW {
+            // The narrow side is transposed: this is the product that is fast.
+            let along = (left.transpose() * &self.basis).transpose();
+            left.gemm(-1.0, &self.basis, &along, 1.0);
+            return;
+        }
+        let along = self.basis.rows(0, filled).tr_mul(&left.rows(0, filled));
+        for (column, along) in self.basis.column_iter().zip(along.row_iter()) {
+            let pairs = left.column_iter_mut().zip(along.iter());
+            pairs.for_each(|(mut left, along)| left.axpy(-along, &column, 1.0));
+        }
+    }
+
+    /// Whitened residual at the optimum, priors below.
+    pub fn residual(&self) -> &DVector<f64> {
+        &self.residual
+    }
+
+    /// What the residual says about columns, shape = (3 N, k).
+    pub fn score(&self, columns: &DMatrix<f64>) -> Score {
+        self.projected(columns, &self.basis.rows(0, self.rows).tr_mul(columns))
+    }
+
+    /// The same of several sets of columns, multiplied together.
+    pub fn scores(&self, sets: &[DMatrix<f64>]) -> Vec<Score> {
+        if sets.is_empty() {
+            return Vec::new();
+        }
+        let columns =
+            DMatrix::from_columns(&sets.iter().flat_map(DMatrix::column_iter).collect::<Vec<_>>());
+        // The narrow side is transposed: this is the product that is fast.
+        let along = (columns.transpose() * self.basis.rows(0, self.rows)).transpose();
+        let mut first = 0;
+        let mut next = |set: &DMatrix<f64>| {
+            first += set.ncols();
+            self.projected(set, &along.columns(first - set.ncols(), set.ncols()).into_owned())
+        };
+        sets.iter().map(&mut next).collect()
+    }
+
+    /// The score of columns that have Qᵀ C along what was fitted.
+    fn projected(&self, columns: &DMatrix<f64>, along: &DMatrix<f64>) -> Score {
+        let gram = columns.tr_mul(columns) - along.tr_mul(along);
+        let product = columns.tr_mul(&self.residual.rows(0, self.rows));
+        Score {
+            gram,
+            product,
+            lengths: columns.column_iter().map(|column| column.norm_squared()).collect(),
+        }
+    }
+
+    /// Largest principal angle \[rad\] between what two sets of columns add to the fit; `None`
+    /// where one of them adds nothing.
+    pub fn angle(&self, one: &DMatrix<f64>, other: &DMatrix<f64>) -> Option<f64> {
+        let (a, b) = (self.directions(one).1, self.directions(other).1);
+        if a.is_empty() || b.is_empty() {
+            return None;
+        }
+        let cosines = a.tr_mul(&b).singular_values();
+        cosines.iter().copied().reduce(f64::min).map(|cosine| cosine.clamp(0.0, 1.0).acos())
+    }
+
+    /// Sum of squared residuals of poses that are left out, block by block, from the fit without
+    /// them.
+    ///
+    /// `block` holds the block of each pose. A left-out residual is (I − H_bb)⁻¹ r_b, by Woodbury's
+    /// identity r_b + Q_b (I − Q_bᵀQ_b)⁻¹ Q_bᵀ r_b. A direction that a block alone decides is left
+    /// as it was fitted.
+    pub fn cross_validate(&self, block: &[usize]) -> Option<f64> {
+        let blocks = block.iter().max().map_or(0, |last| last + 1);
+        let n = self.basis.ncols();
+        let left_out = |number: usize| {
+            let rows: Vec<usize> = (0..self.rows).filter(|row| block[row / 3] == number).collect();
+            let (basis, residual) =
+                (self.basis.select_rows(&rows), self.residual.select_rows(&rows));
+            let inner = DMatrix::identity(n, n) - gram(&basis);
+            let step = decided(inner, &basis.tr_mul(&residual));
+            (residual + basis * step).norm_squared()
+        };
+        let sums: Vec<f64> = (0..blocks).into_par_iter().map(left_out).collect();
+        let sum: f64 = sums.iter().sum();
+        sum.is_finite().then_some(sum)
+    }
+}
+
+/// Q and T of columns with rows `below` them of one entry each, within the directions that the
+/// constraints `active` leave open.
+fn held(
+    jacobian: &DMatrix<f64>,
+    below: &[(usize, f64)],
+    active: &DMatrix<f64>,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let rows = jacobian.nrows();
+    let mut columns = lengthened(jacobian, below.len());
+    below.iter().enumerate().for_each(|(row, &(j, value))| columns[(rows + row, j)] = value);
+    let scale: Vec<f64> =
+        columns.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
+    let Some(open) = open(active, &scale) else { return orthonormal(&columns, None) };
+    columns.column_iter_mut().zip(&scale).for_each(|(mut column, scale)| column /= *scale);
+    let (basis, within) = orthonormal(&product(&columns, &open), None);
+    let mut root = open * within;
+    root.row_iter_mut().zip(&scale).for_each(|(mut row, scale)| row /= *scale);
+    (basis, root)
+}
+
+/// A tall matrix with so many rows of zeros below it.
+fn lengthened(matrix: &DMatrix<f64>, more: usize) -> DMatrix<f64> {
+    let (rows, n) = matrix.shape();
+    let mut long = zeros(rows + more, n);
+    let columns = long.as_mut_slice().par_chunks_mut((rows + more).max(1)).enumerate();
+    columns.for_each(|(j, out)| out[..rows].copy_from_slice(matrix.column(j).as_slice()));
+    long
+}
+
+/// Whether so much is left of every column.
+fn most_is_left(left: &DMatrix<f64>, lengths: &[f64]) -> bool {
+    left.column_iter().zip(lengths).all(|(column, length)| column.norm() >= MOSTLY * length)
+}
+
+/// Solves with a symmetric matrix of eigenvalues from 0 to 1; nothing along those that are nearly
+/// 0.
+fn decided(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+    if let Some(root) = inverse_factor(&matrix)
+        && root.diagonal().iter().all(|value| (value * value).recip() > LEAST_DECIDED)
+    {
+        return root.tr_mul(&(&root * right));
+    }
+    let eigen = matrix.symmetric_eigen();
+    let inverted =
+        eigen.eigenvalues.map(|value| if value > LEAST_DECIDED { value.recip() } else { 0.0 });
+    &eigen.eigenvectors * eigen.eigenvectors.tr_mul(right).component_mul(&inverted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Deterministic numbers without pattern.
+    fn matrix(rows: usize, columns: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, columns, |i, j| {
+            (12.9898 * i as f64 + 78.233 * (j + 1) as f64).sin() * 43.7 % 1.0
+        })
+    }
+
+    fn fit(columns: usize) -> (DMatrix<f64>, DVector<f64>, Unknowns) {
+        let x: Vec<f64> = (0..columns).map(|j| 0.1 * j as f64 - 0.2).collect();
+        let priors = (0..columns).map(|j| (j == 1).then_some(0.5)).collect();
+        let active = DMatrix::zeros(0, columns);
+        (matrix(30, columns), matrix(30, 1).column(0).into_owned(), Unknowns { x, priors, active })
+    }
+
+    #[test]
+    fn a_share_is_what_the_fit_loses_without_its_unknowns() {
+        let (columns, residual, unknowns) = fit(5);
+        let whole = LinearNeighbourhood::new(&columns, &residual, &unknowns, 0);
+        let share = whole.share(&[3, 4]).unwrap();
+        let fewer = Unknowns {
+            x: unknowns.x[..3].to_vec(),
+            priors: unknowns.priors[..3].to_vec(),
+            active: DMatrix::zeros(0, 3),
+        };
+        let without =
+            residual - columns.columns(3, 2) * DVector::from_column_slice(&unknowns.x[3..]);
+        let rest =
+            LinearNeighbourhood::new(&columns.columns(0, 3).into_owned(), &without, &fewer, 0);
+        let (lost, expected) = (whole.sums_without(&share), rest.sums());
+        assert!((lost.squares - expected.squares).abs() < 1e-10 && share.part.norm() > 0.1);
+        assert!((lost.data_freedom - expected.data_freedom).abs() < 1e-10);
+        let with = rest.with(&columns.columns(3, 2).into_owned());
+        assert!((with.sums().squares - whole.sums().squares).abs() < 1e-10);
+        assert!((with.optimum.rows(0, 3) - whole.optimum.rows(0, 3)).norm() < 1e-10);
+    }
+
+    #[test]
+    fn further_columns_with_priors_are_fitted_as_if_they_had_been_there() {
+        let (columns, residual, mut unknowns) = fit(6);
+        (unknowns.x[5], unknowns.priors[5]) = (0.0, Some(0.3));
+        let whole = LinearNeighbourhood::new(&columns, &residual, &unknowns, 0);
+        let first = Unknowns {
+            x: unknowns.x[..5].to_vec(),
+            priors: unknowns.priors[..5].to_vec(),
+            active: DMatrix::zeros(0, 5),
+        };
+        let fit =
+            LinearNeighbourhood::new(&columns.columns(0, 5).into_owned(), &residual, &first, 0);
+        let with = fit.with_priors(&columns.columns(5, 1).into_owned(), 0.3);
+        assert!(
+            (&with.optimum - &whole.optimum).norm() < 1e-12
+                && (&with.step - &whole.step).norm() < 1e-12
+        );
+        assert!((with.sums().squares / whole.sums().squares - 1.0).abs() < 1e-12);
+        assert!((with.sums().data_freedom - whole.sums().data_freedom).abs() < 1e-12);
+        let blocks: Vec<usize> = (0..10).map(|pose| pose / 2).collect();
+        let [one, other] = [with, whole].map(|fit| fit.cross_validate(&blocks).unwrap());
+        assert!((one / other - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_a_constraint_holds_together_is_one_unknown() {
+        let (columns, residual, mut unknowns) = fit(4);
+        unknowns.active = DMatrix::from_row_slice(1, 4, &[0.0, 0.0, 2.0, -1.0]);
+        let held = LinearNeighbourhood::new(&columns, &residual, &unknowns, 0);
+        // x₂ = t, x₃ = 2 t.
+        let mut together = columns.columns(0, 3).into_owned();
+        together.set_column(2, &(columns.column(2) + columns.column(3) * 2.0));
+        let three = Unknowns {
+            x: unknowns.x[..3].to_vec(),
+            priors: unknowns.priors[..3].to_vec(),
+            ..Unknowns::default()
+        };
+        let one = LinearNeighbourhood::new(&together, &residual, &three, 0);
+        assert!((held.sums().squares / one.sums().squares - 1.0).abs() < 1e-12);
+        let step = [one.step[0], one.step[1], one.step[2], 2.0 * one.step[2]];
+        assert!((&held.step - DVector::from_row_slice(&step)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn what_other_columns_take_up_or_what_is_not_finite_changes_nothing() {
+        let (columns, residual, unknowns) = fit(5);
+        let plain = LinearNeighbourhood::new(&columns, &residual, &unknowns, 0);
+        let mut odd = columns.clone().resize_horizontally(7, 0.0);
+        odd.set_column(5, &(columns.column(0) * 3.0 - columns.column(2) * (1.0 + 1e-9)));
+        odd[(4, 6)] = f64::NAN;
+        let mut more = unknowns.clone();
+        more.x.extend([0.0; 2]);
+        more.priors.extend([None; 2]);
+        let odd = LinearNeighbourhood::new(&odd, &residual, &more, 0);
+        assert!((odd.sums().squares - plain.sums().squares).abs() < 1e-9);
+        assert_eq!(odd.fitted().ncols(), 5);
+        assert!(odd.share(&[5]).is_none());
+    }
+}

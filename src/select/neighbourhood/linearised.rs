@@ -1,0 +1,337 @@
+//! Columns of every effect without a fit of it: the derivative at the place where it enters, times
+//! what it is multiplied by.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
+use rayon::prelude::*;
+
+use crate::least_squares::kernel::dot;
+use crate::least_squares::{MANY_UNKNOWNS, jacobian_and_residual};
+use crate::model::effect::Term;
+use crate::model::parameter::{BeamField, Parameter, ParameterSite, Regressor};
+use crate::model::{KnownDerivatives, Model, Pose, PoseResiduals};
+use crate::problem::{Effect, Problem};
+
+/// Mass at which the place of an added mass is differentiated [kg]: none has no place, so small a
+/// one changes nothing else.
+const TRACE_OF_MASS: f64 = 1e-4;
+
+/// A model linearised with every place where effects may enter.
+#[derive(Clone)]
+pub(crate) struct Linearised<'a> {
+    problem: &'a Problem,
+    poses: Arc<Vec<Pose<'a>>>,
+    derivatives: Arc<Derivatives>,
+}
+
+/// What a model linearised in some poses comes to.
+#[derive(Debug, Clone)]
+pub(in crate::select) struct Derivatives {
+    /// Columns of the fitted parameters, and of what is relaxed behind them, shape = (3 N, n).
+    fitted: Arc<DMatrix<f64>>,
+    residual: Arc<DVector<f64>>,
+    /// 1 σ of each pose \[m\].
+    sigma: Vec<f64>,
+    /// σ of the priors of what the problem holds equal and may differ here.
+    relaxed: Vec<Option<f64>>,
+    /// Columns of places by their number, those of `fitted` counted first.
+    places: Vec<(ParameterSite, usize)>,
+    others: Vec<Arc<DVector<f64>>>,
+}
+
+impl Derivatives {
+    /// Those of the fitted parameters, as a fit that begins at the full parameter vector `x` takes
+    /// them.
+    pub fn known(&self, at: (&[Parameter], &DVector<f64>), unknowns: &[usize]) -> KnownDerivatives {
+        KnownDerivatives::new(
+            at,
+            unknowns,
+            self.sigma.clone(),
+            (Arc::clone(&self.fitted), Arc::clone(&self.residual)),
+        )
+    }
+
+    fn column(&self, place: usize) -> DVectorView<'_, f64> {
+        match place.checked_sub(self.fitted.ncols()) {
+            Some(other) => self.others[other].as_view(),
+            None => self.fitted.column(place),
+        }
+    }
+
+    /// Further columns of places.
+    fn extend(&mut self, slots: &[(ParameterSite, f64)], columns: DMatrixView<f64>) {
+        let first = self.fitted.ncols() + self.others.len();
+        self.places.extend(slots.iter().enumerate().map(|(k, &(site, _))| (site, first + k)));
+        self.others.extend(columns.column_iter().map(|column| Arc::new(column.into_owned())));
+    }
+}
+
+impl<'a> Linearised<'a> {
+    /// About the full parameter vector `x` of `model`, with the parameters `unknowns` fitted, for
+    /// the effects and other places given; of many unknowns from what is `known` of the same in the
+    /// same poses.
+    pub fn new(
+        (problem, known): (&'a Problem, Option<Arc<Derivatives>>),
+        model: &Model,
+        poses: impl Into<Arc<Vec<Pose<'a>>>>,
+        unknowns: &[usize],
+        x: &DVector<f64>,
+        (effects, places): (&[Effect], &[ParameterSite]),
+    ) -> Self {
+        let poses = poses.into();
+        let mut slots: Vec<(ParameterSite, f64)> = places.iter().map(|&site| (site, 0.0)).collect();
+        for Term { site, nominal, .. } in effects.iter().flat_map(|effect| effect.terms(problem)) {
+            if !slots.iter().any(|(known, _)| *known == site) {
+                slots.push((site, nominal));
+            }
+        }
+        // Bending stiffnesses about y and z that the problem holds equal may differ: that they do
+        // is no effect of another kind.
+        let shared = |&k: &usize| match model.parameters[k].site {
+            ParameterSite::Beam { joint, field: BeamField::Bending } => {
+                let site = ParameterSite::Beam { joint, field: BeamField::Anisotropy };
+                Some((site, model.parameters[k].sigma))
+            }
+            _ => None,
+        };
+        let (shared, relaxed): (Vec<(ParameterSite, f64)>, Vec<Option<f64>>) =
+            unknowns.iter().filter_map(shared).map(|(site, sigma)| ((site, 0.0), sigma)).unzip();
+        // A parameter that is fitted at a place has its column already.
+        let fitted_at = |&(site, _): &(ParameterSite, f64)| {
+            let is_it = |&k: &usize| {
+                model.parameters[k].site == site && model.parameters[k].regressor.is_constant()
+            };
+            unknowns.iter().position(is_it).map(|column| (site, column))
+        };
+        let at_fitted: Vec<(ParameterSite, usize)> = slots.iter().filter_map(fitted_at).collect();
+        slots.retain(|place| fitted_at(place).is_none());
+        let first = model.parameters.len();
+        // Columns of parameters and of slots, and the residual.
+        let pass = |own: &[usize], slots: &[(ParameterSite, f64)]| {
+            let probing = model.placing(effects).probing(slots);
+            let mut at = x.clone().resize_vertically(first + slots.len(), 0.0);
+            for (index, (site, _)) in slots.iter().enumerate() {
+                if matches!(site, ParameterSite::Beam { field: BeamField::AddedMass, .. }) {
+                    at[first + index] = TRACE_OF_MASS;
+                }
+            }
+            let all: Vec<usize> = own.iter().copied().chain(first..first + slots.len()).collect();
+            let residuals = PoseResiduals::new(&probing, Arc::clone(&poses), all, at.clone());
+            jacobian_and_residual(&residuals, &residuals.reduced(&at))
+        };
+        let new = |fitted: DMatrix<f64>, residual| Derivatives {
+            fitted: Arc::new(fitted),
+            residual: Arc::new(residual),
+            sigma: poses.iter().map(|pose| pose.sigma).collect(),
+            relaxed: relaxed.clone(),
+            places: shared
+                .iter()
+                .enumerate()
+                .map(|(k, &(site, _))| (site, unknowns.len() + k))
+                .collect(),
+            others: Vec::new(),
+        };
+        let mut derivatives = if unknowns.len() < MANY_UNKNOWNS {
+            let all = [shared.as_slice(), &slots].concat();
+            let (jacobian, _) = pass(unknowns, &all);
+            let plain = PoseResiduals::new(model, Arc::clone(&poses), Vec::new(), x.clone());
+            let (_, residual) = jacobian_and_residual(&plain, &DVector::zeros(0));
+            let fitted = unknowns.len() + shared.len();
+            let beside = jacobian.columns_range(fitted..).into_owned();
+            let mut own = new(jacobian.resize_horizontally(fitted, 0.0), residual);
+            own.extend(&slots, beside.as_view());
+            own
+        } else {
+            let mut own = known.map_or_else(
+                || {
+                    let (fitted, residual) = pass(unknowns, &shared);
+                    new(fitted, residual)
+                },
+                Arc::unwrap_or_clone,
+            );
+            slots.retain(|(site, _)| !own.places.iter().any(|(known, _)| known == site));
+            if !slots.is_empty() {
+                own.extend(&slots, pass(&[], &slots).0.as_view());
+            }
+            own
+        };
+        for place in at_fitted {
+            if !derivatives.places.contains(&place) {
+                derivatives.places.push(place);
+            }
+        }
+        Self { problem, poses, derivatives: Arc::new(derivatives) }
+    }
+
+    /// What it comes to, to be known where the same is asked for again.
+    pub fn derivatives(&self) -> Arc<Derivatives> {
+        Arc::clone(&self.derivatives)
+    }
+
+    /// The same with poses that say nothing.
+    pub fn without(&self, poses: &[usize]) -> Self {
+        let mut rest = self.clone();
+        if poses.is_empty() {
+            return rest;
+        }
+        let Derivatives { fitted, residual, others, .. } = Arc::make_mut(&mut rest.derivatives);
+        for &pose in poses {
+            Arc::make_mut(fitted).rows_mut(3 * pose, 3).fill(0.0);
+            for column in others.iter_mut().chain([&mut *residual]) {
+                Arc::make_mut(column).rows_mut(3 * pose, 3).fill(0.0);
+            }
+        }
+        rest
+    }
+
+    /// Columns of the fitted parameters and of what is relaxed beside them, shape = (3 N, n).
+    pub fn fitted(&self) -> &DMatrix<f64> {
+        &self.derivatives.fitted
+    }
+
+    /// The same and the whitened residual; copies only where others know them.
+    pub fn into_fitted(self) -> (DMatrix<f64>, DVector<f64>) {
+        let Derivatives { fitted, residual, .. } = Arc::unwrap_or_clone(self.derivatives);
+        (Arc::unwrap_or_clone(fitted), Arc::unwrap_or_clone(residual))
+    }
+
+    /// σ of the priors of what is relaxed, in the order of its columns.
+    pub fn relaxed(&self) -> &[Option<f64>] {
+        &self.derivatives.relaxed
+    }
+
+    /// Columns of other parameters of the model, about its full parameter vector `x`, shape = (3 N,
+    /// parameters).
+    pub fn of_parameters(
+        &self,
+        model: &Model,
+        parameters: &[usize],
+        x: &DVector<f64>,
+    ) -> DMatrix<f64> {
+        let residuals =
+            PoseResiduals::new(model, Arc::clone(&self.poses), parameters.to_vec(), x.clone());
+        jacobian_and_residual(&residuals, &residuals.reduced(x)).0
+    }
+
+    /// Whitened residual, 3 N.
+    pub fn residual(&self) -> &DVector<f64> {
+        &self.derivatives.residual
+    }
+
+    /// Rows that are 0 because their poses measure fewer numbers than three.
+    pub fn empty(&self) -> usize {
+        self.poses.iter().map(|pose| 3 - pose.observation.coordinates()).sum()
+    }
+
+    /// The poses.
+    pub fn poses(&self) -> &[Pose<'a>] {
+        &self.poses
+    }
+
+    /// Columns of an effect's parameters, shape = (3 N, k).
+    pub fn columns(&self, effect: &Effect) -> DMatrix<f64> {
+        self.columns_of(&Driven::of(self, std::slice::from_ref(effect)), 0)
+    }
+
+    /// The same of one of some effects.
+    pub fn columns_of(&self, driven: &Driven, effect: usize) -> DMatrix<f64> {
+        let terms = driven.terms.get(effect).map_or(&[][..], Vec::as_slice);
+        let mut columns = DMatrix::zeros(self.derivatives.fitted.nrows(), terms.len());
+        for (&(place, regressor), mut out) in terms.iter().zip(columns.column_iter_mut()) {
+            let Some(place) = place else { continue };
+            let (at_place, values) = (self.derivatives.column(place), &driven.values[regressor]);
+            for (row, (out, derivative)) in out.iter_mut().zip(at_place.iter()).enumerate() {
+                *out = derivative * values[row / 3];
+            }
+        }
+        columns
+    }
+
+    /// Cᵀ D of the columns C of each of some effects, shape = (3 N, k), and directions D, shape =
+    /// (3 N, m): summed over the rows of a pose first, for all effects at a place.
+    pub fn along(&self, driven: &Driven, directions: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
+        let (poses, width) = (self.poses.len(), directions.ncols());
+        let of_place = |place: &usize| {
+            let at_place = self.derivatives.column(*place);
+            let sum = |pose: usize, k: usize| {
+                at_place.fixed_rows::<3>(3 * pose).dot(&directions.fixed_view::<3, 1>(3 * pose, k))
+            };
+            DMatrix::from_fn(poses, width, sum)
+        };
+        let places: Vec<usize> = self.derivatives.places.iter().map(|(_, place)| *place).collect();
+        let sums: Vec<DMatrix<f64>> = places.par_iter().map(of_place).collect();
+        let of_effect = |terms: &Vec<(Option<usize>, usize)>| {
+            let mut along = DMatrix::zeros(terms.len(), width);
+            for (&(place, regressor), mut row) in terms.iter().zip(along.row_iter_mut()) {
+                let Some(known) =
+                    place.and_then(|place| places.iter().position(|own| *own == place))
+                else {
+                    continue;
+                };
+                let values = &driven.values[regressor];
+                debug_assert_eq!(values.len(), poses);
+                row.iter_mut()
+                    .zip(sums[known].column_iter())
+                    .for_each(|(out, own)| *out = dot(own.as_slice(), values));
+            }
+            along
+        };
+        driven.terms.par_iter().map(of_effect).collect()
+    }
+
+    /// The problem that it is of.
+    pub fn problem(&self) -> &'a Problem {
+        self.problem
+    }
+
+    /// For each of an effect's parameters, whether it is never negative.
+    pub fn never_negative(&self, effect: &Effect) -> Vec<bool> {
+        effect.terms(self.problem).iter().map(|term| term.never_negative).collect()
+    }
+
+    /// Column of a place, 3 N; `None` where no effect enters there.
+    pub fn place(&self, site: ParameterSite) -> Option<DVector<f64>> {
+        let &(_, place) = self.derivatives.places.iter().find(|(known, _)| *known == site)?;
+        Some(self.derivatives.column(place).into_owned())
+    }
+}
+
+/// Effects by where they enter and what they are multiplied by there in every pose, each regressor
+/// evaluated once.
+pub(crate) struct Driven {
+    /// For each effect and each of its terms the column of the place, if it has one, and the number
+    /// of the regressor.
+    terms: Vec<Vec<(Option<usize>, usize)>>,
+    /// Values of each regressor in every pose.
+    values: Vec<Vec<f64>>,
+}
+
+impl Driven {
+    /// In the poses and at the places of a linearised model.
+    pub fn of(linearised: &Linearised, effects: &[Effect]) -> Self {
+        let mut regressors: Vec<Regressor> = Vec::new();
+        let mut term = |Term { site, regressor, .. }: Term| {
+            let place = linearised
+                .derivatives
+                .places
+                .iter()
+                .find(|(known, _)| *known == site)
+                .map(|(_, place)| *place);
+            let number =
+                regressors.iter().position(|known| *known == regressor).unwrap_or(regressors.len());
+            if number == regressors.len() {
+                regressors.push(regressor);
+            }
+            (place, number)
+        };
+        let terms = effects
+            .iter()
+            .map(|effect| effect.terms(linearised.problem).into_iter().map(&mut term).collect());
+        let terms = terms.collect();
+        let value = |regressor: &Regressor| {
+            regressor.values(linearised.poses.iter().map(|pose| &pose.setup))
+        };
+        Self { terms, values: regressors.par_iter().map(value).collect() }
+    }
+}

@@ -1,0 +1,23 @@
+//! The linear neighbourhood of a fit, in which candidates are judged without being fitted.
+//!
+//! - [`Linearised`]: the model with a column for every place where an effect may enter;
+//!   [`LinearNeighbourhood`]: a fit in it.
+//! - [`Estimated`]: a fit without its columns, which unknowns may leave.
+//! - [`Score`], [`Sums`], [`Gain`]: what columns would take off the residual, and how probable that
+//!   is by chance.
+//! - [`Scan`]: all candidates against one fit.
+
+mod estimated;
+mod left_out;
+mod linear;
+mod linearised;
+mod orthonormal;
+mod scan;
+mod score;
+
+pub(super) use left_out::PartSquares;
+pub(super) use linear::LEAST_DECIDED;
+pub(crate) use linear::{LinearNeighbourhood, Unknowns};
+pub(super) use linearised::Derivatives;
+pub(crate) use linearised::Linearised;
+pub(crate) use scan::{Scan, Tried, tries};

@@ -1,0 +1,174 @@
+//! Orthonormal bases of columns, and the one rule that says how many directions they have.
+
+use std::borrow::Cow;
+
+use nalgebra::DMatrix;
+
+use crate::numeric::{
+    gram, inverse_factor, inverse_lower, multiply_by_upper, product_with_upper,
+    product_with_upper_above,
+};
+
+/// A column is a direction of its own where those before it leave more than this part of its
+/// length.
+///
+/// Products of columns are exact to some 1e-15 of their lengths, so that what is left of a length²
+/// is known to some 1e-14: below 1e-12, (this part)², it is rounding.
+pub(crate) const RANK: f64 = 1e-6;
+
+/// Q = A W with QᵀQ = I for the columns A, and W, shape = (columns, rank): columns that are not
+/// finite, or that those before them take up, have no part in it. `lengths` are those that a column
+/// had before others were projected out.
+///
+/// By Cholesky factors of the Gram matrix, twice [Yamamoto et al. 2015], of the columns that are
+/// directions of their own.
+pub(super) fn orthonormal(
+    columns: &DMatrix<f64>,
+    lengths: Option<&[f64]>,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    orthonormal_above(Cow::Borrowed(columns), &[], lengths)
+}
+
+/// The same of columns with rows `below` them of one entry each, its column and its value; in the
+/// place of columns that nobody else needs.
+pub(super) fn orthonormal_above(
+    columns: Cow<DMatrix<f64>>,
+    below: &[(usize, f64)],
+    lengths: Option<&[f64]>,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (rows, n) = columns.shape();
+    let mut products = gram(&columns);
+    for &(j, value) in below {
+        products[(j, j)] += value * value;
+    }
+    let own: Vec<f64> = products.diagonal().iter().map(|square| square.sqrt()).collect();
+    let (kept, first) = independent(&products, &own, lengths.unwrap_or(&own));
+    // L⁻ᵀ takes columns with the Gram matrix L Lᵀ to orthonormal ones.
+    let mut turn = inverse_lower(&first).transpose();
+    turn.row_iter_mut().zip(&kept).for_each(|(mut row, &j)| row.unscale_mut(own[j]));
+    let own = if kept.len() == n { columns } else { Cow::Owned(columns.select_columns(&kept)) };
+    let mut basis = match own {
+        Cow::Borrowed(own) => product_with_upper_above(own, &turn, below.len()),
+        Cow::Owned(mut own) => {
+            multiply_by_upper(&mut own, &turn);
+            own.resize_vertically(rows + below.len(), 0.0)
+        }
+    };
+    for (row, (j, value)) in below.iter().enumerate() {
+        if let Ok(k) = kept.binary_search(j) {
+            basis.row_mut(rows + row).copy_from(&(turn.row(k) * *value));
+        }
+    }
+    // Once more, for what rounding left.
+    let again = inverse_factor(&gram(&basis)).map(|inverse| inverse.transpose());
+    let Some(again) = again else {
+        return (DMatrix::zeros(basis.nrows(), 0), DMatrix::zeros(n, 0));
+    };
+    multiply_by_upper(&mut basis, &again);
+    let turn = product_with_upper(&turn, &again);
+    let mut within = DMatrix::zeros(n, kept.len());
+    kept.iter().zip(turn.row_iter()).for_each(|(&j, row)| within.set_row(j, &row));
+    (basis, within)
+}
+
+/// Columns that are directions of their own, of those with the Gram matrix given, and the Cholesky
+/// factor of theirs, scaled to length one.
+fn independent(gram: &DMatrix<f64>, own: &[f64], lengths: &[f64]) -> (Vec<usize>, DMatrix<f64>) {
+    let mut kept: Vec<usize> = Vec::new();
+    let mut factor: Vec<Vec<f64>> = Vec::new();
+    for j in (0..gram.ncols()).filter(|&j| own[j] > RANK * lengths[j] && own[j].is_finite()) {
+        let mut row: Vec<f64> = Vec::with_capacity(kept.len() + 1);
+        for (&k, known) in kept.iter().zip(&factor) {
+            let along: f64 = known.iter().zip(&row).map(|(a, b)| a * b).sum();
+            let value = (gram[(k, j)] / (own[k] * own[j]) - along) / known[row.len()];
+            row.push(value);
+        }
+        let left = 1.0 - row.iter().map(|value| value * value).sum::<f64>();
+        if left.max(0.0).sqrt() * own[j] > RANK * lengths[j] {
+            row.push(left.sqrt());
+            factor.push(row);
+            kept.push(j);
+        }
+    }
+    let lower =
+        DMatrix::from_fn(kept.len(), kept.len(), |i, j| if j <= i { factor[i][j] } else { 0.0 });
+    (kept, lower)
+}
+
+/// Z with A D⁻¹ Z = 0 and ZᵀZ = I for the rows A of active constraints, shape = (constraints, n),
+/// and the scale D of the unknowns; `None` where nothing holds them.
+pub(super) fn open(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>> {
+    let mut rows =
+        DMatrix::from_fn(active.nrows(), active.ncols(), |i, j| active[(i, j)] / scale[j]);
+    if rows.iter().all(|coefficient| *coefficient == 0.0) {
+        return None;
+    }
+    for mut row in rows.row_iter_mut() {
+        let length = row.norm();
+        if length > 0.0 {
+            row /= length;
+        }
+    }
+    let eigen = (rows.transpose() * &rows).symmetric_eigen();
+    let left: Vec<usize> =
+        (0..active.ncols()).filter(|&k| eigen.eigenvalues[k] < RANK * RANK).collect();
+    Some(eigen.eigenvectors.select_columns(&left))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_open_keeps_every_constraint() {
+        // The third row follows from the others, the last says nothing.
+        let active = DMatrix::from_row_slice(
+            4,
+            4,
+            &[1., -1., 0., 0., 0., 0., 2., 0., 1., -1., 2., 0., 0., 0., 0., 0.],
+        );
+        let scale = [10.0, 1.0, 1e-3, 5.0];
+        let left = open(&active, &scale).unwrap_or_default();
+        assert_eq!(left.shape(), (4, 2));
+        assert!((left.transpose() * &left - DMatrix::identity(2, 2)).amax() < 1e-14);
+        let moved = DMatrix::from_fn(4, 2, |j, k| left[(j, k)] / scale[j]);
+        assert!((active * moved).amax() < 1e-12);
+        assert_eq!(open(&DMatrix::zeros(1, 3), &[1.0; 3]), None);
+    }
+
+    #[test]
+    fn columns_that_nearly_depend_on_others_keep_a_basis() {
+        let columns =
+            DMatrix::from_fn(300, 60, |i, j| ((1.0 + 0.02 * j as f64) * i as f64 / 300.0).sin());
+        let (basis, within) = orthonormal(&columns, None);
+        assert!(basis.ncols() > 3 && within.ncols() == basis.ncols(), "{}", basis.ncols());
+        assert!(
+            (basis.transpose() * &basis - DMatrix::identity(basis.ncols(), basis.ncols())).amax()
+                < 1e-10
+        );
+    }
+
+    #[test]
+    fn rows_below_are_rows_of_the_columns() {
+        let mut columns =
+            DMatrix::from_fn(200, 40, |i, j| ((1.0 + 0.3 * j as f64) * i as f64 / 20.0).sin());
+        // A column that the first two take up, one of zeros with a row of its own, and one that is
+        // no number.
+        let sum = columns.column(0) + columns.column(1);
+        columns.set_column(7, &sum);
+        columns.column_mut(9).fill(0.0);
+        columns.column_mut(11)[3] = f64::NAN;
+        let below = [(9, 2.0), (3, 5.0), (11, 1.0)];
+        let mut stacked = columns.clone().resize_vertically(203, 0.0);
+        below.iter().enumerate().for_each(|(row, &(j, value))| stacked[(200 + row, j)] = value);
+        let ((basis, within), (expected, turn)) =
+            (orthonormal_above(Cow::Borrowed(&columns), &below, None), orthonormal(&stacked, None));
+        let (same, _) = orthonormal_above(Cow::Owned(columns), &below, None);
+        assert!((same - &basis).amax() < 1e-13);
+        assert_eq!((basis.shape(), within.shape()), ((203, 38), (40, 38)));
+        assert!(
+            (&basis - expected).amax() < 1e-10 && (&within - turn).amax() < 1e-10 * within.amax()
+        );
+        assert!((basis.transpose() * &basis - DMatrix::identity(38, 38)).amax() < 1e-13);
+    }
+}

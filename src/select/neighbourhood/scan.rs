@@ -1,0 +1,185 @@
+//! Every candidate tried against what a fit leaves.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::linear::{LinearNeighbourhood, Share};
+use super::linearised::{Driven, Linearised};
+use super::score::{Gain, Score, Sums};
+use crate::problem::{Effect, Problem};
+use crate::select::rules::SelectionRules;
+
+/// The candidates with what the residual says about each.
+pub(crate) struct Scan<'a, 'l> {
+    linearised: &'l Linearised<'a>,
+    pub linear: Arc<LinearNeighbourhood>,
+    /// The candidates tried.
+    pub effects: Vec<Effect>,
+    driven: Driven,
+    /// Those that cannot be tried: a derivative of theirs is not a finite number.
+    pub refused: Vec<Effect>,
+    scores: Vec<Score>,
+    /// How often chance has a try at each candidate within its family.
+    tries: Vec<f64>,
+    /// Families that are tried.
+    families: usize,
+    /// For each candidate's parameters, whether they are never negative.
+    never_negative: Vec<Vec<bool>>,
+    pub rules: &'l SelectionRules,
+}
+
+/// Candidates that are projected together.
+const TOGETHER: usize = 48;
+
+/// A candidate with its gain.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Tried {
+    /// Index in the scan's list.
+    pub index: usize,
+    pub gain: Gain,
+    /// The information criterion with 2 ln(tries) for the search; negative is better than nothing.
+    pub criterion: f64,
+    /// p times the tries in its family and the number of families: Holm's first step with a weight
+    /// for each candidate.
+    pub corrected: f64,
+}
+
+impl<'a, 'l> Scan<'a, 'l> {
+    /// Tries `effects` against the fit that `linear` describes.
+    pub fn new(
+        linearised: &'l Linearised<'a>,
+        linear: Arc<LinearNeighbourhood>,
+        effects: Vec<Effect>,
+        rules: &'l SelectionRules,
+    ) -> Self {
+        let driven = Driven::of(linearised, &effects);
+        let numbers: Vec<usize> = (0..effects.len()).collect();
+        let scored = |numbers: &[usize]| -> Vec<Option<Score>> {
+            let columns: Vec<DMatrix<f64>> =
+                numbers.iter().map(|&number| linearised.columns_of(&driven, number)).collect();
+            let is_finite: Vec<bool> =
+                columns.iter().map(|all| all.iter().all(|value| value.is_finite())).collect();
+            let finite: Vec<DMatrix<f64>> = columns
+                .into_iter()
+                .zip(&is_finite)
+                .filter_map(|(all, fine)| fine.then_some(all))
+                .collect();
+            let mut scores = linear.scores(&finite).into_iter();
+            is_finite.into_iter().map(|fine| if fine { scores.next() } else { None }).collect()
+        };
+        let all: Vec<Option<Score>> = numbers.par_chunks(TOGETHER).flat_map_iter(scored).collect();
+        let mut refused = Vec::new();
+        let (mut known, mut scores) = (Vec::new(), Vec::new());
+        for (effect, score) in effects.into_iter().zip(all) {
+            match score {
+                Some(score) => {
+                    known.push(effect);
+                    scores.push(score);
+                }
+                None => refused.push(effect),
+            }
+        }
+        let driven = if refused.is_empty() { driven } else { Driven::of(linearised, &known) };
+        let (tries, families) = tries(&known, linearised.problem());
+        let never_negative = known.iter().map(|effect| linearised.never_negative(effect)).collect();
+        Self {
+            linearised,
+            linear,
+            effects: known,
+            driven,
+            refused,
+            scores,
+            tries,
+            families,
+            never_negative,
+            rules,
+        }
+    }
+
+    /// Candidates that the fit does not absorb and that are possible, best first.
+    pub fn ranking(&self) -> Vec<Tried> {
+        self.ranked(&self.scores, self.linear.sums())
+    }
+
+    /// The ranking that there would be without some unknowns of the fit.
+    pub fn ranking_without(&self, share: &Share) -> Vec<Tried> {
+        let data = share.directions.rows(0, self.linear.rows()).into_owned();
+        let along = self.linearised.along(&self.driven, &data);
+        let without = |(along, score): (&DMatrix<f64>, &Score)| score.give_back(along, &share.part);
+        let scores: Vec<Score> = along.par_iter().zip(&self.scores).map(without).collect();
+        self.ranked(&scores, self.linear.sums_without(share))
+    }
+
+    fn ranked(&self, scores: &[Score], sums: Sums) -> Vec<Tried> {
+        let tried = |(index, score): (usize, &Score)| {
+            let gain =
+                sums.gain(score, self.rules).filter(|_| self.is_possible(index, score, sums))?;
+            let tries = self.tries[index] * self.families as f64;
+            let (criterion, corrected) =
+                (gain.criterion + 2.0 * tries.ln(), (gain.p * tries).min(1.0));
+            Some(Tried { index, gain, criterion, corrected })
+        };
+        let mut all: Vec<Tried> = scores.iter().enumerate().filter_map(tried).collect();
+        all.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+        all
+    }
+
+    /// Whether a candidate is no negative compliance or mass, beyond doubt.
+    fn is_possible(&self, index: usize, score: &Score, sums: Sums) -> bool {
+        let never_negative = &self.never_negative[index];
+        if !never_negative.contains(&true) {
+            return true;
+        }
+        let scatter = (sums.squares / sums.freedom()).sqrt();
+        let fine = |((value, error), never): ((f64, f64), &bool)| {
+            !never || value > -self.rules.impossible * error * scatter
+        };
+        score.estimates(self.rules).into_iter().zip(never_negative).all(fine)
+    }
+
+    /// Candidates that the fit absorbs, so that nothing is left to show them.
+    pub fn absorbed(&self) -> Vec<&Effect> {
+        let gone = |(effect, score): (_, &Score)| (score.rank(self.rules) == 0).then_some(effect);
+        self.effects.iter().zip(&self.scores).filter_map(gone).collect()
+    }
+
+    /// Takes a candidate into the fit, in the linear neighbourhood.
+    pub fn take(&mut self, index: usize) {
+        let columns = self.columns(index);
+        let before = self.linear.residual().clone();
+        let added = Arc::make_mut(&mut self.linear).add(&columns);
+        let data = added.rows(0, self.linear.rows()).into_owned();
+        let given = added.tr_mul(&before);
+        let along = self.linearised.along(&self.driven, &data);
+        along
+            .par_iter()
+            .zip(&mut self.scores)
+            .for_each(|(along, score)| score.take_off(along, &given));
+    }
+
+    /// Columns of a candidate, shape = (3 N, k).
+    pub fn columns(&self, index: usize) -> DMatrix<f64> {
+        self.linearised.columns_of(&self.driven, index)
+    }
+
+    /// Largest principal angle \[rad\] between what two candidates add to the fit; none where one
+    /// of them adds nothing.
+    pub fn angle(&self, one: usize, other: usize) -> Option<f64> {
+        self.linear.angle(&self.columns(one), &self.columns(other))
+    }
+}
+
+/// For each candidate how often chance has a try at it within its family, and the number of
+/// families.
+pub(crate) fn tries(effects: &[Effect], problem: &Problem) -> (Vec<f64>, usize) {
+    let mut families: BTreeMap<&str, Vec<&Effect>> = BTreeMap::new();
+    for effect in effects {
+        families.entry(effect.name()).or_default().push(effect);
+    }
+    let tries =
+        effects.iter().map(|effect| effect.tries(&families[effect.name()], problem)).collect();
+    (tries, families.len())
+}

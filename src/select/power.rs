@@ -1,0 +1,123 @@
+//! How large an effect must be for a scan to find it.
+
+use statrs::function::beta::beta_reg;
+
+use super::rules::SelectionRules;
+use crate::numeric::bisected;
+
+/// Halvings of the interval in which a noncentrality is sought.
+const HALVINGS: usize = 24;
+/// Standard deviations of a Poisson distribution beyond which nothing of it counts.
+const FAR: f64 = 9.0;
+/// Largest noncentrality that is looked at: that of an effect some 30 times its error.
+const MOST: f64 = 1024.0;
+
+/// The test that a scan makes of one candidate: part = squares gained / all squares, Beta(k/2, (ν −
+/// k)/2) where there is none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ScanTest {
+    /// k / 2: half of the new directions.
+    new: f64,
+    /// (ν − k) / 2.
+    left: f64,
+    /// Part that the candidate must gain.
+    threshold: f64,
+}
+
+impl ScanTest {
+    /// Of a candidate with `k` new directions, ν = `freedom`, and so many `tries`; `None` where
+    /// nothing would be left to judge by.
+    ///
+    /// The part must be beyond chance at level / tries, and better than nothing by the information
+    /// criterion ν ln(1 − part) + k ln ν + 2 ln(tries).
+    pub fn new(k: usize, freedom: f64, tries: f64) -> Option<Self> {
+        let (new, left) = (k as f64 / 2.0, (freedom - k as f64) / 2.0);
+        if k == 0 || left < 0.5 {
+            return None;
+        }
+        let level = SelectionRules::DEFAULT.level / tries;
+        let chance = halved(|part| beta_reg(left, new, 1.0 - part) > level, (0.0, 1.0));
+        let better = -(-(k as f64 * freedom.ln() + 2.0 * tries.ln()) / freedom).exp_m1();
+        Some(Self { new, left, threshold: chance.max(better) })
+    }
+
+    /// Probability that the candidate is found at a noncentrality λ, that of a noncentral F test:
+    /// Σ_j Poisson(j; λ/2) P(Beta(k/2 + j, (ν − k)/2) > threshold)          [Graybill 1961, ch. 4]
+    pub fn power(&self, noncentrality: f64) -> f64 {
+        let mean = 0.5 * noncentrality;
+        let reach = FAR * mean.sqrt() + FAR;
+        let (mut weight, mut j, mut sum) = ((-mean).exp(), 0.0, 0.0);
+        while j <= mean + reach {
+            if j >= mean - reach {
+                sum += weight * beta_reg(self.left, self.new + j, 1.0 - self.threshold);
+            }
+            j += 1.0;
+            weight *= mean / j;
+        }
+        sum
+    }
+
+    /// p of the part that a noncentrality makes the candidate gain on average, for one candidate
+    /// alone.
+    pub fn expected_p(&self, noncentrality: f64) -> f64 {
+        let gained = 2.0 * self.new + noncentrality;
+        beta_reg(self.left, self.new, 2.0 * self.left / (2.0 * self.left + gained))
+    }
+
+    /// The noncentrality at which the candidate is found with probability `power`; `None` where
+    /// hardly anything is left to judge by, so that one beyond [`MOST`] would not do.
+    pub fn noncentrality(&self, power: f64) -> Option<f64> {
+        let mut most = 32.0;
+        while self.power(most) < power {
+            if most >= MOST {
+                return None;
+            }
+            most *= 2.0;
+        }
+        Some(halved(|lambda| self.power(lambda) < power, (0.0, most)))
+    }
+}
+
+/// The middle of the interval in which `is_below` turns false.
+fn halved(is_below: impl Fn(f64) -> bool, range: (f64, f64)) -> f64 {
+    let (low, high) = bisected(is_below, range, HALVINGS);
+    0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// scipy.stats: threshold by `beta.isf(level, k/2, (ν − k)/2)` or the criterion, power by
+    /// `ncf.sf`.
+    #[test]
+    fn power_is_that_of_a_noncentral_f_test() {
+        let cases = [
+            (1, 84.0, 40.0, 20.0, 0.150_030_798, 0.735_368_43),
+            (2, 84.0, 5000.0, 35.0, 0.273_892_819, 0.663_337_55),
+            (3, 600.0, 2000.0, 40.0, 0.055_709_087, 0.708_206_7),
+        ];
+        for (k, freedom, tries, lambda, threshold, power) in cases {
+            let test = ScanTest::new(k, freedom, tries);
+            assert!(test.is_some_and(|test| (test.threshold - threshold).abs() < 1e-6), "{test:?}");
+            assert!(
+                test.is_some_and(|test| (test.power(lambda) - power).abs() < 1e-5),
+                "{test:?} {power}"
+            );
+            let needed = test.and_then(|test| test.noncentrality(0.8)).unwrap_or(0.0);
+            assert!(test.is_some_and(|test| (test.power(needed) - 0.8).abs() < 1e-4), "{needed}");
+        }
+        assert_eq!(ScanTest::new(0, 84.0, 1.0), None);
+    }
+
+    #[test]
+    fn two_degrees_of_freedom_find_nothing_among_many() {
+        let test = ScanTest::new(1, 3.0, 2000.0);
+        assert!(
+            test.is_some_and(|test| test.power(MOST) < 0.1 && test.noncentrality(0.8).is_none()),
+            "{test:?}"
+        );
+        let sure = ScanTest::new(1, 300.0, 2000.0).and_then(|test| test.noncentrality(0.8));
+        assert!(sure.is_some_and(|lambda| lambda < 50.0), "{sure:?}");
+    }
+}

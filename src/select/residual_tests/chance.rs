@@ -1,0 +1,144 @@
+//! What a statistic does by chance alone.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor, Gamma};
+
+use crate::numeric::bisected;
+
+/// Draws that must reach a value for their share to be its probability; else the tail is that of a
+/// gamma distribution.
+const ENOUGH: usize = 10;
+/// Least skewness of the gamma distribution; with less it is normal.
+const LEAST_SKEWNESS: f64 = 0.02;
+/// Values of A² beyond this have the same p-value: the fitted curve of [Stephens 1986] ends.
+const LARGEST: f64 = 150.0;
+
+/// The distribution of a statistic without structure; large values are improbable.
+#[derive(Debug, Clone)]
+pub(super) enum Chance {
+    /// `scale` times a variable with the χ² distribution.
+    ChiSquared { distribution: ChiSquared, scale: f64 },
+    /// The largest of `of` variables with the F distribution, by Bonferroni's inequality.
+    Fisher { distribution: FisherSnedecor, of: f64 },
+    /// Anderson and Darling's A² of normal variables with mean and variance estimated.
+    AndersonDarling,
+    /// As often drawn.
+    Drawn(Drawn),
+}
+
+impl Chance {
+    /// Probability of `statistic` or more; 1 where there is none.
+    pub fn p_value(&self, statistic: f64) -> f64 {
+        if statistic.is_nan() {
+            return 1.0;
+        }
+        let p = match self {
+            Self::ChiSquared { distribution, scale } => distribution.sf(statistic / scale),
+            Self::Fisher { distribution, of } => of * distribution.sf(statistic),
+            Self::AndersonDarling => anderson_darling_p(statistic),
+            Self::Drawn(drawn) => drawn.p_value(statistic),
+        };
+        p.clamp(f64::MIN_POSITIVE, 1.0)
+    }
+
+    /// The value that is reached with probability `level`.
+    pub fn upper(&self, level: f64) -> f64 {
+        match self {
+            Self::ChiSquared { distribution, scale } => {
+                scale * distribution.inverse_cdf(1.0 - level)
+            }
+            Self::Fisher { distribution, of } => distribution.inverse_cdf(1.0 - level / of),
+            Self::AndersonDarling => anderson_darling_upper(level),
+            Self::Drawn(drawn) => drawn.upper(level),
+        }
+    }
+
+    /// The value below which a χ² falls with probability `level`; 0 for others, of which only large
+    /// values mean anything.
+    pub fn lower(&self, level: f64) -> f64 {
+        match self {
+            Self::ChiSquared { distribution, scale } => scale * distribution.inverse_cdf(level),
+            Self::Fisher { .. } | Self::AndersonDarling | Self::Drawn(_) => 0.0,
+        }
+    }
+}
+
+/// Values drawn without structure.
+///
+/// The p-value is (1 + number of draws that reach the statistic) / (1 + draws), a valid one for any
+/// number of draws; where fewer than ten do, that of a gamma distribution with the draws' mean,
+/// variance and skewness (Pearson's type III), which reaches far beyond 1 / draws [Winkler et al.
+/// 2016, NeuroImage 141, 502-516].
+#[derive(Debug, Clone)]
+pub(super) struct Drawn {
+    /// Ascending.
+    values: Vec<f64>,
+    /// Of the shape parameter k and scale 1.
+    tail: Gamma,
+    /// The statistic at 0 of that distribution, and its unit.
+    origin: f64,
+    unit: f64,
+}
+
+impl Drawn {
+    /// From draws; `None` where they are all the same.
+    pub fn of(mut values: Vec<f64>) -> Option<Self> {
+        values.sort_by(f64::total_cmp);
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let moment =
+            |power: i32| values.iter().map(|value| (value - mean).powi(power)).sum::<f64>() / n;
+        let spread = moment(2).sqrt();
+        let scatters = spread.is_normal() && spread > 1e-9 * mean.abs();
+        let skewness = (moment(3) / spread.powi(3)).max(LEAST_SKEWNESS);
+        let shape = 4.0 / (skewness * skewness);
+        let unit = spread / shape.sqrt();
+        let tail = Gamma::new(shape, 1.0).ok().filter(|_| scatters)?;
+        Some(Self { values, tail, origin: mean - unit * shape, unit })
+    }
+
+    fn share(&self, reached: usize) -> f64 {
+        (1 + reached) as f64 / (1 + self.values.len()) as f64
+    }
+
+    fn p_value(&self, statistic: f64) -> f64 {
+        let reached = self.values.len() - self.values.partition_point(|&value| value < statistic);
+        if reached >= ENOUGH {
+            self.share(reached)
+        } else {
+            self.tail.sf(((statistic - self.origin) / self.unit).max(0.0)).min(self.share(ENOUGH))
+        }
+    }
+
+    fn upper(&self, level: f64) -> f64 {
+        if level > self.share(ENOUGH) {
+            let reached = level * (1 + self.values.len()) as f64 - 1.0;
+            // The share is one of whole draws.
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "between 0 and the draws"
+            )]
+            let reached = (reached.floor() as usize).clamp(1, self.values.len());
+            self.values[self.values.len() - reached]
+        } else {
+            self.origin + self.unit * self.tail.inverse_cdf(1.0 - level)
+        }
+    }
+}
+
+/// Probability of Anderson and Darling's A² or more [Stephens 1986, table 4.9].
+fn anderson_darling_p(statistic: f64) -> f64 {
+    let a = statistic.clamp(0.0, LARGEST);
+    let curve = |c0: f64, c1: f64, c2: f64| (c0 + c1 * a + c2 * a * a).exp();
+    match a {
+        _ if a < 0.2 => 1.0 - curve(-13.436, 101.14, -223.73),
+        _ if a < 0.34 => 1.0 - curve(-8.318, 42.796, -59.938),
+        _ if a < 0.6 => curve(0.9177, -4.279, -1.38),
+        _ => curve(1.2937, -5.709, 0.0186),
+    }
+}
+
+/// The value that is reached with probability `level`, by bisection.
+fn anderson_darling_upper(level: f64) -> f64 {
+    bisected(|statistic| anderson_darling_p(statistic) > level, (0.0, LARGEST), 60).1
+}

@@ -1,0 +1,61 @@
+//! The verdict of all residual tests together.
+
+use super::chance::Chance;
+use super::outcome::{Findings, Outcome, ResidualTest, Test, Untestable};
+use crate::select::rules::SelectionRules;
+
+/// Probability that noise alone makes any test fail.
+pub(super) const ALPHA: f64 = SelectionRules::DEFAULT.level;
+
+/// A test, and what it found before others are considered.
+pub(super) struct Tried {
+    /// What was tested.
+    pub test: Test,
+    /// What came of it.
+    pub trial: Result<Trial, Untestable>,
+}
+
+/// A statistic and what it does by chance.
+pub(super) struct Trial {
+    /// Its value.
+    pub statistic: f64,
+    /// Its distribution without structure.
+    pub chance: Chance,
+    /// How it is shown to people, an increasing function.
+    pub shown: fn(f64) -> f64,
+}
+
+/// Holm's procedure: the smallest of m p-values fails below α / m, the next below α / (m − 1),
+/// until one does not [Holm 1979].
+pub(super) fn judge(tried: Vec<Tried>, outliers: Vec<usize>) -> Findings {
+    let p_value = |tried: &Tried| {
+        tried.trial.as_ref().ok().map(|trial| trial.chance.p_value(trial.statistic))
+    };
+    let p_values: Vec<Option<f64>> = tried.iter().map(p_value).collect();
+    let mut ranked: Vec<usize> = (0..tried.len()).filter(|&k| p_values[k].is_some()).collect();
+    ranked.sort_by(|&a, &b| {
+        p_values[a].partial_cmp(&p_values[b]).unwrap_or(std::cmp::Ordering::Equal)
+    });
+    let mut levels = vec![ALPHA; tried.len()];
+    let mut failed = vec![false; tried.len()];
+    let mut level = ALPHA;
+    let mut stopped = false;
+    for (rank, &k) in ranked.iter().enumerate() {
+        if !stopped {
+            level = ALPHA / (ranked.len() - rank) as f64;
+            failed[k] = p_values[k].is_some_and(|p| p <= level);
+            stopped = !failed[k];
+        }
+        levels[k] = level;
+    }
+    let judged = |(k, Tried { test, trial }): (usize, Tried)| {
+        let outcome = trial.map(|Trial { statistic, chance, shown }| Outcome {
+            statistic: shown(statistic),
+            bounds: (shown(chance.lower(levels[k])), shown(chance.upper(levels[k]))),
+            p_value: p_values[k].unwrap_or(1.0),
+            failed: failed[k],
+        });
+        ResidualTest { test, outcome, row: None }
+    };
+    Findings { tests: tried.into_iter().enumerate().map(judged).collect(), outliers }
+}

@@ -1,0 +1,269 @@
+//! How much of each pose the fit takes away, and what it would leave without some of its poses.
+
+use std::borrow::Cow;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
+use rayon::prelude::*;
+
+use super::fit_residual::FitResidual;
+use super::outcome::Untestable;
+use crate::numeric::{gram, lower_factor, multiply_by_upper};
+use crate::select::neighbourhood::LEAST_DECIDED;
+
+/// Degrees of freedom below which nothing is tested.
+const LEAST_FREEDOM: f64 = 4.0;
+/// Directions of a pose that keep less than this part of their variance say nothing.
+const LEAST_LEFT: f64 = 1e-4;
+/// Directions that priors decide by less than this part count as decided by the data.
+const LEAST_PRIOR: f64 = 1e-6;
+/// What keeps a root of rounding real.
+const ROUNDING: f64 = 1e-10;
+/// Poses whose rows of Q are turned at a time.
+const TOGETHER: usize = 32;
+/// Directions from which on their eigenvectors take longer than draws in all of them.
+const MANY: usize = 100;
+
+/// The projection I − H with H = Q Qᵀ, and the studentising of each pose.
+#[derive(Debug, Clone)]
+pub(super) struct Leverage<'a> {
+    /// Q, shape = (3 N, p).
+    pub fitted: Cow<'a, DMatrix<f64>>,
+    /// QᵀQ.
+    gram: DMatrix<f64>,
+    /// Degrees of freedom ν = tr(I − H).
+    pub freedom: f64,
+    /// tr (I − H)², ν without priors.
+    pub squared_freedom: f64,
+    /// (I − H)ᵦᵦ^(−½) of each pose b.
+    pub whiteners: Vec<Matrix3<f64>>,
+    /// How many numbers each pose measures.
+    pub coordinates: Vec<usize>,
+}
+
+impl<'a> Leverage<'a> {
+    /// Of Q, shape = (3 N, p), of poses that measure so many numbers each: the rows behind these
+    /// are 0.
+    ///
+    /// # Errors
+    /// The fit leaves too few degrees of freedom.
+    pub fn of(fitted: Cow<'a, DMatrix<f64>>, coordinates: Vec<usize>) -> Result<Self, Untestable> {
+        let gram = gram(&fitted);
+        let freedom = coordinates.iter().sum::<usize>() as f64 - gram.trace();
+        if freedom < LEAST_FREEDOM {
+            return Err(Untestable::NoFreedom);
+        }
+        let squared_freedom = freedom - gram.trace() + gram.norm_squared();
+        let whiteners = by_poses(&fitted, |_, rows| {
+            let whitener = |pose| inverse_root(Matrix3::identity() - products(rows, rows, pose));
+            (0..rows.ncols() / 3).map(whitener).collect()
+        });
+        Ok(Self { fitted, gram, freedom, squared_freedom, whiteners, coordinates })
+    }
+
+    /// A root of I − QᵀQ, shape = (p, k): what priors add to the residuals, k directions.
+    pub fn prior_root(&self) -> DMatrix<f64> {
+        let p = self.gram.nrows();
+        let mut left = DMatrix::identity(p, p) - &self.gram;
+        if p < MANY || left.trace() <= LEAST_PRIOR {
+            return root_of_priors(left);
+        }
+        // Any root does; this one has a column for every direction, those that data alone decide
+        // with next to nothing.
+        (0..p).for_each(|k| left[(k, k)] += ROUNDING);
+        lower_factor(left.clone()).unwrap_or_else(|| root_of_priors(left))
+    }
+
+    /// (I − H)ᵦᵦ^(−½) rᵦ of each pose b: residuals with unit covariance, if the noise has it [Cook
+    /// and Weisberg 1982].
+    ///
+    /// Directions of a pose that the fit always meets become zero.
+    pub fn studentise(&self, residual: &[f64]) -> Vec<Vector3<f64>> {
+        let mut poses = residual.as_chunks().0.to_vec();
+        self.studentise_in_place(&mut poses);
+        poses.into_iter().map(Vector3::from).collect()
+    }
+
+    /// The same in the place of the residuals.
+    pub fn studentise_in_place(&self, poses: &mut [[f64; 3]]) {
+        for (own, whitener) in poses.iter_mut().zip(&self.whiteners) {
+            *own = (whitener * Vector3::from(*own)).into();
+        }
+    }
+}
+
+/// What comes of some poses after others, on every core: from the number of the first and their
+/// rows of Q as columns, three a pose.
+fn by_poses<T: Send>(
+    fitted: &DMatrix<f64>,
+    of: impl Fn(usize, &DMatrix<f64>) -> Vec<T> + Sync,
+) -> Vec<T> {
+    let poses = fitted.nrows() / 3;
+    // Evenly: no part is of one pose where others are of many.
+    let together = poses.div_ceil(poses.div_ceil(TOGETHER).max(1)).max(1);
+    let part = |part: usize| {
+        let first = part * together;
+        of(first, &fitted.rows(3 * first, 3 * together.min(poses - first)).transpose())
+    };
+    let parts: Vec<Vec<T>> = (0..poses.div_ceil(together)).into_par_iter().map(part).collect();
+    parts.into_iter().flatten().collect()
+}
+
+/// AᵦᵀBᵦ of the columns of one pose.
+fn products(a: &DMatrix<f64>, b: &DMatrix<f64>, pose: usize) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| a.column(3 * pose + i).dot(&b.column(3 * pose + j)))
+}
+
+/// A root of I − QᵀQ, a column for each direction that priors help to decide.
+fn root_of_priors(left: DMatrix<f64>) -> DMatrix<f64> {
+    let p = left.nrows();
+    if left.trace() <= LEAST_PRIOR {
+        return DMatrix::zeros(p, 0);
+    }
+    let eigen = left.symmetric_eigen();
+    let by_priors: Vec<usize> = (0..p).filter(|&k| eigen.eigenvalues[k] > LEAST_PRIOR).collect();
+    let entry = |i: usize, k: usize| {
+        eigen.eigenvectors[(i, by_priors[k])] * eigen.eigenvalues[by_priors[k]].sqrt()
+    };
+    DMatrix::from_fn(p, by_priors.len(), entry)
+}
+
+/// A^(−½) of a symmetric matrix, zero along directions in which A vanishes.
+fn inverse_root(matrix: Matrix3<f64>) -> Matrix3<f64> {
+    let eigen = matrix.symmetric_eigen();
+    let roots =
+        eigen.eigenvalues.map(|value| if value > LEAST_LEFT { value.sqrt().recip() } else { 0.0 });
+    eigen.eigenvectors * Matrix3::from_diagonal(&roots) * eigen.eigenvectors.transpose()
+}
+
+/// The poses that are kept, and what a (linear) fit to them alone leaves.
+#[derive(Debug, Clone)]
+pub(super) struct Kept<'a> {
+    /// Their numbers, ascending.
+    pub poses: Vec<usize>,
+    /// Their residuals, shape = (3 per pose).
+    pub residual: DVector<f64>,
+    /// Their leverage.
+    pub leverage: Leverage<'a>,
+}
+
+impl<'a> Kept<'a> {
+    /// All poses.
+    pub fn all(fit: &FitResidual, leverage: Leverage<'a>) -> Self {
+        let residual = fit.residual.clone();
+        Self { poses: (0..residual.len() / 3).collect(), residual, leverage }
+    }
+
+    /// All but those `out`; `None` where the others do not decide the fit.
+    ///
+    /// With Q_A and Q_B the rows of the kept and the others, and M = I − Q_BᵀQ_B = L Lᵀ, it leaves
+    /// r_A + Q_A M⁻¹ Q_Bᵀ r_B, and Q_A L⁻ᵀ takes the place of Q [Cook and Weisberg 1982, section
+    /// 3.6].
+    pub fn without(fit: &FitResidual, out: &[bool]) -> Option<Self> {
+        let p = fit.fitted.ncols();
+        let (gone, poses): (Vec<usize>, Vec<usize>) = (0..out.len()).partition(|&pose| out[pose]);
+        let rows_of = |poses: &[usize]| -> Vec<usize> {
+            poses.iter().flat_map(|&b| 3 * b..3 * b + 3).collect()
+        };
+        let coordinates = poses.iter().map(|&pose| fit.coordinates_of(pose)).collect();
+        let (gone, kept) = (rows_of(&gone), rows_of(&poses));
+        let fitted_gone = fit.fitted.select_rows(&gone);
+        let mut fitted = fit.fitted.select_rows(&kept);
+        let decided = Cholesky::new(DMatrix::identity(p, p) - fitted_gone.tr_mul(&fitted_gone))?;
+        if decided.l_dirty().diagonal().iter().any(|&pivot| pivot * pivot < LEAST_DECIDED) {
+            return None;
+        }
+        let pull = decided.solve(&fitted_gone.tr_mul(&fit.residual.select_rows(&gone)));
+        let residual = fit.residual.select_rows(&kept) + &fitted * pull;
+        let inverse = decided.l().solve_lower_triangular(&DMatrix::identity(p, p))?;
+        multiply_by_upper(&mut fitted, &inverse.transpose());
+        Some(Self {
+            poses,
+            residual,
+            leverage: Leverage::of(Cow::Owned(fitted), coordinates).ok()?,
+        })
+    }
+}
+
+/// What a fit without one pose leaves at the others.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Others {
+    /// ‖r‖² of the others.
+    pub squares: f64,
+    /// Its degrees of freedom.
+    pub freedom: f64,
+}
+
+/// Leaves out each pose in turn.
+///
+/// The rows of pose b are Q_b; with D = (I − H_bb)⁻¹, a = D r_b and W = Q_b QᵀQ Q_bᵀ, as in
+/// [`Kept::without`],
+///
+/// ‖r‖² becomes ‖r‖² − |r_b|² + 2 a·(Q_b Qᵀr − H_bb r_b) + a·(W − H_bb²) a,  tr H becomes tr H − tr
+/// H_bb + tr D (W − H_bb²)
+pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Others> {
+    let fitted = leverage.fitted.as_ref();
+    let again = fitted * along(fitted, residual);
+    let total = residual.norm_squared();
+    by_poses(fitted, |first, rows| {
+        let gram_rows = &leverage.gram * rows;
+        let others = |number: usize| {
+            let pose = first + number;
+            let of_pose = |values: &DVector<f64>| values.fixed_rows::<3>(3 * pose).into_owned();
+            let (own, again) = (of_pose(residual), of_pose(&again));
+            let taken = products(rows, rows, number);
+            let more = products(rows, &gram_rows, number) - taken * taken;
+            let inverse = leverage.whiteners[pose] * leverage.whiteners[pose];
+            let pull = inverse * own;
+            let change = 2.0 * pull.dot(&(again - taken * own)) + pull.dot(&(more * pull));
+            Others {
+                squares: total - own.norm_squared() + change,
+                freedom: leverage.freedom - leverage.coordinates[pose] as f64 + taken.trace()
+                    - (inverse * more).trace(),
+            }
+        };
+        (0..rows.ncols() / 3).map(others).collect()
+    })
+}
+
+/// Qᵀr, summed row after row.
+fn along(fitted: &DMatrix<f64>, residual: &DVector<f64>) -> DVector<f64> {
+    let mut sum = DVector::zeros(fitted.ncols());
+    for first in (0..residual.len()).step_by(3 * TOGETHER) {
+        let count = (3 * TOGETHER).min(residual.len() - first);
+        sum.gemv(1.0, &fitted.rows(first, count).transpose(), &residual.rows(first, count), 1.0);
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows of data of an orthonormal factor of 60 poses and p unknowns, with or without a prior on
+    /// each second one.
+    fn leverage(p: usize, has_priors: bool) -> Leverage<'static> {
+        let entry =
+            |i: usize, j: usize| ((12.9898 * i as f64 + 78.233 * j as f64).sin() * 43.7) % 1.0;
+        let prior = |i: usize, j: usize| {
+            if has_priors && i == j && j.is_multiple_of(2) { 3.0 } else { 0.0 }
+        };
+        let stacked =
+            DMatrix::from_fn(
+                180 + p,
+                p,
+                |i, j| if i < 180 { entry(i, j) } else { prior(i - 180, j) },
+            );
+        Leverage::of(Cow::Owned(stacked.qr().q().rows(0, 180).into_owned()), vec![3; 60]).unwrap()
+    }
+
+    #[test]
+    fn what_priors_add_is_a_root_of_what_the_data_leave_open() {
+        for p in [9, 110] {
+            let own = leverage(p, true);
+            let root = own.prior_root();
+            let left = DMatrix::identity(p, p) - &own.gram;
+            assert!(left.trace() > 1.0 && (&root * root.transpose() - left).amax() < 1e-6, "{p}");
+            assert_eq!(leverage(p, false).prior_root().shape(), (p, 0));
+        }
+    }
+}

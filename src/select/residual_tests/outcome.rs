@@ -1,0 +1,301 @@
+//! What the residual tests found.
+
+use std::fmt;
+
+use crate::error::Location;
+use crate::select::covariate::Covariate;
+
+/// An order of the poses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Sequence {
+    /// By time, session by session.
+    Time,
+    /// As the rows stand in the files, session by session.
+    Rows,
+}
+
+/// A test of what a fit leaves.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Test {
+    /// Size against the declared σ; statistic: χ² / ν.
+    ReducedChiSquared,
+    /// Size against the scatter of repeats; statistic: the ratio of both variances, F.
+    LackOfFit,
+    /// Runs of equal sign in some order; statistic: share of steps from pose to pose at which a
+    /// coordinate keeps its sign.
+    Runs {
+        /// The order.
+        sequence: Sequence,
+    },
+    /// Autocorrelation in some order; statistic: Ljung and Box's Q.
+    LjungBox {
+        /// The order.
+        sequence: Sequence,
+    },
+    /// Dependence of the mean residual on a covariate; statistic: a distance correlation, 0…1.
+    Dependence {
+        /// Which.
+        covariate: Covariate,
+    },
+    /// Poses too far off to be noise; statistic: the largest distance in units of the others'
+    /// scatter.
+    Outliers {
+        /// The pose that is farthest off.
+        worst: Option<usize>,
+    },
+    /// Normal distribution; statistic: Anderson and Darling's A².
+    Normality,
+}
+
+/// Why a test says nothing.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Untestable {
+    /// The fit leaves (nearly) no degrees of freedom.
+    #[error("the fit leaves too few degrees of freedom")]
+    NoFreedom,
+    /// Too few poses in any session.
+    #[error("too few poses")]
+    TooFewPoses,
+    /// The covariate has the same value everywhere.
+    #[error("it is the same at every pose")]
+    Constant,
+    /// No σ was declared.
+    #[error("no σ is declared")]
+    NoSigma,
+    /// The residual is below a thousandth of σ.
+    #[error("the residual is below a thousandth of σ: rounding")]
+    Rounding,
+    /// No setup was measured more than once.
+    #[error("no setup was measured twice")]
+    NoRepeats,
+    /// A value is not a finite number.
+    #[error("a value is not a finite number")]
+    NotFinite,
+    /// Residuals, fitted directions, labels or covariates differ in their number of poses.
+    #[error("residuals and labels differ in their number of poses")]
+    SizeMismatch,
+}
+
+/// What a test found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Its value.
+    pub statistic: f64,
+    /// Where chance keeps it, from and to, at the level at which Holm's procedure judges this test.
+    ///
+    /// Above is what fails; below the lower bound (of χ² / ν alone; else 0) σ is overstated.
+    pub bounds: (f64, f64),
+    /// Probability that chance alone gives as much, by itself.
+    pub p_value: f64,
+    /// Whether it failed, all tests together taken into account.
+    pub failed: bool,
+}
+
+/// One test; its `Display` is a sentence for people.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResidualTest {
+    /// What was tested.
+    pub test: Test,
+    /// What came of it, or why nothing did.
+    pub outcome: Result<Outcome, Untestable>,
+    /// Of outliers the row that is farthest off, where that is known.
+    pub row: Option<Location>,
+}
+
+impl ResidualTest {
+    /// Short name of the test.
+    pub fn name(&self) -> &'static str {
+        match self.test {
+            Test::ReducedChiSquared => "reduced-chi-squared",
+            Test::LackOfFit => "lack-of-fit",
+            Test::Runs { .. } => "runs",
+            Test::LjungBox { .. } => "ljung-box",
+            Test::Dependence { .. } => "dependence",
+            Test::Outliers { .. } => "outliers",
+            Test::Normality => "normality",
+        }
+    }
+
+    /// The covariate that the test is about: of a test of order, time or row.
+    pub fn about(&self) -> Option<Covariate> {
+        match &self.test {
+            Test::Dependence { covariate } => Some(covariate.clone()),
+            Test::Runs { sequence } | Test::LjungBox { sequence } => Some(match sequence {
+                Sequence::Time => Covariate::Time,
+                Sequence::Rows => Covariate::Row,
+            }),
+            Test::ReducedChiSquared | Test::LackOfFit | Test::Outliers { .. } | Test::Normality => {
+                None
+            }
+        }
+    }
+
+    /// Whether a failure means structure that an effect could explain.
+    pub fn is_structure(&self) -> bool {
+        !matches!(self.test, Test::Outliers { .. } | Test::Normality)
+    }
+
+    /// Whether it failed.
+    pub fn failed(&self) -> bool {
+        self.outcome.as_ref().is_ok_and(|outcome| outcome.failed)
+    }
+}
+
+/// All tests of what a fit leaves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Findings {
+    /// Every test, testable or not.
+    pub tests: Vec<ResidualTest>,
+    /// Poses that were left out as outliers, counted from 0.
+    pub outliers: Vec<usize>,
+}
+
+impl Findings {
+    /// Whether there is structure left, beyond chance at the family-wise level 0.01.
+    pub fn is_structured(&self) -> bool {
+        self.strongest().is_some()
+    }
+
+    /// The failed test of structure that chance explains least.
+    pub fn strongest(&self) -> Option<&ResidualTest> {
+        let p_value = |test: &ResidualTest| {
+            test.outcome.as_ref().map_or(f64::INFINITY, |outcome| outcome.p_value)
+        };
+        let failed = self.tests.iter().filter(|test| test.is_structure() && test.failed());
+        failed.min_by(|a, b| p_value(a).total_cmp(&p_value(b)))
+    }
+
+    /// The residual in units of the declared σ, where its size alone is beyond chance and no test
+    /// sees structure in it.
+    pub fn size_alone(&self) -> Option<f64> {
+        let mut failed = self.tests.iter().filter(|test| test.is_structure() && test.failed());
+        let (Some(only), None) = (failed.next(), failed.next()) else { return None };
+        match (&only.test, &only.outcome) {
+            (Test::ReducedChiSquared, Ok(outcome)) if outcome.statistic > 1.0 => {
+                Some(outcome.statistic.sqrt())
+            }
+            _ => None,
+        }
+    }
+
+    /// The residual in units of the declared σ, where it is smaller than chance makes one of that
+    /// σ.
+    pub fn overstated_sigma(&self) -> Option<f64> {
+        let size = self.tests.iter().filter(|test| test.test == Test::ReducedChiSquared);
+        let mut sizes = size.filter_map(|test| test.outcome.as_ref().ok());
+        sizes.find(|own| own.statistic < own.bounds.0).map(|own| own.statistic.max(0.0).sqrt())
+    }
+
+    /// Whether anything was tested for structure.
+    pub fn is_testable(&self) -> bool {
+        self.tests.iter().any(|test| test.is_structure() && test.outcome.is_ok())
+    }
+}
+
+impl fmt::Display for ResidualTest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.outcome {
+            Ok(outcome) => tested(self, outcome, f),
+            Err(why) => write!(f, "{} not tested: {why}", untested(&self.test)),
+        }
+    }
+}
+
+fn tested(
+    ResidualTest { test, row, .. }: &ResidualTest,
+    outcome: &Outcome,
+    f: &mut fmt::Formatter<'_>,
+) -> fmt::Result {
+    let Outcome { statistic, bounds: (from, to), failed, .. } = outcome;
+    let chance = format!("chance gives up to {to:.2}");
+    match test {
+        Test::ReducedChiSquared => {
+            let size = match (failed, statistic < from) {
+                (true, _) => "residuals are larger than σ explains",
+                (false, true) => "residuals are smaller than σ, which is overstated",
+                (false, false) => "residuals are as large as σ",
+            };
+            write!(f, "{size} (χ²/ν {statistic:.2}, chance gives {from:.2} to {to:.2})")
+        }
+        Test::LackOfFit => {
+            let size = if *failed { "larger than" } else { "as large as" };
+            write!(
+                f,
+                "residuals are {size} repeats of a setup scatter (F {statistic:.2}, {chance})"
+            )
+        }
+        Test::Runs { sequence } => {
+            let sign =
+                if *failed { "keep their sign" } else { "do not keep their sign beyond chance" };
+            let percent = (100.0 * statistic, 100.0 * to);
+            write!(
+                f,
+                "residuals {sign} {} (at {:.0} % of the steps, chance gives up to {:.0} %)",
+                order(*sequence),
+                percent.0,
+                percent.1
+            )
+        }
+        Test::LjungBox { sequence } => {
+            let follow = if *failed {
+                "follow one another"
+            } else {
+                "do not follow one another beyond chance"
+            };
+            write!(
+                f,
+                "residuals {follow} {} (Ljung–Box {statistic:.1}, chance gives up to {to:.1})",
+                order(*sequence)
+            )
+        }
+        Test::Dependence { covariate } => {
+            let depend = if *failed { "depend" } else { "do not depend beyond chance" };
+            write!(
+                f,
+                "residuals {depend} on {covariate} (distance correlation {statistic:.2}, {chance})"
+            )
+        }
+        Test::Outliers { worst } => {
+            let pose = match (row, worst) {
+                (Some(row), _) => format!("{row} "),
+                (None, Some(pose)) => format!("pose {} ", pose + 1),
+                (None, None) => String::new(),
+            };
+            let far = if *failed {
+                "is too far off to be noise"
+            } else {
+                "is farthest off, not beyond chance"
+            };
+            write!(f, "{pose}{far} ({statistic:.1} times the scatter, chance gives up to {to:.1})")
+        }
+        Test::Normality => {
+            let normal = if *failed { "are not" } else { "may well be" };
+            write!(
+                f,
+                "residuals {normal} normally distributed (Anderson–Darling {statistic:.2}, {chance})"
+            )
+        }
+    }
+}
+
+fn order(sequence: Sequence) -> &'static str {
+    match sequence {
+        Sequence::Time => "in the order of time",
+        Sequence::Rows => "in the order of the rows",
+    }
+}
+
+fn untested(test: &Test) -> String {
+    match test {
+        Test::ReducedChiSquared => "size against σ".to_owned(),
+        Test::LackOfFit => "size against repeats".to_owned(),
+        Test::Runs { sequence } => format!("signs {}", order(*sequence)),
+        Test::LjungBox { sequence } => format!("autocorrelation {}", order(*sequence)),
+        Test::Dependence { covariate } => format!("dependence on {covariate}"),
+        Test::Outliers { .. } => "outliers".to_owned(),
+        Test::Normality => "normal distribution".to_owned(),
+    }
+}

@@ -1,0 +1,121 @@
+//! Residuals as chance would leave them: permuted, and fitted again.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use rand::seq::SliceRandom as _;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF as _, Normal};
+
+use super::chance::{Chance, Drawn};
+use super::leverage::Leverage;
+use super::statistic::{Sample, Statistic};
+use crate::numeric::{take_off_product, transposed_product};
+
+/// Number of draws. Fewer where a product of all of them with Q takes more multiplications than
+/// `WORK`: of a fit of hundreds of parameters to thousands of poses what is less probable than one
+/// in a hundred is then told by the fitted tail, instead of one in two hundred.
+const DRAWS: usize = 1999;
+const FEWEST: usize = 999;
+const WORK: u64 = 1 << 32;
+/// Draws that are fitted together, fewer where they have more than so many numbers: Q is gone
+/// through once for all of them.
+const TOGETHER: usize = 96;
+const FEWEST_TOGETHER: usize = 16;
+const NUMBERS: usize = 1 << 21;
+
+/// What each statistic does by chance; `None` where it cannot vary.
+///
+/// A draw permutes the studentised poses e, takes the fit away again and studentises anew:
+///
+/// r* = ε* − Q (Qᵀε* + S^½ z),  ε* = permuted e,  S = I − QᵀQ                        [Freedman and
+/// Lane 1983]
+///
+/// The last term is what true parameters, scattered about their nominal values as the priors say,
+/// leave of themselves (z standard normal): with it, r* has the covariance I − H of r under priors,
+/// too; without priors S = 0. A permutation needs no distribution of the noise but that it be the
+/// same at every pose, and no σ: without priors the p-values are the same in any unit. All
+/// statistics share the draws; each draw has its own random numbers, whatever the threads.
+pub(super) fn chances(
+    leverage: &Leverage,
+    studentised: &[Vector3<f64>],
+    statistics: &[&Statistic],
+    seed: u64,
+) -> Vec<Option<Chance>> {
+    if statistics.is_empty() {
+        return Vec::new();
+    }
+    let together = (NUMBERS / (3 * studentised.len()).max(1)).clamp(FEWEST_TOGETHER, TOGETHER);
+    let affordable = WORK / (leverage.fitted.len() as u64).max(1);
+    let draws = usize::try_from(affordable).unwrap_or(DRAWS).clamp(FEWEST, DRAWS);
+    let prior = leverage.prior_root();
+    let starts: Vec<usize> = (0..draws).step_by(together).collect();
+    let values = |space: &mut DMatrix<f64>, start: usize| {
+        draw((leverage, &prior), studentised, start..(start + together).min(draws), seed, space);
+        values(leverage, statistics, space)
+    };
+    let drawn: Vec<Vec<Vec<f64>>> = if together > FEWEST_TOGETHER {
+        starts.into_par_iter().map_init(DMatrix::default, values).collect()
+    } else {
+        // Of draws that take much memory all threads work on the same few.
+        let mut space = DMatrix::default();
+        starts.into_iter().map(|start| values(&mut space, start)).collect()
+    };
+    let drawn = drawn.concat();
+    let of =
+        |k: usize| Drawn::of(drawn.iter().map(|values| values[k]).collect()).map(Chance::Drawn);
+    (0..statistics.len()).map(of).collect()
+}
+
+/// Residuals r* of some draws as columns, shape = (3 N, draws), in the place of what `residuals`
+/// held.
+fn draw(
+    (leverage, prior): (&Leverage, &DMatrix<f64>),
+    studentised: &[Vector3<f64>],
+    draws: std::ops::Range<usize>,
+    seed: u64,
+    residuals: &mut DMatrix<f64>,
+) {
+    let (rows, normal) = (3 * studentised.len(), Normal::standard());
+    *residuals = std::mem::take(residuals).resize(rows, draws.len(), 0.0);
+    let permute = |(column, draw): (&mut [f64], usize)| -> DVector<f64> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        random.set_stream(draw as u64);
+        let (poses, _) = column.as_chunks_mut::<3>();
+        // Numbers are smaller than what they stand for.
+        let mut numbers: Vec<u32> = (0..).take(poses.len()).collect();
+        numbers.shuffle(&mut random);
+        poses
+            .iter_mut()
+            .zip(numbers)
+            .for_each(|(pose, number)| *pose = studentised[number as usize].into());
+        let by_prior = |_, _| {
+            let uniform: f64 = random.random();
+            normal.inverse_cdf(uniform.max(f64::EPSILON))
+        };
+        DVector::from_fn(prior.ncols(), by_prior)
+    };
+    let columns = residuals.as_mut_slice().par_chunks_mut(rows.max(1)).zip(draws);
+    let by_priors: Vec<DVector<f64>> = columns.map(permute).collect();
+    let mut taken = transposed_product(&leverage.fitted, residuals.as_view());
+    if prior.ncols() > 0 {
+        taken += prior * DMatrix::from_columns(&by_priors);
+    }
+    take_off_product(residuals.as_view_mut(), &leverage.fitted, &taken);
+}
+
+/// The statistics of each draw, from its residuals, which are studentised in their place.
+fn values(
+    leverage: &Leverage,
+    statistics: &[&Statistic],
+    residuals: &mut DMatrix<f64>,
+) -> Vec<Vec<f64>> {
+    let of_draw = |residual: &mut [f64]| {
+        let (poses, _) = residual.as_chunks_mut();
+        leverage.studentise_in_place(poses);
+        let sample = Sample::of(poses);
+        statistics.iter().map(|statistic| statistic.of(&sample)).collect()
+    };
+    let rows = residuals.nrows().max(1);
+    residuals.as_mut_slice().par_chunks_mut(rows).map(of_draw).collect()
+}

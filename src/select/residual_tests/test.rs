@@ -1,0 +1,102 @@
+//! All residual tests of one fit.
+
+use std::borrow::Cow;
+
+use super::fit_residual::{CovariateValues, FitResidual};
+use super::judgement::{ALPHA, Trial, Tried, judge};
+use super::leverage::{Kept, Leverage};
+use super::outcome::{Findings, Sequence, Test, Untestable};
+use super::outliers;
+use super::permutation;
+use super::size;
+use super::statistic::{Cumulative, Sample, Statistic, sequences};
+
+/// Tests what a fit leaves; `seed` draws the permutations.
+///
+/// The tests come in a fixed order: χ², lack of fit, runs and Ljung–Box in the order of time (and
+/// of the rows, where that is another), each covariate, outliers, normality. Outliers are left out
+/// of all but these last two, with their pull on the fit undone. The judgement is Holm's over all
+/// tests at the family-wise level 0.01; outliers and normality take part in it, but are not
+/// structure, since no effect explains them.
+pub fn test_residual(fit: &FitResidual, seed: u64) -> Findings {
+    let poses = fit.residual.len() / 3;
+    let leverage = match fit
+        .testable()
+        .and_then(|()| {
+            Leverage::of(
+                Cow::Borrowed(fit.fitted),
+                (0..poses).map(|pose| fit.coordinates_of(pose)).collect(),
+            )
+        })
+        .and_then(|all| fit.above_rounding().map(|()| all))
+    {
+        Ok(leverage) => leverage,
+        Err(why) => return judge(all_untestable(fit, &why), Vec::new()),
+    };
+    let studentised = leverage.studentise(fit.residual.as_slice());
+    // At most so many tests: what is left out fails in the judgement, too.
+    let most = fit.covariates.len() + 8;
+    let found = outliers::find(fit, &leverage, ALPHA / most as f64);
+    let kept = found.kept.unwrap_or_else(|| Kept::all(fit, leverage));
+    let mut tried = vec![size::reduced_chi_squared(fit, &kept), size::lack_of_fit(fit, &kept)];
+    tried.extend(permuted(fit, &kept, seed));
+    tried.push(found.tried);
+    tried.push(size::anderson_darling(&studentised));
+    judge(tried, (0..poses).filter(|pose| kept.poses.binary_search(pose).is_err()).collect())
+}
+
+/// The tests of order and dependence.
+fn permuted(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<Tried> {
+    let statistics = statistics(fit, &kept.poses);
+    let working: Vec<&Statistic> =
+        statistics.iter().filter_map(|(_, statistic)| statistic.as_ref().ok()).collect();
+    let studentised = kept.leverage.studentise(kept.residual.as_slice());
+    let mut chances =
+        permutation::chances(&kept.leverage, &studentised, &working, seed).into_iter();
+    let mut own: Vec<[f64; 3]> = studentised.into_iter().map(Into::into).collect();
+    let sample = Sample::of(&mut own);
+    let tried = statistics.iter().map(|(test, statistic)| {
+        let trial = statistic.as_ref().map_err(Clone::clone).and_then(|statistic| {
+            let chance = chances.next().flatten().ok_or(Untestable::NoFreedom)?;
+            let shown =
+                if matches!(test, Test::Dependence { .. }) { f64::sqrt } else { |value| value };
+            Ok(Trial { statistic: statistic.of(&sample), chance, shown })
+        });
+        Tried { test: test.clone(), trial }
+    });
+    tried.collect()
+}
+
+/// The statistics of order and dependence on some of the poses, or why there is none.
+fn statistics(fit: &FitResidual, poses: &[usize]) -> Vec<(Test, Result<Statistic, Untestable>)> {
+    let mut all = Vec::new();
+    for (sequence, order) in sequences(fit, poses) {
+        let order = order.map(std::sync::Arc::new);
+        all.push((Test::Runs { sequence }, order.clone().map(Statistic::Runs)));
+        all.push((Test::LjungBox { sequence }, order.map(Statistic::LjungBox)));
+    }
+    for CovariateValues { covariate, values } in fit.covariates {
+        let statistic = Cumulative::of(values, fit.residual.len() / 3, poses);
+        all.push((
+            Test::Dependence { covariate: covariate.clone() },
+            statistic.map(Statistic::Dependence),
+        ));
+    }
+    all
+}
+
+/// Every test, with the same reason why it is not testable.
+fn all_untestable(fit: &FitResidual, why: &Untestable) -> Vec<Tried> {
+    let sequence = Sequence::Time;
+    let mut tests = vec![
+        Test::ReducedChiSquared,
+        Test::LackOfFit,
+        Test::Runs { sequence },
+        Test::LjungBox { sequence },
+    ];
+    tests.extend(
+        fit.covariates.iter().map(|of| Test::Dependence { covariate: of.covariate.clone() }),
+    );
+    tests.extend([Test::Outliers { worst: None }, Test::Normality]);
+    tests.into_iter().map(|test| Tried { test, trial: Err(why.clone()) }).collect()
+}

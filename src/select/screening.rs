@@ -1,0 +1,211 @@
+//! What the residual of one fit points to.
+
+use super::candidates::{Candidates, NOT_FINITE};
+use super::data::Data;
+use super::evidence::{Evidence, weigh};
+use super::fitted::Fitted;
+use super::neighbourhood::{Scan, Tried};
+use super::residual_tests::{Findings, FitResidual, Test, test_residual};
+use super::rules::SelectionRules;
+use super::telling_pose::{TellingPose, shuffled, telling_pose};
+use crate::fit::{Identification, IdentifyError, Noise, Options};
+use crate::measurement::Dataset;
+use crate::problem::{Effect, Problem};
+
+/// A candidate as the residual sees it.
+#[derive(Debug, Clone)]
+pub struct Ranked {
+    /// Which effect.
+    pub effect: Effect,
+    /// Probability that chance would do as well, corrected for the candidates tried.
+    pub p_value: f64,
+    /// F statistic and its degrees of freedom.
+    pub f: (f64, usize),
+    /// Expected reduction of the root mean squared error on the identification poses \[m\].
+    pub gain: f64,
+    /// The same on identification poses left out in turn \[m\]; `None` where it was not worked out.
+    pub cross_validated: Option<f64>,
+    /// Entries of the ranking that it is hard to tell from, with the largest principal angle
+    /// between them \[rad\].
+    pub alike: Vec<(Effect, f64)>,
+    /// A pose that would tell it from the first of those.
+    pub telling_pose: Option<TellingPose>,
+}
+
+/// What the residual of the declared problem's fit points to.
+#[derive(Debug, Clone)]
+pub struct Trace {
+    /// The fit.
+    pub fit: Identification,
+    /// Tests of its residual.
+    pub findings: Findings,
+    /// Candidates by what they explain, best first; the best of each family at each place.
+    pub ranking: Vec<Ranked>,
+    /// Candidates that were tried, orders and times counted.
+    pub tried: usize,
+    /// Level that a corrected p must be below to stand out.
+    pub level: f64,
+    /// Candidates that these data cannot show, and why.
+    pub untestable: Vec<(Effect, &'static str)>,
+    /// Candidates that the fitted parameters absorb: nothing is left to show them.
+    pub absorbed: Vec<Effect>,
+    /// Explanations weighed against each other, functions of unknown law among them; `None` where
+    /// only the ranking was asked for, or the residual is not finite.
+    pub evidence: Option<Evidence>,
+    /// Whether times were measured; where not, the order of the rows stands for them.
+    pub time_measured: bool,
+}
+
+impl Trace {
+    /// What an effect is in these data, in words.
+    pub fn describe(&self, effect: &Effect) -> String {
+        effect.describe_in(self.time_measured)
+    }
+}
+
+/// Traces the residual of `problem`, from the identification rows alone; changes nothing.
+///
+/// # Errors
+/// Problem, data and options do not fit each other.
+pub fn trace(problem: &Problem, data: &Dataset, options: &Options) -> Result<Trace, IdentifyError> {
+    trace_by(problem, data, options, &SelectionRules::DEFAULT)
+}
+
+/// The same by other rules.
+///
+/// # Errors
+/// Problem, data and options do not fit each other.
+pub fn trace_by(
+    problem: &Problem,
+    data: &Dataset,
+    options: &Options,
+    rules: &SelectionRules,
+) -> Result<Trace, IdentifyError> {
+    rules.check()?;
+    let data = Data::new(data, rules).with_candidates(&options.candidates);
+    // Evidence is of positions: so is the fit.
+    let fitted = Fitted::new(problem.positions_alone(), &data, options)?;
+    Ok(Trace { evidence: weigh(&fitted, &data, &[]), ..trace_fit(&fitted, &data) })
+}
+
+/// Traces the residual of a fit.
+pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
+    let rules = data.rules;
+    let Candidates { testable, mut untestable } = Candidates::of(&fitted.problem, data);
+    let linearised = fitted.linearised(data, &testable);
+    let scan = Scan::new(&linearised, fitted.around(data), testable, rules);
+    untestable.extend(scan.refused.iter().map(|effect| (effect.clone(), NOT_FINITE)));
+    let mut best: Vec<Tried> = Vec::new();
+    for tried in scan.ranking() {
+        let known = |other: &Tried| {
+            scan.effects[other.index].name_and_place() == scan.effects[tried.index].name_and_place()
+        };
+        if !best.iter().any(known) {
+            best.push(tried);
+        }
+    }
+    best.truncate(rules.ranked);
+    let looked_at =
+        best.iter().take(rules.looked_at).filter(|tried| tried.corrected < rules.level).count();
+    let rms =
+        |squares: f64| (3.0 * squares.max(0.0) / scan.linear.rows() as f64).sqrt() * fitted.sigma;
+    let without = scan.linear.cross_validate(&data.block);
+    let poses = shuffled(data);
+    let looked: Vec<Effect> =
+        best.iter().take(rules.looked_at).map(|tried| scan.effects[tried.index].clone()).collect();
+    let all: Vec<usize> = (0..poses.len()).collect();
+    let elsewhere = Data { measurements: &poses, ..data.clone() };
+    let there = (looked_at > 0).then(|| fitted.linearised_at(&elsewhere, &all, &looked));
+    let ranked = |(place, tried): (usize, &Tried)| {
+        let close = place < looked_at;
+        let cross_validated = without.filter(|_| close).and_then(|without| {
+            let with = scan.linear.with(&scan.columns(tried.index));
+            Some(rms(without) - rms(with.cross_validate(&data.block)?))
+        });
+        let alike = best
+            .iter()
+            .take(if close { rules.looked_at } else { 0 })
+            .filter(|other| other.index != tried.index);
+        let angle = |other: &Tried| {
+            let angle =
+                scan.angle(tried.index, other.index).filter(|angle| *angle < rules.alike)?;
+            Some((scan.effects[other.index].clone(), angle))
+        };
+        let alike: Vec<(Effect, f64)> = alike.filter_map(angle).collect();
+        let own = &scan.effects[tried.index];
+        // Of what remembers the poses before none tells by itself.
+        let tells = |(other, _): &&(Effect, f64)| !own.has_memory() && !other.has_memory();
+        let pair = alike.first().filter(tells).zip(there.as_ref());
+        let telling_pose = pair.and_then(|((other, _), there)| {
+            telling_pose(&scan.linear, [&linearised, there], &poses, (own, other))
+        });
+        Ranked {
+            effect: scan.effects[tried.index].clone(),
+            p_value: tried.corrected,
+            f: (tried.gain.f, tried.gain.freedom),
+            gain: rms(scan.linear.sums().squares)
+                - rms(scan.linear.sums().squares - tried.gain.squares),
+            cross_validated,
+            alike,
+            telling_pose,
+        }
+    };
+    let ranking = best.iter().enumerate().map(ranked).collect();
+    let absorbed = scan.absorbed().into_iter().cloned().collect();
+    Trace {
+        fit: fitted.found.clone(),
+        findings: check_fit(fitted, data),
+        ranking,
+        tried: scan.effects.len(),
+        level: rules.level,
+        untestable,
+        absorbed,
+        evidence: None,
+        time_measured: data.measurements.time_measured,
+    }
+}
+
+/// Tests what a fit of `problem` leaves of the identification rows.
+///
+/// # Errors
+/// Problem, data and fit do not belong together.
+pub fn examine(
+    problem: &Problem,
+    data: &Dataset,
+    found: &Identification,
+) -> Result<Findings, IdentifyError> {
+    let data = Data::new(data, &SelectionRules::DEFAULT);
+    Ok(check_fit(&Fitted::of(problem.clone(), &data, found.clone())?, &data))
+}
+
+/// Tests what a fit leaves.
+pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
+    let linearised = fitted.linearised(data, &[]);
+    let coordinates: Vec<usize> =
+        linearised.poses().iter().map(|pose| pose.observation.coordinates()).collect();
+    // Of millions of rows there is room for one such matrix, not for several.
+    let (columns, residual) = fitted.neighbourhood_as_fitted(linearised).into_fitted();
+    let fit = FitResidual {
+        residual: &residual,
+        fitted: &columns,
+        coordinates: &coordinates,
+        sigma_is_declared: fitted.found.noise == Noise::Declared,
+        time: &data.time(),
+        session: &data.session(),
+        setup: &data.setup,
+        covariates: &data.covariates(&fitted.problem),
+    };
+    let mut findings = test_residual(&fit, data.rules.seed);
+    // The tests count poses; people count rows of files.
+    for own in &mut findings.tests {
+        if let Test::Outliers { worst: Some(pose) } = own.test {
+            own.row = data.rows().get(pose).map(|&row| data.measurements.location(row));
+        }
+    }
+    // Against the σ declared, not the smaller one that the scatter speaks for.
+    let size = findings.tests.iter_mut().find(|own| own.test == Test::ReducedChiSquared);
+    if let Some(outcome) = size.and_then(|own| own.outcome.as_mut().ok()) {
+        outcome.statistic *= fitted.found.sigma_scale.powi(2);
+    }
+    findings
+}

@@ -1,0 +1,25 @@
+//! How sure the gain on held-out poses is.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use super::super::data::{Data, bits};
+use crate::numeric::{Interval, mean_interval};
+
+/// Mean reduction of the distance to what was measured on held-out rows of the kind that errors are
+/// told of, \[m\] or \[rad\]; bootstrap over configurations.
+pub(super) fn gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>]) -> Interval {
+    let (rows, kind) = (&data.split.held_out, data.measurements.leading().kind());
+    let mut groups: BTreeMap<Vec<u64>, Vec<f64>> = BTreeMap::new();
+    for ((&row, before), after) in rows.iter().zip(before).zip(after) {
+        if data.measurements.observation(row).kind() != kind {
+            continue;
+        }
+        let gain = before.norm() - after.norm();
+        groups.entry(bits(data.measurements.configuration(row))).or_default().push(gain);
+    }
+    let sums: Vec<(f64, f64)> =
+        groups.values().map(|gains| (gains.iter().sum::<f64>(), gains.len() as f64)).collect();
+    mean_interval(&sums, data.rules.resamples, data.rules.covered, data.rules.seed)
+}

@@ -1,0 +1,92 @@
+//! Which pose would tell two effects apart that the measured poses hardly tell.
+
+use nalgebra::{DMatrix, DVector};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::data::Data;
+use super::neighbourhood::{LinearNeighbourhood, Linearised};
+use crate::measurement::Measurements;
+use crate::problem::Effect;
+
+/// A pose that tells two effects apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TellingPose {
+    /// The other effect.
+    pub other: Effect,
+    /// Configuration within the measured ranges, shape = (joints) \[rad\] or \[m\].
+    pub configuration: Vec<f64>,
+    /// Target that is measured, where the data have such a column.
+    pub target: Option<String>,
+    /// Payload \[kg\], hoist force \[N\] and temperature [°C] there, where the data have such a
+    /// column.
+    pub payload: Option<f64>,
+    /// Hoist force \[N\].
+    pub hoist: Option<f64>,
+    /// Temperature [°C].
+    pub temperature: Option<f64>,
+    /// Distance between what the arm does with the one effect and with the other, each fitted to
+    /// the measured poses \[m\].
+    pub difference: f64,
+}
+
+/// Poses within the measured ranges: every quantity of a pose from some identification row, each
+/// from another.
+pub(super) fn shuffled(data: &Data) -> Measurements {
+    let mut rng = ChaCha8Rng::seed_from_u64(data.rules.seed);
+    let (rows, count) = (data.rows(), data.rules.telling_poses);
+    let drawn: Vec<usize> = (0..count).map(|_| rows[rng.random_range(0..rows.len())]).collect();
+    let mut poses = data.measurements.select(&drawn);
+    let mut from = || rows[rng.random_range(0..rows.len())];
+    let (measured, n) = (data.measurements, poses.joints);
+    for pose in 0..count {
+        for joint in 0..n {
+            poses.configurations[pose * n + joint] = measured.configurations[from() * n + joint];
+        }
+        let columns = [
+            (&mut poses.payload, &measured.payload),
+            (&mut poses.hoist, &measured.hoist),
+            (&mut poses.temperature, &measured.temperature),
+        ];
+        for (column, known) in columns {
+            if let (Some(column), Some(known)) = (column, known) {
+                column[pose] = known[from()];
+            }
+        }
+    }
+    poses
+}
+
+/// The pose of `poses`, linearised `there`, where the fits with the one effect and with the other
+/// differ most.
+pub(super) fn telling_pose(
+    fit: &LinearNeighbourhood,
+    [here, there]: [&Linearised; 2],
+    poses: &Measurements,
+    (one, other): (&Effect, &Effect),
+) -> Option<TellingPose> {
+    let moved = |effect: &Effect| {
+        let fit = fit.with(&here.columns(effect));
+        beside(there.fitted().clone(), &there.columns(effect)) * fit.step()
+    };
+    let difference: DVector<f64> = moved(one) - moved(other);
+    let distance = |pose: usize| difference.rows(3 * pose, 3).norm() * there.poses()[pose].sigma;
+    let best = (0..poses.len()).max_by(|&a, &b| distance(a).total_cmp(&distance(b)))?;
+    let at = |column: &Option<Vec<f64>>| column.as_ref().map(|column| column[best]);
+    Some(TellingPose {
+        other: other.clone(),
+        configuration: poses.configuration(best).to_vec(),
+        target: poses.target.as_ref().and_then(|own| own.names.get(own.of_row[best]).cloned()),
+        payload: at(&poses.payload),
+        hoist: at(&poses.hoist),
+        temperature: at(&poses.temperature),
+        difference: distance(best),
+    })
+}
+
+fn beside(left: DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
+    let first = left.ncols();
+    let mut both = left.resize_horizontally(first + right.ncols(), 0.0);
+    both.columns_mut(first, right.ncols()).copy_from(right);
+    both
+}

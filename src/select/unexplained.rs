@@ -1,0 +1,211 @@
+//! Structure whose law is not known: where it is, what it depends on, and what a smooth correction
+//! gains.
+
+use nalgebra::DVector;
+
+use super::covariate::Covariate;
+use super::data::Data;
+use super::evidence::{
+    Claims, Evidence, Explanation, Hypotheses, Hypothesis, Law, Part, best_form, odds_against,
+};
+use super::fitted::Fitted;
+use super::residual_tests::Findings;
+use crate::fit::ErrorSummary;
+use crate::quantity::Unit;
+
+/// Structure that is left.
+#[derive(Debug, Clone)]
+pub struct Unexplained {
+    /// Where it is; `None`: at no part in particular.
+    pub part: Option<Part>,
+    /// What it depends on.
+    pub depends_on: Vec<Covariate>,
+    /// Probability of no more than this that noise alone makes it, for all that was looked at
+    /// together.
+    pub p_value: f64,
+    /// Probabilities of what is said; `None` where only the residual tests see it.
+    pub claims: Option<Claims>,
+    /// What an empirical correction gains; `None` where it takes less than 5 % off the error of
+    /// poses that were left out, and beside a fit that is not to be trusted.
+    pub correction: Option<Correction>,
+}
+
+/// A smooth correction of one part's error as a function of what it depends on.
+#[derive(Debug, Clone)]
+pub struct Correction {
+    /// Range of each covariate that the identification poses cover, in its unit: beyond it the
+    /// correction keeps its last value.
+    pub ranges: Vec<(Covariate, (f64, f64))>,
+    /// Held-out poses beyond it.
+    pub beyond: usize,
+    /// Root mean squared error of identification poses left out in turn, before and with the
+    /// correction \[m\].
+    pub cross_validated: (f64, f64),
+    /// Error on held-out poses with the correction.
+    pub held_out: ErrorSummary,
+    /// Its curve, where it is a function of one covariate at one coordinate.
+    pub curve: Option<Curve>,
+}
+
+/// A correction as a function of one covariate.
+#[derive(Debug, Clone)]
+pub struct Curve {
+    /// What it is a function of.
+    pub covariate: Covariate,
+    /// Unit of the coordinate that it is added to: an angle or a length.
+    pub unit: Unit,
+    /// What it does and what each identification pose alone says, by the covariate.
+    pub points: Vec<PartialResidual>,
+}
+
+/// What one pose alone says about a coordinate: the correction there and what the corrected fit
+/// leaves along the lever.
+///
+/// f(x) + l·r / |l|²   with the pose's lever l = ∂p/∂(coordinate) and its residual r once
+/// everything is fitted anew.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartialResidual {
+    /// Value of the covariate, in its unit.
+    pub covariate: f64,
+    /// Of the correction there \[rad\] or \[m\].
+    pub correction: f64,
+    /// Of the coordinate as the pose alone measures it \[rad\] or \[m\].
+    pub value: f64,
+    /// |l| [m/rad] or [m/m]: poses where it is small say little.
+    pub lever: f64,
+}
+
+/// What is known of structure that has no law, the surest first, with the correction of the first.
+///
+/// All functions of the best explanation are stated where there are as many hypotheses as surely as
+/// `located` says, whichever they are. Otherwise those are at whose part some function is at work
+/// as surely, one of a part.
+pub(super) fn without_law(
+    fitted: &Fitted,
+    data: &Data,
+    (evidence, best): (&Evidence, &Explanation),
+) -> Vec<Unexplained> {
+    let mut all: Vec<(&Hypothesis, Unexplained)> = Vec::new();
+    let are_all_sure = evidence.as_many(best) >= data.rules.located;
+    for hypothesis in best.hypotheses.iter().filter(|hypothesis| hypothesis.effect().is_none()) {
+        let claims = evidence.claims(hypothesis);
+        let is_known = all.iter().any(|(known, _)| known.part == hypothesis.part);
+        if !are_all_sure && (claims.law.1 < data.rules.located || is_known) {
+            continue;
+        }
+        let found = Unexplained {
+            part: Some(hypothesis.part),
+            depends_on: hypothesis.depends_on.clone(),
+            p_value: evidence.chance(best).min(odds_against(claims.law.1)),
+            claims: Some(claims),
+            correction: None,
+        };
+        all.push((hypothesis, found));
+    }
+    let place = |found: &Unexplained| found.claims.as_ref().map_or(0.0, |claims| claims.place.1);
+    all.sort_by(|a, b| place(&b.1).total_cmp(&place(&a.1)));
+    // What misses the arm altogether is no prediction to improve: a function of the measured
+    // position would hold the answer itself. Nor is a limit that is wrong a function to add.
+    let first = all
+        .iter()
+        .position(|(hypothesis, _)| !matches!(hypothesis.law, Law::PerPose | Law::Limit(_)));
+    if let Some(first) = first.filter(|_| fitted.found.is_trusted()) {
+        let hypothesis = all[first].0.clone();
+        all[first].1.correction = correction(fitted, data, best, &hypothesis);
+    }
+    all.into_iter().map(|(_, found)| found).collect()
+}
+
+/// Structure that the residual tests see and no place or quantity shows.
+pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
+    if !findings.is_structured() {
+        return None;
+    }
+    let strongest = findings.strongest()?;
+    Some(Unexplained {
+        part: None,
+        depends_on: strongest.about().into_iter().collect(),
+        p_value: strongest.outcome.as_ref().map_or(1.0, |outcome| outcome.p_value),
+        claims: None,
+        correction: None,
+    })
+}
+
+/// The most probable function of a hypothesis, applied to the held-out poses; `None` where poses
+/// that are left out gain nothing worth stating.
+fn correction(
+    fitted: &Fitted,
+    data: &Data,
+    best: &Explanation,
+    hypothesis: &Hypothesis,
+) -> Option<Correction> {
+    // The peak of what is narrow may have been set aside; poses that are left out tell a peak from
+    // an outlier.
+    let bends = fitted.problem.robust.is_none() && !fitted.set_aside.is_empty();
+    let whole = bends.then(|| fitted.with_all_rows());
+    let fitted = whole.as_ref().unwrap_or(fitted);
+    let (here, there) = (data.rows(), &data.split.held_out);
+    let weighed = data.weighed();
+    let few = Hypotheses::only(fitted, data, &weighed, weighed.len(), hypothesis);
+    let (shape, sigma) = best_form(fitted, data, &few, best, hypothesis)?;
+    let rows = [here, there.as_slice()].concat();
+    let hypotheses = Hypotheses::only(fitted, data, &rows, here.len(), hypothesis);
+    let own = hypotheses.form(best, hypothesis, (shape, here.len()))?;
+    let linearised = fitted.linearised(data, &[]);
+    let fit = fitted.around(data);
+    let first = 3 * here.len();
+    let (own, beyond) = (own.rows(0, first).into_owned(), own.rows_range(first..));
+    let with = fit.with_priors(&own, sigma);
+    let rms = |squares: f64| (3.0 * squares / fit.rows() as f64).sqrt() * fitted.sigma;
+    let (without, corrected) =
+        fit.cross_validate(&data.block).zip(with.cross_validate(&data.block))?;
+    let cross_validated = (rms(without), rms(corrected));
+    if cross_validated.1 >= data.rules.worthwhile * cross_validated.0 {
+        return None;
+    }
+    let step = with.step();
+    let (parameters, coefficients) =
+        (step.rows(0, step.len() - own.ncols()), step.rows_range(step.len() - own.ncols()..));
+    let held_out = fitted.linearised_at(data, there, &[]);
+    let moved = held_out.fitted() * parameters + beyond * coefficients;
+    let reached = hypotheses.reached(hypothesis, here.len());
+    let mut errors = fitted.errors(data, there);
+    // What was fitted beside the function holds everywhere; beyond its range the function keeps its
+    // last value.
+    for (pose, error) in errors.iter_mut().enumerate() {
+        *error += moved.fixed_rows::<3>(3 * pose) * held_out.poses()[pose].sigma;
+    }
+    let function = own * coefficients;
+    let left = linearised.residual() + linearised.fitted() * parameters + &function;
+    Some(Correction {
+        ranges: hypotheses.ranges(hypothesis),
+        beyond: reached.iter().filter(|reached| !**reached).count(),
+        cross_validated,
+        held_out: ErrorSummary::of_rows(data.measurements, there.iter().copied(), &errors),
+        curve: curve(&hypotheses, hypothesis, (&function, &left)),
+    })
+}
+
+/// A correction, given by what it does to the residual of every identification pose and what it
+/// leaves, as a function of one covariate.
+fn curve(
+    hypotheses: &Hypotheses,
+    hypothesis: &Hypothesis,
+    (function, left): (&DVector<f64>, &DVector<f64>),
+) -> Option<Curve> {
+    let (covariate, site, values, lever) = hypotheses.coordinate(hypothesis)?;
+    let point = |(pose, &value): (usize, &f64)| {
+        // All in σ; r = measured − predicted, so that the lever is −∂r/∂(coordinate).
+        let at = |column: &DVector<f64>| column.fixed_rows::<3>(3 * pose).into_owned();
+        let (lever, function, left) = (-at(&lever), -at(function), at(left));
+        let correction = lever.dot(&function) / lever.norm_squared();
+        PartialResidual {
+            covariate: value,
+            correction,
+            value: correction + lever.dot(&left) / lever.norm_squared(),
+            lever: lever.norm() * hypotheses.linearised.poses()[pose].sigma,
+        }
+    };
+    let points = values.iter().take(left.len() / 3).enumerate().map(point).collect();
+    Some(Curve { covariate, unit: site.unit(), points })
+}

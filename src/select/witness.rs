@@ -1,0 +1,221 @@
+//! What data that took no part in the fit say of an effect: fixed points that were measured again.
+//!
+//! An instrument that moved by d f(t) and turned by ω f(t) moves a fixed point p with it: z = p +
+//! (d + ω × p) f(t) + noise of σ, the true place unknown and p near it. With θ = (d, ω), or d
+//! alone, B = [1  −p×] and what readings of a point say once its place is taken out,
+//!
+//! v = Bᵀ Σ (f − f̄)(z − z̄)/σ²,   M = BᵀB Σ (f − f̄)²/σ²,
+//!
+//! summed over the points, ln p(readings | θ) = θᵀv − θᵀMθ/2 but for a constant. What the loop
+//! found, θ̂ with its covariance C = L Lᵀ, is held against no motion by twice the logarithm of the
+//! ratio of both marginal likelihoods: with g = Lᵀ(v − M θ̂) and K = 1 + LᵀM L,
+//!
+//! 2 θ̂ᵀv − θ̂ᵀM θ̂ + gᵀK⁻¹g − ln det K,
+//!
+//! which decides where the odds are 100 to 1 either way.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::data::Data;
+use super::fitted::Fitted;
+use crate::measurement::NestReading;
+use crate::problem::Effect;
+
+/// Twice the logarithm of the odds at which readings decide: 100 to 1.
+const DECIDED: f64 = 9.21;
+
+/// What it says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WitnessVerdict {
+    /// It moved as the effect has it.
+    Corroborated,
+    /// It did not.
+    Contradicted,
+}
+
+/// A witness of an effect.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Witness {
+    /// Which data.
+    pub data: String,
+    /// What they say.
+    pub says: WitnessVerdict,
+}
+
+/// A reading of a fixed point.
+struct Reading {
+    /// z \[m\].
+    seen: Vector3<f64>,
+    /// f.
+    moved: f64,
+    /// 1/σ² of a coordinate [1/m²].
+    weight: f64,
+}
+
+/// v and M of one point for so many parameters: d, or d and ω.
+fn told(readings: &[Reading], parameters: usize) -> (DVector<f64>, DMatrix<f64>) {
+    let all: f64 = readings.iter().map(|own| own.weight).sum();
+    let place = readings.iter().map(|own| own.seen * own.weight).sum::<Vector3<f64>>() / all;
+    let moved = readings.iter().map(|own| own.moved * own.weight).sum::<f64>() / all;
+    let one = |own: &Reading| {
+        let f = own.moved - moved;
+        ((own.seen - place) * (own.weight * f), own.weight * f * f)
+    };
+    let (sum, certainty) = readings
+        .iter()
+        .map(one)
+        .fold((Vector3::zeros(), 0.0), |a: (Vector3<f64>, f64), b| (a.0 + b.0, a.1 + b.1));
+    let turned = -place.cross_matrix();
+    let moves =
+        DMatrix::from_fn(
+            3,
+            parameters,
+            |i, j| if j < 3 { f64::from(i == j) } else { turned[(i, j - 3)] },
+        );
+    (moves.tr_mul(&sum), moves.tr_mul(&moves) * certainty)
+}
+
+/// Twice the logarithm of the odds of θ ∼ N(θ̂, C) against θ = 0; `None` where no point was read at
+/// different f.
+fn odds(
+    found: &DVector<f64>,
+    spread: &DMatrix<f64>,
+    (told, certainty): (&DVector<f64>, &DMatrix<f64>),
+) -> Option<f64> {
+    if certainty.trace() <= 0.0 {
+        return None;
+    }
+    // Of what is all but certain a combination may have next to no variance.
+    let eigen = spread.clone().symmetric_eigen();
+    let mut root = eigen.eigenvectors;
+    root.column_iter_mut()
+        .zip(&eigen.eigenvalues)
+        .for_each(|(mut own, value)| own *= value.max(0.0).sqrt());
+    let known = certainty * found;
+    let left = root.tr_mul(&(told - &known));
+    let inner = (root.tr_mul(&(certainty * &root)) + DMatrix::identity(root.ncols(), root.ncols()))
+        .cholesky()?;
+    let ln_determinant =
+        2.0 * inner.l_dirty().diagonal().iter().map(|value| value.ln()).sum::<f64>();
+    Some(2.0 * found.dot(told) - found.dot(&known) + left.dot(&inner.solve(&left)) - ln_determinant)
+}
+
+/// What readings of fixed points say of an effect of the instrument; `None` for other effects, and
+/// where they do not decide.
+pub(super) fn witness(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<Witness> {
+    let measurements = data.measurements;
+    let first = measurements.time.iter().copied().fold(f64::INFINITY, f64::min);
+    let moves = |reading: &NestReading| -> Option<f64> {
+        // Where rows are the time, a reading lies between those before and behind it.
+        let time = if measurements.time_measured {
+            reading.time?
+        } else {
+            measurements.time.first()? + reading.after as f64 - 0.5
+        };
+        match effect {
+            Effect::StationShift { at_time } | Effect::StationMove { at_time } => {
+                Some(f64::from(time >= *at_time))
+            }
+            Effect::TrackerDrift => Some(time - first),
+            Effect::TrackerSettling { time_constant } => {
+                Some(1.0 - ((first - time) / time_constant).exp())
+            }
+            _ => None,
+        }
+    };
+    let places = fitted.parameters_of(effect);
+    let count = places.len();
+    if !matches!(count, 3 | 6) {
+        return None;
+    }
+    let found = DVector::from_fn(count, |i, _| fitted.found.x[places[i]]);
+    let spread = DMatrix::from_fn(count, count, |i, j| {
+        fitted.found.covariance.of(places[i], places[j]).unwrap_or(0.0)
+    });
+    // A session has a place of its own for the instrument.
+    let mut points: BTreeMap<(&str, &str), Vec<Reading>> = BTreeMap::new();
+    for reading in &measurements.nests {
+        let weight = reading.sigma.unwrap_or(fitted.sigma).powi(-2);
+        let own = Reading { seen: reading.position, moved: moves(reading)?, weight };
+        points.entry((&reading.session, &reading.name)).or_default().push(own);
+    }
+    let nothing = (DVector::zeros(count), DMatrix::zeros(count, count));
+    let (told, certainty) =
+        points.values().map(|all| told(all, count)).fold(nothing, |a, b| (a.0 + b.0, a.1 + b.1));
+    let gain = odds(&found, &spread, (&told, &certainty))?;
+    let says = if gain > DECIDED {
+        WitnessVerdict::Corroborated
+    } else if gain < -DECIDED {
+        WitnessVerdict::Contradicted
+    } else {
+        return None;
+    };
+    let names: BTreeSet<&str> = points.keys().map(|(_, name)| *name).collect();
+    let names: Vec<&str> = names.into_iter().collect();
+    Some(Witness {
+        data: format!("{} readings of {}", measurements.nests.len(), names.join(", ")),
+        says,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn readings_are_weighed_with_what_was_found_and_its_error() {
+        let found = DVector::from_column_slice(&[1.0, 0.0, 0.0]);
+        let identity = DMatrix::<f64>::identity(3, 3);
+        let (sure, unsure) = (&identity * 1e-8, &identity * 0.09);
+        let odds = |spread: &DMatrix<f64>, part: f64| {
+            let certainty = &identity * 1e4;
+            super::odds(&found, spread, (&(&found * part * 1e4), &certainty)).unwrap()
+        };
+        // Sharp readings of less than half of what was found with an error of 0.3: a motion all the
+        // same.
+        assert!(odds(&unsure, 0.45) > 100.0);
+        assert!(odds(&sure, 0.45) < -100.0);
+        assert!((odds(&sure, 1.0) - 1e4).abs() < 1.0);
+        // Twice ln of N(0; 1, 0.09 + 1e-4) of each coordinate over that of N(0; 0, 1e-4), by hand.
+        let expected = -1.0 / 0.0901 - 3.0 * (901.0_f64).ln();
+        assert!((odds(&unsure, 0.0) - expected).abs() < 1e-6);
+        assert_eq!(super::odds(&found, &unsure, (&DVector::zeros(3), &DMatrix::zeros(3, 3))), None);
+    }
+
+    #[test]
+    fn points_that_turn_about_the_origin_tell_a_turn_from_a_shift() {
+        let places = [
+            Vector3::new(2.0, 0.5, -1.0),
+            Vector3::new(-1.0, 3.0, 0.2),
+            Vector3::new(0.5, -2.0, 1.5),
+        ];
+        let (moved, turned) = (Vector3::new(1e-3, -2e-3, 5e-4), Vector3::new(4e-4, 1e-4, -3e-4));
+        let all = |turn: f64| {
+            let of = |place: &Vector3<f64>| {
+                let at = |f: f64| {
+                    let seen = place + (moved + turned.cross(place) * turn) * f;
+                    Reading { seen, moved: f, weight: 1e12 }
+                };
+                told(&[at(0.0), at(1.0), at(1.0)], 6)
+            };
+            let sum = |a: (DVector<f64>, DMatrix<f64>), b: (DVector<f64>, DMatrix<f64>)| {
+                (a.0 + b.0, a.1 + b.1)
+            };
+            places.iter().map(of).reduce(sum).unwrap()
+        };
+        let found = DVector::from_iterator(6, moved.iter().chain(&turned).copied());
+        let spread = DMatrix::identity(6, 6) * 1e-12;
+        let odds = |turn: f64| {
+            let (told, certainty) = all(turn);
+            super::odds(&found, &spread, (&told, &certainty)).unwrap()
+        };
+        // The places that were seen are off by the motion itself: next to nothing of what they
+        // tell.
+        let (told, certainty) = all(1.0);
+        let read = certainty.cholesky().unwrap().solve(&told);
+        assert!((read - &found).norm() < 1e-3 * found.norm());
+        assert!(odds(1.0) > 1e5 && odds(-2.0) < odds(1.0) - 1e4, "{} {}", odds(1.0), odds(-2.0));
+    }
+}

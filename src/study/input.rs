@@ -1,0 +1,61 @@
+//! What the readers of both kinds of studies have in common.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::{InputError, InputErrorKind};
+use crate::problem::Problem;
+use crate::problem::item::{Document, Item};
+
+/// Most poses, held-out ones, repetitions.
+const MOST: u64 = 1_000_000;
+
+/// A problem that a study names: it, its text, and its file.
+pub(super) fn problem_of(
+    item: &Item<'_, '_>,
+    folder: &Path,
+) -> Result<(Problem, String, PathBuf), InputError> {
+    let mut file = beside(item, folder)?;
+    if file.is_dir() {
+        file.push("problem.toml");
+    }
+    let document = Document::read(&file, InputErrorKind::ProblemMissing)?;
+    let problem = Problem::parse(&document.text, &file)?;
+    if !problem.fixtures.is_empty() {
+        return Err(item.error(InputErrorKind::StudyOfContacts));
+    }
+    Ok((problem, document.text.to_string(), file))
+}
+
+/// A file that the study names.
+pub(super) fn beside(item: &Item<'_, '_>, folder: &Path) -> Result<PathBuf, InputError> {
+    let path = folder.join(item.text()?);
+    if path.exists() {
+        Ok(path)
+    } else {
+        Err(item.error(InputErrorKind::StudyFileMissing { path }))
+    }
+}
+
+/// A number of things, at least one.
+pub(super) fn count(item: &Item<'_, '_>) -> Result<usize, InputError> {
+    let value = item.whole(1)?;
+    let fits = usize::try_from(value).ok().filter(|_| value <= MOST);
+    fits.ok_or_else(|| item.error(InputErrorKind::TooLarge { value, most: MOST }))
+}
+
+/// A list of distinct values, at least one.
+pub(super) fn distinct<'a, 'i, T: PartialEq>(
+    item: &Item<'a, 'i>,
+    read: impl Fn(&Item<'a, 'i>) -> Result<T, InputError>,
+) -> Result<Vec<T>, InputError> {
+    let items = item.list("a list")?;
+    let mut values = Vec::with_capacity(items.len());
+    for item in &items {
+        let value = read(item)?;
+        if values.contains(&value) {
+            return Err(item.error(InputErrorKind::Repeated));
+        }
+        values.push(value);
+    }
+    if values.is_empty() { Err(item.error(InputErrorKind::EmptyList)) } else { Ok(values) }
+}

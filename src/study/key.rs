@@ -1,0 +1,123 @@
+//! Which inputs a kept part belongs to.
+
+use std::fmt::Write as _;
+
+use super::study::{Cell, Part, Study};
+use crate::problem::PoseRanges;
+use crate::problem::digest::hexadecimal;
+use crate::rig::{Cause, HeldOutRows, Shape, Truth};
+
+/// A digest of everything that the fits of a part depend on, 64 hexadecimal digits: the version of
+/// flexcal, the text of the problem file, the truth, and the numbers of the study that concern
+/// these fits.
+///
+/// It is the SHA-256 of lines of words and numbers, numbers in SI as short as they can be read back
+/// exactly: version, source, seed, held-out poses; σ, poses, strategy, solver, first repetition and
+/// the one after the last; the truth; `effects drawn` where the strengths of declared effects are;
+/// the text of the problem file. Numbers that do not concern these fits do not enter: a study with
+/// one more noise level keeps the others' parts.
+pub(super) fn key(study: &Study, part: &Part, cell: &Cell) -> String {
+    let Study { problem_text, source, seed, held_out, .. } = study;
+    let drawn = if study.draws_effects && !study.problem.effects.is_empty() {
+        "\neffects drawn"
+    } else {
+        ""
+    };
+    let Cell { sigma, poses, strategy, solver } = cell;
+    let (version, source) = (env!("CARGO_PKG_VERSION"), source.as_str());
+    let (strategy, solver) = (strategy.as_str(), solver.as_str());
+    let (first, end) = (part.repetitions.start, part.repetitions.end);
+    let truth = canonical(&study.truth);
+    hexadecimal(&format!(
+        "{version} {source} {seed} {held_out}\n{sigma:e} {poses} {strategy} {solver} {first} {end}\n{truth}{drawn}\n{problem_text}"
+    ))
+}
+
+/// A truth in lines: `parameter`, name, value; `random`, pattern, spreads of angles, lengths and
+/// the relative one or `-`; `effect`, its declaration (`bump` or `step` and the joint where no
+/// catalogue has it), values; `poses`, ranges of joints, payloads, hoist, temperature, `sides` or
+/// `-`; `rows`, time step, held-out share or number of the others, σ, segments.
+fn canonical(truth: &Truth) -> String {
+    let Truth {
+        parameters,
+        random,
+        effects,
+        noise_sigma,
+        orientation_sigma: _,
+        poses,
+        time_step,
+        held_out,
+        segments,
+        contact_sigmas: _,
+        positions: _,
+        tilts: _,
+        tilt_sigma: _,
+    } = truth;
+    let optional =
+        |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:e}"));
+    let range = |(from, to): (f64, f64)| format!("{from:e} {to:e}");
+    let mut text = String::new();
+    // Writing to a text cannot fail.
+    for own in parameters {
+        let _ = writeln!(text, "parameter {} {:e}", own.name, own.value);
+    }
+    for rule in random {
+        let spreads = [rule.angle, rule.length, rule.relative].map(optional).join(" ");
+        let _ = writeln!(text, "random {} {spreads}", rule.pattern);
+    }
+    for effect in effects {
+        let cause = match effect.cause() {
+            Cause::Catalogued(effect) => effect.declaration(),
+            Cause::Outside { joint, shape: Shape::Bump } => format!("bump {joint}"),
+            Cause::Outside { joint, shape: Shape::Step } => format!("step {joint}"),
+        };
+        let values: Vec<String> =
+            effect.values().iter().map(|value| format!("{value:e}")).collect();
+        let _ = writeln!(text, "effect {cause} {}", values.join(" "));
+    }
+    let PoseRanges { joints, payloads, hoist, temperature, approach, covariates } = poses;
+    let joints: Vec<String> = joints.iter().copied().map(range).collect();
+    let payloads: Vec<String> = payloads.iter().map(|mass| format!("{mass:e}")).collect();
+    let [hoist, temperature] =
+        [hoist, temperature].map(|own| own.map_or_else(|| "-".to_owned(), range));
+    let sides = if *approach { "sides" } else { "-" };
+    let _ = writeln!(
+        text,
+        "poses {}, {}, {hoist}, {temperature}, {sides}",
+        joints.join(" "),
+        payloads.join(" ")
+    );
+    for &own in covariates {
+        let _ = writeln!(text, "covariate {}", range(own));
+    }
+    let held_out = match held_out {
+        HeldOutRows::Share(share) => format!("share {share:e}"),
+        HeldOutRows::AllBut(others) => format!("all-but {others}"),
+    };
+    let _ = write!(text, "rows {}, {held_out}, {noise_sigma:e}, {segments}", range(*time_step));
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::problem::Problem;
+
+    #[test]
+    fn a_truth_is_written_in_its_words_and_numbers() {
+        let arm = "name = 'arm'\n[[joint]]\na_m = 0.5\n";
+        let problem = Problem::parse(arm, Path::new("problem.toml")).unwrap();
+        let text = "[noise]\nposition_sigma_mm = 0.1\n[random]\n'joint1.a' = { sigma_mm = 2 }\n\
+                    [[effect]]\ngear-ratio = { joint = 1 }\nerror_relative = 1e-3\n[poses]\nq1_deg = [0, 180]\n";
+        let truth = Truth::parse(text, Path::new("TRUTH.toml"), &problem).unwrap();
+        let pi = std::f64::consts::PI;
+        let expected = format!(
+            "random joint1.a - 2e-3 -\neffect gear-ratio = {{ joint = 1 }} 1e-3\nposes 0e0 {pi:e}, , -, -, sides\n\
+             rows 6e1 6e1, share 3e-1, 1e-4, {}",
+            truth.segments
+        );
+        assert_eq!(canonical(&truth), expected);
+    }
+}

@@ -1,0 +1,35 @@
+//! Monte Carlo comparison of strategies: many fits to simulated measurements whose truth is known
+//! (`flexcal study`).
+//!
+//! A [`Study`] (`STUDY.toml`, see `docs/study.md`) crosses noise levels, numbers of poses,
+//! strategies and solvers into cells. Repetition r draws an arm, poses and noise from the seed and
+//! r alone, so every cell fits the same arms in the same poses, and nothing depends on the order,
+//! the number of threads, or on which machine did which part. The fits of a cell are done in
+//! [`Part`]s; a finished part is kept in a [`Store`], and results are only ever made from kept
+//! parts.
+//!
+//! A [`MisprintStudy`] makes replicas of the paper's experiment instead.
+
+mod effects;
+mod input;
+mod key;
+mod read;
+mod repetition;
+mod replica;
+mod results;
+mod run;
+mod store;
+mod study;
+mod tally;
+
+pub use read::Request;
+pub use repetition::table;
+pub use replica::{
+    AlternativeModel, Case, Left, Load, MisprintStudy, NamedReading, Replica, ReplicaError,
+    ReplicaResults, Spread, readings, replicate,
+};
+pub use results::{CellResult, ParameterResult, Results, Timing};
+pub use run::{RunError, collect, pending, run};
+pub use store::{Store, StoreError};
+pub use study::{Cell, Part, Shard, ShardError, Source, Study};
+pub use tally::{Moments, ParameterTally, Tally};

@@ -1,0 +1,223 @@
+//! From the text of `STUDY.toml` to a [`Study`].
+
+use std::path::{Path, PathBuf};
+
+use super::effects;
+use super::input::{beside, count, distinct, problem_of};
+use super::replica::MisprintStudy;
+use super::study::{Cell, Source, Study};
+use crate::error::{InputError, InputErrorKind, Location};
+use crate::fit::{SolverChoice, Strategy};
+use crate::model::Model;
+use crate::problem::item::{Document, Item};
+use crate::problem::read::name;
+use crate::problem::section::Section;
+use crate::problem::{Freedom, ParameterRule, Problem};
+use crate::quantity::Unit;
+use crate::rig::{HeldOutRows, RandomRule, Truth};
+
+/// Poses held out where the file says nothing.
+const HELD_OUT: usize = 50;
+
+/// What a study file asks for.
+#[derive(Debug, Clone)]
+pub enum Request {
+    /// `kind = "fits"`, or no kind: many fits by strategies and solvers.
+    Fits(Box<Study>),
+    /// `kind = "misprints"`: replicas of the paper's experiment.
+    Misprints(Box<MisprintStudy>),
+}
+
+impl Request {
+    /// Reads a study of either kind; `path` is its file, or the folder that holds a `STUDY.toml`.
+    ///
+    /// # Errors
+    /// The first mistake found, in it or in the files that it names; a file that cannot be read
+    /// among them.
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        let file = if path.is_dir() { path.join("STUDY.toml") } else { path.to_owned() };
+        let document = Document::read(&file, InputErrorKind::StudyMissing)?;
+        let table = document.table()?;
+        let mut root = Section::new(&document, String::new(), 0..0, table.get_ref());
+        if root.word("kind", &["fits", "misprints"], &[false, true])?.unwrap_or(false) {
+            return Ok(Self::Misprints(Box::new(MisprintStudy::of_document(root, &file)?)));
+        }
+        Ok(Self::Fits(Box::new(study(root, &file)?)))
+    }
+}
+
+impl Study {
+    /// Reads a study of fits; `path` is its file, or the folder that holds a `STUDY.toml`.
+    ///
+    /// # Errors
+    /// The first mistake found, in it or in the files that it names; a file that cannot be read
+    /// among them.
+    pub fn read(path: &Path) -> Result<Self, InputError> {
+        match Request::read(path)? {
+            Request::Fits(study) => Ok(*study),
+            Request::Misprints(study) => {
+                let file = study.files.first().map_or(path, PathBuf::as_path);
+                Err(Location::file(file).error(InputErrorKind::NotOfFits))
+            }
+        }
+    }
+}
+
+fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let name = name(&mut root)?;
+    let title = root.text("title")?.unwrap_or(&name).to_owned();
+    let (problem, problem_text, problem_file) =
+        problem_of(&root.require("problem", "problem = \"…\", a problem.toml")?, folder)?;
+    let model = Model::new(&problem, &[String::new()], &problem.target_words())?;
+    let source = source(&mut root)?;
+    let seed = root.require("seed", "seed = …, a whole number")?.whole(0)?;
+    let repetitions = count(&root.require("repetitions", "repetitions = …, fits per cell")?)?;
+    let held_out = root.get("held_out_poses").map_or(Ok(HELD_OUT), |item| count(&item))?;
+    let sigmas = sigmas(&mut root)?;
+    let poses =
+        distinct(&root.require("identification_poses", "identification_poses = [28]")?, count)?;
+    let strategies = match root.get("strategies") {
+        Some(item) => distinct(&item, |item| strategy(item, &model))?,
+        None => vec![Strategy::Joint],
+    };
+    let solvers = match root.get("solvers") {
+        Some(item) => distinct(&item, |item| solver(item, &model))?,
+        None => vec![SolverChoice::Auto.decide(&model)],
+    };
+    let truth = truth(&mut root, &problem, folder)?;
+    let draws_effects = root.peek("truth").is_none();
+    let mut files = [&[file.to_owned(), problem_file], problem.data.files.as_slice()].concat();
+    if let Some(item) = root.peek("truth") {
+        files.push(truth_file(beside(&item, folder)?));
+    }
+    root.finish()?;
+    effects::check(&problem, &truth, source, || {
+        let place = root.peek("truth").or_else(|| root.peek("effect"));
+        place.map_or_else(
+            || root.error(InputErrorKind::NeedsRig),
+            |item| item.error(InputErrorKind::NeedsRig),
+        )
+    })?;
+    let mut cells = Vec::new();
+    for &sigma in &sigmas {
+        for &poses in &poses {
+            for &strategy in &strategies {
+                cells.extend(solvers.iter().map(|&solver| Cell { sigma, poses, strategy, solver }));
+            }
+        }
+    }
+    let parameters = model.parameters;
+    Ok(Study {
+        files,
+        name,
+        title,
+        problem,
+        parameters,
+        truth,
+        draws_effects,
+        source,
+        seed,
+        repetitions,
+        held_out,
+        cells,
+        problem_text,
+    })
+}
+
+/// The file that is meant by a path to it or to its folder.
+fn truth_file(path: PathBuf) -> PathBuf {
+    if path.is_dir() { path.join("TRUTH.toml") } else { path }
+}
+
+fn source(root: &mut Section<'_, '_>) -> Result<Source, InputError> {
+    Ok(root
+        .word("data", &["model", "rig"], &[Source::Model, Source::Rig])?
+        .unwrap_or(Source::Model))
+}
+
+/// The file that `truth` names; or else the same sections in the study itself, over the priors of
+/// the problem.
+fn truth(
+    root: &mut Section<'_, '_>,
+    problem: &Problem,
+    folder: &Path,
+) -> Result<Truth, InputError> {
+    let mut truth = if let Some(item) = root.get("truth") {
+        Truth::read(&beside(&item, folder)?, problem)?
+    } else {
+        if let Some(poses) = root.peek("poses") {
+            let poses = poses.section()?;
+            if let Some(item) =
+                ["identification", "held_out"].iter().find_map(|key| poses.peek(key))
+            {
+                return Err(item.error(InputErrorKind::PosesOfStudy));
+            }
+        }
+        let mut truth = Truth::of_sections(root, problem)?;
+        truth.random = problem.parameters.iter().map(prior).chain(truth.random).collect();
+        truth
+    };
+    (truth.noise_sigma, truth.held_out) = (0.0, HeldOutRows::Share(0.0));
+    Ok(truth)
+}
+
+/// A prior as the spread of the truth; parameters without one stay nominal.
+fn prior(rule: &ParameterRule) -> RandomRule {
+    let pattern = rule.pattern.clone();
+    match &rule.freedom {
+        Freedom::Fixed => RandomRule { pattern, angle: None, length: None, relative: None },
+        Freedom::Free { sigma, .. } => RandomRule {
+            pattern,
+            angle: sigma.angle,
+            length: sigma.length,
+            relative: sigma.relative,
+        },
+    }
+}
+
+/// Noise levels \[m\].
+fn sigmas(root: &mut Section<'_, '_>) -> Result<Vec<f64>, InputError> {
+    let Some((item, unit)) = root.quantity("position_sigma", Unit::Length)? else {
+        return Err(
+            root.missing("position_sigma_mm", "position_sigma_mm = [0.05], the noise levels")
+        );
+    };
+    distinct(&item, |item| {
+        let value = item.number()?;
+        let sigma = (unit.to_si)(value);
+        if sigma > 0.0 { Ok(sigma) } else { Err(item.error(InputErrorKind::NotPositive { value })) }
+    })
+}
+
+fn strategy(item: &Item<'_, '_>, model: &Model) -> Result<Strategy, InputError> {
+    let strategy = word(item, &Strategy::NAMES, &Strategy::EACH)?;
+    let varies = |choose: &fn(&_) -> bool| {
+        model.parameters.iter().any(|p| !p.site.is_placement() && choose(p))
+    };
+    if strategy == Strategy::Joint || strategy.stages().iter().any(varies) {
+        Ok(strategy)
+    } else {
+        Err(item.error(InputErrorKind::NothingToVary { strategy: strategy.as_str() }))
+    }
+}
+
+fn solver(item: &Item<'_, '_>, model: &Model) -> Result<SolverChoice, InputError> {
+    let solver = word(item, &SolverChoice::NAMES, &SolverChoice::CHOICES)?.decide(model);
+    if !solver.keeps(model) {
+        return Err(item.error(InputErrorKind::SolverIgnoresBounds { solver: solver.as_str() }));
+    }
+    Ok(solver)
+}
+
+/// One of a few words, with what each stands for.
+fn word<T: Copy>(
+    item: &Item<'_, '_>,
+    known: &'static [&'static str],
+    meanings: &[T],
+) -> Result<T, InputError> {
+    let word = item.text()?;
+    let meaning =
+        known.iter().zip(meanings).find(|(known, _)| **known == word).map(|(_, meaning)| *meaning);
+    meaning.ok_or_else(|| item.error(InputErrorKind::UnknownWord { word: word.to_owned(), known }))
+}

@@ -1,0 +1,209 @@
+//! One repetition of a study: measurements of an arm that was drawn, their fit, and how far it is
+//! from the truth.
+
+use std::path::PathBuf;
+
+use nalgebra::{DVector, Vector3};
+use rand::Rng as _;
+
+use super::effects::Strengths;
+use super::study::{Cell, Source, Study};
+use super::tally::{Fitted, ParameterScore, Score};
+use crate::fit::{
+    Estimate, Identification, IdentifyError, Options, Placement, QualityFlag, identify,
+};
+use crate::measurement::{Dataset, Labels, Measurements, Split};
+use crate::model::Model;
+use crate::problem::Problem;
+use crate::random::stream;
+use crate::rig::{self, Draw, Rig, Row, TrueEffect, TrueParameter, Truth};
+
+/// Measurements whose truth is known.
+struct Data {
+    /// The held-out poses, then those to identify with.
+    dataset: Dataset,
+    /// True x of each free parameter; `None` where the truth does not say.
+    truth: Vec<Option<f64>>,
+}
+
+/// The problem as a cell declares it.
+pub(super) fn problem_of(study: &Study, cell: &Cell) -> Problem {
+    let mut problem = study.problem.positions_alone();
+    problem.data.position_sigma = Some(cell.sigma);
+    problem
+}
+
+/// Fits a repetition, counted from 0; also the time that the fit took \[s\].
+pub(super) fn fit(
+    study: &Study,
+    problem: &Problem,
+    cell: &Cell,
+    repetition: usize,
+) -> (Score, f64) {
+    let Some(data) = data(study, cell, repetition) else {
+        return (Score::Failed("no-equilibrium"), 0.0);
+    };
+    let options = Options { strategy: cell.strategy, solver: cell.solver, ..Options::default() };
+    match identify(problem, &data.dataset, &options) {
+        // The files fit each other: what is left is a nominal arm that does not stand in one of the
+        // poses.
+        Err(IdentifyError::Input(_)) => (Score::Failed("no-equilibrium"), 0.0),
+        Err(_) => (Score::Failed("cannot-be-fitted"), 0.0),
+        Ok(found) => (score(study, &data, &found), found.seconds),
+    }
+}
+
+/// The measurements of a repetition, counted from 0; `None` where the true arm does not come to
+/// rest in some pose.
+///
+/// Held-out poses come first, so that they are the same for every number of poses; noise of another
+/// σ is the same noise scaled.
+fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
+    let truth =
+        Truth { noise_sigma: cell.sigma, contact_sigmas: [cell.sigma; 3], ..study.truth.clone() };
+    let seed = seed_of(study, repetition);
+    let Draw { arm, parameters, mut rows } =
+        rig::draw(&study.problem, &truth, study.held_out + cell.poses, seed);
+    let strengths = Strengths::draw(study, seed);
+    let true_x = study.parameters.iter().map(|parameter| {
+        let known = |known: &&TrueParameter| known.name == parameter.name;
+        let value = parameters
+            .iter()
+            .find(known)
+            .map(|known| known.value)
+            .or_else(|| strengths.of(&parameter.name));
+        Some(parameter.deviation(value?))
+    });
+    let true_x = true_x.collect();
+    let seen = match study.source {
+        Source::Model => by_model(arm, &strengths, &rows)?,
+        Source::Rig => {
+            by_rig(arm, [truth.effects, strengths.for_rig(study)].concat(), truth.segments, &rows)?
+        }
+    };
+    for (row, seen) in rows.iter_mut().zip(seen) {
+        row.position += seen;
+    }
+    let split = Split {
+        held_out: (0..study.held_out).collect(),
+        identification: (study.held_out..rows.len()).collect(),
+    };
+    Some(Data { dataset: Dataset::new(table(&rows), split), truth: true_x })
+}
+
+/// A seed of its own for each repetition.
+fn seed_of(study: &Study, repetition: usize) -> u64 {
+    stream(study.seed, repetition as u64).next_u64()
+}
+
+/// Positions that the model predicts for an arm as declared, its effects at their strengths \[m\].
+fn by_model(mut arm: Problem, strengths: &Strengths, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
+    // What no rule speaks of is free where it is an effect's, and held where it is the arm's.
+    (arm.parameters, arm.constraints) = (Vec::new(), Vec::new());
+    let model = Model::new(&arm, &[String::new()], &arm.target_words()).ok()?;
+    let x = model.parameters.iter().map(|own| Some(own.deviation(strengths.of(&own.name)?)));
+    let x = DVector::from_vec(x.collect::<Option<Vec<f64>>>()?);
+    let mut table = table(rows);
+    table.positions.fill(Vector3::zeros());
+    let all: Vec<usize> = (0..rows.len()).collect();
+    let errors = Placement::of(&table).position_errors(&model, &x, &table, &all);
+    errors.into_iter().map(|error| error.iter().all(|x| x.is_finite()).then_some(-error)).collect()
+}
+
+/// Positions on the virtual test rig \[m\].
+fn by_rig(
+    arm: Problem,
+    effects: Vec<TrueEffect>,
+    segments: usize,
+    rows: &[Row],
+) -> Option<Vec<Vector3<f64>>> {
+    let rig = Rig::new(arm, effects).with_segments(segments);
+    let table = table(rows);
+    let seen =
+        |(k, row): (usize, &Row)| Some(rig.pose_of(&row.target, &table.conditions(k)).ok()?.0);
+    rows.iter().enumerate().map(seen).collect()
+}
+
+/// What the virtual test rig measured, as a table of measurements.
+pub fn table(rows: &[Row]) -> Measurements {
+    let of = |value: fn(&Row) -> Option<f64>| rows.iter().map(value).collect::<Option<Vec<f64>>>();
+    let approach: Vec<f64> =
+        rows.iter().flat_map(|row| row.conditions.approach.iter().flatten().copied()).collect();
+    Measurements {
+        files: vec![PathBuf::from("simulated")],
+        origin: (1_u32..).take(rows.len()).map(|line| (0, line)).collect(),
+        joints: rows.first().map_or(0, |row| row.conditions.configuration.len()),
+        configurations: rows
+            .iter()
+            .flat_map(|row| row.conditions.configuration.iter().copied())
+            .collect(),
+        positions: rows.iter().map(|row| row.position).collect(),
+        position_measured: true,
+        payload: of(|row| row.conditions.payload),
+        hoist: of(|row| row.conditions.hoist),
+        temperature: of(|row| row.conditions.temperature),
+        time: rows.iter().map(|row| row.conditions.time).collect(),
+        time_measured: true,
+        approach: (!approach.is_empty()).then_some(approach),
+        covariates: rows.iter().flat_map(|row| row.conditions.covariates.iter().copied()).collect(),
+        session: Labels { names: vec![String::new()], of_row: vec![0; rows.len()] },
+        target: rows
+            .iter()
+            .any(|row| !row.target.is_empty())
+            .then(|| rows.iter().map(|row| &row.target).collect()),
+        ..Measurements::default()
+    }
+}
+
+fn score(study: &Study, data: &Data, found: &Identification) -> Score {
+    match &found.quality_flag {
+        Some(QualityFlag::TooFewEquations { .. }) => return Score::Failed("too-few-equations"),
+        Some(QualityFlag::NotConverged(_) | QualityFlag::HeldOutNotConverged(_)) => {
+            return Score::Failed("not-converged");
+        }
+        Some(QualityFlag::Misses { .. }) if !found.termination.converged() => {
+            return Score::Failed("not-converged");
+        }
+        Some(QualityFlag::Misses { .. } | QualityFlag::NoBetter { .. }) => {
+            return Score::Failed("misses-the-data");
+        }
+        Some(QualityFlag::BeyondPrior { .. }) => return Score::Failed("beyond-its-prior"),
+        Some(QualityFlag::BeyondArm { .. }) => return Score::Failed("beyond-the-arm"),
+        Some(QualityFlag::OtherSize { .. }) => return Score::Failed("another-size"),
+        Some(QualityFlag::Undetermined { .. }) => return Score::Failed("undetermined"),
+        Some(
+            QualityFlag::HeldOutCopied
+            | QualityFlag::HeldOutMisses { .. }
+            | QualityFlag::HeldOutWorse { .. },
+        ) => {
+            return Score::Failed("misses-held-out-poses");
+        }
+        None => {}
+    }
+    let held_out = &found.fitted.held_out;
+    if !held_out.rms.norm.is_finite() {
+        return Score::Failed("no-equilibrium");
+    }
+    // What a strategy leaves out of the model is as if it were nominal.
+    let estimate = |name: &str| {
+        found.estimates.iter().zip(&found.x).find(|(estimate, _)| estimate.name == name)
+    };
+    let parameters = study.parameters.iter().zip(&data.truth).map(|(parameter, truth)| {
+        let found = estimate(&parameter.name);
+        let (x, std_error) = found.map_or((0.0, None), |(estimate, x)| (*x, of_x(estimate)));
+        truth.map(|truth| ParameterScore { error: x - truth, std_error })
+    });
+    Score::Fitted(Fitted {
+        held_out_mean: held_out.mean.norm,
+        held_out_rms: held_out.rms.norm,
+        reduced_chi2: found.reduced_chi2,
+        iterations: found.iterations,
+        parameters: parameters.collect(),
+    })
+}
+
+/// The standard error of x, which is a logarithm for stiffnesses.
+fn of_x(estimate: &Estimate) -> Option<f64> {
+    let scale = if estimate.unit.is_relative() { estimate.estimate } else { 1.0 };
+    estimate.std_error.map(|error| error / scale)
+}

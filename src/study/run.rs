@@ -1,0 +1,109 @@
+//! Doing the fits of a study, and putting its parts together.
+
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+
+use super::repetition::{fit, problem_of};
+use super::results::{CellResult, Results};
+use super::store::{Kept, Store, StoreError};
+use super::study::{Part, Shard, Study};
+use super::tally::Tally;
+
+/// Why a study has no results.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
+#[non_exhaustive]
+pub enum RunError {
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    #[error(
+        "{missing} of {parts} parts of the study are missing in {}; run the study or the shards that lack",
+        list(folders)
+    )]
+    Incomplete { missing: usize, parts: usize, folders: Vec<PathBuf> },
+}
+
+/// The parts of a share that are not in the store yet.
+///
+/// # Errors
+/// A kept part cannot be read.
+pub fn pending(study: &Study, store: &Store, shard: Shard) -> Result<Vec<Part>, StoreError> {
+    let mut pending = Vec::new();
+    for (_, part) in study.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index))
+    {
+        if store.find(study, &part)?.is_none() {
+            pending.push(part);
+        }
+    }
+    Ok(pending)
+}
+
+/// Does the fits of `parts` on every thread there is and keeps each part as soon as it is finished;
+/// calls `fitted` after each fit.
+///
+/// # Errors
+/// A part cannot be kept.
+pub fn run(
+    study: &Study,
+    store: &Store,
+    parts: &[Part],
+    fitted: impl Fn() + Sync,
+) -> Result<(), StoreError> {
+    let run_part = |part: &Part| {
+        let cell = study.cell(part)?;
+        let problem = problem_of(study, cell);
+        let score = |repetition| {
+            let score = fit(study, &problem, cell, repetition);
+            fitted();
+            score
+        };
+        let fits: Vec<_> = part.repetitions.clone().into_par_iter().map(score).collect();
+        let mut tally = Tally::new(study.parameters.len());
+        let mut seconds = Vec::with_capacity(fits.len());
+        for (score, time) in fits {
+            tally.push(score);
+            seconds.push(time);
+        }
+        store.keep(&Kept::new(study, (part, cell), tally, seconds))
+    };
+    parts.par_iter().try_for_each(run_part)
+}
+
+/// The results of a study whose parts are all in one of `stores`, added up in the order of the
+/// parts.
+///
+/// # Errors
+/// A part is missing or cannot be read.
+pub fn collect(study: &Study, stores: &[Store]) -> Result<Results, RunError> {
+    let empty = |cell: &_| CellResult {
+        cell: *cell,
+        tally: Tally::new(study.parameters.len()),
+        seconds: Vec::new(),
+    };
+    let mut cells: Vec<CellResult> = study.cells.iter().map(empty).collect();
+    let parts = study.parts();
+    let mut missing = 0;
+    for part in &parts {
+        let mut kept = None;
+        for store in stores {
+            kept = kept.or(store.find(study, part)?);
+        }
+        match (kept, cells.get_mut(part.cell)) {
+            (Some(kept), Some(cell)) => {
+                cell.tally.merge(&kept.tally);
+                cell.seconds.extend(kept.seconds);
+            }
+            _ => missing += 1,
+        }
+    }
+    if missing > 0 {
+        let folders = stores.iter().map(|store| store.folder().to_owned()).collect();
+        return Err(RunError::Incomplete { missing, parts: parts.len(), folders });
+    }
+    Ok(Results { cells })
+}
+
+fn list(folders: &[PathBuf]) -> String {
+    folders.iter().map(|folder| folder.display().to_string()).collect::<Vec<_>>().join(", ")
+}

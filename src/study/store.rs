@@ -1,0 +1,119 @@
+//! Finished parts on disk: one small file each, written whole or not at all.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::key::key;
+use super::study::{Cell, Part, Study};
+use super::tally::Tally;
+use crate::files::Ready;
+
+/// Digits of the key that name a part's file.
+const NAME: usize = 16;
+
+/// A folder of finished parts. Machines may share it.
+#[derive(Debug, Clone)]
+pub struct Store {
+    folder: PathBuf,
+}
+
+/// Why a finished part could not be kept or found.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
+#[non_exhaustive]
+pub enum StoreError {
+    #[error("cannot write {}: {source}", path.display())]
+    Unwritable { path: PathBuf, source: io::Error },
+    #[error("{}: cannot be read: {source}", path.display())]
+    Unreadable { path: PathBuf, source: io::Error },
+    #[error("{}: damaged ({source}); delete it and its fits are done again", path.display())]
+    Damaged { path: PathBuf, source: serde_json::Error },
+    #[error("the study has no cell {cell}; it has {cells}, counted from 0")]
+    NoSuchCell { cell: usize, cells: usize },
+    #[error("{}: belongs to other inputs; delete it and its fits are done again", path.display())]
+    Foreign { path: PathBuf },
+}
+
+impl Study {
+    /// The cell of a part.
+    pub(super) fn cell(&self, part: &Part) -> Result<&Cell, StoreError> {
+        let none = StoreError::NoSuchCell { cell: part.cell, cells: self.cells.len() };
+        self.cells.get(part.cell).ok_or(none)
+    }
+}
+
+/// A finished part.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Kept {
+    /// What it is, for people.
+    part: String,
+    /// The inputs that it belongs to.
+    key: String,
+    pub tally: Tally,
+    /// Time of each fit \[s\]; the only thing here that differs from run to run.
+    pub seconds: Vec<f64>,
+}
+
+impl Kept {
+    pub fn new(
+        study: &Study,
+        (part, cell): (&Part, &Cell),
+        tally: Tally,
+        seconds: Vec<f64>,
+    ) -> Self {
+        let what = format!(
+            "{}: σ {} mm, {} poses, {}, {}, repetitions {} to {}",
+            study.name,
+            cell.sigma * 1e3,
+            cell.poses,
+            cell.strategy.as_str(),
+            cell.solver.as_str(),
+            part.repetitions.start + 1,
+            part.repetitions.end
+        );
+        Self { part: what, key: key(study, part, cell), tally, seconds }
+    }
+}
+
+impl Store {
+    /// The parts below the folder of a study's results.
+    pub fn new(results: &Path) -> Self {
+        Self { folder: results.join("cells") }
+    }
+
+    /// Where the parts are.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Keeps a finished part.
+    pub(super) fn keep(&self, kept: &Kept) -> Result<(), StoreError> {
+        let path = self.path(&kept.key);
+        let write =
+            || -> io::Result<()> { Ready::new(&path, &serde_json::to_string_pretty(kept)?)?.put() };
+        write().map_err(|source| StoreError::Unwritable { path: path.clone(), source })
+    }
+
+    /// A part, if it is finished.
+    pub(super) fn find(&self, study: &Study, part: &Part) -> Result<Option<Kept>, StoreError> {
+        let key = key(study, part, study.cell(part)?);
+        let path = self.path(&key);
+        let text = match fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(source) if source.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(source) => return Err(StoreError::Unreadable { path, source }),
+        };
+        let kept: Kept = match serde_json::from_str(&text) {
+            Ok(kept) => kept,
+            Err(source) => return Err(StoreError::Damaged { path, source }),
+        };
+        if kept.key == key { Ok(Some(kept)) } else { Err(StoreError::Foreign { path }) }
+    }
+
+    fn path(&self, key: &str) -> PathBuf {
+        self.folder.join(key.get(..NAME).unwrap_or(key)).with_extension("json")
+    }
+}
