@@ -80,8 +80,8 @@ pub fn joint_origins(
 pub fn yaml(origins: &[JointOrigin], form: Yaml) -> String {
     let mut text = match form {
         Yaml::UniversalRobots => {
-            "# hash: put in that of the controller (calibration/conf of the robot, or the regressor's own file):\n\
-                                  # with another one the regressor reports a mismatch.\n"
+            "# hash: put in that of the controller (calibration/conf of the robot, or the driver's own file):\n\
+                                  # with another one the driver reports a mismatch.\n"
                 .to_owned()
         }
         Yaml::Ros => {

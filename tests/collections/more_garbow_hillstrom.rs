@@ -13,7 +13,7 @@ pub struct Problem {
     pub analytic: Analytic,
     pub start: Vec<f64>,
     /// ‖r‖² of every known local minimum (or infimum); beyond the paper's, those that MINPACK's
-    /// regressor reports (Osborne 2: norm 1.337840, Chebyquad n = 1: 1.886238 and 1.884248) and those
+    /// driver reports (Osborne 2: norm 1.337840, Chebyquad n = 1: 1.886238 and 1.884248) and those
     /// derived where they stand.
     pub minima: Vec<f64>,
 }
