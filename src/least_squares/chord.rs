@@ -1,4 +1,4 @@
-//! Derivatives taken once for several points: the chord method.
+//! Chord method: derivatives at one point reused at neighbouring points.
 
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -10,51 +10,52 @@ use super::kernel::sum_of_squares;
 use super::{Block, LeastSquares, Linearisation, Triangle};
 use crate::numeric::{gram, inverse_factor};
 
-/// Part of what derivatives foresee up to which what they miss is little.
-const MISSED: f64 = 0.01;
-/// Part of a column's length² below which what of it is its own is taken for nothing.
-const UNSEEN: f64 = 1e-10;
+/// Largest linearisation error ‖ρ‖ / ‖J₀ δ‖ at which derivatives of another point are reused.
+const MAX_LINEARISATION_ERROR: f64 = 0.01;
+/// Ridge added to the scaled normal matrix R₀ᵀR₀, whose diagonal is 1.
+const NORMAL_RIDGE: f64 = 1e-10;
 
-/// Residuals and derivatives at a point, which serve at others.
+/// Residuals and derivatives at a base point x₀, reused for linearisations at points nearby.
 ///
-/// About x₀ with J₀ = Q₀ R₀: r(x) = r₀ + J₀ δ + ρ, δ = x − x₀. By J₀ the linearised problem at x is
-/// [R₀ c], c = Q₀ᵀ r(x) = c₀ + R₀ δ + R₀ (R₀ᵀR₀)⁻¹ J₀ᵀ ρ; it leaves (J(x) − J₀)ᵀ r out of the
-/// gradient, which is of the order of ρ. So derivatives serve where ‖ρ‖ is a small part of ‖J₀ δ‖,
-/// or ‖ρ‖² no more than the mean ‖r‖² / N of one number, and no unknown was without effect at x₀:
-/// such a one may have one elsewhere.
+/// With J₀ = Q₀ R₀ and δ = x − x₀, r(x) = r₀ + J₀ δ + ρ. The problem linearised at x with J₀ is
+/// [R₀ c], c = Q₀ᵀ r(x) = c₀ + R₀ δ + R₀ (R₀ᵀR₀)⁻¹ J₀ᵀ ρ. It neglects (J(x) − J₀)ᵀ r in the
+/// gradient, a term of the order of ρ. Derivatives are therefore reused only where ‖ρ‖ is a small
+/// part of ‖J₀ δ‖, or ‖ρ‖² is below the mean square ‖r‖² / N of one residual. No unknown may be
+/// without effect at x₀, since it may have an effect elsewhere.
 #[derive(Debug)]
 pub(super) struct Base {
-    /// Which data.
+    /// Identifier of the data set.
     pub data: u64,
-    /// Unit of the residuals.
+    /// Unit in which the residuals are counted.
     unit: f64,
     x: DVector<f64>,
     chunks: Vec<Chunk>,
     triangle: Triangle,
-    /// Made when first derivatives are asked to serve elsewhere.
-    within: OnceLock<Option<Within>>,
+    /// Formed at the first reuse; `None` inside where reuse is impossible.
+    projector: OnceLock<Option<Projector>>,
 }
 
-/// Some items with their residuals and derivatives.
+/// Consecutive items with their residuals and derivatives at the base point.
 #[derive(Debug)]
 pub(super) struct Chunk {
     pub items: Range<usize>,
     pub block: Block,
 }
 
-/// What takes J₀ᵀ ρ to Q₀ᵀ ρ.
+/// Linear map from J₀ᵀ ρ to Q₀ᵀ ρ = R₀ (R₀ᵀR₀)⁻¹ J₀ᵀ ρ.
 #[derive(Debug)]
-struct Within {
-    /// R₀ S⁻¹ and c₀, S the lengths of the columns.
+struct Projector {
+    /// R₀ S⁻¹, where S = diag(`lengths`) holds the column norms of R₀.
     scaled: DMatrix<f64>,
+    /// Projected residual c₀ at the base point.
     constant: DVector<f64>,
     lengths: DVector<f64>,
-    /// L⁻¹ with L Lᵀ = S⁻¹R₀ᵀR₀S⁻¹, a little added to the diagonal.
+    /// L⁻¹ with L Lᵀ = S⁻¹R₀ᵀR₀S⁻¹ + ridge.
     root: DMatrix<f64>,
 }
 
-impl Within {
-    /// `None` where an unknown has no effect, or numbers are not finite.
+impl Projector {
+    /// Forms the map, or returns `None` if an unknown has no effect or a number is not finite.
     fn new(triangle: &Triangle) -> Option<Self> {
         let Linearisation { triangle: mut scaled, projected: constant, .. } =
             triangle.clone().into_linearisation();
@@ -65,87 +66,96 @@ impl Within {
         }
         scaled.column_iter_mut().zip(&lengths).for_each(|(mut column, length)| column /= *length);
         let mut normal = gram(&scaled);
-        (0..n).for_each(|j| normal[(j, j)] += UNSEEN);
+        (0..n).for_each(|j| normal[(j, j)] += NORMAL_RIDGE);
         let root = inverse_factor(&normal)?;
         Some(Self { scaled, constant, lengths, root })
     }
 
-    /// c₀ + R₀ δ + R₀ (R₀ᵀR₀)⁻¹ J₀ᵀ ρ.
+    /// Returns c = c₀ + R₀ δ + R₀ (R₀ᵀR₀)⁻¹ J₀ᵀ ρ, where `gradient` is J₀ᵀ ρ.
     fn constant(&self, step: &DVector<f64>, gradient: &DVector<f64>) -> DVector<f64> {
         let along = self.root.tr_mul(&(&self.root * gradient.component_div(&self.lengths)));
         &self.constant + &self.scaled * (step.component_mul(&self.lengths) + along)
     }
 }
 
-/// Of some items: J₀ᵀ ρ and the squares of r(x), J₀ δ and ρ.
-struct Missed {
+/// Linearisation error of one chunk.
+struct ChunkError {
+    /// J₀ᵀ ρ.
     gradient: DVector<f64>,
+    /// ‖r(x)‖², ‖J₀ δ‖² and ‖ρ‖².
     squares: [f64; 3],
 }
 
 impl Base {
-    /// Of all items, linearised at `x`, and their factor.
+    /// Keeps the chunks of all items, linearised at `x`, with their triangular factor.
     pub fn new(
         x: &DVector<f64>,
         (data, unit): (u64, f64),
         chunks: Vec<Chunk>,
         triangle: Triangle,
     ) -> Self {
-        Self { data, unit, x: x.clone(), chunks, triangle, within: OnceLock::new() }
+        Self { data, unit, x: x.clone(), chunks, triangle, projector: OnceLock::new() }
     }
 
-    /// The factor where it was taken.
+    /// Returns the triangular factor at the base point.
     pub fn triangle(&self) -> Triangle {
         self.triangle.clone()
     }
 
-    /// The factor at `x` for residuals in this `unit`; `None` where derivatives do not serve there.
+    /// Returns the triangular factor at `x`, with residuals counted in `unit`, from the derivatives
+    /// of the base point; `None` if the linearisation error at `x` is too large.
     pub fn at(&self, problem: &impl LeastSquares, x: &DVector<f64>, unit: f64) -> Option<Triangle> {
-        let (step, larger) = (x - &self.x, self.unit / unit);
+        let (step, scale) = (x - &self.x, self.unit / unit);
         let n = step.len();
-        let missed = |Chunk { items, block }: &Chunk| {
+        let error = |Chunk { items, block }: &Chunk| {
             let mut residual = vec![0.0; block.rows()];
             problem.residuals(x, items.clone(), &mut residual);
             let square = sum_of_squares(&residual);
             let columns =
                 DMatrixView::from_slice(&block.values[..n * block.rows()], block.rows(), n);
-            let way = columns * &step;
-            let own = block.column(n).iter().zip(&way).map(|(start, way)| start + way);
-            let rest: Vec<f64> = residual
+            let change = columns * &step;
+            let predicted = block.column(n).iter().zip(&change).map(|(r0, change)| r0 + change);
+            let error: Vec<f64> = residual
                 .iter()
-                .zip(own)
-                .map(|(there, foreseen)| there / larger - foreseen)
+                .zip(predicted)
+                .map(|(actual, predicted)| actual / scale - predicted)
                 .collect();
-            let rest = DVector::from_vec(rest);
-            Missed {
-                squares: [square, sum_of_squares(way.as_slice()), sum_of_squares(rest.as_slice())],
-                gradient: columns.tr_mul(&rest),
+            let error = DVector::from_vec(error);
+            ChunkError {
+                squares: [
+                    square,
+                    sum_of_squares(change.as_slice()),
+                    sum_of_squares(error.as_slice()),
+                ],
+                gradient: columns.tr_mul(&error),
             }
         };
-        let all: Vec<Missed> = self.chunks.par_iter().map(missed).collect();
+        let errors: Vec<ChunkError> = self.chunks.par_iter().map(error).collect();
         let mut gradient = DVector::zeros(n);
         let mut sums = [0.0; 3];
-        for own in all {
-            gradient += own.gradient;
-            sums.iter_mut().zip(own.squares).for_each(|(sum, square)| *sum += square);
+        for chunk in errors {
+            gradient += chunk.gradient;
+            sums.iter_mut().zip(chunk.squares).for_each(|(sum, square)| *sum += square);
         }
-        let [squares, way, rest] = sums;
+        let [squares, change, error] = sums;
         let rows: usize = self.chunks.iter().map(|chunk| chunk.block.rows()).sum();
-        let least = (MISSED * MISSED * way).max(squares / (larger * larger * rows as f64));
-        // An infinite residual is no more than an infinite one.
-        if !(rest.is_finite() && rest <= least) {
+        let tolerated = (MAX_LINEARISATION_ERROR * MAX_LINEARISATION_ERROR * change)
+            .max(squares / (scale * scale * rows as f64));
+        // The comparison alone would accept an infinite error beside an infinite residual.
+        if !(error.is_finite() && error <= tolerated) {
             return None;
         }
-        let constant = self.within()?.constant(&step, &gradient);
-        Some(self.triangle().with_residual(&constant, squares / (larger * larger)).times(larger))
+        let constant = self.projector()?.constant(&step, &gradient);
+        Some(self.triangle().with_residual(&constant, squares / (scale * scale)).times(scale))
     }
 
-    fn within(&self) -> Option<&Within> {
-        if let Some(known) = self.within.get() {
-            return known.as_ref();
+    fn projector(&self) -> Option<&Projector> {
+        if let Some(projector) = self.projector.get() {
+            return projector.as_ref();
         }
-        // Before the cell waits for it: it is made on several threads.
-        let new = Within::new(&self.triangle);
-        self.within.get_or_init(|| new).as_ref()
+        // Formed outside of `get_or_init`: its products run on several threads, which must not
+        // wait for the cell.
+        let new = Projector::new(&self.triangle);
+        self.projector.get_or_init(|| new).as_ref()
     }
 }

@@ -1,12 +1,11 @@
-//! What linearised residuals leave out of the second derivatives of a cost.
+//! Second-order term Σ rᵢ ∇²rᵢ of the Hessian of a least-squares cost.
 
 use nalgebra::{DMatrix, DVector};
 
-/// How far each unknown is moved: by its effect on all residuals together, as a part of their
-/// length.
-const STEP: f64 = 1e-4;
+/// Difference step of an unknown: the step that changes the residual vector by this part of ‖r‖.
+const DIFFERENCE_STEP: f64 = 1e-4;
 
-/// What is known of an objective at a point.
+/// Cost, gradient and Gauss–Newton matrix of an objective at one point.
 pub(super) struct Slopes {
     /// ½‖r‖².
     pub cost: f64,
@@ -16,10 +15,11 @@ pub(super) struct Slopes {
     pub normal: DMatrix<f64>,
 }
 
-/// S = Σ rᵢ ∇²rᵢ = ∂(Jᵀr)/∂x − JᵀJ, by differences of the gradient Jᵀr.
+/// Returns S = Σ rᵢ ∇²rᵢ = ∂(Jᵀr)/∂x − JᵀJ from differences of the gradient Jᵀr.
 ///
-/// One call of `slopes` for each unknown. An unknown is moved up, or down where `within` forbids
-/// that; where it forbids both, its row and column hold what the others say of them.
+/// Calls `slopes` once for each unknown. An unknown is moved up, or down where `within` forbids the
+/// upper point. If `within` forbids both, its row and column come from the differences of the other
+/// unknowns. Returns `None` if an entry is not finite.
 pub(super) fn by_differences(
     slopes: impl Fn(&DVector<f64>) -> Slopes,
     x: &DVector<f64>,
@@ -29,10 +29,10 @@ pub(super) fn by_differences(
     let residual = (2.0 * cost).sqrt();
     let n = x.len();
     let mut second = DMatrix::zeros(n, n);
-    let mut known = vec![false; n];
+    let mut is_formed = vec![false; n];
     for j in 0..n {
         let size = normal[(j, j)].sqrt();
-        let h = if size > 0.0 { STEP * residual / size } else { continue };
+        let h = if size > 0.0 { DIFFERENCE_STEP * residual / size } else { continue };
         let moved = [h, -h].into_iter().find_map(|h| {
             let mut moved = x.clone();
             moved[j] += h;
@@ -41,9 +41,9 @@ pub(super) fn by_differences(
         let Some(moved) = moved else { continue };
         let change = (slopes(&moved).gradient - &gradient) / (moved[j] - x[j]);
         second.set_column(j, &(change - normal.column(j)));
-        known[j] = true;
+        is_formed[j] = true;
     }
-    let symmetric = DMatrix::from_fn(n, n, |i, j| match (known[i], known[j]) {
+    let symmetric = DMatrix::from_fn(n, n, |i, j| match (is_formed[i], is_formed[j]) {
         (true, true) => 0.5 * (second[(i, j)] + second[(j, i)]),
         (true, false) => second[(j, i)],
         (false, true) => second[(i, j)],

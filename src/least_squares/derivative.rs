@@ -1,20 +1,20 @@
-//! Derivatives checked against differences of the residuals.
+//! Check of derivatives against extrapolated differences of the residuals.
 
 use nalgebra::DVector;
 
 use super::{LeastSquares, jacobian, residual_vector};
 
-/// Largest number of ever smaller steps in one extrapolation.
-const TABLE: usize = 12;
+/// Largest number of decreasing steps in one extrapolation.
+const MAX_STEPS: usize = 12;
 /// Ratio of successive steps.
 const SHRINK: f64 = 1.4;
 /// First steps tried, as fractions of an unknown's typical size.
 const FIRST_STEPS: [f64; 4] = [0.3, 3e-2, 3e-3, 3e-4];
-/// An unknown whose whole effect is below this fraction of the largest is judged against that
-/// fraction.
+/// Smallest effect by which an error is divided, as a fraction of the largest effect of all
+/// unknowns.
 const NEGLIGIBLE: f64 = 1e-9;
 
-/// How one column of the Jacobian compares with differences.
+/// Comparison of one column of the Jacobian with differences.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColumnCheck {
     /// ‖J − F‖ / ‖F‖, or less where ‖F‖ is negligible; F are the differences.
@@ -31,7 +31,8 @@ pub struct JacobianCheck {
 }
 
 impl JacobianCheck {
-    /// The unknown whose column is furthest off, and its comparison; nothing without unknowns.
+    /// Returns the unknown with the largest relative error and its comparison; `None` if there are
+    /// no unknowns.
     pub fn worst(&self) -> Option<(usize, ColumnCheck)> {
         let nan_last = |error: f64| if error.is_nan() { f64::INFINITY } else { error };
         self.columns
@@ -74,7 +75,7 @@ pub fn check_jacobian(
     JacobianCheck { columns }
 }
 
-/// The best extrapolation over several first steps, with its estimated error.
+/// Returns the best extrapolation over several first steps, with its estimated error.
 fn extrapolate<P: LeastSquares>(
     problem: &P,
     x: &DVector<f64>,
@@ -108,12 +109,13 @@ fn central_difference<P: LeastSquares>(
     (at(above) - at(below)) / (above - below)
 }
 
-/// Ridders' tableau; stops once higher orders make it worse.
+/// Extrapolates differences to step zero by Ridders' tableau; stops once higher orders no longer
+/// reduce the estimated error.
 fn ridders(difference: impl Fn(f64) -> DVector<f64>, first: f64) -> (DVector<f64>, f64) {
     let mut h = first;
     let mut previous = vec![difference(h)];
     let mut best = (previous[0].clone(), f64::INFINITY);
-    for _ in 1..TABLE {
+    for _ in 1..MAX_STEPS {
         h /= SHRINK;
         let mut row = vec![difference(h)];
         let mut factor = SHRINK * SHRINK;

@@ -1,59 +1,58 @@
-//! What the measurements can tell: rank, conditioning, and the combinations they cannot tell.
+//! Identifiability of the unknowns: rank, condition number and unidentifiable combinations.
 //!
 //! Columns of the Jacobian are scaled to unit norm first, so that angles, lengths and logarithms
-//! compare.
+//! can be compared.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::inverse::regular_inverse;
 use super::singular::SingularValues;
 
-/// A scaled singular value below this part of the largest counts as zero.
+/// Largest scaled singular value, relative to the largest of all, that counts as zero.
 ///
 /// Exactly redundant parameters come out near 1e-15, parameters that good data tell apart above
 /// 1e-5.
 pub const BLIND_BELOW: f64 = 1e-9;
-/// A column of the Jacobian with a norm below this part of the largest, per unit of its scale,
-/// counts as zero.
+/// Largest norm of a column, relative to the largest column, that counts as zero.
 const ZERO_COLUMN: f64 = 1e-14;
-/// Part of a combination from which an unknown gives it its name.
-const SIZEABLE: f64 = 0.1;
-/// Entries of a combination below this are rounding.
+/// Smallest share of a combination that makes an unknown a preferred pivot of its description.
+const PIVOT_SHARE: f64 = 0.1;
+/// Entries of a combination below this are rounding errors.
 const NEGLIGIBLE: f64 = 1e-6;
-/// A triangle without a singular value below this part of the largest sees everything, however that
-/// is counted.
-const CERTAIN: f64 = 2.0 * BLIND_BELOW;
-/// What moves nothing by more than this part of the largest is blind, however that is counted.
-const ROUNDING: f64 = 1e-12;
+/// Bound on the relative singular values above which full rank is certain without an SVD: twice
+/// [`BLIND_BELOW`], for rounding.
+const CERTAIN_FULL_RANK: f64 = 2.0 * BLIND_BELOW;
+/// Relative size of a trailing pivot below which a direction is certainly unidentifiable.
+const CERTAIN_NULL: f64 = 1e-12;
 
-/// What the data of a problem can identify, from the triangular factor R of its Jacobian.
+/// Identifiability of the unknowns, from the triangular factor R of the Jacobian.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identifiability {
     /// Singular values of the column-scaled Jacobian, largest first.
     pub singular_values: Vec<f64>,
     /// Number of singular values that are not zero.
     pub rank: usize,
-    /// Combinations of parameters that leave every measurement as it is.
+    /// Combinations of parameters that change no measurement.
     pub unidentifiable: Vec<UnidentifiableCombination>,
-    /// Rows that span the unidentifiable combinations, orthonormal in the scaled unknowns, shape =
+    /// Basis of the unidentifiable combinations, orthonormal in the scaled unknowns, shape =
     /// (n − rank, n) [1 / unit of x].
     pub gauge: DMatrix<f64>,
-    /// Part of each unknown that lies outside the unidentifiable combinations, 0…1.
+    /// Share of each unknown outside the unidentifiable combinations, 0 (none) to 1 (identified).
     pub visible: Vec<f64>,
 }
 
 /// Parameters that can change together without changing any measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnidentifiableCombination {
-    /// Unknown and weight in scaled unknowns (unit norm, first weight positive), in the order of
-    /// the unknowns.
+    /// Index and weight of each unknown in scaled unknowns (unit norm, first weight positive),
+    /// sorted by index.
     pub weights: Vec<(usize, f64)>,
-    /// What the scaled Jacobian makes of it.
+    /// Norm of the scaled Jacobian times the combination.
     pub singular_value: f64,
 }
 
 impl Identifiability {
-    /// Of the least-squares problem with triangular factor `triangle` (n × n).
+    /// Analyses the least-squares problem with triangular factor `triangle` (n × n).
     pub fn of(triangle: &DMatrix<f64>) -> Self {
         let Scaled { matrix: scaled, scale } = Scaled::of(triangle);
         let SingularValues { values: singular_values, right } = SingularValues::of(&scaled);
@@ -64,7 +63,7 @@ impl Identifiability {
         Self { singular_values, rank, unidentifiable: named(null, &scaled), gauge, visible }
     }
 
-    /// Ratio of the largest singular value to the smallest that is not zero.
+    /// Returns the ratio of the largest singular value to the smallest nonzero one.
     pub fn condition_number(&self) -> f64 {
         match self.singular_values[..self.rank] {
             [largest, .., smallest] => largest / smallest,
@@ -72,11 +71,11 @@ impl Identifiability {
         }
     }
 
-    /// Observability indices O1 to O5 over the identifiable directions, from m measured
-    /// coordinates.
+    /// Returns the observability indices O1 to O5 over the r identifiable directions, with m =
+    /// `measurements` measured coordinates.
     ///
-    /// O1 = (Π σ)^(1/r) / √m,  O2 = `σ_r` / `σ_1`,  O3 = `σ_r`,  O4 = `σ_r`² / `σ_1`,  O5 = 1 / Σ
-    /// 1/σ   [Sun & Hollerbach 2008].
+    /// O1 = (Π σ)^(1/r) / √m, O2 = `σ_r` / `σ_1`, O3 = `σ_r`, O4 = `σ_r`² / `σ_1`,
+    /// O5 = 1 / Σ 1/σ [Sun & Hollerbach 2008].
     pub fn observability(&self, measurements: usize) -> [f64; 5] {
         let used = &self.singular_values[..self.rank];
         let (Some(&largest), Some(&smallest)) = (used.first(), used.last()) else {
@@ -93,25 +92,26 @@ impl Identifiability {
     }
 }
 
-/// What the data do not see, without the singular values of what they see.
+/// Unidentifiable combinations alone, without the singular values of the identifiable ones.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Blind {
-    /// As [`Identifiability::gauge`].
+    /// Basis of the unidentifiable combinations, see [`Identifiability::gauge`].
     pub gauge: DMatrix<f64>,
-    /// As [`Identifiability::visible`].
+    /// Identified share of each unknown, see [`Identifiability::visible`].
     pub visible: Vec<f64>,
 }
 
 impl Blind {
-    /// Of the least-squares problem with triangular factor `triangle` (n × n).
+    /// Analyses the least-squares problem with triangular factor `triangle` (n × n).
     ///
-    /// Singular values are formed only where triangles do not decide: if R with unit columns has no
-    /// small singular value for certain, nothing is blind; and if by pivoted QR, R P = Q [R₁ R₂; 0
-    /// ε] with R₁ such a triangle and ε rounding, what is blind is spanned by P [−R₁⁻¹R₂; 1].
+    /// Forms singular values only where cheaper tests do not decide. If ‖R⁻¹‖ of R with unit columns
+    /// bounds every singular value away from zero, the rank is full. If pivoted QR gives R P =
+    /// Q [R₁ R₂; 0 ε] with R₁ of certainly full rank and ε at rounding level, the null space is
+    /// spanned by P [−R₁⁻¹R₂; 1].
     pub fn in_triangle(triangle: &DMatrix<f64>) -> Self {
         let n = triangle.ncols();
         let Scaled { matrix: scaled, scale } = Scaled::of(triangle);
-        if regular_inverse(&scaled, CERTAIN).is_some() {
+        if regular_inverse(&scaled, CERTAIN_FULL_RANK).is_some() {
             return Self { gauge: DMatrix::zeros(0, n), visible: vec![1.0; n] };
         }
         if let Some(null) = certain_null(&scaled) {
@@ -121,7 +121,7 @@ impl Blind {
         Self { gauge, visible }
     }
 
-    /// Of orthonormal rows that span it in scaled unknowns.
+    /// Converts orthonormal rows that span the null space in scaled unknowns.
     fn of(null: &DMatrix<f64>, scale: &[f64]) -> Self {
         let visible = (0..null.ncols())
             .map(|j| (1.0 - null.column(j).norm_squared()).clamp(0.0, 1.0))
@@ -133,7 +133,8 @@ impl Blind {
     }
 }
 
-/// A triangle with columns of unit norm, those that count as zero left zero, and their norms.
+/// Triangle with columns scaled to unit norm (columns that count as zero are set to zero), and the
+/// norms.
 struct Scaled {
     matrix: DMatrix<f64>,
     scale: Vec<f64>,
@@ -155,21 +156,21 @@ impl Scaled {
     }
 }
 
-/// Orthonormal rows that span what a matrix with columns of unit norm makes zero, where pivoted QR
-/// decides that for certain.
+/// Returns orthonormal rows that span the null space of a matrix with unit columns; `None` where
+/// pivoted QR does not decide the rank with certainty.
 fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = scaled.ncols();
     let qr = scaled.clone().col_piv_qr();
     let triangle = qr.r();
     let largest = triangle.get((0, 0))?.abs();
-    let rank = (0..n).take_while(|&k| triangle[(k, k)].abs() > ROUNDING * largest).count();
+    let rank = (0..n).take_while(|&k| triangle[(k, k)].abs() > CERTAIN_NULL * largest).count();
     let rest = triangle.view((rank, rank), (n - rank, n - rank)).norm();
-    if rank == 0 || rank == n || rest.is_nan() || rest > ROUNDING * n as f64 * largest {
+    if rank == 0 || rank == n || rest.is_nan() || rest > CERTAIN_NULL * n as f64 * largest {
         return None;
     }
     let first = triangle.view((0, 0), (rank, rank)).into_owned();
-    // The largest singular value is √n at most: that of all columns, which R₁ has only a part of.
-    let inverse = regular_inverse(&first, CERTAIN * (n as f64 / rank as f64).sqrt())?;
+    // The largest singular value of all n columns is at most √n; `regular_inverse` assumes √rank.
+    let inverse = regular_inverse(&first, CERTAIN_FULL_RANK * (n as f64 / rank as f64).sqrt())?;
     let mut null = DMatrix::zeros(n, n - rank);
     null.rows_mut(0, rank)
         .copy_from(&(inverse * triangle.view((0, rank), (rank, n - rank)) * -1.0));
@@ -178,7 +179,8 @@ fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(null.qr().q().transpose())
 }
 
-/// Orthonormal rows that span what the orthonormal columns of `basis` leave out.
+/// Returns orthonormal rows that span the orthogonal complement of the columns of `basis`, which
+/// must be orthonormal.
 pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
     let (n, r) = basis.shape();
     let mut rest = DMatrix::identity(n, n) - basis * basis.transpose();
@@ -195,14 +197,15 @@ pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
     rows
 }
 
-/// The reduced row echelon form of the null space: a basis that depends on the space alone, with
-/// few unknowns in each combination. Pivots are the earliest unknowns that have a part in a
-/// combination worth the name, then any.
+/// Returns the reduced row echelon form of the null space.
+///
+/// This basis depends on the space alone and has few unknowns in each combination. Pivots are the
+/// first unknowns with a share of at least [`PIVOT_SHARE`], then those above [`NEGLIGIBLE`].
 fn named(mut null: DMatrix<f64>, scaled: &DMatrix<f64>) -> Vec<UnidentifiableCombination> {
     let (rows, n) = null.shape();
     let mut row = 0;
     let mut pivots = Vec::new();
-    for (least, column) in [SIZEABLE, NEGLIGIBLE]
+    for (least, column) in [PIVOT_SHARE, NEGLIGIBLE]
         .into_iter()
         .flat_map(|least| (0..n).map(move |column| (least, column)))
     {

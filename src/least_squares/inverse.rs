@@ -1,14 +1,14 @@
-//! Inverses of upper triangles: they say for certain that a problem is well conditioned, at a small
-//! part of the cost of singular values.
+//! Inverses of upper triangles: certify a good condition at a small part of the cost of singular
+//! values.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::kernel::{dot, norm};
 
-/// R⁻¹, if no singular value of R is below `least` of the largest; nothing where that is not
-/// certain, or R no upper triangle.
+/// Returns R⁻¹ if every singular value of R is certainly above `least` times the largest; `None`
+/// otherwise, or if R is not upper triangular.
 ///
-/// Columns of R are at most of length one, so that `σ₁ ≤ √n`; and `σₙ ≥ 1/‖R⁻¹‖`.
+/// Requires columns of norm at most one, so that `σ₁ ≤ √n`; the test uses `σₙ ≥ 1/‖R⁻¹‖`.
 pub(super) fn regular_inverse(triangle: &DMatrix<f64>, least: f64) -> Option<DMatrix<f64>> {
     let n = triangle.ncols();
     if !is_upper(triangle) {
@@ -18,18 +18,18 @@ pub(super) fn regular_inverse(triangle: &DMatrix<f64>, least: f64) -> Option<DMa
     for (j, column) in inverse.as_mut_slice().chunks_exact_mut(n.max(1)).enumerate() {
         column[j] = 1.0;
         for k in (0..=j).rev() {
-            let own = &triangle.as_slice()[k * n..=k * n + k];
-            let value = column[k] / own[k];
+            let upper = &triangle.as_slice()[k * n..=k * n + k];
+            let value = column[k] / upper[k];
             column[k] = value;
-            column[..k].iter_mut().zip(own).for_each(|(x, r)| *x -= value * r);
+            column[..k].iter_mut().zip(upper).for_each(|(x, r)| *x -= value * r);
         }
     }
     let certain = norm(inverse.as_slice()) * (n as f64).sqrt() * least <= 1.0;
     certain.then_some(inverse)
 }
 
-/// The sum of ‖eⱼᵀ R⁻¹‖² `weight²` over some pairs of j and weight; nothing where R is no upper
-/// triangle.
+/// Returns Σ weight² ‖eⱼᵀ R⁻¹‖² over the pairs (j, weight) of `weighted`; `None` if R is not upper
+/// triangular.
 pub(super) fn inverse_rows(
     triangle: &DMatrix<f64>,
     weighted: impl Iterator<Item = (usize, f64)>,
@@ -50,7 +50,7 @@ pub(super) fn inverse_rows(
     Some(squares.sum())
 }
 
-/// Whether a matrix is square with nothing below its diagonal.
+/// Returns true if a matrix is square and zero below its diagonal.
 fn is_upper(matrix: &DMatrix<f64>) -> bool {
     let below = |(j, column): (usize, &[f64])| column[j + 1..].iter().all(|value| *value == 0.0);
     matrix.is_square()

@@ -1,18 +1,20 @@
-//! Loops over columns, written so that the compiler keeps independent sums in vector registers:
-//! wide ones where the processor has them. The order of every sum is written out and products are
-//! never fused, so that results are the same either way.
+//! Dot products and updates of columns in vector registers.
+//!
+//! Every loop keeps independent partial sums, so that the compiler can use wide registers where the
+//! processor has them. The order of each sum is fixed and products are never fused, so that results
+//! do not depend on the processor.
 
 use multiversion::multiversion;
 use nalgebra::DMatrix;
 
-/// Reflectors applied together to one trailing column.
+/// Number of reflectors applied together to one trailing column.
 pub(super) const PANEL: usize = 4;
-/// Independent sums of a dot product.
+/// Number of independent partial sums of a dot product.
 const LANES: usize = 4;
-/// Sums of squares outside this range are formed again from scaled values.
+/// Range of sums of squares that can neither have overflowed nor underflowed.
 const SAFE_SQUARES: std::ops::Range<f64> = 1e-280..1e280;
 
-/// Euclidean norm that neither overflows nor underflows.
+/// Returns the Euclidean norm without overflow or underflow.
 pub(super) fn norm(vector: &[f64]) -> f64 {
     let squares = sum_of_squares(vector);
     if SAFE_SQUARES.contains(&squares) || squares.is_nan() {
@@ -26,12 +28,12 @@ pub(super) fn norm(vector: &[f64]) -> f64 {
     largest * scaled.sqrt()
 }
 
-/// vᵀv, summed in the same order wherever it is formed.
+/// Returns vᵀv, summed in a fixed order.
 pub(crate) fn sum_of_squares(vector: &[f64]) -> f64 {
     dot(vector, vector)
 }
 
-/// aᵀb with independent partial sums.
+/// Returns aᵀb, with independent partial sums in a fixed order.
 #[inline]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let (a, a_rest) = a.as_chunks::<{ 2 * LANES }>();
@@ -45,7 +47,7 @@ pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum::<f64>()
 }
 
-/// The four products vᵢᵀb in one pass over b.
+/// Returns the four products vᵢᵀb from one pass over b.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn dots(vectors: &[&[f64]; PANEL], b: &[f64]) -> [f64; PANEL] {
     let ([v0, v1, v2, v3], [r0, r1, r2, r3]) = split(vectors);
@@ -64,15 +66,16 @@ pub(super) fn dots(vectors: &[&[f64]; PANEL], b: &[f64]) -> [f64; PANEL] {
     std::array::from_fn(|i| (sums[i][0] + sums[i][1]) + (sums[i][2] + sums[i][3]) + tails[i])
 }
 
-/// AᵀB of tall matrices with few columns: nothing is rearranged, which takes longer than the sums.
+/// Returns AᵀB of two tall matrices with few columns, without the copies that a blocked matrix
+/// product makes.
 pub(crate) fn products(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let rows = a.nrows();
     let column = |i: usize| &a.as_slice()[i.min(a.ncols() - 1) * rows..][..rows];
     let mut all = DMatrix::zeros(a.ncols(), b.ncols());
     for first in (0..a.ncols()).step_by(PANEL) {
         let panel: [&[f64]; PANEL] = std::array::from_fn(|i| column(first + i));
-        for (j, own) in b.as_slice().chunks_exact(rows.max(1)).enumerate() {
-            let sums = dots(&panel, own);
+        for (j, right) in b.as_slice().chunks_exact(rows.max(1)).enumerate() {
+            let sums = dots(&panel, right);
             let count = PANEL.min(a.ncols() - first);
             all.column_mut(j).rows_mut(first, count).copy_from_slice(&sums[..count]);
         }
@@ -80,7 +83,7 @@ pub(crate) fn products(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     all
 }
 
-/// b ← b − Σ sᵢ vᵢ in one pass over b.
+/// Subtracts Σ sᵢ vᵢ from b in one pass over b.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn subtract(b: &mut [f64], s: &[f64; PANEL], vectors: &[&[f64]; PANEL]) {
     let ([v0, v1, v2, v3], [r0, r1, r2, r3]) = split(vectors);
@@ -97,7 +100,7 @@ pub(super) fn subtract(b: &mut [f64], s: &[f64; PANEL], vectors: &[&[f64]; PANEL
 
 type Chunks<'a> = [&'a [[f64; LANES]]; PANEL];
 
-/// Whole chunks and remainders of the four vectors.
+/// Splits each of the four vectors into whole chunks of [`LANES`] values and a remainder.
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "for every kind of processor")]
 fn split<'a>(vectors: &[&'a [f64]; PANEL]) -> (Chunks<'a>, [&'a [f64]; PANEL]) {

@@ -1,51 +1,52 @@
-//! Losses that keep gross errors from ruling a fit.
+//! Robust losses, which limit the influence of gross errors.
 
 use super::Block;
 use super::kernel::{norm, sum_of_squares};
 
-/// How the residual of an item (a pose) counts: ½ρ(s²), where s = ‖r‖ is its whitened length \[σ\].
+/// Loss of an item (a pose): its cost is ½ρ(s²), where s = ‖r‖ is the whitened residual length
+/// \[σ\].
 ///
-/// Rows of an item are scaled by √ρ′, with ρ′ = dρ/d(s²). The gradient ρ′ Jᵀr is then exact, the
-/// curvature ρ′ JᵀJ leaves out ρ″: the first-order form of [Triggs et al. 2000, sec. 4.3], which
-/// Ceres takes where ρ″ < 0. Every ρ here is concave in s², so the weighted problem lies above the
-/// cost of the linearised residual: steps achieve what they predict or more (gain ratios of 1 to
-/// 2), and the tests for convergence hold as they are.
+/// Rows of an item are scaled by √ρ′, with ρ′ = dρ/d(s²). The gradient ρ′ Jᵀr is then exact; the
+/// curvature ρ′ JᵀJ neglects ρ″. This is the first-order form of [Triggs et al. 2000, sec. 4.3],
+/// which Ceres uses where ρ″ < 0. Every ρ here is concave in s², so the weighted quadratic model
+/// bounds the cost of the linearised residual from above. Steps therefore gain at least what they
+/// predict (gain ratios of 1 to 2), and the convergence tests need no change.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub enum Loss {
-    /// ρ = s²: least squares.
+    /// Least squares, ρ = s².
     #[default]
     Squares,
-    /// ρ = s² up to s = k, 2ks − k² beyond
-    /// [Huber 1964]
+    /// Huber's loss: ρ = s² for s ≤ k, ρ = 2ks − k² beyond [Huber 1964].
     Huber {
-        /// k \[σ\].
+        /// Threshold k \[σ\].
         threshold: f64,
     },
-    /// ρ = 2c (√(s² + ε²) − ε): the length of the residual, rounded off to s²·c/ε where s ≪ ε.
+    /// Smoothed absolute length, ρ = 2c (√(s² + ε²) − ε); approximately c s²/ε for s ≪ ε.
     L1 {
-        /// c [1/σ]: the negative log-likelihood of lengths that fall off as exp(−c s).
+        /// Slope c [1/σ]; ½ρ is the negative log-likelihood of a density ∝ exp(−c s).
         slope: f64,
-        /// ε \[σ\].
+        /// Smoothing length ε \[σ\].
         smoothing: f64,
     },
 }
 
 impl Loss {
-    /// k with which [`Loss::Huber`] keeps 95 % efficiency on three coordinates of Gaussian noise.
+    /// Threshold at which [`Loss::Huber`] has 95 % efficiency for three coordinates of Gaussian
+    /// noise.
     ///
     /// Efficiency B²/A with A = E‖ψ‖²/3 and B = P(s ≤ k) + ⅔ k E[1/s; s > k], s² ~ χ²₃ (one
     /// coordinate: 1.345).
     /// [Huber & Ronchetti 2009, ch. 7]
     pub const HUBER_POSITION: f64 = 1.628;
-    /// c of [`Loss::L1`] for three coordinates: exp(−2s) has the standard deviation 1 in each, as
-    /// the whitened noise.
+    /// Slope of [`Loss::L1`] for three coordinates: the density ∝ exp(−2s) has standard deviation 1
+    /// in each coordinate, like whitened noise.
     pub const L1_POSITION: f64 = 2.0;
-    /// ε of [`Loss::L1`]: small against the noise, so that 85 % efficiency on Gaussian noise is
-    /// that of the plain length.
+    /// Smoothing length of [`Loss::L1`]: small against the noise, so that the efficiency on Gaussian
+    /// noise is that of the unsmoothed loss, 85 %.
     pub const L1_SMOOTHING: f64 = 0.1;
 
-    /// ρ(s²).
+    /// Returns ρ(s²).
     pub fn rho(self, s: f64) -> f64 {
         match self {
             Self::Squares => s * s,
@@ -58,7 +59,7 @@ impl Loss {
         }
     }
 
-    /// ρ′ = dρ/d(s²), the weight of an item.
+    /// Returns the weight of an item, ρ′ = dρ/d(s²).
     pub fn weight(self, s: f64) -> f64 {
         match self {
             Self::Squares => 1.0,
@@ -67,7 +68,7 @@ impl Loss {
         }
     }
 
-    /// d(ρ′ s)/ds, the curvature of ½ρ along the residual.
+    /// Returns the curvature of ½ρ along the residual, d(ρ′ s)/ds.
     pub fn curvature(self, s: f64) -> f64 {
         match self {
             Self::Squares => 1.0,
@@ -79,7 +80,7 @@ impl Loss {
         }
     }
 
-    /// Σ ρ over the items of `residuals`, `rows` values each.
+    /// Returns Σ ρ over the items of `residuals`, with `rows` values per item.
     pub(super) fn sum(self, residuals: &[f64], rows: usize) -> f64 {
         if self == Self::Squares {
             return sum_of_squares(residuals);
@@ -87,13 +88,14 @@ impl Loss {
         residuals.chunks_exact(rows.max(1)).map(|item| self.rho(norm(item))).sum()
     }
 
-    /// ρ′ of the item of each row of `residuals`, `rows` values an item.
+    /// Returns for each row of `residuals` the weight ρ′ of its item, with `rows` values per item.
     pub(super) fn weights(self, residuals: &[f64], rows: usize) -> Vec<f64> {
         let items = residuals.chunks_exact(rows.max(1));
         items.flat_map(|item| std::iter::repeat_n(self.weight(norm(item)), item.len())).collect()
     }
 
-    /// Scales the rows of each item by √ρ′ and returns Σ ρ; nothing is done for squares.
+    /// Scales the rows of each item by √ρ′ and returns Σ ρ; for [`Loss::Squares`] does nothing and
+    /// returns `None`.
     pub(super) fn weigh(self, block: &mut Block, rows: usize) -> Option<f64> {
         if self == Self::Squares {
             return None;
@@ -114,26 +116,25 @@ impl Loss {
         Some(sum)
     }
 
-    /// Variance of an estimate over that of its weighted Jacobian, from the whitened lengths of its
-    /// residuals.
+    /// Returns the factor A w̄ / B² by which the covariance of an M-estimate exceeds (JᵀWJ)⁻¹.
     ///
-    /// (JᵀWJ)⁻¹ · A w̄ / B², with A = Σ‖ρ′ r‖²/ν, w̄ the mean of ρ′ and B that of the curvature
-    /// ∂²(½ρ)/∂r² over all directions of all items; ν are the degrees of freedom, and `coordinates`
-    /// says how many numbers each item has: its directions
-    /// [Huber & Ronchetti 2009, sec. 7.6].
+    /// A = Σ‖ρ′ r‖²/ν, w̄ is the mean of ρ′, and B is the mean curvature ∂²(½ρ)/∂r² over all
+    /// directions of all items [Huber & Ronchetti 2009, sec. 7.6]. `lengths` are the whitened
+    /// residual lengths \[σ\], `coordinates` the number of coordinates (directions) of each item,
+    /// `freedom` ν the degrees of freedom.
     pub fn variance_factor(self, lengths: &[f64], coordinates: &[usize], freedom: f64) -> f64 {
         let directions = coordinates.iter().sum::<usize>() as f64;
         if self == Self::Squares || directions <= 0.0 || freedom <= 0.0 {
             return 1.0;
         }
         let sum = |of: &dyn Fn(f64, f64) -> f64| {
-            lengths.iter().zip(coordinates).map(|(&s, &own)| of(s, own as f64)).sum::<f64>()
+            lengths.iter().zip(coordinates).map(|(&s, &count)| of(s, count as f64)).sum::<f64>()
         };
         let influence = sum(&|s, _| (self.weight(s) * s).powi(2)) / freedom;
-        let weight = sum(&|s, own| own * self.weight(s)) / directions;
-        // Along the residual the curvature is that of the loss, across it the weight.
+        let weight = sum(&|s, count| count * self.weight(s)) / directions;
+        // The curvature is that of the loss along the residual, and the weight ρ′ across it.
         let curvature =
-            sum(&|s, own| (own - 1.0) * self.weight(s) + self.curvature(s)) / directions;
+            sum(&|s, count| (count - 1.0) * self.weight(s) + self.curvature(s)) / directions;
         influence * weight / (curvature * curvature)
     }
 }
@@ -142,8 +143,8 @@ impl Loss {
 mod tests {
     use super::*;
 
-    /// Against closed forms of A / B² over normal residuals of one and of two numbers, at
-    /// thresholds where most of them are beyond.
+    /// Compares the factor with closed forms of A / B² for normal residuals of one and of two
+    /// coordinates, at thresholds that most residuals exceed.
     #[test]
     fn variance_of_rows_of_one_and_two_numbers() {
         use statrs::distribution::{ContinuousCDF as _, Normal};
