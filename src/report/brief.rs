@@ -114,8 +114,7 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
     let end = remains(closure)
         .map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
     let last = end.lines().count();
-    let found: Vec<&Found> =
-        closure.effects.iter().filter(|found| !is_beside(closure, found)).collect();
+    let found: Vec<&Found> = closure.effects.iter().filter(|found| !is_beside(found)).collect();
     if !found.is_empty() {
         // A blank line and a heading, and perhaps how many more there are.
         let room = LINES.saturating_sub(text(&blocks).lines().count() + last + 3).max(1);

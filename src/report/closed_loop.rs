@@ -17,7 +17,7 @@ use super::quantity::{counted, decimals, number, or_dash, p_value};
 use super::render::{Report, report, text};
 use super::trace::percent;
 use super::unexplained::{correction, not_looked_for, unexplained, wrong_limits};
-use super::verdict::{called, counts, is_beside, stand_in, verdict, verdict_word};
+use super::verdict::{called, counts, is_beside, stand_in, verdict};
 use super::{effect, findings, trace};
 use crate::fit::{ErrorSummary, Errors, Identification};
 use crate::problem::Problem;
@@ -158,7 +158,7 @@ fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
     let gain = closure.gain;
     let digits = decimals(in_unit(&last, gain.high - gain.low), 4).max(2);
     let mut facts = vec![
-        ("Verdict", verdict_word(closure.verdict).replace('-', " ")),
+        ("Verdict", closure.verdict.as_str().replace('-', " ")),
         ("Effects found", counts(closure)),
         poses(after),
         fitted_parameters(after),
@@ -308,7 +308,7 @@ fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
             .as_ref()
             .map(|own| format!("{} by {}, which took no part", says(own), own.data)),
     );
-    let mut chance = if is_beside(closure, found) {
+    let mut chance = if is_beside(found) {
         format!(
             "p-value {}: nothing speaks for it by itself; it is in the model together with others",
             p_value(found.p_value)

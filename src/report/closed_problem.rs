@@ -12,7 +12,7 @@ use super::quantity::p_value;
 use super::verdict::is_beside;
 use crate::error::one_line;
 use crate::problem::{Argument, Effect, Problem};
-use crate::select::{ClosedLoop, Found, HarmonicPrior, SelectionRules};
+use crate::select::{ClosedLoop, Found, HarmonicPrior, Status};
 
 /// The `text` of `problem` with the effects that were found declared and its data in `files`, as
 /// seen from where the text will stand; everything else stays as it was written, comments included.
@@ -30,7 +30,8 @@ pub fn closed_problem(
     let of = |effect: &Effect| closure.effects.iter().find(|found| found.effect == *effect);
     // What data that took no part contradict is not declared.
     let holds = |effect: &Effect| {
-        declared.contains(effect) || of(effect).is_none_or(|found| !found.is_contradicted())
+        declared.contains(effect)
+            || of(effect).is_none_or(|found| found.status != Status::Contradicted)
     };
     let closed =
         closure.closed.effects.iter().filter(|declared| holds(&declared.effect)).map(|declared| {
@@ -205,8 +206,8 @@ fn arguments(effect: &Effect) -> Value {
 
 /// What is known of an effect that was found, line by line.
 fn comments(found: &Found, closure: &ClosedLoop) -> Vec<String> {
-    let sure = match found.is_named(SelectionRules::DEFAULT.stated) {
-        _ if is_beside(closure, found) => "; nothing speaks for it by itself",
+    let sure = match found.status == Status::Found {
+        _ if is_beside(found) => "; nothing speaks for it by itself",
         true => "",
         false => "; that this is the law is not sure",
     };

@@ -7,7 +7,6 @@ use super::errors::in_unit;
 use super::identify::influential_rows;
 use super::json::{both, keyed, kind, list, object, summary, to_text, unless_empty};
 use super::unexplained::place;
-use super::verdict::verdict_word;
 use super::{findings, trace};
 use crate::fit::Identification;
 use crate::problem::Problem;
@@ -21,7 +20,7 @@ pub fn loop_json(problem: &Problem, closure: &ClosedLoop) -> String {
         list(&closure.unexplained, |left| unexplained(left, &closure.before)).into_iter();
     to_text(&object! {
         problem: &problem.name,
-        verdict: verdict_word(closure.verdict),
+        verdict: closure.verdict.as_str(),
         // Only where the search was stopped before it ended.
         ?interrupted: closure.interrupted.then_some(true),
         trusted: closure.after.is_trusted(),
@@ -30,6 +29,7 @@ pub fn loop_json(problem: &Problem, closure: &ClosedLoop) -> String {
         registered: both(&closure.before.fit.registered),
         before: fit(&closure.before.fit),
         after: fit(&closure.after),
+        with_found: both(&closure.with_found),
         // Mean reduction of the error on held-out poses; 95 of 100 such intervals hold the true
         // one.
         ..keyed("held_out_gain", of.is_angle(), object! {
@@ -70,6 +70,7 @@ fn found(own: &Found, closure: &ClosedLoop) -> impl Serialize {
     object! {
         ..&own.effect,
         description: closure.before.describe(&own.effect),
+        status: own.status.as_str(),
         claims: own.claims.as_ref().map(|claims| trace::claims_entry(claims, &closure.before)),
         // Part of fits to configurations drawn anew that name it.
         stability: own.stability,

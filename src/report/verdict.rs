@@ -4,19 +4,10 @@ use super::effect;
 use super::quantity::{counted, number};
 use super::trace::{EVEN, percent};
 use super::unexplained::size_alone;
-use crate::select::{Claims, ClosedLoop, Found, SelectionRules, Verdict};
+use crate::select::{Claims, ClosedLoop, Found, Status, Verdict};
 
 /// Probability of a law below which it is not even an example.
 const NONE: f64 = 0.005;
-
-/// What it came to, in a word.
-pub(super) fn verdict_word(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::NothingFound => "nothing-found",
-        Verdict::Explained => "explained",
-        Verdict::Unexplained => "unexplained",
-    }
-}
 
 /// That the search ended early.
 pub fn interrupted(closure: &ClosedLoop) -> String {
@@ -61,11 +52,11 @@ struct Kinds<'a> {
 impl<'a> Kinds<'a> {
     fn of(closure: &'a ClosedLoop) -> Self {
         let mut all = Self { named: Vec::new(), such: Vec::new(), contradicted: Vec::new() };
-        for found in closure.effects.iter().filter(|found| !is_beside(closure, found)) {
-            let own = match () {
-                () if found.is_contradicted() => &mut all.contradicted,
-                () if found.is_named(SelectionRules::DEFAULT.stated) => &mut all.named,
-                () => &mut all.such,
+        for found in closure.effects.iter().filter(|found| !is_beside(found)) {
+            let own = match found.status {
+                Status::Contradicted => &mut all.contradicted,
+                Status::Found => &mut all.named,
+                Status::Probable | Status::Located => &mut all.such,
             };
             own.push(found);
         }
@@ -73,15 +64,10 @@ impl<'a> Kinds<'a> {
     }
 }
 
-/// Whether an effect is in the model with others, and nothing speaks for it by itself: evidence
-/// weighs it in no set, and chance does as well. Of many orders under one prior none may stand out.
-pub(super) fn is_beside(closure: &ClosedLoop, found: &Found) -> bool {
-    closure.harmonic_prior.is_none() && is_unsupported(found)
-}
-
-/// Whether evidence weighs an effect in no set, and chance does as well.
-fn is_unsupported(found: &Found) -> bool {
-    found.claims.is_none() && found.p_value >= SelectionRules::DEFAULT.leaving_level
+/// Returns true for an effect that is in the model only together with others: no evidence was
+/// evaluated for it, and by itself it is not significant.
+pub(super) fn is_beside(found: &Found) -> bool {
+    found.claims.is_none() && found.status == Status::Located
 }
 
 /// How many effects were found, and how many causes whose laws are not sure.
@@ -213,11 +199,11 @@ fn doubted((place, at, law): (&str, f64, f64), own: &str, rival: Option<&str>) -
 pub(super) fn called(closure: &ClosedLoop, found: &Found) -> String {
     let own = effect::both(&found.effect, &closure.before);
     match &found.claims {
-        _ if found.is_contradicted() => format!("contradicted: {own}"),
-        _ if is_beside(closure, found) => {
+        _ if found.status == Status::Contradicted => format!("contradicted: {own}"),
+        _ if is_beside(found) => {
             format!("in the model beside the others, not found by itself: {own}")
         }
-        Some(claims) if !found.is_named(SelectionRules::DEFAULT.stated) => {
+        Some(claims) if found.status != Status::Found => {
             titled((&claims.place.0.to_string(), claims.place.1, claims.law.1), &own)
         }
         _ => own,
@@ -238,9 +224,9 @@ fn titled((place, at, law): (&str, f64, f64), own: &str) -> String {
 /// What is in the model for a cause whose law is so little known that its title names none.
 pub(super) fn stand_in(closure: &ClosedLoop, found: &Found) -> Option<String> {
     let is_unknown = |claims: &Claims| claims.law.1 < NONE;
-    (found.claims.as_ref().is_some_and(is_unknown) && !found.is_contradicted()).then(|| {
-        format!("in the model stands for it: {}", effect::both(&found.effect, &closure.before))
-    })
+    (found.claims.as_ref().is_some_and(is_unknown) && found.status != Status::Contradicted).then(
+        || format!("in the model stands for it: {}", effect::both(&found.effect, &closure.before)),
+    )
 }
 
 fn lower(words: &str) -> String {
@@ -251,8 +237,6 @@ fn lower(words: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::ErrorSummary;
-    use crate::problem::Effect;
 
     #[test]
     fn nothing_is_said_surer_than_it_is_known() {
@@ -271,21 +255,6 @@ mod tests {
         );
         assert_eq!(title(0.999, 0.0), "joint 2: its law is not known");
         assert!(!words(0.2, 0.001).1.contains("wave") && !title(0.2, 0.001).contains("wave"));
-    }
-
-    #[test]
-    fn what_chance_does_as_well_is_not_found() {
-        let found = |p_value: f64| Found {
-            effect: Effect::GearRatio { joint: 1 },
-            claims: None,
-            p_value,
-            estimates: Vec::new(),
-            alternatives: Vec::new(),
-            stability: None,
-            witness: None,
-            held_out_after: ErrorSummary::default(),
-        };
-        assert!(is_unsupported(&found(1.0)) && !is_unsupported(&found(1e-6)));
     }
 
     #[test]

@@ -36,7 +36,9 @@ pub use residual_tests::{
 };
 pub use rules::SelectionRules;
 pub use screening::{Ranked, Trace, examine, trace, trace_by};
-pub use selection::{ClosedLoop, Found, HarmonicPrior, Interval, Round, Verdict, close, close_by};
+pub use selection::{
+    ClosedLoop, Found, HarmonicPrior, Interval, Round, Status, Verdict, close, close_by,
+};
 pub use separation::{Separation, Side, separation};
 pub use telling_pose::TellingPose;
 pub use unexplained::{Correction, Curve, PartialResidual, Unexplained};

@@ -12,7 +12,7 @@ use flexcal::measurement::{Dataset, NestReading, Split};
 use flexcal::problem::{Effect, Problem};
 use flexcal::rig::{Truth, simulate};
 use flexcal::select::{
-    Covariate, Evidence, Hypothesis, Law, Part, Verdict, WitnessVerdict, close, trace,
+    Covariate, Evidence, Hypothesis, Law, Part, Status, Verdict, WitnessVerdict, close, trace,
 };
 use flexcal::study::table;
 use nalgebra::{Rotation3, Vector3};
@@ -267,7 +267,7 @@ fn a_fixed_point_measured_again_speaks_for_or_against_a_drift() {
         let drift = own("tracker-drift");
         assert_eq!(drift.witness.as_ref().map(|witness| witness.says), says);
         assert_eq!(
-            (drift.is_named(STATED), closure.verdict == Verdict::Explained),
+            (drift.status == Status::Found, closure.verdict == Verdict::Explained),
             (moves > 0.0, moves > 0.0)
         );
         assert_eq!(own("gear-ratio").witness, None);
@@ -306,7 +306,10 @@ fn a_slide_that_bends_as_it_goes_out_is_named() {
             close(&problem, &Dataset::new(table(&rows), split), &Options::default()).unwrap();
         let [found] = closure.effects.as_slice() else { panic!("{:?}", closure.effects) };
         assert_eq!(found.effect, Effect::SlideBending { joint });
-        assert!(found.is_named(STATED) && closure.verdict == Verdict::Explained, "{found:?}");
+        assert!(
+            (found.status == Status::Found) && closure.verdict == Verdict::Explained,
+            "{found:?}"
+        );
         let own = &found.estimates[0];
         assert!((own.estimate - strength).abs() < 4.0 * own.std_error.unwrap(), "{own:?}");
     }
@@ -379,7 +382,7 @@ fn a_station_that_is_set_up_anew_moves_and_turns() {
     // Between the same two poses.
     let before = |time: f64| data.measurements.time.iter().filter(|own| **own < time).count();
     assert_eq!(before(moved), before(at_time), "{moved}");
-    assert!(found.is_named(STATED) && closure.verdict == Verdict::Explained, "{found:?}");
+    assert!((found.status == Status::Found) && closure.verdict == Verdict::Explained, "{found:?}");
     let truth = shift.map(|mm: f64| mm * 1e-3).into_iter().chain(turn.map(f64::to_radians));
     for (own, truth) in found.estimates.iter().zip(truth) {
         assert!((own.estimate - truth).abs() < 4.0 * own.std_error.unwrap(), "{own:?} {truth}");

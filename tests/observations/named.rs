@@ -13,7 +13,7 @@ use flexcal::fit::{Identification, Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{Effect, Problem};
 use flexcal::rig::{Cause, Simulation, Truth, simulate, simulate_poses};
-use flexcal::select::{ClosedLoop, Part, close};
+use flexcal::select::{ClosedLoop, Part, Status, close};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -26,8 +26,6 @@ use crate::common::made::model_of;
 const SEEN: f64 = 30.0;
 /// Squares by which every other one must fall short of it.
 const APART: f64 = 6.0;
-/// Probability of a law from which on it is named.
-const STATED: f64 = 0.9;
 
 /// What the loop made of an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -126,7 +124,7 @@ fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Jud
     let is_true = |effect: &Effect| truth.is_some_and(|truth| is_the_same(effect, truth));
     let at_place = |at: Option<Part>| truth.is_some_and(|truth| at.is_some() && part(truth) == at);
     let (named, such): (Vec<_>, Vec<_>) =
-        closed.effects.iter().partition(|found| found.is_named(STATED));
+        closed.effects.iter().partition(|found| found.status == Status::Found);
     let wrong = named.iter().filter(|found| !is_true(&found.effect)).count();
     let listed = closed
         .effects

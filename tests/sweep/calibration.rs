@@ -5,7 +5,7 @@
 use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::{Effect, Problem};
-use flexcal::select::{Part, Verdict, close};
+use flexcal::select::{Part, Status, Verdict, close};
 use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -90,7 +90,7 @@ impl Set {
         let claims = || found.iter().filter_map(|found| Some((found, found.claims.as_ref()?)));
         let others = judged.closure.unexplained.iter().filter_map(|left| left.claims.as_ref());
         let [shown, named, stated] = judged.counts();
-        let stands = found.iter().filter(|found| found.is_named(STATED));
+        let stands = found.iter().filter(|found| found.status == Status::Found);
         Self {
             laws: claims().map(|(found, claims)| (claims.law.1, true_law(&found.effect))).collect(),
             places: claims()
@@ -253,7 +253,8 @@ fn noise_of_many_kinds_is_no_effect() {
                 &Options::default(),
             )
             .unwrap();
-            let named = closure.effects.iter().filter(|found| found.is_named(STATED)).count();
+            let named =
+                closure.effects.iter().filter(|found| found.status == Status::Found).count();
             let such = closure.effects.len() - named;
             let located = closure.unexplained.iter().any(|left| left.claims.is_some());
             let names: Vec<String> =

@@ -13,34 +13,28 @@ use super::super::residual_tests::Findings;
 use super::super::rules::SelectionRules;
 use super::super::screening::{Trace, check_fit, trace_fit};
 use super::super::unexplained::{self, Unexplained};
-use super::super::witness::{Witness, WitnessVerdict, witness};
+use super::super::witness::{Witness, witness};
 use super::alternatives::Replacements;
 use super::harmonics::{self, HarmonicPrior};
 use super::interval;
 pub use super::rounds::Round;
 use super::rounds::Rounds;
+use super::status::{Status, Verdict};
 use crate::error::Location;
-use crate::fit::{ErrorSummary, Estimate, Identification, IdentifyError, Options, Progress};
+use crate::fit::{
+    ErrorSummary, Errors, Estimate, Identification, IdentifyError, Options, Progress,
+};
 use crate::measurement::Dataset;
 use crate::numeric::Interval;
 use crate::problem::{Effect, Problem};
-
-/// What the loop came to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
-    /// No effect, no structure.
-    NothingFound,
-    /// Effects were found and what is left passes the residual tests.
-    Explained,
-    /// Structure is left.
-    Unexplained,
-}
 
 /// An effect that the loop added.
 #[derive(Debug, Clone)]
 pub struct Found {
     /// Which.
     pub effect: Effect,
+    /// What may be claimed of it.
+    pub status: Status,
     /// What is claimed of it, each with its probability; `None` where no evidence could be weighed.
     pub claims: Option<Claims>,
     /// Probability that chance alone gains as much, corrected for the candidates tried.
@@ -59,19 +53,6 @@ pub struct Found {
     pub held_out_after: ErrorSummary,
 }
 
-impl Found {
-    /// Whether data that took no part speak against it.
-    pub fn is_contradicted(&self) -> bool {
-        self.witness.as_ref().is_some_and(|witness| witness.says == WitnessVerdict::Contradicted)
-    }
-
-    /// Whether it is named as found: its law is surer than `stated`, and no witness contradicts it.
-    /// Otherwise a place is found, and the law is such as this one.
-    pub fn is_named(&self, stated: f64) -> bool {
-        !self.is_contradicted() && self.claims.as_ref().is_none_or(|claims| claims.law.1 >= stated)
-    }
-}
-
 /// The loop from the declared problem to one that leaves nothing to find.
 #[derive(Debug, Clone)]
 pub struct ClosedLoop {
@@ -84,6 +65,8 @@ pub struct ClosedLoop {
     pub before: Trace,
     /// The fit with every effect that was found.
     pub after: Identification,
+    /// Errors with the effects of status [`Status::Found`] alone.
+    pub with_found: Errors,
     /// Residual tests of what it leaves.
     pub findings: Findings,
     /// The problem with what was found declared.
@@ -189,13 +172,16 @@ pub fn close_by(
     if unexplained.is_empty() {
         unexplained.extend(unexplained::nowhere(&findings));
     }
-    // What a witness contradicts explains nothing.
-    let holds = unexplained.is_empty() && !effects.iter().any(Found::is_contradicted);
-    let verdict = match (holds, effects.is_empty()) {
-        (false, _) => Verdict::Unexplained,
-        (true, true) => Verdict::NothingFound,
-        (true, false) => Verdict::Explained,
+    let statuses: Vec<Status> = effects.iter().map(|found| found.status).collect();
+    let with_found = if statuses.iter().all(|status| *status == Status::Found) {
+        None
+    } else {
+        Some(fit_with_found(&rounds, &fitted, &effects, &unhurried)?)
     };
+    let is_noise_with_found =
+        with_found.as_ref().is_none_or(|sure| !check_fit(sure, &data).is_structured());
+    let verdict = Verdict::of(&statuses, unexplained.is_empty(), is_noise_with_found);
+    let with_found = with_found.map_or(fitted.found.fitted, |sure| sure.found.fitted);
     let gain = interval::gain(&data, &errors_before, &fitted.errors(&data, &data.split.held_out));
     let weighed = data.weighed();
     let carried = evidence.iter().flat_map(|all| &all.left_out).map(|&pose| weighed[pose]);
@@ -206,6 +192,7 @@ pub fn close_by(
         interrupted,
         before,
         after: fitted.found,
+        with_found,
         findings,
         closed: fitted.problem,
         effects,
@@ -433,6 +420,19 @@ fn exchanged(rounds: &mut Rounds, fitted: &Fitted) -> Result<Option<Fitted>, Ide
     Ok(None)
 }
 
+/// Fits the declared problem with the effects of status [`Status::Found`] alone.
+fn fit_with_found(
+    rounds: &Rounds,
+    fitted: &Fitted,
+    effects: &[Found],
+    options: &Options,
+) -> Result<Fitted, IdentifyError> {
+    let sure = effects.iter().filter(|found| found.status == Status::Found);
+    let sure: Vec<Effect> = sure.map(|found| found.effect.clone()).collect();
+    let problem = fitted.with_effects(&rounds.with_declared(&sure));
+    Fitted::new(problem, rounds.data, &fitted.onwards(options))
+}
+
 /// Every added effect with what is known of it; harmonics may share a prior.
 fn found(
     rounds: &Rounds,
@@ -457,16 +457,20 @@ fn found(
             alternatives(evidence, &effect, &parts, rounds.data.rules.beside)
         });
         let own = stable.iter().filter(|(part, _)| effect.covers(part)).map(|(_, share)| *share);
+        let rules = rounds.data.rules;
+        let claims = best.and_then(|(evidence, _)| claims(evidence, &effect, rules.several_orders));
+        let tested = tested.iter().filter(|part| effect.covers(&part.effect));
+        let p_value = tested.map(|part| part.p).fold(1.0, f64::min);
+        let witness = witness(fitted, rounds.data, &effect);
+        // Of many orders under one prior none may be significant by itself.
+        let is_significant = common_prior || p_value < rules.leaving_level;
+        let says = witness.as_ref().map(|witness| witness.says);
+        let law = claims.as_ref().map(|claims| claims.law.1);
         Found {
             stability: own.reduce(f64::min),
-            claims: best.and_then(|(evidence, _)| {
-                claims(evidence, &effect, rounds.data.rules.several_orders)
-            }),
-            p_value: tested
-                .iter()
-                .filter(|part| effect.covers(&part.effect))
-                .map(|part| part.p)
-                .fold(1.0, f64::min),
+            status: Status::of(law, rules.stated, (is_significant, says)),
+            claims,
+            p_value,
             estimates: fitted
                 .parameters_of(&effect)
                 .into_iter()
@@ -474,7 +478,7 @@ fn found(
                 .collect(),
             held_out_after: first_with(&effect),
             alternatives,
-            witness: witness(fitted, rounds.data, &effect),
+            witness,
             effect,
         }
     };

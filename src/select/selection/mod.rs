@@ -6,7 +6,9 @@ mod harmonics;
 mod interval;
 mod pick;
 mod rounds;
+mod status;
 
 pub use crate::numeric::Interval;
-pub use close::{ClosedLoop, Found, Round, Verdict, close, close_by};
+pub use close::{ClosedLoop, Found, Round, close, close_by};
 pub use harmonics::HarmonicPrior;
+pub use status::{Status, Verdict};

@@ -209,7 +209,8 @@ impl<'a> Rounds<'a> {
         self.is_seen(&self.with_declared(added))
     }
 
-    fn with_declared(&self, added: &[Effect]) -> Vec<Effect> {
+    /// Returns the declared effects with the added ones, parts of one harmonic joined.
+    pub fn with_declared(&self, added: &[Effect]) -> Vec<Effect> {
         added.iter().fold(self.declared.clone(), |all, effect| joined(&all, effect))
     }
 

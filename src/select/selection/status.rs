@@ -1,0 +1,113 @@
+//! Status of each effect, which says what may be claimed of it, and the verdict that follows.
+
+use crate::select::witness::WitnessVerdict;
+
+/// Probability of a law from which on it is the most probable one at its place.
+const EVEN: f64 = 0.5;
+
+/// What may be claimed of an effect in the extended problem, the strongest claim first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Status {
+    /// Its law is as probable as [`stated`](crate::select::SelectionRules::stated) asks for, or the
+    /// F test alone decided for it.
+    Found,
+    /// Its law is more probable than all others together, but less than `stated`.
+    Probable,
+    /// Only the place of the error is claimed, if anything; the law is one candidate.
+    Located,
+    /// Data outside the fit contradict it.
+    Contradicted,
+}
+
+impl Status {
+    /// Returns the word for the status in result files.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Found => "found",
+            Self::Probable => "probable",
+            Self::Located => "located",
+            Self::Contradicted => "contradicted",
+        }
+    }
+
+    /// Returns the status of an effect: `law` is the probability of its law, `None` where no evidence
+    /// was evaluated, and `stated` the probability from which on a law is named as found.
+    pub(super) fn of(
+        law: Option<f64>,
+        stated: f64,
+        (is_significant, witness): (bool, Option<WitnessVerdict>),
+    ) -> Self {
+        match law {
+            _ if witness == Some(WitnessVerdict::Contradicted) => Self::Contradicted,
+            None if is_significant => Self::Found,
+            Some(law) if law >= stated => Self::Found,
+            Some(law) if law >= EVEN => Self::Probable,
+            _ => Self::Located,
+        }
+    }
+}
+
+/// Outcome of the loop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// No effect was found and the residual shows no structure.
+    NothingFound,
+    /// The effects with status [`Status::Found`] alone leave a residual that passes the tests.
+    Explained,
+    /// Structure is left, or no effect is sure.
+    Unexplained,
+}
+
+impl Verdict {
+    /// Returns the word for the verdict in result files.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::NothingFound => "nothing-found",
+            Self::Explained => "explained",
+            Self::Unexplained => "unexplained",
+        }
+    }
+}
+
+impl Verdict {
+    /// Returns the verdict on effects of these statuses: `is_noise` says whether the fit with all of
+    /// them leaves noise, `is_noise_with_found` whether the fit with the found ones alone does.
+    pub(super) fn of(statuses: &[Status], is_noise: bool, is_noise_with_found: bool) -> Self {
+        match statuses {
+            [] if is_noise => Self::NothingFound,
+            _ if !is_noise || statuses.contains(&Status::Contradicted) => Self::Unexplained,
+            _ if is_noise_with_found && statuses.contains(&Status::Found) => Self::Explained,
+            _ => Self::Unexplained,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_status_claims_no_more_than_the_probability_of_the_law() {
+        let status = |law, is_significant| Status::of(law, 0.9, (is_significant, None));
+        assert_eq!(status(None, true), Status::Found);
+        assert_eq!(status(None, false), Status::Located);
+        assert_eq!(status(Some(0.95), false), Status::Found);
+        assert_eq!(status(Some(0.7), true), Status::Probable);
+        assert_eq!(status(Some(0.3), true), Status::Located);
+        let against = (true, Some(WitnessVerdict::Contradicted));
+        assert_eq!(Status::of(Some(0.99), 0.9, against), Status::Contradicted);
+    }
+
+    #[test]
+    fn explained_means_that_what_is_sure_leaves_noise() {
+        let verdict = |statuses: &[Status], with_found| Verdict::of(statuses, true, with_found);
+        assert_eq!(verdict(&[], true), Verdict::NothingFound);
+        assert_eq!(verdict(&[Status::Found], true), Verdict::Explained);
+        assert_eq!(verdict(&[Status::Probable], false), Verdict::Unexplained);
+        assert_eq!(verdict(&[Status::Probable], true), Verdict::Unexplained);
+        assert_eq!(verdict(&[Status::Found, Status::Located], false), Verdict::Unexplained);
+        assert_eq!(verdict(&[Status::Found, Status::Located], true), Verdict::Explained);
+        assert_eq!(verdict(&[Status::Found, Status::Contradicted], true), Verdict::Unexplained);
+        assert_eq!(Verdict::of(&[], false, false), Verdict::Unexplained);
+    }
+}
