@@ -1,7 +1,8 @@
 //! Rows that carry what a fit does not explain.
 
-use super::outcome::{Identification, Noise};
-use super::outliers::{InfluentialRows, Outlier};
+use crate::fit::checks::outliers::{InfluentialRows, Outlier};
+use crate::fit::outcome::Identification;
+use crate::fit::uncertainty::noise::Noise;
 
 /// Without its influential_rows a fit leaves no more than this part of the variance, or half of it and what
 /// the declared σ explains: then they carry most of it. Rows that an effect touches alone, as two

@@ -4,12 +4,13 @@ use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::covariance::{Collected, Correlations, Covariance};
-use super::fitting::FitEnd;
-use super::noise_model::NoiseModel;
-use super::stage::Stage;
-use super::statistics::Statistics;
-use super::{
+use crate::fit::stages::fitting::FitEnd;
+use crate::fit::stages::noise_model::NoiseModel;
+use crate::fit::stages::stage::Stage;
+use crate::fit::uncertainty::covariance::{Collected, Correlations, Covariance};
+use crate::fit::uncertainty::noise::Noise;
+use crate::fit::uncertainty::statistics::Statistics;
+use crate::fit::{
     ActiveConstraint, Alternation, Caution, Errors, InfluentialRows, OrientationErrors, Outlier,
     PointSpread, PriorSize, QualityFlag, ShadowPrice, SolverChoice, Strategy, TooFewPoses,
 };
@@ -23,18 +24,6 @@ use crate::quantity::Unit;
 pub const STRONG_CORRELATION: f64 = 0.9;
 /// A parameter of which the data gave no more than this part has no standard error.
 const NOTHING_LEARNED: f64 = 1e-6;
-
-/// Where the assumed noise comes from.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum Noise {
-    /// From `position_sigma` or the column `sigma`.
-    Declared,
-    /// From the scatter about the fit, 1 σ per coordinate \[m\].
-    Estimated(f64),
-    /// Neither declared nor to be seen: the fit has no degrees of freedom.
-    Unknown,
-}
 
 /// A parameter after the fit; SI units.
 #[derive(Debug, Clone, PartialEq)]
@@ -145,7 +134,7 @@ pub struct Identification {
     /// Identification rows whose residual is too long to be noise, in the order of the rows.
     pub outliers: Vec<Outlier>,
     /// Those that carry what the fit does not explain, if a few do; looked for where
-    /// [`super::Options::with_influential_rows`] asks, but not with a robust loss.
+    /// [`crate::fit::Options::with_influential_rows`] asks, but not with a robust loss.
     pub influential_rows: Option<InfluentialRows>,
     /// Full parameter vector of the model.
     pub x: DVector<f64>,

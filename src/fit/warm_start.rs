@@ -3,8 +3,8 @@
 
 use nalgebra::DVector;
 
-use super::noise_model::NoiseModel;
-use super::{Errors, Identification};
+use crate::fit::stages::noise_model::NoiseModel;
+use crate::fit::{Errors, Identification};
 use crate::model::{KnownDerivatives, Model};
 
 /// What the next fit need not find anew.

@@ -1,0 +1,9 @@
+//! Application of an identified arm: prediction, compensation, acceptance, saved estimates.
+
+pub(super) mod acceptance;
+pub(super) mod command_jacobian;
+pub(super) mod compensate;
+pub(super) mod joint_source;
+pub(super) mod predict;
+pub(super) mod predict_saved;
+pub(super) mod saved_estimate;

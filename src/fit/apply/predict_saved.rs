@@ -1,0 +1,330 @@
+//! An estimate applied to rows of which it knows nothing, without another fit of the arm.
+
+use std::sync::Arc;
+
+use nalgebra::{DVector, Vector3};
+
+use crate::error::InputError;
+use crate::fit::apply::predict::{Residual, in_space};
+use crate::fit::apply::saved_estimate::{SavedEstimate, SavedEstimateError};
+use crate::fit::checks::point_spread::{PointSpread, spreads};
+use crate::fit::checks::required_columns::check_columns;
+use crate::fit::errors::of_kind;
+use crate::fit::stages::fixture_location::locate;
+use crate::fit::stages::placement::UNKNOWN_SIGMA;
+use crate::fit::stages::registration::register;
+use crate::fit::stages::stage::{COST_TOLERANCE, Stage, StageError};
+use crate::fit::uncertainty::residual_lengths::outlying;
+use crate::fit::{ErrorSummary, Placement, SolverChoice};
+use crate::least_squares::solver::Settings;
+use crate::least_squares::{Loss, Memory};
+use crate::measurement::{Measurements, Split};
+use crate::model::parameter::ParameterSite;
+use crate::model::{Model, Pose};
+use crate::problem::{Observation, Problem};
+
+/// Part of a parameter in a combination that rows leave open, beyond rounding.
+const OPEN: f64 = 1e-6;
+
+/// What an arm makes of some rows.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Prediction {
+    /// Predicted position of each row, measuring frame \[m\]; NaN where the arm has no equilibrium.
+    pub positions: Vec<Vector3<f64>>,
+    /// Predicted orientation of each row, a rotation vector, measuring frame \[rad\], where
+    /// orientation is fitted.
+    pub orientations: Option<Vec<Vector3<f64>>>,
+    /// What the rows hold beyond that; `None` where they hold no positions.
+    pub residuals: Option<Vec<Residual>>,
+    /// Their errors; `None` likewise.
+    pub errors: Option<ErrorsBySession>,
+    /// The spread of the target at each point that the rows touch.
+    pub spreads: Vec<PointSpread>,
+    /// Parameters of bases and tools that the estimate lacks, fitted to their own rows with the arm
+    /// as it is.
+    pub placed: Vec<String>,
+}
+
+/// Errors of all rows, and of those of each session.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorsBySession {
+    /// Of all rows of the first kind that there is.
+    pub all: ErrorSummary,
+    /// Of each kind, where there are several.
+    pub kinds: Vec<ErrorSummary>,
+    /// Of each session by its name, in the order of the rows, of the first kind that it has; none
+    /// where there are no sessions.
+    pub sessions: Vec<(String, ErrorSummary)>,
+}
+
+/// Why an estimate cannot be applied.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PredictError {
+    /// Problem and rows do not fit each other.
+    #[error("{0}")]
+    Input(#[from] InputError),
+    /// The estimate is not of this problem, or lacks what the rows need.
+    #[error(transparent)]
+    Estimate(#[from] SavedEstimateError),
+    /// Rows of a new session or tool leave open where it is.
+    #[error(
+        "{name} is not in the estimate, and its rows do not determine it; measure more poses there"
+    )]
+    Open {
+        /// The parameter.
+        name: String,
+    },
+    /// Without an estimate the rows leave open where base or tool is.
+    #[error(
+        "the rows do not determine {name}, and there is no estimate to take it from; measure more poses there"
+    )]
+    OpenWithoutEstimate {
+        /// The parameter.
+        name: String,
+    },
+    /// Bases and tools of new sessions could not be placed.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+}
+
+impl ErrorsBySession {
+    /// Of the errors measured − predicted of every row \[m\].
+    pub fn of(rows: &Measurements, errors: &[Vector3<f64>]) -> Self {
+        let kinds = rows.kinds();
+        let of = |own: &[usize], errors: &[Vector3<f64>]| {
+            let first = own.iter().map(|&row| rows.observation(row)).min().unwrap_or_default();
+            of_kind(rows, own.iter().copied(), errors, first)
+        };
+        let session = |(label, name): (usize, &String)| {
+            let own = (0..rows.len()).filter(|&row| rows.session.of_row[row] == label);
+            let (own, errors): (Vec<usize>, Vec<Vector3<f64>>) =
+                own.map(|row| (row, errors[row])).unzip();
+            (!name.is_empty() && !own.is_empty()).then(|| (name.clone(), of(&own, &errors)))
+        };
+        let sessions = rows.session.names.iter().enumerate().filter_map(session).collect();
+        let all: Vec<usize> = (0..rows.len()).collect();
+        let each = kinds
+            .iter()
+            .filter(|_| kinds.len() > 1)
+            .map(|&kind| of_kind(rows, 0..rows.len(), errors, kind));
+        Self { all: of(&all, errors), kinds: each.collect(), sessions }
+    }
+}
+
+/// What the arm of `problem` makes of `rows`: as identified in `estimate`, or the nominal arm
+/// without one.
+///
+/// A base or tool that is free and of which the estimate says nothing (a session that took no part
+/// in it; all of them without an estimate) is fitted to its own rows, with the arm as it is, if
+/// they hold positions and enough of them. `split` says which rows are held out, where that is
+/// known.
+///
+/// # Errors
+/// The estimate is not of this problem, or lacks a parameter that the rows need, or the rows lack a
+/// column that an effect needs.
+pub fn predict(
+    problem: &Problem,
+    estimate: Option<&SavedEstimate>,
+    rows: &Measurements,
+    split: Option<&Split>,
+) -> Result<Prediction, PredictError> {
+    check_columns(problem, rows)?;
+    let placement = Placement::of(rows);
+    let model = Model::new(problem, &placement.bases, &placement.targets)?;
+    let model = estimate.map_or(model.clone(), |estimate| estimate.model(model));
+    if let Some(estimate) = estimate {
+        estimate.check(problem, &model)?;
+    }
+    let known = |name: &str| estimate.and_then(|estimate| estimate.value(name));
+    let mut x = DVector::zeros(model.parameters.len());
+    let mut missing = Vec::new();
+    for (k, parameter) in model.parameters.iter().enumerate() {
+        match known(&parameter.name) {
+            Some(value) => x[k] = parameter.deviation(value),
+            None if parameter.site.is_placement() => missing.push(k),
+            None if estimate.is_none() => {}
+            None => return Err(lacking(estimate, &parameter.name)),
+        }
+    }
+    let sigma =
+        problem.data.position_sigma.or(estimate.and_then(|estimate| estimate.estimated_sigma));
+    let all: Vec<usize> = (0..rows.len()).collect();
+    let turn = problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation);
+    let mut poses = placement.oriented_poses(rows, &all, (sigma.unwrap_or(UNKNOWN_SIGMA), turn));
+    if let Some(estimate) = estimate {
+        estimate.count_time_in(&mut poses);
+    }
+    // A point or surface that no row speaks of is nowhere needed.
+    let is_needed = |k: usize| {
+        let fixture = matches!(model.parameters[k].site, ParameterSite::Fixture { .. });
+        !fixture || poses.iter().any(|pose| uses(&model, pose, k))
+    };
+    missing.retain(|&k| is_needed(k));
+    if !missing.is_empty() && rows.position_measured {
+        if let Some(k) = too_few(&model, &poses, &missing) {
+            let name = &model.parameters[k].name;
+            return Err(match model.parameters[k].site {
+                ParameterSite::Fixture { .. } => open(estimate, name.clone()),
+                _ => lacking(estimate, name),
+            });
+        }
+        x = place(&model, &poses, &missing, x).map_err(|error| match error {
+            PredictError::Open { name } => open(estimate, name),
+            other => other,
+        })?;
+    } else if let (Some(&k), Some(_)) = (missing.first(), estimate) {
+        return Err(lacking(estimate, &model.parameters[k].name));
+    }
+    let sigmas: Vec<Option<f64>> = all.iter().map(|&row| rows.sigma_of(row).or(sigma)).collect();
+    let orientations = turn.map(|_| model.orientations(&poses, x.as_slice()));
+    let turns = turn
+        .filter(|_| rows.orientations.is_some())
+        .map(|_| model.orientation_residuals(poses.clone(), &x));
+    let targets = model.points(&poses, x.as_slice());
+    let base_of: Vec<usize> = poses.iter().map(|pose| pose.base).collect();
+    let spreads = spreads(&model, &problem.fixtures, &poses, &x);
+    let errors = model.residuals(poses, &x);
+    let (fixtures, bases) = (model.fixtures(x.as_slice()), model.base_frames(x.as_slice()));
+    let of_row =
+        |(row, error): (usize, &Vector3<f64>)| in_space(rows, row, (&fixtures, &bases), error);
+    let (seen, errors): (Vec<Vector3<f64>>, Vec<Vector3<f64>>) =
+        errors.iter().enumerate().map(of_row).unzip();
+    let position = |row: usize| match rows.observation(row) {
+        Observation::Position => seen[row],
+        _ => targets[row]
+            .map_or(Vector3::from_element(f64::NAN), |point| bases[base_of[row]].point(&point)),
+    };
+    let positions = all.iter().map(|&row| position(row)).collect();
+    let numbers: Vec<usize> = all.iter().map(|&row| rows.observation(row).coordinates()).collect();
+    let residuals = rows.position_measured.then(|| {
+        residuals((&errors, &seen), (&sigmas, &numbers), turns.as_deref().zip(turn), split)
+    });
+    let errors = rows.position_measured.then(|| ErrorsBySession::of(rows, &errors));
+    let placed = if rows.position_measured { missing } else { Vec::new() };
+    let placed = placed.into_iter().map(|k| model.parameters[k].name.clone()).collect();
+    Ok(Prediction { positions, orientations, residuals, errors, spreads, placed })
+}
+
+/// The error of an estimate that lacks a parameter, or of none.
+fn lacking(estimate: Option<&SavedEstimate>, name: &str) -> PredictError {
+    let name = name.to_owned();
+    match estimate {
+        Some(SavedEstimate { file, .. }) => {
+            SavedEstimateError::Missing { file: file.clone(), name }.into()
+        }
+        None => PredictError::OpenWithoutEstimate { name },
+    }
+}
+
+/// The error of rows that leave a parameter open, which the estimate lacks or which none has.
+fn open(estimate: Option<&SavedEstimate>, name: String) -> PredictError {
+    match estimate {
+        Some(_) => PredictError::Open { name },
+        None => PredictError::OpenWithoutEstimate { name },
+    }
+}
+
+/// Whether a pose uses the base or tool that a parameter belongs to.
+fn uses(model: &Model, pose: &Pose, k: usize) -> bool {
+    match model.parameters[k].site {
+        ParameterSite::Base { base, .. } => pose.base == base,
+        ParameterSite::Target { target, .. } => pose.target == target,
+        ParameterSite::Fixture { fixture, .. } => {
+            pose.observation.fixtures().contains(&Some(fixture))
+        }
+        _ => false,
+    }
+}
+
+/// The first of the parameters `missing` without a prior that poses are too few for.
+fn too_few(model: &Model, poses: &[Pose], missing: &[usize]) -> Option<usize> {
+    let open: Vec<usize> =
+        missing.iter().copied().filter(|&k| model.parameters[k].sigma.is_none()).collect();
+    open.iter().copied().find(|&k| {
+        let own: Vec<&Pose> = poses.iter().filter(|pose| uses(model, pose, k)).collect();
+        let measured = own.iter().map(|pose| pose.coordinates()).sum::<usize>();
+        let unknown =
+            open.iter().filter(|&&other| own.iter().any(|pose| uses(model, pose, other))).count();
+        // Contacts that do no more than place a point would meet it exactly.
+        let placed_exactly = matches!(model.parameters[k].site, ParameterSite::Fixture { .. })
+            && measured == unknown;
+        measured < unknown || placed_exactly
+    })
+}
+
+/// The full parameter vector `x` with the bases and tools `missing` from it fitted to the poses
+/// that use them.
+fn place(
+    model: &Model,
+    poses: &[Pose],
+    missing: &[usize],
+    mut x: DVector<f64>,
+) -> Result<DVector<f64>, PredictError> {
+    let own: Vec<Pose> = poses
+        .iter()
+        .filter(|pose| missing.iter().any(|&k| uses(model, pose, k)))
+        .copied()
+        .collect();
+    let of_base = |k: usize| matches!(model.parameters[k].site, ParameterSite::Base { .. });
+    let new_base = |pose: &&Pose| missing.iter().any(|&k| of_base(k) && uses(model, pose, k));
+    let registrable: Vec<Pose> = own.iter().filter(new_base).copied().collect();
+    register(model, &registrable, &mut x);
+    locate(model, &own, |k| missing.contains(&k), &mut x);
+    let memory = Memory::default();
+    let stage = Stage {
+        model,
+        declared: own.iter().map(|pose| pose.sigma).collect(),
+        declared_turn: own.iter().find_map(|pose| pose.orientation).map(|own| own.sigma),
+        poses: Arc::new(own),
+        unknowns: missing.to_vec(),
+        solver: SolverChoice::Auto.decide(model),
+        max_steps: Settings::default().max_iterations,
+        cost_tolerance: COST_TOLERANCE,
+        loss: Loss::Squares,
+        counts_fixed: true,
+        memory: &memory,
+        known: None,
+        progress: None,
+        stop: None,
+    };
+    let placed = stage.run(&x)?.x;
+    let open = stage.gauge(&placed, &vec![false; missing.len()], &[]).rows;
+    let open = missing
+        .iter()
+        .enumerate()
+        .find(|(column, _)| open.column(*column).iter().any(|part| part.abs() > OPEN));
+    match open {
+        Some((_, &k)) => Err(PredictError::Open { name: model.parameters[k].name.clone() }),
+        None => Ok(placed),
+    }
+}
+
+/// Residuals from the errors measured − predicted \[m\] and the σ of each row, NaN where it is not
+/// known, and from those of orientation and their σ \[rad\].
+fn residuals(
+    (errors, seen): (&[Vector3<f64>], &[Vector3<f64>]),
+    (sigmas, coordinates): (&[Option<f64>], &[usize]),
+    turns: Option<(&[Vector3<f64>], f64)>,
+    split: Option<&Split>,
+) -> Vec<Residual> {
+    let whitened: Vec<Vector3<f64>> =
+        errors.iter().zip(sigmas).map(|(error, sigma)| error / sigma.unwrap_or(f64::NAN)).collect();
+    let lengths: Vec<f64> = whitened.iter().map(Vector3::norm).collect();
+    let outliers = outlying(&lengths, coordinates);
+    let held_out =
+        |row: usize| split.is_some_and(|split| split.held_out.binary_search(&row).is_ok());
+    let residual =
+        |(row, (&position, &whitened)): (usize, (&Vector3<f64>, &Vector3<f64>))| Residual {
+            row,
+            predicted: seen[row],
+            held_out: held_out(row),
+            position,
+            whitened,
+            orientation: turns.map(|(turns, _)| turns[row]),
+            whitened_orientation: turns.map(|(turns, sigma)| turns[row] / sigma),
+            outlier: outliers[row],
+        };
+    errors.iter().zip(&whitened).enumerate().map(residual).collect()
+}

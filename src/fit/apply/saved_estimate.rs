@@ -1,0 +1,253 @@
+//! An estimate.json that is read again, to apply what was identified without another fit.
+
+use std::collections::HashSet;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use nalgebra::DVector;
+use serde::Deserialize;
+
+use crate::error::one_line;
+use crate::files::at_most;
+use crate::fit::Strategy;
+use crate::model::{Model, Pose};
+use crate::problem::Problem;
+use crate::problem::item::GREATEST;
+
+/// Largest estimate.json that is read [MiB].
+const LARGEST_MIB: u64 = 256;
+
+/// Identified part from which on a parameter is known but for rounding.
+const IDENTIFIED: f64 = 0.99;
+
+/// What an estimate.json says of the arm.
+#[derive(Debug, Clone)]
+pub struct SavedEstimate {
+    /// Where it was read.
+    pub file: PathBuf,
+    /// Whether the fit was to be trusted.
+    pub trusted: bool,
+    /// 1 σ of a coordinate from the scatter, where the problem declares none \[m\].
+    pub estimated_sigma: Option<f64>,
+    /// Time from which what follows the time counts \[s\]; older versions did not write it.
+    pub first_time: Option<f64>,
+    problem: String,
+    /// Not there in what older versions wrote.
+    arm_digest: Option<String>,
+    strategy: Strategy,
+    parameters: Vec<Entry>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct Entry {
+    name: String,
+    nominal: f64,
+    estimate: f64,
+    /// Not there where it has none, or in what older versions wrote.
+    std_error: Option<f64>,
+    identified: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Document {
+    problem: String,
+    arm_digest: Option<String>,
+    strategy: Option<String>,
+    trusted: bool,
+    estimated_sigma_mm: Option<f64>,
+    first_time_s: Option<f64>,
+    parameters: Vec<Entry>,
+}
+
+/// An estimate that cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
+pub enum SavedEstimateError {
+    #[error("{}: cannot be read: {source}", file.display())]
+    Unreadable { file: PathBuf, source: io::Error },
+    #[error("{}: not an estimate.json: {source}", file.display())]
+    Syntax { file: PathBuf, source: serde_json::Error },
+    #[error("{}: has no estimate of {name}; identify the same problem and sessions", file.display())]
+    Missing { file: PathBuf, name: String },
+    #[error("{}: identifies problem {found}, not {expected}", file.display())]
+    OtherProblem { file: PathBuf, found: String, expected: String },
+    #[error("{}: {name} is {found} nominally there, {expected} in the problem; identify again", file.display())]
+    OtherNominal { file: PathBuf, name: String, found: f64, expected: f64 },
+    #[error("{}: was identified with another declared arm (a fixed value, a mass, gravity or an effect has changed since); identify again", file.display())]
+    OtherArm { file: PathBuf },
+    #[error("{}: {name} was identified, but is not free in the problem; give the problem that was identified (after loop, problem.closed.toml)", file.display())]
+    NotFree { file: PathBuf, name: String },
+    #[error("{}: {name} stands there twice; keep one of the two", file.display())]
+    Twice { file: PathBuf, name: String },
+    #[error("{}: {name} has a value larger than 1e150, the largest number that can be reckoned with", file.display())]
+    TooGreat { file: PathBuf, name: String },
+    #[error("{}: larger than {LARGEST_MIB} MiB; is it the right file?", file.display())]
+    TooLarge { file: PathBuf },
+    #[error("{}: not UTF-8 text, so no estimate.json", file.display())]
+    NotUtf8 { file: PathBuf },
+}
+
+impl SavedEstimate {
+    /// Reads an estimate.json.
+    ///
+    /// # Errors
+    /// The file cannot be read, is no estimate.json, or has a parameter twice or beyond what can be
+    /// reckoned with.
+    pub fn read(file: &Path) -> Result<Self, SavedEstimateError> {
+        let named = || file.to_owned();
+        let bytes = at_most(file, LARGEST_MIB << 20).map_err(|source| match source.kind() {
+            io::ErrorKind::FileTooLarge => SavedEstimateError::TooLarge { file: named() },
+            _ => SavedEstimateError::Unreadable { file: named(), source },
+        })?;
+        let text =
+            String::from_utf8(bytes).map_err(|_| SavedEstimateError::NotUtf8 { file: named() })?;
+        Self::parse(&text, file)
+    }
+
+    /// The same from its text; `file` names it in messages.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn parse(text: &str, file: &Path) -> Result<Self, SavedEstimateError> {
+        let file = file.to_owned();
+        let Document {
+            problem,
+            arm_digest,
+            strategy,
+            trusted,
+            estimated_sigma_mm,
+            first_time_s,
+            mut parameters,
+        } = match serde_json::from_str(text) {
+            Ok(document) => document,
+            Err(source) => return Err(SavedEstimateError::Syntax { file, source }),
+        };
+        let problem = one_line(&problem);
+        for own in &mut parameters {
+            own.name = one_line(&own.name);
+        }
+        let mut names = HashSet::new();
+        for Entry { name, nominal, estimate, .. } in &parameters {
+            if !names.insert(name.as_str()) {
+                return Err(SavedEstimateError::Twice { file, name: name.clone() });
+            }
+            if !(estimate.abs() <= GREATEST && nominal.abs() <= GREATEST) {
+                return Err(SavedEstimateError::TooGreat { file, name: name.clone() });
+            }
+        }
+        let estimated_sigma =
+            estimated_sigma_mm.map(|sigma: f64| sigma * 1e-3).filter(|sigma| *sigma > 0.0);
+        let known =
+            Strategy::EACH.into_iter().find(|known| strategy.as_deref() == Some(known.as_str()));
+        let strategy = known.unwrap_or_default();
+        Ok(Self {
+            file,
+            trusted,
+            estimated_sigma,
+            first_time: first_time_s,
+            problem,
+            arm_digest,
+            strategy,
+            parameters,
+        })
+    }
+
+    /// The model that was fitted, of the declared one: [`Strategy::model`].
+    #[must_use]
+    pub fn model(&self, declared: Model) -> Model {
+        self.strategy.model(declared)
+    }
+
+    /// Lets the time of poses count from where it counted in the identification.
+    pub fn count_time_in(&self, poses: &mut [Pose]) {
+        if let Some(first) = self.first_time {
+            for pose in poses {
+                pose.setup.elapsed = pose.setup.time - first;
+            }
+        }
+    }
+
+    /// Whether it is of `problem`, of which `model` is one: bases and tools of sessions that the
+    /// model lacks are left alone.
+    ///
+    /// # Errors
+    /// It is of another problem, or of the same one declared otherwise.
+    pub fn check(&self, problem: &Problem, model: &Model) -> Result<(), SavedEstimateError> {
+        let file = || self.file.clone();
+        if self.problem != problem.name {
+            let (found, expected) = (self.problem.clone(), problem.name.clone());
+            return Err(SavedEstimateError::OtherProblem { file: file(), found, expected });
+        }
+        for entry in &self.parameters {
+            let name = || entry.name.clone();
+            let Some(own) = model.parameters.iter().find(|parameter| parameter.name == entry.name)
+            else {
+                if entry.name.starts_with("base[") || entry.name.starts_with("tool[") {
+                    continue;
+                }
+                return Err(SavedEstimateError::NotFree { file: file(), name: name() });
+            };
+            if (own.nominal - entry.nominal).abs() > 1e-9 * own.nominal.abs().max(1.0) {
+                let (found, expected) = (entry.nominal, own.nominal);
+                return Err(SavedEstimateError::OtherNominal {
+                    file: file(),
+                    name: name(),
+                    found,
+                    expected,
+                });
+            }
+        }
+        if self.arm_digest.as_ref().is_some_and(|digest| *digest != problem.digest()) {
+            return Err(SavedEstimateError::OtherArm { file: file() });
+        }
+        Ok(())
+    }
+
+    /// Whether the rows that were fitted leave open where a base is in its measuring frame, as
+    /// contacts with sockets of unknown places do.
+    pub fn leaves_base_open(&self) -> bool {
+        let is_base = |own: &&Entry| own.name.starts_with("base.") || own.name.starts_with("base[");
+        let is_open = |own: &Entry| {
+            own.std_error.is_none() && own.identified.is_some_and(|part| part < IDENTIFIED)
+        };
+        self.parameters.iter().filter(is_base).any(is_open)
+    }
+
+    /// Words in brackets behind `base` or `tool`, in the order of the file; one that is empty where
+    /// there are none.
+    pub fn words(&self, of: &str) -> Vec<String> {
+        let mut words: Vec<String> = Vec::new();
+        for entry in &self.parameters {
+            let bracket = entry
+                .name
+                .strip_prefix(of)
+                .and_then(|rest| rest.strip_prefix('[')?.split_once(']'));
+            if let Some((word, _)) =
+                bracket.filter(|(word, _)| !words.iter().any(|known| known == word))
+            {
+                words.push(word.to_owned());
+            }
+        }
+        if words.is_empty() { vec![String::new()] } else { words }
+    }
+
+    /// Estimated value of a parameter \[SI\].
+    pub fn value(&self, name: &str) -> Option<f64> {
+        self.parameters.iter().find(|entry| entry.name == name).map(|entry| entry.estimate)
+    }
+
+    /// The full parameter vector of a model of `problem`.
+    ///
+    /// # Errors
+    /// It is of another problem or arm, or lacks a parameter that the model has.
+    pub fn vector(
+        &self,
+        problem: &Problem,
+        model: &Model,
+    ) -> Result<DVector<f64>, SavedEstimateError> {
+        self.check(problem, model)?;
+        let missing = |name| SavedEstimateError::Missing { file: self.file.clone(), name };
+        model.vector_of(|name| self.value(name)).map_err(missing)
+    }
+}

@@ -1,0 +1,230 @@
+//! How a table, or a number of the problem, may have been misread where the nominal arm is far from
+//! its measurements.
+
+use std::f64::consts::PI;
+use std::fmt;
+
+use nalgebra::Vector3;
+
+use crate::fit::Placement;
+use crate::fit::stages::fitting::Fitting;
+use crate::least_squares::Memory;
+use crate::measurement::{Measurements, Split};
+use crate::model::Model;
+use crate::problem::{Joint, JointKind, Problem};
+
+/// Read otherwise the nominal arm misses the measurements by no more than this part of what it
+/// misses them by as they are.
+const EXPLAINED: f64 = 0.2;
+/// A reading that does nearly as well as the best one is named beside it.
+const AS_GOOD: f64 = 1.5;
+/// Beyond so many sizes of the arm no misreading leads: millimetres are a thousand times metres.
+const MOST_SIZES: f64 = 1e4;
+/// Rows that are looked at.
+const MOST_ROWS: usize = 200;
+/// A length beyond this may be meant in millimetres, of which a link has one at least \[m\].
+const LONG: f64 = 1.0;
+
+/// What may have been taken for something else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Misreading {
+    /// Joint angles in degrees, declared as radians.
+    Degrees,
+    /// Joint angles in radians, declared as degrees.
+    Radians,
+    /// Positions in metres, declared as millimetres.
+    Metres,
+    /// Positions in millimetres, declared as metres.
+    Millimetres,
+    /// Positions in a left-handed frame: two coordinates exchanged, or one of the other sign.
+    Mirrored,
+    /// A joint that counts the other way.
+    Reversed {
+        /// Number of the joint.
+        joint: usize,
+    },
+    /// The target of `[tool]` in millimetres, declared as metres.
+    TargetInMillimetres,
+    /// Lengths of joints in millimetres, declared as metres, and the target likewise where it is as
+    /// long.
+    ArmInMillimetres,
+}
+
+impl fmt::Display for Misreading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Degrees => f.write_str("joint angles that are degrees, declared as radians"),
+            Self::Radians => f.write_str("joint angles that are radians, declared as degrees"),
+            Self::Metres => f.write_str("positions that are metres, declared as millimetres"),
+            Self::Millimetres => f.write_str("positions that are millimetres, declared as metres"),
+            Self::Mirrored => {
+                f.write_str("two of x, y and z that are exchanged, or one of the other sign")
+            }
+            Self::Reversed { joint } => write!(f, "joint {joint} that counts the other way"),
+            Self::TargetInMillimetres => {
+                f.write_str("a target of [tool] that is in millimetres, declared in metres")
+            }
+            Self::ArmInMillimetres => {
+                f.write_str("lengths of joints that are in millimetres, declared in metres")
+            }
+        }
+    }
+}
+
+impl Misreading {
+    /// All that an arm and the columns of some rows may have.
+    fn all(problem: &Problem, rows: &Measurements) -> Vec<Self> {
+        let turns = |radians| {
+            (0..problem.joints.len()).any(|joint| turns_in(problem, rows, joint, radians))
+        };
+        let lengths = |metres| rows.position_unit.is_none_or(|unit| (unit >= 1.0) == metres);
+        let long = problem
+            .joints
+            .iter()
+            .any(|joint| lengths_of(&mut joint.clone()).iter().any(|own| own.abs() > LONG));
+        let mut all = Vec::new();
+        all.extend(turns(true).then_some(Self::Degrees));
+        all.extend(turns(false).then_some(Self::Radians));
+        all.extend(lengths(false).then_some(Self::Metres));
+        all.extend(lengths(true).then_some(Self::Millimetres));
+        all.push(Self::Mirrored);
+        all.extend(is_far(problem).then_some(Self::TargetInMillimetres));
+        all.extend(long.then_some(Self::ArmInMillimetres));
+        let moving =
+            (1..).zip(&problem.joints).filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
+        all.extend(moving.map(|(joint, _)| Self::Reversed { joint }));
+        all
+    }
+
+    /// The problem as it should have been written, where the reading is about that.
+    fn rewritten(self, problem: &Problem) -> Option<Problem> {
+        let mut problem = problem.clone();
+        match self {
+            Self::TargetInMillimetres => {}
+            Self::ArmInMillimetres => {
+                for length in
+                    problem.joints.iter_mut().flat_map(lengths_of).filter(|own| own.abs() > LONG)
+                {
+                    *length *= 1e-3;
+                }
+            }
+            _ => return None,
+        }
+        if is_far(&problem) {
+            problem.tool.target *= 1e-3;
+        }
+        Some(problem)
+    }
+
+    /// The rows as they should have been read.
+    fn mend(self, rows: &mut Measurements, problem: &Problem) {
+        let (factor, chosen): (f64, &dyn Fn(usize) -> bool) = match self {
+            Self::Degrees => (PI / 180.0, &|joint| turns_in(problem, rows, joint, true)),
+            Self::Radians => (180.0 / PI, &|joint| turns_in(problem, rows, joint, false)),
+            Self::Reversed { joint } => (-1.0, &move |own| own + 1 == joint),
+            _ => (1.0, &|_| false),
+        };
+        let chosen: Vec<bool> = (0..problem.joints.len()).map(chosen).collect();
+        let read = rows.configurations.iter_mut().zip(chosen.iter().cycle());
+        read.filter(|(_, chosen)| **chosen).for_each(|(q, _)| *q *= factor);
+        match self {
+            Self::Metres => rows.positions.iter_mut().for_each(|position| *position *= 1e3),
+            Self::Millimetres => rows.positions.iter_mut().for_each(|position| *position *= 1e-3),
+            Self::Mirrored => {
+                rows.positions.iter_mut().for_each(|own| *own = Vector3::new(own.y, own.x, own.z))
+            }
+            _ => {}
+        }
+    }
+
+    /// Root mean squared error of the registered nominal arm with some rows read this way \[m\].
+    fn rms(
+        self,
+        fitting: &Fitting,
+        problem: &Problem,
+        rows: &Measurements,
+        split: &Split,
+    ) -> Option<f64> {
+        let mut mended = rows.clone();
+        self.mend(&mut mended, problem);
+        let other;
+        let model = if let Some(problem) = self.rewritten(problem) {
+            other =
+                Model::new(&problem, &fitting.placement.bases, &fitting.placement.targets).ok()?;
+            &other
+        } else {
+            fitting.model
+        };
+        let placement = &Placement::of(rows);
+        let held_out_only = placement.held_out_only(model, rows, split);
+        // Linearisations of another model are not those of this one.
+        let memory = &Memory::default();
+        let fitting = Fitting {
+            model,
+            measurements: &mended,
+            split,
+            placement,
+            held_out_only,
+            turn_sigma: None,
+            memory,
+            known: None,
+            ..*fitting
+        };
+        let registered = fitting.registered().ok()?;
+        Some(fitting.errors(&registered).identification.rms.norm)
+    }
+}
+
+/// Whether a joint turns and its column is in radians, or else in degrees; either where nobody
+/// knows.
+fn turns_in(problem: &Problem, rows: &Measurements, joint: usize, radians: bool) -> bool {
+    let turns = problem.joints.get(joint).is_some_and(|own| own.commanded() == JointKind::Revolute);
+    let column = rows.command_columns.iter().find(|own| own.joint == joint);
+    turns && column.is_none_or(|own| (own.unit >= 1.0) == radians)
+}
+
+/// The lengths of a joint \[m\].
+fn lengths_of(joint: &mut Joint) -> Vec<&mut f64> {
+    let placement = joint.placement.as_mut().map(|own| own.xyz.iter_mut());
+    [&mut joint.a, &mut joint.d].into_iter().chain(placement.into_iter().flatten()).collect()
+}
+
+/// Whether the target of `[tool]` is so far that it may be in millimetres.
+fn is_far(problem: &Problem) -> bool {
+    problem.targets.is_empty() && problem.tool.target.norm() > LONG
+}
+
+/// Misreadings any one of which would explain why the registered nominal arm misses the
+/// measurements by `rms` \[m\], the best first.
+pub(in crate::fit) fn misreadings(
+    fitting: &Fitting,
+    problem: &Problem,
+    rms: f64,
+) -> Vec<Misreading> {
+    if rms.is_nan() || rms > MOST_SIZES * fitting.model.size() {
+        return Vec::new();
+    }
+    let identification = &fitting.split.identification;
+    let chosen: Vec<usize> = identification
+        .iter()
+        .copied()
+        .step_by(identification.len().div_ceil(MOST_ROWS).max(1))
+        .collect();
+    let rows = fitting.measurements.select(&chosen);
+    let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
+    let one = |own: Misreading| Some((own, own.rms(fitting, problem, &rows, &split)?));
+    // Contacts with one point agree with every arm that hardly moves.
+    let tells = |own: &Misreading| {
+        rows.leading().is_position() || matches!(own, Misreading::Reversed { .. })
+    };
+    let mut explained: Vec<(Misreading, f64)> = Misreading::all(problem, &rows)
+        .into_iter()
+        .filter(tells)
+        .filter_map(one)
+        .filter(|(_, left)| *left < EXPLAINED * rms)
+        .collect();
+    explained.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let best = explained.first().map_or(0.0, |own| own.1);
+    explained.into_iter().filter(|(_, left)| *left <= AS_GOOD * best).map(|(own, _)| own).collect()
+}

@@ -1,0 +1,60 @@
+//! Poses whose residual is too long to be noise.
+
+use nalgebra::Vector3;
+
+use crate::error::Location;
+use crate::fit::uncertainty::residual_lengths::Lengths;
+use crate::measurement::Measurements;
+
+/// A pose whose residual is too long to be noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outlier {
+    /// Row of the measurements, counted from 0 over all files.
+    pub row: usize,
+    /// File and line.
+    pub location: Location,
+    /// What the row measures ([`Observation::kind`](crate::problem::Observation::kind)).
+    pub kind: &'static str,
+    /// Length of the whitened residual in units of the scatter \[σ\].
+    pub distance: f64,
+    /// Residual measured − predicted, measuring frame \[m\]; of one number along x, of tilts
+    /// \[rad\].
+    pub error: Vector3<f64>,
+}
+
+impl Outlier {
+    pub(in crate::fit) fn of(
+        measurements: &Measurements,
+        row: usize,
+        distance: f64,
+        error: Vector3<f64>,
+    ) -> Self {
+        let kind = measurements.observation(row).kind();
+        Self { row, location: measurements.location(row), kind, distance, error }
+    }
+}
+
+/// A few rows too far off to be noise, without which the fit would explain the others far better.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InfluentialRows {
+    /// The rows, in their order.
+    pub rows: Vec<Outlier>,
+    /// χ² over its degrees of freedom of the fit without them; `None` with the noise estimated.
+    pub reduced_chi2: Option<f64>,
+    /// 1 σ of a coordinate that the fit without them takes \[m\]; of tilts \[rad\].
+    pub sigma_taken: f64,
+}
+
+/// The outliers among `rows`, whose residuals these are, in the order of the rows.
+pub(in crate::fit) fn outliers(
+    lengths: &Lengths,
+    rows: &[usize],
+    errors: &[Vector3<f64>],
+    measurements: &Measurements,
+) -> Vec<Outlier> {
+    let outlier = |((place, &row), &error): ((usize, &usize), &Vector3<f64>)| {
+        let distance = lengths.outlying(place)?;
+        Some(Outlier::of(measurements, row, distance, error))
+    };
+    rows.iter().enumerate().zip(errors).filter_map(outlier).collect()
+}

@@ -1,0 +1,195 @@
+//! Whether there are poses enough for what is fitted to them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::DVector;
+
+use crate::fit::Placement;
+use crate::fit::checks::quality::{QualityFlag, TooFewPoses};
+use crate::fit::stages::fitting::Fitting;
+use crate::measurement::different;
+use crate::model::Model;
+use crate::model::parameter::{Parameter, ParameterSite};
+use crate::problem::{Observation, Problem};
+
+/// Coordinates of a rigid body: what any number of targets in one pose of the arm tell of it.
+const BODY: usize = 6;
+
+/// What the poses are enough for.
+pub(in crate::fit) struct PoseSufficiency {
+    /// What they are not enough for, priors or not.
+    pub flag: Option<QualityFlag>,
+    /// Whether priors decide most.
+    pub too_few: Option<TooFewPoses>,
+    /// Different poses of the arm among the identification rows, several targets in one pose being
+    /// one.
+    pub poses: usize,
+    /// Whether some pose of the arm shows several of them.
+    pub several_targets: bool,
+}
+
+impl PoseSufficiency {
+    /// For the parameters `unknowns` of a fit that begins at the full parameter vector `at`.
+    pub fn of(
+        fitting: &Fitting,
+        problem: &Problem,
+        unknowns: &[&Parameter],
+        at: &DVector<f64>,
+    ) -> Self {
+        let Fitting { model, measurements, placement, held_out_only, split, .. } = fitting;
+        let numbers = measurements.pose_numbers(problem);
+        let of_arm = measurements.arm_pose_numbers(problem);
+        let poses = different(&of_arm, split.identification.iter().copied());
+        let turned = if fitting.turn_sigma.is_some() { 3 } else { 0 };
+        let of_row = |row: usize| match measurements.observation(row) {
+            Observation::Position => 3 + turned,
+            other => other.coordinates(),
+        };
+        let of_row: Vec<usize> = (0..measurements.len()).map(of_row).collect();
+        let coordinates = coordinates(fitting, (&numbers, &of_arm), &split.identification, &of_row);
+        let parameters = unknowns.len();
+        let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
+        let (rows, later) = (&split.identification, &held_out_only.rows);
+        let (own, theirs) =
+            (|k: usize| !held_out_only.parameters[k], |k: usize| held_out_only.parameters[k]);
+        let flag = (coordinates < without_prior)
+            .then(|| QualityFlag::TooFewEquations {
+                of: "the fit".to_owned(),
+                coordinates,
+                unknowns: without_prior,
+            })
+            .or_else(|| {
+                underdetermined((model, placement), (&numbers, &of_row), (rows, false), own)
+            })
+            .or_else(|| {
+                underdetermined((model, placement), (&numbers, &of_row), (later, true), theirs)
+            })
+            .or_else(|| undetermined(fitting, &numbers, rows, at, own))
+            .or_else(|| undetermined(fitting, &numbers, later, at, theirs));
+        let too_few =
+            (coordinates < parameters).then_some(TooFewPoses { poses, coordinates, parameters });
+        let several_targets = poses < different(&numbers, split.identification.iter().copied());
+        Self { flag, too_few, poses, several_targets }
+    }
+}
+
+/// Coordinates that tell of the arm and of its targets: as many as each different point has, but no
+/// more than six for a pose of the frame that carries them, with those of contacts and distances
+/// added one by one; the shape of a frame's targets is one measurement more.
+fn coordinates(
+    fitting: &Fitting,
+    (numbers, of_arm): (&[usize], &[usize]),
+    rows: &[usize],
+    of_row: &[usize],
+) -> usize {
+    let Fitting { model, measurements, placement, .. } = fitting;
+    let (positions, others): (Vec<usize>, Vec<usize>) =
+        rows.iter().partition(|&&row| measurements.observation(row).is_position());
+    // By the frame that carries them.
+    let mut points: BTreeMap<(usize, usize), BTreeMap<usize, usize>> = BTreeMap::new();
+    let mut targets: BTreeMap<usize, BTreeMap<usize, usize>> = BTreeMap::new();
+    for &row in &positions {
+        let target = placement.target_of(row);
+        let carrier = model.carrier(target);
+        points.entry((carrier, of_arm[row])).or_default().insert(numbers[row], of_row[row]);
+        targets.entry(carrier).or_default().insert(target, of_row[row]);
+    }
+    let of_pose = |own: &BTreeMap<usize, usize>| own.values().sum::<usize>();
+    let of_poses: usize = points.values().map(|own| of_pose(own).min(BODY)).sum();
+    let several =
+        |carrier: usize| points.iter().any(|(own, all)| own.0 == carrier && of_pose(all) > BODY);
+    let contacts: BTreeSet<(usize, Observation)> =
+        others.iter().map(|&row| (of_arm[row], measurements.observation(row))).collect();
+    let of_contacts: usize =
+        contacts.iter().map(|(_, observation)| observation.coordinates()).sum();
+    let of_targets = targets.iter().filter(|(carrier, _)| several(**carrier));
+    let of_targets: usize = of_targets.map(|(_, all)| of_pose(all).saturating_sub(BODY)).sum();
+    of_poses + of_targets + of_contacts
+}
+
+/// `base[A]`, or `base` where there is one without a name.
+fn label(what: &str, word: &str) -> String {
+    if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") }
+}
+
+/// The first base whose place the points of `rows` leave open, by the parameters without a prior
+/// that are `varied` there.
+fn undetermined(
+    fitting: &Fitting,
+    numbers: &[usize],
+    rows: &[usize],
+    at: &DVector<f64>,
+    varied: impl Fn(usize) -> bool,
+) -> Option<QualityFlag> {
+    let Fitting { model, placement, .. } = fitting;
+    let open = |b: &usize| {
+        // Contacts may leave the place of a base open, which is then one of the combinations that
+        // they do not see.
+        let own = rows.iter().copied().filter(|&row| placement.base_of(row) == *b);
+        let own: Vec<usize> =
+            own.filter(|&row| fitting.measurements.observation(row).is_position()).collect();
+        let counts = |k: &usize| {
+            let parameter = &model.parameters[*k];
+            let of_base = matches!(parameter.site, ParameterSite::Base { base, .. } if base == *b);
+            of_base && parameter.sigma.is_none() && varied(*k)
+        };
+        let unknowns: Vec<usize> = (0..model.parameters.len()).filter(counts).collect();
+        if own.is_empty() || unknowns.is_empty() {
+            return false;
+        }
+        let none = vec![false; unknowns.len()];
+        fitting.stage(&own, unknowns).gauge(at, &none, &[]).rows.nrows() > 0
+    };
+    let base = (0..placement.bases.len()).find(open)?;
+    let own = rows.iter().copied().filter(|&row| placement.base_of(row) == base);
+    Some(QualityFlag::Undetermined {
+        of: label("base", &placement.bases[base]),
+        poses: different(numbers, own),
+    })
+}
+
+/// A base, with the targets that no other base of `rows` uses, or a target with fewer coordinates
+/// measured in different poses of `rows` than parameters of its own without a prior; of the
+/// parameters that are `varied` there. `numbers` are those of the poses of all rows. Where
+/// `judged`, the rows have to leave something to judge by as well.
+fn underdetermined(
+    (model, placement): (&Model, &Placement),
+    (numbers, of_row): (&[usize], &[usize]),
+    (rows, judged): (&[usize], bool),
+    varied: impl Fn(usize) -> bool,
+) -> Option<QualityFlag> {
+    let check = |of: String, used: &dyn Fn(usize) -> bool, own: &dyn Fn(ParameterSite) -> bool| {
+        let apart: BTreeMap<usize, usize> =
+            rows.iter().filter(|&&row| used(row)).map(|&row| (numbers[row], of_row[row])).collect();
+        let coordinates = apart.values().sum::<usize>();
+        let counts = |k: usize| {
+            varied(k) && model.parameters[k].sigma.is_none() && own(model.parameters[k].site)
+        };
+        let unknowns = (0..model.parameters.len()).filter(|&k| counts(k)).count();
+        let enough = if judged { coordinates > unknowns } else { coordinates >= unknowns };
+        (0 < coordinates && 0 < unknowns && !enough).then_some(QualityFlag::TooFewEquations {
+            of,
+            coordinates,
+            unknowns,
+        })
+    };
+    let base = |b: usize| {
+        let alone = |t: usize| {
+            rows.iter().all(|&row| placement.target_of(row) != t || placement.base_of(row) == b)
+        };
+        let own = |site| match site {
+            ParameterSite::Base { base, .. } => base == b,
+            ParameterSite::Target { target, .. } => {
+                alone(target) && rows.iter().any(|&row| placement.target_of(row) == target)
+            }
+            _ => false,
+        };
+        check(label("base", &placement.bases[b]), &|row| placement.base_of(row) == b, &own)
+    };
+    let target = |t: usize| {
+        let own = |site| matches!(site, ParameterSite::Target { target, .. } if target == t);
+        check(label("tool", &placement.targets[t]), &|row| placement.target_of(row) == t, &own)
+    };
+    let bases = (0..placement.bases.len()).find_map(base);
+    bases.or_else(|| (0..placement.targets.len()).find_map(target))
+}

@@ -1,0 +1,133 @@
+//! The paper's own procedure on the problem at hand, as a row to compare with.
+
+use std::time::Instant;
+
+use nalgebra::Vector3;
+
+use crate::fit::compare::procedure::{Procedure, TableEntry, paper_name};
+use crate::fit::{ErrorSummary, Errors};
+use crate::least_squares::solver::Termination;
+use crate::measurement::{Dataset, Measurements};
+use crate::paper::{self, EndPoint, Form, Mdh, Measured, StiffnessStage};
+use crate::problem::{Joint, Problem};
+
+/// What the paper's closed forms and its iteration make of the data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Baseline {
+    /// As printed, or without the misprints.
+    pub form: Form,
+    /// Where the stiffness came from.
+    pub stage: StiffnessStage,
+    /// Table 2: α, a, θ, d, β of each joint.
+    pub geometry: Vec<[TableEntry; 5]>,
+    /// Errors of the identified arm, predicted by the same closed forms.
+    pub errors: Errors,
+    /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
+    pub held_out: Vec<Vector3<f64>>,
+    /// Steps of the iteration of eq. 45.
+    pub iterations: u64,
+    /// Evaluations of its residual.
+    pub evaluations: u64,
+    /// Time taken \[s\].
+    pub seconds: f64,
+    /// Why the iteration stopped.
+    pub termination: Termination,
+}
+
+impl Baseline {
+    /// Name beside the strategies.
+    pub fn name(&self) -> String {
+        paper_name(self.form, self.stage)
+    }
+
+    /// It in the terms of the paper, with what the rigid one leaves.
+    pub(in crate::fit) fn procedure(&self, rigid: Option<&Self>) -> Procedure {
+        let ignoring = rigid.map(|rigid| rigid.held_out.clone());
+        let paper = Some((self.form, self.stage));
+        let geometry = (1..).zip(self.geometry.iter().copied()).collect();
+        Procedure { paper, geometry, after: self.held_out.clone(), ignoring }
+    }
+}
+
+/// Every form of the paper's procedure [Chen2021, eq. 1-45] that the identification rows allow: its
+/// closed forms corrected and as printed, the stiffness known, from positions, or from load
+/// differences; and once with elasticity ignored, the first.
+///
+/// None where the procedure does not apply: it knows base and target, so that there are no sessions
+/// or targets, it knows one chain, no joints placed by xyz and rpy and none that follow others, and
+/// it needs as many equations as it has geometric parameters. Without elasticity there is the rigid
+/// one alone.
+pub(in crate::fit) fn baselines(problem: &Problem, data: &Dataset) -> Vec<Baseline> {
+    let Dataset { measurements, .. } = data;
+    let beyond = |joint: &Joint| joint.placement.is_some() || joint.mimic.is_some();
+    let is_one =
+        measurements.session.names.len() < 2 && measurements.target.is_none() && problem.is_chain();
+    if !is_one || problem.joints.iter().any(beyond) {
+        return Vec::new();
+    }
+    let rigid = (Form::Corrected, StiffnessStage::Rigid);
+    let elastic = [Form::Corrected, Form::Printed].into_iter().flat_map(|form| {
+        let stages =
+            StiffnessStage::EACH.into_iter().filter(|&stage| stage != StiffnessStage::Rigid);
+        stages.map(move |stage| (form, stage))
+    });
+    let elastic = elastic.filter(|_| problem.is_elastic());
+    std::iter::once(rigid)
+        .chain(elastic)
+        .filter_map(|(form, stage)| baseline(problem, data, form, stage))
+        .collect()
+}
+
+/// Some rows as the procedure takes them.
+fn poses<'a>(data: &'a Measurements, rows: &[usize]) -> Vec<Measured<'a>> {
+    let first = data.first_time();
+    rows.iter()
+        .map(|&row| Measured { setup: data.setup(row, first), position: data.positions[row] })
+        .collect()
+}
+
+fn baseline(
+    problem: &Problem,
+    data: &Dataset,
+    form: Form,
+    stage: StiffnessStage,
+) -> Option<Baseline> {
+    let Dataset { measurements, split } = data;
+    let clock = Instant::now();
+    let options = paper::Options::new(form, stage);
+    let found =
+        paper::identify(problem, &poses(measurements, &split.identification), &options).ok()?;
+    let errors = |rows: &[usize]| -> Vec<Vector3<f64>> {
+        let error = |pose: &Measured| {
+            let end = EndPoint::new(problem, &found.parameters, &pose.setup, &options.reading);
+            pose.position - end.position(&found.parameters)
+        };
+        poses(measurements, rows).iter().map(error).collect()
+    };
+    let held_out = errors(&split.held_out);
+    let joints = problem.joints.iter().zip(&found.parameters.geometry).enumerate();
+    let geometry = joints.map(|(joint, (declared, identified))| {
+        let (mut nominal, mut identified) = (Mdh::nominal(declared), *identified);
+        let (nominal, identified) =
+            (nominal.fields_mut().map(|v| *v), identified.fields_mut().map(|v| *v));
+        std::array::from_fn(|field| TableEntry {
+            nominal: nominal[field],
+            identified: identified[field],
+            seen: Some(found.seen[5 * joint + field]),
+        })
+    });
+    Some(Baseline {
+        form,
+        stage,
+        geometry: geometry.collect(),
+        errors: Errors {
+            identification: ErrorSummary::of(&errors(&split.identification)),
+            held_out: ErrorSummary::of(&held_out),
+        },
+        held_out,
+        iterations: found.iteration.iterations,
+        evaluations: found.iteration.evaluations(),
+        seconds: clock.elapsed().as_secs_f64(),
+        termination: found.iteration.termination,
+    })
+}

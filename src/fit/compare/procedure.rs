@@ -1,0 +1,78 @@
+//! Procedures in the terms of the paper: its tables 2 and 3 and its figure 13.
+
+use nalgebra::Vector3;
+
+use crate::fit::{Identification, Strategy};
+use crate::paper::{Form, StiffnessStage};
+use crate::problem::{Joint, Problem};
+
+/// A geometric parameter of table 2 \[m\] or \[rad\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TableEntry {
+    /// As declared.
+    pub nominal: f64,
+    /// As identified.
+    pub identified: f64,
+    /// Part of it that the data gave, 0…1; `None` where it was not identified.
+    pub seen: Option<f64>,
+}
+
+/// What one procedure makes of the data, in the shape of the paper's tables 2 and 3 and figure 13.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Procedure {
+    /// Which form of the paper's procedure; `None`: everything fitted at once, by the declared
+    /// model.
+    pub paper: Option<(Form, StiffnessStage)>,
+    /// Table 2: number and α, a, θ, d, β of each joint that has these, not a placement of its own.
+    pub geometry: Vec<(usize, [TableEntry; 5])>,
+    /// Errors measured − predicted of the held-out poses after it, measuring frame \[m\].
+    pub after: Vec<Vector3<f64>>,
+    /// The same after the procedure with elasticity ignored; `None` where nothing is elastic.
+    pub ignoring: Option<Vec<Vector3<f64>>>,
+}
+
+impl Procedure {
+    /// Of a fit, with what its fellow leaves that ignores elasticity.
+    pub(in crate::fit) fn of_fit(
+        problem: &Problem,
+        found: &Identification,
+        after: Vec<Vector3<f64>>,
+        ignoring: Option<Vec<Vector3<f64>>>,
+    ) -> Self {
+        let entry = |joint: usize, field: &str, nominal: f64| {
+            let estimate = found
+                .estimate(&format!("joint{}.{field}", joint + 1))
+                .filter(|estimate| estimate.fitted);
+            let identified = estimate.map_or(nominal, |estimate| estimate.estimate);
+            TableEntry { nominal, identified, seen: estimate.map(|estimate| estimate.identified) }
+        };
+        let row = |(index, joint): (usize, &Joint)| {
+            let fields = [
+                ("alpha", joint.alpha),
+                ("a", joint.a),
+                ("theta", joint.theta),
+                ("d", joint.d),
+                ("beta", joint.beta),
+            ];
+            (index + 1, fields.map(|(field, nominal)| entry(index, field, nominal)))
+        };
+        let joints =
+            problem.joints.iter().enumerate().filter(|(_, joint)| joint.placement.is_none());
+        let geometry = joints.map(row).collect();
+        Self { paper: None, geometry, after, ignoring }
+    }
+
+    /// Name beside the strategies.
+    pub fn name(&self) -> String {
+        self.paper.map_or_else(
+            || Strategy::Joint.as_str().to_owned(),
+            |(form, stage)| paper_name(form, stage),
+        )
+    }
+}
+
+/// Name of a form of the paper's procedure: `paper-nominal-stiffness-as-printed`.
+pub(in crate::fit) fn paper_name(form: Form, stage: StiffnessStage) -> String {
+    let printed = if form == Form::Printed { "-as-printed" } else { "" };
+    format!("paper-{}{printed}", stage.as_str())
+}

@@ -1,0 +1,14 @@
+//! Least-squares fits of an identification: strategies, solvers, registration, staged fits.
+
+pub(super) mod alternation;
+pub(super) mod constraints;
+pub(super) mod fitting;
+pub(super) mod fixture_location;
+pub(super) mod noise_model;
+pub(super) mod parameter_size;
+pub(super) mod placement;
+pub(super) mod progress;
+pub(super) mod registration;
+pub(super) mod solver_choice;
+pub(super) mod stage;
+pub(super) mod strategy;

@@ -1,0 +1,162 @@
+//! Which base and which target each row uses, and which of them appear in held-out rows only.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{DVector, Vector3};
+
+use crate::measurement::{Measurements, Split};
+use crate::model::parameter::ParameterSite;
+use crate::model::{Model, Pose, SeenOrientation};
+use crate::problem::Problem;
+
+/// Scale of a coordinate's error where no σ is declared and none estimated yet \[m\].
+pub(in crate::fit) const UNKNOWN_SIGMA: f64 = 1e-3;
+
+/// Bases and targets of a set of measurements.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Placement {
+    /// One base per session.
+    pub bases: Vec<String>,
+    /// One target per word of the column `target`, or per session where there is none.
+    pub targets: Vec<String>,
+    base_of_row: Vec<usize>,
+    target_of_row: Vec<usize>,
+}
+
+impl Placement {
+    /// As the columns `session` and `target` say.
+    pub fn of(measurements: &Measurements) -> Self {
+        let session = &measurements.session;
+        let target = measurements.target.as_ref().unwrap_or(session);
+        Self {
+            bases: session.names.clone(),
+            targets: target.names.clone(),
+            base_of_row: session.of_row.clone(),
+            target_of_row: target.of_row.clone(),
+        }
+    }
+
+    /// Base of a row.
+    pub fn base_of(&self, row: usize) -> usize {
+        self.base_of_row[row]
+    }
+
+    /// Target of a row.
+    pub fn target_of(&self, row: usize) -> usize {
+        self.target_of_row[row]
+    }
+
+    /// 1 σ of a coordinate of some rows together, as declared \[m\].
+    pub fn sigma(&self, measurements: &Measurements, rows: &[usize], problem: &Problem) -> f64 {
+        let whole = problem.data.position_sigma.unwrap_or(UNKNOWN_SIGMA);
+        let squares = rows.iter().map(|&row| measurements.sigma_of(row).unwrap_or(whole).powi(2));
+        if rows.is_empty() { whole } else { (squares.sum::<f64>() / rows.len() as f64).sqrt() }
+    }
+
+    /// Rows as poses; `sigma` \[m\] is that of rows without one of their own.
+    pub fn poses<'a>(
+        &self,
+        measurements: &'a Measurements,
+        rows: &[usize],
+        sigma: f64,
+    ) -> Vec<Pose<'a>> {
+        let first = measurements.first_time();
+        rows.iter()
+            .map(|&row| Pose {
+                setup: measurements.setup(row, first),
+                base: self.base_of_row[row],
+                target: self.target_of_row[row],
+                observation: measurements.observation(row),
+                measured: &measurements.positions[row],
+                sigma: measurements.sigma_of(row).unwrap_or(sigma),
+                orientation: None,
+            })
+            .collect()
+    }
+
+    /// The same with the orientations that were measured, where `turn` \[rad\], their σ, is given.
+    pub fn oriented_poses<'a>(
+        &self,
+        measurements: &'a Measurements,
+        rows: &[usize],
+        (sigma, turn): (f64, Option<f64>),
+    ) -> Vec<Pose<'a>> {
+        let mut poses = self.poses(measurements, rows, sigma);
+        if let Some(sigma) = turn {
+            for (pose, &row) in
+                poses.iter_mut().zip(rows).filter(|(pose, _)| pose.observation.is_position())
+            {
+                let seen = |orientation| SeenOrientation { measured: Some(orientation), sigma };
+                pose.orientation = measurements.orientation(row).map(seen);
+            }
+        }
+        poses
+    }
+
+    /// Residuals measured − predicted of some rows with the arm at the full parameter vector `x`,
+    /// measuring frame \[m\]; NaN where it has no equilibrium.
+    pub fn position_errors(
+        &self,
+        model: &Model,
+        x: &DVector<f64>,
+        measurements: &Measurements,
+        rows: &[usize],
+    ) -> Vec<Vector3<f64>> {
+        model.residuals(self.poses(measurements, rows, 1.0), x)
+    }
+
+    /// Which parameters belong to bases, targets or fixtures that held-out rows alone use, and
+    /// which rows use those.
+    ///
+    /// They say nothing about the arm: they are fitted on their held-out rows, alone.
+    pub(in crate::fit) fn held_out_only(
+        &self,
+        model: &Model,
+        measurements: &Measurements,
+        split: &Split,
+    ) -> HeldOutOnly {
+        let unused = |count: usize, of_row: &[usize]| {
+            let mut unused = vec![true; count];
+            split.identification.iter().for_each(|&row| unused[of_row[row]] = false);
+            unused
+        };
+        let bases = unused(self.bases.len(), &self.base_of_row);
+        let targets = unused(self.targets.len(), &self.target_of_row);
+        let fixtures_of = |rows: &[usize]| -> BTreeSet<usize> {
+            rows.iter()
+                .flat_map(|&row| measurements.observation(row).fixtures())
+                .flatten()
+                .collect()
+        };
+        let fitted = fixtures_of(&split.identification);
+        let fixtures: BTreeSet<usize> =
+            fixtures_of(&split.held_out).difference(&fitted).copied().collect();
+        let parameters = model
+            .parameters
+            .iter()
+            .map(|parameter| match parameter.site {
+                ParameterSite::Base { base, .. } => bases[base],
+                ParameterSite::Target { target, .. } => targets[target],
+                ParameterSite::Fixture { fixture, .. } => fixtures.contains(&fixture),
+                _ => false,
+            })
+            .collect();
+        let of_fixture =
+            |row: usize| measurements.observation(row).fixtures().into_iter().flatten();
+        let uses = |&&row: &&usize| {
+            bases[self.base_of_row[row]]
+                || targets[self.target_of_row[row]]
+                || of_fixture(row).any(|fixture| fixtures.contains(&fixture))
+        };
+        HeldOutOnly { parameters, rows: split.held_out.iter().filter(uses).copied().collect() }
+    }
+}
+
+/// Bases, targets and fixtures that appear in held-out rows only.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(in crate::fit) struct HeldOutOnly {
+    /// Whether each parameter of the model belongs to one.
+    pub parameters: Vec<bool>,
+    /// The held-out rows that use one.
+    pub rows: Vec<usize>,
+}

@@ -1,0 +1,431 @@
+//! One least-squares fit of some parameters to some poses.
+
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::fit::SolverChoice;
+use crate::fit::stages::constraints::Held;
+use crate::fit::stages::parameter_size::plausible;
+use crate::fit::stages::progress::{ProgressSink, Reporter, Stop};
+use crate::least_squares::solver::{
+    self, Bounds, BoundsError, GaussNewtonSettings, Inequalities, InequalitiesError,
+    PseudoInverseSettings, Settings, Solution, Termination,
+};
+use crate::least_squares::{
+    Blind, Fit, LinearRows, Linearisation, Loss, Memory, Objective as _, RowsError, Steadied,
+    Triangle, UnidentifiableCombination, Weak,
+};
+use crate::model::parameter::Parameter;
+use crate::model::{KnownDerivatives, Model, Pose, PoseResiduals};
+use crate::problem::PoseView;
+
+/// Relative reduction of the cost below which a step is not worth it: above the rounding of
+/// predicted positions, which are metres measured in units of their noise, and far below what any
+/// estimate's error would show.
+pub const COST_TOLERANCE: f64 = 1e-11;
+
+/// A stage that cannot be set up.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StageError {
+    /// Bounds leave a parameter no value.
+    #[error(transparent)]
+    Bounds(#[from] BoundsError),
+    /// Constraints make no sense.
+    #[error(transparent)]
+    Inequalities(#[from] InequalitiesError),
+    /// Bounds and constraints contradict each other.
+    #[error(
+        "no values of the parameters satisfy all bounds of [parameters] and all of [[constraint]]"
+    )]
+    Infeasible,
+    /// Priors do not fit the unknowns.
+    #[error(transparent)]
+    Rows(#[from] RowsError),
+    /// The fit was stopped.
+    #[error("interrupted before there was a result")]
+    Interrupted,
+}
+
+/// What a stage works on.
+pub(in crate::fit) struct Stage<'a> {
+    pub model: &'a Model,
+    /// With the σ that the fit takes.
+    pub poses: Arc<Vec<Pose<'a>>>,
+    /// 1 σ of a coordinate of each pose, as declared \[m\].
+    pub declared: Vec<f64>,
+    /// 1 σ of their orientations, as declared, where these are fitted \[rad\].
+    pub declared_turn: Option<f64>,
+    /// Which parameters vary.
+    pub unknowns: Vec<usize>,
+    pub solver: SolverChoice,
+    /// Steps after which the solver is stopped.
+    pub max_steps: u64,
+    /// Relative reduction of the cost below which a step is not worth it.
+    pub cost_tolerance: f64,
+    /// How the residual of a pose counts.
+    pub loss: Loss,
+    /// Whether constraints count that also speak of free parameters which do not vary here.
+    pub counts_fixed: bool,
+    /// Linearisations that fits of the same data share.
+    pub memory: &'a Memory,
+    /// Derivatives that are known at some point of a fit of the identification rows.
+    pub known: Option<&'a KnownDerivatives>,
+    pub progress: Option<&'a ProgressSink>,
+    pub stop: Option<&'a Stop>,
+}
+
+/// Where a stage ended.
+pub(in crate::fit) struct StageEnd {
+    /// Full parameter vector.
+    pub x: DVector<f64>,
+    pub solution: Solution,
+    pub gauge: Gauge,
+}
+
+/// The combinations of a stage's unknowns that neither data nor priors see, or too weakly; they are
+/// held where they start.
+#[derive(Debug, Clone, Default)]
+pub(in crate::fit) struct Gauge {
+    /// Rows that span them, on the unknowns.
+    pub rows: DMatrix<f64>,
+    /// Part of each unknown outside of them, 0…1.
+    pub visible: Vec<f64>,
+    /// Those that are seen too weakly, each by itself.
+    pub weak: Vec<UnidentifiableCombination>,
+}
+
+impl<'a> Stage<'a> {
+    /// The parameters that vary.
+    pub fn parameters(&self) -> impl Iterator<Item = &'a Parameter> + '_ {
+        self.unknowns.iter().map(|&k| &self.model.parameters[k])
+    }
+
+    /// Measured numbers of all poses.
+    pub fn count(&self) -> usize {
+        self.poses.iter().map(Pose::coordinates).sum()
+    }
+
+    /// Rows of the residual for each pose: three, or six with its orientation; 0 behind what is
+    /// measured.
+    pub fn coordinates(&self) -> usize {
+        if self.declared_turn.is_some() { 6 } else { 3 }
+    }
+
+    /// Residuals of the stage about the full parameter vector `at`.
+    pub fn residuals(&self, at: &DVector<f64>) -> PoseResiduals<'a> {
+        self.residuals_of(Arc::clone(&self.poses), at)
+    }
+
+    /// The same of other poses.
+    pub fn residuals_of(
+        &self,
+        poses: impl Into<Arc<Vec<Pose<'a>>>>,
+        at: &DVector<f64>,
+    ) -> PoseResiduals<'a> {
+        PoseResiduals::new(self.model, poses, self.unknowns.clone(), at.clone()).knowing(self.known)
+    }
+
+    /// The whitened data linearised at `at`, each pose weighted by `loss`, priors left out.
+    pub fn linearised(&self, at: &DVector<f64>, loss: Loss) -> Linearisation {
+        let residuals = self.residuals(at);
+        self.remembered(&residuals, at, loss).linearise(&residuals.reduced(at))
+    }
+
+    /// A fit of the poses of this stage that shares its linearisations with others of the same.
+    fn remembered<'b>(
+        &'b self,
+        residuals: &'b PoseResiduals<'a>,
+        at: &DVector<f64>,
+        loss: Loss,
+    ) -> Fit<'b, PoseResiduals<'a>> {
+        Fit::new(residuals).with_loss(loss).remembering(self.memory, self.digest(at), self.unit())
+    }
+
+    /// 1 σ of the first pose: what residuals are counted in.
+    fn unit(&self) -> f64 {
+        self.poses.first().map_or(1.0, |pose| pose.sigma)
+    }
+
+    /// What tells this stage's data and unknowns, and the parameters that stay as in `at`, from
+    /// those of others, but for the unit that residuals are counted in.
+    fn digest(&self, at: &DVector<f64>) -> u64 {
+        let (mut digest, unit) = (DefaultHasher::new(), self.unit());
+        let mut others = at.clone();
+        self.unknowns.iter().for_each(|&k| others[k] = 0.0);
+        self.unknowns.hash(&mut digest);
+        let mut put = |value: f64| digest.write_u64(value.to_bits());
+        others.iter().copied().for_each(&mut put);
+        for pose in self.poses.iter() {
+            let PoseView {
+                configuration,
+                payload,
+                hoist,
+                temperature,
+                time,
+                elapsed,
+                approach,
+                covariates,
+                past,
+                strains: _,
+            } = &pose.setup;
+            let columns =
+                configuration.iter().chain(approach.iter().copied().flatten()).chain(*covariates);
+            columns.chain(pose.measured).copied().for_each(&mut put);
+            [*payload, *hoist, *temperature]
+                .map(|own| own.copied().unwrap_or(f64::NAN))
+                .into_iter()
+                .for_each(&mut put);
+            [*time, *elapsed, pose.sigma / unit].into_iter().for_each(&mut put);
+            put(pose.orientation.map_or(0.0, |own| own.sigma / unit));
+            put(pose.base as f64);
+            put(pose.target as f64);
+            // What was before stands in the table, which is the same in all fits that share a
+            // memory: the row tells it.
+            put(past.place().map_or(f64::NAN, f64::from));
+        }
+        self.poses.iter().for_each(|pose| pose.observation.hash(&mut digest));
+        digest.finish()
+    }
+
+    /// Triangular factor R of the whitened data at `at`, priors left out.
+    pub fn data_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
+        self.linearised(at, Loss::Squares).triangle
+    }
+
+    /// How far each unknown may plausibly go, where no prior says so.
+    fn sizes(&self) -> Vec<Option<f64>> {
+        self.parameters().map(|parameter| plausible(self.model, parameter)).collect()
+    }
+
+    /// The same, each pose weighted as the loss does.
+    pub fn weighted_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
+        self.linearised(at, self.loss).triangle
+    }
+
+    /// The same with the rows of the priors below.
+    pub fn triangle_with_priors(&self, at: &DVector<f64>) -> DMatrix<f64> {
+        below(&self.weighted_triangle(at), &self.priors())
+    }
+
+    /// The unknowns' entries of the full parameter vector `at`.
+    pub fn reduced(&self, at: &DVector<f64>) -> DVector<f64> {
+        DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| at[k]))
+    }
+
+    /// The full parameter vector `at` with other unknowns x.
+    pub fn full(&self, at: &DVector<f64>, x: &DVector<f64>) -> DVector<f64> {
+        let mut full = at.clone();
+        self.unknowns.iter().zip(x.iter()).for_each(|(&k, value)| full[k] = *value);
+        full
+    }
+
+    /// Whether the full parameter vector `at` keeps bounds and constraints.
+    ///
+    /// # Errors
+    /// Constraints make no sense.
+    pub fn allows(&self, at: &DVector<f64>) -> Result<bool, StageError> {
+        let inside = self
+            .unknowns
+            .iter()
+            .zip(self.parameters())
+            .all(|(&k, own)| own.lower <= at[k] && at[k] <= own.upper);
+        Ok(inside && self.constraints(at)?.1.contain(&self.reduced(at)))
+    }
+
+    /// Combinations of the unknowns that are not `held` which data, priors and `active` constraints
+    /// leave open at `at`.
+    pub fn gauge(&self, at: &DVector<f64>, held: &[bool], active: &[Held]) -> Gauge {
+        let n = self.unknowns.len();
+        if self.parameters().all(|parameter| parameter.sigma.is_some()) {
+            return Gauge { rows: DMatrix::zeros(0, n), visible: vec![1.0; n], weak: Vec::new() };
+        }
+        let data = self.data_triangle(at);
+        let priors = self.priors();
+        let seen = n + priors.nrows();
+        let stacked = DMatrix::from_fn(seen + active.len(), n, |i, j| match i {
+            i if i < n => data[(i, j)],
+            i if i < seen => priors[(i - n, j)],
+            // Weighted like a measurement of each of its parameters.
+            i => {
+                active[i - seen].row[j].signum()
+                    * f64::from(active[i - seen].row[j] != 0.0)
+                    * data.column(j).norm()
+            }
+        });
+        let free: Vec<usize> = (0..n).filter(|&j| !held[j]).collect();
+        let seen = Triangle::of(&stacked.select_columns(&free));
+        let Blind { gauge: unseen, visible: outside } = Blind::in_triangle(&seen);
+        let all = self.sizes();
+        let sizes: Vec<Option<f64>> = free.iter().map(|&k| all[k]).collect();
+        let weak = Weak::of(&below(&seen, &unseen), &sizes);
+        let unidentifiable = unseen.nrows();
+        let count = unidentifiable + weak.as_ref().map_or(0, |weak| weak.rows.nrows());
+        let mut gauge =
+            Gauge { rows: DMatrix::zeros(count, n), visible: vec![0.0; n], weak: Vec::new() };
+        for (j, &k) in free.iter().enumerate() {
+            gauge.rows.view_mut((0, k), (unidentifiable, 1)).copy_from(&unseen.column(j));
+            gauge.visible[k] = outside[j];
+            if let Some(weak) = &weak {
+                gauge
+                    .rows
+                    .view_mut((unidentifiable, k), (count - unidentifiable, 1))
+                    .copy_from(&weak.rows.column(j));
+                gauge.visible[k] = outside[j].min(weak.visible[j]);
+            }
+        }
+        let named = |own: UnidentifiableCombination| UnidentifiableCombination {
+            weights: own.weights.into_iter().map(|(j, weight)| (free[j], weight)).collect(),
+            ..own
+        };
+        gauge.weak = weak.into_iter().flat_map(|weak| weak.combinations).map(named).collect();
+        gauge
+    }
+
+    /// Minimises from the full parameter vector `start`.
+    ///
+    /// Combinations that are unidentifiable or weak at the start are held there, what becomes weak
+    /// on the way is held where it is then. What is unidentifiable at the start may be seen at the
+    /// end, or decided by a bound or a constraint: then the fit goes on with that set free.
+    ///
+    /// # Errors
+    /// Bounds and constraints leave the parameters no values, or the fit was stopped.
+    pub fn run(&self, start: &DVector<f64>) -> Result<StageEnd, StageError> {
+        let residuals = self.residuals(start);
+        let mut begin = residuals.reduced(start);
+        let lower = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.lower));
+        let upper = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.upper));
+        let bounds = Bounds::new(lower, upper)?;
+        let (_, rows) = self.constraints(start)?;
+        if self.solver.within().is_some() {
+            begin = solver::nearest(&begin, &bounds, &rows).ok_or(StageError::Infeasible)?;
+        }
+        let hold = begin.clone();
+        let mut gauge = self.gauge(start, &vec![false; begin.len()], &[]);
+        let (mut iterations, mut cost_evaluations, mut linearisations) = (0, 0, 0);
+        loop {
+            if self.stop.is_some_and(Stop::is_requested) {
+                return Err(StageError::Interrupted);
+            }
+            let mut solution = self.solve(&residuals, begin, &hold, &gauge, (&bounds, &rows))?;
+            if solution.termination == Termination::Interrupted {
+                return Err(StageError::Interrupted);
+            }
+            iterations += solution.iterations;
+            cost_evaluations += solution.cost_evaluations;
+            linearisations += solution.linearisations;
+            let x = residuals.full(&solution.x);
+            let held: Vec<bool> = solution.at_bound.iter().map(Option::is_some).collect();
+            let now = self.gauge(&x, &held, &self.held(&x)?);
+            if now.rows.nrows() >= gauge.rows.nrows() || !solution.termination.converged() {
+                (solution.iterations, solution.cost_evaluations) = (iterations, cost_evaluations);
+                solution.linearisations = linearisations;
+                let weak = now.weak.clone();
+                let held = if now.rows.nrows() > gauge.rows.nrows() { now } else { gauge };
+                return Ok(StageEnd { x, solution, gauge: Gauge { weak, ..held } });
+            }
+            gauge = now;
+            begin = solution.x;
+        }
+    }
+
+    /// Minimises from the unknowns `begin`, with the combinations in `gauge` held as in `hold`.
+    fn solve(
+        &self,
+        residuals: &PoseResiduals<'a>,
+        begin: DVector<f64>,
+        hold: &DVector<f64>,
+        gauge: &Gauge,
+        (bounds, rows): (&Bounds, &Inequalities),
+    ) -> Result<Solution, StageError> {
+        let priors = self.priors();
+        let none = DVector::zeros(priors.nrows());
+        let fit = self
+            .remembered(residuals, &residuals.full(&begin), self.loss)
+            .with_rows(LinearRows { matrix: priors, constant: none })?
+            .with_rows(LinearRows {
+                matrix: gauge.rows.clone(),
+                constant: -(&gauge.rows * hold),
+            })?;
+        let sizes = self.sizes();
+        let fit = Steadied { objective: fit, sizes: &sizes };
+        let settings = Settings {
+            max_iterations: self.max_steps,
+            cost_tolerance: self.cost_tolerance,
+            ..Settings::default()
+        };
+        let watched = self.progress.is_some() || self.stop.is_some();
+        let reporter = watched.then(|| Reporter {
+            sink: self.progress.map(Arc::clone),
+            stop: self.stop.cloned(),
+            unknowns: self.unknowns.len(),
+            poses: self.poses.len(),
+        });
+        if let Some(within) = self.solver.within() {
+            return Ok(solver::minimise_within(
+                within,
+                fit,
+                begin,
+                (bounds, rows),
+                &settings,
+                reporter,
+            ));
+        }
+        Ok(match (self.solver, reporter) {
+            (SolverChoice::GaussNewton, _) => {
+                let max_iterations =
+                    self.max_steps.min(GaussNewtonSettings::default().max_iterations);
+                let settings =
+                    GaussNewtonSettings { max_iterations, ..GaussNewtonSettings::default() };
+                solver::minimise_gauss_newton(fit, begin, &settings)
+            }
+            (SolverChoice::PseudoInverse, reporter) => {
+                let max_iterations =
+                    self.max_steps.min(PseudoInverseSettings::default().max_iterations);
+                let settings =
+                    PseudoInverseSettings { max_iterations, ..PseudoInverseSettings::default() };
+                match reporter {
+                    Some(reporter) => {
+                        solver::minimise_pseudo_inverse_observed(fit, begin, &settings, reporter)
+                    }
+                    None => solver::minimise_pseudo_inverse(fit, begin, &settings),
+                }
+            }
+            (_, Some(reporter)) => solver::minimise_observed(fit, begin, &settings, reporter),
+            (_, None) => solver::minimise(fit, begin, &settings),
+        })
+    }
+
+    /// ½Σρ of the data and ½‖r‖² of the priors at the full parameter vector `at`.
+    pub fn cost(&self, at: &DVector<f64>) -> f64 {
+        let residuals = self.residuals(at);
+        let x = residuals.reduced(at);
+        Fit::new(&residuals).with_loss(self.loss).cost(&x)
+            + 0.5 * (self.priors() * x).norm_squared()
+    }
+
+    /// One row x / σ for each unknown with a prior.
+    pub fn priors(&self) -> DMatrix<f64> {
+        let sigmas: Vec<(usize, f64)> = self
+            .parameters()
+            .enumerate()
+            .filter_map(|(j, parameter)| Some((j, parameter.sigma?)))
+            .collect();
+        let mut rows = DMatrix::zeros(sigmas.len(), self.unknowns.len());
+        for (i, &(j, sigma)) in sigmas.iter().enumerate() {
+            rows[(i, j)] = sigma.recip();
+        }
+        rows
+    }
+}
+
+/// Rows stacked on top of each other and brought to a triangle.
+fn below(triangle: &DMatrix<f64>, rows: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = triangle.ncols();
+    let mut stack =
+        triangle.clone().resize_vertically((triangle.nrows() + rows.nrows()).max(n), 0.0);
+    stack.view_mut((triangle.nrows(), 0), rows.shape()).copy_from(rows);
+    if rows.nrows() == 0 { stack } else { Triangle::of(&stack) }
+}

@@ -1,0 +1,10 @@
+//! Uncertainty of a fit: noise model, covariance, prior widths, shadow prices.
+
+pub(super) mod active_constraint;
+pub(super) mod covariance;
+pub(super) mod noise;
+pub(super) mod prices;
+pub(super) mod prior_sizes;
+pub(super) mod residual_lengths;
+pub(super) mod shadow_price;
+pub(super) mod statistics;

@@ -1,0 +1,244 @@
+//! The σ that a fit takes: as declared, or what residual and priors speak for where that
+//! contradicts it.
+
+use nalgebra::DVector;
+
+use crate::fit::stages::constraints::confine;
+use crate::fit::stages::fitting::{FitEnd, Fitting};
+use crate::fit::stages::noise_model::{LEAST_NOISE, NoiseModel, by_chance};
+use crate::fit::stages::stage::{Stage, StageError};
+use crate::fit::uncertainty::statistics::Statistics;
+use crate::least_squares::solver::Termination;
+use crate::least_squares::{
+    Fit, Loss, MANY_UNKNOWNS, Objective as _, VarianceLikelihood, residual_vector,
+};
+use crate::model::Pose;
+use crate::problem::Observation;
+
+/// An undeclared σ has settled when it changes by less than this part.
+const NOISE_SETTLED: f64 = 1e-3;
+/// A declared σ that is contradicted has settled when it changes by less than this part: standard
+/// errors tell no more.
+const SCALE_SETTLED: f64 = 0.01;
+/// Steps after which a declared σ is judged first, where everything is fitted at once: where it is
+/// contradicted, its optimum may be far away, and is not wanted.
+const FIRST_STEPS: u64 = 30;
+/// Fits after which the search for σ stops.
+const MAX_NOISE_FITS: usize = 20;
+/// Both σ as declared.
+const AS_DECLARED: (NoiseModel, NoiseModel) = (NoiseModel::DECLARED, NoiseModel::DECLARED);
+/// What an earlier fit took contradicts a declared σ beyond doubt where twice the logarithm of the
+/// likelihood ratio is so many times what chance gives.
+const BEYOND_DOUBT: f64 = 10.0;
+
+/// Where the assumed noise comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Noise {
+    /// From `position_sigma` or the column `sigma`.
+    Declared,
+    /// From the scatter about the fit, 1 σ per coordinate \[m\].
+    Estimated(f64),
+    /// Neither declared nor to be seen: the fit has no degrees of freedom.
+    Unknown,
+}
+
+/// Runs the strategy until the σ that it takes is the one declared or, where residual and priors
+/// contradict that, the one they speak for; where none is declared, until the scatter about the fit
+/// is the σ assumed. `judged` says whether the poses are enough to contradict a σ.
+///
+/// A fit may begin with what an earlier one took in the place of a declared σ, as long as that
+/// contradicts the declared one beyond doubt.
+pub(in crate::fit) fn fitted(
+    fitting: &mut Fitting,
+    start: &DVector<f64>,
+    (noise_is_declared, judged): (bool, bool),
+) -> Result<(FitEnd, Statistics, Noise), StageError> {
+    let mut fits = 0;
+    let mut begin = start.clone();
+    let mut early = fitting.whole().unknowns.len() >= MANY_UNKNOWNS;
+    let mut taken_over = (fitting.noise_model, fitting.turn_noise_model) != AS_DECLARED;
+    loop {
+        fits += 1;
+        let limit = fitting.max_steps;
+        let assumed = (fitting.noise_model, fitting.turn_noise_model);
+        let single = fitting.strategy.stages().len() == 1;
+        let first = fits == 1 && noise_is_declared && judged && single && assumed == AS_DECLARED;
+        if first {
+            fitting.max_steps = Some(limit.map_or(FIRST_STEPS, |limit| limit.min(FIRST_STEPS)));
+            fitting.to_be_judged = std::mem::take(&mut early);
+        }
+        let end = fitting.run(&begin)?;
+        let judged_early = std::mem::take(&mut fitting.to_be_judged);
+        fitting.max_steps = limit;
+        let whole = fitting.whole();
+        if noise_is_declared {
+            if taken_over && !(judged && is_beyond_doubt(&whole)) {
+                (fitting.noise_model, fitting.turn_noise_model) = AS_DECLARED;
+                (taken_over, fits, begin) = (false, 0, end.x);
+                continue;
+            }
+            let next = if judged { contradicted(&whole, &end, assumed)? } else { None };
+            match next.filter(|_| fits < MAX_NOISE_FITS) {
+                Some(next) => {
+                    (fitting.noise_model, fitting.turn_noise_model) = next;
+                    if judged_early {
+                        // What is still to be gained may decide, and is asked again as of what an
+                        // earlier fit took.
+                        taken_over = is_beyond_doubt(&fitting.whole());
+                        if !taken_over {
+                            (fitting.noise_model, fitting.turn_noise_model) = AS_DECLARED;
+                        }
+                    }
+                    // What was held stays where it began, and what ran off under a σ too small
+                    // begins anew.
+                    let went_well = end.termination.converged()
+                        || end.termination == Termination::IterationLimit;
+                    begin = if went_well && end.gauge.rows.nrows() == 0 {
+                        end.x
+                    } else {
+                        start.clone()
+                    };
+                }
+                None if judged_early && end.termination.converged() => {
+                    begin = if end.gauge.rows.nrows() == 0 { end.x } else { start.clone() }
+                }
+                None if first && end.iterations >= FIRST_STEPS && !end.termination.converged() => {
+                    begin = end.x
+                }
+                None => {
+                    let statistics = Statistics::of(&whole, &end, Some(fitting.noise_model))?;
+                    return Ok((end, statistics, Noise::Declared));
+                }
+            }
+            continue;
+        }
+        let statistics = Statistics::of(&whole, &end, None)?;
+        let next =
+            (fitting.sigma * statistics.reduced_chi2.map_or(1.0, f64::sqrt)).max(LEAST_NOISE);
+        let settled = (next - fitting.sigma).abs() < NOISE_SETTLED * fitting.sigma;
+        if settled || fits == MAX_NOISE_FITS {
+            let noise = match statistics.reduced_chi2 {
+                Some(_) => Noise::Estimated(fitting.sigma),
+                None => Noise::Unknown,
+            };
+            return Ok((end, statistics, noise));
+        }
+        fitting.sigma = next;
+    }
+}
+
+/// Whether the variance that a stage took, r times the declared one, contradicts that beyond doubt:
+/// N (r − 1 − ln r) of N numbers less unknowns is twice the logarithm of the likelihood ratio.
+fn is_beyond_doubt(stage: &Stage) -> bool {
+    let ratios = stage
+        .poses
+        .iter()
+        .zip(&stage.declared)
+        .map(|(pose, declared)| (pose.sigma / declared).powi(2));
+    let ratio = ratios.sum::<f64>() / stage.poses.len().max(1) as f64;
+    let freedom = stage.count().saturating_sub(stage.unknowns.len()) as f64;
+    freedom * (ratio - 1.0 - ratio.ln()) > BEYOND_DOUBT * by_chance()
+}
+
+/// What to assume instead, if what is assumed is contradicted or has not settled; poses that a
+/// robust loss sets aside as outliers do not count.
+///
+/// Contradicted is the declared σ where twice the logarithm of the likelihood ratio exceeds what
+/// chance gives (χ²₁) with probability 0.001.
+fn contradicted(
+    stage: &Stage,
+    end: &FitEnd,
+    assumed: (NoiseModel, NoiseModel),
+) -> Result<Option<(NoiseModel, NoiseModel)>, StageError> {
+    let of_fit = || Statistics::of(stage, end, Some(assumed.0));
+    let robust = if stage.loss == Loss::Squares { None } else { Some(of_fit()?) };
+    let counts =
+        |place: &usize| robust.as_ref().is_none_or(|own| own.lengths.outlying(*place).is_none());
+    let places: Vec<usize> = (0..stage.poses.len()).filter(counts).collect();
+    let poses: Vec<Pose> = places.iter().map(|&place| stage.poses[place]).collect();
+    let several_kinds =
+        poses.iter().any(|pose| pose.observation.kind() != poses[0].observation.kind());
+    let count: usize = poses.iter().map(Pose::coordinates).sum();
+    let turned = 3 * poses.iter().filter(|pose| pose.orientation.is_some()).count();
+    let all = poses.len() == stage.poses.len();
+    let residuals = stage.residuals_of(poses, &end.x);
+    let x = residuals.reduced(&end.x);
+    let data = if all {
+        stage.linearised(&end.x, Loss::Squares)
+    } else {
+        Fit::new(&residuals).linearise(&x)
+    };
+    let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
+    let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
+    let closed = confine(&data.triangle, &end.gauge.rows, &stage.held(&end.x)?, &mut held);
+    let rows = (count, 2.0 * data.cost);
+    let (ratio, gain) = VarianceLikelihood::of(&data, rows, &x, &priors, &held, &closed).maximum();
+    if !ratio.is_finite() {
+        return Ok(None);
+    }
+    let first = assumed == AS_DECLARED;
+    let shares =
+        shares(&residual_vector(&residuals, &x), stage.coordinates(), [count - turned, turned]);
+    // Positions and orientations settle each by themselves.
+    let settled = shares.iter().all(|share| ((ratio * share).sqrt() - 1.0).abs() < SCALE_SETTLED);
+    let chance = by_chance();
+    if (first && gain <= chance) || (!first && settled) {
+        return Ok(None);
+    }
+    let of = |all: &dyn Fn(usize) -> f64| {
+        let of_arm = places.iter().filter(|&&place| stage.poses[place].observation.is_of_arm());
+        of_arm.map(|&place| all(place)).collect::<Vec<f64>>()
+    };
+    // An error of the model is one length for all only where all measure the same.
+    let raised = if several_kinds { NoiseModel::scaled } else { NoiseModel::raised };
+    let of_position = raised(
+        &of(&|place| stage.declared[place]),
+        &of(&|place| stage.poses[place].sigma),
+        ratio * shares[0],
+    );
+    let taken = |place: usize| stage.poses[place].orientation.map_or(1.0, |own| own.sigma);
+    let of_turn = match stage.declared_turn {
+        Some(sigma) => NoiseModel::raised(&of(&|_| sigma), &of(&taken), ratio * shares[1]),
+        None => NoiseModel::DECLARED,
+    };
+    let next = (of_position, of_turn);
+    Ok((next != assumed).then_some(next))
+}
+
+/// Mean square of the whitened residuals of positions, and of orientations, over that of all: 1
+/// where there are positions alone.
+fn shares(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f64; 2] {
+    if coordinates == 3 {
+        return [1.0; 2];
+    }
+    let sum = |part: fn(&[f64]) -> &[f64]| -> f64 {
+        whitened.as_slice().chunks_exact(coordinates).flat_map(part).map(|r| r * r).sum()
+    };
+    let sums = [sum(|r| &r[..3]), sum(|r| &r[3..])];
+    let mean = |sum: f64, count: usize| sum / count.max(1) as f64;
+    let (position, turn) = (mean(sums[0], counts[0]), mean(sums[1], counts[1]));
+    let all = mean(sums[0] + sums[1], counts[0] + counts[1]);
+    if all > 0.0 { [position / all, turn / all] } else { [1.0; 2] }
+}
+
+/// The variance that a stage took over the declared one, and 1 σ of the rows of one kind as it took
+/// it; known distances between points keep the σ that they have.
+pub(in crate::fit) fn taken(stage: &Stage, kind: Observation) -> (f64, f64) {
+    let rows =
+        stage.poses.iter().zip(&stage.declared).filter(|(pose, _)| pose.observation.is_of_arm());
+    let (poses, declared): (Vec<&Pose>, Vec<f64>) = rows.unzip();
+    let all = together(poses.iter().map(|pose| pose.sigma));
+    let own =
+        poses.iter().filter(|pose| pose.observation.kind() == kind.kind()).map(|pose| pose.sigma);
+    (
+        (all / together(declared.into_iter())).powi(2),
+        together(own.collect::<Vec<f64>>().into_iter()),
+    )
+}
+
+/// Root mean square of the σ of some rows.
+pub(in crate::fit) fn together(sigmas: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let n = sigmas.len().max(1) as f64;
+    (sigmas.map(|sigma| sigma * sigma).sum::<f64>() / n).sqrt()
+}

@@ -1,0 +1,103 @@
+//! What bounds and constraints cost a fit.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::fit::stages::constraints::Held;
+use crate::fit::stages::stage::{Stage, StageError};
+use crate::fit::uncertainty::shadow_price::ShadowPrice;
+use crate::least_squares::solver::{AtBound, Factor};
+use crate::least_squares::{Fit, LinearRows, Objective as _};
+use crate::model::parameter::Parameter;
+
+/// Normals are dependent when what is left of one is shorter than this part of it.
+const DEPENDENT: f64 = 1e-10;
+
+/// Prices of the bound of each unknown, where it rests on one, and of active constraints.
+#[derive(Debug, Clone, Default)]
+pub(in crate::fit) struct Prices {
+    pub bounds: Vec<Option<ShadowPrice>>,
+    pub constraints: Vec<ShadowPrice>,
+}
+
+impl Stage<'_> {
+    /// What the limits cost at the full parameter vector `at`.
+    ///
+    /// At a minimum g = Aᵀμ + w, with the gradient g, rows A of active constraints and w of bounds:
+    /// μ ≥ 0 at a lower limit, ≤ 0 at an upper one, w likewise.
+    ///
+    /// # Errors
+    /// Priors do not fit the unknowns.
+    pub fn prices(
+        &self,
+        at: &DVector<f64>,
+        at_bound: &[Option<AtBound>],
+        active: &[Held],
+    ) -> Result<Prices, StageError> {
+        let n = self.unknowns.len();
+        if active.is_empty() && at_bound.iter().all(Option::is_none) {
+            return Ok(Prices { bounds: vec![None; n], constraints: Vec::new() });
+        }
+        let residuals = self.residuals(at);
+        let x = residuals.reduced(at);
+        let priors = self.priors();
+        let constant = DVector::zeros(priors.nrows());
+        let fit = Fit::new(&residuals)
+            .with_loss(self.loss)
+            .with_rows(LinearRows { matrix: priors, constant })?;
+        let found = fit.linearise(&x);
+        let mut left = found.triangle.tr_mul(&found.projected);
+        let free: Vec<usize> = (0..n).filter(|&j| at_bound[j].is_none()).collect();
+        let weight = |j: usize| found.triangle.column(j).norm().max(f64::MIN_POSITIVE).recip();
+        let normals = DMatrix::from_fn(free.len(), active.len(), |i, k| {
+            active[k].row[free[i]] * weight(free[i])
+        });
+        let force = DVector::from_fn(free.len(), |i, _| left[free[i]] * weight(free[i]));
+        let forces = if active.is_empty() {
+            DVector::zeros(0)
+        } else {
+            Factor::new(normals, -force, DEPENDENT).gauss_newton()
+        };
+        for (own, force) in active.iter().zip(&forces) {
+            own.row.iter().enumerate().for_each(|(j, coefficient)| left[j] -= coefficient * force);
+        }
+        // Of the rows that measure what most do: millimetres and degrees have no mean.
+        let leading = self.poses.first().map(|pose| pose.observation.kind());
+        let own = |place: &usize| Some(self.poses[*place].observation.kind()) == leading;
+        let places: Vec<usize> = (0..self.poses.len()).filter(own).collect();
+        let all = residuals.position_errors(&x);
+        let errors: Vec<_> = places.iter().map(|&place| all[place]).collect();
+        let count = errors.len().max(1) as f64;
+        let rms = (errors.iter().map(nalgebra::Matrix::norm_squared).sum::<f64>() / count).sqrt();
+        let variance =
+            places.iter().map(|&place| self.poses[place].sigma.powi(2)).sum::<f64>() / count;
+        // Where both limits are one, either may push.
+        let parameters: Vec<&Parameter> = self.parameters().collect();
+        let is_equality = |own: &Held| {
+            let limits = &self.model.constraints[own.constraint];
+            limits.lower >= limits.upper
+        };
+        let price = |force: f64, side: AtBound, is_one: bool| {
+            let multiplier = match side {
+                _ if is_one => force.abs(),
+                AtBound::Lower => force.max(0.0),
+                AtBound::Upper => (-force).max(0.0),
+            };
+            let rms = if rms > 0.0 { multiplier * variance / (count * rms) } else { 0.0 };
+            ShadowPrice { multiplier, rms }
+        };
+        Ok(Prices {
+            bounds: (0..n)
+                .map(|j| {
+                    at_bound[j].map(|side| {
+                        price(left[j], side, parameters[j].lower >= parameters[j].upper)
+                    })
+                })
+                .collect(),
+            constraints: active
+                .iter()
+                .zip(&forces)
+                .map(|(own, force)| price(*force, own.side, is_equality(own)))
+                .collect(),
+        })
+    }
+}

@@ -1,0 +1,107 @@
+//! Poses whose residual is too long to be noise.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
+use crate::fit::stages::stage::Stage;
+use crate::least_squares::residual_vector;
+use crate::model::Pose;
+use crate::numeric::median;
+
+/// Probability that noise alone makes any pose an outlier.
+const BY_CHANCE: f64 = 0.01;
+
+/// The median length of so many `coordinates` of σ 1, √ of the median of χ², and the length beyond
+/// which chance takes any of `count` with probability 0.01 [Bonferroni].
+pub(in crate::fit) fn chance(count: usize, coordinates: usize) -> Option<(f64, f64)> {
+    let squares = ChiSquared::new(coordinates as f64).ok()?;
+    Some((
+        squares.inverse_cdf(0.5).sqrt(),
+        squares.inverse_cdf(1.0 - BY_CHANCE / count.max(1) as f64).sqrt(),
+    ))
+}
+
+/// For each of some residuals, which have so many `coordinates`, what [`chance`] says of it.
+pub(in crate::fit) fn chances(coordinates: &[usize]) -> Vec<(f64, f64)> {
+    let mut known: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+    let of = |&own: &usize| {
+        *known
+            .entry(own)
+            .or_insert_with(|| chance(coordinates.len(), own).unwrap_or((1.0, f64::INFINITY)))
+    };
+    coordinates.iter().map(of).collect()
+}
+
+/// The median of some lengths of whitened residuals, each over the one that chance gives it; those
+/// that are not finite do not count.
+pub(in crate::fit) fn scatter(lengths: &[f64], chances: &[(f64, f64)]) -> f64 {
+    let ratios = lengths.iter().zip(chances).map(|(length, (typical, _))| length / typical);
+    median(ratios.filter(|ratio| ratio.is_finite())).unwrap_or(0.0)
+}
+
+/// Which of some lengths of whitened residuals of so many `coordinates` each are too long to be
+/// noise; the scatter is the median one, no less than the σ that they are in units of.
+pub(in crate::fit) fn outlying(lengths: &[f64], coordinates: &[usize]) -> Vec<bool> {
+    let chances = chances(coordinates);
+    let scatter = scatter(lengths, &chances).max(1.0);
+    lengths.iter().zip(&chances).map(|(length, (_, limit))| *length > limit * scatter).collect()
+}
+
+/// Lengths of the whitened residuals of some poses, and what counts as too long.
+#[derive(Debug, Clone)]
+pub(in crate::fit) struct Lengths {
+    /// ‖r‖ of each pose in units of its declared σ.
+    pub values: Vec<f64>,
+    /// The same in units of the σ that the fit took.
+    pub weighed: Vec<f64>,
+    /// 1 σ of the scatter in units of the assumed one.
+    pub scatter: f64,
+    /// Length of each in units of the scatter beyond which it is an outlier.
+    limits: Vec<f64>,
+}
+
+impl Lengths {
+    /// Of a stage at the full parameter vector `at`; `freedom` is the part of its coordinates that
+    /// is left to scatter, 0…1, and `declared` the part of the declared σ that the fit took to be
+    /// noise, where any σ was declared.
+    ///
+    /// A pose is an outlier where P(χ²ₖ > s²) < 0.01 / N, with s = ‖r‖ / scatter, k measured
+    /// numbers and N poses \[Bonferroni\]. The scatter is the median of ‖r‖ / √(median of χ²ₖ),
+    /// 1.538 of positions, which gross errors hardly move, over √`freedom`; under a declared σ it
+    /// is no less than that part of it. So a model that misses some effect everywhere does not turn
+    /// every pose into an outlier.
+    pub fn of(stage: &Stage, at: &DVector<f64>, freedom: f64, declared: Option<f64>) -> Self {
+        let residuals = stage.residuals(at);
+        let whitened = residual_vector(&residuals, &residuals.reduced(at));
+        let length = |r: &[f64]| r[0].hypot(r[1]).hypot(r[2]);
+        let items = || whitened.as_slice().chunks_exact(stage.coordinates());
+        let both = |r: &[f64], position: f64| {
+            if r.len() > 3 { position.hypot(length(&r[3..])) } else { position }
+        };
+        let weighed: Vec<f64> = items().map(|r| both(r, length(r))).collect();
+        let in_declared = |(r, (pose, declared)): (&[f64], (&Pose, &f64))| {
+            let position = length(r) * (pose.sigma / declared);
+            match (pose.orientation, stage.declared_turn) {
+                (Some(orientation), Some(own)) => {
+                    position.hypot(length(&r[3..]) * (orientation.sigma / own))
+                }
+                _ => position,
+            }
+        };
+        let values: Vec<f64> =
+            items().zip(stage.poses.iter().zip(&stage.declared)).map(in_declared).collect();
+        let least = declared.unwrap_or(0.0);
+        let chances = chances(&stage.poses.iter().map(Pose::coordinates).collect::<Vec<_>>());
+        let scatter = scatter(&values, &chances) / freedom.clamp(0.01, 1.0).sqrt();
+        let limits = chances.into_iter().map(|(_, limit)| limit).collect();
+        Self { values, weighed, scatter: scatter.max(least), limits }
+    }
+
+    /// Length of a residual in units of the scatter, if it is an outlier.
+    pub fn outlying(&self, place: usize) -> Option<f64> {
+        let (length, limit) = (self.values[place], self.limits[place]);
+        (self.scatter > 0.0 && length > limit * self.scatter).then(|| length / self.scatter)
+    }
+}

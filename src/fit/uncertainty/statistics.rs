@@ -1,0 +1,119 @@
+//! What the residual of a fit says about its unknowns.
+
+use nalgebra::DMatrix;
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+
+use crate::fit::stages::constraints::{Held, confine};
+use crate::fit::stages::fitting::FitEnd;
+use crate::fit::stages::noise_model::{IMPROBABLE, NoiseModel};
+use crate::fit::stages::stage::{Stage, StageError};
+use crate::fit::uncertainty::prices::Prices;
+use crate::fit::uncertainty::residual_lengths::Lengths;
+use crate::least_squares::{Blind, Loss, Uncertainty};
+use crate::model::Pose;
+
+/// A part this large in unidentifiable combinations leaves an unknown without an error of its own.
+const PARTLY_BLIND: f64 = 1e-3;
+
+/// Errors and correlations of the unknowns of a fit.
+#[derive(Debug, Clone)]
+pub(in crate::fit) struct Statistics {
+    /// Standard error of each unknown.
+    pub errors: Vec<f64>,
+    /// Whether data and priors decide each unknown: no bound, and no part in a combination that
+    /// neither of them sees.
+    pub known: Vec<bool>,
+    /// Part of each unknown that the data gave, 0…1; in passing 1 where there is no prior.
+    pub identified: Vec<f64>,
+    /// Covariance of the unknowns, shape = (unknowns, unknowns); 0 where one is held.
+    pub covariance: DMatrix<f64>,
+    /// χ² against the declared σ over its degrees of freedom, outliers left out where the loss is
+    /// robust; `None` without any.
+    pub reduced_chi2: Option<f64>,
+    /// Where chance keeps it.
+    pub chance: Option<(f64, f64)>,
+    /// The constraints that hold back.
+    pub constraints: Vec<Held>,
+    /// What bounds and constraints cost.
+    pub prices: Prices,
+    /// Lengths of the residuals.
+    pub lengths: Lengths,
+}
+
+impl Statistics {
+    /// Of a stage that ended at `end` and took its σ as `assumed`, if any σ was declared.
+    ///
+    /// With a robust loss the covariance is that of the weighted Jacobian, times
+    /// [`Loss::variance_factor`]. Active constraints confine it to the directions that they leave
+    /// open.
+    ///
+    /// # Errors
+    /// Constraints make no sense.
+    pub fn of(
+        stage: &Stage,
+        end: &FitEnd,
+        noise_model: Option<NoiseModel>,
+    ) -> Result<Self, StageError> {
+        let triangle = stage.weighted_triangle(&end.x);
+        let priors: Vec<Option<f64>> =
+            stage.parameters().map(|parameter| parameter.sigma).collect();
+        let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
+        let constraints = stage.held(&end.x)?;
+        let closed = confine(&triangle, &end.gauge.rows, &constraints, &mut held);
+        let of = |factor| Uncertainty::of(&triangle, &priors, &closed, &held, factor);
+        let mut uncertainty = of(1.0);
+        let coordinates = stage.count() as f64;
+        let freedom = coordinates - uncertainty.effective_parameters;
+        let lengths =
+            Lengths::of(stage, &end.x, freedom / coordinates, noise_model.map(|own| own.scale));
+        let robust = stage.loss != Loss::Squares;
+        let counts = |place: usize| !robust || lengths.outlying(place).is_none();
+        let kept = (0..lengths.values.len()).filter(|&place| counts(place));
+        let chi2: f64 = kept.map(|place| lengths.values[place].powi(2)).sum();
+        let aside = (0..lengths.values.len()).filter(|&place| !counts(place));
+        let left_out = aside.map(|place| stage.poses[place].coordinates() as f64).sum::<f64>();
+        if robust {
+            let each: Vec<usize> = stage.poses.iter().map(Pose::coordinates).collect();
+            uncertainty = of(stage.loss.variance_factor(&lengths.weighed, &each, freedom));
+        }
+        let freedom = freedom - left_out;
+        let errors = uncertainty.standard_errors();
+        // Nobody asks a fit in passing what data see.
+        let visible = if priors.iter().all(Option::is_some) || stage.memory.is_in_passing() {
+            vec![1.0; errors.len()]
+        } else {
+            Blind::in_triangle(&stage.data_triangle(&end.x)).visible
+        };
+        let identified = (0..errors.len())
+            .map(|j| match priors[j] {
+                _ if held[j] => 0.0,
+                Some(sigma) => (1.0 - (errors[j] / sigma).powi(2)).clamp(0.0, 1.0),
+                None => visible[j],
+            })
+            .collect();
+        // What was seen at the start may have run out of sight on the way, a rigidity towards
+        // infinity for one.
+        let seen = stage.gauge(&end.x, &held, &constraints).visible;
+        let known = (0..errors.len())
+            .map(|j| !held[j] && seen[j].min(end.gauge.visible[j]) > 1.0 - PARTLY_BLIND)
+            .collect();
+        Ok(Self {
+            covariance: uncertainty.covariance,
+            errors,
+            known,
+            identified,
+            reduced_chi2: (freedom > 0.5).then_some(chi2 / freedom),
+            chance: chance(freedom),
+            prices: stage.prices(&end.x, &end.at_bound, &constraints)?,
+            constraints,
+            lengths,
+        })
+    }
+}
+
+/// Where chance keeps χ² / ν.
+fn chance(freedom: f64) -> Option<(f64, f64)> {
+    let distribution = ChiSquared::new(freedom).ok().filter(|_| freedom > 0.5)?;
+    let bound = |p: f64| distribution.inverse_cdf(p) / freedom;
+    Some((bound(0.5 * IMPROBABLE), bound(1.0 - 0.5 * IMPROBABLE)))
+}
