@@ -10,7 +10,7 @@ use crate::error::InputErrorKind;
 use crate::fit::{Placement, locate};
 use crate::measurement::Measurements;
 use crate::model::parameter::{BeamField, Parameter, ParameterSite};
-use crate::model::{Model, Pose, SeenOrientation};
+use crate::model::{MeasuredOrientation, Model, Pose};
 use crate::problem::{Observation, Problem};
 use crate::random;
 
@@ -143,7 +143,7 @@ impl<'a> Site<'a> {
             let turn = turn.filter(|_| pose.observation.is_position());
             pose.orientation = turn
                 .filter(|_| unit.is_none())
-                .map(|sigma| SeenOrientation { measured: None, sigma });
+                .map(|sigma| MeasuredOrientation { measured: None, sigma });
         }
         Sensitivity::of(&self.model, &poses, at)
     }
@@ -165,7 +165,9 @@ impl<'a> Site<'a> {
     /// Rows of a table in which the nominal target stays in a workspace.
     pub(super) fn inside(&self, table: &Measurements, workspace: &Workspace) -> Vec<usize> {
         let nominal = vec![0.0; self.model.parameters.len()];
-        let points = self.model.points(&self.poses(table, &Placement::of(table)), &nominal);
+        let points = self
+            .model
+            .predicted_targets_in_base(&self.poses(table, &Placement::of(table)), &nominal);
         (0..table.len())
             .filter(|&row| points[row].is_some_and(|point| workspace.holds(&point)))
             .collect()

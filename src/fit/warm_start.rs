@@ -5,7 +5,7 @@ use nalgebra::DVector;
 
 use crate::fit::stages::noise_model::NoiseModel;
 use crate::fit::{Errors, Identification};
-use crate::model::{KnownDerivatives, Model};
+use crate::model::{LinearModel, Model};
 
 /// What the next fit need not find anew.
 #[derive(Debug, Clone)]
@@ -19,12 +19,12 @@ pub(crate) struct WarmStart {
     /// begins with them as declared.
     pub(super) noise: Option<(NoiseModel, NoiseModel)>,
     /// Derivatives where it ended, if somebody took them.
-    pub(super) derivatives: Option<KnownDerivatives>,
+    pub(super) derivatives: Option<LinearModel>,
 }
 
 impl WarmStart {
     /// The same with derivatives where it ended.
-    pub(crate) fn with_derivatives(self, derivatives: Option<KnownDerivatives>) -> Self {
+    pub(crate) fn with_derivatives(self, derivatives: Option<LinearModel>) -> Self {
         Self { derivatives, ..self }
     }
 

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::imperfection::Rope;
+use super::imperfection::HoistError;
 use super::joint::Joint;
 use crate::problem::{Equilibrium, PoseView, Problem, Tree};
 use crate::scalar::Scalar;
@@ -31,7 +31,7 @@ pub struct Arm<S> {
     /// By how much a payload is heavier than declared, whenever one is carried \[kg\].
     pub payload_error: S,
     /// How ropes pull other than declared.
-    pub rope: Option<Rope<S>>,
+    pub rope: Option<HoistError<S>>,
     /// Flexibility of the base about its x and y [rad/(N·m)].
     pub mounting: Option<[S; 2]>,
     /// λ from loads on the rigid arm (0) to loads on the bent arm (1), where the declared statics
@@ -70,7 +70,7 @@ impl Arm<f64> {
             payload_at: self.payload_at,
             payload_mass: self.payload_mass,
             payload_error: S::from(self.payload_error),
-            rope: self.rope.as_ref().map(Rope::lift),
+            rope: self.rope.as_ref().map(HoistError::lift),
             mounting: self.mounting.map(|mounting| mounting.map(S::from)),
             mixing: self.mixing.map(S::from),
         }

@@ -70,7 +70,7 @@ impl<S: Scalar> Walk<'_, S> {
                 unknowns: (self.next - unknowns, unknowns),
             });
             events.push(Event::Cut);
-            self.frame = self.frame.constant();
+            self.frame = self.frame.without_derivatives();
         }
     }
 

@@ -4,7 +4,7 @@ use num_dual::Dual64;
 
 use super::arm::Arm;
 use super::forward::Bend;
-use super::statics::{Equilibrated, MAX_PASSES, SETTLED};
+use super::statics::{MAX_PASSES, SETTLED, StaticState};
 use super::workspace::Workspace;
 use crate::problem::{Equilibrium, PoseView};
 use crate::spatial::Frame;
@@ -18,7 +18,7 @@ impl Arm<Dual64> {
     pub(crate) fn frames(
         &self,
         setup: &PoseView,
-        rest: &Equilibrated,
+        rest: &StaticState,
         ws: &mut Workspace<Dual64>,
     ) -> Vec<Frame<Dual64>> {
         ws.keeps_frames = true;

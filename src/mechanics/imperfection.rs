@@ -30,7 +30,7 @@ pub struct AddedMass<S> {
 
 /// How ropes pull other than declared.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rope<S> {
+pub struct HoistError<S> {
     /// Relative error of the force.
     pub force: S,
     /// Lean of the direction, x and y of the base frame.
@@ -72,7 +72,7 @@ impl<S: Scalar> Strain<S> {
     }
 }
 
-impl<S: Scalar> Rope<S> {
+impl<S: Scalar> HoistError<S> {
     /// Force \[N\] of a tension \[N\] in a declared direction, with the hook at these x and y
     /// \[m\], base frame.
     pub(super) fn pull(
@@ -110,10 +110,10 @@ impl AddedMass<f64> {
     }
 }
 
-impl Rope<f64> {
+impl HoistError<f64> {
     /// The same as constants of another scalar.
-    pub(super) fn lift<S: Scalar>(&self) -> Rope<S> {
-        Rope {
+    pub(super) fn lift<S: Scalar>(&self) -> HoistError<S> {
+        HoistError {
             force: S::from(self.force),
             lean: self.lean.map(S::from),
             trolley: S::from(self.trolley),

@@ -6,7 +6,7 @@ use num_dual::Dual64;
 use super::arm::Arm;
 use super::forward::Bend;
 use super::segment::{Segment, moment_lanes};
-use super::statics::{Equilibrated, StaticsError};
+use super::statics::{StaticState, StaticsError};
 use super::tape::Tape;
 use super::workspace::Workspace;
 use crate::problem::{Equilibrium, PoseView};
@@ -65,7 +65,7 @@ impl Sensitivity {
         &mut self,
         setup: &PoseView,
         target: &Vector3<f64>,
-        pose: &mut Equilibrated,
+        pose: &mut StaticState,
     ) -> Result<(), StaticsError> {
         let Self { arms, parameters, lanes, ws, tape } = self;
         let mut moments = std::mem::take(&mut ws.moments);

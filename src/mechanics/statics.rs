@@ -44,7 +44,7 @@ pub enum StaticsError {
 
 /// A pose in static equilibrium.
 #[derive(Debug, Clone, Default)]
-pub struct Equilibrated {
+pub struct StaticState {
     /// The frame that was asked for, of the joint `tip`, arm base frame.
     pub frame: Frame<f64>,
     pub(super) tip: usize,
@@ -66,7 +66,7 @@ impl Arm<f64> {
         &self,
         setup: &PoseView,
         ws: &mut Workspace<f64>,
-        pose: &mut Equilibrated,
+        pose: &mut StaticState,
     ) -> Result<(), StaticsError> {
         self.equilibrate_at(setup, self.last(), ws, pose)
     }
@@ -80,7 +80,7 @@ impl Arm<f64> {
         setup: &PoseView,
         tip: usize,
         ws: &mut Workspace<f64>,
-        pose: &mut Equilibrated,
+        pose: &mut StaticState,
     ) -> Result<(), StaticsError> {
         pose.adjoint.clear();
         pose.moments.clear();
@@ -137,12 +137,12 @@ fn mixed<S: Scalar>(one: &Frame<S>, other: &Frame<S>, mixing: S) -> Frame<S> {
 
 /// Differentiates equilibrium with respect to its moments.
 #[derive(Debug, Clone)]
-pub struct Response {
+pub struct AdjointSolver {
     arm: Arm<Dual64>,
     ws: Workspace<Dual64>,
 }
 
-impl Response {
+impl AdjointSolver {
     /// For poses of `arm`.
     pub fn new(arm: &Arm<f64>) -> Self {
         Self { arm: arm.lift(), ws: Workspace::default() }
@@ -157,7 +157,7 @@ impl Response {
         &mut self,
         setup: &PoseView,
         target: &Vector3<f64>,
-        pose: &mut Equilibrated,
+        pose: &mut StaticState,
     ) -> Result<(), StaticsError> {
         let n = pose.moments.len();
         if n == 0 || (self.arm.is_first_order() && self.arm.mixing.is_none()) {
@@ -190,7 +190,7 @@ impl Response {
     }
 }
 
-impl Equilibrated {
+impl StaticState {
     /// Λ = `P_x` + Λ `G_x` by the same contraction as the equilibrium itself.
     fn solve_adjoint(&mut self) -> Result<(), StaticsError> {
         let n = self.moments.len();
@@ -239,7 +239,7 @@ impl<S: Scalar> Arm<S> {
         &self,
         setup: &PoseView,
         target: &Vector3<f64>,
-        pose: &Equilibrated,
+        pose: &StaticState,
         ws: &mut Workspace<S>,
     ) -> Vector3<S> {
         let target = target.map(S::from);
@@ -273,7 +273,7 @@ impl<S: Scalar> Arm<S> {
         &self,
         setup: &PoseView,
         target: &Vector3<S>,
-        pose: &Equilibrated,
+        pose: &StaticState,
         moments: &mut Vec<S>,
         ws: &mut Workspace<S>,
     ) -> Vector3<S> {
@@ -310,12 +310,12 @@ mod tests {
     use super::*;
 
     /// Two moments, each of which makes the other `factor` times itself.
-    fn pose(factor: f64) -> Equilibrated {
-        Equilibrated {
+    fn pose(factor: f64) -> StaticState {
+        StaticState {
             moments: vec![0.0; 2],
             position_response: vec![1.0; 6],
             moment_response: vec![0.0, factor, factor, 0.0],
-            ..Equilibrated::default()
+            ..StaticState::default()
         }
     }
 

@@ -15,7 +15,7 @@ impl Model {
     /// A correction to q is one to θ of a revolute joint and to d of a prismatic one. Bases and
     /// targets stay as in `x`.
     #[must_use]
-    pub fn commanded(&self, problem: &Problem, x: &DVector<f64>) -> Self {
+    pub fn with_free_commands(&self, problem: &Problem, x: &DVector<f64>) -> Self {
         let arm = self.arm(|k| x[k]);
         let parameters = commands(problem, &arm, Joint::commanded);
         Self {
@@ -24,7 +24,7 @@ impl Model {
             instrument: self.instrument_at(x.as_slice()),
             bases: self.base_poses(x.as_slice()),
             targets: self.target_positions(x.as_slice()),
-            influential_rows: self.influential_rows.clone(),
+            target_joints: self.target_joints.clone(),
             fixtures: self.fixtures(x.as_slice()),
             declared: self.declared.clone(),
             turned: self.target_rotations(x.as_slice()),
@@ -36,13 +36,13 @@ impl Model {
     /// The same without what effects make of the measurement: it predicts where the target is, not
     /// what is read of it.
     #[must_use]
-    pub fn true_to_position(self) -> Self {
-        Self { instrument: self.instrument.true_to_position(), ..self }
+    pub fn without_instrument_errors(self) -> Self {
+        Self { instrument: self.instrument.without_instrument_errors(), ..self }
     }
 
     /// A commanded model with corrections to the joints that follow others as further parameters.
     #[must_use]
-    pub fn with_followers(mut self, problem: &Problem) -> Self {
+    pub fn with_mimic_joints(mut self, problem: &Problem) -> Self {
         let of = |joint: &Joint| if joint.mimic.is_some() { joint.kind } else { JointKind::Fixed };
         self.parameters.extend(commands(problem, &self.nominal, of));
         self
@@ -53,7 +53,10 @@ impl Model {
     ///
     /// # Errors
     /// A free parameter has no value.
-    pub fn vector_of(&self, value: impl Fn(&str) -> Option<f64>) -> Result<DVector<f64>, String> {
+    pub fn parameter_vector(
+        &self,
+        value: impl Fn(&str) -> Option<f64>,
+    ) -> Result<DVector<f64>, String> {
         let entries = self.parameters.iter().map(|parameter| {
             let value = value(&parameter.name).ok_or_else(|| parameter.name.clone())?;
             Ok(parameter.deviation(value))

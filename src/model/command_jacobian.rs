@@ -21,10 +21,10 @@ impl Model {
         poses: Vec<Pose>,
         x: &DVector<f64>,
     ) -> Vec<DMatrix<f64>> {
-        let arm = self.commanded(problem, x);
+        let arm = self.with_free_commands(problem, x);
         let joints = arm.joints();
         let own = arm.moving_joints().len();
-        let arm = arm.with_followers(problem);
+        let arm = arm.with_mimic_joints(problem);
         let moving = arm.moving_joints();
         let poses: Vec<Pose> = poses.into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
         let count = poses.len();

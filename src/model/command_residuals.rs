@@ -21,8 +21,8 @@ pub struct CommandResiduals<'a> {
 }
 
 impl<'a> CommandResiduals<'a> {
-    /// Of `arm` with `commands` commands, whose parameters are those of [`Model::commanded`] and
-    /// then those of [`Model::with_followers`].
+    /// Of `arm` with `commands` commands, whose parameters are those of [`Model::with_free_commands`] and
+    /// then those of [`Model::with_mimic_joints`].
     pub fn new(problem: &Problem, arm: &'a Model, commands: usize, poses: Vec<Pose<'a>>) -> Self {
         let moving = arm.moving_joints();
         let follower = |joint: &usize| {

@@ -11,7 +11,7 @@ use super::commands::Commands;
 use super::elastic::Elastic;
 use super::inputs::inputs;
 use super::instrument::{Instrument, strained};
-use super::observation::{FixtureAt, Slopes, between};
+use super::observation::{FixtureValues, Slopes, between};
 use super::parts::{Base, Inner, Target};
 use super::pose::Pose;
 use super::rigid::Rigid;
@@ -37,7 +37,7 @@ pub(super) struct Linearised {
     bases: Vec<Base>,
     targets: Vec<Target>,
     /// Fixtures, and the columns of their numbers.
-    fixtures: Vec<(FixtureAt<f64>, [Option<usize>; 4])>,
+    fixtures: Vec<(FixtureValues<f64>, [Option<usize>; 4])>,
     /// Tilts of frames, where some are measured.
     tilts: Option<Tilts>,
     inner: Inner,
@@ -61,7 +61,7 @@ impl Linearised {
             .into_iter()
             .zip(model.target_rotations(x.as_slice()));
         let target =
-            |(own, (position, rotation))| Target::new(model.carrier(own), position, &rotation);
+            |(own, (position, rotation))| Target::new(model.target_joint(own), position, &rotation);
         let mut targets: Vec<Target> = places.enumerate().map(target).collect();
         let mut fixtures: Vec<_> =
             model.fixtures(x.as_slice()).into_iter().map(|own| (own, [None; 4])).collect();

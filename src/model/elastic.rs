@@ -10,7 +10,7 @@ use super::Model;
 use super::enter::enter;
 use super::inputs::Input;
 use super::rows::Rows;
-use crate::mechanics::{Angle, Arm, Equilibrated, Response, Segment, Sensitivity, Workspace};
+use crate::mechanics::{AdjointSolver, Angle, Arm, Segment, Sensitivity, StaticState, Workspace};
 use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
 use crate::problem::PoseView;
 use crate::spatial::Frame;
@@ -19,10 +19,10 @@ use crate::spatial::Frame;
 /// the whole arm.
 pub(super) struct Elastic {
     parts: Option<Parts>,
-    response: Response,
+    response: AdjointSolver,
     whole: Vec<Whole>,
     arm: Arm<f64>,
-    rest: Equilibrated,
+    rest: StaticState,
     /// Memory for walks.
     real: Workspace<f64>,
     ws: Workspace<Dual64>,
@@ -65,7 +65,7 @@ impl Elastic {
             };
             Parts { sensitivity: Sensitivity::new(&arm, count, seeded), inputs: apart.clone() }
         });
-        let (response, rest) = (Response::new(&arm), Equilibrated::default());
+        let (response, rest) = (AdjointSolver::new(&arm), StaticState::default());
         Self {
             parts,
             response,
@@ -107,7 +107,7 @@ impl Elastic {
                 &base.vector(&position.map(|coordinate| coordinate.eps)),
             );
         }
-        Some(base.seen(&rest.frame))
+        Some(base.compose(&rest.frame))
     }
 }
 

@@ -1,7 +1,7 @@
 //! How a parameter enters the arm, by its site.
 
 use crate::mechanics::{
-    AddedMass, Angle, Arm, Beam, Compensator, Flexibility, Nonlinear, Rope, Strain,
+    AddedMass, Angle, Arm, Beam, Compensator, Flexibility, HoistError, Nonlinear, Strain,
 };
 use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
 use crate::problem::Effect;
@@ -49,7 +49,7 @@ pub(super) fn prepare(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64) {
             | ArmField::HoistLeanX
             | ArmField::HoistLeanY
             | ArmField::HoistTrolley => {
-                arm.rope.get_or_insert(Rope { force: 0.0, lean: [0.0; 2], trolley: 0.0 });
+                arm.rope.get_or_insert(HoistError { force: 0.0, lean: [0.0; 2], trolley: 0.0 });
             }
             ArmField::MountingX | ArmField::MountingY => _ = arm.mounting.get_or_insert([0.0; 2]),
             ArmField::Mixing => _ = arm.mixing.get_or_insert(0.0),

@@ -44,7 +44,7 @@ impl Instrument {
 
     /// What is true of the arm's surroundings: bases that move with covariates, and no errors of
     /// the instrument.
-    pub fn true_to_position(&self) -> Self {
+    pub fn without_instrument_errors(&self) -> Self {
         let moves = |all: &[(usize, Regressor, f64)]| {
             all.iter()
                 .filter(|(_, regressor, _)| matches!(regressor, Regressor::Covariate(_)))
@@ -91,7 +91,7 @@ impl Instrument {
     #[inline]
     pub fn base(&self, base: &Frame<f64>, setup: &PoseView) -> Frame<f64> {
         if self.turns() {
-            Frame::from_rotation_vector(Vector3::zeros(), &self.turn(setup)).seen(base)
+            Frame::from_rotation_vector(Vector3::zeros(), &self.turn(setup)).compose(base)
         } else {
             *base
         }

@@ -21,7 +21,7 @@ const ROUNDING: f64 = 1e-9;
 /// the same ones there, and columns of these effects beside them. A name stands for the same
 /// parameter in both.
 #[derive(Debug, Clone)]
-pub(crate) struct KnownDerivatives {
+pub(crate) struct LinearModel {
     /// Of each parameter its deviation from nominal, and its column if it has one.
     parameters: BTreeMap<String, (f64, Option<usize>)>,
     /// 1 σ of each pose \[m\].
@@ -30,7 +30,7 @@ pub(crate) struct KnownDerivatives {
     residual: Arc<DVector<f64>>,
 }
 
-impl KnownDerivatives {
+impl LinearModel {
     /// At the full parameter vector `x` of a model with these `parameters`, of poses of these 1 σ
     /// \[m\]; the first columns of the Jacobian are those of the `unknowns`.
     pub fn new(
@@ -166,7 +166,7 @@ mod tests {
         // What is known is taken as it is: a mark shows that it was.
         columns.column_mut(0)[5] += 1.0;
         let all = names(&plain);
-        let known = KnownDerivatives::new(
+        let known = LinearModel::new(
             (&plain.parameters, &x),
             &unknowns(&plain),
             (0..600).map(|k| sigma(k, aside)).collect(),
@@ -176,7 +176,7 @@ mod tests {
         let start = DVector::from_iterator(more.parameters.len(), names(&more).iter().map(at));
         let fresh = PoseResiduals::new(&more, poses(2.0, 1.0), unknowns(&more), start.clone());
         let begun = PoseResiduals::new(&more, poses(2.0, 1.0), unknowns(&more), start.clone())
-            .knowing(Some(&known));
+            .with_linear_model(Some(&known));
         let ((expected, there), (found, own)) =
             (jacobian_and_residual(&fresh, &start), jacobian_and_residual(&begun, &start));
         let mut difference = found - &expected;

@@ -26,11 +26,11 @@ mod terms;
 mod tilt;
 mod turn;
 
-pub use crate::mechanics::Shape;
+pub use crate::mechanics::CentreLine;
 pub use ablation::Ablation;
 pub use command_residuals::CommandResiduals;
-pub(crate) use known::KnownDerivatives;
-pub use pose::{Pose, SeenOrientation};
+pub(crate) use known::LinearModel;
+pub use pose::{MeasuredOrientation, Pose};
 pub use poses::PoseResiduals;
 
 use nalgebra::Vector3;
@@ -46,7 +46,7 @@ use crate::spatial::Frame;
 use commands::Commands;
 use driven::Driven;
 use instrument::Instrument;
-pub(crate) use observation::FixtureAt;
+pub(crate) use observation::FixtureValues;
 
 /// What predicts positions, as a function of the free parameters.
 #[derive(Debug, Clone)]
@@ -58,11 +58,11 @@ pub struct Model {
     bases: Vec<BasePose>,
     targets: Vec<Vector3<f64>>,
     /// Index of the joint whose frame carries each target.
-    influential_rows: Vec<usize>,
+    target_joints: Vec<usize>,
     /// Orientation of each target in that frame, a rotation vector \[rad\].
     turned: Vec<Vector3<f64>>,
     /// Points, anchors and surfaces, as declared; 0 where nothing is known.
-    fixtures: Vec<FixtureAt<f64>>,
+    fixtures: Vec<FixtureValues<f64>>,
     /// The numbers of each of them that are declared.
     declared: Vec<Vec<Option<f64>>>,
     /// Free parameters, shape of every full parameter vector.
@@ -101,9 +101,9 @@ impl Model {
             instrument: Instrument::default(),
             bases: vec![problem.base.clone(); bases.len()],
             targets: own.iter().map(|own| own.at).collect(),
-            influential_rows: own.iter().map(|own| own.joint).collect(),
+            target_joints: own.iter().map(|own| own.joint).collect(),
             turned: own.iter().map(|own| own.rotation).collect(),
-            fixtures: problem.fixtures.iter().map(FixtureAt::declared).collect(),
+            fixtures: problem.fixtures.iter().map(FixtureValues::declared).collect(),
             declared: problem.fixtures.iter().map(|own| own.known.clone()).collect(),
             parameters,
         })
@@ -115,7 +115,7 @@ impl Model {
     /// Given with each site is the value that it has where nothing deviates; what the arm declares
     /// goes before it.
     #[must_use]
-    pub fn probing(&self, slots: &[(ParameterSite, f64)]) -> Self {
+    pub fn with_probes(&self, slots: &[(ParameterSite, f64)]) -> Self {
         let mut model = self.clone();
         for &(site, nominal) in slots {
             enter::prepare(&mut model.nominal, site, nominal);
@@ -140,7 +140,7 @@ impl Model {
     /// The same model with what these effects declare of the arm besides their parameters: where
     /// springs are.
     #[must_use]
-    pub(crate) fn placing(&self, effects: &[Effect]) -> Self {
+    pub(crate) fn with_springs_of(&self, effects: &[Effect]) -> Self {
         let mut model = self.clone();
         for effect in effects {
             enter::place(&mut model.nominal, effect);
@@ -155,7 +155,7 @@ impl Model {
 
     /// How far the nominal arm can stretch \[m\]: Σ √(a² + d²), or ‖xyz‖, over the joints that
     /// carry a target and to it, the most of all targets; 1 m where all that is nought.
-    pub fn size(&self) -> f64 {
+    pub fn reach(&self) -> f64 {
         let length = |joint: &Joint<f64>| {
             joint.a.hypot(joint.d)
                 + joint.placement.as_ref().map_or(0.0, |placement| placement.xyz.norm())
@@ -166,8 +166,8 @@ impl Model {
                 joints.iter().enumerate().filter(|(joint, _)| tree.leads_through(*joint, tip));
             carrying.map(|(_, own)| length(own)).sum()
         };
-        let reach = |(target, &tip): (&Vector3<f64>, &usize)| links(tip) + target.norm();
-        let reach = self.targets.iter().zip(&self.influential_rows).map(reach).fold(0.0, f64::max);
+        let to_target = |(target, &tip): (&Vector3<f64>, &usize)| links(tip) + target.norm();
+        let reach = self.targets.iter().zip(&self.target_joints).map(to_target).fold(0.0, f64::max);
         if reach > 0.0 { reach } else { 1.0 }
     }
 
@@ -229,8 +229,8 @@ impl Model {
     }
 
     /// Index of the joint whose frame carries a target.
-    pub(crate) fn carrier(&self, target: usize) -> usize {
-        self.influential_rows.get(target).copied().unwrap_or_else(|| self.nominal.last())
+    pub(crate) fn target_joint(&self, target: usize) -> usize {
+        self.target_joints.get(target).copied().unwrap_or_else(|| self.nominal.last())
     }
 
     /// Targets in the frames that carry them \[m\].
@@ -250,7 +250,7 @@ impl Model {
     }
 
     /// Points, anchors and surfaces in the measuring frame.
-    pub(crate) fn fixtures(&self, x: &[f64]) -> Vec<FixtureAt<f64>> {
+    pub(crate) fn fixtures(&self, x: &[f64]) -> Vec<FixtureValues<f64>> {
         let mut fixtures = self.fixtures.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
             if let ParameterSite::Fixture { fixture, axis, .. } = parameter.site {

@@ -17,7 +17,7 @@ const INPUTS: usize = 3 + NUMBERS;
 /// A fixture at some parameters: its numbers in the order of [`FixtureKind::fields`], SI, measuring
 /// frame; 0 behind the last.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct FixtureAt<S> {
+pub(crate) struct FixtureValues<S> {
     pub kind: FixtureKind,
     pub numbers: [S; NUMBERS],
 }
@@ -29,7 +29,7 @@ pub(super) struct Slopes {
     pub by_fixture: Matrix3x4<f64>,
 }
 
-impl FixtureAt<f64> {
+impl FixtureValues<f64> {
     /// As declared, 0 where nothing is known.
     pub fn declared(fixture: &Fixture) -> Self {
         let mut numbers = [0.0; NUMBERS];
@@ -50,7 +50,7 @@ impl FixtureAt<f64> {
         let position = Vector3::from_fn(|i, _| seeded::<INPUTS>(position[i], Some(i)));
         let numbers = std::array::from_fn(|k| seeded::<INPUTS>(self.numbers[k], Some(3 + k)));
         let seen: Vector3<DualSVec64<INPUTS>> =
-            FixtureAt { kind: self.kind, numbers }.seen(&position);
+            FixtureValues { kind: self.kind, numbers }.seen(&position);
         let by = [gradient(&seen.x), gradient(&seen.y), gradient(&seen.z)];
         Slopes {
             seen: seen.map(|own| own.re),
@@ -62,11 +62,11 @@ impl FixtureAt<f64> {
 
 /// Distance \[m\] between two points, and its derivatives: by the second as the target, by the
 /// first as the fixture.
-pub(super) fn between(first: &FixtureAt<f64>, second: &FixtureAt<f64>) -> Slopes {
-    FixtureAt { kind: FixtureKind::Anchor, ..*first }.slopes(&second.place())
+pub(super) fn between(first: &FixtureValues<f64>, second: &FixtureValues<f64>) -> Slopes {
+    FixtureValues { kind: FixtureKind::Anchor, ..*first }.slopes(&second.place())
 }
 
-impl<S: Scalar> FixtureAt<S> {
+impl<S: Scalar> FixtureValues<S> {
     /// What is seen of the fixture from the target's `position` \[m\], measuring frame; zeros
     /// behind the numbers that there are.
     ///

@@ -65,14 +65,14 @@ impl Base {
         let by = Frame::from_rotation_vector(Vector3::zeros(), turn);
         let (turning, back) = (turning(turn), by.inverse());
         let column = |(axis, column, factor): (usize, usize, f64)| {
-            let slope = turning[axis].seen(&back);
+            let slope = turning[axis].compose(&back);
             (column, Frame { axes: slope.axes.map(|axis| axis * factor), origin: Vector3::zeros() })
         };
         Self {
-            frame: by.seen(&self.frame),
+            frame: by.compose(&self.frame),
             along: self.along.map(|axis| by.vector(&axis)),
             turns: columns.map(column).collect(),
-            turning: self.turning.map(|turning| by.seen(&turning)),
+            turning: self.turning.map(|turning| by.compose(&turning)),
             columns: self.columns,
         }
     }

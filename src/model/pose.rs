@@ -21,7 +21,7 @@ pub struct Pose<'a> {
     /// 1 σ of each of them \[m\].
     pub sigma: f64,
     /// The orientation of the target, where it counts.
-    pub orientation: Option<SeenOrientation<'a>>,
+    pub orientation: Option<MeasuredOrientation<'a>>,
 }
 
 impl Pose<'_> {
@@ -34,14 +34,14 @@ impl Pose<'_> {
 
 /// A measured orientation of a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SeenOrientation<'a> {
+pub struct MeasuredOrientation<'a> {
     /// As measured, measuring frame; `None`: as predicted, of poses that are still to be measured.
     pub measured: Option<&'a UnitQuaternion<f64>>,
     /// 1 σ about each axis \[rad\].
     pub sigma: f64,
 }
 
-impl SeenOrientation<'_> {
+impl MeasuredOrientation<'_> {
     /// Its axes, measuring frame, where it was measured.
     pub fn axes(&self) -> Option<[Vector3<f64>; 3]> {
         let measured = self.measured?;

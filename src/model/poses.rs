@@ -9,14 +9,14 @@ use rayon::prelude::*;
 use super::Model;
 use super::commands::Commands;
 use super::derivative::Linearised;
-use super::known::KnownDerivatives;
+use super::known::LinearModel;
 use super::observation::between;
 use super::pose::Pose;
 use super::tilt::{Tilts, rigid_tilts};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
-use crate::mechanics::{Equilibrated, Shape, Workspace};
+use crate::mechanics::{CentreLine, StaticState, Workspace};
 use crate::problem::Observation;
-use crate::spatial::{Frame, rotation_axes, turn_between};
+use crate::spatial::{Frame, rotation_axes, rotation_between};
 
 /// Coordinates of a position, and of a position with an orientation.
 const POSITION: usize = 3;
@@ -39,7 +39,7 @@ pub struct PoseResiduals<'a> {
     /// Whether some poses measure tilts.
     tilted: bool,
     /// Derivatives that are known at a point where these residuals may be linearised.
-    known: Option<&'a KnownDerivatives>,
+    known: Option<&'a LinearModel>,
 }
 
 /// What is seen of a pose.
@@ -67,7 +67,7 @@ impl<'a> PoseResiduals<'a> {
 
     /// The same with derivatives that are `known` at a point.
     #[must_use]
-    pub(crate) fn knowing(self, known: Option<&'a KnownDerivatives>) -> Self {
+    pub(crate) fn with_linear_model(self, known: Option<&'a LinearModel>) -> Self {
         Self { known, ..self }
     }
 
@@ -145,7 +145,7 @@ impl<'a> PoseResiduals<'a> {
         let mut commands = self.model.commands(full.as_slice());
         let fixtures = self.model.fixtures(full.as_slice());
         let mut ws = Workspace::default();
-        let mut rest = Equilibrated::default();
+        let mut rest = StaticState::default();
         let mut tilts = None;
         for pose in &self.poses[items] {
             if let Observation::Between(first, second) = pose.observation {
@@ -163,7 +163,7 @@ impl<'a> PoseResiduals<'a> {
             }
             let seen = match arm.equilibrate_at(
                 &commands.apply(&pose.setup),
-                self.model.carrier(pose.target),
+                self.model.target_joint(pose.target),
                 &mut ws,
                 &mut rest,
             ) {
@@ -174,7 +174,7 @@ impl<'a> PoseResiduals<'a> {
                         let axes =
                             turned[pose.target].map(|axis| base.vector(&rest.frame.vector(&axis)));
                         own.axes()
-                            .map_or(Vector3::zeros(), |measured| turn_between(&axes, &measured))
+                            .map_or(Vector3::zeros(), |measured| rotation_between(&axes, &measured))
                     });
                     let seen = match pose.observation.fixture() {
                         Some(fixture) if pose.observation.is_point() => {
@@ -223,11 +223,11 @@ impl Model {
         let arm = self.arm(|k| x[k]);
         let some = |poses: &[Pose]| {
             let mut commands = self.commands(x);
-            let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+            let (mut ws, mut rest) = (Workspace::default(), StaticState::default());
             let mut frame = |pose: &Pose| {
                 arm.equilibrate_at(
                     &commands.apply(&pose.setup),
-                    self.carrier(pose.target),
+                    self.target_joint(pose.target),
                     &mut ws,
                     &mut rest,
                 )
@@ -246,8 +246,8 @@ impl Model {
         let instrument = self.instrument_at(x);
         let still = [Vector3::x(), Vector3::y(), Vector3::z()];
         let orientation = |(pose, frame): (&Pose, Option<Frame<f64>>)| {
-            let last = instrument.base(&bases[pose.base], &pose.setup).seen(&frame?);
-            Some(turn_between(
+            let last = instrument.base(&bases[pose.base], &pose.setup).compose(&frame?);
+            Some(rotation_between(
                 &still,
                 &rotation_axes(&turned[pose.target]).map(|axis| last.vector(&axis)),
             ))
@@ -264,7 +264,7 @@ impl Model {
             (self.base_frames(x), self.target_positions(x), self.instrument_at(x));
         let mut commands = Commands::new(&self.driven, &[], &[]);
         let position = |pose: &Pose| {
-            let tip = arm.rigid_frame(&commands.apply(&pose.setup), self.carrier(pose.target));
+            let tip = arm.rigid_frame(&commands.apply(&pose.setup), self.target_joint(pose.target));
             let base = instrument.base(&bases[pose.base], &pose.setup);
             instrument.of(&base.point(&tip.point(&targets[pose.target])), &pose.setup)
         };
@@ -289,7 +289,7 @@ impl Model {
                 Observation::Tilt(frame) => rigid_tilts(&arm, &setup, frame),
                 of => {
                     let base = instrument.base(&bases[pose.base], &pose.setup);
-                    let tip = arm.rigid_frame(&setup, self.carrier(pose.target));
+                    let tip = arm.rigid_frame(&setup, self.target_joint(pose.target));
                     let position = base.point(&tip.point(&targets[pose.target]));
                     match of.fixture() {
                         Some(fixture) if of.is_point() => {
@@ -307,21 +307,21 @@ impl Model {
 
     /// The arm as a line to the target at the full parameter vector `x`, measuring frame \[m\];
     /// `None` without equilibrium.
-    pub fn shapes(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Shape>> {
+    pub fn centre_lines(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<CentreLine>> {
         let arm = self.arm(|k| x[k]);
         let (bases, targets) = (self.base_frames(x), self.target_positions(x));
         let shape = |(pose, frame): (&Pose, Option<Frame<f64>>)| {
             let mut commands = self.commands(x);
             let setup = commands.apply(&pose.setup);
-            let tip = self.carrier(pose.target);
-            let Shape { mut rigid, mut bent } = arm.shape(&setup, tip).ok()?;
+            let tip = self.target_joint(pose.target);
+            let CentreLine { mut rigid, mut bent } = arm.centre_line(&setup, tip).ok()?;
             rigid.push(arm.rigid_frame(&setup, tip).point(&targets[pose.target]));
             bent.push(frame?.point(&targets[pose.target]));
             rigid
                 .iter_mut()
                 .chain(&mut bent)
                 .for_each(|point| *point = bases[pose.base].point(point));
-            Some(Shape { rigid, bent })
+            Some(CentreLine { rigid, bent })
         };
         poses.iter().zip(self.frames(poses, x)).map(shape).collect()
     }
@@ -329,8 +329,8 @@ impl Model {
     /// Where the arm has its target in each pose at the full parameter vector `x`, whatever was
     /// measured of it, measuring frame \[m\]; NaN without equilibrium. What effects do to the
     /// measurement is not in them.
-    pub(crate) fn target_places(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
-        let (bases, points) = (self.base_frames(x), self.points(poses, x));
+    pub(crate) fn predicted_targets(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
+        let (bases, points) = (self.base_frames(x), self.predicted_targets_in_base(poses, x));
         let lost = Vector3::from_element(f64::NAN);
         poses
             .iter()
@@ -343,7 +343,11 @@ impl Model {
     /// without equilibrium.
     ///
     /// What effects do to the measurement is not in them.
-    pub fn points(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Vector3<f64>>> {
+    pub fn predicted_targets_in_base(
+        &self,
+        poses: &[Pose],
+        x: &[f64],
+    ) -> Vec<Option<Vector3<f64>>> {
         let targets = self.target_positions(x);
         let frames = self.frames(poses, x);
         poses

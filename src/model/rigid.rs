@@ -13,7 +13,7 @@ use super::rows::Rows;
 use crate::mechanics::{Angle, Arm, Coordinates, Joint, Placement};
 use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{PoseView, Tree};
-use crate::spatial::{Frame, turn_x, turn_y, turn_z};
+use crate::spatial::{Frame, rotated_about_x, rotated_about_y, rotated_about_z};
 
 /// A rigid arm, motion by motion.
 pub(super) struct Rigid {
@@ -140,12 +140,12 @@ impl Link {
         point: &Vector3<f64>,
     ) -> ([Vector3<f64>; 5], Vector3<f64>) {
         let Joint { alpha, a, beta, .. } = &self.joint;
-        let (by_beta, point) = derivative(&turn_y(beta.sin_cos, point));
+        let (by_beta, point) = derivative(&rotated_about_y(beta.sin_cos, point));
         let (by_d, point) =
             derivative(&Vector3::new(point.x.into(), point.y.into(), at.offset + point.z));
-        let (by_theta, point) = derivative(&turn_z(at.angle, &point));
+        let (by_theta, point) = derivative(&rotated_about_z(at.angle, &point));
         let (by_a, point) = derivative(&Vector3::new(*a + point.x, point.y.into(), point.z.into()));
-        let (by_alpha, point) = derivative(&turn_x(alpha.sin_cos, &point));
+        let (by_alpha, point) = derivative(&rotated_about_x(alpha.sin_cos, &point));
         ([by_alpha, by_a, by_theta, by_d, by_beta], point)
     }
 
@@ -178,9 +178,9 @@ fn carry_through(
     point: &Vector3<f64>,
 ) -> ([Vector3<f64>; 6], Vector3<f64>) {
     let [roll, pitch, yaw] = &placement.rpy;
-    let (by_roll, point) = derivative(&turn_x(roll.sin_cos, point));
-    let (by_pitch, point) = derivative(&turn_y(pitch.sin_cos, &point));
-    let (by_yaw, point) = derivative(&turn_z(yaw.sin_cos, &point));
+    let (by_roll, point) = derivative(&rotated_about_x(roll.sin_cos, point));
+    let (by_pitch, point) = derivative(&rotated_about_y(pitch.sin_cos, &point));
+    let (by_yaw, point) = derivative(&rotated_about_z(yaw.sin_cos, &point));
     let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()];
     ([x, y, z, by_roll, by_pitch, by_yaw], point + placement.xyz.map(|coordinate| coordinate.re))
 }

@@ -7,7 +7,7 @@ use super::Model;
 use super::elastic::seed_arm;
 use super::inputs::Input;
 use super::rows::Rows;
-use crate::mechanics::{Arm, Equilibrated, Workspace};
+use crate::mechanics::{Arm, StaticState, Workspace};
 use crate::problem::PoseView;
 use crate::scalar::Scalar;
 
@@ -19,7 +19,7 @@ pub(super) struct Tilts {
     arm: Arm<f64>,
     plain: Arm<Dual64>,
     inputs: Vec<(Input, Arm<Dual64>)>,
-    rest: Equilibrated,
+    rest: StaticState,
     real: Workspace<f64>,
     ws: Workspace<Dual64>,
 }
@@ -35,7 +35,7 @@ impl Tilts {
             plain: arm.lift(),
             arm,
             inputs: inputs.into_iter().map(seeded).collect(),
-            rest: Equilibrated::default(),
+            rest: StaticState::default(),
             real: Workspace::default(),
             ws: Workspace::default(),
         }
@@ -75,7 +75,7 @@ fn tilts(
     arm: &Arm<Dual64>,
     setup: &PoseView,
     frame: usize,
-    rest: &Equilibrated,
+    rest: &StaticState,
     ws: &mut Workspace<Dual64>,
 ) -> Vector3<Dual64> {
     let frames = arm.frames(setup, rest, ws);

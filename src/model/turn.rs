@@ -4,11 +4,11 @@
 use nalgebra::Vector3;
 
 use super::parts::{Base, Inner, Target};
-use super::pose::SeenOrientation;
+use super::pose::MeasuredOrientation;
 use super::rows::Rows;
 use crate::least_squares::Block;
 use crate::problem::PoseView;
-use crate::spatial::{Frame, logarithm_slope, turn_between};
+use crate::spatial::{Frame, inverse_right_jacobian, rotation_between};
 
 /// Rows of the derivatives of the target and of the ends of its three axes, 1 m long.
 pub(super) const PROBE_ROWS: usize = 12;
@@ -27,12 +27,12 @@ pub(super) struct About<'a> {
 /// zeros.
 ///
 /// With eₖ the axes of Rₚ and deₖ what a parameter does to them, Rₚ turns by ω = ½ Σ eₖ × deₖ, and
-/// the residual r changes by −J⁻¹(r) ω  ([`logarithm_slope`]).
+/// the residual r changes by −J⁻¹(r) ω  ([`inverse_right_jacobian`]).
 pub(super) fn write(
     inner: &mut Inner,
     probe: &mut Block,
     about: &About,
-    orientation: &SeenOrientation,
+    orientation: &MeasuredOrientation,
     (block, row): (&mut Block, usize),
 ) {
     let About { setup: (commanded, setup), base, target, last } = *about;
@@ -53,8 +53,8 @@ pub(super) fn write(
     }
     let axes = target.axes.map(|axis| last.vector(&axis));
     let error =
-        orientation.axes().map_or(Vector3::zeros(), |measured| turn_between(&axes, &measured));
-    let slope = logarithm_slope(&error) / -orientation.sigma;
+        orientation.axes().map_or(Vector3::zeros(), |measured| rotation_between(&axes, &measured));
+    let slope = inverse_right_jacobian(&error) / -orientation.sigma;
     let mut put = |column: usize, turned: [Vector3<f64>; 3]| {
         let turn: Vector3<f64> =
             axes.iter().zip(&turned).map(|(axis, turned)| axis.cross(turned) * 0.5).sum();

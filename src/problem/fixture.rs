@@ -12,7 +12,7 @@ use super::joint::Joint;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
-use crate::spatial::TOLD_BY_OPPOSITE;
+use crate::spatial::MAX_NORMAL_TILT;
 
 /// σ of a known distance that says nothing of it: one micrometre \[m\].
 const EXACT: f64 = 1e-6;
@@ -302,7 +302,7 @@ fn surface(section: &mut Section<'_, '_>) -> Result<Known, InputError> {
 pub fn lean(normal: &Vector3<f64>) -> [f64; 2] {
     let across = normal.x.hypot(normal.y);
     let angle = across.atan2(normal.z);
-    if angle > TOLD_BY_OPPOSITE {
+    if angle > MAX_NORMAL_TILT {
         let [rx, ry] = lean(&-normal);
         [PI + rx, ry]
     } else if across > 0.0 {

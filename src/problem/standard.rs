@@ -19,7 +19,7 @@ pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
         let (a, alpha) = (row.a, row.alpha);
         (row.a, row.alpha) = before;
         if let Some(Placement { xyz, rpy }) = &mut row.placement {
-            let frame = link(before).seen(&Frame::placed(xyz, rpy));
+            let frame = link(before).compose(&Frame::from_xyz_rpy(xyz, rpy));
             (*xyz, *rpy) = (frame.origin, frame.roll_pitch_yaw());
             (row.a, row.alpha) = (0.0, 0.0);
         }
@@ -55,5 +55,5 @@ pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
 
 /// Tx(a) Rx(α).
 fn link((a, alpha): (f64, f64)) -> Frame<f64> {
-    Frame::placed(&Vector3::new(a, 0.0, 0.0), &Vector3::new(alpha, 0.0, 0.0))
+    Frame::from_xyz_rpy(&Vector3::new(a, 0.0, 0.0), &Vector3::new(alpha, 0.0, 0.0))
 }

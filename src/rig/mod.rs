@@ -118,9 +118,9 @@ impl Rig {
         };
         let carrier = rest.frame(frames.get(joint).ok_or(NoRest)?);
         let base = Frame::from_rotation_vector(self.arm.base.translation, &self.arm.base.rotation);
-        let base = self.mounted(conditions).seen(&base);
+        let base = self.mounted(conditions).compose(&base);
         let seen = base.point(&carrier.point(&at));
-        let axes = base.seen(&carrier).axes;
+        let axes = base.compose(&carrier).axes;
         let last = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
         let orientation = UnitQuaternion::from(last) * UnitQuaternion::from_scaled_axis(rotation);
         let finite = seen.iter().chain(orientation.coords.iter()).all(|x| x.is_finite());

@@ -102,13 +102,13 @@ impl<S: Scalar> Frame<S> {
 
     /// A frame given in this one, as seen from the reference frame.
     #[must_use]
-    pub fn seen(&self, frame: &Self) -> Self {
+    pub fn compose(&self, frame: &Self) -> Self {
         Self { axes: frame.axes.map(|axis| self.vector(&axis)), origin: self.point(&frame.origin) }
     }
 
     /// The same frame without derivatives.
     #[must_use]
-    pub fn constant(&self) -> Self {
+    pub fn without_derivatives(&self) -> Self {
         let constant = |vector: &Vector3<S>| vector.map(|coordinate| S::from(coordinate.re()));
         Self { axes: self.axes.each_ref().map(constant), origin: constant(&self.origin) }
     }

@@ -7,5 +7,8 @@ mod plane;
 mod rotation;
 
 pub use frame::Frame;
-pub use plane::{TOLD_BY_OPPOSITE, plane_normal};
-pub use rotation::{logarithm_slope, rotate, rotation_axes, turn_between, turn_x, turn_y, turn_z};
+pub use plane::{MAX_NORMAL_TILT, plane_normal};
+pub use rotation::{
+    inverse_right_jacobian, rotate, rotated_about_x, rotated_about_y, rotated_about_z,
+    rotation_axes, rotation_between,
+};

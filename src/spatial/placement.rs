@@ -6,7 +6,7 @@ use super::Frame;
 
 impl Frame<f64> {
     /// Txyz Rz(yaw) Ry(pitch) Rx(roll), `xyz` \[m\], `rpy` \[rad\] in the order roll, pitch, yaw.
-    pub fn placed(xyz: &Vector3<f64>, rpy: &Vector3<f64>) -> Self {
+    pub fn from_xyz_rpy(xyz: &Vector3<f64>, rpy: &Vector3<f64>) -> Self {
         let mut frame = Self { origin: *xyz, ..Self::identity() };
         frame.rotate_z(rpy.z.sin_cos());
         frame.rotate_y(rpy.y.sin_cos());
@@ -47,11 +47,11 @@ mod tests {
             angles.iter().flat_map(move |&pitch| angles.map(|yaw| [roll, pitch, yaw]))
         });
         for rpy in all {
-            let frame = Frame::placed(&Vector3::new(1.0, -2.0, 0.5), &rpy.into());
-            let again = Frame::placed(&frame.origin, &frame.roll_pitch_yaw());
+            let frame = Frame::from_xyz_rpy(&Vector3::new(1.0, -2.0, 0.5), &rpy.into());
+            let again = Frame::from_xyz_rpy(&frame.origin, &frame.roll_pitch_yaw());
             let off = (0..3).map(|k| (frame.axes[k] - again.axes[k]).norm()).fold(0.0, f64::max);
             assert!(off < 1e-12, "{rpy:?}: {off}");
-            let back = frame.seen(&frame.inverse());
+            let back = frame.compose(&frame.inverse());
             assert!((back.origin.norm() + (back.axes[0] - Vector3::x()).norm()) < 1e-14);
         }
     }

@@ -38,7 +38,7 @@ pub fn rotation_axes<S: Scalar>(w: &Vector3<S>) -> [Vector3<S>; 3] {
 
 /// The rotation vector \[rad\], in the reference frame, that turns the axes `from` into `to`:
 /// log(R₂ R₁ᵀ), at most half a turn.
-pub fn turn_between(from: &[Vector3<f64>; 3], to: &[Vector3<f64>; 3]) -> Vector3<f64> {
+pub fn rotation_between(from: &[Vector3<f64>; 3], to: &[Vector3<f64>; 3]) -> Vector3<f64> {
     let turn = Matrix3::from_columns(to) * Matrix3::from_columns(from).transpose();
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)).scaled_axis()
 }
@@ -48,7 +48,7 @@ pub fn turn_between(from: &[Vector3<f64>; 3], to: &[Vector3<f64>; 3]) -> Vector3
 ///
 /// The inverse of the right Jacobian of SO(3) at a rotation vector w \[rad\] of less than a turn.
 /// [Chirikjian 2012, ch. 10]
-pub fn logarithm_slope(w: &Vector3<f64>) -> Matrix3<f64> {
+pub fn inverse_right_jacobian(w: &Vector3<f64>) -> Matrix3<f64> {
     let squared = w.norm_squared();
     let c = if squared < SERIES_BELOW {
         1.0 / 12.0 + squared / 720.0 + squared * squared / 30_240.0 + squared.powi(3) / 1_209_600.0
@@ -62,21 +62,21 @@ pub fn logarithm_slope(w: &Vector3<f64>) -> Matrix3<f64> {
 
 /// A plain vector turned about the x axis, given (sin, cos).
 #[inline]
-pub fn turn_x<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
+pub fn rotated_about_x<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
     let (y, z) = turn(sin_cos, vector.y, vector.z);
     Vector3::new(S::from(vector.x), y, z)
 }
 
 /// A plain vector turned about the y axis, given (sin, cos).
 #[inline]
-pub fn turn_y<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
+pub fn rotated_about_y<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
     let (z, x) = turn(sin_cos, vector.z, vector.x);
     Vector3::new(x, S::from(vector.y), z)
 }
 
 /// A plain vector turned about the z axis, given (sin, cos).
 #[inline]
-pub fn turn_z<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
+pub fn rotated_about_z<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
     let (x, y) = turn(sin_cos, vector.x, vector.y);
     Vector3::new(x, y, S::from(vector.z))
 }
@@ -128,15 +128,18 @@ mod tests {
             let (w, base) = (direction * angle, Vector3::new(1.0, 2.0, -0.5));
             let from = rotation_axes(&base);
             let to = from.map(|axis| rotate(&w, &axis));
-            assert!((turn_between(&from, &to) - w).norm() < 1e-12, "{angle}");
+            assert!((rotation_between(&from, &to) - w).norm() < 1e-12, "{angle}");
             for k in 0..3 {
                 let near = |step: f64| {
                     let delta = rotation_axes(&Vector3::ith(k, step));
                     let turned = delta.map(|axis| rotate(&w, &axis));
-                    turn_between(&rotation_axes(&Vector3::zeros()), &turned)
+                    rotation_between(&rotation_axes(&Vector3::zeros()), &turned)
                 };
                 let difference = (near(1e-5) - near(-1e-5)) / 2e-5;
-                assert!((logarithm_slope(&w).column(k) - difference).norm() < 1e-8, "{angle}");
+                assert!(
+                    (inverse_right_jacobian(&w).column(k) - difference).norm() < 1e-8,
+                    "{angle}"
+                );
             }
         }
     }

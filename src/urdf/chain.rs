@@ -103,7 +103,7 @@ impl<'a> Chain<'a> {
         let (mut step, mut leaders) = (Frame::identity(), Vec::new());
         for &index in &self.joints {
             let Some(joint) = robot.joints.get(index) else { continue };
-            step = step.seen(&joint.origin.frame());
+            step = step.compose(&joint.origin.frame());
             if let Kind::Other(kind) = &joint.kind {
                 return Err(robot.error_at(index, UrdfMistake::Kind { kind: kind.clone() }));
             }
@@ -113,7 +113,7 @@ impl<'a> Chain<'a> {
             let axis = axis_frame(&joint.axis);
             let (leader, addend) = self.leader(index)?;
             leaders.push(leader);
-            step = moved(&step.seen(&axis), joint, addend);
+            step = moved(&step.compose(&axis), joint, addend);
             self.stages.push(Stage { joint: index, step, axis, mimic: None, addend });
             // What follows is seen from the axis frame: back to the joint's own first.
             step = axis.inverse();

@@ -162,7 +162,7 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
 
 /// `frame` behind a row with its q at zero.
 fn advanced(frame: &Frame<f64>, row: &Row) -> Frame<f64> {
-    let mut frame = row.placement.as_ref().map_or(*frame, |placement| frame.seen(placement));
+    let mut frame = row.placement.as_ref().map_or(*frame, |placement| frame.compose(placement));
     let [alpha, a, theta, d, beta] = row.numbers;
     frame.rotate_x(alpha.sin_cos());
     frame.translate_x(a);

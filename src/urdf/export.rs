@@ -77,7 +77,7 @@ impl Steps {
         let names = chain.joint_names();
         for ((stage, own), name) in chain.stages.iter().zip(&self.before).zip(&names) {
             // B = G₋ C G⁻¹ with G a turn about the axis and a shift along it.
-            gauge = stage.step.inverse().seen(&gauge).seen(own);
+            gauge = stage.step.inverse().compose(&gauge).compose(own);
             let off = (gauge.axes[2].xy().norm(), gauge.origin.xy().norm());
             if off.0 > SAME || off.1 > SAME || gauge.axes[2].z < 0.0 {
                 return Err(chain.robot.error_at(
@@ -87,7 +87,7 @@ impl Steps {
             }
             gauges.push(gauge);
         }
-        let end = difference(&chain.end, &gauge.seen(&self.end));
+        let end = difference(&chain.end, &gauge.compose(&self.end));
         if end.0 > SAME || end.1 > SAME {
             let joint = names.last().cloned().unwrap_or_default();
             return Err(chain.robot.error(UrdfMistake::OtherArm { joint, off: words(end) }));
@@ -98,7 +98,7 @@ impl Steps {
 
 /// Angle \[rad\] and distance \[m\] between two frames.
 fn difference(one: &Frame<f64>, other: &Frame<f64>) -> (f64, f64) {
-    let rest = one.inverse().seen(other);
+    let rest = one.inverse().compose(other);
     let sines = Vector3::new(
         rest.axes[1].z - rest.axes[2].y,
         rest.axes[2].x - rest.axes[0].z,
@@ -140,19 +140,20 @@ pub fn export(chain: &Chain, problem: &Problem, arm: &Arm<f64>) -> Result<Export
             fixed.push(index);
             continue;
         };
-        let step = before.seen(step).seen(&own.inverse());
-        let target = from.seen(&moved(&step, joint, -stage.addend)).seen(&stage.axis.inverse());
+        let step = before.compose(step).compose(&own.inverse());
+        let target =
+            from.compose(&moved(&step, joint, -stage.addend)).compose(&stage.axis.inverse());
         let passed = patches.through(&fixed);
-        patches.place(index, &passed.inverse().seen(&target));
+        patches.place(index, &passed.inverse().compose(&target));
         from = stage.axis;
         fixed.clear();
         next = stages.next();
     }
     let last = gauges.last().copied().unwrap_or_default();
-    let target = from.seen(&last.seen(&steps.end));
+    let target = from.compose(&last.compose(&steps.end));
     if let Some((&first, others)) = fixed.split_first() {
         let behind = patches.through(others);
-        patches.place(first, &target.seen(&behind.inverse()));
+        patches.place(first, &target.compose(&behind.inverse()));
     } else {
         let off = difference(&Frame::identity(), &target);
         if off.0 > NOTHING || off.1 > NOTHING {
@@ -176,7 +177,7 @@ fn check_names(chain: &Chain, problem: &Problem) -> Result<(), InputError> {
 }
 
 fn as_written(origin: &Origin) -> Frame<f64> {
-    Frame::placed(&origin.xyz, &origin.written)
+    Frame::from_xyz_rpy(&origin.xyz, &origin.written)
 }
 
 struct Patches<'a> {
@@ -194,7 +195,7 @@ impl Patches<'_> {
             let Some(joint) = self.chain.robot.joints.get(index) else { continue };
             let origin = joint.origin.frame();
             self.place(index, &origin);
-            frame = frame.seen(&origin);
+            frame = frame.compose(&origin);
         }
         frame
     }

@@ -38,7 +38,7 @@ impl Step {
         line.rotate_y(step.beta.sin_cos());
         line.rotate_x(step.alpha.sin_cos());
         line.translate_x(step.a);
-        let rest = line.inverse().seen(frame);
+        let rest = line.inverse().compose(frame);
         (step.theta, step.d) = (rest.axes[0].y.atan2(rest.axes[0].x), rest.origin.z);
         step
     }
@@ -111,7 +111,7 @@ mod tests {
                 Vector3::new(0.0, 0.0, 1.0),
                 Vector3::y(),
             ] {
-                let frame = Frame::placed(&xyz, &Vector3::new(roll, pitch, 0.7));
+                let frame = Frame::from_xyz_rpy(&xyz, &Vector3::new(roll, pitch, 0.7));
                 let step = Step::to(&frame);
                 let mut again = Frame::identity();
                 again.rotate_z(step.theta_before.sin_cos());

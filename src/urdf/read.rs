@@ -78,7 +78,7 @@ pub(super) struct Origin {
 impl Origin {
     /// The transform as meant.
     pub fn frame(&self) -> Frame<f64> {
-        Frame::placed(&self.xyz, &self.meant)
+        Frame::from_xyz_rpy(&self.xyz, &self.meant)
     }
 }
 

@@ -39,7 +39,7 @@ pub(super) fn origins(nominal: &Steps, identified: &Steps) -> Result<Vec<Frame<f
         .before
         .iter()
         .zip(pairs)
-        .map(|(step, (before, own))| before.seen(step).seen(&own.inverse()))
+        .map(|(step, (before, own))| before.compose(step).compose(&own.inverse()))
         .collect())
 }
 
@@ -49,11 +49,11 @@ fn gauges(nominal: &Steps, base: &Frame<f64>) -> Result<Vec<Frame<f64>>, String>
     for (k, (step, (roll, link))) in
         nominal.before.iter().zip(ROLLS.into_iter().zip(LINKS)).enumerate()
     {
-        let frame = before.seen(step);
+        let frame = before.compose(step);
         let mut turned = Frame::identity();
         turned.rotate_x(roll.sin_cos());
         // The turn about the axis that is left, and where on the axis the form has its origin.
-        let rest = turned.inverse().seen(&frame);
+        let rest = turned.inverse().compose(&frame);
         if rest.axes[2].xy().norm() > SAME || rest.axes[2].z < 0.0 {
             return Err(format!("the axis of {link} does not lie as that maker's arms have it"));
         }
@@ -70,7 +70,7 @@ fn gauges(nominal: &Steps, base: &Frame<f64>) -> Result<Vec<Frame<f64>>, String>
         own.translate_z(rest.origin.z - along);
         before = own;
         gauges.push(own);
-        let placed = frame.seen(&own.inverse()).origin;
+        let placed = frame.compose(&own.inverse()).origin;
         let off = match k {
             0 => placed.xy().norm(),
             1 => placed.norm(),

@@ -38,11 +38,12 @@ pub(super) fn weights(chain: &Chain) -> (Vec<Weight>, Vec<String>) {
         for (index, joint) in
             robot.joints.iter().enumerate().filter(|(_, joint)| joint.parent == link)
         {
-            let mut next = frame.seen(&joint.origin.frame());
+            let mut next = frame.compose(&joint.origin.frame());
             let stage = chain.stages.iter().position(|stage| stage.joint == index);
             if let Some(own) = stage.and_then(|stage| chain.stages.get(stage)) {
                 // A joint that follows another may be off zero with it.
-                next = moved(&next.seen(&own.axis), joint, own.addend).seen(&own.axis.inverse());
+                next =
+                    moved(&next.compose(&own.axis), joint, own.addend).compose(&own.axis.inverse());
             } else if joint.kind != Kind::Fixed && carrier.is_some() {
                 beside.push(joint.name.clone());
             }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use flexcal::fit::{Options, Placement, compensate, identify};
 use flexcal::measurement::{Dataset, Measurements};
-use flexcal::mechanics::{Arm, Equilibrated, Workspace};
+use flexcal::mechanics::{Arm, StaticState, Workspace};
 use flexcal::model::Model;
 use flexcal::problem::{PoseView, Problem};
 use flexcal::report::{commands_csv, poses_csv};
@@ -42,7 +42,7 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
     // Where the nominal arm would be in the held-out configurations is where the true arm should
     // be.
     let nominal = Arm::nominal(&problem);
-    let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+    let (mut ws, mut rest) = (Workspace::default(), StaticState::default());
     let mut targets = rows.clone();
     for row in 0..rows.len() {
         let set = &simulation.rows[row].conditions;

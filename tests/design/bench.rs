@@ -65,7 +65,7 @@ pub fn true_arm(
             .find(|p| p.name == name || (name.ends_with("EI") && p.name.starts_with(name)));
         known.map(|parameter| parameter.value)
     };
-    let x = model_of(problem, rows).vector_of(value).unwrap();
+    let x = model_of(problem, rows).parameter_vector(value).unwrap();
     (simulation.rig, x)
 }
 

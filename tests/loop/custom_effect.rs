@@ -105,7 +105,7 @@ fn crept(rate: f64, sag: f64) -> (Problem, Dataset) {
             .find(|parameter| parameter.name == name)
             .map(|parameter| parameter.nominal),
     };
-    let truth = model.vector_of(values).unwrap();
+    let truth = model.parameter_vector(values).unwrap();
     let all: Vec<usize> = (0..rows.len()).collect();
     let poses = Placement::of(&rows).poses(&rows, &all, 1.0);
     let errors = model.residuals(poses, &truth);

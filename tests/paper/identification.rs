@@ -1,7 +1,7 @@
 //! The paper's procedure end to end, eq. 42-45, on positions of the dual-number model.
 
 use flexcal::least_squares::solver::Termination;
-use flexcal::mechanics::{Equilibrated, Workspace};
+use flexcal::mechanics::{StaticState, Workspace};
 use flexcal::paper::{
     Form, Identified, IdentifyError, Measured, Misprint, Options, Parameters, Reading,
     StiffnessStage, identify,
@@ -30,7 +30,7 @@ fn measured<'a>(
         .map(|p| place_in_e(p).map_or(stiffness.ln(), |place| part * e[place]));
     let x = DVector::from_iterator(model.parameters.len(), x);
     let arm = model.arm(|k| x[k]);
-    let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+    let (mut ws, mut rest) = (Workspace::default(), StaticState::default());
     rows.iter()
         .map(|row| {
             arm.equilibrate(&row.setup(), &mut ws, &mut rest).unwrap();

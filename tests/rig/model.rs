@@ -1,6 +1,6 @@
 //! The closed-form beams against the rig, on arms with everything that a problem may declare.
 
-use flexcal::mechanics::{Arm, Equilibrated, Workspace};
+use flexcal::mechanics::{Arm, StaticState, Workspace};
 use flexcal::problem::Problem;
 use flexcal::problem::{PoseConditions, PoseView};
 use nalgebra::Vector3;
@@ -69,7 +69,7 @@ fn closed_form(problem: &Problem, set: &PoseConditions) -> Vector3<f64> {
         hoist: set.hoist.as_ref(),
         ..PoseView::of(&set.configuration)
     };
-    let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+    let (mut ws, mut rest) = (Workspace::default(), StaticState::default());
     arm.equilibrate(&setup, &mut ws, &mut rest).unwrap();
     rest.frame.point(&problem.tool.target)
 }

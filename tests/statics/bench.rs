@@ -1,7 +1,7 @@
 //! What the tests of this theme share.
 
 use flexcal::mechanics::{
-    Angle, Arm, Beam, Equilibrated, Flexibility, Joint, StaticsError, Workspace,
+    Angle, Arm, Beam, Flexibility, Joint, StaticState, StaticsError, Workspace,
 };
 use flexcal::problem::PoseView;
 use flexcal::problem::{Equilibrium, JointKind, Tree};
@@ -65,7 +65,7 @@ pub fn arm(joints: Vec<Joint<f64>>) -> Arm<f64> {
 }
 
 pub fn frame(arm: &Arm<f64>, q: &[f64]) -> Result<Frame<f64>, StaticsError> {
-    let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+    let (mut ws, mut rest) = (Workspace::default(), StaticState::default());
     let still = vec![0.0; arm.joints.len()];
     let configuration = if q.is_empty() { &still } else { q };
     arm.equilibrate(&PoseView::of(configuration), &mut ws, &mut rest)?;

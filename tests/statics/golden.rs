@@ -2,7 +2,7 @@
 //! with the closed forms.
 
 use crate::common::arms::{golden, golden_problem, table_2};
-use flexcal::mechanics::{Arm, Equilibrated, Workspace};
+use flexcal::mechanics::{Arm, StaticState, Workspace};
 use flexcal::problem::PoseView;
 use flexcal::problem::{Equilibrium, Problem};
 use nalgebra::Vector3;
@@ -49,7 +49,7 @@ fn rigid(mut arm: Arm<f64>) -> Arm<f64> {
 }
 
 fn position(arm: &Arm<f64>, problem: &Problem, row: &Row) -> Vector3<f64> {
-    let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+    let (mut ws, mut rest) = (Workspace::default(), StaticState::default());
     arm.equilibrate(&row.setup(), &mut ws, &mut rest).unwrap();
     rest.frame.point(&problem.tool.target)
 }

@@ -1,7 +1,7 @@
 //! Many elements, no loads, small deflections, and loads too great for an equilibrium.
 
 use flexcal::fit::Placement;
-use flexcal::mechanics::{Arm, Equilibrated, StaticsError, Workspace};
+use flexcal::mechanics::{Arm, StaticState, StaticsError, Workspace};
 use flexcal::model::PoseResiduals;
 use flexcal::problem::Equilibrium;
 use flexcal::problem::PoseView;
@@ -119,7 +119,7 @@ fn an_arm_that_its_hoist_balances_comes_to_rest() {
          [joint.beam.hoist]\nat_mm = [500, 0, 0]\nforce_N = 39.2266\n[[joint]]\na_m = 0.5\n",
     );
     let arm = Arm::nominal(&problem);
-    let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+    let (mut ws, mut rest) = (Workspace::default(), StaticState::default());
     for step in -80..80 {
         for hoist in [39.2266, 39.227, 39.2] {
             let angle = f64::from(step) * 0.017;

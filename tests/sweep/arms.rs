@@ -112,7 +112,7 @@ fn one(seed: u64) -> Option<Outcome> {
         let limit = match parameter.sigma {
             Some(sigma) => WITHIN * sigma,
             None if name.starts_with("base") => return None,
-            None if parameter.unit() == Unit::Length => model.size(),
+            None if parameter.unit() == Unit::Length => model.reach(),
             None => std::f64::consts::PI,
         };
         (x.abs() > limit).then(|| format!("seed {seed}: {name} {x:e} beyond {limit:e}"))

@@ -83,7 +83,7 @@ pub fn waypoints(
     let mut targets = rows.clone();
     let tree = problem.tree();
     let commanded = |row: usize| {
-        let carrier = model.carrier(placement.target_of(row));
+        let carrier = model.target_joint(placement.target_of(row));
         let leads = problem
             .joints
             .iter()
@@ -156,10 +156,10 @@ pub fn compensate(
     targets: &Measurements,
 ) -> Result<Vec<Command>, StageError> {
     let placement = Placement::of(targets);
-    let arm = model.commanded(problem, x).true_to_position();
+    let arm = model.with_free_commands(problem, x).without_instrument_errors();
     let rows: Vec<usize> = (0..targets.len()).collect();
     let moving = arm.moving_joints();
-    let led = arm.clone().with_followers(problem);
+    let led = arm.clone().with_mimic_joints(problem);
     let tree = problem.tree();
     let mut commands = Vec::with_capacity(rows.len());
     let weights = (POSITION_WEIGHT, Some(ORIENTATION_WEIGHT));
@@ -170,7 +170,7 @@ pub fn compensate(
         pose.setup.past = PastOf::default();
         let seed = targets.configuration(row);
         let n = moving.len();
-        let carrier = model.carrier(pose.target);
+        let carrier = model.target_joint(pose.target);
         let leads = |joint: usize| tree.leads_through(joint, carrier);
         let serves = |joint: usize| {
             let moved = |(own, follows): (usize, Option<Mimic>)| {

@@ -9,7 +9,7 @@ use crate::fit::identification::IdentifyError;
 use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
 use crate::measurement::{Dataset, Measurements};
-use crate::model::{FixtureAt, Model, Pose};
+use crate::model::{FixtureValues, Model, Pose};
 use crate::problem::{Observation, Problem};
 use crate::spatial::Frame;
 
@@ -183,7 +183,7 @@ impl Identification {
 pub(in crate::fit) fn in_space(
     rows: &Measurements,
     row: usize,
-    (fixtures, bases): (&[FixtureAt<f64>], &[Frame<f64>]),
+    (fixtures, bases): (&[FixtureValues<f64>], &[Frame<f64>]),
     residual: &Vector3<f64>,
 ) -> (Vector3<f64>, Vector3<f64>) {
     match rows.observation(row) {

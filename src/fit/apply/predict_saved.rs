@@ -182,7 +182,7 @@ pub fn predict(
     let turns = turn
         .filter(|_| rows.orientations.is_some())
         .map(|_| model.orientation_residuals(poses.clone(), &x));
-    let targets = model.points(&poses, x.as_slice());
+    let targets = model.predicted_targets_in_base(&poses, x.as_slice());
     let base_of: Vec<usize> = poses.iter().map(|pose| pose.base).collect();
     let spreads = spreads(&model, &problem.fixtures, &poses, &x);
     let errors = model.residuals(poses, &x);

@@ -248,6 +248,6 @@ impl SavedEstimate {
     ) -> Result<DVector<f64>, SavedEstimateError> {
         self.check(problem, model)?;
         let missing = |name| SavedEstimateError::Missing { file: self.file.clone(), name };
-        model.vector_of(|name| self.value(name)).map_err(missing)
+        model.parameter_vector(|name| self.value(name)).map_err(missing)
     }
 }

@@ -75,7 +75,7 @@ impl Judgement<'_> {
         let rms = self.errors.0.identification.rms.norm;
         let leading = self.kind(self.fitting.measurements.leading());
         let far_off =
-            far_off(&leading, (rms, model.size()), || misreadings(self.fitting, problem, rms));
+            far_off(&leading, (rms, model.reach()), || misreadings(self.fitting, problem, rms));
         far_off.into_iter().chain(copies).chain(outliers).collect()
     }
 
@@ -120,8 +120,9 @@ impl Judgement<'_> {
             .filter(|&(_, row)| is_own(row))
             .unzip();
         let measured = observation.is_position() || observation.is_angle();
-        let places_of =
-            || self.fitting.model.target_places(&self.fitting.poses(&rows), self.start.as_slice());
+        let places_of = || {
+            self.fitting.model.predicted_targets(&self.fitting.poses(&rows), self.start.as_slice())
+        };
         let at = if measured { Vec::new() } else { places_of() };
         let point =
             |place: usize| if measured { measurements.positions[rows[place]] } else { at[place] };

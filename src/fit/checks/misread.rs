@@ -202,7 +202,7 @@ pub(in crate::fit) fn misreadings(
     problem: &Problem,
     rms: f64,
 ) -> Vec<Misreading> {
-    if rms.is_nan() || rms > MOST_SIZES * fitting.model.size() {
+    if rms.is_nan() || rms > MOST_SIZES * fitting.model.reach() {
         return Vec::new();
     }
     let identification = &fitting.split.identification;

@@ -59,7 +59,7 @@ pub(in crate::fit) fn spreads(
     x: &DVector<f64>,
 ) -> Vec<PointSpread> {
     let bases = model.base_frames(x.as_slice());
-    let points = model.points(poses, x.as_slice());
+    let points = model.predicted_targets_in_base(poses, x.as_slice());
     let of_point = |(index, fixture): (usize, &Fixture)| {
         let own = poses
             .iter()

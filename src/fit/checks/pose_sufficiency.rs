@@ -90,7 +90,7 @@ fn coordinates(
     let mut targets: BTreeMap<usize, BTreeMap<usize, usize>> = BTreeMap::new();
     for &row in &positions {
         let target = placement.target_of(row);
-        let carrier = model.carrier(target);
+        let carrier = model.target_joint(target);
         points.entry((carrier, of_arm[row])).or_default().insert(numbers[row], of_row[row]);
         targets.entry(carrier).or_default().insert(target, of_row[row]);
     }

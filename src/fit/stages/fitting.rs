@@ -19,7 +19,7 @@ use crate::least_squares::solver::{AtBound, Settings, Termination};
 use crate::least_squares::{Loss, Memory};
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Parameter;
-use crate::model::{KnownDerivatives, Model, Pose};
+use crate::model::{LinearModel, Model, Pose};
 use crate::problem::Observation;
 
 /// Sweeps after which a sequential strategy is given up.
@@ -68,7 +68,7 @@ pub(in crate::fit) struct Fitting<'a> {
     /// Linearisations that its fits share.
     pub memory: &'a Memory,
     /// Derivatives that are known where it may begin.
-    pub known: Option<&'a KnownDerivatives>,
+    pub known: Option<&'a LinearModel>,
 }
 
 /// Where a fit ended.

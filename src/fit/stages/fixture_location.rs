@@ -42,7 +42,7 @@ pub(crate) fn locate(
         return;
     }
     let bases = model.base_frames(x.as_slice());
-    let points = model.points(poses, x.as_slice());
+    let points = model.predicted_targets_in_base(poses, x.as_slice());
     let mut first = 0;
     while let Some(&(fixture, kind, ..)) = free.get(first) {
         let own: Vec<_> = free.iter().filter(|(of, ..)| *of == fixture).collect();

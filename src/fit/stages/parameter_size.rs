@@ -24,7 +24,7 @@ pub(in crate::fit) fn plausible(model: &Model, parameter: &Parameter) -> Option<
         return None;
     }
     match parameter.unit() {
-        Unit::Length => Some(model.size()),
+        Unit::Length => Some(model.reach()),
         Unit::Angle => Some(ANGLE),
         unit => unit.is_relative().then_some(LN_STIFFNESS),
     }
@@ -40,7 +40,7 @@ pub(in crate::fit) fn largest(model: &Model, parameter: &Parameter) -> Option<f6
             | ParameterSite::Target { axis: 3.., .. },
             _,
         ) => None,
-        (_, Unit::Length) => Some(model.size()),
+        (_, Unit::Length) => Some(model.reach()),
         (_, Unit::Angle) => Some(HALF_TURN),
         (_, unit) => unit.is_relative().then_some(LN_STIFFNESS),
     }

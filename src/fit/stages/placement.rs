@@ -6,7 +6,7 @@ use nalgebra::{DVector, Vector3};
 
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::ParameterSite;
-use crate::model::{Model, Pose, SeenOrientation};
+use crate::model::{MeasuredOrientation, Model, Pose};
 use crate::problem::Problem;
 
 /// Scale of a coordinate's error where no σ is declared and none estimated yet \[m\].
@@ -86,7 +86,7 @@ impl Placement {
             for (pose, &row) in
                 poses.iter_mut().zip(rows).filter(|(pose, _)| pose.observation.is_position())
             {
-                let seen = |orientation| SeenOrientation { measured: Some(orientation), sigma };
+                let seen = |orientation| MeasuredOrientation { measured: Some(orientation), sigma };
                 pose.orientation = measurements.orientation(row).map(seen);
             }
         }

@@ -20,7 +20,7 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
     let poses: Vec<Pose> =
         poses.iter().filter(|pose| pose.observation.is_position()).copied().collect();
     let poses = &poses[..];
-    let points = model.points(poses, x.as_slice());
+    let points = model.predicted_targets_in_base(poses, x.as_slice());
     let has_orientation = poses.iter().any(|pose| pose.orientation.is_some());
     let frames = if has_orientation { model.frames(poses, x.as_slice()) } else { Vec::new() };
     let oriented: Vec<(&Pose, Frame<f64>)> =
@@ -55,8 +55,9 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
             continue;
         }
         let seen = oriented.iter().filter(|(pose, _)| of_base(pose) && !turns(pose.target));
-        let seen = seen
-            .filter_map(|(pose, last)| Some((last.seen(&turned[pose.target]).axes, axes(pose)?)));
+        let seen = seen.filter_map(|(pose, last)| {
+            Some((last.compose(&turned[pose.target]).axes, axes(pose)?))
+        });
         let nominal_rotation = mean_turn(seen).unwrap_or(nominal.rotation);
         let (rotation, translation) = rigid_motion(&points, &nominal_rotation);
         let rotation = rotation - nominal.rotation;
@@ -88,7 +89,7 @@ fn turn_targets(
         // the last frame.
         let seen =
             poses.iter().filter(|(pose, _)| pose.target == target).filter_map(|(pose, last)| {
-                let last = bases[pose.base].seen(last);
+                let last = bases[pose.base].compose(last);
                 Some((
                     [Vector3::x(), Vector3::y(), Vector3::z()],
                     axes(pose)?.map(|axis| last.resolve(&axis)),

@@ -18,7 +18,7 @@ use crate::least_squares::{
     Triangle, UnidentifiableCombination, Weak,
 };
 use crate::model::parameter::Parameter;
-use crate::model::{KnownDerivatives, Model, Pose, PoseResiduals};
+use crate::model::{LinearModel, Model, Pose, PoseResiduals};
 use crate::problem::PoseView;
 
 /// Relative reduction of the cost below which a step is not worth it: above the rounding of
@@ -72,7 +72,7 @@ pub(in crate::fit) struct Stage<'a> {
     /// Linearisations that fits of the same data share.
     pub memory: &'a Memory,
     /// Derivatives that are known at some point of a fit of the identification rows.
-    pub known: Option<&'a KnownDerivatives>,
+    pub known: Option<&'a LinearModel>,
     pub progress: Option<&'a ProgressSink>,
     pub stop: Option<&'a Stop>,
 }
@@ -125,7 +125,8 @@ impl<'a> Stage<'a> {
         poses: impl Into<Arc<Vec<Pose<'a>>>>,
         at: &DVector<f64>,
     ) -> PoseResiduals<'a> {
-        PoseResiduals::new(self.model, poses, self.unknowns.clone(), at.clone()).knowing(self.known)
+        PoseResiduals::new(self.model, poses, self.unknowns.clone(), at.clone())
+            .with_linear_model(self.known)
     }
 
     /// The whitened data linearised at `at`, each pose weighted by `loss`, priors left out.

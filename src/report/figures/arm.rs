@@ -61,7 +61,7 @@ impl<'a> Poses<'a> {
             .unzip();
         let mut at: Vec<Vector3<f64>> = poses.iter().map(|pose| *pose.measured).collect();
         for (place, target) in
-            places.into_iter().zip(arm.model.target_places(&others, arm.x.as_slice()))
+            places.into_iter().zip(arm.model.predicted_targets(&others, arm.x.as_slice()))
         {
             at[place] = target;
         }
@@ -79,7 +79,8 @@ impl<'a> Poses<'a> {
         if slots.is_empty() {
             return Vec::new();
         }
-        let model = arm.model.probing(&slots.iter().map(|&site| (site, 0.0)).collect::<Vec<_>>());
+        let model =
+            arm.model.with_probes(&slots.iter().map(|&site| (site, 0.0)).collect::<Vec<_>>());
         let x = arm.x.clone().resize_vertically(first + count, 0.0);
         let poses = self.all(1.0);
         let sigmas: Vec<f64> = poses.iter().map(|pose| pose.sigma).collect();

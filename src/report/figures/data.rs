@@ -16,7 +16,7 @@ use crate::fit::{
     Before, Comparison, Correlations, Identification, IdentifyError, Procedure, Strategy,
 };
 use crate::measurement::Dataset;
-use crate::model::{Model, Pose, Shape};
+use crate::model::{CentreLine, Model, Pose};
 use crate::problem::Problem;
 use crate::report::table::{Command, commands};
 use crate::select::{ClosedLoop, Findings, Found, examine};
@@ -72,7 +72,7 @@ pub struct PlotData {
     /// What of the workspace was measured.
     pub coverage: Coverage,
     /// The best arm in the poses of `shown`; none where a pose has no equilibrium.
-    pub arms: Vec<Option<Shape>>,
+    pub arms: Vec<Option<CentreLine>>,
     /// Whether `time` of the residuals was measured.
     pub time_measured: bool,
     /// Tests of what it leaves of the fitted poses.
@@ -228,7 +228,7 @@ impl PlotData {
         let drawn: Vec<Pose> = shown.iter().map(|&row| all[row]).collect();
         Self {
             stages,
-            arms: best.model.shapes(&drawn, best.x.as_slice()),
+            arms: best.model.centre_lines(&drawn, best.x.as_slice()),
             contributions: contribution::of(problem, poses, best, (found, &shown)),
             commands: commands(problem),
             coverage: coverage::of(problem, poses, best),

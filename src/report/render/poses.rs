@@ -5,7 +5,7 @@ use maud::{Markup, PreEscaped, html};
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use crate::model::Shape;
+use crate::model::CentreLine;
 use crate::report::figures::{PlotData, Point};
 use crate::report::quantity::{mm, number};
 use crate::report::table::Command;
@@ -61,14 +61,14 @@ fn millimetres(length: &Vector3<f64>, decimals: i32) -> [f64; 3] {
 }
 
 /// Points of the rigid arm \[mm\].
-fn rigid(arm: &Shape) -> Vec<i64> {
+fn rigid(arm: &CentreLine) -> Vec<i64> {
     #[expect(clippy::cast_possible_truncation, reason = "millimetres of an arm")]
     let whole = |x: f64| (x * 1e3).round() as i64;
     arm.rigid.iter().flat_map(|at| [at.x, at.y, at.z]).map(whole).collect()
 }
 
 /// How far they give \[mm\].
-fn give(arm: &Shape) -> Vec<f64> {
+fn give(arm: &CentreLine) -> Vec<f64> {
     arm.bent
         .iter()
         .zip(&arm.rigid)
@@ -79,7 +79,7 @@ fn give(arm: &Shape) -> Vec<f64> {
 impl Store {
     fn of(data: &PlotData) -> Self {
         let joint = |own: &Command| (own.name(), own.symbol(), own.joint);
-        let entry = |((&row, &count), arm): ((&usize, &f64), &Option<Shape>)| {
+        let entry = |((&row, &count), arm): ((&usize, &f64), &Option<CentreLine>)| {
             let own = &data.residuals[row];
             Entry {
                 row,

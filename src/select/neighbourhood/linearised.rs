@@ -10,7 +10,7 @@ use crate::least_squares::kernel::dot;
 use crate::least_squares::{MANY_UNKNOWNS, jacobian_and_residual};
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, Parameter, ParameterSite, Regressor};
-use crate::model::{KnownDerivatives, Model, Pose, PoseResiduals};
+use crate::model::{LinearModel, Model, Pose, PoseResiduals};
 use crate::problem::{Effect, Problem};
 
 /// Mass at which the place of an added mass is differentiated [kg]: none has no place, so small a
@@ -43,8 +43,8 @@ pub(in crate::select) struct Derivatives {
 impl Derivatives {
     /// Those of the fitted parameters, as a fit that begins at the full parameter vector `x` takes
     /// them.
-    pub fn known(&self, at: (&[Parameter], &DVector<f64>), unknowns: &[usize]) -> KnownDerivatives {
-        KnownDerivatives::new(
+    pub fn known(&self, at: (&[Parameter], &DVector<f64>), unknowns: &[usize]) -> LinearModel {
+        LinearModel::new(
             at,
             unknowns,
             self.sigma.clone(),
@@ -109,7 +109,7 @@ impl<'a> Linearised<'a> {
         let first = model.parameters.len();
         // Columns of parameters and of slots, and the residual.
         let pass = |own: &[usize], slots: &[(ParameterSite, f64)]| {
-            let probing = model.placing(effects).probing(slots);
+            let probing = model.with_springs_of(effects).with_probes(slots);
             let mut at = x.clone().resize_vertically(first + slots.len(), 0.0);
             for (index, (site, _)) in slots.iter().enumerate() {
                 if matches!(site, ParameterSite::Beam { field: BeamField::AddedMass, .. }) {

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::arm::Arm;
 use super::forward::Bend;
-use super::statics::{Equilibrated, StaticsError, Workspace};
+use super::statics::{StaticState, StaticsError, Workspace};
 use crate::problem::PoseView;
 
 /// Elements by which a beam is drawn at least.
@@ -13,7 +13,7 @@ const ELEMENTS: usize = 4;
 /// An arm as a line from its base to the frame of its target: each joint before and after it
 /// turned, and points along its beams.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Shape {
+pub struct CentreLine {
     /// Where nothing gives way \[m\].
     pub rigid: Vec<Vector3<f64>>,
     /// The same points at rest under their loads \[m\].
@@ -25,19 +25,19 @@ impl Arm<f64> {
     ///
     /// # Errors
     /// The arm is too soft for its loads.
-    pub fn shape(&self, setup: &PoseView, tip: usize) -> Result<Shape, StaticsError> {
+    pub fn centre_line(&self, setup: &PoseView, tip: usize) -> Result<CentreLine, StaticsError> {
         let drawn = Self { beam_elements: self.beam_elements.max(ELEMENTS), ..self.clone() };
-        let (mut ws, mut rest) = (Workspace::default(), Equilibrated::default());
+        let (mut ws, mut rest) = (Workspace::default(), StaticState::default());
         drawn.gather_forces(setup, &[], &mut ws);
         drawn.walk(setup, Bend::Rigid, tip, &mut ws);
         let mut rigid = vec![Vector3::zeros()];
         rigid.append(&mut ws.trail);
         if !drawn.is_elastic() {
-            return Ok(Shape { bent: rigid.clone(), rigid });
+            return Ok(CentreLine { bent: rigid.clone(), rigid });
         }
         drawn.equilibrate_at(setup, tip, &mut ws, &mut rest)?;
         let mut bent = vec![Vector3::zeros()];
         bent.append(&mut ws.trail);
-        Ok(Shape { rigid, bent })
+        Ok(CentreLine { rigid, bent })
     }
 }
