@@ -14,9 +14,10 @@
 //!    arms.
 //! 5. [`fit`]: what to fit in which order, identifiability, standard errors, comparison,
 //!    compensation.
-//! 6. [`select`]: what structure the residual still has, which effects it points to
-//!    ([`select::trace`]), and the loop that adds them ([`select::close`]).
-//! 7. [`report`]: text, JSON, Markdown, HTML and figures.
+//! 6. [`residual_tests`]: statistical tests of what a fit leaves, whether structure is left at all.
+//! 7. [`select`]: which effects the residual points to ([`select::trace`]), and the loop that adds
+//!    them ([`select::close`]).
+//! 8. [`report`]: text, JSON, Markdown, HTML and figures.
 //!
 //! Beside this way stand [`design`] (which poses to measure, and what they will tell),
 //! [`study`] (many fits where the truth is known), [`urdf`] (arms from URDF, and identified
@@ -85,6 +86,7 @@ pub mod problem;
 pub mod quantity;
 mod random;
 pub mod report;
+pub mod residual_tests;
 pub mod rig;
 pub mod scalar;
 pub mod select;

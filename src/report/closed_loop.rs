@@ -21,7 +21,7 @@ use super::verdict::{called, counts, is_beside, stand_in, verdict};
 use super::{effect, findings, trace};
 use crate::fit::{ErrorSummary, Errors, Identification};
 use crate::problem::Problem;
-use crate::select::{ClosedLoop, Found, Round, Witness, WitnessVerdict};
+use crate::select::{ClosedLoop, Found, ReferenceCheck, ReferenceVerdict, Round};
 
 /// Alternatives that are named in words; the page names twice as many.
 const SHOWN_ALTERNATIVES: usize = 4;
@@ -304,7 +304,7 @@ fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
     }));
     details.extend(
         found
-            .witness
+            .reference_check
             .as_ref()
             .map(|own| format!("{} by {}, which took no part", says(own), own.data)),
     );
@@ -334,10 +334,10 @@ fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
 }
 
 /// What a witness says, in a word.
-pub(super) fn says(own: &Witness) -> &'static str {
-    match own.says {
-        WitnessVerdict::Corroborated => "corroborated",
-        WitnessVerdict::Contradicted => "contradicted",
+pub(super) fn says(own: &ReferenceCheck) -> &'static str {
+    match own.verdict {
+        ReferenceVerdict::Corroborated => "corroborated",
+        ReferenceVerdict::Contradicted => "contradicted",
     }
 }
 
@@ -373,7 +373,8 @@ fn rounds(closure: &ClosedLoop) -> Vec<Block<'_>> {
 fn sureness<'a>(closure: &ClosedLoop) -> Option<Block<'a>> {
     let share = |part: f64| format!("{} %", number(part * 100.0, 0));
     let row = |found: &Found| {
-        let witness = found.witness.as_ref().map(|own| format!("{} by {}", says(own), own.data));
+        let witness =
+            found.reference_check.as_ref().map(|own| format!("{} by {}", says(own), own.data));
         vec![
             closure.before.describe(&found.effect),
             p_value(found.p_value),

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::document::{Block, Mark, Point};
 use super::json::{list, object};
 use super::quantity::number;
-use crate::select::{Covariate, Findings, ResidualTest, Test};
+use crate::residual_tests::{Covariate, Findings, ResidualTest, Test};
 
 /// What a test is about: the order of the rows in the plural.
 fn named(covariate: &Covariate) -> String {

@@ -75,7 +75,7 @@ fn found(own: &Found, closure: &ClosedLoop) -> impl Serialize {
         // Part of fits to configurations drawn anew that name it.
         stability: own.stability,
         // What data that took no part say.
-        witness: own.witness.as_ref().map(|own| object! { data: &own.data, says: says(own) }),
+        witness: own.reference_check.as_ref().map(|own| object! { data: &own.data, says: says(own) }),
         p_value: own.p_value,
         parameters: list(&own.estimates, |own| object! {
             name: &own.name,

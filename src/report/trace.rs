@@ -15,8 +15,9 @@ use super::{effect, findings};
 use crate::fit::Identification;
 use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
+use crate::residual_tests::Covariate;
 use crate::select::{
-    Claims, Covariate, Evidence, Explanation, Hypothesis, Law, Ranked, TellingPose, Trace,
+    Claims, Evidence, Hypothesis, HypothesisKind, HypothesisSet, Ranked, TellingPose, Trace,
 };
 
 /// Candidates that fit on a screen.
@@ -91,7 +92,7 @@ fn hypothesis(own: &Hypothesis, trace: &Trace) -> impl Serialize {
         effect: own.effect(),
         law: law(own),
         description: words(own, |effect| trace.describe(effect)),
-        place: own.part.to_string(),
+        place: own.site.to_string(),
         depends_on: list(&own.depends_on, ToString::to_string),
     }
 }
@@ -108,8 +109,8 @@ pub(super) fn claims_entry(one: &Claims, trace: &Trace) -> impl Serialize + use<
 }
 
 /// Explanations that are worth a line.
-fn explanations(trace: &Trace) -> impl Iterator<Item = &Explanation> {
-    let all = trace.evidence.iter().flat_map(|evidence| &evidence.explanations);
+fn explanations(trace: &Trace) -> impl Iterator<Item = &HypothesisSet> {
+    let all = trace.evidence.iter().flat_map(|evidence| &evidence.sets);
     all.filter(|one| one.probability > LEAST_PROBABLE)
 }
 
@@ -121,41 +122,45 @@ fn claims(trace: &Trace) -> Vec<Claims> {
 
 /// The law as JSON names it.
 fn law(own: &Hypothesis) -> &str {
-    match &own.law {
-        Law::Effect(effect) => effect.name(),
-        Law::NearHarmonic(_) => "near-harmonic",
-        Law::PerPose => "per-pose",
-        Law::Wandering => "wandering",
-        Law::Linear => "linear",
-        Law::Sag => "sag",
-        Law::Limit(_) => "limit",
+    match &own.kind {
+        HypothesisKind::Effect(effect) => effect.name(),
+        HypothesisKind::NearHarmonic(_) => "near-harmonic",
+        HypothesisKind::PerPose => "per-pose",
+        HypothesisKind::Wandering => "wandering",
+        HypothesisKind::Linear => "linear",
+        HypothesisKind::Sag => "sag",
+        HypothesisKind::Limit(_) => "limit",
         _ => "smooth",
     }
 }
 
 /// A hypothesis in words.
 fn words(own: &Hypothesis, describe: impl Fn(&Effect) -> String) -> String {
-    let (part, on) = (own.part, depends_on(&own.depends_on));
-    match &own.law {
-        Law::Effect(effect) => describe(effect),
-        Law::NearHarmonic(order) => {
+    let (part, on) = (own.site, depends_on(&own.depends_on));
+    match &own.kind {
+        HypothesisKind::Effect(effect) => describe(effect),
+        HypothesisKind::NearHarmonic(order) => {
             let cycles =
                 if *order == 1 { "once".to_owned() } else { format!("about {order} times") };
             format!(
                 "{part}: a function of {on} that repeats {cycles} a revolution; its law is not known"
             )
         }
-        Law::PerPose => {
+        HypothesisKind::PerPose => {
             format!("{part}: another error in every pose, by nothing that is known of the poses")
         }
-        Law::Wandering => {
+        HypothesisKind::Wandering => {
             format!(
                 "{part}: wanders with {on}, as noise does in which one reading follows the last, or a drift that has no law"
             )
         }
-        Law::Linear => format!("{part}: linear in the position, as scale by axis and shear are"),
-        Law::Sag => format!("{part}: gives way under weight that is not declared"),
-        Law::Limit(limit) => format!("{part}: the limit {limit}, which holds the fit, is wrong"),
+        HypothesisKind::Linear => {
+            format!("{part}: linear in the position, as scale by axis and shear are")
+        }
+        HypothesisKind::Sag => format!("{part}: gives way under weight that is not declared"),
+        HypothesisKind::Limit(limit) => {
+            format!("{part}: the limit {limit}, which holds the fit, is wrong")
+        }
         _ => format!("{part}: a smooth function of {on}; its law is not known"),
     }
 }
@@ -166,7 +171,7 @@ fn depends_on(covariates: &[Covariate]) -> String {
 
 /// Explanations beside each other, and what is claimed of the best.
 fn weighed<'a>(trace: &Trace) -> Vec<Block<'a>> {
-    let together = |one: &Explanation| match one.hypotheses.as_slice() {
+    let together = |one: &HypothesisSet| match one.hypotheses.as_slice() {
         [] => "noise alone".to_owned(),
         several => several
             .iter()
@@ -174,7 +179,7 @@ fn weighed<'a>(trace: &Trace) -> Vec<Block<'a>> {
             .collect::<Vec<_>>()
             .join("; and "),
     };
-    let point = |one: &Explanation| format!("{}: {}", percent(one.probability), together(one));
+    let point = |one: &HypothesisSet| format!("{}: {}", percent(one.probability), together(one));
     let shown: Vec<String> = explanations(trace).take(SHOWN_EXPLANATIONS).map(point).collect();
     if shown.is_empty() {
         return Vec::new();
@@ -199,7 +204,7 @@ fn weighed<'a>(trace: &Trace) -> Vec<Block<'a>> {
 pub(super) fn claimed(claims: &Claims) -> String {
     let law = match claims.law.0.effect() {
         Some(effect) => format!("law {} {}", effect.name(), percent(claims.law.1)),
-        None if claims.law.0.law == Law::Wandering => {
+        None if claims.law.0.kind == HypothesisKind::Wandering => {
             let sure = percent(claims.law.1);
             format!(
                 "no law: it wanders {sure}, as noise does in which one reading follows the last"
@@ -400,16 +405,20 @@ pub(super) fn not_seen<'a>(trace: &Trace) -> Vec<Block<'a>> {
 mod tests {
     use super::*;
     use crate::problem::Effect;
-    use crate::select::Part;
+    use crate::select::Site;
 
     /// Other explanations may depend on the same elsewhere: the probability is of both together.
     #[test]
     fn what_it_depends_on_is_said_of_its_place() {
-        let law = Law::Effect(Effect::GearRatio { joint: 2 });
-        let own =
-            Hypothesis { law, part: Part::Joint(1), site: None, depends_on: vec![Covariate::Load] };
+        let kind = HypothesisKind::Effect(Effect::GearRatio { joint: 2 });
+        let own = Hypothesis {
+            kind,
+            site: Site::Joint(1),
+            coordinate: None,
+            depends_on: vec![Covariate::Load],
+        };
         let claims = Claims {
-            place: (Part::Joint(1), 0.5),
+            place: (Site::Joint(1), 0.5),
             depends_on: (vec![Covariate::Load], 0.14),
             law: (own, 0.1),
         };
@@ -418,7 +427,7 @@ mod tests {
             words,
             format!(
                 "{} 50 %; there and depends on {} 14 %; law gear-ratio 10 %",
-                Part::Joint(1),
+                Site::Joint(1),
                 Covariate::Load
             )
         );

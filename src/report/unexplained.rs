@@ -9,8 +9,9 @@ use super::trace::EVEN;
 use crate::model::effect::NO_REFERENCE;
 use crate::model::parameter::holds_all;
 use crate::problem::{Effect, JointKind, Problem};
+use crate::residual_tests::Covariate;
 use crate::select::{
-    Claims, ClosedLoop, Correction, Covariate, HELD_FIXED, Hypothesis, Law, Part, REFUSED,
+    Claims, ClosedLoop, Correction, HELD_FIXED, Hypothesis, HypothesisKind, REFUSED, Site,
     Unexplained,
 };
 
@@ -21,13 +22,13 @@ pub(super) fn correction(closure: &ClosedLoop) -> Option<&Correction> {
 
 /// The residual in units of the declared σ, where its size is all that is left to explain.
 pub(super) fn size_alone(closure: &ClosedLoop) -> Option<f64> {
-    let nowhere = closure.unexplained.iter().all(|left| left.part.is_none());
+    let nowhere = closure.unexplained.iter().all(|left| left.site.is_none());
     closure.findings.size_alone().filter(|_| nowhere && !closure.unexplained.is_empty())
 }
 
 /// Where structure is.
 pub(super) fn place(left: &Unexplained) -> String {
-    left.part.map_or_else(|| "nowhere in particular".to_owned(), |part| part.to_string())
+    left.site.map_or_else(|| "nowhere in particular".to_owned(), |part| part.to_string())
 }
 
 /// Why a law was not tried: what its rules say comes before what the problem lacks, for a reference
@@ -121,14 +122,15 @@ pub(super) fn unexplained(problem: &Problem, closure: &ClosedLoop) -> Vec<String
 
 /// Whether what is left is sag under weight that is not declared.
 fn is_sag(left: &Unexplained) -> bool {
-    left.claims.as_ref().is_some_and(|claims| claims.law.0.law == Law::Sag)
+    left.claims.as_ref().is_some_and(|claims| claims.law.0.kind == HypothesisKind::Sag)
 }
 
 /// The limit of the declared problem that is wrong, in words, by what is left, and how probable
 /// that is.
 fn wrong_limit(left: &Unexplained) -> Option<(&str, f64)> {
-    let Claims { law: (Hypothesis { law: Law::Limit(limit), .. }, probability), .. } =
-        left.claims.as_ref()?
+    let Claims {
+        law: (Hypothesis { kind: HypothesisKind::Limit(limit), .. }, probability), ..
+    } = left.claims.as_ref()?
     else {
         return None;
     };
@@ -166,7 +168,7 @@ fn located(left: &Unexplained) -> String {
         }
         (Some(claims), _) if is_sag(left) => format!(
             "Under weight that is not declared {} gives way, probability {} ({chance}).",
-            if left.part == Some(Part::Arm) { "the arm".to_owned() } else { place(left) },
+            if left.site == Some(Site::Arm) { "the arm".to_owned() } else { place(left) },
             of(claims.law.1)
         ),
         (Some(claims), on) => format!(

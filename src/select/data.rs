@@ -6,13 +6,13 @@ use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
-use super::covariate::Covariate;
-use super::residual_tests::CovariateValues;
 use super::rules::SelectionRules;
 use crate::fit::Stop;
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::effect::{DataCoverage, NO_REFERENCE, NO_TEMPERATURE};
 use crate::problem::{Effect, JointKind, Problem};
+use crate::residual_tests::Covariate;
+use crate::residual_tests::CovariateValues;
 
 /// Measurements and which of their rows take part.
 #[derive(Debug, Clone)]

@@ -1,6 +1,5 @@
 //! What a fit's residual says about effects that the model lacks, and the loop that adds them.
 //!
-//! - [`test_residual`]: residual tests, whether structure is left at all.
 //! - [`trace`]: score screening, every candidate of the catalogue scored in the linear
 //!   neighbourhood of a fit and ranked.
 //! - [`detectable`]: the same screening before anything is measured: from what size on it would
@@ -10,30 +9,26 @@
 //!   a cause.
 
 mod candidates;
-mod covariate;
+
 mod data;
 mod detection;
 mod evidence;
 mod fitted;
 mod neighbourhood;
 mod power;
-mod residual_tests;
+
+mod reference_check;
 mod rules;
 mod screening;
 mod selection;
 mod separation;
 mod telling_pose;
 mod unexplained;
-mod witness;
 
 pub use candidates::{HELD_FIXED, NO_ROOM, NOT_FINITE, REFUSED};
-pub use covariate::Covariate;
 pub use detection::{Detectable, Detection, Size, detectable};
-pub use evidence::{Claims, Evidence, Explanation, Hypothesis, Law, Part};
-pub use residual_tests::{
-    CovariateValues, Findings, FitResidual, Outcome, ResidualTest, Sequence, Test, Untestable,
-    test_residual,
-};
+pub use evidence::{Claims, Evidence, Hypothesis, HypothesisKind, HypothesisSet, Site};
+pub use reference_check::{ReferenceCheck, ReferenceVerdict};
 pub use rules::SelectionRules;
 pub use screening::{Ranked, Trace, examine, trace, trace_by};
 pub use selection::{
@@ -42,4 +37,3 @@ pub use selection::{
 pub use separation::{Separation, Side, separation};
 pub use telling_pose::TellingPose;
 pub use unexplained::{Correction, Curve, PartialResidual, Unexplained};
-pub use witness::{Witness, WitnessVerdict};

@@ -5,12 +5,12 @@ use super::data::Data;
 use super::evidence::{Evidence, weigh};
 use super::fitted::Fitted;
 use super::neighbourhood::{Scan, Tried};
-use super::residual_tests::{Findings, FitResidual, Test, test_residual};
 use super::rules::SelectionRules;
 use super::telling_pose::{TellingPose, shuffled, telling_pose};
 use crate::fit::{Identification, IdentifyError, Noise, Options};
 use crate::measurement::Dataset;
 use crate::problem::{Effect, Problem};
+use crate::residual_tests::{Findings, FitResidual, Test, test_residual};
 
 /// A candidate as the residual sees it.
 #[derive(Debug, Clone)]
@@ -195,7 +195,7 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
         setup: &data.setup,
         covariates: &data.covariates(&fitted.problem),
     };
-    let mut findings = test_residual(&fit, data.rules.seed);
+    let mut findings = test_residual(&fit, data.rules.level, data.rules.seed);
     // The tests count poses; people count rows of files.
     for own in &mut findings.tests {
         if let Test::Outliers { worst: Some(pose) } = own.test {

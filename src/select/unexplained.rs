@@ -3,21 +3,22 @@
 
 use nalgebra::DVector;
 
-use super::covariate::Covariate;
 use super::data::Data;
 use super::evidence::{
-    Claims, Evidence, Explanation, Hypotheses, Hypothesis, Law, Part, best_form, odds_against,
+    Claims, Evidence, Hypotheses, Hypothesis, HypothesisKind, HypothesisSet, Site, best_form,
+    odds_against,
 };
 use super::fitted::Fitted;
-use super::residual_tests::Findings;
 use crate::fit::ErrorSummary;
 use crate::quantity::Unit;
+use crate::residual_tests::Covariate;
+use crate::residual_tests::Findings;
 
 /// Structure that is left.
 #[derive(Debug, Clone)]
 pub struct Unexplained {
     /// Where it is; `None`: at no part in particular.
-    pub part: Option<Part>,
+    pub site: Option<Site>,
     /// What it depends on.
     pub depends_on: Vec<Covariate>,
     /// Probability of no more than this that noise alone makes it, for all that was looked at
@@ -83,18 +84,18 @@ pub struct PartialResidual {
 pub(super) fn without_law(
     fitted: &Fitted,
     data: &Data,
-    (evidence, best): (&Evidence, &Explanation),
+    (evidence, best): (&Evidence, &HypothesisSet),
 ) -> Vec<Unexplained> {
     let mut all: Vec<(&Hypothesis, Unexplained)> = Vec::new();
     let are_all_sure = evidence.as_many(best) >= data.rules.located;
     for hypothesis in best.hypotheses.iter().filter(|hypothesis| hypothesis.effect().is_none()) {
         let claims = evidence.claims(hypothesis);
-        let is_known = all.iter().any(|(known, _)| known.part == hypothesis.part);
+        let is_known = all.iter().any(|(known, _)| known.site == hypothesis.site);
         if !are_all_sure && (claims.law.1 < data.rules.located || is_known) {
             continue;
         }
         let found = Unexplained {
-            part: Some(hypothesis.part),
+            site: Some(hypothesis.site),
             depends_on: hypothesis.depends_on.clone(),
             p_value: evidence.chance(best).min(odds_against(claims.law.1)),
             claims: Some(claims),
@@ -106,9 +107,9 @@ pub(super) fn without_law(
     all.sort_by(|a, b| place(&b.1).total_cmp(&place(&a.1)));
     // What misses the arm altogether is no prediction to improve: a function of the measured
     // position would hold the answer itself. Nor is a limit that is wrong a function to add.
-    let first = all
-        .iter()
-        .position(|(hypothesis, _)| !matches!(hypothesis.law, Law::PerPose | Law::Limit(_)));
+    let first = all.iter().position(|(hypothesis, _)| {
+        !matches!(hypothesis.kind, HypothesisKind::PerPose | HypothesisKind::Limit(_))
+    });
     if let Some(first) = first.filter(|_| fitted.found.is_trusted()) {
         let hypothesis = all[first].0.clone();
         all[first].1.correction = correction(fitted, data, best, &hypothesis);
@@ -123,7 +124,7 @@ pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
     }
     let strongest = findings.strongest()?;
     Some(Unexplained {
-        part: None,
+        site: None,
         depends_on: strongest.about().into_iter().collect(),
         p_value: strongest.outcome.as_ref().map_or(1.0, |outcome| outcome.p_value),
         claims: None,
@@ -136,7 +137,7 @@ pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
 fn correction(
     fitted: &Fitted,
     data: &Data,
-    best: &Explanation,
+    best: &HypothesisSet,
     hypothesis: &Hypothesis,
 ) -> Option<Correction> {
     // The peak of what is narrow may have been set aside; poses that are left out tell a peak from

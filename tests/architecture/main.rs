@@ -40,14 +40,23 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     // The paper checks the model, so it shares no physics with it.
     ("paper", &[&["spatial", "error", "problem", "least_squares"]]),
     ("fit", &[GROUND, BELOW_FIT, &["files"]]),
-    ("select", &[GROUND, BELOW_FIT, &["fit"]]),
+    // Statistical tests of a residual know no arms and no fits.
+    ("residual_tests", &[&["error", "problem", "model", "numeric"]]),
+    ("select", &[GROUND, BELOW_FIT, &["fit", "residual_tests"]]),
     // Arms from URDF and back.
     ("urdf", &[&["spatial", "error", "problem", "mechanics", "model", "least_squares", "random"]]),
     // Which poses to measure, and what they will tell.
     ("design", &[GROUND, BELOW_FIT, &["fit", "select"]]),
     // Many fits to what model or rig measure.
     ("study", &[GROUND, BELOW_FIT, &["fit", "rig", "files"]]),
-    ("report", &[GROUND, BELOW_FIT, &["fit", "select", "design", "study", "files", "urdf"]]),
+    (
+        "report",
+        &[
+            GROUND,
+            BELOW_FIT,
+            &["fit", "residual_tests", "select", "design", "study", "files", "urdf"],
+        ],
+    ),
     (
         "cli",
         &[

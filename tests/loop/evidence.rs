@@ -10,9 +10,10 @@ use std::path::{Path, PathBuf};
 use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, NestReading, Split};
 use flexcal::problem::{Effect, Problem};
+use flexcal::residual_tests::Covariate;
 use flexcal::rig::{Truth, simulate};
 use flexcal::select::{
-    Covariate, Evidence, Hypothesis, Law, Part, Status, Verdict, WitnessVerdict, close, trace,
+    Evidence, Hypothesis, HypothesisKind, ReferenceVerdict, Site, Status, Verdict, close, trace,
 };
 use flexcal::study::table;
 use nalgebra::{Rotation3, Vector3};
@@ -87,7 +88,7 @@ fn causes_outside_the_catalogue_are_located_and_get_no_law() {
             .collect();
         depends_on.sort_unstable();
         let here = |hypothesis: &Hypothesis| {
-            hypothesis.part.to_string() == truth["where"].as_str().unwrap()
+            hypothesis.site.to_string() == truth["where"].as_str().unwrap()
         };
         let by_these = |hypothesis: &Hypothesis| {
             let mut own: Vec<String> =
@@ -147,8 +148,7 @@ fn noise_explains_itself() {
         let (data, _) = Dataset::read_files(&[cases.join(name)], &problem).unwrap();
         let evidence = trace(&problem, &data, &Options::default()).unwrap().evidence.unwrap();
         assert!(evidence.best().is_empty(), "{name}: {:?}", evidence.best());
-        let total: f64 =
-            evidence.explanations.iter().map(|explanation| explanation.probability).sum();
+        let total: f64 = evidence.sets.iter().map(|explanation| explanation.probability).sum();
         assert!((total - 1.0).abs() < 1e-6, "{name}: {total}");
     }
 }
@@ -180,10 +180,10 @@ fn noise_in_which_a_reading_follows_the_last_is_called_that() {
     let evidence = trace(&problem, &data, &Options::default()).unwrap().evidence.unwrap();
     let [only] = evidence.best() else { panic!("{:?}", evidence.best()) };
     assert_eq!(
-        (&only.law, only.part, only.depends_on.as_slice()),
-        (&Law::Wandering, Part::Measurement, &[Covariate::Time][..])
+        (&only.kind, only.site, only.depends_on.as_slice()),
+        (&HypothesisKind::Wandering, Site::Measurement, &[Covariate::Time][..])
     );
-    assert!(evidence.probability(|own| own.law == Law::Wandering) >= STATED);
+    assert!(evidence.probability(|own| own.kind == HypothesisKind::Wandering) >= STATED);
     // A drift that goes to and fro once in all is smooth: it does not wander.
     let (mut data, _) = Dataset::read_files(&[cases.join("h-none-large.csv")], &problem).unwrap();
     let last = data.measurements.time.iter().copied().fold(0.0, f64::max);
@@ -193,10 +193,10 @@ fn noise_in_which_a_reading_follows_the_last_is_called_that() {
     let evidence = trace(&problem, &data, &Options::default()).unwrap().evidence.unwrap();
     let [only] = evidence.best() else { panic!("{:?}", evidence.best()) };
     assert_eq!(
-        (&only.law, only.part, only.depends_on.as_slice()),
-        (&Law::Smooth, Part::Measurement, &[Covariate::Time][..])
+        (&only.kind, only.site, only.depends_on.as_slice()),
+        (&HypothesisKind::Smooth, Site::Measurement, &[Covariate::Time][..])
     );
-    assert!(evidence.probability(|own| own.law == Law::Wandering) < 1.0 - STATED);
+    assert!(evidence.probability(|own| own.kind == HypothesisKind::Wandering) < 1.0 - STATED);
 }
 
 /// The arm with the masses of its links, or without.
@@ -230,7 +230,11 @@ fn sag_of_links_whose_masses_nobody_declared_is_called_that() {
     let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
     let data = Dataset::new(table(&rows), split);
     let evidence = trace(&light, &data, &Options::default()).unwrap().evidence.unwrap();
-    assert!(evidence.probability(|own| own.law == Law::Sag) > STATED, "{:?}", evidence.best());
+    assert!(
+        evidence.probability(|own| own.kind == HypothesisKind::Sag) > STATED,
+        "{:?}",
+        evidence.best()
+    );
     assert_eq!(stated(&evidence), Vec::<String>::new());
 }
 
@@ -244,7 +248,7 @@ fn a_fixed_point_measured_again_speaks_for_or_against_a_drift() {
     let found = plain.effects.iter().find(|found| found.effect.name() == "tracker-drift").unwrap();
     let drift = Vector3::from_iterator(found.estimates.iter().map(|estimate| estimate.estimate));
     for (moves, says) in
-        [(1.0, Some(WitnessVerdict::Corroborated)), (0.0, Some(WitnessVerdict::Contradicted))]
+        [(1.0, Some(ReferenceVerdict::Corroborated)), (0.0, Some(ReferenceVerdict::Contradicted))]
     {
         let mut data = data.clone();
         for k in 0..5 {
@@ -265,12 +269,12 @@ fn a_fixed_point_measured_again_speaks_for_or_against_a_drift() {
         let own =
             |name: &str| closure.effects.iter().find(|found| found.effect.name() == name).unwrap();
         let drift = own("tracker-drift");
-        assert_eq!(drift.witness.as_ref().map(|witness| witness.says), says);
+        assert_eq!(drift.reference_check.as_ref().map(|check| check.verdict), says);
         assert_eq!(
             (drift.status == Status::Found, closure.verdict == Verdict::Explained),
             (moves > 0.0, moves > 0.0)
         );
-        assert_eq!(own("gear-ratio").witness, None);
+        assert_eq!(own("gear-ratio").reference_check, None);
     }
 }
 
@@ -344,7 +348,7 @@ fn what_follows_a_covariate_is_named_and_other_functions_of_it_are_not() {
         let mut data = Dataset::new(table(&rows), split);
         let evidence = trace(&problem, &data, &Options::default()).unwrap().evidence.unwrap();
         assert_eq!(stated(&evidence), ["covariate"], "{:?}", evidence.best());
-        assert_eq!(evidence.best()[0].part.to_string(), name);
+        assert_eq!(evidence.best()[0].site.to_string(), name);
         // The same quantity told by a curve of it: no line is its law.
         let bent = |value: &mut f64| *value = (*value / 2.0).powi(3);
         data.measurements.covariates.iter_mut().step_by(2).for_each(bent);
@@ -391,7 +395,7 @@ fn a_station_that_is_set_up_anew_moves_and_turns() {
     // say that it did not.
     let turn = Rotation3::new(Vector3::from(turn.map(f64::to_radians)));
     for (moves, says) in
-        [(true, WitnessVerdict::Corroborated), (false, WitnessVerdict::Contradicted)]
+        [(true, ReferenceVerdict::Corroborated), (false, ReferenceVerdict::Contradicted)]
     {
         let mut data = data.clone();
         for (name, place) in
@@ -414,7 +418,7 @@ fn a_station_that_is_set_up_anew_moves_and_turns() {
         let closure = close(&problem, &data, &Options::default()).unwrap();
         let found =
             closure.effects.iter().find(|found| found.effect.name() == "station-move").unwrap();
-        assert_eq!(found.witness.as_ref().map(|witness| witness.says), Some(says));
+        assert_eq!(found.reference_check.as_ref().map(|check| check.verdict), Some(says));
     }
 }
 
@@ -445,7 +449,7 @@ fn a_function_of_a_command_that_grows_with_temperature_is_located() {
         .unwrap();
     let [own] = evidence.best() else { panic!("{:?}", evidence.best()) };
     let on = [Covariate::Command(1), Covariate::Temperature];
-    assert_eq!((own.part, own.depends_on.as_slice()), (Part::Joint(1), &on[..]), "{own:?}");
+    assert_eq!((own.site, own.depends_on.as_slice()), (Site::Joint(1), &on[..]), "{own:?}");
     assert!(evidence.claims(own).depends_on.1 >= STATED, "{:?}", evidence.claims(own));
     assert_eq!(stated(&evidence), Vec::<String>::new());
 }
@@ -557,7 +561,7 @@ fn an_order_between_whole_numbers_is_neither_where_a_joint_moves_little() {
         assert!(
             law(harmonic(11)) < STATED && law(harmonic(12)) < STATED,
             "{seed}: {:?}",
-            evidence.explanations[0]
+            evidence.sets[0]
         );
     }
     // A whole number is the more common one, and a wave of no whole number is not ruled out beside

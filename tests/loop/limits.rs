@@ -7,7 +7,7 @@ use flexcal::measurement::{Dataset, Split};
 use flexcal::problem::Problem;
 use flexcal::report::loop_text;
 use flexcal::rig::{Truth, simulate};
-use flexcal::select::{Law, close};
+use flexcal::select::{HypothesisKind, close};
 use flexcal::study::table;
 
 fn service_arm() -> Problem {
@@ -22,7 +22,7 @@ fn a_link_longer_than_its_tolerance_is_no_effect() {
     let closed = close(&problem, &data, &Options::default()).unwrap();
     assert!(closed.effects.is_empty(), "{:?}", closed.effects);
     let claims = closed.unexplained[0].claims.as_ref().unwrap();
-    assert_eq!(claims.law.0.law, Law::Limit("of joint4.a".to_owned()));
+    assert_eq!(claims.law.0.kind, HypothesisKind::Limit("of joint4.a".to_owned()));
     assert!(claims.law.1 > 0.5, "{claims:?}");
     let said = loop_text(&problem, &closed).replace('\n', " ");
     assert!(

@@ -13,7 +13,7 @@ use flexcal::fit::{Identification, Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{Effect, Problem};
 use flexcal::rig::{Cause, Simulation, Truth, simulate, simulate_poses};
-use flexcal::select::{ClosedLoop, Part, Status, close};
+use flexcal::select::{ClosedLoop, Site, Status, close};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -120,9 +120,9 @@ fn is_the_same(named: &Effect, truth: &Effect) -> bool {
 }
 
 fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Judged {
-    let part = |effect: &Effect| effect.terms(problem).first().map(|term| Part::of(term.site));
+    let part = |effect: &Effect| effect.terms(problem).first().map(|term| Site::of(term.site));
     let is_true = |effect: &Effect| truth.is_some_and(|truth| is_the_same(effect, truth));
-    let at_place = |at: Option<Part>| truth.is_some_and(|truth| at.is_some() && part(truth) == at);
+    let at_place = |at: Option<Site>| truth.is_some_and(|truth| at.is_some() && part(truth) == at);
     let (named, such): (Vec<_>, Vec<_>) =
         closed.effects.iter().partition(|found| found.status == Status::Found);
     let wrong = named.iter().filter(|found| !is_true(&found.effect)).count();
@@ -135,7 +135,7 @@ fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Jud
         () if named.iter().any(|found| is_true(&found.effect)) => Outcome::Named,
         () if wrong > 0 => Outcome::Wrong,
         () if listed => Outcome::Listed,
-        () if structure().any(|left| at_place(left.part))
+        () if structure().any(|left| at_place(left.site))
             || such.iter().any(|own| at_place(part(&own.effect))) =>
         {
             Outcome::Located
@@ -161,7 +161,7 @@ fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Jud
             claims.place.0,
             of.join(" "),
             claims.law.1,
-            claims.law.0.law
+            claims.law.0.kind
         ));
     }
     let chi2 = |found: &Identification| found.reduced_chi2.unwrap_or(f64::NAN);

@@ -5,7 +5,7 @@
 use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::{Effect, Problem};
-use flexcal::select::{Part, Status, Verdict, close};
+use flexcal::select::{Site, Status, Verdict, close};
 use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -85,8 +85,8 @@ impl Set {
         }
         let true_law = |effect: &Effect| truth.iter().any(|own| is_the_same(effect, own));
         let found = &judged.closure.effects;
-        let part = |effect: &Effect| effect.terms(problem).first().map(|term| Part::of(term.site));
-        let true_place = |place: Part| truth.iter().any(|own| part(own) == Some(place));
+        let part = |effect: &Effect| effect.terms(problem).first().map(|term| Site::of(term.site));
+        let true_place = |place: Site| truth.iter().any(|own| part(own) == Some(place));
         let claims = || found.iter().filter_map(|found| Some((found, found.claims.as_ref()?)));
         let others = judged.closure.unexplained.iter().filter_map(|left| left.claims.as_ref());
         let [shown, named, stated] = judged.counts();

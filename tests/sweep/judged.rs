@@ -2,7 +2,8 @@
 
 use flexcal::fit::{Identification, Options, identify};
 use flexcal::problem::{Effect, EffectDeclaration, Problem};
-use flexcal::select::{ClosedLoop, Covariate, Unexplained, Verdict, close};
+use flexcal::residual_tests::Covariate;
+use flexcal::select::{ClosedLoop, Unexplained, Verdict, close};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
 use crate::bench::{NOISE, SIGMA, Set, Size, measured};
@@ -256,6 +257,6 @@ pub fn words(covariates: &[Covariate]) -> String {
 
 /// Where structure without a law is, and what it depends on.
 pub fn located(left: &Unexplained) -> String {
-    let place = left.part.map_or_else(|| "nowhere".to_owned(), |part| part.to_string());
+    let place = left.site.map_or_else(|| "nowhere".to_owned(), |part| part.to_string());
     format!("{place} {} p {:.1e}", words(&left.depends_on), left.p_value)
 }

@@ -2,7 +2,7 @@
 
 use flexcal::fit::Options;
 use flexcal::rig::Shape;
-use flexcal::select::{ClosedLoop, Part, close};
+use flexcal::select::{ClosedLoop, Site, close};
 
 use crate::bench::{NOISE, Size, lunar, measured, outside};
 use crate::judged::{located, named, words};
@@ -44,7 +44,7 @@ impl Left {
         let closure = close(&lunar(), &set.data, &Options::default()).unwrap();
         let left = closure.unexplained.first();
         let located = left.is_some_and(|left| {
-            left.part == Some(Part::Joint(joint - 1))
+            left.site == Some(Site::Joint(joint - 1))
                 && words(&left.depends_on) == format!("q{joint}")
         });
         let correction = left.and_then(|left| left.correction.as_ref());

@@ -3,8 +3,9 @@
 use flexcal::fit::{Options, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{Effect, EffectDeclaration};
+use flexcal::residual_tests::Covariate;
 use flexcal::rig::Shape;
-use flexcal::select::{Covariate, Part, Verdict, close};
+use flexcal::select::{Site, Verdict, close};
 use rayon::prelude::*;
 
 use crate::bench::{NOISE, SMALL, lunar};
@@ -172,8 +173,8 @@ fn a_case_of_what_no_catalogue_holds() {
     let closure = close(&problem, &data, &Options::default()).unwrap();
     let [left] = closure.unexplained.as_slice() else { panic!("{:?}", closure.unexplained) };
     assert_eq!(
-        (left.part, left.depends_on.as_slice()),
-        (Some(Part::Joint(1)), [Covariate::Command(1)].as_slice())
+        (left.site, left.depends_on.as_slice()),
+        (Some(Site::Joint(1)), [Covariate::Command(1)].as_slice())
     );
     let (before, after) =
         (closure.before.fit.fitted.held_out, left.correction.as_ref().unwrap().held_out);

@@ -15,7 +15,8 @@ use crate::measurement::Split;
 use crate::model::parameter::{EffectParameter, JointField, ParameterSite, Regressor};
 use crate::problem::{Effect, JointKind, Mount, PoseView, Problem};
 use crate::quantity::Unit;
-use crate::select::{Covariate, PartialResidual, Unexplained};
+use crate::residual_tests::Covariate;
+use crate::select::{PartialResidual, Unexplained};
 
 /// Steps of a curve.
 const STEPS: u32 = 160;
@@ -457,7 +458,7 @@ pub fn unexplained(left: &Unexplained, problem: &Problem, split: &Split) -> Opti
         row: split.identification.get(k).copied(),
     };
     let points: Vec<Point> = telling.map(point).collect();
-    let place = left.part?;
+    let place = left.site?;
     let up = Quantity::error(&place.to_string(), of.unit);
     let title = format!("{place}: structure without a known cause");
     Some(Cause { title, across, up, points, curve, reading: COORDINATE })

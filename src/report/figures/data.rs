@@ -19,7 +19,8 @@ use crate::measurement::Dataset;
 use crate::model::{CentreLine, Model, Pose};
 use crate::problem::Problem;
 use crate::report::table::{Command, commands};
-use crate::select::{ClosedLoop, Findings, Found, examine};
+use crate::residual_tests::Findings;
+use crate::select::{ClosedLoop, Found, examine};
 
 /// Poses that a page knows one by one at most.
 const MOST: usize = 600;

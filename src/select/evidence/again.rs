@@ -10,9 +10,9 @@ use super::super::fitted::Fitted;
 use super::block::Block;
 use super::blocks::blocks;
 use super::candidate::Candidate;
-use super::explanation::Explanation;
 use super::hypotheses::Hypotheses;
 use super::hypothesis::Hypothesis;
+use super::hypothesis_set::HypothesisSet;
 use super::posterior::Evidence;
 use super::products::{Products, Target};
 use super::search::{left_by, search};
@@ -28,7 +28,7 @@ struct Again<'a> {
     hypotheses: &'a Hypotheses<'a>,
     /// Numbers of the probable ones among all.
     probable: Vec<usize>,
-    best: &'a Explanation,
+    best: &'a HypothesisSet,
 }
 
 impl<'a> Again<'a> {
@@ -36,15 +36,10 @@ impl<'a> Again<'a> {
         fitted: &'a Fitted,
         data: &'a Data<'a>,
         hypotheses: &'a Hypotheses<'a>,
-        (evidence, best): (&Evidence, &'a Explanation),
+        (evidence, best): (&Evidence, &'a HypothesisSet),
     ) -> Self {
-        let worth = || {
-            evidence
-                .explanations
-                .iter()
-                .filter(|known| known.probability > WORTH_A_DRAW)
-                .chain([best])
-        };
+        let worth =
+            || evidence.sets.iter().filter(|known| known.probability > WORTH_A_DRAW).chain([best]);
         let all = || worth().flat_map(|known| known.hypotheses.iter().zip(&known.functions));
         let is_known = |candidate: &Candidate| {
             all().any(|(own, (variant, _))| {
@@ -123,7 +118,7 @@ pub(super) fn carried_by_one(
     let alone = |own: &Hypothesis| {
         let pose = again.single_influential_pose(own.effect()?, &evidence.left_out)?;
         let others = again.most_probable(&[evidence.left_out.as_slice(), &[pose]].concat())?;
-        (!others.iter().any(|other| other.part == own.part)).then_some(pose)
+        (!others.iter().any(|other| other.site == own.site)).then_some(pose)
     };
     searched.into_iter().find_map(alone)
 }
@@ -133,7 +128,7 @@ pub(super) fn carried_by_one(
 pub(in crate::select) fn stability(
     fitted: &Fitted,
     data: &Data,
-    (evidence, best): (&Evidence, &Explanation),
+    (evidence, best): (&Evidence, &HypothesisSet),
     added: &[Effect],
 ) -> Vec<(Effect, f64)> {
     if best.effects().is_empty() {

@@ -5,13 +5,13 @@ use nalgebra::{DMatrix, DVector};
 use super::block::Design;
 use super::candidate::{Candidate, even};
 use super::functions::{Known, basis, goes_with, growing, merge, products_of, rough_basis, times};
-use super::hypothesis::{Hypothesis, Law, Part};
+use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::marginal::Coefficients;
 use crate::model::Pose;
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, JointField, ParameterSite, Regressor};
 use crate::problem::{Effect, JointKind, Observation, Problem};
-use crate::select::covariate::Covariate;
+use crate::residual_tests::Covariate;
 use crate::select::data::{bits, number};
 use crate::select::neighbourhood::{Linearised, tries};
 use crate::select::rules::SelectionRules;
@@ -48,7 +48,7 @@ fn acts_along_axes(terms: &[Term]) -> bool {
     let is_axis = |term: &Term| {
         term.regressor == Regressor::Constant
             && term.nominal == 0.0
-            && Part::of(term.site) != Part::Measurement
+            && Site::of(term.site) != Site::Measurement
     };
     let distinct =
         |(k, term): (usize, &Term)| terms[..k].iter().all(|other| other.site != term.site);
@@ -454,9 +454,9 @@ impl<'a, 'l> Columns<'a, 'l> {
     /// Another error in every pose.
     fn per_pose(&mut self, site: ParameterSite, at: &DVector<f64>) {
         let hypothesis = Hypothesis {
-            law: Law::PerPose,
-            part: Part::of(site),
-            site: Some(site),
+            kind: HypothesisKind::PerPose,
+            site: Site::of(site),
+            coordinate: Some(site),
             depends_on: Vec::new(),
         };
         self.add_design("per pose", 1.0, hypothesis, || Design::per_pose(at));
@@ -485,9 +485,10 @@ impl<'a, 'l> Columns<'a, 'l> {
                 }
                 waves
             };
-            let (law, depends_on) = (Law::NearHarmonic(order), vec![known.covariate.clone()]);
+            let (kind, depends_on) =
+                (HypothesisKind::NearHarmonic(order), vec![known.covariate.clone()]);
             let hypothesis =
-                Hypothesis { law, part: Part::Joint(joint), site: Some(site), depends_on };
+                Hypothesis { kind, site: Site::Joint(joint), coordinate: Some(site), depends_on };
             self.add("near harmonic", 1.0 / f64::from(order * order), hypothesis, || {
                 times(&[at], &waves())
             });
@@ -524,28 +525,32 @@ impl<'a, 'l> Columns<'a, 'l> {
             let scaled = &coordinates[j].scaled;
             scaled[k] - scaled[..self.weighed].iter().sum::<f64>() / self.weighed.max(1) as f64
         });
-        let hypothesis = |law| Hypothesis {
-            law,
-            part: Part::Measurement,
-            site: None,
+        let hypothesis = |kind| Hypothesis {
+            kind,
+            site: Site::Measurement,
+            coordinate: None,
             depends_on: vec![Covariate::Position],
         };
         // Where the strain of the frame is looked for, that is the linear law.
         let strain = |own: &Candidate| own.hypothesis.effect() == Some(&Effect::FrameStrain);
         if !self.candidates.iter().any(strain) {
-            self.add("field", 1.0, hypothesis(Law::Linear), || times(&at, &linear));
+            self.add("field", 1.0, hypothesis(HypothesisKind::Linear), || times(&at, &linear));
         }
         if let [x, y, z] = coordinates.as_slice() {
             let plane = products_of(&[&x.scaled, &y.scaled, &z.scaled], self.rules.slow_length);
-            self.add("field", 1.0, hypothesis(Law::Smooth), || times(&at, &plane));
+            self.add("field", 1.0, hypothesis(HypothesisKind::Smooth), || times(&at, &plane));
         }
         self.covariates.extend(coordinates);
     }
 
     /// What measures wanders, or one reading errs as the last did.
     fn wandering(&mut self, site: ParameterSite, at: &[&DVector<f64>], of: &Known) {
-        let (part, depends_on) = (Part::Measurement, vec![of.covariate.clone()]);
-        let hypothesis = Hypothesis { law: Law::Wandering, part, site: Some(site), depends_on };
+        let hypothesis = Hypothesis {
+            kind: HypothesisKind::Wandering,
+            site: Site::Measurement,
+            coordinate: Some(site),
+            depends_on: vec![of.covariate.clone()],
+        };
         for (variant, &length) in self.rules.rough_lengths.iter().enumerate() {
             if let Some(basis) = rough_basis(&of.scaled, length, of.levels) {
                 self.add_variant("smooth in the measurement", &hypothesis, variant, || {
@@ -582,8 +587,12 @@ impl<'a, 'l> Columns<'a, 'l> {
             return;
         }
         let groups = (0..poses.len()).map(|row| numbers.get(row).copied()).collect();
-        let hypothesis =
-            Hypothesis { law: Law::PerPose, part: Part::Arm, site: None, depends_on: Vec::new() };
+        let hypothesis = Hypothesis {
+            kind: HypothesisKind::PerPose,
+            site: Site::Arm,
+            coordinate: None,
+            depends_on: Vec::new(),
+        };
         let design = || Design::Grouped { levers: DMatrix::from_columns(&axes), groups };
         self.add_design("per pose", 1.0, hypothesis, design);
     }

@@ -5,7 +5,7 @@
 use super::block::{Block, Design};
 use super::candidate::{Candidate, even};
 use super::hypotheses::Hypotheses;
-use super::hypothesis::{Hypothesis, Law};
+use super::hypothesis::{Hypothesis, HypothesisKind};
 use super::marginal::Coefficients;
 use super::products::Products;
 use super::search::{Weighted, left_by};
@@ -116,7 +116,8 @@ impl Hypotheses<'_> {
         let (columns, largest) = even(columns, &effect.terms(problem), self.weighed, rules);
         let design = Design::Dense(columns).scaled(self.weighed)?;
         let coefficients = Coefficients { largest, ..own.coefficients.clone() };
-        let hypothesis = Hypothesis { law: Law::Effect(effect), ..own.hypothesis.clone() };
+        let hypothesis =
+            Hypothesis { kind: HypothesisKind::Effect(effect), ..own.hypothesis.clone() };
         Some(Candidate { hypothesis, variant: 0, design, ln_prior: own.ln_prior, coefficients })
     }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::select::covariate::Covariate;
+use crate::residual_tests::Covariate;
 
 /// Margin beyond the range on either side, where functions need not be flat.
 const MARGIN: f64 = 0.25;

@@ -5,15 +5,15 @@ use nalgebra::{DMatrix, DVector};
 use super::block::Design;
 use super::candidate::{Candidate, even, order_of};
 use super::columns::{Columns, slots};
-use super::explanation::Explanation;
 use super::functions::{Known, Shape};
 use super::hypothesis::Hypothesis;
+use super::hypothesis_set::HypothesisSet;
 use super::limits::limits;
 use super::marginal::Coefficients;
 use crate::model::parameter::ParameterSite;
 use crate::problem::{Effect, Problem};
+use crate::residual_tests::Covariate;
 use crate::select::candidates::Candidates;
-use crate::select::covariate::Covariate;
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
 use crate::select::neighbourhood::Linearised;
@@ -120,7 +120,7 @@ impl<'a> Hypotheses<'a> {
     /// The function of a hypothesis that an explanation holds.
     pub(super) fn candidate(
         &self,
-        explanation: &Explanation,
+        explanation: &HypothesisSet,
         hypothesis: &Hypothesis,
     ) -> Option<&Candidate> {
         let mut members = explanation.hypotheses.iter().zip(&explanation.functions);
@@ -132,7 +132,7 @@ impl<'a> Hypotheses<'a> {
     /// of one shape.
     pub fn form(
         &self,
-        explanation: &Explanation,
+        explanation: &HypothesisSet,
         hypothesis: &Hypothesis,
         (shape, weighed): (Option<Shape>, usize),
     ) -> Option<DMatrix<f64>> {
@@ -209,7 +209,8 @@ impl<'a> Hypotheses<'a> {
         &self,
         hypothesis: &Hypothesis,
     ) -> Option<(Covariate, ParameterSite, &[f64], DVector<f64>)> {
-        let site = hypothesis.site.filter(|site| matches!(site, ParameterSite::Joint { .. }))?;
+        let site =
+            hypothesis.coordinate.filter(|site| matches!(site, ParameterSite::Joint { .. }))?;
         let mut covariates = self.covariates(hypothesis);
         let (only, None) = (covariates.next()?, covariates.next()) else { return None };
         Some((only.covariate.clone(), site, &only.values, self.linearised.place(site)?))

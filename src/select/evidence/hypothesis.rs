@@ -4,13 +4,13 @@ use std::fmt;
 
 use crate::model::parameter::{JointField, ParameterSite, Quantity, Regressor};
 use crate::problem::{Effect, Problem};
-use crate::select::covariate::Covariate;
+use crate::residual_tests::Covariate;
 
 /// A part of the arm or of its measurement; joints are counted from 0. Its `Display` is the name in
 /// files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
-pub enum Part {
+pub enum Site {
     /// A joint.
     Joint(usize),
     /// The link before a joint.
@@ -27,7 +27,7 @@ pub enum Part {
     Measurement,
 }
 
-impl Part {
+impl Site {
     /// The part that a site belongs to.
     pub fn of(site: ParameterSite) -> Self {
         match site {
@@ -58,7 +58,7 @@ impl Part {
     }
 }
 
-impl fmt::Display for Part {
+impl fmt::Display for Site {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Joint(joint) => write!(f, "joint {}", joint + 1),
@@ -75,7 +75,7 @@ impl fmt::Display for Part {
 /// How a part's error follows from what it depends on.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub enum Law {
+pub enum HypothesisKind {
     /// As an effect says.
     Effect(Effect),
     /// Some smooth function.
@@ -96,7 +96,7 @@ pub enum Law {
     Limit(String),
 }
 
-impl Law {
+impl HypothesisKind {
     /// Whether it is the same law: of an effect whose time or order is searched with whatever one.
     pub(super) fn is_of(&self, other: &Self) -> bool {
         match (self, other) {
@@ -110,11 +110,11 @@ impl Law {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hypothesis {
     /// The law, or what is known of it.
-    pub law: Law,
+    pub kind: HypothesisKind,
     /// Where it acts.
-    pub part: Part,
+    pub site: Site,
     /// The coordinate of the part, where the error is one of a single coordinate.
-    pub site: Option<ParameterSite>,
+    pub coordinate: Option<ParameterSite>,
     /// What it depends on, ascending.
     pub depends_on: Vec<Covariate>,
 }
@@ -129,7 +129,7 @@ impl Hypothesis {
         time_measured: bool,
     ) -> Self {
         let terms = effect.terms(problem);
-        let part = terms.first().map_or(Part::Arm, |term| Part::of(term.site));
+        let site = terms.first().map_or(Site::Arm, |term| Site::of(term.site));
         let mut depends_on: Vec<Covariate> = terms
             .iter()
             .flat_map(|term| {
@@ -138,28 +138,33 @@ impl Hypothesis {
             .collect();
         depends_on.sort();
         depends_on.dedup();
-        Self { law: Law::Effect(effect.clone()), part, site: None, depends_on }
+        Self { kind: HypothesisKind::Effect(effect.clone()), site, coordinate: None, depends_on }
     }
 
     /// A smooth function of some covariates at a place.
     pub(super) fn smooth(site: ParameterSite, depends_on: Vec<Covariate>) -> Self {
-        Self { law: Law::Smooth, part: Part::of(site), site: Some(site), depends_on }
+        Self {
+            kind: HypothesisKind::Smooth,
+            site: Site::of(site),
+            coordinate: Some(site),
+            depends_on,
+        }
     }
 
     /// Whether another says the same: the same law at the same part, of the same covariates.
     pub fn says(&self, other: &Self) -> bool {
-        self.law == other.law && self.part == other.part && self.depends_on == other.depends_on
+        self.kind == other.kind && self.site == other.site && self.depends_on == other.depends_on
     }
 
     /// Whether it is that a limit of the declared problem is wrong.
     pub(super) fn is_limit(&self) -> bool {
-        matches!(self.law, Law::Limit(_))
+        matches!(self.kind, HypothesisKind::Limit(_))
     }
 
     /// Its effect, if its law is one.
     pub fn effect(&self) -> Option<&Effect> {
-        match &self.law {
-            Law::Effect(effect) => Some(effect),
+        match &self.kind {
+            HypothesisKind::Effect(effect) => Some(effect),
             _ => None,
         }
     }

@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 
 use super::block::Design;
 use super::candidate::Candidate;
-use super::hypothesis::{Hypothesis, Law, Part};
+use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::marginal::Coefficients;
 use crate::select::fitted::Fitted;
 use crate::select::neighbourhood::Linearised;
@@ -44,9 +44,9 @@ pub(super) fn limits(
         let coefficients =
             Coefficients { largest: vec![largest * length], ..Coefficients::default() };
         let hypothesis = Hypothesis {
-            law: Law::Limit(words),
-            part: Part::of(site),
-            site: None,
+            kind: HypothesisKind::Limit(words),
+            site: Site::of(site),
+            coordinate: None,
             depends_on: Vec::new(),
         };
         let design = Design::Dense(columns).scaled(weighed)?;

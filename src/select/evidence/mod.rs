@@ -14,11 +14,11 @@ mod block;
 mod blocks;
 mod candidate;
 mod columns;
-mod explanation;
 mod finer;
 mod functions;
 mod hypotheses;
 mod hypothesis;
+mod hypothesis_set;
 mod limits;
 mod marginal;
 mod moves;
@@ -39,10 +39,10 @@ pub(super) use again::stability;
 use block::Block;
 use blocks::blocks;
 use candidate::Candidate;
-pub use explanation::Explanation;
 pub(super) use functions::Shape;
 pub(super) use hypotheses::Hypotheses;
-pub use hypothesis::{Hypothesis, Law, Part};
+pub use hypothesis::{Hypothesis, HypothesisKind, Site};
+pub use hypothesis_set::HypothesisSet;
 pub(super) use posterior::odds_against;
 pub use posterior::{Claims, Evidence};
 use products::{Known, Products};
@@ -87,7 +87,7 @@ pub(super) fn best_form(
     fitted: &Fitted,
     data: &Data,
     hypotheses: &Hypotheses,
-    best: &Explanation,
+    best: &HypothesisSet,
     hypothesis: &Hypothesis,
 ) -> Option<(Option<Shape>, f64)> {
     let smooth = hypotheses.candidate(best, hypothesis)?;
@@ -151,7 +151,7 @@ fn weighed_without<'a>(
     };
     let present: Vec<usize> =
         (0..blocks.len()).filter(|&k| is_present(&hypotheses.all[k])).collect();
-    let mut explanations: Vec<Explanation> = Vec::new();
+    let mut explanations: Vec<HypothesisSet> = Vec::new();
     let (mut weighted, unlisted, mut known) = {
         let products = Products::new((&blocks, &target), data.rules);
         let weighted = search(&products, &present);
@@ -213,13 +213,13 @@ fn weighed_without<'a>(
                 let own = members.iter().map(|&member| of(member).clone()).collect();
                 let variants = members.into_iter().map(|member| hypotheses.all[member].variant);
                 let functions = variants.zip(sizes).collect();
-                explanations.push(Explanation { hypotheses: own, probability, functions });
+                explanations.push(HypothesisSet { hypotheses: own, probability, functions });
             }
         }
     }
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let mut evidence =
-        Evidence { explanations, stand_ins: Vec::new(), left_out: left_out.to_vec() };
+        Evidence { sets: explanations, stand_ins: Vec::new(), left_out: left_out.to_vec() };
     if let Some(best) = evidence.sure(data.rules.sure) {
         let products = Products::knowing(known, (&blocks, &target), data.rules);
         evidence.stand_ins = stand_ins(best, &hypotheses, &products);
@@ -230,7 +230,7 @@ fn weighed_without<'a>(
 /// For each hypothesis of an explanation the few other effects, one of a family at each place, that
 /// do best in its place, if at least half as well.
 fn stand_ins(
-    best: &Explanation,
+    best: &HypothesisSet,
     hypotheses: &Hypotheses,
     products: &Products,
 ) -> Vec<(Hypothesis, Hypothesis)> {

@@ -11,7 +11,7 @@ use super::products::Products;
 use super::search::{Weighted, left_by};
 use super::waves::is_free;
 use crate::problem::Effect;
-use crate::select::covariate::Covariate;
+use crate::residual_tests::Covariate;
 use crate::select::fitted::Fitted;
 
 /// Probability of an explanation from which on its members are looked at.

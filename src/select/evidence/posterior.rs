@@ -1,9 +1,9 @@
 //! All explanations of a residual with their probabilities, and what may be claimed by them.
 
-use super::explanation::Explanation;
-use super::hypothesis::{Hypothesis, Law, Part};
+use super::hypothesis::{Hypothesis, HypothesisKind, Site};
+use super::hypothesis_set::HypothesisSet;
 use crate::problem::Effect;
-use crate::select::covariate::Covariate;
+use crate::residual_tests::Covariate;
 
 /// Probability below which an explanation is not kept: thousands of them add up to nothing.
 pub(super) const NEGLIGIBLE: f64 = 1e-10;
@@ -11,7 +11,7 @@ pub(super) const NEGLIGIBLE: f64 = 1e-10;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
     /// Most probable first.
-    pub explanations: Vec<Explanation>,
+    pub sets: Vec<HypothesisSet>,
     /// For hypotheses of the sure explanation, effects that do best in their place.
     pub(super) stand_ins: Vec<(Hypothesis, Hypothesis)>,
     /// Poses without which it was weighed, among those that are: each alone would have carried an
@@ -23,7 +23,7 @@ pub struct Evidence {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Claims {
     /// Where, and the probability that something acts there.
-    pub place: (Part, f64),
+    pub place: (Site, f64),
     /// On what it depends, and the probability that what acts there depends on that.
     pub depends_on: (Vec<Covariate>, f64),
     /// The hypothesis, and the probability that its law is at work there and no function that knows
@@ -39,13 +39,13 @@ pub(in crate::select) fn odds_against(probability: f64) -> f64 {
 impl Evidence {
     /// The most probable explanation.
     pub fn best(&self) -> &[Hypothesis] {
-        self.explanations.first().map_or(&[], |best| &best.hypotheses)
+        self.sets.first().map_or(&[], |best| &best.hypotheses)
     }
 
     /// Probability that some hypothesis of a kind is at work.
     pub fn probability(&self, of: impl Fn(&Hypothesis) -> bool) -> f64 {
-        let holds = |explanation: &&Explanation| explanation.hypotheses.iter().any(&of);
-        self.explanations
+        let holds = |explanation: &&HypothesisSet| explanation.hypotheses.iter().any(&of);
+        self.sets
             .iter()
             .filter(holds)
             .map(|explanation| explanation.probability)
@@ -55,24 +55,23 @@ impl Evidence {
 
     /// The most probable explanation that claims no more than is sure: with as many hypotheses as
     /// there are with probability `level`, whichever they are.
-    pub fn sure(&self, level: f64) -> Option<&Explanation> {
-        self.explanations.iter().find(|explanation| self.as_many(explanation) >= level)
+    pub fn sure(&self, level: f64) -> Option<&HypothesisSet> {
+        self.sets.iter().find(|explanation| self.as_many(explanation) >= level)
     }
 
     /// Probability that there are as many hypotheses as an explanation has, whichever they are.
-    pub(in crate::select) fn as_many(&self, as_in: &Explanation) -> f64 {
+    pub(in crate::select) fn as_many(&self, as_in: &HypothesisSet) -> f64 {
         let holds =
-            |explanation: &&Explanation| explanation.hypotheses.len() >= as_in.hypotheses.len();
-        self.explanations.iter().filter(holds).map(|explanation| explanation.probability).sum()
+            |explanation: &&HypothesisSet| explanation.hypotheses.len() >= as_in.hypotheses.len();
+        self.sets.iter().filter(holds).map(|explanation| explanation.probability).sum()
     }
 
     /// Chance that fewer hypotheses than `best` has and noise make as many as probable, for all
     /// that were looked at together: a ratio of likelihoods is above B no more than once in B
     /// times.          [Ville 1939]
-    pub fn chance(&self, best: &Explanation) -> f64 {
-        let is_fewer = |known: &&Explanation| known.hypotheses.len() < best.hypotheses.len();
-        let fewer: f64 =
-            self.explanations.iter().filter(is_fewer).map(|known| known.probability).sum();
+    pub fn chance(&self, best: &HypothesisSet) -> f64 {
+        let is_fewer = |known: &&HypothesisSet| known.hypotheses.len() < best.hypotheses.len();
+        let fewer: f64 = self.sets.iter().filter(is_fewer).map(|known| known.probability).sum();
         odds_against(1.0 - fewer)
     }
 
@@ -80,26 +79,30 @@ impl Evidence {
     /// ones, and those that do best in the place of each, which strong effects decide only at a fit
     /// of their own; so do laws in the place of a function without one. A fit with an effect in the
     /// place of a limit that is wrong may leave other limits too: it is no rival.
-    pub(in crate::select) fn exchanged(&self, best: &Explanation, most: usize) -> Vec<Explanation> {
-        let differ = |one: &Explanation, other: &Explanation| {
+    pub(in crate::select) fn exchanged(
+        &self,
+        best: &HypothesisSet,
+        most: usize,
+    ) -> Vec<HypothesisSet> {
+        let differ = |one: &HypothesisSet, other: &HypothesisSet| {
             let is_new = |own: &&Hypothesis| !other.hypotheses.iter().any(|known| known.says(own));
             one.hypotheses.iter().filter(is_new).cloned().collect::<Vec<Hypothesis>>()
         };
-        let is_exchange = |other: &&Explanation| {
+        let is_exchange = |other: &&HypothesisSet| {
             other.hypotheses.len() == best.hypotheses.len()
                 && matches!(differ(best, other).as_slice(), [only] if !only.is_limit())
                 && matches!(differ(other, best).as_slice(), [only] if only.effect().is_some())
         };
-        let mut all: Vec<Explanation> =
-            self.explanations.iter().filter(is_exchange).take(most).cloned().collect();
+        let mut all: Vec<HypothesisSet> =
+            self.sets.iter().filter(is_exchange).take(most).cloned().collect();
         for (own, other) in self.stand_ins.iter().filter(|(own, _)| !own.is_limit()) {
             let Some(place) = best.hypotheses.iter().position(|known| known == own) else {
                 continue;
             };
-            let mut exchanged = Explanation { probability: 0.0, ..best.clone() };
+            let mut exchanged = HypothesisSet { probability: 0.0, ..best.clone() };
             exchanged.hypotheses[place] = other.clone();
             exchanged.functions[place].0 = 0;
-            let is_known = |known: &Explanation| {
+            let is_known = |known: &HypothesisSet| {
                 known.hypotheses.iter().all(|own| exchanged.hypotheses.contains(own))
             };
             if !all.iter().any(is_known) && !best.hypotheses.contains(other) {
@@ -113,29 +116,29 @@ impl Evidence {
     /// own.
     pub(in crate::select) fn corrected(
         mut self,
-        best: &Explanation,
-        odds: &[(Explanation, f64)],
+        best: &HypothesisSet,
+        odds: &[(HypothesisSet, f64)],
     ) -> Self {
         let of_best = self
-            .explanations
+            .sets
             .iter()
             .find(|own| own.hypotheses == best.hypotheses)
             .map_or(0.0, |own| own.probability);
         for (explanation, ln_odds) in odds {
             // Beyond that nothing is left of the best one.
             let probability = of_best * ln_odds.min(40.0).exp();
-            let is_same = |own: &&mut Explanation| {
+            let is_same = |own: &&mut HypothesisSet| {
                 own.hypotheses.len() == explanation.hypotheses.len()
                     && own.hypotheses.iter().all(|known| explanation.hypotheses.contains(known))
             };
-            match self.explanations.iter_mut().find(is_same) {
+            match self.sets.iter_mut().find(is_same) {
                 Some(own) => own.probability = probability,
-                None => self.explanations.push(Explanation { probability, ..explanation.clone() }),
+                None => self.sets.push(HypothesisSet { probability, ..explanation.clone() }),
             }
         }
-        let total: f64 = self.explanations.iter().map(|own| own.probability).sum();
-        self.explanations.iter_mut().for_each(|own| own.probability /= total);
-        self.explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        let total: f64 = self.sets.iter().map(|own| own.probability).sum();
+        self.sets.iter_mut().for_each(|own| own.probability /= total);
+        self.sets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         self
     }
 
@@ -144,7 +147,7 @@ impl Evidence {
     pub fn alternatives(&self, effect: &Effect, held: &[Effect], beside: f64) -> Vec<Effect> {
         // Of very many effects in a model most are in no explanation: nothing else need be looked
         // at.
-        let mut all = self.explanations.iter().flat_map(|explanation| &explanation.hypotheses);
+        let mut all = self.sets.iter().flat_map(|explanation| &explanation.hypotheses);
         if !all.by_ref().filter_map(Hypothesis::effect).any(|known| known.is_but_for_search(effect))
         {
             return Vec::new();
@@ -152,7 +155,7 @@ impl Evidence {
         let others: Vec<&Effect> = held.iter().filter(|own| *own != effect).collect();
         // What an explanation holds beside these; of one that is searched another value stands for
         // it where its own is not there.
-        let beside_others = |explanation: &Explanation| {
+        let beside_others = |explanation: &HypothesisSet| {
             let mut rest = explanation.effects();
             for other in &others {
                 let exact = rest.iter().position(|known| known == *other);
@@ -166,7 +169,7 @@ impl Evidence {
         // Each with the value of its argument that was most probable first, for explanations are
         // sorted.
         let mut instead: Vec<(Effect, f64)> = Vec::new();
-        for explanation in &self.explanations {
+        for explanation in &self.sets {
             let rest = beside_others(explanation);
             if rest.iter().any(|known| known.is_but_for_search(effect)) {
                 with += explanation.probability;
@@ -189,7 +192,7 @@ impl Evidence {
 
     /// What is claimed of an effect; `None` where it is in no explanation.
     pub fn claims_of(&self, effect: &Effect) -> Option<Claims> {
-        let mut all = self.explanations.iter().flat_map(|explanation| &explanation.hypotheses);
+        let mut all = self.sets.iter().flat_map(|explanation| &explanation.hypotheses);
         all.find(|hypothesis| hypothesis.effect() == Some(effect))
             .map(|hypothesis| self.claims(hypothesis))
     }
@@ -199,29 +202,25 @@ impl Evidence {
     /// Where its time or order is searched, another one counts for it, but not one that is beside
     /// it in the most probable explanation.
     pub fn claims(&self, of: &Hypothesis) -> Claims {
-        let most = self
-            .explanations
-            .iter()
-            .map(|known| &known.hypotheses)
-            .find(|known| known.contains(of));
+        let most = self.sets.iter().map(|known| &known.hypotheses).find(|known| known.contains(of));
         let is_beside =
             |other: &Hypothesis| other != of && most.is_some_and(|most| most.contains(other));
         // Where a limit is wrong nothing need act.
         let is_there =
-            |other: &Hypothesis| other.part == of.part && (of.is_limit() || !other.is_limit());
+            |other: &Hypothesis| other.site == of.site && (of.is_limit() || !other.is_limit());
         let place = self.probability(is_there);
         let depends_on =
             self.probability(|other| is_there(other) && other.depends_on == of.depends_on);
-        let has_law = |explanation: &&Explanation| {
+        let has_law = |explanation: &&HypothesisSet| {
             let unknown = |other: &Hypothesis| is_there(other) && other.effect().is_none();
             // Functions without a law, smooth or not, say the same of the law; what wanders or sags
             // under weight that nobody declared does not.
             let has_one = of.effect().is_some()
                 || of.is_limit()
-                || matches!(of.law, Law::Sag | Law::Wandering);
+                || matches!(of.kind, HypothesisKind::Sag | HypothesisKind::Wandering);
             let is_it = |other: &&Hypothesis| {
                 if has_one {
-                    other.law.is_of(&of.law) && other.part == of.part
+                    other.kind.is_of(&of.kind) && other.site == of.site
                 } else {
                     unknown(other)
                 }
@@ -230,14 +229,14 @@ impl Evidence {
                 && (of.effect().is_none() || !explanation.hypotheses.iter().any(unknown))
         };
         let law = self
-            .explanations
+            .sets
             .iter()
             .filter(has_law)
             .map(|explanation| explanation.probability)
             .fold(0.0, |sum, own| sum + own)
             .min(1.0);
         Claims {
-            place: (of.part, place),
+            place: (of.site, place),
             depends_on: (of.depends_on.clone(), depends_on),
             law: (of.clone(), law),
         }
@@ -253,13 +252,13 @@ mod tests {
         let shift = |time: f64| Effect::StationShift { at_time: time };
         let drift = || Effect::TrackerDrift;
         let settling = || Effect::TrackerSettling { time_constant: 50.0 };
-        let of = |effects: &[Effect], probability: f64| Explanation {
+        let of = |effects: &[Effect], probability: f64| HypothesisSet {
             hypotheses: effects
                 .iter()
                 .map(|effect| Hypothesis {
-                    law: Law::Effect(effect.clone()),
-                    part: Part::Measurement,
-                    site: None,
+                    kind: HypothesisKind::Effect(effect.clone()),
+                    site: Site::Measurement,
+                    coordinate: None,
                     depends_on: vec![Covariate::Time],
                 })
                 .collect(),
@@ -274,7 +273,7 @@ mod tests {
             of(&[settling(), shift(10.0)], 0.1),
         ];
         let held = explanations[0].effects();
-        let evidence = Evidence { explanations, stand_ins: Vec::new(), left_out: Vec::new() };
+        let evidence = Evidence { sets: explanations, stand_ins: Vec::new(), left_out: Vec::new() };
         // Two later moves together are twice as probable as settling.
         assert_eq!(evidence.alternatives(&drift(), &held, 0.1), [shift(30.0), settling()]);
         assert_eq!(evidence.alternatives(&shift(10.0), &held, 0.1), []);
@@ -283,12 +282,12 @@ mod tests {
     #[test]
     fn a_wave_is_as_sure_as_it_is_and_not_as_another_beside_it() {
         let wave = |order: f64| Hypothesis {
-            law: Law::Effect(Effect::JointWave { joint: 1, order }),
-            part: Part::Joint(0),
-            site: None,
+            kind: HypothesisKind::Effect(Effect::JointWave { joint: 1, order }),
+            site: Site::Joint(0),
+            coordinate: None,
             depends_on: vec![Covariate::Command(0)],
         };
-        let of = |orders: &[f64], probability: f64| Explanation {
+        let of = |orders: &[f64], probability: f64| HypothesisSet {
             hypotheses: orders.iter().copied().map(wave).collect(),
             probability,
             functions: vec![(0, 1.0); orders.len()],
@@ -299,7 +298,7 @@ mod tests {
             of(&[6.41, 1.5], 0.125),
             of(&[1.6, 6.4], 0.125),
         ];
-        let evidence = Evidence { explanations, stand_ins: Vec::new(), left_out: Vec::new() };
+        let evidence = Evidence { sets: explanations, stand_ins: Vec::new(), left_out: Vec::new() };
         let law = |order: f64| evidence.claims(&wave(order)).law.1;
         // 6.41 stands for 6.4 and 1.6 for 1.5, but neither 6.4 for 1.5 nor the reverse.
         assert!((law(6.4) - 1.0).abs() < 1e-12, "{}", law(6.4));

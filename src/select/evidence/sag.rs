@@ -12,11 +12,11 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::columns::Columns;
-use super::hypothesis::{Hypothesis, Law, Part};
+use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use crate::mechanics::Arm;
 use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{JointKind, Problem};
-use crate::select::covariate::Covariate;
+use crate::residual_tests::Covariate;
 
 /// Functions whose size is below this part of the largest repeat others.
 const REPEATED: f64 = 1e-3;
@@ -41,17 +41,21 @@ impl Columns<'_, '_> {
             let site = ParameterSite::Joint { joint, field: JointField::Theta };
             let Some(lever) = self.linearised.place(site) else { continue };
             let Some(columns) = self.sags(joint, &lever) else { continue };
-            let part = Part::Joint(joint);
-            let own =
-                Hypothesis { law: Law::Sag, part, site: None, depends_on: vec![Covariate::Load] };
+            let site = Site::Joint(joint);
+            let own = Hypothesis {
+                kind: HypothesisKind::Sag,
+                site,
+                coordinate: None,
+                depends_on: vec![Covariate::Load],
+            };
             self.add("sag", 1.0, own, || columns.clone());
             all.push(columns);
         }
         if all.len() > 1 {
             let own = Hypothesis {
-                law: Law::Sag,
-                part: Part::Arm,
-                site: None,
+                kind: HypothesisKind::Sag,
+                site: Site::Arm,
+                coordinate: None,
                 depends_on: vec![Covariate::Load],
             };
             let columns: Vec<_> = all.iter().flat_map(DMatrix::column_iter).collect();

@@ -24,13 +24,13 @@ use rayon::prelude::*;
 use super::candidate::{Candidate, TOGETHER, order_of};
 use super::functions::times;
 use super::hypotheses::Hypotheses;
-use super::hypothesis::{Hypothesis, Law, Part};
+use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::products::{Left, Products};
 use super::search::{Weighted, left_by};
 use crate::model::effect::HIGHEST_ORDER;
 use crate::model::parameter::{ParameterSite, holds_all, refuses};
 use crate::problem::{Effect, JointKind, Problem};
-use crate::select::covariate::Covariate;
+use crate::residual_tests::Covariate;
 use crate::select::fitted::Fitted;
 use crate::select::rules::SelectionRules;
 
@@ -55,14 +55,14 @@ const WIDER: f64 = 1.3;
 /// The joint, from 0, at which a hypothesis is a function of that joint's own command, or of
 /// nothing that is known.
 fn own_function(of: &Hypothesis, problem: &Problem) -> Option<usize> {
-    let Part::Joint(joint) = of.part else { return None };
-    let at_coordinate = of.site == Some(ParameterSite::coordinate(problem, joint + 1));
-    let is_own = match &of.law {
-        Law::Effect(Effect::JointHarmonic { .. } | Effect::JointWave { .. }) => true,
-        Law::Smooth | Law::NearHarmonic(_) => {
+    let Site::Joint(joint) = of.site else { return None };
+    let at_coordinate = of.coordinate == Some(ParameterSite::coordinate(problem, joint + 1));
+    let is_own = match &of.kind {
+        HypothesisKind::Effect(Effect::JointHarmonic { .. } | Effect::JointWave { .. }) => true,
+        HypothesisKind::Smooth | HypothesisKind::NearHarmonic(_) => {
             at_coordinate && of.depends_on == [Covariate::Command(joint)]
         }
-        Law::PerPose => at_coordinate,
+        HypothesisKind::PerPose => at_coordinate,
         _ => false,
     };
     is_own.then_some(joint)

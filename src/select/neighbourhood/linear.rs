@@ -13,7 +13,7 @@ use crate::numeric::{gram, inverse_factor, product, product_along, zeros};
 
 /// A direction is decided by a block of poses alone when less than this part of its length² is left
 /// without the block: then the others say nothing of it.
-pub(in crate::select) const LEAST_DECIDED: f64 = 1e-6;
+const LEAST_DECIDED: f64 = 1e-6;
 
 /// So many columns at most are projected out by one direction of the basis after the other: it is
 /// gone through once for all of them.

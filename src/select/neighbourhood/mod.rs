@@ -16,7 +16,6 @@ mod scan;
 mod score;
 
 pub(super) use left_out::PartSquares;
-pub(super) use linear::LEAST_DECIDED;
 pub(crate) use linear::{LinearNeighbourhood, Unknowns};
 pub(super) use linearised::Derivatives;
 pub(crate) use linearised::Linearised;

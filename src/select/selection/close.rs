@@ -6,14 +6,13 @@ use std::sync::Arc;
 use super::super::candidates::Candidates;
 use super::super::data::Data;
 use super::super::evidence::{
-    Claims, Evidence, Explanation, Hypothesis, ln_posterior, stability, weigh,
+    Claims, Evidence, Hypothesis, HypothesisSet, ln_posterior, stability, weigh,
 };
 use super::super::fitted::Fitted;
-use super::super::residual_tests::Findings;
+use super::super::reference_check::{ReferenceCheck, reference_check};
 use super::super::rules::SelectionRules;
 use super::super::screening::{Trace, check_fit, trace_fit};
 use super::super::unexplained::{self, Unexplained};
-use super::super::witness::{Witness, witness};
 use super::alternatives::Replacements;
 use super::harmonics::{self, HarmonicPrior};
 use super::interval;
@@ -27,6 +26,7 @@ use crate::fit::{
 use crate::measurement::Dataset;
 use crate::numeric::Interval;
 use crate::problem::{Effect, Problem};
+use crate::residual_tests::Findings;
 
 /// An effect that the loop added.
 #[derive(Debug, Clone)]
@@ -47,7 +47,7 @@ pub struct Found {
     /// be weighed.
     pub stability: Option<f64>,
     /// What data say that took no part in the fit; `None` where none speak of it.
-    pub witness: Option<Witness>,
+    pub reference_check: Option<ReferenceCheck>,
     /// Error on held-out poses after the first round whose effects include it and were all kept to
     /// the end; that of the final fit where no round is such.
     pub held_out_after: ErrorSummary,
@@ -304,7 +304,7 @@ fn weighed(
 }
 
 /// Whether the effects of an explanation are those that were added.
-fn is_held(explanation: &Explanation, added: &[Effect]) -> bool {
+fn is_held(explanation: &HypothesisSet, added: &[Effect]) -> bool {
     let own = explanation.effects();
     let parts: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
     own.len() == parts.len() && parts.iter().all(|part| own.contains(part))
@@ -332,7 +332,7 @@ fn refitted(
     let functions = best.without_law();
     let Some(own) = odds_of(fitted, &functions, fitted.sigma)? else { return Ok((evidence, None)) };
     let rivals = evidence.exchanged(&best, rules.rivals);
-    let mut tried: Vec<(Explanation, f64, Fitted)> = Vec::new();
+    let mut tried: Vec<(HypothesisSet, f64, Fitted)> = Vec::new();
     let count = rivals.len();
     for (k, rival) in rivals.into_iter().enumerate() {
         rounds.tell(k + 1, count);
@@ -341,7 +341,7 @@ fn refitted(
         tried.extend(other.map(|other| (rival, other - own, next)));
     }
     tried.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut odds: Vec<(Explanation, f64)> = Vec::new();
+    let mut odds: Vec<(HypothesisSet, f64)> = Vec::new();
     let mut better: Option<Fitted> = None;
     for (rival, ln_odds, next) in tried {
         // A law in the place of a function must be what its own fit speaks for: functions are never
@@ -437,7 +437,7 @@ fn fit_with_found(
 fn found(
     rounds: &Rounds,
     fitted: &Fitted,
-    best: Option<(&Evidence, &Explanation)>,
+    best: Option<(&Evidence, &HypothesisSet)>,
     common_prior: bool,
 ) -> Vec<Found> {
     let added = rounds.added(fitted);
@@ -461,10 +461,10 @@ fn found(
         let claims = best.and_then(|(evidence, _)| claims(evidence, &effect, rules.several_orders));
         let tested = tested.iter().filter(|part| effect.covers(&part.effect));
         let p_value = tested.map(|part| part.p).fold(1.0, f64::min);
-        let witness = witness(fitted, rounds.data, &effect);
+        let check = reference_check(fitted, rounds.data, &effect);
         // Of many orders under one prior none may be significant by itself.
         let is_significant = common_prior || p_value < rules.leaving_level;
-        let says = witness.as_ref().map(|witness| witness.says);
+        let says = check.as_ref().map(|check| check.verdict);
         let law = claims.as_ref().map(|claims| claims.law.1);
         Found {
             stability: own.reduce(f64::min),
@@ -478,7 +478,7 @@ fn found(
                 .collect(),
             held_out_after: first_with(&effect),
             alternatives,
-            witness,
+            reference_check: check,
             effect,
         }
     };

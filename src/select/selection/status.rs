@@ -1,6 +1,6 @@
 //! Status of each effect, which says what may be claimed of it, and the verdict that follows.
 
-use crate::select::witness::WitnessVerdict;
+use crate::select::reference_check::ReferenceVerdict;
 
 /// Probability of a law from which on it is the most probable one at its place.
 const EVEN: f64 = 0.5;
@@ -35,10 +35,10 @@ impl Status {
     pub(super) fn of(
         law: Option<f64>,
         stated: f64,
-        (is_significant, witness): (bool, Option<WitnessVerdict>),
+        (is_significant, witness): (bool, Option<ReferenceVerdict>),
     ) -> Self {
         match law {
-            _ if witness == Some(WitnessVerdict::Contradicted) => Self::Contradicted,
+            _ if witness == Some(ReferenceVerdict::Contradicted) => Self::Contradicted,
             None if is_significant => Self::Found,
             Some(law) if law >= stated => Self::Found,
             Some(law) if law >= EVEN => Self::Probable,
@@ -94,7 +94,7 @@ mod tests {
         assert_eq!(status(Some(0.95), false), Status::Found);
         assert_eq!(status(Some(0.7), true), Status::Probable);
         assert_eq!(status(Some(0.3), true), Status::Located);
-        let against = (true, Some(WitnessVerdict::Contradicted));
+        let against = (true, Some(ReferenceVerdict::Contradicted));
         assert_eq!(Status::of(Some(0.99), 0.9, against), Status::Contradicted);
     }
 

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use flexcal::select::{Covariate, CovariateValues, Findings, ResidualTest};
+use flexcal::residual_tests::{Covariate, CovariateValues, Findings, ResidualTest};
 use nalgebra::DVector;
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;

@@ -1,6 +1,6 @@
 //! What cannot be tested says why, odd inputs are taken, and threads change nothing.
 
-use flexcal::select::{Covariate, CovariateValues, Findings, Sequence, Test, Untestable};
+use flexcal::residual_tests::{Covariate, CovariateValues, Findings, Sequence, Test, Untestable};
 use nalgebra::DVector;
 use rayon::ThreadPoolBuilder;
 

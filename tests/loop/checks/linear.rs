@@ -1,6 +1,6 @@
 //! Linear fits with known structure in what they leave.
 
-use flexcal::select::{
+use flexcal::residual_tests::{
     Covariate, CovariateValues, Findings, FitResidual, ResidualTest, Test, test_residual,
 };
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -93,7 +93,7 @@ impl Linear {
     }
 
     pub fn check(&self, residual: &DVector<f64>) -> Findings {
-        test_residual(&self.fit(residual), 7)
+        test_residual(&self.fit(residual), 0.01, 7)
     }
 
     pub fn fit<'a>(&'a self, residual: &'a DVector<f64>) -> FitResidual<'a> {

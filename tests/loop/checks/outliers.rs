@@ -1,6 +1,6 @@
 //! Poses that are far off, and noise with heavy tails, are named and are not structure.
 
-use flexcal::select::{Findings, Test};
+use flexcal::residual_tests::{Findings, Test};
 use nalgebra::{DVector, Vector3};
 
 use super::linear::{Linear, count, find, heavy_tails, outliers};

@@ -1,6 +1,6 @@
 //! Structure in what a fit leaves is found and named.
 
-use flexcal::select::{Covariate, Findings, ResidualTest, Sequence, Test};
+use flexcal::residual_tests::{Covariate, Findings, ResidualTest, Sequence, Test};
 use nalgebra::Vector3;
 use rand::RngExt as _;
 use rayon::prelude::*;

@@ -12,6 +12,7 @@
 //!   verdict of all, and words for it.
 
 mod chance;
+mod covariate;
 mod fit_residual;
 mod judgement;
 mod leverage;
@@ -22,6 +23,7 @@ mod size;
 mod statistic;
 mod test;
 
+pub use covariate::Covariate;
 pub use fit_residual::{CovariateValues, FitResidual};
 pub use outcome::{Findings, Outcome, ResidualTest, Sequence, Test, Untestable};
 pub use test::test_residual;

@@ -28,7 +28,7 @@ const DECIDED: f64 = 9.21;
 
 /// What it says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum WitnessVerdict {
+pub enum ReferenceVerdict {
     /// It moved as the effect has it.
     Corroborated,
     /// It did not.
@@ -37,11 +37,11 @@ pub enum WitnessVerdict {
 
 /// A witness of an effect.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Witness {
+pub struct ReferenceCheck {
     /// Which data.
     pub data: String,
     /// What they say.
-    pub says: WitnessVerdict,
+    pub verdict: ReferenceVerdict,
 }
 
 /// A reading of a fixed point.
@@ -104,7 +104,11 @@ fn odds(
 
 /// What readings of fixed points say of an effect of the instrument; `None` for other effects, and
 /// where they do not decide.
-pub(super) fn witness(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<Witness> {
+pub(super) fn reference_check(
+    fitted: &Fitted,
+    data: &Data,
+    effect: &Effect,
+) -> Option<ReferenceCheck> {
     let measurements = data.measurements;
     let first = measurements.time.iter().copied().fold(f64::INFINITY, f64::min);
     let moves = |reading: &NestReading| -> Option<f64> {
@@ -145,18 +149,18 @@ pub(super) fn witness(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<W
     let (told, certainty) =
         points.values().map(|all| told(all, count)).fold(nothing, |a, b| (a.0 + b.0, a.1 + b.1));
     let gain = odds(&found, &spread, (&told, &certainty))?;
-    let says = if gain > DECIDED {
-        WitnessVerdict::Corroborated
+    let verdict = if gain > DECIDED {
+        ReferenceVerdict::Corroborated
     } else if gain < -DECIDED {
-        WitnessVerdict::Contradicted
+        ReferenceVerdict::Contradicted
     } else {
         return None;
     };
     let names: BTreeSet<&str> = points.keys().map(|(_, name)| *name).collect();
     let names: Vec<&str> = names.into_iter().collect();
-    Some(Witness {
+    Some(ReferenceCheck {
         data: format!("{} readings of {}", measurements.nests.len(), names.join(", ")),
-        says,
+        verdict,
     })
 }
 

@@ -2,9 +2,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use super::covariate::Covariate;
 use super::outcome::Untestable;
-use crate::select::covariate::Covariate;
-use crate::select::rules::SelectionRules;
+
+/// Root mean square residual, in units of a declared σ, below which a residual is rounding error and
+/// is not tested.
+pub(crate) const ROUNDING: f64 = 1e-3;
 
 /// Something that the residuals may depend on, pose by pose.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,7 +73,7 @@ impl FitResidual<'_> {
     /// A residual far below a declared σ is rounding.
     pub(super) fn above_rounding(&self) -> Result<(), Untestable> {
         let size = self.residual.norm_squared() / self.residual.len().max(1) as f64;
-        let is_rounding = self.sigma_is_declared && size < SelectionRules::DEFAULT.rounding.powi(2);
+        let is_rounding = self.sigma_is_declared && size < ROUNDING.powi(2);
         if is_rounding { Err(Untestable::Rounding) } else { Ok(()) }
     }
 }

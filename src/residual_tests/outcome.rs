@@ -2,8 +2,8 @@
 
 use std::fmt;
 
+use super::covariate::Covariate;
 use crate::error::Location;
-use crate::select::covariate::Covariate;
 
 /// An order of the poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

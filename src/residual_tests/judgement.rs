@@ -2,10 +2,6 @@
 
 use super::chance::Chance;
 use super::outcome::{Findings, Outcome, ResidualTest, Test, Untestable};
-use crate::select::rules::SelectionRules;
-
-/// Probability that noise alone makes any test fail.
-pub(super) const ALPHA: f64 = SelectionRules::DEFAULT.level;
 
 /// A test, and what it found before others are considered.
 pub(super) struct Tried {
@@ -27,7 +23,7 @@ pub(super) struct Trial {
 
 /// Holm's procedure: the smallest of m p-values fails below α / m, the next below α / (m − 1),
 /// until one does not [Holm 1979].
-pub(super) fn judge(tried: Vec<Tried>, outliers: Vec<usize>) -> Findings {
+pub(super) fn judge(tried: Vec<Tried>, family_level: f64, outliers: Vec<usize>) -> Findings {
     let p_value = |tried: &Tried| {
         tried.trial.as_ref().ok().map(|trial| trial.chance.p_value(trial.statistic))
     };
@@ -36,13 +32,13 @@ pub(super) fn judge(tried: Vec<Tried>, outliers: Vec<usize>) -> Findings {
     ranked.sort_by(|&a, &b| {
         p_values[a].partial_cmp(&p_values[b]).unwrap_or(std::cmp::Ordering::Equal)
     });
-    let mut levels = vec![ALPHA; tried.len()];
+    let mut levels = vec![family_level; tried.len()];
     let mut failed = vec![false; tried.len()];
-    let mut level = ALPHA;
+    let mut level = family_level;
     let mut stopped = false;
     for (rank, &k) in ranked.iter().enumerate() {
         if !stopped {
-            level = ALPHA / (ranked.len() - rank) as f64;
+            level = family_level / (ranked.len() - rank) as f64;
             failed[k] = p_values[k].is_some_and(|p| p <= level);
             stopped = !failed[k];
         }

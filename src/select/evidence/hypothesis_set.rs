@@ -5,7 +5,7 @@ use crate::problem::Effect;
 
 /// Hypotheses that may be at work together.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Explanation {
+pub struct HypothesisSet {
     /// Which; none: what is left is noise.
     pub hypotheses: Vec<Hypothesis>,
     /// Its probability among all explanations that were looked at.
@@ -14,7 +14,7 @@ pub struct Explanation {
     pub(super) functions: Vec<(usize, f64)>,
 }
 
-impl Explanation {
+impl HypothesisSet {
     /// Its effects.
     pub fn effects(&self) -> Vec<Effect> {
         self.hypotheses.iter().filter_map(Hypothesis::effect).cloned().collect()

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::fit_residual::{CovariateValues, FitResidual};
-use super::judgement::{ALPHA, Trial, Tried, judge};
+use super::judgement::{Trial, Tried, judge};
 use super::leverage::{Kept, Leverage};
 use super::outcome::{Findings, Sequence, Test, Untestable};
 use super::outliers;
@@ -11,14 +11,15 @@ use super::permutation;
 use super::size;
 use super::statistic::{Cumulative, Sample, Statistic, sequences};
 
-/// Tests what a fit leaves; `seed` draws the permutations.
+/// Tests the residual of a fit. `level` is the probability that noise alone makes any test fail;
+/// `seed` seeds the permutations.
 ///
 /// The tests come in a fixed order: χ², lack of fit, runs and Ljung–Box in the order of time (and
 /// of the rows, where that is another), each covariate, outliers, normality. Outliers are left out
 /// of all but these last two, with their pull on the fit undone. The judgement is Holm's over all
-/// tests at the family-wise level 0.01; outliers and normality take part in it, but are not
+/// tests at that level; outliers and normality take part in it, but are not
 /// structure, since no effect explains them.
-pub fn test_residual(fit: &FitResidual, seed: u64) -> Findings {
+pub fn test_residual(fit: &FitResidual, level: f64, seed: u64) -> Findings {
     let poses = fit.residual.len() / 3;
     let leverage = match fit
         .testable()
@@ -31,18 +32,18 @@ pub fn test_residual(fit: &FitResidual, seed: u64) -> Findings {
         .and_then(|all| fit.above_rounding().map(|()| all))
     {
         Ok(leverage) => leverage,
-        Err(why) => return judge(all_untestable(fit, &why), Vec::new()),
+        Err(why) => return judge(all_untestable(fit, &why), level, Vec::new()),
     };
     let studentised = leverage.studentise(fit.residual.as_slice());
     // At most so many tests: what is left out fails in the judgement, too.
     let most = fit.covariates.len() + 8;
-    let found = outliers::find(fit, &leverage, ALPHA / most as f64);
+    let found = outliers::find(fit, &leverage, level / most as f64);
     let kept = found.kept.unwrap_or_else(|| Kept::all(fit, leverage));
     let mut tried = vec![size::reduced_chi_squared(fit, &kept), size::lack_of_fit(fit, &kept)];
     tried.extend(permuted(fit, &kept, seed));
     tried.push(found.tried);
     tried.push(size::anderson_darling(&studentised));
-    judge(tried, (0..poses).filter(|pose| kept.poses.binary_search(pose).is_err()).collect())
+    judge(tried, level, (0..poses).filter(|pose| kept.poses.binary_search(pose).is_err()).collect())
 }
 
 /// The tests of order and dependence.

@@ -8,10 +8,12 @@ use rayon::prelude::*;
 use super::fit_residual::FitResidual;
 use super::outcome::Untestable;
 use crate::numeric::{gram, lower_factor, multiply_by_upper};
-use crate::select::neighbourhood::LEAST_DECIDED;
 
 /// Degrees of freedom below which nothing is tested.
 const LEAST_FREEDOM: f64 = 4.0;
+/// Smallest part of the length² of a direction that the kept poses must have for the fit without the
+/// other poses to be defined.
+const LEAST_DECIDED: f64 = 1e-6;
 /// Directions of a pose that keep less than this part of their variance say nothing.
 const LEAST_LEFT: f64 = 1e-4;
 /// Directions that priors decide by less than this part count as decided by the data.
