@@ -6,8 +6,8 @@ use std::time::Instant;
 use argmin::core::observers::Observe;
 use flexcal::fit::SolverChoice;
 use flexcal::least_squares::solver::{
-    Bounds, GaussNewtonSettings, Inequalities, PseudoInverseSettings, Solution, State, Within,
-    minimise, minimise_gauss_newton, minimise_pseudo_inverse, minimise_within,
+    BoundMethod, Bounds, GaussNewtonSettings, Inequalities, PseudoInverseSettings, Solution, State,
+    minimise, minimise_constrained_by, minimise_gauss_newton, minimise_pseudo_inverse,
 };
 use flexcal::least_squares::{LeastSquares as _, Loss};
 use nalgebra::DVector;
@@ -21,7 +21,7 @@ use crate::watched::Watched;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     LevenbergMarquardt,
-    Bounded(Within),
+    Bounded(BoundMethod),
     GaussNewton,
     PseudoInverse,
     TrustRegion,
@@ -68,10 +68,10 @@ impl From<Solution> for End {
 impl Method {
     pub const EACH: [Self; 11] = [
         Self::LevenbergMarquardt,
-        Self::Bounded(Within::ActiveSet),
-        Self::Bounded(Within::InteriorPoint),
-        Self::Bounded(Within::Reflective),
-        Self::Bounded(Within::Clamped),
+        Self::Bounded(BoundMethod::ActiveSet),
+        Self::Bounded(BoundMethod::InteriorPoint),
+        Self::Bounded(BoundMethod::Reflective),
+        Self::Bounded(BoundMethod::Clamped),
         Self::GaussNewton,
         Self::PseudoInverse,
         Self::TrustRegion,
@@ -102,10 +102,9 @@ impl Method {
     pub fn tells(self, case: &Case) -> bool {
         let (bounded, boxed) = (case.bounds.is_some(), case.rows.is_none());
         match self {
-            Self::Bounded(Within::ActiveSet) => true,
-            Self::Bounded(Within::Reflective | Within::Clamped) | Self::MinpackClamped => {
-                bounded && boxed
-            }
+            Self::Bounded(BoundMethod::ActiveSet) => true,
+            Self::Bounded(BoundMethod::Reflective | BoundMethod::Clamped)
+            | Self::MinpackClamped => bounded && boxed,
             Self::Bounded(_) => bounded,
             Self::Minpack => case.loss == Loss::Squares,
             _ => true,
@@ -146,8 +145,15 @@ impl Method {
                 let bounds = case.bounds.clone().unwrap_or_else(|| Bounds::none(data.parameters()));
                 let rows =
                     case.rows.clone().unwrap_or_else(|| Inequalities::none(data.parameters()));
-                minimise_within(within, fit, start, (&bounds, &rows), &settings, None::<Silent>)
-                    .into()
+                minimise_constrained_by(
+                    within,
+                    fit,
+                    start,
+                    (&bounds, &rows),
+                    &settings,
+                    None::<Silent>,
+                )
+                .into()
             }
             Self::GaussNewton => {
                 let tolerance =

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use flexcal::fit::{Options, SolverChoice, Strategy, identify};
-use flexcal::least_squares::solver::Within;
+use flexcal::least_squares::solver::BoundMethod;
 use nalgebra::DVector;
 
 use crate::arms::Lunar;
@@ -101,7 +101,8 @@ pub fn sequential(arm: &Lunar) -> Vec<Row> {
         (whole.cost(&found.x), found, seconds)
     };
     let (best, ..) = cost(&joint);
-    let tells = |solver: &SolverChoice| matches!(solver.within(), None | Some(Within::ActiveSet));
+    let tells =
+        |solver: &SolverChoice| matches!(solver.within(), None | Some(BoundMethod::ActiveSet));
     let each: Vec<SolverChoice> = SolverChoice::EACH.into_iter().filter(tells).collect();
     let solve = |k: usize| {
         cost(&Options::default().with_strategy(Strategy::Sequential).with_solver(each[k]))

@@ -146,7 +146,7 @@ impl Base {
             return None;
         }
         let constant = self.projector()?.constant(&step, &gradient);
-        Some(self.triangle().with_residual(&constant, squares / (scale * scale)).times(scale))
+        Some(self.triangle().with_residual(&constant, squares / (scale * scale)).scaled(scale))
     }
 
     fn projector(&self) -> Option<&Projector> {

@@ -57,7 +57,7 @@ impl Memory {
         let found = locked(&self.kept)
             .iter()
             .find(is_known)
-            .map(|(_, known, triangle)| triangle.clone().times(known / unit));
+            .map(|(_, known, triangle)| triangle.clone().scaled(known / unit));
         found.unwrap_or_else(|| {
             let triangle = reduce();
             let mut kept = locked(&self.kept);

@@ -1,4 +1,4 @@
-//! Nonlinear least squares over many small items; knows no arms.
+//! Nonlinear least squares over many small items, independent of robots.
 //!
 //! A problem is a sum over items (poses, data points) of whitened residuals r(x). Solvers never see
 //! the m × n Jacobian: it is reduced, block by block, to the triangular factor of its QR
@@ -10,6 +10,7 @@ mod derivative;
 mod identifiability;
 mod inverse;
 pub(crate) mod kernel;
+mod linear_rows;
 mod loss;
 mod memory;
 mod objective;
@@ -29,36 +30,38 @@ use nalgebra::{DMatrix, DVector};
 pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
 pub(crate) use identifiability::Blind;
 pub use identifiability::{Identifiability, UnidentifiableCombination};
+pub use linear_rows::{LinearRows, RowsError};
 pub use loss::Loss;
 pub use memory::Memory;
-pub use objective::{CHUNK_ITEMS, Fit, LinearRows, RowsError};
+pub use objective::{CHUNK_ITEMS, Fit};
 pub use triangle::Triangle;
 pub use uncertainty::Uncertainty;
 pub use variance::VarianceLikelihood;
-pub use weak::{Steadied, WEAK_BELOW, Weak};
+pub use weak::{StabilisedObjective, WEAK_THRESHOLD, Weak};
 pub use whole::{jacobian, jacobian_and_residual, residual_vector};
 
-/// Unknowns from which on taking derivatives and reducing them is nearly all of the work of a fit.
+/// Number of unknowns from which forming and reducing derivatives takes nearly all the time of a
+/// fit.
 pub(crate) const MANY_UNKNOWNS: usize = 100;
 
-/// Residuals of many small items, and their derivatives.
+/// Least-squares problem given by the residuals of many small items and their derivatives.
 pub trait LeastSquares: Sync {
-    /// Number of unknowns n.
+    /// Returns the number of unknowns n.
     fn parameters(&self) -> usize;
 
-    /// Number of items (poses).
+    /// Returns the number of items (poses).
     fn items(&self) -> usize;
 
-    /// Residuals per item (3 for a position).
+    /// Returns the number of residuals per item (3 for a position).
     fn rows_per_item(&self) -> usize;
 
-    /// Writes the whitened residuals of `items`, item after item; a value that is not finite marks
-    /// x as out of the domain.
+    /// Writes the whitened residuals of `items`, item after item. A value that is not finite marks
+    /// x as outside the domain.
     fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]);
 
     /// Writes the whitened residuals of `items` and their derivatives ∂r/∂x.
     ///
-    /// `block` comes filled with zeros and has exactly the rows of `items`.
+    /// `block` arrives filled with zeros and has exactly the rows of `items`.
     fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block);
 }
 
@@ -71,17 +74,17 @@ pub struct Block {
 }
 
 impl Block {
-    /// A block of zeros with `rows` rows for `parameters` unknowns.
+    /// Creates a block of zeros with `rows` rows for `parameters` unknowns.
     pub fn zeros(rows: usize, parameters: usize) -> Self {
         Self { rows, parameters, values: vec![0.0; rows * (parameters + 1)] }
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Number of unknowns n.
+    /// Returns the number of unknowns n.
     pub fn parameters(&self) -> usize {
         self.parameters
     }
@@ -91,45 +94,44 @@ impl Block {
         self.values.fill(0.0);
     }
 
-    /// Changes the number of rows and sets every value to zero; keeps the memory.
+    /// Changes the number of rows and sets every value to zero; keeps the allocated memory.
     pub fn reshape(&mut self, rows: usize) {
         self.rows = rows;
         self.values.clear();
         self.values.resize(rows * (self.parameters + 1), 0.0);
     }
 
-    /// Derivative of every row with respect to unknown `j`; `j = n` is the residual itself.
+    /// Returns the derivative of every row with respect to unknown `j`; `j = n` is the residual.
     pub fn column(&self, j: usize) -> &[f64] {
         &self.values[j * self.rows..(j + 1) * self.rows]
     }
 
-    /// As [`Block::column`], to write.
+    /// Returns column `j` of the block for writing; `j = n` is the residual.
     pub fn column_mut(&mut self, j: usize) -> &mut [f64] {
         &mut self.values[j * self.rows..(j + 1) * self.rows]
     }
 
-    /// All columns one after another, the residual last.
+    /// Returns all columns one after another, the residual last.
     pub fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values
     }
 }
 
-/// What solvers minimise: ½‖r(x)‖², given by its value and its triangular linearisation.
+/// Function that solvers minimise, ½‖r(x)‖², given by its value and its triangular linearisation.
 pub trait Objective {
-    /// Number of unknowns n.
+    /// Returns the number of unknowns n.
     fn parameters(&self) -> usize;
 
-    /// ½‖r(x)‖² (½Σρ with a robust loss), or infinity outside the domain.
+    /// Returns ½‖r(x)‖² (½Σρ with a robust loss), or infinity outside the domain.
     fn cost(&self, x: &DVector<f64>) -> f64;
 
-    /// The linearised problem min ‖J p + r‖ at x, reduced by an orthogonal transformation.
+    /// Returns the linearised problem min ‖J p + r‖ at x, reduced by an orthogonal transformation.
     fn linearise(&self, x: &DVector<f64>) -> Linearisation;
 
-    /// S = ∂(Jᵀr)/∂x − JᵀJ at x, what the linearised problem leaves out of the second derivatives
-    /// of the cost.
+    /// Returns S = ∂(Jᵀr)/∂x − JᵀJ at x, the part of the Hessian that Gauss–Newton neglects.
     ///
-    /// By differences of the gradient unless an objective knows better; evaluated only where
-    /// `within` allows. Nothing where derivatives are not finite.
+    /// The default implementation differences the gradient at points that `within` accepts. Returns
+    /// `None` if a derivative is not finite.
     fn curvature(
         &self,
         x: &DVector<f64>,
@@ -138,14 +140,16 @@ pub trait Objective {
         by_differences(|x| slopes(self.linearise(x)), x, within)
     }
 
-    /// How far each unknown may plausibly go, where that is known.
-    fn reach(&self) -> Vec<Option<f64>> {
+    /// Returns the plausible size of each unknown, in its unit, where a size is known.
+    fn plausible_sizes(&self) -> Vec<Option<f64>> {
         vec![None; self.parameters()]
     }
 
-    /// Jᵀ r″, r″ the second derivative of r along a step p from x; nothing where it is not known or
-    /// not finite.
-    fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
+    /// Returns Jᵀ r″, where r″ is the second derivative of r along the step p from x.
+    ///
+    /// Steps use it for geodesic acceleration [Transtrum & Sethna 2012]. Returns `None` if it is
+    /// not available or not finite.
+    fn acceleration_gradient(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
         let _ = (x, step);
         None
     }
@@ -172,37 +176,37 @@ impl<O: Objective + ?Sized> Objective for &O {
         (**self).curvature(x, within)
     }
 
-    fn reach(&self) -> Vec<Option<f64>> {
-        (**self).reach()
+    fn plausible_sizes(&self) -> Vec<Option<f64>> {
+        (**self).plausible_sizes()
     }
 
-    fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
-        (**self).bend(x, step)
+    fn acceleration_gradient(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
+        (**self).acceleration_gradient(x, step)
     }
 }
 
-/// J = Q R at one point: ‖J p + r‖² = ‖R p + Qᵀr‖² + rest; rows are weighted where there is a
-/// robust loss.
+/// Linearised problem at one point: J = Q R, so that ‖J p + r‖² = ‖R p + Qᵀr‖² + constant. A robust
+/// loss weights the rows first.
 #[derive(Debug, Clone)]
 pub struct Linearisation {
-    /// ½‖r‖², or ½Σρ.
+    /// Cost ½‖r‖², or ½Σρ with a robust loss.
     pub cost: f64,
-    /// R, upper triangular, n × n.
+    /// Triangular factor R, shape = (n, n).
     pub triangle: DMatrix<f64>,
-    /// The first n entries of Qᵀr.
+    /// First n entries of Qᵀr.
     pub projected: DVector<f64>,
 }
 
 impl Linearisation {
-    /// The same with further rows W p = 0 for the step p, whose cost is left out.
+    /// Adds rows W p = 0 for the step p, shape of `rows` = (k, n); the cost stays unchanged.
     #[must_use]
     pub fn with_rows(self, rows: &DMatrix<f64>) -> Self {
         let n = self.projected.len();
         let mut block = Block::zeros(n + rows.nrows(), n);
         for j in 0..n {
-            let (own, more) = block.column_mut(j).split_at_mut(n);
-            own.copy_from_slice(self.triangle.column(j).as_slice());
-            more.copy_from_slice(rows.column(j).as_slice());
+            let (triangle_part, added_part) = block.column_mut(j).split_at_mut(n);
+            triangle_part.copy_from_slice(self.triangle.column(j).as_slice());
+            added_part.copy_from_slice(rows.column(j).as_slice());
         }
         block.column_mut(n)[..n].copy_from_slice(self.projected.as_slice());
         let mut triangle = Triangle::new(n);
@@ -211,7 +215,7 @@ impl Linearisation {
     }
 }
 
-/// What a linearised problem says of slopes.
+/// Returns the gradient Jᵀr and the Gauss–Newton matrix JᵀJ of a linearised problem.
 fn slopes(Linearisation { cost, triangle, projected }: Linearisation) -> Slopes {
     Slopes { cost, gradient: triangle.tr_mul(&projected), normal: triangle.tr_mul(&triangle) }
 }

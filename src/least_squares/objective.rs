@@ -1,4 +1,4 @@
-//! A problem over many items as a solver sees it: a value and a triangular linearisation.
+//! Objective over many items: its cost and its triangular linearisation, formed chunk by chunk.
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -11,65 +11,33 @@ use super::curvature::by_differences;
 use super::kernel::{dot, sum_of_squares};
 use super::memory::Key;
 use super::{
-    Block, LeastSquares, Linearisation, Loss, MANY_UNKNOWNS, Memory, Objective, Triangle, slopes,
+    Block, LeastSquares, LinearRows, Linearisation, Loss, MANY_UNKNOWNS, Memory, Objective,
+    RowsError, Triangle, slopes,
 };
 
-/// Items reduced together: beyond this many no m × n matrix is kept, only n × n factors.
+/// Number of items reduced together. Larger problems keep only n × n factors, never the m × n
+/// matrix.
 pub const CHUNK_ITEMS: usize = 256;
 
-/// Part of a step over which the second derivative along it is taken.
-const BEND_STEP: f64 = 0.1;
+/// Fraction of a step over which the second derivative along the step is differenced.
+const ACCELERATION_STEP: f64 = 0.1;
 
-/// Rows, over the number of unknowns, that are absorbed chunk after chunk before factors are
-/// merged: merging two costs as much as absorbing half as many rows as there are unknowns.
+/// Rows per unknown that are absorbed one chunk after the other before factors are merged. Merging
+/// two factors costs as much as absorbing n/2 rows.
 const ROWS_PER_UNKNOWN: usize = 4;
 
-/// Chunks whose results exist at the same time.
+/// Number of chunks whose results exist at the same time.
 const GROUP_CHUNKS: usize = 64;
 
-/// Numbers up to which derivatives of all data are kept in passing, where unknowns are many: 128
-/// MB.
-const MOST_KEPT: usize = 1 << 24;
+/// Largest number of derivatives that a provisional fit keeps for later points: 128 MB.
+const MAX_KEPT_DERIVATIVES: usize = 1 << 24;
 
-/// Linear residual rows r = A x + b beside the data: priors, gauge conditions.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LinearRows {
-    /// A, k × n.
-    pub matrix: DMatrix<f64>,
-    /// b, k entries.
-    pub constant: DVector<f64>,
-}
-
-/// Linear rows that do not fit their problem.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum RowsError {
-    /// The matrix has another number of columns than the problem has unknowns.
-    #[error(
-        "adding linear rows: the matrix has {columns} columns, the problem {parameters} unknowns"
-    )]
-    Columns {
-        /// Columns of the matrix.
-        columns: usize,
-        /// Unknowns of the problem.
-        parameters: usize,
-    },
-    /// Matrix and constant differ in their number of rows.
-    #[error("adding linear rows: the matrix has {matrix} rows, the constant {constant}")]
-    Rows {
-        /// Rows of the matrix.
-        matrix: usize,
-        /// Entries of the constant.
-        constant: usize,
-    },
-}
-
-/// A data problem with optional linear rows, ready for a solver.
+/// Data problem with optional linear rows, ready for a solver.
 ///
-/// Items are walked in chunks of [`CHUNK_ITEMS`]; each chunk, or each few of them where unknowns
-/// are many, is reduced to its own [`Triangle`], and these are merged in order, or two by two where
-/// that is work, always the same ones, so that the result is the same to the bit for any number of
-/// threads. One chunk alone never leaves its thread.
+/// Items are processed in chunks of [`CHUNK_ITEMS`]. Each chunk, or each run of chunks if there are
+/// many unknowns, is reduced to a [`Triangle`]. The triangles are merged in an order that does not
+/// depend on the number of threads, so results are reproducible to the bit. A single chunk stays on
+/// the calling thread.
 #[derive(Debug, Clone)]
 pub struct Fit<'a, P> {
     problem: &'a P,
@@ -79,30 +47,30 @@ pub struct Fit<'a, P> {
 }
 
 impl<'a, P: LeastSquares> Fit<'a, P> {
-    /// The data problem alone.
+    /// Creates the objective of the data alone, with squared loss.
     pub fn new(problem: &'a P) -> Self {
         Self { problem, rows: Vec::new(), loss: Loss::Squares, memory: None }
     }
 
-    /// Counts the residual of every item by `loss`; linear rows keep their squares.
+    /// Replaces the loss of the items; linear rows keep their squares.
     #[must_use]
     pub fn with_loss(mut self, loss: Loss) -> Self {
         self.loss = loss;
         self
     }
 
-    /// Keeps linearisations in `memory`, and takes those that are there; `data` tells the problem
-    /// from others that share it, but for the `unit` that its residuals are counted in.
+    /// Stores linearisations in `memory` and reuses those stored there. `data` identifies the data
+    /// of the problem, apart from the `unit` of its residuals.
     #[must_use]
     pub fn remembering(mut self, memory: &'a Memory, data: u64, unit: f64) -> Self {
         self.memory = Some((memory, data, unit));
         self
     }
 
-    /// Adds linear rows.
+    /// Adds the squared residuals of linear rows to the cost.
     ///
     /// # Errors
-    /// When the rows do not have one column per unknown, or not one constant per row.
+    /// Returns an error if the rows do not have one column per unknown and one constant per row.
     pub fn with_rows(mut self, rows: LinearRows) -> Result<Self, RowsError> {
         let (matrix, columns) = rows.matrix.shape();
         let parameters = self.problem.parameters();
@@ -116,7 +84,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         Ok(self)
     }
 
-    /// The data problem.
+    /// Returns the data problem.
     pub fn problem(&self) -> &'a P {
         self.problem
     }
@@ -142,20 +110,20 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         self.loss.sum(out, self.problem.rows_per_item())
     }
 
-    /// Chunks that are absorbed one after the other.
+    /// Returns the number of chunks that one thread absorbs in sequence.
     fn run_length(&self) -> usize {
         let rows = CHUNK_ITEMS * self.problem.rows_per_item().max(1);
         (ROWS_PER_UNKNOWN * self.problem.parameters()).div_ceil(rows).max(1)
     }
 
-    /// Fills a block with a chunk's residuals and their derivatives at x.
+    /// Fills a block with the residuals of chunk `index` and their derivatives at x.
     fn fill(&self, x: &DVector<f64>, index: usize, block: &mut Block) {
         let items = self.chunk(index);
         block.reshape(items.len() * self.problem.rows_per_item());
         self.problem.linearise(x, items, block);
     }
 
-    /// The factor of a run of chunks, each filled by `fill`.
+    /// Returns the triangular factor of a run of chunks, each written by `fill`.
     fn run_triangle(
         &self,
         fill: &impl Fn(usize, &mut Block),
@@ -175,16 +143,18 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         triangle
     }
 
-    /// The factor of all data at x.
+    /// Returns the triangular factor of all data at x.
     fn reduce(&self, x: &DVector<f64>) -> Triangle {
         self.reduce_by(&|index, block: &mut Block| self.fill(x, index, block))
     }
 
-    /// The factor of all chunks, each filled by `fill`: of few unknowns, whose factors are merged
-    /// in no time, chunk by chunk in order.
+    /// Returns the triangular factor of all chunks, each written by `fill`.
+    ///
+    /// With few unknowns, merging is cheap and chunks are merged one by one in order; otherwise
+    /// [`Fit::reduce_halves`] merges them pairwise.
     fn reduce_by(&self, fill: &(impl Fn(usize, &mut Block) + Sync)) -> Triangle {
         if self.run_length() > 1 {
-            return self.halves(fill, 0..self.chunks(), &Mutex::default());
+            return self.reduce_halves(fill, 0..self.chunks(), &Mutex::default());
         }
         let mut total: Option<Triangle> = None;
         let map = |index, block: &mut Block| self.run_triangle(fill, index..index + 1, block);
@@ -196,9 +166,9 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         total.unwrap_or_else(|| Triangle::new(self.problem.parameters()))
     }
 
-    /// The factor of some chunks: of a run, or of two halves, each on a thread of its own; `spare`
-    /// are blocks to use again.
-    fn halves(
+    /// Returns the triangular factor of a range of chunks by bisection, the halves in parallel.
+    /// `spare` holds blocks for reuse.
+    fn reduce_halves(
         &self,
         fill: &(impl Fn(usize, &mut Block) + Sync),
         chunks: Range<usize>,
@@ -206,22 +176,22 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     ) -> Triangle {
         if chunks.len() <= self.run_length() {
             let spare = || spare.lock().unwrap_or_else(PoisonError::into_inner);
-            let kept = spare().pop();
-            let mut block = kept.unwrap_or_else(|| self.empty_block());
+            let reused = spare().pop();
+            let mut block = reused.unwrap_or_else(|| self.empty_block());
             let triangle = self.run_triangle(fill, chunks, &mut block);
             spare().push(block);
             return triangle;
         }
         let middle = chunks.start + chunks.len() / 2;
-        let half = |chunks| move || self.halves(fill, chunks, spare);
+        let half = |chunks| move || self.reduce_halves(fill, chunks, spare);
         let (mut first, second) = rayon::join(half(chunks.start..middle), half(middle..chunks.end));
         first.merge(&second);
         first
     }
 
-    /// The factor of all data at x, in passing by the derivatives of an earlier point where these
-    /// serve.
-    fn factor(&self, x: &DVector<f64>) -> Triangle {
+    /// Returns the triangular factor of all data at x. A provisional fit takes it from the
+    /// derivatives of an earlier point where these are accurate enough.
+    fn triangle_at(&self, x: &DVector<f64>) -> Triangle {
         let Some((memory, data, unit)) = self.memory else { return self.reduce(x) };
         memory.recall(&Key { data, loss: self.loss, x: x.clone() }, unit, || {
             if !(memory.is_in_passing() && self.keeps_derivatives()) {
@@ -239,7 +209,7 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         })
     }
 
-    /// Residuals and derivatives of all data at x, and their factor.
+    /// Returns residuals and derivatives of all data at x together with their triangular factor.
     fn base(&self, x: &DVector<f64>, key: (u64, f64)) -> Base {
         let chunk = |index| {
             let mut block = Block::zeros(0, self.problem.parameters());
@@ -252,16 +222,16 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         Base::new(x, key, chunks, triangle)
     }
 
-    /// Whether derivatives of all data may be kept: those of squares and of many unknowns, of which
-    /// they take the time, and of no more data than memory has room for.
+    /// Returns true if a provisional fit may keep the derivatives of all data: squared loss, many
+    /// unknowns, and no more than [`MAX_KEPT_DERIVATIVES`] numbers.
     fn keeps_derivatives(&self) -> bool {
         let (n, rows) =
             (self.problem.parameters(), self.problem.items() * self.problem.rows_per_item());
-        self.loss == Loss::Squares && n >= MANY_UNKNOWNS && rows * n <= MOST_KEPT
+        self.loss == Loss::Squares && n >= MANY_UNKNOWNS && rows * n <= MAX_KEPT_DERIVATIVES
     }
 
-    /// Jᵀ r″ of a chunk, r″ = 2 (r(x + h p) − r − h J p) / h².
-    fn chunk_bend(
+    /// Returns Jᵀ r″ of one chunk with r″ = 2 (r(x + h p) − r − h J p) / h².
+    fn chunk_acceleration_gradient(
         &self,
         (x, step): (&DVector<f64>, &DVector<f64>),
         index: usize,
@@ -270,19 +240,20 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         self.fill(x, index, block);
         let n = block.parameters();
         let mut moved = vec![0.0; block.rows()];
-        self.problem.residuals(&(x + BEND_STEP * step), self.chunk(index), &mut moved);
+        self.problem.residuals(&(x + ACCELERATION_STEP * step), self.chunk(index), &mut moved);
         for (i, moved) in moved.iter_mut().enumerate() {
-            let straight: f64 = (0..n).map(|j| block.column(j)[i] * step[j]).sum();
-            *moved = 2.0 * ((*moved - block.column(n)[i]) / BEND_STEP - straight) / BEND_STEP;
+            let linear: f64 = (0..n).map(|j| block.column(j)[i] * step[j]).sum();
+            *moved = 2.0 * ((*moved - block.column(n)[i]) / ACCELERATION_STEP - linear)
+                / ACCELERATION_STEP;
         }
         let weights = self.loss.weights(block.column(n), self.problem.rows_per_item());
-        moved.iter_mut().zip(&weights).for_each(|(bend, weight)| *bend *= weight);
+        moved.iter_mut().zip(&weights).for_each(|(second, weight)| *second *= weight);
         DVector::from_fn(n, |j, _| dot(block.column(j), &moved))
     }
 }
 
-/// Maps every one of `count` chunks, in parallel when there are several, and hands the results on
-/// in order.
+/// Applies `map` to each of `count` chunks, in parallel if there are several, and passes the
+/// results to `take` in order.
 fn in_order<B, T: Send>(
     count: usize,
     buffer: impl Fn() -> B + Sync + Send,
@@ -319,16 +290,16 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
     }
 
     fn linearise(&self, x: &DVector<f64>) -> Linearisation {
-        let mut total = self.factor(x);
+        let mut total = self.triangle_at(x);
         for rows in &self.rows {
-            total.absorb_rows(&mut linear_block(rows, x));
+            total.absorb_rows(&mut rows.block(x));
         }
         let mut linearisation = total.into_linearisation();
         linearisation.cost = half_if_finite(2.0 * linearisation.cost);
         linearisation
     }
 
-    /// By differences of the gradients of each point itself.
+    /// Differences gradients at exact linearisations, without the memory of earlier points.
     fn curvature(
         &self,
         x: &DVector<f64>,
@@ -339,43 +310,37 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
         by_differences(|x| slopes(plain.linearise(x)), x, within)
     }
 
-    /// 1 σ of the prior of each unknown that has one: a linear row a x + b of it alone, σ = 1/|a|.
-    fn reach(&self) -> Vec<Option<f64>> {
-        let mut reach = vec![None; self.parameters()];
+    /// Returns 1 σ of the prior of each unknown that has one: a row a x + b of this unknown alone
+    /// has σ = 1/|a|.
+    fn plausible_sizes(&self) -> Vec<Option<f64>> {
+        let mut sizes = vec![None; self.parameters()];
         for row in self.rows.iter().flat_map(|rows| rows.matrix.row_iter()) {
             let mut entries = row.iter().enumerate().filter(|(_, value)| **value != 0.0);
             if let (Some((j, value)), None) = (entries.next(), entries.next()) {
-                reach[j] = Some(value.abs().recip());
+                sizes[j] = Some(value.abs().recip());
             }
         }
-        reach
+        sizes
     }
 
-    fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
-        // In passing a further step costs less.
+    fn acceleration_gradient(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
+        // In a provisional fit one more step costs less than an acceleration.
         if self.memory.is_some_and(|(memory, ..)| memory.is_in_passing())
             && self.keeps_derivatives()
         {
             return None;
         }
         let mut total = DVector::zeros(x.len());
-        let map = |index, block: &mut Block| self.chunk_bend((x, step), index, block);
-        in_order(self.chunks(), || self.empty_block(), map, |bend| total += bend);
+        let map =
+            |index, block: &mut Block| self.chunk_acceleration_gradient((x, step), index, block);
+        in_order(self.chunks(), || self.empty_block(), map, |chunk| total += chunk);
         total.iter().all(|value| value.is_finite()).then_some(total)
     }
 }
 
-/// ½‖r‖², or infinity when a residual is not finite.
+/// Returns half the sum of squares, or infinity if it is not finite.
 fn half_if_finite(squares: f64) -> f64 {
     if squares.is_finite() { 0.5 * squares } else { f64::INFINITY }
-}
-
-fn linear_block(rows: &LinearRows, x: &DVector<f64>) -> Block {
-    let (k, n) = rows.matrix.shape();
-    let mut block = Block::zeros(k, n);
-    block.values[..k * n].copy_from_slice(rows.matrix.as_slice());
-    block.values[k * n..].copy_from_slice((&rows.matrix * x + &rows.constant).as_slice());
-    block
 }
 
 #[cfg(test)]
@@ -385,8 +350,7 @@ mod tests {
     use super::*;
     use crate::least_squares::{jacobian, residual_vector};
 
-    /// A straight line through many points, which remembers the largest part of them that was asked
-    /// for at once.
+    /// Straight line through many points; records the largest number of points requested at once.
     struct Line {
         points: usize,
         largest: AtomicUsize,
@@ -434,32 +398,35 @@ mod tests {
     fn what_is_remembered_is_not_asked_for_again() {
         let line = Line { points: 500, largest: AtomicUsize::new(0) };
         let memory = Memory::default();
-        let (x, other) = (DVector::from_vec(vec![0.5, 1e-3]), DVector::from_vec(vec![0.5, 2e-3]));
+        let (x, shifted) = (DVector::from_vec(vec![0.5, 1e-3]), DVector::from_vec(vec![0.5, 2e-3]));
         let robust = Loss::Huber { threshold: 1.0 };
         let asked = |x: &DVector<f64>, loss: Loss, data: u64| {
             let fit = Fit::new(&line).with_loss(loss);
             let plain = fit.linearise(x);
             assert!((fit.cost(x) / plain.cost - 1.0).abs() < 1e-12);
             line.largest.store(0, Ordering::Relaxed);
-            let found = fit.remembering(&memory, data, 1.0).linearise(x);
-            assert_eq!((plain.triangle, plain.projected), (found.triangle, found.projected));
+            let remembered = fit.remembering(&memory, data, 1.0).linearise(x);
+            assert_eq!(
+                (plain.triangle, plain.projected),
+                (remembered.triangle, remembered.projected)
+            );
             line.largest.load(Ordering::Relaxed) > 0
         };
-        // The last two are kept, and the first of the same data; asked of anything else, the data
-        // are reduced.
+        // The last two points and the first one of the same data are kept; anything else is reduced
+        // again.
         assert!(asked(&x, Loss::Squares, 1));
         assert!(
             !asked(&x, Loss::Squares, 1) && asked(&x, robust, 1) && !asked(&x, Loss::Squares, 1)
         );
         assert!(
             asked(&x, Loss::Squares, 2)
-                && asked(&other, Loss::Squares, 1)
+                && asked(&shifted, Loss::Squares, 1)
                 && !asked(&x, Loss::Squares, 1)
         );
         assert!(asked(&x, Loss::Squares, 2));
     }
 
-    /// A curve through many points whose first two unknowns do the same, in some unit.
+    /// Curve through many points with two exchangeable unknowns and residuals in some unit.
     struct Curve {
         unit: f64,
     }
@@ -512,7 +479,7 @@ mod tests {
                     < 1e-6 * gradient.norm()
             );
             assert!((2.0 * there.cost / residual.norm_squared() - 1.0).abs() < 1e-12);
-            // Of what two unknowns do alike nothing runs off.
+            // The two exchangeable unknowns do not diverge against each other.
             assert!(there.projected.norm_squared() < residual.norm_squared());
         }
         assert!(base.at(&curve, &(&start * 3.0), 0.1).is_none());

@@ -1,5 +1,5 @@
-//! Singular values by one-sided Jacobi rotations: slow for large matrices, exact and never failing
-//! for ours.
+//! Singular values by one-sided Jacobi rotations: accurate and always convergent, slow for large
+//! matrices.
 
 use multiversion::multiversion;
 use nalgebra::{DMatrix, DVector};
@@ -7,37 +7,37 @@ use rayon::prelude::*;
 
 use super::kernel::dot;
 
-/// Sweeps over all pairs of columns; five are usual.
-const SWEEPS: usize = 60;
-/// Columns that one thread rotates against as many others at a time, and how many there must be for
-/// that: fewer are one thread's.
-const TOGETHER: usize = 32;
-const WORTH_THREADS: usize = 4 * TOGETHER;
+/// Maximum number of sweeps over all pairs of columns; five are usual.
+const MAX_SWEEPS: usize = 60;
+/// Number of columns in a group whose rotations one thread performs.
+const GROUP_COLUMNS: usize = 32;
+/// Number of columns from which they are split into groups; fewer are rotated on one thread.
+const MIN_PARALLEL_COLUMNS: usize = 4 * GROUP_COLUMNS;
 
-/// B = U Σ Vᵀ, with what U makes of a constant c; in no order.
+/// Singular value decomposition B = U Σ Vᵀ with the projection Uᵀc of a constant c; in no order.
 #[derive(Debug, Clone)]
 pub(super) struct Decomposition {
-    /// σᵢ vᵢ as columns.
+    /// Scaled right singular vectors σᵢ vᵢ as columns.
     pub columns: DMatrix<f64>,
-    /// σᵢ.
+    /// Singular values σᵢ.
     pub singular: Vec<f64>,
-    /// `uᵢᵀc`.
+    /// Projections `uᵢᵀc` of the constant.
     pub projected: DVector<f64>,
 }
 
 impl Decomposition {
-    /// Of B and c; without `constant` nothing is projected.
+    /// Decomposes B and projects c; without `constant` nothing is projected.
     ///
-    /// B P = Q R by column-pivoted QR; the columns of Rᵀ are then rotated until orthogonal: they
-    /// become σᵢ Pᵀvᵢ, and the same rotations turn Qᵀc into Uᵀc.
-    /// [Hestenes 1958; Drmač & Veselić 2008]
+    /// B P = Q R by column-pivoted QR. The columns of Rᵀ are rotated until they are orthogonal:
+    /// they become σᵢ Pᵀvᵢ, and the same rotations turn Qᵀc into Uᵀc. [Hestenes 1958; Drmač &
+    /// Veselić 2008]
     ///
-    /// The last rows of R, all together shorter than `cut`·σ₁/8, are left out before: they add no
-    /// more than the square of that to any σ², and would be the slowest to rotate.
+    /// The last rows of R whose joint norm is below `cut`·σ₁/8 are dropped first. They change each
+    /// σ² by at most the square of that norm and would converge slowest.
     pub fn new(matrix: &DMatrix<f64>, constant: Option<&DVector<f64>>, cut: f64) -> Self {
         let qr = matrix.clone().col_piv_qr();
         let triangle = qr.r();
-        // No row from k on is longer than √n |Rₖₖ|.
+        // No row from index k on is longer than √n |Rₖₖ|.
         let least = cut / (8.0 * matrix.ncols() as f64)
             * triangle.get((0, 0)).map_or(0.0, |first| first.abs());
         let rank = (0..triangle.nrows()).take_while(|&k| triangle[(k, k)].abs() > least).count();
@@ -55,17 +55,17 @@ impl Decomposition {
     }
 }
 
-/// Singular values of a matrix and the directions that belong to them.
+/// Singular values of a matrix with their right singular vectors, sorted.
 #[derive(Debug, Clone)]
 pub(super) struct SingularValues {
-    /// σ, largest first, n of them.
+    /// Singular values σ in descending order, length n.
     pub values: Vec<f64>,
-    /// Right singular vectors as columns, n × n; zero where σ is zero.
+    /// Right singular vectors as columns, shape = (n, n); zero where σ is zero.
     pub right: DMatrix<f64>,
 }
 
 impl SingularValues {
-    /// Of a matrix with at least as many rows as columns.
+    /// Decomposes a matrix with at least as many rows as columns.
     pub fn of(matrix: &DMatrix<f64>) -> Self {
         let n = matrix.ncols();
         let Decomposition { columns, singular, .. } = Decomposition::new(matrix, None, 0.0);
@@ -80,66 +80,66 @@ impl SingularValues {
     }
 }
 
-/// Rotates pairs of columns until all are orthogonal, and the entries of `projected` with them.
+/// Rotates pairs of columns until all are orthogonal, together with the entries of `projected`.
 fn orthogonalise(columns: &mut DMatrix<f64>, projected: &mut DVector<f64>) {
     let (rows, n) = columns.shape();
     if rows == 0 {
         return;
     }
-    let together = if n < WORTH_THREADS { n.max(1) } else { TOGETHER };
-    let parts =
-        columns.as_slice().chunks(together * rows).zip(projected.as_slice().chunks(together));
-    let mut parts: Vec<Part> =
-        parts.map(|(entries, projected)| Part::new(rows, entries, projected)).collect();
-    if parts.len() > 1 && parts.len() % 2 == 1 {
-        parts.push(Part::new(rows, &[], &[]));
+    let size = if n < MIN_PARALLEL_COLUMNS { n.max(1) } else { GROUP_COLUMNS };
+    let parts = columns.as_slice().chunks(size * rows).zip(projected.as_slice().chunks(size));
+    let mut groups: Vec<ColumnGroup> =
+        parts.map(|(entries, projected)| ColumnGroup::new(rows, entries, projected)).collect();
+    if groups.len() > 1 && groups.len() % 2 == 1 {
+        groups.push(ColumnGroup::new(rows, &[], &[]));
     }
-    for _ in 0..SWEEPS {
-        if !sweep(&mut parts) {
+    for _ in 0..MAX_SWEEPS {
+        if !sweep(&mut groups) {
             break;
         }
     }
-    for (part, (entries, projected)) in parts.iter().zip(
+    for (group, (entries, projected)) in groups.iter().zip(
         columns
             .as_mut_slice()
-            .chunks_mut(together * rows)
-            .zip(projected.as_mut_slice().chunks_mut(together)),
+            .chunks_mut(size * rows)
+            .zip(projected.as_mut_slice().chunks_mut(size)),
     ) {
-        entries.copy_from_slice(&part.entries);
-        projected.copy_from_slice(&part.projected);
+        entries.copy_from_slice(&group.entries);
+        projected.copy_from_slice(&group.projected);
     }
 }
 
-/// Every pair of columns once, whether any was rotated. Parts meet as in a tournament: in each
-/// round every one meets another, on whatever thread, so that results are the same for any number
-/// of them.
-fn sweep(parts: &mut [Part]) -> bool {
-    parts.par_iter_mut().for_each(Part::measure);
+/// Rotates every pair of columns once and returns true if any pair was not yet orthogonal.
+///
+/// Groups meet as in a round-robin tournament, so the order of rotations, and with it the result,
+/// does not depend on the number of threads.
+fn sweep(groups: &mut [ColumnGroup]) -> bool {
+    groups.par_iter_mut().for_each(ColumnGroup::update_squares);
     let mut rotated =
-        parts.par_iter_mut().map(Part::among_themselves).reduce(|| false, |a, b| a | b);
-    for _ in 1..parts.len() {
-        let (near, far) = parts.split_at_mut(parts.len() / 2);
-        let pairs = near.par_iter_mut().zip(far.par_iter_mut().rev());
-        rotated |= pairs.map(|(a, b)| a.against(b)).reduce(|| false, |a, b| a | b);
-        parts[1..].rotate_right(1);
+        groups.par_iter_mut().map(ColumnGroup::rotate_within).reduce(|| false, |a, b| a | b);
+    for _ in 1..groups.len() {
+        let (first, second) = groups.split_at_mut(groups.len() / 2);
+        let pairs = first.par_iter_mut().zip(second.par_iter_mut().rev());
+        rotated |= pairs.map(|(a, b)| a.rotate_with(b)).reduce(|| false, |a, b| a | b);
+        groups[1..].rotate_right(1);
     }
     rotated
 }
 
-/// Some of the columns.
-struct Part {
+/// Group of columns with their squared norms and projections.
+struct ColumnGroup {
     rows: usize,
-    /// One column after the other.
+    /// Entries of the columns, one column after the other.
     entries: Vec<f64>,
-    /// The square of each.
+    /// Squared norm of each column.
     squares: Vec<f64>,
     projected: Vec<f64>,
 }
 
-/// A column, its square and its entry of what is projected.
+/// One column, its squared norm and its entry of the projected constant.
 type Column<'a> = (&'a mut [f64], &'a mut f64, &'a mut f64);
 
-impl Part {
+impl ColumnGroup {
     fn new(rows: usize, entries: &[f64], projected: &[f64]) -> Self {
         Self {
             rows,
@@ -149,8 +149,8 @@ impl Part {
         }
     }
 
-    /// Forms the squares anew.
-    fn measure(&mut self) {
+    /// Computes the squared norms from the columns.
+    fn update_squares(&mut self) {
         let columns = self.entries.chunks_exact(self.rows);
         self.squares
             .iter_mut()
@@ -166,34 +166,36 @@ impl Part {
             .map(|(column, (square, entry))| (column, square, entry))
     }
 
-    /// Rotates every pair of its columns.
-    fn among_themselves(&mut self) -> bool {
+    /// Rotates every pair of columns of the group; returns true if any rotation was needed.
+    fn rotate_within(&mut self) -> bool {
         let mut columns: Vec<Column> = self.columns().collect();
         let mut rotated = false;
-        let mut left = columns.as_mut_slice();
-        while let [own, others @ ..] = left {
+        let mut remaining = columns.as_mut_slice();
+        while let [first, others @ ..] = remaining {
             for other in &mut *others {
-                rotated |= rotate(own, other);
+                rotated |= rotate(first, other);
             }
-            left = others;
+            remaining = others;
         }
         rotated
     }
 
-    /// Rotates each of its columns with each of those of `other`.
-    fn against(&mut self, other: &mut Self) -> bool {
+    /// Rotates each column of the group with each column of `other`; returns true if any rotation
+    /// was needed.
+    fn rotate_with(&mut self, other: &mut Self) -> bool {
         let mut others: Vec<Column> = other.columns().collect();
         let mut rotated = false;
-        for mut own in self.columns() {
+        for mut column in self.columns() {
             for other in &mut others {
-                rotated |= rotate(&mut own, other);
+                rotated |= rotate(&mut column, other);
             }
         }
         rotated
     }
 }
 
-/// Makes two columns orthogonal, unless they are to within rounding.
+/// Rotates two columns so that they become orthogonal; returns false if they already are, within
+/// rounding.
 #[multiversion(targets("x86_64+avx2"))]
 fn rotate((a, aa, ca): &mut Column, (b, bb, cb): &mut Column) -> bool {
     let product = dot(a, b);
@@ -212,14 +214,15 @@ fn rotate((a, aa, ca): &mut Column, (b, bb, cb): &mut Column) -> bool {
     true
 }
 
-/// Cosine and tangent of the rotation that makes a and b orthogonal, from `aᵀa`, `bᵀb` and `aᵀb`.
+/// Returns cosine and tangent of the rotation that makes a and b orthogonal, from `aᵀa`, `bᵀb` and
+/// `aᵀb`.
 fn rotation(aa: f64, bb: f64, ab: f64) -> (f64, f64) {
     let zeta = (bb - aa) / (2.0 * ab);
     let tangent = (zeta.abs() + (zeta * zeta + 1.0).sqrt()).recip().copysign(zeta);
     ((tangent * tangent + 1.0).sqrt().recip(), tangent)
 }
 
-/// `square` + `change`, formed again from the column where that cancels.
+/// Returns `square` + `change`, recomputed from the column if the sum cancels.
 fn updated(square: f64, change: f64, column: &[f64]) -> f64 {
     let sum = square + change;
     if sum > 0.25 * square { sum } else { dot(column, column) }
@@ -233,13 +236,13 @@ mod tests {
     fn rank_one_is_seen_as_such() {
         let (u, v) =
             (DVector::from_vec(vec![1.0, 2.0, 2.0]), DVector::from_vec(vec![0.6, 0.0, 0.8]));
-        let found = SingularValues::of(&(&u * v.transpose()));
+        let decomposition = SingularValues::of(&(&u * v.transpose()));
         assert!(
-            (found.values[0] - 3.0).abs() < 1e-15
-                && found.values[1] < 1e-15
-                && found.values[2] < 1e-15
+            (decomposition.values[0] - 3.0).abs() < 1e-15
+                && decomposition.values[1] < 1e-15
+                && decomposition.values[2] < 1e-15
         );
-        assert!((found.right.column(0).dot(&v).abs() - 1.0).abs() < 1e-15);
+        assert!((decomposition.right.column(0).dot(&v).abs() - 1.0).abs() < 1e-15);
     }
 
     #[test]

@@ -7,15 +7,19 @@ use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector};
 use super::kernel::{PANEL, dot, dots, norm, subtract, sum_of_squares};
 use super::{Block, Linearisation};
 
-/// Reflectors applied together as matrix products, where so many columns are left: a wide panel
-/// costs more itself, and fewer passes over what is behind it.
-const WIDE: [(usize, usize); 2] = [(WIDEST, 384), (NARROWER, WIDE_FROM)];
-const WIDEST: usize = 96;
-/// Those of the widest are taken so many at a time among themselves.
-const NARROWER: usize = 32;
-const WIDE_FROM: usize = 128;
+/// Widths of the panels of reflectors applied as matrix products, each with the number of remaining
+/// columns from which it is used.
+///
+/// A wider panel costs more itself and needs fewer passes over the columns behind it.
+const PANEL_WIDTHS: [(usize, usize); 2] = [(WIDE_PANEL, 384), (NARROW_PANEL, MIN_BLOCKED_COLUMNS)];
+/// Number of reflectors in the widest panel.
+const WIDE_PANEL: usize = 96;
+/// Number of reflectors in the narrower panel, and in each part of the widest one.
+const NARROW_PANEL: usize = 32;
+/// Number of columns from which reflectors are applied as matrix products.
+const MIN_BLOCKED_COLUMNS: usize = 128;
 
-/// The triangular factor of all rows absorbed so far.
+/// Running triangular factor of all rows absorbed so far.
 ///
 /// \[R c; 0 d\] = Qᵀ \[J r\], so ‖J p + r‖² = ‖R p + c‖² + ‖d‖²          [Golub & Van Loan 2013,
 /// §5.2 and §6.5.3]
@@ -25,24 +29,26 @@ const WIDE_FROM: usize = 128;
 #[derive(Debug, Clone)]
 pub struct Triangle {
     parameters: usize,
-    /// \[R c\], row after row.
+    /// Matrix \[R c\], row after row.
     rows: Vec<f64>,
-    /// ‖r‖² of all rows absorbed.
+    /// Sum of squares ‖r‖² of all rows absorbed.
     squares: f64,
 }
 
 impl Triangle {
-    /// The factor of no rows at all, for `parameters` unknowns.
+    /// Creates the factor of no rows, for `parameters` unknowns.
     pub fn new(parameters: usize) -> Self {
         Self { parameters, rows: vec![0.0; parameters * (parameters + 1)], squares: 0.0 }
     }
 
-    /// The triangular factor of a matrix, of many columns in less time where its rows begin with
-    /// zeros, as those of a factor do.
+    /// Returns the triangular factor R of a matrix, shape = (n, n).
+    ///
+    /// Large matrices are sorted by the first non-zero column of each row, which saves work for
+    /// stacks of triangular factors.
     pub(crate) fn of(matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let (m, n) = matrix.shape();
         let mut order: Vec<usize> = (0..m).collect();
-        if n >= WIDE_FROM {
+        if n >= MIN_BLOCKED_COLUMNS {
             let first =
                 |row: &usize| matrix.row(*row).iter().position(|value| *value != 0.0).unwrap_or(n);
             order.sort_by_cached_key(first);
@@ -56,26 +62,25 @@ impl Triangle {
         triangle.into_linearisation().triangle
     }
 
-    /// Number of unknowns n.
+    /// Returns the number of unknowns n.
     pub fn parameters(&self) -> usize {
         self.parameters
     }
 
-    /// ‖r‖² of all rows absorbed so far.
+    /// Returns ‖r‖² of all rows absorbed so far.
     pub fn sum_of_squares(&self) -> f64 {
         self.squares
     }
 
-    /// The same factor with another cost: that of a robust loss, which weighted rows do not add up
-    /// to.
+    /// Replaces ‖r‖² by the cost of a robust loss, which the weighted rows do not sum to.
     #[must_use]
     pub(super) fn with_sum_of_squares(mut self, squares: f64) -> Self {
         self.squares = squares;
         self
     }
 
-    /// The factor of the same rows in another unit, each number so many times as large.
-    pub(super) fn times(mut self, factor: f64) -> Self {
+    /// Multiplies all rows by `factor`, as a change of the residual unit does.
+    pub(super) fn scaled(mut self, factor: f64) -> Self {
         if factor.to_bits() != 1.0_f64.to_bits() {
             self.rows.iter_mut().for_each(|value| *value *= factor);
             self.squares *= factor * factor;
@@ -83,7 +88,7 @@ impl Triangle {
         self
     }
 
-    /// The same factor R of other residuals, with their c and their ‖r‖².
+    /// Replaces the residual of the factor: `constant` is the new c, `squares` the new ‖r‖².
     pub(super) fn with_residual(mut self, constant: &DVector<f64>, squares: f64) -> Self {
         let n = self.parameters;
         self.rows
@@ -94,20 +99,21 @@ impl Triangle {
         self
     }
 
-    /// Takes in the rows of `block`, whose values are lost.
+    /// Absorbs the rows of `block` and overwrites its values.
     ///
-    /// A block for another number of unknowns is a mistake of the caller and is checked in debug
-    /// builds only.
+    /// The block must have the same number of unknowns; only debug builds check it.
     pub fn absorb(&mut self, block: &mut Block) {
         self.squares += sum_of_squares(block.column(block.parameters));
         self.reduce(block, |_| usize::MAX);
     }
 
-    /// The same of rows sorted by the first column in which they have an entry, as priors are: of
-    /// many unknowns, few are touched by the first reflectors.
+    /// Absorbs rows that are sorted by their first non-zero column, as rows of priors are.
+    ///
+    /// With many unknowns, the first reflectors then touch only few of the rows. Unsorted rows are
+    /// absorbed by [`Triangle::absorb`].
     pub(super) fn absorb_rows(&mut self, block: &mut Block) {
         let n = block.parameters;
-        if n < WIDE_FROM {
+        if n < MIN_BLOCKED_COLUMNS {
             return self.absorb(block);
         }
         let first =
@@ -120,7 +126,7 @@ impl Triangle {
         self.reduce(block, |columns| firsts.partition_point(|&first| first < columns));
     }
 
-    /// Takes in all rows that `other` has absorbed.
+    /// Absorbs all rows that `other` has absorbed.
     pub fn merge(&mut self, other: &Triangle) {
         let n = other.parameters;
         let mut block = Block::zeros(n, n);
@@ -134,7 +140,7 @@ impl Triangle {
         self.squares += other.squares;
     }
 
-    /// The problem \[R c\] with further rows diag(d) p = 0, whose cost is left out.
+    /// Returns the problem \[R c\] with added rows diag(d) p = 0, whose cost is not counted.
     pub(crate) fn damped(
         triangle: &DMatrix<f64>,
         projected: &DVector<f64>,
@@ -154,7 +160,7 @@ impl Triangle {
         damped.into_linearisation()
     }
 
-    /// The linearised problem of all rows absorbed.
+    /// Returns the linearised problem of all rows absorbed.
     pub fn into_linearisation(self) -> Linearisation {
         let n = self.parameters;
         Linearisation {
@@ -168,8 +174,8 @@ impl Triangle {
         }
     }
 
-    /// Reduces the block to zero, panel after panel; `filled(k)` bounds the non-zero rows of its
-    /// first k columns.
+    /// Reduces the block to zero, panel after panel. `filled(k)` bounds the number of non-zero rows
+    /// of its first k columns.
     fn reduce(&mut self, block: &mut Block, filled: impl Fn(usize) -> usize) {
         let (n, m) = (self.parameters, block.rows);
         debug_assert_eq!(n, block.parameters);
@@ -177,20 +183,20 @@ impl Triangle {
             return;
         }
         let mut first = 0;
-        while let Some(&(wide, _)) = WIDE.iter().find(|(_, least)| n - first >= *least) {
+        while let Some(&(wide, _)) = PANEL_WIDTHS.iter().find(|(_, least)| n - first >= *least) {
             let used = filled(first + wide).min(m);
-            let mut factors = [0.0; WIDEST];
+            let mut factors = [0.0; WIDE_PANEL];
             let end = first + wide;
-            for (part, own) in factors[..wide].chunks_mut(NARROWER).enumerate() {
-                let first = first + part * NARROWER;
+            for (part, part_factors) in factors[..wide].chunks_mut(NARROW_PANEL).enumerate() {
+                let first = first + part * NARROW_PANEL;
                 self.reduce_columns(
                     block,
-                    first..first + own.len(),
-                    first + own.len(),
+                    first..first + part_factors.len(),
+                    first + part_factors.len(),
                     |_| used,
-                    own,
+                    part_factors,
                 );
-                self.apply(block, (first, end), used, own);
+                self.apply(block, (first, end), used, part_factors);
             }
             self.apply(block, (first, n + 1), used, &factors[..wide]);
             first = end;
@@ -198,8 +204,8 @@ impl Triangle {
         self.reduce_columns(block, first..n, n + 1, filled, &mut []);
     }
 
-    /// Reduces some columns of the block, and the columns behind them up to `end`; the reflectors'
-    /// factors τ, as far as there is room.
+    /// Reduces `columns` of the block and updates the columns behind them up to `end`. Writes the
+    /// factors τ of the reflectors into `factors`, as far as it has room.
     fn reduce_columns(
         &mut self,
         block: &mut Block,
@@ -213,12 +219,12 @@ impl Triangle {
             let width = PANEL.min(columns.end - first);
             let used = filled(first + width).min(m);
             let (panel, trailing) = block.values[first * m..end * m].split_at_mut(width * m);
-            let own = self.factor_panel(first, width, panel, m, used);
+            let panel_factors = self.factor_panel(first, width, panel, m, used);
             factors
                 .iter_mut()
                 .skip(first - columns.start)
-                .zip(&own[..width])
-                .for_each(|(all, own)| *all = *own);
+                .zip(&panel_factors[..width])
+                .for_each(|(out, factor)| *out = *factor);
             let vectors: [&[f64]; PANEL] =
                 std::array::from_fn(|i| &panel[i.min(width - 1) * m..][..used]);
             let coupling = coupling(&vectors, width);
@@ -228,7 +234,7 @@ impl Triangle {
                 for i in 0..width {
                     let at = (first + i) * (n + 1) + first + width + j;
                     let earlier: f64 = (0..i).map(|l| coupling[i][l] * s[l]).sum();
-                    s[i] = own[i] * (self.rows[at] + s[i] - earlier);
+                    s[i] = panel_factors[i] * (self.rows[at] + s[i] - earlier);
                     self.rows[at] -= s[i];
                 }
                 s[width..].fill(0.0);
@@ -237,11 +243,11 @@ impl Triangle {
         }
     }
 
-    /// Applies the reflectors of the wide panel at `first` to the columns behind it up to `end`, as
-    /// matrix products.
+    /// Applies the reflectors of the panel at column `first` to the columns behind it up to `end`,
+    /// as matrix products.
     ///
-    /// With the vectors V below their leading ones, H₁ … H_k = 1 − U T Uᵀ: W = Tᵀ (R + Vᵀ C), R ← R
-    /// − W, C ← C − V W [Schreiber and Van Loan 1989]
+    /// With the reflector vectors V below their leading ones, H₁ … H_k = 1 − U T Uᵀ: W = Tᵀ (R + Vᵀ
+    /// C), R ← R − W, C ← C − V W [Schreiber & Van Loan 1989].
     fn apply(
         &mut self,
         block: &mut Block,
@@ -266,19 +272,20 @@ impl Triangle {
         let mut triangle = DMatrix::zeros(wide, wide);
         for (i, &factor) in factors.iter().enumerate() {
             for j in 0..i {
-                let turned: f64 = (j..i).map(|l| triangle[(j, l)] * products[(l, i)]).sum();
-                triangle[(j, i)] = -factor * turned;
+                let coupled: f64 = (j..i).map(|l| triangle[(j, l)] * products[(l, i)]).sum();
+                triangle[(j, i)] = -factor * coupled;
             }
             triangle[(i, i)] = factor;
         }
-        let mut taken = rows.clone_owned();
-        taken.gemm(1.0, &transposed, &columns, 1.0);
-        let taken = triangle.transpose() * taken;
-        rows -= &taken;
-        columns.gemm(-1.0, &vectors, &taken, 1.0);
+        let mut update = rows.clone_owned();
+        update.gemm(1.0, &transposed, &columns, 1.0);
+        let update = triangle.transpose() * update;
+        rows -= &update;
+        columns.gemm(-1.0, &vectors, &update, 1.0);
     }
 
-    /// Replaces `width` columns by their reflectors and returns the factors τ of H = I − τ u uᵀ.
+    /// Replaces `width` columns by their reflector vectors and returns the factors τ of H = I − τ u
+    /// uᵀ.
     fn factor_panel(
         &mut self,
         first: usize,
@@ -308,13 +315,12 @@ impl Triangle {
     }
 }
 
-/// Householder reflector that sends (α, v) to (β, 0); `vector` becomes the part of u below its
-/// leading 1.
+/// Computes the Householder reflector that maps (α, v) to (β, 0) and returns (β, τ).
 ///
 /// β = −sign(α) ‖(α, v)‖, τ = (β − α)/β, u = (1, v/(α − β))          [Golub & Van Loan 2013, alg.
 /// 5.1.1]
 ///
-/// Returns (β, τ); for v = 0 nothing is done and τ = 0.
+/// `vector` becomes the part of u below its leading 1. For v = 0 it stays unchanged and τ = 0.
 pub(super) fn reflector(alpha: f64, vector: &mut [f64]) -> (f64, f64) {
     let norm = norm(vector);
     if norm == 0.0 {
@@ -335,7 +341,7 @@ pub(super) fn reflector(alpha: f64, vector: &mut [f64]) -> (f64, f64) {
     (beta, -pivot / beta)
 }
 
-/// `vᵢᵀvₗ` for l < i.
+/// Returns the products `vᵢᵀvₗ` for l < i.
 fn coupling(vectors: &[&[f64]; PANEL], width: usize) -> [[f64; PANEL]; PANEL] {
     let mut products = [[0.0; PANEL]; PANEL];
     for i in 1..width {
@@ -350,7 +356,7 @@ fn coupling(vectors: &[&[f64]; PANEL], width: usize) -> [[f64; PANEL]; PANEL] {
 mod tests {
     use super::*;
 
-    /// A repeatable sequence in (−1, 1).
+    /// Returns entry `i` of a repeatable sequence in (−1, 1).
     fn wave(i: usize) -> f64 {
         (1.7 * i as f64 + 0.3 * (i * i % 101) as f64).sin()
     }
@@ -365,7 +371,7 @@ mod tests {
         DMatrix::from_column_slice(block.rows, block.parameters + 1, &block.values)
     }
 
-    /// `RᵀR`, `Rᵀc` and the cost are those of the stacked rows.
+    /// Asserts that `RᵀR`, `Rᵀc` and the cost equal those of the stacked rows.
     fn assert_same_problem(triangle: Triangle, stacked: &DMatrix<f64>, tolerance: f64) {
         let n = stacked.ncols() - 1;
         let gram = stacked.tr_mul(stacked);
@@ -401,14 +407,15 @@ mod tests {
     #[test]
     fn merging_equals_absorbing() {
         for (n, rows) in [(11, 40), (170, 40), (170, 400), (400, 450)] {
-            merges(n, rows);
+            assert_merge_equals_absorb(n, rows);
         }
     }
 
     #[test]
     fn rows_of_priors_are_absorbed_as_any() {
         for n in [5, 170, 400] {
-            // Unknowns 0, 2, 3, 5, … have a prior; every row reaches two columns on.
+            // Unknowns 0, 2, 3, 5, … have a prior; every row also has an entry two columns further
+            // on.
             let rows: Vec<usize> = (0..n).filter(|j| j % 3 != 1).collect();
             let mut priors = Block::zeros(rows.len(), n);
             for (i, &j) in rows.iter().enumerate() {
@@ -419,14 +426,14 @@ mod tests {
             for data in [0, 3, 400] {
                 let mut triangle = Triangle::new(n);
                 triangle.absorb(&mut block(data, n, 0, 1.0));
-                let mut other = triangle.clone();
+                let mut sorted = triangle.clone();
                 triangle.absorb(&mut priors.clone());
-                other.absorb_rows(&mut priors.clone());
-                let [all, few] = [triangle, other].map(Triangle::into_linearisation);
-                assert!((all.cost / few.cost - 1.0).abs() < 1e-14);
+                sorted.absorb_rows(&mut priors.clone());
+                let [any, sorted] = [triangle, sorted].map(Triangle::into_linearisation);
+                assert!((any.cost / sorted.cost - 1.0).abs() < 1e-14);
                 assert!(
-                    (all.triangle - few.triangle).amax() < 1e-13
-                        && (all.projected - few.projected).amax() < 1e-13
+                    (any.triangle - sorted.triangle).amax() < 1e-13
+                        && (any.projected - sorted.projected).amax() < 1e-13
                 );
             }
         }
@@ -435,7 +442,7 @@ mod tests {
     #[test]
     fn a_factor_does_not_depend_on_the_order_of_the_rows() {
         for n in [6, 130, 400] {
-            // Those of a factor with priors below it, a row of zeros, and one that begins first.
+            // Rows of a factor, rows of priors below it, a row of zeros, and a full row.
             let entry = |i: usize, j: usize| match i {
                 i if i < n => f64::from(u8::from(i <= j)) * wave(i + 31 * j),
                 i if i < 2 * n => f64::from(u8::from(i - n == j)),
@@ -449,16 +456,16 @@ mod tests {
         }
     }
 
-    fn merges(n: usize, rows: usize) {
+    fn assert_merge_equals_absorb(n: usize, rows: usize) {
         let (first, second) = (block(rows, n, 0, 1.0), block(rows, n, 5000, 2.0));
         let mut stacked = DMatrix::zeros(2 * rows, n + 1);
         stacked.view_mut((0, 0), (rows, n + 1)).copy_from(&dense(&first));
         stacked.view_mut((rows, 0), (rows, n + 1)).copy_from(&dense(&second));
         let mut triangle = Triangle::new(n);
         triangle.absorb(&mut first.clone());
-        let mut other = Triangle::new(n);
-        other.absorb(&mut second.clone());
-        triangle.merge(&other);
+        let mut merged = Triangle::new(n);
+        merged.absorb(&mut second.clone());
+        triangle.merge(&merged);
         assert_same_problem(triangle, &stacked, 1e-13);
     }
 

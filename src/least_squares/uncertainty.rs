@@ -1,4 +1,4 @@
-//! Covariance of an estimate.
+//! Covariance of the estimate of a fit.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,30 +6,31 @@ use super::Triangle;
 use super::inverse::regular_inverse;
 use super::singular::SingularValues;
 
-/// Weight that turns gauge rows into constraints: their variance falls below rounding.
-const HARD: f64 = 1e5;
-/// Scaled singular values below this part of the largest carry no information.
+/// Weight that turns gauge rows into constraints: the variance along them falls below rounding.
+pub(super) const CONSTRAINT_WEIGHT: f64 = 1e5;
+/// Scaled singular values below this fraction of the largest carry no information.
 const NO_INFORMATION: f64 = 1e-13;
-/// Where no singular value is below this part of the largest, an inverse is exact enough: to 1e-7
-/// at worst.
+/// Smallest ratio of singular values at which the explicit inverse is used; its error is at most
+/// 1e-7.
 const WELL_CONDITIONED: f64 = 1e-9;
 
-/// Covariance of the unknowns of a fit, and what it rests on.
+/// Covariance of the unknowns of a fit with the number of unknowns that the data determine.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Uncertainty {
-    /// Covariance, shape = (n, n); rows and columns of held unknowns are zero.
+    /// Covariance, shape = (n, n); rows and columns of unknowns that are not estimated are zero.
     pub covariance: DMatrix<f64>,
-    /// How many unknowns the data determine, the priors' share taken off.
+    /// Effective number of parameters: free unknowns less the share that priors determine.
     pub effective_parameters: f64,
 }
 
 impl Uncertainty {
-    /// (`RᵀR` / s² + `PᵀP`)⁻¹ on the free unknowns, with the unidentifiable combinations held.
+    /// Returns (`RᵀR` / s² + `PᵀP`)⁻¹ on the free unknowns, with the unidentifiable combinations
+    /// fixed.
     ///
-    /// `data` is the triangular factor R of the whitened data, `prior_sigma` 1 σ of each unknown's
-    /// prior, `gauge` rows that span the unidentifiable combinations, `held` marks unknowns that
-    /// are not estimated (at a bound), and s² = `noise_factor` multiplies the assumed variance of
-    /// the data.
+    /// `data` is the triangular factor R of the whitened data and `prior_sigma` the 1 σ of each
+    /// unknown's prior. The rows of `gauge` span the unidentifiable combinations. `held` marks
+    /// unknowns that are not estimated (at a bound). s² = `noise_factor` multiplies the assumed
+    /// variance of the data.
     pub fn of(
         data: &DMatrix<f64>,
         prior_sigma: &[Option<f64>],
@@ -45,34 +46,34 @@ impl Uncertainty {
         let mut stack = DMatrix::zeros(rows.max(free.len()), free.len());
         for (j, &k) in free.iter().enumerate() {
             stack.view_mut((0, j), (n, 1)).copy_from(&(data.column(k) / noise_factor.sqrt()));
-            let gauged = gauge.column(k) * HARD;
+            let gauged = gauge.column(k) * CONSTRAINT_WEIGHT;
             stack.view_mut((n + priors.len(), j), (gauge.nrows(), 1)).copy_from(&gauged);
         }
         for (i, &(j, sigma)) in priors.iter().enumerate() {
             stack[(n + i, j)] = sigma.recip();
         }
-        let small = inverse_normal(stack);
+        let free_covariance = inverse_normal(stack);
         let mut covariance = DMatrix::zeros(n, n);
         for (a, &j) in free.iter().enumerate() {
             for (b, &k) in free.iter().enumerate() {
-                covariance[(j, k)] = small[(a, b)];
+                covariance[(j, k)] = free_covariance[(a, b)];
             }
         }
         let from_priors: f64 =
-            priors.iter().map(|&(j, sigma)| small[(j, j)] / (sigma * sigma)).sum();
+            priors.iter().map(|&(j, sigma)| free_covariance[(j, j)] / (sigma * sigma)).sum();
         let effective_parameters =
             (free.len() as f64 - gauge.nrows() as f64 - from_priors).max(0.0);
         Self { covariance, effective_parameters }
     }
 
-    /// Standard error of each unknown.
+    /// Returns the standard error of each unknown, in its unit.
     pub fn standard_errors(&self) -> Vec<f64> {
         self.covariance.diagonal().iter().map(|variance| variance.max(0.0).sqrt()).collect()
     }
 }
 
-/// (`AᵀA`)⁺ through the triangular factor of A with its columns scaled to unit norm, or through its
-/// singular values.
+/// Returns (`AᵀA`)⁺ from the triangular factor of A with columns scaled to unit norm, or from the
+/// singular values if that factor is ill-conditioned.
 fn inverse_normal(mut a: DMatrix<f64>) -> DMatrix<f64> {
     let n = a.ncols();
     if n == 0 {

@@ -1,49 +1,51 @@
-//! How large the noise is that residuals and priors together speak for.
+//! Restricted maximum likelihood (REML) of the noise variance in the presence of priors.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::inverse::inverse_rows;
 use super::singular::SingularValues;
+use super::uncertainty::CONSTRAINT_WEIGHT;
 use super::{Linearisation, Triangle};
 
-/// Weight that turns rows of held combinations into constraints.
-const HARD: f64 = 1e5;
-/// Variances that are searched, as logarithms of their ratio to the assumed one, and the steps of
-/// the search.
-const SEARCH: (f64, f64) = (-60.0, 60.0);
-const STEPS: u32 = 480;
-/// Directions in which a prior reaches the data with more than this part of their variance say
-/// nothing of the noise.
-const DECIDED: f64 = 0.1;
-/// Golden sections of the best step: ln s² is then known to 1e-8.
-const SECTIONS: u32 = 40;
+/// Range of ln s² that is searched, s² being relative to the assumed variance.
+const LOG_VARIANCE_RANGE: (f64, f64) = (-60.0, 60.0);
+/// Number of steps of the grid search over ln s².
+const GRID_STEPS: u32 = 480;
+/// Largest ratio a² of prior variance to assumed data variance in a direction that informs on the
+/// noise. Directions above it are projected out.
+const MAX_PRIOR_RATIO: f64 = 0.1;
+/// Number of golden sections within the best grid step; they locate ln s² to 1e-8.
+const GOLDEN_SECTIONS: u32 = 40;
+/// Golden ratio less one, (√5 − 1)/2.
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
 
-/// Restricted likelihood of the variance of the data, priors being what they are.
+/// Restricted likelihood of the data variance for given priors.
 ///
-/// Linearised about a fit, the data at the priors' means are y = A z + e with z ∼ N(0, I), e ∼ N(0,
-/// s² I): unknowns without a prior are projected out, those with one scaled by it. With A = U
-/// diag(a) Vᵀ, c = Uᵀy and m rows that A does not reach,
+/// Linearised about a fit, the data relative to the prior means are y = A z + e with z ∼ N(0, I)
+/// and e ∼ N(0, s² I). Unknowns without a prior are projected out; those with a prior are scaled by
+/// it. With A = U diag(a) Vᵀ, c = Uᵀy and m rows outside the range of A,
 ///
 /// −2 ln L(s²) = Σ (ln(s² + a²) + c²/(s² + a²)) + m ln s² + ‖y − U c‖²/s²          [Patterson &
 /// Thompson 1971]
 ///
-/// Directions with a² above 0.1 are projected out too: the data decide there, and a prior that they
-/// contradict is no noise. s² = 1 is the variance by which the data were whitened.
+/// Directions with a² above 0.1 are projected out, too: the data determine them, and their
+/// deviation from the prior is not noise. s² = 1 is the variance by which the data were whitened.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VarianceLikelihood {
-    /// a² and c² of each direction that a prior reaches.
+    /// Values a² and c² of each direction that has a prior.
     directions: Vec<(f64, f64)>,
-    /// ‖y − U c‖².
-    rest: f64,
-    /// m.
+    /// Squared residual ‖y − U c‖² outside the range of A.
+    residual_squares: f64,
+    /// Number m of rows outside the range of A.
     free_rows: f64,
 }
 
 impl VarianceLikelihood {
-    /// From the linearisation at the unknowns `x` of `rows` rows of data, `squares` being their
-    /// ‖r‖²; `priors` holds 1 σ of each unknown's prior, `held` marks unknowns that are not
-    /// estimated, and `closed` are rows of combinations that are held.
+    /// Builds the likelihood from the linearisation `data` at the unknowns `x`.
+    ///
+    /// `rows` is the number of data rows and `squares` their ‖r‖². `priors` holds 1 σ of each
+    /// unknown's prior, `held` marks unknowns that are not estimated, and the rows of `closed` are
+    /// combinations that are fixed.
     pub fn of(
         data: &Linearisation,
         (rows, squares): (usize, f64),
@@ -53,67 +55,79 @@ impl VarianceLikelihood {
         closed: &DMatrix<f64>,
     ) -> Self {
         let n = x.len();
-        let with = |prior: bool| (0..n).filter(move |&j| !held[j] && priors[j].is_some() == prior);
-        let (free, known): (Vec<usize>, Vec<usize>) = (with(false).collect(), with(true).collect());
-        let width = free.len() + known.len();
+        let select =
+            |prior: bool| (0..n).filter(move |&j| !held[j] && priors[j].is_some() == prior);
+        let (free, with_prior): (Vec<usize>, Vec<usize>) =
+            (select(false).collect(), select(true).collect());
+        let width = free.len() + with_prior.len();
         let mut moved = DVector::zeros(n);
-        for &j in &known {
+        for &j in &with_prior {
             moved[j] = x[j];
         }
         let at_priors = &data.projected - &data.triangle * &moved;
         let height = n + closed.nrows();
         let mut stack = DMatrix::zeros(height.max(width + 1), width + 1);
-        for (place, &j) in free.iter().chain(&known).enumerate() {
+        for (place, &j) in free.iter().chain(&with_prior).enumerate() {
             let scale = priors[j].unwrap_or(1.0);
             stack.view_mut((0, place), (n, 1)).copy_from(&(data.triangle.column(j) * scale));
             stack
                 .view_mut((n, place), (closed.nrows(), 1))
-                .copy_from(&(closed.column(j) * (HARD * scale)));
+                .copy_from(&(closed.column(j) * (CONSTRAINT_WEIGHT * scale)));
         }
         stack.view_mut((0, width), (n, 1)).copy_from(&at_priors);
-        stack.view_mut((n, width), (closed.nrows(), 1)).copy_from(&(closed * moved * -HARD));
+        stack
+            .view_mut((n, width), (closed.nrows(), 1))
+            .copy_from(&(closed * moved * -CONSTRAINT_WEIGHT));
         let reduced = Triangle::of(&stack);
-        let (first, k) = (free.len(), known.len());
-        let left = reduced.view((first, first), (k, k)).into_owned();
+        let (first, k) = (free.len(), with_prior.len());
+        let prior_block = reduced.view((first, first), (k, k)).into_owned();
         let y = reduced.view((first, width), (k, 1)).column(0).into_owned();
-        let rest =
+        let residual_squares =
             (squares - data.projected.norm_squared()).max(0.0) + reduced[(width, width)].powi(2);
         let free_rows = (rows + closed.nrows()) as f64 - first as f64;
-        // ‖left⁻¹‖² bounds every a² from below: where all directions are projected out, no singular
-        // value is needed.
-        let inverse = inverse_rows(&left, (0..k).map(|j| (j, 1.0)));
-        if inverse.is_some_and(|squares| squares * DECIDED < 1.0) {
-            return Self { directions: Vec::new(), rest, free_rows: free_rows - k as f64 };
+        // The norm of the inverse bounds every a² from below. If all directions are projected out,
+        // the
+        // singular values are not needed.
+        let inverse = inverse_rows(&prior_block, (0..k).map(|j| (j, 1.0)));
+        if inverse.is_some_and(|squares| squares * MAX_PRIOR_RATIO < 1.0) {
+            let free_rows = free_rows - k as f64;
+            return Self { directions: Vec::new(), residual_squares, free_rows };
         }
-        // Singular vectors on the left: of the transpose those on the right.
-        let SingularValues { values, right } = SingularValues::of(&left.transpose());
+        // Left singular vectors are the right ones of the transpose.
+        let SingularValues { values, right } = SingularValues::of(&prior_block.transpose());
         let along = right.tr_mul(&y);
         let mut directions: Vec<(f64, f64)> =
             values.iter().zip(along.iter()).map(|(a, c)| (a * a, c * c)).collect();
-        let lost = (y.norm_squared() - along.norm_squared()).max(0.0);
+        let outside = (y.norm_squared() - along.norm_squared()).max(0.0);
         directions.retain(|(a, _)| *a > 0.0);
-        let seen = directions.len() as f64;
-        directions.retain(|(a, _)| *a <= DECIDED);
-        Self { directions, rest: rest + lost, free_rows: free_rows - seen }
+        let nonzero = directions.len() as f64;
+        directions.retain(|(a, _)| *a <= MAX_PRIOR_RATIO);
+        Self {
+            directions,
+            residual_squares: residual_squares + outside,
+            free_rows: free_rows - nonzero,
+        }
     }
 
-    /// −2 ln L at ln s².
+    /// Returns −2 ln L at ln s² = `log`.
     fn at(&self, log: f64) -> f64 {
         let variance = log.exp();
         let term = |&(a, c): &(f64, f64)| (variance + a).ln() + c / (variance + a);
-        self.directions.iter().map(term).sum::<f64>() + self.free_rows * log + self.rest / variance
+        self.directions.iter().map(term).sum::<f64>()
+            + self.free_rows * log
+            + self.residual_squares / variance
     }
 
-    /// The s² of the largest likelihood, and by how much 2 ln L is above that of s² = 1.
+    /// Returns the s² of the largest likelihood and the excess of its 2 ln L over that of s² = 1.
     pub fn maximum(&self) -> (f64, f64) {
-        let step = (SEARCH.1 - SEARCH.0) / f64::from(STEPS);
-        let place = |k: u32| SEARCH.0 + f64::from(k) * step;
-        let best = (0..=STEPS)
-            .map(place)
+        let step = (LOG_VARIANCE_RANGE.1 - LOG_VARIANCE_RANGE.0) / f64::from(GRID_STEPS);
+        let grid = |k: u32| LOG_VARIANCE_RANGE.0 + f64::from(k) * step;
+        let best = (0..=GRID_STEPS)
+            .map(grid)
             .min_by(|a, b| self.at(*a).total_cmp(&self.at(*b)))
             .unwrap_or(0.0);
         let (mut low, mut high) = (best - step, best + step);
-        for _ in 0..SECTIONS {
+        for _ in 0..GOLDEN_SECTIONS {
             let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
             if self.at(a) < self.at(b) { high = b } else { low = a }
         }
@@ -127,14 +141,14 @@ mod tests {
     use super::*;
     use crate::least_squares::Block;
 
-    /// Deterministic numbers with the spread of normal ones.
+    /// Returns entry `i` of a deterministic sequence with the spread of standard normal numbers.
     fn noise(i: usize) -> f64 {
         let part = |k: usize| ((i * 12 + k) as f64 * 12.9898).sin() * 43_758.545_3 % 1.0;
         (0..12).map(|k| part(k).abs()).sum::<f64>() - 6.0
     }
 
     fn likelihood(rows: usize, sigma: f64, x: [f64; 2]) -> VarianceLikelihood {
-        // y = t x₀ + x₁, the first with a prior, measured in units of 1.
+        // y = t x₀ + x₁; x₀ has a prior of 1 σ = 1.
         let mut block = Block::zeros(rows, 2);
         for i in 0..rows {
             let t = i as f64 / rows as f64 - 0.5;
@@ -160,15 +174,15 @@ mod tests {
     #[test]
     fn the_scatter_is_found_whatever_was_assumed() {
         for sigma in [0.01, 1.0, 30.0] {
-            let found = likelihood(200, sigma, [1.5, 7.0]).maximum();
-            assert!((found.0.sqrt() / sigma - 1.0).abs() < 0.15, "{sigma}: {found:?}");
-            assert_eq!(found.1 > 10.0, (sigma - 1.0).abs() > 1e-9, "{sigma}: {found:?}");
+            let maximum = likelihood(200, sigma, [1.5, 7.0]).maximum();
+            assert!((maximum.0.sqrt() / sigma - 1.0).abs() < 0.15, "{sigma}: {maximum:?}");
+            assert_eq!(maximum.1 > 10.0, (sigma - 1.0).abs() > 1e-9, "{sigma}: {maximum:?}");
         }
     }
 
     #[test]
     fn unknowns_far_beyond_their_prior_are_no_noise() {
-        let found = likelihood(200, 1.0, [30.0, 7.0]).maximum();
-        assert!((found.0.sqrt() - 1.0).abs() < 0.3, "{found:?}");
+        let maximum = likelihood(200, 1.0, [30.0, 7.0]).maximum();
+        assert!((maximum.0.sqrt() - 1.0).abs() < 0.3, "{maximum:?}");
     }
 }

@@ -1,5 +1,4 @@
-//! Combinations of unknowns that the data see too weakly for an estimate, and fits that leave them
-//! where they are.
+//! Weakly determined combinations of unknowns, and an objective that keeps them fixed.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,36 +7,36 @@ use super::inverse::inverse_rows;
 use super::singular::SingularValues;
 use super::{Block, Linearisation, Objective, Triangle};
 
-/// A combination is weak if moving it by its own size changes all measured coordinates together by
-/// less than this many σ.
+/// Smallest change of all measured coordinates together, in σ, that makes a combination of unknowns
+/// estimable. The combination is moved by its plausible size.
 ///
-/// An estimate of it would then have a standard error above a fifth of that size: it may lie
-/// anywhere. What an arm really deviates by, at most a hundredth of its size, moves no position by
-/// more than 0.05 σ along it.
-pub const WEAK_BELOW: f64 = 5.0;
-/// Parts of a combination below this are rounding.
-const NEGLIGIBLE: f64 = 1e-6;
+/// Below it, the standard error of the combination would exceed a fifth of its plausible size. Real
+/// deviations of an arm, at most a hundredth of that size, then move no position by more than 0.05
+/// σ.
+pub const WEAK_THRESHOLD: f64 = 5.0;
+/// Weights of a combination below this value are rounding.
+const NEGLIGIBLE_WEIGHT: f64 = 1e-6;
 
-/// Combinations of unknowns that are seen too weakly to be estimated.
+/// Combinations of unknowns that the data determine too weakly for an estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weak {
-    /// Rows that span them, as strong as what is seen best, shape = (combinations, n) [1 / unit of
-    /// x].
+    /// Rows that span the combinations, scaled to the strongest column, shape = (combinations, n)
+    /// [1 / unit of x].
     pub rows: DMatrix<f64>,
-    /// Each by itself: weights in units of the unknowns' sizes, and the σ by which all data move
-    /// with it.
+    /// Each combination with its weights in units of the plausible sizes, and the data change it
+    /// causes [σ].
     pub combinations: Vec<UnidentifiableCombination>,
-    /// Part of each unknown that lies outside of them, 0…1.
+    /// Fraction of each unknown that lies outside the weak combinations, 0…1.
     pub visible: Vec<f64>,
 }
 
 impl Weak {
-    /// Those of the problem with triangular factor `triangle` (n × n): priors are part of it, and
-    /// rows of what is held anyhow.
+    /// Finds the weak combinations of the problem with triangular factor `triangle`, shape = (n,
+    /// n). The factor includes priors and the rows of combinations that are fixed anyway.
     ///
-    /// `sizes` holds how far each unknown may plausibly go: of those without one (a prior keeps
-    /// them, or they may be anywhere) nothing is asked, they follow the others. With R = [R₁ R₂; 0
-    /// R₃], the others first, the σ by which data move with S w is ‖R₃ S w‖, S = diag(sizes).
+    /// `sizes` holds the plausible size of each unknown. Unknowns without a size are not tested but
+    /// follow the others: with R = [R₁ R₂; 0 R₃], those unknowns first, the data change by ‖R₃ S w‖
+    /// [σ] along S w, S = diag(sizes). Returns `None` if no combination is weak.
     pub fn of(triangle: &DMatrix<f64>, sizes: &[Option<f64>]) -> Option<Self> {
         let n = triangle.ncols();
         let sized: Vec<(usize, f64)> =
@@ -47,13 +46,13 @@ impl Weak {
         }
         // ‖R₃⁻¹‖ of the scaled unknowns, from the rows of R⁻¹.
         let inverse = inverse_rows(triangle, sized.iter().map(|&(j, size)| (j, size.recip())));
-        if inverse.is_some_and(|squares| squares.sqrt() * WEAK_BELOW < 1.0) {
+        if inverse.is_some_and(|squares| squares.sqrt() * WEAK_THRESHOLD < 1.0) {
             return None;
         }
-        let others: Vec<usize> = (0..n).filter(|&j| sizes[j].is_none()).collect();
-        let first = others.len();
+        let unsized_unknowns: Vec<usize> = (0..n).filter(|&j| sizes[j].is_none()).collect();
+        let first = unsized_unknowns.len();
         let mut block = Block::zeros(triangle.nrows(), n);
-        for (place, &j) in others.iter().enumerate() {
+        for (place, &j) in unsized_unknowns.iter().enumerate() {
             block.column_mut(place).copy_from_slice(triangle.column(j).as_slice());
         }
         for (place, &(j, size)) in sized.iter().enumerate() {
@@ -62,20 +61,21 @@ impl Weak {
         }
         let mut reduced = Triangle::new(n);
         reduced.absorb(&mut block);
-        let seen = reduced
+        let conditional = reduced
             .into_linearisation()
             .triangle
             .view((first, first), (sized.len(), sized.len()))
             .into_owned();
-        if seen.iter().any(|value| !value.is_finite()) || is_strong(&seen) {
+        if conditional.iter().any(|value| !value.is_finite()) || has_no_weak_direction(&conditional)
+        {
             return None;
         }
         let strongest = sized
             .iter()
             .map(|&(j, size)| triangle.column(j).norm() * size)
-            .fold(WEAK_BELOW, f64::max);
-        let SingularValues { values, right } = SingularValues::of(&seen);
-        let strong = values.iter().filter(|value| **value >= WEAK_BELOW).count();
+            .fold(WEAK_THRESHOLD, f64::max);
+        let SingularValues { values, right } = SingularValues::of(&conditional);
+        let strong = values.iter().filter(|value| **value >= WEAK_THRESHOLD).count();
         let spanned = super::identifiability::complement(&right.columns(0, strong).into_owned());
         let mut rows = DMatrix::zeros(spanned.nrows(), n);
         let mut visible = vec![1.0; n];
@@ -86,39 +86,43 @@ impl Weak {
         let combination = |row: nalgebra::RowDVector<f64>| {
             let sign = row
                 .iter()
-                .find(|weight| weight.abs() > NEGLIGIBLE)
+                .find(|weight| weight.abs() > NEGLIGIBLE_WEIGHT)
                 .map_or(1.0, |weight| weight.signum());
-            let weights = row.iter().enumerate().filter(|(_, weight)| weight.abs() > NEGLIGIBLE);
+            let weights =
+                row.iter().enumerate().filter(|(_, weight)| weight.abs() > NEGLIGIBLE_WEIGHT);
             let weights = weights.map(|(place, weight)| (sized[place].0, sign * weight)).collect();
-            UnidentifiableCombination { weights, singular_value: (&seen * row.transpose()).norm() }
+            UnidentifiableCombination {
+                weights,
+                singular_value: (&conditional * row.transpose()).norm(),
+            }
         };
         let combinations = spanned.row_iter().map(|row| combination(row.into_owned())).collect();
         (strong < sized.len()).then_some(Self { rows, combinations, visible })
     }
 }
 
-/// Whether an upper triangle leaves no vector of length one shorter than [`WEAK_BELOW`], by ‖T⁻¹‖
-/// in Frobenius's norm.
-fn is_strong(triangle: &DMatrix<f64>) -> bool {
+/// Returns true if ‖T v‖ ≥ [`WEAK_THRESHOLD`] for every unit vector v, judged by the Frobenius norm
+/// of T⁻¹.
+fn has_no_weak_direction(triangle: &DMatrix<f64>) -> bool {
     let n = triangle.ncols();
-    if (0..n).any(|j| triangle[(j, j)].abs() < WEAK_BELOW) {
+    if (0..n).any(|j| triangle[(j, j)].abs() < WEAK_THRESHOLD) {
         return false;
     }
     let inverse = triangle.solve_upper_triangular(&DMatrix::identity(n, n));
-    inverse.is_some_and(|inverse| inverse.norm() * WEAK_BELOW < 1.0)
+    inverse.is_some_and(|inverse| inverse.norm() * WEAK_THRESHOLD < 1.0)
 }
 
-/// An objective whose linearisation holds, at every iterate, what is seen too weakly there.
+/// Objective whose linearisation keeps weakly determined combinations fixed at every iterate.
 ///
-/// To the linearised problem come rows W p = 0 for the step p; the cost stays as it is.
-pub struct Steadied<'a, O> {
-    /// What is minimised.
+/// Rows W p = 0 for the step p are added to the linearised problem; the cost stays unchanged.
+pub struct StabilisedObjective<'a, O> {
+    /// Objective that is minimised.
     pub objective: O,
-    /// How far each unknown may plausibly go.
+    /// Plausible size of each unknown, in its unit.
     pub sizes: &'a [Option<f64>],
 }
 
-impl<O: Objective> Objective for Steadied<'_, O> {
+impl<O: Objective> Objective for StabilisedObjective<'_, O> {
     fn parameters(&self) -> usize {
         self.objective.parameters()
     }
@@ -128,10 +132,10 @@ impl<O: Objective> Objective for Steadied<'_, O> {
     }
 
     fn linearise(&self, x: &DVector<f64>) -> Linearisation {
-        let found = self.objective.linearise(x);
-        match Weak::of(&found.triangle, self.sizes) {
-            Some(weak) => found.with_rows(&weak.rows),
-            None => found,
+        let linearisation = self.objective.linearise(x);
+        match Weak::of(&linearisation.triangle, self.sizes) {
+            Some(weak) => linearisation.with_rows(&weak.rows),
+            None => linearisation,
         }
     }
 
@@ -143,17 +147,13 @@ impl<O: Objective> Objective for Steadied<'_, O> {
         self.objective.curvature(x, within)
     }
 
-    fn reach(&self) -> Vec<Option<f64>> {
-        self.objective
-            .reach()
-            .into_iter()
-            .zip(self.sizes)
-            .map(|(known, size)| known.or(*size))
-            .collect()
+    fn plausible_sizes(&self) -> Vec<Option<f64>> {
+        let sizes = self.objective.plausible_sizes().into_iter().zip(self.sizes);
+        sizes.map(|(from_prior, size)| from_prior.or(*size)).collect()
     }
 
-    fn bend(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
-        self.objective.bend(x, step)
+    fn acceleration_gradient(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
+        self.objective.acceleration_gradient(x, step)
     }
 }
 
@@ -163,8 +163,8 @@ mod tests {
 
     #[test]
     fn what_moves_the_data_by_less_than_its_level_is_weak() {
-        // y = x₀ + x₁ + ε (x₁ − x₂), x₃ alone; 1 is everyone's size but of x₃, which has none.
-        let of = |difference: f64| {
+        // y = x₀ + x₁ + ε (x₁ − x₂), x₃ separate; all but x₃ have the size 1.
+        let triangle = |difference: f64| {
             let rows = [
                 [1e3, 1e3, 0.0, 1.0],
                 [0.0, difference, -difference, 0.0],
@@ -174,8 +174,8 @@ mod tests {
             DMatrix::from_fn(4, 4, |i, j| rows[i][j])
         };
         let sizes = [Some(1.0), Some(1.0), Some(1.0), None];
-        assert_eq!(Weak::of(&of(20.0), &sizes), None);
-        let weak = Weak::of(&of(2.0), &sizes).unwrap();
+        assert_eq!(Weak::of(&triangle(20.0), &sizes), None);
+        let weak = Weak::of(&triangle(2.0), &sizes).unwrap();
         let [combination] = weak.combinations.as_slice() else { panic!("{weak:?}") };
         assert_eq!(combination.weights.iter().map(|(j, _)| *j).collect::<Vec<_>>()[..2], [0, 1]);
         assert!(
@@ -187,8 +187,8 @@ mod tests {
                 && weak.visible[2] > 0.99
                 && (weak.visible[3] - 1.0).abs() < 1e-15
         );
-        // What is ten times as large is ten times as well seen.
-        assert_eq!(Weak::of(&of(2.0), &[Some(10.0), Some(10.0), Some(10.0), None]), None);
-        assert_eq!(Weak::of(&of(0.0), &[None; 4]), None);
+        // A combination with ten times the size has ten times the effect.
+        assert_eq!(Weak::of(&triangle(2.0), &[Some(10.0), Some(10.0), Some(10.0), None]), None);
+        assert_eq!(Weak::of(&triangle(0.0), &[None; 4]), None);
     }
 }

@@ -1,4 +1,4 @@
-//! All rows of a problem at once, for those who need them as they are.
+//! Residuals and Jacobian of all items at once, without reduction.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::{Block, CHUNK_ITEMS, LeastSquares};
 use crate::numeric::zeros;
 
-/// All residuals r(x) in one vector.
+/// Returns all residuals r(x) in one vector.
 pub fn residual_vector<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> DVector<f64> {
     let (items, rows) = (problem.items(), problem.rows_per_item());
     let mut residuals = DVector::zeros(items * rows);
@@ -22,32 +22,35 @@ pub fn residual_vector<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> DVecto
     residuals
 }
 
-/// The whole Jacobian ∂r/∂x, m × n, and all residuals; parts of the items on every core.
+/// Returns the Jacobian ∂r/∂x, shape = (m, n), and all residuals, computed in parallel.
 pub fn jacobian_and_residual<P: LeastSquares>(
     problem: &P,
     x: &DVector<f64>,
 ) -> (DMatrix<f64>, DVector<f64>) {
     let (items, rows, n) = (problem.items(), problem.rows_per_item(), problem.parameters());
-    let (all, together) = ((rows * items).max(1), (rows * CHUNK_ITEMS).max(1));
+    let (column_rows, chunk_rows) = ((rows * items).max(1), (rows * CHUNK_ITEMS).max(1));
     let mut jacobian = zeros(rows * items, n);
     let mut residual = DVector::zeros(rows * items);
-    // Of each chunk its part of every column.
+    // For each chunk, the slices of all columns that belong to it.
     let mut parts: Vec<Vec<&mut [f64]>> = Vec::new();
     parts.resize_with(items.div_ceil(CHUNK_ITEMS), || Vec::with_capacity(n + 1));
-    for column in jacobian.as_mut_slice().chunks_mut(all).chain([residual.as_mut_slice()]) {
-        parts.iter_mut().zip(column.chunks_mut(together)).for_each(|(own, part)| own.push(part));
+    for column in jacobian.as_mut_slice().chunks_mut(column_rows).chain([residual.as_mut_slice()]) {
+        parts
+            .iter_mut()
+            .zip(column.chunks_mut(chunk_rows))
+            .for_each(|(slices, part)| slices.push(part));
     }
     let write = |block: &mut Block, (chunk, part): (usize, Vec<&mut [f64]>)| {
-        let own = chunk * CHUNK_ITEMS..((chunk + 1) * CHUNK_ITEMS).min(items);
-        block.reshape(rows * own.len());
-        problem.linearise(x, own, block);
+        let chunk_items = chunk * CHUNK_ITEMS..((chunk + 1) * CHUNK_ITEMS).min(items);
+        block.reshape(rows * chunk_items.len());
+        problem.linearise(x, chunk_items, block);
         part.into_iter().enumerate().for_each(|(j, out)| out.copy_from_slice(block.column(j)));
     };
     parts.into_par_iter().enumerate().for_each_init(|| Block::zeros(0, n), write);
     (jacobian, residual)
 }
 
-/// The whole Jacobian ∂r/∂x, m × n.
+/// Returns the Jacobian ∂r/∂x, shape = (m, n).
 pub fn jacobian<P: LeastSquares>(problem: &P, x: &DVector<f64>) -> DMatrix<f64> {
     jacobian_and_residual(problem, x).0
 }
@@ -58,7 +61,7 @@ mod tests {
 
     use super::*;
 
-    /// rᵢ = (i x₁², x₂ − i).
+    /// Problem with residuals rᵢ = (i x₁², x₂ − i).
     struct Rows(usize);
 
     impl LeastSquares for Rows {
@@ -75,8 +78,8 @@ mod tests {
         }
 
         fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
-            for (i, own) in items.zip(out.chunks_exact_mut(2)) {
-                own.copy_from_slice(&[i as f64 * x[0] * x[0], x[1] - i as f64]);
+            for (i, item) in items.zip(out.chunks_exact_mut(2)) {
+                item.copy_from_slice(&[i as f64 * x[0] * x[0], x[1] - i as f64]);
             }
         }
 

@@ -7,7 +7,7 @@ use super::effect::{MOST_LISTED, SHOWN_WAVES};
 use super::quantity::{decimals, number, or_dash, two_digits};
 use crate::fit::{Estimate, Identification, PriorSize};
 use crate::least_squares::solver::AtBound;
-use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_BELOW};
+use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_THRESHOLD};
 use crate::model::effect;
 use crate::model::parameter::Regressor;
 use crate::problem::Problem;
@@ -293,7 +293,7 @@ pub(super) fn weak<'a>(found: &Identification, file: &str) -> Option<Block<'a>> 
         if count == 1 { ("combination", "is held") } else { ("combinations", "are held") };
     let words = format!(
         "{count} {noun} of parameters {hold} where the fit met {}: seen too weakly (moved by the arm's own size, 1 rad\n\
-         or a factor of 100, all measured coordinates together change by less than {WEAK_BELOW} σ):",
+         or a factor of 100, all measured coordinates together change by less than {WEAK_THRESHOLD} σ):",
         if count == 1 { "it" } else { "them" }
     );
     let points =

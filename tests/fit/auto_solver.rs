@@ -11,7 +11,7 @@ use flexcal::fit::SolverChoice;
 use flexcal::least_squares::Loss;
 use flexcal::least_squares::solver::{
     GaussNewtonSettings, PseudoInverseSettings, Settings, Solution, State, minimise,
-    minimise_gauss_newton, minimise_pseudo_inverse, minimise_within,
+    minimise_constrained_by, minimise_gauss_newton, minimise_pseudo_inverse,
 };
 use flexcal::model::Model;
 use flexcal::problem::Problem;
@@ -118,7 +118,7 @@ fn auto_is_best_where_bounds_bind() {
         let fit = own.fit(&residuals);
         let solve = |solver: SolverChoice| {
             let (within, limits) = (solver.within().unwrap(), (&own.bounds, &own.rows));
-            let found = minimise_within(
+            let found = minimise_constrained_by(
                 within,
                 &fit,
                 own.nominal(),

@@ -9,7 +9,9 @@ use argmin::core::observers::Observe;
 use flexcal::fit::{
     Estimate, Identification, IdentifyError, Options, SolverChoice, StageError, Strategy, identify,
 };
-use flexcal::least_squares::solver::{Settings, Solution, State, Within, minimise_within};
+use flexcal::least_squares::solver::{
+    BoundMethod, Settings, Solution, State, minimise_constrained_by,
+};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use flexcal::report::{estimate_json, estimate_text};
@@ -228,9 +230,11 @@ fn bounds_against_the_truth_are_fitted_to_the_optimum() {
         let own = Bounded::read(name);
         let residuals = own.residuals();
         let fit = own.fit(&residuals);
-        for (within, most) in [(Within::ActiveSet, most), (Within::InteriorPoint, most.max(20))] {
+        for (within, most) in
+            [(BoundMethod::ActiveSet, most), (BoundMethod::InteriorPoint, most.max(20))]
+        {
             let limits = (&own.bounds, &own.rows);
-            let found = minimise_within(
+            let found = minimise_constrained_by(
                 within,
                 &fit,
                 own.nominal(),

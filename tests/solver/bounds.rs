@@ -3,8 +3,8 @@
 
 use argmin::core::observers::Observe;
 use flexcal::least_squares::solver::{
-    AtBound, Bounds, Inequalities, State, Termination, Within, minimise, minimise_bounded,
-    minimise_within,
+    AtBound, BoundMethod, Bounds, Inequalities, State, Termination, minimise, minimise_bounded,
+    minimise_constrained_by,
 };
 use flexcal::least_squares::{Fit, Linearisation, Objective};
 use nalgebra::DVector;
@@ -100,11 +100,17 @@ fn several_active_bounds_as_scipy() {
         assert!(solution.termination.converged());
         assert_eq!(solution.at_bound, active);
         let none = Inequalities::none(x.len());
-        for within in [Within::InteriorPoint, Within::Reflective, Within::Clamped] {
+        for within in [BoundMethod::InteriorPoint, BoundMethod::Reflective, BoundMethod::Clamped] {
             let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: None };
             let start = vector(&start);
-            let other =
-                minimise_within(within, guarded, start, (&bounds, &none), &tight(), None::<Silent>);
+            let other = minimise_constrained_by(
+                within,
+                guarded,
+                start,
+                (&bounds, &none),
+                &tight(),
+                None::<Silent>,
+            );
             println!(
                 "  {within:?}: {} iterations, {}, cost {:.15}",
                 other.iterations, other.termination, other.cost
@@ -112,12 +118,12 @@ fn several_active_bounds_as_scipy() {
             assert!(other.cost >= cost * (1.0 - 1e-9), "{within:?}: {}", other.cost);
             // The naive way may stop short.
             assert!(
-                within == Within::Clamped || other.cost <= cost * (1.0 + 1e-8),
+                within == BoundMethod::Clamped || other.cost <= cost * (1.0 + 1e-8),
                 "{within:?}: {}",
                 other.cost
             );
             assert!(
-                within == Within::Clamped || other.at_bound == active,
+                within == BoundMethod::Clamped || other.at_bound == active,
                 "{within:?}: {:?}",
                 other.at_bound
             );

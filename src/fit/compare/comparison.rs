@@ -9,7 +9,7 @@ use crate::fit::identification::identify_model;
 use crate::fit::{
     Identification, IdentifyError, Options, Placement, ProgressSink, SolverChoice, Strategy,
 };
-use crate::least_squares::solver::Within;
+use crate::least_squares::solver::BoundMethod;
 use crate::measurement::Dataset;
 use crate::model::{Ablation, Model};
 use crate::paper::StiffnessStage;
@@ -82,7 +82,7 @@ pub fn compare(
     let elastic = problem.is_elastic();
     // Without bounds those that keep them all take the same steps; one of them is enough.
     let tells = |solver: &SolverChoice| {
-        model.is_bounded() || matches!(solver.within(), None | Some(Within::ActiveSet))
+        model.is_bounded() || matches!(solver.within(), None | Some(BoundMethod::ActiveSet))
     };
     let solvers =
         SolverChoice::EACH.into_iter().filter(|solver| solver.keeps(&model) && tells(solver));

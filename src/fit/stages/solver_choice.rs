@@ -1,6 +1,6 @@
 //! By which solver parameters are fitted.
 
-use crate::least_squares::solver::Within;
+use crate::least_squares::solver::BoundMethod;
 use crate::model::Model;
 
 /// A solver by name.
@@ -102,12 +102,12 @@ impl SolverChoice {
     }
 
     /// How it keeps bounds, if it does.
-    pub fn within(self) -> Option<Within> {
+    pub fn within(self) -> Option<BoundMethod> {
         match self {
-            Self::Bounded => Some(Within::ActiveSet),
-            Self::InteriorPoint => Some(Within::InteriorPoint),
-            Self::Reflective => Some(Within::Reflective),
-            Self::Clamped => Some(Within::Clamped),
+            Self::Bounded => Some(BoundMethod::ActiveSet),
+            Self::InteriorPoint => Some(BoundMethod::InteriorPoint),
+            Self::Reflective => Some(BoundMethod::Reflective),
+            Self::Clamped => Some(BoundMethod::Clamped),
             Self::Auto | Self::LevenbergMarquardt | Self::GaussNewton | Self::PseudoInverse => None,
         }
     }
@@ -116,7 +116,7 @@ impl SolverChoice {
     pub fn keeps(self, model: &Model) -> bool {
         match self.within() {
             None => !model.is_bounded(),
-            Some(Within::Reflective | Within::Clamped) => model.constraints.is_empty(),
+            Some(BoundMethod::Reflective | BoundMethod::Clamped) => model.constraints.is_empty(),
             Some(_) => true,
         }
     }

@@ -14,8 +14,8 @@ use crate::least_squares::solver::{
     PseudoInverseSettings, Settings, Solution, Termination,
 };
 use crate::least_squares::{
-    Blind, Fit, LinearRows, Linearisation, Loss, Memory, Objective as _, RowsError, Steadied,
-    Triangle, UnidentifiableCombination, Weak,
+    Blind, Fit, LinearRows, Linearisation, Loss, Memory, Objective as _, RowsError,
+    StabilisedObjective, Triangle, UnidentifiableCombination, Weak,
 };
 use crate::model::parameter::Parameter;
 use crate::model::{LinearModel, Model, Pose, PoseResiduals};
@@ -351,7 +351,7 @@ impl<'a> Stage<'a> {
                 constant: -(&gauge.rows * hold),
             })?;
         let sizes = self.sizes();
-        let fit = Steadied { objective: fit, sizes: &sizes };
+        let fit = StabilisedObjective { objective: fit, sizes: &sizes };
         let settings = Settings {
             max_iterations: self.max_steps,
             cost_tolerance: self.cost_tolerance,
@@ -365,7 +365,7 @@ impl<'a> Stage<'a> {
             poses: self.poses.len(),
         });
         if let Some(within) = self.solver.within() {
-            return Ok(solver::minimise_within(
+            return Ok(solver::minimise_constrained_by(
                 within,
                 fit,
                 begin,

@@ -1,65 +1,67 @@
-//! Bounded Levenberg–Marquardt: every step is a linear least-squares problem in a box, or in a
-//! polyhedron; three ways to solve it.
+//! Levenberg–Marquardt within bounds and linear inequalities, with three ways to find the step.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::interior::interior_point;
 use super::levenberg_marquardt::Model;
 use super::polyhedron::{Faces, Polyhedron};
-use super::polyhedron_step::{NEAR, PolyhedronProblem, PolyhedronSolution};
+use super::polyhedron_step::{FACE_DISTANCE, PolyhedronProblem, PolyhedronSolution};
 use super::settings::RADIUS_SLACK;
 use super::{Bounds, Factor, Inequalities, Settings, Step, Subproblem, TrustRegion};
 use crate::least_squares::Linearisation;
 
-/// Damped problems tried for one step when the radius limits a step along bounds.
-const DAMPINGS: usize = 25;
+/// Maximum number of damping values tried for one step when both the radius and bounds limit it.
+const MAX_DAMPING_TRIES: usize = 25;
 
-/// Levenberg–Marquardt within bounds lo ≤ x ≤ hi.
+/// Returns a Levenberg–Marquardt solver within bounds lo ≤ x ≤ hi.
 ///
-/// As [`constrained_levenberg_marquardt`] without inequalities.
+/// It is [`constrained_levenberg_marquardt`] without inequalities.
 pub fn bounded_levenberg_marquardt(bounds: Bounds, settings: Settings) -> TrustRegion<Constrained> {
     let rows = Inequalities::none(bounds.lower().len());
     constrained_levenberg_marquardt(bounds, rows, settings)
 }
 
-/// Levenberg–Marquardt within bounds lo ≤ x ≤ hi and inequalities lo ≤ A x ≤ hi.
+/// Returns a Levenberg–Marquardt solver within bounds lo ≤ x ≤ hi and inequalities lo ≤ A x ≤ hi.
 ///
 /// min ½‖J p + r‖² + ½λ‖D p‖² subject to the bounds and inequalities on x + p
 ///
-/// The unconstrained step is tried first, then the one in the polyhedron (a box without
-/// inequalities), each without damping if that respects the radius: on a guess of the faces that
-/// hold, corrected until the optimality conditions do. After a step that limits held back the one
-/// in the polyhedron is tried first. The problem is never evaluated outside (inequalities: beyond
-/// rounding); a start outside is moved to the [`nearest`] point within. Converged when the gradient
-/// vanishes along all directions that bounds and inequalities leave open.
+/// The solver first tries the unconstrained step, then the step in the polyhedron. Each is tried
+/// without damping if that respects the radius. An active-set method guesses the active faces and
+/// corrects them until the optimality conditions hold. After a constrained step, the step in the
+/// polyhedron is tried first. The problem is never evaluated outside the bounds, or outside the
+/// inequalities beyond rounding. A start outside is moved to the [`nearest`] feasible point. The
+/// solver has converged when the gradient vanishes along all feasible directions.
 pub fn constrained_levenberg_marquardt(
     bounds: Bounds,
     rows: Inequalities,
     settings: Settings,
 ) -> TrustRegion<Constrained> {
-    Constrained::solver(Steps::ActiveSet, bounds, rows, settings)
+    Constrained::solver(StepMethod::ActiveSet, bounds, rows, settings)
 }
 
-/// The same with every step that leaves the polyhedron by Clarabel's interior-point method, ‖D p‖ ≤
-/// Δ as a second-order cone.
+/// Returns a solver like [`constrained_levenberg_marquardt`] whose constrained steps come from
+/// Clarabel's interior-point method.
+///
+/// The radius ‖D p‖ ≤ Δ is a second-order cone of the same problem.
 pub fn interior_point_levenberg_marquardt(
     bounds: Bounds,
     rows: Inequalities,
     settings: Settings,
 ) -> TrustRegion<Constrained> {
-    Constrained::solver(Steps::InteriorPoint, bounds, rows, settings)
+    Constrained::solver(StepMethod::InteriorPoint, bounds, rows, settings)
 }
 
-/// Levenberg–Marquardt whose unbounded steps are moved to the nearest point within the bounds: what
-/// one would write first.
+/// Returns a Levenberg–Marquardt solver that clamps unconstrained steps to the bounds; a baseline
+/// for comparisons.
 ///
-/// It may stop where a bound keeps it from a lower cost: a clamped step need not lead downhill.
+/// It may stop at a bound above the minimum, since a clamped step need not lead downhill.
 pub fn clamped_levenberg_marquardt(bounds: Bounds, settings: Settings) -> TrustRegion<Constrained> {
     let rows = Inequalities::none(bounds.lower().len());
-    Constrained::solver(Steps::Clamped, bounds, rows, settings)
+    Constrained::solver(StepMethod::Clamped, bounds, rows, settings)
 }
 
-/// The point nearest to `x` that keeps bounds and inequalities, if there is one.
+/// Returns the point nearest to `x` that satisfies bounds and inequalities, or `None` if there is
+/// none.
 pub fn nearest(x: &DVector<f64>, bounds: &Bounds, rows: &Inequalities) -> Option<DVector<f64>> {
     let n = x.len();
     if bounds.lower().len() != n || rows.matrix().ncols() != n {
@@ -76,35 +78,35 @@ pub fn nearest(x: &DVector<f64>, bounds: &Bounds, rows: &Inequalities) -> Option
         PolyhedronProblem::new(&factor, &polyhedron, polyhedron.touched.clone()).solve(0.0);
     let mut point = x + &solution.q;
     bounds.hold(&mut point, &solution.faces.bounds);
-    let kept = |i| rows.at(&point, i).is_some() || rows.holds(&point, i);
-    (0..rows.len()).all(kept).then_some(point)
+    let is_satisfied = |i| rows.at(&point, i).is_some() || rows.holds(&point, i);
+    (0..rows.len()).all(is_satisfied).then_some(point)
 }
 
-/// How a step within bounds is found.
+/// Method that finds a step within the constraints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Steps {
+enum StepMethod {
     ActiveSet,
     InteriorPoint,
     Clamped,
 }
 
-/// The step within a sphere ‖D p‖ ≤ Δ, a box and inequalities.
+/// Subproblem of a step within a sphere ‖D p‖ ≤ Δ, bounds and inequalities.
 #[derive(Debug, Clone)]
 pub struct Constrained {
-    steps: Steps,
+    method: StepMethod,
     bounds: Bounds,
     rows: Inequalities,
     model: Option<Model>,
-    /// Faces that held in the last problem from the same x.
+    /// Active faces of the last problem from the same x.
     guess: Option<Faces>,
-    /// The step from x that only limits hold back, once it was asked for.
+    /// Undamped constrained step from x, once computed.
     undamped: Option<PolyhedronSolution>,
-    /// Whether the last step was held back.
-    confined: bool,
+    /// True if constraints changed the last step.
+    was_constrained: bool,
 }
 
 impl Constrained {
-    /// The step that limits alone hold back, if some do and the radius does not.
+    /// Returns the undamped constrained step if constraints limit it and the radius does not.
     fn undamped_step(&mut self, x: &DVector<f64>, radius: f64) -> Option<Step> {
         let model = self.model.as_ref()?;
         let undamped = self.undamped.get_or_insert_with(|| {
@@ -112,15 +114,15 @@ impl Constrained {
             PolyhedronProblem::new(&model.factor, &polyhedron, polyhedron.touched.clone())
                 .solve(0.0)
         });
-        let alone =
+        let is_within_radius =
             !undamped.faces.is_empty() && undamped.q.norm() <= (1.0 + RADIUS_SLACK) * radius;
-        let solution = alone.then(|| undamped.clone())?;
-        Some(self.along(x, solution, 0.0))
+        let solution = is_within_radius.then(|| undamped.clone())?;
+        Some(self.step_from(x, solution, 0.0))
     }
 
-    /// The step of a solution, exactly on the bounds that hold; the next problem from the same x
-    /// begins with its faces.
-    fn along(
+    /// Returns the step of a solution, placed exactly on its active bounds, and stores its faces as
+    /// the next guess.
+    fn step_from(
         &mut self,
         x: &DVector<f64>,
         PolyhedronSolution { q, faces }: PolyhedronSolution,
@@ -135,14 +137,23 @@ impl Constrained {
         Step { point, length: q.norm(), slope, predicted, damping }
     }
 
+    /// Creates the trust-region solver around this subproblem.
     fn solver(
-        steps: Steps,
+        method: StepMethod,
         bounds: Bounds,
         rows: Inequalities,
         settings: Settings,
     ) -> TrustRegion<Self> {
         TrustRegion::new(
-            Self { steps, bounds, rows, model: None, guess: None, undamped: None, confined: false },
+            Self {
+                method,
+                bounds,
+                rows,
+                model: None,
+                guess: None,
+                undamped: None,
+                was_constrained: false,
+            },
             settings,
         )
     }
@@ -150,14 +161,14 @@ impl Constrained {
 
 impl Subproblem for Constrained {
     fn name(&self) -> &'static str {
-        match self.steps {
-            Steps::ActiveSet => "bounded Levenberg–Marquardt",
-            Steps::InteriorPoint => "interior-point Levenberg–Marquardt",
-            Steps::Clamped => "clamped Levenberg–Marquardt",
+        match self.method {
+            StepMethod::ActiveSet => "bounded Levenberg–Marquardt",
+            StepMethod::InteriorPoint => "interior-point Levenberg–Marquardt",
+            StepMethod::Clamped => "clamped Levenberg–Marquardt",
         }
     }
 
-    fn admit(&self, start: &mut DVector<f64>) -> bool {
+    fn admit_start(&self, start: &mut DVector<f64>) -> bool {
         let Some(admitted) = nearest(start, &self.bounds, &self.rows) else { return false };
         *start = admitted;
         true
@@ -175,56 +186,62 @@ impl Subproblem for Constrained {
     }
 
     fn free_gradient(&self, x: &DVector<f64>, j: usize, gradient: f64) -> f64 {
-        let down = gradient > 0.0 && x[j] <= self.bounds.lower()[j];
-        let up = gradient < 0.0 && x[j] >= self.bounds.upper()[j];
-        if down || up { 0.0 } else { gradient }
+        let is_at_lower = gradient > 0.0 && x[j] <= self.bounds.lower()[j];
+        let is_at_upper = gradient < 0.0 && x[j] >= self.bounds.upper()[j];
+        if is_at_lower || is_at_upper { 0.0 } else { gradient }
     }
 
-    fn hold_back(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &mut DVector<f64>) {
+    fn project_gradient(
+        &self,
+        x: &DVector<f64>,
+        scale: &DVector<f64>,
+        gradient: &mut DVector<f64>,
+    ) {
         if (0..self.rows.len()).any(|i| self.rows.at(x, i).is_some()) {
-            *gradient = Polyhedron::around(x, &self.bounds, &self.rows, scale).free_part(gradient);
+            *gradient =
+                Polyhedron::around(x, &self.bounds, &self.rows, scale).projected_gradient(gradient);
         } else {
             (0..x.len()).for_each(|j| gradient[j] = self.free_gradient(x, j, gradient[j]));
         }
     }
 
-    fn admits(&self, x: &DVector<f64>) -> bool {
+    fn is_feasible(&self, x: &DVector<f64>) -> bool {
         self.bounds.contain(x) && self.rows.contain(x)
     }
 
-    fn is_confined(&self) -> bool {
-        self.confined && self.steps != Steps::Clamped
+    fn is_step_constrained(&self) -> bool {
+        self.was_constrained && self.method != StepMethod::Clamped
     }
 
-    fn pressed(
+    fn active_normals(
         &self,
         x: &DVector<f64>,
         scale: &DVector<f64>,
         gradient: &DVector<f64>,
     ) -> DMatrix<f64> {
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, scale);
-        polyhedron.normals_of(&polyhedron.pressed(gradient).0)
+        polyhedron.normals_of(&polyhedron.active_faces(gradient).0)
     }
 
-    fn bent(
+    fn accelerated(
         &mut self,
         x: &DVector<f64>,
-        bend: &DVector<f64>,
+        acceleration: &DVector<f64>,
         damping: f64,
     ) -> Option<DVector<f64>> {
         let model = self.model.as_ref()?;
-        let factor = model.bent(bend)?;
+        let factor = model.with_acceleration(acceleration)?;
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
-        let PolyhedronSolution { q, faces } = match self.steps {
-            Steps::ActiveSet => {
+        let PolyhedronSolution { q, faces } = match self.method {
+            StepMethod::ActiveSet => {
                 let guess = self.guess.clone().unwrap_or_else(|| polyhedron.touched.clone());
                 PolyhedronProblem::new(&factor, &polyhedron, guess).solve(damping)
             }
-            Steps::InteriorPoint => {
+            StepMethod::InteriorPoint => {
                 let (q, _) = interior_point(&factor, damping, &polyhedron.half_spaces(), None)?;
-                polyhedron.within(q, NEAR)
+                polyhedron.pulled_inside(q, FACE_DISTANCE)
             }
-            Steps::Clamped => return None,
+            StepMethod::Clamped => return None,
         };
         let mut point = x + q.component_div(&model.scale);
         self.bounds.hold(&mut point, &faces.bounds);
@@ -232,63 +249,64 @@ impl Subproblem for Constrained {
     }
 
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step {
-        if self.confined && self.steps == Steps::ActiveSet {
-            // Limits that held the last step back hold this one back too, most often.
+        if self.was_constrained && self.method == StepMethod::ActiveSet {
+            // Constraints that changed the last step usually change this one, too.
             if let Some(step) = self.undamped_step(x, radius) {
                 return step;
             }
         }
         let Some(model) = &mut self.model else { return Step::none(x) };
         let step = model.unbounded_step(x, radius);
-        let inside = self.bounds.contain(&step.point) && self.rows.contain(&step.point);
-        self.confined = !inside;
-        if inside && self.steps != Steps::InteriorPoint {
+        let is_feasible = self.bounds.contain(&step.point) && self.rows.contain(&step.point);
+        self.was_constrained = !is_feasible;
+        if is_feasible && self.method != StepMethod::InteriorPoint {
             return step;
         }
         let polyhedron = Polyhedron::around(x, &self.bounds, &self.rows, &model.scale);
-        let (solution, damping) = match self.steps {
-            Steps::ActiveSet => {
-                let known =
+        let (solution, damping) = match self.method {
+            StepMethod::ActiveSet => {
+                let faces =
                     self.undamped.as_ref().map_or(&polyhedron.touched, |undamped| &undamped.faces);
-                let mut problem = PolyhedronProblem::new(&model.factor, &polyhedron, known.clone());
-                problem.begin_at(&(&step.point - x).component_mul(&model.scale));
+                let mut problem = PolyhedronProblem::new(&model.factor, &polyhedron, faces.clone());
+                problem.guess_faces(&(&step.point - x).component_mul(&model.scale));
                 let (size, undamped) = (problem.gradient_norm(), &mut self.undamped);
                 let solve = |lambda| match lambda {
                     0.0 => undamped.get_or_insert_with(|| problem.solve(0.0)).clone(),
                     _ => problem.solve(lambda),
                 };
-                limited(solve, step.damping, size, radius)
+                step_within_radius(solve, step.damping, size, radius)
             }
-            Steps::InteriorPoint => {
-                let found =
+            StepMethod::InteriorPoint => {
+                let solution =
                     interior_point(&model.factor, 0.0, &polyhedron.half_spaces(), Some(radius));
-                let (q, damping) = found.unwrap_or_else(|| (DVector::zeros(x.len()), 0.0));
-                (polyhedron.within(q, NEAR), damping)
+                let (q, damping) = solution.unwrap_or_else(|| (DVector::zeros(x.len()), 0.0));
+                (polyhedron.pulled_inside(q, FACE_DISTANCE), damping)
             }
-            Steps::Clamped => {
+            StepMethod::Clamped => {
                 let q = (step.point - x).component_mul(&model.scale);
-                (polyhedron.within(q, 0.0), step.damping)
+                (polyhedron.pulled_inside(q, 0.0), step.damping)
             }
         };
-        self.along(x, solution, damping)
+        self.step_from(x, solution, damping)
     }
 }
 
-/// The constrained step with ‖q‖ ≤ Δ to within 10 %, and its damping λ; `solve` gives it for any λ,
-/// `size` is ‖Bᵀc‖, `first` is the λ > 0 that it would need without constraints.
+/// Returns the constrained step with ‖q‖ ≤ Δ to within 10 %, and its damping λ.
 ///
-/// ‖q(λ)‖ falls with λ and is at most ‖Bᵀc‖/λ (compare q with staying put), which brackets λ;
-/// within the bracket Hebden's model ‖q(λ)‖ ≈ a/(b + λ) is fitted to the last two values.
-fn limited(
+/// `solve` returns the constrained step for any λ, `size` is ‖Bᵀc‖ and `first` the λ > 0 of the
+/// unconstrained step. ‖q(λ)‖ falls with λ and is at most ‖Bᵀc‖/λ (compare q with 0), which
+/// brackets λ. Within the bracket, Hebden's model ‖q(λ)‖ ≈ a/(b + λ) is fitted to the last two
+/// values.
+fn step_within_radius(
     mut solve: impl FnMut(f64) -> PolyhedronSolution,
     first: f64,
     size: f64,
     radius: f64,
 ) -> (PolyhedronSolution, f64) {
     let is_short = |length: f64| length <= (1.0 + RADIUS_SLACK) * radius;
-    let fills = |length: f64| is_short(length) && length >= (1.0 - RADIUS_SLACK) * radius;
-    let mut known = (first > 0.0).then(|| solve(first));
-    if let Some(solution) = known.take_if(|solution| fills(solution.q.norm())) {
+    let fills_radius = |length: f64| is_short(length) && length >= (1.0 - RADIUS_SLACK) * radius;
+    let mut first_solution = (first > 0.0).then(|| solve(first));
+    if let Some(solution) = first_solution.take_if(|solution| fills_radius(solution.q.norm())) {
         return (solution, first);
     }
     let undamped = solve(0.0);
@@ -298,15 +316,15 @@ fn limited(
     }
     let (mut low, mut high) = (0.0, size / radius);
     let mut last = (0.0, length);
-    let mut lambda = if known.is_some() { first } else { 1e-3 * high };
+    let mut lambda = if first_solution.is_some() { first } else { 1e-3 * high };
     let mut best = None;
-    for _ in 0..DAMPINGS {
-        let solution = known.take().unwrap_or_else(|| solve(lambda));
+    for _ in 0..MAX_DAMPING_TRIES {
+        let solution = first_solution.take().unwrap_or_else(|| solve(lambda));
         length = solution.q.norm();
         if is_short(length) {
             high = lambda;
             best = Some((solution, lambda));
-            if fills(length) {
+            if fills_radius(length) {
                 break;
             }
         } else {
@@ -315,8 +333,8 @@ fn limited(
         let shift = (last.0 * last.1 - lambda * length) / (length - last.1);
         let model = length * (lambda + shift) / radius - shift;
         last = (lambda, length);
-        let inside = model > low && model < high;
-        lambda = if inside { model } else { (low.max(1e-3 * high) * high).sqrt() };
+        let is_bracketed = model > low && model < high;
+        lambda = if is_bracketed { model } else { (low.max(1e-3 * high) * high).sqrt() };
     }
     best.unwrap_or_else(|| (solve(high), high))
 }

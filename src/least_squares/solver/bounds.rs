@@ -1,24 +1,24 @@
-//! Bounds on single unknowns.
+//! Bounds on individual unknowns.
 
 use nalgebra::DVector;
 
-/// The side of a bound or constraint that holds.
+/// Side of an active bound or constraint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum AtBound {
-    /// The lower one.
+    /// Lower side of the interval.
     Lower,
-    /// The upper one.
+    /// Upper side of the interval.
     Upper,
 }
 
-/// Bounds lo ≤ x ≤ hi; infinite where there is none.
+/// Bounds lo ≤ x ≤ hi, infinite where an unknown is unbounded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bounds {
     lower: DVector<f64>,
     upper: DVector<f64>,
 }
 
-/// Bounds that no x can satisfy.
+/// Error of bounds that no x satisfies.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BoundsError {
@@ -30,23 +30,24 @@ pub enum BoundsError {
         /// Number of upper bounds.
         upper: usize,
     },
-    /// Not lo ≤ hi (or not a number, or an infinity on the wrong side).
+    /// An unknown violates lo ≤ hi, has a bound that is not a number, or an infinity on the wrong
+    /// side.
     #[error("setting bounds: unknown {index} has no value between {lower} and {upper}")]
     Empty {
-        /// Which unknown.
+        /// Index of the unknown.
         index: usize,
-        /// Its lower bound.
+        /// Lower bound of the unknown.
         lower: f64,
-        /// Its upper bound.
+        /// Upper bound of the unknown.
         upper: f64,
     },
 }
 
 impl Bounds {
-    /// Bounds lo ≤ x ≤ hi; lo = hi holds an unknown fixed.
+    /// Creates bounds lo ≤ x ≤ hi; lo = hi fixes an unknown.
     ///
     /// # Errors
-    /// When the lengths differ or some unknown is left without a value.
+    /// Returns an error if the lengths differ or an unknown is left without a value.
     pub fn new(lower: DVector<f64>, upper: DVector<f64>) -> Result<Self, BoundsError> {
         if lower.len() != upper.len() {
             return Err(BoundsError::Sizes { lower: lower.len(), upper: upper.len() });
@@ -59,7 +60,7 @@ impl Bounds {
         Ok(Self { lower, upper })
     }
 
-    /// No bounds on any of `n` unknowns.
+    /// Creates infinite bounds for `n` unknowns.
     pub fn none(n: usize) -> Self {
         Self {
             lower: DVector::from_element(n, f64::NEG_INFINITY),
@@ -67,17 +68,17 @@ impl Bounds {
         }
     }
 
-    /// lo.
+    /// Returns the lower bounds lo.
     pub fn lower(&self) -> &DVector<f64> {
         &self.lower
     }
 
-    /// hi.
+    /// Returns the upper bounds hi.
     pub fn upper(&self) -> &DVector<f64> {
         &self.upper
     }
 
-    /// The bound that `x[j]` equals, if any.
+    /// Returns the bound that `x[j]` equals or exceeds, if any.
     pub fn at(&self, x: &DVector<f64>, j: usize) -> Option<AtBound> {
         if x[j] <= self.lower[j] {
             Some(AtBound::Lower)
@@ -88,14 +89,14 @@ impl Bounds {
         }
     }
 
-    /// The nearest point within the bounds.
+    /// Moves x to the nearest point within the bounds.
     pub fn clamp(&self, x: &mut DVector<f64>) {
         for (j, x) in x.iter_mut().enumerate() {
             *x = x.clamp(self.lower[j], self.upper[j]);
         }
     }
 
-    /// Puts the unknowns of `active` bounds exactly on them, and rounds all others into the box.
+    /// Places the unknowns with an active bound exactly on it and clamps all others into the box.
     pub(super) fn hold(&self, x: &mut DVector<f64>, active: &[Option<AtBound>]) {
         for (j, active) in active.iter().enumerate() {
             match active {
@@ -107,6 +108,7 @@ impl Bounds {
         self.clamp(x);
     }
 
+    /// Returns true if x satisfies every bound.
     pub(super) fn contain(&self, x: &DVector<f64>) -> bool {
         (0..x.len()).all(|j| self.lower[j] <= x[j] && x[j] <= self.upper[j])
     }

@@ -1,14 +1,14 @@
-//! When an undamped iteration counts as diverging.
+//! Divergence test of undamped iterations.
 
-/// When an undamped iteration counts as diverging.
+/// Criterion by which an undamped iteration counts as diverging.
 ///
-/// It does when ½‖r‖² > `growth` · (lowest ½‖r‖² so far) in `patience` iterations one after
-/// another, or as soon as ½‖r‖² is not finite.
+/// The iteration diverges if ½‖r‖² > `growth` · (lowest ½‖r‖² so far) in `patience` successive
+/// iterations, or as soon as ½‖r‖² is not finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Divergence {
-    /// Factor above the lowest cost so far, at least 1; default 10.
+    /// Allowed ratio of the cost to the lowest cost so far, at least 1; default 10.
     pub growth: f64,
-    /// Iterations in a row, at least 1; default 5.
+    /// Number of successive iterations above that ratio, at least 1; default 5.
     pub patience: u64,
 }
 
@@ -18,20 +18,21 @@ impl Default for Divergence {
     }
 }
 
-/// The costs of a run, judged one by one.
+/// Running divergence test over the costs of one run.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Watch {
+pub(super) struct DivergenceMonitor {
     divergence: Divergence,
     lowest: f64,
     above: u64,
 }
 
-impl Watch {
+impl DivergenceMonitor {
+    /// Starts the test before the first cost.
     pub fn new(divergence: Divergence) -> Self {
         Self { divergence, lowest: f64::INFINITY, above: 0 }
     }
 
-    /// Takes in the next cost; true when the run diverges.
+    /// Records the next cost and returns true if the run diverges.
     pub fn diverges(&mut self, cost: f64) -> bool {
         self.above = if cost > self.divergence.growth * self.lowest { self.above + 1 } else { 0 };
         self.lowest = self.lowest.min(cost);

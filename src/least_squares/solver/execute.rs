@@ -1,4 +1,4 @@
-//! argmin's executor, set up once for every solver.
+//! Execution of a solver by argmin's executor.
 
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Executor, Solver, State as _, TerminationReason, TerminationStatus};
@@ -7,25 +7,26 @@ use nalgebra::DVector;
 use super::{Solution, State, Subproblem, Termination, TrustRegion};
 use crate::least_squares::Objective;
 
-/// An observer that says nothing.
-pub(super) struct Silent;
+/// Observer that ignores every iteration.
+pub(super) struct NoObserver;
 
-impl Observe<State> for Silent {}
+impl Observe<State> for NoObserver {}
 
-/// A solver that says why it stopped.
-pub(super) trait Ends {
-    /// Why it stopped, once it has.
-    fn end(&self) -> Option<Termination>;
+/// Solver that reports the reason of its termination.
+pub(super) trait ReportsTermination {
+    /// Returns the reason of termination, or `None` while the solver runs.
+    fn termination(&self) -> Option<Termination>;
 }
 
-impl<S: Subproblem> Ends for TrustRegion<S> {
-    fn end(&self) -> Option<Termination> {
-        self.termination()
+impl<S: Subproblem> ReportsTermination for TrustRegion<S> {
+    fn termination(&self) -> Option<Termination> {
+        TrustRegion::termination(self)
     }
 }
 
-/// Runs a solver from `start`; where it does not converge, x is the best point that it has seen.
-pub(super) fn run<O: Objective, S: Solver<O, State> + Ends>(
+/// Runs a solver from `start`. If it does not converge, the solution is the best point it
+/// evaluated.
+pub(super) fn run<O: Objective, S: Solver<O, State> + ReportsTermination>(
     objective: O,
     start: DVector<f64>,
     solver: S,
@@ -43,20 +44,22 @@ pub(super) fn run<O: Objective, S: Solver<O, State> + Ends>(
     // The executor fails only when an observer does.
     let Ok(mut result) = executor.run() else { return solution };
     let count = |what: &str| result.problem.counts.get(what).copied().unwrap_or(0);
-    // A bend takes a residual and a linearisation, second derivatives one linearisation more than
-    // there are unknowns.
-    let bends = count("bend_count");
-    solution.cost_evaluations = count("cost_count") + bends;
-    solution.linearisations =
-        count("linearise_count") + bends + count("curvature_count") * (solution.x.len() as u64 + 1);
+    // An acceleration takes one residual and one linearisation; differencing the gradient takes one
+    // linearisation more than there are unknowns.
+    let accelerations = count("acceleration_count");
+    solution.cost_evaluations = count("cost_count") + accelerations;
+    solution.linearisations = count("linearise_count")
+        + accelerations
+        + count("curvature_count") * (solution.x.len() as u64 + 1);
     solution.iterations = result.state.get_iter();
-    solution.termination = match (result.solver.end(), result.state.get_termination_status()) {
-        (Some(termination), _) => termination,
-        (None, TerminationStatus::Terminated(TerminationReason::MaxItersReached)) => {
-            Termination::IterationLimit
-        }
-        (None, _) => Termination::Interrupted,
-    };
+    solution.termination =
+        match (result.solver.termination(), result.state.get_termination_status()) {
+            (Some(termination), _) => termination,
+            (None, TerminationStatus::Terminated(TerminationReason::MaxItersReached)) => {
+                Termination::IterationLimit
+            }
+            (None, _) => Termination::Interrupted,
+        };
     solution.cost = result.state.get_cost();
     let mut last = result.state.take_param();
     if !solution.termination.converged() && result.state.get_best_cost() < solution.cost {

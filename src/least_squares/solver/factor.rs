@@ -1,4 +1,4 @@
-//! Linear least-squares steps with one factorisation: Gauss–Newton, damped, and limited in length.
+//! Linear least-squares steps from one factorisation: Gauss–Newton, damped, and limited in length.
 
 use std::sync::OnceLock;
 
@@ -7,12 +7,13 @@ use nalgebra::{DMatrix, DVector};
 use super::pivoted::{Pivoted, is_well_conditioned};
 use super::spectrum::Spectrum;
 
-/// min ‖B q + c‖ factorised once, when first it is needed, to be solved for any damping.
+/// Linear least-squares problem min ‖B q + c‖, factorised once on first use and solved for any
+/// damping.
 ///
-/// A column-pivoted QR of B with its columns brought to length one decides whether B has full rank:
-/// `|Rₙₙ| > tolerance·|R₁₁|`. If so, all steps come from it. Otherwise they come from B = U Σ Vᵀ,
-/// where singular values `σ ≤ tolerance·σ₁` are dropped (less for columns much shorter than the
-/// longest): combinations that the rows cannot see stay where they are.
+/// A column-pivoted QR of B with unit columns decides whether B has full rank: `|Rₙₙ| >
+/// tolerance·|R₁₁|`. If so, all steps come from it. Otherwise they come from B = U Σ Vᵀ, where
+/// singular values `σ ≤ tolerance·σ₁` are dropped (fewer if some columns are much shorter than the
+/// longest). Combinations that the rows do not determine are then left unchanged.
 #[derive(Debug, Clone)]
 pub struct Factor {
     matrix: DMatrix<f64>,
@@ -24,38 +25,38 @@ pub struct Factor {
 }
 
 impl Factor {
-    /// Prepares min ‖B q + c‖; singular values up to `tolerance`·σ₁ count as zero.
+    /// Prepares min ‖B q + c‖, where singular values up to `tolerance`·σ₁ count as zero.
     pub fn new(matrix: DMatrix<f64>, constant: DVector<f64>, tolerance: f64) -> Self {
         let (pivoted, well_conditioned) = (OnceLock::new(), OnceLock::new());
         Self { matrix, constant, tolerance, pivoted, well_conditioned, spectrum: None }
     }
 
-    /// B.
+    /// Returns the matrix B.
     pub fn matrix(&self) -> &DMatrix<f64> {
         &self.matrix
     }
 
-    /// c.
+    /// Returns the constant c.
     pub fn constant(&self) -> &DVector<f64> {
         &self.constant
     }
 
-    /// The fraction of σ₁ that counts as zero.
+    /// Returns the fraction of σ₁ below which singular values count as zero.
     pub fn tolerance(&self) -> f64 {
         self.tolerance
     }
 
-    /// B q.
+    /// Returns the product B q.
     pub fn image(&self, q: &DVector<f64>) -> DVector<f64> {
         &self.matrix * q
     }
 
-    /// Bᵀc, the gradient at q = 0.
+    /// Returns Bᵀc, the gradient at q = 0.
     pub fn gradient(&self) -> DVector<f64> {
         self.matrix.tr_mul(&self.constant)
     }
 
-    /// The Gauss–Newton step: the shortest minimiser of ‖B q + c‖.
+    /// Returns the Gauss–Newton step, the shortest minimiser of ‖B q + c‖.
     pub fn gauss_newton(&mut self) -> DVector<f64> {
         match self.pivoted() {
             Some(pivoted) => pivoted.solution(),
@@ -63,7 +64,7 @@ impl Factor {
         }
     }
 
-    /// The minimiser of ‖B q + c‖² + λ‖q‖², the shortest one for λ = 0.
+    /// Returns the minimiser of ‖B q + c‖² + λ‖q‖², the shortest one for λ = 0.
     ///
     /// q(λ) = −Σ σᵢ/(σᵢ² + λ) (uᵢᵀc) vᵢ
     pub fn damped(&mut self, lambda: f64) -> DVector<f64> {
@@ -71,26 +72,26 @@ impl Factor {
         self.spectrum().solution(lambda, n)
     }
 
-    /// By how much the minimiser of ‖B q + c‖² + λ‖q‖² moves where its gradient is larger by g;
-    /// nothing where B lacks rank.
+    /// Returns the change of the minimiser of ‖B q + c‖² + λ‖q‖² when `gradient` is added to its
+    /// gradient. Returns `None` if B lacks rank.
     pub fn response(&self, gradient: &DVector<f64>, lambda: f64) -> Option<DVector<f64>> {
         self.pivoted()?.response(gradient, lambda)
     }
 
-    /// The minimiser of ‖B q + c‖ with ‖q‖ ≤ `radius` to within 10 %, and its damping λ.
+    /// Returns the minimiser of ‖B q + c‖ with ‖q‖ ≤ `radius` to within 10 %, and its damping λ.
     pub fn limited(&mut self, radius: f64) -> (DVector<f64>, f64) {
-        if let Some(found) = self.pivoted().and_then(|pivoted| pivoted.limited(radius)) {
-            return found;
+        if let Some(step) = self.pivoted().and_then(|pivoted| pivoted.limited(radius)) {
+            return step;
         }
         let lambda = self.spectrum().secular_root(radius);
         (self.damped(lambda), lambda)
     }
 
-    /// Whether B is for certain an upper triangle so well conditioned that any of its columns can
-    /// do without pivots.
+    /// Returns true if B is an upper triangle so well conditioned that no subset of its columns
+    /// needs pivoting.
     pub(super) fn is_well_conditioned(&self) -> bool {
         *self.well_conditioned.get_or_init(|| match self.pivoted.get() {
-            Some(found) => found.as_ref().is_some_and(|pivoted| pivoted.is_plain),
+            Some(pivoted) => pivoted.as_ref().is_some_and(|pivoted| pivoted.is_unpivoted),
             None => is_well_conditioned(&self.matrix, self.tolerance),
         })
     }
@@ -109,7 +110,8 @@ impl Factor {
     }
 }
 
-/// The fraction of σ₁ that counts as zero, lowered (down to rounding) to keep short columns.
+/// Returns the fraction of σ₁ that counts as zero, lowered (down to rounding) so that short columns
+/// are kept.
 fn spectral_cut(matrix: &DMatrix<f64>, tolerance: f64) -> f64 {
     let sizes = || matrix.column_iter().map(|c| c.norm()).filter(|&size| size > 0.0);
     let spread = sizes().fold(f64::INFINITY, f64::min) / sizes().fold(0.0, f64::max);
@@ -154,20 +156,20 @@ mod tests {
     #[test]
     fn responses_are_differences_of_solutions() {
         let (matrix, constant) = example(6);
-        let more = DVector::from_fn(6, |i, _| 0.3 - i as f64);
+        let shift = DVector::from_fn(6, |i, _| 0.3 - i as f64);
         for (matrix, lambda) in
             [(matrix.clone(), 0.0), (matrix.clone(), 0.7), (matrix.transpose(), 0.2)]
         {
             let mut first = Factor::new(matrix.clone(), constant.clone(), 1e-13);
-            let mut second = Factor::new(matrix.clone(), &constant + &more, 1e-13);
+            let mut second = Factor::new(matrix.clone(), &constant + &shift, 1e-13);
             let expected = second.damped(lambda) - first.damped(lambda);
-            let found = first.response(&matrix.tr_mul(&more), lambda).unwrap();
-            assert!((found - &expected).norm() < 1e-9 * expected.norm());
+            let response = first.response(&matrix.tr_mul(&shift), lambda).unwrap();
+            assert!((response - &expected).norm() < 1e-9 * expected.norm());
         }
     }
 
     #[test]
-    fn what_is_not_seen_does_not_move() {
+    fn undetermined_combinations_do_not_move() {
         let (mut matrix, constant) = example(5);
         let first = matrix.column(0).clone_owned();
         matrix.set_column(3, &first);

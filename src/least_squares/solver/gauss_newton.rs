@@ -1,4 +1,4 @@
-//! argmin's own Gauss–Newton method, seeing an [`Objective`] through a small adapter.
+//! Gauss–Newton method of argmin, adapted to an [`Objective`].
 
 use std::cell::RefCell;
 
@@ -9,19 +9,19 @@ use argmin::core::{
 use argmin::solver::gaussnewton::GaussNewton;
 use nalgebra::{DMatrix, DVector};
 
-use super::divergence::Watch;
+use super::divergence::DivergenceMonitor;
 use super::{Divergence, Solution, Termination};
 use crate::least_squares::{Linearisation, Objective};
 
-/// When to stop.
+/// Settings of argmin's Gauss–Newton method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GaussNewtonSettings {
-    /// argmin's test: | ‖Qᵀr‖ₖ₋₁ − ‖Qᵀr‖ₖ | < `tolerance`, above 0, in the units of r; default √ε ≈
-    /// 1.5e-8.
+    /// Stopping tolerance of argmin, above 0, in the units of r: | ‖Qᵀr‖ₖ₋₁ − ‖Qᵀr‖ₖ | <
+    /// `tolerance`. Default √ε ≈ 1.5e-8.
     pub tolerance: f64,
-    /// Largest number of steps; default 100.
+    /// Maximum number of steps; default 100.
     pub max_iterations: u64,
-    /// When to give up; see [`Divergence`].
+    /// Divergence test that ends the run; see [`Divergence`].
     pub divergence: Divergence,
 }
 
@@ -37,23 +37,23 @@ impl Default for GaussNewtonSettings {
 
 /// Minimises ½‖r(x)‖² from `start` by argmin's Gauss–Newton method: full steps −(RᵀR)⁻¹Rᵀ(Qᵀr).
 ///
-/// argmin sees the operator Qᵀr and the Jacobian R, whose steps are those of r and J = Q R. It
-/// inverts JᵀJ, which squares the condition number; a singular one ends the run as
-/// [`Termination::Singular`]. Where the run does not converge, x is the best point it has seen,
-/// which may be `start`.
+/// argmin receives the operator Qᵀr and the Jacobian R, whose steps equal those of r and J = Q R.
+/// It inverts JᵀJ, which squares the condition number; a singular matrix ends the run with
+/// [`Termination::Singular`]. If the run does not converge, the solution is the best point
+/// evaluated, which may be `start`.
 pub fn minimise_gauss_newton<O: Objective>(
     objective: O,
     start: DVector<f64>,
     settings: &GaussNewtonSettings,
 ) -> Solution {
-    let seen = RefCell::new(Seen {
+    let record = RefCell::new(RunRecord {
         last: None,
         best: (start.clone(), f64::INFINITY),
-        watch: Watch::new(settings.divergence),
+        monitor: DivergenceMonitor::new(settings.divergence),
         linearisations: 0,
         termination: None,
     });
-    let adapter = Adapter { objective, seen };
+    let adapter = Adapter { objective, record };
     let mut solution = Solution::at(start);
     if adapter.objective.parameters() != solution.x.len() {
         solution.termination = Termination::SizeMismatch;
@@ -68,8 +68,8 @@ pub fn minimise_gauss_newton<O: Objective>(
         .ctrlc(false)
         .timer(false)
         .run();
-    // argmin counts the steps it has finished; a run that fails has evaluated the start and then a
-    // point a step.
+    // argmin counts the steps it has finished. A run that fails has evaluated the start and one
+    // point per step.
     let (finished, iterations) = match result {
         Ok(result) => {
             let finished = match result.state.get_termination_status() {
@@ -85,7 +85,7 @@ pub fn minimise_gauss_newton<O: Objective>(
         }
         Err(_) => (Termination::Singular, None),
     };
-    let Seen { last, best, linearisations, termination, .. } = adapter.seen.into_inner();
+    let RunRecord { last, best, linearisations, termination, .. } = adapter.record.into_inner();
     solution.termination = termination.unwrap_or(finished);
     solution.iterations = iterations.unwrap_or_else(|| linearisations.saturating_sub(1));
     solution.linearisations = linearisations;
@@ -98,37 +98,38 @@ pub fn minimise_gauss_newton<O: Objective>(
 
 type GaussNewtonState = IterState<DVector<f64>, (), DMatrix<f64>, (), DVector<f64>, f64>;
 
+/// Objective with a record of the run, in the form that argmin's method expects.
 struct Adapter<O> {
     objective: O,
-    seen: RefCell<Seen>,
+    record: RefCell<RunRecord>,
 }
 
-/// What the adapter remembers of a run, since argmin hands nothing back when it fails.
-struct Seen {
+/// Points and counts of a run, recorded because argmin returns nothing when a run fails.
+struct RunRecord {
     last: Option<(DVector<f64>, Linearisation)>,
     best: (DVector<f64>, f64),
-    watch: Watch,
+    monitor: DivergenceMonitor,
     linearisations: u64,
     termination: Option<Termination>,
 }
 
-/// Why the adapter ends a run.
+/// Error that ends a run from within the adapter.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
-struct Stop(Termination);
+struct Stopped(Termination);
 
 impl<O: Objective> Adapter<O> {
-    /// Linearises at x, unless that was the last point.
-    fn at<T>(&self, x: &DVector<f64>, use_it: impl Fn(&Linearisation) -> T) -> Result<T, Error> {
-        let seen = &mut *self.seen.borrow_mut();
-        if let Some((_, linearisation)) = seen.last.as_ref().filter(|(point, _)| point == x) {
-            return Ok(use_it(linearisation));
+    /// Applies `extract` to the linearisation at x, which is formed unless x is the last point.
+    fn at<T>(&self, x: &DVector<f64>, extract: impl Fn(&Linearisation) -> T) -> Result<T, Error> {
+        let record = &mut *self.record.borrow_mut();
+        if let Some((_, linearisation)) = record.last.as_ref().filter(|(point, _)| point == x) {
+            return Ok(extract(linearisation));
         }
         let linearisation = self.objective.linearise(x);
-        let first = seen.linearisations == 0;
-        seen.linearisations += 1;
+        let first = record.linearisations == 0;
+        record.linearisations += 1;
         let cost = linearisation.cost;
-        seen.termination = if seen.watch.diverges(cost) {
+        record.termination = if record.monitor.diverges(cost) {
             Some(if first { Termination::OutsideDomainAtStart } else { Termination::Diverged })
         } else if linearisation
             .triangle
@@ -140,14 +141,14 @@ impl<O: Objective> Adapter<O> {
         } else {
             Some(Termination::DerivativesNotFinite)
         };
-        if cost < seen.best.1 {
-            seen.best = (x.clone(), cost);
+        if cost < record.best.1 {
+            record.best = (x.clone(), cost);
         }
-        if let Some(termination) = seen.termination {
-            return Err(Stop(termination).into());
+        if let Some(termination) = record.termination {
+            return Err(Stopped(termination).into());
         }
-        let out = use_it(&linearisation);
-        seen.last = Some((x.clone(), linearisation));
+        let out = extract(&linearisation);
+        record.last = Some((x.clone(), linearisation));
         Ok(out)
     }
 }

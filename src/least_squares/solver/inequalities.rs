@@ -4,12 +4,12 @@ use nalgebra::{DMatrix, DVector};
 
 use super::AtBound;
 
-/// A row is on its limit when it is this near, relative to the size of its terms and of x.
-const NEAR: f64 = 1e-12;
-/// A row holds when it is outside by no more than this, relative to the size of its terms.
+/// Distance at which a row counts as on its limit, relative to the size of its terms and of x.
+const AT_LIMIT: f64 = 1e-12;
+/// Violation up to which a row counts as satisfied, relative to the size of its terms.
 const ROUNDING: f64 = 1e-14;
 
-/// Rows lo ≤ A x ≤ hi; infinite where there is no limit.
+/// Linear inequalities lo ≤ A x ≤ hi, infinite where a side has no limit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Inequalities {
     matrix: DMatrix<f64>,
@@ -17,7 +17,7 @@ pub struct Inequalities {
     upper: DVector<f64>,
 }
 
-/// Inequalities that make no sense.
+/// Error of inequalities whose shape is wrong or that no x satisfies.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InequalitiesError {
@@ -31,23 +31,24 @@ pub enum InequalitiesError {
         /// Number of upper limits.
         upper: usize,
     },
-    /// Not lo ≤ hi, or a coefficient that is not finite, or nothing but zeros.
+    /// A row violates lo ≤ hi, has a coefficient that is not finite, or only zeros.
     #[error("setting inequalities: row {row} cannot hold between {lower} and {upper}")]
     Empty {
-        /// Which row.
+        /// Index of the row.
         row: usize,
-        /// Its lower limit.
+        /// Lower limit of the row.
         lower: f64,
-        /// Its upper limit.
+        /// Upper limit of the row.
         upper: f64,
     },
 }
 
 impl Inequalities {
-    /// Rows lo ≤ A x ≤ hi; lo = hi is an equation.
+    /// Creates rows lo ≤ A x ≤ hi; lo = hi is an equation.
     ///
     /// # Errors
-    /// When the sizes differ, or a row is empty, or its limits leave no value.
+    /// Returns an error if the sizes differ, a row has no coefficient, or its limits leave no
+    /// value.
     pub fn new(
         matrix: DMatrix<f64>,
         lower: DVector<f64>,
@@ -59,60 +60,61 @@ impl Inequalities {
         }
         for (row, (&lower, &upper)) in lower.iter().zip(&upper).enumerate() {
             let size = matrix.row(row).norm();
-            let possible = lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
-            if !(possible && size.is_finite() && size > 0.0) {
+            let is_possible = lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
+            if !(is_possible && size.is_finite() && size > 0.0) {
                 return Err(InequalitiesError::Empty { row, lower, upper });
             }
         }
         Ok(Self { matrix, lower, upper })
     }
 
-    /// No rows, for `n` unknowns.
+    /// Creates an empty set of rows for `n` unknowns.
     pub fn none(n: usize) -> Self {
         Self { matrix: DMatrix::zeros(0, n), lower: DVector::zeros(0), upper: DVector::zeros(0) }
     }
 
-    /// Whether there are no rows.
+    /// Returns true if there are no rows.
     pub fn is_empty(&self) -> bool {
         self.matrix.nrows() == 0
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.matrix.nrows()
     }
 
-    /// A.
+    /// Returns the matrix A, shape = (rows, n).
     pub fn matrix(&self) -> &DMatrix<f64> {
         &self.matrix
     }
 
-    /// lo.
+    /// Returns the lower limits lo.
     pub fn lower(&self) -> &DVector<f64> {
         &self.lower
     }
 
-    /// hi.
+    /// Returns the upper limits hi.
     pub fn upper(&self) -> &DVector<f64> {
         &self.upper
     }
 
-    /// The limit that row `i` is on to within rounding, if any.
+    /// Returns the limit that row `i` is on, to within rounding, if any.
     pub fn at(&self, x: &DVector<f64>, i: usize) -> Option<AtBound> {
         let (value, size) = self.value(x, i);
         let size = size + self.matrix.row(i).amax() * x.amax();
-        let on =
-            |limit: f64| limit.is_finite() && (value - limit).abs() <= NEAR * (size + limit.abs());
-        if on(self.lower[i]) {
+        let is_at = |limit: f64| {
+            limit.is_finite() && (value - limit).abs() <= AT_LIMIT * (size + limit.abs())
+        };
+        if is_at(self.lower[i]) {
             Some(AtBound::Lower)
-        } else if on(self.upper[i]) {
+        } else if is_at(self.upper[i]) {
             Some(AtBound::Upper)
         } else {
             None
         }
     }
 
-    /// Whether row `i` holds to within rounding.
+    /// Returns true if row `i` is satisfied to within rounding.
     pub(super) fn holds(&self, x: &DVector<f64>, i: usize) -> bool {
         let (value, size) = self.value(x, i);
         let (lower, upper) = (self.lower[i], self.upper[i]);
@@ -120,12 +122,12 @@ impl Inequalities {
             && value - upper <= ROUNDING * (size + upper.abs())
     }
 
-    /// Whether every row holds to within rounding.
+    /// Returns true if every row is satisfied to within rounding.
     pub fn contain(&self, x: &DVector<f64>) -> bool {
         (0..self.len()).all(|i| self.holds(x, i))
     }
 
-    /// `aᵢᵀx` and Σ |aᵢⱼ xⱼ|.
+    /// Returns the value `aᵢᵀx` of row `i` and its size Σ |aᵢⱼ xⱼ|.
     fn value(&self, x: &DVector<f64>, i: usize) -> (f64, f64) {
         let terms = self.matrix.row(i);
         terms

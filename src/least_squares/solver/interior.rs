@@ -9,21 +9,21 @@ use nalgebra::DVector;
 
 use super::Factor;
 
-/// Tolerance on gap and feasibility.
+/// Tolerance on duality gap and feasibility, relative to the scaled problem.
 const TOLERANCE: f64 = 1e-11;
 
-/// g·q ≥ h; g as unknowns and coefficients.
+/// Half-space g·q ≥ h, with g given as pairs of unknown and coefficient.
 #[derive(Debug, Clone)]
 pub(super) struct HalfSpace {
     pub(super) normal: Vec<(usize, f64)>,
-    pub(super) least: f64,
+    pub(super) offset: f64,
 }
 
-/// min ½‖B q + c‖² + ½λ‖q‖² within all half-spaces and, if there is a `radius`, ‖q‖ ≤ Δ; and the
-/// damping that stands for Δ.
+/// Minimises ½‖B q + c‖² + ½λ‖q‖² within all half-spaces and, if there is a `radius`, within ‖q‖ ≤
+/// Δ. Returns q and the damping equivalent to the radius.
 ///
-/// In unknowns whose columns have length one: z = S q and y = B q + c, so that `BᵀB` is never
-/// formed; normals are brought to length one.
+/// The solver works with z = S q (unit columns) and y = B q + c, so that `BᵀB` is never formed;
+/// normals are scaled to unit length. Returns `None` if q is not finite.
 pub(super) fn interior_point(
     factor: &Factor,
     lambda: f64,
@@ -38,15 +38,15 @@ pub(super) fn interior_point(
         .map(|s| if s > 0.0 { s } else { 1.0 })
         .collect();
     let scale = match factor.constant().norm() {
-        0.0 => spaces.iter().fold(f64::MIN_POSITIVE, |scale, space| scale.max(space.least.abs())),
+        0.0 => spaces.iter().fold(f64::MIN_POSITIVE, |scale, space| scale.max(space.offset.abs())),
         norm => norm,
     };
 
     // Rows: y − B S⁻¹ z = c, then −g S⁻¹ z ≤ −h.
-    let (mut is, mut js, mut values) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut row_indices, mut column_indices, mut values) = (Vec::new(), Vec::new(), Vec::new());
     let mut put = |i: usize, j: usize, value: f64| {
-        is.push(i);
-        js.push(j);
+        row_indices.push(i);
+        column_indices.push(j);
         values.push(value);
     };
     let mut right = Vec::with_capacity(rows + spaces.len());
@@ -58,7 +58,7 @@ pub(super) fn interior_point(
     for space in spaces {
         let length = space.normal.iter().map(|&(j, g)| (g / sizes[j]).powi(2)).sum::<f64>().sqrt();
         space.normal.iter().for_each(|&(j, g)| put(right.len(), j, -g / sizes[j] / length));
-        right.push(-space.least / scale / length);
+        right.push(-space.offset / scale / length);
     }
     if let Some(radius) = radius {
         right.push(radius / scale);
@@ -67,7 +67,8 @@ pub(super) fn interior_point(
             right.push(0.0);
         }
     }
-    let constraints = CscMatrix::new_from_triplets(right.len(), n + rows, is, js, values);
+    let constraints =
+        CscMatrix::new_from_triplets(right.len(), n + rows, row_indices, column_indices, values);
     let diagonal: Vec<f64> =
         sizes.iter().map(|s| lambda / (s * s)).chain(std::iter::repeat_n(1.0, rows)).collect();
     let indices: Vec<usize> = (0..n + rows).collect();
@@ -89,7 +90,7 @@ pub(super) fn interior_point(
     solver.solve();
     let z = solver.solution.x.get(..n)?;
     let q = DVector::from_iterator(n, z.iter().zip(&sizes).map(|(z, size)| z * scale / size));
-    // The multiplier of the cone is λ q, in length λ Δ.
+    // The multiplier of the cone is λ q, of length λ Δ.
     let damping = radius
         .and_then(|radius| Some(solver.solution.z.get(rows + spaces.len())? * scale / radius));
     let damping = damping.filter(|lambda| *lambda > TOLERANCE).unwrap_or(0.0);

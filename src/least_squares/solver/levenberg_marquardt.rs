@@ -1,31 +1,31 @@
-//! Levenberg–Marquardt: the step that minimises the linearised problem within a scaled sphere.
+//! Levenberg–Marquardt without constraints: the minimiser of the linearised problem in a sphere.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::{Factor, Settings, Step, Subproblem, TrustRegion};
 use crate::least_squares::{Linearisation, MANY_UNKNOWNS};
 
-/// Levenberg–Marquardt in its trust-region form, for unknowns without bounds.
+/// Returns a Levenberg–Marquardt solver in trust-region form, without bounds.
 ///
-/// min ‖J p + r‖ subject to ‖D p‖ ≤ Δ, that is `(JᵀJ + λD²) p = −Jᵀr` with λ ≥ 0            [Moré
+/// min ‖J p + r‖ subject to ‖D p‖ ≤ Δ, that is `(JᵀJ + λD²) p = −Jᵀr` with λ ≥ 0          [Moré
 /// 1978]
 ///
-/// Needs an [`Objective`](crate::least_squares::Objective); solved from the n × n factor of J
-/// alone. Redundant unknowns are allowed: what the data cannot see does not move. Of many unknowns
-/// steps that miss their forecast follow the bend of the way [Transtrum & Sethna 2012].
+/// It works with the n × n factor of J alone. Redundant unknowns are allowed: combinations that the
+/// data do not determine stay unchanged. With many unknowns, steps whose gain differs from the
+/// prediction get a geodesic acceleration [Transtrum & Sethna 2012].
 pub fn levenberg_marquardt(settings: Settings) -> TrustRegion<Unconstrained> {
     TrustRegion::new(Unconstrained::default(), settings)
 }
 
-/// The step within a sphere ‖D p‖ ≤ Δ and nothing else.
+/// Subproblem of a step within a sphere ‖D p‖ ≤ Δ.
 #[derive(Debug, Clone, Default)]
 pub struct Unconstrained {
     model: Option<Model>,
-    /// The last step.
-    straight: DVector<f64>,
+    /// Last step without acceleration.
+    unaccelerated: DVector<f64>,
 }
 
-/// The linearised problem in scaled unknowns q = D p: B = R D⁻¹.
+/// Linearised problem in scaled unknowns q = D p, with matrix B = R D⁻¹.
 #[derive(Debug, Clone)]
 pub(super) struct Model {
     pub(super) factor: Factor,
@@ -33,6 +33,7 @@ pub(super) struct Model {
 }
 
 impl Model {
+    /// Scales and prepares a linearised problem; `scale` is the diagonal of D.
     pub(super) fn new(
         linearisation: &Linearisation,
         scale: &DVector<f64>,
@@ -43,10 +44,10 @@ impl Model {
         Self { factor, scale: scale.clone() }
     }
 
-    /// The problem whose gradient is larger by ½ `bend`.
-    pub(super) fn bent(&self, bend: &DVector<f64>) -> Option<Factor> {
-        let bend = 0.5 * bend.component_div(&self.scale);
-        let shift = self.factor.matrix().tr_solve_upper_triangular(&bend)?;
+    /// Returns the problem with ½ `acceleration` (Jᵀ r″) added to its gradient.
+    pub(super) fn with_acceleration(&self, acceleration: &DVector<f64>) -> Option<Factor> {
+        let gradient = 0.5 * acceleration.component_div(&self.scale);
+        let shift = self.factor.matrix().tr_solve_upper_triangular(&gradient)?;
         if !shift.iter().all(|value| value.is_finite()) {
             return None;
         }
@@ -57,9 +58,10 @@ impl Model {
         ))
     }
 
-    /// p = D⁻¹ q from x, with what the linearised problem says of it.
+    /// Returns the step p = D⁻¹ q within the radius, without constraints, and its predicted
+    /// reductions.
     ///
-    /// With `(BᵀB + λ) q = −Bᵀc`: −gᵀp = ‖B q‖² + λ‖q‖², free of cancellation.
+    /// With `(BᵀB + λ) q = −Bᵀc`, the slope is −gᵀp = ‖B q‖² + λ‖q‖², free of cancellation.
     pub(super) fn unbounded_step(&mut self, x: &DVector<f64>, radius: f64) -> Step {
         let (q, damping) = self.factor.limited(radius);
         let image = self.factor.image(&q).norm_squared();
@@ -69,7 +71,7 @@ impl Model {
     }
 }
 
-/// B = R D⁻¹.
+/// Returns B = R D⁻¹.
 fn scaled_triangle(linearisation: &Linearisation, scale: &DVector<f64>) -> DMatrix<f64> {
     let mut matrix = linearisation.triangle.clone();
     for (mut column, d) in matrix.column_iter_mut().zip(scale.iter()) {
@@ -83,7 +85,7 @@ impl Subproblem for Unconstrained {
         "Levenberg–Marquardt"
     }
 
-    fn admit(&self, _start: &mut DVector<f64>) -> bool {
+    fn admit_start(&self, _start: &mut DVector<f64>) -> bool {
         true
     }
 
@@ -101,27 +103,27 @@ impl Subproblem for Unconstrained {
         gradient
     }
 
-    fn bends_freely(&self) -> bool {
-        // A bend takes derivatives that are not reduced.
+    fn accelerates_unconstrained(&self) -> bool {
+        // An acceleration takes derivatives of all rows, but no reduction of them.
         self.model.as_ref().is_some_and(|model| model.scale.len() >= MANY_UNKNOWNS)
     }
 
-    fn bent(
+    fn accelerated(
         &mut self,
         x: &DVector<f64>,
-        bend: &DVector<f64>,
+        acceleration: &DVector<f64>,
         damping: f64,
     ) -> Option<DVector<f64>> {
         let Model { factor, scale } = self.model.as_ref()?;
-        let turned = factor.response(&(0.5 * bend.component_div(scale)), damping)?;
-        Some(x + &self.straight + turned.component_div(scale))
+        let change = factor.response(&(0.5 * acceleration.component_div(scale)), damping)?;
+        Some(x + &self.unaccelerated + change.component_div(scale))
     }
 
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step {
         match &mut self.model {
             Some(model) => {
                 let step = model.unbounded_step(x, radius);
-                self.straight = &step.point - x;
+                self.unaccelerated = &step.point - x;
                 step
             }
             None => Step::none(x),

@@ -1,4 +1,4 @@
-//! Solvers of nonlinear least-squares problems, run by argmin's executor; one file a solver.
+//! Solvers of nonlinear least-squares problems, run by argmin's executor; one file per solver.
 //!
 //! Every solver sees the problem through [`Objective`](crate::least_squares::Objective) only: a
 //! cost and an n × n triangular linearisation.
@@ -24,6 +24,7 @@ mod settings;
 mod solution;
 mod spectrum;
 mod termination;
+mod trial;
 mod trust_region;
 
 pub use bounded::{
@@ -42,7 +43,8 @@ pub use pseudo_inverse::{
 };
 pub use reflective::{Reflective, reflective_levenberg_marquardt};
 pub use run::{
-    Within, minimise, minimise_bounded, minimise_constrained, minimise_observed, minimise_within,
+    BoundMethod, minimise, minimise_bounded, minimise_constrained, minimise_constrained_by,
+    minimise_observed,
 };
 pub use settings::Settings;
 pub use solution::Solution;

@@ -6,30 +6,32 @@ use super::settings::RADIUS_SLACK;
 use crate::least_squares::Triangle;
 use crate::least_squares::inverse::regular_inverse;
 
-/// Newton steps allowed to the secular equation before the singular values are asked.
-const SECULAR_ITERATIONS: usize = 20;
-/// A triangle none of whose singular values is below this part of the largest needs no pivots.
+/// Maximum number of Newton steps on the secular equation; the singular values follow after that.
+const MAX_SECULAR_STEPS: usize = 20;
+/// Smallest ratio of singular values at which an upper triangle is used without pivoting.
 const WELL_CONDITIONED: f64 = 1e-8;
 
-/// min ‖B q + c‖ with B S⁻¹ P = Q R of full rank; S holds the lengths of the columns of B.
-/// Well-conditioned upper triangles B are their own factor.
+/// Least-squares problem min ‖B q + c‖ of full rank with B S⁻¹ P = Q R; S holds the column norms of
+/// B.
+///
+/// A well-conditioned upper triangle B serves as its own factor.
 #[derive(Debug, Clone)]
 pub(super) struct Pivoted {
-    /// R.
+    /// Triangular factor R.
     triangle: DMatrix<f64>,
-    /// `Qᵀc`.
+    /// Projected constant `Qᵀc`.
     projected: DVector<f64>,
-    /// 1/S in the order of the pivots.
+    /// Inverse column norms 1/S in pivot order.
     inverse_sizes: DVector<f64>,
     permutation: PermutationSequence<Dyn>,
-    /// q at λ = 0.
+    /// Solution q at λ = 0, in pivot order.
     solution: DVector<f64>,
-    /// Whether B is its own factor.
-    pub(super) is_plain: bool,
+    /// True if B is its own factor.
+    pub(super) is_unpivoted: bool,
 }
 
 impl Pivoted {
-    /// Decomposes B, or gives nothing when `|Rₙₙ| ≤ tolerance·|R₁₁|`.
+    /// Decomposes B; returns `None` if `|Rₙₙ| ≤ tolerance·|R₁₁|`.
     pub(super) fn new(
         matrix: &DMatrix<f64>,
         constant: &DVector<f64>,
@@ -50,7 +52,7 @@ impl Pivoted {
                 inverse_sizes,
                 permutation,
                 solution,
-                is_plain: true,
+                is_unpivoted: true,
             });
         }
         let qr = unit.col_piv_qr();
@@ -65,27 +67,34 @@ impl Pivoted {
         let permutation = qr.p().clone();
         permutation.permute_rows(&mut inverse_sizes);
         let solution = solve(&triangle, &projected, &inverse_sizes)?;
-        Some(Self { triangle, projected, inverse_sizes, permutation, solution, is_plain: false })
+        Some(Self {
+            triangle,
+            projected,
+            inverse_sizes,
+            permutation,
+            solution,
+            is_unpivoted: false,
+        })
     }
 
-    /// The minimiser of ‖B q + c‖.
+    /// Returns the minimiser of ‖B q + c‖.
     pub(super) fn solution(&self) -> DVector<f64> {
-        self.in_order(self.solution.clone())
+        self.unpermuted(self.solution.clone())
     }
 
-    /// The minimiser with ‖q‖ = Δ to within the slack and its λ > 0, if Newton's method settles
-    /// soon.
+    /// Returns the minimiser with ‖q‖ ≤ Δ to within the slack and its λ ≥ 0, or `None` if Newton's
+    /// method does not converge in [`MAX_SECULAR_STEPS`].
     ///
-    /// λ ← λ + (‖q‖ − Δ) / (Δ ‖w‖²), `Rᵀw` = S⁻¹ q/‖q‖, with R of the damped problem      [Moré
+    /// λ ← λ + (‖q‖ − Δ) / (Δ ‖w‖²), `Rᵀw` = S⁻¹ q/‖q‖, with R of the damped problem          [Moré
     /// 1978, eqs. 5.8 and 5.9]
     pub(super) fn limited(&self, radius: f64) -> Option<(DVector<f64>, f64)> {
         let mut lambda = 0.0;
         let mut q = self.solution.clone();
         let mut triangle = self.triangle.clone();
-        for _ in 0..SECULAR_ITERATIONS {
+        for _ in 0..MAX_SECULAR_STEPS {
             let length = q.norm();
             if length <= (1.0 + RADIUS_SLACK) * radius {
-                return Some((self.in_order(q), lambda));
+                return Some((self.unpermuted(q), lambda));
             }
             let mut w = q.component_mul(&self.inverse_sizes) / length;
             if !triangle.tr_solve_upper_triangular_mut(&mut w) {
@@ -103,7 +112,7 @@ impl Pivoted {
         None
     }
 
-    /// −(`BᵀB` + λ)⁻¹ g.
+    /// Returns −(`BᵀB` + λ)⁻¹ g, or `None` if it is not finite.
     pub(super) fn response(&self, gradient: &DVector<f64>, lambda: f64) -> Option<DVector<f64>> {
         let mut q = gradient.clone();
         self.permutation.permute_rows(&mut q);
@@ -117,27 +126,28 @@ impl Pivoted {
             .triangle
         });
         let triangle = damped.as_ref().unwrap_or(&self.triangle);
-        let solved = triangle.tr_solve_upper_triangular_mut(&mut q)
+        let is_solved = triangle.tr_solve_upper_triangular_mut(&mut q)
             && triangle.solve_upper_triangular_mut(&mut q);
         q.component_mul_assign(&self.inverse_sizes);
-        let found = self.in_order(-q);
-        (solved && found.iter().all(|value| value.is_finite())).then_some(found)
+        let response = self.unpermuted(-q);
+        (is_solved && response.iter().all(|value| value.is_finite())).then_some(response)
     }
 
-    fn in_order(&self, mut q: DVector<f64>) -> DVector<f64> {
+    /// Returns q in the order of the columns of B.
+    fn unpermuted(&self, mut q: DVector<f64>) -> DVector<f64> {
         self.permutation.inv_permute_rows(&mut q);
         q
     }
 }
 
-/// Whether B is a well-conditioned upper triangle, by columns brought to length one; then so is the
-/// factor of any of its columns, with damping or without.
+/// Returns true if B is a well-conditioned upper triangle after scaling to unit columns. The factor
+/// of any subset of its columns then is, too, with or without damping.
 pub(super) fn is_well_conditioned(matrix: &DMatrix<f64>, tolerance: f64) -> bool {
     tolerance <= WELL_CONDITIONED
         && regular_inverse(&with_unit_columns(matrix).0, WELL_CONDITIONED).is_some()
 }
 
-/// B S⁻¹, and 1/S.
+/// Returns B S⁻¹ and 1/S, with S the column norms of B.
 fn with_unit_columns(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
     let mut unit = matrix.clone();
     let mut inverse_sizes = DVector::from_element(matrix.ncols(), 1.0);
@@ -151,7 +161,7 @@ fn with_unit_columns(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DVector<f64>) {
     (unit, inverse_sizes)
 }
 
-/// −S⁻¹ R⁻¹ c.
+/// Returns −S⁻¹ R⁻¹ c, or `None` if it is not finite.
 fn solve(
     triangle: &DMatrix<f64>,
     projected: &DVector<f64>,

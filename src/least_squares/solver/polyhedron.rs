@@ -1,39 +1,38 @@
-//! The polyhedron that bounds and inequalities leave to a step; a box where there are no
-//! inequalities.
+//! Polyhedron of steps that bounds and inequalities allow; a box if there are no inequalities.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::interior::HalfSpace;
 use super::{AtBound, Bounds, Factor, Inequalities};
 
-/// Normals are dependent when what is left of one is shorter than this part of it.
+/// Length below which the independent part of a unit normal counts as zero.
 const DEPENDENT: f64 = 1e-10;
-/// Rounding allowed in the distance to a half-space.
-const TOUCH: f64 = 1e-14;
+/// Relative rounding allowed in the distance to a half-space.
+const ROUNDING: f64 = 1e-14;
 
-/// Steps lower ≤ q ≤ upper with G q ≥ h, normals of length one.
+/// Set of steps lower ≤ q ≤ upper with G q ≥ h; the rows of G have unit length.
 #[derive(Debug, Clone)]
 pub(super) struct Polyhedron {
     pub(super) lower: DVector<f64>,
     pub(super) upper: DVector<f64>,
-    /// G, k × n.
+    /// Normals G, shape = (k, n).
     pub(super) normals: DMatrix<f64>,
-    /// h.
-    pub(super) least: DVector<f64>,
-    /// What x lies on.
+    /// Offsets h of the half-spaces.
+    pub(super) offsets: DVector<f64>,
+    /// Faces that contain q = 0, that is x itself.
     pub(super) touched: Faces,
 }
 
-/// Faces of the polyhedron.
+/// Set of faces of the polyhedron.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Faces {
-    /// The bound of each unknown.
+    /// Active bound of each unknown, if any.
     pub(super) bounds: Vec<Option<AtBound>>,
-    /// Which half-spaces.
+    /// True for each active half-space.
     pub(super) rows: Vec<bool>,
 }
 
-/// A step and the faces it lies on.
+/// Step q with the faces that contain it.
 #[derive(Debug, Clone)]
 pub(super) struct PolyhedronSolution {
     pub(super) q: DVector<f64>,
@@ -41,24 +40,24 @@ pub(super) struct PolyhedronSolution {
 }
 
 impl Faces {
-    /// Unknowns at no bound.
+    /// Returns the unknowns without an active bound.
     pub(super) fn free(&self) -> Vec<usize> {
         (0..self.bounds.len()).filter(|&j| self.bounds[j].is_none()).collect()
     }
 
-    /// Whether there are none.
+    /// Returns true if no face is in the set.
     pub(super) fn is_empty(&self) -> bool {
         self.bounds.iter().all(Option::is_none) && !self.rows.contains(&true)
     }
 
-    /// How many faces are those of one alone.
+    /// Returns the number of faces in which the two sets differ.
     pub(super) fn differences(&self, other: &Self) -> usize {
-        let rows = self.rows.iter().zip(&other.rows).filter(|(own, other)| own != other).count();
-        rows + self.bounds.iter().zip(&other.bounds).filter(|(own, other)| own != other).count()
+        let rows = self.rows.iter().zip(&other.rows).filter(|(a, b)| a != b).count();
+        rows + self.bounds.iter().zip(&other.bounds).filter(|(a, b)| a != b).count()
     }
 
-    /// Takes over the last difference to others.
-    pub(super) fn take_last_of(&mut self, other: &Self) {
+    /// Adopts the last face in which `other` differs.
+    pub(super) fn adopt_last_difference(&mut self, other: &Self) {
         if let Some(i) = (0..self.rows.len()).rfind(|&i| self.rows[i] != other.rows[i]) {
             self.rows[i] = other.rows[i];
         } else if let Some(j) = (0..self.bounds.len()).rfind(|&j| self.bounds[j] != other.bounds[j])
@@ -67,14 +66,14 @@ impl Faces {
         }
     }
 
-    /// Half-spaces among the faces.
-    fn chosen(&self) -> Vec<usize> {
+    /// Returns the indices of the active half-spaces.
+    fn active_rows(&self) -> Vec<usize> {
         (0..self.rows.len()).filter(|&i| self.rows[i]).collect()
     }
 }
 
 impl Polyhedron {
-    /// The steps q = D p from `x` that keep bounds and rows; D is `scale`.
+    /// Returns the polyhedron of steps q = D p from `x` that satisfy bounds and rows; D is `scale`.
     pub(super) fn around(
         x: &DVector<f64>,
         bounds: &Bounds,
@@ -91,16 +90,16 @@ impl Polyhedron {
             if lower.is_finite() {
                 spaces.push((&normal / size, (lower - value) / size, at == Some(AtBound::Lower)));
             }
-            let on_upper = at == Some(AtBound::Upper) || (at.is_some() && lower >= upper);
+            let is_at_upper = at == Some(AtBound::Upper) || (at.is_some() && lower >= upper);
             if upper.is_finite() {
-                spaces.push((-&normal / size, (value - upper) / size, on_upper));
+                spaces.push((-&normal / size, (value - upper) / size, is_at_upper));
             }
         }
         Self {
             lower: (bounds.lower() - x).component_mul(scale),
             upper: (bounds.upper() - x).component_mul(scale),
             normals: DMatrix::from_fn(spaces.len(), x.len(), |i, j| spaces[i].0[j]),
-            least: DVector::from_iterator(spaces.len(), spaces.iter().map(|space| space.1)),
+            offsets: DVector::from_iterator(spaces.len(), spaces.iter().map(|space| space.1)),
             touched: Faces {
                 bounds: (0..x.len()).map(|j| bounds.at(x, j)).collect(),
                 rows: spaces.iter().map(|space| space.2).collect(),
@@ -108,73 +107,82 @@ impl Polyhedron {
         }
     }
 
-    /// What is left of a gradient at q = 0 along the directions that the touched faces leave open.
+    /// Returns the part of a gradient at q = 0 along the feasible directions.
     ///
-    /// γ − Gᵀμ with μ ≥ 0 of the touched faces; those that would pull inwards are left.
-    pub(super) fn free_part(&self, gradient: &DVector<f64>) -> DVector<f64> {
-        let (faces, mut left) = self.pressed(gradient);
-        (0..left.len()).filter(|&j| faces.bounds[j].is_some()).for_each(|j| left[j] = 0.0);
-        left
+    /// It is γ − Gᵀμ with μ ≥ 0 over the faces through q = 0, without the faces that the step would
+    /// leave inwards.
+    pub(super) fn projected_gradient(&self, gradient: &DVector<f64>) -> DVector<f64> {
+        let (faces, mut projected) = self.active_faces(gradient);
+        (0..projected.len())
+            .filter(|&j| faces.bounds[j].is_some())
+            .for_each(|j| projected[j] = 0.0);
+        projected
     }
 
-    /// The touched faces that a step against `gradient` at q = 0 would leave, and the gradient
-    /// without the half-spaces among them.
-    pub(super) fn pressed(&self, gradient: &DVector<f64>) -> (Faces, DVector<f64>) {
+    /// Returns the faces through q = 0 that a step against `gradient` would violate, and the
+    /// gradient without its components along the half-spaces among them.
+    pub(super) fn active_faces(&self, gradient: &DVector<f64>) -> (Faces, DVector<f64>) {
         let mut faces = self.touched.clone();
         loop {
-            let (left, multipliers) = self.multipliers(&faces, gradient);
-            let kept = self.kept(&faces, &left, &multipliers, 0.0);
-            if kept == faces {
-                return (faces, left);
+            let (remainder, multipliers) = self.multipliers(&faces, gradient);
+            let retained = self.retained_faces(&faces, &remainder, &multipliers, 0.0);
+            if retained == faces {
+                return (faces, remainder);
             }
-            faces = kept;
+            faces = retained;
         }
     }
 
-    /// Normals of some faces, one a row.
+    /// Returns the normals of the given faces, shape = (faces, n).
     pub(super) fn normals_of(&self, faces: &Faces) -> DMatrix<f64> {
         let n = faces.bounds.len();
-        let (chosen, held) =
-            (faces.chosen(), (0..n).filter(|&j| faces.bounds[j].is_some()).collect::<Vec<_>>());
-        let bounds = DMatrix::from_fn(held.len(), n, |i, j| f64::from(u8::from(held[i] == j)));
-        let mut rows = bounds.insert_rows(held.len(), chosen.len(), 0.0);
-        rows.rows_mut(held.len(), chosen.len()).copy_from(&self.normals.select_rows(&chosen));
+        let (active, bounded) = (
+            faces.active_rows(),
+            (0..n).filter(|&j| faces.bounds[j].is_some()).collect::<Vec<_>>(),
+        );
+        let bounds =
+            DMatrix::from_fn(bounded.len(), n, |i, j| f64::from(u8::from(bounded[i] == j)));
+        let mut rows = bounds.insert_rows(bounded.len(), active.len(), 0.0);
+        rows.rows_mut(bounded.len(), active.len()).copy_from(&self.normals.select_rows(&active));
         rows
     }
 
-    /// μ of the half-spaces among `faces`, the shortest where several do, and what they leave of
-    /// `force`: the multipliers of the bounds, and nothing else where the faces hold all of it.
+    /// Returns `force` − Gᵀμ and the multipliers μ of the half-spaces among `faces`, of minimum
+    /// norm if they are not unique.
+    ///
+    /// The remainder holds the multipliers of the bounds; its free entries vanish if the faces
+    /// carry all of `force`.
     pub(super) fn multipliers(
         &self,
         faces: &Faces,
         force: &DVector<f64>,
     ) -> (DVector<f64>, Vec<(usize, f64)>) {
-        let (chosen, free) = (faces.chosen(), faces.free());
-        if chosen.is_empty() {
+        let (active, free) = (faces.active_rows(), faces.free());
+        if active.is_empty() {
             return (force.clone(), Vec::new());
         }
-        let normals = self.normals.select_rows(&chosen).transpose();
+        let normals = self.normals.select_rows(&active).transpose();
         let multipliers =
             Factor::new(normals.select_rows(&free), -force.select_rows(&free), DEPENDENT)
                 .gauss_newton();
         (
             force - normals * &multipliers,
-            chosen.into_iter().zip(multipliers.iter().copied()).collect(),
+            active.into_iter().zip(multipliers.iter().copied()).collect(),
         )
     }
 
-    /// The faces whose multiplier does not pull inwards by more than `slack`; an unknown with one
-    /// value only keeps it.
-    pub(super) fn kept(
+    /// Returns the faces whose multiplier does not point inwards by more than `slack`; a fixed
+    /// unknown keeps its bound.
+    pub(super) fn retained_faces(
         &self,
         faces: &Faces,
         bounds: &DVector<f64>,
         rows: &[(usize, f64)],
         slack: f64,
     ) -> Faces {
-        let mut kept = faces.clone();
+        let mut retained = faces.clone();
         for (j, bound) in
-            kept.bounds.iter_mut().enumerate().filter(|&(j, _)| self.lower[j] < self.upper[j])
+            retained.bounds.iter_mut().enumerate().filter(|&(j, _)| self.lower[j] < self.upper[j])
         {
             *bound = bound.filter(|side| match side {
                 AtBound::Lower => bounds[j] >= -slack,
@@ -182,65 +190,67 @@ impl Polyhedron {
             });
         }
         for &(i, multiplier) in rows {
-            kept.rows[i] = multiplier >= -slack;
+            retained.rows[i] = multiplier >= -slack;
         }
-        kept
+        retained
     }
 
-    /// The shortest q on some faces, and orthonormal columns that span the directions of the free
-    /// unknowns along the half-spaces among them; none where there are no such half-spaces.
-    pub(super) fn flat(&self, faces: &Faces) -> (DVector<f64>, Option<DMatrix<f64>>) {
+    /// Returns the shortest q on the given faces, and an orthonormal basis of the directions of the
+    /// free unknowns along the active half-spaces.
+    ///
+    /// The basis is `None` if no half-space is active.
+    pub(super) fn affine_subspace(&self, faces: &Faces) -> (DVector<f64>, Option<DMatrix<f64>>) {
         let mut corner = DVector::from_fn(faces.bounds.len(), |j, _| match faces.bounds[j] {
             Some(AtBound::Lower) => self.lower[j],
             Some(AtBound::Upper) => self.upper[j],
             None => 0.0,
         });
-        let (chosen, free) = (faces.chosen(), faces.free());
-        if chosen.is_empty() || free.is_empty() {
+        let (active, free) = (faces.active_rows(), faces.free());
+        if active.is_empty() || free.is_empty() {
             return (corner, None);
         }
-        let normals = self.normals.select_rows(&chosen);
-        let least = self.least.select_rows(&chosen) - &normals * &corner;
+        let normals = self.normals.select_rows(&active);
+        let offsets = self.offsets.select_rows(&active) - &normals * &corner;
         let normals = normals.select_columns(&free);
         let qr = normals.transpose().col_piv_qr();
         let r = qr.r();
         let rank =
             (0..r.nrows()).filter(|&i| r[(i, i)].abs() > DEPENDENT * r[(0, 0)].abs()).count();
-        let mut all = DMatrix::identity(free.len(), free.len());
-        qr.q_tr_mul(&mut all);
-        let mut shortest = Factor::new(normals.clone(), -&least, DEPENDENT).gauss_newton();
+        let mut rotation = DMatrix::identity(free.len(), free.len());
+        qr.q_tr_mul(&mut rotation);
+        let mut shortest = Factor::new(normals.clone(), -&offsets, DEPENDENT).gauss_newton();
         shortest +=
-            Factor::new(normals.clone(), normals * &shortest - least, DEPENDENT).gauss_newton();
+            Factor::new(normals.clone(), normals * &shortest - offsets, DEPENDENT).gauss_newton();
         free.iter().zip(shortest.iter()).for_each(|(&j, value)| corner[j] = *value);
-        (corner, Some(all.rows(rank, free.len() - rank).transpose()))
+        (corner, Some(rotation.rows(rank, free.len() - rank).transpose()))
     }
 
-    /// Whether half-space `i` is left, beyond rounding.
-    pub(super) fn leaves(&self, i: usize, q: &DVector<f64>) -> bool {
+    /// Returns true if q violates half-space `i` beyond rounding.
+    pub(super) fn violates(&self, i: usize, q: &DVector<f64>) -> bool {
         self.normals.row(i).transpose().dot(q)
-            < self.least[i] - TOUCH * (q.norm() + self.least[i].abs())
+            < self.offsets[i] - ROUNDING * (q.norm() + self.offsets[i].abs())
     }
 
-    /// The bounds that are finite, and all others.
+    /// Returns the finite bounds and all inequalities as half-spaces.
     pub(super) fn half_spaces(&self) -> Vec<HalfSpace> {
         let side = |bounds: &DVector<f64>, sign: f64| -> Vec<HalfSpace> {
             let finite = bounds.iter().enumerate().filter(|(_, bound)| bound.is_finite());
             finite
-                .map(|(j, bound)| HalfSpace { normal: vec![(j, sign)], least: sign * bound })
+                .map(|(j, bound)| HalfSpace { normal: vec![(j, sign)], offset: sign * bound })
                 .collect()
         };
         let normal = |i: usize| {
             self.normals.row(i).iter().copied().enumerate().filter(|&(_, g)| g != 0.0).collect()
         };
-        let rows = (0..self.least.len())
-            .map(|i| HalfSpace { normal: normal(i), least: self.least[i] })
+        let rows = (0..self.offsets.len())
+            .map(|i| HalfSpace { normal: normal(i), offset: self.offsets[i] })
             .collect();
         [side(&self.lower, 1.0), side(&self.upper, -1.0), rows].concat()
     }
 
-    /// The faces no farther from `q` than `near`, relative to its size.
-    pub(super) fn faces_near(&self, q: &DVector<f64>, near: f64) -> Faces {
-        let distance = near * q.amax().max(f64::MIN_POSITIVE);
+    /// Returns the faces within `tolerance` of `q`, relative to the size of q.
+    pub(super) fn faces_near(&self, q: &DVector<f64>, tolerance: f64) -> Faces {
+        let distance = tolerance * q.amax().max(f64::MIN_POSITIVE);
         let bound = |j: usize| match q[j] {
             value if value - self.lower[j] <= distance => Some(AtBound::Lower),
             value if self.upper[j] - value <= distance => Some(AtBound::Upper),
@@ -248,28 +258,31 @@ impl Polyhedron {
         };
         let rows = (&self.normals * q)
             .iter()
-            .zip(&self.least)
-            .map(|(along, least)| along - least <= distance)
+            .zip(&self.offsets)
+            .map(|(along, offset)| along - offset <= distance)
             .collect();
         Faces { bounds: (0..q.len()).map(bound).collect(), rows }
     }
 
-    /// Into the box; a bound that overflowed to no number bounds nothing.
+    /// Returns q clamped into the box; a bound that is not a number (after overflow) limits
+    /// nothing.
     pub(super) fn clamped(&self, mut q: DVector<f64>) -> DVector<f64> {
         (0..q.len()).for_each(|j| q[j] = q[j].max(self.lower[j]).min(self.upper[j]));
         q
     }
 
-    /// The part within the half-spaces of a step that is brought into the box, on the faces that
-    /// are `near`; the way back to q = 0 is inside.
-    pub(super) fn within(&self, q: DVector<f64>, near: f64) -> PolyhedronSolution {
+    /// Clamps a step into the box, then shortens it until it satisfies the half-spaces. Its faces
+    /// are those within `tolerance`.
+    ///
+    /// Shortening suffices because q = 0 is feasible.
+    pub(super) fn pulled_inside(&self, q: DVector<f64>, tolerance: f64) -> PolyhedronSolution {
         let q = self.clamped(q);
-        let part = (&self.normals * &q)
+        let fraction = (&self.normals * &q)
             .iter()
-            .zip(&self.least)
-            .filter(|(along, least)| along < least)
-            .fold(1.0_f64, |part, (along, least)| part.min((least / along).clamp(0.0, 1.0)));
-        let q = q * part;
-        PolyhedronSolution { faces: self.faces_near(&q, near), q }
+            .zip(&self.offsets)
+            .filter(|(along, offset)| along < offset)
+            .fold(1.0_f64, |part, (along, offset)| part.min((offset / along).clamp(0.0, 1.0)));
+        let q = q * fraction;
+        PolyhedronSolution { faces: self.faces_near(&q, tolerance), q }
     }
 }

@@ -1,29 +1,29 @@
-//! The pseudo-inverse iteration: full Gauss–Newton steps of minimum norm, neither damped nor
-//! scaled.
+//! Pseudo-inverse iteration: full Gauss–Newton steps of minimum norm, without damping or scaling.
 
 use argmin::core::observers::Observe;
 use argmin::core::{Error, KV, Problem, Solver};
 use argmin::kv;
 use nalgebra::DVector;
 
-use super::divergence::Watch;
-use super::execute::{Ends, Silent, run};
+use super::divergence::DivergenceMonitor;
+use super::execute::{NoObserver, ReportsTermination, run};
 use super::spectrum::Spectrum;
 use super::trust_region::{stopped, take_point};
 use super::{Divergence, Solution, State, Termination};
 use crate::least_squares::{Linearisation, Objective};
 
-/// When to stop, and which directions count as seen.
+/// Settings of the pseudo-inverse iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PseudoInverseSettings {
-    /// Singular values σᵢ ≤ `tolerance`·σ₁ of J are dropped; 0 keeps every one that is not zero.
-    /// Default 1e-8.
+    /// Singular values σᵢ ≤ `tolerance`·σ₁ of J are dropped; 0 keeps every non-zero one. Default
+    /// 1e-8.
     pub tolerance: f64,
-    /// Smallest step worth another: ‖p‖ ≤ `step_tolerance` (‖x‖ + `step_tolerance`); default 1e-10.
+    /// Step tolerance: the run ends if ‖p‖ ≤ `step_tolerance` (‖x‖ + `step_tolerance`); default
+    /// 1e-10.
     pub step_tolerance: f64,
-    /// Largest number of steps; default 100.
+    /// Maximum number of steps; default 100.
     pub max_iterations: u64,
-    /// When to give up; see [`Divergence`].
+    /// Divergence test that ends the run; see [`Divergence`].
     pub divergence: Divergence,
 }
 
@@ -38,34 +38,33 @@ impl Default for PseudoInverseSettings {
     }
 }
 
-/// The pseudo-inverse iteration of the paper.
+/// Pseudo-inverse iteration of [Chen2021].
 ///
-/// xₖ₊₁ = xₖ − J(xₖ)⁺ r(xₖ),  J⁺r = R⁺Qᵀr = Σ vᵢ (uᵢᵀQᵀr)/σᵢ over σᵢ > `tolerance`·σ₁
-/// [Chen2021, eq. 45]
+/// xₖ₊₁ = xₖ − J(xₖ)⁺ r(xₖ),  J⁺r = R⁺Qᵀr = Σ vᵢ (uᵢᵀQᵀr)/σᵢ over σᵢ > `tolerance`·σ₁ [Chen2021,
+/// eq. 45]
 ///
-/// R = U Σ Vᵀ is the n × n triangular factor of J = ∂r/∂x, in the units of the unknowns as they
-/// come: the paper scales nothing, so which directions are dropped depends on those units. Every
-/// step is taken in full.
+/// R = U Σ Vᵀ is the n × n triangular factor of J = ∂r/∂x. The paper does not scale the unknowns,
+/// so the dropped directions depend on their units. Every step is taken in full.
 #[derive(Debug, Clone)]
 pub struct PseudoInverse {
     settings: PseudoInverseSettings,
-    watch: Watch,
+    monitor: DivergenceMonitor,
     linearisation: Option<Linearisation>,
     termination: Option<Termination>,
 }
 
 impl PseudoInverse {
-    /// The iteration with these settings.
+    /// Creates the iteration with these settings.
     pub fn new(settings: PseudoInverseSettings) -> Self {
         Self {
             settings,
-            watch: Watch::new(settings.divergence),
+            monitor: DivergenceMonitor::new(settings.divergence),
             linearisation: None,
             termination: None,
         }
     }
 
-    /// Why it stopped, once it has.
+    /// Returns the reason of termination, or `None` while the iteration runs.
     pub fn termination(&self) -> Option<Termination> {
         self.termination
     }
@@ -75,10 +74,10 @@ impl PseudoInverse {
         stopped(state, termination)
     }
 
-    /// Looks at a new point; the reason to stop there, if there is one.
-    fn take_in(&mut self, linearisation: Linearisation) -> Option<Termination> {
+    /// Stores the linearisation at a new point and returns the reason to stop there, if any.
+    fn accept_linearisation(&mut self, linearisation: Linearisation) -> Option<Termination> {
         let Linearisation { cost, triangle, projected } = &linearisation;
-        let termination = if self.watch.diverges(*cost) {
+        let termination = if self.monitor.diverges(*cost) {
             Some(Termination::Diverged)
         } else if !triangle.iter().chain(projected.iter()).all(|value| value.is_finite()) {
             Some(Termination::DerivativesNotFinite)
@@ -92,14 +91,14 @@ impl PseudoInverse {
     }
 }
 
-impl Ends for PseudoInverse {
-    fn end(&self) -> Option<Termination> {
+impl ReportsTermination for PseudoInverse {
+    fn termination(&self) -> Option<Termination> {
         self.termination
     }
 }
 
-/// p = −J⁺ r = −R⁺ Qᵀr, the shortest minimiser of ‖J p + r‖; singular values up to `tolerance`·σ₁
-/// are dropped.
+/// Returns the minimum-norm step p = −J⁺ r = −R⁺ Qᵀr; singular values up to `tolerance`·σ₁ are
+/// dropped.
 ///
 /// R and Qᵀr must be finite.
 pub fn minimum_norm_step(linearisation: &Linearisation, tolerance: f64) -> DVector<f64> {
@@ -126,9 +125,9 @@ impl<O: Objective> Solver<O, State> for PseudoInverse {
         }
         let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&x)))?;
         let cost = linearisation.cost;
-        let termination = match self.take_in(linearisation) {
+        let termination = match self.accept_linearisation(linearisation) {
             Some(Termination::Diverged) => Some(Termination::OutsideDomainAtStart),
-            other => other,
+            termination => termination,
         };
         let state = state.param(x).cost(cost);
         Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), None))
@@ -149,8 +148,9 @@ impl<O: Objective> Solver<O, State> for PseudoInverse {
         let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&point)))?;
         let cost = linearisation.cost;
         let size = point.norm() + self.settings.step_tolerance;
-        let settled = (length <= self.settings.step_tolerance * size).then_some(Termination::Step);
-        let termination = self.take_in(linearisation).or(settled);
+        let small_step =
+            (length <= self.settings.step_tolerance * size).then_some(Termination::Step);
+        let termination = self.accept_linearisation(linearisation).or(small_step);
         let state = state.param(point).cost(if cost.is_nan() { f64::INFINITY } else { cost });
         let log = kv!("length" => length;);
         Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), Some(log)))
@@ -159,16 +159,23 @@ impl<O: Objective> Solver<O, State> for PseudoInverse {
 
 /// Minimises ½‖r(x)‖² from `start` by the pseudo-inverse iteration.
 ///
-/// Where it does not converge, x is the best point it has seen, which may be `start`.
+/// If the iteration does not converge, the solution is the best point evaluated, which may be
+/// `start`.
 pub fn minimise_pseudo_inverse<O: Objective>(
     objective: O,
     start: DVector<f64>,
     settings: &PseudoInverseSettings,
 ) -> Solution {
-    run(objective, start, PseudoInverse::new(*settings), settings.max_iterations, None::<Silent>)
+    run(
+        objective,
+        start,
+        PseudoInverse::new(*settings),
+        settings.max_iterations,
+        None::<NoObserver>,
+    )
 }
 
-/// As [`minimise_pseudo_inverse`], telling `observer` of every iteration.
+/// Minimises like [`minimise_pseudo_inverse`] and calls `observer` after every iteration.
 pub fn minimise_pseudo_inverse_observed<O: Objective>(
     objective: O,
     start: DVector<f64>,

@@ -1,17 +1,17 @@
-//! A matrix made triangular at the price of what stands below its diagonal: a triangular factor
-//! that some columns have left.
+//! Triangularisation of a triangular factor from which some columns were removed.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::least_squares::kernel::dot;
 use crate::least_squares::triangle::reflector;
 
-/// Rᵀ R = `Bᵀ B` and Rᵀ c′ = `Bᵀ c`, for B with no fewer rows than columns.
+/// Returns R and c′ with Rᵀ R = `Bᵀ B` and Rᵀ c′ = `Bᵀ c`, for B with at least as many rows as
+/// columns.
 ///
-/// A reflector reaches as far down as its column and those before it do: of an n × n triangle that
-/// d columns have left, over d + 1 rows at most. All of them cost 2 (d + 1) n², a factorisation of
-/// all rows 4/3 n³.
-pub(super) fn reduced(
+/// A reflector reaches only to the last non-zero row of its column and those before it. Without d
+/// of the columns of an n × n triangle that is at most d + 1 rows, and the cost is 2 (d + 1) n²,
+/// compared with 4/3 n³ for a full factorisation.
+pub(super) fn retriangularise(
     mut matrix: DMatrix<f64>,
     mut constant: DVector<f64>,
 ) -> (DMatrix<f64>, DVector<f64>) {
@@ -19,12 +19,15 @@ pub(super) fn reduced(
     let mut end = 0;
     let (values, right) = (matrix.as_mut_slice(), constant.as_mut_slice());
     for k in 0..n.min(rows) {
-        let (own, behind) = values[k * rows..].split_at_mut(rows);
-        end = own.iter().rposition(|value| *value != 0.0).map_or(end, |last| end.max(last + 1));
+        let (pivot_column, behind) = values[k * rows..].split_at_mut(rows);
+        end = pivot_column
+            .iter()
+            .rposition(|value| *value != 0.0)
+            .map_or(end, |last| end.max(last + 1));
         if end <= k + 1 {
             continue;
         }
-        let (alpha, vector) = (own[k], &mut own[k + 1..end]);
+        let (alpha, vector) = (pivot_column[k], &mut pivot_column[k + 1..end]);
         let (beta, factor) = reflector(alpha, vector);
         if factor != 0.0 {
             for column in behind.chunks_exact_mut(rows).chain([&mut *right]) {
@@ -35,7 +38,7 @@ pub(super) fn reduced(
             }
         }
         vector.fill(0.0);
-        own[k] = beta;
+        pivot_column[k] = beta;
     }
     (matrix.resize_vertically(n, 0.0), constant.resize_vertically(n, 0.0))
 }
@@ -51,12 +54,17 @@ mod tests {
         let triangle = DMatrix::from_fn(n, n, |i, j| if i <= j { wave(i, j) } else { 0.0 });
         let dense = DMatrix::from_fn(n, 5, wave);
         let constant = DVector::from_fn(n, |i, _| wave(i, n));
-        let some = |columns: &[usize]| triangle.select_columns(columns);
-        let gone = DMatrix::from_fn(n, 3, |i, j| if j == 1 { 0.0 } else { wave(i, j) });
-        for matrix in
-            [some(&[0, 2, 3, 7, 11]), some(&[5]), some(&[]), triangle.clone(), dense, gone]
-        {
-            let (factor, right) = reduced(matrix.clone(), constant.clone());
+        let subset = |columns: &[usize]| triangle.select_columns(columns);
+        let with_zero_column = DMatrix::from_fn(n, 3, |i, j| if j == 1 { 0.0 } else { wave(i, j) });
+        for matrix in [
+            subset(&[0, 2, 3, 7, 11]),
+            subset(&[5]),
+            subset(&[]),
+            triangle.clone(),
+            dense,
+            with_zero_column,
+        ] {
+            let (factor, right) = retriangularise(matrix.clone(), constant.clone());
             assert_eq!(factor.shape(), (matrix.ncols(), matrix.ncols()));
             assert_eq!(factor, factor.upper_triangle());
             assert!(
@@ -70,6 +78,6 @@ mod tests {
                     .all(|error| error.abs() < 1e-13)
             );
         }
-        assert_eq!(reduced(triangle.clone(), constant.clone()), (triangle, constant));
+        assert_eq!(retriangularise(triangle.clone(), constant.clone()), (triangle, constant));
     }
 }

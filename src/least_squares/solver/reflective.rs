@@ -1,24 +1,25 @@
-//! The interior reflective method within a box: steps that bounds slow down, turned back where they
-//! meet one.
+//! Interior reflective method within a box: the distance to the bounds scales the step, and a step
+//! that meets a bound is reflected.
 
 use nalgebra::DVector;
 
 use super::{Bounds, Factor, Settings, Step, Subproblem, TrustRegion};
 use crate::least_squares::Linearisation;
 
-/// Part of the way to a bound that a step may take.
-const WAY: f64 = 0.995;
-/// Distance that a start keeps from its bounds, relative to their size.
-const INSIDE: f64 = 1e-10;
+/// Fraction of the distance to a bound that a step may take.
+const BOUND_FRACTION: f64 = 0.995;
+/// Distance that a start keeps from its bounds, relative to their magnitude (1 at least).
+const START_MARGIN: f64 = 1e-10;
 
-/// Levenberg–Marquardt within bounds lo < x < hi by reflections, never on a bound itself [Branch,
+/// Returns an interior reflective Levenberg–Marquardt solver within bounds lo < x < hi [Branch,
 /// Coleman & Li 1999].
 ///
-/// With v the distance to the bound that lies down the gradient g (1 without one), unknowns are
-/// measured by √v: the optimality conditions are V g = 0, and min ½‖J p + r‖² + ½ pᵀ V⁻¹|g| p is
-/// solved within a radius. Of the step to the bound, its reflection there and the steepest descent
-/// the best is taken, as by SciPy's `trf`. What ends beside a bound that it presses against is put
-/// on it by [`minimise_within`](super::minimise_within).
+/// Let v be the distance to the bound in the direction of −g (1 if there is none), and V = diag(v).
+/// The optimality conditions are V g = 0, and min ½‖J p + r‖² + ½ pᵀ V⁻¹|g| p is solved within a
+/// radius in unknowns scaled by √v. If the step leaves the box, the best of three is taken, like in
+/// SciPy's `trf`: the step to the bound, its reflection there, and the steepest descent. Unknowns
+/// that end next to a bound are moved onto it by
+/// [`minimise_constrained_by`](super::minimise_constrained_by).
 pub fn reflective_levenberg_marquardt(
     bounds: Bounds,
     settings: Settings,
@@ -26,39 +27,39 @@ pub fn reflective_levenberg_marquardt(
     TrustRegion::new(Reflective { bounds, model: None }, settings)
 }
 
-/// The reflective step.
+/// Subproblem of the interior reflective step.
 #[derive(Debug, Clone)]
 pub struct Reflective {
     bounds: Bounds,
-    model: Option<Scaled>,
+    model: Option<ScaledModel>,
 }
 
-/// The problem in unknowns p̂ = p / d.
+/// Linearised problem in unknowns p̂ = p / d.
 #[derive(Debug, Clone)]
-struct Scaled {
+struct ScaledModel {
     factor: Factor,
-    /// d = √v / D, or 1/D far from bounds; 0 where an unknown has one value only.
+    /// Scale d = √v / D, or 1/D if no bound lies ahead; 0 for a fixed unknown.
     size: DVector<f64>,
     gradient: DVector<f64>,
 }
 
-/// A step p̂, and ½‖B p̂‖² + ĝᵀp̂, what it changes.
+/// Step p̂ with the change of the model, ½‖B p̂‖² + ĝᵀp̂.
 struct Candidate {
-    hat: DVector<f64>,
-    value: f64,
+    scaled: DVector<f64>,
+    change: f64,
 }
 
-impl Scaled {
-    fn value(&self, hat: DVector<f64>) -> Candidate {
-        let value = 0.5 * self.factor.image(&hat).norm_squared() + self.gradient.dot(&hat);
-        Candidate { hat, value }
+impl ScaledModel {
+    fn candidate(&self, scaled: DVector<f64>) -> Candidate {
+        let change = 0.5 * self.factor.image(&scaled).norm_squared() + self.gradient.dot(&scaled);
+        Candidate { scaled, change }
     }
 
-    fn step(&self, hat: &DVector<f64>) -> DVector<f64> {
-        hat.component_mul(&self.size)
+    fn step(&self, scaled: &DVector<f64>) -> DVector<f64> {
+        scaled.component_mul(&self.size)
     }
 
-    /// The best of `from` + t `along` for low ≤ t ≤ high.
+    /// Returns the best candidate `from` + t `along` with low ≤ t ≤ high.
     fn best_along(
         &self,
         from: &DVector<f64>,
@@ -69,12 +70,13 @@ impl Scaled {
         let image = self.factor.image(along);
         let slope = self.gradient.dot(along) + image.dot(&self.factor.image(from));
         let best = (-slope / image.norm_squared()).clamp(low, high);
-        self.value(from + if best.is_finite() { best } else { high } * along)
+        self.candidate(from + if best.is_finite() { best } else { high } * along)
     }
 }
 
 impl Reflective {
-    /// Distance to the bound that lies down the gradient, if there is one.
+    /// Returns the distance of `x[j]` to the bound in the direction of −gradient, or `None` if
+    /// there is none.
     fn distance(&self, x: &DVector<f64>, j: usize, gradient: f64) -> Option<f64> {
         let distance = if gradient < 0.0 {
             self.bounds.upper()[j] - x[j]
@@ -84,59 +86,63 @@ impl Reflective {
         (distance.is_finite() && gradient != 0.0).then_some(distance.max(0.0))
     }
 
-    /// Part of p that leads to the first bound, and the unknowns that meet one there.
-    fn to_bound(&self, x: &DVector<f64>, p: &DVector<f64>) -> (f64, Vec<usize>) {
-        let part = |j: usize| match p[j] {
+    /// Returns the fraction of p that reaches the first bound, and the unknowns that meet a bound
+    /// there.
+    fn fraction_to_bound(&self, x: &DVector<f64>, p: &DVector<f64>) -> (f64, Vec<usize>) {
+        let fraction = |j: usize| match p[j] {
             p if p > 0.0 => ((self.bounds.upper()[j] - x[j]) / p).max(0.0),
             p if p < 0.0 => ((self.bounds.lower()[j] - x[j]) / p).max(0.0),
             _ => f64::INFINITY,
         };
-        let parts: Vec<f64> = (0..x.len()).map(part).collect();
-        let first = parts.iter().copied().fold(f64::INFINITY, f64::min);
-        (first, (0..x.len()).filter(|&j| parts[j] <= first).collect())
+        let fractions: Vec<f64> = (0..x.len()).map(fraction).collect();
+        let first = fractions.iter().copied().fold(f64::INFINITY, f64::min);
+        (first, (0..x.len()).filter(|&j| fractions[j] <= first).collect())
     }
 
-    /// The best of three ways, where p̂ leaves the box.
-    fn turned(
+    /// Returns the best of three candidates for a step p̂ that leaves the box: step to the bound,
+    /// reflection, and steepest descent.
+    fn best_inside(
         &self,
-        model: &Scaled,
+        model: &ScaledModel,
         x: &DVector<f64>,
-        hat: &DVector<f64>,
+        scaled: &DVector<f64>,
         radius: f64,
     ) -> Candidate {
-        let (stride, hits) = self.to_bound(x, &model.step(hat));
-        let on_bound = hat * stride;
-        let mut mirrored = hat.clone();
+        let (stride, hits) = self.fraction_to_bound(x, &model.step(scaled));
+        let on_bound = scaled * stride;
+        let mut mirrored = scaled.clone();
         for &j in &hits {
             mirrored[j] = -mirrored[j];
         }
         let reflected = {
-            let to_radius = along_to_radius(&on_bound, &mirrored, radius);
-            let (to_bound, _) = self.to_bound(&(x + model.step(&on_bound)), &model.step(&mirrored));
-            let far = to_bound.min(to_radius);
-            let low = if far > 0.0 { (1.0 - WAY) * stride / far } else { 0.0 };
-            let high = if to_bound <= to_radius { WAY * to_bound } else { to_radius };
-            (far > 0.0 && low <= high).then(|| model.best_along(&on_bound, &mirrored, low, high))
+            let to_radius = fraction_to_radius(&on_bound, &mirrored, radius);
+            let (to_bound, _) =
+                self.fraction_to_bound(&(x + model.step(&on_bound)), &model.step(&mirrored));
+            let limit = to_bound.min(to_radius);
+            let low = if limit > 0.0 { (1.0 - BOUND_FRACTION) * stride / limit } else { 0.0 };
+            let high = if to_bound <= to_radius { BOUND_FRACTION * to_bound } else { to_radius };
+            (limit > 0.0 && low <= high).then(|| model.best_along(&on_bound, &mirrored, low, high))
         };
-        let straight = model.value(&on_bound * WAY);
+        let straight = model.candidate(&on_bound * BOUND_FRACTION);
         let down = -&model.gradient;
         let to_radius = radius / down.norm().max(f64::MIN_POSITIVE);
-        let (to_bound, _) = self.to_bound(x, &model.step(&down));
-        let descent =
-            model.best_along(&DVector::zeros(x.len()), &down, 0.0, (WAY * to_bound).min(to_radius));
-        let best = if descent.value < straight.value { descent } else { straight };
-        reflected
-            .into_iter()
-            .fold(best, |best, own| if own.value < best.value { own } else { best })
+        let (to_bound, _) = self.fraction_to_bound(x, &model.step(&down));
+        let high = (BOUND_FRACTION * to_bound).min(to_radius);
+        let descent = model.best_along(&DVector::zeros(x.len()), &down, 0.0, high);
+        let best = if descent.change < straight.change { descent } else { straight };
+        match reflected {
+            Some(reflected) if reflected.change < best.change => reflected,
+            _ => best,
+        }
     }
 }
 
-/// t ≥ 0 with ‖from + t along‖ = radius, 0 where there is none.
-fn along_to_radius(from: &DVector<f64>, along: &DVector<f64>, radius: f64) -> f64 {
+/// Returns t ≥ 0 with ‖from + t along‖ = radius, or 0 if there is none.
+fn fraction_to_radius(from: &DVector<f64>, along: &DVector<f64>, radius: f64) -> f64 {
     let (a, b, c) = (along.norm_squared(), from.dot(along), from.norm_squared() - radius * radius);
     let root = (b * b - a * c).max(0.0).sqrt();
-    let far = if b > 0.0 { -c / (b + root) } else { (root - b) / a };
-    if far.is_finite() { far.max(0.0) } else { 0.0 }
+    let fraction = if b > 0.0 { -c / (b + root) } else { (root - b) / a };
+    if fraction.is_finite() { fraction.max(0.0) } else { 0.0 }
 }
 
 impl Subproblem for Reflective {
@@ -144,7 +150,7 @@ impl Subproblem for Reflective {
         "interior reflective Levenberg–Marquardt"
     }
 
-    fn admit(&self, start: &mut DVector<f64>) -> bool {
+    fn admit_start(&self, start: &mut DVector<f64>) -> bool {
         let n = start.len();
         if self.bounds.lower().len() != n {
             return false;
@@ -152,9 +158,10 @@ impl Subproblem for Reflective {
         self.bounds.clamp(start);
         for j in 0..n {
             let (lower, upper) = (self.bounds.lower()[j], self.bounds.upper()[j]);
-            let room =
-                |bound: f64| if bound.is_finite() { INSIDE * bound.abs().max(1.0) } else { 0.0 };
-            let (least, most) = (lower + room(lower), upper - room(upper));
+            let margin = |bound: f64| {
+                if bound.is_finite() { START_MARGIN * bound.abs().max(1.0) } else { 0.0 }
+            };
+            let (least, most) = (lower + margin(lower), upper - margin(upper));
             start[j] =
                 if least <= most { start[j].clamp(least, most) } else { 0.5 * (lower + upper) };
         }
@@ -164,12 +171,12 @@ impl Subproblem for Reflective {
     fn prepare(
         &mut self,
         x: &DVector<f64>,
-        found: &Linearisation,
+        linearisation: &Linearisation,
         scale: &DVector<f64>,
         settings: &Settings,
     ) {
         let n = x.len();
-        let gradient = found.triangle.tr_mul(&found.projected);
+        let gradient = linearisation.triangle.tr_mul(&linearisation.projected);
         let mut size = DVector::zeros(n);
         let mut barrier = DVector::zeros(n);
         for j in (0..n).filter(|&j| self.bounds.lower()[j] < self.bounds.upper()[j]) {
@@ -181,20 +188,25 @@ impl Subproblem for Reflective {
                 None => size[j] = scale[j].recip(),
             }
         }
-        let mut matrix = found.triangle.clone().resize_vertically(2 * n, 0.0);
+        let mut matrix = linearisation.triangle.clone().resize_vertically(2 * n, 0.0);
         matrix.column_iter_mut().zip(size.iter()).for_each(|(mut column, size)| column *= *size);
         (0..n).for_each(|j| matrix[(n + j, j)] = barrier[j]);
-        let constant = found.projected.clone().resize_vertically(2 * n, 0.0);
+        let constant = linearisation.projected.clone().resize_vertically(2 * n, 0.0);
         let factor = Factor::new(matrix, constant, settings.rank_tolerance);
-        self.model = Some(Scaled { factor, gradient: gradient.component_mul(&size), size });
+        self.model = Some(ScaledModel { factor, gradient: gradient.component_mul(&size), size });
     }
 
     fn free_gradient(&self, _x: &DVector<f64>, _j: usize, gradient: f64) -> f64 {
         gradient
     }
 
-    fn hold_back(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &mut DVector<f64>) {
-        // Nearer to a bound than moves the residual by one, the gradient counts in proportion.
+    fn project_gradient(
+        &self,
+        x: &DVector<f64>,
+        scale: &DVector<f64>,
+        gradient: &mut DVector<f64>,
+    ) {
+        // Close to a bound (less than one residual unit) the gradient is scaled down in proportion.
         for j in 0..x.len() {
             if let Some(distance) = self.distance(x, j, gradient[j]) {
                 gradient[j] *= (distance * scale[j]).min(1.0);
@@ -202,20 +214,23 @@ impl Subproblem for Reflective {
         }
     }
 
-    fn admits(&self, x: &DVector<f64>) -> bool {
+    fn is_feasible(&self, x: &DVector<f64>) -> bool {
         self.bounds.contain(x)
     }
 
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step {
         let Some(mut model) = self.model.take() else { return Step::none(x) };
-        let (hat, damping) = model.factor.limited(radius);
-        let inside = self.bounds.contain(&(x + model.step(&hat)));
-        let Candidate { hat, value } =
-            if inside { model.value(hat) } else { self.turned(&model, x, &hat, radius) };
-        let mut point = x + model.step(&hat);
+        let (scaled, damping) = model.factor.limited(radius);
+        let is_inside = self.bounds.contain(&(x + model.step(&scaled)));
+        let Candidate { scaled, change } = if is_inside {
+            model.candidate(scaled)
+        } else {
+            self.best_inside(&model, x, &scaled, radius)
+        };
+        let mut point = x + model.step(&scaled);
         self.bounds.clamp(&mut point);
-        let slope = -model.gradient.dot(&hat);
+        let slope = -model.gradient.dot(&scaled);
         self.model = Some(model);
-        Step { point, length: hat.norm(), slope, predicted: -value, damping }
+        Step { point, length: scaled.norm(), slope, predicted: -change, damping }
     }
 }

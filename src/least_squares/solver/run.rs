@@ -1,9 +1,9 @@
-//! One call from objective and start to solution.
+//! Entry points: minimisation of an objective from a start in one call.
 
 use argmin::core::observers::Observe;
 use nalgebra::DVector;
 
-use super::execute::{Silent, run};
+use super::execute::{NoObserver, run};
 use super::{Bounds, Inequalities, Settings, Solution, State, Termination};
 use super::{
     clamped_levenberg_marquardt, constrained_levenberg_marquardt,
@@ -12,10 +12,11 @@ use super::{
 };
 use crate::least_squares::Objective;
 
-/// Part of the width between bounds within which an interior point is beside a bound.
-const BESIDE: f64 = 1e-3;
-/// Relative change of the cost that is rounding.
-const NO_WORSE: f64 = 1e-12;
+/// Distance to a bound, as a fraction of the width between the bounds, up to which a solution is
+/// moved onto the bound.
+const NEAR_BOUND: f64 = 1e-3;
+/// Relative increase of the cost that counts as rounding.
+const COST_ROUNDING: f64 = 1e-12;
 
 /// Minimises ½‖r(x)‖² from `start` by Levenberg–Marquardt.
 ///
@@ -56,10 +57,16 @@ const NO_WORSE: f64 = 1e-12;
 /// assert!((solution.x[1] - 2.0_f64.ln()).abs() < 1e-9);
 /// ```
 pub fn minimise<O: Objective>(objective: O, start: DVector<f64>, settings: &Settings) -> Solution {
-    run(objective, start, levenberg_marquardt(*settings), settings.max_iterations, None::<Silent>)
+    run(
+        objective,
+        start,
+        levenberg_marquardt(*settings),
+        settings.max_iterations,
+        None::<NoObserver>,
+    )
 }
 
-/// As [`minimise`], telling `observer` of every iteration.
+/// Minimises like [`minimise`] and calls `observer` after every iteration.
 pub fn minimise_observed<O: Objective>(
     objective: O,
     start: DVector<f64>,
@@ -69,38 +76,33 @@ pub fn minimise_observed<O: Objective>(
     run(objective, start, levenberg_marquardt(*settings), settings.max_iterations, Some(observer))
 }
 
-/// How bounds are kept.
+/// Method that keeps the unknowns within bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
-pub enum Within {
-    /// [`constrained_levenberg_marquardt`].
+pub enum BoundMethod {
+    /// Active-set steps, [`constrained_levenberg_marquardt`].
     #[default]
     ActiveSet,
-    /// [`interior_point_levenberg_marquardt`].
+    /// Interior-point steps, [`interior_point_levenberg_marquardt`].
     InteriorPoint,
-    /// [`reflective_levenberg_marquardt`]; inequalities are not seen.
+    /// Interior reflective steps, [`reflective_levenberg_marquardt`]; ignores inequalities.
     Reflective,
-    /// [`clamped_levenberg_marquardt`]; inequalities are not seen.
+    /// Clamped steps, [`clamped_levenberg_marquardt`]; ignores inequalities.
     Clamped,
 }
 
-/// Minimises ½‖r(x)‖² within `bounds` from `start`.
+/// Minimises ½‖r(x)‖² within `bounds` from `start` with active-set steps.
 pub fn minimise_bounded<O: Objective>(
     objective: O,
     start: DVector<f64>,
     bounds: &Bounds,
     settings: &Settings,
 ) -> Solution {
-    minimise_constrained(
-        objective,
-        start,
-        bounds,
-        &Inequalities::none(bounds.lower().len()),
-        settings,
-    )
+    let rows = Inequalities::none(bounds.lower().len());
+    minimise_constrained(objective, start, bounds, &rows, settings)
 }
 
-/// Minimises ½‖r(x)‖² within `bounds` and inequalities `rows` from `start`.
+/// Minimises ½‖r(x)‖² within `bounds` and inequalities `rows` from `start` with active-set steps.
 pub fn minimise_constrained<O: Objective>(
     objective: O,
     start: DVector<f64>,
@@ -108,50 +110,52 @@ pub fn minimise_constrained<O: Objective>(
     rows: &Inequalities,
     settings: &Settings,
 ) -> Solution {
-    minimise_within(Within::ActiveSet, objective, start, (bounds, rows), settings, None::<Silent>)
+    let method = BoundMethod::ActiveSet;
+    minimise_constrained_by(method, objective, start, (bounds, rows), settings, None::<NoObserver>)
 }
 
-/// The same in the way that `within` says, telling `observer` of every iteration.
-pub fn minimise_within<O: Objective>(
-    within: Within,
+/// Minimises ½‖r(x)‖² within `bounds` and inequalities `rows` by the given method and calls
+/// `observer`, if any, after every iteration.
+pub fn minimise_constrained_by<O: Objective>(
+    method: BoundMethod,
     objective: O,
     start: DVector<f64>,
     (bounds, rows): (&Bounds, &Inequalities),
     settings: &Settings,
     observer: Option<impl Observe<State> + 'static>,
 ) -> Solution {
-    let fits = start.len() == bounds.lower().len() && start.len() == rows.matrix().ncols();
-    let infeasible = fits && nearest(&start, bounds, rows).is_none();
-    let (box_alone, limit) = (bounds.clone(), settings.max_iterations);
-    let mut solution = match within {
-        Within::ActiveSet => {
-            let solver = constrained_levenberg_marquardt(box_alone, rows.clone(), *settings);
+    let sizes_match = start.len() == bounds.lower().len() && start.len() == rows.matrix().ncols();
+    let is_infeasible = sizes_match && nearest(&start, bounds, rows).is_none();
+    let (solver_bounds, limit) = (bounds.clone(), settings.max_iterations);
+    let mut solution = match method {
+        BoundMethod::ActiveSet => {
+            let solver = constrained_levenberg_marquardt(solver_bounds, rows.clone(), *settings);
             run(&objective, start, solver, limit, observer)
         }
-        Within::InteriorPoint => {
-            let solver = interior_point_levenberg_marquardt(box_alone, rows.clone(), *settings);
+        BoundMethod::InteriorPoint => {
+            let solver = interior_point_levenberg_marquardt(solver_bounds, rows.clone(), *settings);
             run(&objective, start, solver, limit, observer)
         }
-        Within::Reflective => run(
+        BoundMethod::Reflective => run(
             &objective,
             start,
-            reflective_levenberg_marquardt(box_alone, *settings),
+            reflective_levenberg_marquardt(solver_bounds, *settings),
             limit,
             observer,
         ),
-        Within::Clamped => run(
+        BoundMethod::Clamped => run(
             &objective,
             start,
-            clamped_levenberg_marquardt(box_alone, *settings),
+            clamped_levenberg_marquardt(solver_bounds, *settings),
             limit,
             observer,
         ),
     };
-    if infeasible {
+    if is_infeasible {
         solution.termination = Termination::Infeasible;
-    } else if fits {
-        if matches!(within, Within::InteriorPoint | Within::Reflective) {
-            settle(&objective, bounds, rows, &mut solution);
+    } else if sizes_match {
+        if matches!(method, BoundMethod::InteriorPoint | BoundMethod::Reflective) {
+            move_onto_bounds(&objective, bounds, rows, &mut solution);
         }
         solution.at_bound = (0..solution.x.len()).map(|j| bounds.at(&solution.x, j)).collect();
         solution.at_limit = (0..rows.len()).map(|i| rows.at(&solution.x, i)).collect();
@@ -159,8 +163,8 @@ pub fn minimise_within<O: Objective>(
     solution
 }
 
-/// Puts unknowns on bounds that they are near where that does not raise the cost, each by itself.
-fn settle<O: Objective>(
+/// Moves each unknown onto a bound it is near, one at a time, if that does not raise the cost.
+fn move_onto_bounds<O: Objective>(
     objective: &O,
     bounds: &Bounds,
     rows: &Inequalities,
@@ -171,18 +175,18 @@ fn settle<O: Objective>(
             let (value, width) = (solution.x[j], bounds.upper()[j] - bounds.lower()[j]);
             let size = if width.is_finite() { width } else { bound.abs().max(value.abs()) };
             let distance = (value - bound).abs();
-            if !bound.is_finite() || distance == 0.0 || distance > BESIDE * size {
+            if !bound.is_finite() || distance == 0.0 || distance > NEAR_BOUND * size {
                 continue;
             }
-            let mut settled = solution.x.clone();
-            settled[j] = bound;
-            if !rows.contain(&settled) {
+            let mut moved = solution.x.clone();
+            moved[j] = bound;
+            if !rows.contain(&moved) {
                 continue;
             }
-            let cost = objective.cost(&settled);
+            let cost = objective.cost(&moved);
             solution.cost_evaluations += 1;
-            if cost <= solution.cost * (1.0 + NO_WORSE) {
-                (solution.x, solution.cost) = (settled, cost);
+            if cost <= solution.cost * (1.0 + COST_ROUNDING) {
+                (solution.x, solution.cost) = (moved, cost);
             }
         }
     }

@@ -1,23 +1,23 @@
 //! Tolerances and limits common to all solvers.
 
-/// When to stop, and how boldly to start.
+/// Stopping tolerances, rank tolerance and initial radius of a solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Largest cosine between residual and derivatives at a minimum; default 1e-10.
+    /// Largest cosine between the residual and any derivative column at convergence; default 1e-10.
     pub gradient_tolerance: f64,
-    /// Smallest relative reduction of the cost worth a step; default 1e-12.
+    /// Smallest relative reduction of the cost that continues the iteration; default 1e-12.
     pub cost_tolerance: f64,
-    /// Smallest step worth taking, relative to x, both scaled; default 1e-10.
+    /// Smallest step ‖D p‖ relative to ‖D x‖ that continues the iteration; default 1e-10.
     pub step_tolerance: f64,
     /// Singular values of the scaled Jacobian up to this fraction of the largest count as zero;
     /// default 1e-12.
     pub rank_tolerance: f64,
-    /// First radius as a multiple of ‖D x‖ (of 1 where x = 0), but no less than ‖r‖; default 100.
+    /// Initial radius as a multiple of ‖D x‖ (of 1 if x = 0), at least ‖r‖; default 100.
     ///
-    /// Where x is near zero its size says nothing; ‖r‖ is the length that orthogonal columns would
-    /// need.
+    /// Near x = 0 the size of x is no useful scale; ‖r‖ is the step length that orthogonal columns
+    /// would need.
     pub initial_radius: f64,
-    /// Largest number of steps tried, taken or not; default 500.
+    /// Maximum number of steps tried, accepted or not; default 500.
     pub max_iterations: u64,
 }
 
@@ -34,5 +34,5 @@ impl Default for Settings {
     }
 }
 
-/// A length within this fraction of the radius fills it [Moré 1978].
+/// Relative deviation of a step length from the radius that is tolerated [Moré 1978].
 pub(super) const RADIUS_SLACK: f64 = 0.1;

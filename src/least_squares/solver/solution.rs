@@ -1,32 +1,32 @@
-//! Where a solver stopped.
+//! Result of a solver.
 
 use nalgebra::DVector;
 
 use super::{AtBound, Termination};
 
-/// Where a solver stopped, and what it took.
+/// Solution with the reason of termination and the number of evaluations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
-    /// x, the best point found.
+    /// Best point x evaluated.
     pub x: DVector<f64>,
-    /// ½‖r(x)‖².
+    /// Cost ½‖r(x)‖² at x.
     pub cost: f64,
-    /// Why it stopped.
+    /// Reason for which the solver stopped.
     pub termination: Termination,
-    /// Steps tried.
+    /// Number of steps tried.
     pub iterations: u64,
-    /// Evaluations of the cost alone.
+    /// Number of evaluations of the cost alone.
     pub cost_evaluations: u64,
-    /// Evaluations of residual and derivatives.
+    /// Number of evaluations of residuals and derivatives.
     pub linearisations: u64,
-    /// The bound each unknown rests on, one entry per unknown.
+    /// Active bound of each unknown, if any.
     pub at_bound: Vec<Option<AtBound>>,
-    /// The limit each inequality rests on, one entry per inequality.
+    /// Active limit of each inequality, if any.
     pub at_limit: Vec<Option<AtBound>>,
 }
 
 impl Solution {
-    /// Of a run from `start` that has not begun.
+    /// Creates the solution of a run from `start` that has not begun.
     pub(super) fn at(start: DVector<f64>) -> Self {
         Self {
             at_bound: vec![None; start.len()],
@@ -40,7 +40,7 @@ impl Solution {
         }
     }
 
-    /// Evaluations of the residual, with derivatives or without.
+    /// Returns the number of evaluations of the residual, with derivatives or without.
     pub fn evaluations(&self) -> u64 {
         self.cost_evaluations + self.linearisations
     }

@@ -1,39 +1,39 @@
-//! Least squares by singular values, for any damping, where B may lack rank.
+//! Damped least squares by singular values, for matrices that may lack rank.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::settings::RADIUS_SLACK;
 use crate::least_squares::singular::Decomposition;
 
-/// Newton steps allowed to the secular equation.
-const SECULAR_ITERATIONS: usize = 50;
+/// Maximum number of Newton steps on the secular equation.
+const MAX_SECULAR_STEPS: usize = 50;
 
-/// The seen part of min ‖B q + c‖ with B = U Σ Vᵀ.
+/// Singular value expansion of min ‖B q + c‖ with B = U Σ Vᵀ, restricted to the retained σᵢ.
 #[derive(Debug, Clone)]
 pub(super) struct Spectrum {
     terms: Vec<Term>,
 }
 
-/// One singular triplet.
+/// Term of the expansion that belongs to one singular value.
 #[derive(Debug, Clone)]
 struct Term {
-    /// σᵢ.
+    /// Singular value σᵢ.
     singular: f64,
-    /// `−uᵢᵀc`.
+    /// Projected constant `−uᵢᵀc`.
     projected: f64,
-    /// vᵢ.
+    /// Right singular vector vᵢ.
     direction: DVector<f64>,
 }
 
 impl Term {
-    /// Length of q(λ) along vᵢ, written so that λ = 0 needs no σ².
+    /// Returns the length of q(λ) along vᵢ, in a form that needs no σ² at λ = 0.
     fn length(&self, lambda: f64) -> f64 {
         self.projected / (self.singular + lambda / self.singular)
     }
 }
 
 impl Spectrum {
-    /// Decomposes B and drops σ ≤ `cut`·σ₁.
+    /// Decomposes B and drops singular values σ ≤ `cut`·σ₁.
     pub(super) fn new(matrix: &DMatrix<f64>, constant: &DVector<f64>, cut: f64) -> Self {
         let Decomposition { columns, singular, projected } =
             Decomposition::new(matrix, Some(constant), cut);
@@ -49,7 +49,7 @@ impl Spectrum {
         Self { terms }
     }
 
-    /// q(λ) = −Σ σᵢ/(σᵢ² + λ) `(uᵢᵀc)` vᵢ, of `n` entries.
+    /// Returns q(λ) = −Σ σᵢ/(σᵢ² + λ) `(uᵢᵀc)` vᵢ, a vector of length `n`.
     pub(super) fn solution(&self, lambda: f64, n: usize) -> DVector<f64> {
         let mut q = DVector::zeros(n);
         for term in &self.terms {
@@ -58,13 +58,13 @@ impl Spectrum {
         q
     }
 
-    /// λ ≥ 0 with ‖q(λ)‖ = Δ to within the slack, or zero if ‖q(0)‖ is no longer than that.
+    /// Returns λ ≥ 0 with ‖q(λ)‖ = Δ to within the slack, or zero if ‖q(0)‖ is not longer.
     ///
-    /// Newton's method on 1/‖q(λ)‖ = 1/Δ from λ = 0, which approaches from one side        [Hebden
-    /// 1973; Moré 1978]
+    /// Newton's method on 1/‖q(λ)‖ = 1/Δ from λ = 0 converges monotonically [Hebden 1973; Moré
+    /// 1978].
     pub(super) fn secular_root(&self, radius: f64) -> f64 {
         let mut lambda = 0.0;
-        for _ in 0..SECULAR_ITERATIONS {
+        for _ in 0..MAX_SECULAR_STEPS {
             let (mut squares, mut slope) = (0.0, 0.0);
             for term in &self.terms {
                 let square = term.length(lambda).powi(2);

@@ -1,26 +1,27 @@
-//! Why a solver stopped.
+//! Termination reasons of the solvers.
 
 use std::fmt;
 
-/// Why a solver stopped, with the inequality that held.
+/// Reason for which a solver stopped, with the inequality that held.
 ///
-/// The tests on cost and step are those of MINPACK (info 1 to 8), with one exception: a step that
-/// only the radius kept short and that went as predicted (λ > 0 and ρ ≥ ¾) is not judged, since the
-/// next one will be longer.
+/// The tests on cost and step are those of MINPACK (info 1 to 8), with one exception. A step that
+/// only the radius limits and that agrees with its prediction (λ > 0 and ρ ≥ ¾) is not tested,
+/// since the next one will be longer.
 ///
-/// g = Jᵀr, D the scaling, p the last step tried, Δ the radius, ρ actual over predicted reduction
-/// of ½‖r‖²; ε = 2⁻⁵².
+/// Symbols: g = Jᵀr, D the scaling, p the last step tried, Δ the radius, ρ the actual over the
+/// predicted reduction of ½‖r‖², and ε = 2⁻⁵².
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Termination {
-    /// The residual is orthogonal to every column: max |gⱼ| / (‖Jⱼ‖ ‖r‖) ≤ `gradient_tolerance`.
+    /// The residual is orthogonal to every derivative column: max |gⱼ| / (‖Jⱼ‖ ‖r‖) ≤
+    /// `gradient_tolerance`.
     Gradient,
     /// The cost no longer falls: |actual| ≤ `cost_tolerance`·½‖r‖², predicted ≤
-    /// `cost_tolerance`·½‖r‖², and ρ ≤ 2 or |actual| ≤ 1000 ε·½‖r‖², which is rounding.
+    /// `cost_tolerance`·½‖r‖², and ρ ≤ 2 or |actual| ≤ 1000 ε·½‖r‖² (rounding).
     Cost,
     /// The step is negligible: ‖D p‖ ≤ `step_tolerance` ‖D x‖.
     Step,
-    /// The data are met exactly: ‖r‖ = 0.
+    /// The data are fitted exactly: ‖r‖ = 0.
     ZeroResidual,
     /// Rounding hides any further reduction: |actual| and predicted ≤ ε·½‖r‖².
     CostPrecision,
@@ -28,9 +29,9 @@ pub enum Termination {
     StepPrecision,
     /// Rounding hides any smaller gradient: max |gⱼ| / (‖Jⱼ‖ ‖r‖) ≤ ε.
     GradientPrecision,
-    /// argmin's Gauss–Newton method saw no change: | ‖Qᵀr‖ₖ₋₁ − ‖Qᵀr‖ₖ | < `tolerance`.
+    /// The Gauss–Newton method of argmin made no progress: | ‖Qᵀr‖ₖ₋₁ − ‖Qᵀr‖ₖ | < `tolerance`.
     Unchanged,
-    /// As many steps were tried as allowed: iterations ≥ `max_iterations`.
+    /// The iteration limit was reached: iterations ≥ `max_iterations`.
     IterationLimit,
     /// The cost at the start is not finite.
     OutsideDomainAtStart,
@@ -43,17 +44,17 @@ pub enum Termination {
     Infeasible,
     /// The start, the bounds and the problem differ in their number of unknowns.
     SizeMismatch,
-    /// An undamped iteration went astray: ½‖r‖² > `growth`·(lowest ½‖r‖² so far) in `patience`
-    /// iterations in a row, or ∞.
+    /// An undamped iteration diverged: ½‖r‖² > `growth`·(lowest ½‖r‖² so far) in `patience`
+    /// successive iterations, or ∞.
     Diverged,
-    /// JᵀJ has no inverse where argmin's Gauss–Newton method asks for it.
+    /// The matrix JᵀJ that argmin's Gauss–Newton method inverts is singular.
     Singular,
     /// An observer failed or interrupted the run.
     Interrupted,
 }
 
 impl Termination {
-    /// Whether x is a minimum as far as the settings or the arithmetic can tell.
+    /// Returns true if x is a minimum within the tolerances or the precision of the arithmetic.
     pub fn converged(self) -> bool {
         match self {
             Self::Gradient
@@ -76,7 +77,7 @@ impl Termination {
         }
     }
 
-    /// A stable name for files, in kebab case.
+    /// Returns the stable name for files, in kebab case.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Gradient => "gradient",

@@ -1,5 +1,5 @@
-//! The outer loop that every solver here shares: try a step, compare with the prediction, move or
-//! shrink.
+//! Trust-region loop shared by the solvers: try a step, compare it with its prediction, accept it
+//! or shrink the radius.
 
 use argmin::core::{
     ArgminError, Error, IterState, KV, Problem, Solver, State as _, TerminationReason,
@@ -7,56 +7,54 @@ use argmin::core::{
 use argmin::kv;
 use nalgebra::{DMatrix, DVector};
 
-use super::second_order::{Convex, SecondOrder};
+use super::second_order::{ConvexModel, SecondOrder};
+use super::trial::{GOOD_RATIO, Trial};
 use super::{Settings, Termination};
 use crate::least_squares::{Linearisation, Objective};
 
-/// The part of argmin's state in use: x and ½‖r‖².
+/// State of argmin's executor, of which x and ½‖r‖² are used.
 pub type State = IterState<DVector<f64>, (), (), (), (), f64>;
 
-/// A step is taken when ρ reaches this.
-const ACCEPT: f64 = 1e-4;
-/// A step may be bent by this part of its length, and is made longer towards the other; shorter
-/// ones are tried so often.
-const BENT: f64 = 0.75;
-const WELL_BENT: f64 = 0.03;
-const BENDINGS: usize = 6;
-/// The radius grows when ρ reaches this.
-const GOOD: f64 = 0.75;
-/// A relative gain up to this is rounding of the cost.
+/// Smallest gain ratio ρ at which a step is accepted.
+const MIN_ACCEPTED_RATIO: f64 = 1e-4;
+/// Largest ratio of acceleration to step length at which an accelerated step is used.
+const MAX_ACCELERATION: f64 = 0.75;
+/// Maximum number of accelerated steps tried with decreasing radius.
+const MAX_ACCELERATION_TRIES: usize = 6;
+/// Relative change of the cost that counts as rounding.
 const ROUNDING: f64 = 1e3 * f64::EPSILON;
 
-/// A step within the radius, as the linearised problem sees it.
+/// Step within the radius, with its predictions by the linearised problem.
 #[derive(Debug, Clone)]
 pub struct Step {
-    /// x + p.
+    /// Point x + p that the step reaches.
     pub point: DVector<f64>,
-    /// ‖D p‖.
+    /// Scaled length ‖D p‖.
     pub length: f64,
-    /// −gᵀp, the reduction of ½‖r‖² to first order.
+    /// First-order reduction −gᵀp of ½‖r‖².
     pub slope: f64,
-    /// ½‖r‖² − ½‖J p + r‖².
+    /// Predicted reduction ½‖r‖² − ½‖J p + r‖².
     pub predicted: f64,
-    /// λ, zero when the radius did not matter.
+    /// Damping λ, zero if the radius did not limit the step.
     pub damping: f64,
 }
 
 impl Step {
-    /// No step at all, which stops the solver.
+    /// Creates a step of length zero, which stops the solver.
     pub(super) fn none(x: &DVector<f64>) -> Self {
         Self { point: x.clone(), length: 0.0, slope: 0.0, predicted: 0.0, damping: 0.0 }
     }
 }
 
-/// How a solver chooses its step from a linearisation.
+/// Method by which a solver chooses its step from a linearisation.
 pub trait Subproblem {
-    /// Name of the solver.
+    /// Returns the name of the solver.
     fn name(&self) -> &'static str;
 
-    /// Moves a start to where the problem may be evaluated; false when sizes differ.
-    fn admit(&self, start: &mut DVector<f64>) -> bool;
+    /// Moves a start to a feasible point; returns false if the sizes differ.
+    fn admit_start(&self, start: &mut DVector<f64>) -> bool;
 
-    /// Takes in the linearised problem at x; D is `scale`.
+    /// Stores the linearised problem at x; `scale` is the diagonal of D.
     fn prepare(
         &mut self,
         x: &DVector<f64>,
@@ -65,35 +63,41 @@ pub trait Subproblem {
         settings: &Settings,
     );
 
-    /// Component j of the gradient g, or zero where a constraint holds x back.
+    /// Returns component j of the gradient g, or zero if a constraint blocks the descent.
     fn free_gradient(&self, x: &DVector<f64>, j: usize, gradient: f64) -> f64;
 
-    /// Takes out of a gradient whose columns are divided by `scale` what constraints at x hold
-    /// back.
-    fn hold_back(&self, x: &DVector<f64>, scale: &DVector<f64>, gradient: &mut DVector<f64>) {
+    /// Removes from a gradient with unit columns (divided by `scale`) the components that
+    /// constraints at x block.
+    fn project_gradient(
+        &self,
+        x: &DVector<f64>,
+        scale: &DVector<f64>,
+        gradient: &mut DVector<f64>,
+    ) {
         let _ = scale;
         (0..x.len()).for_each(|j| gradient[j] = self.free_gradient(x, j, gradient[j]));
     }
 
-    /// Whether the problem may be evaluated at x.
-    fn admits(&self, x: &DVector<f64>) -> bool {
+    /// Returns true if the problem may be evaluated at x.
+    fn is_feasible(&self, x: &DVector<f64>) -> bool {
         let _ = x;
         true
     }
 
-    /// Whether constraints changed the last step; only then second derivatives may be called for.
-    fn is_confined(&self) -> bool {
+    /// Returns true if constraints changed the last step; only then may second derivatives be
+    /// formed.
+    fn is_step_constrained(&self) -> bool {
         false
     }
 
-    /// Whether steps may be bent although no constraint changes them.
-    fn bends_freely(&self) -> bool {
+    /// Returns true if steps may be accelerated although no constraint changes them.
+    fn accelerates_unconstrained(&self) -> bool {
         false
     }
 
-    /// Normals, one a row and of length one in unknowns scaled by `scale`, of the constraints at x
-    /// that a step against the scaled gradient would leave.
-    fn pressed(
+    /// Returns the unit normals of the constraints at x that a step against the scaled gradient
+    /// would violate, shape = (faces, n), in unknowns scaled by `scale`.
+    fn active_normals(
         &self,
         x: &DVector<f64>,
         scale: &DVector<f64>,
@@ -103,54 +107,56 @@ pub trait Subproblem {
         DMatrix::zeros(0, x.len())
     }
 
-    /// The point that a step leads to whose model has a gradient larger by ½ `bend`, for the same
-    /// damping.
-    fn bent(
+    /// Returns the point reached by the last step with acceleration, at the same damping.
+    ///
+    /// ½ `acceleration` (Jᵀ r″) is added to the gradient of the model. Returns `None` if the method
+    /// has no accelerated step.
+    fn accelerated(
         &mut self,
         x: &DVector<f64>,
-        bend: &DVector<f64>,
+        acceleration: &DVector<f64>,
         damping: f64,
     ) -> Option<DVector<f64>> {
-        let _ = (x, bend, damping);
+        let _ = (x, acceleration, damping);
         None
     }
 
-    /// The best step with ‖D p‖ ≤ `radius` to within 10 %.
+    /// Returns the best step with ‖D p‖ ≤ `radius` to within 10 %.
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step;
 }
 
-/// Trust-region least squares after Moré, over any choice of step.
+/// Trust-region least squares after Moré, generic over the choice of step.
 ///
-/// Dⱼ is the largest ‖Jⱼ‖ seen so far, so the path does not depend on the units of the unknowns.
-/// Radius and gain ratio follow MINPACK's `lmder` [Moré 1978]. From the first step that limits hold
-/// back, Dⱼ is 1 over how far unknown j may plausibly go, where that is known: residuals that
-/// limits keep large go with combinations of which they say little, and ‖Jⱼ‖ would let these run
-/// where linearised residuals are not valid.
+/// Dⱼ is the largest ‖Jⱼ‖ so far, so that the path does not depend on the units of the unknowns.
+/// Radius and gain ratio follow MINPACK's `lmder` [Moré 1978]. After the first constrained step, Dⱼ
+/// is the inverse of the plausible size of unknown j, where it is known. Constraints may keep
+/// residuals large along combinations that they hardly determine, and scaling by ‖Jⱼ‖ would let
+/// these combinations leave the range in which linearised residuals are valid.
 #[derive(Debug, Clone)]
 pub struct TrustRegion<S> {
     subproblem: S,
     settings: Settings,
     scale: DVector<f64>,
     radius: Option<f64>,
-    /// Whether D has been taken from what unknowns may plausibly do.
-    measured: bool,
+    /// True once D was set from plausible sizes.
+    is_scale_fixed: bool,
     second_order: SecondOrder,
-    /// The linearised problem at x, and the model with second derivatives that steps come from
-    /// instead.
+    /// Linearised problem at x.
     linearisation: Option<Linearisation>,
-    convex: Option<Convex>,
+    /// Model with second derivatives that replaces the linearised problem, if S is in use.
+    convex: Option<ConvexModel>,
     termination: Option<Termination>,
 }
 
 impl<S: Subproblem> TrustRegion<S> {
-    /// The loop around `subproblem`.
+    /// Creates the loop around `subproblem`.
     pub fn new(subproblem: S, settings: Settings) -> Self {
         Self {
             subproblem,
             settings,
             scale: DVector::zeros(0),
             radius: None,
-            measured: false,
+            is_scale_fixed: false,
             second_order: SecondOrder::default(),
             linearisation: None,
             convex: None,
@@ -158,12 +164,12 @@ impl<S: Subproblem> TrustRegion<S> {
         }
     }
 
-    /// Why it stopped, once it has.
+    /// Returns the reason of termination, or `None` while the solver runs.
     pub fn termination(&self) -> Option<Termination> {
         self.termination
     }
 
-    /// The choice of step.
+    /// Returns the method that chooses the step.
     pub fn subproblem(&self) -> &S {
         &self.subproblem
     }
@@ -173,9 +179,13 @@ impl<S: Subproblem> TrustRegion<S> {
         stopped(state, termination)
     }
 
-    /// Scales, judges the gradient, and hands the linearisation on; the reason to stop, if there is
-    /// one.
-    fn take_in(&mut self, x: &DVector<f64>, linearisation: Linearisation) -> Option<Termination> {
+    /// Updates the scaling, tests the gradient and stores the linearisation; returns the reason to
+    /// stop, if any.
+    fn accept_linearisation(
+        &mut self,
+        x: &DVector<f64>,
+        linearisation: Linearisation,
+    ) -> Option<Termination> {
         let Linearisation { cost, triangle, projected } = &linearisation;
         if !triangle.iter().chain(projected.iter()).all(|v| v.is_finite()) {
             return Some(Termination::DerivativesNotFinite);
@@ -190,13 +200,13 @@ impl<S: Subproblem> TrustRegion<S> {
         let lengths = norms.map(|norm| if norm == 0.0 { 1.0 } else { norm });
         if self.radius.is_none() {
             self.scale.clone_from(&lengths);
-        } else if !self.measured {
+        } else if !self.is_scale_fixed {
             self.scale = self.scale.sup(&norms);
         }
         let residual = (2.0 * cost).sqrt();
         let mut gradient =
             DVector::from_fn(x.len(), |j, _| triangle.column(j).dot(projected) / lengths[j]);
-        self.subproblem.hold_back(x, &lengths, &mut gradient);
+        self.subproblem.project_gradient(x, &lengths, &mut gradient);
         let cosine = gradient.amax() / residual;
         if cosine <= self.settings.gradient_tolerance {
             return Some(Termination::Gradient);
@@ -213,93 +223,97 @@ impl<S: Subproblem> TrustRegion<S> {
         None
     }
 
-    /// Hands the subproblem the model that steps come from.
+    /// Passes the model of the next steps to the subproblem.
     fn prepare(&mut self, x: &DVector<f64>) {
         let Some(linearisation) = &self.linearisation else { return };
         let gradient =
             || linearisation.triangle.tr_mul(&linearisation.projected).component_div(&self.scale);
-        let pressed = || self.subproblem.pressed(x, &self.scale, &gradient());
-        self.convex = self.second_order.model(linearisation, &self.scale, pressed);
+        let normals = || self.subproblem.active_normals(x, &self.scale, &gradient());
+        self.convex = self.second_order.model(linearisation, &self.scale, normals);
         let model = self.convex.as_ref().map_or(linearisation, |convex| &convex.linearisation);
         self.subproblem.prepare(x, model, &self.scale, &self.settings);
     }
 
-    /// The step from x, bent where that is called for, and by which part of its length; the radius
-    /// becomes that which it took.
+    /// Returns the step from x, accelerated if called for, and its ratio of acceleration to length.
+    /// Sets `radius` to the one that was used.
     fn step<O: Objective>(
         &mut self,
         problem: &mut Problem<O>,
         x: &DVector<f64>,
         radius: &mut f64,
     ) -> Result<(Step, Option<f64>), Error> {
-        let mut bendings = if self.second_order.bends() { BENDINGS } else { 0 };
+        let mut tries = if self.second_order.accelerates() { MAX_ACCELERATION_TRIES } else { 0 };
         loop {
             let mut step = self.subproblem.step(x, *radius);
             if let Some(convex) = &self.convex {
                 step.predicted += convex.excess(&(&step.point - x).component_mul(&self.scale));
             }
-            if bendings == 0 || step.length == 0.0 {
+            if tries == 0 || step.length == 0.0 {
                 return Ok((step, None));
             }
-            let straight = &step.point - x;
-            let bend = problem.problem("bend_count", |o| Ok(o.bend(x, &straight)))?;
-            let Some(point) = bend.and_then(|bend| self.subproblem.bent(x, &bend, step.damping))
-            else {
+            let unaccelerated = &step.point - x;
+            let acceleration = problem.problem("acceleration_count", |o| {
+                Ok(o.acceleration_gradient(x, &unaccelerated))
+            })?;
+            let Some(point) = acceleration.and_then(|acceleration| {
+                self.subproblem.accelerated(x, &acceleration, step.damping)
+            }) else {
                 return Ok((step, None));
             };
-            let share = (&point - &step.point).component_mul(&self.scale).norm() / step.length;
-            if share.is_nan() {
+            let ratio = (&point - &step.point).component_mul(&self.scale).norm() / step.length;
+            if ratio.is_nan() {
                 return Ok((step, None));
             }
-            if share <= BENT {
-                self.second_order.bent(share, step.damping);
+            if ratio <= MAX_ACCELERATION {
+                self.second_order.record_acceleration(ratio, step.damping);
                 step.point = point;
-                return Ok((step, Some(share)));
+                return Ok((step, Some(ratio)));
             }
-            *radius = step.length * (BENT / share).clamp(0.1, 0.5);
-            bendings -= 1;
+            *radius = step.length * (MAX_ACCELERATION / ratio).clamp(0.1, 0.5);
+            tries -= 1;
         }
     }
 
-    /// Takes D from how far each unknown may plausibly go; one of which that is not known, from
-    /// what takes away all of the residual.
+    /// Sets D to the inverse plausible sizes of the unknowns. An unknown without a size gets the
+    /// inverse of the change that would remove the whole residual.
     ///
-    /// False where nothing is known and D stays as it is.
-    fn measure<O: Objective>(
+    /// Returns false, with D unchanged, if no size is known.
+    fn rescale_by_sizes<O: Objective>(
         &mut self,
         problem: &mut Problem<O>,
         x: &DVector<f64>,
     ) -> Result<bool, Error> {
-        let reach = problem.problem("reach_count", |o| Ok(o.reach()))?;
+        let sizes = problem.problem("size_count", |o| Ok(o.plausible_sizes()))?;
         let Some(Linearisation { cost, triangle, .. }) = &self.linearisation else {
             return Ok(false);
         };
-        if reach.iter().all(Option::is_none) {
+        if sizes.iter().all(Option::is_none) {
             return Ok(false);
         }
         let residual = (2.0 * cost).sqrt();
-        let lengths = reach.iter().zip(triangle.column_iter());
+        let lengths = sizes.iter().zip(triangle.column_iter());
         let lengths =
-            lengths.map(|(reach, column)| reach.map_or(column.norm() / residual, f64::recip));
+            lengths.map(|(size, column)| size.map_or(column.norm() / residual, f64::recip));
         let lengths = lengths.map(|length| if length.is_normal() { length } else { 1.0 });
         self.scale = DVector::from_iterator(x.len(), lengths);
-        self.measured = true;
+        self.is_scale_fixed = true;
         self.prepare(x);
         Ok(true)
     }
 
-    /// The tests of MINPACK after a step, with relative reductions.
-    fn judge(&self, trial: &Trial, size: f64) -> Option<Termination> {
+    /// Applies the convergence tests of MINPACK to a step; `size` is ‖D x‖ and reductions are
+    /// relative.
+    fn test_convergence(&self, trial: &Trial, size: f64) -> Option<Termination> {
         let settings = &self.settings;
-        if trial.damping > 0.0 && trial.ratio >= GOOD {
-            // Held back by the radius only, which is about to grow: a short step says nothing yet.
+        if trial.damping > 0.0 && trial.ratio >= GOOD_RATIO {
+            // Only the radius, which is about to grow, limits the step: its length is no evidence.
             return None;
         }
-        let foreseen = 0.5 * trial.ratio <= 1.0 || trial.actual.abs() <= ROUNDING;
-        let settled = |tolerance: f64| {
-            trial.actual.abs() <= tolerance && trial.predicted <= tolerance && foreseen
+        let is_predicted = 0.5 * trial.ratio <= 1.0 || trial.actual.abs() <= ROUNDING;
+        let is_settled = |tolerance: f64| {
+            trial.actual.abs() <= tolerance && trial.predicted <= tolerance && is_predicted
         };
-        if settled(settings.cost_tolerance) {
+        if is_settled(settings.cost_tolerance) {
             return Some(Termination::Cost);
         }
         if trial.length <= settings.step_tolerance * size {
@@ -309,7 +323,7 @@ impl<S: Subproblem> TrustRegion<S> {
                 Termination::DomainEdge
             });
         }
-        if settled(f64::EPSILON) {
+        if is_settled(f64::EPSILON) {
             return Some(Termination::CostPrecision);
         }
         if self.radius.is_some_and(|radius| radius <= f64::EPSILON * size) {
@@ -323,64 +337,7 @@ impl<S: Subproblem> TrustRegion<S> {
     }
 }
 
-/// A step tried: reductions relative to the cost before it.
-struct Trial {
-    cost: f64,
-    actual: f64,
-    predicted: f64,
-    slope: f64,
-    ratio: f64,
-    length: f64,
-    damping: f64,
-    /// By how much the radius grows after it.
-    growth: f64,
-}
-
-impl Trial {
-    fn new((step, share): (&Step, Option<f64>), before: f64, after: f64) -> Self {
-        // A cost a hundred times the old one carries no information on curvature.
-        let actual = if after < 100.0 * before { 1.0 - after / before } else { -1.0 };
-        let predicted = step.predicted / before;
-        let ratio = if predicted > 0.0 { actual / predicted } else { 0.0 };
-        Self {
-            cost: after,
-            actual,
-            predicted,
-            slope: step.slope / before,
-            ratio,
-            length: step.length,
-            damping: step.damping,
-            growth: share.map_or(2.0, |share| (WELL_BENT / share).clamp(1.5, 8.0)),
-        }
-    }
-
-    /// ρ as far as it speaks of the model: a difference that would not be worth a step is rounding
-    /// of the cost.
-    fn forecast(&self, tolerance: f64) -> f64 {
-        if (self.actual - self.predicted).abs() <= tolerance { 1.0 } else { self.ratio }
-    }
-
-    fn next_radius(&self, radius: f64) -> f64 {
-        if self.ratio <= 0.25 {
-            // The minimum of the parabola through the two costs and the slope, between a tenth and
-            // a half.
-            let shrink = if self.actual >= 0.0 {
-                0.5
-            } else {
-                0.5 * self.slope / (self.slope - self.actual)
-            };
-            let shrink =
-                if self.actual <= -1.0 || shrink.is_nan() { 0.1 } else { shrink.clamp(0.1, 0.5) };
-            shrink * radius.min(10.0 * self.length)
-        } else if self.ratio >= GOOD || self.damping == 0.0 {
-            self.growth * self.length
-        } else {
-            radius
-        }
-    }
-}
-
-/// The state of a solver that stops for a reason of its own.
+/// Returns the state of a solver that stops for the given reason.
 pub(super) fn stopped(state: State, termination: Termination) -> State {
     state.terminate_with(if termination.converged() {
         TerminationReason::SolverConverged
@@ -389,7 +346,7 @@ pub(super) fn stopped(state: State, termination: Termination) -> State {
     })
 }
 
-/// x out of argmin's state.
+/// Takes x out of argmin's state.
 pub(super) fn take_point(state: &mut State) -> Result<DVector<f64>, Error> {
     let text = "a solver needs a start".to_owned();
     state.take_param().ok_or_else(|| ArgminError::NotInitialized { text }.into())
@@ -407,7 +364,7 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
     ) -> Result<(State, Option<KV>), Error> {
         let mut x = take_point(&mut state)?;
         let parameters = problem.problem.as_ref().map(Objective::parameters);
-        if parameters != Some(x.len()) || !self.subproblem.admit(&mut x) {
+        if parameters != Some(x.len()) || !self.subproblem.admit_start(&mut x) {
             return Ok((
                 self.stop(state.param(x).cost(f64::INFINITY), Termination::SizeMismatch),
                 None,
@@ -416,7 +373,7 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&x)))?;
         let cost = linearisation.cost;
         let termination = if cost.is_finite() {
-            self.take_in(&x, linearisation)
+            self.accept_linearisation(&x, linearisation)
         } else {
             Some(Termination::OutsideDomainAtStart)
         };
@@ -436,54 +393,57 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         let cost = state.get_cost();
         let first = state.get_iter() == 0;
         let mut radius = self.radius.unwrap_or(self.settings.initial_radius);
-        let (mut step, mut share) = self.step(problem, &x, &mut radius)?;
-        if self.subproblem.is_confined() && !self.measured && self.measure(problem, &x)? {
+        let (mut step, mut acceleration) = self.step(problem, &x, &mut radius)?;
+        if self.subproblem.is_step_constrained()
+            && !self.is_scale_fixed
+            && self.rescale_by_sizes(problem, &x)?
+        {
             radius = self.scale.component_mul(&(&step.point - &x)).norm();
-            (step, share) = self.step(problem, &x, &mut radius)?;
+            (step, acceleration) = self.step(problem, &x, &mut radius)?;
         }
         if first {
             radius = radius.min(step.length);
         }
         let after = problem.problem("cost_count", |o| Ok(o.cost(&step.point)))?;
-        let trial =
-            Trial::new((&step, share), cost, if after.is_nan() { f64::INFINITY } else { after });
+        let after = if after.is_nan() { f64::INFINITY } else { after };
+        let trial = Trial::new((&step, acceleration), cost, after);
         self.radius = Some(trial.next_radius(radius));
-        let taken = trial.ratio >= ACCEPT;
-        let size = self.scale.component_mul(if taken { &step.point } else { &x }).norm();
+        let is_accepted = trial.ratio >= MIN_ACCEPTED_RATIO;
+        let size = self.scale.component_mul(if is_accepted { &step.point } else { &x }).norm();
         let log = kv!("ratio" => trial.ratio; "radius" => radius; "length" => trial.length;);
-        let mut termination = self.judge(&trial, size);
+        let mut termination = self.test_convergence(&trial, size);
         let retired = termination.is_some_and(Termination::converged) && self.second_order.retire();
         if retired {
             termination = None;
         }
-        if taken && termination.is_none() {
+        if is_accepted && termination.is_none() {
             let linearisation =
                 problem.problem("linearise_count", |o| Ok(o.linearise(&step.point)))?;
-            termination = self.take_in(&step.point, linearisation);
+            termination = self.accept_linearisation(&step.point, linearisation);
         }
-        let (x, cost) = if taken { (step.point, trial.cost) } else { (x, cost) };
+        let (x, cost) = if is_accepted { (step.point, trial.cost) } else { (x, cost) };
         if termination.is_none() {
-            let forecast = trial.forecast(self.settings.cost_tolerance);
-            self.second_order.look(forecast);
-            if self.subproblem.bends_freely() {
-                self.second_order.watch(forecast);
+            let ratio = trial.significant_ratio(self.settings.cost_tolerance);
+            self.second_order.check_straightness(ratio);
+            if self.subproblem.accelerates_unconstrained() {
+                self.second_order.count_miss(ratio);
             }
-            let renew = self.subproblem.is_confined()
-                && self.second_order.judge(
-                    (forecast, taken),
+            let worth = trial.predicted / self.settings.cost_tolerance;
+            let remaining = state.get_max_iters().saturating_sub(state.get_iter());
+            let forms = self.subproblem.is_step_constrained()
+                && self.second_order.should_form(
+                    (ratio, is_accepted),
                     (trial.length, trial.damping),
-                    (
-                        trial.predicted / self.settings.cost_tolerance,
-                        state.get_max_iters().saturating_sub(state.get_iter()),
-                    ),
+                    (worth, remaining),
                     x.len(),
                 );
-            if renew {
-                let within = |x: &DVector<f64>| self.subproblem.admits(x);
-                self.second_order
-                    .renew(problem.problem("curvature_count", |o| Ok(o.curvature(&x, &within)))?);
+            if forms {
+                let within = |x: &DVector<f64>| self.subproblem.is_feasible(x);
+                let matrix =
+                    problem.problem("curvature_count", |o| Ok(o.curvature(&x, &within)))?;
+                self.second_order.set_matrix(matrix);
             }
-            if taken || renew || retired {
+            if is_accepted || forms || retired {
                 self.prepare(&x);
             }
         }
