@@ -51,7 +51,7 @@ fn problem() -> String {
 fn bench_identify(bencher: Bencher, text: &str, data: &str) {
     let problem = Problem::parse(text, &cases().join("problem.toml")).unwrap();
     let (measurements, _) = Measurements::read(&[cases().join(data)], &problem).unwrap();
-    let data = Dataset::of(&problem, measurements).unwrap();
+    let data = Dataset::from_measurements(&problem, measurements).unwrap();
     bencher
         .bench_local(|| identify(divan::black_box(&problem), &data, &Options::default()).unwrap());
 }

@@ -21,7 +21,7 @@ const VOID: [&str; 4] = ["meta", "link", "input", "!DOCTYPE"];
 fn case(file: &str) -> (Problem, Dataset) {
     let problem = Problem::read(&path("tests/cases")).unwrap();
     let measurements = measured(&problem, &[file]);
-    let data = Dataset::of(&problem, measurements).unwrap();
+    let data = Dataset::from_measurements(&problem, measurements).unwrap();
     (problem, data)
 }
 
@@ -307,7 +307,7 @@ fn thousands_of_poses_make_no_large_page() {
     let (problem, few) = case("tests/cases/h-none-large.csv");
     let found = identify(&problem, &few, &Options::default()).unwrap();
     let many = part(&few.measurements, (0..6600).map(|k| k % few.measurements.len()));
-    let many = Dataset::of(&problem, many).unwrap();
+    let many = Dataset::from_measurements(&problem, many).unwrap();
     let shown = PlotData::of_identification(&problem, &many, &found).unwrap();
     let page = report::identification_report(&problem, &found, &shown);
     check(&page);

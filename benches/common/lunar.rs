@@ -25,7 +25,7 @@ impl Lunar {
         let placement = Placement::of(&measurements);
         Self {
             model: Model::new(&problem, &placement.bases, &placement.targets).unwrap(),
-            data: Dataset::of(&problem, measurements).unwrap(),
+            data: Dataset::from_measurements(&problem, measurements).unwrap(),
             placement,
             sigma: problem.data.position_sigma.unwrap(),
         }

@@ -87,7 +87,7 @@ impl Ur10 {
     fn residuals_at(&self, unknowns: Vec<usize>, at: DVector<f64>) -> PoseResiduals<'_> {
         let poses =
             self.configurations.iter().zip(&self.measured).map(|(configuration, measured)| Pose {
-                setup: PoseView::of(configuration),
+                setup: PoseView::from_configuration(configuration),
                 base: 0,
                 target: 0,
                 observation: Observation::default(),

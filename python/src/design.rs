@@ -142,7 +142,7 @@ fn judged_data(
     rows: &Measurements,
     truth: Option<&Path>,
 ) -> Result<Judged, DesignError> {
-    let data = Dataset::of(problem, rows.clone())?;
+    let data = Dataset::from_measurements(problem, rows.clone())?;
     let held_out = design::with_known_words(&data);
     Ok(Judged::Table {
         poses: Box::new(rows.select(&data.split.identification)),
@@ -208,7 +208,7 @@ pub fn plan(
     let found = supervised(py, None, move |sink| {
         let candidates = match candidates {
             Some(rows) => Candidates::Rows(Box::new(rows.as_ref().clone())),
-            None => Candidates::Within(ranges(&declared, truth.as_deref())?.that_matter(&declared)),
+            None => Candidates::Within(ranges(&declared, truth.as_deref())?.relevant_to(&declared)),
         };
         // A sweep is a step at which an interrupt ends the work.
         let sweep = |sweep: PlanProgress| {

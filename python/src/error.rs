@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use flexcal::error::{mistake, with_causes};
+use flexcal::error::{message_with_causes, mistake};
 use pyo3::PyErr;
 
 /// The classes of Python.
@@ -19,7 +19,7 @@ pub fn raised(error: &(dyn Error + 'static)) -> PyErr {
         }
         None => (None, None, None),
     };
-    python::InputError::new_err((with_causes(error), file, line, key))
+    python::InputError::new_err((message_with_causes(error), file, line, key))
 }
 
 /// A mistake in an argument.

@@ -88,7 +88,7 @@ impl Problem {
     /// Unit of each joint's command, from the base outwards; None at fixed joints.
     #[getter]
     fn units(&self) -> Vec<Option<&'static str>> {
-        let unit = |joint: &Joint| match joint.commanded() {
+        let unit = |joint: &Joint| match joint.command_kind() {
             JointKind::Revolute => Some("rad"),
             JointKind::Prismatic => Some("m"),
             JointKind::Fixed => None,

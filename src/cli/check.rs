@@ -101,7 +101,7 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Er
             }
             let (measured, warnings) = Measurements::read_poses(files, problem)?;
             common.warn(&warnings);
-            let data = Dataset::of(problem, measured)?;
+            let data = Dataset::from_measurements(problem, measured)?;
             let held_out = design::with_known_words(&data);
             let Dataset { measurements: measured, split } = data;
             Ok(Judged::Table {

@@ -67,7 +67,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         &["commands.csv"],
     )?;
     let (targets, warnings) = Measurements::read_poses(common.data(), &problem)?;
-    let targets = targets.of_the_arm();
+    let targets = targets.arm_rows();
     if let Some(row) = (0..targets.len()).find(|&row| !targets.observation(row).is_position()) {
         return Err(targets.location(row).error(InputErrorKind::NoTarget).into());
     }

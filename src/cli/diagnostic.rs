@@ -6,7 +6,8 @@ use std::io::Write as _;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use flexcal::design::DesignError;
 use flexcal::error::{
-    InputError, InputErrorKind, Location, Warning, mistake, one_line, veiled, with_causes,
+    InputError, InputErrorKind, Location, Warning, mask_hidden, message_with_causes, mistake,
+    one_line,
 };
 use flexcal::fit::Identification;
 use flexcal::report;
@@ -22,7 +23,7 @@ pub fn print(error: &(dyn Error + 'static)) {
     let flagged = error.downcast_ref().and_then(by_arguments).or(mistake.and_then(with_argument));
     show(
         Level::ERROR,
-        &flagged.unwrap_or_else(|| with_causes(error)),
+        &flagged.unwrap_or_else(|| message_with_causes(error)),
         mistake.map(|input| &*input.location),
     );
 }
@@ -84,7 +85,7 @@ fn show(level: Level<'_>, message: &str, location: Option<&Location>) {
     let excerpt = location.and_then(|location| Some((location, location.excerpt.as_ref()?)));
     let group = match excerpt {
         Some((_, excerpt)) => title.element(
-            Snippet::source(veiled(&excerpt.text))
+            Snippet::source(mask_hidden(&excerpt.text))
                 .line_start(excerpt.first_line)
                 .path(path)
                 .annotation(AnnotationKind::Primary.span(excerpt.span.clone())),

@@ -9,7 +9,7 @@ use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
 use flexcal::problem::Problem;
 use flexcal::report::{self, ExportErrors, Exported};
-use flexcal::urdf::{Chain, Robot, Yaml, export, joint_origins, yaml};
+use flexcal::urdf::{Chain, Robot, YamlFormat, export, joint_origins, yaml};
 
 use super::diagnostic;
 use super::flags::Flags;
@@ -78,9 +78,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         }
         (None, format) => {
             let form = if matches!(format, Some(Format::UrYaml)) {
-                Yaml::UniversalRobots
+                YamlFormat::UniversalRobots
             } else {
-                Yaml::Ros
+                YamlFormat::Ros
             };
             (
                 yaml(&joint_origins(&problem, &arm, form)?, form),
@@ -138,7 +138,7 @@ fn errors(
     let (rows, warnings) = Measurements::read(files, problem)?;
     flags.warn(&warnings);
     check_columns(problem, &rows)?;
-    let data = Dataset::of(problem, rows)?;
+    let data = Dataset::from_measurements(problem, rows)?;
     let placement = Placement::of(&data.measurements);
     let model = estimates.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let x = estimates.vector(problem, &model)?;

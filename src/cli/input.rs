@@ -89,7 +89,7 @@ impl Common {
         warnings.extend(measurements.repeated_rows(problem.data.position_sigma));
         warnings.extend(measurements.time_going_back());
         self.warn(&warnings);
-        Dataset::of(problem, measurements)
+        Dataset::from_measurements(problem, measurements)
     }
 
     /// Says that no parameter is to be identified.

@@ -4,8 +4,8 @@ use std::fs;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 
-use flexcal::error::{is_hidden, visible};
-use flexcal::files::{Ready, Record, same_file};
+use flexcal::error::{escape_hidden, is_hidden};
+use flexcal::files::{FolderRecord, StagedFile, same_file};
 use flexcal::report::{Report, is_figure};
 
 use super::{diagnostic, interrupt};
@@ -132,7 +132,7 @@ impl Results {
         let mut ready = Vec::with_capacity(texts.len());
         for (name, text) in texts {
             let path = self.path(name);
-            match Ready::new(&path, text) {
+            match StagedFile::new(&path, text) {
                 Ok(file) => ready.push((file, path)),
                 Err(source) => return Err(WriteError::Io { path, source }),
             }
@@ -143,7 +143,7 @@ impl Results {
         // interrupted.
         self.write_record(&record)?;
         for (file, path) in ready {
-            file.put().map_err(|source| WriteError::Io { path, source })?;
+            file.commit().map_err(|source| WriteError::Io { path, source })?;
         }
         for name in &older {
             let path = self.path(name);
@@ -162,7 +162,7 @@ impl Results {
 
     /// The first of these files that is there and another command's, a report before all others,
     /// with that command.
-    fn others(&self, record: &Record, texts: &[(&str, &str)]) -> Option<(String, String)> {
+    fn others(&self, record: &FolderRecord, texts: &[(&str, &str)]) -> Option<(String, String)> {
         let other = |&(name, _): &(&str, &str)| {
             let writer =
                 record.writer(&self.folder, name).filter(|writer| *writer != self.command)?;
@@ -172,19 +172,19 @@ impl Results {
         report.and_then(other).or_else(|| texts.iter().find_map(other))
     }
 
-    fn record(&self) -> Result<Record, WriteError> {
-        Record::of(&self.folder)
-            .map_err(|source| WriteError::Io { path: Record::file(&self.folder), source })
+    fn record(&self) -> Result<FolderRecord, WriteError> {
+        FolderRecord::read(&self.folder)
+            .map_err(|source| WriteError::Io { path: FolderRecord::file(&self.folder), source })
     }
 
-    fn write_record(&self, record: &Record) -> Result<(), WriteError> {
+    fn write_record(&self, record: &FolderRecord) -> Result<(), WriteError> {
         record
             .write(&self.folder)
-            .map_err(|source| WriteError::Io { path: Record::file(&self.folder), source })
+            .map_err(|source| WriteError::Io { path: FolderRecord::file(&self.folder), source })
     }
 
     /// Whether a result may take its name.
-    fn check(&self, record: &Record, name: &str) -> Result<(), WriteError> {
+    fn check(&self, record: &FolderRecord, name: &str) -> Result<(), WriteError> {
         let path = self.path(name);
         let why = |why| Err(WriteError::InTheWay { path: path.clone(), why });
         if path.is_dir() {
@@ -225,7 +225,7 @@ pub fn columns() -> usize {
 /// Prints to standard output what people read, without characters that do something to their
 /// terminal; a closed pipe ends the printing quietly.
 pub fn print(text: &str) -> Result<(), WriteError> {
-    print_all(&visible(text))
+    print_all(&escape_hidden(text))
 }
 
 /// Prints JSON to standard output: such characters stand in its texts alone, and are escaped there.

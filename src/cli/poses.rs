@@ -59,7 +59,7 @@ impl Source {
     /// The same without temperatures and sides on which no declared effect depends: they need not
     /// be set.
     pub fn ranges(&self, problem: &Problem) -> Result<PoseRanges, DesignError> {
-        Ok(self.all_ranges(problem)?.that_matter(problem))
+        Ok(self.all_ranges(problem)?.relevant_to(problem))
     }
 
     /// The same, if it is known: a TRUTH.toml that is named must be right, limits may be missing.

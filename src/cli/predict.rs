@@ -43,7 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let problem = Problem::read(common.problem())?;
     let results = common.results("predict", &problem, arguments.estimate.as_slice(), &RESULTS)?;
     let (rows, warnings) = Measurements::read_poses(common.files(&problem), &problem)?;
-    let rows = rows.of_the_arm();
+    let rows = rows.arm_rows();
     common.warn(&warnings);
     let estimate = arguments.estimate.as_deref().map(SavedEstimate::read).transpose()?;
     let trusted = estimate.as_ref().is_none_or(|estimate| estimate.trusted);

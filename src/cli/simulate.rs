@@ -85,7 +85,12 @@ fn poses_of(
     let word = |row: usize| {
         target.and_then(|own| own.names.get(*own.of_row.get(row)?).cloned()).unwrap_or_default()
     };
-    Ok(rows.all_conditions().into_iter().enumerate().map(|(row, own)| (own, word(row))).collect())
+    Ok(rows
+        .conditions_without_past()
+        .into_iter()
+        .enumerate()
+        .map(|(row, own)| (own, word(row)))
+        .collect())
 }
 
 fn summary(simulation: &Simulation, table: &Path) -> String {

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use flexcal::files::Ready;
+use flexcal::files::StagedFile;
 use flexcal::report::{self, shell_word};
 use flexcal::study::{self, CellResult, MisprintStudy, Request, Shard, Store, Study};
 
@@ -90,7 +90,7 @@ impl<'a> Sentinel<'a> {
     }
 
     fn put(self) -> Result<(), WriteError> {
-        let ready = Ready::new(self.0, Self::TEXT).and_then(Ready::put);
+        let ready = StagedFile::new(self.0, Self::TEXT).and_then(StagedFile::commit);
         ready.map_err(|source| WriteError::Io { path: self.0.to_owned(), source })
     }
 }

@@ -37,7 +37,8 @@ impl PoseRanges {
     /// # Errors
     /// A moving joint has no limits.
     pub fn of(problem: &Problem) -> Result<Self, DesignError> {
-        for joint in problem.joints.iter().filter(|joint| joint.commanded() != JointKind::Fixed) {
+        for joint in problem.joints.iter().filter(|joint| joint.command_kind() != JointKind::Fixed)
+        {
             for (end, limit) in [("min", joint.limits.0), ("max", joint.limits.1)] {
                 if !limit.is_finite() {
                     return Err(DesignError::no_range(joint, end));
@@ -214,7 +215,7 @@ impl<'a> Table<'a> {
     fn push(&mut self, problem: &Problem, draft: &Draft) {
         for (k, joint) in problem.joints.iter().enumerate() {
             let ((from, to), q) = (self.ranges.joints[k], draft.joints[k]);
-            let q = match joint.commanded() {
+            let q = match joint.command_kind() {
                 JointKind::Fixed => 0.0,
                 JointKind::Prismatic => rounded(q, LENGTH_STEP, (from, to)),
                 JointKind::Revolute => {
@@ -223,7 +224,7 @@ impl<'a> Table<'a> {
                 }
             };
             self.configurations.push(q);
-            self.approach.push(match joint.commanded() {
+            self.approach.push(match joint.command_kind() {
                 JointKind::Fixed => 0.0,
                 _ if draft.sides[k] => 1.0,
                 _ => -1.0,

@@ -8,7 +8,7 @@ use super::plan::choose;
 use super::{DesignError, Extremes, Forecast, Growth, Prediction, Sensitivity, Site};
 use crate::error::InputErrorKind;
 use crate::fit::Placement;
-use crate::measurement::{Dataset, Labels, Measurements, RowOrder, different};
+use crate::measurement::{Dataset, Labels, Measurements, RowOrder, count_distinct};
 use crate::problem::{Observation, PoseRanges, Problem};
 use crate::select::{Detection, detectable};
 
@@ -162,7 +162,7 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
             told.coordinates,
             first_of_each(&poses.pose_numbers(problem)),
         ),
-        different: different(&poses.pose_numbers(problem), 0..count),
+        different: count_distinct(&poses.pose_numbers(problem), 0..count),
         without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),
     })
 }

@@ -126,7 +126,7 @@ pub fn plan(
             let ends = draw(ranges, DRAWN[1].max(2 * poses), Extremes::Often, AT_ENDS);
             (draw(ranges, DRAWN[0].max(2 * poses), Extremes::No, EVENLY), Some(ends))
         }
-        Candidates::Rows(rows) => (rows.as_ref().clone().of_the_arm(), None),
+        Candidates::Rows(rows) => (rows.as_ref().clone().arm_rows(), None),
     };
     let mut tables = vec![&usual];
     tables.extend(given);
@@ -139,14 +139,14 @@ pub fn plan(
         None => (table, told),
     };
     let parameters = &site.model.parameters;
-    let of_arm = given.map(|given| given.clone().of_the_arm());
+    let of_arm = given.map(|given| given.clone().arm_rows());
     let given = given.map(|given| site.at_rest(given));
     let (measured, given): (Option<Measurements>, Option<Sensitivity>) = given.unzip();
     let (mut table, usual) = admitted(site.at_rest(&usual));
     let mut all = usual.clone();
     if let Some(ends) = ends {
         let (ends, sensitivity) = admitted(site.at_rest(&ends));
-        table = table.and(&ends);
+        table = table.concatenate(&ends);
         all = all.and(&sensitivity);
     }
     let tried = all.len();
@@ -251,7 +251,7 @@ fn with_known_distances(
         .collect();
     match given {
         _ if known.is_empty() => given.cloned(),
-        Some(given) => Some(given.and(&rows.select(&known))),
+        Some(given) => Some(given.concatenate(&rows.select(&known))),
         None => Some(rows.select(&known)),
     }
 }

@@ -112,7 +112,8 @@ pub fn separate(
         given,
         &PlanOptions { criterion: &criterion, ..*options },
     )?;
-    let with_given = |own: &Measurements| given.map_or_else(|| own.clone(), |given| given.and(own));
+    let with_given =
+        |own: &Measurements| given.map_or_else(|| own.clone(), |given| given.concatenate(own));
     let usual = Site::new(&pair.declared, &[&usual])?.at_rest(&usual).0;
     let random = (0..DRAWS).into_par_iter().map(|draw| {
         pair.told(&with_given(&usual.select(&choose(

@@ -50,7 +50,7 @@ impl<'a> Site<'a> {
                 add(&mut bases, &placement.bases[placement.base_of(row)]);
                 add(&mut targets, &placement.targets[placement.target_of(row)]);
             }
-            if !table.noise_is_declared(problem) {
+            if !table.has_declared_noise(problem) {
                 return Err(DesignError::no_sigma(problem));
             }
         }

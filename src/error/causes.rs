@@ -1,22 +1,23 @@
-//! What an error comes of.
+//! Causes of an error.
 
 use std::error::Error;
 use std::iter::successors;
 
 use super::InputError;
 
-/// An error and what it comes of, the nearest cause first.
+/// Iterates over an error and its causes, nearest cause first.
 fn chain<'a>(error: &'a (dyn Error + 'static)) -> impl Iterator<Item = &'a (dyn Error + 'static)> {
     successors(Some(error), |&error| error.source())
 }
 
-/// The mistake in the input that an error is or comes of, with its place.
+/// Returns the [`InputError`] that caused an error, if there is one.
 pub fn mistake<'a>(error: &'a (dyn Error + 'static)) -> Option<&'a InputError> {
     chain(error).find_map(|error| error.downcast_ref())
 }
 
-/// The message of an error, and of each of its causes what is not said before.
-pub fn with_causes(error: &(dyn Error + 'static)) -> String {
+/// Returns the message of an error, followed by each cause that the message does not already
+/// contain.
+pub fn message_with_causes(error: &(dyn Error + 'static)) -> String {
     let mut text = error.to_string();
     for cause in chain(error).skip(1).map(ToString::to_string) {
         if !text.contains(&cause) {

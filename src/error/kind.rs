@@ -1,4 +1,4 @@
-//! The kinds of mistakes, and what each says.
+//! Kinds of input errors and their messages.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,17 +7,17 @@ use thiserror::Error;
 
 use super::near::{instead, meant, question};
 use super::shortened;
-use super::urdf::UrdfMistake;
+use super::urdf::UrdfErrorKind;
 
-/// What is wrong with the input.
+/// Kind of an input error.
 ///
-/// The message of a variant says what it stands for and how to mend it; the place comes from
-/// [`Location`](super::Location).
+/// The message of each variant states the cause and the remedy. [`Location`](super::Location) holds
+/// the place.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum InputErrorKind {
-    // Files.
+    // Errors of files.
     #[error("no such file; give a problem.toml or the folder that holds one")]
     ProblemMissing,
     #[error(
@@ -57,7 +57,7 @@ pub enum InputErrorKind {
     #[error("not valid TOML: {message}{}", near(near_text))]
     Syntax { message: String, near_text: String },
 
-    // Keys.
+    // Errors of keys.
     #[error("unknown key{}; known here: {}", meant(key, known), known.join(", "))]
     UnknownKey { key: String, known: Vec<String> },
     #[error("missing; write {write}{}", instead("", near.as_deref()))]
@@ -73,11 +73,11 @@ pub enum InputErrorKind {
     #[error("\"{word}\" is none of {}", known.join(", "))]
     UnknownWord { word: String, known: &'static [&'static str] },
 
-    // Values.
+    // Errors of values.
     #[error("{value} is not a finite number")]
     NotFinite { value: String },
     #[error("{value} is larger than 1e150, the largest number that can be reckoned with")]
-    TooGreat { value: String },
+    MagnitudeTooLarge { value: String },
     #[error(
         "holds a character that is not seen (U+{code:04X}: a control character, or a mark of writing direction); leave it out"
     )]
@@ -95,7 +95,7 @@ pub enum InputErrorKind {
     #[error("{value} is not above zero")]
     NotPositive { value: f64 },
     #[error("{value} is not above zero; leave the key out where nothing gives way")]
-    NotStiff { value: f64 },
+    StiffnessNotPositive { value: f64 },
     #[error("{value} is not between 0 and 1")]
     NotAFraction { value: f64 },
     #[error("a direction has a length; [0, 0, 0] has none")]
@@ -103,7 +103,7 @@ pub enum InputErrorKind {
     #[error("empty; write at least one character")]
     Empty,
 
-    // The arm.
+    // Errors of the arm.
     #[error(
         "\"{name}\" cannot name a folder; leave out / \\ : * ? \" < > | and spaces or dots at either end"
     )]
@@ -129,15 +129,15 @@ pub enum InputErrorKind {
     #[error(
         "joint {joint} cannot stand on joint {parent}: list it behind the joint that it stands on"
     )]
-    StandsOnLater { joint: usize, parent: u64 },
+    ParentListedLater { joint: usize, parent: u64 },
     #[error(
         "the branch of joint {parent} has ended; list everything that stands on a joint right behind it"
     )]
     BranchEnded { parent: u64 },
     #[error("a fixed joint follows no other; leave mimic out, or give the joint another kind")]
-    FixedFollows,
+    FixedJointMimics,
     #[error("joint {joint} takes no command of its own that another could follow")]
-    NoLeader { joint: u64 },
+    LeaderNotCommanded { joint: u64 },
     #[error("\"{name}\" cannot name a beam, for parameters go by it; leave out . * [ ] and spaces")]
     NotABeamName { name: String },
     #[error("\"{name}\" names other parameters; choose another name")]
@@ -145,7 +145,7 @@ pub enum InputErrorKind {
     #[error("another beam is called \"{name}\"; choose another name")]
     RepeatedBeamName { name: String },
 
-    // What is measured against.
+    // Errors of points, anchors, surfaces and targets.
     #[error("\"{name}\" cannot name {what}, for parameters go by it; leave out . * [ ] and spaces")]
     NotAFixtureName { what: &'static str, name: String },
     #[error("the rows name no target; each of them measures one of {}: add a column target", targets.join(", "))]
@@ -161,7 +161,7 @@ pub enum InputErrorKind {
     #[error(
         "nobody knows where {parameter} is, so it can neither be held nor have a prior; write {write}"
     )]
-    HeldUnknown { parameter: String, write: &'static str },
+    UnknownPlaceHeld { parameter: String, write: &'static str },
     #[error("nobody knows where the {what} \"{name}\" is; declare about where: {write}")]
     PlaceUnknown { what: &'static str, name: String, write: &'static str },
     #[error("a distance is between two different points, found {found}")]
@@ -172,7 +172,7 @@ pub enum InputErrorKind {
     )]
     TooFewContacts { what: &'static str, name: String, rows: usize, numbers: usize },
     #[error("{has} without {lacks}; write both or neither")]
-    HalfObserved { has: &'static str, lacks: &'static str },
+    IncompleteObservation { has: &'static str, lacks: &'static str },
     #[error("nothing is measured in this row: every column that could hold something is empty")]
     NothingMeasured,
     #[error(
@@ -182,7 +182,7 @@ pub enum InputErrorKind {
     #[error("rows of several kinds are weighed against each other; write {write} in [data]")]
     NoSigmaOfKind { write: String },
 
-    // Effects.
+    // Errors of effects.
     #[error("an effect is one key, as in `gear-ratio = {{ joint = 2 }}`; found {found}")]
     NotOneEffect { found: usize },
     #[error("needs arguments; write {write}")]
@@ -248,17 +248,17 @@ pub enum InputErrorKind {
     )]
     InEquilibriumAlready,
     #[error("{name} enters where another parameter is already")]
-    Occupied { name: String },
+    SiteOccupied { name: String },
     #[error(
         "{name} is driven, and only the coordinate of a moving joint and a shift of the measurement may be"
     )]
-    NotDrivable { name: String },
+    RegressorNotAllowed { name: String },
     #[error("{name} enters where the arm has nothing")]
-    EntersNowhere { name: String },
+    SiteAbsent { name: String },
     #[error("the measurements cannot show this effect; they need {write}")]
     NeedsColumn { write: &'static str },
 
-    // Rules of [parameters].
+    // Errors of rules in [parameters].
     #[error("a name with dots stands in quotes: \"{name}\" = {{ … }}")]
     UnquotedName { name: String },
     #[error("says nothing; write free = true, fixed = true, or a sigma, min or max")]
@@ -284,7 +284,7 @@ pub enum InputErrorKind {
     #[error("no parameter that the pattern matches takes {suffixes}; leave it out")]
     QuantityUseless { suffixes: &'static str },
 
-    // Constraints.
+    // Errors of constraints.
     #[error("a constraint speaks of angles, lengths, stiffnesses and rigidities only")]
     NotConstrainable,
     #[error(
@@ -319,7 +319,7 @@ pub enum InputErrorKind {
     )]
     NoEquilibrium,
 
-    // The truth of a simulation.
+    // Errors in the truth of a simulation.
     #[error(
         "a range is two numbers, the lower one first; for a fixed value write [{value}, {value}]"
     )]
@@ -337,7 +337,7 @@ pub enum InputErrorKind {
     )]
     NoSessions { session: String },
 
-    // Studies.
+    // Errors of studies.
     #[error("stands in the list already")]
     Repeated,
     #[error("the list is empty; write at least one value")]
@@ -360,9 +360,9 @@ pub enum InputErrorKind {
     NothingToVary { strategy: &'static str },
 
     #[error(transparent)]
-    Urdf(#[from] UrdfMistake),
+    Urdf(#[from] UrdfErrorKind),
 
-    // Held-out rows.
+    // Errors of held-out rows.
     #[error("give one of column, fraction (with seed) or session")]
     NotOneHeldOut,
     #[error(
@@ -384,7 +384,7 @@ pub enum InputErrorKind {
     )]
     UnknownSession { session: String, sessions: Vec<String> },
 
-    // Tables of measurements.
+    // Errors of measurement tables.
     #[error("no measurements; name them in `files`")]
     NoDataFiles,
     #[error("{} is named twice; its rows would count twice", path.display())]
@@ -410,7 +410,7 @@ pub enum InputErrorKind {
     #[error(
         "the table has a column {name} of its own, and none that is {write}; is that meant here?"
     )]
-    ColumnHidden { name: String, write: String },
+    MappedNameTaken { name: String, write: String },
     #[error("not a column that flexcal knows{}", question(meant.as_deref()))]
     UnknownMeaning { meant: Option<String> },
     #[error("the position of every row is the one that stands for nothing measured")]
@@ -457,7 +457,7 @@ pub enum InputErrorKind {
     UnknownSplit { word: String },
 }
 
-/// Why one side of the split is empty.
+/// Reason why one part of the split is empty.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 #[non_exhaustive]
@@ -472,7 +472,7 @@ pub enum NoRows {
     Fraction { rows: usize, configurations: usize, fraction: String },
 }
 
-/// What was passed over.
+/// Kind of a warning, with its cause and remedy as message.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
@@ -500,9 +500,9 @@ pub enum WarningKind {
          seconds)"
     )]
     NotADate { value: String, write: String },
-    #[error("the same as {first} to the last digit{}; measurements do not repeat so exactly, and a copy counts twice", more(*rows, others))]
+    #[error("the same as {first} to the last digit{}; measurements do not repeat so exactly, and a copy counts twice", repeated_rows(*rows, others))]
     RowsRepeated { rows: usize, first: String, others: Vec<String> },
-    #[error("the time goes back by {back} s from the row before{}; rows are taken in the order of their times", further(*rows))]
+    #[error("the time goes back by {back} s from the row before{}; rows are taken in the order of their times", additional_rows(*rows))]
     TimeGoesBack { rows: usize, back: String },
     #[error(
         "commanded beyond its limits ({limits}) in {rows} row{}, furthest here: {worst}; used all the same", plural(*rows)
@@ -518,7 +518,7 @@ pub enum WarningKind {
     FarTarget { distance: String, links: String },
 }
 
-fn more(rows: usize, named: &[String]) -> String {
+fn repeated_rows(rows: usize, named: &[String]) -> String {
     let (further, left) = (rows.saturating_sub(1), rows.saturating_sub(1 + named.len()));
     let left = if left > 0 { format!(" and {left} more") } else { String::new() };
     let named = named.join(", ");
@@ -529,7 +529,7 @@ fn more(rows: usize, named: &[String]) -> String {
     }
 }
 
-fn further(rows: usize) -> String {
+fn additional_rows(rows: usize) -> String {
     if rows > 1 {
         format!(", and in {} further row{}", rows - 1, plural(rows - 1))
     } else {
@@ -537,7 +537,7 @@ fn further(rows: usize) -> String {
     }
 }
 
-/// Where a column goes that is not a known one written wrongly.
+/// Returns the hint for a column that does not resemble a known one.
 fn covariate(meant: Option<&str>) -> &'static str {
     if meant.is_none() { " (what may bear on the arm is named in [data.covariates])" } else { "" }
 }
@@ -555,7 +555,7 @@ fn difference(other: &Path, has: bool) -> String {
     format!("{} {says}", other.display())
 }
 
-/// `there are "a", "b"`.
+/// Returns names in quotes, as in `there are "a", "b"`.
 fn in_quotes(names: &[String]) -> String {
     let names: Vec<String> =
         names.iter().map(|name| format!("\"{}\"", shortened(name, 40))).collect();

@@ -1,4 +1,4 @@
-//! Mistakes in the input, each with the place where it stands.
+//! Errors in the input, each with file, line and key.
 
 mod causes;
 mod kind;
@@ -11,42 +11,42 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub use causes::{mistake, with_causes};
+pub use causes::{message_with_causes, mistake};
 pub use kind::{InputErrorKind, NoRows, WarningKind};
 pub(crate) use near::{nearest, one_typo};
-pub use plain::{is_hidden, one_line, veiled, visible};
-pub use urdf::UrdfMistake;
+pub use plain::{escape_hidden, is_hidden, mask_hidden, one_line};
+pub use urdf::UrdfErrorKind;
 
-/// How UTF-8 text may begin.
+/// Byte-order mark of UTF-8 text.
 pub(crate) const BYTE_ORDER_MARK_UTF8: &[u8] = b"\xef\xbb\xbf";
-/// How UTF-16 text begins, in either order of its bytes.
+/// Byte-order marks of UTF-16 text, little-endian and big-endian.
 pub(crate) const BYTE_ORDER_MARKS: [&[u8]; 2] = [&[0xff, 0xfe], &[0xfe, 0xff]];
 
-/// A place in an input file.
+/// Place in an input file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Location {
-    /// The file.
+    /// Path of the file.
     pub file: PathBuf,
-    /// Line, counted from 1.
+    /// Line number, counted from 1.
     pub line: Option<usize>,
     /// Key (`joint[2].alpha`) or column (`column x_mm`).
     pub key: Option<String>,
-    /// The text that is meant, for showing it.
+    /// Text around the place, for display with the message.
     pub excerpt: Option<Excerpt>,
 }
 
-/// A piece of text of an input file, and a part of it that is meant.
+/// Part of an input file with a marked span.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Excerpt {
-    /// The text: a whole problem file, one line of measurements.
+    /// Text: a whole problem file or one line of measurements.
     pub text: Arc<str>,
     /// Line of the file on which the text begins, counted from 1.
     pub first_line: usize,
-    /// The part that is meant, as bytes of `text`.
+    /// Marked bytes of `text`.
     pub span: Range<usize>,
 }
 
-/// The part that is meant alone; a whole file would bury it.
+/// Prints only the marked text; a whole file would be too long.
 impl fmt::Debug for Excerpt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Excerpt({:?})", self.text.get(self.span.clone()).unwrap_or_default())
@@ -54,39 +54,39 @@ impl fmt::Debug for Excerpt {
 }
 
 impl Location {
-    /// A whole file.
+    /// Returns a place that means a whole file.
     pub fn file(file: impl Into<PathBuf>) -> Self {
         Self { file: file.into(), line: None, key: None, excerpt: None }
     }
 
-    /// A part of a text file that is at hand as a whole.
+    /// Returns the place of a span of a text file that is held in memory.
     pub fn in_text(file: &Path, text: &Arc<str>, span: Range<usize>) -> Self {
         let line = lines(text.as_bytes().get(..span.start).unwrap_or(text.as_bytes()));
         let excerpt = Excerpt { text: Arc::clone(text), first_line: 1, span };
         Self { file: file.to_owned(), line: Some(line), key: None, excerpt: Some(excerpt) }
     }
 
-    /// A line of a file.
+    /// Returns this place with a line number.
     #[must_use]
     pub fn at_line(mut self, line: usize) -> Self {
         self.line = Some(line);
         self
     }
 
-    /// The same place under a key or column.
+    /// Returns this place with a key or column.
     #[must_use]
     pub fn with_key(mut self, key: impl Into<String>) -> Self {
         self.key = Some(key.into());
         self
     }
 
-    /// A mistake at this place.
+    /// Returns an error at this place.
     pub fn error(self, kind: InputErrorKind) -> InputError {
         InputError { location: Box::new(self), kind: Box::new(kind) }
     }
 }
 
-/// `file:line: key`, without what is not known.
+/// Prints `file:line: key` without the parts that are not set.
 impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", one_line(&self.file.display().to_string()))?;
@@ -94,20 +94,20 @@ impl fmt::Display for Location {
             write!(f, ":{line}")?;
         }
         if let Some(key) = &self.key {
-            write!(f, ": {}", one_line(&shortened(key, KEY)))?;
+            write!(f, ": {}", one_line(&shortened(key, MAX_KEY_CHARS)))?;
         }
         Ok(())
     }
 }
 
-/// A mistake in the input: where, what, and how to mend it.
+/// Error in the input: place, cause and remedy.
 ///
-/// Both parts are boxed, so that a `Result` stays small.
+/// Both fields are boxed to keep `Result` small.
 #[derive(Debug)]
 pub struct InputError {
-    /// Where.
+    /// Place of the error.
     pub location: Box<Location>,
-    /// What.
+    /// Cause and remedy.
     pub kind: Box<InputErrorKind>,
 }
 
@@ -123,12 +123,12 @@ impl std::error::Error for InputError {
     }
 }
 
-/// Something in the input that was passed over.
+/// Part of the input that was ignored or looks wrong, without being an error.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {
-    /// Where.
+    /// Place of the warning.
     pub location: Location,
-    /// What.
+    /// Cause and remedy.
     pub kind: WarningKind,
 }
 
@@ -138,18 +138,18 @@ impl fmt::Display for Warning {
     }
 }
 
-/// Longest key that is shown [characters].
-const KEY: usize = 200;
+/// Maximum length of a displayed key [characters].
+const MAX_KEY_CHARS: usize = 200;
 
-/// The beginning of a text, with an ellipsis where more follows.
-pub(crate) fn shortened(text: &str, longest: usize) -> String {
-    match text.char_indices().nth(longest) {
+/// Returns the first `max_chars` characters of a text, followed by an ellipsis if more follow.
+pub(crate) fn shortened(text: &str, max_chars: usize) -> String {
+    match text.char_indices().nth(max_chars) {
         Some((end, _)) => format!("{}…", text.get(..end).unwrap_or_default()),
         None => text.to_owned(),
     }
 }
 
-/// Number of lines that a text has begun.
+/// Returns the number of lines that have begun in a text.
 pub(crate) fn lines(text: &[u8]) -> usize {
     text.split(|&byte| byte == b'\n').count()
 }

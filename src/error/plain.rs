@@ -1,9 +1,7 @@
-//! Text that may go to a terminal: without control characters and other characters that are not
-//! seen but do something.
+//! Text for terminals: control characters and other invisible characters are escaped or masked.
 
-/// Whether a character does something to a terminal or to the order of its neighbours instead of
-/// being seen: control characters, line separators, marks of writing direction, tags, and what is
-/// no character at all.
+/// Returns true if a character is invisible and affects a terminal or the text order. These are
+/// control characters, line separators, direction marks, tags and noncharacters.
 pub fn is_hidden(character: char) -> bool {
     let code = u32::from(character);
     character.is_control()
@@ -14,13 +12,13 @@ pub fn is_hidden(character: char) -> bool {
         || (0xfdd0..=0xfdef).contains(&code)
 }
 
-/// Text on one line: hidden characters, line breaks among them, are written as escapes.
+/// Returns `text` on one line: invisible characters, including line breaks, become escapes.
 pub fn one_line(text: &str) -> String {
     escaped(text, |_| false)
 }
 
-/// Text of any number of lines: hidden characters but line feeds are written as escapes.
-pub fn visible(text: &str) -> String {
+/// Returns `text` with its line feeds; all other invisible characters become escapes.
+pub fn escape_hidden(text: &str) -> String {
     escaped(text, |character| character == '\n')
 }
 
@@ -36,17 +34,17 @@ fn escaped(text: &str, passes: impl Fn(char) -> bool) -> String {
     seen
 }
 
-/// The text with as many bytes and with another character for each hidden one, so that places in it
-/// stay; line feeds stay.
-pub fn veiled(text: &str) -> String {
-    let veil = |character: char| match character.len_utf8() {
+/// Replaces each invisible character by a visible one of the same length in bytes, so that byte
+/// offsets stay valid. Line feeds and tabs stay.
+pub fn mask_hidden(text: &str) -> String {
+    let substitute = |character: char| match character.len_utf8() {
         1 => '?',
         2 => '\u{bf}',
         3 => '\u{fffd}',
         _ => '\u{1fbc4}',
     };
     text.chars()
-        .map(|own| if is_hidden(own) && own != '\n' && own != '\t' { veil(own) } else { own })
+        .map(|c| if is_hidden(c) && c != '\n' && c != '\t' { substitute(c) } else { c })
         .collect()
 }
 
@@ -55,17 +53,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_hidden_is_left() {
+    fn invisible_characters_are_replaced() {
         let text =
             "a\u{1b}[31m\u{9b}2J\u{202e}b\u{200f}\u{2028}\u{e0041}\u{7f}\r\nΩ 日本 שלום\u{200d}";
-        for clean in [visible(text), veiled(text)] {
-            assert!(clean.chars().all(|own| own == '\n' || !is_hidden(own)), "{clean:?}");
+        for clean in [escape_hidden(text), mask_hidden(text)] {
+            assert!(clean.chars().all(|c| c == '\n' || !is_hidden(c)), "{clean:?}");
             assert!(clean.contains("\nΩ 日本 שלום\u{200d}"), "what is seen stays: {clean:?}");
         }
         assert!(
             one_line(text).starts_with("a\\u{1b}[31m\\u{9b}2J\\u{202e}b")
                 && !one_line(text).contains('\n')
         );
-        assert_eq!(veiled(text).len(), text.len());
+        assert_eq!(mask_hidden(text).len(), text.len());
     }
 }

@@ -1,14 +1,14 @@
-//! Mistakes in a URDF, and what does not fit between one and a problem.
+//! Errors in a URDF, and contradictions between a URDF and a problem.
 
 use thiserror::Error;
 
 use super::near::meant;
 
-/// What is wrong with a URDF; the place comes from [`Location`](super::Location).
+/// Kind of error in a URDF; [`Location`](super::Location) holds the place.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
-pub enum UrdfMistake {
+pub enum UrdfErrorKind {
     #[error("no such file; give a URDF")]
     Missing,
     #[error("not valid XML: {message}")]
@@ -79,12 +79,12 @@ pub enum UrdfMistake {
     NotUr { why: String },
 }
 
-/// Most names in a list.
-const LISTED: usize = 30;
+/// Maximum number of names in a list.
+const MAX_LISTED_NAMES: usize = 30;
 
-/// Names, and how many more there are.
+/// Returns names separated by commas, and the number of names left out.
 fn listed(names: &[String]) -> String {
-    let more = names.len().saturating_sub(LISTED);
+    let more = names.len().saturating_sub(MAX_LISTED_NAMES);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    names.iter().take(LISTED).map(String::as_str).collect::<Vec<_>>().join(", ") + &more
+    names.iter().take(MAX_LISTED_NAMES).map(String::as_str).collect::<Vec<_>>().join(", ") + &more
 }

@@ -1,41 +1,41 @@
-//! Files: read up to a size, written whole or not at all, and told apart from those of others;
-//! tables as their text.
+//! Access to files: reads with a size limit, atomic writes, a record of written files, and CSV
+//! text.
 
-mod ready;
 mod record;
+mod staged;
 
 use std::fs::File;
 use std::io::{self, Read as _};
 use std::path::Path;
 
-pub use ready::Ready;
-pub use record::{Record, digest};
+pub use record::{FolderRecord, digest};
+pub use staged::StagedFile;
 
-/// The bytes of a file that has at most `most`.
+/// Reads a file of at most `max_bytes` bytes.
 ///
 /// # Errors
 /// The file cannot be read, or is larger ([`io::ErrorKind::FileTooLarge`]).
-pub fn at_most(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+pub fn read_limited(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > most { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(bytes) }
+    File::open(path)?.take(max_bytes + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > max_bytes { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(bytes) }
 }
 
-/// Whether two paths lead to one file that is there, by whatever names and links.
-pub fn same_file(one: &Path, other: &Path) -> bool {
+/// Returns true if two paths lead to the same existing file, also through links.
+pub fn same_file(first: &Path, second: &Path) -> bool {
     #[cfg(unix)]
-    if let (Ok(one), Ok(other)) = (one.metadata(), other.metadata()) {
+    if let (Ok(first), Ok(second)) = (first.metadata(), second.metadata()) {
         use std::os::unix::fs::MetadataExt as _;
-        return (one.dev(), one.ino()) == (other.dev(), other.ino());
+        return (first.dev(), first.ino()) == (second.dev(), second.ino());
     }
-    matches!((one.canonicalize(), other.canonicalize()), (Ok(one), Ok(other)) if one == other)
+    matches!((first.canonicalize(), second.canonicalize()), (Ok(first), Ok(second)) if first == second)
 }
 
-/// Lines of cells as CSV, the names of the columns first; every line has as many cells.
+/// Returns CSV text with a header line; every line must have as many cells as the header.
 pub(crate) fn csv(header: Vec<String>, lines: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for line in std::iter::once(header).chain(lines) {
-        // Memory takes whatever is written to it.
+        // Writing to memory cannot fail.
         let _ = writer.write_record(line);
     }
     writer.into_inner().ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()

@@ -1,4 +1,4 @@
-//! Which files of a folder flexcal wrote.
+//! Record of the files that flexcal wrote to a folder.
 
 use std::fs::{self, File};
 use std::io;
@@ -6,19 +6,19 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest as _, Sha256};
 
-use super::{Ready, at_most};
+use super::{StagedFile, read_limited};
 
-/// Name of the file that says so.
-const NAME: &str = ".flexcal";
-/// Largest one that is read [bytes].
-const LARGEST: u64 = 1 << 20;
+/// Name of the record file.
+const RECORD_NAME: &str = ".flexcal";
+/// Maximum size of a record that is read [bytes].
+const MAX_RECORD_BYTES: u64 = 1 << 20;
 
-/// What flexcal wrote to a folder: a line of digest, command and name for each file, in `.flexcal`
-/// there.
+/// Record of the files written to a folder, stored there as `.flexcal`: one line of digest, command
+/// and name per file.
 ///
-/// A file that has been changed since is not flexcal's any more.
+/// A file that was changed afterwards no longer counts as written by flexcal.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Record {
+pub struct FolderRecord {
     lines: Vec<Line>,
 }
 
@@ -29,18 +29,18 @@ struct Line {
     name: String,
 }
 
-/// SHA-256 of some bytes, hexadecimal.
+/// Returns the SHA-256 digest of `bytes` as hexadecimal digits.
 pub fn digest(bytes: &[u8]) -> String {
     hexadecimal(Sha256::digest(bytes).as_slice())
 }
 
-impl Record {
-    /// Of a folder; empty where nothing is recorded.
+impl FolderRecord {
+    /// Reads the record of a folder; returns an empty record if there is none.
     ///
     /// # Errors
-    /// The record is there and cannot be read.
-    pub fn of(folder: &Path) -> io::Result<Self> {
-        let text = match at_most(&folder.join(NAME), LARGEST) {
+    /// The record exists and cannot be read.
+    pub fn read(folder: &Path) -> io::Result<Self> {
+        let text = match read_limited(&folder.join(RECORD_NAME), MAX_RECORD_BYTES) {
             Ok(text) => text,
             Err(error)
                 if matches!(
@@ -64,7 +64,7 @@ impl Record {
         Ok(Self { lines: String::from_utf8_lossy(&text).lines().filter_map(line).collect() })
     }
 
-    /// The command that wrote a file, if flexcal did and it is as it was written.
+    /// Returns the command that wrote a file, if flexcal wrote it and it is unchanged.
     pub fn writer(&self, folder: &Path, name: &str) -> Option<&str> {
         let mut lines = self.lines.iter().filter(|line| line.name == name).peekable();
         lines.peek()?;
@@ -72,50 +72,50 @@ impl Record {
         lines.find(|line| line.digest == digest).map(|line| line.command.as_str())
     }
 
-    /// Names of all files.
+    /// Returns the names of all recorded files.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.lines.iter().map(|line| line.name.as_str())
     }
 
-    /// Adds a text that a command is about to write under a name.
+    /// Adds a line for `text`, which a command is about to write to the file `name`.
     pub fn add(&mut self, command: &str, name: &str, text: &str) {
         let (digest, command, name) =
             (hexadecimal(Sha256::digest(text).as_slice()), command.to_owned(), name.to_owned());
         self.lines.push(Line { digest, command, name });
     }
 
-    /// Keeps of each name the line that was added last, and none of names of which `gone` says so.
-    pub fn settle(&mut self, gone: impl Fn(&str) -> bool) {
-        let last: Vec<Line> = self
+    /// Keeps the newest line of each name and removes the names for which `is_gone` returns true.
+    pub fn settle(&mut self, is_gone: impl Fn(&str) -> bool) {
+        let newest: Vec<Line> = self
             .lines
             .iter()
             .enumerate()
-            .filter(|(k, own)| {
-                !gone(&own.name)
-                    && self.lines.iter().skip(k + 1).all(|later| later.name != own.name)
+            .filter(|(index, line)| {
+                !is_gone(&line.name)
+                    && self.lines.iter().skip(index + 1).all(|later| later.name != line.name)
             })
             .map(|(_, line)| line.clone())
             .collect();
-        self.lines = last;
+        self.lines = newest;
     }
 
-    /// Writes it to its folder.
+    /// Writes the record to its folder.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The record cannot be written.
     pub fn write(&self, folder: &Path) -> io::Result<()> {
         let line = |Line { digest, command, name }: &Line| format!("{digest} {command} {name}\n");
         let lines = self.lines.iter().map(line).collect::<Vec<_>>().concat();
-        Ready::new(&Self::file(folder), &lines)?.put()
+        StagedFile::new(&Self::file(folder), &lines)?.commit()
     }
 
-    /// Where the record of a folder stands.
+    /// Returns the path of the record of a folder.
     pub fn file(folder: &Path) -> PathBuf {
-        folder.join(NAME)
+        folder.join(RECORD_NAME)
     }
 }
 
-/// The SHA-256 digest of a regular file, not of what a link leads to.
+/// Returns the SHA-256 digest of a regular file; a symbolic link is refused.
 fn digest_of_file(path: &Path) -> io::Result<String> {
     if !fs::symlink_metadata(path)?.is_file() {
         return Err(io::ErrorKind::InvalidInput.into());
@@ -143,14 +143,14 @@ mod tests {
     fn what_was_changed_is_not_known_any_more() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path();
-        let mut record = Record::of(path).unwrap();
-        assert_eq!(record, Record::default());
+        let mut record = FolderRecord::read(path).unwrap();
+        assert_eq!(record, FolderRecord::default());
         for text in ["one", "two"] {
             record.add("identify", "report of mine.md", text);
             fs::write(path.join("report of mine.md"), text).unwrap();
             record.write(path).unwrap();
         }
-        record = Record::of(path).unwrap();
+        record = FolderRecord::read(path).unwrap();
         assert_eq!(record.writer(path, "report of mine.md"), Some("identify"));
         record.settle(|_| false);
         assert_eq!(record.names().count(), 1);
@@ -158,6 +158,6 @@ mod tests {
         assert_eq!(record.writer(path, "report of mine.md"), None, "the text before the last");
         assert_eq!(record.writer(path, "another"), None);
         record.settle(|name| name.starts_with("report"));
-        assert_eq!(record, Record::default());
+        assert_eq!(record, FolderRecord::default());
     }
 }

@@ -234,7 +234,7 @@ fn check_data(
         if measurements.orientations.is_none() {
             return Err(error(InputErrorKind::NoOrientation));
         }
-        if problem.data.position_sigma.is_none() && !measurements.knows_sigma() {
+        if problem.data.position_sigma.is_none() && !measurements.has_sigma_in_every_row() {
             return Err(error(InputErrorKind::NoPositionSigma));
         }
     }
@@ -292,8 +292,8 @@ fn fit_rows(
     if !solver.keeps(model) {
         return Err(IdentifyError::BoundsIgnored { solver: solver.as_str() });
     }
-    let (declared, noise_is_declared) =
-        (problem.data.position_sigma, measurements.noise_is_declared(problem));
+    let (declared, has_declared_noise) =
+        (problem.data.position_sigma, measurements.has_declared_noise(problem));
     let mut fitting = Fitting {
         model,
         measurements,
@@ -320,12 +320,12 @@ fn fit_rows(
     };
     let unknowns = fitted_parameters(&fitting)?;
     let (start, registered) =
-        prepared(&mut fitting, options.predecessor.as_deref(), noise_is_declared)?;
+        prepared(&mut fitting, options.predecessor.as_deref(), has_declared_noise)?;
     let begin = options.begin(model, &start);
     let enough = PoseSufficiency::of(&fitting, problem, &unknowns, &start);
     let judged = enough.too_few.is_none()
         && !matches!(enough.flag, Some(QualityFlag::TooFewEquations { .. }));
-    let (mut end, statistics, noise) = fitted(&mut fitting, &begin, (noise_is_declared, judged))?;
+    let (mut end, statistics, noise) = fitted(&mut fitting, &begin, (has_declared_noise, judged))?;
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = outliers(&statistics.lengths, &split.identification, &errors, measurements);
     let asked = !options.provisional;
@@ -341,7 +341,7 @@ fn fit_rows(
         errors: (&registered, &fitted),
         outliers: &outliers,
         whole: &whole,
-        noise_is_declared,
+        has_declared_noise,
     };
     let quality_flag = if asked {
         judgement.flag(enough.flag, not_converged, enough.poses)
@@ -369,8 +369,8 @@ fn fit_rows(
         noise,
         registered,
         fitted,
-        reduced_chi2: statistics.reduced_chi2.filter(|_| noise_is_declared),
-        chance: statistics.chance.filter(|_| noise_is_declared),
+        reduced_chi2: statistics.reduced_chi2.filter(|_| has_declared_noise),
+        chance: statistics.chance.filter(|_| has_declared_noise),
         noise_factor,
         sigma_taken,
         sigma_scale: fitting.noise_model.scale.min(1.0),
@@ -405,13 +405,13 @@ fn fit_rows(
 fn prepared(
     fitting: &mut Fitting,
     predecessor: Option<&WarmStart>,
-    noise_is_declared: bool,
+    has_declared_noise: bool,
 ) -> Result<(DVector<f64>, Errors), StageError> {
     let (start, registered) = match predecessor {
         Some(known) => (known.registered(fitting.model), known.errors),
         None => fitting.registered().map(|start| (start.clone(), fitting.errors(&start)))?,
     };
-    if !noise_is_declared {
+    if !has_declared_noise {
         let scatter = registered.identification.rms.norm / fitting.measurements.leading().root();
         fitting.sigma = scatter.max(LEAST_NOISE);
     }

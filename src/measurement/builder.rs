@@ -1,66 +1,66 @@
-//! Data sets from plain arrays.
+//! Builder of data sets from plain arrays.
 
 use std::path::PathBuf;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::{Dataset, Labels, Measurements, Split};
-use crate::problem::item::GREATEST;
+use crate::problem::item::MAX_MAGNITUDE;
 
-/// Arrays that make no data set.
+/// Error of arrays that do not form a data set.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DatasetError {
-    /// A configuration of another length than the first.
+    /// A configuration has another length than the first.
     #[error("configuration {row} has {found} joints, the first {expected}")]
     Joints {
         /// Row, counted from 0.
         row: usize,
-        /// Joints of the first row.
+        /// Number of joints in the first row.
         expected: usize,
-        /// Joints of this row.
+        /// Number of joints in this row.
         found: usize,
     },
-    /// A column of another length than the configurations.
+    /// A column has another length than the configurations.
     #[error("{column}: {found} values for {expected} rows")]
     Length {
-        /// What the column holds.
+        /// Name of the column.
         column: &'static str,
-        /// Rows.
+        /// Number of rows.
         expected: usize,
-        /// Values.
+        /// Number of values.
         found: usize,
     },
-    /// A value that is infinite or no number.
+    /// A value is infinite or not a number.
     #[error("{column}: the value of row {row} is not finite")]
     NotFinite {
-        /// What the column holds.
+        /// Name of the column.
         column: &'static str,
         /// Row, counted from 0.
         row: usize,
     },
-    /// A value outside of what its column may hold.
+    /// A value is outside the range of its column.
     #[error("{column}: the value of row {row} is {rule}")]
     OutOfRange {
-        /// What the column holds.
+        /// Name of the column.
         column: &'static str,
         /// Row, counted from 0.
         row: usize,
-        /// What is wrong with it.
+        /// Rule that the value breaks.
         rule: &'static str,
     },
-    /// A held-out row that does not exist.
+    /// A held-out row does not exist.
     #[error("row {row} cannot be held out: there are {rows}")]
     NoSuchRow {
-        /// The row, counted from 0.
+        /// Row, counted from 0.
         row: usize,
-        /// Rows.
+        /// Number of rows.
         rows: usize,
     },
 }
 
-/// A [`Dataset`] under construction; every method takes one value per row, and a later call
-/// replaces an earlier one.
+/// Builder of a [`Dataset`]. Every method takes one value per row, and a later call replaces an
+/// earlier one.
 #[derive(Debug, Clone)]
 pub struct DatasetBuilder {
     configurations: Vec<Vec<f64>>,
@@ -80,10 +80,11 @@ pub struct DatasetBuilder {
 }
 
 impl Dataset {
-    /// From plain arrays: configurations, shape = (rows)(joints) \[rad\] or \[m\], fixed joints
-    /// included with any value, and measured positions, shape = (rows), measuring frame \[m\].
-    /// Other columns follow by name; no row is held out unless
-    /// [`held_out`](DatasetBuilder::held_out) says so.
+    /// Returns a builder from plain arrays.
+    ///
+    /// `configurations`, shape = (rows)(joints) \[rad\] or \[m\], include fixed joints with any
+    /// value. `positions`, shape = (rows), are measured in the measuring frame \[m\]. No row is
+    /// held out without a call of [`held_out`](DatasetBuilder::held_out).
     pub fn builder<C: AsRef<[f64]>>(
         configurations: impl IntoIterator<Item = C>,
         positions: impl IntoIterator<Item = Vector3<f64>>,
@@ -106,7 +107,7 @@ impl Dataset {
         }
     }
 
-    /// Poses to predict: as [`builder`](Self::builder), with all positions 0.
+    /// Returns a builder of poses to predict, without measured positions.
     pub fn poses<C: AsRef<[f64]>>(configurations: impl IntoIterator<Item = C>) -> DatasetBuilder {
         let configurations = rows_of(configurations);
         let positions = vec![Vector3::zeros(); configurations.len()];
@@ -115,89 +116,90 @@ impl Dataset {
 }
 
 impl DatasetBuilder {
-    /// Measured orientation of the target, measuring frame; fitted where the problem has an
-    /// `orientation_sigma`.
+    /// Sets the measured orientations of the target, measuring frame; they are fitted if the
+    /// problem has an `orientation_sigma`.
     #[must_use]
     pub fn orientation(mut self, orientations: Vec<UnitQuaternion<f64>>) -> Self {
         self.orientations = Some(orientations);
         self
     }
 
-    /// 1 σ of each coordinate of a position, above 0 \[m\].
+    /// Sets the standard deviation of each coordinate of a position, above 0 \[m\].
     #[must_use]
     pub fn sigma(mut self, sigma: Vec<f64>) -> Self {
         self.sigma = Some(sigma);
         self
     }
 
-    /// Payload, not negative \[kg\].
+    /// Sets the payload, not negative \[kg\].
     #[must_use]
     pub fn payload(mut self, payload: Vec<f64>) -> Self {
         self.payload = Some(payload);
         self
     }
 
-    /// Hoist force \[N\].
+    /// Sets the hoist force \[N\].
     #[must_use]
     pub fn hoist(mut self, hoist: Vec<f64>) -> Self {
         self.hoist = Some(hoist);
         self
     }
 
-    /// Temperature [°C].
+    /// Sets the temperature [°C].
     #[must_use]
     pub fn temperature(mut self, temperature: Vec<f64>) -> Self {
         self.temperature = Some(temperature);
         self
     }
 
-    /// Time \[s\]; without it, the number of the row.
+    /// Sets the time \[s\]; the default is the row number.
     #[must_use]
     pub fn time(mut self, time: Vec<f64>) -> Self {
         self.time = Some(time);
         self
     }
 
-    /// Direction from which each joint came, shape = (rows)(joints): −1, 0 (unknown) or +1.
+    /// Sets the direction from which each joint approached, shape = (rows)(joints): −1, 0 (unknown)
+    /// or +1.
     #[must_use]
     pub fn approach<A: AsRef<[f64]>>(mut self, approach: impl IntoIterator<Item = A>) -> Self {
         self.approach = Some(rows_of(approach));
         self
     }
 
-    /// The problem's own covariates, shape = (rows)(covariates), in the order of its
-    /// `[data.covariates]` and in their units.
+    /// Sets the declared covariates, shape = (rows)(covariates), in the order and units of
+    /// `[data.covariates]`.
     #[must_use]
     pub fn covariates<C: AsRef<[f64]>>(mut self, covariates: impl IntoIterator<Item = C>) -> Self {
         self.covariates = rows_of(covariates);
         self
     }
 
-    /// Session of each row: rows of one session share a base.
+    /// Sets the session of each row; rows of one session share a base.
     #[must_use]
     pub fn session<W: AsRef<str>>(mut self, session: impl IntoIterator<Item = W>) -> Self {
         self.session = Some(session.into_iter().collect());
         self
     }
 
-    /// Target of each row: rows of one target share the measured point of the tool.
+    /// Sets the target of each row; rows of one target share the measured point of the tool.
     #[must_use]
     pub fn target<W: AsRef<str>>(mut self, target: impl IntoIterator<Item = W>) -> Self {
         self.target = Some(target.into_iter().collect());
         self
     }
 
-    /// Rows that are not fitted but judge the fit, counted from 0; in any order.
+    /// Sets the rows that are not fitted and judge the fit, counted from 0, in any order.
     #[must_use]
     pub fn held_out(mut self, rows: impl IntoIterator<Item = usize>) -> Self {
         self.held_out = rows.into_iter().collect();
         self
     }
 
-    /// The data set, once every array is found to fit the others.
+    /// Builds the data set after checking that all arrays agree.
     ///
     /// # Errors
-    /// The first array that does not fit.
+    /// The first array that does not agree with the others.
     pub fn build(self) -> Result<Dataset, DatasetError> {
         let rows = self.configurations.len();
         let mut held_out = vec![false; rows];
@@ -211,16 +213,16 @@ impl DatasetBuilder {
         })
     }
 
-    /// The measurements alone.
+    /// Builds the measurements without a split.
     ///
     /// # Errors
-    /// The first array that does not fit.
+    /// The first array that does not agree with the others.
     pub fn measurements(self) -> Result<Measurements, DatasetError> {
         let rows = self.configurations.len();
         let covariates = covariates(&self.covariates, rows)?;
         let joints = self.configurations.first().map_or(0, Vec::len);
         let flat = |column, values: &[Vec<f64>]| {
-            length(column, values.len(), rows)?;
+            check_length(column, values.len(), rows)?;
             for (row, values) in values.iter().enumerate() {
                 if values.len() != joints {
                     return Err(DatasetError::Joints {
@@ -229,21 +231,21 @@ impl DatasetBuilder {
                         found: values.len(),
                     });
                 }
-                finite(column, row, values)?;
+                check_finite(column, row, values)?;
             }
             Ok(values.concat())
         };
-        let one = |column, values: Option<Vec<f64>>| {
+        let column_values = |column, values: Option<Vec<f64>>| {
             let Some(values) = values else { return Ok(None) };
-            length(column, values.len(), rows)?;
+            check_length(column, values.len(), rows)?;
             values
                 .iter()
                 .enumerate()
-                .try_for_each(|(row, value)| finite(column, row, &[*value]))?;
+                .try_for_each(|(row, value)| check_finite(column, row, &[*value]))?;
             Ok(Some(values))
         };
         let within = |column, values: Option<Vec<f64>>, rule, wrong: fn(&f64) -> bool| {
-            let values = one(column, values)?;
+            let values = column_values(column, values)?;
             match values.iter().flatten().position(wrong) {
                 Some(row) => Err(DatasetError::OutOfRange { column, row, rule }),
                 None => Ok(values),
@@ -251,19 +253,19 @@ impl DatasetBuilder {
         };
         let words = |column, labels: Option<Labels>| {
             let Some(labels) = labels else { return Ok(None) };
-            length(column, labels.of_row.len(), rows).map(|()| Some(labels))
+            check_length(column, labels.of_row.len(), rows).map(|()| Some(labels))
         };
-        length("positions", self.positions.len(), rows)?;
+        check_length("positions", self.positions.len(), rows)?;
         for (row, position) in self.positions.iter().enumerate() {
-            finite("positions", row, position.as_slice())?;
+            check_finite("positions", row, position.as_slice())?;
         }
         if let Some(orientations) = &self.orientations {
-            length("orientations", orientations.len(), rows)?;
-            for (row, own) in orientations.iter().enumerate() {
-                finite("orientations", row, own.coords.as_slice())?;
+            check_length("orientations", orientations.len(), rows)?;
+            for (row, orientation) in orientations.iter().enumerate() {
+                check_finite("orientations", row, orientation.coords.as_slice())?;
             }
         }
-        let time = one("time", self.time)?;
+        let time = column_values("time", self.time)?;
         let unnamed = || Labels { names: vec![String::new()], of_row: vec![0; rows] };
         Ok(Measurements {
             files: vec![PathBuf::from("arrays")],
@@ -276,8 +278,8 @@ impl DatasetBuilder {
             orientations: self.orientations,
             sigma: within("sigma", self.sigma, "not above 0", |sigma| *sigma <= 0.0)?,
             payload: within("payload", self.payload, "below 0", |payload| *payload < 0.0)?,
-            hoist: one("hoist", self.hoist)?,
-            temperature: one("temperature", self.temperature)?,
+            hoist: column_values("hoist", self.hoist)?,
+            temperature: column_values("temperature", self.temperature)?,
             time_measured: time.is_some(),
             time: time.unwrap_or_else(|| (0..rows).map(|row| row as f64).collect()),
             approach: self
@@ -292,21 +294,21 @@ impl DatasetBuilder {
     }
 }
 
-/// The covariates of all rows, so many of each.
-fn covariates(all: &[Vec<f64>], rows: usize) -> Result<Vec<f64>, DatasetError> {
+/// Returns the covariates of all rows as one list; every row must have as many as the first.
+fn covariates(rows_of_values: &[Vec<f64>], rows: usize) -> Result<Vec<f64>, DatasetError> {
     let (column, rule) = ("covariates", "not as long as the first");
-    let Some(first) = all.first() else { return Ok(Vec::new()) };
-    length(column, all.len(), rows)?;
-    for (row, values) in all.iter().enumerate() {
-        finite(column, row, values)?;
+    let Some(first) = rows_of_values.first() else { return Ok(Vec::new()) };
+    check_length(column, rows_of_values.len(), rows)?;
+    for (row, values) in rows_of_values.iter().enumerate() {
+        check_finite(column, row, values)?;
         if values.len() != first.len() {
             return Err(DatasetError::OutOfRange { column, row, rule });
         }
     }
-    Ok(all.concat())
+    Ok(rows_of_values.concat())
 }
 
-/// Directions −1, 0 and +1, so many of each row.
+/// Checks that all directions are −1, 0 or +1.
 fn directions(values: Vec<f64>, joints: usize) -> Result<Vec<f64>, DatasetError> {
     match values.iter().position(|value| ![-1.0, 0.0, 1.0].contains(value)) {
         Some(place) => {
@@ -321,16 +323,16 @@ fn rows_of<C: AsRef<[f64]>>(rows: impl IntoIterator<Item = C>) -> Vec<Vec<f64>> 
     rows.into_iter().map(|row| row.as_ref().to_vec()).collect()
 }
 
-fn length(column: &'static str, found: usize, expected: usize) -> Result<(), DatasetError> {
+fn check_length(column: &'static str, found: usize, expected: usize) -> Result<(), DatasetError> {
     if found == expected { Ok(()) } else { Err(DatasetError::Length { column, expected, found }) }
 }
 
-fn finite(column: &'static str, row: usize, values: &[f64]) -> Result<(), DatasetError> {
+fn check_finite(column: &'static str, row: usize, values: &[f64]) -> Result<(), DatasetError> {
     if !values.iter().all(|value| value.is_finite()) {
         return Err(DatasetError::NotFinite { column, row });
     }
-    let reckoned_with = values.iter().all(|value| value.abs() <= GREATEST);
-    if reckoned_with {
+    let is_in_range = values.iter().all(|value| value.abs() <= MAX_MAGNITUDE);
+    if is_in_range {
         Ok(())
     } else {
         Err(DatasetError::OutOfRange { column, row, rule: "larger than 1e150" })

@@ -1,13 +1,13 @@
-//! Cells of a table that take some values only.
+//! Cells with restricted values.
 
 use super::columns::Column;
 use super::table::{Table, shortened};
 use crate::error::{InputError, InputErrorKind};
 
-/// A number above zero \[SI\].
+/// Returns a number above zero \[SI\].
 pub(super) fn above_zero(table: &Table, column: &Column) -> Result<f64, InputError> {
     let value = table.number(column.place)?;
-    // A tiny length in millimetres may become 0 in metres.
+    // A tiny length in millimetres may underflow to 0 in metres.
     let converted = (column.to_si)(value);
     if converted > 0.0 {
         Ok(converted)
@@ -16,7 +16,7 @@ pub(super) fn above_zero(table: &Table, column: &Column) -> Result<f64, InputErr
     }
 }
 
-/// A number that is not below zero \[SI\].
+/// Returns a number that is not below zero \[SI\].
 pub(super) fn not_negative(table: &Table, column: &Column) -> Result<f64, InputError> {
     let value = table.number(column.place)?;
     if value < 0.0 {
@@ -26,7 +26,7 @@ pub(super) fn not_negative(table: &Table, column: &Column) -> Result<f64, InputE
     }
 }
 
-/// A direction: −1, 0 or +1.
+/// Returns a direction: −1, 0 or +1.
 pub(super) fn direction(table: &Table, column: &Column) -> Result<f64, InputError> {
     let value = table.number(column.place)?;
     if [-1.0, 0.0, 1.0].contains(&value) {
@@ -36,7 +36,7 @@ pub(super) fn direction(table: &Table, column: &Column) -> Result<f64, InputErro
     }
 }
 
-/// Whether a cell says `validation`; the other word is `identification`.
+/// Returns true for the word `validation` and false for `identification`.
 pub(super) fn is_validation(table: &Table, place: usize) -> Result<bool, InputError> {
     match table.word(place)? {
         "validation" => Ok(true),

@@ -1,4 +1,4 @@
-//! Tables that are in memory already, column by column; they are read as if they stood in a file.
+//! Tables in memory, stored by column and read like files.
 
 use std::fmt::Write as _;
 use std::io::{self, Read};
@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use super::Labels;
 use crate::error::{InputError, InputErrorKind, Location};
 
-/// Text that is made at a time [bytes].
-const CHUNK: usize = 1 << 15;
+/// Size of the text that is generated at a time [bytes].
+const CHUNK_BYTES: usize = 1 << 15;
 
 /// A table in memory: what a file of measurements holds, with the names that its columns have
 /// there. Its rows go by the lines that they would have in a file: the first one is on line 2.
@@ -39,20 +39,20 @@ pub struct ColumnTable {
     rows: usize,
 }
 
-/// The values of a column, one a row.
+/// Values of a column, one per row.
 #[derive(Debug, Clone)]
 pub enum ColumnValues {
-    /// Numbers, in the unit that the column's name says.
+    /// Numbers in the unit given by the column's name.
     Numbers(Vec<f64>),
-    /// Words, as the cells of a file hold them.
+    /// Words, as in the cells of a file.
     Words(Labels),
 }
 
 impl ColumnTable {
-    /// From columns with their names; messages call the table `name`.
+    /// Creates a table from named columns; messages call the table `name`.
     ///
     /// # Errors
-    /// A column of another length than the first.
+    /// A column has another length than the first.
     pub fn new(
         name: impl Into<PathBuf>,
         columns: Vec<(String, ColumnValues)>,
@@ -68,12 +68,12 @@ impl ColumnTable {
         Ok(Self { name, columns, rows })
     }
 
-    /// What messages call it.
+    /// Returns the name used in messages.
     pub fn name(&self) -> &Path {
         &self.name
     }
 
-    /// Its text as it would stand in a file.
+    /// Returns a reader of the table as CSV text.
     pub(super) fn into_text(self) -> impl Read {
         let header =
             self.columns.iter().map(|(name, _)| quoted(name)).collect::<Vec<_>>().join(",") + "\n";
@@ -89,10 +89,10 @@ impl ColumnValues {
         }
     }
 
-    /// Writes the cell of a row; numbers so that they are read again to the last bit.
+    /// Appends the cell of a row; numbers keep all their digits.
     fn write(&self, row: usize, text: &mut String) {
         match self {
-            // A String takes whatever is written to it.
+            // Writing to a String cannot fail.
             Self::Numbers(values) => _ = values.get(row).map(|value| write!(text, "{value:?}")),
             Self::Words(labels) => {
                 let word = labels.of_row.get(row).and_then(|&label| labels.names.get(label));
@@ -102,10 +102,10 @@ impl ColumnValues {
     }
 }
 
-/// A table as text, made a few rows at a time.
+/// Reader that generates the text of a table a few rows at a time.
 struct Text {
     table: ColumnTable,
-    /// The next row.
+    /// Next row to generate.
     row: usize,
     chunk: String,
     read: usize,
@@ -115,7 +115,7 @@ impl Text {
     fn next_rows(&mut self) {
         self.chunk.clear();
         self.read = 0;
-        while self.row < self.table.rows && self.chunk.len() < CHUNK {
+        while self.row < self.table.rows && self.chunk.len() < CHUNK_BYTES {
             for (k, (_, values)) in self.table.columns.iter().enumerate() {
                 if k > 0 {
                     self.chunk.push(',');
@@ -141,7 +141,7 @@ impl Read for Text {
     }
 }
 
-/// A cell of a file; an empty one is a cell too.
+/// Returns a CSV cell, quoted if needed; an empty cell is quoted so that its row is not empty.
 fn quoted(word: &str) -> String {
     if word.is_empty() || word.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", word.replace('"', "\"\""))

@@ -1,4 +1,4 @@
-//! Measurements together with their division into fitted and held-out rows.
+//! Measurements together with their split into fitted and held-out rows.
 
 use std::path::PathBuf;
 
@@ -20,42 +20,46 @@ use crate::problem::Problem;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Dataset {
-    /// Every row, in the order of the files or arrays.
+    /// All rows in the order of the files or arrays.
     pub measurements: Measurements,
-    /// Which rows are fitted and which are held out.
+    /// Fitted rows and held-out rows.
     pub split: Split,
 }
 
 impl Dataset {
-    /// Measurements divided as given; the numbers in `split` are rows of `measurements`, each part
-    /// in ascending order.
+    /// Creates a data set from measurements and a split; `split` holds row numbers in ascending
+    /// order.
     pub fn new(measurements: Measurements, split: Split) -> Self {
         Self { measurements, split }
     }
 
-    /// Measurements divided as the problem says (`held_out` of `[data]`, or their column `split`).
+    /// Splits measurements as the problem declares (`held_out` of `[data]`, or the column `split`).
     ///
     /// # Errors
-    /// An empty part, a session that nobody measured, no word on what is held out, or an unknown
-    /// point, anchor or surface with too few rows to say more than where it is.
-    pub fn of(problem: &Problem, measurements: Measurements) -> Result<Self, InputError> {
+    /// A part of the split is empty, the held-out session does not exist, no split is declared, or
+    /// an unknown point, anchor or surface has too few rows to contribute information.
+    pub fn from_measurements(
+        problem: &Problem,
+        measurements: Measurements,
+    ) -> Result<Self, InputError> {
         measurements.enough_contacts(problem)?;
         let split = Split::new(problem, &measurements)?;
         Ok(Self { measurements, split })
     }
 
-    /// The files that the problem names, divided as it says; and the columns that were passed over.
+    /// Reads the files of the problem and splits their rows; also returns warnings, for example
+    /// about ignored columns.
     ///
     /// # Errors
-    /// The first mistake found in the files or in their division.
+    /// The first error in the files or in the split.
     pub fn read(problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
         Self::read_files(&problem.data.files, problem)
     }
 
-    /// As [`read`](Self::read), from other files than those that the problem names.
+    /// Reads other files than those of the problem; see [`read`](Self::read).
     ///
     /// # Errors
-    /// The first mistake found in the files or in their division.
+    /// The first error in the files or in the split.
     pub fn read_files(
         files: &[PathBuf],
         problem: &Problem,
@@ -63,13 +67,13 @@ impl Dataset {
         let (measurements, mut warnings) = Measurements::read(files, problem)?;
         warnings.extend(measurements.repeated_rows(problem.data.position_sigma));
         warnings.extend(measurements.time_going_back());
-        Ok((Self::of(problem, measurements)?, warnings))
+        Ok((Self::from_measurements(problem, measurements)?, warnings))
     }
 
-    /// As [`read`](Self::read), from a table in memory.
+    /// Reads a table in memory; see [`read`](Self::read).
     ///
     /// # Errors
-    /// The first mistake found in the table or in its division.
+    /// The first error in the table or in the split.
     pub fn read_columns(
         table: ColumnTable,
         problem: &Problem,
@@ -77,6 +81,6 @@ impl Dataset {
         let (measurements, mut warnings) = Measurements::read_columns(table, problem)?;
         warnings.extend(measurements.repeated_rows(problem.data.position_sigma));
         warnings.extend(measurements.time_going_back());
-        Ok((Self::of(problem, measurements)?, warnings))
+        Ok((Self::from_measurements(problem, measurements)?, warnings))
     }
 }

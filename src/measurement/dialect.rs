@@ -1,34 +1,33 @@
-//! How a table is written: what sets its columns apart, which line names them, and lines that say
-//! nothing.
+//! Layout of a table: delimiter, header line and comments.
 
 use std::io::{Read, Result};
 
 use super::lines::Lines;
 use crate::error::BYTE_ORDER_MARK_UTF8;
-use crate::problem::{ColumnOf, Delimiter, Dialect};
+use crate::problem::{ColumnSelector, Delimiter, Dialect};
 
-/// What of a table is looked at to find its header [bytes].
-pub(super) const LOOKED_AT: u64 = 1 << 16;
-/// Lines among which the header is sought.
-const LINES: usize = 100;
-/// What a line of runs of spaces is rewritten with.
+/// Size of the beginning of a table in which the header is searched [bytes].
+pub(super) const HEADER_SEARCH_BYTES: u64 = 1 << 16;
+/// Maximum number of lines in which the header is searched.
+const MAX_HEADER_LINES: usize = 100;
+/// Delimiter that replaces a run of spaces.
 const TAB: u8 = b'\t';
 
-/// How to read a table.
+/// Delimiter of a table and position of its header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Layout {
     pub delimiter: Delimiter,
-    /// Lines before the header.
+    /// Number of lines before the header.
     pub skipped: usize,
 }
 
 impl Layout {
-    /// Of a table that begins with `beginning`.
+    /// Finds the layout of a table from its `beginning`.
     ///
-    /// The header is the first line that holds most of the names of the map, or else the first that
-    /// says something; columns are set apart by the one of `,` `;` and tab that it has most of,
-    /// else by spaces if it has any.
-    pub fn of(beginning: &[u8], dialect: &Dialect) -> Self {
+    /// The header is the line with most names of the map; without a map it is the first line with
+    /// content. The delimiter is the most frequent of `,` `;` and tab in the header, otherwise
+    /// spaces.
+    pub fn detect(beginning: &[u8], dialect: &Dialect) -> Self {
         let text = String::from_utf8_lossy(
             beginning.strip_prefix(BYTE_ORDER_MARK_UTF8).unwrap_or(beginning),
         );
@@ -37,36 +36,40 @@ impl Layout {
             .columns
             .iter()
             .filter_map(|rule| match &rule.theirs {
-                ColumnOf::Name(name) => Some(name.as_str()),
-                ColumnOf::Place(_) | ColumnOf::File => None,
+                ColumnSelector::Name(name) => Some(name.as_str()),
+                ColumnSelector::Place(_) | ColumnSelector::File => None,
             })
             .collect();
         let is_comment = |line: &str| {
             dialect.comment.as_ref().is_some_and(|mark| line.trim_start().starts_with(mark))
         };
-        let lines = text.split('\n').enumerate().take(LINES);
-        let speaking: Vec<(usize, &str)> =
+        let lines = text.split('\n').enumerate().take(MAX_HEADER_LINES);
+        let candidates: Vec<(usize, &str)> =
             lines.filter(|(_, line)| !line.trim().is_empty() && !is_comment(line)).collect();
-        let apart = |line: &str| dialect.delimiter.unwrap_or_else(|| most_of(line));
-        let held = |line: &str| {
-            let cells = cells(line, apart(line));
+        let delimiter_of =
+            |line: &str| dialect.delimiter.unwrap_or_else(|| most_frequent_delimiter(line));
+        let names_in = |line: &str| {
+            let cells = cells(line, delimiter_of(line));
             names.iter().filter(|name| cells.iter().any(|cell| cell == *name)).count()
         };
-        // Of equals the first: the last of the lines from the end.
-        let counted =
-            speaking.iter().rev().map(|&own| (held(own.1), own)).filter(|(count, _)| *count > 0);
-        let named = counted.max_by_key(|(count, _)| *count).map(|(_, own)| own);
-        match (named, speaking.first()) {
-            (Some((skipped, line)), _) => Self { delimiter: apart(line), skipped },
-            // Lines that say nothing are passed over anyway.
-            (None, Some((_, line))) => Self { delimiter: apart(line), skipped: 0 },
+        // The iterator is reversed so that the first of equals wins.
+        let counted = candidates
+            .iter()
+            .rev()
+            .map(|&candidate| (names_in(candidate.1), candidate))
+            .filter(|(count, _)| *count > 0);
+        let named = counted.max_by_key(|(count, _)| *count).map(|(_, line)| line);
+        match (named, candidates.first()) {
+            (Some((skipped, line)), _) => Self { delimiter: delimiter_of(line), skipped },
+            // Empty and comment lines are skipped anyway.
+            (None, Some((_, line))) => Self { delimiter: delimiter_of(line), skipped: 0 },
             (None, None) => {
                 Self { delimiter: dialect.delimiter.unwrap_or(Delimiter::Byte(b',')), skipped: 0 }
             }
         }
     }
 
-    /// What the reader of cells takes for it.
+    /// Returns the delimiter for the CSV reader.
     pub fn byte(self) -> u8 {
         match self.delimiter {
             Delimiter::Byte(byte) => byte,
@@ -75,10 +78,10 @@ impl Layout {
     }
 }
 
-/// What a header sets its columns apart by.
-fn most_of(line: &str) -> Delimiter {
-    let count = |byte: u8| line.bytes().filter(|own| *own == byte).count();
-    // The last of equals is taken.
+/// Returns the most frequent delimiter of a header line.
+fn most_frequent_delimiter(line: &str) -> Delimiter {
+    let count = |byte: u8| line.bytes().filter(|&other| other == byte).count();
+    // `max_by_key` returns the last of equals.
     let most = [b'\t', b';', b',']
         .into_iter()
         .max_by_key(|byte| count(*byte))
@@ -90,7 +93,7 @@ fn most_of(line: &str) -> Delimiter {
     }
 }
 
-/// Cells of a line without white space and quotes at their ends.
+/// Returns the cells of a line without surrounding white space and quotes.
 fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
     let plain = |cell: &str| cell.trim().trim_matches('"').trim().to_owned();
     match delimiter {
@@ -99,25 +102,25 @@ fn cells(line: &str, delimiter: Delimiter) -> Vec<String> {
     }
 }
 
-/// Passes a table on with lines before the header and comments made empty, and runs of spaces made
-/// tabs.
-pub(super) struct Rewritten<R> {
+/// Reader that empties the lines before the header and comments, and replaces runs of spaces by
+/// tabs. Line numbers stay the same.
+pub(super) struct NormalizedText<R> {
     pub lines: R,
-    /// Lines before the header that are still to come.
+    /// Number of lines before the header that are still unread.
     skipped: usize,
     comment: Option<Vec<u8>>,
     spaces: bool,
-    /// Whether there is anything to do.
-    idle: bool,
-    /// What was read and not yet passed on, and how far it was.
+    /// True if the text passes unchanged.
+    is_unchanged: bool,
+    /// Text that is ready for the caller.
     ready: Vec<u8>,
     given: usize,
-    /// What was read beyond the last line.
-    rest: Vec<u8>,
+    /// Text read beyond the last line.
+    unread: Vec<u8>,
     ended: bool,
 }
 
-impl<R: Read> Rewritten<R> {
+impl<R: Read> NormalizedText<R> {
     pub fn new(lines: R, layout: Layout, comment: Option<&str>) -> Self {
         let spaces = layout.delimiter == Delimiter::Spaces;
         Self {
@@ -125,33 +128,33 @@ impl<R: Read> Rewritten<R> {
             skipped: layout.skipped,
             comment: comment.map(|mark| mark.as_bytes().to_vec()),
             spaces,
-            idle: layout.skipped == 0 && comment.is_none() && !spaces,
+            is_unchanged: layout.skipped == 0 && comment.is_none() && !spaces,
             ready: Vec::new(),
             given: 0,
-            rest: Vec::new(),
+            unread: Vec::new(),
             ended: false,
         }
     }
 
-    /// Makes the next line ready; nothing is at the end.
+    /// Prepares the next line; at the end of the text nothing is prepared.
     fn next_line(&mut self) -> Result<()> {
         (self.ready, self.given) = (Vec::new(), 0);
         let mut chunk = [0; 4096];
         let mut searched = 0;
         let end = loop {
-            if let Some(end) = self.rest.iter().skip(searched).position(|byte| *byte == b'\n') {
+            if let Some(end) = self.unread.iter().skip(searched).position(|byte| *byte == b'\n') {
                 break searched + end + 1;
             }
-            searched = self.rest.len();
+            searched = self.unread.len();
             if self.ended {
                 break searched;
             }
             match self.lines.read(&mut chunk)? {
                 0 => self.ended = true,
-                read => self.rest.extend_from_slice(chunk.get(..read).unwrap_or_default()),
+                read => self.unread.extend_from_slice(chunk.get(..read).unwrap_or_default()),
             }
         };
-        let line: Vec<u8> = self.rest.drain(..end).collect();
+        let line: Vec<u8> = self.unread.drain(..end).collect();
         let text = line.strip_prefix(BYTE_ORDER_MARK_UTF8).unwrap_or(&line).trim_ascii();
         let is_comment = self.comment.as_ref().is_some_and(|mark| text.starts_with(mark));
         if self.skipped > 0 || is_comment {
@@ -171,16 +174,16 @@ impl<R: Read> Rewritten<R> {
     }
 }
 
-impl<R: std::io::BufRead> Rewritten<Lines<R>> {
-    /// Says that a record begins.
+impl<R: std::io::BufRead> NormalizedText<Lines<R>> {
+    /// Marks the start of a record.
     pub fn start_record(&mut self) {
         self.lines.start_record();
     }
 }
 
-impl<R: Read> Read for Rewritten<R> {
+impl<R: Read> Read for NormalizedText<R> {
     fn read(&mut self, out: &mut [u8]) -> Result<usize> {
-        if self.idle {
+        if self.is_unchanged {
             return self.lines.read(out);
         }
         if self.given == self.ready.len() {
@@ -201,7 +204,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_header_says_what_sets_columns_apart() {
+    fn delimiter_is_found_from_the_header() {
         let bytes = Delimiter::Byte;
         for (text, delimiter, skipped) in [
             ("a,b;c,d\n", bytes(b','), 0),
@@ -212,7 +215,7 @@ mod tests {
             ("", bytes(b','), 0),
         ] {
             assert_eq!(
-                Layout::of(text.as_bytes(), &Dialect::default()),
+                Layout::detect(text.as_bytes(), &Dialect::default()),
                 Layout { delimiter, skipped },
                 "{text:?}"
             );
@@ -222,7 +225,7 @@ mod tests {
     #[test]
     fn a_misspelt_name_of_the_map_does_not_hide_the_header() {
         let rule = |name: &str| crate::problem::ColumnRule {
-            theirs: ColumnOf::Name(name.to_owned()),
+            theirs: ColumnSelector::Name(name.to_owned()),
             ours: String::new(),
             location: crate::error::Location::file("problem.toml"),
         };
@@ -230,7 +233,7 @@ mod tests {
             Dialect { columns: ["a", "b", "misspelt"].map(rule).to_vec(), ..Dialect::default() };
         let text = "day 1, tool b\nb,c\na;b;c\n1;2;3\n";
         assert_eq!(
-            Layout::of(text.as_bytes(), &dialect),
+            Layout::detect(text.as_bytes(), &dialect),
             Layout { delimiter: Delimiter::Byte(b';'), skipped: 2 }
         );
     }
@@ -239,10 +242,10 @@ mod tests {
     fn lines_are_counted_through_what_is_left_out() {
         let dialect = Dialect { comment: Some("//".to_owned()), ..Dialect::default() };
         let text = "// a \"b\n  x   y\n\n// c\n 1  2 \n3\t4";
-        let layout = Layout::of(text.as_bytes(), &dialect);
+        let layout = Layout::detect(text.as_bytes(), &dialect);
         assert_eq!(layout, Layout { delimiter: Delimiter::Spaces, skipped: 0 });
         let mut plain = String::new();
-        Rewritten::new(text.as_bytes(), layout, dialect.comment.as_deref())
+        NormalizedText::new(text.as_bytes(), layout, dialect.comment.as_deref())
             .read_to_string(&mut plain)
             .unwrap();
         assert_eq!(plain, "\nx\ty\n\n\n1\t2\n3\t4\n");

@@ -1,32 +1,35 @@
-//! Rows that say twice what one says.
+//! Detection of copied rows.
 
 use std::collections::HashMap;
 
 use super::Measurements;
 use crate::error::{Warning, WarningKind};
 
-/// Copies that are named besides the first.
-const NAMED: usize = 3;
-/// Readings with digits this fine in units of σ hardly ever repeat to the last of them.
-const FINE: f64 = 0.1;
-/// The same where no σ is known \[m\].
-const FINE_LENGTH: f64 = 1e-6;
-/// Steps of the last digit that are looked for, from the coarsest on \[m\].
-const STEPS: [f64; 8] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
-/// A number within this part of a step of a whole number of them has no finer digits.
-const WHOLE: f64 = 1e-3;
+/// Maximum number of copies named in the warning after the first.
+const MAX_NAMED_COPIES: usize = 3;
+/// Resolution in units of σ below which equal readings are unlikely to occur by chance.
+const FINE_RESOLUTION: f64 = 0.1;
+/// Resolution below which equal readings are unlikely if σ is unknown \[m\].
+const FINE_RESOLUTION_WITHOUT_SIGMA: f64 = 1e-6;
+/// Candidate resolutions, coarsest first \[m\].
+const RESOLUTIONS: [f64; 8] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
+/// Tolerance, as a fraction of a step, within which a number counts as a multiple of the step.
+const MULTIPLE_TOLERANCE: f64 = 1e-3;
 
 impl Measurements {
-    /// A warning where rows are the same as earlier ones to the last digit: with measurements, a
-    /// copy. `sigma` is the declared one of a coordinate \[m\]. Where digits are so much finer that
-    /// chance hardly repeats all of a position, copies that differ in their times count too.
+    /// Returns a warning if rows equal earlier ones to the last digit, which measured rows do not
+    /// do.
+    ///
+    /// `sigma` is the declared standard deviation of a coordinate \[m\]. If the resolution is much
+    /// coarser than σ, whole positions repeat by chance; then rows count as copies only if their
+    /// times agree as well.
     pub fn repeated_rows(&self, sigma: Option<f64>) -> Option<Warning> {
-        let fine = sigma.map_or(FINE_LENGTH, |sigma| FINE * sigma);
+        let fine = sigma.map_or(FINE_RESOLUTION_WITHOUT_SIGMA, |sigma| FINE_RESOLUTION * sigma);
         let by_time = self.time_measured && self.step().is_some_and(|step| step > fine);
         let mut first_rows: HashMap<Vec<u64>, usize> = HashMap::with_capacity(self.len());
         let mut repeated = Vec::new();
         for row in 0..self.len() {
-            // Numbers of one coordinate repeat by chance.
+            // Single coordinates repeat by chance.
             let by_time = by_time || !self.observation(row).is_position();
             let first = *first_rows.entry(self.bits(row, by_time)).or_insert(row);
             if first != row {
@@ -37,7 +40,7 @@ impl Measurements {
         let others = repeated
             .iter()
             .skip(1)
-            .take(NAMED)
+            .take(MAX_NAMED_COPIES)
             .map(|&(row, _)| self.location(row).to_string())
             .collect();
         let kind = WarningKind::RowsRepeated {
@@ -48,15 +51,18 @@ impl Measurements {
         Some(Warning { location: self.location(row), kind })
     }
 
-    /// The last digit of the measured positions \[m\]; `None` where there is none that all share.
+    /// Returns the resolution of the measured positions \[m\], or `None` if they have no common
+    /// one.
     fn step(&self) -> Option<f64> {
         let numbers = || self.positions.iter().flatten();
-        let is_whole = |step: f64| numbers().all(|x| (x / step - (x / step).round()).abs() < WHOLE);
-        STEPS.into_iter().find(|step| is_whole(*step))
+        let is_whole = |step: f64| {
+            numbers().all(|x| (x / step - (x / step).round()).abs() < MULTIPLE_TOLERANCE)
+        };
+        RESOLUTIONS.into_iter().find(|step| is_whole(*step))
     }
 
-    /// Everything that was measured in a row, its time where that counts; a time that was only
-    /// counted is none.
+    /// Returns the bits of everything measured in a row. A measured time is included if `by_time`
+    /// is set.
     fn bits(&self, row: usize, by_time: bool) -> Vec<u64> {
         let columns =
             [&self.sigma, &self.payload, &self.hoist, &self.temperature].into_iter().flatten();
@@ -67,16 +73,16 @@ impl Measurements {
         let approach = self
             .approach
             .iter()
-            .flat_map(|all| all.iter().skip(row * self.joints).take(self.joints));
+            .flat_map(|column| column.iter().skip(row * self.joints).take(self.joints));
         let words = [Some(&self.session), self.target.as_ref()].into_iter().flatten();
         let words = words.filter_map(|labels| labels.of_row.get(row)).copied();
         let words = words.chain(self.observation(row).key()).map(|word| word as u64);
         let turned = self
             .orientations
             .iter()
-            .filter_map(|all| all.get(row))
-            .flat_map(|own| own.coords.iter());
-        // Zero has no sign.
+            .filter_map(|column| column.get(row))
+            .flat_map(|orientation| orientation.coords.iter());
+        // Adding 0 turns −0 into 0.
         numbers
             .chain(turned)
             .chain(time)

@@ -1,4 +1,4 @@
-//! Words of a column as they come.
+//! Builders of word columns.
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::Labels;
 use crate::error::one_line;
 
-/// Words of rows, each kept once.
+/// Words of rows; each distinct word is stored once.
 #[derive(Default)]
 pub(super) struct LabelsBuilder {
     pub labels: Labels,
@@ -25,20 +25,20 @@ impl LabelsBuilder {
     }
 }
 
-/// Names of poses: numbers, or else words; none at all where a row has none.
+/// Names of poses: numbers if all are numbers, otherwise words; incomplete if a row has none.
 pub(super) enum PoseNames {
     Numbers(Vec<f64>),
     Words(LabelsBuilder),
-    Lost,
+    Incomplete,
 }
 
 impl PoseNames {
-    /// Before the first row, of tables that have the column or not.
-    pub fn of(there: bool) -> Self {
-        if there { Self::Numbers(Vec::new()) } else { Self::Lost }
+    /// Creates an empty column; `exists` is true if the table has the column `pose`.
+    pub fn new(exists: bool) -> Self {
+        if exists { Self::Numbers(Vec::new()) } else { Self::Incomplete }
     }
 
-    /// Of the next row.
+    /// Appends the name of the next row.
     pub fn push(&mut self, name: Option<&str>) {
         let number =
             name.and_then(|name| name.parse().ok()).filter(|number: &f64| number.is_finite());
@@ -53,29 +53,29 @@ impl PoseNames {
                 *self = Self::Words(words);
             }
             (Self::Words(words), _, Some(name)) => words.push(name),
-            _ => *self = Self::Lost,
+            _ => *self = Self::Incomplete,
         }
     }
 
-    /// The numbers, or the words.
+    /// Returns the numbers or the words.
     pub fn finish(self) -> (Option<Vec<f64>>, Option<Labels>) {
         match self {
             Self::Numbers(numbers) => (Some(numbers), None),
             Self::Words(words) => (None, Some(words.labels)),
-            Self::Lost => (None, None),
+            Self::Incomplete => (None, None),
         }
     }
 }
 
-/// The names of files without their endings; of those that share one with their folders.
+/// Returns the names of files without extension; files with equal names keep their folders.
 pub(super) fn stems(files: &[PathBuf]) -> Vec<String> {
     let stem = |file: &PathBuf| {
         file.file_stem().map_or_else(String::new, |stem| one_line(&stem.to_string_lossy()))
     };
-    let all: Vec<String> = files.iter().map(stem).collect();
-    let named = |(file, own): (&PathBuf, &String)| {
-        let shared = all.iter().filter(|other| *other == own).count() > 1;
-        if shared { one_line(&file.with_extension("").to_string_lossy()) } else { own.clone() }
+    let file_stems: Vec<String> = files.iter().map(stem).collect();
+    let named = |(file, stem): (&PathBuf, &String)| {
+        let shared = file_stems.iter().filter(|other| *other == stem).count() > 1;
+        if shared { one_line(&file.with_extension("").to_string_lossy()) } else { stem.clone() }
     };
-    files.iter().zip(&all).map(named).collect()
+    files.iter().zip(&file_stems).map(named).collect()
 }

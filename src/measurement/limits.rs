@@ -1,17 +1,17 @@
-//! Commands beyond the ranges of their joints, and beyond what joints do at all.
+//! Warnings about implausible commands and temperatures.
 
 use super::Measurements;
 use crate::error::{Warning, WarningKind};
 use crate::problem::{JointKind, Problem};
 
-/// How far beyond its limit a command may be for rounding alone \[rad\] or \[m\].
-const ROUNDING: f64 = 1e-6;
-/// Turns from zero that hardly any arm makes.
+/// Tolerance of a limit for rounding \[rad\] or \[m\].
+const LIMIT_TOLERANCE: f64 = 1e-6;
+/// Number of turns from zero above which a warning asks for the unit.
 const MANY_TURNS: f64 = 2.0;
-/// A temperature \[°C\] at which no arm is calibrated, and below that of a cold room in kelvins.
-const HOT: f64 = 200.0;
+/// Temperature above which a warning asks for the unit [°C]; a cold room in kelvins is above it.
+const MAX_PLAUSIBLE_TEMPERATURE: f64 = 200.0;
 
-/// The column of a joint's commands.
+/// Column with the commands of a joint.
 pub(super) struct Commands<'a> {
     /// Joint, counted from 0.
     pub joint: usize,
@@ -26,12 +26,12 @@ impl Commands<'_> {
         self.name.rsplit_once('_').map_or("", |(_, unit)| unit)
     }
 
-    /// An SI value in the unit of the column; conversions round, and nobody writes more decimals.
+    /// Converts an SI value to the unit of the column, rounded to six decimals.
     fn shown(&self, value: f64) -> f64 {
         (value / (self.to_si)(1.0) * 1e6).round() / 1e6
     }
 
-    /// The limits of the joint as its section would write them in the unit of the column.
+    /// Returns the limits of the joint as keys in the unit of the column.
     fn limits(&self, (min, max): (f64, f64)) -> String {
         let limit = |(key, limit): (&str, f64)| {
             limit.is_finite().then(|| format!("{key}_{} = {}", self.unit(), self.shown(limit)))
@@ -41,8 +41,7 @@ impl Commands<'_> {
 }
 
 impl Measurements {
-    /// A warning where temperatures are those of an oven, or in another unit, at the row of the
-    /// least.
+    /// Returns a warning at the lowest temperature if all of them are implausibly high.
     pub(super) fn kelvins(&self) -> Option<Warning> {
         let (row, &least) = self
             .temperature
@@ -51,27 +50,26 @@ impl Measurements {
             .enumerate()
             .min_by(|(_, a), (_, b)| a.total_cmp(b))?;
         let location = self.location(row).with_key("temperature_C");
-        (least > HOT)
+        (least > MAX_PLAUSIBLE_TEMPERATURE)
             .then(|| Warning { location, kind: WarningKind::Kelvins { least: format!("{least}") } })
     }
 
-    /// A warning where columns in radians turn a joint further than joints turn, at the row that is
-    /// furthest off.
+    /// Returns a warning at the largest angle if a column in radians exceeds [`MANY_TURNS`].
     pub(super) fn many_turns(&self, problem: &Problem, columns: &[Commands]) -> Option<Warning> {
         let is_angle = |column: &&Commands| {
             column.unit() == "rad"
                 && problem
                     .joints
                     .get(column.joint)
-                    .is_some_and(|own| own.commanded() == JointKind::Revolute)
+                    .is_some_and(|joint| joint.command_kind() == JointKind::Revolute)
         };
         let value =
             |row: usize, joint: usize| self.configuration(row).get(joint).copied().unwrap_or(0.0);
-        let every = columns
+        let cells = columns
             .iter()
             .filter(is_angle)
             .flat_map(|column| (0..self.len()).map(move |row| (column, row)));
-        let (column, row) = every.max_by(|(a, i), (b, j)| {
+        let (column, row) = cells.max_by(|(a, i), (b, j)| {
             value(*i, a.joint).abs().total_cmp(&value(*j, b.joint).abs())
         })?;
         let turns = value(row, column.joint).abs() / std::f64::consts::TAU;
@@ -83,16 +81,17 @@ impl Measurements {
         (turns > MANY_TURNS).then_some(Warning { location, kind })
     }
 
-    /// A warning for each joint that was commanded beyond its declared range, at the row that is
-    /// furthest beyond.
+    /// Returns a warning for each joint commanded beyond its declared range, at the row farthest
+    /// beyond.
     pub(super) fn beyond_limits(&self, problem: &Problem, columns: &[Commands]) -> Vec<Warning> {
         let warning = |column: &Commands| {
             let (min, max) = problem.joints.get(column.joint)?.limits;
             let value =
                 |row: usize| self.configuration(row).get(column.joint).copied().unwrap_or(0.0);
             let beyond = |row: usize| (min - value(row)).max(value(row) - max);
-            let rows: Vec<usize> = (0..self.len()).filter(|&row| beyond(row) > ROUNDING).collect();
-            // The first of equals.
+            let rows: Vec<usize> =
+                (0..self.len()).filter(|&row| beyond(row) > LIMIT_TOLERANCE).collect();
+            // The iterator is reversed so that the first of equals wins.
             let worst = *rows.iter().rev().max_by(|&&a, &&b| beyond(a).total_cmp(&beyond(b)))?;
             let location = self.location(worst).with_key(format!("joint {}", column.joint + 1));
             let kind = WarningKind::BeyondLimits {

@@ -1,33 +1,33 @@
-//! Line ends made alike, so that lines can be counted.
+//! Normalisation of line ends, so that lines can be counted.
 
 use std::io::{BufRead, Error, ErrorKind, Read, Result};
 
-/// Longest record of a table [KiB].
-pub(super) const RECORD_KIB: u64 = 1024;
+/// Maximum size of a record [KiB].
+pub(super) const MAX_RECORD_KIB: u64 = 1024;
 
-/// Passes text on with every CRLF or CR as LF, and with an LF at the end; refuses to go on within a
-/// record that is too long.
+/// Reader that converts CRLF and CR to LF and adds a final LF. It refuses records that are too
+/// long.
 pub(super) struct Lines<R> {
     inner: R,
     last: u8,
-    /// Bytes of the record so far, with what is read ahead.
-    of_record: u64,
+    /// Bytes of the current record, including read-ahead.
+    record_bytes: u64,
 }
 
 impl<R: BufRead> Lines<R> {
     pub fn new(inner: R) -> Self {
-        Self { inner, last: b'\n', of_record: 0 }
+        Self { inner, last: b'\n', record_bytes: 0 }
     }
 
-    /// Says that a record begins.
+    /// Marks the start of a record.
     pub fn start_record(&mut self) {
-        self.of_record = 0;
+        self.record_bytes = 0;
     }
 }
 
 impl<R: BufRead> Read for Lines<R> {
     fn read(&mut self, out: &mut [u8]) -> Result<usize> {
-        if self.of_record > RECORD_KIB << 10 {
+        if self.record_bytes > MAX_RECORD_KIB << 10 {
             return Err(Error::from(ErrorKind::FileTooLarge));
         }
         let mut written = 0;
@@ -54,7 +54,7 @@ impl<R: BufRead> Read for Lines<R> {
             }
             self.inner.consume(read);
         }
-        self.of_record += written as u64;
+        self.record_bytes += written as u64;
         Ok(written)
     }
 }

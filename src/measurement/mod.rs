@@ -1,4 +1,4 @@
-//! Measured poses, as columns in SI units.
+//! Measured poses, stored by column in SI units.
 
 mod builder;
 #[deny(clippy::indexing_slicing)]
@@ -42,122 +42,121 @@ use std::path::PathBuf;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::error::{Location, Warning};
-use crate::problem::{Observation, PastOf, PoseConditions, PoseView, Problem};
+use crate::problem::{LazyPast, Observation, PoseConditions, PoseView, Problem};
 
 pub use builder::{DatasetBuilder, DatasetError};
 pub use column_table::{ColumnTable, ColumnValues};
 pub use dataset::Dataset;
 pub use order::RowOrder;
-pub(crate) use repeats::different;
+pub(crate) use repeats::count_distinct;
 pub use split::Split;
 
-/// Measured poses, a column for each quantity, in the order of the files.
+/// Measured poses with one column per quantity, in the order of the files.
 #[derive(Debug, Clone, Default)]
 pub struct Measurements {
-    /// The files that were read.
+    /// Files that were read.
     pub files: Vec<PathBuf>,
     /// File index and line of each row, for messages.
     pub origin: Vec<(u32, u32)>,
-    /// Number of joints of the arm, fixed ones included.
+    /// Number of joints of the arm, including fixed ones.
     pub joints: usize,
-    /// Configurations, shape = (rows, joints), row after row \[rad\] or \[m\]; 0 at fixed joints.
+    /// Configurations, shape = (rows, joints), row-major \[rad\] or \[m\]; 0 at fixed joints.
     pub configurations: Vec<f64>,
-    /// The same from the other of commands and readings, where the table has both.
+    /// Configurations from the other joint source (commands or readings), if the table has both.
     pub other_configurations: Option<Vec<f64>>,
-    /// Fixed points that were measured in between; they take no part in fits.
+    /// Measurements of fixed points between the poses; they take no part in fits.
     pub nests: Vec<NestReading>,
-    /// What each row measures; empty where all of them measure positions.
+    /// Observation of each row; empty if all rows measure positions.
     pub observations: Vec<Observation>,
-    /// The measured numbers of each row, zeros behind them \[m\]: positions in the measuring frame,
-    /// distances, 0 of a contact.
+    /// Measured numbers of each row, padded with zeros \[m\] or \[rad\]: positions in the measuring
+    /// frame, distances or tilts; 0 for a contact.
     pub positions: Vec<Vector3<f64>>,
-    /// Whether they were measured; 0 otherwise, in poses that are still to be measured.
+    /// True if the positions were measured; false for poses still to be measured.
     pub position_measured: bool,
-    /// Unit of the positions in the first file in SI: 1/1000 for millimetres; `None` where they
-    /// came from no file.
+    /// Unit of the positions in the first file in SI (1/1000 for millimetres), or `None` without a
+    /// file.
     pub position_unit: Option<f64>,
-    /// Measured orientations of the target in the measuring frame, where there are all of their
-    /// columns; NaN in a row without one.
+    /// Measured orientations of the target in the measuring frame, if all of their columns exist;
+    /// NaN in a row without one.
     pub orientations: Option<Vec<UnitQuaternion<f64>>>,
-    /// 1 σ of each coordinate from the column `sigma_mm`, or of the row's kind where there are
-    /// several; NaN where it is not known \[m\].
+    /// Standard deviation of each coordinate \[m\] from the column `sigma_mm` or the kind of the
+    /// row; NaN if unknown.
     pub sigma: Option<Vec<f64>>,
-    /// Payload \[kg\].
+    /// Payload of each row \[kg\].
     pub payload: Option<Vec<f64>>,
-    /// Hoist force \[N\].
+    /// Hoist force of each row \[N\].
     pub hoist: Option<Vec<f64>>,
-    /// Temperature [°C].
+    /// Temperature of each row [°C].
     pub temperature: Option<Vec<f64>>,
-    /// Time \[s\]; the row's order where there is no column.
+    /// Time of each row \[s\]; the row number without a column.
     pub time: Vec<f64>,
-    /// Whether `time` was measured, not counted.
+    /// True if `time` was measured, false if it is the row number.
     pub time_measured: bool,
-    /// Direction from which each joint came, −1, 0 or +1, shape = (rows, joints); 0 at joints
-    /// without a column.
+    /// Direction from which each joint approached, −1, 0 or +1, shape = (rows, joints); 0 for
+    /// joints without a column.
     pub approach: Option<Vec<f64>>,
-    /// Values of the problem's own covariates, in their order and units, shape = (rows,
-    /// covariates); empty where there are none.
+    /// Values of the declared covariates in their order and units, shape = (rows, covariates);
+    /// empty if there are none.
     pub covariates: Vec<f64>,
-    /// Number of each pose from the column `pose`, where every row has one and it is a number.
+    /// Pose numbers from the column `pose`, if every row has a number there.
     pub pose: Option<Vec<f64>>,
-    /// Name of each pose from that column, where every row has one and not all are numbers.
+    /// Pose names from the column `pose`, if every row has one and not all are numbers.
     pub pose_names: Option<Labels>,
-    /// Session of each row; one unnamed label where there is no column.
+    /// Session of each row; one unnamed label without a column.
     pub session: Labels,
-    /// Target of each row; `None` where there is no column.
+    /// Target of each row; `None` without a column.
     pub target: Option<Labels>,
-    /// Whether the row is marked `validation`: in the column that the problem names, or in `split`
-    /// where it says nothing.
+    /// True for rows marked `validation` in the column that the problem names, or else in `split`.
     pub marked_held_out: Option<Vec<bool>>,
-    /// How the first file writes the commands, a column a joint; none where they came from no file.
+    /// Columns of the commands in the first file, one per joint; empty without a file.
     pub command_columns: Vec<CommandColumn>,
-    /// What was passed over in the files, for reports.
+    /// Warnings about the files, for reports.
     pub warnings: Vec<Warning>,
-    /// In which order the rows were measured: found when it is first asked for, so rows change
+    /// Order in which the rows were measured. It is computed at first use, so rows may change only
     /// before that or in a copy.
     pub order: RowOrder,
 }
 
-/// A fixed point that was measured again, to see whether the instrument stayed.
+/// Repeated measurement of a fixed point, which shows whether the instrument has moved.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NestReading {
     /// File index and line, for messages.
     pub origin: (u32, u32),
-    /// Which point.
+    /// Name of the fixed point.
     pub name: String,
     /// Measured position, measuring frame \[m\].
     pub position: Vector3<f64>,
-    /// Time \[s\], where there is a column for it.
+    /// Time \[s\], if there is a column.
     pub time: Option<f64>,
-    /// Number of rows of the arm before it: what stands for the time where that is counted.
+    /// Number of arm rows before this measurement, which replaces a missing time.
     pub after: usize,
-    /// Session, empty where there is no column for it.
+    /// Session; empty without a column.
     pub session: String,
-    /// 1 σ of each coordinate, where there is a column for it \[m\].
+    /// Standard deviation of each coordinate, if there is a column \[m\].
     pub sigma: Option<f64>,
 }
 
-/// A column of a joint's commands as a table has it.
+/// Column of a joint's commands as written in a table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommandColumn {
     /// Joint, counted from 0.
     pub joint: usize,
-    /// Its name in the table.
+    /// Name of the column in the table.
     pub name: String,
-    /// Its unit in SI: π/180 for degrees.
+    /// Unit in SI: π/180 for degrees.
     pub unit: f64,
 }
 
-/// A word per row, stored as an index into the distinct words in order of appearance.
+/// Words of rows, stored as indices into the distinct words in order of appearance.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Labels {
     /// Distinct words.
     pub names: Vec<String>,
-    /// Word of each row.
+    /// Index of the word of each row.
     pub of_row: Vec<usize>,
 }
 
-/// Words of the rows in order.
+/// Collects the words of the rows in order.
 impl<W: AsRef<str>> FromIterator<W> for Labels {
     fn from_iter<I: IntoIterator<Item = W>>(words: I) -> Self {
         let mut labels = Self::default();
@@ -175,123 +174,127 @@ impl<W: AsRef<str>> FromIterator<W> for Labels {
 }
 
 impl Measurements {
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.positions.len()
     }
 
-    /// Whether there are no rows.
+    /// Returns true if there are no rows.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }
 
-    /// What a row measures.
+    /// Returns the quantity that a row measures.
     pub fn observation(&self, row: usize) -> Observation {
         self.observations.get(row).copied().unwrap_or_default()
     }
 
-    /// What rows measure, one observation of each kind that there is, positions first.
+    /// Returns one observation of each kind in the table, positions first.
     pub fn kinds(&self) -> Vec<Observation> {
         let mut kinds: Vec<Observation> =
             (0..self.len()).map(|row| self.observation(row)).collect();
         kinds.sort_unstable();
-        kinds.dedup_by_key(|own| own.kind());
+        kinds.dedup_by_key(|observation| observation.kind());
         kinds
     }
 
-    /// The first of them: what errors are told of.
+    /// Returns the first of [`kinds`](Self::kinds), on which error summaries are based.
     pub fn leading(&self) -> Observation {
         self.kinds().first().copied().unwrap_or_default()
     }
 
-    /// The orientation of a row that has one, measuring frame.
+    /// Returns the orientation of a row in the measuring frame, if it was measured.
     pub fn orientation(&self, row: usize) -> Option<&UnitQuaternion<f64>> {
-        self.orientations.as_ref().map(|all| &all[row]).filter(|own| !own.w.is_nan())
+        self.orientations
+            .as_ref()
+            .map(|column| &column[row])
+            .filter(|orientation| !orientation.w.is_nan())
     }
 
-    /// 1 σ of a row that has one of its own \[m\].
+    /// Returns the standard deviation stated for a row \[m\], if there is one.
     pub fn sigma_of(&self, row: usize) -> Option<f64> {
-        self.sigma.as_ref().map(|all| all[row]).filter(|sigma| !sigma.is_nan())
+        self.sigma.as_ref().map(|column| column[row]).filter(|sigma| !sigma.is_nan())
     }
 
-    /// Whether every row has a σ of its own.
-    pub fn knows_sigma(&self) -> bool {
-        self.sigma.as_ref().is_some_and(|all| all.iter().all(|sigma| !sigma.is_nan()))
+    /// Returns true if every row states its standard deviation.
+    pub fn has_sigma_in_every_row(&self) -> bool {
+        self.sigma.as_ref().is_some_and(|column| column.iter().all(|sigma| !sigma.is_nan()))
     }
 
-    /// Whether the σ of every row is known, from columns or from `[data]`.
-    pub fn noise_is_declared(&self, problem: &Problem) -> bool {
-        self.knows_sigma()
+    /// Returns true if the standard deviation of every row is known from columns or from `[data]`.
+    pub fn has_declared_noise(&self, problem: &Problem) -> bool {
+        self.has_sigma_in_every_row()
             || (self.observations.is_empty() && problem.data.position_sigma.is_some())
     }
 
-    /// File and line of a row, for messages.
+    /// Returns file and line of a row, for messages.
     pub fn location(&self, row: usize) -> Location {
         let (file, line) = self.origin[row];
         Location::file(&self.files[file as usize]).at_line(line as usize)
     }
 
-    /// What was set in a row; time counts from its own first one.
+    /// Returns a copy of the conditions of a row; times count from the first pose.
     pub fn conditions(&self, row: usize) -> PoseConditions {
         self.setup(row, self.first_time()).to_owned()
     }
 
-    /// The same of every row, without what was before it, which the other rows say.
-    pub fn all_conditions(&self) -> Vec<PoseConditions> {
+    /// Returns the conditions of all rows without their past, which the other rows contain.
+    pub fn conditions_without_past(&self) -> Vec<PoseConditions> {
         let first = self.first_time();
-        let alone = |row| PoseView { past: PastOf::default(), ..self.setup(row, first) }.to_owned();
+        let alone =
+            |row| PoseView { past: LazyPast::default(), ..self.setup(row, first) }.to_owned();
         (0..self.len()).map(alone).collect()
     }
 
-    /// Time of the first pose \[s\].
+    /// Returns the time of the first pose \[s\].
     pub(crate) fn first_time(&self) -> f64 {
         self.time.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// The same to read, where the time of the first pose \[s\] is known.
+    /// Returns a view of the conditions of a row; `first` is the time of the first pose \[s\].
     pub(crate) fn setup(&self, row: usize, first: f64) -> PoseView<'_> {
         let narrow = u32::try_from(row).unwrap_or(u32::MAX);
         PoseView {
             configuration: self.configuration(row),
-            payload: self.payload.as_ref().map(|all| &all[row]),
-            hoist: self.hoist.as_ref().map(|all| &all[row]),
-            temperature: self.temperature.as_ref().map(|all| &all[row]),
+            payload: self.payload.as_ref().map(|column| &column[row]),
+            hoist: self.hoist.as_ref().map(|column| &column[row]),
+            temperature: self.temperature.as_ref().map(|column| &column[row]),
             time: self.time[row],
             elapsed: self.time[row] - first,
             approach: self
                 .approach
                 .as_ref()
-                .map(|all| &all[row * self.joints..(row + 1) * self.joints]),
+                .map(|column| &column[row * self.joints..(row + 1) * self.joints]),
             covariates: self.covariates_of(row),
-            past: PastOf::row(self, narrow),
+            past: LazyPast::row(self, narrow),
             strains: None,
         }
     }
 
-    /// The problem's own covariates in a row, in their order and units; empty where there are none.
+    /// Returns the declared covariates of a row in their order and units; empty if there are none.
     pub fn covariates_of(&self, row: usize) -> &[f64] {
         let n = self.covariates.len() / self.len().max(1);
         &self.covariates[row * n..(row + 1) * n]
     }
 
-    /// Configuration of a row, shape = (joints) \[rad\] or \[m\].
+    /// Returns the configuration of a row, shape = (joints) \[rad\] or \[m\].
     pub fn configuration(&self, row: usize) -> &[f64] {
         &self.configurations[row * self.joints..(row + 1) * self.joints]
     }
 
-    /// The same rows with the other of commands and readings as configurations, where the table has
-    /// both and they differ.
-    pub fn by_other_joints(&self) -> Option<Self> {
+    /// Returns these rows with configurations from the other joint source (commands or readings),
+    /// if the table has both and they differ.
+    pub fn with_other_joint_source(&self) -> Option<Self> {
         let other =
             self.other_configurations.as_ref().filter(|other| **other != self.configurations)?;
-        let (configurations, own) = (other.clone(), self.configurations.clone());
-        Some(Self { configurations, other_configurations: Some(own), ..self.clone() })
+        let (configurations, current) = (other.clone(), self.configurations.clone());
+        Some(Self { configurations, other_configurations: Some(current), ..self.clone() })
     }
 
-    /// The rows with these numbers, in this order; words that none of them uses are kept.
+    /// Returns the given rows in the given order; unused words are kept.
     #[must_use]
     pub fn select(&self, rows: &[usize]) -> Self {
-        let one = |column: &[f64]| rows.iter().map(|&row| column[row]).collect::<Vec<f64>>();
+        let pick = |column: &[f64]| rows.iter().map(|&row| column[row]).collect::<Vec<f64>>();
         let each = |column: &[f64]| {
             rows.iter()
                 .flat_map(|&row| &column[row * self.joints..(row + 1) * self.joints])
@@ -311,7 +314,7 @@ impl Measurements {
             nests: self.nests.clone(),
             observations: match &self.observations[..] {
                 [] => Vec::new(),
-                all => rows.iter().map(|&row| all[row]).collect(),
+                observations => rows.iter().map(|&row| observations[row]).collect(),
             },
             positions: rows.iter().map(|&row| self.positions[row]).collect(),
             position_measured: self.position_measured,
@@ -319,16 +322,16 @@ impl Measurements {
             orientations: self
                 .orientations
                 .as_ref()
-                .map(|all| rows.iter().map(|&row| all[row]).collect()),
-            sigma: self.sigma.as_deref().map(one),
-            payload: self.payload.as_deref().map(one),
-            hoist: self.hoist.as_deref().map(one),
-            temperature: self.temperature.as_deref().map(one),
-            time: one(&self.time),
+                .map(|column| rows.iter().map(|&row| column[row]).collect()),
+            sigma: self.sigma.as_deref().map(pick),
+            payload: self.payload.as_deref().map(pick),
+            hoist: self.hoist.as_deref().map(pick),
+            temperature: self.temperature.as_deref().map(pick),
+            time: pick(&self.time),
             time_measured: self.time_measured,
             approach: self.approach.as_deref().map(each),
             covariates: rows.iter().flat_map(|&row| self.covariates_of(row)).copied().collect(),
-            pose: self.pose.as_deref().map(one),
+            pose: self.pose.as_deref().map(pick),
             pose_names: self.pose_names.as_ref().map(words),
             session: words(&self.session),
             target: self.target.as_ref().map(words),
@@ -342,42 +345,44 @@ impl Measurements {
         }
     }
 
-    /// These rows, then those of a table with the same columns and words.
+    /// Returns these rows followed by those of a table with the same columns and words.
     #[must_use]
-    pub(crate) fn and(&self, other: &Self) -> Self {
-        let joined = |own: &[f64], other: &[f64]| [own, other].concat();
-        let both = |own: &Option<Vec<f64>>, other: &Option<Vec<f64>>| {
-            Some(joined(own.as_ref()?, other.as_ref()?))
+    pub(crate) fn concatenate(&self, other: &Self) -> Self {
+        let concatenated = |first: &[f64], second: &[f64]| [first, second].concat();
+        let both = |first: &Option<Vec<f64>>, second: &Option<Vec<f64>>| {
+            Some(concatenated(first.as_ref()?, second.as_ref()?))
         };
-        let mut all = self.clone();
-        all.origin.extend(&other.origin);
-        all.configurations.extend(&other.configurations);
-        all.other_configurations = both(&self.other_configurations, &other.other_configurations);
+        let mut joined = self.clone();
+        joined.origin.extend(&other.origin);
+        joined.configurations.extend(&other.configurations);
+        joined.other_configurations = both(&self.other_configurations, &other.other_configurations);
         if !self.observations.is_empty() || !other.observations.is_empty() {
-            let each = |of: &Self| (0..of.len()).map(|row| of.observation(row)).collect::<Vec<_>>();
-            all.observations = [each(self), each(other)].concat();
+            let each = |table: &Self| {
+                (0..table.len()).map(|row| table.observation(row)).collect::<Vec<_>>()
+            };
+            joined.observations = [each(self), each(other)].concat();
         }
-        all.positions.extend(&other.positions);
-        all.orientations = self
+        joined.positions.extend(&other.positions);
+        joined.orientations = self
             .orientations
             .as_ref()
-            .and_then(|own| Some([own.as_slice(), other.orientations.as_deref()?].concat()));
-        all.sigma = both(&self.sigma, &other.sigma);
-        all.payload = both(&self.payload, &other.payload);
-        all.hoist = both(&self.hoist, &other.hoist);
-        all.temperature = both(&self.temperature, &other.temperature);
-        all.time.extend(&other.time);
-        all.approach = both(&self.approach, &other.approach);
-        all.covariates.extend(&other.covariates);
-        all.pose = both(&self.pose, &other.pose);
-        all.session.of_row.extend(&other.session.of_row);
-        if let (Some(own), Some(other)) = (&mut all.target, &other.target) {
-            own.of_row.extend(&other.of_row);
+            .and_then(|first| Some([first.as_slice(), other.orientations.as_deref()?].concat()));
+        joined.sigma = both(&self.sigma, &other.sigma);
+        joined.payload = both(&self.payload, &other.payload);
+        joined.hoist = both(&self.hoist, &other.hoist);
+        joined.temperature = both(&self.temperature, &other.temperature);
+        joined.time.extend(&other.time);
+        joined.approach = both(&self.approach, &other.approach);
+        joined.covariates.extend(&other.covariates);
+        joined.pose = both(&self.pose, &other.pose);
+        joined.session.of_row.extend(&other.session.of_row);
+        if let (Some(target), Some(other)) = (&mut joined.target, &other.target) {
+            target.of_row.extend(&other.of_row);
         }
-        if let (Some(own), Some(other)) = (&mut all.marked_held_out, &other.marked_held_out) {
-            own.extend(other);
+        if let (Some(marked), Some(other)) = (&mut joined.marked_held_out, &other.marked_held_out) {
+            marked.extend(other);
         }
-        all.nests.extend(other.nests.iter().cloned());
-        all
+        joined.nests.extend(other.nests.iter().cloned());
+        joined
     }
 }

@@ -1,5 +1,5 @@
-//! What rows measure besides positions: contacts with points and surfaces, distances to anchors,
-//! known distances between points.
+//! Observations other than positions: contacts with points and surfaces, distances to anchors,
+//! tilts, known distances between points.
 
 use std::path::Path;
 
@@ -13,12 +13,12 @@ use crate::error::{InputError, InputErrorKind};
 use crate::problem::fixture::{frame, unknown};
 use crate::problem::{Fixture, KnownDistance, Observation, Problem};
 
-/// Something that a row measures, and its numbers \[m\]; those of a position are in its own
-/// columns.
+/// Observation of a row with its measured numbers \[m\] or \[rad\]; those of a position are in
+/// separate columns.
 pub(super) struct Observed {
     pub observation: Observation,
     pub numbers: Vector3<f64>,
-    /// Whether they have been measured.
+    /// True if the numbers have been measured.
     pub measured: bool,
 }
 
@@ -28,13 +28,13 @@ impl Observed {
     }
 }
 
-/// Everything that the row measures which the table is at, in the order position, point, distance,
-/// surface; a table of positions alone measures one in every row, and `in_point` is where the whole
-/// file is. A position that is `lost` is none.
+/// Returns all observations of the current row in the order position, point, distance, surface,
+/// tilt. A table of positions has one position per row. `in_point` is the point that the whole file
+/// measures. A position that is `missing` gives no observation.
 pub(super) fn of_row(
     table: &Table,
     columns: &Columns,
-    (problem, measured, lost): (&Problem, bool, bool),
+    (problem, measured, missing): (&Problem, bool, bool),
     in_point: Option<&str>,
 ) -> Result<Vec<Observed>, InputError> {
     let has_position = columns.has(Role::Position(0));
@@ -47,9 +47,9 @@ pub(super) fn of_row(
     };
     let of_point =
         |name: &str, place: Option<usize>| fixture(table, place, ("point", name), problem);
-    let mut all = Vec::new();
-    if !lost && (0..3).any(|axis| filled(Role::Position(axis)).is_some()) {
-        all.push(Observed::position(true));
+    let mut found = Vec::new();
+    if !missing && (0..3).any(|axis| filled(Role::Position(axis)).is_some()) {
+        found.push(Observed::position(true));
     }
     let in_point = match filled(Role::Point) {
         Some(place) => Some((table.name(place)?, Some(place))),
@@ -57,14 +57,14 @@ pub(super) fn of_row(
     };
     if let Some((name, place)) = in_point {
         let observation = Observation::Point(of_point(name, place)?);
-        all.push(Observed { observation, numbers: Vector3::zeros(), measured: true });
+        found.push(Observed { observation, numbers: Vector3::zeros(), measured: true });
     }
-    let lone = |place: usize, has, lacks| {
-        Err(table.cell_error(place, InputErrorKind::HalfObserved { has, lacks }))
+    let incomplete = |place: usize, has, lacks| {
+        Err(table.cell_error(place, InputErrorKind::IncompleteObservation { has, lacks }))
     };
     match (filled(Role::Anchor), filled(Role::Distance)) {
-        (Some(place), None) if measured => return lone(place, "an anchor", "a distance"),
-        (None, Some(place)) => return lone(place, "a distance", "an anchor"),
+        (Some(place), None) if measured => return incomplete(place, "an anchor", "a distance"),
+        (None, Some(place)) => return incomplete(place, "a distance", "an anchor"),
         (Some(place), distance) => {
             let observation = Observation::Distance(fixture(
                 table,
@@ -77,7 +77,7 @@ pub(super) fn of_row(
             if let Some(place) = distance.filter(|_| number <= 0.0) {
                 return Err(table.cell_error(place, InputErrorKind::NotPositive { value: number }));
             }
-            all.push(Observed {
+            found.push(Observed {
                 observation,
                 numbers: number * Vector3::x(),
                 measured: distance.is_some(),
@@ -86,7 +86,7 @@ pub(super) fn of_row(
         (None, None) => {}
     }
     match (filled(Role::Surface), filled(Role::Offset)) {
-        (None, Some(place)) => return lone(place, "an offset", "a surface"),
+        (None, Some(place)) => return incomplete(place, "an offset", "a surface"),
         (Some(place), offset) => {
             let observation = Observation::Surface(fixture(
                 table,
@@ -96,7 +96,7 @@ pub(super) fn of_row(
             )?);
             let number =
                 offset.map(|_| columns.length(table, Role::Offset)).transpose()?.unwrap_or(0.0);
-            all.push(Observed { observation, numbers: number * Vector3::x(), measured: true });
+            found.push(Observed { observation, numbers: number * Vector3::x(), measured: true });
         }
         (None, None) => {}
     }
@@ -105,7 +105,7 @@ pub(super) fn of_row(
             let numbers =
                 [columns.length(table, Role::Tilt(0))?, columns.length(table, Role::Tilt(1))?];
             let observation = Observation::Tilt(frame_of(table, frame, problem)?);
-            all.push(Observed {
+            found.push(Observed {
                 observation,
                 numbers: Vector3::new(numbers[0], numbers[1], 0.0),
                 measured: true,
@@ -113,44 +113,45 @@ pub(super) fn of_row(
         }
         (None, None, Some(frame)) if !measured => {
             let observation = Observation::Tilt(frame_of(table, Some(frame), problem)?);
-            all.push(Observed { observation, numbers: Vector3::zeros(), measured: false });
+            found.push(Observed { observation, numbers: Vector3::zeros(), measured: false });
         }
         (Some(place), None, _) | (None, Some(place), _) => {
-            return lone(place, "a tilt", "that of the other axis");
+            return incomplete(place, "a tilt", "that of the other axis");
         }
-        (None, None, Some(place)) => return lone(place, "a frame", "its tilts"),
+        (None, None, Some(place)) => return incomplete(place, "a frame", "its tilts"),
         (None, None, None) => {}
     }
     let filled = |place: usize| table.text(place).is_ok_and(|cell| !cell.is_empty());
-    if let (true, Some((place, write))) = (all.is_empty(), columns.undeclared(problem, filled)) {
+    if let (true, Some((place, write))) = (found.is_empty(), columns.undeclared(problem, filled)) {
         return Err(table.cell_error(place, InputErrorKind::NotDeclared { write }));
     }
-    match all.is_empty() {
+    match found.is_empty() {
         true if measured => Err(table.error(InputErrorKind::NothingMeasured)),
         true => Ok(vec![Observed::position(false)]),
-        false => Ok(all),
+        false => Ok(found),
     }
 }
 
-/// The frame that a cell names: `base`, a joint by its name, or `joint3`; that of the tool without
-/// a word.
+/// Returns the frame that a cell names: `base`, a joint by its name, or `joint3`; without a column
+/// the tool's frame.
 fn frame_of(table: &Table, place: Option<usize>, problem: &Problem) -> Result<usize, InputError> {
     let Some(place) = place else { return Ok(problem.tool.joint + 1) };
     frame(table.name(place)?, &problem.joints, problem.tool.joint)
         .map_err(|kind| table.cell_error(place, kind))
 }
 
-/// The fixture that a cell names.
+/// Returns the fixture that a cell names.
 fn fixture(
     table: &Table,
     place: Option<usize>,
     (word, name): (&'static str, &str),
     problem: &Problem,
 ) -> Result<usize, InputError> {
-    let of_kind = || problem.fixtures.iter().enumerate().filter(|(_, own)| own.kind.word() == word);
-    let found = of_kind().find(|(_, own)| own.name == name).map(|(index, _)| index);
+    let of_kind =
+        || problem.fixtures.iter().enumerate().filter(|(_, fixture)| fixture.kind.word() == word);
+    let found = of_kind().find(|(_, fixture)| fixture.name == name).map(|(index, _)| index);
     found.ok_or_else(|| {
-        let names: Vec<&str> = of_kind().map(|(_, own)| own.name.as_str()).collect();
+        let names: Vec<&str> = of_kind().map(|(_, fixture)| fixture.name.as_str()).collect();
         let kind = unknown(word, name, &names);
         match place {
             Some(place) => table.cell_error(place, kind),
@@ -159,9 +160,9 @@ fn fixture(
     })
 }
 
-/// Refuses a table of positions without a column of targets where the problem declares some; where
-/// rows may measure something else each of them decides.
-pub(super) fn names_targets(
+/// Returns an error if the problem declares targets and a table of positions has no column for
+/// them. In other tables each row is checked by [`check_target`].
+pub(super) fn check_target_column(
     table: &Table,
     columns: &Columns,
     problem: &Problem,
@@ -172,9 +173,9 @@ pub(super) fn names_targets(
     Err(table.column("target").error(problem.unknown_target("")))
 }
 
-/// Refuses the row that the table is at, in a file with this `stem`, where it names a target that
-/// the problem does not declare among others, or names none and measures more than tilts.
-pub(super) fn known_target(
+/// Returns an error if the current row names an undeclared target. A row without a target is
+/// allowed only if it measures tilts alone. `stem` is the name of the file.
+pub(super) fn check_target(
     table: &Table,
     columns: &Columns,
     (stem, observed): (&str, &[Observed]),
@@ -185,12 +186,12 @@ pub(super) fn known_target(
     }
     let place = columns.place(Role::Target);
     let is_blank = place.map_or(Ok(true), |place| table.text(place).map(str::is_empty))?;
-    if is_blank && observed.iter().all(|own| own.observation.is_angle()) {
+    if is_blank && observed.iter().all(|observed| observed.observation.is_angle()) {
         return Ok(());
     }
     let of_file = if columns.file == Some(Role::Target) { stem } else { "" };
     let word = place.map_or(Ok(of_file), |place| table.name(place))?;
-    if problem.targets.iter().any(|own| own.name == word) {
+    if problem.targets.iter().any(|target| target.name == word) {
         return Ok(());
     }
     let kind = problem.unknown_target(word);
@@ -200,9 +201,9 @@ pub(super) fn known_target(
     })
 }
 
-/// Adds the known distances between points as rows of their own, behind the others, and settles the
-/// σ of every row.
-pub(super) fn complete(
+/// Appends a row for each known distance between points and sets the standard deviation of every
+/// row.
+pub(super) fn add_known_distances(
     measurements: &mut Measurements,
     problem: &Problem,
 ) -> Result<(), InputError> {
@@ -210,8 +211,8 @@ pub(super) fn complete(
         return Ok(());
     }
     if let (Some(of_rows), Some(declared)) = (&mut measurements.target, problem.targets.first()) {
-        // Tilts are of no target: their rows go with one that others measure.
-        let is_known = |word: &&String| problem.targets.iter().any(|own| own.name == **word);
+        // Tilts have no target; their rows get a target that other rows measure.
+        let is_known = |word: &&String| problem.targets.iter().any(|target| target.name == **word);
         let first = of_rows.names.iter().find(is_known).unwrap_or(&declared.name);
         let words = of_rows
             .of_row
@@ -220,13 +221,13 @@ pub(super) fn complete(
         *of_rows = words.collect();
     }
     let of_table = measurements.len();
-    let touched = |&fixture: &usize, all: &[Observation]| {
-        let is_known = |own: &Fixture| own.known.iter().all(Option::is_some);
-        all.contains(&Observation::Point(fixture))
+    let is_located = |&fixture: &usize, observations: &[Observation]| {
+        let is_known = |fixture: &Fixture| fixture.known.iter().all(Option::is_some);
+        observations.contains(&Observation::Point(fixture))
             || problem.fixtures.get(fixture).is_some_and(is_known)
     };
     for distance in &problem.distances {
-        if distance.between.iter().all(|point| touched(point, &measurements.observations)) {
+        if distance.between.iter().all(|point| is_located(point, &measurements.observations)) {
             measurements.add_known(distance, &problem.data.location.file);
         }
     }
@@ -258,14 +259,18 @@ pub(super) fn complete(
 }
 
 impl Measurements {
-    /// Whether rows tell more of every fixture that is not known than where it is.
+    /// Checks that each unknown fixture has more measurements than unknown coordinates.
     pub(super) fn enough_contacts(&self, problem: &Problem) -> Result<(), InputError> {
         for (index, fixture) in problem.fixtures.iter().enumerate() {
             let rows: Vec<usize> = (0..self.len())
                 .filter(|&row| self.observation(row).fixture() == Some(index))
                 .collect();
             let Some(&first) = rows.first() else { continue };
-            let known = problem.distances.iter().filter(|own| own.between.contains(&index)).count();
+            let known = problem
+                .distances
+                .iter()
+                .filter(|distance| distance.between.contains(&index))
+                .count();
             let measured =
                 rows.iter().map(|&row| self.observation(row).coordinates()).sum::<usize>() + known;
             let numbers = fixture.known.iter().filter(|known| known.is_none()).count();
@@ -278,9 +283,10 @@ impl Measurements {
         Ok(())
     }
 
-    /// Adds a known distance as a row, under the conditions of the first one; `file` declares it.
+    /// Appends a known distance as a row with the conditions of the first row; `file` is the file
+    /// that declares it.
     fn add_known(&mut self, distance: &KnownDistance, file: &Path) {
-        let place = self.files.iter().position(|own| own == file).unwrap_or_else(|| {
+        let place = self.files.iter().position(|known| known == file).unwrap_or_else(|| {
             self.files.push(file.to_owned());
             self.files.len() - 1
         });
@@ -294,27 +300,27 @@ impl Measurements {
         row.nests.clear();
         row.pose = self.pose.as_ref().map(|_| vec![0.0]);
         let (marked, named) = (row.marked_held_out.take(), row.pose_names.take());
-        let all = std::mem::take(&mut self.files);
-        *self = Self { files: all, ..self.and(&row) };
-        if let (Some(own), Some(marked)) = (&mut self.marked_held_out, marked) {
-            own.extend(marked);
+        let files = std::mem::take(&mut self.files);
+        *self = Self { files, ..self.concatenate(&row) };
+        if let (Some(column), Some(marked)) = (&mut self.marked_held_out, marked) {
+            column.extend(marked);
         }
-        if let (Some(own), Some(named)) = (&mut self.pose_names, named) {
-            own.of_row.extend(named.of_row);
+        if let (Some(column), Some(named)) = (&mut self.pose_names, named) {
+            column.of_row.extend(named.of_row);
         }
     }
 
-    /// The rows in which the arm takes part: known distances between points left out.
+    /// Returns the rows in which the arm takes part, without known distances between points.
     #[must_use]
-    pub fn of_the_arm(self) -> Self {
+    pub fn arm_rows(self) -> Self {
         let rows: Vec<usize> =
             (0..self.len()).filter(|&row| self.observation(row).is_of_arm()).collect();
         if rows.len() == self.len() { self } else { self.select(&rows) }
     }
 
     fn set_sigma(&mut self, row: usize, value: f64) {
-        if let Some(own) = self.sigma.as_mut().and_then(|all| all.get_mut(row)) {
-            *own = value;
+        if let Some(sigma) = self.sigma.as_mut().and_then(|column| column.get_mut(row)) {
+            *sigma = value;
         }
     }
 }

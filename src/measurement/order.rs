@@ -1,4 +1,4 @@
-//! Rows in the order in which they were measured, session by session: what was before a pose.
+//! Order in which the rows were measured within their sessions, and the past of each pose.
 
 use std::collections::HashMap;
 use std::sync::OnceLock;
@@ -7,10 +7,10 @@ use super::Measurements;
 use crate::error::{Warning, WarningKind};
 use crate::problem::{Past, PoseTable};
 
-/// The order of a table's rows, found when it is first asked for; a copy finds its own, for its
-/// rows may change.
+/// Chronological order of a table's rows, computed at first use. A copy computes its order again,
+/// because its rows may change.
 #[derive(Debug, Default)]
-pub struct RowOrder(OnceLock<Found>);
+pub struct RowOrder(OnceLock<Chronology>);
 
 impl Clone for RowOrder {
     fn clone(&self) -> Self {
@@ -24,16 +24,17 @@ impl PartialEq for RowOrder {
     }
 }
 
-/// Of each row where its session begins and where it is itself, counted in order.
+/// Chronological order of the rows: for each row the place of its session's first row and of
+/// itself.
 #[derive(Debug)]
-struct Found {
+struct Chronology {
     places: Vec<(u32, u32)>,
-    /// The columns in order; `None` where the table is.
+    /// Columns in chronological order; `None` if the table has that order.
     sorted: Option<Past>,
 }
 
-impl Found {
-    fn of(table: &Measurements) -> Self {
+impl Chronology {
+    fn new(table: &Measurements) -> Self {
         let session = |row: usize| table.session.of_row.get(row).copied().unwrap_or(0);
         let mut rows: Vec<usize> = (0..table.len()).collect();
         rows.sort_by(|&a, &b| {
@@ -64,18 +65,18 @@ impl Found {
 }
 
 impl Measurements {
-    /// Median time between two configurations of a session that differ in it, and that of the
-    /// longest session from end to end \[s\]; `None` where times were not measured, or none differ.
-    /// Readings repeated in one configuration say nothing of how fast poses follow one another.
+    /// Returns the median time between consecutive configurations and the duration of the longest
+    /// session \[s\]. Repeated readings of one configuration are not counted. Returns `None` if
+    /// times were not measured or no configuration changes.
     pub fn clock(&self) -> Option<(f64, f64)> {
-        let found = self.found();
-        let sorted = found.sorted.as_ref();
+        let chronology = self.chronology();
+        let sorted = chronology.sorted.as_ref();
         let times = sorted.map_or(self.time.as_slice(), |sorted| &sorted.times);
         let configurations =
             sorted.map_or(self.configurations.as_slice(), |sorted| &sorted.configurations);
         let at_pose = |k: usize| configurations.get(k * self.joints..(k + 1) * self.joints);
         let (mut between, mut longest) = (Vec::new(), 0.0_f64);
-        for &(begin, at) in &found.places {
+        for &(begin, at) in &chronology.places {
             let (begin, at) = (begin as usize, at as usize);
             longest = longest.max(times[at] - times[begin]);
             let is_next = at > begin && times[at] > times[at - 1] && at_pose(at) != at_pose(at - 1);
@@ -88,13 +89,12 @@ impl Measurements {
             .map(|median| (*median, longest))
     }
 
-    /// A warning where the time of a row is before that of the row above it, in one file and
-    /// session.
+    /// Returns a warning if a row is earlier than the row above it in the same file and session.
     pub fn time_going_back(&self) -> Option<Warning> {
         if !self.time_measured {
             return None;
         }
-        let file = |row: usize| self.origin.get(row).map(|own| own.0);
+        let file = |row: usize| self.origin.get(row).map(|origin| origin.0);
         let session = |row: usize| self.session.of_row.get(row);
         let mut last: HashMap<_, f64> = HashMap::new();
         let mut back: Vec<(usize, f64)> = Vec::new();
@@ -109,15 +109,15 @@ impl Measurements {
         Some(Warning { location: self.location(row), kind })
     }
 
-    fn found(&self) -> &Found {
-        self.order.0.get_or_init(|| Found::of(self))
+    fn chronology(&self) -> &Chronology {
+        self.order.0.get_or_init(|| Chronology::new(self))
     }
 }
 
 impl PoseTable for Measurements {
-    /// What was measured before a row, in its session.
+    /// Returns the earlier rows of the same session.
     fn past(&self, row: usize) -> Past<&[f64]> {
-        let Found { places, sorted } = self.found();
+        let Chronology { places, sorted } = self.chronology();
         let Some((begin, at)) = places.get(row).map(|&(begin, at)| (begin as usize, at as usize))
         else {
             return Past::default();
@@ -134,7 +134,7 @@ impl PoseTable for Measurements {
         };
         Past {
             times: columns.times.get(begin..at).unwrap_or_default(),
-            // Without times nobody knows how long ago it was so warm.
+            // Without times the age of a temperature is unknown.
             temperatures: columns
                 .temperatures
                 .get(begin..at)
@@ -153,7 +153,7 @@ mod tests {
     use crate::problem::PoseView;
 
     #[test]
-    fn what_was_before_goes_by_time_within_a_session() {
+    fn past_is_chronological_within_a_session() {
         let table = Measurements {
             joints: 2,
             files: vec!["table.csv".into()],
@@ -167,7 +167,7 @@ mod tests {
             ..Measurements::default()
         };
         assert_eq!(table.clock(), Some((2.0, 5.0)));
-        // Row 1 is before row 0 in session a, row 3 before row 2 in session b.
+        // Row 1 is earlier than row 0 in session a, row 3 earlier than row 2 in session b.
         let warning = table.time_going_back().unwrap();
         assert_eq!(warning.kind, WarningKind::TimeGoesBack { rows: 2, back: "5.000".to_owned() });
         assert_eq!(warning.location.line, Some(3));
@@ -188,11 +188,11 @@ mod tests {
             (in_order.past(2).times, in_order.past(4).temperatures),
             (past.times, [23.0].as_slice())
         );
-        // A row's conditions read the same, and keep it by themselves.
+        // The conditions of a row have the same past and can own it.
         let setup = table.setup(0, table.first_time());
         assert_eq!((setup.past.read(), setup.past.place()), (past, Some(0)));
         assert_eq!(setup.to_owned().view().past.read(), past);
-        let unknown = PoseView::of(setup.configuration).past;
+        let unknown = PoseView::from_configuration(setup.configuration).past;
         assert!(unknown.read().times.is_empty() && unknown.place().is_none());
     }
 }

@@ -4,20 +4,20 @@ use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use crate::problem::RotationKind;
 
-/// How far the length of a quaternion may be from 1 for rounding.
-const ROUNDING: f64 = 0.01;
+/// Tolerance of the norm of a quaternion for rounding.
+const NORM_TOLERANCE: f64 = 0.01;
 
-/// An orientation as its columns come.
+/// Cells of an orientation.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Cells {
-    /// rx, ry, rz \[rad\].
+    /// Angles rx, ry, rz \[rad\].
     pub angles: Vector3<f64>,
-    /// qx, qy, qz, qw.
+    /// Components qx, qy, qz, qw.
     pub quaternion: [f64; 4],
 }
 
 impl Cells {
-    /// The orientation that the three angles say.
+    /// Returns the orientation from the three angles.
     pub fn of_angles(&self, kind: RotationKind) -> UnitQuaternion<f64> {
         let [x, y, z] = self.angles.into();
         let (x, y, z) = (
@@ -32,11 +32,11 @@ impl Cells {
         }
     }
 
-    /// The orientation that the quaternion says; `None` where its length is not 1.
+    /// Returns the orientation from the quaternion, or `None` if its norm is not 1.
     pub fn of_quaternion(&self) -> Option<UnitQuaternion<f64>> {
         let [x, y, z, w] = self.quaternion;
         let quaternion = Quaternion::new(w, x, y, z);
-        ((quaternion.norm() - 1.0).abs() <= ROUNDING)
+        ((quaternion.norm() - 1.0).abs() <= NORM_TOLERANCE)
             .then(|| UnitQuaternion::from_quaternion(quaternion))
     }
 }
@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn angles_are_what_their_kind_says() {
+    fn angles_follow_their_convention() {
         let angles = Vector3::new(0.3, -0.5, 1.2);
         let cells = Cells { angles, ..Cells::default() };
         let turn = |axis: usize| UnitQuaternion::from_scaled_axis(Vector3::ith(axis, angles[axis]));
@@ -58,12 +58,12 @@ mod tests {
         ] {
             assert!(cells.of_angles(kind).angle_to(&expected) < 1e-12, "{kind:?}");
         }
-        let quaternion = expected_cells(&(x * y));
-        assert!(quaternion.of_quaternion().is_some_and(|own| own.angle_to(&(x * y)) < 1e-12));
+        let quaternion = quaternion_cells(&(x * y));
+        assert!(quaternion.of_quaternion().is_some_and(|found| found.angle_to(&(x * y)) < 1e-12));
         assert!(Cells::default().of_quaternion().is_none());
     }
 
-    fn expected_cells(of: &UnitQuaternion<f64>) -> Cells {
-        Cells { quaternion: [of.i, of.j, of.k, of.w], ..Cells::default() }
+    fn quaternion_cells(q: &UnitQuaternion<f64>) -> Cells {
+        Cells { quaternion: [q.i, q.j, q.k, q.w], ..Cells::default() }
     }
 }

@@ -1,4 +1,4 @@
-//! From CSV files to [`Measurements`].
+//! Reader of CSV files and tables in memory into [`Measurements`].
 
 use std::path::{Path, PathBuf};
 
@@ -18,19 +18,18 @@ use crate::files::same_file;
 use crate::problem::{JointSource, Missing, Problem, RotationKind};
 
 impl Measurements {
-    /// Reads the files, one after the other, and says which columns were passed over.
+    /// Reads files one after the other; also returns warnings, for example about ignored columns.
     ///
     /// # Errors
-    /// The first mistake found, a file that cannot be read among them.
+    /// The first error in the files, or a file cannot be read.
     pub fn read(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
         Self::read_table(files, problem, true)
     }
 
-    /// Reads poses that may still be to measure: as [`Measurements::read`], with positions zero
-    /// where there are none.
+    /// Reads poses that may still be unmeasured; missing positions are zero.
     ///
     /// # Errors
-    /// The first mistake found, a file that cannot be read among them.
+    /// The first error in the files, or a file cannot be read.
     pub fn read_poses(
         files: &[PathBuf],
         problem: &Problem,
@@ -38,10 +37,10 @@ impl Measurements {
         Self::read_table(files, problem, false)
     }
 
-    /// Reads a table in memory, and says which columns were passed over.
+    /// Reads a table in memory; also returns warnings, for example about ignored columns.
     ///
     /// # Errors
-    /// The first mistake found.
+    /// The first error in the table.
     pub fn read_columns(
         table: ColumnTable,
         problem: &Problem,
@@ -49,11 +48,10 @@ impl Measurements {
         Self::read_column_table(table, problem, true)
     }
 
-    /// Reads poses that may still be to measure from a table in memory: as
-    /// [`Measurements::read_columns`], with positions zero where there are none.
+    /// Reads poses from a table in memory that may still be unmeasured; missing positions are zero.
     ///
     /// # Errors
-    /// The first mistake found.
+    /// The first error in the table.
     pub fn read_pose_columns(
         table: ColumnTable,
         problem: &Problem,
@@ -70,7 +68,7 @@ impl Measurements {
         for (index, file) in files.iter().enumerate() {
             if files.iter().take(index).any(|other| other == file || same_file(other, file)) {
                 let again = InputErrorKind::RepeatedFile { path: file.clone() };
-                return Err(of_file(
+                return Err(file_error(
                     (file, files),
                     problem,
                     [again, InputErrorKind::GivenFileRepeated],
@@ -78,7 +76,7 @@ impl Measurements {
             }
             let missing = || {
                 let named = InputErrorKind::DataFileMissing { path: file.clone() };
-                of_file((file, files), problem, [named, InputErrorKind::GivenFileMissing])
+                file_error((file, files), problem, [named, InputErrorKind::GivenFileMissing])
             };
             tables.read(index, Table::open(file, &problem.data.dialect, missing)?)?;
         }
@@ -92,17 +90,17 @@ impl Measurements {
     ) -> Result<(Self, Vec<Warning>), InputError> {
         let name = table.name().to_owned();
         let mut tables = Tables::new(std::slice::from_ref(&name), problem, measured);
-        let written = problem.data.dialect.in_memory();
-        tables.read(0, Table::of_text(&name, &written, Box::new(table.into_text()))?)?;
+        let dialect = problem.data.dialect.in_memory();
+        tables.read(0, Table::from_reader(&name, &dialect, Box::new(table.into_text()))?)?;
         tables.finish()
     }
 }
 
-/// Tables that are read one after the other.
+/// Reader of several tables, one after the other.
 struct Tables<'a> {
     files: &'a [PathBuf],
     problem: &'a Problem,
-    /// Whether the poses have been measured.
+    /// True if the poses have been measured.
     measured: bool,
     warnings: Vec<Warning>,
     builder: Option<Builder>,
@@ -113,11 +111,11 @@ impl<'a> Tables<'a> {
         Self { files, problem, measured, warnings: Vec::new(), builder: None }
     }
 
-    /// Reads all rows of a table, that of the file with this number.
+    /// Reads all rows of a table; `index` is the number of its file.
     fn read(&mut self, index: usize, mut table: Table) -> Result<(), InputError> {
         let dialect = &self.problem.data.dialect;
         let mut columns = Columns::find(&table, self.problem, self.measured, &mut self.warnings)?;
-        observed::names_targets(&table, &columns, self.problem)?;
+        observed::check_target_column(&table, &columns, self.problem)?;
         if !table.next_row()? {
             let line = table.line();
             return Err(Location::file(&table.file)
@@ -129,26 +127,31 @@ impl<'a> Tables<'a> {
             .builder
             .get_or_insert_with(|| Builder::new(self.files, &table, &columns, self.problem));
         rows.same_columns(&table, &columns)?;
-        let (before, mut left_out) = (rows.seen(), LeftOut::default());
+        let (before, mut left_out) = (rows.row_count(), LeftOut::default());
         loop {
-            let lost = dialect
+            let missing = dialect
                 .missing
                 .as_ref()
                 .is_some_and(|missing| is_missing(missing, &table, &columns));
-            if lost && !columns.observes_at(&table) {
+            if missing && !columns.observes_at(&table) {
                 left_out.count(&table);
             } else if let Some(name) = columns.nest(&table) {
                 rows.push_nest(index, name, &table, &columns)?;
             } else {
                 let in_point = (columns.file == Some(Role::Point)).then(|| rows.stem(index));
-                let all = observed::of_row(
+                let observations = observed::of_row(
                     &table,
                     &columns,
-                    (self.problem, self.measured, lost),
+                    (self.problem, self.measured, missing),
                     in_point,
                 )?;
-                observed::known_target(&table, &columns, (rows.stem(index), &all), self.problem)?;
-                for observed in &all {
+                observed::check_target(
+                    &table,
+                    &columns,
+                    (rows.stem(index), &observations),
+                    self.problem,
+                )?;
+                for observed in &observations {
                     rows.push(index, &table, &columns, observed)?;
                 }
             }
@@ -156,14 +159,14 @@ impl<'a> Tables<'a> {
                 break;
             }
         }
-        if rows.seen() == before {
+        if rows.row_count() == before {
             return Err(Location::file(&table.file).error(InputErrorKind::AllMissing));
         }
         self.warnings.extend(left_out.warning());
         Ok(())
     }
 
-    /// Everything that was read.
+    /// Returns the measurements of all tables.
     fn finish(self) -> Result<(Measurements, Vec<Warning>), InputError> {
         let Self { problem, measured, mut warnings, builder, .. } = self;
         match builder {
@@ -173,7 +176,7 @@ impl<'a> Tables<'a> {
                     let file = measurements.files.first().cloned().unwrap_or_default();
                     return Err(Location::file(&file).error(InputErrorKind::NestsAlone));
                 }
-                observed::complete(&mut measurements, problem)?;
+                observed::add_known_distances(&mut measurements, problem)?;
                 let commands = commands(&columns);
                 warnings.extend(measurements.many_turns(problem, &commands));
                 warnings.extend(measurements.kelvins());
@@ -189,7 +192,7 @@ impl<'a> Tables<'a> {
     }
 }
 
-/// Rows of a table in which nothing was measured.
+/// Rows without a measurement.
 #[derive(Default)]
 struct LeftOut {
     rows: usize,
@@ -208,7 +211,7 @@ impl LeftOut {
     }
 }
 
-/// Whether the position of the row is what stands where nothing was measured.
+/// Returns true if the position of the current row is the marker for a missing measurement.
 fn is_missing(missing: &Missing, table: &Table, columns: &Columns) -> bool {
     let axis = |column: &&Column| match column.role {
         Role::Position(axis) => Some((axis, column.place)),
@@ -222,7 +225,9 @@ fn is_missing(missing: &Missing, table: &Table, columns: &Columns) -> bool {
         Missing::Position(nothing) => {
             let same = |(axis, place): (usize, usize)| {
                 table.number(place).is_ok_and(|value| {
-                    nothing.get(axis).is_some_and(|own| own.to_bits() == (value + 0.0).to_bits())
+                    nothing
+                        .get(axis)
+                        .is_some_and(|marker| marker.to_bits() == (value + 0.0).to_bits())
                 })
             };
             cells.peek().is_some() && cells.all(same)
@@ -230,7 +235,7 @@ fn is_missing(missing: &Missing, table: &Table, columns: &Columns) -> bool {
     }
 }
 
-/// Whether a table has commands and readings of the joints, of each as many.
+/// Returns true if a table has as many commands as readings of joints.
 fn both_joints(columns: &Columns) -> bool {
     let count = |reading: bool| {
         let of_joint = |column: &&Column| matches!(column.role, Role::Joint(_) | Role::Reading(_));
@@ -244,7 +249,7 @@ fn both_joints(columns: &Columns) -> bool {
     count(true) > 0 && count(true) == count(false)
 }
 
-/// How a table writes the commands of a joint, if that is what a column holds.
+/// Returns the description of a column of commands, or `None` for another column.
 fn command(column: &Column, table: &Table) -> Option<CommandColumn> {
     let Role::Joint(joint) = column.role else { return None };
     Some(CommandColumn {
@@ -254,7 +259,7 @@ fn command(column: &Column, table: &Table) -> Option<CommandColumn> {
     })
 }
 
-/// The columns of commands among all of them.
+/// Returns the columns of commands.
 fn commands(columns: &[(Column, String)]) -> Vec<Commands<'_>> {
     let joints = columns.iter().filter_map(|(column, name)| match column.role {
         Role::Joint(joint) => Some(Commands { joint, name, to_si: column.to_si }),
@@ -263,9 +268,9 @@ fn commands(columns: &[(Column, String)]) -> Vec<Commands<'_>> {
     joints.collect()
 }
 
-/// The error of one of the files: `named` at the line of the problem that names it, or else `given`
-/// on the command line.
-fn of_file(
+/// Returns the error of a data file: `named` at the line of the problem that names it, or `given`
+/// for a file of the command line.
+fn file_error(
     (file, files): (&Path, &[PathBuf]),
     problem: &Problem,
     [named, given]: [InputErrorKind; 2],
@@ -277,23 +282,23 @@ fn of_file(
     }
 }
 
-/// Measurements that grow row by row.
+/// Measurements under construction.
 struct Builder {
     measurements: Measurements,
     session: LabelsBuilder,
     target: LabelsBuilder,
     poses: PoseNames,
-    /// Whether readings are the configurations.
-    uses: bool,
-    /// Whether rows may measure something else than positions.
+    /// True if readings are the configurations.
+    uses_readings: bool,
+    /// True if rows may measure something other than positions.
     mixed: bool,
-    /// Whether rows name one of several declared targets.
+    /// True if rows name one of several declared targets.
     names_targets: bool,
-    /// What rx, ry and rz are.
+    /// Convention of rx, ry and rz.
     rotation: RotationKind,
-    /// What the files are called, where that stands for something.
+    /// Names of the files without extension, which may be the value of a column.
     stems: Vec<String>,
-    /// Columns of the first file and their names.
+    /// Columns of the first file with their names.
     columns: Vec<(Column, String)>,
 }
 
@@ -316,8 +321,8 @@ impl Builder {
             position_unit: columns
                 .read
                 .iter()
-                .find(|own| own.role == Role::Position(0))
-                .map(|own| (own.to_si)(1.0)),
+                .find(|column| column.role == Role::Position(0))
+                .map(|column| (column.to_si)(1.0)),
             orientations: (columns.orientations() != (false, false)).then(Vec::new),
             sigma: if mixed { Some(Vec::new()) } else { list(Role::Sigma) },
             payload: list(Role::Payload),
@@ -340,7 +345,7 @@ impl Builder {
             warnings: Vec::new(),
             order: RowOrder::default(),
         };
-        let poses = PoseNames::of(columns.has(Role::Pose));
+        let poses = PoseNames::new(columns.has(Role::Pose));
         let columns = columns
             .read
             .iter()
@@ -352,7 +357,7 @@ impl Builder {
             session,
             target,
             poses,
-            uses: problem.data.joints == JointSource::Read,
+            uses_readings: problem.data.joints == JointSource::Read,
             mixed,
             names_targets,
             rotation: problem.data.dialect.rotation,
@@ -361,18 +366,18 @@ impl Builder {
         }
     }
 
-    /// Rows so far, those of fixed points among them.
-    fn seen(&self) -> usize {
+    /// Returns the number of rows so far, including those of fixed points.
+    fn row_count(&self) -> usize {
         self.measurements.len() + self.measurements.nests.len()
     }
 
-    /// What a file is called, where that stands for something.
+    /// Returns the name of a file without extension.
     fn stem(&self, file: usize) -> &str {
         self.stems.get(file).map_or("", String::as_str)
     }
 
-    /// Whether a file has the columns of the first one; `pose` alone may come and go, and what is
-    /// measured, and of which target, where that may be something else than positions.
+    /// Checks that a file has the columns of the first one. The column `pose` is optional, and so
+    /// are the columns of observations and targets if rows measure different quantities.
     fn same_columns(&self, table: &Table, columns: &Columns) -> Result<(), InputError> {
         let differ = |name: &str, has| {
             let other = self.measurements.files.first().cloned().unwrap_or_default();
@@ -391,14 +396,14 @@ impl Builder {
             }
         }
         for column in columns.read.iter().filter(|column| !comes_and_goes(column.role)) {
-            if !self.columns.iter().any(|(own, _)| own.role == column.role) {
+            if !self.columns.iter().any(|(known, _)| known.role == column.role) {
                 return differ(table.name_of(column.place), false);
             }
         }
         Ok(())
     }
 
-    /// Adds the row that the table is at, which measures a fixed point.
+    /// Appends the current row, which measures a fixed point.
     fn push_nest(
         &mut self,
         file: usize,
@@ -440,7 +445,7 @@ impl Builder {
         Ok(())
     }
 
-    /// Adds what is `observed` in the row that the table is at.
+    /// Appends the observation of the current row.
     fn push(
         &mut self,
         file: usize,
@@ -474,7 +479,7 @@ impl Builder {
             match column.role {
                 Role::Joint(joint) | Role::Reading(joint) => {
                     let value = number()?;
-                    if self.uses == column.role.is_reading() {
+                    if self.uses_readings == column.role.is_reading() {
                         set(&mut measurements.configurations, row * joints + joint, value);
                     } else if let Some(other) = &mut measurements.other_configurations {
                         set(other, row * joints + joint, value);
@@ -484,10 +489,10 @@ impl Builder {
                 Role::Sigma
                     if self.mixed
                         && (observation.is_angle() || table.text(column.place)?.is_empty()) => {}
-                Role::Sigma => add(&mut measurements.sigma, above_zero(table, column)?),
-                Role::Payload => add(&mut measurements.payload, not_negative(table, column)?),
-                Role::Hoist => add(&mut measurements.hoist, number()?),
-                Role::Temperature => add(&mut measurements.temperature, number()?),
+                Role::Sigma => push(&mut measurements.sigma, above_zero(table, column)?),
+                Role::Payload => push(&mut measurements.payload, not_negative(table, column)?),
+                Role::Hoist => push(&mut measurements.hoist, number()?),
+                Role::Temperature => push(&mut measurements.temperature, number()?),
                 Role::Time => measurements.time.push(table.time(column.place, column.to_si)?),
                 Role::Approach(joint) => {
                     let direction = direction(table, column)?;
@@ -497,16 +502,16 @@ impl Builder {
                 }
                 Role::Orientation(axis) => set(turned.angles.as_mut_slice(), axis, number()?),
                 Role::Quaternion(axis) => set(&mut turned.quaternion, axis, number()?),
-                // In the order of the problem: columns are in that of their roles.
+                // Columns are sorted by role, so covariates have the order of the problem.
                 Role::Covariate(_) => measurements.covariates.push(number()?),
                 Role::Split => _ = is_validation(table, column.place)?,
                 Role::Session => self.session.push(table.name(column.place)?),
-                // Tilts need no target, and one that is named is known.
+                // Tilts need no target; a named one has been checked.
                 Role::Target if self.names_targets && observation.is_angle() => {
                     self.target.push(table.text(column.place)?);
                 }
                 Role::Target => self.target.push(table.name(column.place)?),
-                // Rows of the arm name none, and what they measure is known already.
+                // These columns are empty or have been read by [`observed::of_row`].
                 Role::Nest
                 | Role::Point
                 | Role::Anchor
@@ -535,7 +540,7 @@ impl Builder {
         measurements.position_measured &= measured;
         if self.mixed {
             measurements.observations.push(observation);
-            measurements.sigma.iter_mut().for_each(|all| all.resize(row + 1, f64::NAN));
+            measurements.sigma.iter_mut().for_each(|column| column.resize(row + 1, f64::NAN));
         }
         if let Some(orientations) = &mut measurements.orientations {
             orientations.push(match columns.orientations() {
@@ -550,7 +555,7 @@ impl Builder {
         Ok(())
     }
 
-    /// All that was read, and the columns of the first file.
+    /// Returns the measurements and the columns of the first file.
     fn finish(self) -> (Measurements, Vec<(Column, String)>) {
         let Self { mut measurements, session, target, poses, columns, .. } = self;
         (measurements.pose, measurements.pose_names) = poses.finish();
@@ -564,14 +569,14 @@ impl Builder {
     }
 }
 
-/// Gives a place of a list, which is there, its value.
+/// Sets an existing element of a list.
 fn set(list: &mut [f64], place: usize, value: f64) {
-    if let Some(own) = list.get_mut(place) {
-        *own = value;
+    if let Some(element) = list.get_mut(place) {
+        *element = value;
     }
 }
 
-fn add(list: &mut Option<Vec<f64>>, value: f64) {
+fn push(list: &mut Option<Vec<f64>>, value: f64) {
     if let Some(list) = list {
         list.push(value);
     }

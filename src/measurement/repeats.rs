@@ -1,4 +1,4 @@
-//! Rows that repeat a pose.
+//! Rows that repeat a configuration or pose.
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -6,21 +6,21 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::Measurements;
 use crate::problem::{Effect, JointKind, Observation, Problem};
 
-/// Configurations agree where each angle does to this \[rad\].
+/// Tolerance of equal angles \[rad\].
 const ANGLE_STEP: f64 = 0.01 * std::f64::consts::PI / 180.0;
-/// Configurations agree where each length does to this \[m\].
+/// Tolerance of equal lengths \[m\].
 const LENGTH_STEP: f64 = 1e-4;
-/// Payloads and hoist forces agree where they do to this part of the largest.
+/// Tolerance of equal payloads and hoist forces, as a fraction of the largest.
 const LOAD_STEP: f64 = 0.01;
-/// Temperatures agree where they do to this \[K\].
+/// Tolerance of equal temperatures \[K\].
 const TEMPERATURE_STEP: f64 = 1.0;
-/// Numbers of words and directions agree where they are the same.
-const SAME: f64 = 0.5;
+/// Tolerance of words and directions, which are whole numbers.
+const WORD_STEP: f64 = 0.5;
 
 impl Measurements {
-    /// The configuration of each row and how many there are, numbered in an order that is not that
-    /// of the rows: by session, by pose number and time where they were written down, then by what
-    /// was measured.
+    /// Returns the number of each row's configuration and the number of distinct configurations.
+    /// The numbering does not depend on the order of the rows: it follows session, pose number,
+    /// time and measured values.
     pub(super) fn configurations(&self, problem: &Problem) -> (Vec<usize>, usize) {
         let mut order: Vec<usize> = (0..self.len()).collect();
         let keys: Vec<_> = order.iter().map(|&row| self.key(row)).collect();
@@ -29,10 +29,10 @@ impl Measurements {
             a.0.cmp(b.0).then(numbers.fold(Ordering::Equal, Ordering::then))
         };
         order.sort_by(|&a, &b| compare(&keys[a], &keys[b]));
-        numbered(&self.joint_columns(problem), &order)
+        group_rows(&self.joint_columns(problem), &order)
     }
 
-    /// By what rows are ordered: session, pose number, time, configuration, position.
+    /// Returns the sort key of a row: session, pose number, time, configuration, position.
     fn key(&self, row: usize) -> (&str, Vec<f64>) {
         let session = self.session.names.get(self.session.of_row[row]).map_or("", String::as_str);
         let pose = self.pose.as_ref().map(|poses| poses[row]);
@@ -43,17 +43,18 @@ impl Measurements {
         (session, pose.into_iter().chain(time).chain(measured).collect())
     }
 
-    /// The pose of each row, numbered in order of appearance: rows of one pose tell the same about
-    /// the arm.
+    /// Returns the number of each row's pose, in order of appearance. Rows of one pose contain the
+    /// same information about the arm.
     ///
-    /// They agree in configuration, session and target, in payload and hoist where something of the
-    /// arm gives way or an effect is declared, and in temperature and approach where a declared
+    /// They agree in configuration, session and target. They also agree in payload and hoist if the
+    /// arm is elastic or an effect is declared, and in temperature and approach if a declared
     /// effect depends on them.
     pub fn pose_numbers(&self, problem: &Problem) -> Vec<usize> {
         self.numbers(problem, true)
     }
 
-    /// The same whatever the target: rows of several targets in one pose show one pose of the arm.
+    /// Returns the number of each row's pose regardless of the target: rows of several targets can
+    /// show one pose of the arm.
     pub fn arm_pose_numbers(&self, problem: &Problem) -> Vec<usize> {
         self.numbers(problem, false)
     }
@@ -62,7 +63,7 @@ impl Measurements {
         let mut columns = self.joint_columns(problem);
         let words = |of_row: &[usize]| Column {
             values: of_row.iter().map(|&word| word as f64).collect(),
-            step: SAME,
+            step: WORD_STEP,
         };
         columns.push(words(&self.session.of_row));
         columns
@@ -75,11 +76,12 @@ impl Measurements {
             };
             columns.push(words(&(0..self.len()).map(number).collect::<Vec<_>>()));
         }
-        let declared =
-            |matters: fn(&Effect) -> bool| problem.effects.iter().any(|own| matters(&own.effect));
-        let gives_way =
+        let declared = |matters: fn(&Effect) -> bool| {
+            problem.effects.iter().any(|declared| matters(&declared.effect))
+        };
+        let is_elastic =
             problem.joints.iter().any(|joint| joint.stiffness.is_some() || joint.beam.is_some());
-        if gives_way || !problem.effects.is_empty() {
+        if is_elastic || !problem.effects.is_empty() {
             for load in [&self.payload, &self.hoist].into_iter().flatten() {
                 let largest = load.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
                 let step = if largest > 0.0 { LOAD_STEP * largest } else { 1.0 };
@@ -95,10 +97,11 @@ impl Measurements {
             let side = |joint: usize| {
                 (0..self.len()).map(|row| approach[row * self.joints + joint]).collect()
             };
-            columns
-                .extend((0..self.joints).map(|joint| Column { values: side(joint), step: SAME }));
+            columns.extend(
+                (0..self.joints).map(|joint| Column { values: side(joint), step: WORD_STEP }),
+            );
         }
-        numbered(&columns, &(0..self.len()).collect::<Vec<_>>()).0
+        group_rows(&columns, &(0..self.len()).collect::<Vec<_>>()).0
     }
 
     fn joint_columns(&self, problem: &Problem) -> Vec<Column> {
@@ -110,25 +113,25 @@ impl Measurements {
     }
 }
 
-/// How many different numbers some rows have.
-pub(crate) fn different(numbers: &[usize], rows: impl IntoIterator<Item = usize>) -> usize {
+/// Returns the number of distinct `numbers` among some rows.
+pub(crate) fn count_distinct(numbers: &[usize], rows: impl IntoIterator<Item = usize>) -> usize {
     rows.into_iter().map(|row| numbers[row]).collect::<BTreeSet<_>>().len()
 }
 
-/// A value of every row, and within what values agree.
+/// Values of all rows and the tolerance within which they agree.
 struct Column {
     values: Vec<f64>,
     step: f64,
 }
 
-/// The group of each row, numbered as they appear in `order`, which holds every row, and how many
-/// groups there are.
+/// Returns the group of each row and the number of groups, numbered in the order of the rows in
+/// `order`.
 ///
-/// A row belongs to the group of an earlier row if every column differs by at most its step. Only
-/// rows are compared whose weighted sums Σ wⱼ vⱼ/stepⱼ, in bins of Σ wⱼ, fall in the same or
-/// neighbouring bins: rows that agree always do.
-fn numbered(columns: &[Column], order: &[usize]) -> (Vec<usize>, usize) {
-    // Weights without a common measure, so that unlike rows seldom share a bin.
+/// A row belongs to the group of an earlier row if every column differs by at most its step.
+/// Candidates are found by weighted sums Σ wⱼ vⱼ/stepⱼ in bins of width Σ wⱼ: rows that agree lie
+/// in the same or neighbouring bins.
+fn group_rows(columns: &[Column], order: &[usize]) -> (Vec<usize>, usize) {
+    // Irrational ratios of the weights let different rows rarely share a bin.
     let weights: Vec<f64> =
         (1..=columns.len()).map(|j| 0.5 + (j as f64 * 0.618_033_988_749_895).fract()).collect();
     let width: f64 = weights.iter().sum();
@@ -139,11 +142,13 @@ fn numbered(columns: &[Column], order: &[usize]) -> (Vec<usize>, usize) {
         let sum: f64 = columns
             .iter()
             .zip(&weights)
-            .map(|(own, weight)| weight * own.values[row] / own.step)
+            .map(|(column, weight)| weight * column.values[row] / column.step)
             .sum();
         let bin = floor(sum / width);
         let agrees = |&&(first, _): &&(usize, usize)| {
-            columns.iter().all(|own| (own.values[row] - own.values[first]).abs() <= own.step)
+            columns
+                .iter()
+                .all(|column| (column.values[row] - column.values[first]).abs() <= column.step)
         };
         let near = (-1..=1).filter_map(|side| first_rows.get(&bin.saturating_add(side))).flatten();
         let number = near.clone().find(agrees).map_or(count, |&(_, number)| number);

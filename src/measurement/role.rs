@@ -1,13 +1,13 @@
-//! What columns stand for, and what they are called.
+//! Roles of columns and their names.
 
 use crate::problem::Problem;
 use crate::quantity::Unit;
 
-/// What a column stands for; joints and axes count from 0.
+/// Role of a column; joints and axes count from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Role {
     Joint(usize),
-    /// What a joint's encoder read.
+    /// Encoder reading of a joint.
     Reading(usize),
     Position(usize),
     Sigma,
@@ -22,25 +22,25 @@ pub(super) enum Role {
     Session,
     Target,
     Pose,
-    /// Which fixed point a row without an arm measures.
+    /// Fixed point measured by a row without the arm.
     Nest,
-    /// One of the problem's own covariates.
+    /// Declared covariate.
     Covariate(usize),
-    /// At which point the target is.
+    /// Point that the target touches.
     Point,
-    /// To which anchor a distance is measured, and that distance.
+    /// Anchor and measured distance to it.
     Anchor,
     Distance,
-    /// Which surface is touched, and how far from it.
+    /// Surface and measured distance from it.
     Surface,
     Offset,
-    /// Which frame is tilted, and by how much its x and y axes are.
+    /// Frame and measured tilts of its x and y axes.
     Frame,
     Tilt(usize),
 }
 
 impl Role {
-    /// The table of `problem.toml` that has to declare something for the column to mean anything.
+    /// Returns the table of `problem.toml` that must declare the fixtures of this column.
     fn declared_by(self) -> Option<&'static str> {
         match self {
             Self::Point => Some("point"),
@@ -50,16 +50,16 @@ impl Role {
         }
     }
 
-    /// Whether the column means something in this problem.
+    /// Returns true if the column has a meaning in this problem.
     pub fn is_known_to(self, problem: &Problem) -> bool {
         if matches!(self, Self::Frame | Self::Tilt(_)) {
             return problem.data.tilt_sigma.is_some();
         }
         self.declared_by()
-            .is_none_or(|word| problem.fixtures.iter().any(|own| own.kind.word() == word))
+            .is_none_or(|word| problem.fixtures.iter().any(|fixture| fixture.kind.word() == word))
     }
 
-    /// What `problem.toml` lacks for a column of this name to mean anything, if it lacks something.
+    /// Returns the missing declaration if a column of this name has no meaning in this problem.
     pub fn undeclared(name: &str, problem: &Problem) -> Option<&'static str> {
         let tilts = name.strip_prefix("tilt_").is_some_and(|rest| rest.starts_with(['x', 'y']));
         let (role, write) = match name {
@@ -72,7 +72,8 @@ impl Role {
         (!role.is_known_to(problem)).then_some(write)
     }
 
-    /// Whether it says what is measured rather than where or under which conditions.
+    /// Returns true if the column holds measured values or what they refer to, false for
+    /// configurations and conditions.
     pub fn is_observed(self) -> bool {
         self.declared_by().is_some()
             || matches!(
@@ -85,14 +86,14 @@ impl Role {
             )
     }
 
-    /// Whether it is what a joint's encoder read.
+    /// Returns true for encoder readings.
     pub fn is_reading(self) -> bool {
         matches!(self, Self::Reading(_))
     }
 }
 
-/// Columns without a unit.
-pub(super) const PLAIN: [(&str, Role); 13] = [
+/// Names of columns without a unit.
+pub(super) const COLUMNS_WITHOUT_UNIT: [(&str, Role); 13] = [
     ("nest", Role::Nest),
     ("split", Role::Split),
     ("session", Role::Session),
@@ -108,9 +109,9 @@ pub(super) const PLAIN: [(&str, Role); 13] = [
     ("qw", Role::Quaternion(3)),
 ];
 
-/// Columns with a unit, and whether they need one: a column such as `time` may be about something
-/// else.
-pub(super) const MEASURED: [(&str, Role, Unit, bool); 13] = [
+/// Names of columns with a unit. The flag is true if a missing unit is an error; other names, such
+/// as `time`, may mean something else.
+pub(super) const COLUMNS_WITH_UNIT: [(&str, Role, Unit, bool); 13] = [
     ("x", Role::Position(0), Unit::Length, true),
     ("y", Role::Position(1), Unit::Length, true),
     ("z", Role::Position(2), Unit::Length, true),

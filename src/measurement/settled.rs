@@ -1,4 +1,4 @@
-//! What a column `time` holds, as its first cell says.
+//! Interpretation of a column `time` by its first cell.
 
 use super::columns::{Column, Columns};
 use super::role::Role;
@@ -7,20 +7,20 @@ use crate::error::{InputError, InputErrorKind, Warning, WarningKind};
 use crate::quantity::Unit;
 
 impl Columns {
-    /// A column `time` without a unit holds dates, or else nothing that is known: it is left out
-    /// with a warning.
+    /// Keeps a column `time` without a unit if its first cell is a date; otherwise ignores it with
+    /// a warning.
     ///
     /// # Errors
-    /// A map says that it holds times, and its first cell is none.
+    /// `[data.columns]` maps the column to `time`, and its first cell is no time.
     pub fn settle_time(
         &mut self,
         table: &Table,
         warnings: &mut Vec<Warning>,
     ) -> Result<(), InputError> {
-        let dated =
+        let has_times =
             |column: &Column| (column.to_si)(0.0).is_finite() || table.is_date(column.place);
         if let Some(place) =
-            self.read.iter().position(|column| column.role == Role::Time && !dated(column))
+            self.read.iter().position(|column| column.role == Role::Time && !has_times(column))
         {
             let column = self.read.remove(place);
             let (theirs, value) =
@@ -32,7 +32,7 @@ impl Columns {
                     .at_line(table.line())
                     .error(InputErrorKind::NotATime { value }));
             }
-            let write = Unit::Time.spelled("time");
+            let write = Unit::Time.alternatives("time");
             let kind = if is_number {
                 WarningKind::UnitIgnored { write }
             } else {

@@ -1,4 +1,4 @@
-//! Rows to fit and rows to judge by.
+//! Split of the rows into fitted and held-out ones.
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -8,20 +8,20 @@ use super::Measurements;
 use crate::error::{InputError, InputErrorKind, NoRows};
 use crate::problem::{HeldOut, Observation, Problem};
 
-/// Rows to identify with and rows held out, each in ascending order.
+/// Rows that are fitted and rows that are held out, each in ascending order.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Split {
-    /// Rows that take part in fitting and in choosing.
+    /// Rows used for fitting and for choosing effects.
     pub identification: Vec<usize>,
-    /// Rows that take part in neither.
+    /// Rows used for neither.
     pub held_out: Vec<usize>,
 }
 
 impl Split {
-    /// Divides the rows as the problem says; neither part may be empty.
+    /// Splits the rows as the problem declares.
     ///
     /// # Errors
-    /// An empty part, a session that nobody measured, or no word on what is held out.
+    /// A part is empty, the held-out session does not exist, or no split is declared.
     pub fn new(problem: &Problem, measurements: &Measurements) -> Result<Self, InputError> {
         let error = |kind| problem.data.held_out_location.clone().error(kind);
         let marked =
@@ -30,7 +30,7 @@ impl Split {
             None | Some(HeldOut::Column(_)) => marked()?,
             Some(HeldOut::Session(session)) => of_session(session, measurements).map_err(error)?,
             Some(HeldOut::Fraction { fraction, seed }) => {
-                at_random(*fraction, *seed, problem, measurements)
+                random_fraction(*fraction, *seed, problem, measurements)
             }
         };
         let held_out = with_known_distances(held_out, measurements);
@@ -56,8 +56,8 @@ impl Split {
     }
 }
 
-/// The same, with a known distance among the fitted rows where both of its points are touched
-/// there, else held out.
+/// Moves each known distance to the fitted rows if both of its points are touched there, otherwise
+/// to the held-out rows.
 fn with_known_distances(mut held_out: Vec<bool>, measurements: &Measurements) -> Vec<bool> {
     let touched = |point: usize| {
         (0..measurements.len())
@@ -87,8 +87,8 @@ fn of_session(session: &str, measurements: &Measurements) -> Result<Vec<bool>, I
     }
 }
 
-/// Marks rows until they make up the fraction; rows of one configuration stay together.
-fn at_random(
+/// Marks random configurations until their rows reach the fraction.
+fn random_fraction(
     fraction: f64,
     seed: u64,
     problem: &Problem,

@@ -1,4 +1,4 @@
-//! A CSV file, record by record, with its lines counted.
+//! CSV file that is read record by record with line numbers.
 
 use std::fs::File;
 use std::io::{self, BufReader, Chain, Cursor, Read};
@@ -7,31 +7,31 @@ use std::sync::Arc;
 
 use csv::{ByteRecord, Reader, ReaderBuilder};
 
-use super::dialect::{LOOKED_AT, Layout, Rewritten};
-use super::lines::{Lines, RECORD_KIB};
+use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
+use super::lines::{Lines, MAX_RECORD_KIB};
 use super::time::iso_8601;
 use crate::error::{
     BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, is_hidden, lines,
 };
 use crate::problem::Dialect;
-use crate::problem::item::GREATEST;
+use crate::problem::item::MAX_MAGNITUDE;
 
-/// Most columns of a table.
-const COLUMNS: usize = 10_000;
+/// Maximum number of columns of a table.
+const MAX_COLUMNS: usize = 10_000;
 
-/// How the workbooks of spreadsheet programs begin, which are archives.
-const WORKBOOK: &[u8] = b"PK\x03\x04";
+/// First bytes of a spreadsheet workbook, which is a ZIP archive.
+const WORKBOOK_SIGNATURE: &[u8] = b"PK\x03\x04";
 
-/// A text, its beginning looked at already.
-type Looked = Chain<Cursor<Vec<u8>>, Box<dyn Read>>;
+/// Text whose beginning has already been read.
+type TextFromStart = Chain<Cursor<Vec<u8>>, Box<dyn Read>>;
 
-/// An open CSV file.
+/// Open CSV file.
 pub(super) struct Table {
     pub file: PathBuf,
-    /// The names in the header line, without white space at their ends.
+    /// Names in the header line without surrounding white space.
     pub header: Vec<String>,
     header_line: usize,
-    reader: Reader<Rewritten<Lines<BufReader<Looked>>>>,
+    reader: Reader<NormalizedText<Lines<BufReader<TextFromStart>>>>,
     record: ByteRecord,
     line: usize,
     delimiter: char,
@@ -39,8 +39,8 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// Opens a file written in a `dialect` and reads its header; `missing` makes the error where
-    /// there is no such file.
+    /// Opens a file with the given `dialect` and reads its header; `missing` makes the error if the
+    /// file does not exist.
     pub fn open(
         file: &Path,
         dialect: &Dialect,
@@ -50,29 +50,29 @@ impl Table {
             io::ErrorKind::NotFound => missing(),
             _ => Location::file(file).error(InputErrorKind::Unreadable { source }),
         })?;
-        Self::of_text(file, dialect, Box::new(input))
+        Self::from_reader(file, dialect, Box::new(input))
     }
 
-    /// Reads the header of a text; messages call it `file`.
-    pub fn of_text(
+    /// Reads the header of a text; `file` names it in messages.
+    pub fn from_reader(
         file: &Path,
         dialect: &Dialect,
         mut input: Box<dyn Read>,
     ) -> Result<Self, InputError> {
         let unreadable = |source| Location::file(file).error(InputErrorKind::Unreadable { source });
         let mut beginning = Vec::new();
-        input.by_ref().take(LOOKED_AT).read_to_end(&mut beginning).map_err(unreadable)?;
-        if beginning.starts_with(WORKBOOK) {
+        input.by_ref().take(HEADER_SEARCH_BYTES).read_to_end(&mut beginning).map_err(unreadable)?;
+        if beginning.starts_with(WORKBOOK_SIGNATURE) {
             return Err(Location::file(file).error(InputErrorKind::Workbook));
         }
-        let layout = Layout::of(&beginning, dialect);
+        let layout = Layout::detect(&beginning, dialect);
         let lines =
             Lines::new(BufReader::with_capacity(1 << 16, Cursor::new(beginning).chain(input)));
         let reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
             .delimiter(layout.byte())
-            .from_reader(Rewritten::new(lines, layout, dialect.comment.as_deref()));
+            .from_reader(NormalizedText::new(lines, layout, dialect.comment.as_deref()));
         let mut table = Self {
             file: file.to_owned(),
             header: Vec::new(),
@@ -87,19 +87,23 @@ impl Table {
             return Err(Location::file(file).at_line(1).error(InputErrorKind::EmptyTable));
         }
         table.header_line = table.line;
-        let mistake = |kind| Location::file(file).at_line(table.line).error(kind);
-        if table.record.len() > COLUMNS {
+        let header_error = |kind| Location::file(file).at_line(table.line).error(kind);
+        if table.record.len() > MAX_COLUMNS {
             let found = table.record.len();
-            return Err(mistake(InputErrorKind::TooMany { what: "columns", found, most: COLUMNS }));
+            return Err(header_error(InputErrorKind::TooMany {
+                what: "columns",
+                found,
+                most: MAX_COLUMNS,
+            }));
         }
         if BYTE_ORDER_MARKS.iter().any(|mark| table.record.as_slice().starts_with(mark)) {
-            return Err(mistake(InputErrorKind::Utf16));
+            return Err(header_error(InputErrorKind::Utf16));
         }
         for cell in &table.record {
             match std::str::from_utf8(cell.trim_ascii()) {
                 Ok(name) if !name.contains('\0') => table.header.push(name.to_owned()),
-                // A line of what is not text says nothing.
-                _ => return Err(mistake(InputErrorKind::HeaderNotUtf8)),
+                // A header that is not text cannot be shown.
+                _ => return Err(header_error(InputErrorKind::HeaderNotUtf8)),
             }
         }
         if let [only] = table.header.as_slice()
@@ -110,7 +114,7 @@ impl Table {
         Ok(table)
     }
 
-    /// Goes to the next row; false at the end.
+    /// Reads the next row; returns false at the end.
     pub fn next_row(&mut self) -> Result<bool, InputError> {
         if !self.advance()? {
             return Ok(false);
@@ -132,15 +136,15 @@ impl Table {
         self.reader.get_mut().start_record();
         let found = self.reader.read_byte_record(&mut self.record).map_err(|error| {
             if matches!(error.kind(), csv::ErrorKind::Io(source) if source.kind() == io::ErrorKind::FileTooLarge) {
-                let kind = InputErrorKind::LineTooLong { most: RECORD_KIB };
+                let kind = InputErrorKind::LineTooLong { most: MAX_RECORD_KIB };
                 return Location::file(&self.file).at_line(first).error(kind);
             }
             let source = io::Error::from(error);
             Location::file(&self.file).error(InputErrorKind::Unreadable { source })
         })?;
         if found {
-            // Every record ends in a line feed of its own; one that does not is open to the end of
-            // the file.
+            // Every record ends in a line feed. A record without one has a quote that is open to
+            // the end of the file.
             self.line = self.next_line().saturating_sub(lines(self.record.as_slice()));
             if self.line < first {
                 self.line = first;
@@ -152,12 +156,12 @@ impl Table {
         Ok(found)
     }
 
-    /// The line at which the reader stands.
+    /// Returns the line of the reader.
     fn next_line(&self) -> usize {
         usize::try_from(self.reader.position().line()).unwrap_or(usize::MAX)
     }
 
-    /// Line of the row, counted from 1.
+    /// Returns the line of the row, counted from 1.
     pub fn line(&self) -> usize {
         self.line
     }
@@ -166,13 +170,13 @@ impl Table {
         self.record.get(place).unwrap_or_default().trim_ascii()
     }
 
-    /// A cell of the row as text, without white space at its ends.
+    /// Returns a cell of the row as text without surrounding white space.
     pub fn text(&self, place: usize) -> Result<&str, InputError> {
         std::str::from_utf8(self.cell(place))
             .map_err(|_| self.cell_error(place, InputErrorKind::NotUtf8))
     }
 
-    /// A cell of the row as a word that is not empty.
+    /// Returns a cell of the row as a word that is not empty.
     pub fn word(&self, place: usize) -> Result<&str, InputError> {
         let word = self.text(place)?;
         if word.is_empty() {
@@ -182,7 +186,7 @@ impl Table {
         }
     }
 
-    /// A cell of the row as a word that can be seen.
+    /// Returns a cell of the row as a word without invisible characters.
     pub fn name(&self, place: usize) -> Result<&str, InputError> {
         let word = self.word(place)?;
         match word.chars().find(|&character| is_hidden(character)) {
@@ -193,15 +197,15 @@ impl Table {
         }
     }
 
-    /// A cell of the row as a finite number.
+    /// Returns a cell of the row as a finite number.
     pub fn number(&self, place: usize) -> Result<f64, InputError> {
         let word = self.word(place)?;
         let value = || shortened(word);
         let with_point = (self.decimal_comma && word.contains(',')).then(|| word.replace(',', "."));
         match with_point.as_deref().unwrap_or(word).parse::<f64>() {
-            Ok(number) if number.abs() <= GREATEST => Ok(number),
+            Ok(number) if number.abs() <= MAX_MAGNITUDE => Ok(number),
             Ok(number) if number.is_finite() => {
-                Err(self.cell_error(place, InputErrorKind::TooGreat { value: value() }))
+                Err(self.cell_error(place, InputErrorKind::MagnitudeTooLarge { value: value() }))
             }
             Ok(_) => Err(self.cell_error(place, InputErrorKind::NotFinite { value: value() })),
             Err(_) if word.contains(',') && !self.decimal_comma => {
@@ -211,8 +215,8 @@ impl Table {
         }
     }
 
-    /// A cell of the row as a time: a number in a unit, or a date and time after ISO 8601 \[s since
-    /// 1970\].
+    /// Returns a cell of the row as a time: a number with a unit \[s\], or a date and time \[s
+    /// since 1970\].
     pub fn time(&self, place: usize, to_si: fn(f64) -> f64) -> Result<f64, InputError> {
         let word = self.word(place)?;
         match iso_8601(word) {
@@ -229,35 +233,35 @@ impl Table {
         }
     }
 
-    /// Whether a cell of the row is a date and time after ISO 8601.
+    /// Returns true if a cell of the row is a date and time.
     pub fn is_date(&self, place: usize) -> bool {
         self.text(place).is_ok_and(|word| iso_8601(word).is_some())
     }
 
-    /// Name of a column.
+    /// Returns the name of a column in the header.
     pub fn name_of(&self, place: usize) -> &str {
         self.header.get(place).map_or("", String::as_str)
     }
 
-    /// A mistake in a cell of the row.
+    /// Returns an error in a cell of the row.
     pub fn cell_error(&self, place: usize, kind: InputErrorKind) -> InputError {
         let name = self.name_of(place);
         self.location(Some(place)).with_key(format!("column {}", shortened(name))).error(kind)
     }
 
-    /// A place in the header line.
+    /// Returns the place of a column in the header line.
     pub fn column(&self, name: &str) -> Location {
         Location::file(&self.file)
             .at_line(self.header_line)
             .with_key(format!("column {}", shortened(name)))
     }
 
-    /// A mistake in the row as a whole.
+    /// Returns an error about the whole row.
     pub fn error(&self, kind: InputErrorKind) -> InputError {
         self.location(None).error(kind)
     }
 
-    /// The row as text, with one of its cells marked.
+    /// Returns the place of the row, with its text and one marked cell.
     fn location(&self, place: Option<usize>) -> Location {
         let (mut text, mut span) = (String::new(), None);
         for (index, cell) in self.record.iter().enumerate() {
@@ -276,7 +280,7 @@ impl Table {
     }
 }
 
-/// At most 40 characters of a text.
+/// Returns at most 40 characters of a text.
 pub(super) fn shortened(text: &str) -> String {
     crate::error::shortened(text, 40)
 }

@@ -1,11 +1,11 @@
-//! Dates and times after ISO 8601.
+//! Dates and times.
 
-/// Seconds from 1970-01-01T00:00 UTC to a date and time, if that is what a text is; without a zone
-/// it is taken as UTC.
+/// Parses a date and time of ISO 8601 and returns the seconds since 1970-01-01T00:00 UTC. Without a
+/// zone UTC is assumed.
 ///
-/// Extended (`2024-05-31T14:03:20.25+02:00`, with a space for the T) and basic (`20240531T140320Z`,
-/// also without the T); seconds may be left out of the extended form, and have a decimal point or
-/// comma.
+/// Accepted are the extended form (`2024-05-31T14:03:20.25+02:00`, also with a space instead of T)
+/// and the basic form (`20240531T140320Z`, also without T). In the extended form seconds may be
+/// absent; they may have a decimal point or comma.
 pub(super) fn iso_8601(text: &str) -> Option<f64> {
     let (clock, zone) = split_zone(text.trim());
     let plain: String = clock.chars().filter(|c| !"-:T ".contains(*c)).collect();
@@ -48,12 +48,12 @@ pub(super) fn iso_8601(text: &str) -> Option<f64> {
     Some(whole as f64 + fraction)
 }
 
-/// A time without its zone, and the zone [s ahead of UTC]; `None` where that is none.
+/// Splits off the zone [s ahead of UTC]; the zone is `None` if it is invalid.
 fn split_zone(text: &str) -> (&str, Option<i64>) {
     if let Some(clock) = text.strip_suffix('Z') {
         return (clock, Some(0));
     }
-    // A sign before the time of the day is part of the date.
+    // A sign before the time of day is part of the date.
     let day = text.find(['T', ' ']).unwrap_or(text.len());
     let sign = text.get(day..).and_then(|rest| rest.rfind(['+', '-'])).map(|place| day + place);
     let Some((clock, zone)) = sign.and_then(|place| Some((text.get(..place)?, text.get(place..)?)))
@@ -72,8 +72,8 @@ fn split_zone(text: &str) -> (&str, Option<i64>) {
     (clock, ahead.map(|ahead| if zone.starts_with('-') { -ahead } else { ahead }))
 }
 
-/// Days from 1970-01-01 to a date of the Gregorian calendar, leap years counted: years begin in
-/// March.
+/// Returns the days from 1970-01-01 to a date of the Gregorian calendar. Years start in March, so
+/// that the leap day is last.
 fn days(year: i64, month: i64, day: i64) -> i64 {
     let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
     365 * year + year.div_euclid(4) - year.div_euclid(100)

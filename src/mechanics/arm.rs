@@ -98,7 +98,7 @@ impl<S: Scalar> Arm<S> {
     pub(crate) fn rigid_frame(&self, setup: &PoseView, tip: usize) -> Frame<S> {
         let mut frame = Frame::identity();
         for (index, (joint, &q)) in self.joints.iter().zip(setup.configuration).enumerate() {
-            if self.tree.leads_through(index, tip) {
+            if self.tree.path_contains(index, tip) {
                 joint.advance(&mut frame, q);
             }
         }
@@ -109,7 +109,7 @@ impl<S: Scalar> Arm<S> {
     /// that does not deflect; arm base frame.
     pub fn rigid_joints(&self, configuration: &[f64]) -> Vec<(Vector3<S>, Vector3<S>, Frame<S>)> {
         let mut frame = Frame::identity();
-        let mut forks = vec![frame; self.tree.further_on_base()];
+        let mut forks = vec![frame; self.tree.extra_branches_at_base()];
         let along = |(index, (joint, &q)): (usize, (&Joint<S>, &f64))| {
             if self.tree.begins_branch(index) {
                 frame = forks.pop().unwrap_or(frame);
@@ -117,7 +117,7 @@ impl<S: Scalar> Arm<S> {
             let mut root = frame;
             joint.root(&mut root);
             joint.advance(&mut frame, q);
-            forks.extend((0..self.tree.further_on(index)).map(|_| frame));
+            forks.extend((0..self.tree.extra_branches_on(index)).map(|_| frame));
             (root.origin, root.axes[2], frame)
         };
         self.joints.iter().zip(configuration).enumerate().map(along).collect()

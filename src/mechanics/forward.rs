@@ -158,7 +158,9 @@ impl<S: Scalar> Arm<S> {
         for (index, ((joint, beyond), rope)) in
             self.joints.iter().zip(&mut ws.beyond).zip(&ws.ropes).enumerate().rev()
         {
-            for (more, pull) in (0..self.tree.further_on(index)).filter_map(|_| ws.weights.pop()) {
+            for (more, pull) in
+                (0..self.tree.extra_branches_on(index)).filter_map(|_| ws.weights.pop())
+            {
                 mass += more;
                 hoisted += pull;
             }
@@ -226,7 +228,7 @@ impl<S: Scalar> Arm<S> {
         }
         ws.frames.clear();
         ws.keep(&walk.frame);
-        walk.fork(self.tree.further_on_base(), ws);
+        walk.fork(self.tree.extra_branches_at_base(), ws);
         for (i, joint) in self.joints.iter().enumerate() {
             if self.tree.begins_branch(i) {
                 walk.branch(ws);
@@ -241,7 +243,7 @@ impl<S: Scalar> Arm<S> {
             walk.cut(Segment::Joint(i), 0, &mut ws.events, &mut ws.cuts);
             if let Some(beam) = &joint.beam {
                 self.walk_beam(beam, i, &mut walk, ws);
-            } else if self.tree.leads_through(i, tip) {
+            } else if self.tree.path_contains(i, tip) {
                 ws.trail.push(walk.frame.origin);
             }
             if let Some(lateral) = &joint.lateral {
@@ -272,7 +274,7 @@ impl<S: Scalar> Arm<S> {
                 walk.frame.translate_z(offset);
             }
             walk.frame.rotate_y(joint.beta.sin_cos);
-            if self.tree.leads_through(i, tip) {
+            if self.tree.path_contains(i, tip) {
                 ws.trail.push(walk.frame.origin);
             }
             ws.keep(&walk.frame);
@@ -295,7 +297,7 @@ impl<S: Scalar> Arm<S> {
                 found = walk.frame;
                 ws.passed = ws.events.len();
             }
-            walk.fork(self.tree.further_on(i), ws);
+            walk.fork(self.tree.extra_branches_on(i), ws);
         }
         found
     }
@@ -374,7 +376,7 @@ impl<S: Scalar> Arm<S> {
                     events.push(Event::Tip { at: walk.frame.origin });
                 }
             }
-            if self.tree.leads_through(link, walk.tip) {
+            if self.tree.path_contains(link, walk.tip) {
                 trail.push(walk.frame.origin);
             }
         }

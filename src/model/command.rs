@@ -17,7 +17,7 @@ impl Model {
     #[must_use]
     pub fn with_free_commands(&self, problem: &Problem, x: &DVector<f64>) -> Self {
         let arm = self.arm(|k| x[k]);
-        let parameters = commands(problem, &arm, Joint::commanded);
+        let parameters = commands(problem, &arm, Joint::command_kind);
         Self {
             nominal: arm,
             driven: Driven::all(&self.driven, &self.parameters, x.as_slice()),

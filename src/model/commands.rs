@@ -83,8 +83,11 @@ mod tests {
         assert!(commands.series.len() == 2 && commands.others.len() == 3);
         // A pose with strains of the last one would show it.
         for configuration in [[0.3, -1.2], [0.9, 0.4]] {
-            let pose =
-                PoseView { temperature: Some(&31.0), elapsed: 7.0, ..PoseView::of(&configuration) };
+            let pose = PoseView {
+                temperature: Some(&31.0),
+                elapsed: 7.0,
+                ..PoseView::from_configuration(&configuration)
+            };
             let (mut joints, mut strains) = (configuration, [[0.0; 3]; 2]);
             for Driven { place, regressor, value } in &known {
                 match *place {

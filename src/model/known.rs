@@ -140,7 +140,7 @@ mod tests {
             (0..600).map(|k| [0.01 * f64::from(k), 2.0 * (0.03 * f64::from(k)).sin()]).collect();
         let seen = Vector3::new(0.1, 0.2, 0.3);
         let pose = |own, sigma| Pose {
-            setup: PoseView::of(own),
+            setup: PoseView::from_configuration(own),
             base: 0,
             target: 0,
             observation: Observation::Position,

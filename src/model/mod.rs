@@ -163,7 +163,7 @@ impl Model {
         let Arm { joints, tree, .. } = &self.nominal;
         let links = |tip: usize| -> f64 {
             let carrying =
-                joints.iter().enumerate().filter(|(joint, _)| tree.leads_through(*joint, tip));
+                joints.iter().enumerate().filter(|(joint, _)| tree.path_contains(*joint, tip));
             carrying.map(|(_, own)| length(own)).sum()
         };
         let to_target = |(target, &tip): (&Vector3<f64>, &usize)| links(tip) + target.norm();

@@ -77,7 +77,7 @@ impl Rigid {
         let mut point = *target;
         let way = || {
             let all = links.iter().zip(setup.configuration).enumerate();
-            all.filter(|(joint, _)| tree.leads_through(*joint, tip)).map(|(_, own)| own)
+            all.filter(|(joint, _)| tree.path_contains(*joint, tip)).map(|(_, own)| own)
         };
         for (link, &q) in way().rev() {
             let coordinates = link.joint.coordinates(q);

@@ -120,7 +120,7 @@ mod tests {
         assert!(series.len() == 1 && left.len() == 4 && left[..3] == few);
         for k in -30..30 {
             let configuration = [0.4, 0.21 * f64::from(k), 1.0];
-            let pose = PoseView::of(&configuration);
+            let pose = PoseView::from_configuration(&configuration);
             let expected: f64 = all.iter().map(|own| own.value * own.regressor.value(&pose)).sum();
             assert!((series[0].value(&configuration) - expected).abs() < 1e-15);
         }

@@ -73,19 +73,23 @@ fn check(
 ) -> Result<(), InputErrorKind> {
     let name = || parameter.name.clone();
     if !exists(problem, bases, targets, parameter) {
-        return Err(InputErrorKind::EntersNowhere { name: name() });
+        return Err(InputErrorKind::SiteAbsent { name: name() });
     }
     if parameter.regressor.is_constant() {
         let same =
             |other: &EffectParameter| other.regressor.is_constant() && other.site == parameter.site;
         if is_declared(parameter.site) || others.iter().any(same) {
-            return Err(InputErrorKind::Occupied { name: name() });
+            return Err(InputErrorKind::SiteOccupied { name: name() });
         }
     } else if !is_drivable(problem, parameter.site, parameter.regressor) {
-        return Err(InputErrorKind::NotDrivable { name: name() });
+        return Err(InputErrorKind::RegressorNotAllowed { name: name() });
     }
     let twin = |other: &EffectParameter| other.name == parameter.name;
-    if others.iter().any(twin) { Err(InputErrorKind::Occupied { name: name() }) } else { Ok(()) }
+    if others.iter().any(twin) {
+        Err(InputErrorKind::SiteOccupied { name: name() })
+    } else {
+        Ok(())
+    }
 }
 
 /// Whether the arm has what the parameter enters and what drives it.

@@ -162,7 +162,7 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
     /// The number of a joint that takes a command.
     pub fn moving_joint(&mut self, key: &str) -> Result<usize, InputError> {
         let joint = self.any_joint(key)?;
-        let kind = self.joints.get(joint - 1).map(Joint::commanded);
+        let kind = self.joints.get(joint - 1).map(Joint::command_kind);
         if let (Some(JointKind::Fixed), Some(item)) = (kind, self.section.peek(key)) {
             return Err(item.error(InputErrorKind::NoCommand { joint }));
         }
@@ -271,7 +271,7 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         let base = key.strip_suffix("_s").unwrap_or(key);
         self.section
             .number(base, Unit::Time)?
-            .ok_or_else(|| self.section.missing(base, Unit::Time.spelled(base)))
+            .ok_or_else(|| self.section.missing(base, Unit::Time.alternatives(base)))
     }
 
     /// A time above zero \[s\]; its key ends in the unit.
@@ -280,7 +280,7 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         let found = self
             .section
             .positive(base, Unit::Time, |value| InputErrorKind::NotPositive { value })?;
-        found.ok_or_else(|| self.section.missing(base, Unit::Time.spelled(base)))
+        found.ok_or_else(|| self.section.missing(base, Unit::Time.alternatives(base)))
     }
 
     /// An angle above zero \[rad\]; its key ends in the unit.
@@ -289,7 +289,7 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         let found = self
             .section
             .positive(base, Unit::Angle, |value| InputErrorKind::NotPositive { value })?;
-        found.ok_or_else(|| self.section.missing(base, Unit::Angle.spelled(base)))
+        found.ok_or_else(|| self.section.missing(base, Unit::Angle.alternatives(base)))
     }
 
     /// An end of a spring, x and y in the plane across the axis, which it does not lie on \[m\];
@@ -297,7 +297,7 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
     pub fn arm(&mut self, key: &str) -> Result<[f64; 2], InputError> {
         let base = key.strip_suffix("_m").unwrap_or(key);
         let Some((item, suffix)) = self.section.quantity(base, Unit::Length)? else {
-            return Err(self.section.missing(base, Unit::Length.spelled(base)));
+            return Err(self.section.missing(base, Unit::Length.alternatives(base)));
         };
         let end = item.pair()?.map(suffix.to_si);
         if end[0].hypot(end[1]) > 0.0 {
@@ -311,7 +311,9 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
     pub fn free_length(&mut self, key: &str) -> Result<FreeLength, InputError> {
         let base = key.strip_suffix("_m").unwrap_or(key);
         let found = self.section.not_negative(base, Unit::Length)?;
-        found.map(FreeLength).ok_or_else(|| self.section.missing(base, Unit::Length.spelled(base)))
+        found
+            .map(FreeLength)
+            .ok_or_else(|| self.section.missing(base, Unit::Length.alternatives(base)))
     }
 }
 
@@ -330,7 +332,7 @@ impl<'s> Examples<'s> {
     fn moving(&self) -> impl Iterator<Item = usize> {
         (1..)
             .zip(self.joints)
-            .filter(|(_, joint)| joint.commanded() != JointKind::Fixed)
+            .filter(|(_, joint)| joint.command_kind() != JointKind::Fixed)
             .map(|(number, _)| number)
     }
 

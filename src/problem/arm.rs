@@ -1,4 +1,4 @@
-//! The sections `[[joint]]` and what hangs on them.
+//! Reader of `[[joint]]` with its beams, hoists and bodies.
 
 use nalgebra::Vector3;
 
@@ -8,7 +8,7 @@ use super::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement, effect, stand
 use crate::error::{InputError, InputErrorKind};
 use crate::quantity::Unit;
 
-/// Every `[[joint]]`, at least one, and whether they are written in the standard form.
+/// Reads all `[[joint]]` tables, at least one. The flag is true if they use the standard DH form.
 pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<(Vec<Joint>, bool), InputError> {
     let form = root
         .word("dh", &["modified", "standard"], &[Form::Modified, Form::Standard])?
@@ -28,41 +28,44 @@ pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<(Vec<Joint>, bool), I
     if joints.is_empty() {
         return Err(root.location().with_key("joint").error(InputErrorKind::NoJoints));
     }
-    let leads: Vec<bool> = joints
+    let can_lead: Vec<bool> = joints
         .iter()
         .zip(&mimics)
-        .map(|(own, mimic)| own.kind != JointKind::Fixed && mimic.is_none())
+        .map(|(joint, mimic)| joint.kind != JointKind::Fixed && mimic.is_none())
         .collect();
     for ((joint, section), parent) in joints.iter_mut().zip(mimics).zip(tree::parents(&parents)?) {
-        joint.mimic = section.map(|section| mimic(section, &leads)).transpose()?;
+        joint.mimic = section.map(|section| mimic(section, &can_lead)).transpose()?;
         joint.parent = parent;
     }
     let is_standard = form == Form::Standard;
     Ok((if is_standard { standard::modified(joints) } else { joints }, is_standard))
 }
 
-/// In which order a row of the joint table moves.
+/// Order of the elementary transforms in a row of the joint table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Form {
-    /// α and a before θ and d.
+    /// Modified DH: α and a act before θ and d.
     Modified,
-    /// θ and d before a and α.
+    /// Standard DH: θ and d act before a and α.
     Standard,
 }
 
-/// `mimic = { joint = 2, ratio = -1.0 }`; `leads` says of each joint whether others may follow it.
-fn mimic(mut section: Section<'_, '_>, leads: &[bool]) -> Result<Mimic, InputError> {
+/// Reads `mimic = { joint = 2, ratio = -1.0 }`. `can_lead[j]` is true if joint j takes a command,
+/// so that others may follow it.
+fn mimic(mut section: Section<'_, '_>, can_lead: &[bool]) -> Result<Mimic, InputError> {
     let item = section.require("joint", "joint = …, the number of the joint that it follows")?;
     let number = item.whole(0)?;
     let joint = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
-    let mimic = match joint.and_then(|joint| Some((joint, *leads.get(joint)?))) {
+    let mimic = match joint.and_then(|joint| Some((joint, *can_lead.get(joint)?))) {
         Some((joint, true)) => {
             Mimic { joint, ratio: section.get("ratio").map_or(Ok(1.0), |item| item.number())? }
         }
-        Some((_, false)) => return Err(item.error(InputErrorKind::NoLeader { joint: number })),
+        Some((_, false)) => {
+            return Err(item.error(InputErrorKind::LeaderNotCommanded { joint: number }));
+        }
         None => {
             return Err(
-                item.error(InputErrorKind::UnknownJoint { joint: number, joints: leads.len() })
+                item.error(InputErrorKind::UnknownJoint { joint: number, joints: can_lead.len() })
             );
         }
     };
@@ -82,7 +85,7 @@ fn joint(
         .word("kind", &["revolute", "prismatic", "fixed"], &kinds)?
         .unwrap_or(JointKind::Revolute);
     if follows && kind == JointKind::Fixed {
-        return Err(section.error(InputErrorKind::FixedFollows));
+        return Err(section.error(InputErrorKind::FixedJointMimics));
     }
     let placement = if kind == JointKind::Fixed { placement(&mut section)? } else { None };
     let (mut alpha, mut a, mut theta, mut d, mut beta) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -128,14 +131,14 @@ fn joint(
     })
 }
 
-/// `xyz_m` and `rpy_deg`, in URDF's order, if one of them is there.
+/// Reads `xyz_m` and `rpy_deg` in URDF convention; returns `None` if both are absent.
 pub(super) fn placement(section: &mut Section<'_, '_>) -> Result<Option<Placement>, InputError> {
     let (xyz, rpy) = (section.vector("xyz", Unit::Length)?, section.vector("rpy", Unit::Angle)?);
     let given = xyz.is_some() || rpy.is_some();
     Ok(given.then(|| Placement { xyz: xyz.unwrap_or_default(), rpy: rpy.unwrap_or_default() }))
 }
 
-/// Range of q, infinite where none is given.
+/// Reads the range of q; a side without a limit is infinite.
 fn limits(section: &mut Section<'_, '_>, kind: JointKind) -> Result<(f64, f64), InputError> {
     let unit = match kind {
         JointKind::Revolute => Unit::Angle,
@@ -170,7 +173,7 @@ fn beam(mut section: Section<'_, '_>, beams: &mut Vec<String>) -> Result<Beam, I
     Ok(Beam { name, mass, ea, ei_y, ei_z, gj, masses, hoist })
 }
 
-/// The name of a beam, which begins the names of its parameters.
+/// Reads the name of a beam, which is the prefix of its parameters.
 fn beam_name(item: &Item<'_, '_>, beams: &[String]) -> Result<String, InputError> {
     let name = item.text()?.to_owned();
     let reserved = name
@@ -195,7 +198,7 @@ fn hoist(mut section: Section<'_, '_>) -> Result<Hoist, InputError> {
     let direction = match section.get("direction") {
         Some(item) => {
             let given = item.vector()?;
-            // Scaled first, so that neither huge nor tiny numbers lose their direction.
+            // Scaling first keeps the direction of very large and very small vectors.
             let largest = given.amax();
             let scaled = if largest > 0.0 { given.map(|value| value / largest) } else { given };
             scaled.try_normalize(0.0).ok_or_else(|| item.error(InputErrorKind::NoDirection))?
@@ -206,7 +209,7 @@ fn hoist(mut section: Section<'_, '_>) -> Result<Hoist, InputError> {
     Ok(Hoist { at, force, direction })
 }
 
-/// Point masses; `base` is the key of their position.
+/// Reads point masses; `base` is the key of their position.
 fn bodies(
     section: &mut Section<'_, '_>,
     key: &str,
@@ -231,7 +234,7 @@ fn bodies(
     Ok(bodies)
 }
 
-/// A stiffness or rigidity, above zero where it is given.
+/// Reads an optional stiffness or rigidity, which must be above zero.
 fn stiff(section: &mut Section<'_, '_>, base: &str, unit: Unit) -> Result<Option<f64>, InputError> {
-    section.positive(base, unit, |value| InputErrorKind::NotStiff { value })
+    section.positive(base, unit, |value| InputErrorKind::StiffnessNotPositive { value })
 }

@@ -1,67 +1,71 @@
-//! Under which conditions a pose is measured, and from which ranges poses are drawn.
+//! Conditions under which poses are measured, and the ranges from which poses are drawn.
 
-use super::past::{Past, PastOf};
+use super::past::{LazyPast, Past};
 use super::{Effect, Problem};
 
-/// What the controller and the test bench set for one pose.
+/// Configuration and test conditions of one pose.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PoseConditions {
-    /// Configuration q, shape = (joints) \[rad\] or \[m\]; fixed joints ignore theirs.
+    /// Configuration q, shape = (joints) \[rad\] or \[m\]; values of fixed joints are ignored.
     pub configuration: Vec<f64>,
-    /// Payload \[kg\]; `None`: as the problem declares.
+    /// Payload \[kg\]; `None` for the payload that the problem declares.
     pub payload: Option<f64>,
-    /// Hoist force \[N\]; `None`: as the problem declares.
+    /// Hoist force \[N\]; `None` for the force that the problem declares.
     pub hoist: Option<f64>,
-    /// Temperature [°C]; `None`: the reference.
+    /// Temperature [°C]; `None` for the reference temperature.
     pub temperature: Option<f64>,
-    /// Time \[s\].
+    /// Time of the measurement \[s\].
     pub time: f64,
     /// Time since the first pose \[s\].
     pub elapsed: f64,
-    /// Direction from which each joint came, shape = (joints), −1, 0 or +1; `None`: not known.
+    /// Direction from which each joint approached, shape = (joints), −1, 0 or +1; `None` if
+    /// unknown.
     pub approach: Option<Vec<f64>>,
-    /// Values of the problem's own covariates, in their order and units; empty: not known.
+    /// Values of the declared covariates in their order and units; empty if unknown.
     pub covariates: Vec<f64>,
-    /// What was before.
+    /// Earlier poses of the session.
     pub past: Past,
 }
 
-/// The same of a pose whose numbers are kept elsewhere, in a table for instance: fits hold one for
-/// each pose.
+/// Borrowed form of [`PoseConditions`]. Its numbers are stored elsewhere, for example in the
+/// columns of a table; a fit holds one view per pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PoseView<'a> {
-    /// Configuration q, shape = (joints) \[rad\] or \[m\]; fixed joints ignore theirs.
+    /// Configuration q, shape = (joints) \[rad\] or \[m\]; values of fixed joints are ignored.
     pub configuration: &'a [f64],
-    /// Payload \[kg\]; `None`: as the problem declares.
+    /// Payload \[kg\]; `None` for the payload that the problem declares.
     pub payload: Option<&'a f64>,
-    /// Hoist force \[N\]; `None`: as the problem declares.
+    /// Hoist force \[N\]; `None` for the force that the problem declares.
     pub hoist: Option<&'a f64>,
-    /// Temperature [°C]; `None`: the reference.
+    /// Temperature [°C]; `None` for the reference temperature.
     pub temperature: Option<&'a f64>,
-    /// Time \[s\].
+    /// Time of the measurement \[s\].
     pub time: f64,
     /// Time since the first pose \[s\].
     pub elapsed: f64,
-    /// Direction from which each joint came, shape = (joints), −1, 0 or +1; `None`: not known.
+    /// Direction from which each joint approached, shape = (joints), −1, 0 or +1; `None` if
+    /// unknown.
     pub approach: Option<&'a [f64]>,
-    /// Values of the problem's own covariates, in their order and units; empty: not known.
+    /// Values of the declared covariates in their order and units; empty if unknown.
     pub covariates: &'a [f64],
-    /// What was before.
-    pub past: PastOf<'a>,
-    /// Strain of the beam of each joint without load, shape = (joints): elongation, then curvatures
-    /// about y and z [1/m]; `None`: none. Most poses have none: a thin reference keeps them small.
+    /// Earlier poses of the session.
+    pub past: LazyPast<'a>,
+    /// Stress-free strain of each joint's beam, shape = (joints): elongation, then curvatures about
+    /// y and z [1/m]. `None` for no strain. A thin reference keeps the views small, because most
+    /// poses have no strain.
     pub strains: Option<&'a Vec<[f64; 3]>>,
 }
 
 impl<'a> PoseView<'a> {
-    /// A configuration, shape = (joints) \[rad\] or \[m\], of which nothing else is known.
-    pub fn of(configuration: &'a [f64]) -> Self {
+    /// Returns a view of a configuration, shape = (joints) \[rad\] or \[m\], without any other
+    /// condition.
+    pub fn from_configuration(configuration: &'a [f64]) -> Self {
         Self { configuration, ..Self::default() }
     }
 }
 
 impl PoseView<'_> {
-    /// The same with numbers of its own, without strains.
+    /// Returns a copy that owns its numbers; strains are left out.
     pub fn to_owned(&self) -> PoseConditions {
         PoseConditions {
             configuration: self.configuration.to_vec(),
@@ -78,16 +82,16 @@ impl PoseView<'_> {
 }
 
 impl PoseConditions {
-    /// Enters the pose into the past of the next one. Temperatures and sides are those of all poses
-    /// or of none.
-    pub(crate) fn enter(&self, past: &mut Past) {
+    /// Appends this pose to the past of the next one. All poses of a past must have a temperature
+    /// or none; the same holds for approach directions.
+    pub(crate) fn append_to(&self, past: &mut Past) {
         past.times.push(self.time);
         past.temperatures.extend(self.temperature);
         past.configurations.extend(&self.configuration);
         past.approaches.extend(self.approach.iter().flatten());
     }
 
-    /// The same for who only reads them.
+    /// Returns a view that borrows these conditions.
     pub fn view(&self) -> PoseView<'_> {
         PoseView {
             configuration: &self.configuration,
@@ -98,36 +102,37 @@ impl PoseConditions {
             elapsed: self.elapsed,
             approach: self.approach.as_deref(),
             covariates: &self.covariates,
-            past: PastOf::from(&self.past),
+            past: LazyPast::from(&self.past),
             strains: None,
         }
     }
 }
 
-/// From where poses are drawn: ranges evenly, each quantity by itself.
+/// Ranges from which poses are drawn uniformly and independently.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PoseRanges {
-    /// Range of each joint, shape = (joints) \[rad\] or \[m\]; not used at fixed joints.
+    /// Range of each joint, shape = (joints) \[rad\] or \[m\]; ranges of fixed joints are ignored.
     pub joints: Vec<(f64, f64)>,
-    /// Payloads to choose from \[kg\]; empty: as the problem declares.
+    /// Payloads to choose from \[kg\]; empty for the payload that the problem declares.
     pub payloads: Vec<f64>,
-    /// Range of the hoist's force \[N\]; `None`: as the problem declares.
+    /// Range of the hoist force \[N\]; `None` for the force that the problem declares.
     pub hoist: Option<(f64, f64)>,
-    /// Range of the temperature [°C]; `None`: not known.
+    /// Range of the temperature [°C]; `None` if unknown.
     pub temperature: Option<(f64, f64)>,
-    /// Whether each joint comes from a side that is chosen; otherwise nobody knows from where.
+    /// True if an approach direction is drawn for each joint; otherwise directions are unknown.
     pub approach: bool,
-    /// Range of each of the problem's own covariates, in its unit; empty: not known.
+    /// Range of each declared covariate in its unit; empty if unknown.
     pub covariates: Vec<(f64, f64)>,
 }
 
 impl PoseRanges {
-    /// The same without temperatures, sides and covariates on which no declared effect depends:
-    /// they need not be set.
+    /// Returns these ranges without the temperatures, approach directions and covariates on which
+    /// no declared effect depends, because they need not be set.
     #[must_use]
-    pub fn that_matter(self, problem: &Problem) -> Self {
-        let declared =
-            |matters: fn(&Effect) -> bool| problem.effects.iter().any(|own| matters(&own.effect));
+    pub fn relevant_to(self, problem: &Problem) -> Self {
+        let declared = |matters: fn(&Effect) -> bool| {
+            problem.effects.iter().any(|declared| matters(&declared.effect))
+        };
         let (thermal, sided) = (declared(Effect::is_thermal), declared(Effect::has_sides));
         let covariates = if declared(|effect| effect.covariate().is_some()) {
             self.covariates

@@ -1,58 +1,58 @@
-//! `[[constraint]]`: linear inequalities between parameters.
+//! Reader of `[[constraint]]`: linear inequalities between parameters.
 
 use super::item::Item;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
-/// `[[constraint]]`: at_least ≤ Σ coefficient · parameter ≤ at_most.
+/// Linear inequality `[[constraint]]`: at_least ≤ Σ coefficient · parameter ≤ at_most.
 #[derive(Debug, Clone)]
 pub struct Constraint {
-    /// Parameters and their coefficients.
+    /// Parameters with their coefficients.
     pub terms: Vec<ConstraintTerm>,
-    /// Lower limit.
+    /// Lower limit of the sum.
     pub at_least: Option<Limit>,
-    /// Upper limit.
+    /// Upper limit of the sum.
     pub at_most: Option<Limit>,
-    /// For errors.
+    /// Place in the file, for errors.
     pub location: Location,
 }
 
-/// One term of a constraint.
+/// Term of a constraint: one parameter with its coefficient.
 #[derive(Debug, Clone)]
 pub struct ConstraintTerm {
     /// Name of the parameter.
     pub name: String,
-    /// Its coefficient, not zero.
+    /// Coefficient of the parameter, not zero.
     pub coefficient: f64,
-    /// For errors.
+    /// Place in the file, for errors.
     pub location: Location,
 }
 
-/// A limit of a constraint.
+/// Limit of a constraint.
 #[derive(Debug, Clone)]
 pub struct Limit {
-    /// Value \[rad\], \[m\] or of the logarithm.
+    /// Value of the limit \[rad\], \[m\] or logarithm.
     pub value: f64,
-    /// What it limits.
+    /// Kind of quantity that the constraint adds up.
     pub kind: LimitKind,
-    /// For errors.
+    /// Place in the file, for errors.
     pub location: Location,
 }
 
-/// What a constraint adds up.
+/// Kind of quantity that a constraint adds up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LimitKind {
-    /// Angles \[rad\].
+    /// Sum of angles \[rad\].
     Angle,
-    /// Lengths \[m\].
+    /// Sum of lengths \[m\].
     Length,
-    /// Logarithms of stiffnesses and rigidities in SI units.
+    /// Sum of logarithms of stiffnesses and rigidities in SI units.
     Logarithm,
 }
 
-/// Every constraint, in the order of the file.
+/// Reads all constraints in the order of the file.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Vec<Constraint>, InputError> {
     root.sections("constraint")?.into_iter().map(constraint).collect()
 }
@@ -61,7 +61,7 @@ fn constraint(mut section: Section<'_, '_>) -> Result<Constraint, InputError> {
     let item = section.require("terms", "terms = { \"A.EI\" = 1.0, \"B.EI\" = -1.0 }")?;
     let mut terms = Vec::new();
     for (name, term) in item.section()?.entries() {
-        // `terms = { A.EI = 1.0 }` without quotes is a table `A` that holds `EI`.
+        // TOML reads `terms = { A.EI = 1.0 }` without quotes as a table `A` with the key `EI`.
         if term.holds_tables() {
             let inner = term.section()?.entries().first().map_or("…", |(inner, _)| *inner);
             return Err(
@@ -97,7 +97,7 @@ fn constraint(mut section: Section<'_, '_>) -> Result<Constraint, InputError> {
     Ok(Constraint { terms, at_least, at_most, location: section.location() })
 }
 
-/// A limit in one of its units, or bare for logarithms.
+/// Reads a limit with its unit; a limit of logarithms has none.
 fn limit<'a, 'i>(
     section: &mut Section<'a, 'i>,
     base: &str,
@@ -106,9 +106,9 @@ fn limit<'a, 'i>(
     if let Some(item) = section.get(base) {
         found.push((item.number()?, LimitKind::Logarithm, item));
     }
-    for (unit, of) in [(Unit::Angle, LimitKind::Angle), (Unit::Length, LimitKind::Length)] {
+    for (unit, kind) in [(Unit::Angle, LimitKind::Angle), (Unit::Length, LimitKind::Length)] {
         if let Some((item, suffix)) = section.pick(base, unit)? {
-            found.push(((suffix.to_si)(item.number()?), of, item));
+            found.push(((suffix.to_si)(item.number()?), kind, item));
         }
     }
     if let [_, (.., second), ..] = &found[..] {

@@ -1,4 +1,4 @@
-//! `[data]`: where the measurements are and how they are used.
+//! Reader of `[data]`: measurement files and their use.
 
 use std::path::{Path, PathBuf};
 
@@ -9,72 +9,72 @@ use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
-/// Most files of measurements.
-const MOST_FILES: usize = 1000;
-/// Most covariates of one's own: each is looked for at every joint.
-const MOST_COVARIATES: usize = 20;
+/// Maximum number of measurement files.
+const MAX_FILES: usize = 1000;
+/// Maximum number of declared covariates; the search tests each of them at every joint.
+const MAX_COVARIATES: usize = 20;
 
-/// `[data]`.
+/// Section `[data]`: measurement files and their use.
 #[derive(Debug, Clone)]
 pub struct Data {
-    /// Measurement files, already resolved against the problem's folder.
+    /// Measurement files, resolved against the problem's folder.
     pub files: Vec<PathBuf>,
-    /// 1 σ of a measured coordinate \[m\]; `None`: not known.
+    /// Standard deviation of a measured coordinate \[m\]; `None` if unknown.
     pub position_sigma: Option<f64>,
-    /// The same of a target at a point, of a measured distance, and of a distance from a surface
-    /// \[m\].
+    /// Standard deviation of the distance between a target and the point it touches \[m\].
     pub point_sigma: Option<f64>,
-    /// See [`point_sigma`](Self::point_sigma).
+    /// Standard deviation of a measured distance to an anchor \[m\].
     pub distance_sigma: Option<f64>,
-    /// See [`point_sigma`](Self::point_sigma).
+    /// Standard deviation of a measured distance from a surface \[m\].
     pub surface_sigma: Option<f64>,
-    /// 1 σ of a measured tilt \[rad\]; `None`: tilts are not read.
+    /// Standard deviation of a measured tilt \[rad\]; `None` if tilts are not read.
     pub tilt_sigma: Option<f64>,
-    /// Which rows never take part in fitting or choosing; `None` where the file says nothing.
+    /// Rows that take no part in fitting or choosing effects; `None` if the file does not say.
     pub held_out: Option<HeldOut>,
-    /// T₀ [°C].
+    /// Reference temperature T₀ [°C].
     pub reference_temperature: Option<f64>,
-    /// Which of commands and readings of the joints are the configuration.
+    /// Source of the configurations if a table has both commands and readings.
     pub joints: JointSource,
-    /// 1 σ of a measured orientation about each axis \[rad\]; `None`: orientations are not fitted.
+    /// Standard deviation of a measured orientation about each axis \[rad\]; `None` if orientations
+    /// are not fitted.
     pub orientation_sigma: Option<f64>,
-    /// Whether orientations are fitted; without a σ they never are.
+    /// True if orientations are fitted, which requires `orientation_sigma`.
     pub fits_orientation: bool,
-    /// How the files are written.
+    /// Format of the files and names of their columns.
     pub dialect: Dialect,
-    /// Further columns that errors of the arm may depend on, in the order of the file.
-    pub covariates: Vec<OwnCovariate>,
-    /// Where `files` stands, or `[data]`, for errors.
+    /// Covariates on which the arm's errors may depend, in the order of the file.
+    pub covariates: Vec<DeclaredCovariate>,
+    /// Place of `files`, or else of `[data]`, for errors.
     pub files_location: Location,
-    /// Where `held_out` stands, or `[data]`, for errors.
+    /// Place of `held_out`, or else of `[data]`, for errors.
     pub held_out_location: Location,
-    /// Where `[data]` stands, for errors.
+    /// Place of `[data]`, for errors.
     pub location: Location,
 }
 
-/// A line of `[data.covariates]`: a column of one's own, in its own unit.
+/// Entry of `[data.covariates]`: a user column that effects may depend on, in its unit.
 #[derive(Debug, Clone)]
-pub struct OwnCovariate {
+pub struct DeclaredCovariate {
     /// Name of the column.
     pub name: String,
-    /// What it is, in words.
+    /// Description of the covariate for display.
     pub meaning: String,
-    /// For errors.
+    /// Place in the file, for errors.
     pub location: Location,
 }
 
-/// Where the configurations come from, in tables that have both.
+/// Source of the configurations if a table has both commands and readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum JointSource {
-    /// What the joints were told: `q1_deg`.
+    /// Commanded joint coordinates: columns `q1_deg` …
     #[default]
     Commanded,
-    /// What their encoders read: `q1_read_deg`.
+    /// Encoder readings: columns `q1_read_deg` …
     Read,
 }
 
 impl JointSource {
-    /// As the file has it.
+    /// Returns the word used in the file.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Commanded => "commanded",
@@ -83,25 +83,25 @@ impl JointSource {
     }
 }
 
-/// `held_out` of `[data]`.
+/// Value of `held_out` in `[data]`: selection of the rows that are not fitted.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum HeldOut {
-    /// Rows whose column says `validation`.
+    /// Holds out the rows whose cell in this column is `validation`.
     Column(String),
-    /// A random part of the joint configurations; rows of one configuration stay together.
+    /// Holds out a random fraction; rows of one joint configuration stay together.
     Fraction {
-        /// Part of the rows, in (0, 1).
+        /// Fraction of the rows, in (0, 1).
         fraction: f64,
-        /// Seed of the choice.
+        /// Seed of the random choice.
         seed: u64,
     },
-    /// Every row of one session.
+    /// Holds out all rows of one session.
     Session(String),
 }
 
 impl Data {
-    /// 1 σ of what a row measures, as declared \[m\].
+    /// Returns the declared standard deviation of an observation \[m\] or \[rad\].
     pub fn sigma_of(&self, observation: Observation) -> Option<f64> {
         match observation {
             Observation::Position => self.position_sigma,
@@ -114,7 +114,7 @@ impl Data {
     }
 }
 
-/// The section; empty where it is not there.
+/// Reads the section; returns empty settings if it is absent.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     let file = root.location();
     let Some(mut section) = root.section("data")? else {
@@ -144,7 +144,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     if let Some(item) = section.get("files") {
         let folder = file.file.parent().unwrap_or(Path::new(""));
         let names = item.list("a list of file names")?;
-        item.check_count("files", names.len(), MOST_FILES)?;
+        item.check_count("files", names.len(), MAX_FILES)?;
         for element in names {
             files.push(folder.join(element.text()?));
         }
@@ -192,24 +192,24 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     })
 }
 
-/// `name = "what it is"`, one a line.
-fn covariates(section: &Section<'_, '_>) -> Result<Vec<OwnCovariate>, InputError> {
+/// Reads the entries `name = "meaning"`.
+fn covariates(section: &Section<'_, '_>) -> Result<Vec<DeclaredCovariate>, InputError> {
     let entries = section.entries();
     if let Some((_, item)) = entries.first() {
-        item.check_count("covariates", entries.len(), MOST_COVARIATES)?;
+        item.check_count("covariates", entries.len(), MAX_COVARIATES)?;
     }
-    let one = |(name, item): (&str, Item<'_, '_>)| {
-        // Names of parameters have it between brackets, behind a comma.
+    let declaration = |(name, item): (&str, Item<'_, '_>)| {
+        // Parameter names contain the covariate in brackets after a comma.
         if name.trim() != name || name.is_empty() || name.contains(['[', ']', ',', '*', '?', '"']) {
             return Err(item.error(InputErrorKind::NoCovariateName { name: name.to_owned() }));
         }
-        Ok(OwnCovariate {
+        Ok(DeclaredCovariate {
             name: name.to_owned(),
             meaning: item.text()?.to_owned(),
             location: item.location(),
         })
     };
-    entries.into_iter().map(one).collect()
+    entries.into_iter().map(declaration).collect()
 }
 
 fn held_out_rows(mut section: Section<'_, '_>) -> Result<HeldOut, InputError> {

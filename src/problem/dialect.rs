@@ -1,31 +1,30 @@
-//! `[data.columns]` and `[data.format]`: tables as other programs write them.
+//! Reader of `[data.columns]` and `[data.format]`: tables in the format of other programs.
 
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 
-/// Most columns of a map.
-const MOST_COLUMNS: usize = 10_000;
+/// Maximum number of columns in a map.
+const MAX_MAPPED_COLUMNS: usize = 10_000;
 
-/// How tables are written and what their columns are called, where that is not as flexcal writes
-/// them.
+/// Format of a table and names of its columns, as far as they differ from flexcal's.
 #[derive(Debug, Clone, Default)]
 pub struct Dialect {
-    /// What columns stand for, by their names in the table.
+    /// Map from the table's column names to flexcal's.
     pub columns: Vec<ColumnRule>,
-    /// What sets columns apart; `None`: found from the header.
+    /// Column delimiter; `None` if it is found from the header.
     pub delimiter: Option<Delimiter>,
-    /// Whether numbers have a decimal comma.
+    /// True if numbers have a decimal comma.
     pub decimal_comma: bool,
-    /// With what lines begin that say nothing.
+    /// Prefix of comment lines.
     pub comment: Option<String>,
-    /// What stands where nothing was measured.
+    /// Marker of rows in which nothing was measured.
     pub missing: Option<Missing>,
-    /// What rx, ry and rz are.
+    /// Convention of the angles rx, ry, rz.
     pub rotation: RotationKind,
 }
 
 impl Dialect {
-    /// The same of a table in memory, whose cells need nothing to set them apart.
+    /// Returns the dialect for a table in memory, which has neither delimiters nor comments.
     pub(crate) fn in_memory(&self) -> Self {
         Self {
             delimiter: Some(Delimiter::Byte(b',')),
@@ -36,41 +35,41 @@ impl Dialect {
     }
 }
 
-/// What the three angles rx, ry, rz of an orientation R are.
+/// Convention of the three angles rx, ry, rz of an orientation R.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum RotationKind {
-    /// A rotation vector: its direction is the axis, its length the angle.
+    /// Rotation vector: its direction is the axis and its length is the angle.
     #[default]
     Vector,
-    /// R = Rx(rx) Ry(ry) Rz(rz): about axes that turn along.
+    /// Rotations about moving axes: R = Rx(rx) Ry(ry) Rz(rz).
     EulerXyz,
-    /// R = Rz(rz) Ry(ry) Rx(rx): roll, pitch and yaw about axes that stay, as in URDF.
+    /// Roll, pitch and yaw about fixed axes as in URDF: R = Rz(rz) Ry(ry) Rx(rx).
     RollPitchYaw,
 }
 
-/// One line of `[data.columns]`: theirs = ours.
+/// Entry of `[data.columns]`: a column of the table and its name in flexcal.
 #[derive(Debug, Clone)]
 pub struct ColumnRule {
-    /// Which column of the table.
-    pub theirs: ColumnOf,
-    /// What flexcal calls it.
+    /// Column of the table.
+    pub theirs: ColumnSelector,
+    /// Name of the column in flexcal.
     pub ours: String,
-    /// For errors.
+    /// Place in the file, for errors.
     pub location: Location,
 }
 
-/// A column of a table.
+/// Selector of a table column.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum ColumnOf {
-    /// By its name in the header.
+pub enum ColumnSelector {
+    /// Column with this name in the header.
     Name(String),
-    /// By its place, counted from 1: `"#7"`.
+    /// Column at this place, counted from 1: `"#7"`.
     Place(usize),
-    /// The name of the file, in every row: `"#file"`.
+    /// Name of the file as the value of every row: `"#file"`.
     File,
 }
 
-/// What sets columns apart.
+/// Separator between columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Delimiter {
     /// One character.
@@ -79,16 +78,16 @@ pub enum Delimiter {
     Spaces,
 }
 
-/// What the position of a row is where nothing was measured.
+/// Marker of a row in which nothing was measured.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Missing {
-    /// These three numbers, in the unit of the table.
+    /// Position with these three numbers, in the unit of the table.
     Position([f64; 3]),
-    /// One of its cells is this word; the empty one is a word too.
+    /// Position of which a cell is this word; the word may be empty.
     Word(String),
 }
 
-/// What the two sections say; as flexcal writes where they are not there.
+/// Reads both sections; returns flexcal's format if they are absent.
 pub(super) fn read(data: &mut Section<'_, '_>) -> Result<Dialect, InputError> {
     let columns = data.section("columns")?.map_or(Ok(Vec::new()), |section| columns(&section))?;
     let mut dialect = Dialect { columns, ..Dialect::default() };
@@ -131,22 +130,23 @@ pub(super) fn read(data: &mut Section<'_, '_>) -> Result<Dialect, InputError> {
 fn columns(section: &Section<'_, '_>) -> Result<Vec<ColumnRule>, InputError> {
     let entries = section.entries();
     if let Some((_, item)) = entries.first() {
-        item.check_count("columns", entries.len(), MOST_COLUMNS)?;
+        item.check_count("columns", entries.len(), MAX_MAPPED_COLUMNS)?;
     }
     let rule = |(theirs, item): (&str, super::item::Item<'_, '_>)| {
         let theirs = theirs.trim();
         let place = theirs.strip_prefix('#');
         let theirs = match (place, place.and_then(|number| number.parse().ok())) {
-            (Some("file"), _) => ColumnOf::File,
-            (_, Some(place)) if place > 0 => ColumnOf::Place(place),
-            _ => ColumnOf::Name(theirs.to_owned()),
+            (Some("file"), _) => ColumnSelector::File,
+            (_, Some(place)) if place > 0 => ColumnSelector::Place(place),
+            _ => ColumnSelector::Name(theirs.to_owned()),
         };
         Ok(ColumnRule { theirs, ours: item.text()?.trim().to_owned(), location: item.location() })
     };
     entries.into_iter().map(rule).collect()
 }
 
-/// `0,0,0` as three numbers, with semicolons where numbers have commas; anything else as a word.
+/// Parses `0,0,0` as three numbers (separated by semicolons with a decimal comma) and any other
+/// text as a word.
 fn missing(text: &str, decimal_comma: bool) -> Missing {
     let number = |cell: &str| {
         let cell = cell.trim();
@@ -155,7 +155,7 @@ fn missing(text: &str, decimal_comma: bool) -> Missing {
     let numbers = |delimiter: char| text.split(delimiter).map(number).collect::<Option<Vec<f64>>>();
     let found = if text.contains(';') { numbers(';') } else { numbers(',') };
     match found.as_deref() {
-        // Zero has no sign.
+        // Adding 0 turns −0 into 0.
         Some(&[x, y, z]) => Missing::Position([x + 0.0, y + 0.0, z + 0.0]),
         _ => Missing::Word(text.trim().to_owned()),
     }

@@ -1,4 +1,4 @@
-//! What a declared arm predicts, as a digest: whether an estimate still belongs to it.
+//! Digest of a declared arm, which shows whether an estimate still belongs to it.
 
 use std::fmt::Write as _;
 
@@ -12,29 +12,28 @@ use super::{
 };
 
 impl Problem {
-    /// A digest of everything declared that predictions depend on, 64 hexadecimal digits: the same
-    /// on every machine, and for the same value in another unit.
+    /// Returns a digest of everything declared that predictions depend on, as 64 hexadecimal
+    /// digits. It is the same on every machine and for equal values in other units.
     ///
-    /// It is the SHA-256 of a text of words and numbers with a space before each, numbers in SI
-    /// with twelve digits (`5.00000000000e-1`):
-    /// - `undeflected` or `deflected`, without a space; beam elements; gravity; target; where the
-    ///   payload hangs; translation and rotation of the base; mass of the payload; where the tool
-    ///   has an orientation, `turned` and its rotation vector; where another joint than the last
-    ///   carries it, `on` and its number;
-    /// - for each target a new line with `target`, its name in quotes, the number of its joint,
-    ///   place and rotation vector;
-    /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; where it stands on
-    ///   another than the one before `on` and the number of that, 0 for the base; where it is
-    ///   placed by xyz and rpy `placed` and these; where it follows another `mimic`, its number and
-    ///   the ratio; α, a, θ, d, β; stiffness, or `rigid`; `mass`, mass and position of each body;
-    ///   with a beam `beam`, its name in quotes, mass, EA, `EI_y`, `EI_z`, GJ, each or `rigid`, its
-    ///   masses, and with a hoist `hoist`, force, hook and direction;
-    /// - for each effect, in the order of the alphabet, a new line with its declaration as in a
-    ///   problem file;
-    /// - T₀, where an effect follows the temperature.
+    /// It is the SHA-256 of a text of words and numbers, each after a space. Numbers are in SI with
+    /// twelve digits (`5.00000000000e-1`):
+    /// - `undeflected` or `deflected` without a space; beam elements; gravity; target; payload
+    ///   position; translation and rotation of the base; payload mass; if the tool has an
+    ///   orientation, `turned` and its rotation vector; if another joint than the last carries it,
+    ///   `on` and its number;
+    /// - for each target a new line with `target`, its quoted name, the number of its joint, its
+    ///   position and rotation vector;
+    /// - for each joint a new line with `revolute`, `prismatic` or `fixed`; if its parent is not
+    ///   the joint before it, `on` and the parent's number (0 for the base); if it has xyz and rpy,
+    ///   `placed` and these; if it follows another joint, `mimic`, that joint's number and the
+    ///   ratio; α, a, θ, d, β; its stiffness or `rigid`; `mass`, mass and position of each body;
+    ///   with a beam `beam`, its quoted name, mass, EA, `EI_y`, `EI_z`, GJ, each a number or
+    ///   `rigid`, its masses; with a hoist `hoist`, force, hook and direction;
+    /// - for each effect in alphabetical order a new line with its declaration as in a problem
+    ///   file;
+    /// - T₀ if an effect depends on the temperature.
     ///
-    /// Names for people, limits of joints, `[parameters]`, constraints, data and noise do not
-    /// enter.
+    /// Display names, joint limits, `[parameters]`, constraints, data and noise do not enter.
     pub fn digest(&self) -> String {
         let Self { gravity, statics, joints, tool, targets, base, effects, data, .. } = self;
         let Statics { equilibrium, beam_elements } = statics;
@@ -58,24 +57,25 @@ impl Problem {
             let _ = write!(text, "\ntarget {} {}", quoted(name), joint + 1);
             vectors(&mut text, &[at, rotation]);
         }
-        for (index, own) in joints.iter().enumerate() {
-            joint(&mut text, index, own);
+        for (index, declared) in joints.iter().enumerate() {
+            joint(&mut text, index, declared);
         }
-        // The order in which effects are declared changes nothing.
+        // The order of the declarations has no effect on predictions.
         let mut declared: Vec<String> =
-            effects.iter().map(|own| format!("\n{}", own.effect.declaration())).collect();
+            effects.iter().map(|effect| format!("\n{}", effect.effect.declaration())).collect();
         declared.sort_unstable();
         text.extend(declared);
-        if let (true, Some(reference)) =
-            (effects.iter().any(|own| Effect::is_thermal(&own.effect)), data.reference_temperature)
-        {
+        if let (true, Some(reference)) = (
+            effects.iter().any(|declared| Effect::is_thermal(&declared.effect)),
+            data.reference_temperature,
+        ) {
             number(&mut text, reference);
         }
         hexadecimal(&text)
     }
 }
 
-/// The SHA-256 digest of a text, 64 hexadecimal digits.
+/// Returns the SHA-256 digest of a text, 64 hexadecimal digits.
 pub(crate) fn hexadecimal(text: &str) -> String {
     Sha256::digest(text).iter().fold(String::new(), |mut text, byte| {
         // Writing to a text cannot fail.
@@ -127,7 +127,7 @@ fn joint(text: &mut String, index: usize, joint: &Joint) {
 }
 
 fn beam(text: &mut String, beam: &Beam) {
-    // Its parameters and effects go by its name.
+    // The name enters because parameters and effects use it.
     let Beam { name, mass, ea, ei_y, ei_z, gj, masses: carried, hoist } = beam;
     let _ = write!(text, " beam {}", quoted(name));
     number(text, *mass);
@@ -163,7 +163,8 @@ fn optional(text: &mut String, value: Option<f64>) {
     }
 }
 
-/// Twelve digits: what a change of unit leaves of a number. Zero has no sign.
+/// Appends a number with twelve digits, fewer than a change of unit preserves. Adding 0 turns −0
+/// into 0.
 fn number(text: &mut String, value: f64) {
     let _ = write!(text, " {:.11e}", value + 0.0);
 }

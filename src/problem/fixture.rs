@@ -1,7 +1,7 @@
-//! What stands around the arm and is touched or measured against instead of a tracker: `[[point]]`,
-//! `[[anchor]]`, `[[surface]]`, and the known distances between points.
+//! Fixtures: objects around the arm that are touched or measured against instead of a tracked
+//! target. Reads `[[point]]`, `[[anchor]]`, `[[surface]]`, and `[[distance]]` between points.
 //!
-//! All of it stands in the measuring frame.
+//! All coordinates are in the measuring frame.
 
 use std::f64::consts::PI;
 
@@ -14,39 +14,39 @@ use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 use crate::spatial::MAX_NORMAL_TILT;
 
-/// σ of a known distance that says nothing of it: one micrometre \[m\].
-const EXACT: f64 = 1e-6;
+/// Standard deviation of a known distance if the file states none: one micrometre \[m\].
+const DEFAULT_DISTANCE_SIGMA: f64 = 1e-6;
 
-/// Something in the surroundings, with a few numbers that say where it is, known or not.
+/// Object in the surroundings whose position may be known or unknown.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fixture {
-    /// Its name, as columns have it.
+    /// Name of the fixture, as used in columns.
     pub name: String,
-    /// What it is.
+    /// Kind of the fixture.
     pub kind: FixtureKind,
-    /// Its numbers in the order of [`FixtureKind::fields`], SI; `None`: not known, to be found.
+    /// Coordinates in the order of [`FixtureKind::fields`], SI; `None` for an unknown coordinate.
     pub known: Vec<Option<f64>>,
-    /// For errors.
+    /// Place in the file, for errors.
     pub location: Location,
 }
 
-/// Kinds of fixtures, and what their numbers are.
+/// Kind of a fixture, which determines its coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum FixtureKind {
-    /// A point that the target comes to: a socket, a touch point; x, y, z \[m\].
+    /// Point that the target is brought to (socket, touch point): x, y, z \[m\].
     Point,
-    /// A point to which distances are measured; x, y, z \[m\].
+    /// Point to which distances are measured: x, y, z \[m\].
     Anchor,
-    /// A plane n·x = d with n = exp(\[(rx, ry, 0)\]×) ẑ, or near −ẑ, with rx above 3π/4, n =
-    /// −exp(\[(rx − π, ry, 0)\]×) ẑ; rx, ry \[rad\], d \[m\].
+    /// Plane n·x = d with n = exp(\[(rx, ry, 0)\]×) ẑ. Near −ẑ (rx above 3π/4) n = −exp(\[(rx − π,
+    /// ry, 0)\]×) ẑ. Coordinates rx, ry \[rad\], d \[m\].
     Plane,
-    /// A sphere: centre x, y, z and radius \[m\].
+    /// Sphere: centre x, y, z and radius \[m\].
     Sphere,
 }
 
 impl FixtureKind {
-    /// The word that names its table, its column and its parameters.
+    /// Returns the word that names its table, its column and its parameters.
     pub fn word(self) -> &'static str {
         match self {
             Self::Point => "point",
@@ -55,7 +55,7 @@ impl FixtureKind {
         }
     }
 
-    /// Names of its numbers, behind the dot of a parameter.
+    /// Returns the names of its coordinates, as used in parameter names.
     pub fn fields(self) -> &'static [&'static str] {
         match self {
             Self::Point | Self::Anchor => &["x", "y", "z"],
@@ -64,7 +64,7 @@ impl FixtureKind {
         }
     }
 
-    /// The keys that declare one of its numbers.
+    /// Returns the keys that declare one of its coordinates.
     pub fn declared_by(self, axis: usize) -> &'static str {
         match (self, axis) {
             (Self::Plane, _) => "normal and at_m",
@@ -73,47 +73,48 @@ impl FixtureKind {
         }
     }
 
-    /// Kind of quantity of one of its numbers.
+    /// Returns the unit of one of its coordinates.
     pub fn unit(self, axis: usize) -> Unit {
         if self == Self::Plane && axis < 2 { Unit::Angle } else { Unit::Length }
     }
 }
 
-/// `[[distance]]`: a known distance between two points.
+/// Known distance between two points: `[[distance]]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnownDistance {
-    /// The points, as places in [`Problem::fixtures`](super::Problem::fixtures).
+    /// Indices of the two points in [`Problem::fixtures`](super::Problem::fixtures).
     pub between: [usize; 2],
     /// Distance \[m\].
     pub length: f64,
-    /// 1 σ \[m\].
+    /// Standard deviation of the distance \[m\].
     pub sigma: f64,
-    /// For errors.
+    /// Place in the file, for errors.
     pub location: Location,
 }
 
-/// What a row measures; fixtures are places in [`Problem::fixtures`](super::Problem::fixtures).
+/// Quantity that a row measures; fixtures are indices into
+/// [`Problem::fixtures`](super::Problem::fixtures).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
 pub enum Observation {
-    /// The position of the target, measuring frame; three numbers, six with its orientation.
+    /// Position of the target in the measuring frame: three residuals, six with its orientation.
     #[default]
     Position,
-    /// The target is at a point: three residuals.
+    /// Contact of the target with a point: three residuals.
     Point(usize),
-    /// Distance from the target to an anchor: one number.
+    /// Distance from the target to an anchor: one residual.
     Distance(usize),
-    /// Distance of the target from a surface, 0 in contact: one number.
+    /// Distance of the target from a surface, 0 in contact: one residual.
     Surface(usize),
-    /// Tilts of the x and the y axis of a frame against the horizontal: two numbers. Frame 0 is the
+    /// Tilts of the x and y axes of a frame against the horizontal: two residuals. Frame 0 is the
     /// arm's base, frame i that of joint i.
     Tilt(usize),
-    /// Distance between two points, without the arm: one number. Indices are narrow so that both
-    /// take the room of one.
+    /// Distance between two points, in which the arm takes no part: one residual. The indices are
+    /// narrow to keep the enum small.
     Between(u32, u32),
 }
 
 impl Observation {
-    /// How many numbers it measures of a position or contact.
+    /// Returns the number of measured coordinates, without those of an orientation.
     pub fn coordinates(self) -> usize {
         match self {
             Self::Position | Self::Point(_) => 3,
@@ -122,12 +123,12 @@ impl Observation {
         }
     }
 
-    /// √ of that.
+    /// Returns the square root of [`coordinates`](Self::coordinates).
     pub(crate) fn root(self) -> f64 {
         (self.coordinates() as f64).sqrt()
     }
 
-    /// Its kind in results.
+    /// Returns the name of its kind in results.
     pub fn kind(self) -> &'static str {
         match self {
             Self::Position => "position",
@@ -139,12 +140,12 @@ impl Observation {
         }
     }
 
-    /// The fixture against which the target is measured, if it is measured against one.
+    /// Returns the fixture that the target is measured against, if there is one.
     pub fn fixture(self) -> Option<usize> {
         self.fixtures()[0].filter(|_| self.is_of_arm())
     }
 
-    /// The fixtures that it speaks of.
+    /// Returns the fixtures that take part in the observation.
     pub fn fixtures(self) -> [Option<usize>; 2] {
         match self {
             Self::Position | Self::Tilt(_) => [None; 2],
@@ -155,7 +156,7 @@ impl Observation {
         }
     }
 
-    /// What tells it from others, as numbers.
+    /// Returns numbers that are equal exactly for equal observations.
     pub(crate) fn key(self) -> [usize; 3] {
         let [first, second] =
             self.fixtures().map(|fixture| fixture.map_or(0, |fixture| fixture + 1));
@@ -163,34 +164,33 @@ impl Observation {
         [first, second, 4 * frame + self.coordinates()]
     }
 
-    /// Whether its numbers are angles \[rad\] rather than lengths \[m\].
+    /// Returns true if its numbers are angles \[rad\], false if they are lengths \[m\].
     pub fn is_angle(self) -> bool {
         matches!(self, Self::Tilt(_))
     }
 
-    /// Whether it measures where something is in the measuring frame, rather than against something
-    /// else.
+    /// Returns true if it measures a position in the measuring frame.
     pub fn is_position(self) -> bool {
         self == Self::Position
     }
 
-    /// Whether the target is at a point; what is missing to that is told along the axes of the
-    /// arm's base, so that it does not depend on where arm and point stand together.
+    /// Returns true for a contact with a point. Its residual is expressed along the axes of the
+    /// arm's base and therefore does not depend on a common displacement of arm and point.
     pub fn is_point(self) -> bool {
         matches!(self, Self::Point(_))
     }
 
-    /// Whether the arm takes part in it.
+    /// Returns true if the arm takes part in the observation.
     pub fn is_of_arm(self) -> bool {
         !matches!(self, Self::Between(..))
     }
 }
 
-/// The frame of an arm that a word names: `base`, a joint by its name, or `joint3`; `tool` is that
-/// of the joint that holds the tool, number `tool` counted from 0.
+/// Returns the frame that a word names: `base`, a joint by its name, or `joint3`. The word `tool`
+/// means the frame of joint `tool` (counted from 0).
 ///
 /// # Errors
-/// It names none.
+/// The word names no frame.
 pub(crate) fn frame(word: &str, joints: &[Joint], tool: usize) -> Result<usize, InputErrorKind> {
     let named = || joints.iter().position(|joint| joint.name == word).map(|index| index + 1);
     let numbered = || {
@@ -213,7 +213,7 @@ pub(crate) fn frame(word: &str, joints: &[Joint], tool: usize) -> Result<usize, 
     }
 }
 
-/// A word that names a frame of an arm: the joint's own, unless that names another.
+/// Returns a word that names a frame: the joint's name if it is unambiguous, otherwise `joint3`.
 pub(crate) fn frame_word(place: usize, joints: &[Joint], tool: usize) -> String {
     let Some(joint) = place.checked_sub(1).and_then(|joint| joints.get(joint)) else {
         return "base".to_owned();
@@ -222,7 +222,8 @@ pub(crate) fn frame_word(place: usize, joints: &[Joint], tool: usize) -> String 
     if is_it { joint.name.clone() } else { format!("joint{place}") }
 }
 
-/// The name of `what` is measured, or measured against: parameters go by it.
+/// Reads the name of a fixture or target, which parameter names contain; `what` is used in
+/// messages.
 pub(super) fn name_of(item: &Item<'_, '_>, what: &'static str) -> Result<String, InputError> {
     let name = item.text()?.trim().to_owned();
     let barred = |c: char| c.is_control() || c.is_whitespace() || ".*[]\"".contains(c);
@@ -232,7 +233,7 @@ pub(super) fn name_of(item: &Item<'_, '_>, what: &'static str) -> Result<String,
     Ok(name)
 }
 
-/// Every fixture, in the order point, anchor, surface, and the known distances.
+/// Reads all fixtures in the order point, anchor, surface, and the known distances.
 pub(super) fn read(
     root: &mut Section<'_, '_>,
 ) -> Result<(Vec<Fixture>, Vec<KnownDistance>), InputError> {
@@ -242,7 +243,7 @@ pub(super) fn read(
             let item = section.require("name", "name = \"…\"")?;
             let name = name_of(&item, "a fixture")?;
             if let Some(first) =
-                fixtures.iter().find(|own| own.kind.word() == table && own.name == name)
+                fixtures.iter().find(|fixture| fixture.kind.word() == table && fixture.name == name)
             {
                 let line = first.location.line.unwrap_or(0);
                 return Err(item.error(InputErrorKind::RepeatedFixture {
@@ -266,15 +267,15 @@ pub(super) fn read(
     Ok((fixtures, distances))
 }
 
-/// A kind and its numbers as far as they are declared.
-type Known = (FixtureKind, Vec<Option<f64>>);
+/// Kind of a fixture with its declared coordinates.
+type Coordinates = (FixtureKind, Vec<Option<f64>>);
 
-fn place(section: &mut Section<'_, '_>, kind: FixtureKind) -> Result<Known, InputError> {
+fn place(section: &mut Section<'_, '_>, kind: FixtureKind) -> Result<Coordinates, InputError> {
     let at = section.vector("at", Unit::Length)?;
     Ok((kind, at.map_or(vec![None; 3], |at| at.iter().map(|x| Some(*x)).collect())))
 }
 
-fn surface(section: &mut Section<'_, '_>) -> Result<Known, InputError> {
+fn surface(section: &mut Section<'_, '_>) -> Result<Coordinates, InputError> {
     section.require("kind", "kind = \"plane\" or \"sphere\"")?;
     let kinds = [FixtureKind::Plane, FixtureKind::Sphere];
     let kind = section.word("kind", &["plane", "sphere"], &kinds)?.unwrap_or(FixtureKind::Plane);
@@ -297,7 +298,7 @@ fn surface(section: &mut Section<'_, '_>) -> Result<Known, InputError> {
     Ok((kind, vec![Some(rx), Some(ry), at.map(|at| at.dot(&normal) / length)]))
 }
 
-/// The first two numbers (rx, ry) of a plane with this normal, of length 1 \[rad\]; see
+/// Returns the coordinates (rx, ry) of a plane from its unit normal \[rad\]; see
 /// [`plane_normal`](crate::spatial::plane_normal).
 pub fn lean(normal: &Vector3<f64>) -> [f64; 2] {
     let across = normal.x.hypot(normal.y);
@@ -320,14 +321,15 @@ fn distance(
     let points = item.list("a list of two names of points")?;
     let names: Vec<&str> = fixtures
         .iter()
-        .filter(|own| own.kind == FixtureKind::Point)
-        .map(|own| &*own.name)
+        .filter(|fixture| fixture.kind == FixtureKind::Point)
+        .map(|fixture| &*fixture.name)
         .collect();
     let mut between = Vec::new();
     for point in &points {
         let name = point.text()?;
-        let known =
-            fixtures.iter().position(|own| own.kind == FixtureKind::Point && own.name == name);
+        let known = fixtures
+            .iter()
+            .position(|fixture| fixture.kind == FixtureKind::Point && fixture.name == name);
         between.push(known.ok_or_else(|| point.error(unknown("point", name, &names)))?);
     }
     let [first, second] = between[..] else {
@@ -355,12 +357,12 @@ fn distance(
     Ok(KnownDistance {
         between: [first, second],
         length,
-        sigma: sigma.unwrap_or(EXACT),
+        sigma: sigma.unwrap_or(DEFAULT_DISTANCE_SIGMA),
         location: section.location(),
     })
 }
 
-/// The mistake of a word that names no fixture.
+/// Returns the error for a word that names no fixture.
 pub fn unknown(what: &'static str, name: &str, names: &[&str]) -> InputErrorKind {
     let known = names.iter().map(|&name| name.to_owned()).collect();
     InputErrorKind::UnknownFixture { what, name: name.to_owned(), known }

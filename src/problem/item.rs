@@ -1,4 +1,4 @@
-//! A value of the problem file together with its place.
+//! Values of a problem file together with their places.
 
 use std::io;
 use std::ops::Range;
@@ -10,26 +10,26 @@ use toml::Spanned;
 use toml::de::{DeInteger, DeString, DeTable, DeValue};
 
 use crate::error::{BYTE_ORDER_MARKS, InputError, InputErrorKind, Location, is_hidden, lines};
-use crate::files::at_most;
+use crate::files::read_limited;
 
-/// Largest file of TOML that is read [MiB].
-const LARGEST_MIB: u64 = 4;
-/// Largest number that is read: its square is one as well.
-pub(crate) const GREATEST: f64 = 1e150;
+/// Maximum size of a TOML file that is read [MiB].
+const MAX_TEXT_MIB: u64 = 4;
+/// Maximum magnitude of an input number; its square is still finite.
+pub(crate) const MAX_MAGNITUDE: f64 = 1e150;
 
-/// The text that is read, and its name.
+/// Text of an input file and its path.
 pub(crate) struct Document {
     pub file: PathBuf,
     pub text: Arc<str>,
 }
 
 impl Document {
-    /// Reads a text file; `missing` is the mistake where there is none.
+    /// Reads a text file; `missing` is the error if the file does not exist.
     pub fn read(file: &Path, missing: InputErrorKind) -> Result<Self, InputError> {
-        let bytes = at_most(file, LARGEST_MIB << 20).map_err(|source| {
+        let bytes = read_limited(file, MAX_TEXT_MIB << 20).map_err(|source| {
             Location::file(file).error(match source.kind() {
                 io::ErrorKind::NotFound => missing,
-                io::ErrorKind::FileTooLarge => InputErrorKind::FileTooLarge { most: LARGEST_MIB },
+                io::ErrorKind::FileTooLarge => InputErrorKind::FileTooLarge { most: MAX_TEXT_MIB },
                 _ => InputErrorKind::Unreadable { source },
             })
         })?;
@@ -44,7 +44,7 @@ impl Document {
         Ok(Self { file: file.to_owned(), text: Arc::from(text) })
     }
 
-    /// The text as a table of TOML.
+    /// Parses the text as TOML.
     pub fn table(&self) -> Result<Spanned<DeTable<'_>>, InputError> {
         DeTable::parse(&self.text).map_err(|error| {
             let span = error.span().unwrap_or(self.text.len()..self.text.len());
@@ -55,13 +55,13 @@ impl Document {
         })
     }
 
-    /// A part of the text.
+    /// Returns the place of a span of the text.
     pub fn locate(&self, span: Range<usize>) -> Location {
         Location::in_text(&self.file, &self.text, span)
     }
 }
 
-/// A value and its place.
+/// Value of the problem file with its key and place.
 #[derive(Clone)]
 pub(crate) struct Item<'a, 'i> {
     pub(super) document: &'a Document,
@@ -71,7 +71,7 @@ pub(crate) struct Item<'a, 'i> {
 }
 
 impl<'a, 'i> Item<'a, 'i> {
-    /// The value of a key in the section called `path`.
+    /// Returns the value of a key in the section at `path`.
     pub fn of_key(
         document: &'a Document,
         path: &str,
@@ -85,23 +85,23 @@ impl<'a, 'i> Item<'a, 'i> {
         Self { document, key: join(path, key.get_ref()), value: value.get_ref(), span }
     }
 
-    /// Where the value stands.
+    /// Returns the place of the value.
     pub fn location(&self) -> Location {
         self.document.locate(self.span.clone()).with_key(self.key.as_str())
     }
 
-    /// A mistake in this value.
+    /// Returns an error at this value.
     pub fn error(&self, kind: InputErrorKind) -> InputError {
         self.location().error(kind)
     }
 
-    /// The error of a lower limit at this place that is above the upper one at another, both as
-    /// they are written.
+    /// Returns the error for a lower limit (this value) above the upper limit `upper`. The message
+    /// quotes both entries.
     pub fn above(&self, upper: &Self) -> InputError {
-        let written = |own: &Self| {
-            own.document
+        let written = |item: &Self| {
+            item.document
                 .text
-                .get(own.span.clone())
+                .get(item.span.clone())
                 .unwrap_or_default()
                 .split_whitespace()
                 .collect::<Vec<_>>()
@@ -110,7 +110,7 @@ impl<'a, 'i> Item<'a, 'i> {
         self.error(InputErrorKind::LimitsCross { lower: written(self), upper: written(upper) })
     }
 
-    /// The error of a value of another type.
+    /// Returns the error for a value of the wrong type.
     pub fn wrong_type(&self, expected: &'static str) -> InputError {
         let found = match self.value {
             DeValue::String(_) => "text",
@@ -123,7 +123,7 @@ impl<'a, 'i> Item<'a, 'i> {
         self.error(InputErrorKind::WrongType { expected, found })
     }
 
-    /// Whether it is a table, or a list that holds one.
+    /// Returns true if the value is a table or a list that contains one.
     pub fn holds_tables(&self) -> bool {
         match self.value {
             DeValue::Table(_) => true,
@@ -132,7 +132,7 @@ impl<'a, 'i> Item<'a, 'i> {
         }
     }
 
-    /// A finite number; integers are numbers too.
+    /// Returns a finite number; integers are accepted.
     pub fn number(&self) -> Result<f64, InputError> {
         let (number, written) = match self.value {
             DeValue::Float(float) => (float.as_str().parse().ok(), float.as_str()),
@@ -141,13 +141,13 @@ impl<'a, 'i> Item<'a, 'i> {
         };
         let value = || written.to_owned();
         match number.filter(|number: &f64| number.is_finite()) {
-            Some(number) if number.abs() <= GREATEST => Ok(number),
-            Some(_) => Err(self.error(InputErrorKind::TooGreat { value: value() })),
+            Some(number) if number.abs() <= MAX_MAGNITUDE => Ok(number),
+            Some(_) => Err(self.error(InputErrorKind::MagnitudeTooLarge { value: value() })),
             None => Err(self.error(InputErrorKind::NotFinite { value: value() })),
         }
     }
 
-    /// A whole number of at least `least`.
+    /// Returns an integer of at least `least`.
     pub fn whole(&self, least: u64) -> Result<u64, InputError> {
         let written = match self.value {
             DeValue::Integer(integer) => {
@@ -162,7 +162,7 @@ impl<'a, 'i> Item<'a, 'i> {
         Err(self.error(InputErrorKind::NotWhole { value: written.to_owned(), least }))
     }
 
-    /// A whole number from 1 to 1000: of elements, of harmonics.
+    /// Returns an integer from 1 to 1000, for example a number of beam elements.
     pub fn small(&self) -> Result<u16, InputError> {
         let number = self.whole(1)?;
         u16::try_from(number)
@@ -171,7 +171,7 @@ impl<'a, 'i> Item<'a, 'i> {
             .ok_or_else(|| self.error(InputErrorKind::TooLarge { value: number, most: 1000 }))
     }
 
-    /// Refuses more of something than can be meant.
+    /// Returns an error if `found` exceeds the maximum `most`; `what` names the counted items.
     pub fn check_count(
         &self,
         what: &'static str,
@@ -185,12 +185,12 @@ impl<'a, 'i> Item<'a, 'i> {
         }
     }
 
-    /// True or false.
+    /// Returns a boolean.
     pub fn boolean(&self) -> Result<bool, InputError> {
         self.value.as_bool().ok_or_else(|| self.wrong_type("true or false"))
     }
 
-    /// Text that is not empty and can be seen.
+    /// Returns text that is neither empty nor contains invisible characters.
     pub fn text(&self) -> Result<&'a str, InputError> {
         let text = self.value.as_str().ok_or_else(|| self.wrong_type("text in quotes"))?;
         match text.chars().find(|&character| is_hidden(character)) {
@@ -200,12 +200,12 @@ impl<'a, 'i> Item<'a, 'i> {
         }
     }
 
-    /// Text, which may be empty.
+    /// Returns text, which may be empty.
     pub fn any_text(&self) -> Result<&'a str, InputError> {
         self.value.as_str().ok_or_else(|| self.wrong_type("text in quotes"))
     }
 
-    /// The elements of a list, counted from 1 in messages.
+    /// Returns the elements of a list; their keys count from 1.
     pub fn list(&self, expected: &'static str) -> Result<Vec<Self>, InputError> {
         let array = self.value.as_array().ok_or_else(|| self.wrong_type(expected))?;
         let element = |(index, value): (usize, &'a Spanned<DeValue<'i>>)| Self {
@@ -217,7 +217,7 @@ impl<'a, 'i> Item<'a, 'i> {
         Ok(array.iter().enumerate().map(element).collect())
     }
 
-    /// Two numbers.
+    /// Returns a list of two numbers.
     pub fn pair(&self) -> Result<[f64; 2], InputError> {
         let elements = self.list("a list of 2 numbers")?;
         match elements.as_slice() {
@@ -226,7 +226,7 @@ impl<'a, 'i> Item<'a, 'i> {
         }
     }
 
-    /// Three numbers.
+    /// Returns a list of three numbers.
     pub fn vector(&self) -> Result<Vector3<f64>, InputError> {
         let elements = self.list("a list of 3 numbers")?;
         if elements.len() != 3 {
@@ -237,7 +237,7 @@ impl<'a, 'i> Item<'a, 'i> {
     }
 }
 
-/// An integer of any size as a float.
+/// Converts an integer of any size to a float.
 fn integer_as_float(integer: &DeInteger<'_>) -> Option<f64> {
     if integer.radix() == 10 {
         integer.as_str().parse().ok()
@@ -246,7 +246,7 @@ fn integer_as_float(integer: &DeInteger<'_>) -> Option<f64> {
     }
 }
 
-/// `path.key`, the key in quotes where it is not bare.
+/// Returns `path.key`; a key that is not a bare TOML key is quoted.
 pub(crate) fn join(path: &str, key: &str) -> String {
     let bare =
         !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');

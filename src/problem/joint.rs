@@ -1,64 +1,66 @@
-//! Joints, elastic links and masses, as declared.
+//! Declared joints, elastic links and masses.
 
 use nalgebra::Vector3;
 
 use crate::error::Location;
 
-/// What a joint's configuration coordinate does.
+/// Kind of a joint, which determines the effect of its coordinate q.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JointKind {
     /// q adds to θ \[rad\].
     Revolute,
     /// q adds to d \[m\].
     Prismatic,
-    /// A constant transform that takes no q.
+    /// Constant transform without a coordinate.
     Fixed,
 }
 
-/// `[[joint]]`: `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β)  [Chen2021, eq. 1], behind the placement
-/// where there is one.
+/// Table `[[joint]]`: `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β)  [Chen2021, eq. 1], preceded by the
+/// placement of a fixed joint.
 #[derive(Debug, Clone)]
 pub struct Joint {
-    /// Name for people; parameters go by number.
+    /// Display name; parameters are named by the joint's number.
     pub name: String,
-    /// What q does.
+    /// Kind of the joint.
     pub kind: JointKind,
-    /// Index of the joint on whose frame it stands, an earlier one; `None`: the base.
+    /// Index of the parent joint, which is listed earlier; `None` for the base.
     pub parent: Option<usize>,
-    /// A transform before all others of this joint; of fixed joints alone.
+    /// Transform before all others of this joint; only fixed joints have one.
     pub placement: Option<Placement>,
-    /// Whose command the joint follows, if it has none of its own.
+    /// Joint whose command this joint follows, if it takes no command itself.
     pub mimic: Option<Mimic>,
-    /// α \[rad\].
+    /// Twist angle α \[rad\].
     pub alpha: f64,
-    /// a \[m\].
+    /// Link length a \[m\].
     pub a: f64,
-    /// θ \[rad\].
+    /// Joint angle θ at q = 0 \[rad\].
     pub theta: f64,
-    /// d \[m\].
+    /// Link offset d at q = 0 \[m\].
     pub d: f64,
-    /// β \[rad\].
+    /// Angle β about y \[rad\].
     pub beta: f64,
-    /// Range of q \[rad\] or \[m\], infinite where none is given; commands keep to it.
+    /// Range of q \[rad\] or \[m\], infinite without limits; commands stay inside it.
     pub limits: (f64, f64),
-    /// Torsional stiffness about `z_i` [N·m/rad]; `None`: rigid.
+    /// Torsional stiffness about `z_i` [N·m/rad]; `None` for a rigid joint.
     pub stiffness: Option<f64>,
     /// Elastic link along this joint's a.
     pub beam: Option<Beam>,
-    /// Rigid masses carried by frame `i`, after the whole `T_i`.
+    /// Rigid masses attached to frame `i`, after the whole `T_i`.
     pub bodies: Vec<Body>,
-    /// For errors.
+    /// Place in the file, for errors.
     pub location: Location,
 }
 
 impl Joint {
-    /// What a command of the joint's own does: nothing where it follows another one.
-    pub fn commanded(&self) -> JointKind {
+    /// Returns the kind of coordinate that a command sets: `Fixed` for a joint that follows
+    /// another.
+    pub fn command_kind(&self) -> JointKind {
         if self.mimic.is_some() { JointKind::Fixed } else { self.kind }
     }
 }
 
-/// `xyz_m` and `rpy_deg` of a fixed joint: Txyz Rz(yaw) Ry(pitch) Rx(roll), as URDF has it.
+/// Transform `xyz_m` and `rpy_deg` of a fixed joint in URDF convention: Txyz Rz(yaw) Ry(pitch)
+/// Rx(roll).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
     /// Origin \[m\].
@@ -67,53 +69,53 @@ pub struct Placement {
     pub rpy: Vector3<f64>,
 }
 
-/// `mimic` of a joint: its q is `ratio` times the command of another one.
+/// Coupling `mimic` of a joint: its q is `ratio` times the command of another joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mimic {
-    /// Index of the other joint, counted from 0.
+    /// Index of the leading joint, counted from 0.
     pub joint: usize,
-    /// q per q of the other one [rad or m per rad or m].
+    /// Ratio of the coordinates [rad or m per rad or m].
     pub ratio: f64,
 }
 
-/// `[joint.beam]`: an elastic link, clamped after Rx(α), its x axis along the link.
+/// Elastic link `[joint.beam]`, clamped after Rx(α), with its x axis along the link.
 #[derive(Debug, Clone)]
 pub struct Beam {
-    /// Name; its parameters are `<name>.EA` and so on.
+    /// Name of the beam; its parameters are `<name>.EA` and so on.
     pub name: String,
-    /// Mass spread evenly over the length \[kg\].
+    /// Mass, uniformly distributed over the length \[kg\].
     pub mass: f64,
-    /// Axial rigidity EA \[N\]; `None`: does not stretch.
+    /// Axial rigidity EA \[N\]; `None` for an inextensible beam.
     pub ea: Option<f64>,
-    /// Flexural rigidity about y, `EI_y` [N·m²]: bends in the x-z plane; `None`: rigid there.
+    /// Flexural rigidity about y, `EI_y` [N·m²], for bending in the x-z plane; `None` for rigid.
     pub ei_y: Option<f64>,
-    /// Flexural rigidity about z, `EI_z` [N·m²]: bends in the x-y plane; `None`: rigid there.
+    /// Flexural rigidity about z, `EI_z` [N·m²], for bending in the x-y plane; `None` for rigid.
     pub ei_z: Option<f64>,
-    /// Torsional rigidity GJ [N·m²]; `None`: does not twist.
+    /// Torsional rigidity GJ [N·m²]; `None` for a beam that does not twist.
     pub gj: Option<f64>,
-    /// Masses carried on the beam, positions in the beam's frame.
+    /// Point masses on the beam; positions in the beam's frame.
     pub masses: Vec<Body>,
     /// Suspension force on the beam.
     pub hoist: Option<Hoist>,
 }
 
-/// A point mass.
+/// Point mass.
 #[derive(Debug, Clone)]
 pub struct Body {
-    /// Name for people.
+    /// Display name.
     pub name: String,
     /// Mass \[kg\], not negative.
     pub mass: f64,
-    /// Centre of mass in the carrier's frame \[m\].
+    /// Centre of mass in the carrying frame \[m\].
     pub position: Vector3<f64>,
 }
 
-/// `[joint.beam.hoist]`: a suspension force on a beam.
+/// Suspension force `[joint.beam.hoist]` on a beam.
 #[derive(Debug, Clone)]
 pub struct Hoist {
-    /// Hook in the beam's frame \[m\].
+    /// Hook position in the beam's frame \[m\].
     pub at: Vector3<f64>,
-    /// Force \[N\]; a column `hoist_N` overrides it pose by pose.
+    /// Force \[N\]; the column `hoist_N` overrides it in each pose.
     pub force: f64,
     /// Unit direction in the arm's base frame.
     pub direction: Vector3<f64>,

@@ -1,7 +1,7 @@
-//! The problem file: the arm as declared, what is free, and where the data are.
+//! Problem file: the arm as declared, the free parameters, and the measurement files.
 //!
-//! Everything here is plain data in SI units (m, rad, N, kg, s; temperatures in °C), read once from
-//! `problem.toml` and never changed afterwards.
+//! All values are plain data in SI units (m, rad, N, kg, s; temperatures in °C). They are read once
+//! from `problem.toml` and never changed afterwards.
 
 mod argument;
 mod arm;
@@ -34,58 +34,58 @@ pub(crate) use argument::HIGHEST_ORDER;
 pub use argument::{Argument, FreeLength, Mount};
 pub use conditions::{PoseConditions, PoseRanges, PoseView};
 pub use constraints::{Constraint, ConstraintTerm, Limit, LimitKind};
-pub use data::{Data, HeldOut, JointSource, OwnCovariate};
-pub use dialect::{ColumnOf, ColumnRule, Delimiter, Dialect, Missing, RotationKind};
+pub use data::{Data, DeclaredCovariate, HeldOut, JointSource};
+pub use dialect::{ColumnRule, ColumnSelector, Delimiter, Dialect, Missing, RotationKind};
 pub use effect::{Custom, Effect, EffectDeclaration};
 pub use fixture::{Fixture, FixtureKind, KnownDistance, Observation};
 pub use joint::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement};
 pub use parameters::{Freedom, ParameterRule, Quantities};
-pub(crate) use past::Lag;
 pub(crate) use past::PoseTable;
-pub use past::{Past, PastOf};
+pub(crate) use past::ThermalLag;
+pub use past::{LazyPast, Past};
 pub use robust::{Robust, RobustLoss};
 pub use target::{Target, Tool};
 pub use tree::Tree;
 
-/// A problem as declared in `problem.toml`.
+/// Problem as declared in `problem.toml`.
 #[derive(Debug, Clone)]
 pub struct Problem {
-    /// Short name; results go to `out/<name>` by default.
+    /// Short name; the default output folder is `out/<name>`.
     pub name: String,
-    /// One line for people.
+    /// Title for display, one line.
     pub title: String,
     /// Gravity in the arm's base frame [m/s²].
     pub gravity: Vector3<f64>,
-    /// How static loads act.
+    /// Settings of the static loads.
     pub statics: Statics,
-    /// Joints from the base outwards, branch by branch; joint `i` of the files is element `i − 1`.
+    /// Joints from the base outwards, branch by branch. Joint `i` of the file is element `i − 1`.
     pub joints: Vec<Joint>,
-    /// The measured point and the payload.
+    /// Measured point and payload.
     pub tool: Tool,
-    /// The measured points, where rows name theirs.
+    /// Declared measured points, named by the rows; empty if the tool's point is the only one.
     pub targets: Vec<Target>,
     /// Pose of the arm's base in the measuring frame.
     pub base: BasePose,
-    /// Which links of a URDF the arm lies between, if it came from one.
+    /// Links at both ends of the arm, if the problem was made from a URDF.
     pub urdf: Option<UrdfEnds>,
-    /// Effects that the model declares.
+    /// Effects declared by the model.
     pub effects: Vec<EffectDeclaration>,
-    /// What is touched or measured against: points, anchors, surfaces.
+    /// Points, anchors and surfaces that rows are measured against.
     pub fixtures: Vec<Fixture>,
     /// Known distances between points.
     pub distances: Vec<KnownDistance>,
-    /// What is free, in the order of the file: a later rule wins.
+    /// Rules for free parameters in the order of the file; a later rule overrides an earlier one.
     pub parameters: Vec<ParameterRule>,
     /// Linear inequalities between parameters.
     pub constraints: Vec<Constraint>,
-    /// Where the measurements are and how they are used.
+    /// Measurement files and their use.
     pub data: Data,
-    /// How gross errors are kept from ruling the fit; `None`: they are not.
+    /// Robust loss; `None` for least squares.
     pub robust: Option<Robust>,
 }
 
 impl Problem {
-    /// Whether something of the declared arm gives way: a joint with a stiffness, or a beam with a
+    /// Returns true if the declared arm is elastic: a joint has a stiffness or a beam has a
     /// rigidity.
     pub fn is_elastic(&self) -> bool {
         let bends =
@@ -95,83 +95,85 @@ impl Problem {
             .any(|joint| joint.stiffness.is_some() || joint.beam.as_ref().is_some_and(bends))
     }
 
-    /// How the joints stand on each other.
+    /// Returns the parent relations of the joints.
     pub fn tree(&self) -> Tree {
-        Tree::of(&self.joints)
+        Tree::from_joints(&self.joints)
     }
 
-    /// Whether the joints are one chain, which carries tool and targets behind its last joint.
+    /// Returns true if the joints form one chain with the tool and all targets on its last joint.
     pub fn is_chain(&self) -> bool {
         let last = self.joints.len().saturating_sub(1);
-        let mut influential_rows =
-            self.targets.iter().map(|own| own.joint).chain([self.tool.joint]);
-        self.tree().is_chain() && influential_rows.all(|joint| joint == last)
+        let mut carrier_joints =
+            self.targets.iter().map(|target| target.joint).chain([self.tool.joint]);
+        self.tree().is_chain() && carrier_joints.all(|joint| joint == last)
     }
 
-    /// Refuses a tree of joints, for the sake of `what`.
+    /// Returns an error if the joints form a tree; `what` names the operation that needs a chain.
     ///
     /// # Errors
-    /// A joint stands elsewhere than on the one before.
+    /// The parent of a joint is not the joint before it.
     pub fn require_chain(&self, what: &'static str) -> Result<(), InputError> {
         let mut joints = self.joints.iter().enumerate();
-        match joints.find(|(index, own)| own.parent != index.checked_sub(1)) {
-            Some((index, own)) => {
+        match joints.find(|(index, joint)| joint.parent != index.checked_sub(1)) {
+            Some((index, joint)) => {
                 let location =
-                    own.location.clone().with_key(format!("joint[{}].parent", index + 1));
+                    joint.location.clone().with_key(format!("joint[{}].parent", index + 1));
                 Err(location.error(InputErrorKind::NotAChain { what }))
             }
             None => Ok(()),
         }
     }
 
-    /// What the word of a row's target names: one of `[[target]]`, or the point of `[tool]` where
-    /// none is declared.
+    /// Returns the `[[target]]` called `word`, or the point of `[tool]` if no target is declared.
     ///
     /// # Errors
-    /// There are targets, and none has that name.
+    /// Targets are declared and none has that name.
     pub fn target(&self, word: &str) -> Result<Target, InputError> {
         let location = Location { line: None, excerpt: None, ..self.data.location.clone() };
         if self.targets.is_empty() {
             return Ok(Target::of_tool(&self.tool, location.with_key("tool")));
         }
-        let found = self.targets.iter().find(|own| own.name == word).cloned();
+        let found = self.targets.iter().find(|target| target.name == word).cloned();
         found.ok_or_else(|| location.with_key("target").error(self.unknown_target(word)))
     }
 
-    /// The words by which rows may name their target: the empty one where none is declared.
+    /// Returns the words by which rows may name their target; one empty word if no target is
+    /// declared.
     pub fn target_words(&self) -> Vec<String> {
         if self.targets.is_empty() {
             return vec![String::new()];
         }
-        self.targets.iter().map(|own| own.name.clone()).collect()
+        self.targets.iter().map(|target| target.name.clone()).collect()
     }
 
-    /// The mistake of a word that names no target.
+    /// Returns the error for a word that names no target.
     pub(crate) fn unknown_target(&self, word: &str) -> InputErrorKind {
-        let known: Vec<String> = self.targets.iter().map(|own| own.name.clone()).collect();
+        let known: Vec<String> = self.targets.iter().map(|target| target.name.clone()).collect();
         match word {
             "" => InputErrorKind::TargetsUnnamed { targets: known },
             _ => InputErrorKind::UnknownFixture { what: "target", name: word.to_owned(), known },
         }
     }
 
-    /// A warning where a target lies further from its frame than the arm could reach twice.
+    /// Returns a warning if a target is farther from its frame than twice the length of the arm.
     pub fn far_target(&self) -> Option<Warning> {
         let length = |joint: &Joint| {
-            let placed = joint.placement.as_ref().map_or(0.0, |own| own.xyz.norm());
+            let placed = joint.placement.as_ref().map_or(0.0, |placement| placement.xyz.norm());
             let (min, max) = joint.limits;
-            let way =
+            let travel =
                 if joint.kind == JointKind::Prismatic { min.abs().max(max.abs()) } else { 0.0 };
-            joint.a.hypot(joint.d) + placed + way
+            joint.a.hypot(joint.d) + placed + travel
         };
-        let whole = || Location {
+        let tool_location = || Location {
             line: None,
             excerpt: None,
             ..self.data.location.clone().with_key("tool.target")
         };
         let farthest = self.targets.iter().max_by(|a, b| a.at.norm().total_cmp(&b.at.norm()));
-        let (location, target) = farthest
-            .map_or_else(|| (whole(), self.tool.target), |own| (own.location.clone(), own.at));
+        let (location, target) = farthest.map_or_else(
+            || (tool_location(), self.tool.target),
+            |target| (target.location.clone(), target.at),
+        );
         let (links, distance) = (self.joints.iter().map(length).sum::<f64>(), target.norm());
         let kind = WarningKind::FarTarget {
             distance: format!("{distance:.3}"),
@@ -181,39 +183,39 @@ impl Problem {
     }
 }
 
-/// `[statics]`.
+/// Section `[statics]`: settings of the static loads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Statics {
-    /// On which arm the loads act.
+    /// Arm shape in which the loads act.
     pub equilibrium: Equilibrium,
-    /// Closed-form elements per beam, at least 1.
+    /// Number of closed-form elements per beam, at least 1.
     pub beam_elements: usize,
 }
 
-/// On which arm the loads act.
+/// Arm shape in which the loads act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Equilibrium {
-    /// On the rigid arm: the first order of the paper.
+    /// Loads act on the rigid arm: first order in the deflection [Chen2021].
     Undeflected,
-    /// On the bent arm, in equilibrium.
+    /// Loads act on the deflected arm in equilibrium.
     Deflected,
 }
 
-/// `[urdf]`: the links of a URDF at both ends of the arm.
+/// Section `[urdf]`: links of a URDF at both ends of the arm.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UrdfEnds {
-    /// The arm's base frame is that of this link.
+    /// Link whose frame is the arm's base frame.
     pub base: String,
-    /// The last frame is that of this link.
+    /// Link whose frame is the last frame of the arm.
     pub tip: String,
 }
 
-/// `[base]`: pose of the arm's base in the measuring frame.
+/// Section `[base]`: pose of the arm's base in the measuring frame.
 #[derive(Debug, Clone)]
 pub struct BasePose {
-    /// Origin \[m\].
+    /// Origin of the base frame \[m\].
     pub translation: Vector3<f64>,
-    /// Rotation vector \[rad\].
+    /// Rotation vector of the base frame \[rad\].
     pub rotation: Vector3<f64>,
 }

@@ -1,61 +1,63 @@
-//! The rules of `[parameters]`.
+//! Reader of the rules in `[parameters]`.
 
 use super::item::Item;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
-/// One line of `[parameters]`.
+/// Rule of `[parameters]`: a pattern of names and what holds for the matching parameters.
 #[derive(Debug, Clone)]
 pub struct ParameterRule {
-    /// Name with `*` for any run of characters.
+    /// Parameter name in which `*` stands for any run of characters.
     pub pattern: String,
-    /// What the rule says.
+    /// Freedom of the matching parameters.
     pub freedom: Freedom,
-    /// For errors.
+    /// Place in the file, for errors.
     pub location: Location,
 }
 
-/// What a rule makes of the parameters it matches.
+/// Freedom of a parameter: fixed, or free with optional prior and bounds.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Freedom {
     /// Held at its nominal value.
     Fixed,
-    /// Free, with or without prior and bounds.
+    /// Free, with optional prior and bounds.
     Free {
-        /// 1 σ of a Gaussian prior about the nominal value.
+        /// Standard deviation of a Gaussian prior about the nominal value.
         sigma: Quantities,
-        /// Lower bound on the deviation from nominal (relative: multiple of nominal).
+        /// Lower bound of the deviation from nominal; for relative quantities a multiple of
+        /// nominal.
         min: Quantities,
-        /// Upper bound on the deviation from nominal (relative: multiple of nominal).
+        /// Upper bound of the deviation from nominal; for relative quantities a multiple of
+        /// nominal.
         max: Quantities,
     },
 }
 
-/// The same thing said for each kind of parameter that a pattern may match.
+/// Prior width or bound for each kind of parameter that a pattern may match.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Quantities {
-    /// Angles \[rad\].
+    /// Value for angles \[rad\].
     pub angle: Option<f64>,
-    /// Lengths \[m\].
+    /// Value for lengths \[m\].
     pub length: Option<f64>,
-    /// Relative to nominal; a σ is that of ln(value / nominal).
+    /// Value relative to nominal; as a standard deviation, that of ln(value / nominal).
     pub relative: Option<f64>,
 }
 
-/// Most rules.
-const MOST_RULES: usize = 2000;
+/// Maximum number of rules.
+const MAX_RULES: usize = 2000;
 
 const KINDS: [Unit; 3] = [Unit::Angle, Unit::Length, Unit::Ratio];
-/// Where the nominal value lies on the scale of each kind: no deviation, or once the nominal.
-const NOMINALS: [f64; 3] = [0.0, 0.0, 1.0];
+/// Nominal value on the scale of each kind: deviation 0 or ratio 1.
+const NOMINAL_VALUES: [f64; 3] = [0.0, 0.0, 1.0];
 
-/// Every rule, in the order of the file.
+/// Reads all rules in the order of the file.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Vec<ParameterRule>, InputError> {
     let Some(section) = root.section("parameters")? else { return Ok(Vec::new()) };
     if let Some(item) = root.peek("parameters") {
-        item.check_count("rules", section.len(), MOST_RULES)?;
+        item.check_count("rules", section.len(), MAX_RULES)?;
     }
     section.entries().into_iter().map(|(pattern, item)| rule(pattern, &item)).collect()
 }
@@ -65,7 +67,7 @@ fn rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputError>
         return Err(item.error(InputErrorKind::Empty));
     }
     let mut section = item.section()?;
-    // `tool.x = { … }` without quotes is a table `tool` that holds a table `x`.
+    // TOML reads `tool.x = { … }` without quotes as a table `tool` with a table `x`.
     if let Some((inner, _)) = section.entries().into_iter().find(|(_, inner)| inner.holds_tables())
     {
         let name = format!("{pattern}.{inner}");
@@ -91,7 +93,7 @@ fn rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputError>
     } else if section.len() == 0 {
         return Err(item.error(InputErrorKind::EmptyRule));
     } else {
-        let kinds = NOMINALS.into_iter().zip(&sigma.0).zip(&min.0).zip(&max.0);
+        let kinds = NOMINAL_VALUES.into_iter().zip(&sigma.0).zip(&min.0).zip(&max.0);
         for (((nominal, sigma), min), max) in kinds {
             check(nominal, sigma.as_ref(), min.as_ref(), max.as_ref())?;
         }
@@ -104,16 +106,16 @@ fn flag(section: &mut Section<'_, '_>, key: &str) -> Result<Option<bool>, InputE
     section.get(key).map(|item| item.boolean()).transpose()
 }
 
-/// A σ or bound \[SI\] and its place.
+/// Prior width or bound in SI with its place.
 type Value<'a, 'i> = (f64, Item<'a, 'i>);
 
-/// A σ or bound for each of [`KINDS`].
+/// Prior widths or bounds, one for each unit in [`KINDS`].
 struct Spread<'a, 'i>([Option<Value<'a, 'i>>; 3]);
 
 impl<'a, 'i> Spread<'a, 'i> {
     fn read(section: &mut Section<'a, 'i>, base: &str) -> Result<Self, InputError> {
         if let Some(bare) = section.peek(base) {
-            let write = KINDS.map(|unit| unit.spelled(base)).join(" or ");
+            let write = KINDS.map(|unit| unit.alternatives(base)).join(" or ");
             return Err(bare.error(InputErrorKind::NeedsUnit { noun: "a spread or bound", write }));
         }
         let mut values = [None, None, None];
@@ -132,7 +134,7 @@ impl<'a, 'i> Spread<'a, 'i> {
     }
 }
 
-/// Whether σ and bounds of one kind make sense together.
+/// Returns an error if prior width and bounds of one kind contradict each other.
 fn check(
     nominal: f64,
     sigma: Option<&Value<'_, '_>>,
@@ -147,7 +149,7 @@ fn check(
     {
         return Err(item.above(upper));
     }
-    // A ratio to the nominal value is positive; its logarithm is what has bounds.
+    // A ratio to the nominal value must be positive, because its logarithm is bounded.
     if let Some((value, item)) =
         min.into_iter().chain(max).find(|(value, _)| nominal > 0.0 && *value <= 0.0)
     {

@@ -1,25 +1,25 @@
-//! What was before a pose: effects with a memory know it.
+//! Earlier poses of a session, on which effects with memory depend.
 
 use std::fmt;
 
-/// The poses of a session that were measured before one, from the first to the last; empty where
-/// none were, or none are known.
+/// Poses of a session measured before a given one, in order; empty if there are none or they are
+/// unknown.
 ///
-/// V holds one number per pose, or one per pose and joint: a `Vec<f64>` or a `&[f64]`.
+/// V is a list with one number per pose, or one per pose and joint: `Vec<f64>` or `&[f64]`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Past<V = Vec<f64>> {
     /// Times, shape = (poses) \[s\], ascending.
     pub times: V,
-    /// Temperatures, shape = (poses) [°C]; empty: not known.
+    /// Temperatures, shape = (poses) [°C]; empty if unknown.
     pub temperatures: V,
-    /// Configurations, shape = (poses, joints), pose after pose \[rad\] or \[m\].
+    /// Configurations, shape = (poses, joints), row-major \[rad\] or \[m\].
     pub configurations: V,
-    /// Directions of approach, shape = (poses, joints), −1, 0 or +1; empty: not known.
+    /// Directions of approach, shape = (poses, joints), −1, 0 or +1; empty if unknown.
     pub approaches: V,
 }
 
 impl Past<&[f64]> {
-    /// The same with numbers of its own.
+    /// Returns a copy that owns its numbers.
     pub(super) fn to_owned(self) -> Past {
         Past {
             times: self.times.to_vec(),
@@ -31,7 +31,7 @@ impl Past<&[f64]> {
 }
 
 impl Past {
-    /// The same for who only reads it.
+    /// Returns a view that borrows the numbers.
     pub(crate) fn view(&self) -> Past<&[f64]> {
         Past {
             times: &self.times,
@@ -42,107 +42,109 @@ impl Past {
     }
 }
 
-/// A table of poses that knows what was before each of its rows.
+/// Table of poses that provides the earlier poses of each row.
 pub(crate) trait PoseTable: Sync {
-    /// The past of a row.
+    /// Returns the earlier poses of a row.
     fn past(&self, row: usize) -> Past<&[f64]>;
 }
 
-/// The past of one pose alone.
+/// Provides itself as the past of a single pose.
 impl PoseTable for Past {
     fn past(&self, _row: usize) -> Past<&[f64]> {
         self.view()
     }
 }
 
-/// What was before a pose, looked up where it is needed: most poses are never asked.
+/// Past of a pose that is looked up only when it is read, because few poses need it.
 #[derive(Clone, Copy, Default)]
-pub struct PastOf<'a> {
+pub struct LazyPast<'a> {
     table: Option<&'a dyn PoseTable>,
     row: u32,
 }
 
-impl<'a> PastOf<'a> {
-    /// What was before a row of a table.
+impl<'a> LazyPast<'a> {
+    /// Returns the past of a row of a table.
     pub(crate) fn row(table: &'a dyn PoseTable, row: u32) -> Self {
         Self { table: Some(table), row }
     }
 
-    /// Its row in its table, 0 where it is of one pose alone; `None`: there is none.
+    /// Returns the row in the table (0 for a single pose), or `None` without a past.
     pub(crate) fn place(self) -> Option<u32> {
         self.table.map(|_| self.row)
     }
 
-    /// The poses before.
+    /// Returns the earlier poses.
     pub fn read(self) -> Past<&'a [f64]> {
         self.table.map(|table| table.past(self.row as usize)).unwrap_or_default()
     }
 }
 
-/// The past of a pose that has one of its own.
-impl<'a> From<&'a Past> for PastOf<'a> {
+/// Refers to the past of a single pose.
+impl<'a> From<&'a Past> for LazyPast<'a> {
     fn from(past: &'a Past) -> Self {
         Self::row(past, 0)
     }
 }
 
-impl PartialEq for PastOf<'_> {
+impl PartialEq for LazyPast<'_> {
     fn eq(&self, other: &Self) -> bool {
         self.read() == other.read()
     }
 }
 
-impl fmt::Debug for PastOf<'_> {
+impl fmt::Debug for LazyPast<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.read().fmt(f)
     }
 }
 
-/// Beyond this many time constants or distances nothing is left of what was before: exp(−36) is
-/// below rounding.
-const FORGOTTEN: f64 = 36.0;
+/// Number of time constants or distances after which the past has no influence: exp(−36) is below
+/// double precision.
+const MAX_MEMORY: f64 = 36.0;
 
 impl Past<&[f64]> {
-    /// Temperature of what follows the measured one with a time constant τ \[s\], dT̃/dt = (T −
-    /// T̃)/τ, at a `time` \[s\] at which T is measured [°C].
+    /// Returns the temperature T̃ of a body that follows the measured temperature T with a time
+    /// constant τ \[s\]: dT̃/dt = (T − T̃)/τ [°C].
     ///
-    /// T goes evenly from each reading to the next, and T̃ begins at the first of them.
-    pub fn lagging(&self, now: (f64, f64), time_constant: f64) -> f64 {
+    /// `now` is a time \[s\] with the temperature measured then [°C]. T is linear between readings,
+    /// and T̃ starts at the first reading.
+    pub fn lagged_temperature(&self, now: (f64, f64), time_constant: f64) -> f64 {
         let first = self
             .times
-            .partition_point(|time| *time < now.0 - FORGOTTEN * time_constant)
+            .partition_point(|time| *time < now.0 - MAX_MEMORY * time_constant)
             .saturating_sub(1);
-        Lag { time_constant, known: None }.felt_from(first, self, now)
+        ThermalLag { time_constant, progress: None }.advance_from(first, self, now)
     }
 
-    /// Which part of its friction pulls a joint, counted from 0, back the way on which it came, −1
-    /// to 1: on a way Δq it follows the side g = ±1 from which the joint comes, z = g + (z' − g)
-    /// exp(−|Δq|/s), with a distance s \[rad\] or \[m\]. \[Dahl 1968\]
+    /// Returns the friction state z ∈ [−1, 1] of a joint (counted from 0) after a Dahl model: over
+    /// a travel Δq towards the side g = ±1, z = g + (z' − g) exp(−|Δq|/s). \[Dahl 1968\]
     ///
-    /// The side is that of the pose, or the sign of Δq where that is not known; z begins at the
-    /// side of the first pose.
-    pub fn dragged(&self, joint: usize, (q, side): (f64, f64), distance: f64) -> f64 {
+    /// `q` and `side` are coordinate and approach direction of the pose; `distance` is s \[rad\] or
+    /// \[m\]. If the side is unknown (0), the sign of Δq replaces it. At the first pose z equals
+    /// its side.
+    pub fn friction_state(&self, joint: usize, (q, side): (f64, f64), distance: f64) -> f64 {
         let joints = self.configurations.len().checked_div(self.times.len()).unwrap_or(0);
-        let of =
+        let value_at =
             |column: &[f64], pose: usize| column.get(pose * joints + joint).copied().unwrap_or(0.0);
         let (mut q, mut side) = (q, side);
-        let (mut gone, mut pulled) = (0.0, 0.0);
+        let (mut travelled, mut state) = (0.0, 0.0);
         for pose in (0..self.times.len()).rev() {
-            let before = of(self.configurations, pose);
+            let before = value_at(self.configurations, pose);
             let way = (q - before).abs() / distance;
             let towards = if side == 0.0 { (q - before).signum() } else { side };
-            pulled += towards * f64::exp(-gone) * -(-way).exp_m1();
-            gone += way;
-            (q, side) = (before, of(self.approaches, pose));
-            if gone > FORGOTTEN {
-                return pulled;
+            state += towards * f64::exp(-travelled) * -(-way).exp_m1();
+            travelled += way;
+            (q, side) = (before, value_at(self.approaches, pose));
+            if travelled > MAX_MEMORY {
+                return state;
             }
         }
-        pulled + side * f64::exp(-gone)
+        state + side * f64::exp(-travelled)
     }
 
-    /// Derivative of [`Past::dragged`] by q, (g − z)/s along the way: 0 where no pose was before.
-    pub fn drag_slope(&self, joint: usize, (q, side): (f64, f64), distance: f64) -> f64 {
+    /// Returns the derivative of [`Past::friction_state`] with respect to q, ±(g − z)/s; 0 without
+    /// an earlier pose.
+    pub fn friction_state_slope(&self, joint: usize, (q, side): (f64, f64), distance: f64) -> f64 {
         let joints = self.configurations.len().checked_div(self.times.len()).unwrap_or(0);
         let last = self
             .times
@@ -154,53 +156,56 @@ impl Past<&[f64]> {
             return 0.0;
         }
         let towards = if side == 0.0 { way.signum() } else { side };
-        (towards - self.dragged(joint, (q, side), distance)) * way.signum() / distance
+        (towards - self.friction_state(joint, (q, side), distance)) * way.signum() / distance
     }
 }
 
-/// What follows the temperature, pose after pose of a session in order: each from the one before.
+/// Integrates a lagging temperature over the poses of a session in order; each call continues from
+/// the previous pose.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Lag {
+pub(crate) struct ThermalLag {
     time_constant: f64,
-    /// Where the poses of the session begin in memory, how many of them are behind, and T̃ at the
-    /// last.
-    known: Option<(usize, usize, f64)>,
+    /// Start of the session's data in memory, number of poses processed, and T̃ at the last of
+    /// them.
+    progress: Option<(usize, usize, f64)>,
 }
 
-impl Lag {
-    /// With a time constant \[s\].
+impl ThermalLag {
+    /// Returns a lag with the time constant \[s\].
     pub fn new(time_constant: f64) -> Self {
-        Self { time_constant, known: None }
+        Self { time_constant, progress: None }
     }
 
-    /// T̃ [°C] at a time \[s\] at which T is measured [°C].
-    pub fn felt(&mut self, past: &Past<&[f64]>, now: (f64, f64)) -> f64 {
-        self.felt_from(0, past, now)
+    /// Returns T̃ [°C] at the time and temperature `now` (\[s\], [°C]).
+    pub fn advance(&mut self, past: &Past<&[f64]>, now: (f64, f64)) -> f64 {
+        self.advance_from(0, past, now)
     }
 
-    fn felt_from(&mut self, first: usize, past: &Past<&[f64]>, now: (f64, f64)) -> f64 {
+    fn advance_from(&mut self, first: usize, past: &Past<&[f64]>, now: (f64, f64)) -> f64 {
         let reading = |k: usize| Some((*past.times.get(k)?, *past.temperatures.get(k)?));
         let session = past.times.as_ptr().addr();
-        let ahead =
-            |(own, behind, _): &(usize, usize, f64)| *own == session && *behind <= past.times.len();
-        let begin = || Some((session, first + 1, reading(first)?.1));
-        let Some((_, mut behind, mut felt)) = self.known.filter(ahead).or_else(begin) else {
+        let continues = |(start, processed, _): &(usize, usize, f64)| {
+            *start == session && *processed <= past.times.len()
+        };
+        let restart = || Some((session, first + 1, reading(first)?.1));
+        let Some((_, mut processed, mut lagged)) = self.progress.filter(continues).or_else(restart)
+        else {
             return now.1;
         };
-        while let Some((before, next)) = reading(behind - 1).zip(reading(behind)) {
-            felt = self.after(felt, before, next);
-            behind += 1;
+        while let Some((before, next)) = reading(processed - 1).zip(reading(processed)) {
+            lagged = self.after(lagged, before, next);
+            processed += 1;
         }
-        self.known = Some((session, behind, felt));
-        reading(behind - 1).map_or(now.1, |before| self.after(felt, before, now))
+        self.progress = Some((session, processed, lagged));
+        reading(processed - 1).map_or(now.1, |before| self.after(lagged, before, now))
     }
 
-    /// T̃ after T went evenly from one reading to the next: by the rate times τ it stays behind in
-    /// the end, T̃ = T − (1 − e) τ ΔT/Δt + (T̃' − T') e, e = exp(−Δt/τ).
-    fn after(&self, felt: f64, before: (f64, f64), next: (f64, f64)) -> f64 {
+    /// Returns T̃ after a linear change of T between two readings: T̃ = T − (1 − e) τ ΔT/Δt + (T̃'
+    /// − T') e with e = exp(−Δt/τ).
+    fn after(&self, lagged: f64, before: (f64, f64), next: (f64, f64)) -> f64 {
         let passed = (next.0 - before.0) / self.time_constant;
-        let behind = if passed > 0.0 { -(-passed).exp_m1() / passed } else { 1.0 };
-        next.1 - behind * (next.1 - before.1) + (felt - before.1) * (-passed).exp()
+        let mean_delay = if passed > 0.0 { -(-passed).exp_m1() / passed } else { 1.0 };
+        next.1 - mean_delay * (next.1 - before.1) + (lagged - before.1) * (-passed).exp()
     }
 }
 
@@ -211,37 +216,40 @@ mod tests {
     const TIMES: [f64; 4] = [0.0, 60.0, 200.0, 230.0];
 
     #[test]
-    fn what_lags_follows_its_differential_equation() {
+    fn lagged_temperature_solves_its_differential_equation() {
         let temperatures = [20.0, 26.0, 21.0, 30.0];
         let past = Past { times: &TIMES[..3], temperatures: &temperatures[..3], ..Past::default() };
         let (steps, tau) = (200_000, 90.0);
-        let mut felt = 20.0;
+        let mut lagged = 20.0;
         for step in 0..steps {
             let t = 230.0 * (f64::from(step) + 0.5) / f64::from(steps);
             let k = TIMES.iter().rposition(|time| *time <= t).unwrap();
             let part = (t - TIMES[k]) / (TIMES[k + 1] - TIMES[k]);
             let air = temperatures[k] + part * (temperatures[k + 1] - temperatures[k]);
-            felt += (air - felt) / tau * 230.0 / f64::from(steps);
+            lagged += (air - lagged) / tau * 230.0 / f64::from(steps);
         }
-        let found = past.lagging((230.0, 30.0), tau);
-        assert!((found - felt).abs() < 1e-4, "{found}, not {felt}");
-        assert!((past.lagging((230.0, 30.0), 1e-3) - 30.0).abs() < 1e-3);
-        assert!((past.lagging((230.0, 30.0), 1e9) - 20.0).abs() < 1e-5);
-        assert_eq!(Past::default().lagging((5.0, 17.0), 30.0).to_bits(), 17_f64.to_bits());
-        let mut lag = Lag::new(tau);
+        let found = past.lagged_temperature((230.0, 30.0), tau);
+        assert!((found - lagged).abs() < 1e-4, "{found}, not {lagged}");
+        assert!((past.lagged_temperature((230.0, 30.0), 1e-3) - 30.0).abs() < 1e-3);
+        assert!((past.lagged_temperature((230.0, 30.0), 1e9) - 20.0).abs() < 1e-5);
+        assert_eq!(
+            Past::default().lagged_temperature((5.0, 17.0), 30.0).to_bits(),
+            17_f64.to_bits()
+        );
+        let mut lag = ThermalLag::new(tau);
         for k in [0, 2, 3, 1] {
             let past =
                 Past { times: &TIMES[..k], temperatures: &temperatures[..k], ..Past::default() };
             let (one_by_one, alone) = (
-                lag.felt(&past, (TIMES[k], temperatures[k])),
-                past.lagging((TIMES[k], temperatures[k]), tau),
+                lag.advance(&past, (TIMES[k], temperatures[k])),
+                past.lagged_temperature((TIMES[k], temperatures[k]), tau),
             );
             assert!((one_by_one - alone).abs() < 1e-12, "{k}: {one_by_one}, not {alone}");
         }
     }
 
     #[test]
-    fn friction_follows_the_way_of_a_joint() {
+    fn friction_state_follows_the_travel_of_a_joint() {
         let commands = [0.1, 0.7, 0.5, 0.9];
         let mut z: f64 = -1.0;
         for k in 0..4 {
@@ -258,7 +266,7 @@ mod tests {
                 approaches: &approaches,
                 ..Past::default()
             };
-            let found = past.dragged(1, (commands[k], if k == 0 { -1.0 } else { 0.0 }), 0.3);
+            let found = past.friction_state(1, (commands[k], if k == 0 { -1.0 } else { 0.0 }), 0.3);
             assert!((found - z).abs() < 1e-12, "pose {k}: {found}, not {z}");
         }
     }

@@ -1,7 +1,7 @@
-//! Names as TOML writes them.
+//! TOML strings.
 
-/// A name in quotes, quotes and backslashes in it with a backslash before them; names hold nothing
-/// that is not seen.
+/// Returns a name in quotes with escaped quotes and backslashes; names contain no other character
+/// that needs an escape.
 pub(crate) fn quoted(name: &str) -> String {
     format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
 }

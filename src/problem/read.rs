@@ -1,4 +1,4 @@
-//! From the text of `problem.toml` to a [`Problem`].
+//! Conversion of the text of `problem.toml` to a [`Problem`].
 
 use std::path::Path;
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::item::Document;
 use super::section::Section;
-use super::target::InfluentialRows;
+use super::target::CarrierJoints;
 use super::{
     BasePose, Effect, EffectDeclaration, Equilibrium, Placement, Problem, Statics, UrdfEnds, arm,
     constraints, data, effects, fixture, parameters, robust, target,
@@ -15,39 +15,40 @@ use super::{
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
-/// Most elements of a beam: eight are as good as any number, and the time of a pose grows with
-/// their square.
-const MOST_ELEMENTS: usize = 32;
+/// Maximum number of elements per beam: more than eight do not improve the result, and the cost per
+/// pose grows quadratically.
+const MAX_BEAM_ELEMENTS: usize = 32;
 
 impl Problem {
-    /// Reads a problem; `path` is its file, or the folder that holds a `problem.toml`.
+    /// Reads a problem; `path` is its file or the folder that contains `problem.toml`.
     ///
     /// # Errors
-    /// The first mistake found, a file that cannot be read among them.
+    /// The first error in the file, or the file cannot be read.
     pub fn read(path: &Path) -> Result<Self, InputError> {
         Self::read_with_text(path).map(|(problem, _)| problem)
     }
 
-    /// As [`read`](Self::read), with the text: a pipe can be read only once.
+    /// Reads a problem like [`read`](Self::read) and returns its text as well, because a pipe can
+    /// be read only once.
     ///
     /// # Errors
-    /// The first mistake found, a file that cannot be read among them.
+    /// The first error in the file, or the file cannot be read.
     pub fn read_with_text(path: &Path) -> Result<(Self, Arc<str>), InputError> {
         let file = if path.is_dir() { path.join("problem.toml") } else { path.to_owned() };
         let document = Document::read(&file, InputErrorKind::ProblemMissing)?;
         Ok((problem_of(&document)?, document.text))
     }
 
-    /// Reads a problem from its text; `file` names it in messages, and data files are looked for
-    /// beside it.
+    /// Parses a problem; `file` names the text in messages, and data files are relative to its
+    /// folder.
     ///
     /// # Errors
-    /// The first mistake found.
+    /// The first error in the text.
     pub fn parse(text: &str, file: &Path) -> Result<Self, InputError> {
         problem_of(&Document { file: file.to_owned(), text: Arc::from(text) })
     }
 
-    /// The same problem with one more effect declared, behind the others; joints are numbered from
+    /// Returns this problem with one more effect declared after the others; its joints count from
     /// 1.
     #[must_use]
     pub fn with_effect(&self, effect: Effect) -> Self {
@@ -59,7 +60,8 @@ impl Problem {
         problem
     }
 
-    /// The same problem with orientations left out of fits, and the tools' own with them.
+    /// Returns this problem without fitted orientations, and so without orientation parameters of
+    /// the tools.
     #[must_use]
     pub fn positions_alone(&self) -> Self {
         let mut problem = self.clone();
@@ -67,11 +69,11 @@ impl Problem {
         problem
     }
 
-    /// Reads an effect that this arm may have, written as in a problem file (`gear-ratio = { joint
-    /// = 3 }`); `named` is what messages call the text.
+    /// Parses an effect for this arm, written as in a problem file (`gear-ratio = { joint = 3 }`);
+    /// `named` names the text in messages.
     ///
     /// # Errors
-    /// It is no effect, or one that could never act on this arm.
+    /// The text is no effect, or the effect cannot act on this arm.
     pub fn effect(&self, text: &str, named: &Path) -> Result<EffectDeclaration, InputError> {
         effects::parse(text, named, self)
     }
@@ -88,9 +90,9 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
         root.vector("gravity", Unit::Acceleration)?.unwrap_or(Vector3::new(0.0, 0.0, -9.80665));
     let statics = statics(root.section("statics")?)?;
     let (joints, is_standard) = arm::joints(&mut root)?;
-    let influential_rows = InfluentialRows { joints: &joints, is_standard };
-    let tool = target::tool(root.section("tool")?, &influential_rows)?;
-    let targets = target::targets(&mut root, &tool, &influential_rows)?;
+    let carriers = CarrierJoints { joints: &joints, is_standard };
+    let tool = target::tool(root.section("tool")?, &carriers)?;
+    let targets = target::targets(&mut root, &tool, &carriers)?;
     let base = base(root.section("base")?)?;
     let urdf = root.section("urdf")?.map(urdf).transpose()?;
     let effects = effects::read(&mut root, &joints)?;
@@ -121,16 +123,19 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     })
 }
 
-/// Characters that no name of a folder holds everywhere.
-pub(crate) const BARRED_IN_NAMES: &str = "/\\:*?\"<>|";
+/// Characters that are not allowed in folder names on some system.
+pub(crate) const FORBIDDEN_IN_FOLDER_NAMES: &str = "/\\:*?\"<>|";
 
-/// A name that is fit to name a folder.
+/// Reads the name of a problem, which must be a valid folder name.
 pub(crate) fn name(root: &mut Section<'_, '_>) -> Result<String, InputError> {
     let item = root.require("name", "name = \"…\"")?;
     let name = item.text()?;
-    let barred = |c: char| c.is_control() || BARRED_IN_NAMES.contains(c);
-    let edges = |c: char| c.is_whitespace() || c == '.';
-    if name.contains(barred) || name.starts_with(edges) || name.ends_with(edges) || name.len() > 200
+    let is_forbidden = |c: char| c.is_control() || FORBIDDEN_IN_FOLDER_NAMES.contains(c);
+    let is_space_or_dot = |c: char| c.is_whitespace() || c == '.';
+    if name.contains(is_forbidden)
+        || name.starts_with(is_space_or_dot)
+        || name.ends_with(is_space_or_dot)
+        || name.len() > 200
     {
         let name = name.chars().take(200).collect();
         return Err(item.error(InputErrorKind::NotAFolderName { name }));
@@ -149,7 +154,7 @@ fn statics(section: Option<Section<'_, '_>>) -> Result<Statics, InputError> {
     }
     if let Some(item) = section.get("beam_elements") {
         statics.beam_elements = usize::from(item.small()?);
-        item.check_count("beam elements", statics.beam_elements, MOST_ELEMENTS)?;
+        item.check_count("beam elements", statics.beam_elements, MAX_BEAM_ELEMENTS)?;
     }
     section.finish()?;
     Ok(statics)

@@ -1,29 +1,29 @@
-//! `[robust]`: how much a residual counts.
+//! Reader of `[robust]`: loss of large residuals.
 
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind};
 
-/// `[robust]`.
+/// Section `[robust]`: robust loss.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Robust {
-    /// What residuals count.
+    /// Loss function of a residual.
     pub loss: RobustLoss,
-    /// `threshold_sigma`: the length of a residual from which it counts less than its square \[σ\];
-    /// `None`: the usual one.
+    /// Length of a residual above which the loss is no longer quadratic, `threshold_sigma` \[σ\];
+    /// `None` for the default.
     pub threshold: Option<f64>,
 }
 
-/// What the residual of a pose counts.
+/// Loss function of the residual of a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RobustLoss {
-    /// Its square up to the threshold, its length beyond.
+    /// Quadratic up to the threshold, linear beyond.
     Huber,
-    /// Its length, rounded off below the threshold.
+    /// Linear, rounded off below the threshold.
     L1,
 }
 
-/// The section, if it is there.
+/// Reads the section; returns `None` if it is absent.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Option<Robust>, InputError> {
     let Some(mut section) = root.section("robust")? else { return Ok(None) };
     let words = ["huber", "l1"];

@@ -1,4 +1,4 @@
-//! A table of the problem file, read key by key; a key that nobody asked for is an error.
+//! Tables of the problem file, read key by key; a key that was not read is an error.
 
 use std::ops::Range;
 
@@ -9,17 +9,17 @@ use super::item::{Document, Item, join};
 use crate::error::{InputError, InputErrorKind, Location, nearest, shortened};
 use crate::quantity::{Suffix, Unit};
 
-/// Most tables `[[…]]` of one name: joints, masses of a beam, effects, constraints.
-const MOST_TABLES: usize = 100;
+/// Maximum number of tables `[[…]]` with one name: joints, masses of a beam, effects, constraints.
+const MAX_TABLES: usize = 100;
 
-/// A table that is being read.
+/// Table of a problem file while it is read.
 pub(crate) struct Section<'a, 'i> {
     document: &'a Document,
     path: String,
     span: Range<usize>,
     table: &'a DeTable<'i>,
-    /// Keys asked for so far.
-    known: Vec<String>,
+    /// Keys that have been read.
+    keys_read: Vec<String>,
 }
 
 impl<'a, 'i> Section<'a, 'i> {
@@ -29,41 +29,41 @@ impl<'a, 'i> Section<'a, 'i> {
         span: Range<usize>,
         table: &'a DeTable<'i>,
     ) -> Self {
-        Self { document, path, span, table, known: Vec::new() }
+        Self { document, path, span, table, keys_read: Vec::new() }
     }
 
-    /// Where the section begins.
+    /// Returns the place of the section's header.
     pub fn location(&self) -> Location {
         let location = self.document.locate(self.span.clone());
         if self.path.is_empty() { location } else { location.with_key(self.path.as_str()) }
     }
 
-    /// A mistake in the section as a whole.
+    /// Returns an error about the whole section.
     pub fn error(&self, kind: InputErrorKind) -> InputError {
         self.location().error(kind)
     }
 
-    /// The error of a key that is not there; one that nobody asked for may be meant by it.
+    /// Returns the error for a missing key; suggests a similar key that was not read.
     pub fn missing(&self, key: &str, write: impl Into<String>) -> InputError {
-        let others =
-            self.entries().into_iter().map(|(key, _)| key).filter(|key| !self.asked_for(key));
+        let unread =
+            self.entries().into_iter().map(|(key, _)| key).filter(|key| !self.was_read(key));
         let kind = InputErrorKind::MissingKey {
             write: write.into(),
-            near: nearest(key, others).map(str::to_owned),
+            near: nearest(key, unread).map(str::to_owned),
         };
         self.location().with_key(join(&self.path, key)).error(kind)
     }
 
-    fn asked_for(&self, key: &str) -> bool {
-        self.known.iter().any(|known| known == key)
+    fn was_read(&self, key: &str) -> bool {
+        self.keys_read.iter().any(|read| read == key)
     }
 
-    /// Number of keys.
+    /// Returns the number of keys.
     pub fn len(&self) -> usize {
         self.table.len()
     }
 
-    /// Every key and its value, in the order of the file.
+    /// Returns all keys and values in the order of the file.
     pub fn entries(&self) -> Vec<(&'a str, Item<'a, 'i>)> {
         let mut entries: Vec<_> = self.table.iter().collect();
         entries.sort_by_key(|(key, _)| key.span().start);
@@ -71,29 +71,29 @@ impl<'a, 'i> Section<'a, 'i> {
         entries.into_iter().map(|(key, value)| (&**key.get_ref(), item((key, value)))).collect()
     }
 
-    /// The value of a key, without taking note of it.
+    /// Returns the value of a key without marking the key as read.
     pub fn peek(&self, key: &str) -> Option<Item<'a, 'i>> {
         let (key, value) = self.table.get_key_value(key)?;
         Some(Item::of_key(self.document, &self.path, key, value))
     }
 
-    /// The value of a key that may be there.
+    /// Returns the value of an optional key.
     pub fn get(&mut self, key: &str) -> Option<Item<'a, 'i>> {
-        self.known.push(key.to_owned());
+        self.keys_read.push(key.to_owned());
         self.peek(key)
     }
 
-    /// The value of a key that has to be there.
+    /// Returns the value of a required key; `write` is the remedy in the error.
     pub fn require(&mut self, key: &str, write: &str) -> Result<Item<'a, 'i>, InputError> {
         self.get(key).ok_or_else(|| self.missing(key, write))
     }
 
-    /// Text that may be there.
+    /// Returns an optional text.
     pub fn text(&mut self, key: &str) -> Result<Option<&'a str>, InputError> {
         self.get(key).map(|item| item.text()).transpose()
     }
 
-    /// One of a few words, with what each stands for.
+    /// Returns the meaning of an optional word; `words[k]` stands for `meanings[k]`.
     pub fn word<T: Copy>(
         &mut self,
         key: &str,
@@ -112,20 +112,20 @@ impl<'a, 'i> Section<'a, 'i> {
         meaning.ok_or_else(unknown).map(Some)
     }
 
-    /// A subsection that may be there.
+    /// Returns an optional subsection.
     pub fn section(&mut self, key: &str) -> Result<Option<Self>, InputError> {
         self.get(key).map(|item| item.section()).transpose()
     }
 
-    /// The tables of `[[key]]`, none if it is not there and no more than can be meant.
+    /// Returns the tables of `[[key]]`, empty if absent; too many are an error.
     pub fn sections(&mut self, key: &str) -> Result<Vec<Self>, InputError> {
         let Some(item) = self.get(key) else { return Ok(Vec::new()) };
-        let all = item.list("a list of tables, each with its header in double brackets")?;
-        item.check_count("tables", all.len(), MOST_TABLES)?;
-        all.iter().map(Item::section).collect()
+        let tables = item.list("a list of tables, each with its header in double brackets")?;
+        item.check_count("tables", tables.len(), MAX_TABLES)?;
+        tables.iter().map(Item::section).collect()
     }
 
-    /// The value of the key `base` with one of the suffixes of `unit`, and that suffix.
+    /// Returns the value of the key `base` with one of the suffixes of `unit`, and that suffix.
     pub fn pick(
         &mut self,
         base: &str,
@@ -146,19 +146,20 @@ impl<'a, 'i> Section<'a, 'i> {
         Ok(found)
     }
 
-    /// The same, where `base` has this one unit: no suffix, or that of another unit, is an error.
+    /// Returns the value of `base` like [`pick`](Self::pick). A missing suffix, or one of another
+    /// unit, is an error.
     pub fn quantity(
         &mut self,
         base: &str,
         unit: Unit,
     ) -> Result<Option<(Item<'a, 'i>, Suffix)>, InputError> {
         if let Some(bare) = self.peek(base).filter(|item| !item.holds_tables()) {
-            let write = unit.spelled(base);
+            let write = unit.alternatives(base);
             return Err(bare.error(InputErrorKind::NeedsUnit { noun: unit.noun(), write }));
         }
         for suffix in Unit::all_suffixes().filter(|suffix| unit.suffix(suffix).is_none()) {
             if let Some(item) = self.peek(&format!("{base}_{suffix}")) {
-                let (suffix, write) = (suffix.to_owned(), unit.spelled(base));
+                let (suffix, write) = (suffix.to_owned(), unit.alternatives(base));
                 return Err(item.error(InputErrorKind::WrongUnit {
                     noun: unit.noun(),
                     suffix,
@@ -169,13 +170,13 @@ impl<'a, 'i> Section<'a, 'i> {
         self.pick(base, unit)
     }
 
-    /// A number with a unit \[SI\].
+    /// Returns an optional number with a unit \[SI\].
     pub fn number(&mut self, base: &str, unit: Unit) -> Result<Option<f64>, InputError> {
         let Some((item, suffix)) = self.quantity(base, unit)? else { return Ok(None) };
         Ok(Some((suffix.to_si)(item.number()?)))
     }
 
-    /// A number with a unit that is not negative \[SI\].
+    /// Returns an optional number with a unit that is not negative \[SI\].
     pub fn not_negative(&mut self, base: &str, unit: Unit) -> Result<Option<f64>, InputError> {
         let Some((item, suffix)) = self.quantity(base, unit)? else { return Ok(None) };
         let value = item.number()?;
@@ -186,7 +187,8 @@ impl<'a, 'i> Section<'a, 'i> {
         }
     }
 
-    /// A number with a unit that is above zero \[SI\]; `zero` makes the error where it is not.
+    /// Returns an optional number with a unit that is above zero \[SI\]; `zero` makes the error for
+    /// other values.
     pub fn positive(
         &mut self,
         base: &str,
@@ -195,29 +197,29 @@ impl<'a, 'i> Section<'a, 'i> {
     ) -> Result<Option<f64>, InputError> {
         let Some((item, suffix)) = self.quantity(base, unit)? else { return Ok(None) };
         let value = item.number()?;
-        // A tiny length in millimetres may become 0 in metres.
+        // A tiny length in millimetres may underflow to 0 in metres.
         let converted = (suffix.to_si)(value);
         if converted > 0.0 { Ok(Some(converted)) } else { Err(item.error(zero(value))) }
     }
 
-    /// Three numbers with a unit \[SI\].
+    /// Returns an optional vector with a unit \[SI\].
     pub fn vector(&mut self, base: &str, unit: Unit) -> Result<Option<Vector3<f64>>, InputError> {
         let Some((item, suffix)) = self.quantity(base, unit)? else { return Ok(None) };
         Ok(Some(item.vector()?.map(suffix.to_si)))
     }
 
-    /// Three numbers with a unit that have to be there \[SI\].
+    /// Returns a required vector with a unit \[SI\].
     pub fn require_vector(&mut self, base: &str, unit: Unit) -> Result<Vector3<f64>, InputError> {
-        self.vector(base, unit)?.ok_or_else(|| self.missing(base, unit.spelled(base)))
+        self.vector(base, unit)?.ok_or_else(|| self.missing(base, unit.alternatives(base)))
     }
 
-    /// Whether the section holds a key that nobody asked for: an error at the first of them.
+    /// Returns an error at the first key that was not read.
     pub fn finish(&self) -> Result<(), InputError> {
-        let unknown = self.entries().into_iter().find(|(key, _)| !self.asked_for(key));
+        let unknown = self.entries().into_iter().find(|(key, _)| !self.was_read(key));
         match unknown {
             Some((key, item)) => Err(item.error(InputErrorKind::UnknownKey {
                 key: shortened(key, 80),
-                known: self.known.clone(),
+                known: self.keys_read.clone(),
             })),
             None => Ok(()),
         }
@@ -225,13 +227,13 @@ impl<'a, 'i> Section<'a, 'i> {
 }
 
 impl<'a, 'i> Item<'a, 'i> {
-    /// A table, as a section.
+    /// Returns the value as a section; it must be a table.
     pub fn section(&self) -> Result<Section<'a, 'i>, InputError> {
         let table = self.value.as_table().ok_or_else(|| self.wrong_type("a table"))?;
         Ok(self.section_of(table))
     }
 
-    /// A section with this item's place and a table from elsewhere.
+    /// Returns a section with the place of this item and another table.
     pub fn section_of(&self, table: &'a DeTable<'i>) -> Section<'a, 'i> {
         Section::new(self.document, self.key.clone(), self.span.clone(), table)
     }

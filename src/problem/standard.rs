@@ -1,37 +1,37 @@
-//! Tables of standard (distal) DH, told in the modified form that everything else is written in.
+//! Conversion of standard (distal) DH tables to the modified form.
 
 use nalgebra::Vector3;
 
 use super::{Joint, JointKind, Placement};
 use crate::spatial::Frame;
 
-/// The same arm from rows that stand for Rz(θ+q) Tz(d) Tx(a) Rx(α).
+/// Converts rows of standard DH, T = Rz(θ+q) Tz(d) Tx(a) Rx(α), to joints of modified DH.
 ///
-/// a and α of a row are those of the next joint here, where Rx(α) Tx(a) = Tx(a) Rx(α) come first;
-/// those of the last row belong to a fixed joint that is added behind it. Bodies stay where they
-/// are: in the frame before a and α.
+/// a and α of a row become those of the next joint, where Rx(α) Tx(a) = Tx(a) Rx(α) come first.
+/// Those of the last row belong to an added fixed joint. Bodies keep their places, and their frames
+/// are those previous a and α.
 pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
     let mut joints = Vec::with_capacity(rows.len() + 1);
-    // a and α of the row before.
-    let mut before = (0.0, 0.0);
+    // Values of a and α in the previous row.
+    let mut previous = (0.0, 0.0);
     let mut last = None;
     for mut row in rows {
         let (a, alpha) = (row.a, row.alpha);
-        (row.a, row.alpha) = before;
+        (row.a, row.alpha) = previous;
         if let Some(Placement { xyz, rpy }) = &mut row.placement {
-            let frame = link(before).compose(&Frame::from_xyz_rpy(xyz, rpy));
+            let frame = link(previous).compose(&Frame::from_xyz_rpy(xyz, rpy));
             (*xyz, *rpy) = (frame.origin, frame.roll_pitch_yaw());
             (row.a, row.alpha) = (0.0, 0.0);
         }
         for body in &mut row.bodies {
             body.position = link((a, alpha)).point(&body.position);
         }
-        before = (a, alpha);
+        previous = (a, alpha);
         last = Some(row.location.clone());
         joints.push(row);
     }
     if let Some(location) = last {
-        let (a, alpha) = before;
+        let (a, alpha) = previous;
         joints.push(Joint {
             name: "flange".to_owned(),
             kind: JointKind::Fixed,
@@ -53,7 +53,7 @@ pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
     joints
 }
 
-/// Tx(a) Rx(α).
+/// Returns the transform Tx(a) Rx(α).
 fn link((a, alpha): (f64, f64)) -> Frame<f64> {
     Frame::from_xyz_rpy(&Vector3::new(a, 0.0, 0.0), &Vector3::new(alpha, 0.0, 0.0))
 }

@@ -1,5 +1,4 @@
-//! What is measured and what is carried: `[tool]`, and `[[target]]` where several points are
-//! measured.
+//! Reader of `[tool]` and `[[target]]`: the measured points and the payload.
 
 use nalgebra::Vector3;
 
@@ -9,38 +8,38 @@ use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
-/// `[tool]`.
+/// Section `[tool]`: the measured point and the payload.
 #[derive(Debug, Clone)]
 pub struct Tool {
-    /// Index of the joint whose frame carries it: the last one, unless the file says otherwise.
+    /// Index of the joint whose frame carries the tool, by default the last.
     pub joint: usize,
-    /// The measured point in that frame \[m\].
+    /// Measured point in that frame \[m\].
     pub target: Vector3<f64>,
-    /// Orientation of what is measured in that frame, a rotation vector \[rad\].
+    /// Orientation of the target in that frame, a rotation vector \[rad\].
     pub rotation: Vector3<f64>,
-    /// Where a payload hangs, in that frame \[m\].
+    /// Position of the payload in that frame \[m\].
     pub payload_at: Vector3<f64>,
-    /// Payload where no column `payload_kg` says otherwise \[kg\].
+    /// Payload without a column `payload_kg` \[kg\].
     pub payload_mass: f64,
 }
 
-/// `[[target]]`: a point that rows name in the column `target`.
+/// Table `[[target]]`: a measured point that rows name in the column `target`.
 #[derive(Debug, Clone)]
 pub struct Target {
-    /// Its name, as the column has it.
+    /// Name of the target, as used in the column.
     pub name: String,
     /// Index of the joint whose frame carries it.
     pub joint: usize,
-    /// Place in that frame \[m\].
+    /// Position in that frame \[m\].
     pub at: Vector3<f64>,
     /// Orientation in that frame, a rotation vector \[rad\].
     pub rotation: Vector3<f64>,
-    /// For errors.
+    /// Place in the file, for errors.
     pub location: Location,
 }
 
 impl Target {
-    /// What `[tool]` says, without a name.
+    /// Returns the unnamed target of `[tool]`.
     pub(super) fn of_tool(tool: &Tool, location: Location) -> Self {
         Self {
             name: String::new(),
@@ -52,15 +51,15 @@ impl Target {
     }
 }
 
-/// Joints that may carry something.
-pub(super) struct InfluentialRows<'a> {
+/// Joints that may carry a tool or target.
+pub(super) struct CarrierJoints<'a> {
     pub joints: &'a [Joint],
-    /// Whether frames have no place of their own in the file's form of the joints.
+    /// True if the joint table is in standard form, which has no frame per row to refer to.
     pub is_standard: bool,
 }
 
-impl InfluentialRows<'_> {
-    /// The joint with the number behind the key `joint`.
+impl CarrierJoints<'_> {
+    /// Reads the optional key `joint` and returns the joint's index.
     fn joint(&self, section: &mut Section<'_, '_>) -> Result<Option<usize>, InputError> {
         let Some(item) = section.get("joint") else { return Ok(None) };
         if self.is_standard {
@@ -76,16 +75,16 @@ impl InfluentialRows<'_> {
     }
 }
 
-/// `[tool]`, all of it at the origin of the last frame where the section is not there.
+/// Reads `[tool]`; without the section everything is at the origin of the last frame.
 pub(super) fn tool(
     section: Option<Section<'_, '_>>,
-    influential_rows: &InfluentialRows,
+    carriers: &CarrierJoints,
 ) -> Result<Tool, InputError> {
-    let joint = influential_rows.joints.len().saturating_sub(1);
+    let joint = carriers.joints.len().saturating_sub(1);
     let (target, rotation, payload_at) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
     let mut tool = Tool { joint, target, rotation, payload_at, payload_mass: 0.0 };
     let Some(mut section) = section else { return Ok(tool) };
-    tool.joint = influential_rows.joint(&mut section)?.unwrap_or(joint);
+    tool.joint = carriers.joint(&mut section)?.unwrap_or(joint);
     tool.target = section.vector("target", Unit::Length)?.unwrap_or_default();
     tool.rotation = section.vector("rotation", Unit::Angle)?.unwrap_or_default();
     tool.payload_at = section.vector("payload_at", Unit::Length)?.unwrap_or(tool.target);
@@ -94,21 +93,21 @@ pub(super) fn tool(
     Ok(tool)
 }
 
-/// Every `[[target]]`; what one does not say of itself is as in `[tool]`.
+/// Reads all `[[target]]` tables; missing keys default to the values of `[tool]`.
 pub(super) fn targets(
     root: &mut Section<'_, '_>,
     tool: &Tool,
-    influential_rows: &InfluentialRows,
+    carriers: &CarrierJoints,
 ) -> Result<Vec<Target>, InputError> {
     let mut targets: Vec<Target> = Vec::new();
     for mut section in root.sections("target")? {
         let item = section.require("name", "name = \"…\", a word of the column target")?;
         let name = name_of(&item, "a target")?;
-        if let Some(first) = targets.iter().find(|own| own.name == name) {
+        if let Some(first) = targets.iter().find(|target| target.name == name) {
             let line = first.location.line.unwrap_or(0);
             return Err(item.error(InputErrorKind::RepeatedFixture { what: "target", name, line }));
         }
-        let joint = influential_rows.joint(&mut section)?.unwrap_or(tool.joint);
+        let joint = carriers.joint(&mut section)?.unwrap_or(tool.joint);
         let at = section.vector("at", Unit::Length)?.unwrap_or(tool.target);
         let rotation = section.vector("rotation", Unit::Angle)?.unwrap_or(tool.rotation);
         section.finish()?;

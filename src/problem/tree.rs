@@ -1,80 +1,80 @@
-//! How joints stand on each other.
+//! Tree of joints.
 
 use super::Joint;
 use super::item::Item;
 use crate::error::{InputError, InputErrorKind};
 
-/// Which joints stand on which, directly or through others; by default each on the one before it.
+/// Parent relations of the joints; by default each joint is the child of the joint before it.
 ///
-/// Joints are listed branch by branch: everything that stands on a joint comes right behind it.
+/// Joints are listed branch by branch: all descendants of a joint follow it directly.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Tree {
-    /// For each joint the index behind the last one that stands on it; empty for a chain.
+    /// Index after the last descendant of each joint; empty for a chain.
     ends: Vec<usize>,
-    /// Further branches that begin at the base and behind each joint, besides the first; empty for
-    /// a chain.
-    further: Vec<usize>,
+    /// Number of children after the first, of the base and then of each joint; empty for a chain.
+    extra_children: Vec<usize>,
 }
 
 impl Tree {
-    /// Of joints that each name the one they stand on.
-    pub fn of(joints: &[Joint]) -> Self {
+    /// Returns the tree of joints that each name their parent.
+    pub fn from_joints(joints: &[Joint]) -> Self {
         let is_chain =
-            joints.iter().enumerate().all(|(index, own)| own.parent == index.checked_sub(1));
+            joints.iter().enumerate().all(|(index, joint)| joint.parent == index.checked_sub(1));
         if is_chain {
             return Self::default();
         }
-        let mut stands = Self { ends: (1..=joints.len()).collect(), further: Vec::new() };
-        // Everything that stands on a joint is behind it, the last of it in the last branch.
-        for (index, own) in joints.iter().enumerate().rev() {
-            let end = stands.ends.get(index).copied().unwrap_or(index + 1);
-            if let Some(of_parent) = own.parent.and_then(|parent| stands.ends.get_mut(parent)) {
-                *of_parent = end.max(*of_parent);
+        let mut tree = Self { ends: (1..=joints.len()).collect(), extra_children: Vec::new() };
+        // The descendants of a joint follow it, so its last branch ends last.
+        for (index, joint) in joints.iter().enumerate().rev() {
+            let end = tree.ends.get(index).copied().unwrap_or(index + 1);
+            if let Some(parent_end) = joint.parent.and_then(|parent| tree.ends.get_mut(parent)) {
+                *parent_end = end.max(*parent_end);
             }
         }
-        let on = |carrier: Option<usize>| {
-            joints.iter().filter(|own| own.parent == carrier).count().saturating_sub(1)
+        let extra = |parent: Option<usize>| {
+            joints.iter().filter(|joint| joint.parent == parent).count().saturating_sub(1)
         };
-        stands.further = std::iter::once(None).chain((0..joints.len()).map(Some)).map(on).collect();
-        stands
+        tree.extra_children =
+            std::iter::once(None).chain((0..joints.len()).map(Some)).map(extra).collect();
+        tree
     }
 
-    /// Whether each joint stands on the one before it.
+    /// Returns true if the parent of each joint is the joint before it.
     pub fn is_chain(&self) -> bool {
         self.ends.is_empty()
     }
 
-    /// Whether the way from the base to the frame of the joint `tip` leads through a joint, `tip`
-    /// itself included.
+    /// Returns true if `joint` lies on the path from the base to the frame of joint `tip`, `tip`
+    /// included.
     #[inline]
-    pub fn leads_through(&self, joint: usize, tip: usize) -> bool {
+    pub fn path_contains(&self, joint: usize, tip: usize) -> bool {
         joint <= tip && self.ends.get(joint).is_none_or(|&end| tip < end)
     }
 
-    /// Whether a joint begins a branch that stands on an earlier joint than the one before it, or
-    /// on the base.
+    /// Returns true if a joint begins a branch: its parent is not the joint before it.
     #[inline]
     pub fn begins_branch(&self, joint: usize) -> bool {
         joint.checked_sub(1).and_then(|before| self.ends.get(before)) == Some(&joint)
     }
 
-    /// How many branches besides the first stand on the base.
-    pub fn further_on_base(&self) -> usize {
-        self.further.first().copied().unwrap_or(0)
+    /// Returns the number of branches from the base after the first.
+    pub fn extra_branches_at_base(&self) -> usize {
+        self.extra_children.first().copied().unwrap_or(0)
     }
 
-    /// How many branches besides the first stand on a joint.
+    /// Returns the number of branches from a joint after the first.
     #[inline]
-    pub fn further_on(&self, joint: usize) -> usize {
-        self.further.get(joint + 1).copied().unwrap_or(0)
+    pub fn extra_branches_on(&self, joint: usize) -> usize {
+        self.extra_children.get(joint + 1).copied().unwrap_or(0)
     }
 }
 
-/// On which joint each joint stands, from the values of its `parent`, a number counted from 1 or 0
-/// for the base; without one on the joint before.
+/// Returns the parent of each joint from the values of the key `parent` (counted from 1, 0 for the
+/// base). The default is the joint before.
 pub(super) fn parents(given: &[Option<Item<'_, '_>>]) -> Result<Vec<Option<usize>>, InputError> {
     let mut parents = Vec::with_capacity(given.len());
-    // From the base to the joint before: what the next one may stand on.
+    // Joints on the path from the base to the previous joint, which are the allowed parents of the
+    // next.
     let mut open: Vec<usize> = Vec::new();
     for (joint, item) in given.iter().enumerate() {
         let parent = match item {
@@ -90,7 +90,7 @@ pub(super) fn parents(given: &[Option<Item<'_, '_>>]) -> Result<Vec<Option<usize
                         }));
                     }
                     Some(parent) if parent >= joint => {
-                        return Err(item.error(InputErrorKind::StandsOnLater {
+                        return Err(item.error(InputErrorKind::ParentListedLater {
                             joint: joint + 1,
                             parent: number,
                         }));

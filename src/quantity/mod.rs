@@ -1,4 +1,5 @@
-//! Quantities and their units: SI inside, a suffix in files, a unit of a handy size for people.
+//! Physical quantities and their units: SI inside the program, unit suffixes in files, convenient
+//! units on screens.
 
 mod unit;
 

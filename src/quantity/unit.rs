@@ -1,107 +1,107 @@
-//! One table of units: in the program, in files, and for display.
+//! Table of all units: SI symbol, suffixes in files, and unit for display.
 
 use std::f64::consts::PI;
 
-/// What kind of quantity a number is, and its SI unit.
+/// Kind of physical quantity, which determines the SI unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Unit {
-    /// \[rad\]
+    /// Angle \[rad\].
     Angle,
-    /// \[m\]
+    /// Length \[m\].
     Length,
-    /// \[kg\]
+    /// Mass \[kg\].
     Mass,
-    /// \[N\]
+    /// Force \[N\].
     Force,
-    /// [m/s²]
+    /// Acceleration [m/s²].
     Acceleration,
-    /// [°C]
+    /// Temperature [°C].
     Temperature,
-    /// \[s\]
+    /// Time \[s\].
     Time,
-    /// [N/m]
+    /// Force per length [N/m].
     ForcePerLength,
-    /// [N·m/rad]
+    /// Torsional stiffness [N·m/rad].
     TorsionalStiffness,
-    /// EA \[N\]
+    /// Axial rigidity EA \[N\].
     AxialRigidity,
-    /// EI or GJ [N·m²]
+    /// Flexural rigidity EI or torsional rigidity GJ [N·m²].
     FlexuralRigidity,
-    /// [rad/(N·m)]
+    /// Torsional compliance [rad/(N·m)].
     Compliance,
-    /// [rad/(N·m)³]
+    /// Coefficient of a moment cubed in an angle [rad/(N·m)³].
     CubicCompliance,
-    /// Of a bending beam [1/(N·m²)]
+    /// Flexibility 1/EI of a bending beam [1/(N·m²)].
     Flexibility,
-    /// [1/(m·K)]
+    /// Beam curvature per temperature difference [1/(m·K)].
     CurvaturePerDegree,
-    /// Of a strain [1/K]
+    /// Strain per temperature difference [1/K].
     PerDegree,
-    /// [rad/K]
+    /// Angle per temperature difference [rad/K].
     AnglePerDegree,
-    /// [m/K]
+    /// Length per temperature difference [m/K].
     LengthPerDegree,
-    /// [rad/kg]
+    /// Angle per payload mass [rad/kg].
     AnglePerMass,
-    /// [m/kg]
+    /// Length per payload mass [m/kg].
     LengthPerMass,
-    /// [1/m]
+    /// Number per length [1/m].
     PerLength,
-    /// [m/s]
+    /// Speed [m/s].
     Speed,
-    /// [m/rad]
+    /// Length per angle [m/rad].
     LengthPerAngle,
-    /// [rad/m]
+    /// Angle per length [rad/m].
     AnglePerLength,
-    /// Per unit of a covariate [rad/unit]
+    /// Angle per unit of a declared covariate [rad/unit].
     AnglePerUnit,
-    /// Per unit of a covariate [m/unit]
+    /// Length per unit of a declared covariate [m/unit].
     LengthPerUnit,
-    /// Per row, where no time was measured [m/row]
+    /// Length per table row, used when no time was measured [m/row].
     LengthPerRow,
-    /// A small part: rad/rad, m/m
+    /// Small dimensionless ratio (rad/rad or m/m), displayed in ‰.
     Ratio,
-    /// A number of order 1
+    /// Dimensionless number of order 1.
     Number,
 }
 
-/// A unit as files write it, behind an underscore: `alpha_deg`.
+/// Unit suffix of a key or column, written after an underscore: `deg` in `alpha_deg`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Suffix {
-    /// Without its underscore.
+    /// Suffix without its underscore.
     pub name: &'static str,
-    /// Conversion to the SI unit.
+    /// Converts a value in this unit to SI.
     pub to_si: fn(f64) -> f64,
 }
 
-/// A unit for people and the factor from SI to it.
+/// Unit for display, with the factor that converts an SI value to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Display {
-    /// From SI.
+    /// Factor that converts an SI value to the displayed unit.
     pub factor: f64,
-    /// The unit in words: `mm`, `kN·m²`.
+    /// Symbol of the displayed unit: `mm`, `kN·m²`.
     pub symbol: String,
 }
 
-/// What is known of a unit.
+/// Properties of one unit: a row of the table.
 struct Row {
-    /// The quantity with its article, for messages.
+    /// Name of the quantity with its article, for messages.
     noun: &'static str,
-    /// SI unit in words.
+    /// Symbol of the SI unit.
     symbol: &'static str,
-    /// As files may write it, the SI unit among them; empty where no file does.
+    /// Suffixes accepted in files, including the SI unit; empty if no file contains this unit.
     suffixes: &'static [Suffix],
     shown: Shown,
 }
 
-/// How a unit is shown to people.
+/// Rule that selects the displayed unit.
 enum Shown {
-    /// Times a factor, under another symbol.
+    /// Multiplies the SI value by a factor and uses another symbol.
     As(f64, &'static str),
-    /// In SI.
+    /// Displays the SI value.
     Plain,
-    /// In SI with the prefix that suits the size: k, M or G.
+    /// Displays the SI value with the prefix k, M or G that suits its magnitude.
     Prefixed,
 }
 
@@ -126,7 +126,7 @@ const fn row(
 }
 
 impl Unit {
-    /// The table.
+    /// Returns the row of the unit table.
     fn row(self) -> Row {
         use Shown::{As, Plain, Prefixed};
         match self {
@@ -221,19 +221,19 @@ impl Unit {
         }
     }
 
-    /// SI unit in words.
+    /// Returns the symbol of the SI unit.
     pub fn symbol(self) -> &'static str {
         self.row().symbol
     }
 
-    /// Whether a parameter of this unit deviates by ln(value / nominal): stiffnesses and
+    /// Returns true if parameters of this unit deviate by ln(value / nominal): stiffnesses and
     /// rigidities.
     pub fn is_relative(self) -> bool {
         matches!(self, Self::TorsionalStiffness | Self::AxialRigidity | Self::FlexuralRigidity)
     }
 
-    /// The unit for people: degrees, millimetres, and stiffnesses with the prefix that suits
-    /// `magnitude` \[SI\].
+    /// Returns the unit for display: degrees, millimetres, and stiffnesses with the prefix that
+    /// suits `magnitude` \[SI\].
     pub fn display(self, magnitude: f64) -> Display {
         let Row { symbol, shown, .. } = self.row();
         match shown {
@@ -251,45 +251,45 @@ impl Unit {
         }
     }
 
-    /// The unit in which files give a deviation from a value of this unit.
-    pub(crate) fn of_deviation(self) -> Self {
+    /// Returns the unit in which files state a deviation from a value of this unit.
+    pub(crate) fn deviation_unit(self) -> Self {
         if self.is_relative() { Self::Ratio } else { self }
     }
 
-    /// The quantity with its article, for messages.
+    /// Returns the name of the quantity with its article, for messages.
     pub(crate) fn noun(self) -> &'static str {
         self.row().noun
     }
 
-    /// As files may write it.
+    /// Returns the suffixes that files may use for this unit.
     pub(crate) fn suffixes(self) -> &'static [Suffix] {
         self.row().suffixes
     }
 
-    /// The suffix of that name, if files may write this unit so.
+    /// Returns the suffix called `name`, or `None` if files may not write this unit with it.
     pub(crate) fn suffix(self, name: &str) -> Option<Suffix> {
         self.suffixes().iter().copied().find(|suffix| suffix.name == name)
     }
 
-    /// Suffix of the SI unit.
+    /// Returns the suffix of the SI unit.
     pub(crate) fn si_suffix(self) -> &'static str {
         let is_si = |suffix: &&Suffix| (suffix.to_si)(1.0).to_bits() == 1.0_f64.to_bits();
         self.suffixes().iter().find(is_si).map_or("", |suffix| suffix.name)
     }
 
-    /// A key or column with each of the suffixes.
+    /// Returns `base` combined with each suffix: `alpha_deg`, `alpha_rad`.
     pub(crate) fn spellings(self, base: &str) -> impl Iterator<Item = String> {
         self.suffixes().iter().map(move |suffix| format!("{base}_{}", suffix.name))
     }
 
-    /// How to write a quantity of this unit: `alpha_deg or alpha_rad`.
-    pub(crate) fn spelled(self, base: &str) -> String {
+    /// Returns the accepted spellings in words: `alpha_deg or alpha_rad`.
+    pub(crate) fn alternatives(self, base: &str) -> String {
         self.spellings(base).collect::<Vec<_>>().join(" or ")
     }
 
-    /// Every suffix that arms and measurements are written with.
+    /// Returns every suffix that can occur in arms and measurements.
     pub(crate) fn all_suffixes() -> impl Iterator<Item = &'static str> {
-        let all = [
+        let units = [
             Self::Angle,
             Self::Length,
             Self::Mass,
@@ -300,6 +300,6 @@ impl Unit {
             Self::Temperature,
             Self::Time,
         ];
-        all.into_iter().flat_map(Self::suffixes).map(|suffix| suffix.name)
+        units.into_iter().flat_map(Self::suffixes).map(|suffix| suffix.name)
     }
 }

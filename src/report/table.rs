@@ -42,7 +42,7 @@ pub(super) fn commands(problem: &Problem) -> Vec<Command> {
         JointKind::Prismatic => Some(Command { joint, unit: Unit::Length }),
         JointKind::Fixed => None,
     };
-    problem.joints.iter().map(Joint::commanded).enumerate().filter_map(command).collect()
+    problem.joints.iter().map(Joint::command_kind).enumerate().filter_map(command).collect()
 }
 
 /// Sessions of some rows, where any has a name.

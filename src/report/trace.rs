@@ -73,7 +73,7 @@ fn ranked_entry(ranked: &Ranked, trace: &Trace) -> impl Serialize {
         // At 0° the same on these poses, at 90° nothing in common.
         alike: list(&ranked.alike, |(effect, angle)| object! { ..effect, angle_deg: angle.to_degrees() }),
         // A pose that would tell it from the first of those.
-        told_apart: ranked.telling_pose.as_ref().map(|apart| object! {
+        distinguishable_parameters: ranked.telling_pose.as_ref().map(|apart| object! {
             from: &apart.other,
             // Configuration [rad] or [m].
             q: &apart.configuration,

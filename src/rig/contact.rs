@@ -104,7 +104,7 @@ impl Rig {
             let ranges = &truth.poses.joints;
             let joints = self.arm.joints.iter().zip(ranges).zip(&mut row.conditions.configuration);
             for ((joint, range), q) in
-                joints.filter(|((joint, _), _)| joint.commanded() != JointKind::Fixed)
+                joints.filter(|((joint, _), _)| joint.command_kind() != JointKind::Fixed)
             {
                 *q = rounded_command(joint.kind, between(random, *range));
             }
@@ -120,7 +120,7 @@ impl Rig {
         truth: &Truth,
         missing: &impl Fn(&PoseConditions) -> Result<DVector<f64>, NoRest>,
     ) -> Result<bool, NoRest> {
-        let kinds: Vec<JointKind> = self.arm.joints.iter().map(Joint::commanded).collect();
+        let kinds: Vec<JointKind> = self.arm.joints.iter().map(Joint::command_kind).collect();
         let moving: Vec<usize> =
             (0..kinds.len()).filter(|&joint| kinds[joint] != JointKind::Fixed).collect();
         for _ in 0..STEPS {

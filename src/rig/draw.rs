@@ -194,7 +194,7 @@ fn measured(
             row.conditions.past = std::mem::take(&mut past);
             let seen = measure((row, stream_of));
             past = std::mem::take(&mut row.conditions.past);
-            row.conditions.enter(&mut past);
+            row.conditions.append_to(&mut past);
             seen
         };
         rows.iter_mut().zip(streams).map(after_those).collect()
@@ -284,7 +284,7 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
         let turn = row.checked_sub(truth.positions).map_or(row, |place| place / round);
         let mut conditions: PoseConditions = PoseConditions::default();
         for (joint, range) in problem.joints.iter().zip(&ranges.joints) {
-            let q = if joint.commanded() == JointKind::Fixed {
+            let q = if joint.command_kind() == JointKind::Fixed {
                 0.0
             } else {
                 between(&mut random, *range)
@@ -307,7 +307,7 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
         conditions.elapsed = time - rows.first().map_or(time, |row| row.conditions.time);
         if ranges.approach {
             let side = |kind| if kind == JointKind::Fixed { 0.0 } else { 1.0 };
-            let sides = problem.joints.iter().map(|joint| side(joint.commanded()));
+            let sides = problem.joints.iter().map(|joint| side(joint.command_kind()));
             let signed = sides.map(|side| if random.random::<bool>() { side } else { -side });
             conditions.approach = Some(signed.collect());
         }

@@ -40,7 +40,7 @@ impl Simulation {
 
     /// Joints that take a q: index, and whether they turn.
     fn moving(&self) -> impl Iterator<Item = (usize, bool)> {
-        let joints = self.joints.iter().map(Joint::commanded).enumerate();
+        let joints = self.joints.iter().map(Joint::command_kind).enumerate();
         joints
             .filter(|(_, kind)| *kind != JointKind::Fixed)
             .map(|(index, kind)| (index, kind == JointKind::Revolute))

@@ -55,7 +55,7 @@ fn joint_range(
     joint: &Joint,
     problem: &Problem,
 ) -> Result<(f64, f64), InputError> {
-    let unit = match joint.commanded() {
+    let unit = match joint.command_kind() {
         JointKind::Revolute => Unit::Angle,
         JointKind::Prismatic => Unit::Length,
         JointKind::Fixed => return Ok((0.0, 0.0)),
@@ -76,7 +76,9 @@ fn joint_range(
         }
         (Some(found), None) | (None, Some(found)) => found,
         (None, None) => {
-            return Err(section.missing(&base, format!("{} = [from, to]", unit.spelled(&base))));
+            return Err(
+                section.missing(&base, format!("{} = [from, to]", unit.alternatives(&base)))
+            );
         }
     };
     let (from, to) = pair(&item)?;

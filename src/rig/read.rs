@@ -139,7 +139,7 @@ fn check_places(
 
 /// How the section `[poses]` may be written for these joints.
 fn example(joints: &[Joint]) -> String {
-    let range = |(number, joint): (usize, &Joint)| match joint.commanded() {
+    let range = |(number, joint): (usize, &Joint)| match joint.command_kind() {
         JointKind::Revolute => Some(format!("q{number}_deg = [-90, 90]")),
         JointKind::Prismatic => Some(format!("q{number}_mm = [0, 500]")),
         JointKind::Fixed => None,
@@ -175,7 +175,8 @@ fn noise(mut section: Section<'_, '_>) -> Result<Noise, InputError> {
     let turn = section.not_negative("orientation_sigma", Unit::Angle)?;
     let tilt = section.not_negative("tilt_sigma", Unit::Angle)?;
     section.finish()?;
-    let missing = || section.missing("position_sigma_mm", Unit::Length.spelled("position_sigma"));
+    let missing =
+        || section.missing("position_sigma_mm", Unit::Length.alternatives("position_sigma"));
     let missing = position.is_none().then(missing);
     Ok(Noise { position, contacts, turn, tilt, missing })
 }
@@ -198,7 +199,7 @@ fn deviation(
         let known = known.iter().map(|parameter| parameter.name.clone()).collect();
         return Err(item.error(InputErrorKind::UnknownParameter { name: name.to_owned(), known }));
     };
-    let units = parameter.unit.of_deviation().suffixes();
+    let units = parameter.unit.deviation_unit().suffixes();
     let given: Vec<_> =
         units.iter().filter_map(|unit| section.get(unit.name).map(|item| (item, unit))).collect();
     section.finish()?;
@@ -247,7 +248,7 @@ fn random(
     };
     let rule = RandomRule { pattern: pattern.to_owned(), angle, length, relative };
     if matched.iter().all(|parameter| rule.sigma(parameter.unit).is_none()) {
-        let write = first.unit.of_deviation().spelled("sigma");
+        let write = first.unit.deviation_unit().alternatives("sigma");
         return Err(section.missing("sigma", write));
     }
     Ok(rule)

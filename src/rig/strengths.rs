@@ -68,7 +68,8 @@ fn one(
         values.push(value.unwrap_or(0.0));
     }
     section.finish()?;
-    let write = || keys.iter().map(|(key, unit)| unit.spelled(key)).collect::<Vec<_>>().join(", ");
+    let write =
+        || keys.iter().map(|(key, unit)| unit.alternatives(key)).collect::<Vec<_>>().join(", ");
     if !given {
         return Err(item.error(InputErrorKind::NoStrength { write: write() }));
     }

@@ -176,7 +176,7 @@ impl<'a> Data<'a> {
             .joints
             .iter()
             .enumerate()
-            .filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
+            .filter(|(_, joint)| joint.command_kind() != JointKind::Fixed);
         let joint = |(index, _): (usize, _)| CovariateValues {
             covariate: Covariate::Command(index),
             values: self.rows().iter().map(|&row| measurements.configuration(row)[index]).collect(),

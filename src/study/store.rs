@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::key::key;
 use super::study::{Cell, Part, Study};
 use super::tally::Tally;
-use crate::files::Ready;
+use crate::files::StagedFile;
 
 /// Digits of the key that name a part's file.
 const NAME: usize = 16;
@@ -92,8 +92,9 @@ impl Store {
     /// Keeps a finished part.
     pub(super) fn keep(&self, kept: &Kept) -> Result<(), StoreError> {
         let path = self.path(&kept.key);
-        let write =
-            || -> io::Result<()> { Ready::new(&path, &serde_json::to_string_pretty(kept)?)?.put() };
+        let write = || -> io::Result<()> {
+            StagedFile::new(&path, &serde_json::to_string_pretty(kept)?)?.commit()
+        };
         write().map_err(|source| StoreError::Unwritable { path: path.clone(), source })
     }
 

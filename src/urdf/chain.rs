@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::read::{Joint, Kind, Robot};
-use crate::error::{InputError, UrdfMistake};
+use crate::error::{InputError, UrdfErrorKind};
 use crate::problem::Problem;
 use crate::spatial::Frame;
 
@@ -63,7 +63,7 @@ impl<'a> Chain<'a> {
         let (mut joints, mut passed, mut at) = (Vec::new(), Vec::new(), tip);
         while at != base {
             let Some((joint, parent)) = above.get(at).copied().flatten() else {
-                return Err(robot.error(UrdfMistake::NotBelow {
+                return Err(robot.error(UrdfErrorKind::NotBelow {
                     base: name(base),
                     tip: name(tip),
                     above: passed,
@@ -75,15 +75,16 @@ impl<'a> Chain<'a> {
         }
         joints.reverse();
         if joints.len() > MOST_JOINTS {
-            return Err(
-                robot.error(UrdfMistake::TooManyJoints { found: joints.len(), most: MOST_JOINTS })
-            );
+            return Err(robot
+                .error(UrdfErrorKind::TooManyJoints { found: joints.len(), most: MOST_JOINTS }));
         }
         let mut chain =
             Self { robot, base, tip, joints, stages: Vec::new(), end: Frame::identity() };
         chain.walk()?;
         if chain.stages.is_empty() {
-            return Err(robot.error(UrdfMistake::NothingMoves { base: name(base), tip: name(tip) }));
+            return Err(
+                robot.error(UrdfErrorKind::NothingMoves { base: name(base), tip: name(tip) })
+            );
         }
         Ok(chain)
     }
@@ -105,7 +106,7 @@ impl<'a> Chain<'a> {
             let Some(joint) = robot.joints.get(index) else { continue };
             step = step.compose(&joint.origin.frame());
             if let Kind::Other(kind) = &joint.kind {
-                return Err(robot.error_at(index, UrdfMistake::Kind { kind: kind.clone() }));
+                return Err(robot.error_at(index, UrdfErrorKind::Kind { kind: kind.clone() }));
             }
             if joint.kind == Kind::Fixed {
                 continue;
@@ -147,7 +148,7 @@ impl<'a> Chain<'a> {
                 last = (Some((at, factor)), addend);
             }
         }
-        Err(self.robot.error_at(index, UrdfMistake::MimicCircle))
+        Err(self.robot.error_at(index, UrdfErrorKind::MimicCircle))
     }
 
     /// Names of the moving joints.
@@ -197,7 +198,7 @@ fn parents(robot: &Robot) -> Result<Vec<Option<(usize, usize)>>, InputError> {
         if let Some((first, _)) = place.replace((index, joint.parent)) {
             let first = robot.joints.get(first).map_or(String::new(), |own| own.name.clone());
             let (link, second) = (link(joint.child), joint.name.clone());
-            return Err(robot.error_at(index, UrdfMistake::TwoParents { link, first, second }));
+            return Err(robot.error_at(index, UrdfErrorKind::TwoParents { link, first, second }));
         }
     }
     // Every link is at most as deep as there are links.
@@ -206,7 +207,7 @@ fn parents(robot: &Robot) -> Result<Vec<Option<(usize, usize)>>, InputError> {
         while let Some((joint, parent)) = above.get(at).copied().flatten() {
             (at, steps) = (parent, steps + 1);
             if steps > robot.links.len() {
-                return Err(robot.error_at(joint, UrdfMistake::Loop { link: link(at) }));
+                return Err(robot.error_at(joint, UrdfErrorKind::Loop { link: link(at) }));
             }
         }
     }
@@ -218,13 +219,13 @@ fn root(robot: &Robot, above: &[Option<(usize, usize)>]) -> Result<usize, InputE
         (0..above.len()).filter(|&link| above.get(link).is_some_and(Option::is_none)).collect();
     match *roots.as_slice() {
         [root] => Ok(root),
-        [] => Err(robot.error(UrdfMistake::NoLinks)),
+        [] => Err(robot.error(UrdfErrorKind::NoLinks)),
         _ => {
             let roots = roots
                 .iter()
                 .filter_map(|&link| Some(robot.links.get(link)?.name.clone()))
                 .collect();
-            Err(robot.error(UrdfMistake::Roots { roots }))
+            Err(robot.error(UrdfErrorKind::Roots { roots }))
         }
     }
 }
@@ -256,5 +257,5 @@ fn leaf(robot: &Robot, above: &[Option<(usize, usize)>], base: usize) -> Result<
     };
     let base = robot.links.get(base).map_or(String::new(), |own| own.name.clone());
     Err(robot
-        .error(UrdfMistake::Leaves { base, leaves: leaves.iter().filter_map(named).collect() }))
+        .error(UrdfErrorKind::Leaves { base, leaves: leaves.iter().filter_map(named).collect() }))
 }

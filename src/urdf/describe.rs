@@ -7,14 +7,14 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::chain::Chain;
-use super::free::told_apart;
+use super::free::distinguishable_parameters;
 use super::lines::Step;
 use super::read::Kind;
 use super::weights::weights;
 use crate::error::InputError;
 use crate::problem::Problem;
 use crate::problem::quoted::quoted;
-use crate::problem::read::BARRED_IN_NAMES;
+use crate::problem::read::FORBIDDEN_IN_FOLDER_NAMES;
 use crate::spatial::Frame;
 
 /// Smaller numbers than this are rounding, of a right angle written to eleven decimals as well
@@ -66,7 +66,7 @@ pub fn describe(chain: &Chain) -> Result<Description, InputError> {
     // What the arm cannot hold, the URDF cannot: numbers beyond any size.
     let problem = Problem::parse(&arm, Path::new("problem.toml"))
         .map_err(|error| chain.robot.as_problem(&error))?;
-    let free = told_apart(&problem)?;
+    let free = distinguishable_parameters(&problem)?;
     notes.extend(right_angles(chain));
     let text = format!("{arm}\n{}\n{}", parameters(&rows, &free), data(chain, &rows));
     Ok(Description { name, text, notes })
@@ -176,7 +176,7 @@ fn advanced(frame: &Frame<f64>, row: &Row) -> Frame<f64> {
 fn name(robot: &str) -> String {
     let fit: String = robot
         .chars()
-        .map(|c| if BARRED_IN_NAMES.contains(c) || c.is_whitespace() { '-' } else { c })
+        .map(|c| if FORBIDDEN_IN_FOLDER_NAMES.contains(c) || c.is_whitespace() { '-' } else { c })
         .collect();
     let fit: String =
         fit.trim_matches(|c| c == '.' || c == '-').chars().take(LONGEST_NAME).collect();

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use super::chain::{Chain, moved};
 use super::read::Origin;
-use crate::error::{InputError, UrdfMistake};
+use crate::error::{InputError, UrdfErrorKind};
 use crate::mechanics::Arm;
 use crate::problem::{JointKind, Problem};
 use crate::spatial::Frame;
@@ -82,7 +82,7 @@ impl Steps {
             if off.0 > SAME || off.1 > SAME || gauge.axes[2].z < 0.0 {
                 return Err(chain.robot.error_at(
                     stage.joint,
-                    UrdfMistake::OtherArm { joint: name.clone(), off: words(off) },
+                    UrdfErrorKind::OtherArm { joint: name.clone(), off: words(off) },
                 ));
             }
             gauges.push(gauge);
@@ -90,7 +90,7 @@ impl Steps {
         let end = difference(&chain.end, &gauge.compose(&self.end));
         if end.0 > SAME || end.1 > SAME {
             let joint = names.last().cloned().unwrap_or_default();
-            return Err(chain.robot.error(UrdfMistake::OtherArm { joint, off: words(end) }));
+            return Err(chain.robot.error(UrdfErrorKind::OtherArm { joint, off: words(end) }));
         }
         Ok(gauges)
     }
@@ -158,7 +158,7 @@ pub fn export(chain: &Chain, problem: &Problem, arm: &Arm<f64>) -> Result<Export
         let off = difference(&Frame::identity(), &target);
         if off.0 > NOTHING || off.1 > NOTHING {
             let joint = chain.joint_names().pop().unwrap_or_default();
-            return Err(chain.robot.error(UrdfMistake::NoRoom { joint, off: words(off) }));
+            return Err(chain.robot.error(UrdfErrorKind::NoRoom { joint, off: words(off) }));
         }
     }
     Ok(patches.finish())
@@ -173,7 +173,7 @@ fn check_names(chain: &Chain, problem: &Problem) -> Result<(), InputError> {
     }
     let (base, tip) = chain.ends();
     let (base, tip) = (base.to_owned(), tip.to_owned());
-    Err(chain.robot.error(UrdfMistake::OtherJoints { base, tip, found, expected }))
+    Err(chain.robot.error(UrdfErrorKind::OtherJoints { base, tip, found, expected }))
 }
 
 fn as_written(origin: &Origin) -> Frame<f64> {

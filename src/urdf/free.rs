@@ -22,7 +22,7 @@ const SLIDE: f64 = 0.5;
 ///
 /// Base and tool come first, then α, a, θ, d of all joints, then β: each is taken if it moves
 /// positions in a way that none before it does, in poses drawn from the limits of the joints.
-pub(super) fn told_apart(problem: &Problem) -> Result<Vec<String>, InputError> {
+pub(super) fn distinguishable_parameters(problem: &Problem) -> Result<Vec<String>, InputError> {
     let mut problem = problem.clone();
     let location = Location::file(&problem.data.location.file);
     let freedom = Freedom::Free {
@@ -37,7 +37,7 @@ pub(super) fn told_apart(problem: &Problem) -> Result<Vec<String>, InputError> {
     let count = model.parameters.len();
     let mut random = stream(1, 0);
     let mut draw = |joint: &crate::problem::Joint| {
-        let reach = match joint.commanded() {
+        let reach = match joint.command_kind() {
             JointKind::Fixed => return 0.0,
             JointKind::Revolute => TURN,
             JointKind::Prismatic => SLIDE,
@@ -51,7 +51,7 @@ pub(super) fn told_apart(problem: &Problem) -> Result<Vec<String>, InputError> {
     let mut poses = Vec::with_capacity(count);
     for configuration in &configurations {
         poses.push(Pose {
-            setup: PoseView::of(configuration),
+            setup: PoseView::from_configuration(configuration),
             base: 0,
             target: 0,
             observation: Observation::default(),

@@ -21,4 +21,4 @@ pub use chain::Chain;
 pub use describe::{Description, HELD_OUT, SIGMA_MM, describe};
 pub use export::{Export, MovedOrigin, export};
 pub use read::Robot;
-pub use yaml::{JointOrigin, Yaml, joint_origins, yaml};
+pub use yaml::{JointOrigin, YamlFormat, joint_origins, yaml};

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use roxmltree::{Document as Xml, Node};
 
 use super::number::{meant_angle, numbers};
-use crate::error::{InputError, InputErrorKind, Location, UrdfMistake, is_hidden, shortened};
+use crate::error::{InputError, InputErrorKind, Location, UrdfErrorKind, is_hidden, shortened};
 use crate::problem::item::Document;
 use crate::spatial::Frame;
 
@@ -88,7 +88,7 @@ impl Robot {
     /// # Errors
     /// The first mistake found, a file that cannot be read among them.
     pub fn read(file: &Path) -> Result<Self, InputError> {
-        let source = Document::read(file, InputErrorKind::Urdf(UrdfMistake::Missing))?;
+        let source = Document::read(file, InputErrorKind::Urdf(UrdfErrorKind::Missing))?;
         Self::of(source)
     }
 
@@ -105,8 +105,8 @@ impl Robot {
         let xml = Xml::parse(&text).map_err(|error| {
             let location = Location::file(&source.file).at_line(error.pos().row as usize);
             location.error(match error {
-                roxmltree::Error::DtdDetected => UrdfMistake::DocumentType.into(),
-                _ => UrdfMistake::Syntax { message: error.to_string() }.into(),
+                roxmltree::Error::DtdDetected => UrdfErrorKind::DocumentType.into(),
+                _ => UrdfErrorKind::Syntax { message: error.to_string() }.into(),
             })
         })?;
         let robot = Reader { source: &source }.robot(xml.root_element())?;
@@ -114,7 +114,7 @@ impl Robot {
     }
 
     /// A mistake at a joint.
-    pub(super) fn error_at(&self, joint: usize, mistake: UrdfMistake) -> InputError {
+    pub(super) fn error_at(&self, joint: usize, mistake: UrdfErrorKind) -> InputError {
         match self.joints.get(joint) {
             Some(own) => {
                 self.source.locate(own.span.start..own.span.start + 1).error(mistake.into())
@@ -124,14 +124,14 @@ impl Robot {
     }
 
     /// A mistake of the whole.
-    pub(super) fn error(&self, mistake: UrdfMistake) -> InputError {
+    pub(super) fn error(&self, mistake: UrdfErrorKind) -> InputError {
         Location::file(&self.source.file).error(mistake.into())
     }
 
     /// A mistake that is seen only in the problem made of it.
     pub(super) fn as_problem(&self, error: &InputError) -> InputError {
         let key = error.location.key.clone().unwrap_or_default();
-        self.error(UrdfMistake::AsProblem { key, why: error.kind.to_string() })
+        self.error(UrdfErrorKind::AsProblem { key, why: error.kind.to_string() })
     }
 
     /// The file that was read.
@@ -143,7 +143,7 @@ impl Robot {
     pub(super) fn link(&self, name: &str) -> Result<usize, InputError> {
         let unknown = || {
             let known = self.links.iter().map(|link| link.name.clone()).collect();
-            self.error(UrdfMistake::NoLink { name: name.to_owned(), known })
+            self.error(UrdfErrorKind::NoLink { name: name.to_owned(), known })
         };
         self.links.iter().position(|link| link.name == name).ok_or_else(unknown)
     }
@@ -154,12 +154,12 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn fail<T>(&self, node: Node<'_, '_>, mistake: UrdfMistake) -> Result<T, InputError> {
+    fn fail<T>(&self, node: Node<'_, '_>, mistake: UrdfErrorKind) -> Result<T, InputError> {
         self.fail_at(node.range(), mistake)
     }
 
     /// At the first line of a part of the text.
-    fn fail_at<T>(&self, span: Range<usize>, mistake: UrdfMistake) -> Result<T, InputError> {
+    fn fail_at<T>(&self, span: Range<usize>, mistake: UrdfErrorKind) -> Result<T, InputError> {
         let line = self
             .source
             .text
@@ -173,14 +173,14 @@ impl Reader<'_> {
         if root.tag_name().name() != "robot" {
             return self.fail(
                 root,
-                UrdfMistake::NotARobot { found: shortened(root.tag_name().name(), 40) },
+                UrdfErrorKind::NotARobot { found: shortened(root.tag_name().name(), 40) },
             );
         }
         if let Some(node) = root
             .descendants()
             .find(|node| node.tag_name().namespace().is_some_and(|own| own.contains("xacro")))
         {
-            return self.fail(node, UrdfMistake::Xacro);
+            return self.fail(node, UrdfErrorKind::Xacro);
         }
         let name = root.attribute("name").unwrap_or("arm").to_owned();
         let mut links: Vec<Link> = Vec::new();
@@ -188,7 +188,7 @@ impl Reader<'_> {
         for node in of("link") {
             let link = self.link(node)?;
             if links.iter().any(|other| other.name == link.name) {
-                return self.fail(node, UrdfMistake::Repeated { what: "link", name: link.name });
+                return self.fail(node, UrdfErrorKind::Repeated { what: "link", name: link.name });
             }
             links.push(link);
         }
@@ -198,7 +198,8 @@ impl Reader<'_> {
         for node in of("joint") {
             let joint = self.joint(node, &links, &names)?;
             if joints.iter().any(|other| other.name == joint.name) {
-                return self.fail(node, UrdfMistake::Repeated { what: "joint", name: joint.name });
+                return self
+                    .fail(node, UrdfErrorKind::Repeated { what: "joint", name: joint.name });
             }
             joints.push(joint);
         }
@@ -211,13 +212,13 @@ impl Reader<'_> {
             return Ok(value);
         }
         let element = shortened(node.tag_name().name(), 40);
-        self.fail(node, UrdfMistake::NoAttribute { element, attribute: name })
+        self.fail(node, UrdfErrorKind::NoAttribute { element, attribute: name })
     }
 
     fn name(&self, node: Node<'_, '_>) -> Result<String, InputError> {
         let name = self.attribute(node, "name")?;
         let bad = name.trim().is_empty() || name.chars().any(is_hidden) || name.contains("${");
-        if bad { self.fail(node, UrdfMistake::BadName) } else { Ok(name.to_owned()) }
+        if bad { self.fail(node, UrdfErrorKind::BadName) } else { Ok(name.to_owned()) }
     }
 
     /// N numbers of an attribute, and where they stand; `None` where it is not there.
@@ -230,10 +231,10 @@ impl Reader<'_> {
         let span = found.range_value();
         match numbers(found.value()) {
             Some(values) => Ok(Some((values, span))),
-            None if found.value().contains("${") => self.fail_at(span, UrdfMistake::Xacro),
+            None if found.value().contains("${") => self.fail_at(span, UrdfErrorKind::Xacro),
             None => self.fail_at(
                 span,
-                UrdfMistake::NotNumbers { text: shortened(found.value(), 40), count: N },
+                UrdfErrorKind::NotNumbers { text: shortened(found.value(), 40), count: N },
             ),
         }
     }
@@ -251,7 +252,7 @@ impl Reader<'_> {
             Some(mass) => match self.numbers::<1>(mass, "value")? {
                 Some(([value], span)) if value < 0.0 => {
                     return self
-                        .fail_at(span, UrdfMistake::NegativeMass { text: value.to_string() });
+                        .fail_at(span, UrdfErrorKind::NegativeMass { text: value.to_string() });
                 }
                 Some(([value], _)) => value,
                 None => 0.0,
@@ -281,7 +282,7 @@ impl Reader<'_> {
         };
         let end = |tag: &'static str| {
             let Some(element) = child(tag) else {
-                return self.fail(node, UrdfMistake::NoElement { element: tag });
+                return self.fail(node, UrdfErrorKind::NoElement { element: tag });
             };
             let name = self.attribute(element, "link")?;
             let known = || links.iter().map(|link| link.name.clone()).collect();
@@ -289,7 +290,7 @@ impl Reader<'_> {
                 Some(link) => Ok(link),
                 None => self.fail(
                     element,
-                    UrdfMistake::NoLink { name: shortened(name, 80), known: known() },
+                    UrdfErrorKind::NoLink { name: shortened(name, 80), known: known() },
                 ),
             }
         };
@@ -304,7 +305,7 @@ impl Reader<'_> {
             let scaled = given / given.amax().max(f64::MIN_POSITIVE);
             axis = match scaled.try_normalize(0.0) {
                 Some(axis) => axis,
-                None => return self.fail_at(span, UrdfMistake::NoAxis),
+                None => return self.fail_at(span, UrdfErrorKind::NoAxis),
             };
         }
         let turns_on = node.attribute("type") == Some("continuous");
@@ -331,7 +332,7 @@ impl Reader<'_> {
                     let known = names.iter().map(|&name| name.to_owned()).collect();
                     return self.fail(
                         element,
-                        UrdfMistake::NoJoint { name: shortened(leader, 80), known },
+                        UrdfErrorKind::NoJoint { name: shortened(leader, 80), known },
                     );
                 };
                 let one = |which, absent| {

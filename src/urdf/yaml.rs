@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::export::Steps;
 use super::universal_robots;
-use crate::error::{InputError, Location, UrdfMistake};
+use crate::error::{InputError, Location, UrdfErrorKind};
 use crate::mechanics::Arm;
 use crate::problem::{JointKind, Problem};
 use crate::spatial::Frame;
@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 /// For whom the file is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Yaml {
+pub enum YamlFormat {
     /// The calibration of a Universal Robots driver: six links by name.
     UniversalRobots,
     /// Every joint by its name.
@@ -42,7 +42,7 @@ pub struct JointOrigin {
 pub fn joint_origins(
     problem: &Problem,
     arm: &Arm<f64>,
-    form: Yaml,
+    form: YamlFormat,
 ) -> Result<Vec<JointOrigin>, InputError> {
     problem.require_chain("export to YAML")?;
     let steps = Steps::of(arm);
@@ -51,11 +51,11 @@ pub fn joint_origins(
         xyz: frame.origin,
         rpy: frame.roll_pitch_yaw(),
     };
-    if form == Yaml::UniversalRobots {
+    if form == YamlFormat::UniversalRobots {
         let nominal = Steps::of(&Arm::nominal(problem));
         let found = universal_robots::origins(&nominal, &steps);
         let mistake = |why: String| {
-            Location::file(&problem.data.location.file).error(UrdfMistake::NotUr { why }.into())
+            Location::file(&problem.data.location.file).error(UrdfErrorKind::NotUr { why }.into())
         };
         let frames = found.map_err(mistake)?;
         return Ok(universal_robots::LINKS
@@ -77,14 +77,14 @@ pub fn joint_origins(
 }
 
 /// The origins as a file.
-pub fn yaml(origins: &[JointOrigin], form: Yaml) -> String {
+pub fn yaml(origins: &[JointOrigin], form: YamlFormat) -> String {
     let mut text = match form {
-        Yaml::UniversalRobots => {
+        YamlFormat::UniversalRobots => {
             "# hash: put in that of the controller (calibration/conf of the robot, or the driver's own file):\n\
                                   # with another one the driver reports a mismatch.\n"
                 .to_owned()
         }
-        Yaml::Ros => {
+        YamlFormat::Ros => {
             "# Each frame seen from the one before [m, rad]; each joint turns about, or slides along, its z.\n"
                 .to_owned()
         }
@@ -98,7 +98,7 @@ pub fn yaml(origins: &[JointOrigin], form: Yaml) -> String {
             let _ = writeln!(text, "    {field}: {}", float(*value));
         }
     }
-    if form == Yaml::UniversalRobots {
+    if form == YamlFormat::UniversalRobots {
         text.push_str("  hash: \"\"\n");
     }
     text

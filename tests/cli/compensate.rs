@@ -35,7 +35,7 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
     let problem = Problem::read(&case("problem.toml")).unwrap();
     let truth = Truth::read(&case("truth.toml"), &problem).unwrap();
     let simulation = simulate(&problem, &truth, 78, 7).unwrap();
-    let data = Dataset::of(&problem, measured(&simulation.csv(), &problem)).unwrap();
+    let data = Dataset::from_measurements(&problem, measured(&simulation.csv(), &problem)).unwrap();
     let rows = &data.measurements;
     let found = identify(&problem, &data, &Options::default()).unwrap();
 
@@ -49,7 +49,7 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
         let setup = PoseView {
             payload: set.payload.as_ref(),
             hoist: set.hoist.as_ref(),
-            ..PoseView::of(&set.configuration)
+            ..PoseView::from_configuration(&set.configuration)
         };
         nominal.equilibrate(&setup, &mut ws, &mut rest).unwrap();
         targets.positions[row] = rest.frame.point(&problem.tool.target);

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use flexcal::problem::{JointKind, OwnCovariate};
+use flexcal::problem::{DeclaredCovariate, JointKind};
 use serde_json::Value;
 
 /// A folder for results, and flexcal run in the package's folder.
@@ -253,7 +253,7 @@ fn a_plan_tells_two_effects_apart() {
 fn examples_of_arguments_are_effects_of_the_arm() {
     let (mut problem, _) = super::bench::lunar();
     let (name, meaning) = ("oil_bar".to_owned(), String::new());
-    problem.data.covariates.push(OwnCovariate {
+    problem.data.covariates.push(DeclaredCovariate {
         name,
         meaning,
         location: problem.data.location.clone(),

@@ -6,7 +6,8 @@ use flexcal::error::Location;
 use flexcal::measurement::Measurements;
 use flexcal::model::Model;
 use flexcal::problem::{
-    Effect, EffectDeclaration, Equilibrium, JointKind, Mount, OwnCovariate, PoseConditions, Problem,
+    DeclaredCovariate, Effect, EffectDeclaration, Equilibrium, JointKind, Mount, PoseConditions,
+    Problem,
 };
 use flexcal::rig::{Cause, TrueEffect};
 use nalgebra::DVector;
@@ -121,9 +122,9 @@ pub fn tree() -> (Problem, Vec<Strong>) {
 }
 
 /// Columns of one's own.
-fn covariates(names: &[&str]) -> Vec<OwnCovariate> {
+fn covariates(names: &[&str]) -> Vec<DeclaredCovariate> {
     let location = Location::file(Path::new("problem.toml"));
-    let own = |name: &&str| OwnCovariate {
+    let own = |name: &&str| DeclaredCovariate {
         name: (*name).to_owned(),
         meaning: String::new(),
         location: location.clone(),

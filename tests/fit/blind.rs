@@ -150,7 +150,7 @@ fn a_wave_may_go_far_beyond_its_prior_and_an_angle_of_the_arm_may_not() {
 fn stage_by_stage_settles_on_two_hundred_poses() {
     let problem = Problem::read(&path("tests/cases/problem.toml")).unwrap();
     let rows = read(&problem, &["tests/cases/h-none-large.csv"]);
-    let data = Dataset::of(&problem, rows).unwrap();
+    let data = Dataset::from_measurements(&problem, rows).unwrap();
     let options = Options::default().with_strategy(Strategy::Sequential);
     let found = identify(&problem, &data, &options).unwrap();
     assert!(found.is_trusted());
@@ -168,7 +168,7 @@ fn everything_free_and_no_prior_converges() {
         "'joint*' = { free = true }\n'tool.*' = { free = true }",
     );
     let rows = read(&problem, &["tests/cases/h-none-large.csv"]);
-    let data = Dataset::of(&problem, rows).unwrap();
+    let data = Dataset::from_measurements(&problem, rows).unwrap();
     let found = identify(&problem, &data, &Options::default()).unwrap();
     assert!(found.is_trusted() && found.identifiability().rank < found.unknowns.len());
     assert!(found.fitted.held_out.rms.norm < 0.2e-3);

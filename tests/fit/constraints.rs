@@ -34,7 +34,7 @@ fn problem(more: &str) -> Problem {
 
 fn run(problem: &Problem, options: &Options) -> Result<Identification, IdentifyError> {
     let (measurements, _) = Measurements::read(&[cases().join("a-none.csv")], problem).unwrap();
-    let data = Dataset::of(problem, measurements).unwrap();
+    let data = Dataset::from_measurements(problem, measurements).unwrap();
     identify(problem, &data, options)
 }
 
@@ -201,7 +201,7 @@ fn checks_are_of_what_a_constraint_leaves() {
     // 10 mm less than the links have: the fit misses, and so must the residual that is checked.
     let problem = problem(&constraint("\"joint3.a\" = 1, \"joint4.a\" = 1", "at_most_mm = 3690"));
     let (measurements, _) = Measurements::read(&[cases().join("a-none.csv")], &problem).unwrap();
-    let data = Dataset::of(&problem, measurements).unwrap();
+    let data = Dataset::from_measurements(&problem, measurements).unwrap();
     let trace = trace(&problem, &data, &Options::default()).unwrap();
     assert_eq!(trace.fit.active_constraints.len(), 1);
     let check =

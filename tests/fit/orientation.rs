@@ -37,7 +37,7 @@ fn rig(problem: &Problem, poses: usize, seed: u64, more: &str) -> (Simulation, D
     );
     let truth = Truth::parse(&truth, Path::new("TRUTH.toml"), problem).unwrap();
     let simulation = simulate(problem, &truth, poses, seed).unwrap();
-    let data = Dataset::of(problem, measured(&simulation.csv(), problem)).unwrap();
+    let data = Dataset::from_measurements(problem, measured(&simulation.csv(), problem)).unwrap();
     (simulation, data)
 }
 

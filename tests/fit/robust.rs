@@ -16,7 +16,7 @@ fn lunar(case: &str) -> (Problem, Dataset) {
     let problem = Problem::read(&cases).unwrap();
     let files: [PathBuf; 1] = [cases.join(case)];
     let (measurements, _) = Measurements::read(&files, &problem).unwrap();
-    let data = Dataset::of(&problem, measurements).unwrap();
+    let data = Dataset::from_measurements(&problem, measurements).unwrap();
     (problem, data)
 }
 

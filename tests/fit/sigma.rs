@@ -14,7 +14,7 @@ fn case(name: &str, sigma: f64) -> (Problem, Dataset) {
     let mut problem = Problem::read(&path("tests/cases/problem.toml")).unwrap();
     problem.data.position_sigma = Some(sigma);
     let rows = measured(&problem, &[&format!("tests/cases/{name}.csv")]);
-    let data = Dataset::of(&problem, rows).unwrap();
+    let data = Dataset::from_measurements(&problem, rows).unwrap();
     (problem, data)
 }
 

@@ -16,7 +16,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 fn check(case: &str, limit_mm: f64) {
     let problem = Problem::read(&path("tests/cases")).unwrap();
     let measurements = measured(&problem, &[case]);
-    let data = Dataset::of(&problem, measurements).unwrap();
+    let data = Dataset::from_measurements(&problem, measurements).unwrap();
     let found = identify(&problem, &data, &Options::default()).unwrap();
     let (registered, held_out) =
         (found.registered.held_out.rms.norm * 1e3, found.fitted.held_out.rms.norm * 1e3);

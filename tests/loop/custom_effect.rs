@@ -185,11 +185,11 @@ fn what_the_model_has_no_room_for_is_refused() {
     let theta = ParameterSite::of_joint(3, JointField::Theta);
     assert!(matches!(
         refused(vec![Term::constant("x", theta, 1.0)]),
-        InputErrorKind::Occupied { .. }
+        InputErrorKind::SiteOccupied { .. }
     ));
     let nowhere = |site, regressor| {
         let kind = refused(vec![Term::driven("x", site, regressor, 1.0)]);
-        assert!(matches!(kind, InputErrorKind::EntersNowhere { .. }), "{regressor:?}: {kind}");
+        assert!(matches!(kind, InputErrorKind::SiteAbsent { .. }), "{regressor:?}: {kind}");
     };
     nowhere(ParameterSite::of_joint(8, JointField::Theta), Regressor::Elapsed);
     nowhere(ParameterSite::of_joint(0, JointField::Theta), Regressor::Elapsed);
@@ -201,17 +201,17 @@ fn what_the_model_has_no_room_for_is_refused() {
     nowhere(theta, Regressor::Step { of, centre: 0.0, width: 1.0 });
     let length = ParameterSite::of_joint(3, JointField::A);
     let driven = Term::driven("x", length, Regressor::Elapsed, 1.0);
-    assert!(matches!(refused(vec![driven]), InputErrorKind::NotDrivable { .. }));
+    assert!(matches!(refused(vec![driven]), InputErrorKind::RegressorNotAllowed { .. }));
     let twice = vec![
         Term::constant("x", ParameterSite::Scale, 1.0),
         Term::constant("y", ParameterSite::Scale, 1.0),
     ];
-    assert!(matches!(refused(twice), InputErrorKind::Occupied { .. }));
+    assert!(matches!(refused(twice), InputErrorKind::SiteOccupied { .. }));
     let beside = problem.with_effect(Effect::TrackerScale);
     let scale = own(vec![Term::constant("x", ParameterSite::Scale, 1.0)]);
     assert!(matches!(
         model(&beside.with_effect(scale), &rows),
-        Err(InputErrorKind::Occupied { .. })
+        Err(InputErrorKind::SiteOccupied { .. })
     ));
     let reserved = Effect::custom(Terms("gear-ratio", Vec::new()));
     assert!(matches!(

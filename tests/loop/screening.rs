@@ -34,7 +34,7 @@ fn a_derivative_that_is_not_finite_spoils_no_other_candidate() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases");
     let problem = Problem::read(&folder).unwrap();
     let (measurements, _) = Measurements::read(&[folder.join("f-two.csv")], &problem).unwrap();
-    let data = Dataset::of(&problem, measurements).unwrap();
+    let data = Dataset::from_measurements(&problem, measurements).unwrap();
     let mut options = Options::default();
     let plain = trace(&problem, &data, &options).unwrap();
     options.candidates = vec![Effect::custom(Endless)];

@@ -19,7 +19,11 @@ pub struct Row {
 
 impl Row {
     pub fn setup(&self) -> PoseView<'_> {
-        PoseView { payload: Some(&self.payload), hoist: Some(&self.hoist), ..PoseView::of(&self.q) }
+        PoseView {
+            payload: Some(&self.payload),
+            hoist: Some(&self.hoist),
+            ..PoseView::from_configuration(&self.q)
+        }
     }
 }
 

@@ -96,7 +96,7 @@ fn torsion_of_eq_8_to_11_with_the_arm_stretched_out() {
     let setup = flexcal::problem::PoseView {
         payload: Some(&0.0),
         hoist: Some(&60.0),
-        ..flexcal::problem::PoseView::of(&[0.3, 0.0, 0.0, 0.0])
+        ..flexcal::problem::PoseView::from_configuration(&[0.3, 0.0, 0.0, 0.0])
     };
     let chain = Chain::new(&problem, &parameters.geometry, setup.configuration);
     let joints = Loads::new(&problem, &chain, &setup).joints;

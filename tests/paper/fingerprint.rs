@@ -39,7 +39,7 @@ fn identified(alpha_2: f64) -> Vec<[f64; 5]> {
     let measured = |q: &'_ [f64]| Chain::new(&problem, &truth.geometry, q).position();
     let poses: Vec<Measured> = configurations
         .iter()
-        .map(|q| Measured { setup: PoseView::of(q), position: measured(q) })
+        .map(|q| Measured { setup: PoseView::from_configuration(q), position: measured(q) })
         .collect();
     let options = Options::new(Form::Corrected, StiffnessStage::Nominal);
     let found = identify(&problem, &poses, &options).unwrap();

@@ -444,14 +444,14 @@ fn readings_stand_beside_commands_and_nests_apart() {
     let nest = &rows.nests[1];
     assert_eq!((nest.name.as_str(), nest.time, nest.after), ("floor", Some(180.0), 2));
     assert!(close(nest.position.x, 1.5e-3));
-    let other = rows.by_other_joints().unwrap();
+    let other = rows.with_other_joint_source().unwrap();
     assert!(close(other.configuration(1)[1], 40.5_f64.to_radians()));
     let readings = parse(&format!("{text}[data]\njoints = 'read'\n"));
     let read_rows = read(&readings, &[table]).unwrap().0;
     assert_eq!(read_rows.configurations, other.configurations);
     // Readings alone are enough where they count, and not where commands do.
     let alone = "q1_read_rad,q2_read_deg,x_m,y_m,z_m\n0.1,2,3,4,5\n";
-    assert!(read(&readings, &[alone]).unwrap().0.by_other_joints().is_none());
+    assert!(read(&readings, &[alone]).unwrap().0.with_other_joint_source().is_none());
     let error = read(&commanded, &[alone]).unwrap_err().to_string();
     assert!(error.contains("column q1: missing; add q1_deg or q1_rad"), "{error}");
     let error =

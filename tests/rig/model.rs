@@ -67,7 +67,7 @@ fn closed_form(problem: &Problem, set: &PoseConditions) -> Vector3<f64> {
     let setup = PoseView {
         payload: set.payload.as_ref(),
         hoist: set.hoist.as_ref(),
-        ..PoseView::of(&set.configuration)
+        ..PoseView::from_configuration(&set.configuration)
     };
     let (mut ws, mut rest) = (Workspace::default(), StaticState::default());
     arm.equilibrate(&setup, &mut ws, &mut rest).unwrap();

@@ -68,7 +68,7 @@ pub fn frame(arm: &Arm<f64>, q: &[f64]) -> Result<Frame<f64>, StaticsError> {
     let (mut ws, mut rest) = (Workspace::default(), StaticState::default());
     let still = vec![0.0; arm.joints.len()];
     let configuration = if q.is_empty() { &still } else { q };
-    arm.equilibrate(&PoseView::of(configuration), &mut ws, &mut rest)?;
+    arm.equilibrate(&PoseView::from_configuration(configuration), &mut ws, &mut rest)?;
     Ok(rest.frame)
 }
 

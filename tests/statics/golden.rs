@@ -16,7 +16,11 @@ struct Row {
 
 impl Row {
     fn setup(&self) -> PoseView<'_> {
-        PoseView { payload: Some(&self.payload), hoist: Some(&self.hoist), ..PoseView::of(&self.q) }
+        PoseView {
+            payload: Some(&self.payload),
+            hoist: Some(&self.hoist),
+            ..PoseView::from_configuration(&self.q)
+        }
     }
 
     fn vector(&self, k: usize) -> Vector3<f64> {

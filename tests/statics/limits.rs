@@ -124,7 +124,8 @@ fn an_arm_that_its_hoist_balances_comes_to_rest() {
         for hoist in [39.2266, 39.227, 39.2] {
             let angle = f64::from(step) * 0.017;
             let configuration = [0.3, angle, -0.7 * angle, 0.2];
-            let setup = PoseView { hoist: Some(&hoist), ..PoseView::of(&configuration) };
+            let setup =
+                PoseView { hoist: Some(&hoist), ..PoseView::from_configuration(&configuration) };
             let found = arm.equilibrate(&setup, &mut ws, &mut rest);
             assert!(found.is_ok(), "{angle} rad, {hoist} N: {found:?}");
         }

@@ -122,7 +122,7 @@ fn what_no_catalogue_holds_is_located_and_corrected() {
 fn case(file: &str, effects: &[Effect], limit_mm: f64) {
     let mut problem = lunar();
     let measurements = read(&problem, &[&format!("tests/cases/{file}.csv")]);
-    let data = Dataset::of(&problem, measurements).unwrap();
+    let data = Dataset::from_measurements(&problem, measurements).unwrap();
     let closure = close(&problem, &data, &Options::default()).unwrap();
     let location = problem.data.location.clone();
     problem.effects = effects
@@ -169,7 +169,7 @@ fn cases_with_effects() {
 fn a_case_of_what_no_catalogue_holds() {
     let problem = lunar();
     let measurements = read(&problem, &["tests/cases/g-not-in-catalogue.csv"]);
-    let data = Dataset::of(&problem, measurements).unwrap();
+    let data = Dataset::from_measurements(&problem, measurements).unwrap();
     let closure = close(&problem, &data, &Options::default()).unwrap();
     let [left] = closure.unexplained.as_slice() else { panic!("{:?}", closure.unexplained) };
     assert_eq!(

@@ -1,7 +1,7 @@
 //! Identified geometry written back.
 
 use flexcal::mechanics::Arm;
-use flexcal::urdf::{Chain, Robot, Yaml, export, joint_origins, yaml};
+use flexcal::urdf::{Chain, Robot, YamlFormat, export, joint_origins, yaml};
 use nalgebra::{DVector, Vector3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -96,7 +96,8 @@ fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
 #[test]
 fn universal_robots_get_their_six_links() {
     let problem = Problem::read(&path("problems/ur10-ipa")).unwrap();
-    let origins = joint_origins(&problem, &Arm::nominal(&problem), Yaml::UniversalRobots).unwrap();
+    let origins =
+        joint_origins(&problem, &Arm::nominal(&problem), YamlFormat::UniversalRobots).unwrap();
     let half = std::f64::consts::FRAC_PI_2;
     let expected = [
         ([0.0, 0.0, 0.1273], 0.0),
@@ -111,7 +112,7 @@ fn universal_robots_get_their_six_links() {
             + (origin.rpy - Vector3::new(roll, 0.0, 0.0)).norm();
         assert!(off < 1e-9, "{origin:?}");
     }
-    let text = yaml(&origins, Yaml::UniversalRobots);
+    let text = yaml(&origins, YamlFormat::UniversalRobots);
     assert!(
         text.contains("kinematics:\n  shoulder:\n    x: 0.0\n    y: 0.0\n    z: 0.1273\n")
             && text.ends_with("  hash: \"\"\n"),
@@ -119,7 +120,7 @@ fn universal_robots_get_their_six_links() {
     );
     let odd = robot("odd.urdf");
     let other = problem_of(&Chain::new(&odd, None, Some("tool")).unwrap());
-    let error = joint_origins(&other, &Arm::nominal(&other), Yaml::UniversalRobots)
+    let error = joint_origins(&other, &Arm::nominal(&other), YamlFormat::UniversalRobots)
         .unwrap_err()
         .to_string();
     assert!(
@@ -127,7 +128,8 @@ fn universal_robots_get_their_six_links() {
         "{error}"
     );
     let tree = Problem::read(&path("problems/two-arms")).unwrap();
-    let error = joint_origins(&tree, &Arm::nominal(&tree), Yaml::Ros).unwrap_err().to_string();
+    let error =
+        joint_origins(&tree, &Arm::nominal(&tree), YamlFormat::Ros).unwrap_err().to_string();
     assert!(
         error.contains(":53: joint[7].parent: export to YAML takes one chain of joints"),
         "{error}"

@@ -72,7 +72,7 @@ fn the_gallery_runs() {
         let file = folder.path().join("measurements.csv");
         std::fs::write(&file, simulate(&problem, &truth, 80, 1).unwrap().csv()).unwrap();
         let rows = Measurements::read(&[file], &problem).unwrap().0;
-        let data = Dataset::of(&problem, rows).unwrap();
+        let data = Dataset::from_measurements(&problem, rows).unwrap();
         let fit = identify(&problem, &data, &Options::default()).unwrap();
         assert!(fit.is_trusted(), "{arm}");
         assert!(fit.fitted.held_out.mean.norm < 0.6 * fit.registered.held_out.mean.norm, "{arm}");

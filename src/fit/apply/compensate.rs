@@ -8,7 +8,7 @@ use crate::least_squares::solver::{self, Bounds, Settings};
 use crate::least_squares::{Fit, LinearRows};
 use crate::measurement::Measurements;
 use crate::model::{CommandResiduals, Model, Pose};
-use crate::problem::{JointKind, Mimic, PastOf, PoseView, Problem};
+use crate::problem::{JointKind, LazyPast, Mimic, PoseView, Problem};
 use crate::spatial::Frame;
 
 use crate::fit::stages::stage::StageError;
@@ -88,8 +88,8 @@ pub fn waypoints(
             .joints
             .iter()
             .enumerate()
-            .filter(|(joint, _)| tree.leads_through(*joint, carrier));
-        leads.filter(|(_, joint)| joint.commanded() != JointKind::Fixed).count()
+            .filter(|(joint, _)| tree.path_contains(*joint, carrier));
+        leads.filter(|(_, joint)| joint.command_kind() != JointKind::Fixed).count()
     };
     let oriented: Vec<bool> = all.iter().map(|&row| commanded(row) >= POSE).collect();
     targets.orientations = oriented.contains(&true).then(|| {
@@ -167,11 +167,11 @@ pub fn compensate(
     {
         pose.sigma = POSITION_WEIGHT;
         // Nobody knows what is measured or done before a target.
-        pose.setup.past = PastOf::default();
+        pose.setup.past = LazyPast::default();
         let seed = targets.configuration(row);
         let n = moving.len();
         let carrier = model.target_joint(pose.target);
-        let leads = |joint: usize| tree.leads_through(joint, carrier);
+        let leads = |joint: usize| tree.path_contains(joint, carrier);
         let serves = |joint: usize| {
             let moved = |(own, follows): (usize, Option<Mimic>)| {
                 leads(own) && (own == joint || follows.is_some_and(|own| own.joint == joint))

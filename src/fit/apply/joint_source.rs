@@ -35,7 +35,7 @@ pub fn joint_sources(
     options: &Options,
     found: &Identification,
 ) -> Result<Option<JointSources>, IdentifyError> {
-    let Some(other) = data.measurements.by_other_joints() else { return Ok(None) };
+    let Some(other) = data.measurements.with_other_joint_source() else { return Ok(None) };
     let other = identify(problem, &Dataset::new(other, data.split.clone()), options)?;
     let [own, other] = [found, &other].map(|found| found.fitted.identification.rms.norm);
     let used = problem.data.joints;

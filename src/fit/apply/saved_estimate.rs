@@ -8,11 +8,11 @@ use nalgebra::DVector;
 use serde::Deserialize;
 
 use crate::error::one_line;
-use crate::files::at_most;
+use crate::files::read_limited;
 use crate::fit::Strategy;
 use crate::model::{Model, Pose};
 use crate::problem::Problem;
-use crate::problem::item::GREATEST;
+use crate::problem::item::MAX_MAGNITUDE;
 
 /// Largest estimate.json that is read [MiB].
 const LARGEST_MIB: u64 = 256;
@@ -81,7 +81,7 @@ pub enum SavedEstimateError {
     #[error("{}: {name} stands there twice; keep one of the two", file.display())]
     Twice { file: PathBuf, name: String },
     #[error("{}: {name} has a value larger than 1e150, the largest number that can be reckoned with", file.display())]
-    TooGreat { file: PathBuf, name: String },
+    MagnitudeTooLarge { file: PathBuf, name: String },
     #[error("{}: larger than {LARGEST_MIB} MiB; is it the right file?", file.display())]
     TooLarge { file: PathBuf },
     #[error("{}: not UTF-8 text, so no estimate.json", file.display())]
@@ -96,10 +96,11 @@ impl SavedEstimate {
     /// reckoned with.
     pub fn read(file: &Path) -> Result<Self, SavedEstimateError> {
         let named = || file.to_owned();
-        let bytes = at_most(file, LARGEST_MIB << 20).map_err(|source| match source.kind() {
-            io::ErrorKind::FileTooLarge => SavedEstimateError::TooLarge { file: named() },
-            _ => SavedEstimateError::Unreadable { file: named(), source },
-        })?;
+        let bytes =
+            read_limited(file, LARGEST_MIB << 20).map_err(|source| match source.kind() {
+                io::ErrorKind::FileTooLarge => SavedEstimateError::TooLarge { file: named() },
+                _ => SavedEstimateError::Unreadable { file: named(), source },
+            })?;
         let text =
             String::from_utf8(bytes).map_err(|_| SavedEstimateError::NotUtf8 { file: named() })?;
         Self::parse(&text, file)
@@ -132,8 +133,8 @@ impl SavedEstimate {
             if !names.insert(name.as_str()) {
                 return Err(SavedEstimateError::Twice { file, name: name.clone() });
             }
-            if !(estimate.abs() <= GREATEST && nominal.abs() <= GREATEST) {
-                return Err(SavedEstimateError::TooGreat { file, name: name.clone() });
+            if !(estimate.abs() <= MAX_MAGNITUDE && nominal.abs() <= MAX_MAGNITUDE) {
+                return Err(SavedEstimateError::MagnitudeTooLarge { file, name: name.clone() });
             }
         }
         let estimated_sigma =

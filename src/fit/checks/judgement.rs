@@ -32,7 +32,7 @@ pub(in crate::fit) struct Judgement<'a> {
     /// The identification rows, with the σ that were declared, if they were, and those that the fit
     /// took.
     pub whole: &'a Stage<'a>,
-    pub noise_is_declared: bool,
+    pub has_declared_noise: bool,
 }
 
 impl Judgement<'_> {
@@ -131,7 +131,7 @@ impl Judgement<'_> {
         Kind {
             observation,
             spread: spread(placement, &rows, point),
-            sigma: (self.noise_is_declared.then_some(declared), taken),
+            sigma: (self.has_declared_noise.then_some(declared), taken),
             rows,
         }
     }

@@ -91,8 +91,9 @@ impl Misreading {
         all.push(Self::Mirrored);
         all.extend(is_far(problem).then_some(Self::TargetInMillimetres));
         all.extend(long.then_some(Self::ArmInMillimetres));
-        let moving =
-            (1..).zip(&problem.joints).filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
+        let moving = (1..)
+            .zip(&problem.joints)
+            .filter(|(_, joint)| joint.command_kind() != JointKind::Fixed);
         all.extend(moving.map(|(joint, _)| Self::Reversed { joint }));
         all
     }
@@ -179,7 +180,8 @@ impl Misreading {
 /// Whether a joint turns and its column is in radians, or else in degrees; either where nobody
 /// knows.
 fn turns_in(problem: &Problem, rows: &Measurements, joint: usize, radians: bool) -> bool {
-    let turns = problem.joints.get(joint).is_some_and(|own| own.commanded() == JointKind::Revolute);
+    let turns =
+        problem.joints.get(joint).is_some_and(|own| own.command_kind() == JointKind::Revolute);
     let column = rows.command_columns.iter().find(|own| own.joint == joint);
     turns && column.is_none_or(|own| (own.unit >= 1.0) == radians)
 }

@@ -7,7 +7,7 @@ use nalgebra::DVector;
 use crate::fit::Placement;
 use crate::fit::checks::quality::{QualityFlag, TooFewPoses};
 use crate::fit::stages::fitting::Fitting;
-use crate::measurement::different;
+use crate::measurement::count_distinct;
 use crate::model::Model;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::problem::{Observation, Problem};
@@ -39,7 +39,7 @@ impl PoseSufficiency {
         let Fitting { model, measurements, placement, held_out_only, split, .. } = fitting;
         let numbers = measurements.pose_numbers(problem);
         let of_arm = measurements.arm_pose_numbers(problem);
-        let poses = different(&of_arm, split.identification.iter().copied());
+        let poses = count_distinct(&of_arm, split.identification.iter().copied());
         let turned = if fitting.turn_sigma.is_some() { 3 } else { 0 };
         let of_row = |row: usize| match measurements.observation(row) {
             Observation::Position => 3 + turned,
@@ -68,7 +68,8 @@ impl PoseSufficiency {
             .or_else(|| undetermined(fitting, &numbers, later, at, theirs));
         let too_few =
             (coordinates < parameters).then_some(TooFewPoses { poses, coordinates, parameters });
-        let several_targets = poses < different(&numbers, split.identification.iter().copied());
+        let several_targets =
+            poses < count_distinct(&numbers, split.identification.iter().copied());
         Self { flag, too_few, poses, several_targets }
     }
 }
@@ -144,7 +145,7 @@ fn undetermined(
     let own = rows.iter().copied().filter(|&row| placement.base_of(row) == base);
     Some(QualityFlag::Undetermined {
         of: label("base", &placement.bases[base]),
-        poses: different(numbers, own),
+        poses: count_distinct(numbers, own),
     })
 }
 

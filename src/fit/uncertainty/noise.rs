@@ -52,7 +52,7 @@ pub enum Noise {
 pub(in crate::fit) fn fitted(
     fitting: &mut Fitting,
     start: &DVector<f64>,
-    (noise_is_declared, judged): (bool, bool),
+    (has_declared_noise, judged): (bool, bool),
 ) -> Result<(FitEnd, Statistics, Noise), StageError> {
     let mut fits = 0;
     let mut begin = start.clone();
@@ -63,7 +63,7 @@ pub(in crate::fit) fn fitted(
         let limit = fitting.max_steps;
         let assumed = (fitting.noise_model, fitting.turn_noise_model);
         let single = fitting.strategy.stages().len() == 1;
-        let first = fits == 1 && noise_is_declared && judged && single && assumed == AS_DECLARED;
+        let first = fits == 1 && has_declared_noise && judged && single && assumed == AS_DECLARED;
         if first {
             fitting.max_steps = Some(limit.map_or(FIRST_STEPS, |limit| limit.min(FIRST_STEPS)));
             fitting.to_be_judged = std::mem::take(&mut early);
@@ -72,7 +72,7 @@ pub(in crate::fit) fn fitted(
         let judged_early = std::mem::take(&mut fitting.to_be_judged);
         fitting.max_steps = limit;
         let whole = fitting.whole();
-        if noise_is_declared {
+        if has_declared_noise {
             if taken_over && !(judged && is_beyond_doubt(&whole)) {
                 (fitting.noise_model, fitting.turn_noise_model) = AS_DECLARED;
                 (taken_over, fits, begin) = (false, 0, end.x);

@@ -35,7 +35,7 @@ pub(super) const FAMILY: Family = Family {
             .joints
             .iter()
             .enumerate()
-            .filter(|(_, joint)| joint.commanded() == JointKind::Revolute);
+            .filter(|(_, joint)| joint.command_kind() == JointKind::Revolute);
         let effects = |(index, _)| {
             (1..=HIGHEST_ORDER)
                 .map(move |order| Effect::JointHarmonic { joint: index + 1, orders: vec![order] })

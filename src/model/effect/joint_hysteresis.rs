@@ -47,7 +47,7 @@ pub(super) const FAMILY: Family = Family {
                 .map(candidate)
                 .collect::<Vec<_>>()
         };
-        let turns = |joint: &usize| problem.joints[joint - 1].commanded() == JointKind::Revolute;
+        let turns = |joint: &usize| problem.joints[joint - 1].command_kind() == JointKind::Revolute;
         commanded(problem).filter(turns).flat_map(of_joint).collect()
     },
     describe: |effect| match effect {

@@ -45,8 +45,12 @@ pub(super) const FAMILY: Family = Family {
         // turns, over the share.
         Effect::JointWave { joint, order } => {
             let of_kind = |kind| {
-                problem.joints.iter().filter(|own: &&Joint| own.commanded() == kind).count().max(1)
-                    as f64
+                problem
+                    .joints
+                    .iter()
+                    .filter(|own: &&Joint| own.command_kind() == kind)
+                    .count()
+                    .max(1) as f64
             };
             // The chance of a lead in a factor e of leads, over the orders in it.
             if slides(problem, *joint) {

@@ -33,7 +33,7 @@ impl Regressor {
 /// Numbers, from 1, of the joints that take a command.
 pub(super) fn commanded(problem: &Problem) -> impl Iterator<Item = usize> + '_ {
     let takes =
-        |&(_, joint): &(usize, &crate::problem::Joint)| joint.commanded() != JointKind::Fixed;
+        |&(_, joint): &(usize, &crate::problem::Joint)| joint.command_kind() != JointKind::Fixed;
     problem.joints.iter().enumerate().filter(takes).map(|(index, _)| index + 1)
 }
 
@@ -54,11 +54,11 @@ pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
             .iter()
             .enumerate()
             .skip(joint)
-            .filter(|(k, _)| tree.leads_through(joint - 1, *k))
+            .filter(|(k, _)| tree.path_contains(joint - 1, *k))
     };
     let mass =
         all(&own.bodies) + beyond().map(|(_, joint)| all(&joint.bodies) + beam(joint)).sum::<f64>();
-    let payload = if tree.leads_through(joint - 1, problem.tool.joint) {
+    let payload = if tree.path_contains(joint - 1, problem.tool.joint) {
         problem.tool.payload_mass
     } else {
         0.0
@@ -71,7 +71,7 @@ pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
         all.map(|(_, at)| at.norm()).fold(0.0, f64::max)
     };
     let reach = |tip: usize| {
-        let way = beyond().filter(|(k, _)| tree.leads_through(*k, tip));
+        let way = beyond().filter(|(k, _)| tree.path_contains(*k, tip));
         way.map(|(_, joint)| joint.a.hypot(joint.d)).sum::<f64>() + carried(tip)
     };
     let tips = beyond().map(|(k, _)| k).chain([joint - 1]);

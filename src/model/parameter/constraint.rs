@@ -105,7 +105,7 @@ fn one(
     {
         let kind = InputErrorKind::LimitOfAnotherKind {
             parameter: parameter.to_owned(),
-            write: spelled(kind),
+            write: alternatives(kind),
         };
         return Err(limit.location.clone().error(kind));
     }
@@ -133,7 +133,7 @@ fn kind_of(unit: Unit) -> LimitKind {
     }
 }
 
-fn spelled(kind: LimitKind) -> &'static str {
+fn alternatives(kind: LimitKind) -> &'static str {
     match kind {
         LimitKind::Angle => "at_least_deg or at_least_rad, at_most_deg or at_most_rad",
         LimitKind::Length => "at_least_mm or at_least_m, at_most_mm or at_most_m",

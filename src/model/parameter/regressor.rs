@@ -1,6 +1,6 @@
 //! What a parameter is multiplied by, pose by pose.
 
-use crate::problem::{Lag, PoseView};
+use crate::problem::{PoseView, ThermalLag};
 
 /// The known quantity of a pose that scales a parameter's part in a joint's coordinate or in the
 /// observation.
@@ -44,7 +44,7 @@ pub enum Regressor {
         time_constant: f64,
     },
     /// Which part of its friction pulls a joint back the way on which it came, −1 to 1
-    /// ([`dragged`](crate::problem::Past::dragged)).
+    /// ([`dragged`](crate::problem::Past::friction_state)).
     Dragged {
         /// The joint.
         joint: usize,
@@ -134,9 +134,9 @@ impl Regressor {
         let Self::Lagging { reference, time_constant } = self else {
             return poses.map(|own| self.value(own)).collect();
         };
-        let mut lag = Lag::new(time_constant);
+        let mut lag = ThermalLag::new(time_constant);
         let felt = |own: &PoseView| {
-            own.temperature.map(|&now| lag.felt(&own.past.read(), (own.time, now)) - reference)
+            own.temperature.map(|&now| lag.advance(&own.past.read(), (own.time, now)) - reference)
         };
         poses.map(felt).map(|warming| warming.unwrap_or(0.0)).collect()
     }
@@ -156,13 +156,18 @@ impl Regressor {
             }
             Self::Lagging { reference, time_constant } => {
                 setup.temperature.map_or(0.0, |&temperature| {
-                    setup.past.read().lagging((setup.time, temperature), time_constant) - reference
+                    setup.past.read().lagged_temperature((setup.time, temperature), time_constant)
+                        - reference
                 })
             }
             Self::Dragged { joint, distance } => {
                 let side =
                     setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0);
-                setup.past.read().dragged(joint, (setup.configuration[joint], side), distance)
+                setup.past.read().friction_state(
+                    joint,
+                    (setup.configuration[joint], side),
+                    distance,
+                )
             }
             Self::Elapsed => setup.elapsed,
             Self::Since(time) => f64::from(setup.time >= time),
@@ -218,7 +223,11 @@ impl Regressor {
             Self::Dragged { joint: own, distance } if own == joint => {
                 let side =
                     setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0);
-                setup.past.read().drag_slope(joint, (setup.configuration[joint], side), distance)
+                setup.past.read().friction_state_slope(
+                    joint,
+                    (setup.configuration[joint], side),
+                    distance,
+                )
             }
             _ => 0.0,
         }
@@ -338,7 +347,7 @@ mod tests {
     fn a_pose_of_unknown_payload_carries_the_declared_one() {
         let regressor = Regressor::LoadedSide { joint: 1, declared: 3.0 };
         let sides = [1.0, -1.0];
-        let pose = PoseView { approach: Some(&sides), ..PoseView::of(&[0.0, 0.0]) };
+        let pose = PoseView { approach: Some(&sides), ..PoseView::from_configuration(&[0.0, 0.0]) };
         assert!((regressor.value(&pose) + 1.5).abs() < 1e-15);
         assert!((regressor.value(&PoseView { payload: Some(&2.0), ..pose }) + 1.0).abs() < 1e-15);
     }
@@ -360,10 +369,10 @@ mod tests {
         ];
         for regressor in regressors {
             for k in -20..20 {
-                let at = |q: f64| regressor.value(&PoseView::of(&[0.2, q]));
+                let at = |q: f64| regressor.value(&PoseView::from_configuration(&[0.2, q]));
                 let (q, step) = (0.093 * f64::from(k), 1e-5);
                 let expected = (at(q + step) - at(q - step)) / (2.0 * step);
-                let slope = regressor.slope(&PoseView::of(&[0.2, q]), 1);
+                let slope = regressor.slope(&PoseView::from_configuration(&[0.2, q]), 1);
                 assert!(
                     (slope - expected).abs() < 1e-8,
                     "{regressor:?} at {q}: {slope}, not {expected}"
@@ -374,7 +383,7 @@ mod tests {
 
     #[test]
     fn waves_that_follow_each_other_are_those_by_themselves() {
-        let setup = PoseView::of(&[0.7, -2.3]);
+        let setup = PoseView::from_configuration(&[0.7, -2.3]);
         let mut waves = Waves::default();
         let orders = (1..=60).chain([3, 4, 4, 6, 9, 13, 18]);
         for (order, joint) in

@@ -109,7 +109,7 @@ pub fn resolve(
             (candidate.unknown, rule, candidate.site)
             && !matches!(&rule.freedom, Freedom::Free { sigma, .. } if of_kind(sigma, candidate.unit()).is_none())
         {
-            let kind = InputErrorKind::HeldUnknown {
+            let kind = InputErrorKind::UnknownPlaceHeld {
                 parameter: candidate.name,
                 write: kind.declared_by(axis),
             };

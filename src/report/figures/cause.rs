@@ -237,7 +237,7 @@ fn at_joint<'a>(
     let in_proportion: Law = Box::new(move |x| first * x);
     let of_command: Law = Box::new(|q: f64| {
         let configuration = vec![q; rows.poses[0].configuration.len()];
-        rows.driven(&PoseView::of(&configuration))
+        rows.driven(&PoseView::from_configuration(&configuration))
     });
     let (joint, across, x, law): (_, _, _, Law) = match *found {
         Effect::JointHarmonic { joint, .. }
@@ -249,8 +249,12 @@ fn at_joint<'a>(
             (joint, Quantity::command(problem, from), command(from), of_command)
         }
         Effect::JointThermalDrift { joint } => {
-            let law =
-                Box::new(|t| rows.driven(&PoseView { temperature: Some(&t), ..PoseView::of(&[]) }));
+            let law = Box::new(|t| {
+                rows.driven(&PoseView {
+                    temperature: Some(&t),
+                    ..PoseView::from_configuration(&[])
+                })
+            });
             (joint, Quantity::temperature(), rows.temperatures(), law)
         }
         Effect::Covariate { joint: Mount::Joint(joint), ref of } => {

@@ -47,7 +47,7 @@ pub fn of(problem: &Problem, poses: &Poses, arm: &Arm) -> Coverage {
     let Some(first) = fitted.first() else { return Coverage::default() };
     let ends = |(joint, own): (usize, &crate::problem::Joint)| {
         let measured = range(fitted.iter().map(|pose| pose.setup.configuration[joint]));
-        match own.commanded() {
+        match own.command_kind() {
             JointKind::Fixed => (0.0, 0.0),
             _ if own.limits.0.is_finite() && own.limits.1.is_finite() => own.limits,
             _ => measured,

@@ -10,7 +10,7 @@ const MOST: usize = 400;
 const LONG: f64 = 0.09;
 /// Heights of a view as shown.
 const LEAST: f64 = 150.0;
-const GREATEST: f64 = 330.0;
+const MAX_MAGNITUDE: f64 = 330.0;
 
 /// Residuals from above and from the side, at their measured positions; none where no row measures
 /// a position.
@@ -34,8 +34,9 @@ pub fn vectors(data: &PlotData) -> Option<Drawing> {
     let width = f64::from(WIDTH - LEFT - 12);
     let size = |(low, high): (f64, f64)| high - low;
     // One scale for all: strokes keep their directions.
-    let per_pixel =
-        (size(extent(0)) / width).max(size(extent(1)) / GREATEST).max(size(extent(2)) / GREATEST);
+    let per_pixel = (size(extent(0)) / width)
+        .max(size(extent(1)) / MAX_MAGNITUDE)
+        .max(size(extent(2)) / MAX_MAGNITUDE);
     let across = about(extent(0), width * per_pixel);
     let views = [1, 2].map(|axis| View::new(axis, extent(axis), per_pixel));
     let mut lengths: Vec<f64> = shown.iter().map(|(_, residual)| residual.error.norm()).collect();

@@ -243,7 +243,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             .joints
             .iter()
             .enumerate()
-            .filter(|(_, joint)| joint.commanded() != JointKind::Fixed);
+            .filter(|(_, joint)| joint.command_kind() != JointKind::Fixed);
         for (joint, _) in moving.clone() {
             all.push((Covariate::Command(joint), self.command(joint)));
         }
@@ -465,7 +465,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     /// Harmonics whose height and phase change slowly: orders that are no whole numbers, and sums
     /// of neighbouring ones.
     fn near_harmonics(&mut self, site: ParameterSite, at: &DVector<f64>, joint: usize) {
-        if self.problem.joints[joint].commanded() != JointKind::Revolute {
+        if self.problem.joints[joint].command_kind() != JointKind::Revolute {
             return;
         }
         let Some(known) = Known::of(Covariate::Command(joint), self.command(joint), self.weighed)

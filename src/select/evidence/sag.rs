@@ -103,7 +103,7 @@ fn moments<'a>(
             let along = frame.axes.map(|own| about(own * length));
             std::iter::once(about(frame.origin - at)).chain(along).collect::<Vec<f64>>()
         };
-        let outboard = joints.iter().enumerate().filter(|(k, _)| arm.tree.leads_through(joint, *k));
+        let outboard = joints.iter().enumerate().filter(|(k, _)| arm.tree.path_contains(joint, *k));
         outboard.flat_map(|(_, (.., frame))| of_link(frame)).collect()
     };
     let rows: Vec<Vec<f64>> = configurations.map(of_pose).collect();

@@ -175,7 +175,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
 
     /// Whether a joint slides.
     fn slides(&self, joint: usize) -> bool {
-        self.fitted.problem.joints[joint].commanded() == JointKind::Prismatic
+        self.fitted.problem.joints[joint].command_kind() == JointKind::Prismatic
     }
 
     /// The highest order of a wave of a joint that is looked for; of one that slides \[rad/m\].

@@ -1,4 +1,4 @@
-//! A file on the disk that is not yet in its place.
+//! Atomic file writes: a file is written in full before it appears under its name.
 
 use std::fs::{self, File};
 use std::io::{self, Write as _};
@@ -6,36 +6,36 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-/// A text that is on the disk as a whole and lacks only its name.
+/// File that is completely on the disk but does not have its name yet.
 ///
-/// Where the system can, it has no name at all until then, so that a process that is killed leaves
-/// nothing behind; killed between the two calls that replace a file, it leaves what the next one to
-/// replace files there takes away.
+/// On Linux the file has no name at all until [`commit`](Self::commit), so a killed process leaves
+/// nothing behind. A process that is killed while it replaces an existing file can leave a
+/// temporary name; the next replacement in that folder removes it.
 #[derive(Debug)]
-pub struct Ready {
+pub struct StagedFile {
     path: PathBuf,
-    file: Kept,
+    file: Storage,
 }
 
 #[derive(Debug)]
-enum Kept {
+enum Storage {
     #[cfg(target_os = "linux")]
     Nameless(File),
     Named(NamedTempFile),
 }
 
-impl Ready {
-    /// Writes `text` for `path`, whose folder is made if it is not there, and waits until the disk
-    /// has it.
+impl StagedFile {
+    /// Writes `text` for `path` and waits until the disk holds it. Creates the folder if needed.
     ///
-    /// An existing file keeps its permissions, a new one gets those that files of the process get.
+    /// An existing file keeps its permissions. A new file gets the default permissions of the
+    /// process.
     ///
     /// # Errors
-    /// The folder or the file cannot be made or written.
+    /// The folder or the file cannot be created or written.
     pub fn new(path: &Path, text: &str) -> io::Result<Self> {
         let folder = folder_of(path);
         fs::create_dir_all(folder)?;
-        let file = Kept::in_folder(folder)?;
+        let file = Storage::in_folder(folder)?;
         let mut open = file.as_file();
         if let Ok(existing) = fs::symlink_metadata(path)
             && existing.is_file()
@@ -47,18 +47,18 @@ impl Ready {
         Ok(Self { path: path.to_owned(), file })
     }
 
-    /// Puts the file in its place at once; what stood there before is gone then.
+    /// Moves the file to its path and atomically replaces a file that exists there.
     ///
     /// # Errors
-    /// The name cannot be given.
-    pub fn put(self) -> io::Result<()> {
+    /// The file cannot be renamed.
+    pub fn commit(self) -> io::Result<()> {
         let folder = folder_of(&self.path);
         match self.file {
             #[cfg(target_os = "linux")]
-            Kept::Nameless(file) => name(&file, folder, &self.path)?,
-            Kept::Named(file) => _ = file.persist(&self.path).map_err(|error| error.error)?,
+            Storage::Nameless(file) => link_at(&file, folder, &self.path)?,
+            Storage::Named(file) => _ = file.persist(&self.path).map_err(|error| error.error)?,
         }
-        // Names are on the disk when their folder is; not every system lets one wait for that.
+        // The name is durable once the folder is synchronised, which some systems do not support.
         if let Ok(folder) = File::open(folder) {
             let _ = folder.sync_all();
         }
@@ -66,14 +66,14 @@ impl Ready {
     }
 }
 
-impl Kept {
+impl Storage {
     fn in_folder(folder: &Path) -> io::Result<Self> {
         #[cfg(target_os = "linux")]
         {
             use rustix::fs::{Mode, OFlags, open};
-            // What a program asks for when it makes a file; the system takes its mask off.
+            // Usual mode of a new file; the system applies its umask.
             let mode = Mode::from_raw_mode(0o666);
-            // Naming goes through /proc.
+            // A nameless file is linked through /proc.
             if let (Ok(file), true) = (
                 open(folder, OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC, mode),
                 Path::new("/proc/self/fd").is_dir(),
@@ -82,7 +82,7 @@ impl Kept {
             }
         }
         let mut builder = tempfile::Builder::new();
-        // Left alone, it would be for the owner only.
+        // By default only the owner could read a temporary file.
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         builder.tempfile_in(folder).map(Self::Named)
@@ -97,26 +97,31 @@ impl Kept {
     }
 }
 
-/// How names begin that last until a file is replaced; the number of their process follows.
+/// Prefix of temporary names, followed by the process number.
 #[cfg(target_os = "linux")]
-const PASSING: &str = ".flexcal-";
+const TEMPORARY_PREFIX: &str = ".flexcal-";
 
-/// Nothing takes so long between two names.
+/// Minimum age of a temporary file before another process removes it; renaming takes far less.
 #[cfg(target_os = "linux")]
-const LEFT: std::time::Duration = std::time::Duration::from_secs(60);
+const MIN_STALE_AGE: std::time::Duration = std::time::Duration::from_secs(60);
 
-/// Takes away what processes left that are no more. On a folder that several machines share a
-/// number may be that of another one's: what is younger than [`LEFT`] stays.
+/// Removes temporary files of processes that have ended. On a network folder the process number may
+/// belong to another machine, so files younger than [`MIN_STALE_AGE`] stay.
 #[cfg(target_os = "linux")]
-fn clear(folder: &Path) {
+fn remove_stale_files(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
-        let process = name
-            .to_str()
-            .and_then(|name| name.strip_prefix(PASSING)?.split_once('-')?.0.parse::<u32>().ok());
+        let process = name.to_str().and_then(|name| {
+            name.strip_prefix(TEMPORARY_PREFIX)?.split_once('-')?.0.parse::<u32>().ok()
+        });
         let is_gone = |process: u32| !Path::new("/proc").join(process.to_string()).exists();
         let is_old = || {
-            entry.metadata()?.modified()?.elapsed().map_err(io::Error::other).map(|age| age > LEFT)
+            entry
+                .metadata()?
+                .modified()?
+                .elapsed()
+                .map_err(io::Error::other)
+                .map(|age| age > MIN_STALE_AGE)
         };
         if process.is_some_and(is_gone) && is_old().unwrap_or(false) {
             _ = fs::remove_file(entry.path());
@@ -124,10 +129,9 @@ fn clear(folder: &Path) {
     }
 }
 
-/// Gives a file without a name its own: at once where nothing has it, else by way of a name that
-/// nobody else takes.
+/// Links a nameless file to `path`. Replaces an existing file through a temporary name.
 #[cfg(target_os = "linux")]
-fn name(file: &File, folder: &Path, path: &Path) -> io::Result<()> {
+fn link_at(file: &File, folder: &Path, path: &Path) -> io::Result<()> {
     use std::os::fd::AsRawFd as _;
 
     use rustix::fs::{AtFlags, CWD, linkat};
@@ -139,12 +143,12 @@ fn name(file: &File, folder: &Path, path: &Path) -> io::Result<()> {
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
         done => return done,
     }
-    clear(folder);
+    remove_stale_files(folder);
     let new = tempfile::Builder::new()
-        .prefix(&format!("{PASSING}{}-", std::process::id()))
+        .prefix(&format!("{TEMPORARY_PREFIX}{}-", std::process::id()))
         .make_in(folder, link)?;
     fs::rename(new.path(), path)?;
-    // It is gone under this name already.
+    // The rename has already removed this name.
     _ = new.into_temp_path().keep();
     Ok(())
 }
