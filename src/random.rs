@@ -1,22 +1,23 @@
-//! Random numbers that are the same on every machine and for any number of threads.
+//! Reproducible random numbers, the same on every machine and for any number of threads.
 
 use std::f64::consts::TAU;
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// A stream of random numbers of one seed; none shifts when another is used more.
+/// Returns stream number `stream` of the generator with this seed. Streams are independent: using
+/// one more does not shift another.
 pub(crate) fn stream(seed: u64, stream: u64) -> ChaCha8Rng {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(stream);
     random
 }
 
-/// A standard normal number: √(−2 ln(1 − u)) cos 2πv with u, v even in [0, 1).                [Box
-/// & Muller 1958]
+/// Returns a standard normal number, √(−2 ln(1 − u)) cos 2πv with u, v uniform in [0, 1) [Box &
+/// Muller 1958].
 ///
-/// It stays as it is: with any other method the same seed would give other measurements than the
-/// ones that are published.
+/// The method must not change: with another one the same seed would give other measurements than
+/// the published ones.
 pub(crate) fn normal(random: &mut ChaCha8Rng) -> f64 {
     let (u, v): (f64, f64) = (random.random(), random.random());
     (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos()

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector, SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::criterion::{Size, Yardstick, part};
-use crate::numeric::bisected;
+use crate::numeric::bisect;
 
 /// Candidates multiplied together.
 const TOGETHER: usize = 256;
@@ -230,7 +230,7 @@ where
     if !is_below(limit) {
         return f64::INFINITY;
     }
-    bisected(|t| !is_below(t), (0.0, limit), HALVINGS).1.ln()
+    bisect(|t| !is_below(t), (0.0, limit), HALVINGS).1.ln()
 }
 
 /// Number of positive eigenvalues of S − Yᵀ(Λ − t)⁻¹Y.

@@ -1,23 +1,24 @@
-//! How sure a mean is.
+//! Bootstrap confidence interval of a mean.
 
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use statrs::function::erf::{erfc, erfc_inv};
 
-/// An estimate with the interval that covers it.
+/// Estimate with its confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
-    /// Estimate.
+    /// Estimated value.
     pub value: f64,
-    /// Lower end.
+    /// Lower end of the interval.
     pub low: f64,
-    /// Upper end.
+    /// Upper end of the interval.
     pub high: f64,
 }
 
-/// Mean of groups, each given by the sum and the number of its values, with the interval that
-/// covers it in the part `covered` of cases; bootstrap over groups, corrected for bias and for a
-/// spread that changes with the mean (BCa) [Efron 1987].
+/// Returns the mean over all groups with its confidence interval at level `covered`.
+///
+/// Each group is given by the sum and the number of its values. The bootstrap draws groups and
+/// corrects for bias and acceleration (BCa) [Efron 1987].
 pub(crate) fn mean_interval(
     sums: &[(f64, f64)],
     draws: usize,
@@ -37,41 +38,43 @@ pub(crate) fn mean_interval(
         .map(|_| mean(&mut (0..sums.len()).map(|_| sums[rng.random_range(0..sums.len())])))
         .collect();
     means.sort_by(f64::total_cmp);
-    // z₀: by how much the mean itself is not in the middle; a: a sixth of the skewness of what one
-    // configuration does to it.
-    let z0 = quantile(means.partition_point(|own| *own < value) as f64 / draws as f64);
+    // z₀ corrects the bias of the bootstrap median; the acceleration is a sixth of the skewness of
+    // the
+    // jackknife means.
+    let z0 = quantile(means.partition_point(|drawn| *drawn < value) as f64 / draws as f64);
     let without = |left_out: usize| {
         mean(&mut sums.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, sum)| *sum))
     };
-    let influence: Vec<f64> = (0..sums.len()).map(without).collect();
-    let middle = influence.iter().sum::<f64>() / influence.len().max(1) as f64;
-    let power = |k: i32| influence.iter().map(|own| (middle - own).powi(k)).sum::<f64>();
-    let spread = power(2).powf(1.5);
-    let a = if spread > 0.0 { power(3) / (6.0 * spread) } else { 0.0 };
-    let at = |part: f64| {
-        let z = z0 + quantile(part);
-        let part = 0.5 * erfc(-(z0 + z / (1.0 - a * z).max(0.1)) / std::f64::consts::SQRT_2);
+    let jackknife: Vec<f64> = (0..sums.len()).map(without).collect();
+    let center = jackknife.iter().sum::<f64>() / jackknife.len().max(1) as f64;
+    let moment = |k: i32| jackknife.iter().map(|mean| (center - mean).powi(k)).sum::<f64>();
+    let scale = moment(2).powf(1.5);
+    let acceleration = if scale > 0.0 { moment(3) / (6.0 * scale) } else { 0.0 };
+    let at = |level: f64| {
+        let z = z0 + quantile(level);
+        let shifted = z0 + z / (1.0 - acceleration * z).max(0.1);
+        let corrected = 0.5 * erfc(-shifted / std::f64::consts::SQRT_2);
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "a part of a count"
+            reason = "a fraction of a count"
         )]
-        let place = (part * draws as f64) as usize;
-        means[place.min(draws - 1)]
+        let index = (corrected * draws as f64) as usize;
+        means[index.min(draws - 1)]
     };
-    let beyond = (1.0 - covered) / 2.0;
-    Interval { value, low: at(beyond), high: at(1.0 - beyond) }
+    let tail = (1.0 - covered) / 2.0;
+    Interval { value, low: at(tail), high: at(1.0 - tail) }
 }
 
-/// z with Φ(z) = part, within four standard deviations.
-fn quantile(part: f64) -> f64 {
-    let most = 4.0;
-    if part > 0.0 && part < 1.0 {
-        (-std::f64::consts::SQRT_2 * erfc_inv(2.0 * part)).clamp(-most, most)
-    } else if part > 0.0 {
-        most
+/// Returns z with Φ(z) = `probability`, limited to four standard deviations.
+fn quantile(probability: f64) -> f64 {
+    const LIMIT: f64 = 4.0;
+    if probability > 0.0 && probability < 1.0 {
+        (-std::f64::consts::SQRT_2 * erfc_inv(2.0 * probability)).clamp(-LIMIT, LIMIT)
+    } else if probability > 0.0 {
+        LIMIT
     } else {
-        -most
+        -LIMIT
     }
 }
 
@@ -81,10 +84,14 @@ mod tests {
 
     #[test]
     fn quantiles_are_those_of_the_normal_distribution() {
-        for (part, z) in
+        for (probability, z) in
             [(0.025, -1.959_963_984_5), (0.5, 0.0), (0.841_344_746_1, 1.0), (0.0, -4.0), (1.0, 4.0)]
         {
-            assert!((quantile(part) - z).abs() < 1e-6, "{part} {}", quantile(part));
+            assert!(
+                (quantile(probability) - z).abs() < 1e-6,
+                "{probability} {}",
+                quantile(probability)
+            );
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Small numerical methods that several rooms need.
+//! Small numerical methods that several modules share.
 
 mod bootstrap;
 mod factor;
@@ -8,11 +8,12 @@ pub use bootstrap::Interval;
 pub(crate) use bootstrap::mean_interval;
 pub(crate) use factor::{inverse_factor, inverse_lower, lower_factor, solve_positive};
 pub(crate) use product::{
-    gram, lower_product, multiply_by_upper, product, product_along, product_with_upper,
-    product_with_upper_above, take_off_product, transposed_product, zeros,
+    gram, lower_product, multiply_by_upper, product, product_with_upper, product_with_upper_padded,
+    subtract_product, transposed_narrow_product, transposed_product, zeros,
 };
 
-/// The median of some values, the mean of the two in the middle of an even number; `None` of none.
+/// Returns the median of some values, or `None` if there are none; an even number has the mean of
+/// its two middle values.
 pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut sorted: Vec<f64> = values.into_iter().collect();
     sorted.sort_by(f64::total_cmp);
@@ -20,8 +21,8 @@ pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     Some(if sorted.len() % 2 == 1 { upper } else { 0.5 * (sorted[sorted.len() / 2 - 1] + upper) })
 }
 
-/// The interval in which `is_below` turns false, after so many halvings.
-pub(crate) fn bisected(
+/// Halves the interval `halvings` times and returns the part in which `is_below` turns false.
+pub(crate) fn bisect(
     is_below: impl Fn(f64) -> bool,
     (mut low, mut high): (f64, f64),
     halvings: usize,
@@ -47,7 +48,7 @@ mod tests {
 
     #[test]
     fn a_root_is_bracketed() {
-        let (low, high) = bisected(|x| x * x < 2.0, (0.0, 2.0), 40);
+        let (low, high) = bisect(|x| x * x < 2.0, (0.0, 2.0), 40);
         assert!(low < 2.0_f64.sqrt() && 2.0_f64.sqrt() <= high && high - low < 1e-11);
     }
 }

@@ -1,28 +1,29 @@
-//! Products of tall matrices on every core: each part of the result is one thread's, and parts
-//! depend on sizes alone, so that they are the same to the bit for any number of threads.
+//! Parallel products of tall matrices. The partition depends only on the sizes, so results are the
+//! same to the bit for any number of threads.
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn, MatrixView};
 use rayon::prelude::*;
 
-/// Columns of a result that one thread forms at a time: each time the other matrix is packed anew.
-const TOGETHER: usize = 96;
-/// The same of a narrow result, of which nothing is packed.
-const FEW: usize = 8;
-/// Columns up to which a product is formed by axpys and dots: there is too little to do with what
-/// would be packed.
+/// Number of result columns that one thread forms at a time; each block packs the other factor
+/// again.
+const BLOCK_COLUMNS: usize = 96;
+/// Number of columns of a narrow result that one thread forms at a time; nothing is packed.
+const NARROW_BLOCK_COLUMNS: usize = 8;
+/// Number of columns up to which a product is formed by axpy and dot operations, because packing
+/// would not pay.
 const NARROW: usize = 5;
-/// Rows that one thread goes through at a time where the result is narrow.
-const SHORT: usize = 1024;
-/// Numbers below which copies of rows cost more than new memory.
-const WORTH_PLACE: usize = 1 << 20;
-/// Columns of a tall matrix that one thread turns at a time.
-const BAND: usize = 24;
-/// Multiplications below which threads cost more than they save.
-const WORTH_THREADS: usize = 1 << 20;
+/// Number of rows that one thread processes at a time if the result is narrow.
+const BLOCK_ROWS: usize = 1024;
+/// Number of entries from which a product replaces its factor in place instead of in new memory.
+const MIN_IN_PLACE: usize = 1 << 20;
+/// Number of columns of a tall matrix that one thread transposes at a time.
+const TRANSPOSED_COLUMNS: usize = 24;
+/// Number of multiplications from which a product is formed in parallel.
+const MIN_PARALLEL_WORK: usize = 1 << 20;
 
-/// A B.
+/// Returns A B.
 pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    if b.ncols() <= NARROW && a.len() * b.ncols() >= WORTH_THREADS {
+    if b.ncols() <= NARROW && a.len() * b.ncols() >= MIN_PARALLEL_WORK {
         return narrow_product(a, b);
     }
     let mut out = zeros(a.nrows(), b.ncols());
@@ -30,64 +31,66 @@ pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     out
 }
 
-/// A B of a square upper triangle B.
+/// Returns A B for a square upper triangle B.
 pub(crate) fn product_with_upper(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
-    product_with_upper_above(a, b, 0)
+    product_with_upper_padded(a, b, 0)
 }
 
-/// A B of a square upper triangle B, with so many rows of zeros below.
-pub(crate) fn product_with_upper_above(
+/// Returns A B for a square upper triangle B, followed by `extra` rows of zeros.
+pub(crate) fn product_with_upper_padded(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
-    more: usize,
+    extra: usize,
 ) -> DMatrix<f64> {
-    let mut out = zeros(a.nrows() + more, b.ncols());
+    let mut out = zeros(a.nrows() + extra, b.ncols());
     product_to(a, b, &mut out, |columns| columns);
     out
 }
 
-/// A B of a square upper triangle B, in the place of a large A: new memory takes a good part of the
-/// time of the product.
+/// Replaces A by A B for a square upper triangle B. A large A is overwritten in place, since new
+/// memory takes much of the time of the product.
 pub(crate) fn multiply_by_upper(a: &mut DMatrix<f64>, b: &DMatrix<f64>) {
-    if a.len() < WORTH_PLACE {
+    if a.len() < MIN_IN_PLACE {
         *a = product_with_upper(a, b);
         return;
     }
     let n = b.ncols();
-    let form = |_, mut own: DMatrixViewMut<f64>| {
-        let before = own.clone_owned();
-        for first in (0..n).step_by(TOGETHER) {
-            let end = n.min(first + TOGETHER);
+    let form = |_, mut block: DMatrixViewMut<f64>| {
+        let before = block.clone_owned();
+        for first in (0..n).step_by(BLOCK_COLUMNS) {
+            let end = n.min(first + BLOCK_COLUMNS);
             let upper = b.view((0, first), (end, end - first));
-            own.columns_range_mut(first..end).gemm(1.0, &before.columns(0, end), &upper, 0.0);
+            block.columns_range_mut(first..end).gemm(1.0, &before.columns(0, end), &upper, 0.0);
         }
     };
     by_rows(a.as_view_mut(), 0, &form);
 }
 
-/// C − A B in the place of a tall C.
-pub(crate) fn take_off_product(c: DMatrixViewMut<f64>, a: &DMatrix<f64>, b: &DMatrix<f64>) {
-    let form =
-        |first, mut own: DMatrixViewMut<f64>| own.gemm(-1.0, &a.rows(first, own.nrows()), b, 1.0);
+/// Replaces a tall C by C − A B.
+pub(crate) fn subtract_product(c: DMatrixViewMut<f64>, a: &DMatrix<f64>, b: &DMatrix<f64>) {
+    let form = |first, mut block: DMatrixViewMut<f64>| {
+        block.gemm(-1.0, &a.rows(first, block.nrows()), b, 1.0);
+    };
     by_rows(c, 0, &form);
 }
 
-/// Some rows after others of a tall matrix, on every core, each with the number of its first row.
+/// Applies `form` in parallel to blocks of rows of a tall matrix, each with the index of its first
+/// row.
 fn by_rows(
-    mut all: DMatrixViewMut<f64>,
+    mut matrix: DMatrixViewMut<f64>,
     first: usize,
     form: &(impl Fn(usize, DMatrixViewMut<f64>) + Sync),
 ) {
-    let half = all.nrows() / 2;
-    if all.nrows() <= SHORT {
-        return form(first, all);
+    let half = matrix.nrows() / 2;
+    if matrix.nrows() <= BLOCK_ROWS {
+        return form(first, matrix);
     }
-    let (upper, lower) = all.rows_range_pair_mut(..half, half..);
+    let (upper, lower) = matrix.rows_range_pair_mut(..half, half..);
     rayon::join(|| by_rows(upper, first, form), || by_rows(lower, first + half, form));
 }
 
-/// A B in the first rows of `out`, of which the first columns, so many, have nothing below so many
-/// rows of B.
+/// Writes A B into the first rows of `out`. `filled(k)` bounds the non-zero rows of the first k
+/// columns of B.
 fn product_to(
     a: &DMatrix<f64>,
     b: &DMatrix<f64>,
@@ -95,30 +98,30 @@ fn product_to(
     filled: impl Fn(usize) -> usize + Sync,
 ) {
     let (rows, inner, columns) = (a.nrows(), a.ncols(), b.ncols());
-    if rows * inner * columns < WORTH_THREADS || inner == 0 {
+    if rows * inner * columns < MIN_PARALLEL_WORK || inner == 0 {
         return a.mul_to(b, &mut out.rows_mut(0, rows));
     }
-    let long = out.nrows();
-    let form = |(part, own): (usize, &mut [f64])| {
-        let (first, count) = (part * TOGETHER, own.len() / long);
+    let height = out.nrows();
+    let form = |(part, entries): (usize, &mut [f64])| {
+        let (first, count) = (part * BLOCK_COLUMNS, entries.len() / height);
         let filled = filled(first + count);
-        let mut own = DMatrixViewMut::from_slice(own, long, count);
-        own.rows_mut(0, rows).gemm(
+        let mut block = DMatrixViewMut::from_slice(entries, height, count);
+        block.rows_mut(0, rows).gemm(
             1.0,
             &a.columns(0, filled),
             &b.view((0, first), (filled, count)),
             0.0,
         );
     };
-    // Of a triangle what takes longest comes first.
-    out.as_mut_slice().par_chunks_mut(long * TOGETHER).enumerate().rev().for_each(form);
+    // The longest columns of a triangle come first.
+    out.as_mut_slice().par_chunks_mut(height * BLOCK_COLUMNS).enumerate().rev().for_each(form);
 }
 
-/// L B of a square lower triangle L, on one thread.
+/// Returns L B for a square lower triangle L, on one thread.
 pub(crate) fn lower_product(lower: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(lower.nrows(), b.ncols());
-    for first in (0..lower.nrows()).step_by(TOGETHER) {
-        let end = lower.nrows().min(first + TOGETHER);
+    for first in (0..lower.nrows()).step_by(BLOCK_COLUMNS) {
+        let end = lower.nrows().min(first + BLOCK_COLUMNS);
         out.rows_range_mut(first..end).gemm(
             1.0,
             &lower.view((first, 0), (end - first, end)),
@@ -129,109 +132,106 @@ pub(crate) fn lower_product(lower: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f
     out
 }
 
-/// A B of a narrow B: some rows after others, which stay in the processor's cache from column to
+/// Returns A B for a narrow B, by blocks of rows that stay in the processor's cache from column to
 /// column.
 fn narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let rows = a.nrows();
-    let of_rows = |part: usize| a.rows(part * SHORT, SHORT.min(rows - part * SHORT)) * b;
-    let parts: Vec<DMatrix<f64>> = (0..rows.div_ceil(SHORT)).into_par_iter().map(of_rows).collect();
+    let of_rows =
+        |part: usize| a.rows(part * BLOCK_ROWS, BLOCK_ROWS.min(rows - part * BLOCK_ROWS)) * b;
+    let parts: Vec<DMatrix<f64>> =
+        (0..rows.div_ceil(BLOCK_ROWS)).into_par_iter().map(of_rows).collect();
     let mut out = zeros(rows, b.ncols());
-    for (part, own) in parts.iter().enumerate() {
-        out.rows_mut(part * SHORT, own.nrows()).copy_from(own);
+    for (index, part) in parts.iter().enumerate() {
+        out.rows_mut(index * BLOCK_ROWS, part.nrows()).copy_from(part);
     }
     out
 }
 
-/// AᵀB of a tall A and a B with few columns.
-pub(crate) fn product_along(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
+/// Returns AᵀB for a tall A and a B with few columns.
+pub(crate) fn transposed_narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let n = a.ncols();
-    if a.len() * b.ncols() < WORTH_THREADS || a.nrows() <= NARROW {
+    if a.len() * b.ncols() < MIN_PARALLEL_WORK || a.nrows() <= NARROW {
         return a.tr_mul(b);
     }
-    let together = if b.ncols() <= NARROW { FEW } else { TOGETHER };
-    // The narrow side is transposed: this is the product that is fast.
-    let turned = transposed_view(b);
+    let width = if b.ncols() <= NARROW { NARROW_BLOCK_COLUMNS } else { BLOCK_COLUMNS };
+    // BᵀA is formed instead of AᵀB: transposing the narrow side is faster.
+    let transposed = transposed_view(b);
     let mut out = zeros(b.ncols(), n);
-    let form = |(part, own): (usize, &mut [f64])| {
-        let (first, count) = (part * together, own.len() / turned.nrows());
-        let (mut own, a) =
-            (DMatrixViewMut::from_slice(own, turned.nrows(), count), a.columns(first, count));
-        if turned.nrows().min(count) <= NARROW {
-            for (mut out, column) in own.column_iter_mut().zip(a.column_iter()) {
+    let form = |(part, entries): (usize, &mut [f64])| {
+        let (first, count) = (part * width, entries.len() / transposed.nrows());
+        let mut block = DMatrixViewMut::from_slice(entries, transposed.nrows(), count);
+        let a = a.columns(first, count);
+        if transposed.nrows().min(count) <= NARROW {
+            for (mut out, column) in block.column_iter_mut().zip(a.column_iter()) {
                 out.iter_mut().zip(b.column_iter()).for_each(|(out, b)| *out = b.dot(&column));
             }
         } else {
-            own.gemm(1.0, &turned, &a, 0.0);
+            block.gemm(1.0, &transposed, &a, 0.0);
         }
     };
-    out.as_mut_slice().par_chunks_mut(b.ncols() * together).enumerate().for_each(form);
+    out.as_mut_slice().par_chunks_mut(b.ncols() * width).enumerate().for_each(form);
     out.transpose()
 }
 
-/// AᵀA: its upper triangle, mirrored.
+/// Returns AᵀA; the upper triangle is formed and mirrored.
 pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, n) = a.shape();
-    if rows * n * n < WORTH_THREADS || rows <= NARROW {
+    if rows * n * n < MIN_PARALLEL_WORK || rows <= NARROW {
         return a.transpose() * a;
     }
     let transposed = transposed_view(a);
     let mut out = zeros(n, n);
-    let form = |(part, own): (usize, &mut [f64])| {
-        let (first, count) = (part * TOGETHER, own.len() / n);
-        let mut own = DMatrixViewMut::from_slice(own, n, count);
-        let above = first + count;
+    let form = |(part, entries): (usize, &mut [f64])| {
+        let (first, count) = (part * BLOCK_COLUMNS, entries.len() / n);
+        let mut block = DMatrixViewMut::from_slice(entries, n, count);
+        let end = first + count;
         if count <= NARROW {
-            own.rows_mut(0, above).gemm_tr(
-                1.0,
-                &a.columns(0, above),
-                &a.columns(first, count),
-                0.0,
-            );
+            block.rows_mut(0, end).gemm_tr(1.0, &a.columns(0, end), &a.columns(first, count), 0.0);
         } else {
-            own.rows_mut(0, above).gemm(
+            block.rows_mut(0, end).gemm(
                 1.0,
-                &transposed.rows(0, above),
+                &transposed.rows(0, end),
                 &a.columns(first, count),
                 0.0,
             );
         }
     };
-    // The longest columns first.
-    out.as_mut_slice().par_chunks_mut(n * TOGETHER).enumerate().rev().for_each(form);
+    // The longest columns come first.
+    out.as_mut_slice().par_chunks_mut(n * BLOCK_COLUMNS).enumerate().rev().for_each(form);
     out.fill_lower_triangle_with_upper_triangle();
     out
 }
 
-/// Aᵀ, of which nothing is copied; not for products of a size up to `NARROW`: they go by axpys, and
-/// nalgebra's do not keep within columns with gaps between their numbers.
+/// Returns a view of Aᵀ without copying. It is not for products with a size up to [`NARROW`]:
+/// nalgebra forms these by axpy operations that access strided columns out of bounds.
 fn transposed_view(a: &DMatrix<f64>) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> {
     let (rows, n) = a.shape();
     DMatrixView::from_slice_with_strides_generic(a.as_slice(), Dyn(n), Dyn(rows), Dyn(rows), Dyn(1))
 }
 
-/// AᵀB of a tall A and a B as tall: some columns of A after others, so that each sum is that of one
-/// thread.
+/// Returns AᵀB for a tall A and an equally tall B, by groups of columns of A, so that one thread
+/// forms each sum.
 pub(crate) fn transposed_product(a: &DMatrix<f64>, b: DMatrixView<f64>) -> DMatrix<f64> {
     let (rows, n) = a.shape();
     // See `transposed_view`.
-    if a.len() * b.ncols() < WORTH_THREADS || rows.min(n).min(b.ncols()) <= NARROW {
+    if a.len() * b.ncols() < MIN_PARALLEL_WORK || rows.min(n).min(b.ncols()) <= NARROW {
         return a.transpose() * b;
     }
-    let turned = transposed_view(a);
-    let parts = n.div_ceil(BAND);
+    let transposed = transposed_view(a);
+    let parts = n.div_ceil(TRANSPOSED_COLUMNS);
     let of_columns = |part: usize| {
         let (first, end) = (part * n / parts, (part + 1) * n / parts);
-        turned.rows(first, end - first) * b
+        transposed.rows(first, end - first) * b
     };
-    let found: Vec<DMatrix<f64>> = (0..parts).into_par_iter().map(of_columns).collect();
+    let blocks: Vec<DMatrix<f64>> = (0..parts).into_par_iter().map(of_columns).collect();
     let mut out = zeros(n, b.ncols());
-    for (part, own) in found.iter().enumerate() {
-        out.rows_mut(part * n / parts, own.nrows()).copy_from(own);
+    for (part, block) in blocks.iter().enumerate() {
+        out.rows_mut(part * n / parts, block.nrows()).copy_from(block);
     }
     out
 }
 
-/// Zeros, which cost nothing before they are written to.
+/// Returns a matrix of zeros whose memory is not touched before it is written to.
 pub(crate) fn zeros(rows: usize, columns: usize) -> DMatrix<f64> {
     DMatrix::from_vec(rows, columns, vec![0.0; rows * columns])
 }
@@ -261,24 +261,28 @@ mod tests {
             let upper =
                 DMatrix::from_fn(inner, inner, |i, j| if i <= j { entry(i, j) } else { 0.0 });
             let (expected, mut in_place) = (&a * &upper, a.clone());
-            let above = product_with_upper_above(&a, &upper, 2);
+            let padded = product_with_upper_padded(&a, &upper, 2);
             assert!((product_with_upper(&a, &upper) - &expected).amax() <= scale);
-            assert!(above == product_with_upper(&a, &upper).resize_vertically(rows + 2, 0.0));
+            assert!(padded == product_with_upper(&a, &upper).resize_vertically(rows + 2, 0.0));
             multiply_by_upper(&mut in_place, &upper);
             assert!((in_place - expected).amax() <= scale);
             let (lower, wide) = (upper.transpose(), b.columns(0, columns.min(inner)).into_owned());
             assert!((lower_product(&lower, &wide) - &lower * &wide).amax() <= scale);
-            let own = gram(&a);
-            assert!((&own - a.transpose() * &a).amax() <= scale * 10.0 && own == own.transpose());
+            let square = gram(&a);
+            assert!((&square - a.transpose() * &a).amax() <= scale * 10.0);
+            assert!(square == square.transpose());
             let tall = DMatrix::from_fn(rows, columns, |i, j| entry(i, j + inner));
-            assert!((product_along(&a, &tall) - a.transpose() * &tall).amax() <= scale * 10.0);
+            assert!(
+                (transposed_narrow_product(&a, &tall) - a.transpose() * &tall).amax()
+                    <= scale * 10.0
+            );
             assert!(
                 (transposed_product(&a, tall.as_view()) - a.transpose() * &tall).amax()
                     <= scale * 10.0
             );
-            let mut left = tall.clone();
-            take_off_product(left.as_view_mut(), &a, &b);
-            assert!((left - (&tall - &a * &b)).amax() <= scale);
+            let mut difference = tall.clone();
+            subtract_product(difference.as_view_mut(), &a, &b);
+            assert!((difference - (&tall - &a * &b)).amax() <= scale);
         }
     }
 }

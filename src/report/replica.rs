@@ -10,7 +10,9 @@ use super::render::{Report, report, text};
 use crate::fit::ErrorSummary;
 use crate::paper::Misprint;
 use crate::paper::published::{BEFORE, IGNORING_IT, Published, WITH_ELASTICITY};
-use crate::study::{AlternativeModel, Case, Left, MisprintStudy, Replica, ReplicaResults, Spread};
+use crate::study::{
+    AlternativeModel, Case, HeldOutError, MisprintStudy, Replica, ReplicaResults, Spread,
+};
 
 /// What a stage takes for the stiffness, in the order of a replica's results.
 const STAGES: [&str; 4] =
@@ -43,7 +45,7 @@ fn document(study: &MisprintStudy, found: &ReplicaResults) -> impl Serialize {
 
 /// Held-out errors of one specimen; null where an iteration does not converge.
 fn specimen(own: &Replica, found: &ReplicaResults) -> impl Serialize {
-    let left = |left: &Left| left.as_ref().map(summary);
+    let left = |left: &HeldOutError| left.as_ref().map(summary);
     object! {
         scale: own.scale,
         before: summary(&own.before),
@@ -58,7 +60,7 @@ fn specimen(own: &Replica, found: &ReplicaResults) -> impl Serialize {
             from_positions: left(&stages[2]),
             from_load_differences: left(&stages[3]),
         }),
-        rivals: list(AlternativeModel::EACH.into_iter().zip(&own.by_rival), |(rival, own)| object! {
+        rivals: list(AlternativeModel::EACH.into_iter().zip(&own.by_alternative), |(rival, own)| object! {
             rival: rival.words().0,
             held_out: left(own),
         }),
@@ -80,7 +82,7 @@ pub fn replica_text(study: &MisprintStudy, found: &ReplicaResults) -> String {
 /// The report of a study of the misprints.
 pub fn replica_report(study: &MisprintStudy, found: &ReplicaResults) -> Report {
     let main = main_case(study, found);
-    let error = |pick: fn(&Replica) -> Left| {
+    let error = |pick: fn(&Replica) -> HeldOutError| {
         let spread = Spread::of(main.iter().map(|own| Some(pick(own)?.mean.norm)));
         or_dash(spread, |spread| mm(spread.mean, 3))
     };
@@ -88,7 +90,7 @@ pub fn replica_report(study: &MisprintStudy, found: &ReplicaResults) -> Report {
         unit: "mm",
         states: vec![
             ("elasticity ignored", error(|own| own.rigid)),
-            ("corrected formulas, stiffness known", error(|own| own.left(0, 0))),
+            ("corrected formulas, stiffness known", error(|own| own.reading_error(0, 0))),
         ],
         of: "held-out poses".to_owned(),
         facts: vec![("Everything fitted at once", format!("{} mm", error(|own| Some(own.joint))))],
@@ -143,7 +145,7 @@ fn procedures(study: &MisprintStudy, found: &ReplicaResults) -> Table {
         let size =
             Misprint::ALL.iter().zip(&found.sizes).find(|(own, _)| Some(**own) == named.misprint);
         let cell = |stage: usize| {
-            let means = main.iter().map(|own| Some(own.left(place, stage)?.mean.norm));
+            let means = main.iter().map(|own| Some(own.reading_error(place, stage)?.mean.norm));
             shown(Spread::of(means), |value| mm(value, 3))
         };
         let head =
@@ -160,7 +162,7 @@ fn procedures(study: &MisprintStudy, found: &ReplicaResults) -> Table {
 
 fn others(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let main = main_case(study, found);
-    let row = |name: &str, of: fn(&Replica) -> Left, published: Option<&Published>| {
+    let row = |name: &str, of: fn(&Replica) -> HeldOutError, published: Option<&Published>| {
         let of_kind = |kind: fn(&ErrorSummary) -> f64| {
             shown(Spread::of(main.iter().map(|own| of(own).as_ref().map(kind))), |value| {
                 mm(value, 3)
@@ -177,7 +179,7 @@ fn others(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let rows = vec![
         row("before: nominal arm, rigid", |own| Some(own.before), Some(&BEFORE)),
         row("elasticity ignored, eq. 45", |own| own.rigid, Some(&IGNORING_IT)),
-        row("elasticity considered", |own| own.left(0, 0), Some(&WITH_ELASTICITY)),
+        row("elasticity considered", |own| own.reading_error(0, 0), Some(&WITH_ELASTICITY)),
         row("geometry-only, this model", |own| Some(own.geometry_only), None),
         row("joint fit, this model", |own| Some(own.joint), None),
         row("joint fit, both loads", |own| Some(own.joint_twice), None),
@@ -190,7 +192,7 @@ fn others(study: &MisprintStudy, found: &ReplicaResults) -> Table {
 
 fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let main = main_case(study, found);
-    let row = |name: &str, summary: &str, left: &dyn Fn(&Replica) -> Left| {
+    let row = |name: &str, summary: &str, left: &dyn Fn(&Replica) -> HeldOutError| {
         let ratio = |case: &Case| {
             let ratios = found.of_case(case).map(|own| own.ratio(left(own)));
             shown(Spread::of(ratios), |value| number(value, 3))
@@ -206,11 +208,12 @@ fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
         .readings
         .iter()
         .enumerate()
-        .map(|(place, named)| row(&named.name, &named.summary, &|own| own.left(place, 0)))
+        .map(|(place, named)| row(&named.name, &named.summary, &|own| own.reading_error(place, 0)))
         .collect();
     rows.extend(
-        AlternativeModel::EACH
-            .map(|rival| row(rival.words().0, rival.words().1, &|own| own.rival(rival))),
+        AlternativeModel::EACH.map(|rival| {
+            row(rival.words().0, rival.words().1, &|own| own.alternative_error(rival))
+        }),
     );
     let [with, without] = [&WITH_ELASTICITY, &IGNORING_IT];
     let paper =

@@ -2,7 +2,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor, Gamma};
 
-use crate::numeric::bisected;
+use crate::numeric::bisect;
 
 /// Draws that must reach a value for their share to be its probability; else the tail is that of a
 /// gamma distribution.
@@ -140,5 +140,5 @@ fn anderson_darling_p(statistic: f64) -> f64 {
 
 /// The value that is reached with probability `level`, by bisection.
 fn anderson_darling_upper(level: f64) -> f64 {
-    bisected(|statistic| anderson_darling_p(statistic) > level, (0.0, LARGEST), 60).1
+    bisect(|statistic| anderson_darling_p(statistic) > level, (0.0, LARGEST), 60).1
 }

@@ -10,7 +10,7 @@ use statrs::distribution::{ContinuousCDF as _, Normal};
 use super::chance::{Chance, Drawn};
 use super::leverage::Leverage;
 use super::statistic::{Sample, Statistic};
-use crate::numeric::{take_off_product, transposed_product};
+use crate::numeric::{subtract_product, transposed_product};
 
 /// Number of draws. Fewer where a product of all of them with Q takes more multiplications than
 /// `WORK`: of a fit of hundreds of parameters to thousands of poses what is less probable than one
@@ -101,7 +101,7 @@ fn draw(
     if prior.ncols() > 0 {
         taken += prior * DMatrix::from_columns(&by_priors);
     }
-    take_off_product(residuals.as_view_mut(), &leverage.fitted, &taken);
+    subtract_product(residuals.as_view_mut(), &leverage.fitted, &taken);
 }
 
 /// The statistics of each draw, from its residuals, which are studentised in their place.

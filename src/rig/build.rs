@@ -1,26 +1,27 @@
-//! From the declared arm and its effects to a chain of pieces, springs and loads.
+//! Construction of the chain of pieces, hinges and loads from the declared arm and its effects.
 
 use nalgebra::{Rotation2, Vector2, Vector3};
 
 use super::Rig;
-use super::chain::{Chain, Force, Hinge, Place, Spring};
+use super::chain::{Chain, Force, Hinge, PieceFrame, Spring};
 use super::effect::TrueEffect;
 use crate::problem::{Effect, Joint, JointKind, Placement, PoseConditions};
 use crate::spatial::rotate;
 
-/// An effect and its values.
-pub(super) type Part<'a> = (&'a Effect, &'a [f64]);
+/// Catalogue effect with its true values.
+pub(super) type EffectValues<'a> = (&'a Effect, &'a [f64]);
 
 impl Rig {
-    /// The chain of one pose, in the base frame, and where the frame of each joint is on it.
-    pub(super) fn chain(&self, conditions: &PoseConditions) -> (Chain, Vec<Place>) {
+    /// Returns the chain of one pose in the base frame, and the frame of each joint on it.
+    pub(super) fn chain(&self, conditions: &PoseConditions) -> (Chain, Vec<PieceFrame>) {
         let gravity = self.gravity();
         let weight = |mass: f64| Force::Constant(gravity * mass);
         let mut chain = Chain::new(self.base_hinge());
-        let (base, mut frames) = (chain.place(), Vec::with_capacity(self.arm.joints.len()));
+        let (base, mut frames) = (chain.end_frame(), Vec::with_capacity(self.arm.joints.len()));
         for (index, joint) in self.arm.joints.iter().enumerate() {
             let number = index + 1;
-            chain.go_on_from(joint.parent.and_then(|parent| frames.get(parent)).unwrap_or(&base));
+            chain
+                .continue_from(joint.parent.and_then(|parent| frames.get(parent)).unwrap_or(&base));
             if let Some(Placement { xyz, rpy }) = &joint.placement {
                 chain.end().translate(xyz);
                 chain.end().rotate_z(rpy.z.sin_cos());
@@ -29,22 +30,22 @@ impl Rig {
             }
             chain.end().rotate_x(joint.alpha.sin_cos());
             self.link(joint, number, &gravity, conditions, &mut chain);
-            let (before, about) = self.joint_hinges(joint, number, conditions);
-            chain.hinge(before);
+            let (lateral, about_axis) = self.joint_hinges(joint, number, conditions);
+            chain.hinge(lateral);
             let (mut turn, mut slide) = (joint.theta, joint.d);
             let command =
                 |joint: usize| conditions.configuration.get(joint).copied().unwrap_or(0.0);
             let q = joint
                 .mimic
                 .map_or_else(|| command(index), |mimic| mimic.ratio * command(mimic.joint));
-            let miss = self.miss(number, conditions);
+            let error = self.command_error(number, conditions);
             match joint.kind {
-                JointKind::Revolute => turn += q + miss,
-                JointKind::Prismatic => slide += q + miss,
-                JointKind::Fixed => turn += miss,
+                JointKind::Revolute => turn += q + error,
+                JointKind::Prismatic => slide += q + error,
+                JointKind::Fixed => turn += error,
             }
-            chain.hinge(about);
-            if !about.is_rigid() {
+            chain.hinge(about_axis);
+            if !about_axis.is_rigid() {
                 chain.spring(self.springs(number, turn));
             }
             chain.end().rotate_z(turn.sin_cos());
@@ -53,77 +54,81 @@ impl Rig {
             for body in &joint.bodies {
                 chain.load(&body.position, weight(body.mass));
             }
-            frames.push(chain.place());
+            frames.push(chain.end_frame());
         }
         let payload = self.payload(conditions);
         if let Some(tool) = frames.get(self.arm.tool.joint).filter(|_| payload != 0.0) {
-            chain.go_on_from(tool);
+            chain.continue_from(tool);
             chain.load(&self.arm.tool.payload_at, weight(payload));
         }
         (chain, frames)
     }
 
-    /// The effects of the catalogue with their strengths.
-    pub(super) fn parts(&self) -> impl Iterator<Item = Part<'_>> {
-        self.effects.iter().filter_map(TrueEffect::parts)
+    /// Returns the catalogue effects of the truth with their values.
+    pub(super) fn effect_values(&self) -> impl Iterator<Item = EffectValues<'_>> {
+        self.effects.iter().filter_map(TrueEffect::catalogued)
     }
 
-    /// Gravity, base frame [m/s²].
+    /// Returns the gravity vector, base frame [m/s²].
     pub(super) fn gravity(&self) -> Vector3<f64> {
-        let turn = |gravity, part: Part<'_>| match part {
+        let turn = |gravity, effect: EffectValues<'_>| match effect {
             (Effect::GravityDirection, &[x, y]) => rotate(&Vector3::new(x, y, 0.0), &gravity),
             _ => gravity,
         };
-        self.parts().fold(self.arm.gravity, turn)
+        self.effect_values().fold(self.arm.gravity, turn)
     }
 
+    /// Returns the hinge between the floor and the base.
     fn base_hinge(&self) -> Hinge {
         let mut hinge = Hinge::default();
-        for part in self.parts() {
-            if let (Effect::BaseCompliance, [x, y]) = part {
+        for effect in self.effect_values() {
+            if let (Effect::BaseCompliance, [x, y]) = effect {
                 hinge.compliance += Vector3::new(*x, *y, 0.0);
             }
         }
         hinge
     }
 
-    /// The hinges of a joint: one that tilts it before it turns, and one about its z.
+    /// Returns the hinges of a joint: the lateral one before its rotation, and the one about its z
+    /// axis.
     fn joint_hinges(
         &self,
         joint: &Joint,
         number: usize,
         conditions: &PoseConditions,
     ) -> (Hinge, Hinge) {
-        let (mut before, mut about) = (Hinge::default(), Hinge::default());
-        about.compliance.z = softness(joint.stiffness);
-        for part in self.parts() {
-            match part {
-                (Effect::JointCompliance { joint }, [compliance]) if *joint == number => {
-                    about.compliance.z += compliance;
+        let (mut lateral, mut about_axis) = (Hinge::default(), Hinge::default());
+        about_axis.compliance.z = compliance(joint.stiffness);
+        for effect in self.effect_values() {
+            match effect {
+                (Effect::JointCompliance { joint }, [extra]) if *joint == number => {
+                    about_axis.compliance.z += extra;
                 }
                 (Effect::JointNonlinearStiffness { joint }, [cubic]) if *joint == number => {
-                    about.cubic += cubic
+                    about_axis.cubic += cubic
                 }
                 (Effect::JointLateralCompliance { joint }, [x, y]) if *joint == number => {
-                    before.compliance += Vector3::new(*x, *y, 0.0);
+                    lateral.compliance += Vector3::new(*x, *y, 0.0);
                 }
-                // A moment about its axis moves no joint along its slide.
-                (Effect::Backlash { joint: place }, [width])
-                    if *place == number
+                // Backlash acts on moments about the axis, which a prismatic joint does not yield
+                // to.
+                (Effect::Backlash { joint: affected }, [width])
+                    if *affected == number
                         && conditions.approach.is_none()
                         && joint.kind != JointKind::Prismatic =>
                 {
-                    about.play += width;
+                    about_axis.play += width;
                 }
                 _ => {}
             }
         }
-        (before, about)
+        (lateral, about_axis)
     }
 
-    /// The springs of compensators at a joint that is at this angle \[rad\] before it gives way.
+    /// Returns the springs of gravity compensators at a joint whose undeformed angle is `angle`
+    /// \[rad\].
     fn springs(&self, number: usize, angle: f64) -> impl Iterator<Item = Spring> {
-        self.parts().filter_map(move |part| match part {
+        self.effect_values().filter_map(move |effect| match effect {
             (
                 Effect::GravityCompensator { joint, anchor, lever, free_length },
                 &[rate, preload],
@@ -136,18 +141,18 @@ impl Rig {
         })
     }
 
-    /// Payload \[kg\].
+    /// Returns the payload with its error \[kg\].
     fn payload(&self, conditions: &PoseConditions) -> f64 {
         let declared = conditions.payload.unwrap_or(self.arm.tool.payload_mass);
-        let more = |payload: f64, part: Part<'_>| match part {
+        let add = |payload: f64, effect: EffectValues<'_>| match effect {
             (Effect::PayloadMass, &[mass]) if declared > 0.0 => payload + mass,
             _ => payload,
         };
-        self.parts().fold(declared, more)
+        self.effect_values().fold(declared, add)
     }
 }
 
-/// 1/k, or 0 where nothing gives way.
-pub(super) fn softness(stiffness: Option<f64>) -> f64 {
+/// Returns the compliance 1/k, or 0 for a rigid part.
+pub(super) fn compliance(stiffness: Option<f64>) -> f64 {
     stiffness.map_or(0.0, f64::recip)
 }

@@ -1,20 +1,19 @@
-//! An arm as the rig sees it: rigid pieces joined by lumped springs, and the loads that they carry.
+//! Arm as a chain of rigid pieces joined by lumped springs, with the loads on the pieces.
 
 use nalgebra::{Rotation2, Vector2, Vector3};
 
 use crate::spatial::Frame;
 
-/// A lumped spring between two rigid pieces: it turns and stretches, and may do so without load.
+/// Lumped spring between two rigid pieces, with compliance, play and deformation without load.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Hinge {
-    /// Angle per moment about each axis [rad/(N·m)].
+    /// Compliance about each axis [rad/(N·m)].
     pub compliance: Vector3<f64>,
-    /// Angle about x per moment about y, and about y per moment about x; then the same with z
-    /// [rad/(N·m)].
+    /// Coupling compliances [rad/(N·m)]: between the x and y axes, then between the x and z axes.
     pub coupling: Vector2<f64>,
     /// Angle about z per cube of the moment [rad/(N·m)³].
     pub cubic: f64,
-    /// Play about z that the moment takes up: b \[rad\].
+    /// Play b about z, taken up by the moment \[rad\].
     pub play: f64,
     /// Elongation along x per force [m/N].
     pub stretch: f64,
@@ -24,16 +23,18 @@ pub(super) struct Hinge {
     pub free_stretch: f64,
 }
 
-/// Moment at which play is taken up to three quarters [N·m].
+/// Moment at which 76 % (tanh 1) of the play is taken up [N·m].
 const PLAY_MOMENT: f64 = 1.0;
 
 impl Hinge {
+    /// Returns true if the hinge does not deform.
     pub fn is_rigid(&self) -> bool {
         *self == Self::default()
     }
 
-    /// What the hinge does under a force \[N\] and a moment [N·m] in its own axes.
-    pub fn give(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> Motion {
+    /// Returns the deformation under a force \[N\] and a moment [N·m], both in the axes of the
+    /// hinge.
+    pub fn deformation(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> Motion {
         let mut rotation = self.free_rotation + self.compliance.component_mul(moment);
         rotation += Vector3::new(
             self.coupling.x * moment.y + self.coupling.y * moment.z,
@@ -46,7 +47,7 @@ impl Hinge {
     }
 }
 
-/// How far a hinge has moved.
+/// Deformation of a hinge.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Motion {
     /// Rotation vector \[rad\].
@@ -55,79 +56,80 @@ pub(super) struct Motion {
     pub stretch: f64,
 }
 
-/// A spring across a hinge, which pulls a point of the piece behind it towards one of the piece
-/// before it; x and y of the hinge.
+/// Spring across a hinge: it pulls a point of the piece behind the hinge towards a point before it;
+/// x and y of the hinge.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spring {
     /// Index of the piece behind the hinge.
     pub piece: usize,
-    /// The point before the hinge \[m\].
+    /// Anchor before the hinge \[m\].
     pub anchor: Vector2<f64>,
-    /// The point behind it, where the hinge has not turned \[m\].
+    /// Attachment behind the hinge, at zero rotation \[m\].
     pub end: Vector2<f64>,
-    /// Length at which the preload alone pulls \[m\].
+    /// Length at which the tension equals the preload \[m\].
     pub free_length: f64,
-    /// Tension per length [N/m].
+    /// Spring rate, tension per length [N/m].
     pub rate: f64,
     /// Tension at the free length \[N\].
     pub preload: f64,
 }
 
 impl Spring {
-    /// Moment about z on the piece behind the hinge, which has turned by an angle \[rad\] [N·m].
-    pub fn moment(&self, turned: f64) -> f64 {
-        let end = Rotation2::new(turned) * self.end;
-        let way = self.anchor - end;
-        let tension = self.preload + self.rate * (way.norm() - self.free_length);
-        way.try_normalize(0.0).map_or(0.0, |direction| end.perp(&(direction * tension)))
+    /// Returns the moment about z on the piece behind the hinge [N·m] after a rotation by `angle`
+    /// \[rad\].
+    pub fn moment(&self, angle: f64) -> f64 {
+        let end = Rotation2::new(angle) * self.end;
+        let span = self.anchor - end;
+        let tension = self.preload + self.rate * (span.norm() - self.free_length);
+        span.try_normalize(0.0).map_or(0.0, |direction| end.perp(&(direction * tension)))
     }
 }
 
-/// A rigid piece behind a hinge.
+/// Rigid piece with the hinge before it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Piece {
     pub hinge: Hinge,
-    /// Where the hinge sits.
-    pub root: Place,
+    /// Frame in which the hinge is mounted.
+    pub root: PieceFrame,
 }
 
-/// A frame on a piece.
+/// Frame that is fixed to a piece.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
-    /// Index of the piece, an earlier one than any that sits there; `None`: the base.
+pub(super) struct PieceFrame {
+    /// Index of the piece, lower than that of any piece mounted here; `None` is the base.
     pub piece: Option<usize>,
-    /// Seen from the piece's own hinge, or from the base.
+    /// Frame relative to the hinge of the piece, or to the base.
     pub frame: Frame<f64>,
 }
 
-/// A force on a rigid piece.
+/// Force on a rigid piece.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Load {
-    /// Index of the piece.
+    /// Index of the piece that carries the load.
     pub piece: usize,
-    /// Where it acts, seen from the piece's hinge \[m\].
+    /// Point of action, relative to the hinge of the piece \[m\].
     pub at: Vector3<f64>,
     pub force: Force,
 }
 
-/// What pulls.
+/// Force law of a load.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Force {
-    /// The same wherever the piece is, base frame \[N\].
+    /// Constant force, base frame \[N\].
     Constant(Vector3<f64>),
-    /// A rope whose direction may depend on where its hook is.
+    /// Rope with constant tension, whose direction may depend on the position of its hook.
     Rope {
-        /// Tension \[N\].
+        /// Tension of the rope \[N\].
         tension: f64,
-        /// Direction with the hook at the origin, base frame.
+        /// Direction of the rope with the hook at the origin, base frame.
         direction: Vector3<f64>,
-        /// How the x and y of the direction change with those of the hook [1/m].
+        /// Change of the x and y components of the direction per x and y of the hook [1/m].
         trolley: f64,
     },
 }
 
 impl Force {
-    /// The force \[N\] at a point \[m\], base frame.
+    /// Returns the force \[N\] on a point \[m\], base frame.
     pub fn at(&self, point: &Vector3<f64>) -> Vector3<f64> {
         match *self {
             Self::Constant(force) => force,
@@ -139,55 +141,56 @@ impl Force {
     }
 }
 
-/// Pieces from the base outwards, several perhaps on one; their loads in any order.
+/// Tree of pieces from the base outwards, with loads in any order.
 #[derive(Debug)]
 pub(super) struct Chain {
     pub pieces: Vec<Piece>,
     pub loads: Vec<Load>,
     pub springs: Vec<Spring>,
-    /// Index of the piece at which it goes on, and where that ends so far, seen from its hinge.
+    /// Index of the piece to which the next elements are added.
     last: usize,
+    /// Present end of that piece, relative to its hinge.
     end: Frame<f64>,
 }
 
 impl Chain {
-    /// A single piece of no length, clamped to the base by `hinge`.
+    /// Creates a single piece of zero length, mounted to the base by `hinge`.
     pub fn new(hinge: Hinge) -> Self {
-        let root = Place { piece: None, frame: Frame::identity() };
+        let root = PieceFrame { piece: None, frame: Frame::identity() };
         let pieces = vec![Piece { hinge, root }];
         Self { pieces, loads: Vec::new(), springs: Vec::new(), last: 0, end: Frame::identity() }
     }
 
-    /// Where the chain ends so far, seen from its last hinge.
+    /// Returns the present end of the chain, relative to its last hinge, for changes.
     pub fn end(&mut self) -> &mut Frame<f64> {
         &mut self.end
     }
 
-    /// The same as a place to come back to.
-    pub fn place(&self) -> Place {
-        Place { piece: Some(self.last), frame: self.end }
+    /// Returns the present end of the chain as a frame on its piece.
+    pub fn end_frame(&self) -> PieceFrame {
+        PieceFrame { piece: Some(self.last), frame: self.end }
     }
 
-    /// Goes on from a place where it has been.
-    pub fn go_on_from(&mut self, place: &Place) {
-        (self.last, self.end) = (place.piece.unwrap_or(0), place.frame);
+    /// Continues the chain from a frame on one of its pieces.
+    pub fn continue_from(&mut self, start: &PieceFrame) {
+        (self.last, self.end) = (start.piece.unwrap_or(0), start.frame);
     }
 
-    /// Goes on behind a hinge; a rigid one is none.
+    /// Adds a hinge and a new piece behind it; a rigid hinge adds nothing.
     pub fn hinge(&mut self, hinge: Hinge) {
         if !hinge.is_rigid() {
-            self.pieces.push(Piece { hinge, root: self.place() });
+            self.pieces.push(Piece { hinge, root: self.end_frame() });
             (self.last, self.end) = (self.pieces.len() - 1, Frame::identity());
         }
     }
 
-    /// Puts springs across the hinge behind which the chain has just gone on.
+    /// Adds springs across the last hinge.
     pub fn spring(&mut self, springs: impl Iterator<Item = Spring>) {
         let piece = self.last;
         self.springs.extend(springs.map(|spring| Spring { piece, ..spring }));
     }
 
-    /// Hangs a load at a point \[m\] seen from where the chain ends so far.
+    /// Adds a load at a point \[m\] relative to the present end of the chain.
     pub fn load(&mut self, point: &Vector3<f64>, force: Force) {
         self.loads.push(Load { piece: self.last, at: self.end.point(point), force });
     }

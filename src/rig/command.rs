@@ -1,18 +1,19 @@
-//! Where a joint really goes when it is told to go to q.
+//! Deviation of a joint coordinate from its command.
 
 use super::Rig;
 use super::effect::{Cause, Shape, TrueEffect};
 use crate::problem::{Effect, Mount, PoseConditions};
 
 impl Rig {
-    /// By how much the coordinate of the joint with this number misses its command, without any
-    /// load \[rad\] or \[m\].
+    /// Returns the deviation of the joint with this number (from 1) from its command, without load
+    /// \[rad\] or \[m\].
     ///
-    /// Errors of a prismatic joint add to its d.
-    pub(super) fn miss(&self, number: usize, conditions: &PoseConditions) -> f64 {
-        let of = |joint: usize| conditions.configuration.get(joint - 1).copied().unwrap_or(0.0);
-        let q = of(number);
-        let part = |effect: &TrueEffect| match (effect.cause(), effect.values()) {
+    /// Deviations of a prismatic joint add to its d.
+    pub(super) fn command_error(&self, number: usize, conditions: &PoseConditions) -> f64 {
+        let command =
+            |joint: usize| conditions.configuration.get(joint - 1).copied().unwrap_or(0.0);
+        let q = command(number);
+        let deviation = |effect: &TrueEffect| match (effect.cause(), effect.values()) {
             (Cause::Outside { joint, shape }, [height, centre, width]) if *joint == number => {
                 let u = (q - centre) / width;
                 height
@@ -55,7 +56,7 @@ impl Rig {
                 (Effect::JointThermalDriftLag { joint, time_constant }, [rate])
                     if *joint == number =>
                 {
-                    rate * self.felt(conditions, *time_constant)
+                    rate * self.lagged_warming(conditions, *time_constant)
                 }
                 (Effect::JointHysteresis { joint, distance }, [amplitude]) if *joint == number => {
                     amplitude * friction(conditions, number - 1, *distance)
@@ -66,22 +67,23 @@ impl Rig {
                     rate * self.covariate(of, conditions)
                 }
                 (Effect::JointCoupling { joint, from }, [factor]) if *joint == number => {
-                    factor * of(*from)
+                    factor * command(*from)
                 }
                 _ => 0.0,
             },
             _ => 0.0,
         };
-        self.effects.iter().map(part).sum()
+        self.effects.iter().map(deviation).sum()
     }
 
-    /// One of the problem's own covariates, in its unit; 0 where nobody knows.
+    /// Returns the value of a covariate declared by the problem, in its unit; 0 if it is unknown.
     pub(super) fn covariate(&self, name: &str, conditions: &PoseConditions) -> f64 {
-        let own = self.arm.data.covariates.iter().zip(&conditions.covariates);
-        own.filter(|(own, _)| own.name == name).map(|(_, value)| *value).sum()
+        let covariates = self.arm.data.covariates.iter().zip(&conditions.covariates);
+        let matching = covariates.filter(|(covariate, _)| covariate.name == name);
+        matching.map(|(_, value)| *value).sum()
     }
 
-    /// T − T₀ [°C].
+    /// Returns the temperature difference T − T₀ [°C].
     pub(super) fn warming(&self, conditions: &PoseConditions) -> f64 {
         match (conditions.temperature, self.arm.data.reference_temperature) {
             (Some(temperature), Some(reference)) => temperature - reference,
@@ -89,59 +91,60 @@ impl Rig {
         }
     }
 
-    /// T̃ − T₀ [°C] of what takes on the temperature within a time constant \[s\]: pose by pose,
-    /// along straight lines between readings.
-    pub(super) fn felt(&self, conditions: &PoseConditions, time_constant: f64) -> f64 {
+    /// Returns the lagged temperature difference T̃ − T₀ [°C] of a body that follows the
+    /// temperature with a time constant \[s\].
+    ///
+    /// The temperature is linear between the readings of successive poses.
+    pub(super) fn lagged_warming(&self, conditions: &PoseConditions, time_constant: f64) -> f64 {
         let past = &conditions.past;
         let Some(now) = conditions.temperature else { return 0.0 };
         let reference = self.arm.data.reference_temperature.unwrap_or(now);
         let before = past.times.iter().copied().zip(past.temperatures.iter().copied());
         let mut readings = before.chain([(conditions.time, now)]);
         let Some((mut time, mut air)) = readings.next() else { return now - reference };
-        let mut felt = air;
+        let mut lagged = air;
         for (next, reading) in readings {
             let passed = next - time;
-            // Behind air that warms at a steady rate it stays by rate × τ.
-            let behind = if passed > 0.0 { (reading - air) / passed * time_constant } else { 0.0 };
-            let start = if passed > 0.0 { felt - air } else { felt - reading };
-            felt = reading - behind + (start + behind) * (-passed / time_constant).exp();
+            // Under a steady rate the body lags by rate × τ.
+            let lag = if passed > 0.0 { (reading - air) / passed * time_constant } else { 0.0 };
+            let start = if passed > 0.0 { lagged - air } else { lagged - reading };
+            lagged = reading - lag + (start + lag) * (-passed / time_constant).exp();
             (time, air) = (next, reading);
         }
-        felt - reference
+        lagged - reference
     }
 }
 
-/// z of the friction of a joint, counted from 0, pose by pose.
-/// [Dahl 1968]
+/// Returns the friction state z of a joint (index from 0) after the sequence of poses [Dahl 1968].
 fn friction(conditions: &PoseConditions, joint: usize, distance: f64) -> f64 {
     let past = &conditions.past;
     let joints = conditions.configuration.len();
-    let nowhere = vec![0.0; joints];
-    let sides_now = conditions.approach.as_ref().unwrap_or(&nowhere);
+    let no_sides = vec![0.0; joints];
+    let sides_now = conditions.approach.as_ref().unwrap_or(&no_sides);
     let sides = past
         .approaches
         .chunks(joints)
-        .chain(std::iter::repeat(nowhere.as_slice()))
+        .chain(std::iter::repeat(no_sides.as_slice()))
         .take(past.times.len());
     let earlier = past.configurations.chunks(joints).zip(sides);
-    let mut way: Option<(f64, f64)> = None;
+    let mut state: Option<(f64, f64)> = None;
     for (configuration, sides) in
         earlier.chain([(conditions.configuration.as_slice(), sides_now.as_slice())])
     {
         let (q, side) = (configuration[joint], sides[joint]);
-        way = Some(match way {
+        state = Some(match state {
             None => (q, side),
             Some((last, z)) => {
                 let step = q - last;
-                let towards = match side {
+                let direction = match side {
                     0.0 if step > 0.0 => 1.0,
                     0.0 => -1.0,
                     side => side,
                 };
                 let kept = 1.0 / (step.abs() / distance).exp();
-                (q, towards * (1.0 - kept) + z * kept)
+                (q, direction * (1.0 - kept) + z * kept)
             }
         });
     }
-    way.map_or(0.0, |(_, z)| z)
+    state.map_or(0.0, |(_, z)| z)
 }

@@ -1,73 +1,78 @@
-//! Rows that measure against the surroundings: which, in which configuration, and what is read.
+//! Rows that measure against fixtures: search of a configuration in contact, and the reading.
 
 use std::f64::consts::FRAC_PI_2;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand_chacha::ChaCha8Rng;
 
-use super::chain::Place;
+use super::chain::PieceFrame;
 use super::draw::{Row, between, rounded_command};
-use super::equilibrium::AtRest;
+use super::equilibrium::Equilibrium;
 use super::truth::Truth;
-use super::{NoRest, Rig};
+use super::{NoEquilibrium, Rig};
 use crate::problem::{FixtureKind, Joint, JointKind, Observation, PoseConditions};
 use crate::spatial::{Frame, plane_normal};
 
-/// Configurations from which a contact is sought before it is given up.
-const TRIES: usize = 200;
-/// Steps of one search.
-const STEPS: usize = 40;
-/// A contact is reached where this much is missing \[m\].
-const REACHED: f64 = 1e-9;
-/// Step of a difference \[rad\] or \[m\], and the longest step of a search.
+/// Maximum number of start configurations from which a contact is searched.
+const MAX_STARTS: usize = 200;
+/// Maximum number of Newton steps of one search.
+const MAX_STEPS: usize = 40;
+/// Distance at which a contact counts as reached \[m\].
+const CONTACT_TOLERANCE: f64 = 1e-9;
+/// Difference step of a joint coordinate \[rad\] or \[m\].
 const DIFFERENCE: f64 = 1e-6;
-const LONGEST: f64 = 0.3;
-/// Singular values below this part of the largest turn no joint.
-const WEAK: f64 = 1e-3;
+/// Largest change of a joint coordinate in one Newton step \[rad\] or \[m\].
+const MAX_STEP: f64 = 0.3;
+/// Ratio of singular values below which a direction is left unchanged.
+const RANK_TOLERANCE: f64 = 1e-3;
 
 impl Rig {
-    /// The place of a fixture, or the distance of the target from it \[m\]: what is missing to be
-    /// at a point, the distance to an anchor, the height above a surface.
-    fn seen(&self, fixture: usize, target: &Vector3<f64>) -> Vector3<f64> {
-        let Some(own) = self.arm.fixtures.get(fixture) else { return Vector3::zeros() };
-        let number = |k: usize| own.known.get(k).copied().flatten().unwrap_or(0.0);
+    /// Returns the offset of a target from a fixture \[m\]: the vector from a point, the distance
+    /// from an anchor, or the height above a surface.
+    fn fixture_offset(&self, fixture: usize, target: &Vector3<f64>) -> Vector3<f64> {
+        let Some(fixture) = self.arm.fixtures.get(fixture) else { return Vector3::zeros() };
+        let number = |k: usize| fixture.known.get(k).copied().flatten().unwrap_or(0.0);
         let place = Vector3::new(number(0), number(1), number(2));
-        let only = |x: f64| Vector3::new(x, 0.0, 0.0);
-        match own.kind {
+        let scalar = |x: f64| Vector3::new(x, 0.0, 0.0);
+        match fixture.kind {
             FixtureKind::Point => target - place,
-            FixtureKind::Anchor => only((target - place).norm()),
-            FixtureKind::Sphere => only((target - place).norm() - number(3)),
-            FixtureKind::Plane => only(plane_normal(place.x, place.y).dot(target) - place.z),
+            FixtureKind::Anchor => scalar((target - place).norm()),
+            FixtureKind::Sphere => scalar((target - place).norm() - number(3)),
+            FixtureKind::Plane => scalar(plane_normal(place.x, place.y).dot(target) - place.z),
         }
     }
 
-    /// How far the x and the y axis of a frame of the arm at rest lie above the horizontal \[rad\].
+    /// Returns the angles of the x and y axes of a frame above the horizontal \[rad\], in
+    /// equilibrium.
     ///
-    /// A plumb line shows how the frame leans: the axis is off the vertical by the angle ½π − τ
-    /// between it and the line.
-    fn tilts(&self, conditions: &PoseConditions, frame: usize) -> Result<Vector3<f64>, NoRest> {
+    /// A plumb line shows them: an axis is at the angle ½π − τ from the line.
+    fn tilts(
+        &self,
+        conditions: &PoseConditions,
+        frame: usize,
+    ) -> Result<Vector3<f64>, NoEquilibrium> {
         let (chain, frames) = self.chain(conditions);
-        let mounting = Place { piece: Some(0), frame: Frame::identity() };
-        let place = frame
+        let base = PieceFrame { piece: Some(0), frame: Frame::identity() };
+        let mounted = frame
             .checked_sub(1)
-            .map_or(Some(&mounting), |joint| frames.get(joint))
-            .ok_or(NoRest)?;
-        let frame = AtRest::find(&chain).ok_or(NoRest)?.frame(place);
+            .map_or(Some(&base), |joint| frames.get(joint))
+            .ok_or(NoEquilibrium)?;
+        let frame = Equilibrium::find(&chain).ok_or(NoEquilibrium)?.frame(mounted);
         let down = self.gravity().try_normalize(0.0).unwrap_or(-Vector3::z());
         let above = |axis: &Vector3<f64>| axis.angle(&down) - FRAC_PI_2;
         Ok(Vector3::new(above(&frame.axes[0]), above(&frame.axes[1]), 0.0))
     }
 
-    /// Moves the joints of a row until the target is at its point or surface, as far off as the
-    /// row's noise says, and reads the row.
+    /// Measures a row. For a contact, it first moves the joints until the target touches the
+    /// fixture, offset by the noise of the row.
     ///
-    /// `None` where no configuration within the ranges was found.
+    /// Returns `None` if no configuration in contact was found within the ranges.
     pub(super) fn measure(
         &self,
         row: &mut Row,
         truth: &Truth,
         random: &mut ChaCha8Rng,
-    ) -> Result<Option<()>, NoRest> {
+    ) -> Result<Option<()>, NoEquilibrium> {
         let noise = row.position;
         let (fixture, target) = match row.observation {
             Observation::Tilt(frame) => {
@@ -84,7 +89,8 @@ impl Rig {
             }
             Observation::Distance(anchor) => {
                 let (target, _) = self.placed(&row.target, &row.conditions)?;
-                row.position = self.seen(anchor, &target) + Vector3::new(noise.x, 0.0, 0.0);
+                row.position =
+                    self.fixture_offset(anchor, &target) + Vector3::new(noise.x, 0.0, 0.0);
                 row.orientation = None;
                 return Ok(Some(()));
             }
@@ -92,13 +98,14 @@ impl Rig {
             Observation::Surface(fixture) => (fixture, Vector3::new(noise.x, 0.0, 0.0)),
         };
         (row.position, row.orientation) = (Vector3::zeros(), None);
-        let (numbers, measured) = (row.observation.coordinates(), row.target.clone());
-        let missing = |conditions: &PoseConditions| -> Result<DVector<f64>, NoRest> {
-            let seen = self.seen(fixture, &self.placed(&measured, conditions)?.0) - target;
-            Ok(DVector::from_column_slice(&seen.as_slice()[..numbers]))
+        let (count, measured) = (row.observation.coordinates(), row.target.clone());
+        let gap = |conditions: &PoseConditions| -> Result<DVector<f64>, NoEquilibrium> {
+            let (position, _) = self.placed(&measured, conditions)?;
+            let gap = self.fixture_offset(fixture, &position) - target;
+            Ok(DVector::from_column_slice(&gap.as_slice()[..count]))
         };
-        for _ in 0..TRIES {
-            if self.reach(&mut row.conditions, truth, &missing)? {
+        for _ in 0..MAX_STARTS {
+            if self.move_to_contact(&mut row.conditions, truth, &gap)? {
                 return Ok(Some(()));
             }
             let ranges = &truth.poses.joints;
@@ -112,20 +119,20 @@ impl Rig {
         Ok(None)
     }
 
-    /// Moves the joints by Newton's method until nothing is missing; whether that is so, within the
-    /// ranges.
-    fn reach(
+    /// Moves the joints by Newton's method until the gap closes. Returns true if it closed within
+    /// the ranges.
+    fn move_to_contact(
         &self,
         conditions: &mut PoseConditions,
         truth: &Truth,
-        missing: &impl Fn(&PoseConditions) -> Result<DVector<f64>, NoRest>,
-    ) -> Result<bool, NoRest> {
+        gap: &impl Fn(&PoseConditions) -> Result<DVector<f64>, NoEquilibrium>,
+    ) -> Result<bool, NoEquilibrium> {
         let kinds: Vec<JointKind> = self.arm.joints.iter().map(Joint::command_kind).collect();
         let moving: Vec<usize> =
             (0..kinds.len()).filter(|&joint| kinds[joint] != JointKind::Fixed).collect();
-        for _ in 0..STEPS {
-            let now = missing(conditions)?;
-            if now.amax() < REACHED {
+        for _ in 0..MAX_STEPS {
+            let now = gap(conditions)?;
+            if now.amax() < CONTACT_TOLERANCE {
                 for &joint in &moving {
                     let q = &mut conditions.configuration[joint];
                     *q = rounded_command(kinds[joint], *q);
@@ -140,14 +147,14 @@ impl Rig {
             for (column, &joint) in moving.iter().enumerate() {
                 let mut moved = conditions.clone();
                 moved.configuration[joint] += DIFFERENCE;
-                jacobian.set_column(column, &((missing(&moved)? - &now) / DIFFERENCE));
+                jacobian.set_column(column, &((gap(&moved)? - &now) / DIFFERENCE));
             }
             let svd = jacobian.svd(true, true);
             let largest = svd.singular_values.max();
-            let Ok(step) = svd.solve(&now, WEAK * largest) else { return Ok(false) };
-            let shorter = LONGEST / step.amax().max(LONGEST);
+            let Ok(step) = svd.solve(&now, RANK_TOLERANCE * largest) else { return Ok(false) };
+            let factor = MAX_STEP / step.amax().max(MAX_STEP);
             for (&joint, step) in moving.iter().zip(&step) {
-                conditions.configuration[joint] -= shorter * step;
+                conditions.configuration[joint] -= factor * step;
             }
         }
         Ok(false)

@@ -1,4 +1,4 @@
-//! Measurements of the true arm in poses drawn at random.
+//! Simulated measurements of the true arm in random poses.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::RngExt;
@@ -8,80 +8,86 @@ use rayon::prelude::*;
 
 use super::parameters::{self, TrueParameter};
 use super::truth::Truth;
-use super::{NoRest, Rig};
+use super::{NoEquilibrium, Rig};
 use crate::problem::pattern::matches;
 use crate::problem::{
     Fixture, HeldOut, Joint, JointKind, Observation, Past, PoseConditions, Problem,
 };
 use crate::random::{normal, stream};
 
-/// Streams of random numbers of one seed, so that none shifts when another is used more.
+/// Stream of the parameter deviations. Every quantity has its own stream, so that more numbers of
+/// one kind do not shift another.
 const DEVIATIONS: u64 = 0;
+/// Stream of the poses.
 const POSES: u64 = 1;
+/// Stream of the position noise.
 const NOISE: u64 = 2;
+/// Stream of the held-out selection.
 const SPLIT: u64 = 3;
+/// Stream of the effect values.
 const EFFECTS: u64 = 4;
+/// Stream of the orientation noise.
 const TURNS: u64 = 5;
-/// The first of as many as there are poses.
+/// First of the streams of contact searches, one stream per pose.
 const CONTACTS: u64 = 1000;
 
-/// A simulated measurement.
+/// Simulated measurement of one pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// What was set.
+    /// Commanded conditions of the pose.
     pub conditions: PoseConditions,
-    /// Name of the target that is measured; empty where the problem declares none.
+    /// Name of the measured target; empty if the problem declares none.
     pub target: String,
-    /// What is measured.
+    /// Kind of measurement.
     pub observation: Observation,
-    /// What the tracker read, measuring frame, or a distance; 0 of a contact \[m\].
+    /// Measured position, measuring frame, or a distance; 0 for a contact \[m\].
     pub position: Vector3<f64>,
-    /// The orientation that it read, measuring frame, where it reads any.
+    /// Measured orientation, measuring frame, if orientations are measured.
     pub orientation: Option<UnitQuaternion<f64>>,
-    /// Whether the row is held out.
+    /// True if the row is held out.
     pub held_out: bool,
 }
 
-/// Simulated measurements and what is true about them.
+/// Simulated measurements with their truth.
 #[derive(Debug, Clone)]
 pub struct Simulation {
     /// Name of the problem.
     pub problem: String,
     /// The declared joints.
     pub joints: Vec<Joint>,
-    /// What the rows measure against.
+    /// Fixtures that the rows measure against.
     pub fixtures: Vec<Fixture>,
-    /// Seed of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// What was true.
+    /// Truth from which the arm was drawn.
     pub truth: Truth,
-    /// Every parameter with its true value.
+    /// All parameters with their true values.
     pub parameters: Vec<TrueParameter>,
-    /// The true arm.
+    /// Rig with the true arm.
     pub rig: Rig,
-    /// The measurements in order of time.
+    /// Measurements in order of time.
     pub rows: Vec<Row>,
     /// Name of the column that marks held-out rows.
     pub split_column: String,
-    /// Names of the columns of the problem's own covariates, where the poses have them.
+    /// Names of the columns of the problem's covariates, if the poses have them.
     pub(super) covariates: Vec<String>,
 }
 
-/// Why there are no measurements.
+/// Error that prevents simulated measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimulationError {
     /// One of the poses has no equilibrium.
     #[error("pose {pose} of the simulation: {source}; check stiffnesses, masses and the truth")]
-    NoRest {
+    NoEquilibrium {
         /// Number of the pose, from 1.
         pose: usize,
-        /// Why.
-        source: NoRest,
+        /// Cause of the error.
+        source: NoEquilibrium,
     },
-    /// The arm does not come to what it is to touch.
+    /// The arm does not reach a fixture that it should touch.
     #[error(
-        "pose {pose} of the simulation: the arm does not come to what it is to touch; check its true place and the ranges"
+        "pose {pose} of the simulation: the arm does not reach the fixture it should touch; check its true position and the ranges"
     )]
     OutOfReach {
         /// Number of the pose, from 1.
@@ -89,28 +95,28 @@ pub enum SimulationError {
     },
 }
 
-/// What chance decides, before anything is measured.
+/// Random arm, poses and noise, before any measurement.
 #[derive(Debug, Clone)]
 pub struct Draw {
-    /// The problem with true values instead of nominal ones.
+    /// Problem with true values in place of nominal ones.
     pub arm: Problem,
-    /// Every parameter with its true value.
+    /// All parameters with their true values.
     pub parameters: Vec<TrueParameter>,
-    /// The poses in order of time, no row held out; `position` and `orientation` are the noise
-    /// alone \[m\].
+    /// Poses in order of time, none held out; `position` and `orientation` hold the noise alone
+    /// \[m\].
     pub rows: Vec<Row>,
 }
 
 /// Draws the true arm, `poses` poses and their noise.
 ///
-/// More poses leave the arm and the first poses as they are; another σ of the noise scales it and
-/// changes nothing else.
+/// More poses do not change the arm or the first poses. Another σ scales the noise and changes
+/// nothing else.
 pub fn draw(problem: &Problem, truth: &Truth, poses: usize, seed: u64) -> Draw {
-    drawn(problem, truth, draw_poses(problem, truth, poses, stream(seed, POSES)), seed)
+    draw_in(problem, truth, draw_poses(problem, truth, poses, stream(seed, POSES)), seed)
 }
 
-/// The same in given poses.
-fn drawn(problem: &Problem, truth: &Truth, mut rows: Vec<Row>, seed: u64) -> Draw {
+/// Draws the true arm and the noise of given poses.
+fn draw_in(problem: &Problem, truth: &Truth, mut rows: Vec<Row>, seed: u64) -> Draw {
     let (arm, parameters) = true_arm(problem, truth, stream(seed, DEVIATIONS));
     let mut noise = stream(seed, NOISE);
     let kinds = truth.observations(&problem.fixtures, rows.len());
@@ -129,25 +135,25 @@ fn drawn(problem: &Problem, truth: &Truth, mut rows: Vec<Row>, seed: u64) -> Dra
     Draw { arm, parameters, rows }
 }
 
-/// Measures the true arm in `poses` poses; the same for the same `seed`, however many threads there
-/// are.
+/// Measures the true arm in `poses` random poses. The result depends on `seed`, not on the number
+/// of threads.
 ///
 /// # Errors
-/// The arm is too soft for its loads.
+/// Returns an error if a pose has no equilibrium, or if the arm does not reach a fixture.
 pub fn simulate(
     problem: &Problem,
     truth: &Truth,
     poses: usize,
     seed: u64,
 ) -> Result<Simulation, SimulationError> {
-    measured(problem, truth, draw(problem, truth, poses, seed), seed)
+    measure(problem, truth, draw(problem, truth, poses, seed), seed)
 }
 
-/// The same in given poses, each of the target with its name, one after the other; what they do not
-/// say of temperature and sides is drawn where the truth has it.
+/// Measures the true arm in given poses, each with the name of its target, one after the other.
+/// Temperatures and approach sides that the poses lack are drawn if the truth has them.
 ///
 /// # Errors
-/// The arm is too soft for its loads.
+/// Returns an error if a pose has no equilibrium, or if the arm does not reach a fixture.
 pub fn simulate_poses(
     problem: &Problem,
     truth: &Truth,
@@ -171,11 +177,11 @@ pub fn simulate_poses(
             ..given
         };
     }
-    measured(problem, truth, drawn(problem, truth, rows, seed), seed)
+    measure(problem, truth, draw_in(problem, truth, rows, seed), seed)
 }
 
-/// Measures what was drawn.
-fn measured(
+/// Measures a drawn arm in the drawn poses.
+fn measure(
     problem: &Problem,
     truth: &Truth,
     draw: Draw,
@@ -185,30 +191,30 @@ fn measured(
     let poses = rows.len();
     let rig = Rig::new(arm, truth.effects.clone()).with_segments(truth.segments);
     hold_out(&mut rows, truth.held_out.count(poses), &mut stream(seed, SPLIT));
-    let measure =
+    let measure_row =
         |(row, stream_of): (&mut Row, u64)| rig.measure(row, truth, &mut stream(seed, stream_of));
     let streams: Vec<u64> = (CONTACTS..).take(poses).collect();
-    let seen: Vec<_> = if truth.has_memory() {
+    let outcomes: Vec<_> = if truth.has_memory() {
         let mut past = Past::default();
-        let after_those = |(row, stream_of): (&mut Row, u64)| {
+        let measure_after_past = |(row, stream_of): (&mut Row, u64)| {
             row.conditions.past = std::mem::take(&mut past);
-            let seen = measure((row, stream_of));
+            let outcome = measure_row((row, stream_of));
             past = std::mem::take(&mut row.conditions.past);
             row.conditions.append_to(&mut past);
-            seen
+            outcome
         };
-        rows.iter_mut().zip(streams).map(after_those).collect()
+        rows.iter_mut().zip(streams).map(measure_after_past).collect()
     } else {
-        rows.par_iter_mut().zip(streams).map(measure).collect()
+        rows.par_iter_mut().zip(streams).map(measure_row).collect()
     };
-    for (index, seen) in seen.into_iter().enumerate() {
+    for (index, outcome) in outcomes.into_iter().enumerate() {
         let pose = index + 1;
-        let found = seen.map_err(|source| SimulationError::NoRest { pose, source })?;
-        found.ok_or(SimulationError::OutOfReach { pose })?;
+        let contact = outcome.map_err(|source| SimulationError::NoEquilibrium { pose, source })?;
+        contact.ok_or(SimulationError::OutOfReach { pose })?;
     }
-    let known = rows.first().is_some_and(|row| !row.conditions.covariates.is_empty());
-    let names =
-        problem.data.covariates.iter().filter(|_| known).map(|own| own.name.clone()).collect();
+    let has_covariates = rows.first().is_some_and(|row| !row.conditions.covariates.is_empty());
+    let covariates = problem.data.covariates.iter().filter(|_| has_covariates);
+    let covariates = covariates.map(|covariate| covariate.name.clone()).collect();
     let split_column = match &problem.data.held_out {
         Some(HeldOut::Column(name)) => name.clone(),
         _ => "split".to_owned(),
@@ -223,17 +229,17 @@ fn measured(
         rig,
         rows,
         split_column,
-        covariates: names,
+        covariates,
     })
 }
 
-/// Standard normal numbers for the strengths of effects, in a stream of their own.
+/// Returns standard normal numbers for effect values, from a separate stream.
 pub(crate) fn standard_normals(count: usize, seed: u64) -> Vec<f64> {
     let mut random = stream(seed, EFFECTS);
     (0..count).map(|_| normal(&mut random)).collect()
 }
 
-/// A command as the file of measurements will hold it.
+/// Rounds a command to the digits of the measurement file.
 pub(super) fn rounded_command(kind: JointKind, q: f64) -> f64 {
     match kind {
         JointKind::Revolute => rounded(q.to_degrees(), 6).to_radians(),
@@ -241,18 +247,19 @@ pub(super) fn rounded_command(kind: JointKind, q: f64) -> f64 {
     }
 }
 
+/// Returns a uniform random number between two limits.
 pub(super) fn between(random: &mut ChaCha8Rng, (from, to): (f64, f64)) -> f64 {
     from + (to - from) * random.random::<f64>()
 }
 
-/// The arm with its true parameters: given ones, else drawn ones, else nominal.
+/// Returns the arm with its true parameters: given, else drawn, else nominal values.
 fn true_arm(
     problem: &Problem,
     truth: &Truth,
     mut random: ChaCha8Rng,
 ) -> (Problem, Vec<TrueParameter>) {
     let mut arm = problem.clone();
-    let mut all = Vec::new();
+    let mut parameters = Vec::new();
     parameters::visit(&mut arm, |name, unit, value| {
         let nominal = *value;
         // Drawn for every parameter, so that a rule for one does not change another.
@@ -268,19 +275,19 @@ fn true_arm(
         {
             *value = parameters::spread(unit, nominal, sigma, drawn);
         }
-        all.push(TrueParameter { name, unit, nominal, value: *value });
+        parameters.push(TrueParameter { name, unit, nominal, value: *value });
     });
-    (arm, all)
+    (arm, parameters)
 }
 
-/// Draws poses; every number is rounded to what the file of measurements will hold.
+/// Draws poses; every number is rounded to the digits of the measurement file.
 fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha8Rng) -> Vec<Row> {
     let ranges = &truth.poses;
     let mut rows: Vec<Row> = Vec::with_capacity(poses);
     let mut time = 0.0;
     let (targets, round) = (problem.target_words(), truth.rows_per_target(&problem.fixtures));
     for row in 0..poses {
-        // Positions before the first round are of one target after the other.
+        // Rows before the first round of fixtures measure one target after the other.
         let turn = row.checked_sub(truth.positions).map_or(row, |place| place / round);
         let mut conditions: PoseConditions = PoseConditions::default();
         for (joint, range) in problem.joints.iter().zip(&ranges.joints) {
@@ -325,7 +332,7 @@ fn draw_poses(problem: &Problem, truth: &Truth, poses: usize, mut random: ChaCha
     rows
 }
 
-/// Holds out `count` rows chosen at random.
+/// Marks `count` random rows as held out.
 fn hold_out(rows: &mut [Row], count: usize, random: &mut ChaCha8Rng) {
     let mut order: Vec<usize> = (0..rows.len()).collect();
     order.shuffle(random);
@@ -334,7 +341,7 @@ fn hold_out(rows: &mut [Row], count: usize, random: &mut ChaCha8Rng) {
     }
 }
 
-/// `value` to so many decimals: the number that is read back from its text.
+/// Rounds `value` to a number of decimals, as reading it back from its text does.
 fn rounded(value: f64, decimals: i32) -> f64 {
     let scale = 10_f64.powi(decimals);
     (value * scale).round() / scale

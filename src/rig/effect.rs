@@ -1,42 +1,41 @@
-//! Effects that the rig injects: what the catalogue names, one thing that it does not, and how
-//! strong they are.
+//! Effects that the rig applies: those of the catalogue and one outside it, with their true values.
 
 use crate::problem::{Effect, Joint, JointKind, Mount};
 use crate::quantity::Unit;
 
-/// What makes the arm differ from its declared model.
+/// Cause of a deviation of the arm from its declared model.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Cause {
-    /// An effect of the catalogue.
+    /// Effect of the catalogue.
     Catalogued(Effect),
-    /// Something that no catalogue holds: a smooth error of one joint's coordinate.
+    /// Smooth error of one joint coordinate that no catalogue effect describes.
     Outside {
         /// Number of the joint, from 1.
         joint: usize,
-        /// Its course over q.
+        /// Shape of the error over q.
         shape: Shape,
     },
 }
 
-/// Course of an error over q, with u = (q − centre)/width.
+/// Shape of an error over q, with u = (q − centre)/width.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Shape {
-    /// height · exp(−u²/2)
+    /// Bell curve, height · exp(−u²/2).
     Bump,
-    /// height · tanh u
+    /// Smooth step, height · tanh u.
     Step,
 }
 
-/// A cause and its strength.
+/// Cause with its true values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrueEffect {
     cause: Cause,
     values: Vec<f64>,
 }
 
-/// A strength of the wrong shape.
+/// Error of a wrong number of values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the effect takes {expected} values, not {found}")]
 pub struct ValueCount {
@@ -45,10 +44,10 @@ pub struct ValueCount {
 }
 
 impl TrueEffect {
-    /// A cause with its values in SI units, in the order of [`TrueEffect::keys`].
+    /// Creates an effect with values in SI units, in the order of [`TrueEffect::keys`].
     ///
     /// # Errors
-    /// Too many values or too few.
+    /// Returns an error if the number of values is wrong.
     pub fn new(cause: Cause, values: &[f64], joints: &[Joint]) -> Result<Self, ValueCount> {
         let expected = keys(&cause, joints).len();
         if values.len() == expected {
@@ -58,17 +57,17 @@ impl TrueEffect {
         }
     }
 
-    /// The cause.
+    /// Returns the cause.
     pub fn cause(&self) -> &Cause {
         &self.cause
     }
 
-    /// Its values, SI.
+    /// Returns the values, SI units.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// Names of the values in the order of the law, with the suffix of their SI unit.
+    /// Returns the names of the values in the order of the law, with the suffix of their SI unit.
     pub fn keys(cause: &Cause, joints: &[Joint]) -> Vec<String> {
         keys(cause, joints)
             .into_iter()
@@ -76,8 +75,9 @@ impl TrueEffect {
             .collect()
     }
 
-    /// The effect of the catalogue with its values, where it is one.
-    pub(super) fn parts(&self) -> Option<(&Effect, &[f64])> {
+    /// Returns the catalogue effect with its values, or `None` if the cause is outside the
+    /// catalogue.
+    pub(super) fn catalogued(&self) -> Option<(&Effect, &[f64])> {
         match &self.cause {
             Cause::Catalogued(effect) => Some((effect, &self.values)),
             Cause::Outside { .. } => None,
@@ -85,7 +85,7 @@ impl TrueEffect {
     }
 }
 
-/// What the values of a cause are called and measured in, in the order of the law in FORMAT.
+/// Returns names and units of the values of a cause, in the order of the law in FORMAT.
 pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
     let slides = |joint: &usize| {
         joints.get(joint - 1).is_some_and(|joint| joint.kind == JointKind::Prismatic)
@@ -166,11 +166,12 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
             let turns = ["rx", "ry", "rz"].map(|name| (name, Unit::AnglePerUnit));
             named(&[turns, ["x", "y", "z"].map(|name| (name, Unit::LengthPerUnit))].concat())
         }
-        // The rig knows the laws of the catalogue alone.
+        // The rig implements the laws of the catalogue only.
         Effect::Custom(_) => Vec::new(),
     }
 }
 
+/// Returns the keys with owned names.
 fn named(keys: &[(&str, Unit)]) -> Vec<(String, Unit)> {
     keys.iter().map(|(name, unit)| ((*name).to_owned(), *unit)).collect()
 }

@@ -1,34 +1,35 @@
-//! Static equilibrium of a chain: every hinge has given way to exactly the load that it carries.
+//! Static equilibrium of a chain: the deformation of every hinge matches the load that it carries.
 
 use nalgebra::Vector3;
 
-use super::chain::{Chain, Load, Motion, Place};
+use super::chain::{Chain, Load, Motion, PieceFrame};
 use crate::spatial::Frame;
 
-/// Hinges have settled when one more pass would move all of them together by less [rad, m].
-const SETTLED: f64 = 1e-12;
-/// Passes after which an arm is given up as too soft for its loads.
+/// Sum of all hinge changes below which the equilibrium is reached [rad, m].
+const TOLERANCE: f64 = 1e-12;
+/// Maximum number of passes; after it the arm counts as too flexible for its loads.
 const MAX_PASSES: usize = 2000;
-/// Smallest part of a pass that is followed.
-const LEAST_STEP: f64 = 1.0 / 64.0;
+/// Smallest fraction of a pass that is applied.
+const MIN_STEP: f64 = 1.0 / 64.0;
 
-/// A chain at rest in the base frame.
-pub(super) struct AtRest {
-    /// Frames in the middle of every hinge's motion, in whose axes it feels its load.
+/// Chain in static equilibrium, base frame.
+pub(super) struct Equilibrium {
+    /// Frames at half the deformation of every hinge, in which its load is resolved.
     hinges: Vec<Frame<f64>>,
     /// Frames of the pieces.
     pieces: Vec<Frame<f64>>,
     motions: Vec<Motion>,
-    /// Force \[N\] of all that each piece carries, and its moment about the origin of the base
-    /// frame [N·m].
+    /// Total force \[N\] that each piece carries, and its moment about the origin of the base frame
+    /// [N·m].
     carried: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 
-impl AtRest {
-    /// Lets the chain come to rest; `None` if it never does.
+impl Equilibrium {
+    /// Finds the equilibrium of a chain; returns `None` if the iteration does not converge.
     ///
-    /// Each pass loads the chain as it stands and lets every hinge follow. A pass that overshoots,
-    /// as in an arm that hangs from soft joints, is taken back and followed in part.
+    /// Each pass computes the loads on the present chain and deforms every hinge accordingly. If a
+    /// pass overshoots, as with an arm that hangs from flexible joints, it is undone and applied in
+    /// part.
     pub fn find(chain: &Chain) -> Option<Self> {
         let count = chain.pieces.len();
         let mut rest = Self {
@@ -37,7 +38,7 @@ impl AtRest {
             motions: vec![Motion::default(); count],
             carried: Vec::with_capacity(count),
         };
-        // Those of a piece may lie apart where others have come to sit on it.
+        // Loads of one piece need not be adjacent.
         let mut loads = chain.loads.clone();
         loads.sort_by_key(|load| load.piece);
         let mut from = rest.motions.clone();
@@ -47,10 +48,10 @@ impl AtRest {
         for _ in 0..MAX_PASSES {
             rest.place(chain);
             let change = rest.load(chain, &loads, &mut next_missing);
-            if change <= SETTLED {
+            if change <= TOLERANCE {
                 return Some(rest);
             }
-            if step > LEAST_STEP && (change > least || !change.is_finite()) {
+            if step > MIN_STEP && (change > least || !change.is_finite()) {
                 step /= 2.0;
             } else if change.is_finite() {
                 least = change;
@@ -67,7 +68,7 @@ impl AtRest {
         None
     }
 
-    /// Places every piece, given how far the hinges have moved.
+    /// Computes the frame of every piece from the deformations of the hinges.
     fn place(&mut self, chain: &Chain) {
         self.hinges.clear();
         self.pieces.clear();
@@ -82,15 +83,19 @@ impl AtRest {
         }
     }
 
-    /// Where a place on a piece that has been placed is, base frame.
-    pub fn frame(&self, place: &Place) -> Frame<f64> {
-        let Place { piece, frame: seen } = place;
+    /// Returns a frame on a piece, in the base frame.
+    pub fn frame(&self, on_piece: &PieceFrame) -> Frame<f64> {
+        let PieceFrame { piece, frame: local } = on_piece;
         let frame = piece.map_or(Frame::identity(), |piece| self.pieces[piece]);
-        Frame { axes: seen.axes.map(|axis| frame.vector(&axis)), origin: frame.point(&seen.origin) }
+        Frame {
+            axes: local.axes.map(|axis| frame.vector(&axis)),
+            origin: frame.point(&local.origin),
+        }
     }
 
-    /// Sums `loads`, in the order of their pieces, from the tips inwards: how far each hinge is
-    /// from what it does under its load, and their sum.
+    /// Sums the loads from the tips inwards. Writes the change that each hinge needs to match its
+    /// load into `missing`, and returns the sum of the changes. `loads` must be in the order of the
+    /// pieces.
     fn load(&mut self, chain: &Chain, loads: &[Load], missing: &mut [Motion]) -> f64 {
         let mut sum = 0.0;
         let mut loads = loads.iter().rev().peekable();
@@ -111,10 +116,10 @@ impl AtRest {
             let hinge = &self.hinges[k];
             let about_hinge = moment - hinge.origin.cross(&force);
             let motion = &self.motions[k];
-            let mut felt = hinge.resolve(&about_hinge);
+            let mut resolved = hinge.resolve(&about_hinge);
             let springs = chain.springs.iter().filter(|spring| spring.piece == k);
-            felt.z += springs.map(|spring| spring.moment(motion.rotation.z)).sum::<f64>();
-            let wanted = piece.hinge.give(&hinge.resolve(&force), &felt);
+            resolved.z += springs.map(|spring| spring.moment(motion.rotation.z)).sum::<f64>();
+            let wanted = piece.hinge.deformation(&hinge.resolve(&force), &resolved);
             missing[k] = Motion {
                 rotation: wanted.rotation - motion.rotation,
                 stretch: wanted.stretch - motion.stretch,

@@ -1,23 +1,24 @@
-//! A link as segments of rigid parts and springs.
+//! Links as segments of rigid parts and hinges.
 
 use nalgebra::{Vector2, Vector3};
 
 use super::Rig;
-use super::build::{Part, softness};
+use super::build::{EffectValues, compliance};
 use super::chain::{Chain, Force, Hinge};
 use crate::problem::{Beam, Effect, Joint, PoseConditions};
 
-/// A load on a link, at a point of the straight link's frame \[m\].
+/// Load on a link, at a point in the frame of the straight link \[m\].
 type LinkLoad = (Vector3<f64>, Force);
-/// Part of a segment before its first hinge and behind its second: they sit at the points of Gauss
-/// and Legendre, so that bending moments that change with up to the cube of the station are summed
-/// exactly.
-const OUTER: f64 = 0.211_324_865_405_187_1;
+/// Fraction of a segment before its first hinge and behind its second. The hinges are at the
+/// Gauss–Legendre points, so that bending moments up to third order along the segment are
+/// integrated exactly.
+const OUTER_FRACTION: f64 = 0.211_324_865_405_187_1;
 
 impl Rig {
-    /// The link along a joint's a: segments with two hinges each, or one rigid piece.
+    /// Adds the link along a joint's a: segments with two hinges each, or one rigid piece.
     ///
-    /// The link is cut where it carries something, so that bending is smooth along every segment.
+    /// The link is divided where it carries a load, so that its bending moment is smooth along
+    /// every segment.
     pub(super) fn link(
         &self,
         joint: &Joint,
@@ -32,9 +33,9 @@ impl Rig {
         }
         let mut loads =
             beam.map_or_else(Vec::new, |beam| self.link_loads(beam, joint.a, gravity, conditions));
-        // From the root outwards; what lies beyond either end hangs on that end.
+        // Loads beyond either end of the link act at that end.
         let station = |at: &Vector3<f64>| (at.x * joint.a.signum()).clamp(0.0, joint.a.abs());
-        loads.sort_by(|(one, _), (other, _)| station(one).total_cmp(&station(other)));
+        loads.sort_by(|(a, _), (b, _)| station(a).total_cmp(&station(b)));
         let weight = gravity * beam.map_or(0.0, |beam| beam.mass);
         let mut from = 0.0;
         for (at, force) in loads {
@@ -46,7 +47,7 @@ impl Rig {
         self.span(&weight, joint, number, joint.a.abs() - from, conditions, chain);
     }
 
-    /// A part of a link, `reach` \[m\] long: its share of the link's segments.
+    /// Adds a part of a link that is `reach` \[m\] long, with its share of the link's segments.
     fn span(
         &self,
         weight: &Vector3<f64>,
@@ -71,38 +72,38 @@ impl Rig {
             chain.end().translate_x(part * length);
         };
         for _ in 0..segments {
-            rigid(OUTER, chain);
+            rigid(OUTER_FRACTION, chain);
             chain.hinge(hinge);
-            rigid(1.0 - 2.0 * OUTER, chain);
+            rigid(1.0 - 2.0 * OUTER_FRACTION, chain);
             chain.hinge(hinge);
-            rigid(OUTER, chain);
+            rigid(OUTER_FRACTION, chain);
         }
     }
 
-    /// The slide of a joint, `length` \[m\] along z, negative along −z: segments with two hinges
-    /// each, or one rigid piece.
+    /// Adds the slide of a joint, `length` \[m\] along z (negative along −z): segments with two
+    /// hinges each, or one rigid piece.
     pub(super) fn slide(&self, number: usize, length: f64, chain: &mut Chain) {
-        let bends = |part: Part<'_>| match part {
+        let flexibility = |effect: EffectValues<'_>| match effect {
             (Effect::SlideBending { joint }, &[flexibility]) if *joint == number => flexibility,
             _ => 0.0,
         };
-        let flexibility: f64 = self.parts().map(bends).sum();
+        let flexibility: f64 = self.effect_values().map(flexibility).sum();
         if flexibility == 0.0 {
             return chain.end().translate_z(length);
         }
         let segment = length / self.segments as f64;
-        let across = flexibility * segment.abs() / 2.0;
-        let hinge = Hinge { compliance: Vector3::new(across, across, 0.0), ..Hinge::default() };
+        let lateral = flexibility * segment.abs() / 2.0;
+        let hinge = Hinge { compliance: Vector3::new(lateral, lateral, 0.0), ..Hinge::default() };
         for _ in 0..self.segments {
-            chain.end().translate_z(OUTER * segment);
+            chain.end().translate_z(OUTER_FRACTION * segment);
             chain.hinge(hinge);
-            chain.end().translate_z((1.0 - 2.0 * OUTER) * segment);
+            chain.end().translate_z((1.0 - 2.0 * OUTER_FRACTION) * segment);
             chain.hinge(hinge);
-            chain.end().translate_z(OUTER * segment);
+            chain.end().translate_z(OUTER_FRACTION * segment);
         }
     }
 
-    /// The hinge that stands for `length` \[m\] of a link, which is negative along −x.
+    /// Returns the hinge that represents `length` \[m\] of a link (negative along −x).
     fn hinge(
         &self,
         beam: Option<&Beam>,
@@ -111,21 +112,21 @@ impl Rig {
         conditions: &PoseConditions,
     ) -> Hinge {
         let mut hinge = Hinge::default();
-        let between = length.abs();
+        let size = length.abs();
         if let Some(beam) = beam {
-            let softness =
-                Vector3::new(softness(beam.gj), softness(beam.ei_y), softness(beam.ei_z));
-            hinge.compliance = softness * between;
-            hinge.stretch = self::softness(beam.ea) * between;
+            let per_length =
+                Vector3::new(compliance(beam.gj), compliance(beam.ei_y), compliance(beam.ei_z));
+            hinge.compliance = per_length * size;
+            hinge.stretch = compliance(beam.ea) * size;
         }
         let is_this = |link: &String| beam.is_some_and(|beam| beam.name == *link);
-        for part in self.parts() {
-            match part {
+        for effect in self.effect_values() {
+            match effect {
                 (Effect::LinkBending { joint }, [flexibility]) if *joint == number => {
-                    hinge.compliance += Vector3::new(0.0, *flexibility, *flexibility) * between;
+                    hinge.compliance += Vector3::new(0.0, *flexibility, *flexibility) * size;
                 }
                 (Effect::TwistBending { link }, [y, z]) if is_this(link) => {
-                    hinge.coupling += Vector2::new(*y, *z) * between;
+                    hinge.coupling += Vector2::new(*y, *z) * size;
                 }
                 (Effect::LinkThermalBending { link }, [y, z]) if is_this(link) => {
                     hinge.free_rotation +=
@@ -134,8 +135,8 @@ impl Rig {
                 (Effect::LinkThermalBendingLag { link, time_constant }, [y, z])
                     if is_this(link) =>
                 {
-                    let warm = self.felt(conditions, *time_constant);
-                    hinge.free_rotation += Vector3::new(0.0, *y, *z) * (warm * length);
+                    let warming = self.lagged_warming(conditions, *time_constant);
+                    hinge.free_rotation += Vector3::new(0.0, *y, *z) * (warming * length);
                 }
                 (Effect::LinkThermalExpansion { link }, [strain]) if is_this(link) => {
                     hinge.free_stretch += strain * self.warming(conditions) * length;
@@ -143,7 +144,8 @@ impl Rig {
                 (Effect::LinkThermalExpansionLag { link, time_constant }, [strain])
                     if is_this(link) =>
                 {
-                    hinge.free_stretch += strain * self.felt(conditions, *time_constant) * length;
+                    let warming = self.lagged_warming(conditions, *time_constant);
+                    hinge.free_stretch += strain * warming * length;
                 }
                 _ => {}
             }
@@ -151,7 +153,7 @@ impl Rig {
         hinge
     }
 
-    /// What a beam of signed length `a` \[m\] carries besides its own weight.
+    /// Returns the loads on a beam of signed length `a` \[m\], except its weight.
     fn link_loads(
         &self,
         beam: &Beam,
@@ -162,8 +164,8 @@ impl Rig {
         let weight = |mass: f64| Force::Constant(gravity * mass);
         let mut loads: Vec<LinkLoad> =
             beam.masses.iter().map(|carried| (carried.position, weight(carried.mass))).collect();
-        for part in self.parts() {
-            if let (Effect::UnmodelledMass { link }, &[mass, at]) = part
+        for effect in self.effect_values() {
+            if let (Effect::UnmodelledMass { link }, &[mass, at]) = effect
                 && *link == beam.name
             {
                 loads.push((Vector3::new(at.copysign(a), 0.0, 0.0), weight(mass)));
@@ -172,8 +174,8 @@ impl Rig {
         if let Some(hoist) = &beam.hoist {
             let mut tension = conditions.hoist.unwrap_or(hoist.force);
             let (mut direction, mut trolley) = (hoist.direction, 0.0);
-            for part in self.parts() {
-                match part {
+            for effect in self.effect_values() {
+                match effect {
                     (Effect::HoistForce, [error]) => tension *= 1.0 + error,
                     (Effect::HoistDirection, &[x, y, per_metre]) => {
                         direction += Vector3::new(x, y, 0.0);

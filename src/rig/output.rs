@@ -1,4 +1,4 @@
-//! Simulations as text: the table of measurements, and what is true about it.
+//! Output of a simulation: table of measurements and its truth.
 
 use serde::Serialize;
 use serde_json::{Map, Value, json};
@@ -32,13 +32,13 @@ struct Parameter<'a> {
 }
 
 impl Simulation {
-    /// `measurements.csv`.
+    /// Returns the text of `measurements.csv`.
     pub fn csv(&self) -> String {
         let rows = self.rows.iter().enumerate().map(|(index, row)| self.cells(index + 1, row));
         csv(self.header(), rows)
     }
 
-    /// Joints that take a q: index, and whether they turn.
+    /// Returns the commanded joints: index, and true for a revolute joint.
     fn moving(&self) -> impl Iterator<Item = (usize, bool)> {
         let joints = self.joints.iter().map(Joint::command_kind).enumerate();
         joints
@@ -46,53 +46,53 @@ impl Simulation {
             .map(|(index, kind)| (index, kind == JointKind::Revolute))
     }
 
-    /// Whether rows name their targets.
+    /// Returns true if rows name their targets.
     fn names_targets(&self) -> bool {
         self.rows.iter().any(|row| !row.target.is_empty())
     }
 
     fn header(&self) -> Vec<String> {
-        let set = self.rows.first().map(|row| row.conditions.clone()).unwrap_or_default();
+        let first = self.rows.first().map(|row| row.conditions.clone()).unwrap_or_default();
         let mut names = vec!["pose".to_owned(), self.split_column.clone()];
         let unit = |turns| if turns { "deg" } else { "m" };
         names.extend(self.moving().map(|(index, turns)| format!("q{}_{}", index + 1, unit(turns))));
-        let there = |word| self.rows.iter().any(|row| self.word(row) == word);
+        let has = |word| self.rows.iter().any(|row| self.word(row) == word);
         let columns = [
-            (there(""), "x_mm"),
-            (there(""), "y_mm"),
-            (there(""), "z_mm"),
-            (there("point"), "point"),
-            (there("anchor"), "anchor"),
-            (there("anchor"), "distance_mm"),
-            (there("surface"), "surface"),
-            (there("frame"), "frame"),
-            (there("frame"), "tilt_x_deg"),
-            (there("frame"), "tilt_y_deg"),
+            (has(""), "x_mm"),
+            (has(""), "y_mm"),
+            (has(""), "z_mm"),
+            (has("point"), "point"),
+            (has("anchor"), "anchor"),
+            (has("anchor"), "distance_mm"),
+            (has("surface"), "surface"),
+            (has("frame"), "frame"),
+            (has("frame"), "tilt_x_deg"),
+            (has("frame"), "tilt_y_deg"),
             (self.truth.orientation_sigma.is_some(), "rx_deg"),
             (self.truth.orientation_sigma.is_some(), "ry_deg"),
             (self.truth.orientation_sigma.is_some(), "rz_deg"),
-            (set.payload.is_some(), "payload_kg"),
-            (set.hoist.is_some(), "hoist_N"),
-            (set.temperature.is_some(), "temperature_C"),
+            (first.payload.is_some(), "payload_kg"),
+            (first.hoist.is_some(), "hoist_N"),
+            (first.temperature.is_some(), "temperature_C"),
             (true, "time_s"),
         ];
         names.extend(self.names_targets().then(|| "target".to_owned()));
         names.extend(
-            columns.into_iter().filter(|(there, _)| *there).map(|(_, name)| name.to_owned()),
+            columns.into_iter().filter(|(exists, _)| *exists).map(|(_, name)| name.to_owned()),
         );
         names.extend(self.covariates.iter().cloned());
-        if set.approach.is_some() {
+        if first.approach.is_some() {
             names.extend(self.moving().map(|(index, _)| format!("approach{}", index + 1)));
         }
         names
     }
 
     fn cells(&self, pose: usize, row: &Row) -> Vec<String> {
-        let set = &row.conditions;
+        let conditions = &row.conditions;
         let split = if row.held_out { "validation" } else { "identification" };
         let mut cells = vec![pose.to_string(), split.to_owned()];
         cells.extend(self.moving().map(|(index, turns)| {
-            match set.configuration.get(index).copied().unwrap_or(0.0) {
+            match conditions.configuration.get(index).copied().unwrap_or(0.0) {
                 q if turns => format!("{:.6}", q.to_degrees()),
                 q => format!("{q:.9}"),
             }
@@ -101,17 +101,17 @@ impl Simulation {
         self.observed(row, &mut cells);
         let turn =
             row.orientation.map(|orientation| orientation.scaled_axis().map(f64::to_degrees));
-        let turned = self.truth.orientation_sigma.is_some();
+        let has_orientations = self.truth.orientation_sigma.is_some();
         let angles = turn.map_or([const { String::new() }; 3], |turn| {
             turn.map(|angle| format!("{angle:.7}")).into()
         });
-        cells.extend(angles.into_iter().filter(|_| turned));
-        cells.extend(set.payload.map(|mass| mass.to_string()));
-        cells.extend(set.hoist.map(|force| format!("{force:.3}")));
-        cells.extend(set.temperature.map(|temperature| format!("{temperature:.2}")));
-        cells.push(format!("{:.1}", set.time));
-        cells.extend(set.covariates.iter().map(f64::to_string));
-        if let Some(approach) = &set.approach {
+        cells.extend(angles.into_iter().filter(|_| has_orientations));
+        cells.extend(conditions.payload.map(|mass| mass.to_string()));
+        cells.extend(conditions.hoist.map(|force| format!("{force:.3}")));
+        cells.extend(conditions.temperature.map(|temperature| format!("{temperature:.2}")));
+        cells.push(format!("{:.1}", conditions.time));
+        cells.extend(conditions.covariates.iter().map(f64::to_string));
+        if let Some(approach) = &conditions.approach {
             cells.extend(
                 self.moving().map(|(index, _)| approach.get(index).unwrap_or(&0.0).to_string()),
             );
@@ -119,37 +119,37 @@ impl Simulation {
         cells
     }
 
-    /// The word of what a row measures against, none of a position.
+    /// Returns the word of the fixture that a row measures against; empty for a position.
     fn word(&self, row: &Row) -> &'static str {
         if row.observation.is_angle() {
             return "frame";
         }
         row.observation
             .fixture()
-            .and_then(|own| self.fixtures.get(own))
-            .map_or("", |own| own.kind.word())
+            .and_then(|fixture| self.fixtures.get(fixture))
+            .map_or("", |fixture| fixture.kind.word())
     }
 
-    /// What is measured, in the columns of all kinds that there are.
+    /// Adds the measured values, in the columns of all kinds of measurement in the table.
     fn observed(&self, row: &Row, cells: &mut Vec<String>) {
-        let there = |word| self.rows.iter().any(|row| self.word(row) == word);
+        let has = |word| self.rows.iter().any(|row| self.word(row) == word);
         let name = row
             .observation
             .fixture()
-            .and_then(|own| self.fixtures.get(own))
-            .map_or("", |own| own.name.as_str());
-        let own = self.word(row);
-        let cell = |word: &str, text: String| if own == word { text } else { String::new() };
-        if there("") {
+            .and_then(|fixture| self.fixtures.get(fixture))
+            .map_or("", |fixture| fixture.name.as_str());
+        let row_word = self.word(row);
+        let cell = |word: &str, text: String| if row_word == word { text } else { String::new() };
+        if has("") {
             cells.extend(row.position.iter().map(|x| cell("", format!("{:.6}", x * 1e3))));
         }
-        for word in ["point", "anchor", "surface"].into_iter().filter(|word| there(word)) {
+        for word in ["point", "anchor", "surface"].into_iter().filter(|word| has(word)) {
             cells.push(cell(word, name.to_owned()));
             if word == "anchor" {
                 cells.push(cell(word, format!("{:.6}", row.position.x * 1e3)));
             }
         }
-        if there("frame") {
+        if has("frame") {
             let tool = self.rig.arm.tool.joint;
             let word = |frame| frame_word(frame, &self.joints, tool);
             cells.push(if let Observation::Tilt(frame) = row.observation {
@@ -162,7 +162,7 @@ impl Simulation {
         }
     }
 
-    /// `truth.json`.
+    /// Returns the text of `truth.json`.
     pub fn truth_json(&self) -> String {
         let document = Document {
             problem: &self.problem,
@@ -179,11 +179,11 @@ impl Simulation {
                 .collect(),
             parameters: self.parameters.iter().map(parameter).collect(),
         };
-        // Numbers and words always have a JSON text.
+        // Numbers and texts always have a JSON form.
         serde_json::to_string_pretty(&document).unwrap_or_default() + "\n"
     }
 
-    /// Names of the effects at work.
+    /// Returns the names of the true effects.
     pub fn effect_names(&self) -> Vec<String> {
         let name = |effect| {
             described(effect, &self.joints)
@@ -195,22 +195,22 @@ impl Simulation {
         self.truth.effects.iter().map(name).collect()
     }
 
-    /// Number of rows that are held out.
+    /// Returns the number of held-out rows.
     pub fn held_out(&self) -> usize {
         self.rows.iter().filter(|row| row.held_out).count()
     }
 }
 
-fn parameter(known: &TrueParameter) -> Parameter<'_> {
+fn parameter(parameter: &TrueParameter) -> Parameter<'_> {
     Parameter {
-        name: &known.name,
-        unit: known.unit.symbol(),
-        nominal: known.nominal,
-        value: known.value,
+        name: &parameter.name,
+        unit: parameter.unit.symbol(),
+        nominal: parameter.nominal,
+        value: parameter.value,
     }
 }
 
-/// An effect under its name, with arguments and values.
+/// Returns an effect as JSON: its name, arguments and values.
 fn described(effect: &TrueEffect, joints: &[Joint]) -> Value {
     let mut entry = match effect.cause() {
         Cause::Outside { joint, shape } => json!({

@@ -1,9 +1,9 @@
-//! The parameters of an arm by name, to be given true values.
+//! Parameters of an arm by name, for setting their true values.
 
 use crate::problem::{Fixture, Placement, Problem, Target};
 use crate::quantity::Unit;
 
-/// A parameter with its nominal and its true value, SI.
+/// Parameter with its nominal and true value, SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrueParameter {
     /// Name as in the problem file.
@@ -16,21 +16,21 @@ pub struct TrueParameter {
     pub value: f64,
 }
 
-/// The true value from the nominal one and its deviation, a multiple where the unit is relative,
-/// else a difference.
+/// Returns the true value for a given deviation: a factor if the unit is relative, else a
+/// difference.
 pub(super) fn deviated(unit: Unit, nominal: f64, deviation: f64) -> f64 {
     if unit.is_relative() { nominal * deviation } else { nominal + deviation }
 }
 
-/// The true value from the nominal one, 1 σ and a standard normal number; relative: σ of ln(value /
-/// nominal).
+/// Returns a random true value from 1 σ and a standard normal number; for a relative unit σ is that
+/// of ln(value / nominal).
 pub(super) fn spread(unit: Unit, nominal: f64, sigma: f64, normal: f64) -> f64 {
     if unit.is_relative() { nominal * (sigma * normal).exp() } else { nominal + sigma * normal }
 }
 
-/// Calls `see` on every parameter, in the order of the file format: name, unit, and the value that
-/// may be changed.
-pub(super) fn visit(problem: &mut Problem, mut see: impl FnMut(String, Unit, &mut f64)) {
+/// Calls `set` for every parameter, in the order of the file format, with its name, its unit and a
+/// value that may be changed.
+pub(super) fn visit(problem: &mut Problem, mut set: impl FnMut(String, Unit, &mut f64)) {
     use Unit::{Angle, AxialRigidity, FlexuralRigidity, Length, TorsionalStiffness};
     for (index, joint) in problem.joints.iter_mut().enumerate() {
         let fields = if let Some(Placement { xyz, rpy }) = &mut joint.placement {
@@ -52,18 +52,18 @@ pub(super) fn visit(problem: &mut Problem, mut see: impl FnMut(String, Unit, &mu
             .iter_mut()
             .map(|stiffness| ("stiffness", TorsionalStiffness, stiffness));
         for (field, unit, value) in fields.into_iter().chain(stiffness) {
-            see(format!("joint{}.{field}", index + 1), unit, value);
+            set(format!("joint{}.{field}", index + 1), unit, value);
         }
     }
     for beam in problem.joints.iter_mut().filter_map(|joint| joint.beam.as_mut()) {
         let name = &beam.name;
         let mut rigidity = |field: &str, unit, value: &mut Option<f64>| {
             if let Some(value) = value {
-                see(format!("{name}.{field}"), unit, value);
+                set(format!("{name}.{field}"), unit, value);
             }
         };
         rigidity("EA", AxialRigidity, &mut beam.ea);
-        // One parameter where both planes are declared alike, as in the problem file.
+        // Equal rigidities of both planes are one parameter, as in the problem file.
         if beam.ei_y == beam.ei_z {
             rigidity("EI", FlexuralRigidity, &mut beam.ei_y);
             beam.ei_z = beam.ei_y;
@@ -82,42 +82,42 @@ pub(super) fn visit(problem: &mut Problem, mut see: impl FnMut(String, Unit, &mu
     }
     for (name, at, _) in &mut targets {
         for (axis, value) in ["x", "y", "z"].into_iter().zip(at.iter_mut()) {
-            see(format!("{name}.{axis}"), Length, value);
+            set(format!("{name}.{axis}"), Length, value);
         }
     }
     for (axis, value) in ["x", "y", "z"].into_iter().zip(problem.base.translation.iter_mut()) {
-        see(format!("base.{axis}"), Length, value);
+        set(format!("base.{axis}"), Length, value);
     }
     for (axis, value) in ["rx", "ry", "rz"].into_iter().zip(problem.base.rotation.iter_mut()) {
-        see(format!("base.{axis}"), Angle, value);
+        set(format!("base.{axis}"), Angle, value);
     }
-    // Behind all others, so that they are drawn as without it.
+    // Rotations come last, so that the other parameters are drawn as without them.
     if problem.data.orientation_sigma.is_some() {
         for (name, _, rotation) in targets {
             for (axis, value) in ["rx", "ry", "rz"].into_iter().zip(rotation.iter_mut()) {
-                see(format!("{name}.{axis}"), Angle, value);
+                set(format!("{name}.{axis}"), Angle, value);
             }
         }
     }
-    visit_fixtures(&mut problem.fixtures, see);
+    visit_fixtures(&mut problem.fixtures, set);
 }
 
-/// What is touched or measured against, behind all others as well.
-fn visit_fixtures(fixtures: &mut [Fixture], mut see: impl FnMut(String, Unit, &mut f64)) {
+/// Calls `set` for every unknown of the fixtures, which also come last.
+fn visit_fixtures(fixtures: &mut [Fixture], mut set: impl FnMut(String, Unit, &mut f64)) {
     for Fixture { name, kind, known, .. } in fixtures {
         for (axis, (field, number)) in kind.fields().iter().zip(known).enumerate() {
             let mut value = number.unwrap_or(0.0);
-            see(format!("{}[{name}].{field}", kind.word()), kind.unit(axis), &mut value);
+            set(format!("{}[{name}].{field}", kind.word()), kind.unit(axis), &mut value);
             *number = Some(value);
         }
     }
 }
 
-/// Every parameter of a problem at its nominal value.
+/// Returns every parameter of a problem at its nominal value.
 pub(super) fn nominal(problem: &Problem) -> Vec<TrueParameter> {
-    let mut all = Vec::new();
+    let mut parameters = Vec::new();
     visit(&mut problem.clone(), |name, unit, value| {
-        all.push(TrueParameter { name, unit, nominal: *value, value: *value });
+        parameters.push(TrueParameter { name, unit, nominal: *value, value: *value });
     });
-    all
+    parameters
 }

@@ -1,4 +1,4 @@
-//! The section `[poses]`.
+//! Reader of the section `[poses]` of a truth.
 
 use super::truth::HeldOutRows;
 use crate::error::{InputError, InputErrorKind};
@@ -8,27 +8,27 @@ use crate::problem::section::Section;
 use crate::problem::{Joint, JointKind, PoseRanges, Problem};
 use crate::quantity::Unit;
 
-/// Part of the rows that is held out where the file says nothing.
-const HELD_OUT: f64 = 0.3;
-/// Seconds between poses where the file says nothing.
-const TIME_STEP: f64 = 60.0;
+/// Share of held-out rows if the file gives none.
+const DEFAULT_HELD_OUT: f64 = 0.3;
+/// Time between poses if the file gives none \[s\].
+const DEFAULT_TIME_STEP: f64 = 60.0;
 
-/// Other quantities of the section: no joint goes by their names.
-const OTHERS: [&str; 4] = ["payload", "hoist", "temperature", "time_step"];
+/// Names of other quantities of the section, which no joint may use.
+const RESERVED: [&str; 4] = ["payload", "hoist", "temperature", "time_step"];
 
-/// `[poses]`.
+/// Contents of `[poses]`.
 pub(super) struct Poses {
     pub ranges: PoseRanges,
-    /// Time from one pose to the next \[s\].
+    /// Range of the time between poses \[s\].
     pub time_step: (f64, f64),
     pub held_out: HeldOutRows,
-    /// How many rows measure positions before the others.
+    /// Number of rows that measure positions before the other kinds.
     pub positions: usize,
     /// Frames whose tilts are measured.
     pub tilts: Vec<usize>,
 }
 
-/// The section.
+/// Reads the section.
 pub(super) fn read(mut section: Section<'_, '_>, problem: &Problem) -> Result<Poses, InputError> {
     let joints = problem.joints.iter().enumerate();
     let joints = joints.map(|(index, joint)| joint_range(&mut section, index + 1, joint, problem));
@@ -37,8 +37,9 @@ pub(super) fn read(mut section: Section<'_, '_>, problem: &Problem) -> Result<Po
     let hoist = range(&mut section, "hoist", Unit::Force)?;
     let temperature = range(&mut section, "temperature", Unit::Temperature)?;
     let time_step = time_step(&mut section)?;
-    let covariates =
-        section.section("covariates")?.map_or(Ok(Vec::new()), |own| covariates(own, problem))?;
+    let covariates = section
+        .section("covariates")?
+        .map_or(Ok(Vec::new()), |inner| covariates(inner, problem))?;
     let approach = section.get("approach").map_or(Ok(true), |item| item.boolean())?;
     let held_out = held_out(&mut section)?;
     let positions = section.get("positions").map_or(Ok(0), |item| item.small().map(usize::from))?;
@@ -48,7 +49,7 @@ pub(super) fn read(mut section: Section<'_, '_>, problem: &Problem) -> Result<Po
     Ok(Poses { ranges, time_step, held_out, positions, tilts })
 }
 
-/// `q1_deg = [from, to]`, or the joint's own name instead of `q1` where it alone has that name.
+/// Reads `q1_deg = [from, to]`, or the same under the name of the joint if no other joint has it.
 fn joint_range(
     section: &mut Section<'_, '_>,
     number: usize,
@@ -62,19 +63,20 @@ fn joint_range(
     };
     let base = format!("q{number}");
     let is_number = |name: &str| {
-        name.strip_prefix('q').is_some_and(|rest| rest.bytes().all(|own| own.is_ascii_digit()))
+        name.strip_prefix('q').is_some_and(|digits| digits.bytes().all(|b| b.is_ascii_digit()))
     };
-    let is_shared = |name: &str| problem.joints.iter().filter(|own| own.name == name).count() > 1;
-    let own = Some(joint.name.as_str())
-        .filter(|own| !is_number(own) && !OTHERS.contains(own) && !is_shared(own));
-    let by_name = own.map(|name| section.quantity(name, unit)).transpose()?.flatten();
+    let is_shared =
+        |name: &str| problem.joints.iter().filter(|other| other.name == name).count() > 1;
+    let joint_name = Some(joint.name.as_str())
+        .filter(|name| !is_number(name) && !RESERVED.contains(name) && !is_shared(name));
+    let by_name = joint_name.map(|name| section.quantity(name, unit)).transpose()?.flatten();
     let (item, suffix) = match (section.quantity(&base, unit)?, by_name) {
         (Some((_, first)), Some((item, _))) => {
             return Err(
                 item.error(InputErrorKind::GivenTwice { first: format!("{base}_{}", first.name) })
             );
         }
-        (Some(found), None) | (None, Some(found)) => found,
+        (Some(given), None) | (None, Some(given)) => given,
         (None, None) => {
             return Err(
                 section.missing(&base, format!("{} = [from, to]", unit.alternatives(&base)))
@@ -85,20 +87,20 @@ fn joint_range(
     Ok(((suffix.to_si)(from), (suffix.to_si)(to)))
 }
 
-/// `name = [from, to]` of each of the problem's own covariates, in its unit.
+/// Reads `name = [from, to]` for each covariate of the problem, in its unit.
 fn covariates(
     mut section: Section<'_, '_>,
     problem: &Problem,
 ) -> Result<Vec<(f64, f64)>, InputError> {
-    let own = problem.data.covariates.iter();
-    let all =
-        own.map(|own| pair(&section.require(&own.name, &format!("{} = [from, to]", own.name))?));
-    let all = all.collect::<Result<_, _>>()?;
+    let range = |name: &str| pair(&section.require(name, &format!("{name} = [from, to]"))?);
+    let mut range = range;
+    let ranges = problem.data.covariates.iter().map(|covariate| range(&covariate.name));
+    let ranges = ranges.collect::<Result<_, _>>()?;
     section.finish()?;
-    Ok(all)
+    Ok(ranges)
 }
 
-/// `base_unit = [from, to]` \[SI\].
+/// Reads `base_unit = [from, to]`, if given \[SI\].
 fn range(
     section: &mut Section<'_, '_>,
     base: &str,
@@ -136,10 +138,10 @@ fn payloads(section: &mut Section<'_, '_>) -> Result<Vec<f64>, InputError> {
     choices.iter().map(mass).collect()
 }
 
-/// A number, or a range of them; time does not run backwards.
+/// Reads the time step, a number or a range; it must not be negative.
 fn time_step(section: &mut Section<'_, '_>) -> Result<(f64, f64), InputError> {
     let Some((item, _)) = section.quantity("time_step", Unit::Time)? else {
-        return Ok((TIME_STEP, TIME_STEP));
+        return Ok((DEFAULT_TIME_STEP, DEFAULT_TIME_STEP));
     };
     let (from, to) = item.number().map(|step| (step, step)).or_else(|_| pair(&item))?;
     if from < 0.0 {
@@ -149,13 +151,13 @@ fn time_step(section: &mut Section<'_, '_>) -> Result<(f64, f64), InputError> {
     }
 }
 
-/// The words of frames whose tilts are measured; the problem must read tilts.
+/// Reads the frames whose tilts are measured; the problem must declare tilts.
 fn tilts(section: &mut Section<'_, '_>, problem: &Problem) -> Result<Vec<usize>, InputError> {
     let Some(item) = section.get("tilts") else { return Ok(Vec::new()) };
     if problem.data.tilt_sigma.is_none() {
         return Err(problem.data.location.clone().with_key("tilt_sigma_deg".to_owned()).error(
             InputErrorKind::MissingKey {
-                write: "tilt_sigma_deg = …, for tilts are measured".to_owned(),
+                write: "tilt_sigma_deg = …, because tilts are measured".to_owned(),
                 near: None,
             },
         ));
@@ -179,6 +181,6 @@ fn held_out(section: &mut Section<'_, '_>) -> Result<HeldOutRows, InputError> {
         (None, Some(item)) => {
             Ok(HeldOutRows::AllBut(usize::try_from(item.whole(1)?).unwrap_or(usize::MAX)))
         }
-        (None, None) => Ok(HeldOutRows::Share(HELD_OUT)),
+        (None, None) => Ok(HeldOutRows::Share(DEFAULT_HELD_OUT)),
     }
 }

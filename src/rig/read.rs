@@ -1,4 +1,4 @@
-//! From the text of `TRUTH.toml` to a [`Truth`].
+//! Reader of `TRUTH.toml`.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -16,10 +16,10 @@ use crate::problem::{HeldOut, Joint, JointKind, Observation, Problem};
 use crate::quantity::Unit;
 
 impl Truth {
-    /// Reads a `TRUTH.toml` about a problem, or the one in a folder.
+    /// Reads a `TRUTH.toml` for a problem; `path` is the file or its folder.
     ///
     /// # Errors
-    /// The first mistake found, a file that cannot be read among them.
+    /// Returns the first error in the file, or that it cannot be read.
     pub fn read(path: &Path, problem: &Problem) -> Result<Self, InputError> {
         let inside = path.is_dir().then(|| path.join("TRUTH.toml"));
         truth(
@@ -28,15 +28,15 @@ impl Truth {
         )
     }
 
-    /// Reads it from its text; `file` names it in messages.
+    /// Parses a truth from its text; `file` names it in messages.
     ///
     /// # Errors
-    /// The first mistake found.
+    /// Returns the first error in the text.
     pub fn parse(text: &str, file: &Path, problem: &Problem) -> Result<Self, InputError> {
         truth(&Document { file: file.to_owned(), text: Arc::from(text) }, problem)
     }
 
-    /// Reads its sections but `[noise]` where they stand in another document; no noise.
+    /// Reads the sections of a truth, except `[noise]`, from another document; the noise is zero.
     pub(crate) fn of_sections(
         root: &mut Section<'_, '_>,
         problem: &Problem,
@@ -52,20 +52,20 @@ fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
     let truth = sections(&mut root, problem)?;
     root.finish()?;
     let Noise { position, contacts, turn, tilt, missing } = noise;
-    let things = truth.positions + problem.fixtures.len() + truth.tilts.len();
-    let needed =
-        truth.observations(&problem.fixtures, things.max(1)).into_iter().any(|own| match own {
-            Observation::Point(_) => contacts[0].is_none(),
-            Observation::Distance(_) => contacts[1].is_none(),
-            Observation::Surface(_) => contacts[2].is_none(),
-            Observation::Tilt(_) => false,
-            _ => true,
-        });
-    if let Some(error) = missing.filter(|_| needed) {
+    let count = truth.positions + problem.fixtures.len() + truth.tilts.len();
+    let observations = truth.observations(&problem.fixtures, count.max(1));
+    let is_needed = observations.into_iter().any(|observation| match observation {
+        Observation::Point(_) => contacts[0].is_none(),
+        Observation::Distance(_) => contacts[1].is_none(),
+        Observation::Surface(_) => contacts[2].is_none(),
+        Observation::Tilt(_) => false,
+        _ => true,
+    });
+    if let Some(error) = missing.filter(|_| is_needed) {
         return Err(error);
     }
     let noise_sigma = position.unwrap_or(0.0);
-    let contact_sigmas = contacts.map(|own| own.unwrap_or(noise_sigma));
+    let contact_sigmas = contacts.map(|sigma| sigma.unwrap_or(noise_sigma));
     if let Some(HeldOut::Session(session)) = &problem.data.held_out {
         let location = problem.data.held_out_location.clone();
         return Err(location.error(InputErrorKind::NoSessions { session: session.clone() }));
@@ -75,19 +75,21 @@ fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
     Ok(Truth { noise_sigma, contact_sigmas, tilt_sigma, orientation_sigma, ..truth })
 }
 
-/// The sections that say what is true, without noise.
+/// Reads the sections of a truth without noise.
 fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, InputError> {
-    let known = parameters::nominal(problem);
+    let nominal = parameters::nominal(problem);
     let parameters = match root.section("parameters")? {
         Some(section) => {
-            section.entries().iter().map(|(name, item)| deviation(name, item, &known)).collect()
+            section.entries().iter().map(|(name, item)| deviation(name, item, &nominal)).collect()
         }
         None => Ok(Vec::new()),
     }?;
     let random = match root.section("random")? {
-        Some(section) => {
-            section.entries().iter().map(|(pattern, item)| random(pattern, item, &known)).collect()
-        }
+        Some(section) => section
+            .entries()
+            .iter()
+            .map(|(pattern, item)| random(pattern, item, &nominal))
+            .collect(),
         None => Ok(Vec::new()),
     }?;
     check_places(root, problem, &parameters, &random)?;
@@ -114,21 +116,20 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
     })
 }
 
-/// Everything that the rig measures against stands somewhere.
+/// Checks that every unknown of the fixtures has a true value.
 fn check_places(
     root: &Section<'_, '_>,
     problem: &Problem,
     parameters: &[Deviation],
     random: &[RandomRule],
 ) -> Result<(), InputError> {
-    for own in &problem.fixtures {
-        for (field, _) in
-            own.kind.fields().iter().zip(&own.known).filter(|(_, known)| known.is_none())
-        {
-            let name = format!("{}[{}].{field}", own.kind.word(), own.name);
-            let is_said = parameters.iter().any(|own| own.name == name);
-            if !is_said && !random.iter().any(|rule| matches(&rule.pattern, &name)) {
-                let write = format!("where it truly is: \"{name}\" in [parameters]");
+    for fixture in &problem.fixtures {
+        let fields = fixture.kind.fields().iter().zip(&fixture.known);
+        for (field, _) in fields.filter(|(_, known)| known.is_none()) {
+            let name = format!("{}[{}].{field}", fixture.kind.word(), fixture.name);
+            let is_given = parameters.iter().any(|parameter| parameter.name == name);
+            if !is_given && !random.iter().any(|rule| matches(&rule.pattern, &name)) {
+                let write = format!("its true value: \"{name}\" in [parameters]");
                 let location = root.location().with_key(join("parameters", &name));
                 return Err(location.error(InputErrorKind::MissingKey { write, near: None }));
             }
@@ -137,7 +138,7 @@ fn check_places(
     Ok(())
 }
 
-/// How the section `[poses]` may be written for these joints.
+/// Returns an example of the section `[poses]` for these joints.
 fn example(joints: &[Joint]) -> String {
     let range = |(number, joint): (usize, &Joint)| match joint.command_kind() {
         JointKind::Revolute => Some(format!("q{number}_deg = [-90, 90]")),
@@ -148,22 +149,22 @@ fn example(joints: &[Joint]) -> String {
     format!("[poses] with the range of each joint: {}", ranges.join(", "))
 }
 
-/// `[noise]`.
+/// Contents of `[noise]`.
 #[derive(Default)]
 struct Noise {
-    /// 1 σ of a position \[m\], if it is given.
+    /// Standard deviation of a position \[m\], if given.
     position: Option<f64>,
-    /// The same of a contact with a point, of a distance, and of a contact with a surface.
+    /// Standard deviations of a point contact, a distance and a surface contact \[m\], if given.
     contacts: [Option<f64>; 3],
-    /// 1 σ of an orientation \[rad\], if it is given.
+    /// Standard deviation of an orientation \[rad\], if given.
     turn: Option<f64>,
-    /// 1 σ of a tilt \[rad\], if it is given.
+    /// Standard deviation of a tilt \[rad\], if given.
     tilt: Option<f64>,
-    /// What is wrong if positions are measured, or contacts that scatter as they do.
+    /// Error to report if positions, or contacts without a σ of their own, are measured.
     missing: Option<InputError>,
 }
 
-/// The section; contacts scatter as positions do where it says nothing else.
+/// Reads the section; contacts have the σ of positions by default.
 fn noise(mut section: Section<'_, '_>) -> Result<Noise, InputError> {
     let position = section.not_negative("position_sigma", Unit::Length)?;
     let contact = |section: &mut Section<'_, '_>, base| section.not_negative(base, Unit::Length);
@@ -188,7 +189,7 @@ fn segments(mut section: Section<'_, '_>) -> Result<usize, InputError> {
     Ok(segments)
 }
 
-/// `"joint2.stiffness" = { relative = 0.83 }`.
+/// Reads a deviation, for example `"joint2.stiffness" = { relative = 0.83 }`.
 fn deviation(
     name: &str,
     item: &Item<'_, '_>,
@@ -221,7 +222,7 @@ fn deviation(
     Ok(Deviation { name: name.to_owned(), value })
 }
 
-/// `"joint*.alpha" = { sigma_deg = 0.3 }`.
+/// Reads a rule for random values, for example `"joint*.alpha" = { sigma_deg = 0.3 }`.
 fn random(
     pattern: &str,
     item: &Item<'_, '_>,
@@ -254,7 +255,8 @@ fn random(
     Ok(rule)
 }
 
-/// The table of a name; `tool.x = { … }` without quotes is a table `tool` that holds a table `x`.
+/// Returns the table of a name. An unquoted `tool.x = { … }` is a table `tool` with a table `x`,
+/// which is an error.
 fn named<'a, 'i>(name: &str, item: &Item<'a, 'i>) -> Result<Section<'a, 'i>, InputError> {
     let section = item.section()?;
     match section.entries().into_iter().find(|(_, inner)| inner.holds_tables()) {

@@ -1,5 +1,4 @@
-//! The tables `[[effect]]` of a truth: an effect as the problem file declares it, and beside it how
-//! strong it is.
+//! Reader of the tables `[[effect]]` of a truth: effects as in the problem file, with their values.
 
 use super::effect::{Cause, Shape, TrueEffect, keys};
 use crate::error::{InputError, InputErrorKind, Location};
@@ -9,31 +8,34 @@ use crate::problem::item::Item;
 use crate::problem::section::Section;
 use crate::problem::{Effect, PoseRanges, Problem};
 
-/// The key of what no catalogue holds.
+/// Key of an effect outside the catalogue.
 const OUTSIDE: &str = "outside";
 
-/// Every `[[effect]]`.
+/// Reads every `[[effect]]`.
 pub(super) fn read(
     root: &mut Section<'_, '_>,
     problem: &Problem,
     poses: &PoseRanges,
 ) -> Result<Vec<TrueEffect>, InputError> {
-    let all = root.sections("effect")?.into_iter().map(|section| one(section, problem, poses));
-    let all = all.collect::<Result<Vec<(TrueEffect, Location)>, _>>()?;
-    for (own, location) in &all {
-        let Some(joint) = own.parts().and_then(|(effect, _)| effect.compensated()) else {
+    let sections = root.sections("effect")?.into_iter();
+    let located = sections
+        .map(|section| located_effect(section, problem, poses))
+        .collect::<Result<Vec<(TrueEffect, Location)>, _>>()?;
+    for (effect, location) in &located {
+        let Some(joint) = effect.catalogued().and_then(|(effect, _)| effect.compensated()) else {
             continue;
         };
-        let effects = all.iter().filter_map(|(own, _)| own.parts()).map(|(effect, _)| effect);
+        let catalogued = located.iter().filter_map(|(effect, _)| effect.catalogued());
+        let effects = catalogued.map(|(effect, _)| effect);
         if !gives_way(joint, &problem.joints, effects) {
             return Err(location.clone().error(InputErrorKind::NothingToRelieve { joint }));
         }
     }
-    Ok(all.into_iter().map(|(own, _)| own).collect())
+    Ok(located.into_iter().map(|(effect, _)| effect).collect())
 }
 
-/// One with where it stands.
-fn one(
+/// Reads one effect with its location in the file.
+fn located_effect(
     mut section: Section<'_, '_>,
     problem: &Problem,
     poses: &PoseRanges,
@@ -86,14 +88,13 @@ fn one(
         }
         _ => {}
     }
-    // The number of values is that of the keys.
+    // There is one value for each key.
     TrueEffect::new(cause, &values, &problem.joints)
-        .map(|own| (own, item.location()))
+        .map(|effect| (effect, item.location()))
         .map_err(|_| item.error(InputErrorKind::NoStrength { write: write() }))
 }
 
-/// The one key that says what the effect is: a known name, or else the first that does not look
-/// like a strength.
+/// Returns the key that declares the effect: a known name, or the first entry that is not a value.
 fn declaration<'a, 'i>(section: &Section<'a, 'i>) -> Result<(&'a str, Item<'a, 'i>), InputError> {
     let entries = section.entries();
     let is_effect = |(name, item): &(&str, Item<'_, '_>)| {
@@ -101,7 +102,7 @@ fn declaration<'a, 'i>(section: &Section<'a, 'i>) -> Result<(&'a str, Item<'a, '
     };
     let mut declared: Vec<_> = entries.into_iter().filter(is_effect).collect();
     match (declared.pop(), declared.len()) {
-        (Some(only), 0) => Ok(only),
+        (Some(single), 0) => Ok(single),
         (last, others) => {
             let found = others + usize::from(last.is_some());
             Err(section.error(InputErrorKind::NotOneEffect { found }))
@@ -109,7 +110,7 @@ fn declaration<'a, 'i>(section: &Section<'a, 'i>) -> Result<(&'a str, Item<'a, '
     }
 }
 
-/// `outside = { joint = 2, shape = "bump" }`.
+/// Reads `outside = { joint = 2, shape = "bump" }`.
 fn outside(item: &Item<'_, '_>, problem: &Problem) -> Result<Cause, InputError> {
     let mut section = item.section()?;
     let place = section.require("joint", "joint = …, a joint's number")?;
@@ -125,14 +126,14 @@ fn outside(item: &Item<'_, '_>, problem: &Problem) -> Result<Cause, InputError> 
     Ok(Cause::Outside { joint: number, shape })
 }
 
-/// Thermal effects need temperatures and what to compare them with.
+/// Checks that thermal effects have temperatures and a reference temperature.
 fn check_temperature(
     cause: &Cause,
     item: &Item<'_, '_>,
     problem: &Problem,
     poses: &PoseRanges,
 ) -> Result<(), InputError> {
-    let thermal = matches!(cause, Cause::Catalogued(effect) if effect.is_thermal());
+    let is_thermal = matches!(cause, Cause::Catalogued(effect) if effect.is_thermal());
     let write = if poses.temperature.is_none() {
         "temperature_C = [from, to] in [poses]"
     } else if problem.data.reference_temperature.is_none() {
@@ -140,5 +141,5 @@ fn check_temperature(
     } else {
         return Ok(());
     };
-    if thermal { Err(item.error(InputErrorKind::NeedsTemperature { write })) } else { Ok(()) }
+    if is_thermal { Err(item.error(InputErrorKind::NeedsTemperature { write })) } else { Ok(()) }
 }

@@ -1,107 +1,113 @@
-//! What is true on the test bench, as plain data in SI units.
+//! Truth of a simulation, as plain data in SI units.
 
 use super::effect::TrueEffect;
 use crate::problem::{Fixture, FixtureKind, Observation, PoseRanges};
 use crate::quantity::Unit;
 
-/// How the true arm differs from the declared one, and in which poses it is measured: `TRUTH.toml`.
+/// Difference of the true arm from the declared one, and the poses in which it is measured
+/// (`TRUTH.toml`).
 #[derive(Debug, Clone)]
 pub struct Truth {
-    /// `[parameters]`: true values that are given.
+    /// Given true values, `[parameters]`.
     pub parameters: Vec<Deviation>,
-    /// `[random]`: true values that are drawn, except where they are given; a later rule wins.
+    /// Rules for random true values, `[random]`; a given value precedes them, and a later rule an
+    /// earlier one.
     pub random: Vec<RandomRule>,
-    /// `[[effect]]`: what is at work besides.
+    /// True effects, `[[effect]]`.
     pub effects: Vec<TrueEffect>,
-    /// 1 σ of a measured coordinate \[m\].
+    /// Standard deviation of a measured coordinate \[m\].
     pub noise_sigma: f64,
-    /// The same of a contact with a point, of a measured distance, and of a contact with a surface
-    /// \[m\].
+    /// Standard deviations of a point contact, a measured distance and a surface contact \[m\].
     pub contact_sigmas: [f64; 3],
-    /// How many rows measure positions, the first ones, where there are points, anchors or surfaces
-    /// to measure against.
+    /// Number of rows that measure positions before the other kinds, if there are fixtures to
+    /// measure against.
     pub positions: usize,
-    /// Frames whose tilts are measured, one after the other behind the fixtures: 0 is the arm's
-    /// base, i that of joint i.
+    /// Frames whose tilts are measured in turn after the fixtures: 0 is the base of the arm, i that
+    /// of joint i.
     pub tilts: Vec<usize>,
-    /// 1 σ of a measured tilt \[rad\].
+    /// Standard deviation of a measured tilt \[rad\].
     pub tilt_sigma: f64,
-    /// 1 σ of a measured orientation about each axis, where orientations are measured \[rad\].
+    /// Standard deviation of a measured orientation about each axis \[rad\], if orientations are
+    /// measured.
     pub orientation_sigma: Option<f64>,
-    /// `[poses]`: ranges; where there is no payload, hoist or temperature there is no column.
+    /// Ranges of the poses, `[poses]`; a payload, hoist or temperature without a range has no
+    /// column.
     pub poses: PoseRanges,
-    /// `[poses]`: range of the time from one pose to the next \[s\].
+    /// Range of the time between poses \[s\], `[poses]`.
     pub time_step: (f64, f64),
-    /// `[poses]`: which rows are held out.
+    /// Selection of held-out rows, `[poses]`.
     pub held_out: HeldOutRows,
-    /// Segments per beam.
+    /// Number of segments per beam.
     pub segments: usize,
 }
 
-/// The true value of one parameter.
+/// True value of one parameter, as a deviation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Deviation {
-    /// Name as in the problem file: `joint2.alpha`.
+    /// Name as in the problem file, for example `joint2.alpha`.
     pub name: String,
-    /// Added to the nominal value \[rad\] or \[m\]; multiple of the nominal for a stiffness or
-    /// rigidity.
+    /// Difference from the nominal value \[rad\] or \[m\]; factor of the nominal value for a
+    /// stiffness or rigidity.
     pub value: f64,
 }
 
-/// A spread for the parameters that a pattern matches.
+/// Standard deviations of the parameters that a pattern matches.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RandomRule {
-    /// Name with `*` for any run of characters.
+    /// Name pattern in which `*` matches any run of characters.
     pub pattern: String,
-    /// 1 σ of angles \[rad\].
+    /// Standard deviation of angles \[rad\].
     pub angle: Option<f64>,
-    /// 1 σ of lengths \[m\].
+    /// Standard deviation of lengths \[m\].
     pub length: Option<f64>,
-    /// 1 σ of ln(value / nominal) of stiffnesses and rigidities.
+    /// Standard deviation of ln(value / nominal) for stiffnesses and rigidities.
     pub relative: Option<f64>,
 }
 
-/// How many rows are held out, chosen at random.
+/// Number of held-out rows, which are chosen at random.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum HeldOutRows {
-    /// This part of them; at least one, and never all.
+    /// Share of the rows; at least one row, and never all.
     Share(f64),
-    /// All but this many.
+    /// All rows but this many.
     AllBut(usize),
 }
 
 impl Truth {
-    /// Whether something depends on the poses before.
+    /// Returns true if an effect depends on earlier poses.
     pub(super) fn has_memory(&self) -> bool {
-        self.effects.iter().filter_map(TrueEffect::parts).any(|(effect, _)| effect.has_memory())
+        self.effects
+            .iter()
+            .filter_map(TrueEffect::catalogued)
+            .any(|(effect, _)| effect.has_memory())
     }
 
-    /// What rows measure: first the positions, then one fixture or tilted frame after the other;
-    /// positions alone where there are none.
+    /// Returns the kind of measurement of each row: positions first, then fixtures and tilted
+    /// frames in turn; positions only if there are none of these.
     pub(super) fn observations(&self, fixtures: &[Fixture], rows: usize) -> Vec<Observation> {
         let of = |(index, kind): (usize, FixtureKind)| match kind {
             FixtureKind::Point => Observation::Point(index),
             FixtureKind::Anchor => Observation::Distance(index),
             FixtureKind::Plane | FixtureKind::Sphere => Observation::Surface(index),
         };
-        let fixtures = fixtures.iter().map(|own| own.kind).enumerate().map(of);
-        let all: Vec<Observation> =
+        let fixtures = fixtures.iter().map(|fixture| fixture.kind).enumerate().map(of);
+        let kinds: Vec<Observation> =
             fixtures.chain(self.tilts.iter().map(|&frame| Observation::Tilt(frame))).collect();
         let of_row = |row: usize| match row.checked_sub(self.positions) {
-            Some(place) if !all.is_empty() => all[place % all.len()],
+            Some(turn) if !kinds.is_empty() => kinds[turn % kinds.len()],
             _ => Observation::Position,
         };
         (0..rows).map(of_row).collect()
     }
 
-    /// How many rows measure one target before the next one has its turn: with fixtures all that
-    /// there is to measure, so that each target meets each of them, else one.
+    /// Returns the number of successive rows of one target: with fixtures one row for each fixture
+    /// and tilted frame, so that each target is measured against all of them, else one.
     pub(super) fn rows_per_target(&self, fixtures: &[Fixture]) -> usize {
         if fixtures.is_empty() { 1 } else { fixtures.len() + self.tilts.len() }
     }
 
-    /// 1 σ of what a row measures \[m\], of a tilt \[rad\].
+    /// Returns the standard deviation of a measurement \[m\], or of a tilt \[rad\].
     pub(super) fn sigma_of(&self, observation: Observation) -> f64 {
         let [point, distance, surface] = self.contact_sigmas;
         match observation {
@@ -115,7 +121,7 @@ impl Truth {
 }
 
 impl RandomRule {
-    /// 1 σ of a parameter of that unit.
+    /// Returns the standard deviation of a parameter with this unit.
     pub(super) fn sigma(&self, unit: Unit) -> Option<f64> {
         match unit {
             Unit::Angle => self.angle,
@@ -126,7 +132,7 @@ impl RandomRule {
 }
 
 impl HeldOutRows {
-    /// How many of `rows` rows are held out.
+    /// Returns the number of held-out rows among `rows` rows.
     pub(super) fn count(self, rows: usize) -> usize {
         match self {
             Self::AllBut(kept) => rows.saturating_sub(kept),

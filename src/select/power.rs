@@ -3,7 +3,7 @@
 use statrs::function::beta::beta_reg;
 
 use super::rules::SelectionRules;
-use crate::numeric::bisected;
+use crate::numeric::bisect;
 
 /// Halvings of the interval in which a noncentrality is sought.
 const HALVINGS: usize = 24;
@@ -80,7 +80,7 @@ impl ScanTest {
 
 /// The middle of the interval in which `is_below` turns false.
 fn halved(is_below: impl Fn(f64) -> bool, range: (f64, f64)) -> f64 {
-    let (low, high) = bisected(is_below, range, HALVINGS);
+    let (low, high) = bisect(is_below, range, HALVINGS);
     0.5 * (low + high)
 }
 

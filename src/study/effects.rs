@@ -1,4 +1,4 @@
-//! What is true of the effects that the problem of a study declares.
+//! True values of the effects that the problem of a study declares.
 
 use super::study::{Source, Study};
 use crate::error::{InputError, InputErrorKind};
@@ -7,41 +7,44 @@ use crate::model::parameter::{ArmField, EffectParameter, Parameter, ParameterSit
 use crate::problem::{Effect, PoseRanges, Problem};
 use crate::rig::{Cause, TrueEffect, Truth, standard_normals};
 
-/// True values of the parameters of declared effects, SI.
+/// True values of the parameters of declared effects, by parameter name, SI units.
 pub(super) struct Strengths(Vec<(String, f64)>);
 
 impl Strengths {
-    /// As the truth gives them; else drawn from their priors, where the study draws them, each by
-    /// itself; else no effect.
+    /// Determines the true values: given by the truth, drawn from the prior if the study draws
+    /// effects, or nominal (no effect).
     pub fn draw(study: &Study, seed: u64) -> Self {
-        let own: Vec<_> = study
+        let parameters: Vec<_> = study
             .problem
             .effects
             .iter()
-            .flat_map(|own| own.effect.parameters(&study.problem))
+            .flat_map(|declared| declared.effect.parameters(&study.problem))
             .collect();
         let given = given(&study.truth, &study.problem);
-        let value = |(own, normal): (EffectParameter, f64)| {
-            let stated = given.iter().find(|(name, _)| *name == own.name).map(|(_, value)| *value);
+        let value = |(parameter, normal): (EffectParameter, f64)| {
+            let stated =
+                given.iter().find(|(name, _)| *name == parameter.name).map(|(_, value)| *value);
             // The rig is always in equilibrium.
             let at_rest = (study.source == Source::Rig
-                && own.site == ParameterSite::Arm(ArmField::Mixing))
+                && parameter.site == ParameterSite::Arm(ArmField::Mixing))
             .then_some(1.0);
-            let free = study.parameters.iter().find(|parameter| parameter.name == own.name);
+            let free = study.parameters.iter().find(|free| free.name == parameter.name);
             let drawn = || drawn(free.filter(|_| study.draws_effects)?, normal);
-            (own.name, stated.or(at_rest).or_else(drawn).unwrap_or(own.nominal))
+            let value = stated.or(at_rest).or_else(drawn).unwrap_or(parameter.nominal);
+            (parameter.name, value)
         };
-        let normals = standard_normals(own.len(), seed);
-        Self(own.into_iter().zip(normals).map(value).collect())
+        let normals = standard_normals(parameters.len(), seed);
+        Self(parameters.into_iter().zip(normals).map(value).collect())
     }
 
-    /// True value of a parameter of that name, if it is one of an effect.
+    /// Returns the true value of an effect parameter, or `None` if no effect has a parameter of
+    /// that name.
     pub fn of(&self, name: &str) -> Option<f64> {
-        self.0.iter().find(|(own, _)| own == name).map(|(_, value)| *value)
+        self.0.iter().find(|(parameter, _)| parameter == name).map(|(_, value)| *value)
     }
 
-    /// What the rig has to be told besides the effects of the truth: those that are declared, at
-    /// these values.
+    /// Returns the declared effects, with their true values, that the rig must add to those of the
+    /// truth.
     pub fn for_rig(&self, study: &Study) -> Vec<TrueEffect> {
         let given = given(&study.truth, &study.problem);
         let effect = |effect: &Effect| {
@@ -66,34 +69,35 @@ impl Strengths {
     }
 }
 
-/// A value drawn from a prior; `None` where there is none.
+/// Draws a value from the prior of a parameter; returns `None` if it has no prior.
 fn drawn(parameter: &Parameter, normal: f64) -> Option<f64> {
     Some(parameter.value(parameter.sigma? * normal))
 }
 
 fn is_in(given: &[(String, f64)], name: &str) -> bool {
-    given.iter().any(|(own, _)| own == name)
+    given.iter().any(|(parameter, _)| parameter == name)
 }
 
-/// Names of an effect's parameters in the order of its law, which is that of the strengths in a
-/// truth.
+/// Returns the names of an effect's parameters, in the order in which a truth lists its values.
 fn names(effect: &Effect, problem: &Problem) -> Vec<String> {
     effect.parameters(problem).into_iter().map(|parameter| parameter.name).collect()
 }
 
-/// The strengths that a truth gives, by the names of the parameters that they are the values of.
+/// Returns the effect values of a truth with the names of their parameters.
 fn given(truth: &Truth, problem: &Problem) -> Vec<(String, f64)> {
-    let of = |own: &TrueEffect| match own.cause() {
+    let of = |true_effect: &TrueEffect| match true_effect.cause() {
         Cause::Catalogued(effect) => {
-            names(effect, problem).into_iter().zip(own.values().iter().copied()).collect()
+            names(effect, problem).into_iter().zip(true_effect.values().iter().copied()).collect()
         }
         Cause::Outside { .. } => Vec::new(),
     };
     truth.effects.iter().flat_map(of).collect::<Vec<_>>()
 }
 
-/// Refuses a study whose poses cannot show a declared effect, and one by the model whose truth has
-/// an effect that nothing declares: `undeclared` makes the error of that.
+/// Checks that the poses of a study can show every declared effect. If the model measures, it also
+/// checks that every effect of the truth is declared.
+///
+/// `undeclared` creates the error for an effect that is not declared.
 pub(super) fn check(
     problem: &Problem,
     truth: &Truth,
@@ -119,10 +123,12 @@ pub(super) fn check(
             return Err(declared.location.clone().error(InputErrorKind::NeedsColumn { write }));
         }
     }
-    let own: Vec<String> =
-        problem.effects.iter().flat_map(|own| names(&own.effect, problem)).collect();
+    let declared_names: Vec<String> =
+        problem.effects.iter().flat_map(|declared| names(&declared.effect, problem)).collect();
     let is_declared = |effect: &TrueEffect| match effect.cause() {
-        Cause::Catalogued(effect) => names(effect, problem).iter().all(|name| own.contains(name)),
+        Cause::Catalogued(effect) => {
+            names(effect, problem).iter().all(|name| declared_names.contains(name))
+        }
         Cause::Outside { .. } => false,
     };
     if source == Source::Model && !truth.effects.iter().all(is_declared) {

@@ -1,4 +1,4 @@
-//! What the readers of both kinds of studies have in common.
+//! Input checks shared by the readers of both kinds of studies.
 
 use std::path::{Path, PathBuf};
 
@@ -6,10 +6,10 @@ use crate::error::{InputError, InputErrorKind};
 use crate::problem::Problem;
 use crate::problem::item::{Document, Item};
 
-/// Most poses, held-out ones, repetitions.
-const MOST: u64 = 1_000_000;
+/// Largest number of poses, held-out poses and repetitions.
+const MAX_COUNT: u64 = 1_000_000;
 
-/// A problem that a study names: it, its text, and its file.
+/// Reads the problem that a study names; returns it with its text and its file.
 pub(super) fn problem_of(
     item: &Item<'_, '_>,
     folder: &Path,
@@ -26,7 +26,7 @@ pub(super) fn problem_of(
     Ok((problem, document.text.to_string(), file))
 }
 
-/// A file that the study names.
+/// Returns the path of a file that the study names, relative to its folder.
 pub(super) fn beside(item: &Item<'_, '_>, folder: &Path) -> Result<PathBuf, InputError> {
     let path = folder.join(item.text()?);
     if path.exists() {
@@ -36,14 +36,14 @@ pub(super) fn beside(item: &Item<'_, '_>, folder: &Path) -> Result<PathBuf, Inpu
     }
 }
 
-/// A number of things, at least one.
+/// Reads a count, at least one and at most [`MAX_COUNT`].
 pub(super) fn count(item: &Item<'_, '_>) -> Result<usize, InputError> {
     let value = item.whole(1)?;
-    let fits = usize::try_from(value).ok().filter(|_| value <= MOST);
-    fits.ok_or_else(|| item.error(InputErrorKind::TooLarge { value, most: MOST }))
+    let fits = usize::try_from(value).ok().filter(|_| value <= MAX_COUNT);
+    fits.ok_or_else(|| item.error(InputErrorKind::TooLarge { value, most: MAX_COUNT }))
 }
 
-/// A list of distinct values, at least one.
+/// Reads a list of distinct values with at least one entry.
 pub(super) fn distinct<'a, 'i, T: PartialEq>(
     item: &Item<'a, 'i>,
     read: impl Fn(&Item<'a, 'i>) -> Result<T, InputError>,

@@ -1,4 +1,4 @@
-//! Which inputs a kept part belongs to.
+//! Digest of the inputs of a finished part.
 
 use std::fmt::Write as _;
 
@@ -7,15 +7,13 @@ use crate::problem::PoseRanges;
 use crate::problem::digest::hexadecimal;
 use crate::rig::{Cause, HeldOutRows, Shape, Truth};
 
-/// A digest of everything that the fits of a part depend on, 64 hexadecimal digits: the version of
-/// flexcal, the text of the problem file, the truth, and the numbers of the study that concern
-/// these fits.
+/// Returns a digest of everything on which the fits of a part depend, 64 hexadecimal digits.
 ///
-/// It is the SHA-256 of lines of words and numbers, numbers in SI as short as they can be read back
-/// exactly: version, source, seed, held-out poses; σ, poses, strategy, solver, first repetition and
-/// the one after the last; the truth; `effects drawn` where the strengths of declared effects are;
-/// the text of the problem file. Numbers that do not concern these fits do not enter: a study with
-/// one more noise level keeps the others' parts.
+/// It is the SHA-256 of a text with numbers in SI, as short as they can be read back exactly. Its
+/// lines are: version of flexcal, source, seed and held-out poses; σ, poses, strategy, solver,
+/// first repetition and the one after the last; the truth; `effects drawn` if effect values are
+/// drawn; the text of the problem file. Inputs of other parts do not enter: a study with one more
+/// noise level keeps its finished parts.
 pub(super) fn key(study: &Study, part: &Part, cell: &Cell) -> String {
     let Study { problem_text, source, seed, held_out, .. } = study;
     let drawn = if study.draws_effects && !study.problem.effects.is_empty() {
@@ -33,10 +31,12 @@ pub(super) fn key(study: &Study, part: &Part, cell: &Cell) -> String {
     ))
 }
 
-/// A truth in lines: `parameter`, name, value; `random`, pattern, spreads of angles, lengths and
-/// the relative one or `-`; `effect`, its declaration (`bump` or `step` and the joint where no
-/// catalogue has it), values; `poses`, ranges of joints, payloads, hoist, temperature, `sides` or
-/// `-`; `rows`, time step, held-out share or number of the others, σ, segments.
+/// Returns a truth as text in a fixed order.
+///
+/// Its lines are: `parameter`, name, value; `random`, pattern, standard deviations of angles,
+/// lengths and relative values or `-`; `effect`, declaration (`bump` or `step` with the joint if it
+/// is outside the catalogue), values; `poses`, ranges of joints, payloads, hoist, temperature,
+/// `sides` or `-`; `rows`, time step, held-out share or number of the others, σ, segments.
 fn canonical(truth: &Truth) -> String {
     let Truth {
         parameters,
@@ -58,8 +58,8 @@ fn canonical(truth: &Truth) -> String {
     let range = |(from, to): (f64, f64)| format!("{from:e} {to:e}");
     let mut text = String::new();
     // Writing to a text cannot fail.
-    for own in parameters {
-        let _ = writeln!(text, "parameter {} {:e}", own.name, own.value);
+    for parameter in parameters {
+        let _ = writeln!(text, "parameter {} {:e}", parameter.name, parameter.value);
     }
     for rule in random {
         let spreads = [rule.angle, rule.length, rule.relative].map(optional).join(" ");
@@ -79,7 +79,7 @@ fn canonical(truth: &Truth) -> String {
     let joints: Vec<String> = joints.iter().copied().map(range).collect();
     let payloads: Vec<String> = payloads.iter().map(|mass| format!("{mass:e}")).collect();
     let [hoist, temperature] =
-        [hoist, temperature].map(|own| own.map_or_else(|| "-".to_owned(), range));
+        [hoist, temperature].map(|limits| limits.map_or_else(|| "-".to_owned(), range));
     let sides = if *approach { "sides" } else { "-" };
     let _ = writeln!(
         text,
@@ -87,8 +87,8 @@ fn canonical(truth: &Truth) -> String {
         joints.join(" "),
         payloads.join(" ")
     );
-    for &own in covariates {
-        let _ = writeln!(text, "covariate {}", range(own));
+    for &limits in covariates {
+        let _ = writeln!(text, "covariate {}", range(limits));
     }
     let held_out = match held_out {
         HeldOutRows::Share(share) => format!("share {share:e}"),
@@ -106,7 +106,7 @@ mod tests {
     use crate::problem::Problem;
 
     #[test]
-    fn a_truth_is_written_in_its_words_and_numbers() {
+    fn a_truth_is_written_as_a_fixed_text() {
         let arm = "name = 'arm'\n[[joint]]\na_m = 0.5\n";
         let problem = Problem::parse(arm, Path::new("problem.toml")).unwrap();
         let text = "[noise]\nposition_sigma_mm = 0.1\n[random]\n'joint1.a' = { sigma_mm = 2 }\n\

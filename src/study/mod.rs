@@ -3,12 +3,12 @@
 //!
 //! A [`Study`] (`STUDY.toml`, see `docs/study.md`) crosses noise levels, numbers of poses,
 //! strategies and solvers into cells. Repetition r draws an arm, poses and noise from the seed and
-//! r alone, so every cell fits the same arms in the same poses, and nothing depends on the order,
-//! the number of threads, or on which machine did which part. The fits of a cell are done in
-//! [`Part`]s; a finished part is kept in a [`Store`], and results are only ever made from kept
-//! parts.
+//! r alone. Every cell therefore fits the same arms in the same poses, and results depend neither
+//! on the order nor on the number of threads or machines. The fits of a cell are grouped into
+//! [`Part`]s; a finished part is kept in a [`Store`], and results are made from finished parts
+//! only.
 //!
-//! A [`MisprintStudy`] makes replicas of the paper's experiment instead.
+//! A [`MisprintStudy`] repeats the experiment of [Chen2021] with simulated arms instead.
 
 mod effects;
 mod input;
@@ -25,7 +25,7 @@ mod tally;
 pub use read::Request;
 pub use repetition::table;
 pub use replica::{
-    AlternativeModel, Case, Left, Load, MisprintStudy, NamedReading, Replica, ReplicaError,
+    AlternativeModel, Case, HeldOutError, Load, MisprintStudy, NamedReading, Replica, ReplicaError,
     ReplicaResults, Spread, readings, replicate,
 };
 pub use results::{CellResult, ParameterResult, Results, Timing};

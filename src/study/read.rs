@@ -1,4 +1,4 @@
-//! From the text of `STUDY.toml` to a [`Study`].
+//! Reader of `STUDY.toml`.
 
 use std::path::{Path, PathBuf};
 
@@ -16,24 +16,24 @@ use crate::problem::{Freedom, ParameterRule, Problem};
 use crate::quantity::Unit;
 use crate::rig::{HeldOutRows, RandomRule, Truth};
 
-/// Poses held out where the file says nothing.
-const HELD_OUT: usize = 50;
+/// Number of held-out poses if the file gives none.
+const DEFAULT_HELD_OUT: usize = 50;
 
-/// What a study file asks for.
+/// Study of either kind, as read from a file.
 #[derive(Debug, Clone)]
 pub enum Request {
-    /// `kind = "fits"`, or no kind: many fits by strategies and solvers.
+    /// Fits by several strategies and solvers; `kind = "fits"`, or no kind.
     Fits(Box<Study>),
-    /// `kind = "misprints"`: replicas of the paper's experiment.
+    /// Replicas of the experiment of [Chen2021]; `kind = "misprints"`.
     Misprints(Box<MisprintStudy>),
 }
 
 impl Request {
-    /// Reads a study of either kind; `path` is its file, or the folder that holds a `STUDY.toml`.
+    /// Reads a study of either kind; `path` is its file or the folder with a `STUDY.toml`.
     ///
     /// # Errors
-    /// The first mistake found, in it or in the files that it names; a file that cannot be read
-    /// among them.
+    /// Returns the first error in the file or in the files that it names, including unreadable
+    /// files.
     pub fn read(path: &Path) -> Result<Self, InputError> {
         let file = if path.is_dir() { path.join("STUDY.toml") } else { path.to_owned() };
         let document = Document::read(&file, InputErrorKind::StudyMissing)?;
@@ -47,11 +47,11 @@ impl Request {
 }
 
 impl Study {
-    /// Reads a study of fits; `path` is its file, or the folder that holds a `STUDY.toml`.
+    /// Reads a study of fits; `path` is its file or the folder with a `STUDY.toml`.
     ///
     /// # Errors
-    /// The first mistake found, in it or in the files that it names; a file that cannot be read
-    /// among them.
+    /// Returns the first error in the file or in the files that it names, including unreadable
+    /// files.
     pub fn read(path: &Path) -> Result<Self, InputError> {
         match Request::read(path)? {
             Request::Fits(study) => Ok(*study),
@@ -73,7 +73,7 @@ fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
     let source = source(&mut root)?;
     let seed = root.require("seed", "seed = …, a whole number")?.whole(0)?;
     let repetitions = count(&root.require("repetitions", "repetitions = …, fits per cell")?)?;
-    let held_out = root.get("held_out_poses").map_or(Ok(HELD_OUT), |item| count(&item))?;
+    let held_out = root.get("held_out_poses").map_or(Ok(DEFAULT_HELD_OUT), |item| count(&item))?;
     let sigmas = sigmas(&mut root)?;
     let poses =
         distinct(&root.require("identification_poses", "identification_poses = [28]")?, count)?;
@@ -125,7 +125,7 @@ fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
     })
 }
 
-/// The file that is meant by a path to it or to its folder.
+/// Returns the truth file for a path to it or to its folder.
 fn truth_file(path: PathBuf) -> PathBuf {
     if path.is_dir() { path.join("TRUTH.toml") } else { path }
 }
@@ -136,8 +136,8 @@ fn source(root: &mut Section<'_, '_>) -> Result<Source, InputError> {
         .unwrap_or(Source::Model))
 }
 
-/// The file that `truth` names; or else the same sections in the study itself, over the priors of
-/// the problem.
+/// Reads the truth from the file that `truth` names, or from the sections of the study itself. In
+/// the latter case unnamed parameters are drawn from their priors.
 fn truth(
     root: &mut Section<'_, '_>,
     problem: &Problem,
@@ -162,7 +162,8 @@ fn truth(
     Ok(truth)
 }
 
-/// A prior as the spread of the truth; parameters without one stay nominal.
+/// Returns the prior of a parameter as a rule for drawing its true value; fixed parameters stay
+/// nominal.
 fn prior(rule: &ParameterRule) -> RandomRule {
     let pattern = rule.pattern.clone();
     match &rule.freedom {
@@ -176,7 +177,7 @@ fn prior(rule: &ParameterRule) -> RandomRule {
     }
 }
 
-/// Noise levels \[m\].
+/// Reads the noise levels, 1 σ \[m\].
 fn sigmas(root: &mut Section<'_, '_>) -> Result<Vec<f64>, InputError> {
     let Some((item, unit)) = root.quantity("position_sigma", Unit::Length)? else {
         return Err(
@@ -210,14 +211,15 @@ fn solver(item: &Item<'_, '_>, model: &Model) -> Result<SolverChoice, InputError
     Ok(solver)
 }
 
-/// One of a few words, with what each stands for.
+/// Reads one of a few words and returns its meaning.
 fn word<T: Copy>(
     item: &Item<'_, '_>,
-    known: &'static [&'static str],
+    allowed: &'static [&'static str],
     meanings: &[T],
 ) -> Result<T, InputError> {
     let word = item.text()?;
-    let meaning =
-        known.iter().zip(meanings).find(|(known, _)| **known == word).map(|(_, meaning)| *meaning);
-    meaning.ok_or_else(|| item.error(InputErrorKind::UnknownWord { word: word.to_owned(), known }))
+    let meaning = allowed.iter().zip(meanings).find(|(name, _)| **name == word);
+    meaning.map(|(_, meaning)| *meaning).ok_or_else(|| {
+        item.error(InputErrorKind::UnknownWord { word: word.to_owned(), known: allowed })
+    })
 }

@@ -1,5 +1,4 @@
-//! One repetition of a study: measurements of an arm that was drawn, their fit, and how far it is
-//! from the truth.
+//! One repetition of a study: simulated measurements, their fit and its deviation from the truth.
 
 use std::path::PathBuf;
 
@@ -18,22 +17,22 @@ use crate::problem::Problem;
 use crate::random::stream;
 use crate::rig::{self, Draw, Rig, Row, TrueEffect, TrueParameter, Truth};
 
-/// Measurements whose truth is known.
+/// Simulated measurements with their truth.
 struct Data {
-    /// The held-out poses, then those to identify with.
+    /// Measurements: held-out poses first, then identification poses.
     dataset: Dataset,
-    /// True x of each free parameter; `None` where the truth does not say.
+    /// True deviation x of each free parameter; `None` if the truth does not give it.
     truth: Vec<Option<f64>>,
 }
 
-/// The problem as a cell declares it.
+/// Returns the problem of a study with the noise level that a cell declares.
 pub(super) fn problem_of(study: &Study, cell: &Cell) -> Problem {
     let mut problem = study.problem.positions_alone();
     problem.data.position_sigma = Some(cell.sigma);
     problem
 }
 
-/// Fits a repetition, counted from 0; also the time that the fit took \[s\].
+/// Fits one repetition (counted from 0); returns its score and the duration of the fit \[s\].
 pub(super) fn fit(
     study: &Study,
     problem: &Problem,
@@ -45,44 +44,44 @@ pub(super) fn fit(
     };
     let options = Options { strategy: cell.strategy, solver: cell.solver, ..Options::default() };
     match identify(problem, &data.dataset, &options) {
-        // The files fit each other: what is left is a nominal arm that does not stand in one of the
-        // poses.
+        // The inputs agree with each other, so the only input error is a nominal arm without
+        // equilibrium in some pose.
         Err(IdentifyError::Input(_)) => (Score::Failed("no-equilibrium"), 0.0),
         Err(_) => (Score::Failed("cannot-be-fitted"), 0.0),
-        Ok(found) => (score(study, &data, &found), found.seconds),
+        Ok(identification) => (score(study, &data, &identification), identification.seconds),
     }
 }
 
-/// The measurements of a repetition, counted from 0; `None` where the true arm does not come to
-/// rest in some pose.
+/// Simulates the measurements of one repetition (counted from 0); `None` if the true arm has no
+/// equilibrium in some pose.
 ///
-/// Held-out poses come first, so that they are the same for every number of poses; noise of another
-/// σ is the same noise scaled.
+/// Held-out poses come first, so that they are the same for every number of identification poses.
+/// Noise of another σ is the same noise, scaled.
 fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
     let truth =
         Truth { noise_sigma: cell.sigma, contact_sigmas: [cell.sigma; 3], ..study.truth.clone() };
-    let seed = seed_of(study, repetition);
+    let seed = repetition_seed(study, repetition);
     let Draw { arm, parameters, mut rows } =
         rig::draw(&study.problem, &truth, study.held_out + cell.poses, seed);
     let strengths = Strengths::draw(study, seed);
     let true_x = study.parameters.iter().map(|parameter| {
-        let known = |known: &&TrueParameter| known.name == parameter.name;
+        let is_same = |truth: &&TrueParameter| truth.name == parameter.name;
         let value = parameters
             .iter()
-            .find(known)
-            .map(|known| known.value)
+            .find(is_same)
+            .map(|truth| truth.value)
             .or_else(|| strengths.of(&parameter.name));
         Some(parameter.deviation(value?))
     });
     let true_x = true_x.collect();
-    let seen = match study.source {
+    let positions = match study.source {
         Source::Model => by_model(arm, &strengths, &rows)?,
         Source::Rig => {
             by_rig(arm, [truth.effects, strengths.for_rig(study)].concat(), truth.segments, &rows)?
         }
     };
-    for (row, seen) in rows.iter_mut().zip(seen) {
-        row.position += seen;
+    for (row, position) in rows.iter_mut().zip(positions) {
+        row.position += position;
     }
     let split = Split {
         held_out: (0..study.held_out).collect(),
@@ -91,26 +90,26 @@ fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
     Some(Data { dataset: Dataset::new(table(&rows), split), truth: true_x })
 }
 
-/// A seed of its own for each repetition.
-fn seed_of(study: &Study, repetition: usize) -> u64 {
+/// Returns the seed of one repetition.
+fn repetition_seed(study: &Study, repetition: usize) -> u64 {
     stream(study.seed, repetition as u64).next_u64()
 }
 
-/// Positions that the model predicts for an arm as declared, its effects at their strengths \[m\].
+/// Returns the positions that the model predicts for an arm with the true effect values \[m\].
 fn by_model(mut arm: Problem, strengths: &Strengths, rows: &[Row]) -> Option<Vec<Vector3<f64>>> {
-    // What no rule speaks of is free where it is an effect's, and held where it is the arm's.
+    // Without rules, parameters of effects are free and those of the arm fixed.
     (arm.parameters, arm.constraints) = (Vec::new(), Vec::new());
     let model = Model::new(&arm, &[String::new()], &arm.target_words()).ok()?;
-    let x = model.parameters.iter().map(|own| Some(own.deviation(strengths.of(&own.name)?)));
+    let x = model.parameters.iter().map(|free| Some(free.deviation(strengths.of(&free.name)?)));
     let x = DVector::from_vec(x.collect::<Option<Vec<f64>>>()?);
     let mut table = table(rows);
     table.positions.fill(Vector3::zeros());
-    let all: Vec<usize> = (0..rows.len()).collect();
-    let errors = Placement::of(&table).position_errors(&model, &x, &table, &all);
+    let all_rows: Vec<usize> = (0..rows.len()).collect();
+    let errors = Placement::of(&table).position_errors(&model, &x, &table, &all_rows);
     errors.into_iter().map(|error| error.iter().all(|x| x.is_finite()).then_some(-error)).collect()
 }
 
-/// Positions on the virtual test rig \[m\].
+/// Returns the positions that the virtual test rig measures, without noise \[m\].
 fn by_rig(
     arm: Problem,
     effects: Vec<TrueEffect>,
@@ -119,12 +118,12 @@ fn by_rig(
 ) -> Option<Vec<Vector3<f64>>> {
     let rig = Rig::new(arm, effects).with_segments(segments);
     let table = table(rows);
-    let seen =
+    let position =
         |(k, row): (usize, &Row)| Some(rig.pose_of(&row.target, &table.conditions(k)).ok()?.0);
-    rows.iter().enumerate().map(seen).collect()
+    rows.iter().enumerate().map(position).collect()
 }
 
-/// What the virtual test rig measured, as a table of measurements.
+/// Returns the rows of the virtual test rig as a table of measurements.
 pub fn table(rows: &[Row]) -> Measurements {
     let of = |value: fn(&Row) -> Option<f64>| rows.iter().map(value).collect::<Option<Vec<f64>>>();
     let approach: Vec<f64> =
@@ -155,13 +154,14 @@ pub fn table(rows: &[Row]) -> Measurements {
     }
 }
 
-fn score(study: &Study, data: &Data, found: &Identification) -> Score {
-    match &found.quality_flag {
+/// Scores a fit against the truth; a fit with a quality flag counts as failed.
+fn score(study: &Study, data: &Data, identification: &Identification) -> Score {
+    match &identification.quality_flag {
         Some(QualityFlag::TooFewEquations { .. }) => return Score::Failed("too-few-equations"),
         Some(QualityFlag::NotConverged(_) | QualityFlag::HeldOutNotConverged(_)) => {
             return Score::Failed("not-converged");
         }
-        Some(QualityFlag::Misses { .. }) if !found.termination.converged() => {
+        Some(QualityFlag::Misses { .. }) if !identification.termination.converged() => {
             return Score::Failed("not-converged");
         }
         Some(QualityFlag::Misses { .. } | QualityFlag::NoBetter { .. }) => {
@@ -180,30 +180,33 @@ fn score(study: &Study, data: &Data, found: &Identification) -> Score {
         }
         None => {}
     }
-    let held_out = &found.fitted.held_out;
+    let held_out = &identification.fitted.held_out;
     if !held_out.rms.norm.is_finite() {
         return Score::Failed("no-equilibrium");
     }
-    // What a strategy leaves out of the model is as if it were nominal.
+    // Parameters outside the model of a strategy are nominal.
     let estimate = |name: &str| {
-        found.estimates.iter().zip(&found.x).find(|(estimate, _)| estimate.name == name)
+        let estimates = identification.estimates.iter().zip(&identification.x);
+        estimates.into_iter().find(|(estimate, _)| estimate.name == name)
     };
     let parameters = study.parameters.iter().zip(&data.truth).map(|(parameter, truth)| {
-        let found = estimate(&parameter.name);
-        let (x, std_error) = found.map_or((0.0, None), |(estimate, x)| (*x, of_x(estimate)));
+        let (x, std_error) = match estimate(&parameter.name) {
+            Some((estimate, x)) => (*x, deviation_error(estimate)),
+            None => (0.0, None),
+        };
         truth.map(|truth| ParameterScore { error: x - truth, std_error })
     });
     Score::Fitted(Fitted {
         held_out_mean: held_out.mean.norm,
         held_out_rms: held_out.rms.norm,
-        reduced_chi2: found.reduced_chi2,
-        iterations: found.iterations,
+        reduced_chi2: identification.reduced_chi2,
+        iterations: identification.iterations,
         parameters: parameters.collect(),
     })
 }
 
-/// The standard error of x, which is a logarithm for stiffnesses.
-fn of_x(estimate: &Estimate) -> Option<f64> {
+/// Returns the standard error of the deviation x, which is a logarithm for stiffnesses.
+fn deviation_error(estimate: &Estimate) -> Option<f64> {
     let scale = if estimate.unit.is_relative() { estimate.estimate } else { 1.0 };
     estimate.std_error.map(|error| error / scale)
 }

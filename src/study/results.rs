@@ -1,34 +1,35 @@
-//! What a study found: each cell, and each parameter in it.
+//! Results of a study by cell and by parameter.
 
 use super::study::{Cell, Study};
 use super::tally::{ParameterTally, Tally};
 use crate::model::parameter::Parameter;
 use crate::numeric::median;
 
-/// A finished study.
+/// Results of a finished study.
 #[derive(Debug, Clone)]
 pub struct Results {
-    /// One result a cell, in the order of the study.
+    /// Results of each cell, in the order of the study.
     pub cells: Vec<CellResult>,
 }
 
-/// One cell over all its repetitions.
+/// Results of one cell over all its repetitions.
 #[derive(Debug, Clone)]
 pub struct CellResult {
-    /// What was fitted.
+    /// Noise level, number of poses, strategy and solver of the fits.
     pub cell: Cell,
-    /// What came of it.
+    /// Statistics over the fits.
     pub tally: Tally,
-    /// Time of each fit \[s\]; differs from run to run.
+    /// Duration of each fit \[s\]; differs from run to run.
     pub seconds: Vec<f64>,
 }
 
-/// One parameter of a cell; x is a deviation \[rad\], \[m\], or ln(value / nominal).
+/// Statistics of one parameter of a cell; its deviation x is in \[rad\], \[m\], or ln(value /
+/// nominal).
 #[derive(Debug, Clone, Copy)]
 pub struct ParameterResult<'a> {
-    /// The parameter.
+    /// Parameter that the statistics describe.
     pub parameter: &'a Parameter,
-    /// Trusted fits whose truth is known.
+    /// Number of trusted fits whose truth is known.
     pub fits: u64,
     /// Mean of estimate − truth.
     pub bias: Option<f64>,
@@ -36,27 +37,27 @@ pub struct ParameterResult<'a> {
     pub spread: Option<f64>,
     /// Root mean square of estimate − truth.
     pub rms_error: Option<f64>,
-    /// Fits that claim a standard error.
+    /// Number of fits that report a standard error.
     pub with_std_error: u64,
-    /// Mean of the standard errors that they claim.
+    /// Mean of the reported standard errors.
     pub std_error: Option<f64>,
-    /// Share of them whose estimate is within 1.96 standard errors of the truth.
+    /// Share of those fits whose estimate is within 1.96 standard errors of the truth.
     pub coverage: Option<f64>,
 }
 
-/// How long the fits of a cell took \[s\].
+/// Durations of the fits of a cell \[s\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Timing {
-    /// Middle fit.
+    /// Median duration.
     pub median: f64,
-    /// Slowest fit.
+    /// Duration of the slowest fit.
     pub slowest: f64,
-    /// All fits.
+    /// Sum over all fits.
     pub total: f64,
 }
 
 impl ParameterResult<'_> {
-    /// Unit of errors: SI, or `relative` where they are of ln(value).
+    /// Returns the unit of the errors: SI, or `relative` if they are errors of ln(value).
     pub fn unit(&self) -> &'static str {
         let unit = self.parameter.unit();
         if unit.is_relative() { "relative" } else { unit.symbol() }
@@ -64,12 +65,12 @@ impl ParameterResult<'_> {
 }
 
 impl CellResult {
-    /// Share of the fits that are not to be trusted.
+    /// Returns the share of fits that failed or are not trusted.
     pub fn failure_rate(&self) -> f64 {
         self.tally.failed() as f64 / self.tally.fits.max(1) as f64
     }
 
-    /// Every free parameter.
+    /// Returns the statistics of every free parameter.
     pub fn parameters<'a>(&'a self, study: &'a Study) -> impl Iterator<Item = ParameterResult<'a>> {
         study.parameters.iter().zip(&self.tally.parameters).map(|(parameter, tally)| {
             let ParameterTally { error, std_error, covered } = tally;
@@ -86,15 +87,15 @@ impl CellResult {
         })
     }
 
-    /// Share of all standard errors, over fits and parameters, that cover the truth 1.96 times
-    /// taken.
+    /// Returns the share of all standard errors, over fits and parameters, whose 1.96-fold covers
+    /// the truth.
     pub fn coverage(&self) -> Option<f64> {
         let sum = |of: fn(&ParameterTally) -> u64| self.tally.parameters.iter().map(of).sum();
         share(sum(|tally| tally.covered), sum(|tally| tally.std_error.count))
     }
 
-    /// The parameter whose bias is largest against its spread, and that ratio, with the sign of the
-    /// bias.
+    /// Returns the parameter with the largest ratio of bias to standard deviation, and the signed
+    /// ratio.
     pub fn largest_bias<'a>(&'a self, study: &'a Study) -> Option<(&'a Parameter, f64)> {
         let ratio = |result: ParameterResult<'a>| {
             let spread = result.spread.filter(|spread| *spread > 0.0)?;
@@ -103,7 +104,7 @@ impl CellResult {
         self.parameters(study).filter_map(ratio).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }
 
-    /// How long the fits took.
+    /// Returns the durations of the fits.
     pub fn timing(&self) -> Timing {
         let seconds = || self.seconds.iter().copied();
         let median = median(seconds()).unwrap_or(0.0);
@@ -111,6 +112,7 @@ impl CellResult {
     }
 }
 
+/// Returns the ratio of two counts, or `None` if the whole is zero.
 fn share(part: u64, whole: u64) -> Option<f64> {
     (whole > 0).then(|| part as f64 / whole as f64)
 }

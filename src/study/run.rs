@@ -1,4 +1,4 @@
-//! Doing the fits of a study, and putting its parts together.
+//! Runs the fits of a study and combines its finished parts.
 
 use std::path::PathBuf;
 
@@ -6,11 +6,11 @@ use rayon::prelude::*;
 
 use super::repetition::{fit, problem_of};
 use super::results::{CellResult, Results};
-use super::store::{Kept, Store, StoreError};
+use super::store::{FinishedPart, Store, StoreError};
 use super::study::{Part, Shard, Study};
 use super::tally::Tally;
 
-/// Why a study has no results.
+/// Error that prevents the results of a study.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 #[non_exhaustive]
@@ -18,16 +18,16 @@ pub enum RunError {
     #[error(transparent)]
     Store(#[from] StoreError),
     #[error(
-        "{missing} of {parts} parts of the study are missing in {}; run the study or the shards that lack",
+        "{missing} of {parts} parts of the study are missing in {}; run the study or the missing shards",
         list(folders)
     )]
     Incomplete { missing: usize, parts: usize, folders: Vec<PathBuf> },
 }
 
-/// The parts of a share that are not in the store yet.
+/// Returns the parts of a shard that are not in the store yet.
 ///
 /// # Errors
-/// A kept part cannot be read.
+/// Returns an error if a finished part cannot be read.
 pub fn pending(study: &Study, store: &Store, shard: Shard) -> Result<Vec<Part>, StoreError> {
     let mut pending = Vec::new();
     for (_, part) in study.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index))
@@ -39,11 +39,11 @@ pub fn pending(study: &Study, store: &Store, shard: Shard) -> Result<Vec<Part>, 
     Ok(pending)
 }
 
-/// Does the fits of `parts` on every thread there is and keeps each part as soon as it is finished;
-/// calls `fitted` after each fit.
+/// Runs the fits of `parts` in parallel and keeps each part as soon as it is finished; calls
+/// `fitted` after each fit.
 ///
 /// # Errors
-/// A part cannot be kept.
+/// Returns an error if a part cannot be written.
 pub fn run(
     study: &Study,
     store: &Store,
@@ -65,16 +65,15 @@ pub fn run(
             tally.push(score);
             seconds.push(time);
         }
-        store.keep(&Kept::new(study, (part, cell), tally, seconds))
+        store.keep(&FinishedPart::new(study, (part, cell), tally, seconds))
     };
     parts.par_iter().try_for_each(run_part)
 }
 
-/// The results of a study whose parts are all in one of `stores`, added up in the order of the
-/// parts.
+/// Combines the parts of a study from several stores into its results, in the order of the parts.
 ///
 /// # Errors
-/// A part is missing or cannot be read.
+/// Returns an error if a part is missing or cannot be read.
 pub fn collect(study: &Study, stores: &[Store]) -> Result<Results, RunError> {
     let empty = |cell: &_| CellResult {
         cell: *cell,
@@ -85,14 +84,14 @@ pub fn collect(study: &Study, stores: &[Store]) -> Result<Results, RunError> {
     let parts = study.parts();
     let mut missing = 0;
     for part in &parts {
-        let mut kept = None;
+        let mut finished = None;
         for store in stores {
-            kept = kept.or(store.find(study, part)?);
+            finished = finished.or(store.find(study, part)?);
         }
-        match (kept, cells.get_mut(part.cell)) {
-            (Some(kept), Some(cell)) => {
-                cell.tally.merge(&kept.tally);
-                cell.seconds.extend(kept.seconds);
+        match (finished, cells.get_mut(part.cell)) {
+            (Some(finished), Some(cell)) => {
+                cell.tally.merge(&finished.tally);
+                cell.seconds.extend(finished.seconds);
             }
             _ => missing += 1,
         }

@@ -1,4 +1,4 @@
-//! Finished parts on disk: one small file each, written whole or not at all.
+//! Finished parts on disk, one small file each, written atomically.
 
 use std::fs;
 use std::io;
@@ -11,16 +11,16 @@ use super::study::{Cell, Part, Study};
 use super::tally::Tally;
 use crate::files::StagedFile;
 
-/// Digits of the key that name a part's file.
-const NAME: usize = 16;
+/// Number of digits of the key that form the file name of a part.
+const NAME_DIGITS: usize = 16;
 
-/// A folder of finished parts. Machines may share it.
+/// Folder of finished parts, which several machines may share.
 #[derive(Debug, Clone)]
 pub struct Store {
     folder: PathBuf,
 }
 
-/// Why a finished part could not be kept or found.
+/// Error while writing or reading a finished part.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 #[non_exhaustive]
@@ -38,26 +38,26 @@ pub enum StoreError {
 }
 
 impl Study {
-    /// The cell of a part.
+    /// Returns the cell of a part.
     pub(super) fn cell(&self, part: &Part) -> Result<&Cell, StoreError> {
         let none = StoreError::NoSuchCell { cell: part.cell, cells: self.cells.len() };
         self.cells.get(part.cell).ok_or(none)
     }
 }
 
-/// A finished part.
+/// Finished part with its statistics.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Kept {
-    /// What it is, for people.
+pub(super) struct FinishedPart {
+    /// Description for people.
     part: String,
-    /// The inputs that it belongs to.
+    /// Digest of the inputs of the part.
     key: String,
     pub tally: Tally,
-    /// Time of each fit \[s\]; the only thing here that differs from run to run.
+    /// Duration of each fit \[s\]; the only field that differs from run to run.
     pub seconds: Vec<f64>,
 }
 
-impl Kept {
+impl FinishedPart {
     pub fn new(
         study: &Study,
         (part, cell): (&Part, &Cell),
@@ -79,27 +79,31 @@ impl Kept {
 }
 
 impl Store {
-    /// The parts below the folder of a study's results.
+    /// Returns the store below the folder of a study's results.
     pub fn new(results: &Path) -> Self {
         Self { folder: results.join("cells") }
     }
 
-    /// Where the parts are.
+    /// Returns the folder of the parts.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Keeps a finished part.
-    pub(super) fn keep(&self, kept: &Kept) -> Result<(), StoreError> {
-        let path = self.path(&kept.key);
+    /// Writes a finished part.
+    pub(super) fn keep(&self, finished: &FinishedPart) -> Result<(), StoreError> {
+        let path = self.path(&finished.key);
         let write = || -> io::Result<()> {
-            StagedFile::new(&path, &serde_json::to_string_pretty(kept)?)?.commit()
+            StagedFile::new(&path, &serde_json::to_string_pretty(finished)?)?.commit()
         };
         write().map_err(|source| StoreError::Unwritable { path: path.clone(), source })
     }
 
-    /// A part, if it is finished.
-    pub(super) fn find(&self, study: &Study, part: &Part) -> Result<Option<Kept>, StoreError> {
+    /// Returns a part if it is finished.
+    pub(super) fn find(
+        &self,
+        study: &Study,
+        part: &Part,
+    ) -> Result<Option<FinishedPart>, StoreError> {
         let key = key(study, part, study.cell(part)?);
         let path = self.path(&key);
         let text = match fs::read_to_string(&path) {
@@ -107,14 +111,14 @@ impl Store {
             Err(source) if source.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(source) => return Err(StoreError::Unreadable { path, source }),
         };
-        let kept: Kept = match serde_json::from_str(&text) {
-            Ok(kept) => kept,
+        let finished: FinishedPart = match serde_json::from_str(&text) {
+            Ok(finished) => finished,
             Err(source) => return Err(StoreError::Damaged { path, source }),
         };
-        if kept.key == key { Ok(Some(kept)) } else { Err(StoreError::Foreign { path }) }
+        if finished.key == key { Ok(Some(finished)) } else { Err(StoreError::Foreign { path }) }
     }
 
     fn path(&self, key: &str) -> PathBuf {
-        self.folder.join(key.get(..NAME).unwrap_or(key)).with_extension("json")
+        self.folder.join(key.get(..NAME_DIGITS).unwrap_or(key)).with_extension("json")
     }
 }

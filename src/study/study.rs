@@ -1,4 +1,4 @@
-//! What a study asks for, as plain data in SI units, and the parts in which it is done.
+//! Declaration of a study in SI units, and its division into parts.
 
 use std::ops::Range;
 use std::path::PathBuf;
@@ -9,82 +9,82 @@ use crate::model::parameter::Parameter;
 use crate::problem::Problem;
 use crate::rig::Truth;
 
-/// Repetitions in a part. What is kept is sums over parts, so another number rounds differently.
-const REPETITIONS: usize = 50;
+/// Number of repetitions in a part. Statistics are summed over parts, so another number changes
+/// their rounding.
+const PART_REPETITIONS: usize = 50;
 
-/// A study as declared in `STUDY.toml`.
+/// Monte Carlo study as declared in `STUDY.toml`.
 #[derive(Debug, Clone)]
 pub struct Study {
-    /// The files that it was read from: its own, that of its problem, and that of its truth where
-    /// it has one.
+    /// Files that the study was read from: study, problem, and truth if it has a file.
     pub files: Vec<PathBuf>,
-    /// Short name; results go to `out/<name>` by default.
+    /// Short name; results are written to `out/<name>` by default.
     pub name: String,
-    /// One line for people.
+    /// Title for people, one line.
     pub title: String,
-    /// The arm that is fitted.
+    /// Problem that is fitted.
     pub problem: Problem,
-    /// Its free parameters.
+    /// Free parameters of the problem.
     pub parameters: Vec<Parameter>,
-    /// From what arms and poses are drawn; without noise.
+    /// Distribution of true arms and poses, without noise.
     pub truth: Truth,
-    /// Whether true strengths of declared effects are drawn from their priors, where the truth does
-    /// not give them.
+    /// True if values of declared effects that the truth does not give are drawn from their priors.
     pub draws_effects: bool,
-    /// What measures.
+    /// Source of the simulated measurements.
     pub source: Source,
     /// Seed of every random number.
     pub seed: u64,
-    /// Fits per cell.
+    /// Number of fits per cell.
     pub repetitions: usize,
-    /// Poses per repetition that are held out.
+    /// Number of held-out poses per repetition.
     pub held_out: usize,
-    /// Every combination of noise level, number of poses, strategy and solver, in this order.
+    /// All combinations of noise level, number of poses, strategy and solver, in this order.
     pub cells: Vec<Cell>,
-    /// Text of the problem file: kept results belong to it to the letter.
+    /// Text of the problem file, which the key of finished parts includes.
     pub(super) problem_text: String,
 }
 
-/// What measures the true arm.
+/// Source of the simulated measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Source {
-    /// The model that is fitted, at the true parameters: no error but noise.
+    /// The fitted model at the true parameters, so that noise is the only error.
     Model,
-    /// The virtual test rig: independent physics, and effects that the model lacks.
+    /// The virtual test rig, with independent physics and effects that the model may lack.
     Rig,
 }
 
-/// What is fitted, to how many poses, under how much noise.
+/// Combination of noise level, number of poses, strategy and solver.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
-    /// 1 σ of a measured coordinate, in the measurements and as declared to the fit \[m\].
+    /// Standard deviation of a measured coordinate, in the measurements and as declared to the fit
+    /// \[m\].
     pub sigma: f64,
-    /// Poses to identify with.
+    /// Number of identification poses.
     pub poses: usize,
-    /// Which parameters are fitted together.
+    /// Strategy: the parameters that are fitted together.
     pub strategy: Strategy,
-    /// By which solver; never `auto`.
+    /// Solver of the fits; never `auto`.
     pub solver: SolverChoice,
 }
 
-/// Some repetitions of one cell.
+/// Range of repetitions of one cell.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Part {
     /// Index of the cell.
     pub cell: usize,
-    /// The repetitions, counted from 0.
+    /// Repetitions, counted from 0.
     pub repetitions: Range<usize>,
 }
 
 impl Study {
-    /// Every part, cell by cell.
+    /// Returns every part, cell by cell.
     pub fn parts(&self) -> Vec<Part> {
         let of_cell = |cell| {
-            let starts = (0..self.repetitions).step_by(REPETITIONS);
+            let starts = (0..self.repetitions).step_by(PART_REPETITIONS);
             starts.map(move |start| Part {
                 cell,
-                repetitions: start..self.repetitions.min(start + REPETITIONS),
+                repetitions: start..self.repetitions.min(start + PART_REPETITIONS),
             })
         };
         (0..self.cells.len()).flat_map(of_cell).collect()
@@ -92,7 +92,7 @@ impl Study {
 }
 
 impl Source {
-    /// Word in files.
+    /// Returns the word in files.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Model => "model",
@@ -101,28 +101,29 @@ impl Source {
     }
 }
 
-/// One machine's share of the parts: every n-th of them, so that each has some of every cell.
+/// Share of the parts for one machine: every n-th part, so that each machine has parts of every
+/// cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     index: usize,
     count: usize,
 }
 
-/// Not a shard.
+/// Error of a text that is not a shard.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("write i/n: share i of n, counted from 1")]
 pub struct ShardError;
 
 impl Shard {
-    /// Everything.
+    /// Shard that contains every part.
     pub const WHOLE: Self = Self { index: 1, count: 1 };
 
-    /// Share `index` of `count`, counted from 1; `None` outside of 1..=`count`.
+    /// Creates shard `index` of `count`, counted from 1; `None` outside 1..=`count`.
     pub fn new(index: usize, count: usize) -> Option<Self> {
         (1..=count).contains(&index).then_some(Self { index, count })
     }
 
-    /// Whether the part with this index is in the share.
+    /// Returns true if the part with this index belongs to the shard.
     pub fn holds(self, part: usize) -> bool {
         part % self.count == self.index - 1
     }

@@ -1,31 +1,32 @@
-//! What many fits come to, added up fit by fit and part by part.
+//! Statistics over many fits, accumulated fit by fit and part by part.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// Half the width of the interval that should cover the truth in 95 % of the fits \[σ\].
-const COVERING: f64 = 1.96;
+/// Half-width of the interval that should cover the truth in 95 % of the fits \[σ\].
+const COVERAGE_SIGMAS: f64 = 1.96;
 
-/// Number, mean and scatter of values that were given one by one.
+/// Count, mean and scatter of values, accumulated one by one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Moments {
-    /// How many.
+    /// Number of values.
     pub count: u64,
-    /// Their mean, 0 of none.
+    /// Mean of the values; 0 if there are none.
     pub mean: f64,
     /// Sum of the squared deviations from the mean.
     pub squares: f64,
-    /// Largest absolute value, 0 of none.
+    /// Largest absolute value; 0 if there are none.
     pub largest: f64,
 }
 
 impl Moments {
+    /// Adds one value.
     fn push(&mut self, value: f64) {
         self.merge(&Self { count: 1, mean: value, squares: 0.0, largest: value.abs() });
     }
 
-    /// Adds the values behind `other` (Chan, Golub and LeVeque 1979).
+    /// Adds the values of `other` [Chan, Golub & LeVeque 1979].
     fn merge(&mut self, other: &Self) {
         let count = self.count + other.count;
         if count == 0 {
@@ -38,91 +39,92 @@ impl Moments {
         self.largest = self.largest.max(other.largest);
     }
 
-    /// The mean; `None` of no value.
+    /// Returns the mean, or `None` without values.
     pub fn mean(&self) -> Option<f64> {
         (self.count > 0).then_some(self.mean)
     }
 
-    /// The standard deviation; `None` of fewer than two values.
+    /// Returns the standard deviation, or `None` for fewer than two values.
     pub fn deviation(&self) -> Option<f64> {
         (self.count > 1).then(|| (self.squares / (self.count - 1) as f64).sqrt())
     }
 
-    /// The root of the mean square; `None` of no value.
+    /// Returns the root mean square, or `None` without values.
     pub fn rms(&self) -> Option<f64> {
         (self.count > 0).then(|| (self.mean * self.mean + self.squares / self.count as f64).sqrt())
     }
 
-    /// The largest absolute value; `None` of no value.
+    /// Returns the largest absolute value, or `None` without values.
     pub fn largest(&self) -> Option<f64> {
         (self.count > 0).then_some(self.largest)
     }
 }
 
-/// One parameter over many fits: deviations x \[rad\], \[m\], or of ln(value).
+/// Statistics of one parameter over many fits: deviations x in \[rad\], \[m\], or of ln(value).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct ParameterTally {
-    /// Estimate − truth.
+    /// Errors, estimate − truth.
     pub error: Moments,
-    /// Standard errors that the fits claim.
+    /// Standard errors that the fits report.
     pub std_error: Moments,
-    /// Fits with a standard error whose estimate is within 1.96 of them from the truth.
+    /// Number of fits whose estimate is within 1.96 reported standard errors of the truth.
     pub covered: u64,
 }
 
-/// Many fits of one cell; all but `fits` and `failures` are over those to be trusted.
+/// Statistics over the fits of one cell; all but `fits` and `failures` cover trusted fits only.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tally {
-    /// Fits, failed ones included.
+    /// Number of fits, failed ones included.
     pub fits: u64,
-    /// Fits that are not to be trusted, by reason.
+    /// Number of fits that are not trusted, by reason.
     pub failures: BTreeMap<String, u64>,
-    /// Mean position error of the held-out poses of each fit \[m\].
+    /// Mean position error at the held-out poses of each fit \[m\].
     pub held_out_mean: Moments,
-    /// Root mean squared position error of the held-out poses of each fit \[m\].
+    /// Root mean square position error at the held-out poses of each fit \[m\].
     pub held_out_rms: Moments,
-    /// χ² over its degrees of freedom.
+    /// Reduced χ² of each fit.
     pub reduced_chi2: Moments,
-    /// Steps tried.
+    /// Number of solver steps of each fit.
     pub iterations: Moments,
-    /// Each free parameter of the problem.
+    /// Statistics of each free parameter of the problem.
     pub parameters: Vec<ParameterTally>,
 }
 
-/// How a fit came out.
+/// Outcome of one fit.
 pub(super) enum Score {
-    /// Not to be trusted, and why.
+    /// Reason for which the fit is not trusted.
     Failed(&'static str),
     Fitted(Fitted),
 }
 
-/// A fit to be trusted; SI units.
+/// Results of a trusted fit, SI units.
 pub(super) struct Fitted {
     pub held_out_mean: f64,
     pub held_out_rms: f64,
     pub reduced_chi2: Option<f64>,
     pub iterations: u64,
-    /// `None` where the truth is not known.
+    /// Score of each free parameter; `None` if the truth is not known.
     pub parameters: Vec<Option<ParameterScore>>,
 }
 
-/// Of x.
+/// Error and reported standard error of the deviation x of one parameter.
 pub(super) struct ParameterScore {
     pub error: f64,
     pub std_error: Option<f64>,
 }
 
 impl Tally {
-    /// Of no fit yet.
+    /// Creates empty statistics for a number of parameters.
     pub(super) fn new(parameters: usize) -> Self {
         Self { parameters: vec![ParameterTally::default(); parameters], ..Self::default() }
     }
 
-    /// Number of fits that are not to be trusted.
+    /// Returns the number of fits that are not trusted.
     pub fn failed(&self) -> u64 {
         self.failures.values().sum()
     }
 
+    /// Adds the outcome of one fit.
     pub(super) fn push(&mut self, score: Score) {
         self.fits += 1;
         let fitted = match score {
@@ -140,12 +142,12 @@ impl Tally {
             tally.error.push(error);
             if let Some(std_error) = std_error {
                 tally.std_error.push(std_error);
-                tally.covered += u64::from(error.abs() <= COVERING * std_error);
+                tally.covered += u64::from(error.abs() <= COVERAGE_SIGMAS * std_error);
             }
         }
     }
 
-    /// Adds the fits behind `other`.
+    /// Adds the fits of `other`.
     pub(super) fn merge(&mut self, other: &Self) {
         self.fits += other.fits;
         for (reason, count) in &other.failures {
@@ -155,10 +157,10 @@ impl Tally {
         self.held_out_rms.merge(&other.held_out_rms);
         self.reduced_chi2.merge(&other.reduced_chi2);
         self.iterations.merge(&other.iterations);
-        for (own, others) in self.parameters.iter_mut().zip(&other.parameters) {
-            own.error.merge(&others.error);
-            own.std_error.merge(&others.std_error);
-            own.covered += others.covered;
+        for (tally, added) in self.parameters.iter_mut().zip(&other.parameters) {
+            tally.error.merge(&added.error);
+            tally.std_error.merge(&added.std_error);
+            tally.covered += added.covered;
         }
     }
 }
@@ -184,12 +186,12 @@ mod tests {
         let rms = (values.iter().map(|v| v * v).sum::<f64>() / 6.0).sqrt();
         for moments in [joined, whole] {
             assert_eq!((moments.count, moments.largest()), (6, Some(9.25)));
-            for (found, expected) in [
+            for (statistic, expected) in [
                 (moments.mean(), mean),
                 (moments.deviation(), variance.sqrt()),
                 (moments.rms(), rms),
             ] {
-                assert!((found.unwrap_or(f64::NAN) - expected).abs() < 1e-14);
+                assert!((statistic.unwrap_or(f64::NAN) - expected).abs() < 1e-14);
             }
         }
         let none = Moments::default();

@@ -23,7 +23,7 @@ fn study() -> MisprintStudy {
 /// Mean of what a reading leaves over what the rigid fit leaves.
 fn ratio(found: &ReplicaResults, name: &str, stage: usize) -> f64 {
     let place = found.readings.iter().position(|own| own.name == name).unwrap();
-    let ratios = found.replicas.iter().map(|own| own.ratio(own.left(place, stage)));
+    let ratios = found.replicas.iter().map(|own| own.ratio(own.reading_error(place, stage)));
     Spread::of(ratios).unwrap().mean
 }
 

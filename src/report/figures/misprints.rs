@@ -2,7 +2,9 @@
 
 use super::prelude::*;
 use crate::paper::published::{IGNORING_IT, WITH_ELASTICITY};
-use crate::study::{AlternativeModel, Case, Left, MisprintStudy, Replica, ReplicaResults, Spread};
+use crate::study::{
+    AlternativeModel, Case, HeldOutError, MisprintStudy, Replica, ReplicaResults, Spread,
+};
 
 const ROW: i32 = 19;
 /// Room for names.
@@ -17,17 +19,18 @@ type Row = (String, Vec<Option<Spread>>);
 
 /// Ratio of the held-out mean to that of the rigid fit, of every reading and every rival.
 pub fn misprints(study: &MisprintStudy, found: &ReplicaResults) -> Drawing {
-    let spreads = |left: &dyn Fn(&Replica) -> Left| -> Vec<Option<Spread>> {
+    let spreads = |left: &dyn Fn(&Replica) -> HeldOutError| -> Vec<Option<Spread>> {
         let ratio = |case: &Case| Spread::of(found.of_case(case).map(|own| own.ratio(left(own))));
         study.cases.iter().map(ratio).collect()
     };
     let named = found.readings.iter().enumerate();
     let mut rows: Vec<Row> = named
-        .map(|(place, named)| (named.name.clone(), spreads(&|own| own.left(place, 0))))
+        .map(|(place, named)| (named.name.clone(), spreads(&|own| own.reading_error(place, 0))))
         .collect();
     rows.extend(
-        AlternativeModel::EACH
-            .map(|rival| (rival.words().0.to_owned(), spreads(&|own| own.rival(rival)))),
+        AlternativeModel::EACH.map(|rival| {
+            (rival.words().0.to_owned(), spreads(&|own| own.alternative_error(rival)))
+        }),
     );
     let caption = "Mean error of the held-out poses over that of the rigid fit, mean and standard deviation over specimens, stiffness \
                    known: each misprint alone, their combinations, and below them other explanations. Colours: how links and joints \

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::estimated::Estimated;
 use super::orthonormal::{open, orthonormal, orthonormal_above};
 use super::score::{Score, Sums};
-use crate::numeric::{gram, inverse_factor, product, product_along, zeros};
+use crate::numeric::{gram, inverse_factor, product, transposed_narrow_product, zeros};
 
 /// A direction is decided by a block of poses alone when less than this part of its length² is left
 /// without the block: then the others say nothing of it.
@@ -162,7 +162,7 @@ impl LinearNeighbourhood {
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
         let mut along = DMatrix::zeros(self.basis.ncols(), columns.ncols());
         for _ in 0..2 {
-            let more = product_along(&self.basis, &left);
+            let more = transposed_narrow_product(&self.basis, &left);
             left -= product(&self.basis, &more);
             along += more;
             if most_is_left(&left, &lengths) {

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use crate::numeric::{
     gram, inverse_factor, inverse_lower, multiply_by_upper, product_with_upper,
-    product_with_upper_above,
+    product_with_upper_padded,
 };
 
 /// A column is a direction of its own where those before it leave more than this part of its
@@ -48,7 +48,7 @@ pub(super) fn orthonormal_above(
     turn.row_iter_mut().zip(&kept).for_each(|(mut row, &j)| row.unscale_mut(own[j]));
     let own = if kept.len() == n { columns } else { Cow::Owned(columns.select_columns(&kept)) };
     let mut basis = match own {
-        Cow::Borrowed(own) => product_with_upper_above(own, &turn, below.len()),
+        Cow::Borrowed(own) => product_with_upper_padded(own, &turn, below.len()),
         Cow::Owned(mut own) => {
             multiply_by_upper(&mut own, &turn);
             own.resize_vertically(rows + below.len(), 0.0)

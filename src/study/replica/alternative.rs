@@ -1,31 +1,31 @@
-//! Other explanations: arms that the paper's authors may have taken theirs for.
+//! Alternative models: mistaken assumptions that might explain the errors reported in [Chen2021].
 
 use crate::problem::{Joint, Problem};
 
-/// A mistake in the model of the arm, its formulas corrected.
+/// Mistake in the model of the arm, while the formulas are correct.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum AlternativeModel {
-    /// Everything a quarter too stiff.
+    /// Model 1.25 times as stiff as the arm.
     QuarterTooStiff,
-    /// Everything twice as stiff as it is.
+    /// Model twice as stiff as the arm.
     TwiceTooStiff,
-    /// Everything two thirds as stiff as it is.
+    /// Model two thirds as stiff as the arm.
     TooSoft,
-    /// Joints give way, links do not.
+    /// Model with elastic joints and rigid links.
     JointsAlone,
-    /// Links bend, joints do not give way.
+    /// Model with elastic links and rigid joints.
     LinksAlone,
-    /// The hoist pulls a tenth more than the model says.
+    /// Model whose hoist force is 10 % too small.
     HoistTooWeak,
-    /// No hoist in the model.
+    /// Model without a hoist.
     NoHoist,
-    /// No payload in the model.
+    /// Model without a payload.
     NoPayload,
 }
 
 impl AlternativeModel {
-    /// All of them.
+    /// All alternative models.
     pub const EACH: [Self; 8] = [
         Self::QuarterTooStiff,
         Self::TwiceTooStiff,
@@ -37,7 +37,7 @@ impl AlternativeModel {
         Self::NoPayload,
     ];
 
-    /// Name in results, and what it says in a few words.
+    /// Returns the name in results and a short description.
     pub const fn words(self) -> (&'static str, &'static str) {
         match self {
             Self::QuarterTooStiff => ("quarter-too-stiff", "model 1.25 times as stiff as the arm"),
@@ -51,7 +51,7 @@ impl AlternativeModel {
         }
     }
 
-    /// The arm that is assumed in place of the true one.
+    /// Returns the arm that this model assumes in place of the true one.
     pub(super) fn assumed(self, mut arm: Problem) -> Problem {
         match self {
             Self::QuarterTooStiff => stiffen(&mut arm, 1.25, 1.25),
@@ -64,7 +64,7 @@ impl AlternativeModel {
         arm
     }
 
-    /// By what payload and hoist are multiplied.
+    /// Returns the factors of payload and hoist force.
     pub(super) fn loads(self) -> (f64, f64) {
         match self {
             Self::HoistTooWeak => (1.0, 0.9),
@@ -75,7 +75,7 @@ impl AlternativeModel {
     }
 }
 
-/// Multiplies stiffnesses of joints and rigidities of links.
+/// Multiplies the stiffnesses of joints and the rigidities of links.
 pub(super) fn stiffen(arm: &mut Problem, joints: f64, links: f64) {
     let each = |joint: &mut Joint| {
         joint.stiffness.iter_mut().for_each(|stiffness| *stiffness *= joints);

@@ -1,4 +1,4 @@
-//! The paper's procedure on some poses, and what it leaves of others.
+//! Procedure of [Chen2021] on measured poses, and its errors at held-out poses.
 
 use super::measured_pose::MeasuredPose;
 use crate::fit::{ErrorSummary, IdentifyError};
@@ -6,7 +6,7 @@ use crate::measurement::{Dataset, DatasetError};
 use crate::paper::{self, EndPoint, Identified, Measured, Options, Parameters, Reading};
 use crate::problem::Problem;
 
-/// Why there are no replicas.
+/// Error that prevents the replicas of an experiment.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 #[non_exhaustive]
@@ -23,8 +23,8 @@ pub enum ReplicaError {
     Dataset(#[from] DatasetError),
 }
 
-/// The paper's procedure on some poses.
-pub(super) fn fitted(
+/// Applies the procedure of [Chen2021] to some poses.
+pub(super) fn identify_as_published(
     problem: &Problem,
     poses: &[MeasuredPose],
     options: &Options,
@@ -33,8 +33,8 @@ pub(super) fn fitted(
     Ok(paper::identify(problem, &poses, options)?)
 }
 
-/// What an arm leaves of some poses, predicted by the paper's closed forms.
-pub(super) fn judged(
+/// Returns the position errors at some poses that the closed forms of [Chen2021] predict.
+pub(super) fn position_errors(
     problem: &Problem,
     poses: &[MeasuredPose],
     parameters: &Parameters,
@@ -48,17 +48,17 @@ pub(super) fn judged(
     ErrorSummary::of(&poses.iter().map(error).collect::<Vec<_>>())
 }
 
-/// Poses to identify with, and those that are held out.
+/// Returns the dataset of identification poses and held-out poses.
 pub(super) fn dataset(
     poses: &[MeasuredPose],
     held_out: &[MeasuredPose],
 ) -> Result<Dataset, DatasetError> {
-    let all = || poses.iter().chain(held_out);
+    let rows = || poses.iter().chain(held_out);
     let of =
-        |value: fn(&MeasuredPose) -> Option<f64>| all().map(value).collect::<Option<Vec<f64>>>();
-    let configurations = all().map(|pose| pose.conditions.configuration.clone());
+        |value: fn(&MeasuredPose) -> Option<f64>| rows().map(value).collect::<Option<Vec<f64>>>();
+    let configurations = rows().map(|pose| pose.conditions.configuration.clone());
     let mut builder =
-        Dataset::builder(configurations, all().map(|pose| pose.position).collect::<Vec<_>>())
+        Dataset::builder(configurations, rows().map(|pose| pose.position).collect::<Vec<_>>())
             .held_out(poses.len()..poses.len() + held_out.len());
     if let Some(payload) = of(|pose| pose.conditions.payload) {
         builder = builder.payload(payload);

@@ -1,34 +1,33 @@
-//! A measured pose.
+//! Pose with its measured position.
 
 use nalgebra::Vector3;
 
 use crate::paper::Measured;
 use crate::problem::{PoseConditions, Problem};
 
-/// A measured pose.
+/// Commanded conditions of a pose with the measured position.
 #[derive(Debug, Clone)]
 pub struct MeasuredPose {
-    /// What was set.
+    /// Commanded configuration, payload and hoist.
     pub conditions: PoseConditions,
-    /// What the tracker read \[m\].
+    /// Measured position \[m\].
     pub position: Vector3<f64>,
 }
 
 impl MeasuredPose {
-    /// For the paper's procedure.
+    /// Returns the pose in the form that the procedure of [Chen2021] expects.
     pub fn measured(&self) -> Measured<'_> {
         Measured { setup: self.conditions.view(), position: self.position }
     }
 
-    /// The same with payload and hoist multiplied, those that `arm` declares where the pose says
-    /// nothing.
+    /// Multiplies payload and hoist force; a load that the pose does not give is taken from `arm`.
     pub fn under(&self, (payload, hoist): (f64, f64), arm: &Problem) -> Self {
         let declared =
             arm.joints.iter().find_map(|joint| Some(joint.beam.as_ref()?.hoist.as_ref()?.force));
         let mut pose = self.clone();
-        let own = &mut pose.conditions;
-        own.payload = Some(own.payload.unwrap_or(arm.tool.payload_mass) * payload);
-        own.hoist = own.hoist.or(declared).map(|force| force * hoist);
+        let conditions = &mut pose.conditions;
+        conditions.payload = Some(conditions.payload.unwrap_or(arm.tool.payload_mass) * payload);
+        conditions.hoist = conditions.hoist.or(declared).map(|force| force * hoist);
         pose
     }
 }

@@ -1,11 +1,11 @@
-//! Replicas of the paper's experiment whose truth is known: what each misprint costs, and what may
-//! explain its 2.14 mm.
+//! Replicas of the experiment of [Chen2021] with known truth: the cost of each misprint, and
+//! possible causes of the reported 2.14 mm.
 //!
 //! A [`MisprintStudy`] (`MISPRINTS.toml`, see `docs/paper.md`) draws specimens of the arm on the
-//! virtual test rig, as elastic as the paper's: their flexibility is scaled until the rigid fit
-//! leaves what the paper's left. Each is identified by the paper's procedure in every reading and
-//! with every first stage, by arms that it might have been taken for ([`AlternativeModel`]), and by
-//! the joint fit; held-out poses judge.
+//! virtual test rig. Their flexibility is scaled until the rigid fit leaves the error that the
+//! paper reports for it. Each specimen is identified by the procedure of the paper in every reading
+//! and with every first stage, with every [`AlternativeModel`], and by the joint fit. Errors at
+//! held-out poses are compared.
 
 mod alternative;
 mod fit;
@@ -21,6 +21,6 @@ mod study;
 pub use alternative::AlternativeModel;
 pub use fit::ReplicaError;
 pub use reading::{NamedReading, readings};
-pub use results::{Left, Replica, ReplicaResults, Spread};
+pub use results::{HeldOutError, Replica, ReplicaResults, Spread};
 pub use run::replicate;
 pub use study::{Case, Load, MisprintStudy};

@@ -1,4 +1,4 @@
-//! From the text of `MISPRINTS.toml` to a [`MisprintStudy`].
+//! Reader of `MISPRINTS.toml`.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crate::rig::{HeldOutRows, Truth};
 use crate::study::input::{count, distinct, problem_of};
 
 impl MisprintStudy {
-    /// Reads the sections of a document; `file` is the document's.
+    /// Reads the sections of a document; `file` is the path of the document.
     pub(in crate::study) fn of_document(
         mut root: Section<'_, '_>,
         file: &Path,
@@ -19,14 +19,14 @@ impl MisprintStudy {
         let folder = file.parent().unwrap_or(Path::new(""));
         let name = name(&mut root)?;
         let title = root.text("title")?.unwrap_or(&name).to_owned();
-        let asked = root.require("problem", "problem = \"…\", a problem.toml")?;
-        let (problem, _, problem_file) = problem_of(&asked, folder)?;
+        let path = root.require("problem", "problem = \"…\", a problem.toml")?;
+        let (problem, _, problem_file) = problem_of(&path, folder)?;
         let what = "a study of misprints";
         if !problem.tree().is_chain() {
-            return Err(asked.error(InputErrorKind::NotAChain { what }));
+            return Err(path.error(InputErrorKind::NotAChain { what }));
         }
         if !problem.is_chain() || !problem.targets.is_empty() {
-            return Err(asked.error(InputErrorKind::NotOneTool { what }));
+            return Err(path.error(InputErrorKind::NotOneTool { what }));
         }
         let seed = root.require("seed", "seed = …, a whole number")?.whole(0)?;
         let specimens = count(&root.require("specimens", "specimens = …, arms of each case")?)?;
@@ -52,7 +52,7 @@ impl MisprintStudy {
                 Err(item.error(InputErrorKind::NotPositive { value }))
             }
         })?;
-        // As declared, or nearest to it, first.
+        // The case closest to the declared ratio comes first.
         links_over_joints.sort_by(|a, b| a.ln().abs().total_cmp(&b.ln().abs()));
         let one_load = root.section("one_load")?.map(load).transpose()?;
         let second_load = match root.section("second_load")? {

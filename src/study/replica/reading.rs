@@ -1,24 +1,24 @@
-//! The readings of the paper's formulas that are tried.
+//! Readings of the formulas of [Chen2021] that the study compares.
 
 use crate::paper::{Form, Misprint, Reading};
 
-/// A reading with its name.
+/// Reading of the formulas with its name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedReading {
     /// Name in results.
     pub name: String,
-    /// The equations that are kept as printed, or what it is.
+    /// Equations that are kept as printed, or a description.
     pub place: String,
-    /// What it says, in a few words.
+    /// Description in a few words.
     pub summary: String,
-    /// The forms.
+    /// Form of each equation, printed or corrected.
     pub reading: Reading,
-    /// The misprint, where it is one alone.
+    /// The misprint, if the reading contains only one.
     pub misprint: Option<Misprint>,
 }
 
-/// Everything corrected, each misprint alone, eq. 21 with each other misprint that may have been
-/// run, and everything as printed that may have been run, with and without eq. 21.
+/// Returns the readings: all corrected, each misprint alone, eq. 21 with each other executable
+/// misprint, and all executable misprints with and without eq. 21.
 pub fn readings() -> Vec<NamedReading> {
     let named = |name: &str, place: &str, summary: &str, reading: Reading| NamedReading {
         name: name.to_owned(),
@@ -32,9 +32,9 @@ pub fn readings() -> Vec<NamedReading> {
         ..named(misprint.as_str(), misprint.place(), misprint.summary(), misprint.into())
     };
     let printed = Reading::from(Form::Printed);
-    let mut all = vec![named("corrected", "all", "no misprint", Reading::default())];
-    all.extend(Misprint::ALL.map(alone));
-    all.push(NamedReading {
+    let mut all_readings = vec![named("corrected", "all", "no misprint", Reading::default())];
+    all_readings.extend(Misprint::ALL.map(alone));
+    all_readings.push(NamedReading {
         reading: Reading::from(Misprint::LinkSide).with(Misprint::TransferIndex, Form::Printed),
         ..named(
             "both-transfers",
@@ -43,17 +43,17 @@ pub fn readings() -> Vec<NamedReading> {
             printed,
         )
     });
-    all.push(named(
+    all_readings.push(named(
         "as-printed",
         "4-21",
         "every misprint that can have been run together",
         printed,
     ));
-    all.push(named(
+    all_readings.push(named(
         "as-printed-but-link-side",
         "4-10",
         "the same with eq. 21 corrected",
         printed.with(Misprint::LinkSide, Form::Corrected),
     ));
-    all
+    all_readings
 }

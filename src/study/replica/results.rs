@@ -1,103 +1,105 @@
-//! What the replicas showed.
+//! Results of the replicas.
 
 use super::alternative::AlternativeModel;
 use super::reading::NamedReading;
 use super::study::Case;
 use crate::fit::ErrorSummary;
 
-/// What a procedure left of the held-out poses; `None` where its iteration did not converge.
-pub type Left = Option<ErrorSummary>;
+/// Position errors of a procedure at the held-out poses; `None` if its iteration did not converge.
+pub type HeldOutError = Option<ErrorSummary>;
 
-/// One specimen, identified in every way: what is left of its held-out poses.
+/// Errors at the held-out poses of one specimen, by each procedure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Replica {
-    /// What it has in common with others.
+    /// Case that the specimen belongs to.
     pub case: Case,
-    /// By what the declared flexibilities were multiplied.
+    /// Factor of the declared flexibilities.
     pub scale: f64,
-    /// By the nominal arm without elasticity.
+    /// Errors of the nominal arm without elasticity.
     pub before: ErrorSummary,
-    /// By eq. 45 with elasticity ignored.
-    pub rigid: Left,
-    /// By each reading of the paper: stiffness known, as declared, from positions, from load
-    /// differences.
-    pub by_reading: Vec<[Left; 4]>,
-    /// By each rival, formulas corrected, in the order of [`AlternativeModel::EACH`].
-    pub by_rival: Vec<Left>,
-    /// By geometry alone, stiffness as declared, with the model of this library.
+    /// Errors of eq. 45 without elasticity.
+    pub rigid: HeldOutError,
+    /// Errors of each reading with the four sources of stiffness: true, as declared, from
+    /// positions, from load differences.
+    pub by_reading: Vec<[HeldOutError; 4]>,
+    /// Errors of each alternative model, with correct formulas, in the order of
+    /// [`AlternativeModel::EACH`].
+    pub by_alternative: Vec<HeldOutError>,
+    /// Errors of a fit of the geometry alone, with the declared stiffness, by the model of this
+    /// library.
     pub geometry_only: ErrorSummary,
-    /// By the joint fit.
+    /// Errors of the joint fit.
     pub joint: ErrorSummary,
-    /// By the joint fit that also has the poses under the second load.
+    /// Errors of the joint fit that includes the poses under the second load.
     pub joint_twice: ErrorSummary,
 }
 
-/// Everything that a study of the misprints gives.
+/// Results of a study of the misprints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReplicaResults {
-    /// How far each misprint moves the end point \[m\], in the order of
+    /// Largest displacement of the end point by each misprint \[m\], in the order of
     /// [`Misprint::ALL`](crate::paper::Misprint::ALL).
     pub sizes: Vec<f64>,
-    /// The readings.
+    /// Readings that were compared.
     pub readings: Vec<NamedReading>,
-    /// The specimens, case by case.
+    /// Specimens, case by case.
     pub replicas: Vec<Replica>,
 }
 
-/// Mean and standard deviation of some values over specimens.
+/// Mean and standard deviation of a quantity over specimens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spread {
-    /// Mean.
+    /// Mean over the available values.
     pub mean: f64,
-    /// Standard deviation, with n − 1; 0 for one value.
+    /// Standard deviation with n − 1 degrees of freedom; 0 for one value.
     pub deviation: f64,
-    /// Values there are, of how many.
+    /// Number of available values, and of specimens.
     pub count: (usize, usize),
 }
 
 impl Spread {
-    /// Of the values there are; `None` without any.
+    /// Returns the statistics of the available values; `None` if there are none.
     pub fn of(values: impl IntoIterator<Item = Option<f64>>) -> Option<Self> {
-        let all: Vec<Option<f64>> = values.into_iter().collect();
-        let there: Vec<f64> = all.iter().flatten().copied().collect();
-        let n = there.len() as f64;
-        if there.is_empty() {
+        let values: Vec<Option<f64>> = values.into_iter().collect();
+        let available: Vec<f64> = values.iter().flatten().copied().collect();
+        let n = available.len() as f64;
+        if available.is_empty() {
             return None;
         }
-        let mean = there.iter().sum::<f64>() / n;
-        let squares: f64 = there.iter().map(|value| (value - mean).powi(2)).sum();
-        let deviation = if there.len() > 1 { (squares / (n - 1.0)).sqrt() } else { 0.0 };
-        Some(Self { mean, deviation, count: (there.len(), all.len()) })
+        let mean = available.iter().sum::<f64>() / n;
+        let squares: f64 = available.iter().map(|value| (value - mean).powi(2)).sum();
+        let deviation = if available.len() > 1 { (squares / (n - 1.0)).sqrt() } else { 0.0 };
+        Some(Self { mean, deviation, count: (available.len(), values.len()) })
     }
 }
 
 impl ReplicaResults {
-    /// Specimens of one case.
+    /// Returns the specimens of one case.
     pub fn of_case(&self, case: &Case) -> impl Iterator<Item = &Replica> {
-        self.replicas.iter().filter(move |own| own.case == *case)
+        self.replicas.iter().filter(move |replica| replica.case == *case)
     }
 }
 
 impl Replica {
-    /// What a reading leaves: its place among the readings, and the stage: stiffness known, as
-    /// declared, from positions, from load differences.
-    pub fn left(&self, reading: usize, stage: usize) -> Left {
+    /// Returns the errors of a reading, given by its index and the index of its stiffness source in
+    /// `by_reading`.
+    pub fn reading_error(&self, reading: usize, stage: usize) -> HeldOutError {
         *self.by_reading.get(reading)?.get(stage)?
     }
 
-    /// What a rival leaves.
-    pub fn rival(&self, rival: AlternativeModel) -> Left {
-        let place = AlternativeModel::EACH.iter().position(|own| *own == rival)?;
-        *self.by_rival.get(place)?
+    /// Returns the errors of an alternative model.
+    pub fn alternative_error(&self, alternative: AlternativeModel) -> HeldOutError {
+        let index = AlternativeModel::EACH.iter().position(|model| *model == alternative)?;
+        *self.by_alternative.get(index)?
     }
 
-    /// Mean error over that of the rigid fit.
-    pub fn ratio(&self, left: Left) -> Option<f64> {
-        Some(left?.mean.norm / self.rigid?.mean.norm)
+    /// Returns the ratio of a mean error to that of the rigid fit.
+    pub fn ratio(&self, error: HeldOutError) -> Option<f64> {
+        Some(error?.mean.norm / self.rigid?.mean.norm)
     }
 
-    /// Largest error over that of the rigid fit.
-    pub fn largest_ratio(&self, left: Left) -> Option<f64> {
-        Some(left?.max.norm / self.rigid?.max.norm)
+    /// Returns the ratio of a largest error to that of the rigid fit.
+    pub fn largest_ratio(&self, error: HeldOutError) -> Option<f64> {
+        Some(error?.max.norm / self.rigid?.max.norm)
     }
 }

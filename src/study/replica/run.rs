@@ -1,12 +1,12 @@
-//! Identifies every specimen in every way.
+//! Identification of every specimen by every procedure.
 
 use rayon::prelude::*;
 
 use super::alternative::AlternativeModel;
-use super::fit::{ReplicaError, dataset, fitted, judged};
+use super::fit::{ReplicaError, dataset, identify_as_published, position_errors};
 use super::measured_pose::MeasuredPose;
 use super::reading::{NamedReading, readings};
-use super::results::{Left, Replica, ReplicaResults};
+use super::results::{HeldOutError, Replica, ReplicaResults};
 use super::simulated_arm::SimulatedArm;
 use super::size::sizes;
 use super::study::{Case, MisprintStudy};
@@ -15,26 +15,28 @@ use crate::paper::{Form, Options, Parameters, Reading, StiffnessStage};
 use crate::problem::Problem;
 use crate::random::stream;
 
-/// Draws every specimen and identifies it in every way; calls `done` after each.
+/// Draws every specimen and identifies it by every procedure; calls `done` after each specimen.
 ///
 /// # Errors
-/// A specimen cannot be scaled, or a procedure cannot be set up.
+/// Returns an error if a specimen cannot be scaled or a procedure cannot be set up.
 pub fn replicate(
     study: &MisprintStudy,
     done: impl Fn() + Sync,
 ) -> Result<ReplicaResults, ReplicaError> {
     let readings = readings();
     let of_case = |case| (0..study.specimens).map(move |index| (case, index));
-    let all: Vec<(&Case, usize)> = study.cases.iter().flat_map(of_case).collect();
-    let one = |&(case, index): &(&Case, usize)| {
+    let specimens: Vec<(&Case, usize)> = study.cases.iter().flat_map(of_case).collect();
+    let evaluate = |&(case, index): &(&Case, usize)| {
         let replica = replica(study, &readings, case, index);
         done();
         replica
     };
-    let replicas = all.par_iter().map(one).collect::<Result<Vec<Replica>, ReplicaError>>()?;
+    let replicas =
+        specimens.par_iter().map(evaluate).collect::<Result<Vec<Replica>, ReplicaError>>()?;
     Ok(ReplicaResults { sizes: sizes(study), readings, replicas })
 }
 
+/// Draws one specimen and returns its errors by every procedure.
 fn replica(
     study: &MisprintStudy,
     readings: &[NamedReading],
@@ -43,59 +45,67 @@ fn replica(
 ) -> Result<Replica, ReplicaError> {
     use rand::Rng as _;
     let seed = stream(study.seed, index as u64).next_u64();
-    let own = SimulatedArm::find(study, case, seed)?;
-    let twice = [own.identification.as_slice(), own.again.as_slice()].concat();
-    let left = |problem: &Problem,
-                poses: &[MeasuredPose],
-                reading: &Reading,
-                stage|
-     -> Result<Left, ReplicaError> {
+    let arm = SimulatedArm::find(study, case, seed)?;
+    let both_loads = [arm.identification.as_slice(), arm.second_load.as_slice()].concat();
+    let error = |problem: &Problem,
+                 poses: &[MeasuredPose],
+                 reading: &Reading,
+                 stage|
+     -> Result<HeldOutError, ReplicaError> {
         let options = Options::new(*reading, stage);
-        let found = fitted(problem, poses, &options)?;
-        let judged = || judged(problem, &own.held_out, &found.parameters, &options.reading);
-        Ok(found.iteration.termination.converged().then(judged))
+        let identified = identify_as_published(problem, poses, &options)?;
+        let errors =
+            || position_errors(problem, &arm.held_out, &identified.parameters, &options.reading);
+        Ok(identified.iteration.termination.converged().then(errors))
     };
-    let by_stage = |named: &NamedReading| -> Result<[Left; 4], ReplicaError> {
-        let (reading, single) = (&named.reading, own.identification.as_slice());
+    let by_stage = |named: &NamedReading| -> Result<[HeldOutError; 4], ReplicaError> {
+        let (reading, single) = (&named.reading, arm.identification.as_slice());
         Ok([
-            left(&own.known, single, reading, StiffnessStage::Nominal)?,
-            left(&own.declared, single, reading, StiffnessStage::Nominal)?,
-            left(&own.declared, single, reading, StiffnessStage::Positions)?,
-            left(&own.declared, &twice, reading, StiffnessStage::LoadDifferences)?,
+            error(&arm.true_stiffness, single, reading, StiffnessStage::Nominal)?,
+            error(&arm.declared, single, reading, StiffnessStage::Nominal)?,
+            error(&arm.declared, single, reading, StiffnessStage::Positions)?,
+            error(&arm.declared, &both_loads, reading, StiffnessStage::LoadDifferences)?,
         ])
     };
-    let rival = |rival: AlternativeModel| -> Result<Left, ReplicaError> {
-        let assumed = rival.assumed(own.known.clone());
-        let seen = |poses: &[MeasuredPose]| -> Vec<MeasuredPose> {
-            poses.iter().map(|pose| pose.under(rival.loads(), &assumed)).collect()
+    let alternative = |model: AlternativeModel| -> Result<HeldOutError, ReplicaError> {
+        let assumed = model.assumed(arm.true_stiffness.clone());
+        let under_assumed_loads = |poses: &[MeasuredPose]| -> Vec<MeasuredPose> {
+            poses.iter().map(|pose| pose.under(model.loads(), &assumed)).collect()
         };
         let options = Options::new(Form::Corrected, StiffnessStage::Nominal);
-        let found = fitted(&assumed, &seen(&own.identification), &options)?;
-        let judged = || judged(&assumed, &seen(&own.held_out), &found.parameters, &options.reading);
-        Ok(found.iteration.termination.converged().then(judged))
+        let poses = under_assumed_loads(&arm.identification);
+        let identified = identify_as_published(&assumed, &poses, &options)?;
+        let errors = || {
+            let held_out = under_assumed_loads(&arm.held_out);
+            position_errors(&assumed, &held_out, &identified.parameters, &options.reading)
+        };
+        Ok(identified.iteration.termination.converged().then(errors))
     };
     let fit = |poses: &[MeasuredPose], strategy| -> Result<ErrorSummary, ReplicaError> {
-        let (data, mut problem) = (dataset(poses, &own.held_out)?, own.declared.clone());
+        let (data, mut problem) = (dataset(poses, &arm.held_out)?, arm.declared.clone());
         problem.data.position_sigma = Some(study.truth.noise_sigma);
-        let found = identify(&problem, &data, &FitOptions::default().with_strategy(strategy))?;
-        Ok(found.fitted.held_out)
+        let options = FitOptions::default().with_strategy(strategy);
+        Ok(identify(&problem, &data, &options)?.fitted.held_out)
     };
     let rigid =
-        left(&own.declared, &own.identification, &Reading::default(), StiffnessStage::Rigid)?;
+        error(&arm.declared, &arm.identification, &Reading::default(), StiffnessStage::Rigid)?;
     Ok(Replica {
         case: *case,
-        scale: own.scale,
-        before: judged(
-            &own.declared,
-            &own.held_out,
-            &Parameters::rigid(&own.declared),
+        scale: arm.scale,
+        before: position_errors(
+            &arm.declared,
+            &arm.held_out,
+            &Parameters::rigid(&arm.declared),
             &Reading::default(),
         ),
         rigid,
         by_reading: readings.iter().map(by_stage).collect::<Result<_, _>>()?,
-        by_rival: AlternativeModel::EACH.into_iter().map(rival).collect::<Result<_, _>>()?,
-        geometry_only: fit(&own.identification, Strategy::GeometryOnly)?,
-        joint: fit(&own.identification, Strategy::Joint)?,
-        joint_twice: fit(&twice, Strategy::Joint)?,
+        by_alternative: AlternativeModel::EACH
+            .into_iter()
+            .map(alternative)
+            .collect::<Result<_, _>>()?,
+        geometry_only: fit(&arm.identification, Strategy::GeometryOnly)?,
+        joint: fit(&arm.identification, Strategy::Joint)?,
+        joint_twice: fit(&both_loads, Strategy::Joint)?,
     })
 }

@@ -1,69 +1,74 @@
-//! Specimens of the arm, measured on the virtual test rig.
+//! Specimens of the arm of [Chen2021], measured on the virtual test rig.
 
 use nalgebra::Vector3;
 
 use super::alternative::stiffen;
-use super::fit::{ReplicaError, fitted, judged};
+use super::fit::{ReplicaError, identify_as_published, position_errors};
 use super::measured_pose::MeasuredPose;
 use super::study::{Case, MisprintStudy};
 use crate::paper::{Form, Options, StiffnessStage};
 use crate::problem::{PoseConditions, Problem};
-use crate::rig::{Draw, NoRest, Rig, Row, draw};
+use crate::rig::{Draw, NoEquilibrium, Rig, Row, draw};
 
-/// The rigid fit leaves what it should to this part.
-const SCALED: f64 = 1e-4;
-/// Trials of a scale after which a specimen is given up.
-const TRIALS: usize = 40;
+/// Relative tolerance of the error that the rigid fit leaves.
+const SCALE_TOLERANCE: f64 = 1e-4;
+/// Maximum number of flexibility scales tried for a specimen.
+const MAX_SCALE_TRIES: usize = 40;
 
-/// One arm and its measurements.
+/// True arm with its simulated measurements.
 #[derive(Debug, Clone)]
 pub struct SimulatedArm {
-    /// The arm as declared, as elastic as specimens are on average.
+    /// Declared arm with the mean flexibility of the specimens.
     pub declared: Problem,
-    /// The same with the true stiffness of this one.
-    pub known: Problem,
-    /// By what the declared flexibilities were multiplied, those of links by `links_over_joints`
-    /// more.
+    /// Declared arm with the true stiffness of this specimen.
+    pub true_stiffness: Problem,
+    /// Factor of the declared flexibilities; links have `links_over_joints` times this factor.
     pub scale: f64,
-    /// Poses that judge.
+    /// Poses at which the procedures are compared.
     pub held_out: Vec<MeasuredPose>,
-    /// Poses to identify with.
+    /// Poses for identification, first load.
     pub identification: Vec<MeasuredPose>,
-    /// The same under the second load.
-    pub again: Vec<MeasuredPose>,
+    /// The identification poses under the second load.
+    pub second_load: Vec<MeasuredPose>,
 }
 
 impl SimulatedArm {
-    /// Arm of a seed, its flexibility scaled until the rigid fit leaves what the study says.
+    /// Draws the arm of a seed and scales its flexibility until the rigid fit leaves the error that
+    /// the study states.
     pub fn find(study: &MisprintStudy, case: &Case, seed: u64) -> Result<Self, ReplicaError> {
         let mut scale = 1.0;
-        for _ in 0..TRIALS {
+        for _ in 0..MAX_SCALE_TRIES {
             let Ok(specimen) = Self::at(study, case, scale, seed) else {
-                // Too soft to stand.
+                // The arm is too flexible for an equilibrium.
                 scale *= 0.5;
                 continue;
             };
             let options = Options::new(Form::Corrected, StiffnessStage::Rigid);
-            let found = fitted(&specimen.declared, &specimen.identification, &options)?;
-            let left =
-                judged(&specimen.declared, &specimen.held_out, &found.parameters, &options.reading)
-                    .mean
-                    .norm;
-            if (left / study.rigid_leaves - 1.0).abs() < SCALED {
+            let (arm, poses) = (&specimen.declared, &specimen.identification);
+            let parameters = identify_as_published(arm, poses, &options)?.parameters;
+            let errors = position_errors(arm, &specimen.held_out, &parameters, &options.reading);
+            let error = errors.mean.norm;
+            if (error / study.rigid_leaves - 1.0).abs() < SCALE_TOLERANCE {
                 return Ok(specimen);
             }
-            // What it leaves is nearly proportional to the flexibility.
-            scale *= study.rigid_leaves / left;
+            // The error is nearly proportional to the flexibility.
+            scale *= study.rigid_leaves / error;
         }
         Err(ReplicaError::Scale { leaves: study.rigid_leaves })
     }
 
-    fn at(study: &MisprintStudy, case: &Case, scale: f64, seed: u64) -> Result<Self, NoRest> {
+    /// Simulates the specimen with a given flexibility scale.
+    fn at(
+        study: &MisprintStudy,
+        case: &Case,
+        scale: f64,
+        seed: u64,
+    ) -> Result<Self, NoEquilibrium> {
         let mut declared = study.problem.clone();
         stiffen(&mut declared, scale.recip(), (scale * case.links_over_joints).recip());
         let (held_out, identification) = (study.held_out, study.identification);
-        // Held-out poses first, so that they are the same for every number of the others; the noise
-        // of the second load last.
+        // Held-out poses come first, so that they are the same for every number of others; the last
+        // rows provide the noise under the second load.
         let Draw { arm, mut rows, .. } =
             draw(&declared, &study.truth, held_out + 2 * identification, seed);
         if let Some(load) = case.load {
@@ -73,41 +78,42 @@ impl SimulatedArm {
         }
         let rig =
             Rig::new(arm.clone(), study.truth.effects.clone()).with_segments(study.truth.segments);
-        let pose =
-            |conditions: &PoseConditions, noise: &Vector3<f64>| -> Result<MeasuredPose, NoRest> {
-                Ok(MeasuredPose {
-                    conditions: conditions.clone(),
-                    position: rig.position(conditions)? + noise,
-                })
-            };
-        let taken = |rows: &[Row]| -> Result<Vec<MeasuredPose>, NoRest> {
+        let pose = |conditions: &PoseConditions,
+                    noise: &Vector3<f64>|
+         -> Result<MeasuredPose, NoEquilibrium> {
+            Ok(MeasuredPose {
+                conditions: conditions.clone(),
+                position: rig.position(conditions)? + noise,
+            })
+        };
+        let measured = |rows: &[Row]| -> Result<Vec<MeasuredPose>, NoEquilibrium> {
             rows.iter().map(|row| pose(&row.conditions, &row.position)).collect()
         };
-        let (judging, others) = rows.split_at(held_out);
+        let (held_out_rows, others) = rows.split_at(held_out);
         let (first, second) = others.split_at(identification);
-        let again = first
+        let second_load = first
             .iter()
             .zip(second)
             .map(|(row, noise)| pose(&study.second_load.put_on(&row.conditions), &noise.position));
-        let again = again.collect::<Result<Vec<MeasuredPose>, NoRest>>()?;
-        let (held_out, identification) = (taken(judging)?, taken(first)?);
+        let second_load = second_load.collect::<Result<Vec<MeasuredPose>, NoEquilibrium>>()?;
+        let (held_out, identification) = (measured(held_out_rows)?, measured(first)?);
         Ok(Self {
-            known: with_geometry(arm, &declared),
+            true_stiffness: with_geometry(arm, &declared),
             declared,
             scale,
             held_out,
             identification,
-            again,
+            second_load,
         })
     }
 }
 
-/// An arm with the geometry, tool and base of another.
-fn with_geometry(mut arm: Problem, of: &Problem) -> Problem {
-    for (own, other) in arm.joints.iter_mut().zip(&of.joints) {
-        (own.alpha, own.a, own.theta) = (other.alpha, other.a, other.theta);
-        (own.d, own.beta) = (other.d, other.beta);
+/// Returns an arm with the geometry, tool and base of `source`.
+fn with_geometry(mut arm: Problem, source: &Problem) -> Problem {
+    for (joint, other) in arm.joints.iter_mut().zip(&source.joints) {
+        (joint.alpha, joint.a, joint.theta) = (other.alpha, other.a, other.theta);
+        (joint.d, joint.beta) = (other.d, other.beta);
     }
-    (arm.tool, arm.base) = (of.tool.clone(), of.base.clone());
+    (arm.tool, arm.base) = (source.tool.clone(), source.base.clone());
     arm
 }

@@ -1,4 +1,4 @@
-//! How far each misprint moves the end point.
+//! Displacement of the end point by each misprint.
 
 use nalgebra::DVector;
 
@@ -6,17 +6,19 @@ use super::study::MisprintStudy;
 use crate::paper::{EndPoint, Misprint, Parameters, Reading};
 use crate::rig::{Draw, draw};
 
-/// Largest change \[m\] of `D_f`, or of `D_g` = `J_g` e, by each misprint over the poses of the
-/// first specimen: the declared arm, as elastic as the problem says, with the geometric errors e of
-/// the truth; in the order of [`Misprint::ALL`].
+/// Returns the largest change \[m\] of `D_f`, or of `D_g` = `J_g` e, by each misprint, in the order
+/// of [`Misprint::ALL`].
 ///
-/// Of `BetaLeftOut`: what the β of e move.
+/// The maximum is over the poses of the first specimen: the declared arm with its declared
+/// elasticity and the geometric errors e of the truth. For `BetaLeftOut` it is the displacement by
+/// the β of e.
 pub fn sizes(study: &MisprintStudy) -> Vec<f64> {
     let (problem, poses) = (&study.problem, study.held_out + study.identification);
     let Draw { arm, rows, .. } = draw(problem, &study.truth, poses, study.seed);
     let nominal = Parameters::nominal(problem);
-    let there = Parameters { geometry: Parameters::nominal(&arm).geometry, ..nominal.clone() };
-    let pairs = nominal.geometry.iter().zip(&there.geometry);
+    let true_geometry =
+        Parameters { geometry: Parameters::nominal(&arm).geometry, ..nominal.clone() };
+    let pairs = nominal.geometry.iter().zip(&true_geometry.geometry);
     let e: Vec<f64> = pairs
         .flat_map(|(from, to)| {
             let (mut from, mut to) = (*from, *to);
@@ -25,7 +27,7 @@ pub fn sizes(study: &MisprintStudy) -> Vec<f64> {
             changes.collect::<Vec<f64>>()
         })
         .collect();
-    let beta = e.iter().enumerate().map(|(place, e)| if place % 5 == 4 { *e } else { 0.0 });
+    let beta = e.iter().enumerate().map(|(index, e)| if index % 5 == 4 { *e } else { 0.0 });
     let (beta, e) = (DVector::from_iterator(e.len(), beta), DVector::from_vec(e.clone()));
     let size = |misprint: Misprint| {
         let of_row = |row: &crate::rig::Row| {
@@ -33,14 +35,14 @@ pub fn sizes(study: &MisprintStudy) -> Vec<f64> {
             let at = |parameters: &Parameters, reading: Reading| {
                 EndPoint::new(problem, parameters, &view, &reading)
             };
-            let (right, printed) = (Reading::default(), Reading::from(misprint));
+            let (corrected, printed) = (Reading::default(), Reading::from(misprint));
             if misprint == Misprint::BetaLeftOut {
-                return (at(&nominal, right).jacobian() * &beta).norm();
+                return (at(&nominal, corrected).jacobian() * &beta).norm();
             }
-            let elastic =
-                at(&there, printed).deflection(&there) - at(&there, right).deflection(&there);
+            let elastic = at(&true_geometry, printed).deflection(&true_geometry)
+                - at(&true_geometry, corrected).deflection(&true_geometry);
             let geometric =
-                at(&nominal, printed).jacobian() * &e - at(&nominal, right).jacobian() * &e;
+                at(&nominal, printed).jacobian() * &e - at(&nominal, corrected).jacobian() * &e;
             elastic.norm().max(geometric.norm())
         };
         rows.iter().map(of_row).fold(0.0, f64::max)

@@ -1,50 +1,50 @@
-//! What a study of the misprints asks for, in SI units.
+//! Declaration of a study of the misprints, in SI units.
 
 use std::path::PathBuf;
 
 use crate::problem::{PoseConditions, Problem};
 use crate::rig::Truth;
 
-/// A study as declared in `MISPRINTS.toml`.
+/// Study of the misprints as declared in `MISPRINTS.toml`.
 #[derive(Debug, Clone)]
 pub struct MisprintStudy {
-    /// The files that it was read from.
+    /// Files that the study was read from.
     pub files: Vec<PathBuf>,
-    /// Short name; results go to `out/<name>` by default.
+    /// Short name; results are written to `out/<name>` by default.
     pub name: String,
-    /// One line for people.
+    /// Title for people, one line.
     pub title: String,
-    /// The arm as declared.
+    /// Arm as declared.
     pub problem: Problem,
-    /// How specimens differ from it, and from where poses are drawn.
+    /// Distribution of the specimens about the declared arm, and of the poses.
     pub truth: Truth,
     /// Seed of every random number.
     pub seed: u64,
-    /// Specimens of each case.
+    /// Number of specimens of each case.
     pub specimens: usize,
-    /// Poses to identify with.
+    /// Number of identification poses.
     pub identification: usize,
-    /// Poses that judge.
+    /// Number of held-out poses.
     pub held_out: usize,
-    /// What the rigid fit leaves of the held-out poses of every specimen, mean \[m\].
+    /// Mean error that the rigid fit leaves at the held-out poses of every specimen \[m\].
     pub rigid_leaves: f64,
-    /// What specimens have in common; the first is the one that everything is tried on.
+    /// Cases of the study; the first one is identified by every procedure.
     pub cases: Vec<Case>,
     /// Load under which the identification poses are measured a second time.
     pub second_load: Load,
 }
 
-/// What the specimens of a row have in common.
+/// Properties that the specimens of one case share.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
-    /// Flexibility of links over that of joints, as multiples of what the problem declares.
+    /// Ratio of the flexibility of links to that of joints, relative to the declared ratio.
     pub links_over_joints: f64,
-    /// The one load of every pose; `None`: drawn pose by pose.
+    /// Load of every pose; `None` if loads are drawn for each pose.
     pub load: Option<Load>,
 }
 
 impl Case {
-    /// Name in results: how many times the links' share is as declared, or that there is one load.
+    /// Returns the name in results: the ratio of links to joints, or that there is one load.
     pub fn name(&self) -> String {
         if self.load.is_some() {
             "one load".to_owned()
@@ -54,17 +54,17 @@ impl Case {
     }
 }
 
-/// What hangs on the arm.
+/// Load on the arm.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Load {
-    /// Payload \[kg\]; `None`: as drawn.
+    /// Payload \[kg\]; `None` leaves it as drawn.
     pub payload: Option<f64>,
-    /// Hoist force \[N\]; `None`: as drawn.
+    /// Hoist force \[N\]; `None` leaves it as drawn.
     pub hoist: Option<f64>,
 }
 
 impl Load {
-    /// A pose under this load.
+    /// Returns the conditions of a pose under this load.
     pub(super) fn put_on(self, conditions: &PoseConditions) -> PoseConditions {
         let (payload, hoist) =
             (self.payload.or(conditions.payload), self.hoist.or(conditions.hoist));
