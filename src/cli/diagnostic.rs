@@ -9,7 +9,7 @@ use flexcal::error::{
     InputError, InputErrorKind, Location, Warning, mask_hidden, message_with_causes, mistake,
     one_line,
 };
-use flexcal::fit::Identification;
+use flexcal::fit::{Finding, FindingCode, Identification};
 use flexcal::report;
 
 use super::outcome::Outcome;
@@ -68,10 +68,9 @@ pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
         warn(&report::why_not_trusted(fit));
     }
     if !quiet {
-        if let Some(few) = fit.too_few_poses.filter(|_| fit.is_trusted()) {
-            warn(&few.to_string());
-        }
-        fit.cautions.iter().for_each(|caution| warn(&caution.to_string()));
+        let is_shown =
+            |caution: &&Finding| fit.is_trusted() || caution.code != FindingCode::PriorsDecide;
+        fit.cautions().filter(is_shown).for_each(|caution| warn(&caution.to_string()));
     }
     if fit.is_trusted() { Outcome::Done } else { Outcome::NotTrusted }
 }

@@ -5,7 +5,9 @@ use std::path::Path;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use flexcal::fit::{self, Identification, IdentifyError, Options, SolverChoice, Strategy};
+use flexcal::fit::{
+    self, FindingCode, Identification, IdentifyError, Options, SolverChoice, Strategy,
+};
 use flexcal::report::{self, PlotData, shell_word};
 
 use super::input::{Common, Input};
@@ -109,7 +111,7 @@ fn next(common: &Common, found: &Identification, estimate: &Path) -> String {
         None if !found.is_trusted() || report::tells_little(found) => {
             format!("flexcal check {named} says what the poses can tell")
         }
-        None if found.too_few_poses.is_some() => {
+        None if found.has(FindingCode::PriorsDecide) => {
             format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
         }
         None if report::lacks_something(found) => {

@@ -7,11 +7,13 @@ use std::time::Instant;
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::{InputError, InputErrorKind};
-use crate::fit::checks::judgement::Judgement;
+use crate::fit::checks::checked_fit::CheckedFit;
+use crate::fit::checks::finding::{Finding, FindingCode};
+use crate::fit::checks::fitted_rows::influential_finding;
 use crate::fit::checks::outliers::outliers;
 use crate::fit::checks::pose_sufficiency::PoseSufficiency;
-use crate::fit::checks::quality::QualityFlag;
 use crate::fit::checks::required_columns::check_columns;
+use crate::fit::checks::{findings, held_out};
 use crate::fit::influential_rows::influential_rows;
 use crate::fit::outcome::{Estimate, Identification, enter};
 use crate::fit::stages::fitting::{FitEnd, Fitting};
@@ -25,6 +27,7 @@ use crate::fit::uncertainty::prior_sizes::prior_sizes;
 use crate::fit::uncertainty::statistics::Statistics;
 use crate::fit::warm_start::WarmStart;
 use crate::fit::{Errors, Placement, Progress, ProgressSink, SolverChoice, Stop, Strategy};
+use crate::least_squares::solver::Termination;
 use crate::least_squares::{Loss, Memory};
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::Model;
@@ -273,6 +276,7 @@ pub fn identify_model(
             fit_rows(model, problem, (measurements, &split), &passing).ok()
         };
         found.influential_rows = influential_rows(&found, without);
+        found.findings.extend(found.influential_rows.as_ref().map(influential_finding));
     }
     Ok(found)
 }
@@ -323,8 +327,7 @@ fn fit_rows(
         prepared(&mut fitting, options.predecessor.as_deref(), has_declared_noise)?;
     let begin = options.begin(model, &start);
     let enough = PoseSufficiency::of(&fitting, problem, &unknowns, &start);
-    let judged = enough.too_few.is_none()
-        && !matches!(enough.flag, Some(QualityFlag::TooFewEquations { .. }));
+    let judged = enough.judges_noise(unknowns.len());
     let (mut end, statistics, noise) = fitted(&mut fitting, &begin, (has_declared_noise, judged))?;
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = outliers(&statistics.lengths, &split.identification, &errors, measurements);
@@ -334,31 +337,41 @@ fn fit_rows(
     let (estimates, covariance, not_converged) = estimated(&fitting, &mut end, &statistics, noise)?;
     let (fitted, whole) = (fitting.errors(&end.x), fitting.whole());
     let (noise_factor, sigma_taken) = taken(&whole, measurements.leading());
-    let judgement = Judgement {
-        fitting: &fitting,
-        start: &start,
-        end: &end,
-        errors: (&registered, &fitted),
-        outliers: &outliers,
-        whole: &whole,
-        has_declared_noise,
-    };
-    let quality_flag = if asked {
-        judgement.flag(enough.flag, not_converged, enough.poses)
-    } else {
-        not_converged
-    };
-    let cautions = || judgement.cautions(problem, &whole.unknowns, &statistics.covariance);
     let told = asked && noise != Noise::Unknown && end.termination.converged();
     let values: Vec<f64> = whole.unknowns.iter().map(|&k| end.x[k]).collect();
     let sizes = || prior_sizes(&unknowns, &values, &statistics.covariance);
+    let prior_sizes = if told { sizes() } else { Vec::new() };
+    let spreads = fitting.spreads(&problem.fixtures, &start, &end.x);
+    let held_out_outliers = if asked {
+        held_out::outliers(&fitting, &end.x, &whole.unknowns, &statistics.covariance)
+    } else {
+        Vec::new()
+    };
+    let findings = if asked {
+        findings(&CheckedFit {
+            fitting: &fitting,
+            problem,
+            registered_x: &start,
+            end: &end,
+            registered: &registered,
+            fitted: &fitted,
+            outliers: &outliers,
+            held_out_outliers: &held_out_outliers,
+            whole: &whole,
+            has_declared_noise,
+            poses: &enough,
+            not_converged: not_converged.as_ref(),
+            prior_sizes: &prior_sizes,
+            spreads: &spreads,
+        })
+    } else {
+        not_converged.into_iter().collect()
+    };
     Ok(Identification {
         provisional: options.provisional,
-        quality_flag,
-        too_few_poses: enough.too_few,
+        findings,
         poses: enough.poses,
         several_targets: enough.several_targets,
-        cautions: if asked { cautions() } else { Vec::new() },
         strategy,
         solver,
         solver_reason: options.solver.reason(model),
@@ -376,14 +389,14 @@ fn fit_rows(
         sigma_scale: fitting.noise_model.scale.min(1.0),
         noise_models: (fitting.noise_model, fitting.turn_noise_model),
         kinds: fitting.errors_by_kind(&start, &end.x),
-        spreads: fitting.spreads(&problem.fixtures, &start, &end.x),
+        spreads,
         weak: end.gauge.weak.clone(),
         orientation: fitting.orientation(&start, &end.x),
         coordinates: whole.count(),
         sight: (sight, OnceLock::new()),
         estimates,
         covariance: covariance.finish(),
-        prior_sizes: if told { sizes() } else { Vec::new() },
+        prior_sizes,
         unknowns: unknowns.iter().map(|parameter| parameter.name.clone()).collect(),
         active_constraints: ActiveConstraint::all(
             &statistics.constraints,
@@ -391,6 +404,7 @@ fn fit_rows(
             model,
         ),
         outliers,
+        held_out_outliers,
         influential_rows: None,
         x: end.x,
         registered_x: start,
@@ -443,14 +457,14 @@ fn estimated(
     end: &mut FitEnd,
     statistics: &Statistics,
     noise: Noise,
-) -> Result<(Vec<Estimate>, Collected, Option<QualityFlag>), StageError> {
+) -> Result<(Vec<Estimate>, Collected, Option<Finding>), StageError> {
     let (model, time_measured) = (fitting.model, fitting.measurements.time_measured);
     let mut estimates: Vec<Estimate> =
         model.parameters.iter().map(|own| Estimate::unfitted(own, time_measured)).collect();
     let mut covariance = Collected::new(estimates.len());
     enter((&mut estimates, &mut covariance), &fitting.whole(), end, statistics);
     let mut not_converged =
-        (!end.termination.converged()).then_some(QualityFlag::NotConverged(end.termination));
+        (!end.termination.converged()).then(|| not_converged_finding(end.termination));
     if let Some(stage) = fitting.held_out_stage() {
         let placed: FitEnd = stage.run(&end.x)?.into();
         end.iterations += placed.iterations;
@@ -461,8 +475,11 @@ fn estimated(
             (noise == Noise::Declared).then_some(fitting.noise_model),
         )?;
         enter((&mut estimates, &mut covariance), &stage, &placed, &statistics);
-        let held_out = (!placed.termination.converged())
-            .then_some(QualityFlag::HeldOutNotConverged(placed.termination));
+        let held_out = (!placed.termination.converged()).then(|| {
+            let reason = placed.termination;
+            let text = format!("the bases of held-out sessions: {reason}");
+            Finding::new(FindingCode::HeldOutNotConverged, [reason.as_str().into()], text)
+        });
         not_converged = not_converged.or(held_out);
         end.x = placed.x;
     }
@@ -472,6 +489,18 @@ fn estimated(
         }
     }
     Ok((estimates, covariance, not_converged))
+}
+
+/// Reports the reason for which a fit did not converge.
+fn not_converged_finding(reason: Termination) -> Finding {
+    let text = reason.to_string();
+    let finding = Finding::new(FindingCode::NotConverged, [reason.as_str().into()], text);
+    finding.with_remedy(match reason {
+        Termination::DomainEdge => {
+            "units, signs of joints, or sessions are wrong, or the table's columns".to_owned()
+        }
+        _ => String::new(),
+    })
 }
 
 /// The loss that `[robust]` stands for, on the three coordinates of a position.

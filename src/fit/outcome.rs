@@ -4,6 +4,7 @@ use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::fit::checks::finding::{Finding, FindingCode, Severity};
 use crate::fit::stages::fitting::FitEnd;
 use crate::fit::stages::noise_model::NoiseModel;
 use crate::fit::stages::stage::Stage;
@@ -11,8 +12,8 @@ use crate::fit::uncertainty::covariance::{Collected, Correlations, Covariance};
 use crate::fit::uncertainty::noise::Noise;
 use crate::fit::uncertainty::statistics::Statistics;
 use crate::fit::{
-    ActiveConstraint, Alternation, Caution, Errors, InfluentialRows, OrientationErrors, Outlier,
-    PointSpread, PriorSize, QualityFlag, ShadowPrice, SolverChoice, Strategy, TooFewPoses,
+    ActiveConstraint, Alternation, Errors, InfluentialRows, OrientationErrors, Outlier,
+    PointSpread, PriorSize, ShadowPrice, SolverChoice, Strategy,
 };
 use crate::least_squares::solver::{AtBound, Termination};
 use crate::least_squares::{Identifiability, UnidentifiableCombination};
@@ -62,16 +63,12 @@ pub struct Identification {
     pub solver_reason: Option<&'static str>,
     /// Why it stopped.
     pub termination: Termination,
-    /// Why the fit is not to be trusted, if it is not.
-    pub quality_flag: Option<QualityFlag>,
-    /// Whether the poses are too few to say much without priors.
-    pub too_few_poses: Option<TooFewPoses>,
+    /// Findings of the checks, errors first; a provisional fit is only checked for convergence.
+    pub findings: Vec<Finding>,
     /// Different poses of the arm that were fitted; several targets in one pose make one.
     pub poses: usize,
     /// Whether some pose of the arm shows several targets.
     pub several_targets: bool,
-    /// What to ask about the input.
-    pub cautions: Vec<Caution>,
     /// Steps tried, over all stages.
     pub iterations: u64,
     /// Evaluations of the residual, with derivatives or without, over all stages.
@@ -133,6 +130,9 @@ pub struct Identification {
     pub active_constraints: Vec<ActiveConstraint>,
     /// Identification rows whose residual is too long to be noise, in the order of the rows.
     pub outliers: Vec<Outlier>,
+    /// Held-out rows that are farther from the prediction than its σ allows, in the order of the
+    /// rows.
+    pub held_out_outliers: Vec<Outlier>,
     /// Those that carry what the fit does not explain, if a few do; looked for where
     /// [`crate::fit::Options::with_influential_rows`] asks, but not with a robust loss.
     pub influential_rows: Option<InfluentialRows>,
@@ -148,9 +148,35 @@ pub struct Identification {
 }
 
 impl Identification {
-    /// Whether the fit is to be trusted.
+    /// Returns true if no finding is an error.
     pub fn is_trusted(&self) -> bool {
-        self.quality_flag.is_none()
+        self.first_error().is_none()
+    }
+
+    /// Returns the first error among the findings: the reason for which the fit is not to be
+    /// trusted.
+    pub fn first_error(&self) -> Option<&Finding> {
+        self.findings.iter().find(|finding| finding.severity() == Severity::Error)
+    }
+
+    /// Returns the first finding with a code.
+    pub fn finding(&self, code: FindingCode) -> Option<&Finding> {
+        self.findings.iter().find(|finding| finding.code == code)
+    }
+
+    /// Returns true if a finding has this code.
+    pub fn has(&self, code: FindingCode) -> bool {
+        self.finding(code).is_some()
+    }
+
+    /// Returns the findings that are warnings, without those that reports show in sections of their
+    /// own.
+    pub fn cautions(&self) -> impl Iterator<Item = &Finding> {
+        let has_section =
+            |code| matches!(code, FindingCode::InfluentialRows | FindingCode::UnsteadyPoint);
+        self.findings
+            .iter()
+            .filter(move |own| own.severity() == Severity::Warning && !has_section(own.code))
     }
 
     /// What the identification data can tell about the fitted parameters, at the registered nominal
@@ -160,10 +186,9 @@ impl Identification {
         found.get_or_init(|| Identifiability::of(triangle))
     }
 
-    /// What to ask about the fit, in words: whether priors decide most of it, and its cautions.
+    /// Returns the sentences of [`cautions`](Self::cautions).
     pub fn reasons_to_ask(&self) -> Vec<String> {
-        let few = self.too_few_poses.iter().map(ToString::to_string);
-        few.chain(self.cautions.iter().map(ToString::to_string)).collect()
+        self.cautions().map(ToString::to_string).collect()
     }
 
     /// A parameter by its name: `joint2.stiffness`.

@@ -76,6 +76,7 @@ fn document(problem: &Problem, found: &Identification) -> impl Serialize {
         outliers: list(&found.outliers, outlier),
         misfit_carried_by: found.influential_rows.as_ref().map(influential_rows),
         cautions: found.reasons_to_ask(),
+        findings: &found.findings,
     }
 }
 
@@ -200,7 +201,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
 
 /// Why a fit is not to be trusted, in one line.
 pub fn why_not_trusted(found: &Identification) -> String {
-    match &found.quality_flag {
+    match found.first_error() {
         Some(reason) => format!("the fit is not to be trusted: {reason}"),
         None => "the fit is to be trusted".to_owned(),
     }

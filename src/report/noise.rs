@@ -5,7 +5,7 @@ use std::path::Path;
 use super::document::{Block, first_of, named};
 use super::errors::{brief, noun, rows_in, unit, with_unit};
 use super::quantity::{counted, decimals, mm, number};
-use crate::fit::{Identification, Noise, Outlier, QualityFlag, size_of_kind};
+use crate::fit::{FindingCode, Identification, Noise, Outlier, size_of_kind};
 use crate::problem::Problem;
 
 /// Outliers that fit on a screen.
@@ -28,8 +28,7 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
                 .to_owned()
         }
         (Noise::Declared, Some(_))
-            if found.too_few_poses.is_some()
-                || matches!(found.quality_flag, Some(QualityFlag::TooFewEquations { .. })) =>
+            if found.has(FindingCode::PriorsDecide) || found.has(FindingCode::TooFewEquations) =>
         {
             "There are not enough different poses to judge the declared σ, or the model.".to_owned()
         }

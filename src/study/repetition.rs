@@ -9,7 +9,7 @@ use super::effects::Strengths;
 use super::study::{Cell, Source, Study};
 use super::tally::{Fitted, ParameterScore, Score};
 use crate::fit::{
-    Estimate, Identification, IdentifyError, Options, Placement, QualityFlag, identify,
+    Estimate, FindingCode, Identification, IdentifyError, Options, Placement, identify,
 };
 use crate::measurement::{Dataset, Labels, Measurements, Split};
 use crate::model::Model;
@@ -154,31 +154,25 @@ pub fn table(rows: &[Row]) -> Measurements {
     }
 }
 
-/// Scores a fit against the truth; a fit with a quality flag counts as failed.
+/// Scores a fit against the truth; a fit with an error among its findings counts as failed.
 fn score(study: &Study, data: &Data, identification: &Identification) -> Score {
-    match &identification.quality_flag {
-        Some(QualityFlag::TooFewEquations { .. }) => return Score::Failed("too-few-equations"),
-        Some(QualityFlag::NotConverged(_) | QualityFlag::HeldOutNotConverged(_)) => {
-            return Score::Failed("not-converged");
-        }
-        Some(QualityFlag::Misses { .. }) if !identification.termination.converged() => {
-            return Score::Failed("not-converged");
-        }
-        Some(QualityFlag::Misses { .. } | QualityFlag::NoBetter { .. }) => {
-            return Score::Failed("misses-the-data");
-        }
-        Some(QualityFlag::BeyondPrior { .. }) => return Score::Failed("beyond-its-prior"),
-        Some(QualityFlag::BeyondArm { .. }) => return Score::Failed("beyond-the-arm"),
-        Some(QualityFlag::OtherSize { .. }) => return Score::Failed("another-size"),
-        Some(QualityFlag::Undetermined { .. }) => return Score::Failed("undetermined"),
-        Some(
-            QualityFlag::HeldOutCopied
-            | QualityFlag::HeldOutMisses { .. }
-            | QualityFlag::HeldOutWorse { .. },
-        ) => {
-            return Score::Failed("misses-held-out-poses");
-        }
-        None => {}
+    if let Some(error) = identification.first_error() {
+        return Score::Failed(match error.code {
+            FindingCode::TooFewEquations => "too-few-equations",
+            FindingCode::NotConverged | FindingCode::HeldOutNotConverged => "not-converged",
+            FindingCode::MissesMeasurements if !identification.termination.converged() => {
+                "not-converged"
+            }
+            FindingCode::MissesMeasurements | FindingCode::NoBetterThanNominal => "misses-the-data",
+            FindingCode::BeyondPrior => "beyond-its-prior",
+            FindingCode::BeyondArmSize => "beyond-the-arm",
+            FindingCode::OtherSize => "another-size",
+            FindingCode::BaseNotDetermined => "undetermined",
+            FindingCode::HeldOutCopied | FindingCode::HeldOutMissed | FindingCode::HeldOutWorse => {
+                "misses-held-out-poses"
+            }
+            other => other.entry().code,
+        });
     }
     let held_out = &identification.fitted.held_out;
     if !held_out.rms.norm.is_finite() {

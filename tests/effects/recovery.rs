@@ -19,7 +19,7 @@ const NOISE: f64 = 2e-5;
 /// Checks the estimates of effects: within 4 σ of the truth, and better known than before.
 fn check(problem: &Problem, rows: &Measurements, truth: &DVector<f64>, found: &Identification) {
     let model = model_of(problem, rows);
-    assert!(found.is_trusted(), "{:?}", found.quality_flag);
+    assert!(found.is_trusted(), "{:?}", found.findings);
     for k in of_effects(&model) {
         let (parameter, estimate) = (&model.parameters[k], &found.estimates[k]);
         let error = estimate.std_error.unwrap();

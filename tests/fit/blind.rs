@@ -2,7 +2,7 @@
 
 use crate::common::arms::{measured as read, parse, path, with_parameters};
 use crate::common::made::{at_random, divided, labels, measure, model_of, split_at};
-use flexcal::fit::{Estimate, Identification, Options, QualityFlag, Strategy, identify};
+use flexcal::fit::{Estimate, FindingCode, Identification, Options, Strategy, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use nalgebra::DVector;
@@ -96,9 +96,10 @@ fn a_session_with_too_few_poses_is_not_trusted() {
     let mut data = measured(&problem, &[("joint3.a", 0.001)]);
     data.measurements.session = labels((0..90).map(|row| if row == 75 { "B" } else { "A" }));
     let found = identify(&problem, &data, &Options::default()).unwrap();
-    let expected =
-        QualityFlag::TooFewEquations { of: "base[B]".to_owned(), coordinates: 3, unknowns: 6 };
-    assert_eq!(found.quality_flag, Some(expected));
+    let few = found.first_error().unwrap();
+    assert_eq!(few.code, FindingCode::TooFewEquations);
+    assert_eq!(few.word("of"), Some("base[B]"));
+    assert_eq!((few.number("coordinates"), few.number("parameters")), (Some(3.0), Some(6.0)));
 }
 
 #[test]
@@ -109,11 +110,7 @@ fn an_arm_that_misses_is_not_trusted() {
         *q = -*q;
     }
     let found = identify(&problem, &data, &Options::default()).unwrap();
-    assert!(
-        matches!(found.quality_flag, Some(QualityFlag::Misses { .. })),
-        "{:?}",
-        found.quality_flag
-    );
+    assert!(found.has(FindingCode::MissesMeasurements), "{:?}", found.findings);
 }
 
 #[test]
@@ -124,7 +121,7 @@ fn a_mirrored_arm_is_not_trusted() {
         position.swap_rows(0, 1);
     }
     let found = identify(&problem, &data, &Options::default()).unwrap();
-    assert!(found.quality_flag.is_some());
+    assert!(found.first_error().is_some());
 }
 
 #[test]
@@ -136,14 +133,17 @@ fn a_wave_may_go_far_beyond_its_prior_and_an_angle_of_the_arm_may_not() {
     let find = |rules: &str, truth: &str, size: f64| {
         let problem = declared(rules);
         let data = measured(&problem, &[(truth, size)]);
-        identify(&problem, &data, &Options::default()).unwrap().quality_flag
+        identify(&problem, &data, &Options::default())
+            .unwrap()
+            .first_error()
+            .map(|error| error.code)
     };
     assert_eq!(
         find("'joint-harmonic.*' = { sigma_deg = 0.01 }", "joint-harmonic[3].sin2", 0.02),
         None
     );
     let angle = find("'joint3.alpha' = { sigma_deg = 0.01 }", "joint3.alpha", 0.02);
-    assert!(matches!(angle, Some(QualityFlag::BeyondPrior { .. })), "{angle:?}");
+    assert_eq!(angle, Some(FindingCode::BeyondPrior));
 }
 
 #[test]
@@ -195,9 +195,10 @@ fn base_and_tool_of_a_held_out_session_count_together() {
     let mut data = measured(&problem, &[]);
     data.measurements.session = labels((0..90).map(|row| if row >= 88 { "B" } else { "A" }));
     let found = identify(&problem, &data, &Options::default()).unwrap();
-    let expected =
-        QualityFlag::TooFewEquations { of: "base[B]".to_owned(), coordinates: 6, unknowns: 9 };
-    assert_eq!(found.quality_flag, Some(expected));
+    let few = found.first_error().unwrap();
+    assert_eq!(few.code, FindingCode::TooFewEquations);
+    assert_eq!(few.word("of"), Some("base[B]"));
+    assert_eq!((few.number("coordinates"), few.number("parameters")), (Some(6.0), Some(9.0)));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use crate::common::arms::parse;
 use crate::common::made::{at_random, divided, draw, labels, measure, model_of};
-use flexcal::fit::{Caution, Identification, Misreading, Options, QualityFlag, identify};
+use flexcal::fit::{FindingCode, Identification, Misreading, Options, identify};
 use flexcal::measurement::{CommandColumn, Dataset};
 use flexcal::problem::{Problem, Robust, RobustLoss};
 use flexcal::quantity::Unit;
@@ -49,41 +49,34 @@ fn held_out_rows_are_judged() {
     let problem = arm(PRIORS);
     let clean = measured(&problem, 1);
     let found = fit(&problem, &clean);
-    assert!(
-        found.is_trusted() && found.cautions.is_empty(),
-        "{:?} {:?}",
-        found.quality_flag,
-        found.cautions
-    );
+    assert!(found.is_trusted() && found.cautions().next().is_none(), "{:?}", found.findings);
     let with = |edit: &dyn Fn(&mut Dataset)| {
         let mut data = clean.clone();
         edit(&mut data);
         fit(&problem, &data)
     };
     let shifted = with(&|data| data.measurements.positions[60..].rotate_left(1));
-    assert!(
-        matches!(shifted.quality_flag, Some(QualityFlag::HeldOutMisses { .. })),
-        "{:?}",
-        shifted.quality_flag
-    );
+    assert!(shifted.has(FindingCode::HeldOutMissed), "{:?}", shifted.findings);
     let copied = with(&|data| {
         let rows: Vec<usize> = (0..60).chain(0..30).collect();
         data.measurements = data.measurements.select(&rows);
     });
-    assert_eq!(copied.quality_flag, Some(QualityFlag::HeldOutCopied));
+    assert!(copied.has(FindingCode::HeldOutCopied));
     let some = with(&|data| {
         let rows: Vec<usize> = (0..60).chain(0..10).chain(70..90).collect();
         data.measurements = data.measurements.select(&rows);
     });
     assert!(some.is_trusted());
-    assert_eq!(some.cautions, [Caution::HeldOutCopies { copies: 10, of: 30 }]);
+    let [repeated] = some.findings.as_slice() else { panic!("{:?}", some.findings) };
+    assert_eq!(repeated.code, FindingCode::HeldOutRepeated);
+    assert_eq!((repeated.number("rows"), repeated.number("of")), (Some(10.0), Some(30.0)));
     for by in [1e-3, 0.3, 1e147] {
         let wrong = with(&|data| data.measurements.positions[77].y += by);
-        let [Caution::HeldOutOutliers { rows, of: 30 }] = wrong.cautions.as_slice() else {
-            panic!("{by}: {:?}", wrong.cautions)
-        };
+        let [outliers] = wrong.findings.as_slice() else { panic!("{by}: {:?}", wrong.findings) };
+        assert_eq!(outliers.code, FindingCode::HeldOutOutliers);
+        let rows = &wrong.held_out_outliers;
         assert!(rows.len() == 1 && rows[0].row == 77 && wrong.is_trusted(), "{by}: {rows:?}");
-        let words = wrong.cautions[0].to_string();
+        let words = outliers.to_string();
         assert!(
             words.contains("1 of 30 held-out poses is too far off") && words.len() < 200,
             "{words}"
@@ -118,11 +111,7 @@ pub fn worse_than_none() -> (String, Dataset) {
 fn a_fit_that_is_worse_than_none_where_it_was_not_made_is_not_trusted() {
     let (text, data) = worse_than_none();
     let found = fit(&parse(&text), &data);
-    assert!(
-        matches!(found.quality_flag, Some(QualityFlag::HeldOutWorse { .. })),
-        "{:?}",
-        found.quality_flag
-    );
+    assert!(found.has(FindingCode::HeldOutWorse), "{:?}", found.findings);
     assert!(found.fitted.held_out.rms.norm > 1.5 * found.registered.held_out.rms.norm);
 }
 
@@ -136,15 +125,20 @@ fn a_session_needs_points_that_tie_its_base_down() {
         data.measurements.session = labels((0..90).map(word));
         // Each session has a tool of its own: that of B is not fitted here.
         data.measurements.target = Some(labels((0..90).map(|_| "t")));
-        fit(&problem, &data).quality_flag
+        let found = fit(&problem, &data);
+        found
+            .first_error()
+            .map(|error| (error.code, error.word("of").map(str::to_owned), error.to_string()))
     };
-    let few =
-        QualityFlag::TooFewEquations { of: "base[B]".to_owned(), coordinates: 6, unknowns: 6 };
-    assert_eq!(with(&[70, 71]), Some(few));
+    let of_b = |code, found: Option<(FindingCode, Option<String>, String)>| {
+        let (found, of, words) = found.unwrap();
+        assert_eq!((found, of.as_deref()), (code, Some("base[B]")));
+        words
+    };
+    of_b(FindingCode::TooFewEquations, with(&[70, 71]));
     assert_eq!(with(&[70, 71, 72]), None);
-    let open = QualityFlag::Undetermined { of: "base[B]".to_owned(), poses: 2 };
-    assert_eq!(with(&[10, 11]), Some(open.clone()));
-    assert!(open.to_string().contains("leaves a turn"), "{open}");
+    let open = of_b(FindingCode::BaseNotDetermined, with(&[10, 11]));
+    assert!(open.contains("leaves a turn"), "{open}");
     assert_eq!(with(&[10, 11, 12]), None);
 }
 
@@ -153,12 +147,7 @@ fn gross_mistakes_are_asked_about_without_priors_too() {
     let problem = arm(FREE);
     let clean = measured(&problem, 3);
     let found = fit(&problem, &clean);
-    assert!(
-        found.is_trusted() && found.cautions.is_empty(),
-        "{:?} {:?}",
-        found.quality_flag,
-        found.cautions
-    );
+    assert!(found.is_trusted() && found.cautions().next().is_none(), "{:?}", found.findings);
     let edited = |edit: &dyn Fn(&mut Vector3<f64>)| {
         let mut data = clean.clone();
         data.measurements.positions.iter_mut().for_each(edit);
@@ -169,12 +158,9 @@ fn gross_mistakes_are_asked_about_without_priors_too() {
     {
         let found = edited(&|position| *position *= factor);
         assert!(
-            matches!(
-                found.quality_flag,
-                Some(QualityFlag::OtherSize { .. } | QualityFlag::Misses { .. })
-            ),
+            found.has(FindingCode::OtherSize) || found.has(FindingCode::MissesMeasurements),
             "{what}: {:?}",
-            found.quality_flag
+            found.findings
         );
     }
     // The same numbers read by the other convention: Rz(θ) Tz(d) Tx(a) Rx(α).
@@ -189,8 +175,8 @@ fn gross_mistakes_are_asked_about_without_priors_too() {
         (standard.joints[joint].alpha, standard.joints[joint].a) = before;
     }
     let found = fit(&standard, &clean);
-    let asked = found.cautions.iter().any(|caution| matches!(caution, Caution::FarOff { .. }));
-    assert!(asked || !found.is_trusted(), "{:?}", found.cautions);
+    let asked = found.has(FindingCode::NominalFarOff);
+    assert!(asked || !found.is_trusted(), "{:?}", found.findings);
 }
 
 #[test]
@@ -200,11 +186,10 @@ fn what_may_have_been_misread_is_said() {
     let with = |misread: &dyn Fn(&mut Problem, &mut Dataset)| {
         let (mut problem, mut data) = (problem.clone(), clean.clone());
         misread(&mut problem, &mut data);
-        let far = fit(&problem, &data).cautions.into_iter().find_map(|own| match own {
-            Caution::FarOff { misreadings, .. } => Some(misreadings),
-            _ => None,
-        });
-        far.expect("far off")
+        let found = fit(&problem, &data);
+        let far = found.finding(FindingCode::NominalFarOff).unwrap();
+        let explanations = far.value("explanations").and_then(|list| list.as_array()).unwrap();
+        explanations.iter().map(|word| word.as_str().unwrap().to_owned()).collect::<Vec<_>>()
     };
     let scaled = |factor: f64| {
         move |_: &mut Problem, data: &mut Dataset| {
@@ -217,24 +202,24 @@ fn what_may_have_been_misread_is_said() {
         }
     };
     let degree = std::f64::consts::PI / 180.0;
-    assert_eq!(with(&scaled(degree)), [Misreading::Radians]);
-    assert_eq!(with(&scaled(1.0 / degree)), [Misreading::Degrees]);
-    assert_eq!(with(&sized(1e3)), [Misreading::Millimetres]);
-    assert_eq!(with(&sized(1e-3)), [Misreading::Metres]);
+    assert_eq!(with(&scaled(degree)), [Misreading::Radians.to_string()]);
+    assert_eq!(with(&scaled(1.0 / degree)), [Misreading::Degrees.to_string()]);
+    assert_eq!(with(&sized(1e3)), [Misreading::Millimetres.to_string()]);
+    assert_eq!(with(&sized(1e-3)), [Misreading::Metres.to_string()]);
     let mirrored =
         with(&|_, data| data.measurements.positions.iter_mut().for_each(|own| own.swap_rows(0, 2)));
-    assert_eq!(mirrored, [Misreading::Mirrored]);
+    assert_eq!(mirrored, [Misreading::Mirrored.to_string()]);
     let reversed = with(&|_, data| {
         data.measurements.configurations.iter_mut().skip(2).step_by(5).for_each(|q| *q = -*q)
     });
-    assert_eq!(reversed, [Misreading::Reversed { joint: 3 }]);
+    assert_eq!(reversed, [Misreading::Reversed { joint: 3 }.to_string()]);
     // A tool that is free goes where it belongs, far beyond its prior.
     let held = arm("'joint*' = { sigma_deg = 0.3, sigma_mm = 2 }\n'base.*' = { free = true }");
     let far = with(&|problem, _| {
         *problem = held.clone();
         problem.tool.target *= 1e3;
     });
-    assert_eq!(far, [Misreading::TargetInMillimetres]);
+    assert_eq!(far, [Misreading::TargetInMillimetres.to_string()]);
     // Lengths of the arm in millimetres: that the angles leave less than they are explains it no
     // better.
     let long = |problem: &mut Problem, data: &mut Dataset, unit: f64| {
@@ -245,28 +230,28 @@ fn what_may_have_been_misread_is_said() {
     for unit in [degree, 1.0] {
         assert_eq!(
             with(&|problem, data| long(problem, data, unit)),
-            [Misreading::ArmInMillimetres]
+            [Misreading::ArmInMillimetres.to_string()]
         );
     }
     let all = with(&|problem, _| {
         let lengths = problem.joints.iter_mut().flat_map(|own| [&mut own.a, &mut own.d]);
         lengths.chain(&mut problem.tool.target).for_each(|length| *length *= 1e3);
     });
-    assert_eq!(all, [Misreading::ArmInMillimetres]);
+    assert_eq!(all, [Misreading::ArmInMillimetres.to_string()]);
     // What the columns are declared as they were not misread for.
     let impossible = with(&|problem, data| {
         scaled(1.0 / degree)(problem, data);
         long(&mut problem.clone(), data, degree);
     });
-    assert!(!impossible.contains(&Misreading::Degrees), "{impossible:?}");
+    assert!(!impossible.contains(&Misreading::Degrees.to_string()), "{impossible:?}");
     let metres = with(&|problem, data| {
         sized(1e-3)(problem, data);
         data.measurements.position_unit = Some(1.0);
     });
-    assert!(!metres.contains(&Misreading::Metres), "{metres:?}");
+    assert!(!metres.contains(&Misreading::Metres.to_string()), "{metres:?}");
     // What none of them explains.
     let shuffled = with(&|_, data| data.measurements.positions.rotate_left(1));
-    assert_eq!(shuffled, []);
+    assert!(shuffled.is_empty());
 }
 
 #[test]
@@ -276,13 +261,13 @@ fn what_a_robust_loss_sets_aside_is_no_reason_for_distrust() {
     for row in [3, 20, 41] {
         data.measurements.positions[row].x += 2.0;
     }
-    assert!(matches!(fit(&problem, &data).quality_flag, Some(QualityFlag::Misses { .. })));
+    assert!(fit(&problem, &data).has(FindingCode::MissesMeasurements));
     problem.robust = Some(Robust { loss: RobustLoss::Huber, threshold: None });
     let found = fit(&problem, &data);
     assert!(
         found.is_trusted() && found.outliers.len() == 3,
         "{:?} {:?}",
-        found.quality_flag,
+        found.findings,
         found.outliers
     );
     assert!(found.fitted.held_out.rms.norm < 3.0 * SIGMA);
@@ -305,8 +290,10 @@ fn targets_of_one_pose_are_points_not_poses() {
     let found = fit(&problem, &divided(21, &rows));
     assert!(found.poses == 7 && found.several_targets);
     assert_eq!(model.parameters.len(), 40);
-    assert_eq!(found.too_few_poses.map(|few| few.coordinates), None);
+    assert!(!found.has(FindingCode::PriorsDecide));
     assert!(estimate_text(&problem, &found).contains("from 21 points in 7 different poses"));
-    let fewer = fit(&problem, &divided(18, &rows)).too_few_poses.unwrap();
-    assert_eq!((fewer.poses, fewer.coordinates, fewer.parameters), (6, 39, 40));
+    let found = fit(&problem, &divided(18, &rows));
+    let fewer = found.finding(FindingCode::PriorsDecide).unwrap();
+    let numbers = ["poses", "coordinates", "parameters"].map(|name| fewer.number(name).unwrap());
+    assert_eq!(numbers, [6.0, 39.0, 40.0]);
 }

@@ -10,6 +10,7 @@ mod blind;
 mod constraints;
 mod coverage;
 mod dataset;
+mod findings;
 mod identified;
 mod judged;
 mod orientation;

@@ -198,7 +198,7 @@ fn base_and_tool_are_found_from_poses_without_a_guess() {
         .retain(|rule| !rule.pattern.starts_with("tool") && !rule.pattern.starts_with("base"));
     problem.parameters.extend(rules.parameters);
     let found = fit(&problem, &data);
-    assert!(found.is_trusted(), "{:?}", found.quality_flag);
+    assert!(found.is_trusted(), "{:?}", found.findings);
     assert!(
         found.reduced_chi2.is_some_and(|chi2| (0.6..1.5).contains(&chi2)),
         "{:?}",

@@ -27,7 +27,7 @@ fn fit_by(
 ) -> Identification {
     let options = Options::default().with_strategy(strategy);
     let found = identify(problem, &Dataset::new(rows.clone(), split.clone()), &options).unwrap();
-    assert!(found.is_trusted(), "{:?} {:?}", found.quality_flag, found.termination);
+    assert!(found.is_trusted(), "{:?} {:?}", found.findings, found.termination);
     found
 }
 

@@ -3,7 +3,7 @@
 
 use crate::common::arms::parse;
 use crate::common::made::{at_random, divided, draw, measure, model_of};
-use flexcal::fit::{Identification, Options, QualityFlag, SolverChoice, identify};
+use flexcal::fit::{FindingCode, Identification, Options, SolverChoice, identify};
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use flexcal::quantity::Unit;
@@ -67,7 +67,7 @@ fn what_is_seen_too_weakly_is_held_and_named() {
             assert!(
                 found.is_trusted() && far(&found).is_empty(),
                 "{at}: {:?} {:?}",
-                found.quality_flag,
+                found.findings,
                 far(&found)
             );
             assert!(
@@ -111,7 +111,10 @@ fn no_trusted_parameter_leaves_the_arm() {
         position.z += 3.0;
     }
     let found = identify(&problem, &data, &Options::default()).unwrap();
-    let flag = found.quality_flag.unwrap();
-    assert!(matches!(&flag, QualityFlag::BeyondArm { name, .. } if name == "joint1.d"), "{flag:?}");
-    assert!(flag.to_string().contains("times the arm's own size"), "{flag}");
+    let error = found.first_error().unwrap();
+    assert_eq!(
+        (error.code, error.word("parameter")),
+        (FindingCode::BeyondArmSize, Some("joint1.d"))
+    );
+    assert!(error.to_string().contains("times the arm's own size"), "{error}");
 }

@@ -41,7 +41,7 @@ fn the_truth_of_both_arms_comes_back_within_its_standard_errors() {
     for seed in 0..SEEDS {
         let simulation = simulate(&problem, &truth, 160, seed).unwrap();
         let found = identify(&problem, &dataset(&simulation), &Options::default()).unwrap();
-        assert!(found.is_trusted(), "{:?}", found.quality_flag);
+        assert!(found.is_trusted(), "{:?}", found.findings);
         chi2.push(found.reduced_chi2.unwrap());
         for estimate in &found.estimates {
             let Some(own) = simulation.parameters.iter().find(|own| own.name == estimate.name)
@@ -205,7 +205,7 @@ fn each_target_of_a_tree_meets_everything_that_is_measured_against() {
     assert!(
         found.is_trusted() && (chi2 - 1.0).abs() < 0.25,
         "{:?}, reduced χ² {chi2}",
-        found.quality_flag
+        found.findings
     );
 }
 

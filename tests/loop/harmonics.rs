@@ -115,7 +115,7 @@ fn many_waves_fade_out_where_nothing_was_measured() {
     assert!(after < 0.2 * before);
     let (before, after) = errors(&beyond);
     assert!(after < before);
-    assert!(closure.after.is_trusted(), "{:?}", closure.after.quality_flag);
+    assert!(closure.after.is_trusted(), "{:?}", closure.after.findings);
     assert!(closure.effects.iter().all(|found| found.p_value < 0.05), "{:?}", closure.effects);
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexcal::fit::{Caution, Options, QualityFlag, identify};
+use flexcal::fit::{FindingCode, Options, identify};
 use flexcal::least_squares::UnidentifiableCombination;
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
@@ -121,7 +121,7 @@ fn what_contacts_cannot_tell_is_named() {
         &Options::default(),
     )
     .unwrap();
-    assert!(found.is_trusted(), "{:?}", found.quality_flag);
+    assert!(found.is_trusted(), "{:?}", found.findings);
     for name in ["base.x", "base.y", "base.z", "base.rx", "base.ry", "base.rz"] {
         assert_eq!(found.estimate(name).unwrap().std_error, None, "{name}");
     }
@@ -204,16 +204,17 @@ fn exchanged_names_are_not_trusted() {
         )
         .unwrap();
         if exchanged.is_some() {
-            let flag = found.quality_flag.as_ref();
-            assert!(
-                matches!(flag, Some(QualityFlag::Misses { kind: of, .. }) if *of == kind),
-                "{kind}: {flag:?}"
+            let error = found.first_error().unwrap();
+            assert_eq!(
+                (error.code, error.word("kind")),
+                (FindingCode::MissesMeasurements, Some(kind)),
+                "{error:?}"
             );
             continue;
         }
-        assert!(found.is_trusted(), "{:?}", found.quality_flag);
-        let asked = found.cautions.iter().any(|caution| matches!(caution, Caution::FarOff { .. }));
-        assert!(!asked, "{:?}", found.cautions);
+        assert!(found.is_trusted(), "{:?}", found.findings);
+        let asked = found.has(FindingCode::NominalFarOff);
+        assert!(!asked, "{:?}", found.findings);
     }
 }
 

@@ -44,7 +44,7 @@ fn each_kind_and_all_together_find_the_arm() {
             truth.extend(fixtures());
             let data = read(&problem, &Bench::new(arm, 100 + seed).table(kinds, 150 / kinds.len()));
             let found = identify(&problem, &data, &Options::default()).unwrap();
-            assert!(found.is_trusted(), "{kinds:?}, seed {seed}: {:?}", found.quality_flag);
+            assert!(found.is_trusted(), "{kinds:?}, seed {seed}: {:?}", found.findings);
             let chi2 = found.reduced_chi2.unwrap();
             assert!((0.6..1.5).contains(&chi2), "{kinds:?}, seed {seed}: {chi2}");
             all.extend(deviations(&found, &truth));
@@ -86,7 +86,7 @@ fn coverage_of_each_kind() {
             let data =
                 read(&problem, &Bench::new(arm, 2000 + seed).table(kinds, 150 / kinds.len()));
             let found = identify(&problem, &data, &Options::default()).unwrap();
-            assert!(found.is_trusted(), "{kinds:?}, seed {seed}: {:?}", found.quality_flag);
+            assert!(found.is_trusted(), "{kinds:?}, seed {seed}: {:?}", found.findings);
             all.extend(deviations(&found, &truth).into_iter().map(|own| own.1.abs()));
             chi2.extend(found.reduced_chi2);
         }
@@ -127,7 +127,7 @@ fn a_point_of_held_out_rows_alone_is_found_on_them() {
     let found =
         identify(&problem, &read(&problem, &(marked.join("\n") + "\n")), &Options::default())
             .unwrap();
-    assert!(found.is_trusted(), "{:?}", found.quality_flag);
+    assert!(found.is_trusted(), "{:?}", found.findings);
     assert_eq!((found.fitted.held_out.n, found.fitted.held_out.kind), (30, "point"));
     assert!(found.fitted.held_out.rms.norm < 0.3e-3, "{:?}", found.fitted.held_out);
     let top = found.spreads.iter().find(|(before, ..)| before.point == "top").unwrap();
@@ -191,7 +191,7 @@ fn planes_of_either_side_are_found() {
             }
             let found = identify(&problem, &read(&problem, &table), &Options::default()).unwrap();
             let what = format!("{height} m, up {up}, step {step}, declared {declared}");
-            assert!(found.is_trusted(), "{what}: {:?}", found.quality_flag);
+            assert!(found.is_trusted(), "{what}: {:?}", found.findings);
             let value =
                 |field: &str| found.estimate(&format!("surface[table].{field}")).unwrap().estimate;
             let lean = [value("rx"), value("ry")];

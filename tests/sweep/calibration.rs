@@ -80,7 +80,7 @@ impl Set {
                 );
             }
         }
-        if let Some(flag) = &judged.closure.after.quality_flag {
+        if let Some(flag) = judged.closure.after.first_error() {
             println!("  {seed} is not to be trusted: {flag}");
         }
         let true_law = |effect: &Effect| truth.iter().any(|own| is_the_same(effect, own));

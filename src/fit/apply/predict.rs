@@ -4,7 +4,6 @@ use std::collections::HashSet;
 
 use nalgebra::{DVector, Vector3};
 
-use crate::fit::checks::cautions::Caution;
 use crate::fit::identification::IdentifyError;
 use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
@@ -35,8 +34,8 @@ pub struct Residual {
     /// The same over 1 σ about an axis \[1\].
     pub whitened_orientation: Option<Vector3<f64>>,
     /// Whether the row is too far off to be noise: one of the fit's
-    /// [outliers](Identification::outliers), or of the held-out rows that its
-    /// [cautions](Identification::cautions) name.
+    /// [outliers](Identification::outliers) or
+    /// [held-out outliers](Identification::held_out_outliers).
     pub outlier: bool,
 }
 
@@ -97,12 +96,12 @@ impl Identification {
         let turns = self.turns(problem, &model, measurements)?;
         let turn_sigma = problem.data.orientation_sigma.unwrap_or(f64::NAN);
         let sigma = |row: usize| measurements.sigma_of(row).unwrap_or(self.sigma);
-        let held_out = self.cautions.iter().flat_map(|caution| match caution {
-            Caution::HeldOutOutliers { rows, .. } => rows.as_slice(),
-            _ => &[],
-        });
-        let outliers: HashSet<usize> =
-            self.outliers.iter().chain(held_out).map(|outlier| outlier.row).collect();
+        let outliers: HashSet<usize> = self
+            .outliers
+            .iter()
+            .chain(&self.held_out_outliers)
+            .map(|outlier| outlier.row)
+            .collect();
         let x = self.vector(&model)?;
         let (fixtures, bases) = (model.fixtures(x.as_slice()), model.base_frames(x.as_slice()));
         let residual = |(row, position): (usize, Vector3<f64>)| Residual {

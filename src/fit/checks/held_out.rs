@@ -6,20 +6,20 @@ use std::collections::HashSet;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
-use crate::fit::Errors;
-use crate::fit::checks::kind::Kind;
-use crate::fit::checks::outliers::Outlier;
-use crate::fit::checks::quality::{BEYOND_NOISE, LEAST_SPREAD, MISSES, QualityFlag};
+use super::checked_fit::{Check, CheckedFit};
+use super::finding::{Finding, FindingCode};
+use super::misfit::{BEYOND_NOISE, MAX_MISS, MIN_SPREAD};
+use super::outliers::{Outlier, places};
+use super::row_kind::{RowKind, rows as noun, size};
 use crate::fit::stages::fitting::Fitting;
 use crate::fit::uncertainty::residual_lengths::{chances, scatter};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 use crate::measurement::Measurements;
 use crate::numeric::median;
 
-/// A fit is worse than none if its error on held-out poses is this many times that of the
-/// registered nominal arm …
+/// Ratio of the errors on held-out rows, fitted over nominal, from which on a fit is worse than none …
 const WORSE: f64 = 1.5;
-/// … and this many times the noise.
+/// … where the fitted error is also this multiple of the noise.
 const ABOVE_NOISE: f64 = 5.0;
 
 /// Held-out rows whose errors of position are too long for the fit's σ and its own uncertainty
@@ -80,11 +80,7 @@ pub(in crate::fit) fn outliers(
 
 /// Number of held-out rows that are identification rows again: configuration, position and session
 /// are the same to the bit.
-pub(in crate::fit) fn copies(
-    measurements: &Measurements,
-    identification: &[usize],
-    held_out: &[usize],
-) -> usize {
+fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usize]) -> usize {
     let key = |row: usize| -> Vec<u64> {
         let values =
             measurements.configuration(row).iter().chain(measurements.positions[row].iter());
@@ -99,35 +95,126 @@ pub(in crate::fit) fn copies(
     held_out.iter().filter(|&&row| known.contains(&key(row))).count()
 }
 
-/// Whether held-out poses contradict the fit: most are missed as if they were of another arm, or
-/// they are met worse than by the registered nominal arm.
-///
-/// Rows of each of the identified `kinds` are judged by themselves; worse than the nominal arm is
-/// asked of those that errors are told of.
-pub(in crate::fit) fn contradict(
-    fitting: &Fitting,
-    x: &DVector<f64>,
-    (registered, fitted): (&Errors, &Errors),
-    kinds: &[Kind],
-) -> Option<QualityFlag> {
-    let errors = fitting.position_errors(&fitting.split.held_out, x);
-    let missed = |own: &Kind| {
-        let kind = own.observation.kind();
-        let rows = fitting.split.held_out.iter().zip(&errors);
-        let lengths =
-            rows.filter(|(row, _)| fitting.measurements.observation(**row).kind() == kind);
-        let lengths = lengths.map(|(_, error)| error.norm()).filter(|length| length.is_finite());
-        let (median, spread) = (median(lengths).unwrap_or(0.0), own.spread);
-        let least = own.sigma.0.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
-        (spread > LEAST_SPREAD && median > MISSES * spread && median > least)
-            .then_some(QualityFlag::HeldOutMisses { kind, median, spread })
-    };
-    let worse = || {
-        let (before, after) = (registered.held_out.rms.norm, fitted.held_out.rms.norm);
-        let own = kinds.iter().find(|own| own.observation.kind() == fitted.held_out.kind)?;
-        let noise = own.observation.root() * own.sigma.1;
-        (after > WORSE * before && after > ABOVE_NOISE * noise)
-            .then_some(QualityFlag::HeldOutWorse { kind: fitted.held_out.kind, before, after })
-    };
-    kinds.iter().find_map(missed).or_else(worse)
+/// Number of held-out rows that a text names.
+const MAX_NAMED_ROWS: usize = 5;
+
+/// Returns the number of held-out rows that are identification rows again.
+fn copied(fit: &CheckedFit) -> usize {
+    let Fitting { measurements, split, .. } = fit.fitting;
+    copies(measurements, &split.identification, &split.held_out)
+}
+
+/// Checks that not every held-out row is an identification row again.
+pub(super) struct NotAllCopied;
+
+impl Check for NotAllCopied {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let rows = fit.fitting.split.held_out.len();
+        if rows == 0 || copied(fit) < rows {
+            return Vec::new();
+        }
+        let text = "all held-out rows are identification rows again: their errors judge nothing"
+            .to_owned();
+        vec![Finding::new(FindingCode::HeldOutCopied, [rows.into()], text)]
+    }
+}
+
+/// Checks that few held-out rows are identification rows again.
+pub(super) struct NotRepeated;
+
+impl Check for NotRepeated {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let (rows, of) = (copied(fit), fit.fitting.split.held_out.len());
+        if rows == 0 || rows == of {
+            return Vec::new();
+        }
+        let text = format!(
+            "{rows} of {of} held-out rows are identification rows again: they judge nothing"
+        );
+        let numbers = [rows.into(), of.into()];
+        vec![Finding::new(FindingCode::HeldOutRepeated, numbers, text)]
+    }
+}
+
+/// Checks that most held-out rows of each kind are near the prediction.
+pub(super) struct HeldOutReached;
+
+impl Check for HeldOutReached {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let fitting = fit.fitting;
+        let errors = fitting.position_errors(&fitting.split.held_out, &fit.end.x);
+        let of_kind = |row_kind: RowKind| {
+            let RowKind { observation, spread, declared_sigma, .. } = row_kind;
+            let kind = observation.kind();
+            let rows = fitting.split.held_out.iter().zip(&errors);
+            let lengths = rows
+                .filter(|(row, _)| fitting.measurements.observation(**row).kind() == kind)
+                .map(|(_, error)| error.norm());
+            let median = median(lengths.filter(|length| length.is_finite())).unwrap_or(0.0);
+            let noise = declared_sigma.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
+            let text = format!(
+                "half of the held-out {} are missed by more than {}, {:.0} % of the spread of the fitted ones",
+                noun(kind),
+                size(kind, median, 1),
+                100.0 * median / spread
+            );
+            let numbers = [kind.into(), median.into(), spread.into()];
+            (spread > MIN_SPREAD && median > MAX_MISS * spread && median > noise)
+                .then(|| Finding::new(FindingCode::HeldOutMissed, numbers, text))
+        };
+        fit.kinds().into_iter().filter_map(of_kind).collect()
+    }
+}
+
+/// Checks that held-out rows are not met worse than by the registered nominal arm.
+pub(super) struct BetterThanNominal;
+
+impl Check for BetterThanNominal {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let kind = fit.fitted.held_out.kind;
+        let (before, after) = (fit.registered.held_out.rms.norm, fit.fitted.held_out.rms.norm);
+        let row_kind = fit.kinds().into_iter().find(|own| own.observation.kind() == kind);
+        let Some(RowKind { observation, taken_sigma, .. }) = row_kind else { return Vec::new() };
+        let noise = observation.root() * taken_sigma;
+        if !(after > WORSE * before && after > ABOVE_NOISE * noise) {
+            return Vec::new();
+        }
+        let text = format!(
+            "held-out {} are met worse than by the nominal arm ({} rms before, {} after)",
+            noun(kind),
+            size(kind, before, 3),
+            size(kind, after, 3)
+        );
+        let numbers = [kind.into(), before.into(), after.into()];
+        vec![Finding::new(FindingCode::HeldOutWorse, numbers, text)]
+    }
+}
+
+/// Reports held-out rows that are too far from the prediction to be noise.
+pub(super) struct WithoutOutliers;
+
+impl Check for WithoutOutliers {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let (rows, of) = (fit.held_out_outliers, fit.fitting.split.held_out.len());
+        if rows.is_empty() {
+            return Vec::new();
+        }
+        let name = |row: &Outlier| {
+            let is_vector = matches!(row.kind, "position" | "point");
+            let axis = if is_vector { " along an axis" } else { "" };
+            format!("{} (off by {}{axis})", row.location, size(row.kind, row.error.amax(), 3))
+        };
+        let are_positions = rows.iter().all(|row| row.kind == "position");
+        let noun = if are_positions { "poses" } else { "rows" };
+        let named: Vec<String> = rows.iter().take(MAX_NAMED_ROWS).map(name).collect();
+        let more = rows.len().saturating_sub(MAX_NAMED_ROWS);
+        let more = if more > 0 { format!(", and {more} more") } else { String::new() };
+        let (count, verb) = (rows.len(), if rows.len() == 1 { "is" } else { "are" });
+        let text = format!(
+            "{count} of {of} held-out {noun} {verb} too far off to be noise: {}{more}",
+            named.join(", ")
+        );
+        let numbers = [places(rows), of.into()];
+        vec![Finding::new(FindingCode::HeldOutOutliers, numbers, text).with_remedy(String::new())]
+    }
 }

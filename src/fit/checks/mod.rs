@@ -1,12 +1,47 @@
-//! Checks of a fit: whether its result can be trusted, and what to check in the input.
+//! Checks of a fit: whether its result can be trusted, and what to look at in the input.
+//!
+//! Each check is a type that implements [`checked_fit::Check`]; [`findings`] runs all of them.
+//! `docs/findings.md` lists the codes of their findings.
 
-pub(super) mod cautions;
+pub(super) mod checked_fit;
+pub(super) mod far_off;
+pub(super) mod finding;
+pub(super) mod fitted_rows;
 pub(super) mod held_out;
-pub(super) mod judgement;
-pub(super) mod kind;
-pub(super) mod misread;
+pub(super) mod misfit;
+pub(super) mod misreading;
 pub(super) mod outliers;
+pub(super) mod parameter_limits;
 pub(super) mod point_spread;
 pub(super) mod pose_sufficiency;
-pub(super) mod quality;
+pub(super) mod priors;
 pub(super) mod required_columns;
+pub(super) mod row_kind;
+
+use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations};
+use finding::Finding;
+
+/// Every check, in the order of the findings; the first error is the reason that commands print.
+const CHECKS: &[&dyn Check] = &[
+    &EnoughEquations,
+    &misfit::Misfit,
+    &misfit::SizeOfArm,
+    &Convergence,
+    &parameter_limits::WithinPriors,
+    &parameter_limits::WithinArmSize,
+    &held_out::NotAllCopied,
+    &held_out::HeldOutReached,
+    &held_out::BetterThanNominal,
+    &priors::DataDecide,
+    &far_off::NominalIsNear,
+    &held_out::NotRepeated,
+    &held_out::WithoutOutliers,
+    &fitted_rows::SteadyPoints,
+    &fitted_rows::NoOutliers,
+    &priors::PriorWidths,
+];
+
+/// Runs every check on a fit.
+pub(super) fn findings(fit: &CheckedFit) -> Vec<Finding> {
+    CHECKS.iter().flat_map(|check| check.check(fit)).collect()
+}

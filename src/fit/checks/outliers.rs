@@ -1,12 +1,13 @@
-//! Poses whose residual is too long to be noise.
+//! Rows whose residual is too long to be noise.
 
 use nalgebra::Vector3;
+use serde_json::{Value, json};
 
 use crate::error::Location;
 use crate::fit::uncertainty::residual_lengths::Lengths;
 use crate::measurement::Measurements;
 
-/// A pose whose residual is too long to be noise.
+/// Row whose residual is too long to be noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outlier {
     /// Row of the measurements, counted from 0 over all files.
@@ -34,7 +35,7 @@ impl Outlier {
     }
 }
 
-/// A few rows too far off to be noise, without which the fit would explain the others far better.
+/// Few rows without which the fit would explain the others far better.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InfluentialRows {
     /// The rows, in their order.
@@ -45,7 +46,8 @@ pub struct InfluentialRows {
     pub sigma_taken: f64,
 }
 
-/// The outliers among `rows`, whose residuals these are, in the order of the rows.
+/// Returns the outliers among `rows`, whose residuals have these lengths and \[m\] `errors`, in the
+/// order of the rows.
 pub(in crate::fit) fn outliers(
     lengths: &Lengths,
     rows: &[usize],
@@ -57,4 +59,13 @@ pub(in crate::fit) fn outliers(
         Some(Outlier::of(measurements, row, distance, error))
     };
     rows.iter().enumerate().zip(errors).filter_map(outlier).collect()
+}
+
+/// Returns the places of rows in their files as numbers of a finding: file, line and \[σ\] distance.
+pub(super) fn places(rows: &[Outlier]) -> Value {
+    let place = |row: &Outlier| {
+        let Location { file, line, .. } = &row.location;
+        json!({ "file": file.display().to_string(), "line": line, "sigmas": row.distance })
+    };
+    rows.iter().map(place).collect()
 }

@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::DVector;
 
+use super::finding::{Finding, FindingCode};
 use crate::fit::Placement;
-use crate::fit::checks::quality::{QualityFlag, TooFewPoses};
 use crate::fit::stages::fitting::Fitting;
 use crate::measurement::count_distinct;
 use crate::model::Model;
@@ -17,10 +17,10 @@ const BODY: usize = 6;
 
 /// What the poses are enough for.
 pub(in crate::fit) struct PoseSufficiency {
-    /// What they are not enough for, priors or not.
-    pub flag: Option<QualityFlag>,
-    /// Whether priors decide most.
-    pub too_few: Option<TooFewPoses>,
+    /// Finding about what the poses are too few for, whatever the priors are.
+    pub finding: Option<Finding>,
+    /// Measured coordinates that are independent of each other.
+    pub coordinates: usize,
     /// Different poses of the arm among the identification rows, several targets in one pose being
     /// one.
     pub poses: usize,
@@ -47,17 +47,12 @@ impl PoseSufficiency {
         };
         let of_row: Vec<usize> = (0..measurements.len()).map(of_row).collect();
         let coordinates = coordinates(fitting, (&numbers, &of_arm), &split.identification, &of_row);
-        let parameters = unknowns.len();
         let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
         let (rows, later) = (&split.identification, &held_out_only.rows);
         let (own, theirs) =
             (|k: usize| !held_out_only.parameters[k], |k: usize| held_out_only.parameters[k]);
-        let flag = (coordinates < without_prior)
-            .then(|| QualityFlag::TooFewEquations {
-                of: "the fit".to_owned(),
-                coordinates,
-                unknowns: without_prior,
-            })
+        let finding = (coordinates < without_prior)
+            .then(|| too_few("the fit".to_owned(), coordinates, without_prior))
             .or_else(|| {
                 underdetermined((model, placement), (&numbers, &of_row), (rows, false), own)
             })
@@ -66,12 +61,25 @@ impl PoseSufficiency {
             })
             .or_else(|| undetermined(fitting, &numbers, rows, at, own))
             .or_else(|| undetermined(fitting, &numbers, later, at, theirs));
-        let too_few =
-            (coordinates < parameters).then_some(TooFewPoses { poses, coordinates, parameters });
         let several_targets =
             poses < count_distinct(&numbers, split.identification.iter().copied());
-        Self { flag, too_few, poses, several_targets }
+        Self { finding, coordinates, poses, several_targets }
     }
+
+    /// Returns true if there are enough equations to judge the declared σ.
+    pub fn judges_noise(&self, parameters: usize) -> bool {
+        let is_short = |finding: &Finding| finding.code == FindingCode::TooFewEquations;
+        self.coordinates >= parameters && !self.finding.as_ref().is_some_and(is_short)
+    }
+}
+
+/// Reports that `of` has fewer measured coordinates than parameters without a prior.
+fn too_few(of: String, coordinates: usize, parameters: usize) -> Finding {
+    let text = format!(
+        "{of}: {coordinates} measured coordinates for {parameters} parameters without a prior (a pose measured again adds none)"
+    );
+    let numbers = [of.into(), coordinates.into(), parameters.into()];
+    Finding::new(FindingCode::TooFewEquations, numbers, text)
 }
 
 /// Coordinates that tell of the arm and of its targets: as many as each different point has, but no
@@ -121,7 +129,7 @@ fn undetermined(
     rows: &[usize],
     at: &DVector<f64>,
     varied: impl Fn(usize) -> bool,
-) -> Option<QualityFlag> {
+) -> Option<Finding> {
     let Fitting { model, placement, .. } = fitting;
     let open = |b: &usize| {
         // Contacts may leave the place of a base open, which is then one of the combinations that
@@ -143,10 +151,11 @@ fn undetermined(
     };
     let base = (0..placement.bases.len()).find(open)?;
     let own = rows.iter().copied().filter(|&row| placement.base_of(row) == base);
-    Some(QualityFlag::Undetermined {
-        of: label("base", &placement.bases[base]),
-        poses: count_distinct(numbers, own),
-    })
+    let (of, poses) = (label("base", &placement.bases[base]), count_distinct(numbers, own));
+    let text = format!(
+        "{of}: its points, of {poses} different poses, are too few or lie on a line, which leaves a turn about it open"
+    );
+    Some(Finding::new(FindingCode::BaseNotDetermined, [of.into(), poses.into()], text))
 }
 
 /// A base, with the targets that no other base of `rows` uses, or a target with fewer coordinates
@@ -158,7 +167,7 @@ fn underdetermined(
     (numbers, of_row): (&[usize], &[usize]),
     (rows, judged): (&[usize], bool),
     varied: impl Fn(usize) -> bool,
-) -> Option<QualityFlag> {
+) -> Option<Finding> {
     let check = |of: String, used: &dyn Fn(usize) -> bool, own: &dyn Fn(ParameterSite) -> bool| {
         let apart: BTreeMap<usize, usize> =
             rows.iter().filter(|&&row| used(row)).map(|&row| (numbers[row], of_row[row])).collect();
@@ -168,11 +177,7 @@ fn underdetermined(
         };
         let unknowns = (0..model.parameters.len()).filter(|&k| counts(k)).count();
         let enough = if judged { coordinates > unknowns } else { coordinates >= unknowns };
-        (0 < coordinates && 0 < unknowns && !enough).then_some(QualityFlag::TooFewEquations {
-            of,
-            coordinates,
-            unknowns,
-        })
+        (0 < coordinates && 0 < unknowns && !enough).then(|| too_few(of, coordinates, unknowns))
     };
     let base = |b: usize| {
         let alone = |t: usize| {

@@ -1,0 +1,126 @@
+//! Input of the checks: a fit with everything that they look at.
+
+use nalgebra::{DVector, Vector3};
+
+use super::finding::Finding;
+use super::outliers::Outlier;
+use super::point_spread::PointSpread;
+use super::pose_sufficiency::PoseSufficiency;
+use super::row_kind::{RowKind, spread};
+use crate::fit::errors::Errors;
+use crate::fit::stages::fitting::{FitEnd, Fitting};
+use crate::fit::stages::stage::Stage;
+use crate::fit::uncertainty::noise::together;
+use crate::fit::uncertainty::prior_sizes::PriorSize;
+use crate::least_squares::Loss;
+use crate::problem::{Observation, Problem};
+
+/// Check of a fit.
+pub(in crate::fit) trait Check: Sync {
+    /// Returns what there is to report about `fit`; nothing where all is well.
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding>;
+}
+
+/// Fit that the checks look at.
+pub(in crate::fit) struct CheckedFit<'a> {
+    pub fitting: &'a Fitting<'a>,
+    pub problem: &'a Problem,
+    /// Full parameter vector of the registered nominal arm.
+    pub registered_x: &'a DVector<f64>,
+    /// Point where the fit ended.
+    pub end: &'a FitEnd,
+    /// Errors of the registered nominal arm.
+    pub registered: &'a Errors,
+    /// Errors of the fitted arm.
+    pub fitted: &'a Errors,
+    /// Identification rows whose residual is too long to be noise.
+    pub outliers: &'a [Outlier],
+    /// Held-out rows that are too far from the prediction.
+    pub held_out_outliers: &'a [Outlier],
+    /// Fit of all unknowns to the identification rows, with the declared σ and those that it took.
+    pub whole: &'a Stage<'a>,
+    /// Whether the problem or the table declares the σ of positions.
+    pub has_declared_noise: bool,
+    /// Number of different poses and what they are too few for.
+    pub poses: &'a PoseSufficiency,
+    /// Finding about a fit that did not converge.
+    pub not_converged: Option<&'a Finding>,
+    /// Prior widths that the fitted deviations contradict.
+    pub prior_sizes: &'a [PriorSize],
+    /// Scatter of the predictions at each touched point: nominal arm, fitted arm, held out or not.
+    pub spreads: &'a [(PointSpread, PointSpread, bool)],
+}
+
+impl CheckedFit<'_> {
+    /// Returns the kinds of identification rows that the arm takes part in, positions first.
+    pub fn kinds(&self) -> Vec<RowKind> {
+        let kinds = self.fitting.measurements.kinds().into_iter().filter(|kind| kind.is_of_arm());
+        kinds.map(|kind| self.kind(kind)).filter(|kind| !kind.rows.is_empty()).collect()
+    }
+
+    /// Collects the identification rows that measure the same kind of thing as `observation`.
+    pub fn kind(&self, observation: Observation) -> RowKind {
+        let Fitting { measurements, placement, split, .. } = self.fitting;
+        let is_of_kind = |row: usize| measurements.observation(row).kind() == observation.kind();
+        let (places, rows): (Vec<usize>, Vec<usize>) = split
+            .identification
+            .iter()
+            .copied()
+            .enumerate()
+            .filter(|&(_, row)| is_of_kind(row))
+            .unzip();
+        let is_measured_directly = observation.is_position() || observation.is_angle();
+        let target_places = if is_measured_directly {
+            Vec::new()
+        } else {
+            let poses = self.fitting.poses(&rows);
+            self.fitting.model.predicted_targets(&poses, self.registered_x.as_slice())
+        };
+        let point = |place: usize| match is_measured_directly {
+            true => measurements.positions[rows[place]],
+            false => target_places[place],
+        };
+        let declared = together(places.iter().map(|&place| self.whole.declared[place]));
+        let taken = together(places.iter().map(|&place| self.whole.poses[place].sigma));
+        RowKind {
+            observation,
+            spread: spread(placement, &rows, point),
+            declared_sigma: self.has_declared_noise.then_some(declared),
+            taken_sigma: taken,
+            rows,
+        }
+    }
+
+    /// Returns the root mean squared length of the errors of identification rows \[m\] or \[rad\],
+    /// without those that a robust loss sets aside.
+    pub fn rms(&self, rows: &[usize], errors: &[Vector3<f64>]) -> f64 {
+        let is_robust = self.fitting.loss != Loss::Squares;
+        let is_set_aside =
+            |row: usize| is_robust && self.outliers.iter().any(|outlier| outlier.row == row);
+        let kept: Vec<f64> = rows
+            .iter()
+            .zip(errors)
+            .filter(|(row, _)| !is_set_aside(**row))
+            .map(|(_, error)| error.norm_squared())
+            .collect();
+        (kept.iter().sum::<f64>() / kept.len().max(1) as f64).sqrt()
+    }
+}
+
+/// Checks that there are as many equations as unknowns without a prior, and that bases are determined.
+pub(super) struct EnoughEquations;
+
+impl Check for EnoughEquations {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        fit.poses.finding.clone().into_iter().collect()
+    }
+}
+
+/// Checks that the fits converged.
+pub(super) struct Convergence;
+
+impl Check for Convergence {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        fit.not_converged.cloned().into_iter().collect()
+    }
+}

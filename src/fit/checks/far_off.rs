@@ -1,0 +1,54 @@
+//! Check of the nominal arm: whether it is so far from the measurements that something was misread.
+
+use serde_json::json;
+
+use super::checked_fit::{Check, CheckedFit};
+use super::finding::{Finding, FindingCode};
+use super::misreading::{Misreading, misreadings};
+use super::row_kind::{RowKind, measured, named, size};
+
+/// Part of the spread of the measurements by which the registered nominal arm may miss them.
+const MAX_NOMINAL_MISS: f64 = 0.1;
+/// Spread of contacts, as a part of the arm's size, below which they are in one place: their spread
+/// is then what the arm misses it by.
+const ONE_PLACE: f64 = 0.05;
+
+/// Checks that the registered nominal arm is near the measurements.
+pub(super) struct NominalIsNear;
+
+impl Check for NominalIsNear {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let rms = fit.registered.identification.rms.norm;
+        let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
+        let is_measured_directly = observation.is_position() || observation.is_angle();
+        let least = if is_measured_directly { 0.0 } else { ONE_PLACE * fit.fitting.model.reach() };
+        if !(spread > least && rms > MAX_NOMINAL_MISS * spread) {
+            return Vec::new();
+        }
+        let kind = observation.kind();
+        let explanations = misreadings(fit.fitting, fit.problem, rms);
+        vec![far_off(kind, rms, spread, &explanations)]
+    }
+}
+
+/// Reports an error `rms` of the nominal arm beside the `spread` of rows of a kind \[m\] or \[rad\],
+/// with what would explain it, each by itself, the best first.
+fn far_off(kind: &str, rms: f64, spread: f64, explanations: &[Misreading]) -> Finding {
+    let words: Vec<String> = explanations.iter().map(Misreading::to_string).collect();
+    let numbers = [kind.into(), rms.into(), spread.into(), json!(words)];
+    if !rms.is_finite() {
+        let text = "the nominal arm misses the measurements by more than numbers hold";
+        return Finding::new(FindingCode::NominalFarOff, numbers, text.to_owned())
+            .with_remedy("check their units".to_owned());
+    }
+    let (what, by, part) = (measured(kind), size(kind, rms, 1), 100.0 * rms / spread);
+    let standing = if kind == "position" { ", wherever its base stands" } else { "" };
+    let text =
+        format!("the nominal arm misses the {what} by {by}, {part:.0} % of their spread{standing}");
+    let finding = Finding::new(FindingCode::NominalFarOff, numbers, text);
+    match words.is_empty() {
+        false => finding.with_remedy(format!("this would explain it: {}", words.join(", or "))),
+        true if kind == "position" => finding,
+        true => finding.with_remedy(format!("check units, signs of joints, and {}", named(kind))),
+    }
+}

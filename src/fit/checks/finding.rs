@@ -1,0 +1,210 @@
+//! Findings: what the checks of a fit report, with stable codes that programs can act on.
+
+use std::fmt;
+
+use serde::ser::{Serialize, SerializeStruct as _, Serializer};
+use serde_json::{Map, Value};
+
+/// Consequence of a finding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// Information about fit or data that needs no action.
+    Note,
+    /// Circumstance that the user should look at; the fit may be right all the same.
+    Warning,
+    /// Reason for which the fit is not to be trusted: commands end with exit status 1.
+    Error,
+}
+
+impl Severity {
+    /// Returns the word for the severity in JSON files: `error`, `warning` or `note`.
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::Note => "note",
+            Self::Warning => "warning",
+            Self::Error => "error",
+        }
+    }
+}
+
+/// Description of a finding code, one row of the table in `docs/findings.md`.
+#[derive(Debug, Clone, Copy)]
+pub struct FindingEntry {
+    /// Code in JSON files; it never changes its meaning.
+    pub code: &'static str,
+    /// Consequence of every finding with this code.
+    pub severity: Severity,
+    /// Names of the numbers that such a finding carries.
+    pub numbers: &'static [&'static str],
+    /// Statement that the finding makes, in one sentence.
+    pub meaning: &'static str,
+    /// Remedy that is suggested where the check knows no better one.
+    pub remedy: &'static str,
+}
+
+macro_rules! finding_codes {
+    ($($(#[$doc:meta])* $name:ident: $severity:ident $code:literal [$($number:literal),*] $meaning:literal, $remedy:literal;)*) => {
+        /// Code of a finding, one for each circumstance that a check reports.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[non_exhaustive]
+        pub enum FindingCode {
+            $(#[doc = $meaning] $name,)*
+        }
+
+        impl FindingCode {
+            /// Every code, in the order of `docs/findings.md`.
+            pub const EACH: &[Self] = &[$(Self::$name),*];
+
+            /// Returns the description of the code.
+            pub const fn entry(self) -> FindingEntry {
+                match self {
+                    $(Self::$name => FindingEntry {
+                        code: $code,
+                        severity: Severity::$severity,
+                        numbers: &[$($number),*],
+                        meaning: $meaning,
+                        remedy: $remedy,
+                    },)*
+                }
+            }
+        }
+    };
+}
+
+finding_codes! {
+    TooFewEquations: Error "too-few-equations" ["of", "coordinates", "parameters"]
+        "The whole fit, a base or a tool has fewer measured coordinates than parameters without a prior.",
+        "measure more different poses, or give priors";
+    BaseNotDetermined: Error "base-not-determined" ["of", "poses"]
+        "The measured points of a base leave its pose open, as points on a line do.",
+        "measure more poses of this session, or give its base a prior";
+    MissesMeasurements: Error "misses-measurements" ["kind", "rms", "spread"]
+        "The fitted arm misses the measurements by more than 2 % of their spread and more than 100 σ.",
+        "check units, signs of joints, and whether base and session are declared";
+    NoBetterThanNominal: Error "no-better-than-nominal" ["kind", "before", "after"]
+        "The fitted arm is as far from contacts, distances or tilts as the nominal arm, and more than 1000 σ off.",
+        "check units, signs of joints, and the names in the table";
+    OtherSize: Error "other-size" ["measured", "expected"]
+        "The spread of the measured points differs from that of the nominal arm by more than a factor of 2.",
+        "check units, and what the columns hold";
+    NotConverged: Error "not-converged" ["termination"]
+        "The fit did not converge.",
+        "check units, signs of joints, sessions and priors, or take another solver";
+    HeldOutNotConverged: Error "held-out-not-converged" ["termination"]
+        "The fit of bases and tools of held-out sessions did not converge.",
+        "check these sessions, or hold out other rows";
+    BeyondPrior: Error "beyond-prior" ["parameter", "sigmas"]
+        "A parameter of the arm deviates from nominal by more than 5 times the σ of its prior.",
+        "check axes of the measuring frame, signs of joints, units, and the prior";
+    BeyondArmSize: Error "beyond-arm-size" ["parameter", "sizes"]
+        "A parameter deviates by more than the size of the arm, half a turn, or a factor of 100.",
+        "give it a prior, or check units and the table's columns";
+    HeldOutCopied: Error "held-out-copied" ["rows"]
+        "Every held-out row is an identification row again, so that held-out errors judge nothing.",
+        "hold out rows that were not fitted";
+    HeldOutMissed: Error "held-out-missed" ["kind", "median", "spread"]
+        "Half of the held-out rows are missed by more than 2 % of the spread of the fitted ones and more than 100 σ.",
+        "check whether these rows belong together, and whether the fitted poses cover them";
+    HeldOutWorse: Error "held-out-worse" ["kind", "before", "after"]
+        "The fitted arm misses held-out rows by more than 1.5 times what the nominal arm misses them by.",
+        "more poses, fewer free parameters or smaller priors are needed";
+    PriorsDecide: Warning "priors-decide" ["poses", "coordinates", "parameters"]
+        "The poses measure fewer coordinates than parameters are fitted, so that priors decide part of the result.",
+        "measure more different poses";
+    NominalFarOff: Warning "nominal-far-off" ["kind", "rms", "spread", "explanations"]
+        "The nominal arm misses the measurements by more than a tenth of their spread.",
+        "check units, signs of joints, and whether the numbers are of this convention of frames";
+    HeldOutRepeated: Warning "held-out-repeated" ["rows", "of"]
+        "Some held-out rows are identification rows again.",
+        "hold out rows that were not fitted";
+    HeldOutOutliers: Warning "held-out-outliers" ["rows", "of"]
+        "Some held-out rows are farther from the prediction than its σ allows.",
+        "look at these rows";
+    InfluentialRows: Warning "influential-rows" ["rows", "reduced_chi2_without"]
+        "A few rows cause most of the misfit.",
+        "look at these rows; a section [robust] limits their influence";
+    UnsteadyPoint: Warning "unsteady-point" ["point", "times", "share"]
+        "The predictions at one touched point scatter far more than at the others, and along one direction.",
+        "check whether the point moved or gave way";
+    Outliers: Note "outliers" ["rows", "of"]
+        "Some identification rows are farther from the fit than noise explains.",
+        "look at these rows; a section [robust] limits their influence";
+    PriorWidth: Note "prior-width" ["rule", "declared", "estimated"]
+        "The fitted deviations speak for a prior σ that is more than twice as large or as small.",
+        "declare the estimated σ, or leave the prior as it is where it is known better";
+}
+
+/// Circumstance that a check of a fit reports.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// Code, which determines the severity.
+    pub code: FindingCode,
+    /// Numbers and names of the case by the names of [`FindingEntry::numbers`]; SI units.
+    pub numbers: Vec<(&'static str, Value)>,
+    /// Statement about the case at hand, without the remedy.
+    pub text: String,
+    /// Suggested remedy.
+    pub remedy: String,
+}
+
+impl Finding {
+    /// Creates a finding with the remedy of its code; `numbers` in the order of its entry.
+    pub(in crate::fit) fn new<const N: usize>(
+        code: FindingCode,
+        numbers: [Value; N],
+        text: String,
+    ) -> Self {
+        let entry = code.entry();
+        let numbers = entry.numbers.iter().copied().zip(numbers).collect();
+        Self { code, numbers, text, remedy: entry.remedy.to_owned() }
+    }
+
+    /// Replaces the remedy by one for the case at hand.
+    #[must_use]
+    pub(in crate::fit) fn with_remedy(self, remedy: String) -> Self {
+        Self { remedy, ..self }
+    }
+
+    /// Returns the consequence of the finding.
+    pub const fn severity(&self) -> Severity {
+        self.code.entry().severity
+    }
+
+    /// Returns the number or name that is called `name`.
+    pub fn value(&self, name: &str) -> Option<&Value> {
+        self.numbers.iter().find(|(known, _)| *known == name).map(|(_, value)| value)
+    }
+
+    /// Returns the number that is called `name`.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        self.value(name)?.as_f64()
+    }
+
+    /// Returns the word that is called `name`.
+    pub fn word(&self, name: &str) -> Option<&str> {
+        self.value(name)?.as_str()
+    }
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.remedy.is_empty() {
+            return f.write_str(&self.text);
+        }
+        write!(f, "{}; {}", self.text, self.remedy)
+    }
+}
+
+impl Serialize for Finding {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let numbers: Map<String, Value> =
+            self.numbers.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect();
+        let mut object = serializer.serialize_struct("Finding", 5)?;
+        object.serialize_field("code", self.code.entry().code)?;
+        object.serialize_field("severity", self.severity().as_str())?;
+        object.serialize_field("numbers", &numbers)?;
+        object.serialize_field("text", &self.text)?;
+        object.serialize_field("remedy", &self.remedy)?;
+        object.end()
+    }
+}

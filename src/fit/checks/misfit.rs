@@ -1,0 +1,145 @@
+//! Checks of the size of the residual: whether the fitted arm describes the measured one at all.
+
+use super::checked_fit::{Check, CheckedFit};
+use super::finding::{Finding, FindingCode};
+use super::row_kind::{RowKind, measured, named, size, spread};
+
+/// Part of the spread of the measurements that the residual of a fit of the same arm stays below.
+pub(super) const MAX_MISS: f64 = 0.02;
+/// Multiple of σ that a residual may have whatever the spread is.
+pub(super) const BEYOND_NOISE: f64 = 100.0;
+/// Part of the nominal arm's error beyond which a fit has not fitted what was measured …
+const NO_BETTER: f64 = 0.9;
+/// … where its error is also beyond this multiple of σ.
+const FAR_BEYOND_NOISE: f64 = 1000.0;
+/// Ratio of the spreads of measured and predicted points beyond which they are of two arms.
+const MAX_SIZE_RATIO: f64 = 2.0;
+/// Spread below which points say nothing about the size of an arm \[m\], and tilts nothing about
+/// its turns \[rad\].
+pub(super) const MIN_SPREAD: f64 = 0.01;
+/// Number of different poses below which the spread of their points says nothing.
+const MIN_POSES: usize = 4;
+
+/// Checks that the fitted arm reaches the rows of each kind.
+pub(super) struct Misfit;
+
+impl Check for Misfit {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let of_kind = |kind: RowKind| {
+            let error = |x| fit.rms(&kind.rows, &fit.fitting.position_errors(&kind.rows, x));
+            let (nominal, fitted) = (error(fit.registered_x), error(&fit.end.x));
+            // A solver that did not converge may have driven away an arm that was near before.
+            let counts =
+                |_: &Finding| fit.end.termination.converged() || misses(&kind, nominal).is_some();
+            misses(&kind, fitted).filter(counts).or_else(|| no_better(&kind, nominal, fitted))
+        };
+        fit.kinds().into_iter().filter_map(of_kind).collect()
+    }
+}
+
+/// Checks that the measured positions are of an arm of the nominal size.
+pub(super) struct SizeOfArm;
+
+impl Check for SizeOfArm {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let of_kind = |kind: RowKind| {
+            let RowKind { observation, rows, .. } = &kind;
+            if !observation.is_position() || fit.poses.poses.min(rows.len()) < MIN_POSES {
+                return None;
+            }
+            let nominal = fit.fitting.position_errors(rows, fit.registered_x);
+            let positions = &fit.fitting.measurements.positions;
+            let predicted = spread(fit.fitting.placement, rows, |place| {
+                positions[rows[place]] - nominal[place]
+            });
+            other_size(kind.spread, predicted)
+        };
+        fit.kinds().into_iter().filter_map(of_kind).collect()
+    }
+}
+
+/// Reports a fit whose error `rms` is large against the spread and the σ of rows of a kind.
+fn misses(kind: &RowKind, rms: f64) -> Option<Finding> {
+    let RowKind { observation, spread, declared_sigma, .. } = *kind;
+    let noise = declared_sigma.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
+    if !(spread > MIN_SPREAD && rms > MAX_MISS * spread && rms > noise) {
+        return None;
+    }
+    let kind = observation.kind();
+    let (text, remedy) = if rms.is_finite() {
+        let (what, by, part) = (measured(kind), size(kind, rms, 1), 100.0 * rms / spread);
+        (
+            format!("the fitted arm misses the {what} by {by}, {part:.0} % of their spread"),
+            format!("check units, signs of joints, and {}", named(kind)),
+        )
+    } else {
+        let text = "the fitted arm misses the measurements by more than numbers hold";
+        (text.to_owned(), "check their units".to_owned())
+    };
+    let numbers = [kind.into(), rms.into(), spread.into()];
+    Some(Finding::new(FindingCode::MissesMeasurements, numbers, text).with_remedy(remedy))
+}
+
+/// Reports a fit that meets rows other than positions no better than the nominal arm; `before` and
+/// `after` are the errors of the two. The spread of such rows may say nothing.
+fn no_better(kind: &RowKind, before: f64, after: f64) -> Option<Finding> {
+    let RowKind { observation, declared_sigma, .. } = *kind;
+    let is_far = declared_sigma.is_some_and(|sigma| after > FAR_BEYOND_NOISE * sigma);
+    if observation.is_position() || !is_far || after <= NO_BETTER * before {
+        return None;
+    }
+    let kind = observation.kind();
+    let text = format!(
+        "the fitted arm misses the {} by {}, the nominal one by {}, both far beyond the declared σ",
+        measured(kind),
+        size(kind, after, 1),
+        size(kind, before, 1)
+    );
+    let numbers = [kind.into(), before.into(), after.into()];
+    let remedy = format!("check units, signs of joints, and {}", named(kind));
+    Some(Finding::new(FindingCode::NoBetterThanNominal, numbers, text).with_remedy(remedy))
+}
+
+/// Reports points whose spread `measured` \[m\] is of an arm of another size than the nominal one,
+/// whose points have the spread `expected` \[m\].
+fn other_size(measured: f64, expected: f64) -> Option<Finding> {
+    let is_same = (expected / MAX_SIZE_RATIO..=expected * MAX_SIZE_RATIO).contains(&measured);
+    let text = format!(
+        "the measured points lie {:.1} mm from their centre, those of the nominal arm {:.1} mm",
+        measured * 1e3,
+        expected * 1e3
+    );
+    let numbers = [measured.into(), expected.into()];
+    (expected > MIN_SPREAD && !is_same).then(|| Finding::new(FindingCode::OtherSize, numbers, text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::Observation;
+
+    #[test]
+    fn a_fit_that_changes_nothing_far_beyond_the_noise_fits_nothing() {
+        let sigma = Some(5e-5);
+        for (observation, sigma, after, is_reported) in [
+            (Observation::Point(0), sigma, 0.058, true),
+            (Observation::Point(0), sigma, 0.051, false),
+            (Observation::Point(0), Some(1e-3), 0.058, false),
+            (Observation::Point(0), None, 0.058, false),
+            (Observation::Position, sigma, 0.058, false),
+        ] {
+            let kind = RowKind {
+                observation,
+                rows: Vec::new(),
+                spread: 0.0,
+                declared_sigma: sigma,
+                taken_sigma: 1e-3,
+            };
+            assert_eq!(
+                no_better(&kind, 0.06, after).is_some(),
+                is_reported,
+                "{observation:?} {sigma:?} {after}"
+            );
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Checks of the size of the fitted deviations.
+
+use super::checked_fit::{Check, CheckedFit};
+use super::finding::{Finding, FindingCode};
+use crate::fit::stages::parameter_size::largest;
+use crate::model::parameter::{JointField, Parameter, ParameterSite};
+use crate::quantity::Unit;
+
+/// Deviation in σ of the prior that a parameter of the measured arm stays below: chance exceeds it
+/// once in two million.
+const MAX_PRIOR_SIGMAS: f64 = 5.0;
+
+/// Checks that no parameter of the arm deviates far beyond its prior; parameters of effects may.
+pub(super) struct WithinPriors;
+
+impl Check for WithinPriors {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let is_of_arm = |parameter: &Parameter| {
+            let is_declared = match parameter.site {
+                ParameterSite::Joint { field, .. } => {
+                    field.is_geometry() || field == JointField::Stiffness
+                }
+                ParameterSite::Beam { .. } => parameter.site.unit().is_relative(),
+                ParameterSite::Base { .. } | ParameterSite::Target { .. } => true,
+                _ => false,
+            };
+            is_declared && parameter.regressor.is_constant()
+        };
+        let ratio = |parameter: &Parameter, x: f64| {
+            Some(x.abs() / parameter.sigma.filter(|_| is_of_arm(parameter))?)
+        };
+        let finding = |(parameter, sigmas): (&Parameter, f64)| {
+            let name = &parameter.name;
+            let text = format!("{name} moved by {sigmas:.0} times the σ of its prior");
+            let numbers = [name.as_str().into(), sigmas.into()];
+            Finding::new(FindingCode::BeyondPrior, numbers, text)
+        };
+        let largest = largest_ratio(fit, ratio).filter(|(_, sigmas)| *sigmas > MAX_PRIOR_SIGMAS);
+        largest.map(finding).into_iter().collect()
+    }
+}
+
+/// Checks that no parameter deviates by more than an arm of this size can be off.
+pub(super) struct WithinArmSize;
+
+impl Check for WithinArmSize {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let model = fit.fitting.model;
+        let ratio = |parameter: &Parameter, x: f64| Some(x.abs() / largest(model, parameter)?);
+        let finding = |(parameter, sizes): (&Parameter, f64)| {
+            let unit = match parameter.unit() {
+                Unit::Length => "the arm's own size",
+                Unit::Angle => "half a turn",
+                _ => "a factor of 100",
+            };
+            let name = &parameter.name;
+            let text =
+                format!("{name} moved by {sizes:.1} times {unit}: more than an arm can be off");
+            let numbers = [name.as_str().into(), sizes.into()];
+            Finding::new(FindingCode::BeyondArmSize, numbers, text)
+        };
+        let largest = largest_ratio(fit, ratio).filter(|(_, sizes)| *sizes > 1.0);
+        largest.map(finding).into_iter().collect()
+    }
+}
+
+/// Returns the parameter of the fit with the largest `ratio` of its deviation x to a limit.
+fn largest_ratio<'a>(
+    fit: &CheckedFit<'a>,
+    ratio: impl Fn(&Parameter, f64) -> Option<f64>,
+) -> Option<(&'a Parameter, f64)> {
+    let parameters = fit.fitting.model.parameters.iter().zip(&fit.end.x);
+    let ratios = parameters.filter_map(|(parameter, &x)| Some((parameter, ratio(parameter, x)?)));
+    ratios.max_by(|a, b| a.1.total_cmp(&b.1))
+}

@@ -1,0 +1,101 @@
+//! Identification rows that measure one kind of thing, and the words for them.
+
+use nalgebra::Vector3;
+
+use crate::fit::stages::placement::Placement;
+use crate::problem::Observation;
+
+/// Identification rows that measure one kind of thing; lengths \[m\], angles of tilts \[rad\].
+pub(in crate::fit) struct RowKind {
+    pub observation: Observation,
+    pub rows: Vec<usize>,
+    /// Root mean squared distance of the measured positions or tilts from their centre; of other
+    /// kinds, of the places where the nominal arm has its target.
+    pub spread: f64,
+    /// 1 σ of a coordinate as declared, where it is declared.
+    pub declared_sigma: Option<f64>,
+    /// 1 σ of a coordinate that the fit took.
+    pub taken_sigma: f64,
+}
+
+/// Returns the root mean squared distance \[m\] of the points of `rows` from the centre of those
+/// with the same base.
+pub(super) fn spread(
+    placement: &Placement,
+    rows: &[usize],
+    point: impl Fn(usize) -> Vector3<f64>,
+) -> f64 {
+    let points: Vec<(usize, Vector3<f64>)> = rows
+        .iter()
+        .enumerate()
+        .map(|(place, &row)| (placement.base_of(row), point(place)))
+        .collect();
+    let mut squares = 0.0;
+    for base in 0..placement.bases.len() {
+        let of_base = || points.iter().filter(|(of, _)| *of == base).map(|(_, point)| point);
+        let centre = of_base().sum::<Vector3<f64>>() / of_base().count().max(1) as f64;
+        squares += of_base().map(|point| (point - centre).norm_squared()).sum::<f64>();
+    }
+    (squares / rows.len().max(1) as f64).sqrt()
+}
+
+/// Length from which on errors are written with a power of ten \[m\].
+const HUGE: f64 = 1e6;
+
+/// Writes an error with its unit: degrees with one decimal more for tilts \[rad\], millimetres for
+/// others \[m\].
+pub(crate) fn size(kind: &str, error: f64, decimals: usize) -> String {
+    match kind {
+        _ if !error.is_finite() => "more than numbers hold".to_owned(),
+        "tilt" => format!("{:.*}°", decimals + 1, error.to_degrees()),
+        _ if error < HUGE => format!("{:.*} mm", decimals, error * 1e3),
+        _ => format!("{:.2e} mm", error * 1e3),
+    }
+}
+
+/// Returns the noun for rows of a kind.
+pub(crate) fn rows(kind: &str) -> &'static str {
+    match kind {
+        "point" => "contacts with points",
+        "distance" => "distances",
+        "surface" => "contacts with surfaces",
+        "tilt" => "rows of tilts",
+        _ => "poses",
+    }
+}
+
+/// Returns the noun for what rows of a kind measure.
+pub(in crate::fit) fn measured(kind: &str) -> &'static str {
+    match kind {
+        "position" => "measurements",
+        "tilt" => "tilts",
+        _ => rows(kind),
+    }
+}
+
+/// Returns what to check in a table where the arm misses rows of a kind.
+pub(in crate::fit) fn named(kind: &str) -> &'static str {
+    match kind {
+        "point" => "the names in the column point",
+        "distance" => "the names in the column anchor",
+        "surface" => "the names in the column surface",
+        "tilt" => "the names in the column frame",
+        _ => "whether base and session are declared",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_without_a_number_is_said_in_words() {
+        for error in [f64::INFINITY, f64::NAN] {
+            assert_eq!(size("position", error, 3), "more than numbers hold");
+        }
+        assert_eq!(
+            (size("position", 1e-3, 2), size("tilt", 0.0, 1)),
+            ("1.00 mm".to_owned(), "0.00°".to_owned())
+        );
+    }
+}
