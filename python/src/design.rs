@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexcal::design::{
-    self, Candidates, Criterion, DesignError, Judged, Pair, PlanOptions, PlanProgress,
+    self, Candidates, CheckedPoses, Criterion, DesignError, EffectPair, PlanOptions, PlanProgress,
 };
 use flexcal::fit::Progress;
 use flexcal::measurement::{Dataset, Measurements};
@@ -30,7 +30,7 @@ pub struct Check {
 pub struct Plan {
     problem: Arc<Declared>,
     found: design::Plan,
-    separated: Option<design::Separated>,
+    separated: Option<design::PairSeparation>,
     criterion: Criterion,
     seed: u64,
 }
@@ -116,17 +116,17 @@ fn judged(
     table: Option<&Measurements>,
     (count, seed): (Option<usize>, u64),
     truth: Option<&Path>,
-) -> Result<Judged, DesignError> {
+) -> Result<CheckedPoses, DesignError> {
     match (table, count) {
         (None, None) => Err(DesignError::NoPoses),
-        (None, Some(count)) => Ok(Judged::Drawn(ranges(problem, truth)?, count)),
+        (None, Some(count)) => Ok(CheckedPoses::Drawn(ranges(problem, truth)?, count)),
         (Some(table), Some(poses)) if poses > table.len() => {
             Err(DesignError::TooFewCandidates { poses, candidates: table.len() })
         }
         (Some(table), count) => {
-            let poses =
-                count.map_or_else(|| table.clone(), |count| design::some_of(table, count, seed));
-            Ok(Judged::Table {
+            let poses = count
+                .map_or_else(|| table.clone(), |count| design::random_rows(table, count, seed));
+            Ok(CheckedPoses::Table {
                 poses: Box::new(poses),
                 within: known_ranges(problem, truth)?,
                 held_out: None,
@@ -141,10 +141,10 @@ fn judged_data(
     problem: &Declared,
     rows: &Measurements,
     truth: Option<&Path>,
-) -> Result<Judged, DesignError> {
+) -> Result<CheckedPoses, DesignError> {
     let data = Dataset::from_measurements(problem, rows.clone())?;
-    let held_out = design::with_known_words(&data);
-    Ok(Judged::Table {
+    let held_out = design::predictable_rows(&data);
+    Ok(CheckedPoses::Table {
         poses: Box::new(rows.select(&data.split.identification)),
         within: known_ranges(problem, truth)?,
         held_out: (!held_out.is_empty()).then(|| Box::new(rows.select(&held_out))),
@@ -197,7 +197,7 @@ pub fn plan(
     let (given, candidates) = (rows(given), rows(candidates));
     let pair = separate.map(|(one, other)| {
         let effect = |text: &str| problem.declared.effect(text, Path::new("separate"));
-        Pair::new(&problem.declared, [effect(&one)?, effect(&other)?])
+        EffectPair::new(&problem.declared, [effect(&one)?, effect(&other)?])
     });
     let pair = pair.transpose().map_err(|error| raised(&error))?;
     let problem = pair

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::{Args, value_parser};
-use flexcal::design::{self, Judged};
+use flexcal::design::{self, CheckedPoses};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use flexcal::report;
@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 }
 
 /// The poses that the arguments mean.
-fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Error>> {
+fn judged(arguments: &Arguments, problem: &Problem) -> Result<CheckedPoses, Box<dyn Error>> {
     let Arguments { common, poses, source } = arguments;
     let poses = poses.map(|poses| poses as usize);
     let table = source.table(problem, common)?;
@@ -80,10 +80,10 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Er
                 Some(poses) if poses > rows => {
                     return Err(PosesError::TooMany { poses, rows }.into());
                 }
-                Some(poses) => design::some_of(&table, poses, source.seed),
+                Some(poses) => design::random_rows(&table, poses, source.seed),
                 None => table,
             };
-            Ok(Judged::Table {
+            Ok(CheckedPoses::Table {
                 poses: Box::new(poses),
                 within: source.known_ranges(problem)?,
                 held_out: None,
@@ -91,7 +91,7 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Er
         }
         (None, Some(poses)) => {
             common.warn(problem.far_target().as_slice());
-            Ok(Judged::Drawn(source.all_ranges(problem)?, poses))
+            Ok(CheckedPoses::Drawn(source.all_ranges(problem)?, poses))
         }
         (None, None) => {
             let files: &[PathBuf] =
@@ -102,9 +102,9 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<Judged, Box<dyn Er
             let (measured, warnings) = Measurements::read_poses(files, problem)?;
             common.warn(&warnings);
             let data = Dataset::from_measurements(problem, measured)?;
-            let held_out = design::with_known_words(&data);
+            let held_out = design::predictable_rows(&data);
             let Dataset { measurements: measured, split } = data;
-            Ok(Judged::Table {
+            Ok(CheckedPoses::Table {
                 poses: Box::new(measured.select(&split.identification)),
                 within: source.known_ranges(problem)?,
                 held_out: (!held_out.is_empty()).then(|| Box::new(measured.select(&held_out))),

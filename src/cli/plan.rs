@@ -4,7 +4,9 @@ use std::error::Error;
 use std::path::Path;
 
 use clap::{Args, ValueEnum, value_parser};
-use flexcal::design::{self, Candidates, Criterion, Pair, PlanOptions, PlanProgress, Workspace};
+use flexcal::design::{
+    self, Candidates, Criterion, EffectPair, PlanOptions, PlanProgress, Workspace,
+};
 use flexcal::measurement::Measurements;
 use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
@@ -79,7 +81,7 @@ fn workspace(arguments: &Arguments) -> Result<Option<Workspace>, WorkspaceError>
     };
     let planes = arguments.keep_out_mm.iter().copied().map(plane).collect::<Result<Vec<_>, _>>()?;
     let said = room.is_some() || !planes.is_empty();
-    Ok(said.then_some(Workspace { room, planes }))
+    Ok(said.then_some(Workspace { corners: room, planes }))
 }
 
 /// A workspace that makes no sense.
@@ -186,8 +188,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 }
 
 /// The two effects to tell apart, if there are any.
-fn pair(named: &[String], problem: &Problem) -> Result<Option<Pair>, Box<dyn Error>> {
+fn pair(named: &[String], problem: &Problem) -> Result<Option<EffectPair>, Box<dyn Error>> {
     let [one, other] = named else { return Ok(None) };
     let read = |text: &String| problem.effect(text, Path::new("--separate"));
-    Ok(Some(Pair::new(problem, [read(one)?, read(other)?])?))
+    Ok(Some(EffectPair::new(problem, [read(one)?, read(other)?])?))
 }

@@ -1,4 +1,4 @@
-//! Poses that might be measured.
+//! Candidate poses: random draws from ranges and variations of given poses.
 
 use std::path::PathBuf;
 
@@ -11,31 +11,31 @@ use crate::measurement::{Labels, Measurements};
 use crate::problem::{JointKind, PoseRanges, Problem};
 use crate::random;
 
-/// Angles are commanded in steps of this [°].
+/// Step of commanded angles [°].
 const ANGLE_STEP: f64 = 1e-4;
-/// Lengths are commanded in steps of this \[m\].
+/// Step of commanded lengths \[m\].
 const LENGTH_STEP: f64 = 1e-6;
-/// Added to the stream of the poses for what is drawn apart, so that poses are the same with it and
-/// without.
-const APART: u64 = 1 << 32;
-/// Forces and temperatures are set in steps of this \[N\], [°C].
+/// Offset of the random stream of temperatures and covariates, which leaves the poses unchanged if
+/// these are added.
+const SETTINGS_STREAM: u64 = 1 << 32;
+/// Step of commanded forces \[N\] and temperatures [°C].
 const SETTING_STEP: f64 = 0.1;
 
-/// Whether poses at the ends of the ranges are preferred.
+/// Frequency of poses at the ends of the ranges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Extremes {
-    /// Every quantity evenly within its range.
+    /// Every quantity is uniform within its range.
     No,
-    /// Every quantity at one of its ends as often as within its range.
+    /// Every quantity is at one of its ends with probability one half.
     Often,
 }
 
 impl PoseRanges {
-    /// The limits of the joints that the problem declares.
+    /// Returns the joint limits that the problem declares.
     ///
     /// # Errors
-    /// A moving joint has no limits.
+    /// Returns an error if a moving joint lacks a limit.
     pub fn of(problem: &Problem) -> Result<Self, DesignError> {
         for joint in problem.joints.iter().filter(|joint| joint.command_kind() != JointKind::Fixed)
         {
@@ -49,8 +49,8 @@ impl PoseRanges {
         Ok(Self { joints, ..Self::default() })
     }
 
-    /// `count` poses, drawn one after the other, so that more of them leave the first ones as they
-    /// are. Each quantity by itself, of the targets one after the other; positions are zero.
+    /// Draws `count` poses. A larger count leaves the first poses unchanged. Quantities are
+    /// independent, targets alternate, and positions are zero.
     pub fn draw(
         &self,
         problem: &Problem,
@@ -59,8 +59,8 @@ impl PoseRanges {
         seed: u64,
         stream: u64,
     ) -> Measurements {
-        let (mut random, mut apart) =
-            (random::stream(seed, stream), random::stream(seed, APART + stream));
+        let (mut random, mut settings) =
+            (random::stream(seed, stream), random::stream(seed, SETTINGS_STREAM + stream));
         let value = |random: &mut ChaCha8Rng, (from, to): (f64, f64)| {
             let (kind, within) = (random.random::<f64>(), random.random::<f64>());
             match extremes {
@@ -69,14 +69,14 @@ impl PoseRanges {
                 _ => from + (to - from) * within,
             }
         };
-        let mut drawn = Table::new(self, problem);
+        let mut drawn = PoseTable::new(self, problem);
         for pose in 0..count {
             let joints = self.joints.iter().map(|&range| value(&mut random, range)).collect();
             let choice = value(&mut random, (0.0, 1.0));
             let hoist = self.hoist.map(|range| value(&mut random, range));
-            let temperature = self.temperature.map(|range| value(&mut apart, range));
+            let temperature = self.temperature.map(|range| value(&mut settings, range));
             let covariates =
-                self.covariates.iter().map(|&range| value(&mut apart, range)).collect();
+                self.covariates.iter().map(|&range| value(&mut settings, range)).collect();
             let sides = self.joints.iter().map(|_| random.random()).collect();
             let target = pose % problem.targets.len().max(1);
             drawn.push(
@@ -87,8 +87,9 @@ impl PoseRanges {
         drawn.finish()
     }
 
-    /// For each row of `poses` itself and `count` others near it: about half of its quantities
-    /// moved by up to `reach` of their range, and now and then another payload or side.
+    /// Returns each row of `poses` followed by `count` variations of it. A variation changes each
+    /// quantity with probability one half by up to `reach` times its range, and sometimes payload
+    /// or approach side.
     pub(super) fn vary(
         &self,
         problem: &Problem,
@@ -98,32 +99,32 @@ impl PoseRanges {
         (seed, stream): (u64, u64),
     ) -> Measurements {
         let mut random = random::stream(seed, stream);
-        let mut drawn = Table::new(self, problem);
+        let mut drawn = PoseTable::new(self, problem);
         for row in 0..poses.len() {
-            let own = Draft::of(self, poses, row);
-            drawn.push(problem, &own);
+            let base = Draft::of(self, poses, row);
+            drawn.push(problem, &base);
             for _ in 0..count {
-                let mut next = own.clone();
-                let mut near = |value: &mut f64, (from, to): (f64, f64)| {
+                let mut next = base.clone();
+                let mut vary = |value: &mut f64, (from, to): (f64, f64)| {
                     let (moves, step) =
                         (random.random::<bool>(), 2.0 * random.random::<f64>() - 1.0);
                     if moves {
                         *value = (*value + step * reach * (to - from)).clamp(from, to);
                     }
                 };
-                next.joints.iter_mut().zip(&self.joints).for_each(|(q, &range)| near(q, range));
+                next.joints.iter_mut().zip(&self.joints).for_each(|(q, &range)| vary(q, range));
                 next.hoist
                     .iter_mut()
                     .zip(&self.hoist)
-                    .for_each(|(force, &range)| near(force, range));
+                    .for_each(|(force, &range)| vary(force, range));
                 next.temperature
                     .iter_mut()
                     .zip(&self.temperature)
-                    .for_each(|(degrees, &range)| near(degrees, range));
+                    .for_each(|(degrees, &range)| vary(degrees, range));
                 next.covariates
                     .iter_mut()
                     .zip(&self.covariates)
-                    .for_each(|(own, &range)| near(own, range));
+                    .for_each(|(value, &range)| vary(value, range));
                 if random.random::<f64>() < 0.25 {
                     next.choice = random.random();
                 }
@@ -137,28 +138,28 @@ impl PoseRanges {
     }
 }
 
-/// A pose as it is drawn.
+/// Pose before rounding to command steps.
 #[derive(Clone)]
 struct Draft {
-    /// \[rad\] or \[m\].
+    /// Joint coordinates \[rad\] or \[m\].
     joints: Vec<f64>,
-    /// Place among the payloads, 0…1.
+    /// Position in the list of payloads, 0…1.
     choice: f64,
     hoist: Option<f64>,
     temperature: Option<f64>,
     covariates: Vec<f64>,
-    /// Whether each joint comes from above.
+    /// True for each joint that approaches from above.
     sides: Vec<bool>,
-    /// Index of the target that is measured.
+    /// Index of the measured target.
     target: usize,
 }
 
 impl Draft {
-    /// A row that was drawn from these ranges.
+    /// Recovers the draft of a row that was drawn from these ranges.
     fn of(ranges: &PoseRanges, poses: &Measurements, row: usize) -> Self {
         let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
-        let place = at(&poses.payload).and_then(|mass| {
-            ranges.payloads.iter().position(|&known| known.to_bits() == mass.to_bits())
+        let index = at(&poses.payload).and_then(|mass| {
+            ranges.payloads.iter().position(|&payload| payload.to_bits() == mass.to_bits())
         });
         let n = poses.joints;
         let sides = poses.approach.as_ref().map_or_else(
@@ -167,7 +168,7 @@ impl Draft {
         );
         Self {
             joints: poses.configuration(row).to_vec(),
-            choice: (place.unwrap_or(0) as f64 + 0.5) / ranges.payloads.len().max(1) as f64,
+            choice: (index.unwrap_or(0) as f64 + 0.5) / ranges.payloads.len().max(1) as f64,
             hoist: at(&poses.hoist),
             temperature: at(&poses.temperature),
             covariates: poses.covariates_of(row).to_vec(),
@@ -177,11 +178,11 @@ impl Draft {
     }
 }
 
-/// Poses as they are drawn, in steps that a controller can be given.
-struct Table<'a> {
+/// Table of poses in command steps.
+struct PoseTable<'a> {
     ranges: &'a PoseRanges,
     joints: usize,
-    /// Names of the targets that rows may measure, where there are several.
+    /// Names of the targets, if there are several.
     names: Vec<String>,
     target: Vec<usize>,
     configurations: Vec<f64>,
@@ -192,10 +193,10 @@ struct Table<'a> {
     approach: Vec<f64>,
 }
 
-impl<'a> Table<'a> {
+impl<'a> PoseTable<'a> {
     fn new(ranges: &'a PoseRanges, problem: &Problem) -> Self {
         let (joints, target) = (problem.joints.len(), Vec::new());
-        let names = problem.targets.iter().map(|own| own.name.clone()).collect();
+        let names = problem.targets.iter().map(|target| target.name.clone()).collect();
         let (configurations, payload, hoist, temperature, covariates, approach) =
             Default::default();
         Self {
@@ -269,7 +270,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// The multiple of `step` nearest to `value`, or `value` where that leaves the range.
+/// Returns the multiple of `step` nearest to `value`, or `value` if that leaves the range.
 fn rounded(value: f64, step: f64, (from, to): (f64, f64)) -> f64 {
     let steps = step.recip().round();
     let rounded = (value * steps).round() / steps;

@@ -1,9 +1,9 @@
-//! What measurements in given poses will tell, before anyone makes them.
+//! Forecast of the results of measurements in given poses.
 //!
-//! Rank, unidentifiable combinations and predictions are linear about the nominal arm; standard
-//! errors are those to expect of arms drawn from the priors.
+//! Rank, unidentifiable combinations and predictions are linear about the nominal arm. Standard
+//! errors are expected values over arms drawn from the priors.
 
-use super::coordinates::{coordinates, first_of_each};
+use super::coordinates::{coordinates, first_rows};
 use super::plan::choose;
 use super::{DesignError, Extremes, Forecast, Growth, Prediction, Sensitivity, Site};
 use crate::error::InputErrorKind;
@@ -12,101 +12,107 @@ use crate::measurement::{Dataset, Labels, Measurements, RowOrder, count_distinct
 use crate::problem::{Observation, PoseRanges, Problem};
 use crate::select::{Detection, detectable};
 
-/// Poses in which predictions are judged.
-const WORKSPACE: usize = 500;
-/// Length of the series that shows what more poses would bring.
-const SERIES: usize = 384;
-/// Arms drawn from the priors, least and most; as many poses together as these, if that lies
-/// between.
+/// Number of poses at which predictions are evaluated.
+const PREDICTION_POSES: usize = 500;
+/// Length of the series that shows the benefit of more poses.
+const SERIES_LENGTH: usize = 384;
+/// Minimum and maximum number of arms drawn from the priors.
 const ARMS: (usize, usize) = (16, 200);
+/// Number of poses over all drawn arms, within the limits of [`ARMS`].
 const ARM_POSES: usize = 20_000;
-/// Streams of random numbers of one seed.
+/// Random stream of the drawn poses.
 const POSES: u64 = 0;
-const ELSEWHERE: u64 = 10;
+/// Random stream of the poses of predictions.
+const PREDICTIONS: u64 = 10;
+/// Random stream of the order of rows.
 const ORDER: u64 = 11;
+/// Random stream of the drawn arms.
 const ARM: u64 = 12;
 
-/// Which poses are to be judged.
+/// Poses whose measurements are forecast.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
-pub enum Judged {
-    /// So many, drawn evenly within ranges.
+pub enum CheckedPoses {
+    /// Number of poses drawn uniformly from ranges.
     Drawn(PoseRanges, usize),
-    /// Rows of a table. Predictions are judged elsewhere: within ranges, in rows held out, or in
-    /// the rows themselves.
+    /// Rows of a table. Predictions are evaluated within ranges, at held-out rows, or at the rows
+    /// themselves.
     Table {
-        /// The poses.
+        /// Poses of the table.
         poses: Box<Measurements>,
-        /// Ranges in which predictions count.
+        /// Ranges in which predictions are evaluated.
         within: Option<PoseRanges>,
-        /// Rows in which predictions count, where no ranges are known.
+        /// Held-out rows, at which predictions are evaluated if no ranges are known.
         held_out: Option<Box<Measurements>>,
     },
 }
 
-/// Where predictions are judged.
+/// Poses at which predictions are evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Elsewhere {
-    /// In poses drawn evenly within the ranges.
+pub enum PredictionPoses {
+    /// Poses drawn uniformly from the ranges.
     Ranges,
-    /// In the rows held out.
+    /// Held-out rows.
     HeldOut,
-    /// In the poses themselves.
+    /// The checked poses themselves.
     Same,
 }
 
-/// What measurements in some poses will tell.
+/// Forecast of the results of measurements in some poses.
 #[derive(Debug, Clone)]
 pub struct Check {
-    /// Of these poses.
+    /// Expected errors and identifiability of the parameters.
     pub forecast: Forecast,
-    /// Error of the arm identified from them, elsewhere.
+    /// Expected error of positions that the identified arm predicts.
     pub prediction: Prediction,
-    /// Where that is.
-    pub elsewhere: Elsewhere,
-    /// Root mean square length of the error of one position measured with the σ of these poses
-    /// \[m\]; `None` where they measure tilts alone.
+    /// Poses at which the prediction is evaluated.
+    pub predicted_at: PredictionPoses,
+    /// Root mean square length of the error of one measured position \[m\]; `None` if only tilts
+    /// are measured.
     pub noise: Option<f64>,
-    /// What that σ is of: the first kind of what is measured that is a length
+    /// Kind of measurement that has this noise: the first kind in the table that is a length
     /// ([`Observation::kind`]).
     pub noise_of: &'static str,
-    /// Of the first n of a series of such poses.
+    /// Forecasts for the first n poses of a series of such poses.
     pub growth: Growth,
-    /// Which effects of the catalogue they would show, and from what size on.
+    /// Effects of the catalogue that the poses would show, with their smallest detectable sizes.
     pub detection: Detection,
-    /// Measured coordinates.
+    /// Number of measured coordinates.
     pub coordinates: usize,
-    /// The same of poses that differ from each other.
+    /// Number of measured coordinates over poses that differ from each other.
     pub distinct: usize,
-    /// How many of the poses differ from each other.
+    /// Number of poses that differ from each other.
     pub different: usize,
-    /// Free parameters without a prior.
+    /// Number of free parameters without a prior.
     pub without_prior: usize,
 }
 
-/// Judges poses.
+/// Forecasts the results of measurements in some poses.
 ///
 /// # Errors
-/// The problem does not say enough, or the nominal arm does not come to rest in one of the poses of
-/// a table.
-pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, DesignError> {
+/// Returns an error if the problem lacks a declaration, or if the nominal arm has no equilibrium in
+/// a pose of a table.
+pub fn check(problem: &Problem, checked: &CheckedPoses, seed: u64) -> Result<Check, DesignError> {
     let draw = |ranges: &PoseRanges, count, stream| {
         ranges.draw(problem, count, Extremes::No, seed, stream)
     };
-    let (series, count, workspace, elsewhere) = match judged {
-        Judged::Drawn(ranges, count) => {
-            let series = draw(ranges, SERIES.max(2 * count), POSES);
-            (series, *count, draw(ranges, WORKSPACE, ELSEWHERE), Elsewhere::Ranges)
+    let (series, count, prediction_table, predicted_at) = match checked {
+        CheckedPoses::Drawn(ranges, count) => {
+            let series = draw(ranges, SERIES_LENGTH.max(2 * count), POSES);
+            let predictions = draw(ranges, PREDICTION_POSES, PREDICTIONS);
+            (series, *count, predictions, PredictionPoses::Ranges)
         }
-        Judged::Table { poses, within, held_out } => {
+        CheckedPoses::Table { poses, within, held_out } => {
             let series = poses.select(&choose(poses.len(), poses.len(), seed, ORDER));
-            let (workspace, elsewhere) = match (within, held_out) {
-                (Some(ranges), _) => (draw(ranges, WORKSPACE, ELSEWHERE), Elsewhere::Ranges),
-                (None, Some(rows)) => (rows.as_ref().clone(), Elsewhere::HeldOut),
-                (None, None) => (poses.as_ref().clone(), Elsewhere::Same),
+            let (predictions, predicted_at) = match (within, held_out) {
+                (Some(ranges), _) => {
+                    (draw(ranges, PREDICTION_POSES, PREDICTIONS), PredictionPoses::Ranges)
+                }
+                (None, Some(rows)) => (rows.as_ref().clone(), PredictionPoses::HeldOut),
+                (None, None) => (poses.as_ref().clone(), PredictionPoses::Same),
             };
-            (series, poses.len(), workspace, elsewhere)
+            (series, poses.len(), predictions, predicted_at)
         }
     };
     if count == 0 {
@@ -114,60 +120,60 @@ pub fn check(problem: &Problem, judged: &Judged, seed: u64) -> Result<Check, Des
     }
     let site = Site::new(problem, &[&series])?;
     let parameters = &site.model.parameters;
-    let (series, told) = match judged {
-        Judged::Drawn(..) => site.at_rest(&series),
-        Judged::Table { .. } => {
-            let all = site.sensitivity(&series, None);
-            if let Some(row) = (0..all.len()).find(|&row| !all.is_finite(row)) {
+    let (series, sensitivity) = match checked {
+        CheckedPoses::Drawn(..) => site.in_equilibrium(&series),
+        CheckedPoses::Table { .. } => {
+            let sensitivity = site.sensitivity(&series, None);
+            if let Some(row) = (0..sensitivity.len()).find(|&row| !sensitivity.is_finite(row)) {
                 return Err(series.location(row).error(InputErrorKind::NoEquilibrium).into());
             }
-            (series, all)
+            (series, sensitivity)
         }
     };
-    if told.len() < count {
+    if sensitivity.len() < count {
         return Err(DesignError::NoEquilibrium);
     }
-    let attainable = match judged {
-        Judged::Table { poses, within: Some(ranges), .. } => {
-            let drawn = measured_as(poses, draw(ranges, SERIES, POSES));
-            Some(site.at_rest(&drawn).1)
+    let attainable = match checked {
+        CheckedPoses::Table { poses, within: Some(ranges), .. } => {
+            let drawn = measured_as(poses, draw(ranges, SERIES_LENGTH, POSES));
+            Some(site.in_equilibrium(&drawn).1)
         }
         _ => None,
     };
     let poses = series.select(&(0..count).collect::<Vec<_>>());
     // Predictions are of positions, whatever is measured.
-    let workspace = Measurements { observations: Vec::new(), ..workspace };
-    let workspace = finite(&site.sensitivity(&workspace, Some(1.0)));
+    let prediction_table = Measurements { observations: Vec::new(), ..prediction_table };
+    let workspace = finite(&site.sensitivity(&prediction_table, Some(1.0)));
     let lengths = series.kinds().into_iter().find(|kind| kind.is_of_arm() && !kind.is_angle());
     let noise = lengths.map(|kind| noise(problem, &series, kind));
-    let forecast = Forecast::new(parameters, &told.select(&(0..count).collect::<Vec<_>>()));
+    let forecast = Forecast::new(parameters, &sensitivity.select(&(0..count).collect::<Vec<_>>()));
     let arms = site.arms(&poses, (ARM_POSES / count).clamp(ARMS.0, ARMS.1), (seed, ARM));
     Ok(Check {
         prediction: forecast.prediction(&workspace),
         forecast: forecast.over(parameters, &arms),
-        elsewhere,
+        predicted_at,
         noise,
         noise_of: lengths.unwrap_or_default().kind(),
         detection: detectable(problem, &poses)?,
         growth: Growth::new(
             parameters,
-            &told,
+            &sensitivity,
             attainable.as_ref(),
             &workspace,
             (noise.unwrap_or(0.0), count),
         ),
-        coordinates: coordinates(&poses, told.coordinates, 0..count),
+        coordinates: coordinates(&poses, sensitivity.coordinates, 0..count),
         distinct: coordinates(
             &poses,
-            told.coordinates,
-            first_of_each(&poses.pose_numbers(problem)),
+            sensitivity.coordinates,
+            first_rows(&poses.pose_numbers(problem)),
         ),
         different: count_distinct(&poses.pose_numbers(problem), 0..count),
         without_prior: parameters.iter().filter(|parameter| parameter.sigma.is_none()).count(),
     })
 }
 
-/// Poses that are drawn, with sessions and targets as often as a table has them.
+/// Gives drawn poses the sessions and targets of a table, in the same proportions.
 fn measured_as(table: &Measurements, drawn: Measurements) -> Measurements {
     let spread = |words: &Labels| Labels {
         names: words.names.clone(),
@@ -182,43 +188,47 @@ fn measured_as(table: &Measurements, drawn: Measurements) -> Measurements {
 }
 
 impl Check {
-    /// Whether the poses decide every parameter as far as poses of their kind can, and measure as
-    /// many coordinates as parameters have no prior.
+    /// Returns true if the poses determine all combinations that poses of their kind can, and
+    /// measure at least as many coordinates as there are parameters without a prior.
     pub fn suffices(&self) -> bool {
-        self.forecast.open <= self.growth.open && self.distinct >= self.without_prior
+        self.forecast.undetermined <= self.growth.undetermined
+            && self.distinct >= self.without_prior
     }
 }
 
-/// `count` rows of a table, drawn at random; the same for the same seed.
-pub fn some_of(table: &Measurements, count: usize, seed: u64) -> Measurements {
+/// Returns `count` random rows of a table; the seed determines the choice.
+pub fn random_rows(table: &Measurements, count: usize, seed: u64) -> Measurements {
     table.select(&choose(table.len(), count, seed, ORDER))
 }
 
-/// The held-out rows of sessions and targets that identification rows use as well: those in which
-/// predictions can be judged.
-pub fn with_known_words(data: &Dataset) -> Vec<usize> {
+/// Returns the held-out rows whose session and target also occur in identification rows, so that
+/// predictions can be evaluated there.
+pub fn predictable_rows(data: &Dataset) -> Vec<usize> {
     let Dataset { measurements, split } = data;
     let placement = Placement::of(measurements);
-    let known = |of: fn(&Placement, usize) -> usize, row: usize| {
-        split.identification.iter().any(|&own| of(&placement, own) == of(&placement, row))
+    let is_used = |of: fn(&Placement, usize) -> usize, row: usize| {
+        split.identification.iter().any(|&other| of(&placement, other) == of(&placement, row))
     };
-    let judges = |&row: &usize| known(Placement::base_of, row) && known(Placement::target_of, row);
-    split.held_out.iter().copied().filter(judges).collect()
+    let is_predictable =
+        |&row: &usize| is_used(Placement::base_of, row) && is_used(Placement::target_of, row);
+    split.held_out.iter().copied().filter(is_predictable).collect()
 }
 
-fn finite(all: &Sensitivity) -> Sensitivity {
-    all.select(&(0..all.len()).filter(|&row| all.is_finite(row)).collect::<Vec<_>>())
+/// Returns the poses whose sensitivity is finite.
+fn finite(sensitivity: &Sensitivity) -> Sensitivity {
+    let rows = (0..sensitivity.len()).filter(|&row| sensitivity.is_finite(row));
+    sensitivity.select(&rows.collect::<Vec<_>>())
 }
 
-/// √3 σ, of the mean σ² of the rows of a kind.
+/// Returns √3 σ, from the mean σ² of the rows of one kind.
 fn noise(problem: &Problem, table: &Measurements, kind: Observation) -> f64 {
     let declared = problem.data.sigma_of(kind).unwrap_or(1.0);
-    let own = |row: &usize| table.observation(*row).kind() == kind.kind();
+    let is_of_kind = |row: &usize| table.observation(*row).kind() == kind.kind();
     let squares = match &table.sigma {
         Some(sigmas) => {
-            let own: Vec<f64> =
-                (0..sigmas.len()).filter(own).map(|row| sigmas[row] * sigmas[row]).collect();
-            own.iter().sum::<f64>() / own.len().max(1) as f64
+            let rows = (0..sigmas.len()).filter(is_of_kind);
+            let squares: Vec<f64> = rows.map(|row| sigmas[row] * sigmas[row]).collect();
+            squares.iter().sum::<f64>() / squares.len().max(1) as f64
         }
         None => declared * declared,
     };

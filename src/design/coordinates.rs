@@ -1,11 +1,12 @@
-//! How many numbers poses measure.
+//! Number of coordinates that poses measure.
 
 use std::collections::HashSet;
 
 use crate::measurement::Measurements;
 use crate::problem::Observation;
 
-/// Numbers that some rows of a table measure, of which a position has so many.
+/// Returns the number of coordinates that some rows of a table measure; a position has
+/// `of_position`.
 pub(super) fn coordinates(
     table: &Measurements,
     of_position: usize,
@@ -13,13 +14,13 @@ pub(super) fn coordinates(
 ) -> usize {
     let of_row = |row: usize| match table.observation(row) {
         Observation::Position => of_position,
-        other => other.coordinates(),
+        observation => observation.coordinates(),
     };
     rows.into_iter().map(of_row).sum()
 }
 
-/// The first row with each number.
-pub(super) fn first_of_each(numbers: &[usize]) -> Vec<usize> {
-    let mut seen = HashSet::new();
-    (0..numbers.len()).filter(|&row| seen.insert(numbers[row])).collect()
+/// Returns the first row of each pose number.
+pub(super) fn first_rows(numbers: &[usize]) -> Vec<usize> {
+    let mut found = HashSet::new();
+    (0..numbers.len()).filter(|&row| found.insert(numbers[row])).collect()
 }

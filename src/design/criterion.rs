@@ -1,61 +1,62 @@
-//! What makes a set of poses good.
+//! Optimality criteria of experimental design.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::parameter::Parameter;
 
-/// An eigenvalue of the prior's share above this: the prior, not the data, decides the combination.
-const MOSTLY_PRIOR: f64 = 0.5;
+/// Share of the prior in the information on a combination from which the prior determines it.
+const PRIOR_DOMINATED: f64 = 0.5;
 
-/// What a plan makes small: a size of the covariance C that a set of poses leaves, priors included.
+/// Optimality criterion: a size, to be minimised, of the covariance C of the parameters (priors
+/// included).
 ///
-/// S, D, A and E are about the arm's parameters. Bases and targets are estimated along with them
-/// and are in C, but their own errors do not count.
+/// D, S, A and E concern the parameters of the arm. Bases and targets are estimated together with
+/// them and enter C, but their errors do not count.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Criterion {
-    /// det C: the volume of the confidence ellipsoid. Does not depend on units.
+    /// Determinant of C, the volume of the confidence ellipsoid; independent of units.
     D,
-    /// Π C_kk: the geometric mean of the standard errors. Does not depend on units.
+    /// Product Π C_kk, from the geometric mean of the standard errors; independent of units.
     S,
-    /// Σ C_kk / C̄_kk: the mean variance, each parameter's in units of what as many average
-    /// candidates leave of it, C̄.
+    /// Sum Σ C_kk / C̄_kk, the mean variance relative to the covariance C̄ of as many average
+    /// candidates.
     A,
-    /// The largest variance of any combination, in units of what as many average candidates leave
-    /// of it; of the combinations that those decide more than the priors do.
+    /// Largest variance of a combination relative to C̄, among the combinations that average
+    /// candidates determine more than the priors do.
     E,
-    /// D_s: det of the part of C of these parameters (numbers in the model), all others estimated
-    /// along with them.
+    /// Determinant of the block of C of these parameters (indices in the model), with all others
+    /// estimated (D_s).
     Subset(Vec<usize>),
-    /// S of these parameters alone (numbers in the model), all others estimated along with them.
+    /// Product of C_kk over these parameters (indices in the model), with all others estimated.
     Each(Vec<usize>),
 }
 
-/// A criterion made ready for one problem, in scaled unknowns.
+/// Criterion for one problem, in scaled unknowns.
 #[derive(Debug, Clone)]
-pub(super) struct Yardstick {
-    /// Unknowns whose errors count, ascending.
+pub(super) struct ScaledCriterion {
+    /// Unknowns whose errors count, in ascending order.
     pub wanted: Vec<usize>,
-    /// The others.
-    pub rest: Vec<usize>,
-    pub size: Size,
+    /// All other unknowns.
+    pub nuisance: Vec<usize>,
+    pub measure: Measure,
 }
 
-/// How the covariance of the wanted unknowns is summed up.
+/// Scalar measure of the covariance of the wanted unknowns.
 #[derive(Debug, Clone)]
-pub(super) enum Size {
-    /// det C_ss = det M_rr / det M, r the rest.
+pub(super) enum Measure {
+    /// Determinant det C_ss = det M_rr / det M, with r the nuisance unknowns.
     Determinant,
-    /// Π C_kk over the wanted unknowns.
+    /// Product Π C_kk over the wanted unknowns.
     Product,
-    /// Σ weight · C_kk over all unknowns, weight 0 for those not wanted.
+    /// Weighted sum Σ w_k C_kk over all unknowns; w_k = 0 for nuisance unknowns.
     Trace(DVector<f64>),
-    /// The largest eigenvalue of F C Fᵀ; F, shape = (combinations, unknowns).
+    /// Largest eigenvalue of F C Fᵀ; F has shape = (combinations, unknowns).
     Eigenvalue(DMatrix<f64>),
 }
 
 impl Criterion {
-    /// Name on the command line and in results.
+    /// Returns the name on the command line and in results.
     pub fn as_str(&self) -> &'static str {
         match self {
             Self::D => "D",
@@ -67,61 +68,61 @@ impl Criterion {
         }
     }
 
-    /// Ready to measure information matrices in scaled unknowns; `average` is that of average
-    /// poses, `prior` that of the priors alone.
-    pub(super) fn yardstick(
+    /// Prepares the criterion for information matrices in scaled unknowns. `average` is the
+    /// information of average poses, `prior` that of the priors alone.
+    pub(super) fn scaled(
         &self,
         parameters: &[Parameter],
         average: &DMatrix<f64>,
         prior: &DMatrix<f64>,
-    ) -> Option<Yardstick> {
+    ) -> Option<ScaledCriterion> {
         let n = parameters.len();
         let is_wanted = |k: usize| match self {
             Self::Subset(columns) | Self::Each(columns) => columns.contains(&k),
-            // Where only bases or targets are free, they are what is looked for.
+            // If only bases or targets are free, their errors count.
             _ => {
                 !parameters[k].site.is_placement()
                     || parameters.iter().all(|p| p.site.is_placement())
             }
         };
-        let (wanted, rest): (Vec<usize>, Vec<usize>) = (0..n).partition(|&k| is_wanted(k));
-        let size = match self {
-            Self::D | Self::Subset(_) => Size::Determinant,
+        let (wanted, nuisance): (Vec<usize>, Vec<usize>) = (0..n).partition(|&k| is_wanted(k));
+        let measure = match self {
+            Self::D | Self::Subset(_) => Measure::Determinant,
             Self::A => {
-                let usual = average.clone().cholesky()?.inverse();
+                let covariance = average.clone().cholesky()?.inverse();
                 let mut weights = DVector::zeros(n);
                 for &k in &wanted {
-                    weights[k] = (wanted.len() as f64 * usual[(k, k)]).recip();
+                    weights[k] = (wanted.len() as f64 * covariance[(k, k)]).recip();
                 }
-                Size::Trace(weights)
+                Measure::Trace(weights)
             }
-            Self::S | Self::Each(_) => Size::Product,
-            Self::E => Size::Eigenvalue(decided(average, prior, &wanted)?),
+            Self::S | Self::Each(_) => Measure::Product,
+            Self::E => Measure::Eigenvalue(data_determined(average, prior, &wanted)?),
         };
-        Some(Yardstick { wanted, rest, size })
+        Some(ScaledCriterion { wanted, nuisance, measure })
     }
 }
 
-impl Yardstick {
-    /// ln of the size that information M leaves, per parameter where it is a determinant or a
-    /// product; infinite where M is singular.
+impl ScaledCriterion {
+    /// Returns the logarithm of the measure for information M, per parameter for a determinant or
+    /// product; infinite if M is singular.
     pub fn value(&self, information: &DMatrix<f64>) -> f64 {
         let Some(cholesky) = information.clone().cholesky() else { return f64::INFINITY };
-        match &self.size {
-            Size::Determinant => {
-                let Some(rest) = part(information, &self.rest).cholesky() else {
+        match &self.measure {
+            Measure::Determinant => {
+                let Some(nuisance) = block(information, &self.nuisance).cholesky() else {
                     return f64::INFINITY;
                 };
                 let log = |l: &DMatrix<f64>| 2.0 * l.diagonal().iter().map(|d| d.ln()).sum::<f64>();
-                (log(rest.l_dirty()) - log(cholesky.l_dirty())) / self.wanted.len() as f64
+                (log(nuisance.l_dirty()) - log(cholesky.l_dirty())) / self.wanted.len() as f64
             }
-            Size::Product => {
+            Measure::Product => {
                 let variances = cholesky.inverse().diagonal();
                 self.wanted.iter().map(|&k| variances[k].ln()).sum::<f64>()
                     / self.wanted.len() as f64
             }
-            Size::Trace(weights) => cholesky.inverse().diagonal().dot(weights).ln(),
-            Size::Eigenvalue(combinations) => {
+            Measure::Trace(weights) => cholesky.inverse().diagonal().dot(weights).ln(),
+            Measure::Eigenvalue(combinations) => {
                 let covariance = combinations * cholesky.inverse() * combinations.transpose();
                 covariance.symmetric_eigenvalues().max().ln()
             }
@@ -129,30 +130,35 @@ impl Yardstick {
     }
 }
 
-/// Rows and columns `keep` of a square matrix.
-pub(super) fn part(matrix: &DMatrix<f64>, keep: &[usize]) -> DMatrix<f64> {
+/// Returns the rows and columns `keep` of a square matrix.
+pub(super) fn block(matrix: &DMatrix<f64>, keep: &[usize]) -> DMatrix<f64> {
     matrix.select_rows(keep).select_columns(keep)
 }
 
-/// Combinations F of the unknowns, uncorrelated and of variance one after average poses, that those
-/// decide more than the priors do; all of them, if none is.
+/// Returns the combinations F of the unknowns that average poses determine more than the priors do;
+/// all combinations if there are none. They are uncorrelated with unit variance after average
+/// poses.
 ///
-/// (C̄_ss)⁻¹ = L Lᵀ and L⁻¹ P_ss L⁻ᵀ = Q diag(prior's share) Qᵀ; rows of Qᵀ Lᵀ whose share is below
-/// a half.
-fn decided(average: &DMatrix<f64>, prior: &DMatrix<f64>, wanted: &[usize]) -> Option<DMatrix<f64>> {
-    let covariance = part(&average.clone().cholesky()?.inverse(), wanted);
+/// (C̄_ss)⁻¹ = L Lᵀ and L⁻¹ P_ss L⁻ᵀ = Q diag(share of the prior) Qᵀ; F consists of the rows of Qᵀ
+/// Lᵀ with a share below one half.
+fn data_determined(
+    average: &DMatrix<f64>,
+    prior: &DMatrix<f64>,
+    wanted: &[usize],
+) -> Option<DMatrix<f64>> {
+    let covariance = block(&average.clone().cholesky()?.inverse(), wanted);
     let l = covariance.cholesky()?.inverse().cholesky()?.unpack();
-    let half = l.solve_lower_triangular(&part(prior, wanted))?;
+    let half = l.solve_lower_triangular(&block(prior, wanted))?;
     let share = l.solve_lower_triangular(&half.transpose())?;
     let eigen = (0.5 * (&share + share.transpose())).symmetric_eigen();
     let count = eigen.eigenvalues.len();
-    let mut kept: Vec<usize> =
-        (0..count).filter(|&k| eigen.eigenvalues[k] < MOSTLY_PRIOR).collect();
-    if kept.is_empty() {
-        kept = (0..count).collect();
+    let mut selected: Vec<usize> =
+        (0..count).filter(|&k| eigen.eigenvalues[k] < PRIOR_DOMINATED).collect();
+    if selected.is_empty() {
+        selected = (0..count).collect();
     }
-    let rows = (&l * eigen.eigenvectors.select_columns(&kept)).transpose();
-    let mut combinations = DMatrix::zeros(kept.len(), average.ncols());
+    let rows = (&l * eigen.eigenvectors.select_columns(&selected)).transpose();
+    let mut combinations = DMatrix::zeros(selected.len(), average.ncols());
     wanted.iter().enumerate().for_each(|(j, &k)| combinations.set_column(k, &rows.column(j)));
     Some(combinations)
 }

@@ -1,60 +1,60 @@
-//! Poses exchanged one by one for better candidates.
+//! Exchange algorithm: replaces poses one by one by better candidates.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::criterion::{Criterion, Yardstick};
-use super::scan::Scan;
+use super::criterion::{Criterion, ScaledCriterion};
+use super::scan::CandidateScan;
 use super::sensitivity::Sensitivity;
 use crate::least_squares::Identifiability;
 use crate::model::parameter::Parameter;
 
-/// Part of the information of average poses that every plan has: keeps plans with too few poses
-/// comparable.
+/// Fraction of the information of average poses that is added to every plan, so that plans with too
+/// few poses are comparable.
 const RIDGE: f64 = 1e-6;
-/// Information on combinations that neither candidates nor priors see: they stay where they are.
-const HELD: f64 = 1e4;
-/// A sweep that lowers the logarithm of the criterion by less than this is the last.
-const SETTLED: f64 = 1e-6;
-/// Sweeps after which the exchange stops.
-const SWEEPS: usize = 50;
+/// Scaled information that fixes combinations that neither candidates nor priors determine.
+const FIXING_INFORMATION: f64 = 1e4;
+/// Smallest decrease of the logarithm of the criterion that continues with another sweep.
+const MIN_GAIN: f64 = 1e-6;
+/// Maximum number of sweeps.
+const MAX_SWEEPS: usize = 50;
 
-/// Candidates and a criterion, ready to exchange poses.
+/// Candidates and criterion of an exchange of poses.
 ///
-/// Unknowns are scaled by the information that average candidates and priors give on each.
+/// Unknowns are scaled by the information of average candidates and priors.
 #[derive(Debug, Clone)]
 pub struct Exchange {
     /// Jᵀ of the candidates, scaled.
     candidates: DMatrix<f64>,
-    /// Measured coordinates of each of them.
+    /// Number of measured coordinates of each candidate.
     coordinates: usize,
-    /// By what each unknown is multiplied.
+    /// Scale by which each unknown is multiplied.
     scale: DVector<f64>,
-    /// Information that is there without any candidate, scaled.
-    ground: DMatrix<f64>,
-    yardstick: Yardstick,
+    /// Information without any candidate, scaled: priors, given poses, ridge.
+    base_information: DMatrix<f64>,
+    criterion: ScaledCriterion,
 }
 
-/// A set of poses that no exchange of one of them makes better.
+/// Set of poses that no single exchange improves.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Exchanged {
-    /// Numbers of the candidates, ascending.
+pub struct ExchangeResult {
+    /// Indices of the candidates, in ascending order.
     pub chosen: Vec<usize>,
-    /// ln of the criterion at the start and after each sweep; never rises.
+    /// Logarithm of the criterion at the start and after each sweep; never increases.
     pub values: Vec<f64>,
 }
 
-impl Exchanged {
-    /// ln of the criterion at the end.
+impl ExchangeResult {
+    /// Returns the logarithm of the criterion at the end.
     pub fn value(&self) -> f64 {
         self.values.last().copied().unwrap_or(f64::INFINITY)
     }
 }
 
 impl Exchange {
-    /// Of `poses` poses beside those `given`, which are measured in any case.
+    /// Prepares the exchange of `poses` poses in addition to the poses `given`, which are measured
+    /// anyway.
     ///
-    /// `None` where the information on the parameters is not finite: some candidate has no
-    /// equilibrium.
+    /// Returns `None` if the information is not finite, because a candidate has no equilibrium.
     pub fn new(
         parameters: &[Parameter],
         candidates: &Sensitivity,
@@ -69,15 +69,20 @@ impl Exchange {
         ));
         let mut average =
             candidates.information() * (poses as f64 / candidates.len().max(1) as f64);
-        let mut ground = &prior + &average * RIDGE;
+        let mut base = &prior + &average * RIDGE;
         if let Some(given) = given {
-            let known = given.information();
-            average += &known;
-            ground += known;
+            let information = given.information();
+            average += &information;
+            base += information;
         }
-        let mut all = &average + &prior;
+        let mut total = &average + &prior;
         let scale =
-            DVector::from_fn(n, |k, _| if all[(k, k)] > 0.0 { all[(k, k)].sqrt() } else { 1.0 });
+            DVector::from_fn(
+                n,
+                |k, _| {
+                    if total[(k, k)] > 0.0 { total[(k, k)].sqrt() } else { 1.0 }
+                },
+            );
         let scaled = |mut matrix: DMatrix<f64>| {
             for j in 0..n {
                 for i in 0..n {
@@ -87,30 +92,30 @@ impl Exchange {
             matrix
         };
         let rows = in_scale(candidates, &scale);
-        let (scaled_prior, mut ground) = (scaled(prior), scaled(ground));
-        all = scaled(all);
-        if all.iter().any(|value| !value.is_finite()) {
+        let (scaled_prior, mut base) = (scaled(prior), scaled(base));
+        total = scaled(total);
+        if total.iter().any(|value| !value.is_finite()) {
             return None;
         }
-        let seen = DMatrix::from_fn(n + candidates.rows.ncols(), n, |i, j| match i {
+        let stacked = DMatrix::from_fn(n + candidates.rows.ncols(), n, |i, j| match i {
             i if i < n => scaled_prior[(i, j)].sqrt(),
             i => rows[(j, i - n)],
         });
-        let unidentifiable = Identifiability::of(&seen.qr().r()).gauge;
-        let held = unidentifiable.transpose() * &unidentifiable * HELD;
-        ground += &held;
-        all += &held;
-        let yardstick = criterion.yardstick(parameters, &all, &scaled_prior)?;
+        let unidentifiable = Identifiability::of(&stacked.qr().r()).gauge;
+        let fixing = unidentifiable.transpose() * &unidentifiable * FIXING_INFORMATION;
+        base += &fixing;
+        total += &fixing;
+        let criterion = criterion.scaled(parameters, &total, &scaled_prior)?;
         Some(Self {
             candidates: rows,
             coordinates: candidates.coordinates,
             scale,
-            ground,
-            yardstick,
+            base_information: base,
+            criterion,
         })
     }
 
-    /// Other candidates, measured by the same criterion in the same units.
+    /// Replaces the candidates; criterion and scale stay the same.
     #[must_use]
     pub fn with_candidates(&self, candidates: &Sensitivity) -> Self {
         Self {
@@ -120,52 +125,58 @@ impl Exchange {
         }
     }
 
-    /// Number of candidates.
+    /// Returns the number of candidates.
     pub fn candidates(&self) -> usize {
         self.candidates.ncols() / self.coordinates
     }
 
-    /// ln of the criterion for a set of candidates.
+    /// Returns the logarithm of the criterion for a set of candidates.
     pub fn value(&self, chosen: &[usize]) -> f64 {
-        self.yardstick.value(&self.information(chosen.iter().copied()))
+        self.criterion.value(&self.information(chosen.iter().copied()))
     }
 
-    /// Exchanges each pose in turn for the best candidate, until a sweep over all of them gains
-    /// nothing  [Cook & Nachtsheim 1980: the modified Fedorov exchange].
+    /// Exchanges each pose in turn for the best candidate until a sweep over all poses gains
+    /// nothing (modified Fedorov exchange) [Cook & Nachtsheim 1980].
     ///
-    /// No candidate is taken twice. `swept` is told of every sweep.
-    pub fn improve(&self, mut chosen: Vec<usize>, mut swept: impl FnMut(usize, f64)) -> Exchanged {
+    /// No candidate is chosen twice. `swept` is called after every sweep.
+    pub fn improve(
+        &self,
+        mut chosen: Vec<usize>,
+        mut swept: impl FnMut(usize, f64),
+    ) -> ExchangeResult {
         let mut values = vec![self.value(&chosen)];
-        for sweep in 1..=SWEEPS {
+        for sweep in 1..=MAX_SWEEPS {
             let before = values[values.len() - 1];
             let mut value = before;
-            for place in 0..chosen.len() {
+            for index in 0..chosen.len() {
                 let others =
-                    (0..chosen.len()).filter(|&other| other != place).map(|other| chosen[other]);
-                let Some(scan) = Scan::new(&self.yardstick, &self.information(others)) else {
+                    (0..chosen.len()).filter(|&other| other != index).map(|other| chosen[other]);
+                let Some(scan) = CandidateScan::new(&self.criterion, &self.information(others))
+                else {
                     continue;
                 };
-                // Rounding must not pass for a gain.
-                let least = value - 1e-10 * value.abs().max(1.0);
+                // Rounding does not count as a gain.
+                let limit = value - 1e-10 * value.abs().max(1.0);
                 if let Some((better, gained)) =
-                    scan.best((&self.candidates, self.coordinates), |k| !chosen.contains(&k), least)
+                    scan.best((&self.candidates, self.coordinates), |k| !chosen.contains(&k), limit)
                 {
-                    (chosen[place], value) = (better, gained);
+                    (chosen[index], value) = (better, gained);
                 }
             }
             let value = self.value(&chosen).min(before);
             values.push(value);
             swept(sweep, value);
-            if before - value < SETTLED {
+            if before - value < MIN_GAIN {
                 break;
             }
         }
         chosen.sort_unstable();
-        Exchanged { chosen, values }
+        ExchangeResult { chosen, values }
     }
 
+    /// Returns the scaled information of a set of candidates.
     fn information(&self, poses: impl Iterator<Item = usize>) -> DMatrix<f64> {
-        let mut information = self.ground.clone();
+        let mut information = self.base_information.clone();
         for pose in poses {
             let rows = self.candidates.columns(self.coordinates * pose, self.coordinates);
             information.gemm(1.0, &rows, &rows.transpose(), 1.0);
@@ -174,7 +185,7 @@ impl Exchange {
     }
 }
 
-/// Jᵀ per unit of the scaled unknowns.
+/// Returns Jᵀ with respect to the scaled unknowns.
 fn in_scale(candidates: &Sensitivity, scale: &DVector<f64>) -> DMatrix<f64> {
     let mut rows = candidates.rows.clone();
     rows.column_iter_mut().for_each(|mut column| column.component_div_assign(scale));

@@ -1,4 +1,4 @@
-//! What identification from given poses will tell.
+//! Forecast of the errors of identification from given poses.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -8,73 +8,74 @@ use crate::least_squares::{Identifiability, Uncertainty};
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
 
-/// A part this large in combinations that stay open leaves a parameter without an error of its own.
-const PARTLY_OPEN: f64 = 1e-3;
-/// A parameter of which the data will give no more than this part has no standard error.
-const NOTHING_LEARNED: f64 = 1e-6;
+/// Share in undetermined combinations above which a parameter has no standard error.
+const UNDETERMINED_SHARE: f64 = 1e-3;
+/// Identified share below which a parameter has no standard error.
+const MIN_IDENTIFIED: f64 = 1e-6;
 
-/// What is to be expected of one parameter.
+/// Forecast for one parameter.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Expected {
+pub struct ExpectedParameter {
     /// Name as in the problem file.
     pub name: String,
-    /// Kind of quantity.
+    /// Unit of the quantity.
     pub unit: Unit,
     /// Nominal value, SI.
     pub nominal: f64,
-    /// 1 σ of the prior at the nominal value, SI.
+    /// Standard deviation of the prior at the nominal value, SI.
     pub prior: Option<f64>,
-    /// 1 σ of the estimate, SI (that of a logarithm times the nominal value); `None` where nothing
-    /// will be learned.
+    /// Standard error of the estimate, SI (for a logarithm times the nominal value); `None` if the
+    /// data will not inform on the parameter.
     pub std_error: Option<f64>,
-    /// Part of the value that the data will give, 0…1.
+    /// Share of the value that the data will determine, 0…1.
     pub identified: f64,
-    /// The same at the nominal arm, where parameters may go together that other arms tell apart.
+    /// Share at the nominal arm, where parameters may be confounded that other arms separate, 0…1.
     pub identified_at_nominal: f64,
-    /// Whether it belongs to a base or a target rather than to the arm.
+    /// True for a parameter of a base or target, false for one of the arm.
     pub is_placement: bool,
 }
 
-/// What identification from a set of poses will tell about the free parameters.
+/// Forecast of the identification of all free parameters from a set of poses.
 #[derive(Debug, Clone)]
 pub struct Forecast {
     /// Number of poses.
     pub poses: usize,
-    /// What the positions alone tell, priors left out.
+    /// Identifiability by the measurements alone, without priors.
     pub identifiability: Identifiability,
-    /// Every free parameter.
-    pub expected: Vec<Expected>,
-    /// Covariance of x, unidentifiable combinations held, shape = (parameters, parameters).
+    /// Forecast for every free parameter.
+    pub expected: Vec<ExpectedParameter>,
+    /// Covariance of x with fixed unidentifiable combinations, shape = (parameters, parameters).
     pub covariance: DMatrix<f64>,
-    /// Combinations that neither positions nor priors see.
-    pub open: usize,
+    /// Number of combinations that neither measurements nor priors determine.
+    pub undetermined: usize,
 }
 
 /// Expected error of predicted positions over some poses \[m\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prediction {
-    /// Median over the poses of the root mean square length of the error.
+    /// Median over the poses of the root mean square error length.
     pub median: f64,
-    /// The value that 95 % of the poses keep below.
-    pub most: f64,
-    /// Root mean square length over all poses.
+    /// 95 % quantile over the poses.
+    pub quantile_95: f64,
+    /// Root mean square error length over all poses.
     pub rms: f64,
 }
 
 impl Forecast {
-    /// A share of the data from which a parameter counts as well identified.
-    pub const WELL: f64 = 0.9;
+    /// Share from the data at which a parameter counts as well identified.
+    pub const WELL_IDENTIFIED: f64 = 0.9;
 
-    /// Of measurements in the poses of `sensitivity`, with the priors of `parameters`.
+    /// Forecasts measurements with the given `sensitivity` and the priors of `parameters`.
     pub fn new(parameters: &[Parameter], sensitivity: &Sensitivity) -> Self {
         let triangle = sensitivity.triangle();
         let identifiability = Identifiability::of(&triangle);
-        let Known { covariance, variances, gauge, visible } = Known::of(&triangle, parameters);
+        let Posterior { covariance, variances, gauge, visible } =
+            Posterior::of(&triangle, parameters);
         let expected = parameters
             .iter()
             .enumerate()
             .map(|(k, parameter)| {
-                let mut expected = Expected {
+                let mut expected = ExpectedParameter {
                     name: parameter.name.clone(),
                     unit: parameter.unit(),
                     nominal: parameter.nominal,
@@ -84,8 +85,8 @@ impl Forecast {
                     identified_at_nominal: identifiability.visible[k],
                     is_placement: parameter.site.is_placement(),
                 };
-                if visible[k] > 1.0 - PARTLY_OPEN {
-                    expected.learn(parameter, variances[k]);
+                if visible[k] > 1.0 - UNDETERMINED_SHARE {
+                    expected.set_variance(parameter, variances[k]);
                 }
                 expected.identified_at_nominal = expected.identified;
                 expected
@@ -96,36 +97,39 @@ impl Forecast {
             identifiability,
             expected,
             covariance,
-            open: gauge.nrows(),
+            undetermined: gauge.nrows(),
         }
     }
 
-    /// The same, with the errors to expect of arms that differ from the nominal one: root mean
-    /// squares over what the poses tell about each of them, in `arms`.
+    /// Replaces the standard errors by root mean squares over the arms in `arms`, which differ from
+    /// the nominal one.
     ///
-    /// Where a combination is unidentifiable at the nominal arm and its prior is wide, other
-    /// parameters go with it at other arms: their errors are larger than the nominal arm's
-    /// linearisation says.
+    /// If a combination is unidentifiable at the nominal arm and has a wide prior, it is confounded
+    /// with other parameters at other arms. Errors are then larger than the linearisation at the
+    /// nominal arm says.
     #[must_use]
     pub fn over(mut self, parameters: &[Parameter], arms: &[Sensitivity]) -> Self {
         if arms.is_empty() {
             return self;
         }
-        let variances: Vec<Vec<f64>> =
-            arms.par_iter().map(|arm| Known::of(&arm.triangle(), parameters).variances).collect();
+        let variances: Vec<Vec<f64>> = arms
+            .par_iter()
+            .map(|arm| Posterior::of(&arm.triangle(), parameters).variances)
+            .collect();
         for (k, (expected, parameter)) in self.expected.iter_mut().zip(parameters).enumerate() {
             if expected.std_error.is_some() {
-                let mean = variances.iter().map(|own| own[k]).sum::<f64>() / arms.len() as f64;
-                expected.learn(parameter, mean);
+                let mean =
+                    variances.iter().map(|of_arm| of_arm[k]).sum::<f64>() / arms.len() as f64;
+                expected.set_variance(parameter, mean);
             }
         }
         self
     }
 
-    /// How well the identified arm predicts positions elsewhere; `poses` in metres (σ = 1 m).
+    /// Returns the expected error of positions that the identified arm predicts at `poses`, whose
+    /// sensitivity is in metres (σ = 1 m).
     ///
-    /// The error of a prediction J x has the covariance J C Jᵀ. Noise of a measurement there comes
-    /// on top.
+    /// The error of a prediction J x has the covariance J C Jᵀ. Measurement noise is not included.
     pub fn prediction(&self, poses: &Sensitivity) -> Prediction {
         let mut squares: Vec<f64> = (0..poses.len())
             .map(|k| {
@@ -139,12 +143,12 @@ impl Forecast {
             |share: usize| squares.get((count - 1) * share / 100).copied().unwrap_or(0.0).sqrt();
         Prediction {
             median: at(50),
-            most: at(95),
+            quantile_95: at(95),
             rms: (squares.iter().sum::<f64>() / count as f64).sqrt(),
         }
     }
 
-    /// How many of the arm's parameters will be identified to 90 % or more.
+    /// Returns the number of parameters of the arm that will be identified to 90 % or more.
     pub fn well_identified(&self) -> usize {
         self.expected
             .iter()
@@ -153,35 +157,35 @@ impl Forecast {
     }
 }
 
-impl Expected {
-    /// Enters a variance of x.
-    fn learn(&mut self, parameter: &Parameter, variance: f64) {
+impl ExpectedParameter {
+    /// Sets the standard error and the identified share for a variance of x.
+    fn set_variance(&mut self, parameter: &Parameter, variance: f64) {
         if let Some(sigma) = parameter.sigma {
             self.identified = (1.0 - variance / (sigma * sigma)).clamp(0.0, 1.0);
         }
-        let learned = self.identified > NOTHING_LEARNED;
-        self.std_error = learned.then(|| parameter.value_error(0.0, variance.sqrt()));
+        let is_informed = self.identified > MIN_IDENTIFIED;
+        self.std_error = is_informed.then(|| parameter.value_error(0.0, variance.sqrt()));
     }
 
-    /// Whether the data will give 90 % of the value or more.
+    /// Returns true if the data will determine 90 % of the value or more.
     pub fn is_well_identified(&self) -> bool {
-        self.identified >= Forecast::WELL && self.std_error.is_some()
+        self.identified >= Forecast::WELL_IDENTIFIED && self.std_error.is_some()
     }
 }
 
-/// What data and priors leave of the unknowns.
-struct Known {
-    /// Of x, open combinations held.
+/// Posterior of the unknowns given data and priors.
+struct Posterior {
+    /// Covariance of x with fixed undetermined combinations.
     covariance: DMatrix<f64>,
-    /// Its diagonal.
+    /// Diagonal of the covariance.
     variances: Vec<f64>,
-    /// Rows that span the combinations that stay open.
+    /// Rows that span the undetermined combinations.
     gauge: DMatrix<f64>,
-    /// Part of each unknown outside of them.
+    /// Share of each unknown outside the undetermined combinations.
     visible: Vec<f64>,
 }
 
-impl Known {
+impl Posterior {
     fn of(triangle: &DMatrix<f64>, parameters: &[Parameter]) -> Self {
         let n = parameters.len();
         let sigmas: Vec<Option<f64>> = parameters.iter().map(|parameter| parameter.sigma).collect();
@@ -194,7 +198,7 @@ impl Known {
     }
 }
 
-/// Triangular factor of data and priors together.
+/// Returns the triangular factor of data and priors together.
 fn with_priors(triangle: &DMatrix<f64>, sigmas: &[Option<f64>]) -> DMatrix<f64> {
     let n = triangle.ncols();
     let mut stacked = DMatrix::zeros(2 * n, n);

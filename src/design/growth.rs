@@ -1,53 +1,55 @@
-//! What more poses of the same kind would bring.
+//! Benefit of more poses of the same kind.
 
 use rayon::prelude::*;
 
 use super::{Forecast, Prediction, Sensitivity};
 use crate::model::parameter::Parameter;
 
-/// Numbers of poses that are looked at.
-const LADDER: [usize; 14] = [4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384];
+/// Numbers of poses that are evaluated.
+const POSE_COUNTS: [usize; 14] = [4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384];
 
-/// What the first n poses of a series tell, for growing n.
+/// Forecasts for the first n poses of a series, for increasing n.
 #[derive(Debug, Clone)]
 pub struct Growth {
-    /// In ascending order of poses.
+    /// Forecasts in ascending order of the number of poses.
     pub steps: Vec<GrowthStep>,
-    /// Combinations that are to be seen, priors left out.
+    /// Number of combinations that can be determined without priors.
     pub attainable_rank: usize,
-    /// Combinations that stay open when all that can be seen is.
-    pub open: usize,
-    /// The least number of poses that see all of that and predict positions as exactly as one is
-    /// measured (rms); `None` where the series is too short.
+    /// Number of combinations that stay undetermined with all poses.
+    pub undetermined: usize,
+    /// Smallest number of poses that determine all attainable combinations and predict positions as
+    /// accurately as one measurement (rms); `None` if the series is too short.
     pub enough: Option<usize>,
 }
 
-/// What n poses tell.
+/// Forecast for n poses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GrowthStep {
-    /// n.
+    /// Number of poses n.
     pub poses: usize,
-    /// Combinations that they see, priors left out.
+    /// Number of combinations that the poses determine without priors.
     pub rank: usize,
-    /// Combinations that neither they nor priors see.
-    pub open: usize,
-    /// How many of the arm's parameters they identify to 90 % or more.
+    /// Number of combinations that neither poses nor priors determine.
+    pub undetermined: usize,
+    /// Number of parameters of the arm that are identified to 90 % or more.
     pub well_identified: usize,
-    /// Error of the identified arm elsewhere.
+    /// Expected error of predicted positions.
     pub prediction: Prediction,
 }
 
 impl Growth {
-    /// Of the poses of `series` in their order, with predictions judged in the poses `workspace`
-    /// (in metres); `noise` is the root mean square length of the error of one measured position
-    /// \[m\], and `also` a number to look at besides. What can be seen is what the series and the
-    /// poses `elsewhere` see together.
+    /// Forecasts the poses of `series` in their order.
+    ///
+    /// Predictions are evaluated at the poses `workspace` (in metres). `noise` is the root mean
+    /// square length of the error of one measured position \[m\], `extra` a further number of poses
+    /// to evaluate. The attainable combinations are those that the series and the poses `elsewhere`
+    /// determine together.
     pub fn new(
         parameters: &[Parameter],
         series: &Sensitivity,
         elsewhere: Option<&Sensitivity>,
         workspace: &Sensitivity,
-        (noise, also): (f64, usize),
+        (noise, extra): (f64, usize),
     ) -> Self {
         let step = |poses: usize| {
             let forecast =
@@ -55,28 +57,30 @@ impl Growth {
             GrowthStep {
                 poses,
                 rank: forecast.identifiability.rank,
-                open: forecast.open,
+                undetermined: forecast.undetermined,
                 well_identified: forecast.well_identified(),
                 prediction: forecast.prediction(workspace),
             }
         };
-        let mut ladder: Vec<usize> =
-            LADDER.into_iter().filter(|&poses| poses < series.len()).collect();
-        ladder.extend([also.min(series.len()), series.len()]);
-        ladder.sort_unstable();
-        ladder.dedup();
-        let steps: Vec<GrowthStep> = ladder.into_par_iter().map(step).collect();
-        let (attainable_rank, open) = match elsewhere {
+        let mut counts: Vec<usize> =
+            POSE_COUNTS.into_iter().filter(|&poses| poses < series.len()).collect();
+        counts.extend([extra.min(series.len()), series.len()]);
+        counts.sort_unstable();
+        counts.dedup();
+        let steps: Vec<GrowthStep> = counts.into_par_iter().map(step).collect();
+        let (attainable_rank, undetermined) = match elsewhere {
             Some(elsewhere) => {
-                let all = Forecast::new(parameters, &series.and(elsewhere));
-                (all.identifiability.rank, all.open)
+                let forecast = Forecast::new(parameters, &series.and(elsewhere));
+                (forecast.identifiability.rank, forecast.undetermined)
             }
-            None => steps.last().map_or((0, 0), |last| (last.rank, last.open)),
+            None => steps.last().map_or((0, 0), |last| (last.rank, last.undetermined)),
         };
         let suffices = |step: &GrowthStep| {
-            step.rank == attainable_rank && step.open == open && step.prediction.rms <= noise
+            step.rank == attainable_rank
+                && step.undetermined == undetermined
+                && step.prediction.rms <= noise
         };
-        // More poses never tell less, so that the least number can be bracketed.
+        // More poses never inform less, so the smallest sufficient number can be bracketed.
         let enough = steps.iter().position(suffices).map(|first| {
             let (mut few, mut many) =
                 (if first == 0 { 0 } else { steps[first - 1].poses }, steps[first].poses);
@@ -86,6 +90,6 @@ impl Growth {
             }
             many
         });
-        Self { steps, attainable_rank, open, enough }
+        Self { steps, attainable_rank, undetermined, enough }
     }
 }

@@ -1,9 +1,8 @@
-//! Design of experiments: which poses to measure, and what measurements will tell before anyone
-//! makes them.
+//! Design of experiments: choice of poses, and forecast of the results of their measurement.
 //!
-//! Everything here is linear about the nominal arm. M = Σ JᵢᵀJᵢ + P is the information on the free
-//! parameters: Jᵢ the derivatives of a position over its σ (3 rows a pose), P = diag(1/σ²) of the
-//! priors; C = M⁻¹ is the covariance to expect. Positions need not be measured for that.
+//! All quantities are linear about the nominal arm. M = Σ JᵢᵀJᵢ + P is the information on the free
+//! parameters, with Jᵢ the derivatives of a position over its σ (3 rows per pose) and P =
+//! diag(1/σ²) of the priors. C = M⁻¹ is the expected covariance. No measured positions are needed.
 
 mod candidate_poses;
 mod check;
@@ -21,14 +20,14 @@ mod site;
 mod workspace;
 
 pub use candidate_poses::Extremes;
-pub use check::{Check, Elsewhere, Judged, check, some_of, with_known_words};
+pub use check::{Check, CheckedPoses, PredictionPoses, check, predictable_rows, random_rows};
 pub use criterion::Criterion;
 pub use error::DesignError;
-pub use exchange::{Exchange, Exchanged};
-pub use forecast::{Expected, Forecast, Prediction};
+pub use exchange::{Exchange, ExchangeResult};
+pub use forecast::{ExpectedParameter, Forecast, Prediction};
 pub use growth::{Growth, GrowthStep};
 pub use plan::{Candidates, Plan, PlanOptions, PlanProgress, plan};
 pub use sensitivity::Sensitivity;
-pub use separate::{Pair, Separated, separate};
+pub use separate::{EffectPair, PairSeparation, separate};
 pub use site::Site;
 pub use workspace::Workspace;

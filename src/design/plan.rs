@@ -1,12 +1,13 @@
-//! The best of several exchanges, beside poses drawn at random.
+//! Plan of poses: the best of several exchanges, compared with random poses.
 
 use rand::Rng;
 use rand::seq::SliceRandom as _;
 use rayon::prelude::*;
 
-use super::coordinates::{coordinates, first_of_each};
+use super::coordinates::{coordinates, first_rows};
 use super::{
-    Criterion, DesignError, Exchange, Exchanged, Extremes, Forecast, Sensitivity, Site, Workspace,
+    Criterion, DesignError, Exchange, ExchangeResult, Extremes, Forecast, Sensitivity, Site,
+    Workspace,
 };
 use crate::measurement::Measurements;
 use crate::model::parameter::{Parameter, ParameterSite};
@@ -14,98 +15,103 @@ use crate::numeric::median;
 use crate::problem::{PoseRanges, Problem};
 use crate::random;
 
-/// Candidates drawn from ranges, evenly and with a liking for the ends.
-pub(super) const DRAWN: [usize; 2] = [500, 2000];
-/// Exchanges, each from poses drawn at random.
+/// Number of candidates drawn from ranges: uniformly, and with emphasis on the ends.
+pub(super) const DRAWN_CANDIDATES: [usize; 2] = [500, 2000];
+/// Number of exchanges, each started from random poses.
 const STARTS: usize = 8;
-/// The best exchanges that are refined.
-const REFINED: usize = 4;
-/// Rounds of candidates drawn about the best poses, by how far they lie apart, as a part of the
-/// ranges.
-const ROUNDS: [f64; 8] = [0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.02];
-/// Candidates of a round.
-const ABOUT: usize = 2500;
-/// Draws of random poses that a plan is compared with; odd, so that there is a median.
-pub(super) const DRAWS: usize = 75;
-/// Streams of random numbers of one seed.
-pub(super) const EVENLY: u64 = 0;
-const AT_ENDS: u64 = 1;
-const FIRST_ROUND: u64 = 2;
-const FIRST_START: u64 = 100;
-pub(super) const FIRST_DRAW: u64 = 200;
+/// Number of best exchanges that are refined.
+const REFINED_STARTS: usize = 4;
+/// Rounds of refinement, each with the reach of its variations as a fraction of the ranges.
+const REFINEMENT_REACHES: [f64; 8] = [0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05, 0.02];
+/// Number of candidates in a refinement round.
+const ROUND_CANDIDATES: usize = 2500;
+/// Number of random sets of poses that a plan is compared with; odd, so that the median is one of
+/// them.
+pub(super) const RANDOM_SETS: usize = 75;
+/// Random stream of the uniform candidates.
+pub(super) const UNIFORM_STREAM: u64 = 0;
+/// Random stream of the candidates with emphasis on the ends.
+const EXTREMES_STREAM: u64 = 1;
+/// First random stream of the refinement rounds.
+const REFINEMENT_STREAM: u64 = 2;
+/// First random stream of the starts.
+const START_STREAM: u64 = 100;
+/// First random stream of the random sets.
+pub(super) const RANDOM_SET_STREAM: u64 = 200;
 
-/// Where the poses of a plan come from.
+/// Source of the poses of a plan.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Candidates {
-    /// Anywhere within ranges.
+    /// Poses anywhere within ranges.
     Within(PoseRanges),
     /// Rows of a table.
     Rows(Box<Measurements>),
 }
 
-/// How to plan.
+/// Options of a plan.
 #[derive(Clone, Copy)]
 pub struct PlanOptions<'a> {
     /// Number of poses.
     pub poses: usize,
-    /// What to make small.
+    /// Criterion to minimise.
     pub criterion: &'a Criterion,
-    /// Seed of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Where the target may go; `None`: anywhere.
+    /// Region for the target; `None` is unlimited.
     pub workspace: Option<&'a Workspace>,
-    /// Told of every sweep; from several threads at once.
+    /// Callback after every sweep, called from several threads.
     pub progress: Option<&'a (dyn Fn(PlanProgress) + Sync)>,
 }
 
-/// How far a plan has come.
+/// Progress of a plan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlanProgress {
-    /// Which start, from 1; `None` once the best of them are refined.
+    /// Number of the start, from 1; `None` during refinement.
     pub start: Option<usize>,
-    /// Sweeps of the exchange at hand.
+    /// Number of sweeps of the present exchange.
     pub sweep: usize,
-    /// ln of the criterion.
+    /// Logarithm of the criterion.
     pub value: f64,
 }
 
-/// Poses to measure, and what they will tell.
+/// Planned poses with their forecast.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// The poses; rows of the table of candidates in its order, if there is one.
+    /// Planned poses; rows of the table of candidates in its order, if there is one.
     pub poses: Measurements,
-    /// Rows that are measured in any case, known distances between points left out.
+    /// Number of given rows that are measured anyway, without known distances between points.
     pub given: usize,
     /// Number of candidates that were tried.
     pub candidates: usize,
-    /// ln of the criterion that each start ended with, before the best of them were refined.
+    /// Logarithm of the criterion at the end of each start, before refinement.
     pub starts: Vec<f64>,
-    /// ln of the criterion that was reached.
+    /// Logarithm of the criterion of the plan.
     pub value: f64,
-    /// Of the poses given and the planned ones together.
+    /// Forecast for given and planned poses together.
     pub planned: Forecast,
-    /// Combinations of parameters that all candidates together see, priors left out.
+    /// Number of combinations of parameters that all candidates together determine without priors.
     pub attainable_rank: usize,
-    /// Planned poses without which they cannot all be seen, whichever poses they are.
+    /// Smallest number of planned poses that can determine all of them.
     pub least_poses: usize,
-    /// Numbers that the poses given and the planned ones measure together.
+    /// Number of coordinates that given and planned poses measure together.
     pub coordinates: usize,
-    /// Of the poses given and as many others, drawn at random again and again.
+    /// Forecasts for the given poses with as many random ones, for each random set.
     pub random: Vec<Forecast>,
-    /// Whether the plan decides every parameter as far as all candidates together can, and measures
-    /// as many coordinates as parameters have no prior.
+    /// True if the plan determines all combinations that all candidates can, and measures at least
+    /// as many coordinates as there are parameters without a prior.
     pub suffices: bool,
 }
 
-/// Chooses poses by exchange from several starts; the same for the same seed, however many threads
-/// there are.
+/// Chooses poses by exchange from several starts. The result depends on the seed, not on the number
+/// of threads.
 ///
-/// Within ranges, candidates are drawn, and then drawn again ever closer about the best poses.
-/// Poses in `given` are measured in any case.
+/// Within ranges, candidates are drawn first and then varied ever closer to the best poses. Poses
+/// in `given` are measured anyway.
 ///
 /// # Errors
-/// There are fewer candidates than poses, or the problem does not say enough.
+/// Returns an error if there are fewer candidates than poses, or if the problem lacks a
+/// declaration.
 pub fn plan(
     problem: &Problem,
     candidates: &Candidates,
@@ -121,100 +127,110 @@ pub fn plan(
     };
     let given = with_known_distances(given, candidates);
     let given = given.as_ref();
-    let (usual, ends) = match candidates {
+    let (uniform, extremes) = match candidates {
         Candidates::Within(ranges) => {
-            let ends = draw(ranges, DRAWN[1].max(2 * poses), Extremes::Often, AT_ENDS);
-            (draw(ranges, DRAWN[0].max(2 * poses), Extremes::No, EVENLY), Some(ends))
+            let count = DRAWN_CANDIDATES.map(|count| count.max(2 * poses));
+            let extremes = draw(ranges, count[1], Extremes::Often, EXTREMES_STREAM);
+            (draw(ranges, count[0], Extremes::No, UNIFORM_STREAM), Some(extremes))
         }
         Candidates::Rows(rows) => (rows.as_ref().clone().arm_rows(), None),
     };
-    let mut tables = vec![&usual];
+    let mut tables = vec![&uniform];
     tables.extend(given);
     let site = Site::new(problem, &tables)?;
-    let admitted = |(table, told): (Measurements, Sensitivity)| match options.workspace {
+    let admitted = |(table, sensitivity): (Measurements, Sensitivity)| match options.workspace {
         Some(workspace) => {
             let rows = site.inside(&table, workspace);
-            (table.select(&rows), told.select(&rows))
+            (table.select(&rows), sensitivity.select(&rows))
         }
-        None => (table, told),
+        None => (table, sensitivity),
     };
     let parameters = &site.model.parameters;
-    let of_arm = given.map(|given| given.clone().arm_rows());
-    let given = given.map(|given| site.at_rest(given));
-    let (measured, given): (Option<Measurements>, Option<Sensitivity>) = given.unzip();
-    let (mut table, usual) = admitted(site.at_rest(&usual));
-    let mut all = usual.clone();
-    if let Some(ends) = ends {
-        let (ends, sensitivity) = admitted(site.at_rest(&ends));
-        table = table.concatenate(&ends);
-        all = all.and(&sensitivity);
+    let given_arm_rows = given.map(|given| given.clone().arm_rows());
+    let given = given.map(|given| site.in_equilibrium(given));
+    let (given_table, given): (Option<Measurements>, Option<Sensitivity>) = given.unzip();
+    let (mut table, uniform) = admitted(site.in_equilibrium(&uniform));
+    let mut sensitivity = uniform.clone();
+    if let Some(extremes) = extremes {
+        let (extremes, extreme_sensitivity) = admitted(site.in_equilibrium(&extremes));
+        table = table.concatenate(&extremes);
+        sensitivity = sensitivity.and(&extreme_sensitivity);
     }
-    let tried = all.len();
-    if all.is_empty() {
+    let tried = sensitivity.len();
+    if sensitivity.is_empty() {
         return Err(DesignError::NoEquilibrium);
     }
     if tried < poses {
         return Err(DesignError::TooFewCandidates { poses, candidates: tried });
     }
-    let Forecast { open: attainable, identifiability, .. } = Forecast::new(parameters, &all);
+    let Forecast { undetermined, identifiability, .. } = Forecast::new(parameters, &sensitivity);
     if identifiability.rank == 0 {
         return Err(DesignError::NothingSeen);
     }
-    let attainable = attainable.saturating_sub(untouched(parameters, &[Some(&all)]));
-    let (attainable_rank, least_poses) = attainable_rank(parameters, given.as_ref(), &all);
-    let exchange = Exchange::new(parameters, &all, given.as_ref(), poses, criterion)
+    let unavoidable = undetermined.saturating_sub(untouched(parameters, &[Some(&sensitivity)]));
+    let (attainable_rank, least_poses) = attainable_rank(parameters, given.as_ref(), &sensitivity);
+    let exchange = Exchange::new(parameters, &sensitivity, given.as_ref(), poses, criterion)
         .ok_or(DesignError::NoEquilibrium)?;
-    let (ends, starts) = starts(&exchange, options);
-    let begun = |end: &Exchanged| Found {
-        poses: table.select(&end.chosen),
-        told: all.select(&end.chosen),
-        value: end.value(),
+    let (results, starts) = starts(&exchange, options);
+    let selection = |result: &ExchangeResult| Selection {
+        poses: table.select(&result.chosen),
+        sensitivity: sensitivity.select(&result.chosen),
+        value: result.value(),
         tried: 0,
     };
-    let found: Vec<Found> = match candidates {
-        Candidates::Within(ranges) => ends[..REFINED.min(ends.len())]
+    let selections: Vec<Selection> = match candidates {
+        Candidates::Within(ranges) => results[..REFINED_STARTS.min(results.len())]
             .par_iter()
             .enumerate()
-            .map(|(number, end)| {
-                begun(end).refined(problem, &site, ranges, &exchange, (options, number as u64))
+            .map(|(number, result)| {
+                let options = (options, number as u64);
+                selection(result).refined(problem, &site, ranges, &exchange, options)
             })
             .collect(),
-        Candidates::Rows(_) => ends.iter().take(1).map(begun).collect(),
+        Candidates::Rows(_) => results.iter().take(1).map(selection).collect(),
     };
-    let tried = tried + found.iter().map(|found| found.tried).sum::<usize>();
-    // Of equals the first.
-    let best =
-        found.into_iter().reduce(|best, next| if next.value < best.value { next } else { best });
-    let Found { poses: chosen, told, value, .. } = best.ok_or(DesignError::NoEquilibrium)?;
-    let forecast = |own: &Sensitivity| match &given {
-        Some(given) => Forecast::new(parameters, &given.and(own)),
-        None => Forecast::new(parameters, own),
+    let tried = tried + selections.iter().map(|selection| selection.tried).sum::<usize>();
+    // Among equal values the first selection counts.
+    let best = selections
+        .into_iter()
+        .reduce(|best, next| if next.value < best.value { next } else { best });
+    let Selection { poses: chosen, sensitivity: planned, value, .. } =
+        best.ok_or(DesignError::NoEquilibrium)?;
+    let forecast = |added: &Sensitivity| match &given {
+        Some(given) => Forecast::new(parameters, &given.and(added)),
+        None => Forecast::new(parameters, added),
     };
-    let random = (0..DRAWS)
+    let of_position = sensitivity.coordinates;
+    let random = (0..RANDOM_SETS)
         .into_par_iter()
-        .map(|draw| {
-            forecast(&usual.select(&choose(usual.len(), poses, seed, FIRST_DRAW + draw as u64)))
+        .map(|set| {
+            let stream = RANDOM_SET_STREAM + set as u64;
+            forecast(&uniform.select(&choose(uniform.len(), poses, seed, stream)))
         })
         .collect();
-    let planned = forecast(&told);
-    let of_position = all.coordinates;
-    let distinct = |own: &Measurements| {
-        coordinates(own, of_position, first_of_each(&own.pose_numbers(problem)))
+    let undetermined_now = |forecast: &Forecast| {
+        forecast
+            .undetermined
+            .saturating_sub(untouched(parameters, &[Some(&planned), given.as_ref()]))
     };
-    let apart = of_arm.as_ref().map_or(0, distinct) + distinct(&chosen);
-    let every = |own: &Measurements| coordinates(own, of_position, 0..own.len());
-    let coordinates = measured.as_ref().map_or(0, every) + every(&chosen);
+    let planned_forecast = forecast(&planned);
+    let distinct = |table: &Measurements| {
+        coordinates(table, of_position, first_rows(&table.pose_numbers(problem)))
+    };
+    let distinct_coordinates = given_arm_rows.as_ref().map_or(0, distinct) + distinct(&chosen);
+    let all_rows = |table: &Measurements| coordinates(table, of_position, 0..table.len());
+    let coordinates = given_table.as_ref().map_or(0, all_rows) + all_rows(&chosen);
     let without_prior = parameters.iter().filter(|parameter| parameter.sigma.is_none()).count();
-    let open = planned.open.saturating_sub(untouched(parameters, &[Some(&told), given.as_ref()]));
-    let suffices = open <= attainable && apart >= without_prior;
-    let given = of_arm.map_or(0, |own| own.len());
+    let suffices =
+        undetermined_now(&planned_forecast) <= unavoidable && distinct_coordinates >= without_prior;
+    let given = given_arm_rows.map_or(0, |rows| rows.len());
     Ok(Plan {
         poses: chosen,
         given,
         candidates: tried,
         starts,
         value,
-        planned,
+        planned: planned_forecast,
         attainable_rank,
         least_poses,
         coordinates,
@@ -223,89 +239,89 @@ pub fn plan(
     })
 }
 
-/// Combinations that the poses given and all candidates see together, and poses without which they
-/// cannot be seen.
+/// Returns the number of combinations that given poses and all candidates determine together, and
+/// the smallest number of planned poses that can determine them.
 fn attainable_rank(
     parameters: &[Parameter],
     given: Option<&Sensitivity>,
-    all: &Sensitivity,
+    candidates: &Sensitivity,
 ) -> (usize, usize) {
-    let rank = |own: &Sensitivity| Forecast::new(parameters, own).identifiability.rank;
-    let (most, before) =
-        given.map_or_else(|| (rank(all), 0), |given| (rank(&given.and(all)), rank(given)));
-    (most, most.saturating_sub(before).div_ceil(all.coordinates))
+    let rank = |rows: &Sensitivity| Forecast::new(parameters, rows).identifiability.rank;
+    let (total, before) = given
+        .map_or_else(|| (rank(candidates), 0), |given| (rank(&given.and(candidates)), rank(given)));
+    (total, total.saturating_sub(before).div_ceil(candidates.coordinates))
 }
 
-/// What is measured in any case, with the known distances between points that only the candidates
-/// touch.
+/// Returns the given rows together with known distances between points that only the candidates
+/// contain.
 fn with_known_distances(
     given: Option<&Measurements>,
     candidates: &Candidates,
 ) -> Option<Measurements> {
     let Candidates::Rows(rows) = candidates else { return given.cloned() };
-    let is_told = |observation| {
+    let is_given = |observation| {
         given.is_some_and(|given| (0..given.len()).any(|row| given.observation(row) == observation))
     };
-    let known: Vec<usize> = (0..rows.len())
-        .filter(|&row| !rows.observation(row).is_of_arm() && !is_told(rows.observation(row)))
+    let distances: Vec<usize> = (0..rows.len())
+        .filter(|&row| !rows.observation(row).is_of_arm() && !is_given(rows.observation(row)))
         .collect();
     match given {
-        _ if known.is_empty() => given.cloned(),
-        Some(given) => Some(given.concatenate(&rows.select(&known))),
-        None => Some(rows.select(&known)),
+        _ if distances.is_empty() => given.cloned(),
+        Some(given) => Some(given.concatenate(&rows.select(&distances))),
+        None => Some(rows.select(&distances)),
     }
 }
 
-/// Numbers without a prior of points, anchors and surfaces that none of these rows touches: what is
-/// left out need not be found.
+/// Returns the number of fixture unknowns without a prior that none of these rows informs on; a
+/// fixture that is not used need not be located.
 fn untouched(parameters: &[Parameter], rows: &[Option<&Sensitivity>]) -> usize {
-    let is_seen = |k: usize| {
-        rows.iter().flatten().any(|own| own.rows.row(k).iter().any(|slope| *slope != 0.0))
+    let is_informed =
+        |k: usize| rows.iter().flatten().any(|of| of.rows.row(k).iter().any(|slope| *slope != 0.0));
+    let is_free = |parameter: &Parameter| {
+        matches!(parameter.site, ParameterSite::Fixture { .. }) && parameter.sigma.is_none()
     };
-    let is_free =
-        |own: &Parameter| matches!(own.site, ParameterSite::Fixture { .. }) && own.sigma.is_none();
-    (0..parameters.len()).filter(|&k| is_free(&parameters[k]) && !is_seen(k)).count()
+    (0..parameters.len()).filter(|&k| is_free(&parameters[k]) && !is_informed(k)).count()
 }
 
 impl PlanOptions<'_> {
-    fn tell(&self, start: Option<usize>, sweep: usize, value: f64) {
+    fn report(&self, start: Option<usize>, sweep: usize, value: f64) {
         if let Some(progress) = self.progress {
             progress(PlanProgress { start, sweep, value });
         }
     }
 }
 
-/// Every exchange, the best first, and the values in the order of the starts.
-fn starts(exchange: &Exchange, options: &PlanOptions) -> (Vec<Exchanged>, Vec<f64>) {
-    let mut ends: Vec<Exchanged> = (0..STARTS)
+/// Returns the results of all starts, the best first, and their values in the order of the starts.
+fn starts(exchange: &Exchange, options: &PlanOptions) -> (Vec<ExchangeResult>, Vec<f64>) {
+    let mut results: Vec<ExchangeResult> = (0..STARTS)
         .into_par_iter()
         .map(|start| {
             let chosen = choose(
                 exchange.candidates(),
                 options.poses,
                 options.seed,
-                FIRST_START + start as u64,
+                START_STREAM + start as u64,
             );
-            exchange.improve(chosen, |sweep, value| options.tell(Some(start + 1), sweep, value))
+            exchange.improve(chosen, |sweep, value| options.report(Some(start + 1), sweep, value))
         })
         .collect();
-    let values = ends.iter().map(Exchanged::value).collect();
-    ends.sort_by(|a, b| a.value().total_cmp(&b.value()));
-    (ends, values)
+    let values = results.iter().map(ExchangeResult::value).collect();
+    results.sort_by(|a, b| a.value().total_cmp(&b.value()));
+    (results, values)
 }
 
-/// Poses that an exchange has found.
-struct Found {
+/// Poses selected by an exchange.
+struct Selection {
     poses: Measurements,
-    told: Sensitivity,
-    /// ln of the criterion.
+    sensitivity: Sensitivity,
+    /// Logarithm of the criterion.
     value: f64,
-    /// Candidates tried beyond those of the exchange.
+    /// Number of candidates tried in refinement.
     tried: usize,
 }
 
-impl Found {
-    /// The same, exchanged for candidates drawn ever closer about them.
+impl Selection {
+    /// Refines the poses in rounds of exchanges with candidates ever closer to them.
     fn refined(
         mut self,
         problem: &Problem,
@@ -314,56 +330,58 @@ impl Found {
         exchange: &Exchange,
         (options, number): (&PlanOptions, u64),
     ) -> Self {
-        let each = (ABOUT / options.poses).max(1);
-        for (round, reach) in (0..).zip(ROUNDS) {
-            let stream = FIRST_ROUND + number * ROUNDS.len() as u64 + round;
-            let about = ranges.vary(problem, &self.poses, each, reach, (options.seed, stream));
-            let told = site.sensitivity(&about, None);
+        let variations = (ROUND_CANDIDATES / options.poses).max(1);
+        for (round, reach) in (0..).zip(REFINEMENT_REACHES) {
+            let stream = REFINEMENT_STREAM + number * REFINEMENT_REACHES.len() as u64 + round;
+            let streams = (options.seed, stream);
+            let varied = ranges.vary(problem, &self.poses, variations, reach, streams);
+            let sensitivity = site.sensitivity(&varied, None);
             let inside: Vec<usize> = match options.workspace {
-                Some(workspace) => site.inside(&about, workspace),
-                None => (0..about.len()).collect(),
+                Some(workspace) => site.inside(&varied, workspace),
+                None => (0..varied.len()).collect(),
             };
-            // The poses themselves come first, each before those about it.
-            let is_own = |k: usize| k.is_multiple_of(each + 1);
-            let kept: Vec<usize> = (0..about.len())
-                .filter(|&k| is_own(k) || (told.is_finite(k) && inside.binary_search(&k).is_ok()))
-                .collect();
-            let own = (0..kept.len()).filter(|&k| is_own(kept[k])).collect();
-            let told = told.select(&kept);
-            let end = exchange
-                .with_candidates(&told)
-                .improve(own, |sweep, value| options.tell(None, sweep, value));
+            // Each present pose precedes its variations.
+            let is_present = |k: usize| k.is_multiple_of(variations + 1);
+            let is_usable = |k: usize| sensitivity.is_finite(k) && inside.binary_search(&k).is_ok();
+            let kept: Vec<usize> =
+                (0..varied.len()).filter(|&k| is_present(k) || is_usable(k)).collect();
+            let present = (0..kept.len()).filter(|&k| is_present(kept[k])).collect();
+            let sensitivity = sensitivity.select(&kept);
+            let result = exchange
+                .with_candidates(&sensitivity)
+                .improve(present, |sweep, value| options.report(None, sweep, value));
             self.tried += kept.len() - options.poses;
-            self.value = end.value();
-            self.poses = about.select(&end.chosen.iter().map(|&k| kept[k]).collect::<Vec<_>>());
-            self.told = told.select(&end.chosen);
+            self.value = result.value();
+            self.poses = varied.select(&result.chosen.iter().map(|&k| kept[k]).collect::<Vec<_>>());
+            self.sensitivity = sensitivity.select(&result.chosen);
         }
         self
     }
 }
 
 impl Plan {
-    /// 1 σ of parameter k after random poses, the median of the draws, SI; `None` where most of
-    /// them say nothing.
+    /// Returns the median standard error of parameter k over the random sets, SI; `None` if most of
+    /// them do not inform on it.
     pub fn random_error(&self, k: usize) -> Option<f64> {
         let errors = self.random.iter().map(|forecast| forecast.expected[k].std_error);
         median(errors.map(|error| error.unwrap_or(f64::INFINITY))).filter(|error| error.is_finite())
     }
 
-    /// The arm's parameters that random poses identify to 90 % or more (median of the draws), by
-    /// their numbers.
+    /// Returns the indices of the arm parameters that random poses identify to 90 % or more (median
+    /// over the sets).
     pub fn meaningful(&self) -> Vec<usize> {
         let share =
             |k: usize| median(self.random.iter().map(|forecast| forecast.expected[k].identified));
         let arm = |k: &usize| !self.planned.expected[*k].is_placement;
         (0..self.planned.expected.len())
             .filter(arm)
-            .filter(|&k| share(k).is_some_and(|share| share >= Forecast::WELL))
+            .filter(|&k| share(k).is_some_and(|share| share >= Forecast::WELL_IDENTIFIED))
             .collect()
     }
 
-    /// By what factor the plan's standard errors are smaller than those of random poses: the
-    /// geometric mean over these parameters; `None` without any that both give.
+    /// Returns the factor by which the standard errors of the plan are smaller than those of random
+    /// poses, the geometric mean over these parameters; `None` if there are none that both
+    /// determine.
     pub fn gain(&self, parameters: &[usize]) -> Option<f64> {
         let ratios: Vec<f64> = parameters
             .iter()
@@ -375,12 +393,13 @@ impl Plan {
     }
 }
 
-/// `count` of `all` numbers (all of them, if there are fewer), in random order.
-pub(super) fn choose(all: usize, count: usize, seed: u64, stream: u64) -> Vec<usize> {
-    shuffled(all, count, &mut random::stream(seed, stream))
+/// Returns `count` random numbers out of 0..`available` (all of them if there are fewer), in random
+/// order.
+pub(super) fn choose(available: usize, count: usize, seed: u64, stream: u64) -> Vec<usize> {
+    shuffled(available, count, &mut random::stream(seed, stream))
 }
 
-fn shuffled(all: usize, count: usize, random: &mut impl Rng) -> Vec<usize> {
-    let mut numbers: Vec<usize> = (0..all).collect();
-    numbers.partial_shuffle(random, count.min(all)).0.to_vec()
+fn shuffled(available: usize, count: usize, random: &mut impl Rng) -> Vec<usize> {
+    let mut numbers: Vec<usize> = (0..available).collect();
+    numbers.partial_shuffle(random, count.min(available)).0.to_vec()
 }

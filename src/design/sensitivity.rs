@@ -1,4 +1,4 @@
-//! What each pose says about each parameter.
+//! Sensitivity of the measurements of each pose to each parameter.
 
 use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
@@ -6,31 +6,32 @@ use rayon::prelude::*;
 use crate::least_squares::{Block, LeastSquares as _, Triangle};
 use crate::model::{Model, Pose, PoseResiduals};
 
-/// Poses differentiated together.
-const TOGETHER: usize = 64;
+/// Number of poses that are differentiated together.
+const BLOCK_POSES: usize = 64;
 
-/// Derivatives of the measured coordinates of some poses, over their σ, with respect to every free
+/// Derivatives of the measured coordinates of poses, divided by their σ, with respect to every free
 /// parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensitivity {
-    /// Jᵀ, shape = (parameters, coordinates · poses) [1 / unit of x]; not finite where a pose has
-    /// no equilibrium.
+    /// Matrix Jᵀ, shape = (parameters, coordinates · poses) [1 / unit of x]; not finite for a pose
+    /// without equilibrium.
     pub rows: DMatrix<f64>,
-    /// Measured coordinates of a pose: three, or six with its orientation.
+    /// Number of measured coordinates of a pose: three, or six with its orientation.
     pub coordinates: usize,
 }
 
 impl Sensitivity {
-    /// Of `poses` at the full parameter vector `at`; what was measured there does not matter.
+    /// Computes the sensitivity of `poses` at the full parameter vector `at`; measured values do
+    /// not matter.
     pub fn of(model: &Model, poses: &[Pose], at: &DVector<f64>) -> Self {
         let n = model.parameters.len();
         let residuals = PoseResiduals::new(model, poses.to_vec(), (0..n).collect(), at.clone());
         let coordinates = residuals.rows_per_item();
-        let starts: Vec<usize> = (0..poses.len()).step_by(TOGETHER).collect();
+        let starts: Vec<usize> = (0..poses.len()).step_by(BLOCK_POSES).collect();
         let blocks: Vec<(usize, Block)> = starts
             .into_par_iter()
             .map(|start| {
-                let items = start..(start + TOGETHER).min(poses.len());
+                let items = start..(start + BLOCK_POSES).min(poses.len());
                 let mut block = Block::zeros(coordinates * items.len(), n);
                 residuals.linearise(at, items, &mut block);
                 (start, block)
@@ -47,27 +48,27 @@ impl Sensitivity {
         Self { rows, coordinates }
     }
 
-    /// Number of poses.
+    /// Returns the number of poses.
     pub fn len(&self) -> usize {
         self.rows.ncols() / self.coordinates
     }
 
-    /// Whether there is no pose.
+    /// Returns true if there is no pose.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Jᵢᵀ of one pose, shape = (parameters, coordinates).
+    /// Returns Jᵢᵀ of one pose, shape = (parameters, coordinates).
     pub fn pose(&self, pose: usize) -> DMatrixView<'_, f64> {
         self.rows.columns(self.coordinates * pose, self.coordinates)
     }
 
-    /// Whether the arm comes to rest in a pose.
+    /// Returns true if the arm has an equilibrium in a pose.
     pub fn is_finite(&self, pose: usize) -> bool {
         self.pose(pose).iter().all(|value| value.is_finite())
     }
 
-    /// The poses with these numbers, in this order.
+    /// Returns the sensitivity of the poses with these indices, in this order.
     #[must_use]
     pub fn select(&self, poses: &[usize]) -> Self {
         let of_pose = self.coordinates;
@@ -78,22 +79,22 @@ impl Sensitivity {
         Self { rows, coordinates: of_pose }
     }
 
-    /// These poses, then those of `other`.
+    /// Returns the sensitivity of these poses followed by those of `other`.
     #[must_use]
     pub fn and(&self, other: &Self) -> Self {
-        let (own, n) = (self.rows.ncols(), self.rows.nrows());
-        let mut rows = DMatrix::zeros(n, own + other.rows.ncols());
-        rows.columns_mut(0, own).copy_from(&self.rows);
-        rows.columns_mut(own, other.rows.ncols()).copy_from(&other.rows);
+        let (columns, n) = (self.rows.ncols(), self.rows.nrows());
+        let mut rows = DMatrix::zeros(n, columns + other.rows.ncols());
+        rows.columns_mut(0, columns).copy_from(&self.rows);
+        rows.columns_mut(columns, other.rows.ncols()).copy_from(&other.rows);
         Self { rows, coordinates: self.coordinates }
     }
 
-    /// Σ JᵢᵀJᵢ, shape = (parameters, parameters).
+    /// Returns the information Σ JᵢᵀJᵢ, shape = (parameters, parameters).
     pub fn information(&self) -> DMatrix<f64> {
         &self.rows * self.rows.transpose()
     }
 
-    /// Triangular factor R of J, shape = (parameters, parameters): RᵀR = Σ JᵢᵀJᵢ.
+    /// Returns the triangular factor R of J, shape = (parameters, parameters), with RᵀR = Σ JᵢᵀJᵢ.
     pub fn triangle(&self) -> DMatrix<f64> {
         let n = self.rows.nrows();
         let mut block = Block::zeros(self.rows.ncols(), n);

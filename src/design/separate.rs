@@ -1,37 +1,38 @@
-//! Poses that tell two effects apart.
+//! Plan of poses that separate two effects.
 
 use rayon::prelude::*;
 
-use super::plan::{DRAWN, DRAWS, EVENLY, FIRST_DRAW, choose};
+use super::plan::{DRAWN_CANDIDATES, RANDOM_SET_STREAM, RANDOM_SETS, UNIFORM_STREAM, choose};
 use super::{Candidates, Criterion, DesignError, Extremes, Plan, PlanOptions, Site, plan};
 use crate::measurement::Measurements;
 use crate::numeric::median;
 use crate::problem::{Effect, EffectDeclaration, Problem};
 use crate::select::{Separation, separation};
 
-/// Two effects to tell apart, and a problem that declares both.
+/// Two effects to separate, with a problem that declares both.
 #[derive(Debug, Clone)]
-pub struct Pair {
-    /// The effects.
+pub struct EffectPair {
+    /// Both effects.
     pub effects: [Effect; 2],
-    /// The problem without them.
+    /// Problem without the effects.
     pub plain: Problem,
-    /// The problem with both.
+    /// Problem with both effects.
     pub declared: Problem,
 }
 
-impl Pair {
-    /// Two effects that `problem` does not declare; positions alone tell them apart.
+impl EffectPair {
+    /// Creates a pair of effects that `problem` does not declare; only positions separate them.
     ///
     /// # Errors
-    /// They are the same, one of them is declared, or follows the time and not the poses.
+    /// Returns an error if the effects are equal, if one is already declared, or if one depends on
+    /// time instead of the poses.
     pub fn new(problem: &Problem, pair: [EffectDeclaration; 2]) -> Result<Self, DesignError> {
-        let [one, other] = &pair;
-        let relieved = one.effect.compensated();
-        if one.effect == other.effect
-            || (relieved.is_some() && relieved == other.effect.compensated())
+        let [first, second] = &pair;
+        let compensated = first.effect.compensated();
+        if first.effect == second.effect
+            || (compensated.is_some() && compensated == second.effect.compensated())
         {
-            return Err(DesignError::SameEffect { effect: one.effect.describe() });
+            return Err(DesignError::SameEffect { effect: first.effect.describe() });
         }
         for EffectDeclaration { effect, .. } in &pair {
             if problem.effects.iter().any(|declared| declared.effect == *effect) {
@@ -47,16 +48,18 @@ impl Pair {
         Ok(Self { effects: pair.map(|declared| declared.effect), plain, declared })
     }
 
-    /// The errors of the effects' parameters, each beside the other effect and everything else that
-    /// is free: an effect whose own part is known so well is told from the other. Where a mass is,
-    /// and what else has no size, does not count.
+    /// Returns the criterion: the errors of the parameters of both effects, with all other free
+    /// parameters estimated. If these errors are small, the effects are separated. Parameters
+    /// without a size, such as the position of a mass, do not count.
     ///
     /// # Errors
-    /// As for [`Site::new`], or rules of `[parameters]` fix both effects.
+    /// Returns the errors of [`Site::new`], or an error if rules of `[parameters]` fix both
+    /// effects.
     fn criterion(&self, poses: &Measurements) -> Result<Criterion, DesignError> {
         let site = Site::new(&self.declared, &[poses])?;
-        let own = self.effects.iter().flat_map(|effect| effect.parameters(&self.declared));
-        let names: Vec<String> = own.filter(|own| own.nominal == 0.0).map(|own| own.name).collect();
+        let parameters = self.effects.iter().flat_map(|effect| effect.parameters(&self.declared));
+        let sized = parameters.filter(|parameter| parameter.nominal == 0.0);
+        let names: Vec<String> = sized.map(|parameter| parameter.name).collect();
         let parameters = site.model.parameters.iter().enumerate();
         let columns: Vec<usize> = parameters
             .filter(|(_, parameter)| names.contains(&parameter.name))
@@ -68,44 +71,45 @@ impl Pair {
         Ok(Criterion::Each(columns))
     }
 
-    fn told(&self, poses: &Measurements) -> Result<Separation, DesignError> {
-        let [one, other] = &self.effects;
-        Ok(separation(&self.plain, poses, [one, other])?)
+    fn separation(&self, poses: &Measurements) -> Result<Separation, DesignError> {
+        let [first, second] = &self.effects;
+        Ok(separation(&self.plain, poses, [first, second])?)
     }
 }
 
-/// How well a plan tells two effects apart, beside random poses.
+/// Separation of two effects by a plan and by random poses.
 #[derive(Debug, Clone)]
-pub struct Separated {
-    /// The effects.
+pub struct PairSeparation {
+    /// Both effects.
     pub effects: [Effect; 2],
-    /// What the plan is made for.
+    /// Criterion that the plan minimises.
     pub criterion: Criterion,
-    /// How well it tells them apart.
+    /// Separation by the plan.
     pub planned: Separation,
-    /// How well random poses do, each draw by itself.
+    /// Separation by each random set of poses.
     pub random: Vec<Separation>,
 }
 
-/// Chooses the poses that tell two effects apart best, both effects declared; `options.criterion`
-/// is not used.
+/// Chooses the poses that separate two effects best, with both effects declared;
+/// `options.criterion` is not used.
 ///
 /// # Errors
-/// As for [`plan`].
+/// Returns the errors of [`plan`].
 pub fn separate(
-    pair: &Pair,
+    pair: &EffectPair,
     candidates: &Candidates,
     given: Option<&Measurements>,
     options: &PlanOptions,
-) -> Result<(Plan, Separated), DesignError> {
+) -> Result<(Plan, PairSeparation), DesignError> {
     let PlanOptions { poses, seed, .. } = *options;
-    let usual = match candidates {
+    let uniform = match candidates {
         Candidates::Within(ranges) => {
-            ranges.draw(&pair.declared, DRAWN[0].max(2 * poses), Extremes::No, seed, EVENLY)
+            let count = DRAWN_CANDIDATES[0].max(2 * poses);
+            ranges.draw(&pair.declared, count, Extremes::No, seed, UNIFORM_STREAM)
         }
         Candidates::Rows(rows) => rows.as_ref().clone(),
     };
-    let criterion = pair.criterion(given.unwrap_or(&usual))?;
+    let criterion = pair.criterion(given.unwrap_or(&uniform))?;
     let plan = plan(
         &pair.declared,
         candidates,
@@ -113,29 +117,25 @@ pub fn separate(
         &PlanOptions { criterion: &criterion, ..*options },
     )?;
     let with_given =
-        |own: &Measurements| given.map_or_else(|| own.clone(), |given| given.concatenate(own));
-    let usual = Site::new(&pair.declared, &[&usual])?.at_rest(&usual).0;
-    let random = (0..DRAWS).into_par_iter().map(|draw| {
-        pair.told(&with_given(&usual.select(&choose(
-            usual.len(),
-            poses,
-            seed,
-            FIRST_DRAW + draw as u64,
-        ))))
+        |rows: &Measurements| given.map_or_else(|| rows.clone(), |given| given.concatenate(rows));
+    let uniform = Site::new(&pair.declared, &[&uniform])?.in_equilibrium(&uniform).0;
+    let random = (0..RANDOM_SETS).into_par_iter().map(|set| {
+        let rows = choose(uniform.len(), poses, seed, RANDOM_SET_STREAM + set as u64);
+        pair.separation(&with_given(&uniform.select(&rows)))
     });
-    let separated = Separated {
+    let separated = PairSeparation {
         effects: pair.effects.clone(),
-        planned: pair.told(&with_given(&plan.poses))?,
+        planned: pair.separation(&with_given(&plan.poses))?,
         random: random.collect::<Result<_, _>>()?,
         criterion,
     };
     Ok((plan, separated))
 }
 
-impl Separated {
-    /// The median over random poses of something about a separation; infinite where most of them
-    /// say nothing.
+impl PairSeparation {
+    /// Returns the median of a quantity over the random sets; infinite if most of them lack it.
     pub fn random(&self, of: impl Fn(&Separation) -> Option<f64>) -> f64 {
-        median(self.random.iter().map(|own| of(own).unwrap_or(f64::INFINITY))).unwrap_or(f64::NAN)
+        let values = self.random.iter().map(|separation| of(separation).unwrap_or(f64::INFINITY));
+        median(values).unwrap_or(f64::NAN)
     }
 }

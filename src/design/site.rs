@@ -1,4 +1,4 @@
-//! The arm where it is to be measured.
+//! Model of the arm at the site of a measurement, with its bases and targets.
 
 use std::collections::BTreeSet;
 
@@ -14,34 +14,33 @@ use crate::model::{MeasuredOrientation, Model, Pose};
 use crate::problem::{Observation, Problem};
 use crate::random;
 
-/// Mass that a declared `unmodelled-mass` is taken to have: without any, its place would not matter
+/// Mass assumed for a declared `unmodelled-mass`; without a mass its position would not matter
 /// \[kg\].
 const PROBE_MASS: f64 = 1.0;
 
-/// The model with a base for every session and a target for every word of some tables of poses.
+/// Model with a base for every session and a target for every target name of some tables of poses.
 #[derive(Debug, Clone)]
 pub struct Site<'a> {
-    /// The declared arm, its bases and targets.
+    /// Declared arm with its bases and targets.
     pub model: Model,
     problem: &'a Problem,
     bases: Vec<String>,
     targets: Vec<String>,
-    /// Where the nominal arm puts the points, anchors and surfaces of which nothing is known: the
-    /// full parameter vector.
-    about: DVector<f64>,
+    /// Full parameter vector at which unknown fixtures are where the nominal arm touches them.
+    nominal: DVector<f64>,
 }
 
 impl<'a> Site<'a> {
-    /// For all poses of `tables`.
+    /// Creates the site for all poses of `tables`.
     ///
     /// # Errors
-    /// Rules of `[parameters]` do not fit the arm, no parameter is free, σ is not known, or
-    /// distances are to be measured to an anchor that nobody knows the place of.
+    /// Returns an error if rules of `[parameters]` do not match the arm, no parameter is free, σ is
+    /// unknown, or distances are to be measured to an anchor at an unknown position.
     pub fn new(problem: &'a Problem, tables: &[&Measurements]) -> Result<Self, DesignError> {
         let (mut bases, mut targets): (Vec<String>, Vec<String>) = Default::default();
-        let add = |all: &mut Vec<String>, word: &String| {
-            if !all.contains(word) {
-                all.push(word.clone());
+        let add = |words: &mut Vec<String>, word: &String| {
+            if !words.contains(word) {
+                words.push(word.clone());
             }
         };
         for table in tables {
@@ -58,55 +57,52 @@ impl<'a> Site<'a> {
         if model.parameters.is_empty() {
             return Err(DesignError::nothing_free(problem));
         }
-        let about = DVector::zeros(model.parameters.len());
-        let mut site = Self { model, problem, bases, targets, about };
-        let (mut seen, mut planned_only) = (BTreeSet::new(), BTreeSet::new());
+        let nominal = DVector::zeros(model.parameters.len());
+        let mut site = Self { model, problem, bases, targets, nominal };
+        let (mut located, mut planned_only) = (BTreeSet::new(), BTreeSet::new());
         for table in tables {
             let mut poses = site.poses(table, &Placement::of(table));
             for pose in &poses {
-                // Where nothing is measured yet, contacts tell where something stands; distances do
-                // not.
+                // Before any measurement, contacts locate a fixture, but distances do not.
                 let planned = matches!(pose.observation, Observation::Distance(_))
                     && !table.position_measured;
                 if let Some(fixture) = pose.observation.fixture() {
-                    if planned { &mut planned_only } else { &mut seen }.insert(fixture);
+                    if planned { &mut planned_only } else { &mut located }.insert(fixture);
                 }
             }
             poses.retain(|pose| {
                 table.position_measured || !matches!(pose.observation, Observation::Distance(_))
             });
-            let mut about = std::mem::take(&mut site.about);
-            locate(&site.model, &poses, |_| true, &mut about);
-            site.about = about;
+            let mut nominal = std::mem::take(&mut site.nominal);
+            locate(&site.model, &poses, |_| true, &mut nominal);
+            site.nominal = nominal;
         }
-        for own in
-            planned_only.difference(&seen).filter_map(|&fixture| problem.fixtures.get(fixture))
-        {
-            if own.known.iter().any(Option::is_none) {
-                let (what, name) = (own.kind.word(), own.name.clone());
-                let kind =
-                    InputErrorKind::PlaceUnknown { what, name, write: own.kind.declared_by(0) };
-                return Err(own.location.clone().error(kind).into());
+        let unlocated = planned_only.difference(&located);
+        for fixture in unlocated.filter_map(|&fixture| problem.fixtures.get(fixture)) {
+            if fixture.known.iter().any(Option::is_none) {
+                let (what, name) = (fixture.kind.word(), fixture.name.clone());
+                let write = fixture.kind.declared_by(0);
+                let kind = InputErrorKind::PlaceUnknown { what, name, write };
+                return Err(fixture.location.clone().error(kind).into());
             }
         }
         Ok(site)
     }
 
-    /// What the poses of a table tell about the nominal arm; `unit` \[m\] stands for σ, if it is
-    /// given. Words that the site does not know are taken for its first.
+    /// Returns the sensitivity of the poses of a table at the nominal arm. `unit` \[m\] replaces σ,
+    /// if given. Unknown sessions and targets are taken as the first of the site.
     pub fn sensitivity(&self, table: &Measurements, unit: Option<f64>) -> Sensitivity {
-        let added = |site| matches!(site, ParameterSite::Beam { field: BeamField::AddedMass, .. });
-        let own = self.model.parameters.iter().zip(&self.about);
-        let about = own.map(|(own, about)| if added(own.site) { PROBE_MASS } else { *about });
-        self.sensitivity_at(
-            table,
-            unit,
-            &DVector::from_iterator(self.model.parameters.len(), about),
-        )
+        let is_mass =
+            |site| matches!(site, ParameterSite::Beam { field: BeamField::AddedMass, .. });
+        let parameters = self.model.parameters.iter().zip(&self.nominal);
+        let values = parameters
+            .map(|(parameter, value)| if is_mass(parameter.site) { PROBE_MASS } else { *value });
+        let at = DVector::from_iterator(self.model.parameters.len(), values);
+        self.sensitivity_at(table, unit, &at)
     }
 
-    /// The same about `count` arms drawn from the priors; parameters without one stay nominal, and
-    /// arms that do not come to rest in all of the poses are left out.
+    /// Returns the sensitivities at `count` arms drawn from the priors. Parameters without a prior
+    /// stay nominal; arms without equilibrium in one of the poses are omitted.
     pub(super) fn arms(
         &self,
         table: &Measurements,
@@ -121,13 +117,15 @@ impl<'a> Site<'a> {
         let n = self.model.parameters.len();
         let drawn: Vec<DVector<f64>> = (0..count)
             .map(|_| {
-                DVector::from_iterator(n, self.model.parameters.iter().map(&mut draw)) + &self.about
+                DVector::from_iterator(n, self.model.parameters.iter().map(&mut draw))
+                    + &self.nominal
             })
             .collect();
-        let all = drawn.par_iter().map(|at| self.sensitivity_at(table, None, at));
-        all.filter(|arm| (0..arm.len()).all(|row| arm.is_finite(row))).collect()
+        let arms = drawn.par_iter().map(|at| self.sensitivity_at(table, None, at));
+        arms.filter(|arm| (0..arm.len()).all(|row| arm.is_finite(row))).collect()
     }
 
+    /// Returns the sensitivity of the poses of a table at a parameter vector.
     fn sensitivity_at(
         &self,
         table: &Measurements,
@@ -139,7 +137,7 @@ impl<'a> Site<'a> {
             pose.sigma = unit.unwrap_or(pose.sigma);
             let turn =
                 self.problem.data.orientation_sigma.filter(|_| self.problem.data.fits_orientation);
-            // In a unit of length, what counts are positions.
+            // In a unit of length only positions count.
             let turn = turn.filter(|_| pose.observation.is_position());
             pose.orientation = turn
                 .filter(|_| unit.is_none())
@@ -148,39 +146,41 @@ impl<'a> Site<'a> {
         Sensitivity::of(&self.model, &poses, at)
     }
 
-    /// The rows of a table as poses of the site's model.
+    /// Returns the rows of a table as poses of the model.
     fn poses<'t>(&self, table: &'t Measurements, placement: &Placement) -> Vec<Pose<'t>> {
         let rows: Vec<usize> = (0..table.len()).collect();
         let mut poses =
             placement.poses(table, &rows, self.problem.data.position_sigma.unwrap_or(1.0));
-        let place =
-            |all: &[String], word: &String| all.iter().position(|known| known == word).unwrap_or(0);
+        let index = |words: &[String], word: &String| {
+            words.iter().position(|other| other == word).unwrap_or(0)
+        };
         for pose in &mut poses {
-            pose.base = place(&self.bases, &placement.bases[pose.base]);
-            pose.target = place(&self.targets, &placement.targets[pose.target]);
+            pose.base = index(&self.bases, &placement.bases[pose.base]);
+            pose.target = index(&self.targets, &placement.targets[pose.target]);
         }
         poses
     }
 
-    /// Rows of a table in which the nominal target stays in a workspace.
+    /// Returns the rows of a table at which the nominal target is inside a workspace.
     pub(super) fn inside(&self, table: &Measurements, workspace: &Workspace) -> Vec<usize> {
         let nominal = vec![0.0; self.model.parameters.len()];
         let points = self
             .model
             .predicted_targets_in_base(&self.poses(table, &Placement::of(table)), &nominal);
         (0..table.len())
-            .filter(|&row| points[row].is_some_and(|point| workspace.holds(&point)))
+            .filter(|&row| points[row].is_some_and(|point| workspace.contains(&point)))
             .collect()
     }
 
-    /// A table without the poses in which the arm does not come to rest, and what the others tell.
-    pub(super) fn at_rest(&self, table: &Measurements) -> (Measurements, Sensitivity) {
-        let all = self.sensitivity(table, None);
-        let rows: Vec<usize> = (0..all.len()).filter(|&row| all.is_finite(row)).collect();
-        if rows.len() == all.len() {
-            (table.clone(), all)
+    /// Returns the rows of a table in which the arm has an equilibrium, and their sensitivity.
+    pub(super) fn in_equilibrium(&self, table: &Measurements) -> (Measurements, Sensitivity) {
+        let sensitivity = self.sensitivity(table, None);
+        let rows: Vec<usize> =
+            (0..sensitivity.len()).filter(|&row| sensitivity.is_finite(row)).collect();
+        if rows.len() == sensitivity.len() {
+            (table.clone(), sensitivity)
         } else {
-            (table.select(&rows), all.select(&rows))
+            (table.select(&rows), sensitivity.select(&rows))
         }
     }
 }

@@ -1,24 +1,24 @@
-//! Where the target may go.
+//! Region that the target must stay in.
 
 use nalgebra::Vector3;
 
-/// A box and half-spaces that the nominal target has to stay in, frame of the arm's base; the rest
-/// of the arm is not looked at.
+/// Box and half-spaces that the nominal target must stay in, frame of the arm's base. Other parts
+/// of the arm are not checked.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Workspace {
-    /// Opposite corners of the box, least first \[m\].
-    pub room: Option<[Vector3<f64>; 2]>,
-    /// Planes that the target stays beyond: n·p ≥ d with a unit normal n and d \[m\].
+    /// Opposite corners of the box, minimum first \[m\].
+    pub corners: Option<[Vector3<f64>; 2]>,
+    /// Planes beyond which the target stays: n·p ≥ d with a unit normal n and d \[m\].
     pub planes: Vec<(Vector3<f64>, f64)>,
 }
 
 impl Workspace {
-    /// Whether a point may be reached for.
-    pub fn holds(&self, point: &Vector3<f64>) -> bool {
-        let inside = |[from, to]: &[Vector3<f64>; 2]| {
+    /// Returns true if a point is inside the region.
+    pub fn contains(&self, point: &Vector3<f64>) -> bool {
+        let is_inside = |[from, to]: &[Vector3<f64>; 2]| {
             point.iter().zip(from).zip(to).all(|((x, from), to)| (*from..=*to).contains(x))
         };
-        self.room.as_ref().is_none_or(inside)
-            && self.planes.iter().all(|(normal, least)| normal.dot(point) >= *least)
+        self.corners.as_ref().is_none_or(is_inside)
+            && self.planes.iter().all(|(normal, offset)| normal.dot(point) >= *offset)
     }
 }

@@ -1,4 +1,4 @@
-//! Errors of the end point, eq. 39-41.
+//! End-point error, eq. 39-41.
 
 use nalgebra::{DVector, Matrix3xX, Vector3, Vector6};
 
@@ -9,18 +9,19 @@ use super::parameters::Parameters;
 use super::{Elastic, geometric};
 use crate::problem::{PoseView, Problem};
 
-/// A pose with everything the paper computes for it, at geometry E.
+/// Quantities of one pose that the paper defines, at geometry E.
 #[derive(Debug, Clone)]
 pub struct EndPoint {
-    /// The rigid arm.
+    /// Frames of the rigid arm.
     pub chain: Chain,
-    /// What deflects it.
+    /// Deflections of joints and links.
     pub elastic: Elastic,
     reading: Reading,
 }
 
 impl EndPoint {
-    /// The arm of `problem` with the geometry of `parameters`, loaded and set as `setup` says.
+    /// Computes the arm of `problem` with the geometry of `parameters`, in the configuration and
+    /// under the loads of `setup`.
     ///
     /// `parameters` has an entry for each joint; coordinates missing in the configuration are 0.
     pub fn new(
@@ -34,23 +35,28 @@ impl EndPoint {
         Self { elastic: Elastic::new(&chain, &loads, reading), chain, reading: *reading }
     }
 
-    /// Displacement \[m\] in the measuring frame of a motion D of the end frame: R [I 0] D.
+    /// Returns the displacement R [I 0] D of the end point for a motion D of the end frame,
+    /// measuring frame \[m\].
     ///
-    /// Printed differently: `EndFrame`. D of eq. 27 and 37 lies in the end frame, yet eq. 39 sets
-    /// it equal to `PE_meas` − `PE_nom` of the measuring frame: [I 0] D.
+    /// Printed differently (`EndFrame`): D of eq. 27 and 37 is in the end frame, but eq. 39 sets it
+    /// equal to `PE_meas` − `PE_nom` in the measuring frame, [I 0] D.
     pub fn displacement(&self, motion: &Vector6<f64>) -> Vector3<f64> {
-        let own: Vector3<f64> = motion.fixed_rows::<3>(0).into_owned();
-        if self.reading.keeps(Misprint::EndFrame) { own } else { split(&self.chain.end()).0 * own }
+        let translation: Vector3<f64> = motion.fixed_rows::<3>(0).into_owned();
+        if self.reading.keeps(Misprint::EndFrame) {
+            translation
+        } else {
+            split(&self.chain.end()).0 * translation
+        }
     }
 
-    /// `D_f` = `J_f` `d_f` as a displacement, measuring frame \[m\]
-    /// [Chen2021, eq. 27, 39]
+    /// Returns the deflection `D_f` = `J_f` `d_f` as a displacement, measuring frame \[m\]
+    /// [Chen2021, eq. 27, 39].
     pub fn deflection(&self, parameters: &Parameters) -> Vector3<f64> {
         self.displacement(&self.elastic.motion(parameters))
     }
 
-    /// The three rows of `J_g` that positions need, 3 × 5n, measuring frame
-    /// [Chen2021, eq. 38, 39, 42]
+    /// Returns the position rows of `J_g`, shape = (3, 5n), measuring frame [Chen2021, eq. 38, 39,
+    /// 42].
     pub fn jacobian(&self) -> Matrix3xX<f64> {
         let motions = geometric::jacobian(&self.chain, &self.reading);
         let columns: Vec<Vector3<f64>> = motions
@@ -60,16 +66,16 @@ impl EndPoint {
         Matrix3xX::from_columns(&columns)
     }
 
-    /// `D_End` = `J_f` `d_f` + `J_g` e, first order in both, measuring frame \[m\]
-    /// [Chen2021, eq. 39, 41]
+    /// Returns the end-point error `D_End` = `J_f` `d_f` + `J_g` e, first order in both, measuring
+    /// frame \[m\] [Chen2021, eq. 39, 41].
     ///
-    /// e = [e₁ … e_n] has 5n entries. Eq. 40 has `d_f` of the true parameters; eq. 41 takes it at E
-    /// and S and so drops what e changes in the deflection.
+    /// e = [e₁ … e_n] has 5n entries. Eq. 40 evaluates `d_f` at the true parameters. Eq. 41
+    /// evaluates it at E and S and so neglects the effect of e on the deflection.
     pub fn error(&self, parameters: &Parameters, e: &DVector<f64>) -> Vector3<f64> {
         self.deflection(parameters) + self.jacobian() * e
     }
 
-    /// `PE_nom` + `D_f`: where the paper expects the end point, measuring frame \[m\].
+    /// Returns the predicted position `PE_nom` + `D_f` of the end point, measuring frame \[m\].
     pub fn position(&self, parameters: &Parameters) -> Vector3<f64> {
         self.chain.position() + self.deflection(parameters)
     }

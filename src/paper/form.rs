@@ -1,55 +1,56 @@
-//! Which form of each misprinted formula is used.
+//! Printed and corrected forms of the misprinted formulas.
 
-/// How a formula is read.
+/// Form in which a formula is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum Form {
-    /// As it stands in the paper.
+    /// Form as printed in the paper.
     Printed,
-    /// As it must be.
+    /// Form with the misprint corrected.
     #[default]
     Corrected,
 }
 
-/// A misprint that changes a formula; each is documented where the formula stands.
+/// Misprint that changes a formula; each is documented at its formula.
 ///
-/// How much each moves the end point of the lunar sampler, and what it does to a calibration,
-/// stands in `docs/paper.md`.
+/// `docs/paper.md` lists the displacement of the end point by each misprint and its effect on a
+/// calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Misprint {
-    /// Eq. 4: `F_y2` has G₄ₙ l² for G₄ₙ l³.
+    /// Eq. 4: `F_y2` has G₄ₙ l² instead of G₄ₙ l³.
     TipForceLever,
     /// Eq. 4: the hoist stretches link B but does not bend it.
     HoistBending,
-    /// Eq. 4, 5, 7: slopes stand in each other's places, or without their sign.
+    /// Eq. 4, 5, 7: slopes are exchanged, or lack their sign.
     SlopePlaces,
-    /// Eq. 6: q l²/(EA) for q l²/(2EA).
+    /// Eq. 6: q l²/(EA) instead of q l²/(2EA).
     Stretch,
     /// Eq. 6: link A carries the weights beyond it, but not the hoist beyond it.
     HoistBeyond,
-    /// Eq. 10: joint 2 has the length of joint 3; nothing where both are as long, as in the nominal
-    /// arm.
+    /// Eq. 10: joint 2 has the length of joint 3; no effect on the nominal arm, where both are
+    /// equal.
     JointTwoLength,
-    /// Eq. 8-10: torsion turns about `z_i` after Ry(β), the joint about `z_i` before it; the same
-    /// for β = 0.
+    /// Eq. 8-10: torsion rotates about `z_i` after Ry(β), but the joint rotates about `z_i` before
+    /// it; no effect for β = 0.
     JointAxis,
-    /// Eq. 16: `U_i` for `U_{i+1}`.
+    /// Eq. 16: `U_i` instead of `U_{i+1}`.
     TransferIndex,
-    /// Eq. 21: the deflection acts at the link's root, not at its tip.
+    /// Eq. 21: the deflection acts at the root of the link instead of its tip.
     LinkSide,
-    /// Eq. 23, 25: carried to the end point by the frames before the link, not by those after it.
+    /// Eq. 23, 25: the frames before the link transfer the motion to the end point, instead of
+    /// those after it.
     LinkTransfer,
-    /// Eq. 28, 29: `dT_i` = `Δ_i` `T_i` for `T_i` `Δ_i`.
+    /// Eq. 28, 29: `dT_i` = `Δ_i` `T_i` instead of `T_i` `Δ_i`.
     GeometricSide,
-    /// Eq. 37, 39: motions of the end frame are taken for motions in the measuring frame.
+    /// Eq. 37, 39: motions in the end frame are used as motions in the measuring frame.
     EndFrame,
-    /// Eq. 45: `E_j` has no β.
+    /// Eq. 45: `E_j` lacks β.
     BetaLeftOut,
 }
 
 impl Misprint {
-    /// All of them, in the order of the paper.
+    /// All misprints, in the order of the paper.
     pub const ALL: [Self; 13] = [
         Self::TipForceLever,
         Self::HoistBending,
@@ -66,14 +67,13 @@ impl Misprint {
         Self::BetaLeftOut,
     ];
 
-    /// Those that the paper itself contradicts elsewhere: nobody who ran its formulas can have kept
+    /// Misprints that the paper contradicts elsewhere, so that its authors cannot have executed
     /// them.
     ///
-    /// Eq. 17 and 18 are right against 16; eq. 21 with 22 is dT = (V Δ V⁻¹) T, which eq. 24 states
-    /// in the inertial frame, as the text to eq. 26 says, so that in eq. 23 and 25 only T or the
-    /// frame is on the wrong side; eq. 33-37 are right against 28 and 29; the inertial frame of eq.
-    /// 26 is against the end frame of eq. 37 and 39; and table 2 identifies the β that the text to
-    /// eq. 45 leaves out.
+    /// Eq. 17 and 18 correct eq. 16. Eq. 21 with 22 is dT = (V Δ V⁻¹) T, which eq. 24 states in the
+    /// inertial frame, as the text to eq. 26 says; in eq. 23 and 25 only T or the frame is on the
+    /// wrong side. Eq. 33-37 correct eq. 28 and 29. The inertial frame of eq. 26 contradicts the
+    /// end frame of eq. 37 and 39. Table 2 identifies the β that the text to eq. 45 omits.
     pub const CONTRADICTED: [Self; 5] = [
         Self::TransferIndex,
         Self::LinkTransfer,
@@ -82,7 +82,7 @@ impl Misprint {
         Self::BetaLeftOut,
     ];
 
-    /// Name in results, where it stands, and what it says in a few words.
+    /// Returns the name in results, the equations and a short description.
     const fn words(self) -> (&'static str, &'static str, &'static str) {
         match self {
             Self::TipForceLever => ("tip-force-lever", "eq. 4", "tip force times l² for l³"),
@@ -92,12 +92,12 @@ impl Misprint {
             }
             Self::Stretch => ("stretch", "eq. 6", "stretch by own weight twice"),
             Self::HoistBeyond => {
-                ("hoist-beyond", "eq. 6", "link A does not feel the hoist on link B")
+                ("hoist-beyond", "eq. 6", "link A does not carry the hoist on link B")
             }
             Self::JointTwoLength => {
                 ("joint-two-length", "eq. 10", "joint 2 with the length of joint 3")
             }
-            Self::JointAxis => ("joint-axis", "eq. 8-10", "joints give way about z after Ry(β)"),
+            Self::JointAxis => ("joint-axis", "eq. 8-10", "joint torsion about z after Ry(β)"),
             Self::TransferIndex => ("transfer-index", "eq. 16", "U_i for U_{i+1}"),
             Self::LinkSide => ("link-side", "eq. 21", "links deflect about their root"),
             Self::LinkTransfer => {
@@ -111,40 +111,40 @@ impl Misprint {
         }
     }
 
-    /// Name in results.
+    /// Returns the name in results.
     pub const fn as_str(self) -> &'static str {
         self.words().0
     }
 
-    /// The equations that it stands in.
+    /// Returns the equations that contain the misprint.
     pub const fn place(self) -> &'static str {
         self.words().1
     }
 
-    /// What it says, in a few words.
+    /// Returns a short description.
     pub const fn summary(self) -> &'static str {
         self.words().2
     }
 }
 
-/// A choice of form for every misprint.
+/// Choice of the form of every misprinted formula.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct Reading {
     forms: [Form; Misprint::ALL.len()],
 }
 
 impl Reading {
-    /// The form of one misprint.
+    /// Returns the form of one misprint.
     pub fn form(&self, misprint: Misprint) -> Form {
         self.forms[misprint as usize]
     }
 
-    /// Whether one misprint is kept.
+    /// Returns true if one misprint is kept.
     pub fn keeps(&self, misprint: Misprint) -> bool {
         self.form(misprint) == Form::Printed
     }
 
-    /// The same with another form of one misprint.
+    /// Returns the reading with another form of one misprint.
     #[must_use]
     pub fn with(mut self, misprint: Misprint, form: Form) -> Self {
         self.forms[misprint as usize] = form;
@@ -152,19 +152,18 @@ impl Reading {
     }
 }
 
-/// Everything corrected, or everything as printed that the authors can have run: `Printed` keeps
-/// every misprint but those of [`Misprint::CONTRADICTED`], which have their effect only when chosen
-/// by name.
+/// All formulas corrected, or all misprints kept that the authors can have executed. `Printed`
+/// keeps every misprint except [`Misprint::CONTRADICTED`], which apply only if chosen by name.
 impl From<Form> for Reading {
     fn from(form: Form) -> Self {
-        let all = Self { forms: [form; Misprint::ALL.len()] };
+        let uniform = Self { forms: [form; Misprint::ALL.len()] };
         Misprint::CONTRADICTED
             .into_iter()
-            .fold(all, |reading, misprint| reading.with(misprint, Form::Corrected))
+            .fold(uniform, |reading, misprint| reading.with(misprint, Form::Corrected))
     }
 }
 
-/// One misprint kept, everything else corrected.
+/// One misprint kept, all other formulas corrected.
 impl From<Misprint> for Reading {
     fn from(misprint: Misprint) -> Self {
         Self::default().with(misprint, Form::Printed)

@@ -1,4 +1,4 @@
-//! From errors of the geometric parameters to the motion of the end frame, eq. 28-38.
+//! Motion of the end frame by errors of the geometric parameters, eq. 28-38.
 
 use nalgebra::{DMatrix, Matrix6, SMatrix};
 
@@ -6,8 +6,8 @@ use super::form::{Misprint, Reading};
 use super::kinematics::{Chain, Mdh};
 use super::transfer::transfer;
 
-/// From `e_i` = [Δα Δa Δθ Δd Δβ] to the differential motion [dx dy dz δx δy δz] of frame i, frame
-/// i.
+/// Returns the matrix from `e_i` = [Δα Δa Δθ Δd Δβ] to the differential motion [dx dy dz δx δy δz]
+/// of frame i, in frame i.
 ///
 /// ```text
 /// ⎡ −d sθ cβ   cθ cβ    0   −sβ  0 ⎤
@@ -18,7 +18,7 @@ use super::transfer::transfer;
 /// ⎣  cθ sβ      0      cβ    0   0 ⎦                                            [Chen2021, eq. 30, 31]
 /// ```
 ///
-/// Exact for `dT_i` = `T_i` `Δ_i`; see [`error_transfer`] for what eq. 28 says.
+/// It is exact for `dT_i` = `T_i` `Δ_i`; see [`error_transfer`] for the form of eq. 28.
 pub fn error_matrix(link: &Mdh) -> SMatrix<f64, 6, 5> {
     let (st, ct) = link.theta.sin_cos();
     let (sb, cb) = link.beta.sin_cos();
@@ -57,19 +57,20 @@ pub fn error_matrix(link: &Mdh) -> SMatrix<f64, 6, 5> {
     ])
 }
 
-/// From the motion of frame i (joint `k`, counted from 0) to that of the end frame.
+/// Returns the matrix from the motion of frame i (joint `k`, counted from 0) to that of the end
+/// frame.
 ///
-/// dT = Σ T₁ … `T_i` `Δ_i` T_{i+1} … T_n = T Σ `U_{i+1}`⁻¹ `Δ_i` `U_{i+1}`              [Chen2021,
-/// eq. 32-37]
+/// dT = Σ T₁ … `T_i` `Δ_i` T_{i+1} … T_n = T Σ `U_{i+1}`⁻¹ `Δ_i` `U_{i+1}`          [Chen2021, eq.
+/// 32-37]
 ///
-/// Printed differently: `GeometricSide`, eq. 28 and 29 have `dT_i` = `Δ_i` `T_i`, which makes it
-/// `U_i`⁻¹ `Δ_i` `U_i`; eq. 31 and eq. 33-37 hold for `T_i` `Δ_i`.
+/// Printed differently (`GeometricSide`): eq. 28 and 29 have `dT_i` = `Δ_i` `T_i`, which gives
+/// `U_i`⁻¹ `Δ_i` `U_i`. Eq. 31 and eq. 33-37 hold for `T_i` `Δ_i`.
 pub fn error_transfer(chain: &Chain, k: usize, reading: &Reading) -> Matrix6<f64> {
     transfer(&chain.after[if reading.keeps(Misprint::GeometricSide) { k } else { k + 1 }])
 }
 
-/// `J_g` = [`J_g1` … `J_gn`], 6 × 5n: `D_g` = `J_g` e, motion of the end frame, end frame
-/// [Chen2021, eq. 38]
+/// Returns `J_g` = [`J_g1` … `J_gn`], shape = (6, 5n), with `D_g` = `J_g` e, the motion of the end
+/// frame in the end frame [Chen2021, eq. 38].
 pub fn jacobian(chain: &Chain, reading: &Reading) -> DMatrix<f64> {
     let mut out = DMatrix::zeros(6, 5 * chain.links.len());
     for (k, link) in chain.links.iter().enumerate() {

@@ -5,33 +5,33 @@ use nalgebra::{Matrix3, Matrix4, Rotation3, Vector3};
 use crate::problem::{Joint, JointKind, Problem};
 use crate::spatial::Frame;
 
-/// The five parameters of a joint and the link before it, `E_i` of the paper.
+/// Modified Denavit–Hartenberg parameters of a joint and the link before it, `E_i` of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mdh {
-    /// α \[rad\].
+    /// Twist angle α \[rad\].
     pub alpha: f64,
-    /// a \[m\].
+    /// Link length a \[m\].
     pub a: f64,
-    /// θ \[rad\].
+    /// Joint angle θ \[rad\].
     pub theta: f64,
-    /// d \[m\].
+    /// Joint offset d \[m\].
     pub d: f64,
-    /// β \[rad\].
+    /// Parallelism angle β \[rad\].
     pub beta: f64,
 }
 
 impl Mdh {
-    /// As the problem declares them.
+    /// Returns the declared parameters of a joint.
     pub fn nominal(joint: &Joint) -> Self {
         Self { alpha: joint.alpha, a: joint.a, theta: joint.theta, d: joint.d, beta: joint.beta }
     }
 
-    /// The five values in the order of `e_i` = [Δα Δa Δθ Δd Δβ].
+    /// Returns the five values in the order of `e_i` = [Δα Δa Δθ Δd Δβ].
     pub fn fields_mut(&mut self) -> [&mut f64; 5] {
         [&mut self.alpha, &mut self.a, &mut self.theta, &mut self.d, &mut self.beta]
     }
 
-    /// With the configuration coordinate q \[rad\] or \[m\] added to θ or d.
+    /// Adds the configuration coordinate q \[rad\] or \[m\] to θ or d.
     #[must_use]
     pub fn at(mut self, kind: JointKind, q: f64) -> Self {
         match kind {
@@ -42,36 +42,36 @@ impl Mdh {
         self
     }
 
-    /// `T_i1` = Rx(α) Tx(a), up to the tip of the link
-    /// [Chen2021, eq. 20]
+    /// Returns `T_i1` = Rx(α) Tx(a), the transform to the tip of the link [Chen2021, eq. 20].
     pub fn to_tip(&self) -> Matrix4<f64> {
-        turn(Vector3::x() * self.alpha) * shift(Vector3::x() * self.a)
+        rotation(Vector3::x() * self.alpha) * translation(Vector3::x() * self.a)
     }
 
-    /// `T_i2` = Rz(θ) Tz(d) Ry(β), from the tip of the link                              [Chen2021,
-    /// eq. 20]
+    /// Returns `T_i2` = Rz(θ) Tz(d) Ry(β), the transform from the tip of the link [Chen2021, eq.
+    /// 20].
     pub fn from_tip(&self) -> Matrix4<f64> {
-        turn(Vector3::z() * self.theta)
-            * shift(Vector3::z() * self.d)
-            * turn(Vector3::y() * self.beta)
+        rotation(Vector3::z() * self.theta)
+            * translation(Vector3::z() * self.d)
+            * rotation(Vector3::y() * self.beta)
     }
 
-    /// `T_i` = Rx(α) Tx(a) Rz(θ) Tz(d) Ry(β)
-    /// [Chen2021, eq. 1]
+    /// Returns `T_i` = Rx(α) Tx(a) Rz(θ) Tz(d) Ry(β) [Chen2021, eq. 1].
     pub fn transform(&self) -> Matrix4<f64> {
         self.to_tip() * self.from_tip()
     }
 }
 
-fn turn(rotation_vector: Vector3<f64>) -> Matrix4<f64> {
+/// Returns the homogeneous transform of a rotation vector.
+fn rotation(rotation_vector: Vector3<f64>) -> Matrix4<f64> {
     Rotation3::new(rotation_vector).to_homogeneous()
 }
 
-fn shift(translation: Vector3<f64>) -> Matrix4<f64> {
-    Matrix4::new_translation(&translation)
+/// Returns the homogeneous transform of a translation.
+fn translation(vector: Vector3<f64>) -> Matrix4<f64> {
+    Matrix4::new_translation(&vector)
 }
 
-/// The axes of a transform, as a rotation matrix, and its origin \[m\].
+/// Returns the rotation matrix of a transform and its origin \[m\].
 pub(super) fn split(transform: &Matrix4<f64>) -> (Matrix3<f64>, Vector3<f64>) {
     (
         transform.fixed_view::<3, 3>(0, 0).into_owned(),
@@ -79,27 +79,28 @@ pub(super) fn split(transform: &Matrix4<f64>) -> (Matrix3<f64>, Vector3<f64>) {
     )
 }
 
-/// One configuration of the rigid arm.
+/// Frames of the rigid arm in one configuration.
 ///
-/// The paper ends in frame n, `U_{n+1}` = I; here `U_{n+1}` = Trans(target), since on axis n itself
-/// neither Δθ nor Δβ of the last joint moves the end point. The paper's inertial frame is the arm's
-/// base frame; measured positions lie in the measuring frame, which sees the base at the problem's
-/// `base`.
+/// The paper ends in frame n, `U_{n+1}` = I. Here `U_{n+1}` = Trans(target), since on axis n
+/// neither Δθ nor Δβ of the last joint moves the end point. The inertial frame of the paper is the
+/// base frame of the arm. Measured positions are in the measuring frame, in which the problem's
+/// `base` locates the arm.
 #[derive(Debug, Clone)]
 pub struct Chain {
-    /// Parameters with the configuration added.
+    /// Parameters of the joints, with the configuration added.
     pub links: Vec<Mdh>,
-    /// The base in the measuring frame.
+    /// Transform from the measuring frame to the base.
     pub base: Matrix4<f64>,
-    /// `before[k]` = T₁ … T_k, one more than joints.
+    /// Products `before[k]` = T₁ … T_k, one more than joints.
     pub before: Vec<Matrix4<f64>>,
-    /// `after[k]` = T_{k+1} … T_n Trans(target), the paper's `U_{k+1}`, one more than joints.
+    /// Products `after[k]` = T_{k+1} … T_n Trans(target), the paper's `U_{k+1}`, one more than
+    /// joints.
     pub after: Vec<Matrix4<f64>>,
 }
 
 impl Chain {
-    /// The arm of `problem` with `geometry` at configuration q, shape = (joints) \[rad\] or \[m\];
-    /// missing coordinates are 0.
+    /// Computes the frames of `problem` with `geometry` at configuration q, shape = (joints)
+    /// \[rad\] or \[m\]; missing coordinates are 0.
     pub fn new(problem: &Problem, geometry: &[Mdh], configuration: &[f64]) -> Self {
         let q = configuration.iter().copied().chain(std::iter::repeat(0.0));
         let declared = geometry.iter().zip(&problem.joints);
@@ -112,7 +113,7 @@ impl Chain {
             product *= transform;
             before.push(product);
         }
-        let mut product = shift(problem.tool.target);
+        let mut product = translation(problem.tool.target);
         let mut after = vec![product];
         for transform in transforms.iter().rev() {
             product = transform * product;
@@ -125,13 +126,12 @@ impl Chain {
         Self { links, base, before, after }
     }
 
-    /// T = T₁ … T_n, here with base and target, measuring frame
-    /// [Chen2021, eq. 2]
+    /// Returns T = T₁ … T_n with base and target, measuring frame [Chen2021, eq. 2].
     pub fn end(&self) -> Matrix4<f64> {
         self.base * self.after[0]
     }
 
-    /// `PE_nom`: nominal position of the end point, measuring frame \[m\].
+    /// Returns the nominal position `PE_nom` of the end point, measuring frame \[m\].
     pub fn position(&self) -> Vector3<f64> {
         split(&self.end()).1
     }

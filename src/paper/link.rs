@@ -5,60 +5,63 @@ use nalgebra::Vector6;
 use super::form::{Misprint, Reading};
 use super::loads::{LinkLoads, PointLoad, Wrench};
 
-/// Flexibilities of a link; 0 means rigid there. The paper has one EI for both planes.
+/// Flexibilities of a link; 0 is rigid. The paper has one EI for both planes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LinkFlexibility {
-    /// 1/EA [1/N].
+    /// Axial flexibility 1/EA [1/N].
     pub axial: f64,
-    /// `1/EI_y` [1/(N·m²)]: bending in z.
+    /// Flexibility `1/EI_y` [1/(N·m²)], bending in z.
     pub about_y: f64,
-    /// `1/EI_z` [1/(N·m²)]: bending in y.
+    /// Flexibility `1/EI_z` [1/(N·m²)], bending in y.
     pub about_z: f64,
-    /// 1/`GI_p` [1/(N·m²)].
+    /// Torsional flexibility 1/`GI_p` [1/(N·m²)].
     pub twist: f64,
 }
 
-/// Numerators of eq. 4 and 6: deflections for unit flexibility, link frame, tip.
+/// Numerators of eq. 4 and 6: deflections of the tip for unit flexibility, link frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkTerms {
-    /// EA Δx [N·m].
+    /// Elongation EA Δx [N·m].
     pub stretch: f64,
-    /// EI Δy [N·m³] and EI dΔy/dx [N·m²].
+    /// Deflection EI Δy [N·m³] and slope EI dΔy/dx [N·m²].
     pub bend_y: (f64, f64),
-    /// EI Δz [N·m³] and EI dΔz/dx [N·m²].
+    /// Deflection EI Δz [N·m³] and slope EI dΔz/dx [N·m²].
     pub bend_z: (f64, f64),
-    /// `GI_p` Δφ [N·m²].
+    /// Twist `GI_p` Δφ [N·m²].
     pub twist: f64,
-    /// Whether the link is one of eq. 4 (it carries loads between its ends, as link B) or of eq. 6
-    /// (link A).
+    /// True for a link of eq. 4, which carries loads between its ends (link B); false for one of
+    /// eq. 6 (link A).
     pub carries: bool,
 }
 
-/// Loads of one bending plane: forces across the link and moments that bend the same way.
+/// Loads in one bending plane: lateral forces and the moments that bend in the same sense.
 struct Plane {
     spread: f64,
     tip: (f64, f64),
-    points: fn(&PointLoad) -> (f64, f64),
+    point_load: fn(&PointLoad) -> (f64, f64),
 }
 
 impl LinkTerms {
-    /// Stretch, bending in two planes and twist of a cantilever under its loads.
+    /// Computes elongation, bending in two planes and twist of a cantilever under its loads.
     ///
-    /// Δx = [q_x l² + 2 (Σ P_x s + G_x l)] / (2EA) Δy = [q_y l⁴ + 4 (M l² + Σ P_y s² (l − s))] /
-    /// (8EI) + [Σ P_y s³ + G_y l³] / (3EI) Δz = [M l² + Σ M_s s² + 2 Σ M_s s (l − s)] / (2EI) Δφ =
-    /// [Σ M_x s + M_x l] / (GI_p) slope y = q_y l³ / (6EI) + [Σ P_y s² + G_y l² + 2 M l] / (2EI),
-    /// slope z = [Σ M_s s + M l] / (EI) \[Chen2021, eq. 4 for a link that carries loads, eq. 6 for
-    /// one that does not\]
+    /// ```text
+    /// Δx = [q_x l² + 2 (Σ P_x s + G_x l)] / (2EA)
+    /// Δy = [q_y l⁴ + 4 (M l² + Σ P_y s² (l − s))] / (8EI) + [Σ P_y s³ + G_y l³] / (3EI)
+    /// Δz = [M l² + Σ M_s s² + 2 Σ M_s s (l − s)] / (2EI)
+    /// Δφ = [Σ M_x s + M_x l] / (GI_p)
+    /// slope y = q_y l³ / (6EI) + [Σ P_y s² + G_y l² + 2 M l] / (2EI)
+    /// slope z = [Σ M_s s + M l] / (EI)
+    /// ```
+    /// \[Chen2021, eq. 4 for a link that carries loads, eq. 6 for one that does not\]
     ///
-    /// Link frame: q [N/m], point loads P \[N\], `M_s` [N·m] at s \[m\], tip load G \[N\], M [N·m].
-    /// The paper's links bend in a vertical plane, so that it needs no forces along z and no
-    /// moments of carried masses in the vertical plane; both forms here have all terms in both
-    /// planes, which are zero for its arm.
+    /// In the link frame: q [N/m], point loads P \[N\] and `M_s` [N·m] at s \[m\], tip load G
+    /// \[N\], M [N·m]. The links of the paper bend in a vertical plane, so that it omits forces
+    /// along z and moments of carried masses in the vertical plane. Here both planes have all
+    /// terms, which vanish for its arm.
     ///
-    /// Printed differently: `TipForceLever`, G l² for G l³ in Δy of eq. 4 (a force × length² among
-    /// forces × length³); `HoistBending`, of the hoist only `F_1r` in Δx of eq. 4, though the text
-    /// says that `F_1n` and `M_F1` bend the link; `Stretch`, q l²/(EA) in eq. 6; `HoistBeyond`, no
-    /// hoist at all in eq. 6.
+    /// Printed differently: `TipForceLever`, G l² instead of G l³ in Δy of eq. 4; `HoistBending`,
+    /// the hoist enters eq. 4 only by `F_1r` in Δx, although the text says that `F_1n` and `M_F1`
+    /// bend the link; `Stretch`, q l²/(EA) in eq. 6; `HoistBeyond`, no hoist in eq. 6.
     pub fn new(loads: &LinkLoads, reading: &Reading) -> Self {
         let l = loads.length;
         let carries = !loads.points.is_empty();
@@ -71,7 +74,8 @@ impl LinkTerms {
         } else {
             loads.tip
         };
-        let own = if !carries && reading.keeps(Misprint::Stretch) { l * l } else { 0.5 * l * l };
+        let weight_arm =
+            if !carries && reading.keeps(Misprint::Stretch) { l * l } else { 0.5 * l * l };
         let pulls: f64 = loads.points.iter().map(|p| p.wrench.force.x * p.station).sum();
         let bending: Vec<PointLoad> =
             loads.points.iter().filter(|p| hoist_bends || !p.hoist).copied().collect();
@@ -81,34 +85,34 @@ impl LinkTerms {
         let y = Plane {
             spread: loads.spread.y,
             tip: (tip.force.y, tip.moment.z),
-            points: |p| (p.wrench.force.y, p.wrench.moment.z),
+            point_load: |p| (p.wrench.force.y, p.wrench.moment.z),
         };
         let z = Plane {
             spread: loads.spread.z,
             tip: (tip.force.z, -tip.moment.y),
-            points: |p| (p.wrench.force.z, -p.wrench.moment.y),
+            point_load: |p| (p.wrench.force.z, -p.wrench.moment.y),
         };
-        // A link along −x: its flexibilities enter with the sign of l.
+        // For a link along −x, flexibilities enter with the sign of l.
         let sign = l.signum();
         let scaled = |(deflection, slope): (f64, f64)| (sign * deflection, sign * slope);
         Self {
-            stretch: sign * (loads.spread.x * own + pulls + tip.force.x * l),
-            bend_y: scaled(y.bend(l, lever, &bending)),
-            bend_z: scaled(z.bend(l, lever, &bending)),
+            stretch: sign * (loads.spread.x * weight_arm + pulls + tip.force.x * l),
+            bend_y: scaled(y.tip_deflection(l, lever, &bending)),
+            bend_z: scaled(z.tip_deflection(l, lever, &bending)),
             twist: sign * (twists + tip.moment.x * l),
             carries,
         }
     }
 
-    /// `D_A` or `D_B`: differential motion [Δx Δy Δz Δα Δβ Δθ] of the link's tip, \[m\] and
-    /// \[rad\], link frame.
+    /// Returns `D_A` or `D_B`, the differential motion [Δx Δy Δz Δα Δβ Δθ] of the tip \[m, rad\],
+    /// link frame.
     ///
-    /// Bending along y turns about z, bending along z about −y: Δθ = slope y, Δβ = −slope z
-    /// [Chen2021, eq. 5, 7]
+    /// Bending along y rotates about z, bending along z about −y: Δθ = slope y, Δβ = −slope z
+    /// [Chen2021, eq. 5, 7].
     ///
-    /// Printed differently: `SlopePlaces`. Eq. 4 puts the slope of y into Δβ and that of z into Δθ,
-    /// and eq. 5 takes them as rotations about y and z; eq. 7 has slope y right and slope z without
-    /// its sign. Its Δ, not eq. 6, is what eq. 21-26 use.
+    /// Printed differently (`SlopePlaces`): eq. 4 uses the slope of y as Δβ and that of z as Δθ,
+    /// and eq. 5 takes them as rotations about y and z. Eq. 7 has slope y right, but slope z
+    /// without its sign. Eq. 21-26 use its Δ instead of eq. 6.
     pub fn motion(&self, flexibility: &LinkFlexibility, reading: &Reading) -> Vector6<f64> {
         let slope_y = flexibility.about_z * self.bend_y.1;
         let slope_z = flexibility.about_y * self.bend_z.1;
@@ -129,14 +133,14 @@ impl LinkTerms {
 }
 
 impl Plane {
-    /// EI times deflection and slope of the tip; `lever` is what the tip force is multiplied by.
-    fn bend(&self, l: f64, lever: f64, points: &[PointLoad]) -> (f64, f64) {
+    /// Returns EI times deflection and slope of the tip; `lever` is the factor of the tip force.
+    fn tip_deflection(&self, l: f64, lever: f64, points: &[PointLoad]) -> (f64, f64) {
         let (force, moment) = self.tip;
         let mut deflection =
             self.spread * l.powi(4) / 8.0 + force * lever / 3.0 + moment * l * l / 2.0;
         let mut slope = self.spread * l.powi(3) / 6.0 + force * l * l / 2.0 + moment * l;
         for point in points {
-            let ((force, moment), s) = ((self.points)(point), point.station);
+            let ((force, moment), s) = ((self.point_load)(point), point.station);
             deflection += force * (s.powi(3) / 3.0 + s * s * (l - s) / 2.0)
                 + moment * (s * s / 2.0 + s * (l - s));
             slope += force * s * s / 2.0 + moment * s;

@@ -1,9 +1,9 @@
-//! Every load of a pose, resolved in the frames of the rigid arm.
+//! Loads of a pose, resolved in the frames of the rigid arm.
 //!
-//! The paper resolves them by hand for its arm (`G_4r`, `G_4n`, `M_4P`, `M_4V`, …, §2.1 and §2.2);
-//! here they follow from the frames, with signs, for any arm: component x of a link's frame is the
-//! paper's index r, components y and z its index n in the two planes; moment components z and y are
-//! its `M_V` and (with the other sign) `M_Pn`, component x its `M_Pr`.
+//! The paper resolves them by hand for its arm (`G_4r`, `G_4n`, `M_4P`, `M_4V`, …, §2.1 and §2.2).
+//! Here they follow from the frames, with signs, for any arm. Component x of a link frame is the
+//! index r of the paper, components y and z its index n in the two planes. Moment components z and
+//! y are its `M_V` and (with opposite sign) `M_Pn`, component x its `M_Pr`.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -19,52 +19,52 @@ pub struct Wrench {
     pub moment: Vector3<f64>,
 }
 
-/// A load between root and tip of a link.
+/// Load between root and tip of a link.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointLoad {
-    /// s, distance from the root along the link \[m\]; the paper's `r_cx` and `l_F1`.
+    /// Distance s from the root along the link \[m\]; `r_cx` and `l_F1` of the paper.
     pub station: f64,
-    /// Force and moment there, link frame.
+    /// Force and moment at s, link frame.
     pub wrench: Wrench,
-    /// Whether it is the hoist.
+    /// True for the hoist.
     pub hoist: bool,
 }
 
-/// Loads of an elastic link, in the frame at its root, x along it.
+/// Loads of an elastic link, in the frame at its root with x along the link.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinkLoads {
-    /// l \[m\], negative for a link along −x.
+    /// Length l \[m\], negative for a link along −x.
     pub length: f64,
-    /// q, own weight over l [N/m].
+    /// Distributed weight q, the link's weight over l [N/m].
     pub spread: Vector3<f64>,
     /// Carried masses and the hoist.
     pub points: Vec<PointLoad>,
-    /// Weights beyond the tip, at the tip: `G_4`, `M_4` or `G_34`, `M_34`
-    /// [Chen2021, eq. 3]
+    /// Weights beyond the tip, reduced to the tip: `G_4`, `M_4` or `G_34`, `M_34` [Chen2021, eq.
+    /// 3].
     pub tip: Wrench,
-    /// Hoists on links further out, at the tip.
+    /// Hoists on links further out, reduced to the tip.
     pub tip_hoist: Wrench,
 }
 
 /// Moments about a joint's axis [N·m].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct JointLoads {
-    /// Of the weights beyond it: `M_4V`, `M_34V`, `M_234V`.
+    /// Moment of the weights beyond the joint: `M_4V`, `M_34V`, `M_234V`.
     pub weights: f64,
-    /// Of the hoists beyond it: −`M_1F`, −`M_2F`.
+    /// Moment of the hoists beyond the joint: −`M_1F`, −`M_2F`.
     pub hoists: f64,
 }
 
-/// Loads of a pose, an entry for each joint.
+/// Loads of a pose, with an entry for each joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loads {
-    /// On each link that is a beam.
+    /// Loads on each link that is a beam.
     pub links: Vec<Option<LinkLoads>>,
-    /// About each joint's axis.
+    /// Moments about each joint axis.
     pub joints: Vec<JointLoads>,
 }
 
-/// A force \[N\] somewhere on the arm \[m\], base frame.
+/// Force \[N\] at a point of the arm \[m\], base frame.
 struct Load {
     at: Vector3<f64>,
     force: Vector3<f64>,
@@ -72,7 +72,7 @@ struct Load {
 }
 
 impl Loads {
-    /// Walks from the end point to the base: what acts on a section is all that lies beyond it.
+    /// Computes the loads from the end point to the base: a section carries all loads beyond it.
     pub fn new(problem: &Problem, chain: &Chain, setup: &PoseView) -> Self {
         let gravity = problem.gravity;
         let n = problem.joints.len();
@@ -89,7 +89,7 @@ impl Loads {
                 push(&mut forces, origin + axes * body.position, gravity * body.mass, false);
             }
             let (axes, tip) = split(&(chain.before[k] * chain.links[k].to_tip()));
-            let (weights, hoists) = (about(&forces, tip, false), about(&forces, tip, true));
+            let (weights, hoists) = (sum_about(&forces, tip, false), sum_about(&forces, tip, true));
             let axis = axes.column(2);
             out.joints[k] =
                 JointLoads { weights: axis.dot(&weights.moment), hoists: axis.dot(&hoists.moment) };
@@ -115,7 +115,8 @@ impl Loads {
     }
 }
 
-/// Places in the link's frame \[m\] and forces in the base frame \[N\] of what a beam carries.
+/// Returns the loads that a beam carries: positions in the link frame \[m\], forces in the base
+/// frame \[N\], and true for the hoist.
 fn carried(
     beam: &Beam,
     gravity: Vector3<f64>,
@@ -130,22 +131,23 @@ fn carried(
         .collect()
 }
 
-/// A force at `at`, carried to the link's axis: what hangs beyond an end acts at that end, with its
-/// lever.
+/// Returns a force at `at` as a load on the link axis. A load beyond an end acts at that end, with
+/// its moment.
 fn point_load(at: Vector3<f64>, length: f64, force: Vector3<f64>, hoist: bool) -> PointLoad {
     let station = at.x.clamp(length.min(0.0), length.max(0.0));
     let offset = at - Vector3::x() * station;
     PointLoad { station, wrench: Wrench { force, moment: offset.cross(&force) }, hoist }
 }
 
-/// Sum of the weights or of the hoists, with moments about a point, base frame.
-fn about(forces: &[Load], point: Vector3<f64>, hoist: bool) -> Wrench {
+/// Returns the sum of the weights or of the hoists, with moments about a point, base frame.
+fn sum_about(forces: &[Load], point: Vector3<f64>, hoist: bool) -> Wrench {
     forces.iter().filter(|load| load.hoist == hoist).fold(Wrench::default(), |sum, load| Wrench {
         force: sum.force + load.force,
         moment: sum.moment + (load.at - point).cross(&load.force),
     })
 }
 
+/// Resolves a wrench in the given axes.
 fn resolved(axes: &Matrix3<f64>, wrench: &Wrench) -> Wrench {
     Wrench { force: axes.tr_mul(&wrench.force), moment: axes.tr_mul(&wrench.moment) }
 }

@@ -1,4 +1,4 @@
-//! The paper's closed forms, equation by equation, in plain numbers: a baseline and a check.
+//! Closed forms of [Chen2021], equation by equation: a baseline and a check of the model.
 //!
 //! \[Chen2021\] Chen Gang, Sun Fenglei, Li Tong, Shao Wen: "Accuracy Compensation for a Lunar
 //! Sampling Manipulator with Elastic Deformation", J. Nanjing Univ. of Aeronautics & Astronautics
@@ -15,31 +15,31 @@
 //! | 42-45 least squares, iteration | [`least_squares`], [`stiffness`], [`identify`], [`crate::least_squares::solver::PseudoInverse`] |
 //! | tables 1-3 | [`published`] |
 //!
-//! Shares no physics with the model: forces are resolved in the frames of the rigid arm and every
-//! effect is of first order.
+//! The module shares no physics with the model: forces are resolved in the frames of the rigid arm,
+//! and every effect is of first order.
 //!
 //! # Misprints
-//! Each formula that is misprinted takes a [`Reading`], which says for each [`Misprint`] whether
-//! the [`Form`] is the printed or the corrected one; the difference stands where the formula does,
-//! its size in `docs/paper.md`. Misprints that are not formulas:
+//! Each misprinted formula takes a [`Reading`], which selects for each [`Misprint`] the printed or
+//! the corrected [`Form`]. The difference is documented at the formula, its size in
+//! `docs/paper.md`. Misprints outside the formulas:
 //!
 //! - Table 1 has `α_2` = −90°, table 2 has 90°: two conventions for the sign of θ₂ to θ₄, metres
-//!   apart for the same angles. Table 2 identifies Δβ₁ = Δθ₂ = 0.304°, which is what a step of
-//!   least length does at −90°, where both turn the arm alike; at 90° it makes them opposite.
-//!   "Bends toward +y" (§2.1) says −90°, too. Against it: parallel axes would make Δd₂ = Δd₃ = Δd₄,
-//!   where table 2 has 16, 5 and 8 mm. The closed forms take any α.
-//! - Tables 1 and 2 print a in degrees and a, d in mm; they are metres: a reach of 3.7 mm
-//!   otherwise.
+//!   apart for the same angles. Table 2 identifies Δβ₁ = Δθ₂ = 0.304°, as a minimum-norm step does
+//!   at −90°, where both rotate the arm alike; at 90° it gives opposite values. "Bends toward +y"
+//!   (§2.1) also implies −90°. Against it: parallel axes would give Δd₂ = Δd₃ = Δd₄, but table 2
+//!   has 16, 5 and 8 mm. The closed forms accept any α.
+//! - Tables 1 and 2 print a in degrees and a, d in mm; they are metres (otherwise the reach is 3.7
+//!   mm).
 //! - Table 1 prints d₃ = −a₃, the length of link A; with table 2 it is −0.10 m, presumably −a₂.
-//! - §2.1.1 calls both components of the camera's place `r_cx`; its moment is `M_c` = −`m_c` g
-//!   `r_cz`. The frames decide.
+//! - §2.1.1 calls both components of the camera position `r_cx`; its moment is `M_c` = −`m_c` g
+//!   `r_cz`, as the frames require.
 //! - Eq. 8 has l₅, the length of a link 5 that an arm of four joints lacks. Joints enter by
 //!   l/(`GI_p`) = 1/k alone.
 //! - Eq. 13 to 16 lack their products and sums over the joints; eq. 17 has them.
 //! - Eq. 26 is "in the inertial frame", where eq. 25 and 27 to 39 have the end frame.
-//! - The text to table 3 prints 88.63 % where its numbers give 1 − 5.5416/48.9644 = 88.68 %.
+//! - The text to table 3 prints 88.63 %, but its numbers give 1 − 5.5416/48.9644 = 88.68 %.
 //! - Table 2 identifies Δθ₄ and Δβ₄ from positions. The end point of eq. 2 lies on axis 4, where
-//!   both columns of `J_g` are zero; they can be seen only with the target off the axis, as in
+//!   both columns of `J_g` vanish; they are identifiable only with the target off the axis, as in
 //!   [`Chain`].
 
 mod end_point;

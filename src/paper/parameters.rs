@@ -1,40 +1,40 @@
-//! The parameters of the paper: geometry E and elasticity S.
+//! Parameters of the paper: geometry E and flexibilities S.
 
 use super::kinematics::Mdh;
 use super::link::LinkFlexibility;
 use crate::problem::Problem;
 
-/// Geometric parameters E and flexibilities S, an entry for each joint.
+/// Geometric parameters E and flexibilities S, with an entry for each joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
-    /// E.
+    /// Geometry E.
     pub geometry: Vec<Mdh>,
-    /// l/(`GI_p`) of each joint [rad/(N·m)]; 0 where it is rigid.
+    /// Flexibility l/(`GI_p`) of each joint [rad/(N·m)]; 0 is rigid.
     pub joints: Vec<f64>,
-    /// Of the link before each joint; all 0 where it is rigid.
+    /// Flexibilities of the link before each joint; all 0 if it is rigid.
     pub links: Vec<LinkFlexibility>,
 }
 
-/// One flexibility; joints are counted from 0.
+/// Identifier of one flexibility; joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Flexibility {
-    /// Torsion of a joint, 1/k [rad/(N·m)].
+    /// Torsional flexibility of a joint, 1/k [rad/(N·m)].
     Joint(usize),
-    /// 1/EA of the link before a joint [1/N].
+    /// Axial flexibility 1/EA of the link before a joint [1/N].
     Axial(usize),
-    /// 1/EI for both planes [1/(N·m²)].
+    /// Bending flexibility 1/EI for both planes [1/(N·m²)].
     Bending(usize),
-    /// `1/EI_y` [1/(N·m²)].
+    /// Bending flexibility `1/EI_y` [1/(N·m²)].
     BendingY(usize),
-    /// `1/EI_z` [1/(N·m²)].
+    /// Bending flexibility `1/EI_z` [1/(N·m²)].
     BendingZ(usize),
-    /// 1/GJ [1/(N·m²)].
+    /// Torsional flexibility 1/GJ of the link before a joint [1/(N·m²)].
     Twist(usize),
 }
 
 impl Parameters {
-    /// As the problem declares them.
+    /// Returns the parameters that the problem declares.
     pub fn nominal(problem: &Problem) -> Self {
         let reciprocal = |rigidity: Option<f64>| rigidity.map_or(0.0, f64::recip);
         Self {
@@ -57,14 +57,14 @@ impl Parameters {
         }
     }
 
-    /// As the problem declares the geometry, with nothing that gives way.
+    /// Returns the declared geometry with a rigid arm.
     pub fn rigid(problem: &Problem) -> Self {
         let n = problem.joints.len();
         let geometry = problem.joints.iter().map(Mdh::nominal).collect();
         Self { geometry, joints: vec![0.0; n], links: vec![LinkFlexibility::default(); n] }
     }
 
-    /// No geometry, and one flexibility of 1.
+    /// Returns no geometry and one flexibility of 1.
     pub(super) fn unit(joints: usize, which: Flexibility) -> Self {
         let mut out = Self {
             geometry: Vec::new(),
@@ -75,7 +75,7 @@ impl Parameters {
         out
     }
 
-    /// The flexibilities that are not 0. A link with one EI for both planes has one bending
+    /// Returns the flexibilities that are not 0. A link with one EI for both planes has one bending
     /// flexibility, as in the paper.
     pub fn flexibilities(&self) -> Vec<Flexibility> {
         let joints = self.joints.iter().enumerate().map(|(k, _)| Flexibility::Joint(k));
@@ -90,7 +90,7 @@ impl Parameters {
         joints.chain(links).filter(|&which| self.get(which) != 0.0).collect()
     }
 
-    /// Value of a flexibility.
+    /// Returns the value of a flexibility.
     pub fn get(&self, which: Flexibility) -> f64 {
         match which {
             Flexibility::Joint(k) => self.joints[k],

@@ -1,4 +1,4 @@
-//! Measured poses as the least-squares problem that eq. 45 iterates on.
+//! Least-squares problem of the iteration of eq. 45.
 
 use std::ops::Range;
 
@@ -9,20 +9,19 @@ use super::{EndPoint, Parameters};
 use crate::least_squares::{Block, LeastSquares};
 use crate::problem::{PoseView, Problem};
 
-/// A pose with its measured position.
+/// Pose with its measured position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measured<'a> {
-    /// What was set.
+    /// Commanded conditions of the pose.
     pub setup: PoseView<'a>,
-    /// `PE_meas`, measuring frame \[m\].
+    /// Measured position `PE_meas`, measuring frame \[m\].
     pub position: Vector3<f64>,
 }
 
-/// Residuals `PE_meas` − `PE_nom(E)` − `D_f(E)` \[m\] with the paper's derivative −`J_g(E)` for the
-/// pseudo-inverse.
+/// Residuals `PE_meas` − `PE_nom(E)` − `D_f(E)` \[m\] with the derivative −`J_g(E)` of the paper.
 ///
-/// The derivative leaves out ∂`D_f`/∂E (eq. 41), so the iteration stops where `J_g`ᵀ r = 0, near
-/// the minimum of ‖r‖, not in it.
+/// The derivative neglects ∂`D_f`/∂E (eq. 41). The iteration therefore stops at `J_g`ᵀ r = 0, near
+/// the minimum of ‖r‖ but not at it.
 pub struct GeometryResiduals<'a> {
     problem: &'a Problem,
     poses: &'a [Measured<'a>],
@@ -32,8 +31,8 @@ pub struct GeometryResiduals<'a> {
 }
 
 impl<'a> GeometryResiduals<'a> {
-    /// Of `poses`, about the geometry and with the flexibilities of `parameters`; `unknowns` are
-    /// places in e = [e₁ … e_n], and every pose has as many joints as the arm.
+    /// Creates the residuals of `poses` with the flexibilities of `parameters`. `unknowns` are
+    /// indices into e = [e₁ … e_n]; every pose has as many joints as the arm.
     pub fn new(
         problem: &'a Problem,
         poses: &'a [Measured<'a>],
@@ -44,11 +43,11 @@ impl<'a> GeometryResiduals<'a> {
         Self { problem, poses, parameters, unknowns, reading }
     }
 
-    /// The parameters at errors `x` of the unknowns.
+    /// Returns the parameters for errors `x` of the unknowns.
     pub fn at(&self, x: &DVector<f64>) -> Parameters {
         let mut parameters = self.parameters.clone();
-        for (&place, x) in self.unknowns.iter().zip(x) {
-            *parameters.geometry[place / 5].fields_mut()[place % 5] += x;
+        for (&index, x) in self.unknowns.iter().zip(x) {
+            *parameters.geometry[index / 5].fields_mut()[index % 5] += x;
         }
         parameters
     }
@@ -81,8 +80,8 @@ impl LeastSquares for GeometryResiduals<'_> {
             let end = EndPoint::new(self.problem, &parameters, &pose.setup, &self.reading);
             let rows = 3 * item..3 * item + 3;
             let jacobian = end.jacobian();
-            for (column, &place) in self.unknowns.iter().enumerate() {
-                let derivative = -jacobian.column(place);
+            for (column, &index) in self.unknowns.iter().enumerate() {
+                let derivative = -jacobian.column(index);
                 block.column_mut(column)[rows.clone()].copy_from_slice(derivative.as_slice());
             }
             let residual = pose.position - end.position(&parameters);

@@ -1,4 +1,4 @@
-//! Stage one: where the stiffness comes from, before the geometry is identified (§3.3).
+//! First stage: source of the stiffness before the geometry is identified (§3.3).
 
 use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
 
@@ -9,33 +9,32 @@ use crate::least_squares::solver::minimum_norm_step;
 use crate::least_squares::{Block, Triangle};
 use crate::problem::Problem;
 
-/// Where the stiffness comes from. The paper says that elastic parameters are calibrated first, and
-/// not how.
+/// Source of the stiffness. The paper says that elastic parameters are calibrated first, but not
+/// how.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum StiffnessStage {
-    /// Nothing gives way: what the paper calls ignoring elasticity.
+    /// Rigid arm, which the paper calls ignoring elasticity.
     Rigid,
-    /// It is known: as the problem declares it.
+    /// Stiffness that the problem declares.
     Nominal,
-    /// By linear least squares from the measured positions, the geometry held at nominal.
+    /// Linear least squares from the measured positions at nominal geometry.
     Positions,
-    /// The same from differences between poses of one configuration under different loads: the
-    /// geometry cancels.
+    /// Linear least squares from differences between poses of one configuration under different
+    /// loads, in which the geometry cancels.
     LoadDifferences,
 }
 
 impl StiffnessStage {
-    /// All of them.
+    /// All sources.
     pub const EACH: [Self; 4] =
         [Self::Rigid, Self::Nominal, Self::Positions, Self::LoadDifferences];
 
-    /// Singular values of the elastic Jacobian, its columns multiplied by the nominal
-    /// flexibilities, up to this fraction of the largest are dropped: those combinations keep their
-    /// nominal value.
+    /// Fraction of the largest singular value up to which combinations keep their nominal value.
+    /// The columns of the elastic Jacobian are multiplied by the nominal flexibilities.
     pub const TOLERANCE: f64 = 1e-2;
 
-    /// Name in results.
+    /// Returns the name in results.
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Rigid => "rigid",
@@ -46,10 +45,9 @@ impl StiffnessStage {
     }
 }
 
-/// x = A⁺ b with singular values up to `tolerance`·σ₁ dropped
-/// [Chen2021, eq. 43, 44]
+/// Returns x = A⁺ b with singular values up to `tolerance`·σ₁ dropped [Chen2021, eq. 43, 44].
 ///
-/// `None` where A or b is not finite, or they differ in rows.
+/// Returns `None` if A or b is not finite, or if their numbers of rows differ.
 pub fn least_squares(a: &DMatrix<f64>, b: &DVector<f64>, tolerance: f64) -> Option<DVector<f64>> {
     if a.nrows() != b.len() || !a.iter().chain(b.iter()).all(|value| value.is_finite()) {
         return None;
@@ -64,19 +62,19 @@ pub fn least_squares(a: &DMatrix<f64>, b: &DVector<f64>, tolerance: f64) -> Opti
     Some(minimum_norm_step(&triangle.into_linearisation(), tolerance))
 }
 
-/// What a pose says of the flexibilities: ∂`D_f`/∂ln c, shape = (3, flexibilities), and `PE_meas` −
+/// Equations of one pose: ∂`D_f`/∂ln c, shape = (3, flexibilities), and the residual `PE_meas` −
 /// `PE_nom` − `D_f` \[m\].
 type Equations = (Matrix3xX<f64>, Vector3<f64>);
 
-/// Flexibilities by linear least squares at nominal geometry, where `D_f` is linear in them:
-/// c = c₀ + C⁺ [`PE_meas` − `PE_nom` − C c₀].
+/// Estimates flexibilities by linear least squares at nominal geometry, where `D_f` is linear in
+/// them: c = c₀ + C⁺ [`PE_meas` − `PE_nom` − C c₀].
 ///
-/// From load differences each pose counts less the mean of its configuration, which takes away what
-/// the loads do not change: all errors of the geometry but their part in `J_f` (eq. 40). Poses of a
-/// configuration that was measured under one load say nothing then.
+/// With load differences, the mean over each configuration is subtracted from its poses. This
+/// cancels all quantities that do not depend on the load: the geometric errors, except their part
+/// in `J_f` (eq. 40). Poses of a configuration with a single load are not used.
 ///
-/// `None` where something is not finite, and from load differences where no configuration was
-/// measured under several loads.
+/// Returns `None` if a value is not finite, or if load differences are requested and no
+/// configuration was measured under several loads.
 pub fn stiffness(
     problem: &Problem,
     poses: &[Measured],
@@ -97,18 +95,19 @@ pub fn stiffness(
         equations = differences(poses, &equations)?;
     }
     let mut columns = DMatrix::zeros(3 * equations.len(), unknowns.len());
-    let mut rest = DVector::zeros(3 * equations.len());
-    for (row, (derivatives, left)) in equations.iter().enumerate() {
+    let mut residuals = DVector::zeros(3 * equations.len());
+    for (row, (derivatives, residual)) in equations.iter().enumerate() {
         columns.fixed_rows_mut::<3>(3 * row).copy_from(derivatives);
-        rest.fixed_rows_mut::<3>(3 * row).copy_from(left);
+        residuals.fixed_rows_mut::<3>(3 * row).copy_from(residual);
     }
-    let relative = least_squares(&columns, &rest, StiffnessStage::TOLERANCE)?;
+    let relative = least_squares(&columns, &residuals, StiffnessStage::TOLERANCE)?;
     for (&which, change) in unknowns.iter().zip(&relative) {
         parameters.set(which, parameters.get(which) * (1.0 + change));
     }
     Some(parameters)
 }
 
+/// Returns the equations of one pose at nominal geometry.
 fn equations_of(
     problem: &Problem,
     parameters: &Parameters,
@@ -124,16 +123,16 @@ fn equations_of(
     (Matrix3xX::from_columns(&columns), pose.position - end.position(parameters))
 }
 
-/// Each pose less the mean of its configuration, for configurations that were measured under
-/// several loads; `None` where there is none.
+/// Subtracts from each pose the mean of its configuration, for configurations measured under
+/// several loads; returns `None` if there are none.
 fn differences(poses: &[Measured], equations: &[Equations]) -> Option<Vec<Equations>> {
     let load = |pose: &Measured| (pose.setup.payload.copied(), pose.setup.hoist.copied());
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (k, pose) in poses.iter().enumerate() {
-        let same = |group: &&mut Vec<usize>| {
+        let is_same = |group: &&mut Vec<usize>| {
             poses[group[0]].setup.configuration == pose.setup.configuration
         };
-        match groups.iter_mut().find(same) {
+        match groups.iter_mut().find(is_same) {
             Some(group) => group.push(k),
             None => groups.push(vec![k]),
         }
@@ -142,13 +141,13 @@ fn differences(poses: &[Measured], equations: &[Equations]) -> Option<Vec<Equati
     let mut out = Vec::new();
     for group in &groups {
         let n = group.len() as f64;
-        let (mut columns, mut rest) = equations[group[0]].clone();
+        let (mut columns, mut residual) = equations[group[0]].clone();
         for &k in &group[1..] {
             columns += &equations[k].0;
-            rest += equations[k].1;
+            residual += equations[k].1;
         }
         out.extend(
-            group.iter().map(|&k| (&equations[k].0 - &columns / n, equations[k].1 - rest / n)),
+            group.iter().map(|&k| (&equations[k].0 - &columns / n, equations[k].1 - residual / n)),
         );
     }
     (!out.is_empty()).then_some(out)

@@ -9,12 +9,12 @@ use super::parameters::{conditioning, unidentifiable};
 use super::quantity::{counted, mm};
 use super::render::text;
 use super::{detection, json};
-use crate::design::{Check, Elsewhere, Expected, Forecast, Prediction};
+use crate::design::{Check, ExpectedParameter, Forecast, Prediction, PredictionPoses};
 use crate::fit::rows_of_kind;
 use crate::problem::Problem;
 
 fn lengths(own: &Prediction) -> impl Serialize + use<> {
-    object! { median_mm: own.median * 1e3, most_mm: own.most * 1e3, rms_mm: own.rms * 1e3 }
+    object! { median_mm: own.median * 1e3, most_mm: own.quantile_95 * 1e3, rms_mm: own.rms * 1e3 }
 }
 
 /// A check as JSON text.
@@ -37,10 +37,10 @@ pub fn check_json(problem: &Problem, check: &Check) -> String {
         // tilts alone none.
         noise_mm: noise.map(|noise| noise * 1e3),
         prediction: object! {
-            judged_in: match check.elsewhere {
-                Elsewhere::Ranges => "ranges",
-                Elsewhere::HeldOut => "held-out",
-                Elsewhere::Same => "same",
+            judged_in: match check.predicted_at {
+                PredictionPoses::Ranges => "ranges",
+                PredictionPoses::HeldOut => "held-out",
+                PredictionPoses::Same => "same",
             },
             ..lengths(&check.prediction),
             // Of measured − predicted there: with the noise of the measurement.
@@ -49,7 +49,7 @@ pub fn check_json(problem: &Problem, check: &Check) -> String {
         growth: list(&check.growth.steps, |own| object! {
             poses: own.poses,
             rank: own.rank,
-            open: own.open,
+            open: own.undetermined,
             well_identified: own.well_identified,
             ..lengths(&own.prediction),
         }),
@@ -98,7 +98,7 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
         Block::lines(enough(check)),
     ];
     // Where the poses are measured ones, the held-out ones are none of them.
-    let all = (check.elsewhere != Elsewhere::HeldOut).then_some(forecast.poses);
+    let all = (check.predicted_at != PredictionPoses::HeldOut).then_some(forecast.poses);
     blocks.extend(assumptions(problem, &forecast.expected, all));
     blocks.extend(detection::blocks(&check.detection));
     text(&blocks)
@@ -109,13 +109,13 @@ const APART: f64 = 0.05;
 
 /// Whether the poses hardly tell a parameter at the nominal arm, and tell it at arms drawn from the
 /// priors.
-fn goes_with_others(expected: &Expected) -> bool {
+fn goes_with_others(expected: &ExpectedParameter) -> bool {
     let nominal = expected.identified_at_nominal;
-    nominal < Forecast::WELL && expected.identified - nominal > APART
+    nominal < Forecast::WELL_IDENTIFIED && expected.identified - nominal > APART
 }
 
 /// The share of a parameter that the data will give.
-fn share(expected: &Expected) -> String {
+fn share(expected: &ExpectedParameter) -> String {
     let percent = |share: f64| format!("{:3.0}", share * 100.0);
     let own = percent(expected.identified);
     if goes_with_others(expected) {
@@ -129,7 +129,7 @@ fn share(expected: &Expected) -> String {
 pub fn why_not_sufficient(check: &Check) -> String {
     let (forecast, different) = (&check.forecast, check.different);
     let (of, parameters) = (forecast.poses, check.without_prior);
-    let open = forecast.open.saturating_sub(check.growth.open);
+    let open = forecast.undetermined.saturating_sub(check.growth.undetermined);
     if open > 0 {
         let noun = if open == 1 { "combination" } else { "combinations" };
         return format!(
@@ -145,12 +145,12 @@ pub fn why_not_sufficient(check: &Check) -> String {
 }
 
 fn prediction(check: &Check) -> String {
-    let place = match check.elsewhere {
-        Elsewhere::Ranges => "anywhere within the ranges",
-        Elsewhere::HeldOut => "in the held-out poses",
-        Elsewhere::Same => "in these very poses (no ranges are known)",
+    let place = match check.predicted_at {
+        PredictionPoses::Ranges => "anywhere within the ranges",
+        PredictionPoses::HeldOut => "in the held-out poses",
+        PredictionPoses::Same => "in these very poses (no ranges are known)",
     };
-    let Prediction { median, most, rms } = check.prediction;
+    let Prediction { median, quantile_95, rms } = check.prediction;
     let noise = match check.noise {
         Some(noise) if positions(check) => format!(
             "One measured position has {} mm of noise (rms), so held-out errors to expect are {} mm (rms).",
@@ -164,7 +164,7 @@ fn prediction(check: &Check) -> String {
         ),
         None => "Tilts measure no length to compare that with.".to_owned(),
     };
-    let [median, most, rms] = [median, most, rms].map(|own| mm(own, 3));
+    let [median, most, rms] = [median, quantile_95, rms].map(|own| mm(own, 3));
     format!(
         "The identified arm will predict positions {place} to {median} mm (median), {most} mm (95 %), {rms} mm (rms).\n{noise}"
     )
@@ -177,10 +177,10 @@ fn positions(check: &Check) -> bool {
 
 fn growth(check: &Check) -> Table {
     let rows = check.growth.steps.iter().map(|step| {
-        let Prediction { median, most, rms } = step.prediction;
+        let Prediction { median, quantile_95, rms } = step.prediction;
         let mut row: Vec<String> =
             [step.poses, step.rank, step.well_identified].iter().map(usize::to_string).collect();
-        row.extend([median, most, rms].map(|length| mm(length, 3)));
+        row.extend([median, quantile_95, rms].map(|length| mm(length, 3)));
         row.push(if step.poses == check.forecast.poses { "these" } else { "" }.to_owned());
         row
     });

@@ -1,11 +1,11 @@
-//! Expected standard errors as people and programs read them.
+//! ExpectedParameter standard errors as people and programs read them.
 
 use serde::Serialize;
 
 use super::document::Block;
 use super::json::object;
 use super::quantity::{counted, decimals, number, or_dash, two_digits};
-use crate::design::Expected;
+use crate::design::ExpectedParameter;
 use crate::problem::{HeldOut, Problem};
 use crate::quantity::Display;
 
@@ -13,7 +13,7 @@ use crate::quantity::Display;
 const MOST: usize = 6;
 
 /// A parameter before anything is measured, as JSON.
-pub(super) fn expected(own: &Expected) -> impl Serialize {
+pub(super) fn expected(own: &ExpectedParameter) -> impl Serialize {
     object! {
         name: &own.name,
         unit: own.unit.symbol(),
@@ -26,7 +26,7 @@ pub(super) fn expected(own: &Expected) -> impl Serialize {
 }
 
 /// Nominal value and some errors \[SI\] of a parameter in a unit for display: cells, and the unit.
-pub(super) fn cells(expected: &Expected, errors: &[Option<f64>]) -> (Vec<String>, String) {
+pub(super) fn cells(expected: &ExpectedParameter, errors: &[Option<f64>]) -> (Vec<String>, String) {
     let unit = expected.unit.display(expected.nominal);
     let digits = errors
         .iter()
@@ -44,7 +44,7 @@ pub(super) fn cells(expected: &Expected, errors: &[Option<f64>]) -> (Vec<String>
 /// where the target sits.
 pub(super) fn assumptions<'a>(
     problem: &Problem,
-    expected: &[Expected],
+    expected: &[ExpectedParameter],
     fitted: Option<usize>,
 ) -> Option<Block<'a>> {
     let mut points = Vec::new();

@@ -8,7 +8,7 @@ use super::document::Table;
 use super::json::{list, object, summary};
 use super::quantity::{mm, number, or_dash};
 use crate::fit::{AxisValues, Before, Comparison, ErrorSummary, Procedure, TableEntry};
-use crate::paper::published::{BEFORE, IGNORING_IT, Published, WITH_ELASTICITY};
+use crate::paper::published::{BEFORE, Published, WITH_ELASTICITY, WITHOUT_ELASTICITY};
 use crate::paper::{Form, StiffnessStage};
 
 /// A parameter of which the data gave less than this part by itself is marked.
@@ -135,7 +135,7 @@ pub(super) fn table_3(comparison: &Comparison, own: &Procedure) -> Table {
             ));
             if beside {
                 let [before, with, without] =
-                    [&BEFORE, &WITH_ELASTICITY, &IGNORING_IT].map(|own| printed(own)[axis]);
+                    [&BEFORE, &WITH_ELASTICITY, &WITHOUT_ELASTICITY].map(|own| printed(own)[axis]);
                 row.extend(reduced(before, [Some(with), Some(without)]));
             }
             rows.push(row);

@@ -7,7 +7,7 @@ use super::parameters::{conditioning, unidentifiable};
 use super::quantity::{counted, number, or_dash};
 use super::render::text;
 use super::{json, separation};
-use crate::design::{Criterion, Plan, Separated};
+use crate::design::{Criterion, PairSeparation, Plan};
 use crate::problem::Problem;
 
 /// A plan as JSON text; `separated` where it tells two effects apart.
@@ -16,7 +16,7 @@ pub fn plan_json(
     criterion: &Criterion,
     seed: u64,
     plan: &Plan,
-    separated: Option<&Separated>,
+    separated: Option<&PairSeparation>,
 ) -> String {
     let Plan { planned, .. } = plan;
     let (meaningful, name) = (plan.meaningful(), |k: usize| planned.expected[k].name.as_str());
@@ -78,7 +78,7 @@ pub fn plan_text(
     problem: &Problem,
     criterion: &Criterion,
     plan: &Plan,
-    separated: Option<&Separated>,
+    separated: Option<&PairSeparation>,
 ) -> String {
     let planned = &plan.planned;
     let (poses, given) = (plan.poses.len(), plan.given);

@@ -9,7 +9,7 @@ use super::quantity::{mm, number, or_dash};
 use super::render::{Report, report, text};
 use crate::fit::ErrorSummary;
 use crate::paper::Misprint;
-use crate::paper::published::{BEFORE, IGNORING_IT, Published, WITH_ELASTICITY};
+use crate::paper::published::{BEFORE, Published, WITH_ELASTICITY, WITHOUT_ELASTICITY};
 use crate::study::{
     AlternativeModel, Case, HeldOutError, MisprintStudy, Replica, ReplicaResults, Spread,
 };
@@ -178,7 +178,7 @@ fn others(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     };
     let rows = vec![
         row("before: nominal arm, rigid", |own| Some(own.before), Some(&BEFORE)),
-        row("elasticity ignored, eq. 45", |own| own.rigid, Some(&IGNORING_IT)),
+        row("elasticity ignored, eq. 45", |own| own.rigid, Some(&WITHOUT_ELASTICITY)),
         row("elasticity considered", |own| own.reading_error(0, 0), Some(&WITH_ELASTICITY)),
         row("geometry-only, this model", |own| Some(own.geometry_only), None),
         row("joint fit, this model", |own| Some(own.joint), None),
@@ -215,7 +215,7 @@ fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
             row(rival.words().0, rival.words().1, &|own| own.alternative_error(rival))
         }),
     );
-    let [with, without] = [&WITH_ELASTICITY, &IGNORING_IT];
+    let [with, without] = [&WITH_ELASTICITY, &WITHOUT_ELASTICITY];
     let paper =
         [with.mean[3] / without.mean[3], with.mean[2] / with.mean[3], with.max[3] / without.max[3]];
     let [ratio, along, largest] = paper;

@@ -6,11 +6,11 @@ use super::document::{Block, Table};
 use super::forecast::size as shown;
 use super::json::object;
 use super::quantity::{number, or_dash, p_value};
-use crate::design::Separated;
+use crate::design::PairSeparation;
 use crate::select::{Separation, Side};
 
 /// All of it as JSON: sizes in SI, beside each figure the median over random poses.
-pub(super) fn entry(separated: &Separated) -> impl Serialize {
+pub(super) fn entry(separated: &PairSeparation) -> impl Serialize {
     let side = |side: usize| {
         let Figures { planned, random_found, random_told, size, p, random_p } =
             Figures::of(separated, side);
@@ -49,7 +49,7 @@ struct Figures<'a> {
 }
 
 impl<'a> Figures<'a> {
-    fn of(separated: &'a Separated, side: usize) -> Self {
+    fn of(separated: &'a PairSeparation, side: usize) -> Self {
         let planned = &separated.planned.sides[side];
         let median = |of: fn(&Side) -> Option<f64>| {
             Some(separated.random(|own| of(&own.sides[side]))).filter(|value| value.is_finite())
@@ -67,12 +67,12 @@ impl<'a> Figures<'a> {
     }
 }
 
-fn random_angle(separated: &Separated) -> Option<f64> {
+fn random_angle(separated: &PairSeparation) -> Option<f64> {
     Some(separated.random(|own: &Separation| own.angle)).filter(|angle| angle.is_finite())
 }
 
 /// A table of the two, random poses beside planned ones.
-pub(super) fn blocks<'a>(separated: &Separated) -> Vec<Block<'a>> {
+pub(super) fn blocks<'a>(separated: &PairSeparation) -> Vec<Block<'a>> {
     let angle = |angle: Option<f64>| or_dash(angle, |angle| number(angle.to_degrees(), 1));
     let cells = |cells: [&str; 4]| cells.map(str::to_owned).to_vec();
     let planned = separated.planned.angle;

@@ -1,6 +1,6 @@
 //! What a check expects of given poses, against what many fits then show.
 
-use flexcal::design::{Check, Expected, Extremes, Judged, check};
+use flexcal::design::{Check, CheckedPoses, ExpectedParameter, Extremes, check};
 use flexcal::measurement::Measurements;
 use flexcal::problem::{Freedom, Problem};
 use flexcal::quantity::Unit;
@@ -42,7 +42,7 @@ fn errors(
 }
 
 /// 1 σ of x.
-fn expected_x(expected: &Expected) -> Option<f64> {
+fn expected_x(expected: &ExpectedParameter) -> Option<f64> {
     let relative = !matches!(expected.unit, Unit::Angle | Unit::Length);
     expected.std_error.map(|error| if relative { error / expected.nominal } else { error })
 }
@@ -63,7 +63,7 @@ fn compare(
     elsewhere: &Measurements,
     runs: u64,
 ) -> (Vec<(String, f64)>, f64) {
-    let judged = Judged::Table {
+    let judged = CheckedPoses::Table {
         poses: Box::new(rows.clone()),
         within: None,
         held_out: Some(Box::new(elsewhere.clone())),

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use flexcal::design::{
-    Candidates, Criterion, DesignError, Extremes, Pair, PlanOptions, Separated, separate,
+    Candidates, Criterion, DesignError, EffectPair, Extremes, PairSeparation, PlanOptions, separate,
 };
 use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, Measurements, Split};
@@ -36,8 +36,8 @@ const CASES: [Case; 3] = [
     ),
 ];
 
-fn pair(problem: &Problem, names: [&str; 2]) -> Result<Pair, DesignError> {
-    Pair::new(problem, names.map(|name| problem.effect(name, Path::new("test")).unwrap()))
+fn pair(problem: &Problem, names: [&str; 2]) -> Result<EffectPair, DesignError> {
+    EffectPair::new(problem, names.map(|name| problem.effect(name, Path::new("test")).unwrap()))
 }
 
 /// 28 poses that tell the two apart, chosen among candidates within the ranges of the rig, or among
@@ -47,7 +47,7 @@ fn planned(
     truth: &Truth,
     names: [&str; 2],
     few: bool,
-) -> (Measurements, Separated) {
+) -> (Measurements, PairSeparation) {
     let within = ranges(truth);
     let candidates = if few {
         Candidates::Rows(Box::new(within.draw(problem, 300, Extremes::Often, 1, 0)))
@@ -112,7 +112,7 @@ fn below(one: &Measurements, other: &Measurements) -> Measurements {
 
 /// In how many of the seeds the loop names each of the two where it is at work: from planned poses,
 /// and from as many random ones, drawn anew for each seed.
-fn named(case: &Case, few: bool, seeds: u64) -> ([usize; 2], [usize; 2], Separated) {
+fn named(case: &Case, few: bool, seeds: u64) -> ([usize; 2], [usize; 2], PairSeparation) {
     let (problem, truth) = lunar();
     let (names, strengths) = case;
     let (planned, told) = planned(&problem, &truth, *names, few);

@@ -44,7 +44,7 @@ enum Outcome {
 }
 
 /// A set through the loop.
-struct Judged {
+struct CheckedPoses {
     outcome: Outcome,
     /// Laws at 0.9 or more that are not true.
     ghosts: usize,
@@ -57,8 +57,8 @@ struct Case {
     how: Measured,
     is_distinguishable: bool,
     is_distinguishable_to_tracker: bool,
-    contacts: Judged,
-    tracker: Judged,
+    contacts: CheckedPoses,
+    tracker: CheckedPoses,
 }
 
 fn sets(otherwise: u64) -> u64 {
@@ -119,7 +119,7 @@ fn is_the_same(named: &Effect, truth: &Effect) -> bool {
     }
 }
 
-fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Judged {
+fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> CheckedPoses {
     let part = |effect: &Effect| effect.terms(problem).first().map(|term| Site::of(term.site));
     let is_true = |effect: &Effect| truth.is_some_and(|truth| is_the_same(effect, truth));
     let at_place = |at: Option<Site>| truth.is_some_and(|truth| at.is_some() && part(truth) == at);
@@ -171,7 +171,7 @@ fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Jud
         chi2(&closed.before.fit),
         chi2(&closed.after)
     );
-    Judged { outcome, ghosts: wrong, said }
+    CheckedPoses { outcome, ghosts: wrong, said }
 }
 
 /// The rows of a simulation in a problem.
@@ -262,7 +262,7 @@ struct Row {
 }
 
 impl Row {
-    fn add(&mut self, is_shown: bool, judged: &Judged) {
+    fn add(&mut self, is_shown: bool, judged: &CheckedPoses) {
         self.sets += 1;
         if is_shown {
             self.shown += 1;

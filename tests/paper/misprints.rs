@@ -1,6 +1,8 @@
 //! Every misprint of the paper, and its size on the lunar sampler.
 
-use flexcal::paper::published::{BEFORE, ERRORS, NOMINAL, Published, WITH_ELASTICITY, is_its_arm};
+use flexcal::paper::published::{
+    BEFORE, ERRORS, NOMINAL, Published, WITH_ELASTICITY, is_published_arm,
+};
 use flexcal::paper::{Form, Misprint, Parameters, Reading};
 use flexcal::problem::Problem;
 
@@ -158,11 +160,11 @@ fn readings_keep_what_they_are_told_to() {
 #[test]
 fn the_papers_arm_is_known_by_its_tables() {
     let mut problem = problem();
-    assert!(is_its_arm(&problem), "by the α₂ of table 2");
+    assert!(is_published_arm(&problem), "by the α₂ of table 2");
     problem.joints[1].alpha = -problem.joints[1].alpha;
-    assert!(is_its_arm(&problem), "by the α₂ of table 1");
+    assert!(is_published_arm(&problem), "by the α₂ of table 1");
     let identified = NOMINAL.iter().zip(&ERRORS).map(|(nominal, error)| nominal[1] + error[1]);
     assert!(identified.zip(table_2()).all(|(a, link)| (a - link.a).abs() < 1e-12), "table 2");
     problem.joints[2].a += 1e-6;
-    assert!(!is_its_arm(&problem));
+    assert!(!is_published_arm(&problem));
 }

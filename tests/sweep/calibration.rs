@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::bench::{LARGE, SIGMA, SMALL, Size, lunar, noiseless};
 use crate::families::{Lacking, catalogue, newest};
 use crate::full::{first, sets};
-use crate::judged::{Judged, Place, is_the_same, name, named};
+use crate::judged::{CheckedPoses, Place, is_the_same, name, named};
 
 /// From this probability on an effect is named as found.
 const STATED: f64 = 0.9;
@@ -60,7 +60,7 @@ pub struct Set {
 fn judge(first: &[Lacking], seed: u64) -> Set {
     let lacking = drawn(first, seed);
     let size = [SMALL, Size { identification: 60, held_out: 50 }, LARGE][(seed % 3) as usize];
-    let judged = Judged::of(&lacking, size, seed);
+    let judged = CheckedPoses::of(&lacking, size, seed);
     println!("{}", judged.line(&name(&lacking), size, seed));
     let effects: Vec<Effect> = lacking.into_iter().map(|one| one.effect).collect();
     Set::of(&judged, &effects, (&lunar(), seed))
@@ -68,7 +68,7 @@ fn judge(first: &[Lacking], seed: u64) -> Set {
 
 impl Set {
     /// What is stated of a problem's data, beside the effects that are true.
-    pub fn of(judged: &Judged, truth: &[Effect], (problem, seed): (&Problem, u64)) -> Self {
+    pub fn of(judged: &CheckedPoses, truth: &[Effect], (problem, seed): (&Problem, u64)) -> Self {
         if std::env::var_os("FLEXCAL_FIRST").is_some() {
             for found in &judged.closure.effects {
                 let others: Vec<String> = found.alternatives.iter().map(named).collect();

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::bench::{LARGE, SMALL, Size};
 use crate::families::{Lacking, catalogue, pairs, triples};
-use crate::judged::{Judged, name};
+use crate::judged::{CheckedPoses, name};
 use crate::outside::{KINDS, Left};
 
 /// Sets of each kind, unless `FLEXCAL_SWEEP` names another number.
@@ -33,7 +33,7 @@ fn run(kinds: &[Vec<Lacking>], size: Size, seeds: Range<u64>) {
     let all: Vec<(&Vec<Lacking>, u64)> =
         kinds.iter().flat_map(|kind| seeds.clone().map(move |seed| (kind, seed))).collect();
     let one = |(lacking, seed): (&Vec<Lacking>, u64)| {
-        let judged = Judged::of(lacking, size, seed);
+        let judged = CheckedPoses::of(lacking, size, seed);
         println!("{}", judged.line(&name(lacking), size, seed));
         let [shown, named, stated] = judged.counts();
         [

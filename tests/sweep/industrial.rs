@@ -14,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::bench::{Set, Size};
 use crate::calibration::{Set as Stated, calibrated};
 use crate::families::Lacking;
-use crate::judged::{Judged, name};
+use crate::judged::{CheckedPoses, name};
 
 /// What differs from set to set, and in which poses it is measured.
 const DRAWN: &str = "[random]\n'joint*.*' = { sigma_deg = 0.05, sigma_mm = 0.5 }\n[noise]\nposition_sigma_mm = 0.05\n[poses]\n\
@@ -81,7 +81,7 @@ fn judge(seed: u64) -> Stated {
     let rows = simulate(&arm, &truth, size.identification + size.held_out, seed).unwrap().rows;
     let (held_out, identification) = (0..rows.len()).partition(|&row| rows[row].held_out);
     let set = Set { data: Dataset::new(table(&rows), Split { identification, held_out }) };
-    let judged = Judged::with(arm.clone(), &set, &effects);
+    let judged = CheckedPoses::with(arm.clone(), &set, &effects);
     println!("{}", judged.line(&name(&lacking), size, seed));
     Stated::of(&judged, &effects, (&arm, seed))
 }

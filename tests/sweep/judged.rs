@@ -27,7 +27,7 @@ pub enum Place {
 }
 
 /// A set after the loop.
-pub struct Judged {
+pub struct CheckedPoses {
     pub closure: ClosedLoop,
     /// One per true effect.
     pub places: Vec<Place>,
@@ -45,7 +45,7 @@ pub struct Judged {
     pub alike: f64,
 }
 
-impl Judged {
+impl CheckedPoses {
     /// Runs the loop on one set.
     pub fn of(lacking: &[Lacking], size: Size, seed: u64) -> Self {
         let on_the_rig: Vec<_> = lacking.iter().filter_map(Lacking::on_the_rig).collect();

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::bench::{NOISE, SMALL, lunar};
 use crate::common::arms::measured as read;
 use crate::families::{Lacking, catalogue, pairs};
-use crate::judged::{Judged, is_the_same, name};
+use crate::judged::{CheckedPoses, is_the_same, name};
 use crate::outside::Left;
 
 /// Sets of noise alone.
@@ -19,8 +19,8 @@ const QUIET: u64 = 12;
 
 #[test]
 fn noise_alone_says_nothing() {
-    let one = |seed| (seed, Judged::of(&[], SMALL, seed));
-    let all: Vec<(u64, Judged)> = (600..600 + QUIET).into_par_iter().map(one).collect();
+    let one = |seed| (seed, CheckedPoses::of(&[], SMALL, seed));
+    let all: Vec<(u64, CheckedPoses)> = (600..600 + QUIET).into_par_iter().map(one).collect();
     let wrong: Vec<String> = all
         .iter()
         .filter(|(_, judged)| judged.closure.verdict != Verdict::NothingFound)
@@ -35,7 +35,7 @@ fn noise_alone_says_nothing() {
 fn named_of(kinds: &[Vec<Lacking>], seed: u64) -> [usize; 3] {
     let one = |(k, kind): (usize, &Vec<Lacking>)| {
         let seed = seed + k as u64;
-        let judged = Judged::of(kind, SMALL, seed);
+        let judged = CheckedPoses::of(kind, SMALL, seed);
         println!("{}", judged.line(&name(kind), SMALL, seed));
         assert!(
             judged.after < judged.before + 1.0,
@@ -89,7 +89,7 @@ fn a_law_that_bends_the_fit_is_weighed_at_a_fit_of_its_own() {
         ),
     ];
     for (seed, kind) in kinds {
-        let judged = Judged::of(&kind, SMALL, seed);
+        let judged = CheckedPoses::of(&kind, SMALL, seed);
         let line = judged.line(&name(&kind), SMALL, seed);
         let wave = Effect::JointHarmonic { joint: 2, orders: vec![3] };
         assert!(judged.closure.effects.iter().any(|found| found.effect == wave), "{line}");

@@ -113,7 +113,7 @@ fn baseline(
         std::array::from_fn(|field| TableEntry {
             nominal: nominal[field],
             identified: identified[field],
-            seen: Some(found.seen[5 * joint + field]),
+            seen: Some(found.identified_share[5 * joint + field]),
         })
     });
     Some(Baseline {

@@ -13,7 +13,7 @@ use crate::least_squares::solver::BoundMethod;
 use crate::measurement::Dataset;
 use crate::model::{Ablation, Model};
 use crate::paper::StiffnessStage;
-use crate::paper::published::is_its_arm;
+use crate::paper::published::is_published_arm;
 use crate::problem::Problem;
 
 /// Strategies and solvers side by side.
@@ -109,7 +109,7 @@ pub fn compare(
     let joint = run(&model, Strategy::Joint, SolverChoice::Auto)?;
     let rigid_model = model.ablated(Ablation::Rigid);
     let rigid = run(&rigid_model, Strategy::Joint, SolverChoice::Auto)?;
-    let is_papers_arm = is_its_arm(problem);
+    let is_papers_arm = is_published_arm(problem);
     // The paper's procedure and its tables are of positions.
     let of_positions = data.measurements.kinds().iter().all(|kind| kind.is_position());
     let paper = if of_positions && (options.paper || is_papers_arm) {

@@ -1,7 +1,7 @@
 //! What each misprint and each rival leaves, over what the rigid fit leaves.
 
 use super::prelude::*;
-use crate::paper::published::{IGNORING_IT, WITH_ELASTICITY};
+use crate::paper::published::{WITH_ELASTICITY, WITHOUT_ELASTICITY};
 use crate::study::{
     AlternativeModel, Case, HeldOutError, MisprintStudy, Replica, ReplicaResults, Spread,
 };
@@ -42,7 +42,7 @@ pub fn misprints(study: &MisprintStudy, found: &ReplicaResults) -> Drawing {
 
 fn draw(study: &MisprintStudy, rows: &[Row]) -> String {
     let bottom = TOP + ROW * i32::try_from(rows.len()).unwrap_or_default();
-    let paper = WITH_ELASTICITY.mean[3] / IGNORING_IT.mean[3];
+    let paper = WITH_ELASTICITY.mean[3] / WITHOUT_ELASTICITY.mean[3];
     let colour = |k: usize| COLOURS[k % COLOURS.len()];
     let words: Vec<String> = study.cases.iter().map(Case::name).collect();
     figure((WIDTH, bottom + BELOW), "Error of every reading over that of the rigid fit", |area| {
