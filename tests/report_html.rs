@@ -226,7 +226,7 @@ fn poses_without_an_equilibrium_are_counted_and_left_out() {
     check(&page);
     assert!(
         page.html.contains(&words)
-            && page.html.contains("3 poses without an equilibrium are left out")
+            && page.html.contains("3 poses without an equilibrium are omitted")
     );
     let dots = |page: &Report| {
         page.figures
@@ -313,7 +313,7 @@ fn thousands_of_poses_make_no_large_page() {
     check(&page);
     assert!(page.html.len() < 1_000_000, "{} bytes", page.html.len());
     assert!(
-        page.html.contains("poses are drawn, those with the largest residuals among them."),
+        page.html.contains("poses are drawn, including those with the largest residuals."),
         "what is left out is said"
     );
 }

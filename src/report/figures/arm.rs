@@ -1,4 +1,4 @@
-//! An arm among its measurements: errors pose by pose, and how positions answer to one coordinate.
+//! Arm and measurements behind a figure: errors of each pose, and sensitivities to a coordinate.
 
 use nalgebra::{DVector, Vector3};
 
@@ -9,18 +9,18 @@ use crate::model::parameter::ParameterSite;
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::Problem;
 
-/// A pose whose position moves by less than this part of the most is left out: it says little about
-/// the coordinate.
-pub const LEAST_LEVER: f64 = 0.1;
+/// Smallest sensitivity of a pose to a coordinate, relative to the largest, at which the pose is
+/// shown as a measurement of it.
+pub const MIN_LEVER: f64 = 0.1;
 
-/// Measurements with what their poses need.
+/// Measurements with their split and placement.
 pub struct Poses<'a> {
     pub measurements: &'a Measurements,
     pub split: &'a Split,
     pub placement: Placement,
 }
 
-/// An arm that predicts.
+/// Arm at a parameter vector.
 #[derive(Debug, Clone)]
 pub struct Arm {
     pub model: Model,
@@ -34,64 +34,63 @@ impl<'a> Poses<'a> {
         Self { measurements, split, placement: Placement::of(measurements) }
     }
 
-    /// The arm of `problem` as identified.
+    /// Returns the identified arm of `problem`.
     pub fn arm(&self, problem: &Problem, found: &Identification) -> Result<Arm, IdentifyError> {
         let model = Model::new(problem, &self.placement.bases, &self.placement.targets)?;
         Ok(Arm { model: found.strategy.model(model), x: found.x.clone() })
     }
 
-    /// Numbers of all rows.
+    /// Returns the indices of all rows.
     pub fn rows(&self) -> Vec<usize> {
         (0..self.measurements.len()).collect()
     }
 
-    /// All of them, σ \[m\] where a row has none of its own.
+    /// Returns all poses; `sigma` \[m\] applies to rows without a σ.
     pub fn all(&self, sigma: f64) -> Vec<Pose<'_>> {
         self.placement.poses(self.measurements, &self.rows(), sigma)
     }
 
-    /// Where some poses were measured, or where an arm has its target in those that measure no
-    /// position, measuring frame \[m\].
-    pub fn places(arm: &Arm, poses: &[Pose]) -> Vec<Vector3<f64>> {
-        let (others, places): (Vec<Pose>, Vec<usize>) = poses
+    /// Returns the measured position of each pose, measuring frame \[m\]. For a pose without a
+    /// measured position it is the predicted position of its target.
+    pub fn positions(arm: &Arm, poses: &[Pose]) -> Vec<Vector3<f64>> {
+        let (unmeasured, indices): (Vec<Pose>, Vec<usize>) = poses
             .iter()
             .copied()
             .zip(0..)
             .filter(|(pose, _)| !pose.observation.is_position())
             .unzip();
         let mut at: Vec<Vector3<f64>> = poses.iter().map(|pose| *pose.measured).collect();
-        for (place, target) in
-            places.into_iter().zip(arm.model.predicted_targets(&others, arm.x.as_slice()))
-        {
-            at[place] = target;
+        let predicted = arm.model.predicted_targets(&unmeasured, arm.x.as_slice());
+        for (index, target) in indices.into_iter().zip(predicted) {
+            at[index] = target;
         }
         at
     }
 
-    /// Errors measured − predicted of some rows, measuring frame \[m\].
+    /// Returns the errors measured − predicted of some rows, measuring frame \[m\].
     pub fn errors(&self, arm: &Arm, rows: &[usize]) -> Vec<Vector3<f64>> {
         self.placement.position_errors(&arm.model, &arm.x, self.measurements, rows)
     }
 
-    /// ∂p/∂(coordinate) of all rows, of one coordinate after the other [m/rad] or [m/m].
-    pub fn levers(&self, arm: &Arm, slots: &[ParameterSite]) -> Vec<Vec<Vector3<f64>>> {
-        let (first, count) = (arm.x.len(), slots.len());
-        if slots.is_empty() {
+    /// Returns the levers ∂p/∂(coordinate) of all rows for each parameter site [m/rad] or [m/m].
+    pub fn levers(&self, arm: &Arm, sites: &[ParameterSite]) -> Vec<Vec<Vector3<f64>>> {
+        let (first, count) = (arm.x.len(), sites.len());
+        if sites.is_empty() {
             return Vec::new();
         }
         let model =
-            arm.model.with_probes(&slots.iter().map(|&site| (site, 0.0)).collect::<Vec<_>>());
+            arm.model.with_probes(&sites.iter().map(|&site| (site, 0.0)).collect::<Vec<_>>());
         let x = arm.x.clone().resize_vertically(first + count, 0.0);
         let poses = self.all(1.0);
         let sigmas: Vec<f64> = poses.iter().map(|pose| pose.sigma).collect();
         let residuals = PoseResiduals::new(&model, poses, (first..first + count).collect(), x);
         let columns = jacobian(&residuals, &DVector::zeros(count));
-        let of_slot = |place: usize| {
+        let of_site = |site: usize| {
             let lever = |(k, sigma): (usize, &f64)| {
-                Vector3::from_fn(|axis, _| -columns[(3 * k + axis, place)] * sigma)
+                Vector3::from_fn(|axis, _| -columns[(3 * k + axis, site)] * sigma)
             };
             sigmas.iter().enumerate().map(lever).collect()
         };
-        (0..count).map(of_slot).collect()
+        (0..count).map(of_site).collect()
     }
 }

@@ -1,16 +1,14 @@
-//! The residual against what drives an effect: each pose's own measurement of the effect, and the
-//! law that was fitted.
+//! Data of the figure of an effect: the partial residual of each pose over the regressor of the
+//! effect, and the fitted law.
 //!
-//! Shown is the partial residual: what the fit leaves, with the effect's own part put back. At a
-//! joint it is turned into the error of the joint's coordinate by the lever of each pose; elsewhere
-//! it is the part along the effect's displacement.
+//! The partial residual is the residual of the fit plus the fitted displacement by the effect. For
+//! an effect on a joint it is converted to the error of the joint coordinate by the lever of each
+//! pose. For other effects it is the component along the displacement by the effect.
 
 use nalgebra::Vector3;
 
-use super::arm::{Arm, LEAST_LEVER, Poses};
-use super::pose::{thin, thinned};
+use super::arm::{Arm, MIN_LEVER, Poses};
 use super::prelude::*;
-use super::reach::{beyond, reach};
 use crate::measurement::Split;
 use crate::model::parameter::{EffectParameter, JointField, ParameterSite, Regressor};
 use crate::problem::{Effect, JointKind, Mount, PoseView, Problem};
@@ -18,58 +16,56 @@ use crate::quantity::Unit;
 use crate::residual_tests::Covariate;
 use crate::select::{PartialResidual, Unexplained};
 
-/// Steps of a curve.
-const STEPS: u32 = 160;
-/// Poses that are drawn at most.
-const MOST: usize = 500;
-const HEIGHT: i32 = 300;
+/// Number of steps of a curve.
+const CURVE_STEPS: u32 = 160;
+/// Number of degrees in a radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-/// A quantity along an axis: what it is with its unit, and the factor from SI to that.
+/// Quantity along an axis, with its unit and the factor from SI.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
-    /// `temperature [°C]`
+    /// Label with the unit, for example `temperature [°C]`.
     pub label: String,
-    /// From SI.
+    /// Factor from SI to the unit.
     pub factor: f64,
 }
 
-/// One pose's own measurement of an effect, SI.
+/// Partial residual of one pose, SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// What drives the effect.
+    /// Value of the regressor.
     pub x: f64,
-    /// What it does.
+    /// Partial residual.
     pub y: f64,
-    /// Whether the pose was held out.
+    /// True for a held-out pose.
     pub held_out: bool,
-    /// The row of the pose, counted from 0, where it is known.
+    /// Row of the pose, counted from 0, if known.
     pub row: Option<usize>,
 }
 
-/// The residual against the cause of an effect.
+/// Partial residuals over the regressor of an effect, with the fitted law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
-    /// The effect in words.
+    /// Description of the effect.
     pub title: String,
-    /// From left to right.
+    /// Quantity on the horizontal axis.
     pub across: Quantity,
-    /// From bottom to top.
+    /// Quantity on the vertical axis.
     pub up: Quantity,
-    /// Poses that say something about it, in the order of the rows.
+    /// Poses that inform on the effect, in the order of the rows.
     pub points: Vec<Point>,
-    /// The fitted law.
+    /// Points of the fitted law.
     pub curve: Vec<(f64, f64)>,
-    /// What a point is.
-    reading: &'static str,
+    /// Explanation of a dot in the caption.
+    pub(super) reading: &'static str,
 }
 
-const COORDINATE: &str = "Each dot is the error of this coordinate as one pose alone measures it, all other parameters as fitted. \
-                          Poses that hardly feel the coordinate are left out.";
-const ALONG: &str = "Each dot is the residual of one pose along the direction in which the effect moves it, all other parameters \
+const COORDINATE: &str = "Each dot is the error of this coordinate from one pose alone, with all other parameters as fitted. \
+                          Poses with little sensitivity to the coordinate are omitted.";
+const ALONG: &str = "Each dot is the residual of one pose along the displacement by the effect, with all other parameters \
                      as fitted.";
-const SIZE: &str = "Each dot is the effect's size as one pose alone measures it, all other parameters as fitted. Poses that \
-                    hardly feel it are left out.";
+const SIZE: &str = "Each dot is the size of the effect from one pose alone, with all other parameters as fitted. Poses with \
+                    little sensitivity to it are omitted.";
 
 impl Quantity {
     fn new(label: impl Into<String>, factor: f64) -> Self {
@@ -89,43 +85,44 @@ impl Quantity {
         Self::new(format!("temperature that lags by {time_constant} s [°C]"), 1.0)
     }
 
-    /// Up to `most` \[s\].
-    fn elapsed(most: f64) -> Self {
-        let (unit, factor) = if most > 7200.0 { ("h", 1.0 / 3600.0) } else { ("s", 1.0) };
+    /// Returns the axis of elapsed times up to `longest` \[s\].
+    fn elapsed(longest: f64) -> Self {
+        let (unit, factor) = if longest > 7200.0 { ("h", 1.0 / 3600.0) } else { ("s", 1.0) };
         Self::new(format!("time since the first pose [{unit}]"), factor)
     }
 
-    /// An error of a coordinate.
+    /// Returns the axis of the error of a coordinate.
     fn error(of: &str, unit: Unit) -> Self {
         match unit {
             Unit::Length => Self::new(format!("error of {of} [mm]"), 1e3),
-            // In the unit of the tables.
+            // Angles have the unit of the tables.
             _ => Self::new(format!("error of {of} [°]"), DEGREES),
         }
     }
 
-    fn small(what: &str, unit: &str, most: f64) -> Self {
-        let (prefix, factor) = if most < 1e-3 { ('µ', 1e6) } else { ('m', 1e3) };
+    fn small(what: &str, unit: &str, largest: f64) -> Self {
+        let (prefix, factor) = if largest < 1e-3 { ('µ', 1e6) } else { ('m', 1e3) };
         Self::new(format!("{what} [{prefix}{unit}]"), factor)
     }
 }
 
+/// Returns true if a joint (numbered from 1) is prismatic.
 fn slides(problem: &Problem, joint: usize) -> bool {
     problem.joints[joint - 1].kind == JointKind::Prismatic
 }
 
-/// The fit of a model that declares the effects, in every row.
+/// Fit of a model that declares the effects, evaluated in every row.
 #[derive(Clone, Copy)]
-pub struct Closed<'a> {
-    /// The arm as fitted.
+pub struct EffectFit<'a> {
+    /// Fitted arm.
     pub arm: &'a Arm,
-    /// The residual that is left \[m\].
-    pub left: &'a [Vector3<f64>],
-    /// What the coordinate of each joint does \[m/rad\] or \[m/m\].
+    /// Residual of each row \[m\].
+    pub residuals: &'a [Vector3<f64>],
+    /// Lever of each joint coordinate in each row \[m/rad\] or \[m/m\].
     pub levers: &'a [Vec<Vector3<f64>>],
 }
 
-/// The coordinate of every joint.
+/// Returns the site of every joint coordinate.
 pub fn coordinates(problem: &Problem) -> Vec<ParameterSite> {
     let field =
         |joint: usize| if slides(problem, joint) { JointField::D } else { JointField::Theta };
@@ -134,87 +131,89 @@ pub fn coordinates(problem: &Problem) -> Vec<ParameterSite> {
         .collect()
 }
 
-/// An effect over its cause, before it is known which poses say something.
+/// Partial residuals of an effect before the selection of poses.
 struct View<'a> {
     across: Quantity,
-    /// By the largest value \[SI\] that is shown.
+    /// Vertical axis for the largest value \[SI\].
     up: Box<dyn Fn(f64) -> Quantity + 'a>,
-    /// The cause in each row.
+    /// Value of the regressor in each row.
     x: Vec<f64>,
-    /// What one unit of the ordinate does to each row \[m\].
+    /// Displacement by one unit of the ordinate in each row \[m\].
     levers: Vec<Vector3<f64>>,
-    /// The ordinate at a value of the cause.
+    /// Fitted law: the ordinate at a value of the regressor.
     law: Box<dyn Fn(f64) -> f64 + 'a>,
     reading: &'static str,
 }
 
-/// Every row with its conditions and what an effect does to it.
+/// Poses with the displacement by an effect.
 struct Rows<'a> {
     poses: Vec<PoseView<'a>>,
-    /// The effect's displacement \[m\].
-    own: Vec<Vector3<f64>>,
+    /// Displacement by the effect in each row \[m\].
+    displacements: Vec<Vector3<f64>>,
     parameters: &'a [EffectParameter],
     values: &'a [f64],
 }
 
-/// The cause of an effect at the fit of `problem`, which declares it.
+/// Computes the figure data of an effect from the fit of `problem`, which declares it.
 pub fn of(
-    found: &Effect,
+    effect: &Effect,
     problem: &Problem,
-    Closed { arm, left, levers }: Closed,
+    EffectFit { arm, residuals, levers }: EffectFit,
     poses: &Poses,
 ) -> Option<Cause> {
-    let parameters = found.parameters(problem);
-    let place = |parameter: &EffectParameter| {
-        arm.model.parameters.iter().position(|own| own.name == parameter.name)
+    let parameters = effect.parameters(problem);
+    let index = |parameter: &EffectParameter| {
+        arm.model.parameters.iter().position(|free| free.name == parameter.name)
     };
-    let places: Vec<usize> = parameters.iter().map(place).collect::<Option<_>>()?;
+    let indices: Vec<usize> = parameters.iter().map(index).collect::<Option<_>>()?;
     let mut without = arm.clone();
-    for &k in &places {
+    for &k in &indices {
         without.x[k] = 0.0;
     }
-    let with = poses.errors(&without, &poses.rows());
-    let all = poses.all(1.0);
-    let values: Vec<f64> = places.iter().map(|&k| arm.x[k]).collect();
+    let partial = poses.errors(&without, &poses.rows());
+    let all_poses = poses.all(1.0);
+    let values: Vec<f64> = indices.iter().map(|&k| arm.x[k]).collect();
+    let displacements = partial.iter().zip(residuals).map(|(partial, residual)| partial - residual);
     let rows = Rows {
-        poses: all.iter().map(|pose| pose.setup).collect(),
-        own: with.iter().zip(left).map(|(with, left)| with - left).collect(),
+        poses: all_poses.iter().map(|pose| pose.setup).collect(),
+        displacements: displacements.collect(),
         parameters: &parameters,
         values: &values,
     };
-    let view = at_joint(found, problem, &rows, levers, poses)
-        .unwrap_or_else(|| elsewhere(found, problem, &rows));
-    let most = view.levers.iter().map(Vector3::norm).fold(0.0, f64::max);
+    let view = at_joint(effect, problem, &rows, levers, poses)
+        .unwrap_or_else(|| beyond_joints(effect, problem, &rows));
+    let longest = view.levers.iter().map(Vector3::norm).fold(0.0, f64::max);
     let point = |k: usize| Point {
         x: view.x[k],
-        y: along(&view.levers[k], &with[k]),
+        y: along(&view.levers[k], &partial[k]),
         held_out: poses.split.held_out.binary_search(&k).is_ok(),
         row: Some(k),
     };
-    let telling = (0..with.len()).filter(|&k| view.levers[k].norm() > LEAST_LEVER * most);
-    let points: Vec<Point> = telling.map(point).collect();
+    let informative = (0..partial.len()).filter(|&k| view.levers[k].norm() > MIN_LEVER * longest);
+    let points: Vec<Point> = informative.map(point).collect();
     let (low, high) = range(points.iter().map(|point| point.x));
-    let at = |step: u32| low + (high - low) * f64::from(step) / f64::from(STEPS);
+    let at = |step: u32| low + (high - low) * f64::from(step) / f64::from(CURVE_STEPS);
     let curve: Vec<(f64, f64)> =
-        (0..=STEPS).filter(|_| low <= high).map(at).map(|x| (x, (view.law)(x))).collect();
+        (0..=CURVE_STEPS).filter(|_| low <= high).map(at).map(|x| (x, (view.law)(x))).collect();
     let up = (view.up)(largest(&points, &curve));
-    let title = found.describe_in(poses.measurements.time_measured);
+    let title = effect.describe_in(poses.measurements.time_measured);
     Some(Cause { title, across: view.across, up, points, curve, reading: view.reading })
 }
 
-/// The change of a coordinate that explains a displacement best.
+/// Returns the least-squares change of a coordinate for a displacement.
 fn along(lever: &Vector3<f64>, displacement: &Vector3<f64>) -> f64 {
     lever.dot(displacement) / lever.norm_squared()
 }
 
+/// Returns the largest absolute ordinate of points and curve.
 fn largest(points: &[Point], curve: &[(f64, f64)]) -> f64 {
     let heights = points.iter().map(|point| point.y).chain(curve.iter().map(|at| at.1));
     heights.filter(|height| height.is_finite()).map(f64::abs).fold(0.0, f64::max)
 }
 
-/// An effect that changes the coordinate of a joint.
+/// Returns the view of an effect on a joint coordinate; `None` for other effects.
 fn at_joint<'a>(
-    found: &Effect,
+    effect: &Effect,
     problem: &'a Problem,
     rows: &'a Rows,
     levers: &[Vec<Vector3<f64>>],
@@ -226,20 +225,20 @@ fn at_joint<'a>(
     let command = |joint: usize| each(&|pose| pose.configuration[joint - 1]);
     let lever = |joint: usize| &levers[joint - 1];
     let moment = |joint: usize| Quantity::new(format!("moment about joint {joint} [N·m]"), 1.0);
-    // Δθ = c M, c₃ M³: the moment follows from the law itself.
+    // Δθ = c M or c₃ M³: the moment follows from the displacement and the law.
     let moments = |joint: usize, of: fn(f64) -> f64| -> Vec<f64> {
         lever(joint)
             .iter()
-            .zip(&rows.own)
-            .map(|(lever, own)| of(along(lever, own) / first))
+            .zip(&rows.displacements)
+            .map(|(lever, displacement)| of(along(lever, displacement) / first))
             .collect()
     };
-    let in_proportion: Law = Box::new(move |x| first * x);
+    let proportional: Law = Box::new(move |x| first * x);
     let of_command: Law = Box::new(|q: f64| {
         let configuration = vec![q; rows.poses[0].configuration.len()];
-        rows.driven(&PoseView::from_configuration(&configuration))
+        rows.law_value(&PoseView::from_configuration(&configuration))
     });
-    let (joint, across, x, law): (_, _, _, Law) = match *found {
+    let (joint, across, x, law): (_, _, _, Law) = match *effect {
         Effect::JointHarmonic { joint, .. }
         | Effect::JointWave { joint, .. }
         | Effect::GearRatio { joint } => {
@@ -250,7 +249,7 @@ fn at_joint<'a>(
         }
         Effect::JointThermalDrift { joint } => {
             let law = Box::new(|t| {
-                rows.driven(&PoseView {
+                rows.law_value(&PoseView {
                     temperature: Some(&t),
                     ..PoseView::from_configuration(&[])
                 })
@@ -258,45 +257,41 @@ fn at_joint<'a>(
             (joint, Quantity::temperature(), rows.temperatures(), law)
         }
         Effect::Covariate { joint: Mount::Joint(joint), ref of } => {
-            let which = problem.data.covariates.iter().position(|own| own.name == *of)?;
+            let which = problem.data.covariates.iter().position(|declared| declared.name == *of)?;
             let values = each(&|pose| pose.covariates.get(which).copied().unwrap_or_default());
-            (joint, Quantity::new(of, 1.0), values, in_proportion)
+            (joint, Quantity::new(of, 1.0), values, proportional)
         }
         Effect::Backlash { joint } if poses.measurements.approach.is_some() => {
-            let across =
-                Quantity::new(format!("side from which joint {joint} came [−1 … +1]"), 1.0);
-            let sides = each(&|pose| pose.approach.map_or(0.0, |all| all[joint - 1]));
+            let label = format!("approach side of joint {joint} [−1 … +1]");
+            let sides = each(&|pose| pose.approach.map_or(0.0, |sides| sides[joint - 1]));
+            let across = Quantity::new(label, 1.0);
             (joint, across, sides, Box::new(move |side| 0.5 * first * side))
         }
         Effect::PayloadBacklash { joint } => {
-            let across = Quantity::new(
-                format!("half the payload × side from which joint {joint} came [kg]"),
-                1.0,
-            );
+            let label = format!("half the payload × approach side of joint {joint} [kg]");
+            let across = Quantity::new(label, 1.0);
             let regressor =
                 Regressor::LoadedSide { joint: joint - 1, declared: problem.tool.payload_mass };
-            (joint, across, each(&|pose| regressor.value(pose)), in_proportion)
+            (joint, across, each(&|pose| regressor.value(pose)), proportional)
         }
         Effect::JointHysteresis { joint, distance } => {
-            let across = Quantity::new(
-                format!("part of its friction that pulls joint {joint} back [−1 … +1]"),
-                1.0,
-            );
+            let label = format!("friction state of joint {joint} [−1 … +1]");
+            let across = Quantity::new(label, 1.0);
             let regressor = Regressor::Dragged { joint: joint - 1, distance };
-            (joint, across, each(&|pose| regressor.value(pose)), in_proportion)
+            (joint, across, each(&|pose| regressor.value(pose)), proportional)
         }
         Effect::JointThermalDriftLag { joint, time_constant } => {
             let reference = problem.data.reference_temperature.unwrap_or_default();
-            let felt = rows.felt(reference, time_constant);
+            let lagged = rows.lagged_temperatures(reference, time_constant);
             (
                 joint,
                 Quantity::lagging(time_constant),
-                felt,
-                Box::new(move |felt| first * (felt - reference)),
+                lagged,
+                Box::new(move |lagged| first * (lagged - reference)),
             )
         }
         Effect::JointCompliance { joint } => {
-            (joint, moment(joint), moments(joint, |moment| moment), in_proportion)
+            (joint, moment(joint), moments(joint, |moment| moment), proportional)
         }
         Effect::JointNonlinearStiffness { joint } => (
             joint,
@@ -314,17 +309,17 @@ fn at_joint<'a>(
 type Law<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
 
 impl Rows<'_> {
-    /// Σ value · regressor.
-    fn driven(&self, pose: &PoseView) -> f64 {
+    /// Returns the value of the law at a pose, Σ value · regressor.
+    fn law_value(&self, pose: &PoseView) -> f64 {
         self.parameters
             .iter()
             .zip(self.values)
-            .map(|(own, value)| value * own.regressor.value(pose))
+            .map(|(parameter, value)| value * parameter.regressor.value(pose))
             .sum()
     }
 
-    /// Temperatures that lag.
-    fn felt(&self, reference: f64, time_constant: f64) -> Vec<f64> {
+    /// Returns the lagged temperature of each row [°C].
+    fn lagged_temperatures(&self, reference: f64, time_constant: f64) -> Vec<f64> {
         let regressor = Regressor::Lagging { reference, time_constant };
         self.poses.iter().map(|pose| regressor.value(pose) + reference).collect()
     }
@@ -333,66 +328,68 @@ impl Rows<'_> {
         self.poses.iter().map(|pose| pose.temperature.copied().unwrap_or_default()).collect()
     }
 
-    /// The effect's displacement over its size in each row; none where that is 0.
-    fn over(&self, sizes: impl Iterator<Item = f64>) -> Vec<Vector3<f64>> {
-        let lever = |(own, size): (&Vector3<f64>, f64)| {
-            if size == 0.0 { Vector3::zeros() } else { own / size }
+    /// Returns the displacement of each row divided by the size of the effect; zero if the size is
+    /// zero.
+    fn per_size(&self, sizes: impl Iterator<Item = f64>) -> Vec<Vector3<f64>> {
+        let lever = |(displacement, size): (&Vector3<f64>, f64)| {
+            if size == 0.0 { Vector3::zeros() } else { displacement / size }
         };
-        self.own.iter().zip(sizes).map(lever).collect()
+        self.displacements.iter().zip(sizes).map(lever).collect()
     }
 }
 
-/// An effect that is no error of a joint's coordinate.
-fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> {
+/// Returns the view of an effect that is no error of a joint coordinate.
+fn beyond_joints<'a>(effect: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> {
     let sum: f64 = rows.values.iter().sum();
     let norm = rows.values.iter().map(|value| value * value).sum::<f64>().sqrt();
     let elapsed: Vec<f64> = rows.poses.iter().map(|pose| pose.elapsed).collect();
     let last = elapsed.iter().copied().fold(0.0, f64::max);
-    let most = rows
-        .own
+    let longest = rows
+        .displacements
         .iter()
         .fold(Vector3::zeros(), |a: Vector3<f64>, b| if b.norm() > a.norm() { *b } else { a });
     let measured = |_| Quantity::new("displacement, measured [mm]", 1e3);
-    // Of the measuring frame: every pose moves in one direction.
+    // An effect on the measuring frame displaces every pose in one direction.
     let of_time = |law: Law<'a>| View {
         across: Quantity::elapsed(last),
         up: Box::new(measured),
         x: elapsed.clone(),
-        levers: vec![most.try_normalize(0.0).unwrap_or_default(); rows.own.len()],
+        levers: vec![longest.try_normalize(0.0).unwrap_or_default(); rows.displacements.len()],
         law,
         reading: ALONG,
     };
-    match found {
+    match effect {
         Effect::LinkThermalBending { link }
         | Effect::LinkThermalExpansion { link }
         | Effect::LinkThermalBendingLag { link, .. }
         | Effect::LinkThermalExpansionLag { link, .. } => {
             let reference = problem.data.reference_temperature.unwrap_or_default();
-            let (across, felt) = match found {
+            let (across, temperatures) = match effect {
                 Effect::LinkThermalBendingLag { time_constant, .. }
-                | Effect::LinkThermalExpansionLag { time_constant, .. } => {
-                    (Quantity::lagging(*time_constant), rows.felt(reference, *time_constant))
-                }
+                | Effect::LinkThermalExpansionLag { time_constant, .. } => (
+                    Quantity::lagging(*time_constant),
+                    rows.lagged_temperatures(reference, *time_constant),
+                ),
                 _ => (Quantity::temperature(), rows.temperatures()),
             };
             let bends = matches!(
-                found,
+                effect,
                 Effect::LinkThermalBending { .. } | Effect::LinkThermalBendingLag { .. }
             );
             let link = link.clone();
-            // An expansion has one coefficient with a sign; a bending's two make one size.
+            // An expansion has one signed coefficient; the two of a bending have one norm.
             let size = if bends { norm } else { sum };
             View {
                 across,
                 up: if bends {
-                    Box::new(move |most| {
-                        Quantity::small(&format!("curvature of link {link}"), "rad/m", most)
+                    Box::new(move |largest| {
+                        Quantity::small(&format!("curvature of link {link}"), "rad/m", largest)
                     })
                 } else {
                     Box::new(move |_| Quantity::new(format!("strain of link {link} [10⁻⁶]"), 1e6))
                 },
-                levers: rows.over(felt.iter().map(|felt| size * (felt - reference))),
-                x: felt,
+                levers: rows.per_size(temperatures.iter().map(|t| size * (t - reference))),
+                x: temperatures,
                 law: Box::new(move |t| size * (t - reference)),
                 reading: SIZE,
             }
@@ -401,12 +398,12 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
             across: Quantity::new("payload [kg]", 1.0),
             up: Box::new(|_| Quantity::new("missing mass [kg]", 1.0)),
             x: rows.poses.iter().map(|pose| pose.payload.copied().unwrap_or_default()).collect(),
-            levers: rows.over(std::iter::repeat(sum)),
+            levers: rows.per_size(std::iter::repeat(sum)),
             law: Box::new(move |_| sum),
             reading: SIZE,
         },
         Effect::TrackerDrift => {
-            let speed = if last > 0.0 { most.norm() / last } else { 0.0 };
+            let speed = if last > 0.0 { longest.norm() / last } else { 0.0 };
             of_time(Box::new(move |t| speed * t))
         }
         Effect::TrackerSettling { time_constant } => {
@@ -415,24 +412,28 @@ fn elsewhere<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> 
         }
         Effect::StationShift { at_time } => {
             let first = rows.poses.first().map_or(0.0, |pose| pose.time - pose.elapsed);
-            let (at, step) = (at_time - first, most.norm());
+            let (at, step) = (at_time - first, longest.norm());
             of_time(Box::new(move |t| if t >= at { step } else { 0.0 }))
         }
         _ => View {
-            across: Quantity::new("displacement by the law [mm]", 1e3),
+            across: Quantity::new("displacement predicted by the law [mm]", 1e3),
             up: Box::new(measured),
-            x: rows.own.iter().map(Vector3::norm).collect(),
-            levers: rows.own.iter().map(|own| own.try_normalize(0.0).unwrap_or_default()).collect(),
+            x: rows.displacements.iter().map(Vector3::norm).collect(),
+            levers: rows
+                .displacements
+                .iter()
+                .map(|displacement| displacement.try_normalize(0.0).unwrap_or_default())
+                .collect(),
             law: Box::new(|displacement| displacement),
             reading: ALONG,
         },
     }
 }
 
-/// The correction of structure without a cause, less its mean; none where it is no function of one
-/// covariate, or of the order of the rows.
-pub fn unexplained(left: &Unexplained, problem: &Problem, split: &Split) -> Option<Cause> {
-    let of = left.correction.as_ref()?.curve.as_ref()?;
+/// Returns the empirical correction of unexplained structure, less its mean; `None` if it does not
+/// depend on a single covariate or the order of the rows.
+pub fn unexplained(structure: &Unexplained, problem: &Problem, split: &Split) -> Option<Cause> {
+    let of = structure.correction.as_ref()?.curve.as_ref()?;
     let mut curve: Vec<(f64, f64)> =
         of.points.iter().map(|point| (point.covariate, point.correction)).collect();
     curve.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -452,113 +453,18 @@ pub fn unexplained(left: &Unexplained, problem: &Problem, split: &Split) -> Opti
         Covariate::Own(ref name) => Quantity::new(&**name, 1.0),
         _ => return None,
     };
-    let most = of.points.iter().map(|point| point.lever).fold(0.0, f64::max);
-    let telling =
-        of.points.iter().enumerate().filter(|(_, point)| point.lever > LEAST_LEVER * most);
+    let longest = of.points.iter().map(|point| point.lever).fold(0.0, f64::max);
+    let informative =
+        of.points.iter().enumerate().filter(|(_, point)| point.lever > MIN_LEVER * longest);
     let point = |(k, point): (usize, &PartialResidual)| Point {
         x: point.covariate,
         y: point.value - mean,
         held_out: false,
         row: split.identification.get(k).copied(),
     };
-    let points: Vec<Point> = telling.map(point).collect();
-    let place = left.site?;
-    let up = Quantity::error(&place.to_string(), of.unit);
-    let title = format!("{place}: structure without a known cause");
+    let points: Vec<Point> = informative.map(point).collect();
+    let site = structure.site?;
+    let up = Quantity::error(&site.to_string(), of.unit);
+    let title = format!("{site}: structure without a known cause");
     Some(Cause { title, across, up, points, curve, reading: COORDINATE })
-}
-
-/// The fitted law at a value, between the points of its curve; 0 without one.
-fn at_law(curve: &[(f64, f64)], x: f64) -> f64 {
-    let next = curve.partition_point(|at| at.0 < x);
-    match (next.checked_sub(1).and_then(|k| curve.get(k)), curve.get(next)) {
-        (Some(a), Some(b)) if b.0 > a.0 => a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0),
-        (Some(one), _) | (None, Some(one)) => one.1,
-        (None, None) => 0.0,
-    }
-}
-
-impl Cause {
-    /// Of an effect that was found, with its number.
-    pub fn draw_effect(&self, number: usize, shown: &[usize]) -> Drawing {
-        self.draw(
-            shown,
-            &format!("effect-{number}"),
-            "fitted law",
-            "Found by the loop; the line is the fitted law.",
-        )
-    }
-
-    /// Of structure that no effect explains.
-    pub fn draw_unexplained(&self, shown: &[usize]) -> Drawing {
-        let lead = "No effect explains this; the line is the empirical correction. Its mean over this range is taken off line \
-                    and dots: a constant is what base and geometry take up.";
-        self.draw(shown, "unexplained", "correction", lead)
-    }
-
-    /// Each pose's own measurement, of the poses that figures show, and the law as a line.
-    fn draw(&self, shown: &[usize], name: &str, law: &str, lead: &str) -> Drawing {
-        let finite = |point: &&Point| point.x.is_finite() && point.y.is_finite();
-        let all: Vec<&Point> = self.points.iter().filter(finite).collect();
-        let at = |x: f64, y: f64| (x * self.across.factor, y * self.up.factor);
-        let known = |k: &usize| all[*k].row.is_none_or(|row| shown.binary_search(&row).is_ok());
-        let known: Vec<usize> = (0..all.len()).filter(known).collect();
-        let kept = thin(&known, MOST, |k| all[k].y - at_law(&self.curve, all[k].x));
-        let points: Vec<((f64, f64), &Point)> =
-            kept.iter().map(|&k| (at(all[k].x, all[k].y), all[k])).collect();
-        let curve: Vec<(f64, f64)> = self.curve.iter().map(|&(x, y)| at(x, y)).collect();
-        let every_point = || points.iter().map(|(at, _)| *at).chain(curve.iter().copied());
-        let x = with_margin(range(every_point().map(|at| at.0)), 0.04);
-        let law_at = |x: f64| at_law(&curve, x);
-        let most = reach(points.iter().map(|((x, y), _)| y - law_at(*x)));
-        let near = |(x, y): &(f64, f64)| (y - law_at(*x)).abs() <= most;
-        let close = points.iter().map(|(at, _)| *at).filter(near).chain(curve.iter().copied());
-        let y = with_margin(range(close.map(|at| at.1)), 0.06);
-        let is_beyond = |at: &(f64, f64)| at.1 < y.0 || at.1 > y.1;
-        let outside = points.iter().filter(|(at, _)| is_beyond(at)).count();
-        let tags = Tags::of_dots();
-        let svg = figure((WIDTH, HEIGHT), &self.title, |area| {
-            let held_out = points.iter().any(|(_, point)| point.held_out);
-            let dots = [("fitted pose", FAINT, Mark::Dot), ("held-out pose", INK, Mark::Dot)];
-            let dots = dots.into_iter().take(if held_out { 2 } else { 1 });
-            let entries: Vec<_> = dots.chain([(law, ACCENT, Mark::Line)]).collect();
-            let body = legend(area, 20, &entries)?;
-            let mut chart = chart(
-                &body,
-                &Axis::linear(x, &self.across.label),
-                &Axis::linear(y, &self.up.label),
-            )?;
-            if y.0 < 0.0 && y.1 > 0.0 {
-                chart.draw_series([PathElement::new(
-                    vec![(x.0, 0.0), (x.1, 0.0)],
-                    line(FAINT, 1.0),
-                )])?;
-            }
-            for (only, colour) in [(false, FAINT), (true, INK)] {
-                for (at, point) in points.iter().filter(|(_, point)| point.held_out == only) {
-                    let style = if is_beyond(at) { line(WARM, 1.4) } else { colour.filled() };
-                    tags.pose(point.row);
-                    chart.draw_series([Circle::new(
-                        (at.0, at.1.clamp(y.0, y.1)),
-                        pixels(2.2),
-                        style,
-                    )])?;
-                }
-            }
-            chart.draw_series(LineSeries::new(curve.iter().copied(), line(ACCENT, 2.2)))?;
-            note_beyond(&body, outside)
-        });
-        let mut letters = self.title.chars();
-        let title = letters
-            .next()
-            .map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect());
-        let caption =
-            format!("{lead} {}{}{}", self.reading, beyond(outside), thinned(kept.len(), all.len()));
-        let columns = ["held_out", self.across.label.as_str(), self.up.label.as_str()];
-        let row = |(at, point): &((f64, f64), &Point)| {
-            vec![point.held_out.to_string(), fixed(at.0, 6), fixed(at.1, 9)]
-        };
-        let sheet = Sheet::new(&columns, points.iter().map(row).collect());
-        Drawing::new(name, &title, caption, tags.put(&svg)).with(sheet)
-    }
 }

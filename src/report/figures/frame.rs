@@ -1,5 +1,5 @@
-//! Paper and axes of every figure: sizes in pixels as shown, ticks at round numbers, colours that a
-//! page may exchange.
+//! Canvas and axes of the figures: sizes in displayed pixels, round tick values, and colours that a
+//! page may replace.
 
 use std::io;
 use std::ops::Range;
@@ -12,49 +12,51 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::sheet::Sheet;
 
-/// Figures are drawn this much larger than they are shown: the backend keeps to whole pixels.
+/// Ratio of drawn to displayed size; the backend rounds to whole drawn pixels.
 pub const SCALE: i32 = 4;
-/// Width of a figure as shown.
+/// Width of a figure in displayed pixels.
 pub const WIDTH: i32 = 480;
-/// Text as shown.
+/// Text size in displayed pixels.
 pub const TEXT: f64 = 11.5;
-/// Room on the left for what the backend sets too far out.
+/// Margin on the left for text that the backend places too far out, in displayed pixels.
 const MARGIN: i32 = 6;
-/// Room for what stands left of an axis and below it.
+/// Space left of an axis in displayed pixels.
 pub const LEFT: i32 = 62;
+/// Space below an axis in displayed pixels.
 pub const BELOW: i32 = 40;
-/// The backend writes text smaller than asked by this.
+/// Ratio by which the backend writes text smaller than requested.
 const POINTS: f64 = 1.24;
 
-/// Lines and text that matter; held-out poses.
+/// Colour of important lines and text, and of held-out poses.
 pub const INK: RGBColor = RGBColor(0x1F, 0x23, 0x28);
-/// Axes and their numbers.
+/// Colour of axes and their numbers.
 pub const MUTED: RGBColor = RGBColor(0x59, 0x63, 0x6E);
-/// What is there to compare with; fitted poses.
+/// Colour of references, and of fitted poses.
 pub const FAINT: RGBColor = RGBColor(0xA3, 0xAD, 0xB8);
-/// Grid.
+/// Colour of the grid.
 pub const GRID: RGBColor = RGBColor(0xE4, 0xE8, 0xEC);
-/// What to look at: the best, a law, what noise alone does.
+/// Accent colour: the best result, a law, or pure noise.
 pub const ACCENT: RGBColor = RGBColor(0x0B, 0x6B, 0xCB);
-/// Its opposite: negative, failed.
+/// Opposite of the accent: negative values and failures.
 pub const WARM: RGBColor = RGBColor(0xC2, 0x52, 0x1B);
 
-/// A figure as it is drawn.
+/// Figure with its title, caption and data.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Drawing {
-    /// Name of its file, without the ending.
+    /// File name without extension.
     pub name: String,
-    /// What it shows.
+    /// Title of the figure.
     pub title: String,
-    /// What to see in it.
+    /// Explanation of the figure.
     pub caption: String,
-    /// The drawing.
+    /// Drawing as SVG text.
     pub svg: String,
-    /// Its numbers, as drawn.
+    /// Data that are drawn.
     pub data: Sheet,
 }
 
 impl Drawing {
+    /// Creates a figure without data.
     pub fn new(name: &str, title: &str, caption: impl Into<String>, svg: String) -> Self {
         Self {
             name: name.to_owned(),
@@ -65,20 +67,20 @@ impl Drawing {
         }
     }
 
-    /// With its numbers.
+    /// Adds the data that are drawn.
     pub fn with(self, data: Sheet) -> Self {
         Self { data, ..self }
     }
 }
 
-/// A part of a figure.
+/// Rectangular part of a figure.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// Why drawing failed; writing to memory never does.
+/// Error of the backend; writing to memory never fails.
 pub type Failure = DrawingAreaErrorKind<io::Error>;
-/// Axes with what is drawn between them.
+/// Axes with the area between them.
 pub type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Coordinate, Coordinate>>;
 
-/// A coordinate with numbers at chosen places.
+/// Coordinate of an axis with chosen tick values.
 pub struct Coordinate {
     inner: RangedCoordf64,
     ticks: Vec<f64>,
@@ -107,16 +109,16 @@ impl ValueFormatter<f64> for Coordinate {
     }
 }
 
-/// An axis.
+/// Axis of a chart.
 #[derive(Debug, Clone)]
 pub struct Axis<'a> {
-    /// Ends; of a logarithmic axis the logarithms to base 10.
+    /// Ends of the axis; logarithms to base 10 for a logarithmic axis.
     pub range: (f64, f64),
-    /// What it shows, with its unit.
+    /// Label with the unit.
     pub label: &'a str,
-    /// Whether values are given as logarithms to base 10.
+    /// True if values are given as logarithms to base 10.
     pub logarithmic: bool,
-    /// About how many numbers it has; none without numbers.
+    /// Approximate number of tick values; 0 for none.
     pub numbers: usize,
 }
 
@@ -125,7 +127,7 @@ impl<'a> Axis<'a> {
         Self { range: widened(range), label, logarithmic: false, numbers: 6 }
     }
 
-    /// The range in decades.
+    /// Creates a logarithmic axis; `range` is in decades.
     pub fn logarithmic(range: (f64, f64), label: &'a str) -> Self {
         Self { range: widened(range), label, logarithmic: true, numbers: 6 }
     }
@@ -144,12 +146,12 @@ impl<'a> Axis<'a> {
             return Vec::new();
         }
         if self.logarithmic && high - low >= 1.0 {
-            let parts: &[f64] = if high - low > 2.0 { &[1.0] } else { &[1.0, 3.0] };
+            let steps: &[f64] = if high - low > 2.0 { &[1.0] } else { &[1.0, 3.0] };
             let every = ((high - low) / self.numbers as f64).floor().max(1.0);
             let decades = (0..=64).map(|k| (low / every).floor() * every + f64::from(k) * every);
-            let all =
-                decades.flat_map(|decade| parts.iter().map(move |part| decade + part.log10()));
-            return all.filter(|tick| (low - 1e-9..=high + 1e-9).contains(tick)).collect();
+            let ticks =
+                decades.flat_map(|decade| steps.iter().map(move |step| decade + step.log10()));
+            return ticks.filter(|tick| (low - 1e-9..=high + 1e-9).contains(tick)).collect();
         }
         let step = step(high - low, self.numbers);
         let first = (low / step - 1e-9).ceil();
@@ -173,16 +175,16 @@ impl<'a> Axis<'a> {
     }
 }
 
-/// 10⁻⁶ for −6.
+/// Returns a power of ten as text, for example 10⁻⁶ for −6.
 fn power_of_ten(exponent: f64) -> String {
-    let raised = |digit: char| match digit {
+    let superscript = |digit: char| match digit {
         '-' => Some('⁻'),
         digit => "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit.to_digit(10)? as usize),
     };
-    format!("10{}", format!("{exponent:.0}").chars().filter_map(raised).collect::<String>())
+    format!("10{}", format!("{exponent:.0}").chars().filter_map(superscript).collect::<String>())
 }
 
-/// A small number without its fraction.
+/// Returns the integer part of a small number.
 fn whole(value: f64) -> usize {
     #[expect(
         clippy::cast_possible_truncation,
@@ -193,24 +195,24 @@ fn whole(value: f64) -> usize {
     whole
 }
 
-/// Numbers at round places of a range, about `count`, each in words.
+/// Returns about `count` round values in a range, each with its text.
 pub fn round_numbers(range: (f64, f64), count: usize) -> Vec<(f64, String)> {
     let axis = Axis::linear(range, "").numbers(count);
     axis.ticks().into_iter().map(|tick| (tick, axis.number(tick))).collect()
 }
 
-/// 1, 2 or 5 times a power of ten, about `count` to a range.
+/// Returns a tick step of 1, 2 or 5 times a power of ten that gives about `count` ticks.
 fn step(range: f64, count: usize) -> f64 {
     let raw = range / count as f64;
     let power = 10.0_f64.powf(raw.log10().floor());
     [1.0, 2.0, 5.0, 10.0]
-        .map(|part| part * power)
+        .map(|factor| factor * power)
         .into_iter()
         .find(|step| *step >= raw)
         .unwrap_or(10.0 * power)
 }
 
-/// A range that is one, even of a single value or none.
+/// Returns a range of positive width, also for a single value or none.
 fn widened((low, high): (f64, f64)) -> (f64, f64) {
     match (low.is_finite() && high.is_finite(), high - low) {
         (false, _) => (0.0, 1.0),
@@ -219,7 +221,7 @@ fn widened((low, high): (f64, f64)) -> (f64, f64) {
     }
 }
 
-/// Smallest and largest of some values.
+/// Returns the smallest and the largest of some values.
 pub fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let finite = values.into_iter().filter(|value| value.is_finite());
     finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
@@ -227,27 +229,27 @@ pub fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     })
 }
 
-/// A range with a margin of this part on both sides.
-pub fn with_margin((low, high): (f64, f64), part: f64) -> (f64, f64) {
-    let margin = part * (high - low);
+/// Adds a margin to both ends of a range, as a fraction of its width.
+pub fn with_margin((low, high): (f64, f64), fraction: f64) -> (f64, f64) {
+    let margin = fraction * (high - low);
     (low - margin, high + margin)
 }
 
-/// Pixels as drawn.
+/// Converts displayed to drawn pixels.
 pub fn px(shown: i32) -> i32 {
     shown * SCALE
 }
 
-/// A style of lines, width as shown.
+/// Returns a line style; the width is in displayed pixels.
 pub fn line(colour: RGBColor, width: f64) -> ShapeStyle {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few pixels")]
     let width = (width * f64::from(SCALE)).round() as u32;
     colour.stroke_width(width)
 }
 
-/// A length as drawn, to the nearest pixel.
+/// Converts a displayed length to drawn pixels, rounded.
 pub fn pixels(shown: f64) -> i32 {
-    #[expect(clippy::cast_possible_truncation, reason = "no longer than the paper")]
+    #[expect(clippy::cast_possible_truncation, reason = "no longer than the canvas")]
     let drawn = (shown * f64::from(SCALE)).round() as i32;
     drawn
 }
@@ -256,12 +258,12 @@ fn font(colour: RGBColor, size: f64) -> TextStyle<'static> {
     ("sans-serif", size * f64::from(SCALE) * POINTS).into_font().color(&colour)
 }
 
-/// Without control characters, which no SVG may have.
+/// Removes control characters, which SVG does not allow.
 fn printable(text: &str) -> String {
     text.chars().filter(|c| !c.is_control()).collect()
 }
 
-/// Writes text at a place in pixels as shown.
+/// Writes text at a position in displayed pixels.
 pub fn write(
     area: &Area,
     text: &str,
@@ -272,7 +274,7 @@ pub fn write(
     write_sized(area, text, at, (colour, TEXT), side)
 }
 
-/// The same in letters of some size as shown.
+/// Writes text of a given size in displayed pixels.
 pub fn write_sized(
     area: &Area,
     text: &str,
@@ -284,8 +286,8 @@ pub fn write_sized(
     area.draw_text(&printable(text), &style, (px(at.0), px(at.1)))
 }
 
-/// Draws an upright line at a place as drawn, between two heights as shown.
-pub fn upright(
+/// Draws a vertical line at a drawn position, between two displayed heights.
+pub fn vertical_line(
     area: &Area,
     at: i32,
     (from, to): (i32, i32),
@@ -294,7 +296,7 @@ pub fn upright(
     area.draw(&PathElement::new(vec![(at, px(from)), (at, px(to))], line(colour, 1.0)))
 }
 
-/// Draws a figure of some size as shown; `label` says what it is to who cannot see it.
+/// Draws a figure of a displayed size; `label` describes it for screen readers.
 pub fn figure(
     size: (i32, i32),
     label: &str,
@@ -309,7 +311,7 @@ pub fn figure(
         }
     }
     let body = text.split_once('>').map_or("", |(_, body)| body);
-    // What every element says of itself and is so anyway.
+    // Attributes that every element repeats although they are the default.
     let body = [
         " opacity=\"1\"",
         " stroke=\"none\"",
@@ -329,7 +331,7 @@ pub fn figure(
     )
 }
 
-/// Axes in an area, with room for their numbers and labels; an axis without a label takes none
+/// Creates axes in an area with space for numbers and labels; an axis without a label takes none
 /// below.
 pub fn chart<'a, 'b>(area: &'a Area<'b>, x: &Axis, y: &Axis) -> Result<Chart<'a, 'b>, Failure> {
     let below = match (x.label.is_empty(), x.numbers) {
@@ -360,27 +362,27 @@ pub fn chart<'a, 'b>(area: &'a Area<'b>, x: &Axis, y: &Axis) -> Result<Chart<'a,
     Ok(chart)
 }
 
-/// How something is drawn.
+/// Mark of a legend entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mark {
     Dot,
     Ring,
     Line,
     Bar,
-    /// Pale, behind what is drawn on it.
+    /// Translucent band behind the data.
     Band,
 }
 
 /// Opacity of a band.
-const PALE: f64 = 0.16;
+const BAND_OPACITY: f64 = 0.16;
 
-/// The colour of a band.
+/// Returns the fill style of a band.
 pub fn band(colour: RGBColor) -> ShapeStyle {
-    colour.mix(PALE).filled()
+    colour.mix(BAND_OPACITY).filled()
 }
 
-/// Entries of a legend, from left to right along the top of an area, each with the mark that it
-/// stands for, and the area from `height` on.
+/// Draws legend entries from left to right along the top of an area, and returns the area below
+/// `height`.
 pub fn legend<'a>(
     area: &Area<'a>,
     height: i32,
@@ -389,7 +391,7 @@ pub fn legend<'a>(
     let mut at = LEFT;
     for &(name, colour, mark) in entries {
         let middle = (px(at + 4), px(10));
-        let corners = |reach: i32| [(px(at), px(10 - reach)), (px(at + 8), px(10 + reach))];
+        let corners = |half: i32| [(px(at), px(10 - half)), (px(at + 8), px(10 + half))];
         match mark {
             Mark::Dot => area.draw(&Circle::new(middle, pixels(3.2), colour.filled())),
             Mark::Ring => area.draw(&Circle::new(middle, pixels(3.2), line(colour, 1.2))),
@@ -406,18 +408,18 @@ pub fn legend<'a>(
     Ok(area.split_vertically(px(height)).1)
 }
 
-/// Parts of an area below each other, of these heights as shown.
+/// Divides an area into parts one below the other, with heights in displayed pixels.
 pub fn stacked<'a>(area: &Area<'a>, heights: &[i32]) -> Vec<Area<'a>> {
-    let mut rest = area.clone();
+    let mut remaining = area.clone();
     let part = |height: &i32| {
-        let (part, below) = rest.split_vertically(px(*height));
-        rest = below;
+        let (part, below) = remaining.split_vertically(px(*height));
+        remaining = below;
         part
     };
     heights.iter().map(part).collect()
 }
 
-/// Writes at the top right of a panel how many values lie beyond it.
+/// Writes the number of values beyond the axes at the top right of a panel.
 pub fn note_beyond(panel: &Area, count: usize) -> Result<(), Failure> {
     if count == 0 {
         return Ok(());

@@ -1,30 +1,32 @@
-//! How the residuals scatter.
+//! Histogram of the residuals.
 
 use super::data::PlotData;
 use super::pose::PoseError;
 use super::prelude::*;
 use crate::numeric::median;
 
+/// Height of the figure in pixels.
 const HEIGHT: i32 = 280;
-/// Least that the axis reaches \[σ\]; else four times what most residuals scatter. What lies beyond
-/// is counted into the outermost bars.
-const REACH: f64 = 5.0;
+/// Smallest half-width of the axis \[σ\]. The axis spans four times the scatter of most residuals
+/// if that is more; values beyond it are counted in the outermost bars.
+const MIN_HALF_WIDTH: f64 = 5.0;
 
-/// The numbers that a row measures, in units of σ.
-fn numbers(own: &PoseError) -> impl Iterator<Item = f64> + use<> {
-    (own.error / own.sigma).data.0[0].into_iter().take(own.observation.coordinates())
+/// Returns the residual coordinates of a row in units of σ.
+fn coordinates(residual: &PoseError) -> impl Iterator<Item = f64> + use<> {
+    let whitened = residual.error / residual.sigma;
+    whitened.data.0[0].into_iter().take(residual.observation.coordinates())
 }
 
-/// Residual coordinates of the fitted poses in units of σ, beside the normal distribution.
+/// Draws the residual coordinates of the fitted poses in units of σ, with the normal distribution.
 pub fn histogram(data: &PlotData) -> Option<Drawing> {
     let fitted = data.residuals.iter().filter(|residual| !residual.held_out);
-    let values: Vec<f64> = fitted.flat_map(numbers).filter(|v| v.is_finite()).collect();
+    let values: Vec<f64> = fitted.flat_map(coordinates).filter(|v| v.is_finite()).collect();
     if values.len() < 3 {
         return None;
     }
-    // From the median of their sizes: a few large ones do not flatten the others.
+    // The median absolute value is robust against a few large residuals.
     let scatter = 1.4826 * median(values.iter().map(|value| value.abs()))?;
-    let reach = (4.0 * scatter).ceil().max(REACH);
+    let reach = (4.0 * scatter).ceil().max(MIN_HALF_WIDTH);
     let half: usize = if values.len() < 150 { 10 } else { 20 };
     let width = reach / half as f64;
     let mut counts = vec![0_usize; 2 * half];
@@ -49,7 +51,7 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
         let body = legend(
             area,
             20,
-            &[("fitted poses", FAINT, Mark::Bar), ("noise alone", ACCENT, Mark::Line)],
+            &[("fitted poses", FAINT, Mark::Bar), ("expected from noise", ACCENT, Mark::Line)],
         )?;
         let x = Axis::linear((-reach, reach), "residual coordinate [σ]").numbers(10);
         let mut chart = chart(&body, &x, &Axis::linear((0.0, tallest), "number of coordinates"))?;
@@ -75,19 +77,22 @@ pub fn histogram(data: &PlotData) -> Option<Drawing> {
         Ok(())
     });
     let outside = if beyond[0] + beyond[1] > 0 {
-        let all = beyond[0] + beyond[1];
-        format!(" {all} lie beyond ±{reach} σ and are counted into the outermost bars.")
+        let total = beyond[0] + beyond[1];
+        format!(" {total} lie beyond ±{reach} σ and are counted in the outermost bars.")
     } else {
         String::new()
     };
     let caption = format!(
-        "Residual coordinates of the fitted poses against the σ of the measurement. Noise alone would follow the line; a \
-             fit takes a little off it, the more parameters the more.{outside}"
+        "Residual coordinates of the fitted poses in units of the σ of the measurement. If only noise is left, they follow \
+             the line; a fit reduces them slightly, the more the more parameters it has.{outside}"
     );
     let rows = counts.iter().enumerate().map(|(k, count)| {
         let left = k as f64 * width - reach;
         vec![fixed(left, 4), fixed(left + width, 4), count.to_string()]
     });
     let sheet = Sheet::new(&["from_sigma", "to_sigma", "coordinates"], rows.collect());
-    Some(Drawing::new("residual-histogram", "How the residuals scatter", caption, svg).with(sheet))
+    Some(
+        Drawing::new("residual-histogram", "Distribution of the residuals", caption, svg)
+            .with(sheet),
+    )
 }

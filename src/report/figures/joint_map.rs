@@ -1,46 +1,48 @@
-//! The residual by ranges of each joint.
+//! Residual by ranges of each joint.
 
 use super::data::PlotData;
 use super::prelude::*;
 
-/// Ranges of a joint.
-const PARTS: usize = 12;
+/// Number of ranges of a joint.
+const RANGES: usize = 12;
+/// Height of a row in pixels.
 const ROW: i32 = 26;
-/// Room for names, and for the ends of the ranges.
+/// Width for names in pixels.
 const NAMES: i32 = 40;
+/// Width for the ends of the ranges in pixels.
 const ENDS: i32 = 52;
+/// Width of a cell in pixels.
 const CELL: i32 = (WIDTH - NAMES - 2 * ENDS) / 12;
 
-/// A range of a joint: its ends, and the root mean square of the residuals there \[m\] over how
-/// many poses.
-struct Part {
+/// Range of a joint with its ends and the root mean square residual of the poses in it \[m\].
+struct JointRange {
     ends: (f64, f64),
     rms: f64,
     count: usize,
 }
 
-/// Residuals of a joint's ranges, from the lowest to the highest.
-fn parts(data: &PlotData, joint: usize) -> Vec<Part> {
+/// Returns the ranges of a joint in ascending order.
+fn joint_ranges(data: &PlotData, joint: usize) -> Vec<JointRange> {
     let of =
         || data.residuals.iter().filter(|pose| pose.has_place() && pose.error.norm().is_finite());
     let (low, high) = range(of().map(|pose| pose.configuration[joint]));
     if high - low <= 0.0 || !(high - low).is_finite() {
         return Vec::new();
     }
-    let width = (high - low) / PARTS as f64;
-    let mut sums = vec![(0.0, 0_usize); PARTS];
+    let width = (high - low) / RANGES as f64;
+    let mut sums = vec![(0.0, 0_usize); RANGES];
     for pose in of() {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "clamped to the parts"
+            reason = "clamped to the ranges"
         )]
-        let part =
-            ((pose.configuration[joint] - low) / width).clamp(0.0, PARTS as f64 - 1.0) as usize;
-        sums[part].0 += pose.error.norm_squared();
-        sums[part].1 += 1;
+        let index =
+            ((pose.configuration[joint] - low) / width).clamp(0.0, RANGES as f64 - 1.0) as usize;
+        sums[index].0 += pose.error.norm_squared();
+        sums[index].1 += 1;
     }
-    let part = |(k, (sum, count)): (usize, (f64, usize))| Part {
+    let part = |(k, (sum, count)): (usize, (f64, usize))| JointRange {
         ends: (low + width * k as f64, low + width * (k + 1) as f64),
         rms: (sum / count.max(1) as f64).sqrt(),
         count,
@@ -48,16 +50,16 @@ fn parts(data: &PlotData, joint: usize) -> Vec<Part> {
     sums.into_iter().enumerate().map(part).collect()
 }
 
-/// A row a joint, a box a range, darker where the residual is larger.
+/// Draws a row per joint and a box per range, darker for a larger residual.
 pub fn joint_map(data: &PlotData) -> Option<Drawing> {
     let joints: Vec<_> = data
         .commands
         .iter()
-        .map(|own| (own, parts(data, own.joint)))
-        .filter(|own| !own.1.is_empty())
+        .map(|command| (command, joint_ranges(data, command.joint)))
+        .filter(|(_, ranges)| !ranges.is_empty())
         .collect();
-    let rms = |part: &Part| Some(part.rms).filter(|_| part.count > 0);
-    let (least, most) = range(joints.iter().flat_map(|(_, parts)| parts).filter_map(rms));
+    let rms = |part: &JointRange| Some(part.rms).filter(|_| part.count > 0);
+    let (least, most) = range(joints.iter().flat_map(|(_, ranges)| ranges).filter_map(rms));
     if least > most {
         return None;
     }
@@ -68,7 +70,7 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
     let tags = Tags::of_boxes();
     let mut rows = Vec::new();
     let svg = figure((WIDTH, 34 + ROW * count), "Residual by ranges of each joint", |area| {
-        for (row, (command, parts)) in (0..).zip(&joints) {
+        for (row, (command, ranges)) in (0..).zip(&joints) {
             let unit = command.unit.display(1.0);
             let (top, middle) = (28 + ROW * row, 28 + ROW * row + ROW / 2);
             write(area, &command.name(), (NAMES - 8, middle), INK, HPos::Right)?;
@@ -81,12 +83,12 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
                 )
             };
             let (first, last) = (
-                parts.first().map_or(0.0, |own| own.ends.0),
-                parts.last().map_or(0.0, |own| own.ends.1),
+                ranges.first().map_or(0.0, |part| part.ends.0),
+                ranges.last().map_or(0.0, |part| part.ends.1),
             );
             write(area, &end(first), (NAMES + ENDS - 6, middle), MUTED, HPos::Right)?;
             write(area, &end(last), (NAMES + ENDS + 12 * CELL + 6, middle), MUTED, HPos::Left)?;
-            for (k, part) in (0..).zip(parts) {
+            for (k, part) in (0..).zip(ranges) {
                 let left = NAMES + ENDS + CELL * k;
                 let corners =
                     [(px(left) + 2, px(top + 2)), (px(left + CELL) - 2, px(top + ROW - 2))];
@@ -99,7 +101,7 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
                     part.count.to_string(),
                     rms(part).map_or_else(String::new, |rms| fixed(rms * 1e3, 6)),
                 ]);
-                tags.own(format!(
+                tags.push(format!(
                     " data-joint=\"{}\" data-low=\"{low:.6}\" data-high=\"{high:.6}\"",
                     command.joint
                 ));
@@ -114,8 +116,8 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
         Ok(())
     });
     let caption = format!(
-        "Root mean square of the residual over the poses in which a joint stands in a twelfth of its measured range: pale {} \
-         mm, deep {} mm; an empty box has no pose. A joint whose row changes along it is where to look.",
+        "Root mean square residual over the poses in which a joint is in one twelfth of its measured range: pale {} \
+         mm, deep {} mm; an empty box has no pose. A change along a row points to an error of that joint.",
         two_digits(least * 1e3, 4),
         two_digits(most * 1e3, 4)
     );
@@ -123,9 +125,9 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
     Some(
         Drawing::new(
             "residual-joints",
-            "What is left, by ranges of each joint",
+            "Residual by ranges of each joint",
             caption,
-            tags.put(&svg),
+            tags.insert_into(&svg),
         )
         .with(Sheet::new(&header, rows)),
     )

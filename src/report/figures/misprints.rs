@@ -1,4 +1,4 @@
-//! What each misprint and each rival leaves, over what the rigid fit leaves.
+//! Errors with each misprint and each alternative model, relative to the rigid fit.
 
 use super::prelude::*;
 use crate::paper::published::{WITH_ELASTICITY, WITHOUT_ELASTICITY};
@@ -6,37 +6,43 @@ use crate::study::{
     AlternativeModel, Case, HeldOutError, MisprintStudy, Replica, ReplicaResults, Spread,
 };
 
+/// Height of a row in pixels.
 const ROW: i32 = 19;
-/// Room for names.
+/// Width for names in pixels.
 const NAMES: i32 = 178;
+/// Height above the rows in pixels.
 const TOP: i32 = 26;
 /// Ends of the logarithmic axis.
 const RANGE: (f64, f64) = (0.02, 5.0);
+/// Colours of the cases.
 const COLOURS: [RGBColor; 4] = [INK, ACCENT, FAINT, MUTED];
 
-/// A row: its name, and mean and spread for each case.
+/// Name of a row with mean and spread of each case.
 type Row = (String, Vec<Option<Spread>>);
 
-/// Ratio of the held-out mean to that of the rigid fit, of every reading and every rival.
-pub fn misprints(study: &MisprintStudy, found: &ReplicaResults) -> Drawing {
-    let spreads = |left: &dyn Fn(&Replica) -> HeldOutError| -> Vec<Option<Spread>> {
-        let ratio = |case: &Case| Spread::of(found.of_case(case).map(|own| own.ratio(left(own))));
+/// Draws the ratio of the held-out mean to that of the rigid fit, for every reading and every
+/// alternative model.
+pub fn misprints(study: &MisprintStudy, results: &ReplicaResults) -> Drawing {
+    let spreads = |error: &dyn Fn(&Replica) -> HeldOutError| -> Vec<Option<Spread>> {
+        let ratio = |case: &Case| {
+            Spread::of(results.of_case(case).map(|replica| replica.ratio(error(replica))))
+        };
         study.cases.iter().map(ratio).collect()
     };
-    let named = found.readings.iter().enumerate();
+    let named = results.readings.iter().enumerate();
     let mut rows: Vec<Row> = named
-        .map(|(place, named)| (named.name.clone(), spreads(&|own| own.reading_error(place, 0))))
+        .map(|(index, named)| {
+            (named.name.clone(), spreads(&|replica| replica.reading_error(index, 0)))
+        })
         .collect();
-    rows.extend(
-        AlternativeModel::EACH.map(|rival| {
-            (rival.words().0.to_owned(), spreads(&|own| own.alternative_error(rival)))
-        }),
-    );
-    let caption = "Mean error of the held-out poses over that of the rigid fit, mean and standard deviation over specimens, stiffness \
-                   known: each misprint alone, their combinations, and below them other explanations. Colours: how links and joints \
-                   share the flexibility, and one load in place of many. The line is the paper's 2.136/3.967; a misprint \
-                   explains it where its marks meet the line.";
-    let title = "What each misprint costs";
+    rows.extend(AlternativeModel::EACH.map(|model| {
+        (model.words().0.to_owned(), spreads(&|replica| replica.alternative_error(model)))
+    }));
+    let caption = "Mean error at the held-out poses relative to that of the rigid fit, mean and standard deviation over specimens, with \
+                   known stiffness: each misprint alone, combinations of misprints, and below them alternative models. Colours: how \
+                   links and joints share the flexibility, and a single load instead of several. The line is the ratio in the paper, \
+                   2.136/3.967; a misprint can explain it if its marks meet the line.";
+    let title = "Cost of each misprint";
     Drawing::new("misprints", title, caption, draw(study, &rows))
 }
 
@@ -54,11 +60,11 @@ fn draw(study: &MisprintStudy, rows: &[Row]) -> String {
         marks.push(("the paper", WARM, Mark::Line));
         legend(area, TOP, &marks)?;
         for value in [0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0] {
-            upright(area, place(value), (TOP, bottom), GRID)?;
+            vertical_line(area, position(value), (TOP, bottom), GRID)?;
             let number = number(value, if value < 1.0 { 2 } else { 0 });
-            write(area, &number, (place(value) / px(1), bottom + 10), MUTED, HPos::Center)?;
+            write(area, &number, (position(value) / px(1), bottom + 10), MUTED, HPos::Center)?;
         }
-        upright(area, place(paper), (TOP, bottom), WARM)?;
+        vertical_line(area, position(paper), (TOP, bottom), WARM)?;
         for (k, (name, spreads)) in (0..).zip(rows) {
             let y = TOP + ROW * k + ROW / 2;
             write(area, name, (NAMES - 10, y), INK, HPos::Right)?;
@@ -73,9 +79,9 @@ fn draw(study: &MisprintStudy, rows: &[Row]) -> String {
                         + 1)
                     / 2;
                 let at = px(y) + shift;
-                let ends = vec![(place(mean - deviation), at), (place(mean + deviation), at)];
+                let ends = vec![(position(mean - deviation), at), (position(mean + deviation), at)];
                 area.draw(&PathElement::new(ends, line(colour(j), 1.2)))?;
-                area.draw(&Circle::new((place(mean), at), pixels(2.4), colour(j).filled()))?;
+                area.draw(&Circle::new((position(mean), at), pixels(2.4), colour(j).filled()))?;
             }
         }
         let middle = NAMES + (WIDTH - NAMES) / 2;
@@ -89,9 +95,9 @@ fn draw(study: &MisprintStudy, rows: &[Row]) -> String {
     })
 }
 
-/// Where a ratio stands, in pixels as drawn.
-fn place(value: f64) -> i32 {
+/// Returns the horizontal position of a ratio in drawn pixels.
+fn position(value: f64) -> i32 {
     let (low, high) = (RANGE.0.log10(), RANGE.1.log10());
-    let part = (value.max(RANGE.0).log10().clamp(low, high) - low) / (high - low);
-    px(NAMES) + pixels(part * f64::from(WIDTH - NAMES - 16))
+    let fraction = (value.max(RANGE.0).log10().clamp(low, high) - low) / (high - low);
+    px(NAMES) + pixels(fraction * f64::from(WIDTH - NAMES - 16))
 }

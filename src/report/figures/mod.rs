@@ -1,7 +1,9 @@
-//! The figures of the report, one a file: numbers in, SVG with its title and caption out.
+//! Figures of the reports, one per file: data in, SVG with title and caption out.
 
 mod arm;
+mod axis_limit;
 mod cause;
+mod cause_drawing;
 mod contribution;
 mod correlation;
 mod coverage;
@@ -15,7 +17,6 @@ mod order;
 mod pose;
 mod prelude;
 mod ranking;
-mod reach;
 mod sheet;
 mod spectrum;
 mod strategies;
@@ -42,7 +43,7 @@ pub use data::{PlotData, Stage, StageErrors};
 pub use frame::{ACCENT, Drawing, FAINT, GRID, INK, MUTED, WARM};
 pub use pose::PoseError;
 
-/// Every name but those of effects, which are numbered, and of procedures, which are named.
+/// File names of all figures, except those of effects (numbered) and procedures (named).
 const NAMES: [&str; 14] = [
     "ablations",
     "contributions",
@@ -60,15 +61,15 @@ const NAMES: [&str; 14] = [
     "unexplained",
 ];
 
-/// Whether a file of this name is a figure that some page may have: `effect-1.svg`.
+/// Returns true if the file name is that of a figure, for example `effect-1.svg`.
 pub fn is_figure(file: &str) -> bool {
     let Some(name) = file.strip_suffix(".svg") else { return false };
-    let numbered =
+    let is_number =
         |number: &str| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
-    let named = |word: &str| {
+    let is_word = |word: &str| {
         !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'-')
     };
     NAMES.contains(&name)
-        || name.strip_prefix("effect-").is_some_and(numbered)
-        || name.strip_prefix("held-out-errors-").is_some_and(named)
+        || name.strip_prefix("effect-").is_some_and(is_number)
+        || name.strip_prefix("held-out-errors-").is_some_and(is_word)
 }

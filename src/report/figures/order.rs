@@ -1,27 +1,28 @@
-//! Residuals one after another.
+//! Residuals in the order of measurement.
 
+use super::axis_limit::{axis_limit, beyond_note};
 use super::data::PlotData;
-use super::pose::{PoseError, left_out, thin, thinned};
+use super::pose::{PoseError, omission_note, sample, thinning_note};
 use super::prelude::*;
-use super::reach::{beyond, reach};
 
-/// Poses that are drawn at most.
-const MOST: usize = 300;
+/// Maximum number of poses in the figure.
+const MAX_POSES: usize = 300;
+/// Height of a panel in pixels.
 const PANEL: i32 = 92;
 
-/// Residual coordinates of positions in the order of time, with the band of ±2 σ.
+/// Draws the residual coordinates of positions in the order of time, with a band of ±2 σ.
 pub fn order(data: &PlotData) -> Option<Drawing> {
     let fitted = data
         .residuals
         .iter()
         .filter(|residual| !residual.held_out && residual.observation.is_position());
     let (finite, lost): (Vec<&PoseError>, Vec<&PoseError>) =
-        fitted.partition(|own| own.error.norm().is_finite());
+        fitted.partition(|residual| residual.error.norm().is_finite());
     let is_fitted = |row: &usize| {
         data.is_position(*row) && !data.residuals[*row].held_out && data.size(*row).is_finite()
     };
-    let known: Vec<usize> = data.shown.iter().copied().filter(is_fitted).collect();
-    let shown: Vec<(usize, &PoseError)> = thin(&known, MOST, |row| data.size(row))
+    let candidates: Vec<usize> = data.shown.iter().copied().filter(is_fitted).collect();
+    let shown: Vec<(usize, &PoseError)> = sample(&candidates, MAX_POSES, |row| data.size(row))
         .into_iter()
         .map(|row| (row, &data.residuals[row]))
         .collect();
@@ -37,16 +38,16 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
     let across = with_margin((first.0 * factor, first.1 * factor), 0.02);
     let sigma =
         shown.iter().map(|(_, residual)| residual.sigma).sum::<f64>() / shown.len() as f64 * 1e3;
-    let most = reach(shown.iter().flat_map(|(_, own)| own.error.iter().map(|x| x * 1e3)))
-        .max(2.2 * sigma)
-        * 1.08;
-    let is_beyond = |own: &PoseError, axis: usize| (own.error[axis] * 1e3).abs() > most;
-    let outside = |axis: usize| shown.iter().filter(|(_, own)| is_beyond(own, axis)).count();
+    let values = shown.iter().flat_map(|(_, residual)| residual.error.iter().map(|x| x * 1e3));
+    let limit = axis_limit(values).max(2.2 * sigma) * 1.08;
+    let is_beyond = |residual: &PoseError, axis: usize| (residual.error[axis] * 1e3).abs() > limit;
+    let outside =
+        |axis: usize| shown.iter().filter(|(_, residual)| is_beyond(residual, axis)).count();
     let tags = Tags::of_dots();
     let svg = figure((WIDTH, 22 + 3 * PANEL + 36), "Residuals in order", |area| {
         let entries = [
             ("fitted pose", FAINT, Mark::Dot),
-            ("noise alone: ±2 σ of the measurement", ACCENT, Mark::Band),
+            ("expected from noise: ±2 σ of the measurement", ACCENT, Mark::Band),
         ];
         let panels = stacked(&legend(area, 20, &entries)?, &[PANEL, PANEL, PANEL + 36]);
         for (axis, (name, panel)) in
@@ -58,7 +59,7 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
             } else {
                 0
             });
-            let mut chart = chart(panel, &bottom, &Axis::linear((-most, most), name).numbers(5))?;
+            let mut chart = chart(panel, &bottom, &Axis::linear((-limit, limit), name).numbers(5))?;
             let noise =
                 Rectangle::new([(across.0, -2.0 * sigma), (across.1, 2.0 * sigma)], band(ACCENT));
             chart.draw_series([noise])?;
@@ -66,9 +67,11 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
                 vec![(across.0, 0.0), (across.1, 0.0)],
                 line(FAINT, 1.0),
             )])?;
-            for (row, own) in &shown {
-                let at = (own.time * factor, (own.error[axis] * 1e3).clamp(-most, most));
-                let style = if is_beyond(own, axis) { line(WARM, 1.4) } else { FAINT.filled() };
+            for (row, residual) in &shown {
+                let value = (residual.error[axis] * 1e3).clamp(-limit, limit);
+                let at = (residual.time * factor, value);
+                let is_beyond = is_beyond(residual, axis);
+                let style = if is_beyond { line(WARM, 1.4) } else { FAINT.filled() };
                 tags.pose(Some(*row));
                 chart.draw_series([Circle::new(at, pixels(2.0), style)])?;
             }
@@ -77,14 +80,15 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
         Ok(())
     });
     let caption = format!(
-        "Residuals measured − predicted of the fitted poses, in the order in which they were measured; nineteen of twenty \
-             should lie within the band. Runs of equal sign, drifts and steps are structure.{}{}{}",
-        beyond((0..3).map(outside).sum()),
-        left_out(lost.len()),
-        thinned(shown.len(), finite.len())
+        "Residuals measured − predicted of the fitted poses in the order of measurement; 95 % should lie within the band. \
+             Runs of equal sign, drifts and steps are structure.{}{}{}",
+        beyond_note((0..3).map(outside).sum()),
+        omission_note(lost.len()),
+        thinning_note(shown.len(), finite.len())
     );
-    let row = |own: &PoseError| {
-        std::iter::once(own.time * factor).chain(own.error.iter().map(|x| x * 1e3)).collect()
+    let row = |residual: &PoseError| {
+        let errors = residual.error.iter().map(|x| x * 1e3);
+        std::iter::once(residual.time * factor).chain(errors).collect()
     };
     let columns = [
         if label == "row" { "number" } else { label },
@@ -92,9 +96,15 @@ pub fn order(data: &PlotData) -> Option<Drawing> {
         "residual_y_mm",
         "residual_z_mm",
     ];
-    let sheet = Sheet::of_poses(&columns, shown.iter().map(|&(_, own)| (own, row(own))));
+    let cells = shown.iter().map(|&(_, residual)| (residual, row(residual)));
+    let sheet = Sheet::of_poses(&columns, cells);
     Some(
-        Drawing::new("residual-order", "The residuals one after another", caption, tags.put(&svg))
-            .with(sheet),
+        Drawing::new(
+            "residual-order",
+            "Residuals in the order of measurement",
+            caption,
+            tags.insert_into(&svg),
+        )
+        .with(sheet),
     )
 }

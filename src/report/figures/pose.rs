@@ -1,89 +1,95 @@
-//! A pose as the figures show it, and which poses are drawn.
+//! Residual of a pose, and the choice of poses that a figure draws.
 
 use nalgebra::Vector3;
 
 use crate::problem::Observation;
 
-/// A pose and what arms leave of it.
+/// Pose with its residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseError {
-    /// File and line of its row, without the folder where the names of the files are distinct.
+    /// File and line of its row, without the folder if the file names are distinct.
     pub place: String,
-    /// Commands or readings of its joints, 0 at fixed ones \[rad\] or \[m\].
+    /// Commands or readings of its joints, 0 for fixed ones \[rad\] or \[m\].
     pub configuration: Vec<f64>,
-    /// Whether it was held out.
+    /// True for a held-out pose.
     pub held_out: bool,
-    /// What was measured.
+    /// Kind of measurement.
     pub observation: Observation,
-    /// Measured position, or where the best arm has its target in a row that measures none,
+    /// Measured position, or the predicted target of the best arm in a row without a position,
     /// measuring frame \[m\].
     pub position: Vector3<f64>,
-    /// Residual measured − predicted, measuring frame \[m\]; of one number along x, of tilts
+    /// Residual measured − predicted, measuring frame \[m\]; a single value along x, tilts in
     /// \[rad\].
     pub error: Vector3<f64>,
-    /// The same of the nominal arm, with base and tool fitted where they are free \[m\].
+    /// Residual of the nominal arm, with base and tool fitted if they are free \[m\].
     pub before: Vector3<f64>,
-    /// 1 σ of each coordinate \[m\].
+    /// Standard deviation of each coordinate \[m\].
     pub sigma: f64,
-    /// Time \[s\], or the row's number where no time was measured.
+    /// Time \[s\], or the number of the row if no time was measured.
     pub time: f64,
 }
 
 impl PoseError {
-    /// Whether its residual is a length at a place of the target.
+    /// Returns true if the residual is a length at a position of the target.
     pub fn has_place(&self) -> bool {
         self.observation.is_of_arm() && !self.observation.is_angle()
     }
 }
 
-/// Of those that are drawn, one in so many is there because its value is among the largest.
-const LARGEST: usize = 10;
+/// Ratio of the sample size to the number of rows that are included for their large value.
+const SAMPLE_PER_LARGEST: usize = 10;
 
-/// At most `most` of some rows, ascending: those of the largest `size`, and others evenly among the
-/// rest.
-pub fn thin(rows: &[usize], most: usize, size: impl Fn(usize) -> f64) -> Vec<usize> {
-    weighted(rows, most, size).into_iter().map(|(row, _)| row).collect()
+/// Returns at most `limit` of some rows in ascending order: those with the largest `size`, and an
+/// even sample of the others.
+pub fn sample(rows: &[usize], limit: usize, size: impl Fn(usize) -> f64) -> Vec<usize> {
+    weighted_sample(rows, limit, size).into_iter().map(|(row, _)| row).collect()
 }
 
-/// The same, each with the number of rows that it stands for: 1 of the largest, as many as there
-/// are for one that is drawn of the others, so that sums over all rows can be told from those that
-/// are drawn [Horvitz & Thompson 1952].
-pub fn weighted(rows: &[usize], most: usize, size: impl Fn(usize) -> f64) -> Vec<(usize, f64)> {
-    if rows.len() <= most {
+/// Returns a sample like [`sample`], each row with the number of rows that it represents: 1 for the
+/// largest, the inverse sampling fraction for the others. Weighted sums over the sample estimate
+/// sums over all rows [Horvitz & Thompson 1952].
+pub fn weighted_sample(
+    rows: &[usize],
+    limit: usize,
+    size: impl Fn(usize) -> f64,
+) -> Vec<(usize, f64)> {
+    if rows.len() <= limit {
         return rows.iter().map(|&row| (row, 1.0)).collect();
     }
     let finite = |row: usize| Some(size(row)).filter(|size| size.is_finite()).unwrap_or(0.0);
     let mut by_size = rows.to_vec();
     by_size.sort_by(|&a, &b| finite(b).total_cmp(&finite(a)).then(a.cmp(&b)));
-    let (largest, rest) = by_size.split_at_mut((most / LARGEST).max(1));
-    rest.sort_unstable();
-    let every = rest.len().div_ceil((most - largest.len()).max(1));
-    let drawn: Vec<usize> = rest.iter().copied().step_by(every).collect();
-    let each = rest.len() as f64 / drawn.len().max(1) as f64;
-    let mut kept: Vec<(usize, f64)> = largest
+    let (largest, others) = by_size.split_at_mut((limit / SAMPLE_PER_LARGEST).max(1));
+    others.sort_unstable();
+    let step = others.len().div_ceil((limit - largest.len()).max(1));
+    let drawn: Vec<usize> = others.iter().copied().step_by(step).collect();
+    let weight = others.len() as f64 / drawn.len().max(1) as f64;
+    let mut sampled: Vec<(usize, f64)> = largest
         .iter()
         .map(|&row| (row, 1.0))
-        .chain(drawn.into_iter().map(|row| (row, each)))
+        .chain(drawn.into_iter().map(|row| (row, weight)))
         .collect();
-    kept.sort_unstable_by_key(|own| own.0);
-    kept
+    sampled.sort_unstable_by_key(|(row, _)| *row);
+    sampled
 }
 
-/// " 300 of 6487 poses are drawn, those with the largest residuals among them." where not all are.
-pub fn thinned(drawn: usize, all: usize) -> String {
-    if drawn < all {
-        format!(" {drawn} of {all} poses are drawn, those with the largest residuals among them.")
+/// Returns the sentence of a caption on omitted poses, for example " 300 of 6487 poses are drawn,
+/// including those with the largest residuals."; empty if all are drawn.
+pub fn thinning_note(drawn: usize, total: usize) -> String {
+    if drawn < total {
+        format!(" {drawn} of {total} poses are drawn, including those with the largest residuals.")
     } else {
         String::new()
     }
 }
 
-/// " 3 poses without an equilibrium are left out." where there are any.
-pub fn left_out(poses: usize) -> String {
+/// Returns the sentence of a caption on poses without equilibrium, for example " 3 poses without an
+/// equilibrium are omitted."; empty for none.
+pub fn omission_note(poses: usize) -> String {
     match poses {
         0 => String::new(),
-        1 => " One pose without an equilibrium is left out.".to_owned(),
-        n => format!(" {n} poses without an equilibrium are left out."),
+        1 => " One pose without an equilibrium is omitted.".to_owned(),
+        n => format!(" {n} poses without an equilibrium are omitted."),
     }
 }
 
@@ -95,12 +101,13 @@ mod tests {
     fn the_largest_stay() {
         let rows: Vec<usize> = (0..1000).collect();
         let size = |row: usize| if row == 501 { 9.0 } else { 1.0 / (row + 1) as f64 };
-        let kept = thin(&rows, 100, size);
-        assert!(kept.len() <= 100 && kept.len() > 80, "{}", kept.len());
-        assert!(kept.contains(&501) && kept.contains(&0) && kept.is_sorted());
-        assert_eq!(thin(&rows[..7], 100, size), rows[..7]);
-        assert_eq!(thin(&rows, 100, |_| f64::NAN).len(), kept.len());
-        let stands_for: f64 = weighted(&rows, 100, size).into_iter().map(|(_, count)| count).sum();
+        let sampled = sample(&rows, 100, size);
+        assert!(sampled.len() <= 100 && sampled.len() > 80, "{}", sampled.len());
+        assert!(sampled.contains(&501) && sampled.contains(&0) && sampled.is_sorted());
+        assert_eq!(sample(&rows[..7], 100, size), rows[..7]);
+        assert_eq!(sample(&rows, 100, |_| f64::NAN).len(), sampled.len());
+        let weighted = weighted_sample(&rows, 100, size);
+        let stands_for: f64 = weighted.into_iter().map(|(_, count)| count).sum();
         assert!((stands_for - 1000.0).abs() < 1e-9, "{stands_for}");
     }
 }

@@ -1,5 +1,4 @@
-//! What figures are drawn with: plotters, paper and axes, the numbers beside a drawing, and numbers
-//! in words.
+//! Common imports of the figures: plotters, canvas and axes, data sheets, and formatted numbers.
 
 pub use plotters::prelude::*;
 pub use plotters::style::text_anchor::HPos;
@@ -7,7 +6,7 @@ pub use plotters::style::text_anchor::HPos;
 pub use super::frame::{
     ACCENT, Area, Axis, BELOW, Drawing, FAINT, Failure, GRID, INK, LEFT, MUTED, Mark, TEXT, WARM,
     WIDTH, band, chart, figure, legend, line, note_beyond, pixels, px, range, round_numbers,
-    stacked, upright, with_margin, write, write_sized,
+    stacked, vertical_line, with_margin, write, write_sized,
 };
 pub use super::sheet::Sheet;
 pub use super::tags::Tags;

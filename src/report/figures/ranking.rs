@@ -1,28 +1,29 @@
-//! Candidates by what they explain.
+//! Ranking of candidate effects by their evidence.
 
 use super::prelude::*;
 use crate::problem::Effect;
 use crate::select::{Ranked, Trace};
 
-/// Candidates that are drawn.
-const MOST: usize = 12;
+/// Maximum number of candidates in the figure.
+const MAX_CANDIDATES: usize = 12;
+/// Height of a row in pixels.
 const ROW: i32 = 22;
-/// Room for names.
+/// Width for names in pixels.
 const NAMES: i32 = 200;
-/// p below this cannot be told from zero.
-const LEAST_P: f64 = 1e-300;
+/// Smallest p value that is distinguished from zero.
+const MIN_P: f64 = 1e-300;
 
-/// Name of an effect with its place, as in a problem file.
-fn named(found: &Effect, trace: &Trace) -> String {
-    let place = found.place();
-    let orders = match found {
+/// Returns the name of an effect with its site, as in a problem file.
+fn named(effect: &Effect, trace: &Trace) -> String {
+    let place = effect.place();
+    let orders = match effect {
         Effect::JointHarmonic { orders, .. } => {
             format!(" ×{}", orders.iter().map(u32::to_string).collect::<Vec<_>>().join(","))
         }
         _ => String::new(),
     };
-    let name = found.name();
-    match found {
+    let name = effect.name();
+    match effect {
         Effect::StationShift { at_time } | Effect::StationMove { at_time }
             if trace.time_measured =>
         {
@@ -33,17 +34,17 @@ fn named(found: &Effect, trace: &Trace) -> String {
         }
         Effect::JointWave { joint, order } => format!("{name} {joint} ×{order}"),
         Effect::TrackerSettling { time_constant } => format!("{name} {time_constant} s"),
-        own if own.has_memory() => own.name_and_place(),
+        effect if effect.has_memory() => effect.name_and_place(),
         _ if place.is_empty() => name.to_owned(),
         _ => format!("{name} {place}{orders}"),
     }
 }
 
-/// −log₁₀ p of the best candidates; those alike to the first are marked.
+/// Draws −log₁₀ p of the best candidates; candidates confounded with the first are marked.
 pub fn ranking(trace: &Trace) -> Option<Drawing> {
-    let shown: Vec<&Ranked> = trace.ranking.iter().take(MOST).collect();
+    let shown: Vec<&Ranked> = trace.ranking.iter().take(MAX_CANDIDATES).collect();
     let first = shown.first()?;
-    let evidence = |ranked: &Ranked| -ranked.p_value.max(LEAST_P).log10();
+    let evidence = |ranked: &Ranked| -ranked.p_value.max(MIN_P).log10();
     let most = shown
         .iter()
         .map(|ranked| evidence(ranked))
@@ -52,21 +53,21 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
     let alike = |ranked: &Ranked| first.alike.iter().any(|(other, _)| *other == ranked.effect);
     let count = i32::try_from(shown.len()).unwrap_or_default();
     let (top, bottom) = (10, 10 + ROW * count);
-    let place = |value: f64| px(NAMES) + pixels(value / most * f64::from(WIDTH - NAMES - 96));
+    let position = |value: f64| px(NAMES) + pixels(value / most * f64::from(WIDTH - NAMES - 96));
     let svg = figure((WIDTH, bottom + BELOW), "Candidate effects by evidence", |area| {
         for (value, number) in round_numbers((0.0, most), 5) {
-            let at = place(value);
-            upright(area, at, (top, bottom), GRID)?;
+            let at = position(value);
+            vertical_line(area, at, (top, bottom), GRID)?;
             write(area, &number, (at / px(1), bottom + 10), MUTED, HPos::Center)?;
         }
         for (k, ranked) in (0..).zip(&shown) {
             let y = top + ROW * k + ROW / 2;
-            let stands_out = ranked.p_value < trace.level;
-            let colour = if stands_out { INK } else { MUTED };
+            let is_significant = ranked.p_value < trace.level;
+            let colour = if is_significant { INK } else { MUTED };
             write(area, &named(&ranked.effect, trace), (NAMES - 8, y), colour, HPos::Right)?;
-            let end = place(evidence(ranked)).max(place(0.0) + px(1));
-            let bar = [(place(0.0), px(y - 6)), (end, px(y + 6))];
-            let style = match (k, alike(ranked), stands_out) {
+            let end = position(evidence(ranked)).max(position(0.0) + px(1));
+            let bar = [(position(0.0), px(y - 6)), (end, px(y + 6))];
+            let style = match (k, alike(ranked), is_significant) {
                 (0, _, true) => ACCENT.filled(),
                 (_, true, _) => ACCENT.mix(0.4).filled(),
                 _ => FAINT.filled(),
@@ -74,12 +75,12 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
             area.draw(&Rectangle::new(bar, style))?;
             let mark = if k > 0 && alike(ranked) { "≈ first, " } else { "" };
             let gain = format!("{mark}{} mm", mm(ranked.gain.max(0.0), 4));
-            // Beside the bar, and clear of the line.
-            let beside = end.max(place(-trace.level.log10()));
+            // The text is to the right of both bar and line.
+            let beside = end.max(position(-trace.level.log10()));
             write(area, &gain, (beside / px(1) + 6, y), MUTED, HPos::Left)?;
         }
-        let level = place(-trace.level.log10());
-        upright(area, level, (top - 4, bottom), INK)?;
+        let level = position(-trace.level.log10());
+        vertical_line(area, level, (top - 4, bottom), INK)?;
         write(
             area,
             "evidence, −log₁₀ p",
@@ -89,9 +90,10 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
         )
     });
     let caption = format!(
-        "{} candidates were tried on the fit of the declared model; these are the best. The longer the bar, the less chance \
-             could do as much; left of the upright line (p = {}) nothing stands out. Behind each bar: how much the effect would \
-             take off the root mean square error. Pale blue: hard to tell from the first with these poses.",
+        "{} candidates were tested on the fit of the declared model; these are the best. A longer bar is less likely to \
+             arise by chance; left of the vertical line (p = {}) a candidate is not significant. Next to each bar: the \
+             expected decrease of the root mean square error. Pale blue: hardly distinguishable from the first candidate \
+             with these poses.",
         trace.tried, trace.level
     );
     let row = |ranked: &&Ranked| {
@@ -103,5 +105,5 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
     };
     let sheet =
         Sheet::new(&["effect", "p_value", "expected_gain_mm"], shown.iter().map(row).collect());
-    Some(Drawing::new("ranking", "Which effects the residual points to", caption, svg).with(sheet))
+    Some(Drawing::new("ranking", "Candidate effects by evidence", caption, svg).with(sheet))
 }

@@ -1,15 +1,15 @@
-//! The numbers of a figure, for other programs.
+//! Data of a figure as a table.
 
 use super::pose::PoseError;
 use crate::files::csv;
 use crate::report::quantity::fixed;
 
-/// A table of what a figure shows.
+/// Table of the data that a figure draws.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Sheet {
-    /// Names of the columns, each with its unit.
+    /// Column names with units.
     pub header: Vec<String>,
-    /// Its rows.
+    /// Rows of the table.
     pub rows: Vec<Vec<String>>,
 }
 
@@ -18,20 +18,20 @@ impl Sheet {
         Self { header: header.iter().map(|&name| name.to_owned()).collect(), rows }
     }
 
-    /// Of poses: the file and line of each, whether it was held out, and further columns.
+    /// Creates a table of poses: file and line, true if held out, and additional columns.
     pub fn of_poses<'a>(
-        further: &[&str],
+        columns: &[&str],
         rows: impl IntoIterator<Item = (&'a PoseError, Vec<f64>)>,
     ) -> Self {
-        let header = [&["row", "held_out"], further].concat();
+        let header = [&["row", "held_out"], columns].concat();
         let cells = |(pose, values): (&PoseError, Vec<f64>)| {
-            let own = [pose.place.clone(), pose.held_out.to_string()];
-            own.into_iter().chain(values.into_iter().map(|value| fixed(value, 6))).collect()
+            let pose = [pose.place.clone(), pose.held_out.to_string()];
+            pose.into_iter().chain(values.into_iter().map(|value| fixed(value, 6))).collect()
         };
         Self::new(&header, rows.into_iter().map(cells).collect())
     }
 
-    /// As CSV.
+    /// Returns the table as CSV text.
     pub fn csv(&self) -> String {
         csv(self.header.clone(), self.rows.iter().cloned())
     }

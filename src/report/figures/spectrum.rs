@@ -1,24 +1,25 @@
-//! What the poses can tell: singular values.
+//! Singular values of the scaled Jacobian.
 
 use super::prelude::*;
 use crate::least_squares::Identifiability;
 
+/// Height of the figure in pixels.
 const HEIGHT: i32 = 280;
-/// Singular values below this part of the largest are drawn there.
-const LEAST: f64 = 1e-17;
+/// Relative singular value below which points are drawn at the lower edge.
+const MIN_VALUE: f64 = 1e-17;
 
-/// Singular values of the scaled Jacobian, largest first.
-pub fn spectrum(found: &Identifiability) -> Option<Drawing> {
-    let largest = found.singular_values.first().copied().filter(|value| *value > 0.0)?;
-    let relative = |value: f64| (value / largest).max(LEAST).log10();
-    let values: Vec<(f64, f64)> = found
+/// Draws the singular values of the scaled Jacobian in descending order.
+pub fn spectrum(identifiability: &Identifiability) -> Option<Drawing> {
+    let largest = identifiability.singular_values.first().copied().filter(|value| *value > 0.0)?;
+    let relative = |value: f64| (value / largest).max(MIN_VALUE).log10();
+    let values: Vec<(f64, f64)> = identifiability
         .singular_values
         .iter()
         .enumerate()
         .map(|(k, value)| (k as f64 + 1.0, relative(*value)))
         .collect();
     let lowest = values.iter().map(|at| at.1).fold(0.0, f64::min).floor().min(-2.0);
-    let unidentifiable = found.unidentifiable.len();
+    let unidentifiable = identifiability.unidentifiable.len();
     let svg = figure((WIDTH, HEIGHT), "Singular values", |area| {
         let entries = [("identifiable", ACCENT, Mark::Dot), ("not identifiable", WARM, Mark::Dot)];
         let body = legend(area, 20, if unidentifiable > 0 { &entries } else { &entries[..1] })?;
@@ -29,31 +30,32 @@ pub fn spectrum(found: &Identifiability) -> Option<Drawing> {
         let y = Axis::logarithmic((lowest, 0.3), "singular value / largest");
         let mut chart = chart(&body, &x, &y)?;
         for (k, at) in values.iter().enumerate() {
-            let colour = if k < found.rank { ACCENT } else { WARM };
+            let colour = if k < identifiability.rank { ACCENT } else { WARM };
             chart.draw_series([PathElement::new(vec![(at.0, lowest), *at], line(FAINT, 1.0))])?;
             chart.draw_series([Circle::new(*at, pixels(2.6), colour.filled())])?;
         }
         Ok(())
     });
-    let tells = match unidentifiable {
+    let statement = match unidentifiable {
         0 => "every combination is identifiable".to_owned(),
-        1 => "one combination is not identifiable: it can change and no predicted position moves"
+        1 => "one combination is not identifiable: changing it moves no predicted position"
             .to_owned(),
         n => format!(
-            "{n} combinations are not identifiable: they can change and no predicted position moves"
+            "{n} combinations are not identifiable: changing them moves no predicted position"
         ),
     };
     let caption = format!(
-        "Singular values of the Jacobian with columns of unit length, at the nominal arm; {tells}. Rank {} of {}, condition \
+        "Singular values of the Jacobian with columns of unit length, at the nominal arm; {statement}. Rank {} of {}, condition \
              number {:.0}.",
-        found.rank,
-        found.singular_values.len(),
-        found.condition_number()
+        identifiability.rank,
+        identifiability.singular_values.len(),
+        identifiability.condition_number()
     );
-    let values = found.singular_values.iter().enumerate();
+    let values = identifiability.singular_values.iter().enumerate();
     let rows = values.map(|(k, value)| {
-        vec![(k + 1).to_string(), format!("{value:e}"), (k < found.rank).to_string()]
+        vec![(k + 1).to_string(), format!("{value:e}"), (k < identifiability.rank).to_string()]
     });
     let sheet = Sheet::new(&["number", "singular_value", "identifiable"], rows.collect());
-    Some(Drawing::new("singular-values", "What the poses can tell", caption, svg).with(sheet))
+    let title = "Identifiable combinations of parameters";
+    Some(Drawing::new("singular-values", title, caption, svg).with(sheet))
 }

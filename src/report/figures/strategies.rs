@@ -1,72 +1,77 @@
-//! Strategies and parts of the elasticity side by side.
+//! Errors of strategies, of parts of the elasticity, and of rounds of a loop.
 
 use super::prelude::*;
 use crate::fit::{Comparison, Errors};
 use crate::problem::Effect;
 use crate::select::{ClosedLoop, Round};
 
+/// Height of a row in pixels.
 const ROW: i32 = 22;
-/// Room for names.
+/// Width for names in pixels.
 const NAMES: i32 = 236;
-/// Room for numbers.
+/// Width for numbers in pixels.
 const NUMBERS: i32 = 66;
+/// Height above the rows in pixels.
 const TOP: i32 = 26;
-/// Decades in which 2 and 5 have room for their numbers, too.
-const CLOSE: f64 = 2.2;
+/// Number of decades below which 2 and 5 are labelled, too.
+const MAX_LABELLED_DECADES: f64 = 2.2;
 
+/// Row of the figure.
 struct Entry {
     strategy: String,
     name: String,
-    /// How many solvers it stands for.
+    /// Number of solvers that share the row.
     solvers: usize,
     errors: Errors,
 }
 
-/// Held-out and identification error of every strategy with every solver, and of the paper's own
-/// procedure.
+/// Draws held-out and identification error of every strategy with every solver, and of the
+/// procedure of [Chen2021].
 pub fn strategies(comparison: &Comparison) -> Drawing {
     let mut entries: Vec<Entry> = Vec::new();
-    for found in &comparison.strategies {
-        // Solvers that end in the same place stand in one row.
-        let (strategy, errors) = (found.strategy.as_str(), found.fitted);
-        let same = |entry: &&mut Entry| {
+    for outcome in &comparison.strategies {
+        // Solvers with the same result share a row.
+        let (strategy, errors) = (outcome.strategy.as_str(), outcome.fitted);
+        let is_same = |entry: &&mut Entry| {
             let ratio = entry.errors.held_out.mean.norm / errors.held_out.mean.norm;
             entry.strategy == strategy && (ratio - 1.0).abs() < 1e-3
         };
-        if let Some(entry) = entries.iter_mut().find(same) {
+        if let Some(entry) = entries.iter_mut().find(is_same) {
             entry.solvers += 1;
             entry.name = format!("{strategy}, {} solvers", entry.solvers);
         } else {
-            let name = format!("{strategy} {}", found.solver.as_str());
+            let name = format!("{strategy} {}", outcome.solver.as_str());
             entries.push(Entry { name, ..entry(strategy.to_owned(), errors) });
         }
     }
-    entries.extend(comparison.paper.iter().map(|own| entry(own.name(), own.errors)));
-    let caption = "Mean position error after each strategy, on the fitted poses and on those held out, on a logarithmic scale. A \
-                   wide gap between the two marks of a row: the strategy has learned noise. Solvers that end in the same place \
+    let paper = comparison.paper.iter();
+    entries.extend(paper.map(|procedure| entry(procedure.name(), procedure.errors)));
+    let caption = "Mean position error of each strategy at the fitted and at the held-out poses, on a logarithmic scale. A \
+                   wide gap between the two marks of a row means that the strategy fits noise. Solvers with the same result \
                    share a row.";
-    drawn("strategies", ("Strategies side by side", "Error of every strategy"), caption, &entries)
+    let titles = ("Errors of the strategies", "Error of every strategy");
+    draw_entries("strategies", titles, caption, &entries)
 }
 
 fn entry(strategy: String, errors: Errors) -> Entry {
     Entry { name: strategy.clone(), strategy, solvers: 1, errors }
 }
 
-/// The same for every part of the elasticity that is kept; nothing for an arm without any.
+/// Draws the errors with every part of the elasticity; `None` for an arm without elasticity.
 pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
     let entries: Vec<Entry> = comparison
         .ablations
         .iter()
-        .map(|(part, found)| entry(part.as_str().to_owned(), found.fitted))
+        .map(|(part, outcome)| entry(part.as_str().to_owned(), outcome.fitted))
         .collect();
-    let caption = "Mean position error with only this part of the elasticity in the model, everything else fitted at once: from \
-                   rigid to complete, on a logarithmic scale.";
+    let caption = "Mean position error with only this part of the elasticity in the model and everything else fitted, \
+                   from rigid to complete, on a logarithmic scale.";
     let titles =
-        ("What each part of the elasticity is worth", "Error with parts of the elasticity");
-    (entries.len() > 1).then(|| drawn("ablations", titles, caption, &entries))
+        ("Contribution of each part of the elasticity", "Error with parts of the elasticity");
+    (entries.len() > 1).then(|| draw_entries("ablations", titles, caption, &entries))
 }
 
-/// The same after each round of a loop, with what it added.
+/// Draws the errors after each round of a loop, with the effects it added.
 pub fn rounds(closure: &ClosedLoop) -> Option<Drawing> {
     let after = |(k, round): (usize, &Round)| {
         let errors = Errors { identification: round.identification, held_out: round.held_out };
@@ -74,39 +79,45 @@ pub fn rounds(closure: &ClosedLoop) -> Option<Drawing> {
     };
     let mut entries = vec![entry("as declared".to_owned(), closure.before.fit.fitted)];
     entries.extend(closure.rounds.iter().enumerate().map(after));
-    let caption = "Mean position error after each round of the loop, on the fitted poses and on those held out, which took part in \
-                   no choice, on a logarithmic scale. Where the two part, a round has learned noise.";
-    (entries.len() > 1)
-        .then(|| drawn("rounds", ("Round by round", "Error after every round"), caption, &entries))
+    let caption = "Mean position error after each round of the loop, at the fitted poses and at the held-out ones, which do not \
+                   influence any choice, on a logarithmic scale. If the two diverge, a round has fitted noise.";
+    let titles = ("Errors after each round", "Error after every round");
+    (entries.len() > 1).then(|| draw_entries("rounds", titles, caption, &entries))
 }
 
-/// Entries with a title, and a label for who cannot see them.
-fn drawn(name: &str, (title, label): (&str, &str), caption: &str, entries: &[Entry]) -> Drawing {
+/// Draws entries with a title, and a label for screen readers.
+fn draw_entries(
+    name: &str,
+    (title, label): (&str, &str),
+    caption: &str,
+    entries: &[Entry],
+) -> Drawing {
     Drawing::new(name, title, caption, rows(entries, label)).with(sheet(entries))
 }
 
-/// What a round changed, counted from 0.
+/// Returns the change by a round, counted from 0.
 fn round_name(closure: &ClosedLoop, k: usize) -> String {
     let before = k.checked_sub(1).map_or(&[][..], |last| closure.rounds[last].effects.as_slice());
-    let own = &closure.rounds[k].effects;
+    let effects = &closure.rounds[k].effects;
     let named =
         |effect: &Effect| format!("{} {}", effect.name(), effect.place()).trim_end().to_owned();
-    let added: Vec<&Effect> = own.iter().filter(|effect| !before.contains(effect)).collect();
+    let added: Vec<&Effect> = effects.iter().filter(|effect| !before.contains(effect)).collect();
     let change = match added.as_slice() {
-        [] if own.len() < before.len() => {
-            format!("− {} of {}", before.len() - own.len(), before.len())
+        [] if effects.len() < before.len() => {
+            format!("− {} of {}", before.len() - effects.len(), before.len())
         }
-        [] => "nothing more".to_owned(),
-        [one] => format!("+ {}", named(one)),
-        [one, rest @ ..] => format!("+ {} and {} more", named(one), rest.len()),
+        [] => "no change".to_owned(),
+        [single] => format!("+ {}", named(single)),
+        [first, others @ ..] => format!("+ {} and {} more", named(first), others.len()),
     };
     format!("{} {change}", k + 1)
 }
 
 fn sheet(entries: &[Entry]) -> Sheet {
-    let row = |own: &Entry| {
-        let errors = [own.errors.identification.mean.norm, own.errors.held_out.mean.norm];
-        std::iter::once(own.name.clone()).chain(errors.map(|error| fixed(error * 1e3, 6))).collect()
+    let row = |entry: &Entry| {
+        let errors = [entry.errors.identification.mean.norm, entry.errors.held_out.mean.norm];
+        let errors = errors.map(|error| fixed(error * 1e3, 6));
+        std::iter::once(entry.name.clone()).chain(errors).collect()
     };
     Sheet::new(&["name", "fitted_mean_mm", "held_out_mean_mm"], entries.iter().map(row).collect())
 }
@@ -120,18 +131,18 @@ fn rows(entries: &[Entry], label: &str) -> String {
     let (low, high) = if low < high { ((low - 0.1), (high + 0.1)) } else { (low - 0.5, low + 0.5) };
     let bottom = TOP + ROW * i32::try_from(entries.len()).unwrap_or_default();
     let room = f64::from(WIDTH - NAMES - NUMBERS);
-    let place = |value: f64| px(NAMES) + pixels((value - low) / (high - low) * room);
+    let position = |value: f64| px(NAMES) + pixels((value - low) / (high - low) * room);
     let best = entries.iter().map(|entry| of(entry)[1]).fold(f64::INFINITY, f64::min);
     figure((WIDTH, bottom + BELOW), label, |area| {
         let marks = [("fitted poses", FAINT), ("held-out poses", INK), ("best", ACCENT)];
         legend(area, TOP, &marks.map(|(name, colour)| (name, colour, Mark::Dot)))?;
         for decade in -6..=6 {
-            for part in [1.0_f64, 2.0, 5.0] {
-                let value = f64::from(decade) + part.log10();
+            for step in [1.0_f64, 2.0, 5.0] {
+                let value = f64::from(decade) + step.log10();
                 if (low..=high).contains(&value) {
-                    let at = place(value);
-                    upright(area, at, (TOP, bottom), GRID)?;
-                    if part < 1.5 || high - low < CLOSE {
+                    let at = position(value);
+                    vertical_line(area, at, (TOP, bottom), GRID)?;
+                    if step < 1.5 || high - low < MAX_LABELLED_DECADES {
                         let digits = usize::try_from(-decade).unwrap_or_default();
                         let number = number(10.0_f64.powf(value), digits);
                         write(area, &number, (at / px(1), bottom + 10), MUTED, HPos::Center)?;
@@ -148,10 +159,10 @@ fn rows(entries: &[Entry], label: &str) -> String {
                 write(area, "no result", (NAMES + 8, y), MUTED, HPos::Left)?;
                 continue;
             }
-            let ends = vec![(place(fitted), px(y)), (place(held_out), px(y))];
+            let ends = vec![(position(fitted), px(y)), (position(held_out), px(y))];
             area.draw(&PathElement::new(ends, line(FAINT, 1.4)))?;
-            area.draw(&Circle::new((place(fitted), px(y)), pixels(3.4), FAINT.filled()))?;
-            area.draw(&Circle::new((place(held_out), px(y)), pixels(3.4), colour.filled()))?;
+            area.draw(&Circle::new((position(fitted), px(y)), pixels(3.4), FAINT.filled()))?;
+            area.draw(&Circle::new((position(held_out), px(y)), pixels(3.4), colour.filled()))?;
             let value = entry.errors.held_out.mean.norm * 1e3;
             write(
                 area,

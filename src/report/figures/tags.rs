@@ -1,48 +1,46 @@
-//! What elements of a drawing stand for, as data beside them: `<circle data-p="12" …>` is the pose
-//! of row 12.
+//! Data attributes of drawn elements: `<circle data-p="12" …>` is the pose of row 12.
 
 use std::cell::RefCell;
 
-/// Tags of the last elements of one kind, in the order in which they are drawn.
+/// Attributes of the last elements of one kind, in the order of drawing.
 #[derive(Debug)]
 pub struct Tags {
     element: &'static str,
-    all: RefCell<Vec<String>>,
+    attributes: RefCell<Vec<String>>,
 }
 
 impl Tags {
-    /// Of dots.
+    /// Creates attributes for dots.
     pub fn of_dots() -> Self {
-        Self { element: "<circle", all: RefCell::default() }
+        Self { element: "<circle", attributes: RefCell::default() }
     }
 
-    /// Of boxes.
+    /// Creates attributes for boxes.
     pub fn of_boxes() -> Self {
-        Self { element: "<rect", all: RefCell::default() }
+        Self { element: "<rect", attributes: RefCell::default() }
     }
 
-    /// The next dot is the pose of a row, where it is one.
+    /// Marks the next dot as the pose of a row, if there is one.
     pub fn pose(&self, row: Option<usize>) {
-        self.own(row.map_or_else(String::new, |row| format!(" data-p=\"{row}\"")));
+        self.push(row.map_or_else(String::new, |row| format!(" data-p=\"{row}\"")));
     }
 
-    /// The next element has these attributes.
-    pub fn own(&self, attributes: String) {
-        self.all.borrow_mut().push(attributes);
+    /// Adds the attributes of the next element.
+    pub fn push(&self, attributes: String) {
+        self.attributes.borrow_mut().push(attributes);
     }
 
-    /// The drawing with them.
-    pub fn put(self, svg: &str) -> String {
-        let all = self.all.into_inner();
+    /// Returns the drawing with the attributes inserted.
+    pub fn insert_into(self, svg: &str) -> String {
+        let attributes = self.attributes.into_inner();
         let parts: Vec<&str> = svg.split(self.element).collect();
-        let untagged = (parts.len() - 1).saturating_sub(all.len());
-        let mut text = String::with_capacity(svg.len() + 16 * all.len());
+        let untagged = (parts.len() - 1).saturating_sub(attributes.len());
+        let mut text = String::with_capacity(svg.len() + 16 * attributes.len());
         for (k, part) in parts.into_iter().enumerate() {
             if k > 0 {
                 text.push_str(self.element);
-                text.extend(
-                    k.checked_sub(untagged + 1).and_then(|tag| all.get(tag)).map(String::as_str),
-                );
+                let tag = k.checked_sub(untagged + 1).and_then(|tag| attributes.get(tag));
+                text.extend(tag.map(String::as_str));
             }
             text.push_str(part);
         }
@@ -61,7 +59,7 @@ mod tests {
         tags.pose(None);
         let svg = "<circle cx=\"1\"/><text/><circle cx=\"2\"/><circle cx=\"3\"/>";
         assert_eq!(
-            tags.put(svg),
+            tags.insert_into(svg),
             "<circle cx=\"1\"/><text/><circle data-p=\"7\" cx=\"2\"/><circle cx=\"3\"/>"
         );
     }

@@ -1,5 +1,5 @@
-//! Blocks as a page that needs nothing else: nothing to load, and no script to be read; its own
-//! adds what one can do with poses. Its figures are files of their own as well.
+//! HTML report: one self-contained page. Scripts add interaction with poses; figures are also
+//! separate files.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -12,25 +12,25 @@ use crate::problem::Problem;
 use crate::report::document::{Bar, Block, CODE, Headline, Mark, Point, Table};
 use crate::report::figures::Drawing;
 
-/// Half the width of a bar in standard errors: wider changes run off it.
-const REACH: f64 = 10.0;
+/// Half-width of a bar in standard errors; larger changes end at its edge.
+const BAR_SIGMAS: f64 = 10.0;
 
-/// What a page does beyond being read, and the arm in three dimensions.
+/// Scripts of the page: interaction, and the three-dimensional view of the arm.
 const SCRIPTS: [&str; 2] = [include_str!("page.js"), include_str!("view.js")];
 
-/// A report for people.
+/// Report for people, in two formats.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Report {
-    /// In brief and without figures.
+    /// Short version without figures.
     pub markdown: String,
-    /// The whole page: nothing to load, and no script needed to read it.
+    /// Self-contained page that is readable without scripts.
     pub html: String,
-    /// File name and SVG text of every figure.
+    /// File name and SVG text of each figure.
     pub figures: Vec<(String, String)>,
 }
 
-/// The report of some blocks; `kind` says what was done.
+/// Renders the report of some blocks; `kind` names what was done.
 pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block]) -> Report {
     let title = if problem.title.is_empty() { &problem.name } else { &problem.title };
     let mut figures = Vec::new();
@@ -42,7 +42,7 @@ pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block])
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { (title) " – " (kind) }
-                // An empty picture of its own, so that no browser asks for one.
+                // An empty icon, so that browsers do not request one.
                 link rel="icon" href="data:,";
                 style { (PreEscaped(style::sheet())) }
             }
@@ -55,8 +55,8 @@ pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block])
                     (body)
                     footer {
                         "Made by flexcal " (env!("CARGO_PKG_VERSION")) ". Errors are distances between measured and predicted \
-                        positions. Before: the nominal arm, with base and tool fitted where they are free, unless the page says \
-                        otherwise. Held-out poses decided nothing: no parameter was fitted to them and no effect chosen by them."
+                        positions. Before: the nominal arm, with base and tool fitted if they are free, unless stated \
+                        otherwise. Held-out poses influence nothing: no parameter is fitted to them and no effect chosen by them."
                         @if !figures.is_empty() { " Every figure is also a file in the folder figures." }
                     }
                 }
@@ -64,13 +64,14 @@ pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block])
             }
         }
     };
-    let files =
-        figures.iter().map(|own| (format!("{}.svg", own.name), printable(&style::alone(&own.svg))));
+    let files = figures
+        .iter()
+        .map(|figure| (format!("{}.svg", figure.name), printable(&style::standalone(&figure.svg))));
     let html = printable(&page.into_string());
     Report { markdown: markdown(&problem.title, blocks), figures: files.collect(), html }
 }
 
-/// What stands before the first heading, then a section for each heading.
+/// Renders the blocks before the first heading, then a section for each heading.
 fn sections<'a>(blocks: &'a [Block], figures: &mut Vec<&'a Drawing>) -> Markup {
     let shown = on_page(blocks);
     let starts: Vec<usize> =
@@ -78,26 +79,27 @@ fn sections<'a>(blocks: &'a [Block], figures: &mut Vec<&'a Drawing>) -> Markup {
     let ends = starts.iter().copied().chain([shown.len()]);
     let parts = std::iter::once(0).chain(starts.iter().copied()).zip(ends);
     html! {
-        @for (from, to) in parts { section { @for block in &shown[from..to] { (one(block, figures)) } } }
+        @for (from, to) in parts { section { @for item in &shown[from..to] { (block(item, figures)) } } }
     }
 }
 
-/// What the page shows, one after another.
+/// Returns the blocks that the page shows, in order.
 fn on_page<'a, 'b>(blocks: &'b [Block<'a>]) -> Vec<&'b Block<'a>> {
-    let mut all = Vec::new();
+    let mut shown = Vec::new();
     for block in blocks {
         match block {
-            Block::Page(inner) => all.extend(on_page(inner)),
+            Block::Page(inner) => shown.extend(on_page(inner)),
             Block::Words(_) => {}
-            shown => all.push(shown),
+            block => shown.push(block),
         }
     }
-    all
+    shown
 }
 
-fn one<'a>(block: &'a Block, figures: &mut Vec<&'a Drawing>) -> Markup {
+/// Renders one block and collects its figures.
+fn block<'a>(item: &'a Block, figures: &mut Vec<&'a Drawing>) -> Markup {
     html! {
-        @match block {
+        @match item {
             Block::Heading(text) => h2 { (words(text)) },
             Block::Text(text) => p { (words(text)) },
             Block::Note(text) => p.note { (words(text)) },
@@ -105,24 +107,24 @@ fn one<'a>(block: &'a Block, figures: &mut Vec<&'a Drawing>) -> Markup {
                 p { (words(text)) }
                 @if !points.is_empty() { ul.plain { @for point in points { li.skip { (words(point)) } } } }
             },
-            Block::List(points) => ul.plain { @for point in points { (item(point)) } },
-            Block::Ranking(points) => ol { @for point in points { (item(point)) } },
-            Block::Table(own) => (table(own)),
-            Block::Headline(own) => (headline(own)),
-            Block::Blanks(own) => dl.blanks { @for term in own { div { dt { (term) } dd {} } } },
-            Block::Poses(own) => (poses::section(own)),
-            Block::Figures(own) => (grid(own, figures)),
+            Block::List(points) => ul.plain { @for point in points { (list_item(point)) } },
+            Block::Ranking(points) => ol { @for point in points { (list_item(point)) } },
+            Block::Table(content) => (table(content)),
+            Block::Headline(content) => (headline(content)),
+            Block::Blanks(terms) => dl.blanks { @for term in terms { div { dt { (term) } dd {} } } },
+            Block::Poses(data) => (poses::section(data)),
+            Block::Figures(drawings) => (grid(drawings, figures)),
             Block::Folded(title, inner, on_paper) => {
-                details { summary { (words(title)) } @for block in inner { (one(block, figures)) } }
+                details { summary { (words(title)) } @for item in inner { (block(item, figures)) } }
                 p.folded { (words(on_paper)) }
             },
-            Block::Page(inner) => @for block in on_page(inner) { (one(block, figures)) },
+            Block::Page(inner) => @for item in on_page(inner) { (block(item, figures)) },
             Block::Words(_) => "",
         }
     }
 }
 
-/// Words with their code.
+/// Renders text with its code spans.
 fn words(text: &str) -> Markup {
     let mut parts = Vec::new();
     for (k, part) in text.split(CODE.0).enumerate() {
@@ -135,13 +137,13 @@ fn words(text: &str) -> Markup {
     }
 }
 
-/// Without control characters, which no page may have, and others that are not seen but do
-/// something.
+/// Removes control characters and other invisible characters.
 fn printable(text: &str) -> String {
     text.chars().filter(|&c| c == '\n' || !is_hidden(c)).collect()
 }
 
-fn item(point: &Point) -> Markup {
+/// Renders a list item with its details.
+fn list_item(point: &Point) -> Markup {
     let class = point.mark.map(|mark| match mark {
         Mark::Failed => "fail",
         Mark::Passed => "pass",
@@ -155,21 +157,21 @@ fn item(point: &Point) -> Markup {
     }
 }
 
-/// Before → after, as large as it deserves, and facts.
-fn headline(own: &Headline) -> Markup {
+/// Renders the errors of all states, and facts.
+fn headline(headline: &Headline) -> Markup {
     html! {
-        @let last = own.states.len().saturating_sub(1);
+        @let last = headline.states.len().saturating_sub(1);
         div.big {
-            @for (k, (label, error)) in own.states.iter().enumerate() {
+            @for (k, (label, error)) in headline.states.iter().enumerate() {
                 @if k > 0 { span.arrow { "→" } }
                 span.state {
-                    span class=(if k == last { "now" } else { "was" }) { (error) @if k == last { " " span.unit { (own.unit) } } }
+                    span class=(if k == last { "now" } else { "was" }) { (error) @if k == last { " " span.unit { (headline.unit) } } }
                     span.label { (label) }
                 }
             }
         }
-        p.under { "mean error on " (own.of) }
-        dl.facts { @for (term, value) in &own.facts { div { dt { (term) } dd { (value) } } } }
+        p.under { "mean error at " (headline.of) }
+        dl.facts { @for (term, value) in &headline.facts { div { dt { (term) } dd { (value) } } } }
     }
 }
 
@@ -180,7 +182,7 @@ fn table(table: &Table) -> Markup {
         (false, true) => Some("o"),
         (false, false) => None,
     };
-    // A minus is wider than a hyphen, and names keep their hyphens.
+    // Numbers get a minus sign instead of a hyphen; names keep their hyphens.
     let cell = |k: usize, text: &str| {
         if table.left.contains(&k) { text.to_owned() } else { text.replace('-', "−") }
     };
@@ -188,10 +190,10 @@ fn table(table: &Table) -> Markup {
     html! {
         @for note in &table.notes { p.o { (words(note)) } }
         @if bars.is_some() {
-            p.o { "bars: the change from nominal in units of its standard error, up to ten either way, with one standard error about \
-                it; changes beyond that rest at the end, an orange mark there is a bound" }
+            p.o { "bars: the change from nominal in units of its standard error, limited to ±10, with an interval of one standard error; \
+                larger changes end at the edge, an orange mark there is a bound" }
         }
-        // Rows that continue those above keep their places.
+        // Rows that continue the row above cannot be sorted.
         @let sorts = table.rows.len() > 3 && table.rows.iter().all(|row| row.first().is_some_and(|cell| !cell.is_empty()));
         div.scroll tabindex="0" role="region" aria-label={ "table: " (table.header.iter().find(|head| !head.is_empty()).unwrap_or(&"")) } { table.sort[sorts] {
             thead { tr {
@@ -208,24 +210,24 @@ fn table(table: &Table) -> Markup {
     }
 }
 
-/// The change in standard errors about nominal, with one standard error about it.
-fn bar(own: &Bar) -> Markup {
-    let place = |sigmas: f64| 50.0 + 50.0 * (sigmas / REACH).clamp(-1.0, 1.0);
+/// Renders the change from nominal in standard errors, with an interval of one standard error.
+fn bar(bar: &Bar) -> Markup {
+    let position = |sigmas: f64| 50.0 + 50.0 * (sigmas / BAR_SIGMAS).clamp(-1.0, 1.0);
     html! {
-        @if let Some(bound) = own.bound {
+        @if let Some(bound) = bar.bound {
             span.bar { i {} u {} b.at.out style=(format!("left:{:.0}%", 100.0 * bound)) {} }
-        } @else if let Some(change) = own.change.filter(|change| change.is_finite()) {
-            @let (from, to) = (place(change - 1.0), place(change + 1.0));
+        } @else if let Some(change) = bar.change.filter(|change| change.is_finite()) {
+            @let (from, to) = (position(change - 1.0), position(change + 1.0));
             span.bar title=(format!("{change:.1} σ")) {
                 i {} u {}
                 b style=(format!("left:{from:.1}%;width:{:.1}%", to - from)) {}
-                b.at style=(format!("left:{:.1}%", place(change))) {}
+                b.at style=(format!("left:{:.1}%", position(change))) {}
             }
         }
     }
 }
 
-/// A table as an address that holds it.
+/// Returns a data URL that contains a CSV table.
 fn address(csv: &str) -> String {
     let escapes =
         [("%", "%25"), ("#", "%23"), ("\n", "%0A"), ("\r", ""), (" ", "%20"), ("/", "%2F")];
@@ -235,7 +237,7 @@ fn address(csv: &str) -> String {
     format!("data:text/csv;charset=utf-8,{csv}")
 }
 
-/// Figures side by side where there is room, numbered after those that were shown.
+/// Renders figures in a grid, numbered after those already shown.
 fn grid<'a>(new: &'a [Drawing], shown: &mut Vec<&'a Drawing>) -> Markup {
     let first = shown.len() + 1;
     let grid = html! {

@@ -1,4 +1,4 @@
-//! Blocks as Markdown with GitHub's tables.
+//! Markdown report with GitHub's tables.
 
 use std::fmt::Write as _;
 
@@ -6,12 +6,12 @@ use super::text::{flat, marked};
 use crate::error::is_hidden;
 use crate::report::document::{Block, CODE, Point, Table};
 
-/// Blocks below a title, ending in a line break.
+/// Renders blocks below a title, ending in a line break.
 pub(in crate::report) fn markdown(title: &str, blocks: &[Block]) -> String {
     let mut text = format!("# {}\n", escaped(&one_line(title)));
     for block in flat(blocks) {
         text.push('\n');
-        // A String takes whatever is written to it.
+        // Writing to a String cannot fail.
         match block {
             Block::Heading(words) => _ = writeln!(text, "## {}", escaped(words)),
             Block::Text(words) | Block::Note(words) => _ = writeln!(text, "{}", escaped(words)),
@@ -22,20 +22,20 @@ pub(in crate::report) fn markdown(title: &str, blocks: &[Block]) -> String {
                 }
                 text.extend(points.iter().map(|words| format!("- {}\n", escaped(words))));
             }
-            Block::List(points) => points.iter().for_each(|own| point(&mut text, "- ", own)),
+            Block::List(points) => points.iter().for_each(|item| point(&mut text, "- ", item)),
             Block::Ranking(points) => {
                 points
                     .iter()
                     .enumerate()
-                    .for_each(|(k, own)| point(&mut text, &format!("{}. ", k + 1), own));
+                    .for_each(|(k, item)| point(&mut text, &format!("{}. ", k + 1), item));
             }
-            Block::Table(own) => {
-                table(&mut text, own);
-                if !own.notes.is_empty() {
-                    let _ = writeln!(text, "{}\n", escaped(&own.notes.join("\n")));
+            Block::Table(content) => {
+                table(&mut text, content);
+                if !content.notes.is_empty() {
+                    let _ = writeln!(text, "{}\n", escaped(&content.notes.join("\n")));
                 }
             }
-            // Of the page alone.
+            // Other blocks are for the page only.
             _ => {}
         }
     }
@@ -67,57 +67,58 @@ fn one_line(words: &str) -> String {
     words.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Words with the marks that Markdown would take for its own, and code between backticks.
+/// Escapes text for Markdown and puts code spans between backticks.
 fn escaped(words: &str) -> String {
     let mut text = String::with_capacity(words.len());
-    let mut rest = words;
-    while let Some((before, after)) = rest.split_once(CODE.0) {
+    let mut remaining = words;
+    while let Some((before, after)) = remaining.split_once(CODE.0) {
         plain(&mut text, before);
         let (code, after) = after.split_once(CODE.1).unwrap_or((after, ""));
-        // Code that holds backticks itself stands between more of them.
+        // Code that contains backticks is fenced by more of them.
         let longest = code.split(|c| c != '`').map(str::len).max().unwrap_or(0);
         let (fence, space) = ("`".repeat(longest + 1), if longest > 0 { " " } else { "" });
         let _ = write!(text, "{fence}{space}{code}{space}{fence}");
-        rest = after;
+        remaining = after;
     }
-    plain(&mut text, rest);
+    plain(&mut text, remaining);
     text
 }
 
-/// Words of which Markdown makes nothing: no code, emphasis, tag, entity, link, picture, address or
+/// Appends text in which Markdown finds no code, emphasis, tag, entity, link, image, URL or
 /// heading.
 fn plain(text: &mut String, words: &str) {
     let words: Vec<char> = words.chars().filter(|&c| c == '\n' || !is_hidden(c)).collect();
-    let follows =
+    let is_followed_by =
         |k: usize, word: &str| word.chars().zip(k + 1..).all(|(c, k)| words.get(k) == Some(&c));
     for (k, &c) in words.iter().enumerate() {
         let before = k.checked_sub(1).and_then(|k| words.get(k)).copied();
         let in_word = |c: Option<&char>| c.is_some_and(|c| c.is_alphanumeric());
-        // Marks at the beginning of a line may begin a heading, a list, a quotation, a rule or a
+        // A mark at the start of a line may begin a heading, a list, a quotation, a rule or a
         // fence.
-        let begins =
+        let starts_line =
             before.map_or(text.is_empty() || text.ends_with(['\n', ' ']), |before| before == '\n');
-        let marks = match c {
+        let is_markup = match c {
             '*' | '<' | '\\' | '`' | '~' | '@' => true,
             '_' => !(in_word(before.as_ref()) && in_word(words.get(k + 1))),
             '&' => words.get(k + 1).is_some_and(|c| c.is_ascii_alphanumeric() || *c == '#'),
-            // A link's text, a picture's, and what a reference defines.
-            ']' => ["(", "[", ":"].iter().any(|next| follows(k, next)),
-            '!' => follows(k, "["),
-            ':' => follows(k, "//"),
+            // End of a link text, of an image text, or of a reference label.
+            ']' => ["(", "[", ":"].iter().any(|next| is_followed_by(k, next)),
+            '!' => is_followed_by(k, "["),
+            ':' => is_followed_by(k, "//"),
             '.' => {
                 k >= 3
                     && words
                         .get(k - 3..k)
                         .is_some_and(|www| www.iter().all(|w| w.eq_ignore_ascii_case(&'w')))
             }
-            '#' | '>' | '=' => begins,
+            '#' | '>' | '=' => starts_line,
             '+' | '-' => {
-                begins && words.get(k + 1).is_none_or(|next| next.is_whitespace() || *next == c)
+                starts_line
+                    && words.get(k + 1).is_none_or(|next| next.is_whitespace() || *next == c)
             }
             _ => false,
         };
-        if marks {
+        if is_markup {
             text.push('\\');
         }
         text.push(c);
@@ -129,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_that_a_name_holds_is_active() {
+    fn names_contain_no_active_markup() {
         let cases = [
             ("[x](https://a.b)", "[x\\](https\\://a.b)"),
             ("![x][y] and [z]: u", "\\![x\\][y] and [z\\]: u"),

@@ -1,4 +1,4 @@
-//! Blocks as terminals, Markdown and browsers show them.
+//! Rendering of report blocks for terminals, Markdown and browsers.
 
 mod html;
 mod markdown;

@@ -1,5 +1,5 @@
-//! Pose by pose: the arm in three dimensions, ranges of joints to choose by, the largest residuals,
-//! and what the script knows.
+//! Section on individual poses: view of the arm, ranges of joints, the largest residuals, and the
+//! data of the script.
 
 use maud::{Markup, PreEscaped, html};
 use nalgebra::Vector3;
@@ -10,49 +10,49 @@ use crate::report::figures::{PlotData, Point};
 use crate::report::quantity::{mm, number};
 use crate::report::table::Command;
 
-/// Poses in the table.
-const LISTED: usize = 12;
+/// Number of poses in the table of the largest residuals.
+const LISTED_POSES: usize = 12;
 
-/// What the script knows of a page.
+/// Data of the script of a page.
 #[derive(Debug, Serialize)]
-struct Store {
-    /// Name, unit and number of each joint that takes a command.
+struct ScriptData {
+    /// Name, unit and index of each joint that takes a command.
     joints: Vec<(String, String, usize)>,
     poses: Vec<Entry>,
-    /// What residuals may be traced to: its name, and rows with its value.
+    /// Regressors of the effects found: label, and rows with their values.
     traced: Vec<(String, Vec<(usize, f64)>)>,
-    /// Positions that no fitted pose is near \[mm\].
+    /// Positions without a fitted pose near \[mm\].
     uncovered: Vec<[f64; 3]>,
 }
 
-/// A pose; lengths in mm.
+/// Pose in the data of the script; lengths in mm.
 #[derive(Debug, Serialize)]
 struct Entry {
     row: usize,
     place: String,
     held_out: bool,
-    /// What was measured, where that is no position.
+    /// Kind of measurement, if it is no position.
     #[serde(skip_serializing_if = "Option::is_none")]
     kind: Option<&'static str>,
-    /// How many poses it stands for, where not all are there.
+    /// Number of poses that it represents, if not all are included.
     #[serde(skip_serializing_if = "Option::is_none")]
     n: Option<f64>,
     q: Vec<f64>,
     position: [f64; 3],
     before: [f64; 3],
     after: [f64; 3],
-    /// The arm as a line, and by how much it gives.
+    /// Centre line of the rigid arm.
     #[serde(skip_serializing_if = "Option::is_none")]
     rigid: Option<Vec<i64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     give: Option<Vec<f64>>,
 }
 
-/// With so many decimals; NaN, which JSON does not have, becomes null.
+/// Rounds to a number of decimals; NaN becomes null in JSON.
 fn rounded(value: f64, decimals: i32) -> f64 {
     let power = 10.0_f64.powi(decimals);
     let rounded = (value * power).round() / power;
-    // Never −0.
+    // Adding zero turns −0 into 0.
     rounded + 0.0
 }
 
@@ -60,15 +60,15 @@ fn millimetres(length: &Vector3<f64>, decimals: i32) -> [f64; 3] {
     [length.x, length.y, length.z].map(|x| rounded(x * 1e3, decimals))
 }
 
-/// Points of the rigid arm \[mm\].
+/// Returns the points of the rigid arm \[mm\].
 fn rigid(arm: &CentreLine) -> Vec<i64> {
     #[expect(clippy::cast_possible_truncation, reason = "millimetres of an arm")]
     let whole = |x: f64| (x * 1e3).round() as i64;
     arm.rigid.iter().flat_map(|at| [at.x, at.y, at.z]).map(whole).collect()
 }
 
-/// How far they give \[mm\].
-fn give(arm: &CentreLine) -> Vec<f64> {
+/// Returns the deflections of these points \[mm\].
+fn deflections(arm: &CentreLine) -> Vec<f64> {
     arm.bent
         .iter()
         .zip(&arm.rigid)
@@ -76,27 +76,27 @@ fn give(arm: &CentreLine) -> Vec<f64> {
         .collect()
 }
 
-impl Store {
+impl ScriptData {
     fn of(data: &PlotData) -> Self {
-        let joint = |own: &Command| (own.name(), own.symbol(), own.joint);
+        let joint = |command: &Command| (command.name(), command.symbol(), command.joint);
         let entry = |((&row, &count), arm): ((&usize, &f64), &Option<CentreLine>)| {
-            let own = &data.residuals[row];
+            let residual = &data.residuals[row];
+            let observation = &residual.observation;
+            let coordinate = |command: &Command| {
+                rounded(residual.configuration[command.joint] * command.factor(), 5)
+            };
             Entry {
                 row,
-                place: own.place.clone(),
-                held_out: own.held_out,
-                kind: Some(own.observation.kind()).filter(|_| !own.observation.is_position()),
+                place: residual.place.clone(),
+                held_out: residual.held_out,
+                kind: Some(observation.kind()).filter(|_| !observation.is_position()),
                 n: Some(count).filter(|count| *count > 1.0),
-                q: data
-                    .commands
-                    .iter()
-                    .map(|own_q| rounded(own.configuration[own_q.joint] * own_q.factor(), 5))
-                    .collect(),
-                position: millimetres(&own.position, 2),
-                before: millimetres(&own.before, 4),
-                after: millimetres(&own.error, 4),
+                q: data.commands.iter().map(coordinate).collect(),
+                position: millimetres(&residual.position, 2),
+                before: millimetres(&residual.before, 4),
+                after: millimetres(&residual.error, 4),
                 rigid: arm.as_ref().map(rigid),
-                give: arm.as_ref().filter(|arm| arm.bent != arm.rigid).map(give),
+                give: arm.as_ref().filter(|arm| arm.bent != arm.rigid).map(deflections),
             }
         };
         let traced = data.causes.iter().map(|cause| {
@@ -115,24 +115,24 @@ impl Store {
     }
 }
 
-/// The data of a page for its script; nothing in it ends the element that holds it.
-fn store(data: &PlotData) -> String {
-    serde_json::to_string(&Store::of(data))
+/// Returns the data of the script as JSON that cannot end the element that holds it.
+fn script_data(data: &PlotData) -> String {
+    serde_json::to_string(&ScriptData::of(data))
         .unwrap_or_default()
         .replace('<', "\\u003c")
         .replace("//", "/\\/")
 }
 
-/// The section.
+/// Renders the section.
 pub(super) fn section(data: &PlotData) -> Markup {
     let without = without_positions(data);
     if data.shown.is_empty() && !without.is_empty() {
         return html! { p { (without) } };
     }
     html! {
-        h2 { "Pose by pose" }
+        h2 { "Individual poses" }
         @if !without.is_empty() { p { (without) } }
-        p hidden data-script { "Point at a dot of any figure to see which row it is; choose it, here or there, and all figures mark it." }
+        p hidden data-script { "Point at a dot of any figure to see its row; select it, here or there, and all figures mark it." }
         (view(data))
         (ranges(data))
         div.chosen id="chosen" hidden {
@@ -142,33 +142,32 @@ pub(super) fn section(data: &PlotData) -> Markup {
             " " button type="button" data-do="none" { "none" }
         }
         (largest(data))
-        script type="application/json" id="poses" { (PreEscaped(store(data))) }
+        script type="application/json" id="poses" { (PreEscaped(script_data(data))) }
     }
 }
 
-/// What is not drawn of rows that measure no positions; nothing to say where all do.
+/// Returns a sentence on rows without positions; empty if all rows measure positions.
 fn without_positions(data: &PlotData) -> String {
-    if data.residuals.iter().all(|own| own.observation.is_position()) {
+    if data.residuals.iter().all(|residual| residual.observation.is_position()) {
         return String::new();
     }
     let figures = if data.has_positions() {
-        "show positions alone"
+        "show positions only"
     } else {
-        "are left out: no row measures a position"
+        "are omitted: no row measures a position"
     };
-    let tilts = if data.residuals.iter().any(|own| own.observation.is_angle()) {
-        "; tilts have no place"
+    let tilts = if data.residuals.iter().any(|residual| residual.observation.is_angle()) {
+        "; tilts have no position"
     } else {
         ""
     };
     format!(
         "Figures of errors along axes, of residual vectors and of residuals in order {figures}. In the view of the arm, contacts and \
-         distances stand where the fitted arm has its target, those of one number without a stroke{tilts}."
+         distances are at the target of the fitted arm, single values without a line{tilts}."
     )
 }
 
-/// The arm in its poses; shown by the script where there is WebGL. The figure of residual vectors
-/// is the same without.
+/// Renders the view of the arm in its poses, which the script shows if WebGL is available.
 fn view(data: &PlotData) -> Markup {
     let coverage = &data.coverage;
     let share = 100.0 * (1.0 - coverage.uncovered.len() as f64 / coverage.tried.max(1) as f64);
@@ -177,8 +176,8 @@ fn view(data: &PlotData) -> Markup {
             canvas tabindex="0" role="img" aria-label="The arm in its poses, with the residual of each: drag or use the arrow keys to turn it, + and − to come closer" {}
             div.controls {
                 label { "deflection, times " input type="range" data-view="give" min="0" max="3" step="0.01" value="0"; }
-                label { "length of strokes " input type="range" data-view="length" min="-1" max="1" step="0.01" value="0"; }
-                label { "strokes " select data-view="vectors" {
+                label { "length of lines " input type="range" data-view="length" min="-1" max="1" step="0.01" value="0"; }
+                label { "lines " select data-view="vectors" {
                     option value="after" { "residual after" } option value="before" { "residual before" } option value="none" { "none" }
                 } }
                 label { "colour by " select data-view="colour" {
@@ -192,17 +191,17 @@ fn view(data: &PlotData) -> Markup {
             p.under { output {} }
         }
         @if coverage.tried > 0 {
-            p { (number(share, 0)) " % of " (coverage.tried) " positions evenly drawn from the joints' limits (or measured ranges, where no \
-                limit is declared) lie within " (mm(coverage.near, 0)) " mm of a fitted pose." }
+            p { (number(share, 0)) " % of " (coverage.tried) " positions, uniformly distributed over the joint limits (or measured ranges, \
+                if no limit is declared), lie within " (mm(coverage.near, 0)) " mm of a fitted pose." }
         }
     }
 }
 
-/// Two ends of a range for each joint.
+/// Renders two range inputs for each joint.
 fn ranges(data: &PlotData) -> Markup {
     html! {
         div.brush id="brush" hidden {
-            p { "Keep the poses in which each joint stands between two angles; a box of the map of joints does the same:" }
+            p { "Select the poses in which each joint is between two values; a box of the map of joints does the same:" }
             @for (k, command) in data.commands.iter().enumerate() {
                 fieldset {
                     legend { (command.name()) " " span data-range=(k) {} }
@@ -215,29 +214,29 @@ fn ranges(data: &PlotData) -> Markup {
     }
 }
 
-/// The largest residuals with their rows.
+/// Renders the table of the largest residuals.
 fn largest(data: &PlotData) -> Markup {
     let mut rows: Vec<usize> =
         data.shown.iter().copied().filter(|&row| data.size(row).is_finite()).collect();
     rows.sort_by(|&a, &b| data.size(b).total_cmp(&data.size(a)));
-    rows.truncate(LISTED);
+    rows.truncate(LISTED_POSES);
     html! {
-        @let all = data.residuals.iter().all(|own| own.observation.is_position());
-        p { "The largest residuals of " (data.placed()) @if all { " poses:" } @else { " rows:" } }
+        @let all_positions = data.residuals.iter().all(|residual| residual.observation.is_position());
+        p { "The largest residuals of " (data.placed()) @if all_positions { " poses:" } @else { " rows:" } }
         div.scroll tabindex="0" role="region" aria-label="The largest residuals" { table.sort {
             thead { tr {
                 th.l { "row" } th.l { "pose" }
-                @for own in &data.commands { th.o { (own.name()) ", " (own.symbol()) } }
+                @for command in &data.commands { th.o { (command.name()) ", " (command.symbol()) } }
                 th.o { "before, mm" } th { "residual, mm" } th.o { "in σ" }
             } }
             tbody { @for row in rows {
-                @let own = &data.residuals[row];
+                @let residual = &data.residuals[row];
                 tr data-row=(row) {
-                    td.l { (own.place) } td.l { @if own.held_out { "held out" } @else { "fitted" } }
+                    td.l { (residual.place) } td.l { @if residual.held_out { "held out" } @else { "fitted" } }
                     @for command in &data.commands {
-                        td.o { (number(own.configuration[command.joint] * command.factor(), 2).replace('-', "−")) }
+                        td.o { (number(residual.configuration[command.joint] * command.factor(), 2).replace('-', "−")) }
                     }
-                    td.o { (mm(own.before.norm(), 3)) } td { (mm(own.error.norm(), 4)) } td.o { (number(own.error.norm() / own.sigma, 1)) }
+                    td.o { (mm(residual.before.norm(), 3)) } td { (mm(residual.error.norm(), 4)) } td.o { (number(residual.error.norm() / residual.sigma, 1)) }
                 }
             } }
         } }

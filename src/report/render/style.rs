@@ -1,4 +1,4 @@
-//! How page and figures look, light and dark, on a screen, a phone and paper.
+//! Style sheet of page and figures, for light and dark themes, screens and paper.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,7 @@ use plotters::style::RGBColor;
 
 use crate::report::figures::{ACCENT, FAINT, GRID, INK, MUTED, WARM};
 
-/// Colours of the figures with the names and the values that they have on a dark page.
+/// Colours of the figures with their names and their values in the dark theme.
 const COLOURS: [(RGBColor, &str, &str); 6] = [
     (INK, "ink", "#e6e9ec"),
     (MUTED, "muted", "#9aa4ae"),
@@ -20,11 +20,12 @@ const DARK_PAPER: &str = "#14181c";
 
 const LAYOUT: &str = include_str!("page.css");
 
+/// Returns a colour in hexadecimal notation.
 fn hex(colour: RGBColor) -> String {
     format!("#{:02X}{:02X}{:02X}", colour.0, colour.1, colour.2)
 }
 
-/// The variables of both themes; paper is always light.
+/// Returns the colour variables of both themes; printed paper is always light.
 fn themes() -> String {
     let mut text = format!(":root{{color-scheme:light dark;--paper:{LIGHT_PAPER}");
     for (light, name, _) in COLOURS {
@@ -41,8 +42,8 @@ fn themes() -> String {
     text
 }
 
-/// What the drawings' own colours become.
-fn exchanged(colour: impl Fn(&'static str, &'static str) -> String) -> String {
+/// Returns rules that replace the colours in the drawings.
+fn replaced_colours(colour: impl Fn(&'static str, &'static str) -> String) -> String {
     let mut text = String::new();
     for (light, name, dark) in COLOURS {
         let (light, colour) = (hex(light), colour(name, dark));
@@ -54,17 +55,17 @@ fn exchanged(colour: impl Fn(&'static str, &'static str) -> String) -> String {
     text
 }
 
-/// The style sheet of a page.
+/// Returns the style sheet of a page.
 pub(super) fn sheet() -> String {
-    format!("{}{LAYOUT}{}", themes(), exchanged(|name, _| format!("var(--{name})")))
+    format!("{}{LAYOUT}{}", themes(), replaced_colours(|name, _| format!("var(--{name})")))
 }
 
-/// A figure that stands alone: drawn on paper, its colours written out where it is dark, and light
-/// for who reads no styles.
-pub(super) fn alone(svg: &str) -> String {
+/// Returns a figure as a separate file: with a background, and with dark colours for viewers that
+/// support styles.
+pub(super) fn standalone(svg: &str) -> String {
     let style = format!(
         "<style>@media screen and (prefers-color-scheme:dark){{\n[fill=\"{LIGHT_PAPER}\"]{{fill:{DARK_PAPER}}}\n{}}}</style>",
-        exchanged(|_, dark| dark.to_owned())
+        replaced_colours(|_, dark| dark.to_owned())
     );
     let paper = format!("<rect x=\"-50%\" width=\"200%\" height=\"100%\" fill=\"{LIGHT_PAPER}\"/>");
     match svg.split_once('>') {

@@ -1,20 +1,20 @@
-//! Blocks on a terminal.
+//! Text report for terminals.
 
 use comfy_table::{CellAlignment, presets::NOTHING};
 
 use crate::report::document::{Block, Mark, Point, Table};
 
-/// Columns that running text is wrapped to; tables may be wider.
+/// Maximum width of running text in columns; tables may be wider.
 const WIDTH: usize = 110;
 
-/// Blocks as text, ending in a line break.
+/// Renders blocks as text, ending in a line break.
 pub(in crate::report) fn text(blocks: &[Block]) -> String {
     text_within(blocks, WIDTH)
 }
 
-/// The same with running text wrapped to at most so many columns.
-pub(in crate::report) fn text_within(blocks: &[Block], most: usize) -> String {
-    let width = most.min(WIDTH);
+/// Renders blocks as text with running text wrapped to at most `columns` columns.
+pub(in crate::report) fn text_within(blocks: &[Block], columns: usize) -> String {
+    let width = columns.min(WIDTH);
     let mut text = String::new();
     let mut follows_heading = false;
     for block in flat(blocks) {
@@ -32,43 +32,45 @@ pub(in crate::report) fn text_within(blocks: &[Block], most: usize) -> String {
                 text.extend(words.lines().map(|line| wrapped(line, ("", ""), width)));
                 text.extend(points.iter().map(|point| wrapped(point, ("  ", "    "), width)));
             }
-            Block::List(points) => points.iter().for_each(|own| point(&mut text, "- ", own, width)),
+            Block::List(points) => {
+                points.iter().for_each(|item| point(&mut text, "- ", item, width))
+            }
             Block::Ranking(points) => {
                 points
                     .iter()
                     .enumerate()
-                    .for_each(|(k, own)| point(&mut text, &format!("{}. ", k + 1), own, width));
+                    .for_each(|(k, item)| point(&mut text, &format!("{}. ", k + 1), item, width));
             }
-            Block::Table(own) => {
-                text.push_str(&table(own));
-                text.extend(own.notes.iter().map(|note| wrapped(note, ("  ", "  "), width)));
+            Block::Table(content) => {
+                text.push_str(&table(content));
+                text.extend(content.notes.iter().map(|note| wrapped(note, ("  ", "  "), width)));
             }
-            // Of the page alone.
+            // Other blocks are for the page only.
             _ => {}
         }
     }
     text
 }
 
-/// What terminals and Markdown show, one after another.
+/// Returns the blocks that terminals and Markdown show, in order.
 pub(super) fn flat<'a, 'b>(blocks: &'b [Block<'a>]) -> Vec<&'b Block<'a>> {
-    let mut all = Vec::new();
+    let mut shown = Vec::new();
     for block in blocks {
         match block {
-            Block::Words(inner) => all.extend(flat(inner)),
+            Block::Words(inner) => shown.extend(flat(inner)),
             Block::Headline(_)
             | Block::Blanks(_)
             | Block::Figures(_)
             | Block::Poses(_)
             | Block::Folded(..)
             | Block::Page(_) => {}
-            shown => all.push(shown),
+            block => shown.push(block),
         }
     }
-    all
+    shown
 }
 
-/// A point's text with how its test went.
+/// Returns the text of a point with the result of its test.
 pub(super) fn marked(point: &Point) -> String {
     let mark = match point.mark {
         Some(Mark::Failed) => "failed: ",
@@ -79,31 +81,31 @@ pub(super) fn marked(point: &Point) -> String {
 }
 
 fn point(text: &mut String, mark: &str, point: &Point, width: usize) {
-    let (first, further) = (format!("  {mark}"), " ".repeat(2 + mark.len()));
-    text.push_str(&wrapped(&marked(point), (&first, &further), width));
+    let (first, indent) = (format!("  {mark}"), " ".repeat(2 + mark.len()));
+    text.push_str(&wrapped(&marked(point), (&first, &indent), width));
     for detail in &point.details {
-        text.push_str(&wrapped(detail, (&further, &format!("{further}  ")), width));
+        text.push_str(&wrapped(detail, (&indent, &format!("{indent}  ")), width));
     }
 }
 
-/// Lines of words, each ending in a line break; a break in the words stays one.
-fn wrapped(words: &str, (first, further): (&str, &str), width: usize) -> String {
+/// Wraps text, each line ending in a line break; line breaks in the text are kept.
+fn wrapped(words: &str, (first, following): (&str, &str), width: usize) -> String {
     let plain = plain(words);
-    // Names of effects and files stay whole, to be copied.
+    // Names of effects and files are not split, so that they can be copied.
     let options = textwrap::Options::new(width)
         .initial_indent(first)
-        .subsequent_indent(further)
+        .subsequent_indent(following)
         .break_words(false)
         .word_splitter(textwrap::WordSplitter::NoHyphenation);
     textwrap::wrap(&plain, options).iter().flat_map(|line| [line.trim_end(), "\n"]).collect()
 }
 
-/// Without marks and what else would steer the terminal.
+/// Removes code marks and other control characters.
 fn plain(words: &str) -> String {
     words.chars().filter(|c| !c.is_control() || *c == '\n').collect()
 }
 
-/// Rows and columns without lines around them.
+/// Renders a table without lines around it.
 fn table(table: &Table) -> String {
     let mut shown = comfy_table::Table::new();
     let rows = table.rows.iter().map(|row| row.iter().map(|cell| plain(cell)).collect::<Vec<_>>());
@@ -123,7 +125,7 @@ mod tests {
     use crate::report::render::markdown::markdown;
 
     #[test]
-    fn a_story_is_shown_both_ways() {
+    fn blocks_are_shown_as_text_and_markdown() {
         let details = vec!["2 < 3".to_owned()];
         let point =
             Point { text: format!("found {}", code("a*b")), details, mark: Some(Mark::Passed) };
@@ -142,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn titles_and_names_change_nothing_else() {
+    fn titles_and_names_contain_no_active_markup() {
         let words = format!("link ` is *off*: {}\u{1b}[31m", code("link = \"a`*\""));
         let story = [Block::Text(words)];
         assert_eq!(text(&story), "link ` is *off*: link = \"a`*\"[31m\n");

@@ -188,8 +188,8 @@
     draw("point", dots, matrix, 0);
 
     const scale = (value) => String(Number(value.toPrecision(2)));
-    legend.textContent = poses.length + " poses; axes of the measuring frame" + (most > 0 ? "; deflection \u00d7 " + scale(factor) : "; in this model nothing gives way") +
-      (input("vectors").value === "none" ? "" : "; strokes \u00d7 " + scale(lengthen / unit)) +
+    legend.textContent = poses.length + " poses; axes of the measuring frame" + (most > 0 ? "; deflection \u00d7 " + scale(factor) : "; the model is rigid") +
+      (input("vectors").value === "none" ? "" : "; lines \u00d7 " + scale(lengthen / unit)) +
       (by === "kind" ? "; strong: held out, faint: fitted" : "; blue to orange: " + scale(ends[0]) + " to " + scale(ends[1]) + " " + (traced ? traced[0] : "mm"));
     box.dataset.drawn = String(poses.length);
   };
