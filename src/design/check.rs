@@ -53,7 +53,7 @@ pub enum CheckedPoses {
 pub enum PredictionPoses {
     /// Poses drawn uniformly from the ranges.
     Ranges,
-    /// Held-out rows.
+    /// Held-out rows of the table.
     HeldOut,
     /// The checked poses themselves.
     Same,

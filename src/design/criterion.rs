@@ -37,7 +37,7 @@ pub enum Criterion {
 pub(super) struct ScaledCriterion {
     /// Unknowns whose errors count, in ascending order.
     pub wanted: Vec<usize>,
-    /// All other unknowns.
+    /// Other unknowns, whose errors do not count.
     pub nuisance: Vec<usize>,
     pub measure: Measure,
 }

@@ -20,7 +20,7 @@ pub struct ExpectedParameter {
     pub name: String,
     /// Unit of the quantity.
     pub unit: Unit,
-    /// Nominal value, SI.
+    /// Nominal value of the parameter, SI.
     pub nominal: f64,
     /// Standard deviation of the prior at the nominal value, SI.
     pub prior: Option<f64>,
@@ -38,7 +38,7 @@ pub struct ExpectedParameter {
 /// Forecast of the identification of all free parameters from a set of poses.
 #[derive(Debug, Clone)]
 pub struct Forecast {
-    /// Number of poses.
+    /// Number of poses of the forecast.
     pub poses: usize,
     /// Identifiability by the measurements alone, without priors.
     pub identifiability: Identifiability,

@@ -52,9 +52,9 @@ pub enum Candidates {
 /// Options of a plan.
 #[derive(Clone, Copy)]
 pub struct PlanOptions<'a> {
-    /// Number of poses.
+    /// Number of poses to plan.
     pub poses: usize,
-    /// Criterion to minimise.
+    /// Criterion that the plan minimises.
     pub criterion: &'a Criterion,
     /// Seed of all random numbers.
     pub seed: u64,

@@ -12,7 +12,7 @@ use crate::select::{Separation, separation};
 /// Two effects to separate, with a problem that declares both.
 #[derive(Debug, Clone)]
 pub struct EffectPair {
-    /// Both effects.
+    /// Both effects of the pair.
     pub effects: [Effect; 2],
     /// Problem without the effects.
     pub plain: Problem,
@@ -80,7 +80,7 @@ impl EffectPair {
 /// Separation of two effects by a plan and by random poses.
 #[derive(Debug, Clone)]
 pub struct PairSeparation {
-    /// Both effects.
+    /// Both effects of the pair.
     pub effects: [Effect; 2],
     /// Criterion that the plan minimises.
     pub criterion: Criterion,

@@ -80,7 +80,7 @@ impl Projector {
 
 /// Linearisation error of one chunk.
 struct ChunkError {
-    /// J₀ᵀ ρ.
+    /// Gradient change J₀ᵀ ρ of the residual change.
     gradient: DVector<f64>,
     /// ‖r(x)‖², ‖J₀ δ‖² and ‖ρ‖².
     squares: [f64; 3],

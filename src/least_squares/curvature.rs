@@ -7,11 +7,11 @@ const DIFFERENCE_STEP: f64 = 1e-4;
 
 /// Cost, gradient and Gauss–Newton matrix of an objective at one point.
 pub(super) struct Slopes {
-    /// ½‖r‖².
+    /// Cost ½‖r‖² at the point.
     pub cost: f64,
-    /// Jᵀr.
+    /// Gradient Jᵀr of the cost.
     pub gradient: DVector<f64>,
-    /// JᵀJ.
+    /// Gauss–Newton matrix JᵀJ.
     pub normal: DMatrix<f64>,
 }
 

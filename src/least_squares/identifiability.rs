@@ -280,15 +280,12 @@ mod tests {
         let unknowns: Vec<Vec<usize>> = found
             .unidentifiable
             .iter()
-            .map(|own| own.weights.iter().map(|w| w.0).collect())
+            .map(|combination| combination.weights.iter().map(|w| w.0).collect())
             .collect();
         assert_eq!(unknowns, [vec![0, 2], vec![1, 2, 4], vec![3]]);
-        assert!(
-            found
-                .unidentifiable
-                .iter()
-                .all(|own| own.singular_value < 1e-12 && own.weights[0].1 > 0.0)
-        );
+        assert!(found.unidentifiable.iter().all(
+            |combination| combination.singular_value < 1e-12 && combination.weights[0].1 > 0.0
+        ));
         assert!(found.visible[3] == 0.0 && found.visible[1] > 0.0);
         // Orthonormal in scaled unknowns, and seen by no row there.
         let norms: Vec<f64> = triangle
@@ -305,14 +302,14 @@ mod tests {
         // Without singular values the same space.
         let blind = Blind::in_triangle(&triangle);
         assert!(certain_null(&Scaled::of(&triangle).matrix).is_some());
-        let own = unscaled(&blind.gauge);
-        assert!((own.transpose() * &own - rows.transpose() * &rows).amax() < 1e-12);
+        let recovered = unscaled(&blind.gauge);
+        assert!((recovered.transpose() * &recovered - rows.transpose() * &rows).amax() < 1e-12);
         assert!(
             blind
                 .visible
                 .iter()
                 .zip(&found.visible)
-                .all(|(own, other)| (own - other).abs() < 1e-12)
+                .all(|(value, other)| (value - other).abs() < 1e-12)
         );
     }
 
@@ -330,7 +327,7 @@ mod tests {
                     .visible
                     .iter()
                     .zip(&found.visible)
-                    .all(|(own, other)| (own - other).abs() < 1e-9),
+                    .all(|(value, other)| (value - other).abs() < 1e-9),
                 "{small}"
             );
         }

@@ -19,7 +19,7 @@ pub enum Loss {
     Squares,
     /// Huber's loss: ρ = s² for s ≤ k, ρ = 2ks − k² beyond [Huber 1964].
     Huber {
-        /// Threshold k \[σ\].
+        /// Threshold k of the residual length \[σ\].
         threshold: f64,
     },
     /// Smoothed absolute length, ρ = 2c (√(s² + ε²) − ε); approximately c s²/ε for s ≪ ε.
@@ -42,11 +42,11 @@ impl Loss {
     /// Slope of [`Loss::L1`] for three coordinates: the density ∝ exp(−2s) has standard deviation 1
     /// in each coordinate, like whitened noise.
     pub const L1_POSITION: f64 = 2.0;
-    /// Smoothing length of [`Loss::L1`]: small against the noise, so that the efficiency on Gaussian
-    /// noise is that of the unsmoothed loss, 85 %.
+    /// Smoothing length of [`Loss::L1`]: small against the noise, so that the efficiency on
+    /// Gaussian noise is that of the unsmoothed loss, 85 %.
     pub const L1_SMOOTHING: f64 = 0.1;
 
-    /// Returns ρ(s²).
+    /// Returns the loss ρ(s²) of a residual length s.
     pub fn rho(self, s: f64) -> f64 {
         match self {
             Self::Squares => s * s,

@@ -65,7 +65,7 @@ pub trait LeastSquares: Sync {
     fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block);
 }
 
-/// A block of rows [∂r/∂x  r], stored column after column.
+/// Block of rows [∂r/∂x  r], stored column after column.
 #[derive(Debug, Clone)]
 pub struct Block {
     rows: usize,

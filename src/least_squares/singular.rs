@@ -19,7 +19,7 @@ const MIN_PARALLEL_COLUMNS: usize = 4 * GROUP_COLUMNS;
 pub(super) struct Decomposition {
     /// Scaled right singular vectors σᵢ vᵢ as columns.
     pub columns: DMatrix<f64>,
-    /// Singular values σᵢ.
+    /// Singular values σᵢ, in the order of the columns.
     pub singular: Vec<f64>,
     /// Projections `uᵢᵀc` of the constant.
     pub projected: DVector<f64>,

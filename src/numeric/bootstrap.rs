@@ -7,7 +7,7 @@ use statrs::function::erf::{erfc, erfc_inv};
 /// Estimate with its confidence interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
-    /// Estimated value.
+    /// Estimate of the quantity.
     pub value: f64,
     /// Lower end of the interval.
     pub low: f64,

@@ -21,7 +21,7 @@ const TRANSPOSED_COLUMNS: usize = 24;
 /// Number of multiplications from which a product is formed in parallel.
 const MIN_PARALLEL_WORK: usize = 1 << 20;
 
-/// Returns A B.
+/// Returns the product A B, formed in parallel.
 pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     if b.ncols() <= NARROW && a.len() * b.ncols() >= MIN_PARALLEL_WORK {
         return narrow_product(a, b);

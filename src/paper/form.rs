@@ -90,7 +90,7 @@ impl Misprint {
             Self::SlopePlaces => {
                 ("slope-places", "eq. 4, 5, 7", "slopes exchanged, or without their sign")
             }
-            Self::Stretch => ("stretch", "eq. 6", "stretch by own weight twice"),
+            Self::Stretch => ("stretch", "eq. 6", "stretch by the link's weight doubled"),
             Self::HoistBeyond => {
                 ("hoist-beyond", "eq. 6", "link A does not carry the hoist on link B")
             }

@@ -13,7 +13,7 @@ use crate::problem::{Beam, PoseView, Problem};
 /// Force \[N\] and moment [N·m] at a point.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wrench {
-    /// Force \[N\].
+    /// Force at the point \[N\].
     pub force: Vector3<f64>,
     /// Moment about the point [N·m].
     pub moment: Vector3<f64>,

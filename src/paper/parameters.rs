@@ -7,7 +7,7 @@ use crate::problem::Problem;
 /// Geometric parameters E and flexibilities S, with an entry for each joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
-    /// Geometry E.
+    /// Geometry E of the joints.
     pub geometry: Vec<Mdh>,
     /// Flexibility l/(`GI_p`) of each joint [rad/(N·m)]; 0 is rigid.
     pub joints: Vec<f64>,
@@ -101,7 +101,7 @@ impl Parameters {
         }
     }
 
-    /// Sets a flexibility.
+    /// Sets the value of a flexibility.
     pub fn set(&mut self, which: Flexibility, value: f64) {
         match which {
             Flexibility::Joint(k) => self.joints[k] = value,

@@ -26,7 +26,7 @@ pub enum StiffnessStage {
 }
 
 impl StiffnessStage {
-    /// All sources.
+    /// All sources, in the order of the results.
     pub const EACH: [Self; 4] =
         [Self::Rigid, Self::Nominal, Self::Positions, Self::LoadDifferences];
 

@@ -21,7 +21,7 @@ use super::{joint, parameters::Flexibility};
 /// ⎣ 0      aᵀ    ⎦                                                        [Chen2021, eq. 17, 18, 37]
 /// ```
 ///
-/// Motions [dx dy dz δx δy δz], \[m\] and \[rad\], each in its own frame.
+/// Motions [dx dy dz δx δy δz], \[m\] and \[rad\], are each in the frame that moves.
 pub fn transfer(u: &Matrix4<f64>) -> Matrix6<f64> {
     let (axes, origin) = split(u);
     let mut out = Matrix6::zeros();

@@ -50,7 +50,7 @@ impl Hinge {
 /// Deformation of a hinge.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Motion {
-    /// Rotation vector \[rad\].
+    /// Rotation vector of the deformation \[rad\].
     pub rotation: Vector3<f64>,
     /// Displacement along x \[m\].
     pub stretch: f64,

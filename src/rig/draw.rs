@@ -15,7 +15,7 @@ use crate::problem::{
 };
 use crate::random::{normal, stream};
 
-/// Stream of the parameter deviations. Every quantity has its own stream, so that more numbers of
+/// Stream of the parameter deviations. Each quantity has a separate stream, so that more numbers of
 /// one kind do not shift another.
 const DEVIATIONS: u64 = 0;
 /// Stream of the poses.
@@ -38,7 +38,7 @@ pub struct Row {
     pub conditions: PoseConditions,
     /// Name of the measured target; empty if the problem declares none.
     pub target: String,
-    /// Kind of measurement.
+    /// Kind of measurement of the row.
     pub observation: Observation,
     /// Measured position, measuring frame, or a distance; 0 for a contact \[m\].
     pub position: Vector3<f64>,
@@ -53,7 +53,7 @@ pub struct Row {
 pub struct Simulation {
     /// Name of the problem.
     pub problem: String,
-    /// The declared joints.
+    /// Joints that the problem declares.
     pub joints: Vec<Joint>,
     /// Fixtures that the rows measure against.
     pub fixtures: Vec<Fixture>,

@@ -57,7 +57,7 @@ impl TrueEffect {
         }
     }
 
-    /// Returns the cause.
+    /// Returns the cause of the effect.
     pub fn cause(&self) -> &Cause {
         &self.cause
     }

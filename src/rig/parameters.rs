@@ -8,11 +8,11 @@ use crate::quantity::Unit;
 pub struct TrueParameter {
     /// Name as in the problem file.
     pub name: String,
-    /// Kind of quantity.
+    /// Unit of the quantity.
     pub unit: Unit,
-    /// Declared value.
+    /// Value that the problem declares.
     pub nominal: f64,
-    /// True value.
+    /// Value of the true arm.
     pub value: f64,
 }
 

@@ -16,7 +16,7 @@ const DEFAULT_TIME_STEP: f64 = 60.0;
 /// Names of other quantities of the section, which no joint may use.
 const RESERVED: [&str; 4] = ["payload", "hoist", "temperature", "time_step"];
 
-/// Contents of `[poses]`.
+/// Contents of the section `[poses]`.
 pub(super) struct Poses {
     pub ranges: PoseRanges,
     /// Range of the time between poses \[s\].
@@ -28,7 +28,7 @@ pub(super) struct Poses {
     pub tilts: Vec<usize>,
 }
 
-/// Reads the section.
+/// Reads the section `[poses]`.
 pub(super) fn read(mut section: Section<'_, '_>, problem: &Problem) -> Result<Poses, InputError> {
     let joints = problem.joints.iter().enumerate();
     let joints = joints.map(|(index, joint)| joint_range(&mut section, index + 1, joint, problem));

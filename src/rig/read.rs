@@ -1,4 +1,4 @@
-//! Reader of `TRUTH.toml`.
+//! Reader of the truth file `TRUTH.toml`.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -149,7 +149,7 @@ fn example(joints: &[Joint]) -> String {
     format!("[poses] with the range of each joint: {}", ranges.join(", "))
 }
 
-/// Contents of `[noise]`.
+/// Contents of the section `[noise]`.
 #[derive(Default)]
 struct Noise {
     /// Standard deviation of a position \[m\], if given.
@@ -160,7 +160,7 @@ struct Noise {
     turn: Option<f64>,
     /// Standard deviation of a tilt \[rad\], if given.
     tilt: Option<f64>,
-    /// Error to report if positions, or contacts without a σ of their own, are measured.
+    /// Error to report if positions, or contacts without a given σ, are measured.
     missing: Option<InputError>,
 }
 

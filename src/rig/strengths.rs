@@ -11,7 +11,7 @@ use crate::problem::{Effect, PoseRanges, Problem};
 /// Key of an effect outside the catalogue.
 const OUTSIDE: &str = "outside";
 
-/// Reads every `[[effect]]`.
+/// Reads every table `[[effect]]` of a truth.
 pub(super) fn read(
     root: &mut Section<'_, '_>,
     problem: &Problem,

@@ -13,7 +13,7 @@ pub struct Truth {
     /// Rules for random true values, `[random]`; a given value precedes them, and a later rule an
     /// earlier one.
     pub random: Vec<RandomRule>,
-    /// True effects, `[[effect]]`.
+    /// Effects on the true arm, `[[effect]]`.
     pub effects: Vec<TrueEffect>,
     /// Standard deviation of a measured coordinate \[m\].
     pub noise_sigma: f64,

@@ -1,4 +1,4 @@
-//! Reader of `STUDY.toml`.
+//! Reader of the study file `STUDY.toml`.
 
 use std::path::{Path, PathBuf};
 

@@ -48,7 +48,7 @@ pub struct ParameterResult<'a> {
 /// Durations of the fits of a cell \[s\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Timing {
-    /// Median duration.
+    /// Median duration of a fit.
     pub median: f64,
     /// Duration of the slowest fit.
     pub slowest: f64,

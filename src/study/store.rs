@@ -48,7 +48,7 @@ impl Study {
 /// Finished part with its statistics.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct FinishedPart {
-    /// Description for people.
+    /// Description of the part for people.
     part: String,
     /// Digest of the inputs of the part.
     key: String,

@@ -10,7 +10,7 @@ const COVERAGE_SIGMAS: f64 = 1.96;
 /// Count, mean and scatter of values, accumulated one by one.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Moments {
-    /// Number of values.
+    /// Number of accumulated values.
     pub count: u64,
     /// Mean of the values; 0 if there are none.
     pub mean: f64,
@@ -21,7 +21,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Adds one value.
+    /// Adds one value to the statistics.
     fn push(&mut self, value: f64) {
         self.merge(&Self { count: 1, mean: value, squares: 0.0, largest: value.abs() });
     }

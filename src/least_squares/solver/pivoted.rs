@@ -14,19 +14,19 @@ const WELL_CONDITIONED: f64 = 1e-8;
 /// Least-squares problem min ‖B q + c‖ of full rank with B S⁻¹ P = Q R; S holds the column norms of
 /// B.
 ///
-/// A well-conditioned upper triangle B serves as its own factor.
+/// A well-conditioned upper triangle B is used as the factor directly.
 #[derive(Debug, Clone)]
 pub(super) struct Pivoted {
-    /// Triangular factor R.
+    /// Triangular factor R of B S⁻¹ P.
     triangle: DMatrix<f64>,
-    /// Projected constant `Qᵀc`.
+    /// Projection `Qᵀc` of the constant.
     projected: DVector<f64>,
     /// Inverse column norms 1/S in pivot order.
     inverse_sizes: DVector<f64>,
     permutation: PermutationSequence<Dyn>,
     /// Solution q at λ = 0, in pivot order.
     solution: DVector<f64>,
-    /// True if B is its own factor.
+    /// True if B itself is the factor.
     pub(super) is_unpivoted: bool,
 }
 

@@ -80,10 +80,10 @@ pub fn minimise_observed<O: Objective>(
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum BoundMethod {
-    /// Active-set steps, [`constrained_levenberg_marquardt`].
+    /// Steps of the active-set method, see [`constrained_levenberg_marquardt`].
     #[default]
     ActiveSet,
-    /// Interior-point steps, [`interior_point_levenberg_marquardt`].
+    /// Steps of the interior-point method, see [`interior_point_levenberg_marquardt`].
     InteriorPoint,
     /// Interior reflective steps, [`reflective_levenberg_marquardt`]; ignores inequalities.
     Reflective,

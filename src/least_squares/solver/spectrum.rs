@@ -17,9 +17,9 @@ pub(super) struct Spectrum {
 /// Term of the expansion that belongs to one singular value.
 #[derive(Debug, Clone)]
 struct Term {
-    /// Singular value σᵢ.
+    /// Singular value σᵢ of B.
     singular: f64,
-    /// Projected constant `−uᵢᵀc`.
+    /// Projection `−uᵢᵀc` of the constant.
     projected: f64,
     /// Right singular vector vᵢ.
     direction: DVector<f64>,

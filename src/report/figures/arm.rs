@@ -24,7 +24,7 @@ pub struct Poses<'a> {
 #[derive(Debug, Clone)]
 pub struct Arm {
     pub model: Model,
-    /// Full parameter vector.
+    /// Full parameter vector of the model.
     pub x: DVector<f64>,
 }
 

@@ -35,7 +35,7 @@ pub struct Quantity {
 pub struct Point {
     /// Value of the regressor.
     pub x: f64,
-    /// Partial residual.
+    /// Partial residual of one pose at one value of the regressor, SI.
     pub y: f64,
     /// True for a held-out pose.
     pub held_out: bool,
@@ -114,7 +114,7 @@ fn slides(problem: &Problem, joint: usize) -> bool {
 /// Fit of a model that declares the effects, evaluated in every row.
 #[derive(Clone, Copy)]
 pub struct EffectFit<'a> {
-    /// Fitted arm.
+    /// Arm of the fit.
     pub arm: &'a Arm,
     /// Residual of each row \[m\].
     pub residuals: &'a [Vector3<f64>],

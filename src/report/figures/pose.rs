@@ -13,7 +13,7 @@ pub struct PoseError {
     pub configuration: Vec<f64>,
     /// True for a held-out pose.
     pub held_out: bool,
-    /// Kind of measurement.
+    /// Kind of measurement of the row.
     pub observation: Observation,
     /// Measured position, or the predicted target of the best arm in a row without a position,
     /// measuring frame \[m\].

@@ -123,7 +123,7 @@ fn script_data(data: &PlotData) -> String {
         .replace("//", "/\\/")
 }
 
-/// Renders the section.
+/// Renders the section on individual poses.
 pub(super) fn section(data: &PlotData) -> Markup {
     let without = without_positions(data);
     if data.shown.is_empty() && !without.is_empty() {

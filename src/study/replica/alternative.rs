@@ -25,7 +25,7 @@ pub enum AlternativeModel {
 }
 
 impl AlternativeModel {
-    /// All alternative models.
+    /// All alternative models, in the order of the results.
     pub const EACH: [Self; 8] = [
         Self::QuarterTooStiff,
         Self::TwiceTooStiff,

@@ -10,7 +10,7 @@ use crate::problem::{PoseConditions, Problem};
 pub struct MeasuredPose {
     /// Commanded configuration, payload and hoist.
     pub conditions: PoseConditions,
-    /// Measured position \[m\].
+    /// Position measured by the tracker \[m\].
     pub position: Vector3<f64>,
 }
 

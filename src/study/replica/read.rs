@@ -1,4 +1,4 @@
-//! Reader of `MISPRINTS.toml`.
+//! Reader of the study file `MISPRINTS.toml`.
 
 use std::path::Path;
 

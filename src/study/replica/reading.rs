@@ -5,7 +5,7 @@ use crate::paper::{Form, Misprint, Reading};
 /// Reading of the formulas with its name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedReading {
-    /// Name in results.
+    /// Name of the reading in results.
     pub name: String,
     /// Equations that are kept as printed, or a description.
     pub place: String,

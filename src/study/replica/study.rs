@@ -14,7 +14,7 @@ pub struct MisprintStudy {
     pub name: String,
     /// Title for people, one line.
     pub title: String,
-    /// Arm as declared.
+    /// Arm as the problem declares it.
     pub problem: Problem,
     /// Distribution of the specimens about the declared arm, and of the poses.
     pub truth: Truth,
