@@ -87,6 +87,7 @@ pub mod quantity;
 mod random;
 pub mod report;
 pub mod residual_tests;
+pub mod results;
 pub mod rig;
 pub mod scalar;
 pub mod select;

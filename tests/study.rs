@@ -14,6 +14,7 @@ use std::time::Duration;
 
 use assert_cmd::Command;
 use flexcal::report;
+use flexcal::results::{Document as _, StudyResult};
 use flexcal::study::{Results, Shard, Store, Study, collect, pending, run};
 use serde_json::Value;
 
@@ -116,7 +117,7 @@ fn run_on(threads: usize, study: &Study, store: &Store, shard: Shard) {
 fn texts(study: &Study, results: &Results) -> [String; 3] {
     [
         report::study_csv(study, results),
-        report::study_json(study, results),
+        StudyResult::new(study, results).to_json(),
         report::study_parameters_csv(study, results),
     ]
 }

@@ -10,6 +10,7 @@ use flexcal::fit::Progress;
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::{PoseRanges, Problem as Declared};
 use flexcal::report;
+use flexcal::results::{CheckResult, Document as _, PlanResult};
 use flexcal::rig::Truth;
 use pyo3::prelude::*;
 
@@ -39,7 +40,7 @@ pub struct Plan {
 impl Check {
     /// check.json.
     fn json(&self) -> String {
-        report::check_json(&self.problem, &self.check)
+        CheckResult::new(&self.problem, &self.check).to_json()
     }
 
     /// What the command line prints.
@@ -58,13 +59,8 @@ impl Check {
 impl Plan {
     /// plan.json.
     fn json(&self) -> String {
-        report::plan_json(
-            &self.problem,
-            self.reached(),
-            self.seed,
-            &self.found,
-            self.separated.as_ref(),
-        )
+        let separated = self.separated.as_ref();
+        PlanResult::new(&self.problem, self.reached(), self.seed, &self.found, separated).to_json()
     }
 
     /// What the command line prints.

@@ -7,6 +7,7 @@ use flexcal::fit;
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use flexcal::report::{self, PlotData, Report};
+use flexcal::results::{Document as _, IdentificationResult, LoopResult, TraceResult};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -49,7 +50,7 @@ pub struct Trace {
 impl Identification {
     /// estimate.json.
     fn json(&self, py: Python<'_>) -> String {
-        py.detach(|| report::estimate_json(&self.problem, &self.found))
+        py.detach(|| IdentificationResult::new(&self.problem, &self.found).to_json())
     }
 
     /// What the command line prints.
@@ -121,7 +122,7 @@ impl Identification {
 impl ClosedLoop {
     /// loop.json.
     fn json(&self, py: Python<'_>) -> String {
-        py.detach(|| report::loop_json(&self.problem, &self.closure))
+        py.detach(|| LoopResult::new(&self.problem, &self.closure).to_json())
     }
 
     /// What the command line prints.
@@ -163,7 +164,7 @@ impl ClosedLoop {
 impl Trace {
     /// trace.json.
     fn json(&self, py: Python<'_>) -> String {
-        py.detach(|| report::trace_json(&self.problem, &self.found))
+        py.detach(|| TraceResult::new(&self.problem, &self.found).to_json())
     }
 
     /// What the command line prints.

@@ -8,6 +8,7 @@ use flexcal::measurement::Dataset;
 use flexcal::model::Model;
 use flexcal::problem::Problem;
 use flexcal::report::{self, ExportErrors, Exported};
+use flexcal::results::Document as _;
 use flexcal::urdf::{Chain, Robot, export};
 use pyo3::prelude::*;
 
@@ -52,7 +53,7 @@ impl Export {
         let errors = Some(ExportErrors::of(&model, &found.x, data, None));
         let exported =
             Exported { problem, model: &model, file: None, moved: Some(&moved.moved), errors };
-        let (json, summary) = (report::export_json(&exported), report::export_text(&exported));
+        let (json, summary) = (exported.result().to_json(), report::export_text(&exported));
         Ok(Self { text: moved.text, json, summary })
     }
 }

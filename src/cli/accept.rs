@@ -8,6 +8,7 @@ use clap::Args;
 use flexcal::files::digest;
 use flexcal::fit::{self, Options, SolverChoice, Strategy};
 use flexcal::report::{self, AcceptanceRecord};
+use flexcal::results::Document as _;
 
 use super::diagnostic;
 use super::input::{Common, Input};
@@ -46,10 +47,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         commit: commit(&file),
         instrument: arguments.instrument.clone(),
     };
-    let json = report::acceptance_json(&problem, &data.measurements, &found, &judged, &record);
+    let json =
+        report::acceptance_result(&problem, &data.measurements, &found, &judged, &record).to_json();
     let page = report::acceptance_page(&problem, &data.measurements, &found, &judged, &record);
     results.write(&[("acceptance.json", &json), ("acceptance.html", &page)])?;
-    common.tell(&json, || report::acceptance_text(&problem, &judged) + &results.written())?;
+    common.tell(&json, || {
+        let text = report::acceptance_text(&problem, &judged);
+        let page = results.path("acceptance.html");
+        format!("{text}{}Next: print {} and sign it\n", results.written(), page.display())
+    })?;
     Ok(diagnostic::judged(&found, common.quiet))
 }
 

@@ -7,7 +7,8 @@ use clap::{Args, value_parser};
 use flexcal::design::{self, CheckedPoses};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
-use flexcal::report;
+use flexcal::report::{self, shell_word};
+use flexcal::results::{CheckResult, Document as _};
 
 use super::diagnostic;
 use super::input::Common;
@@ -54,11 +55,18 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let problem = Problem::read(common.problem())?;
     let results = common.results("check", &problem, &arguments.source.files(), &["check.json"])?;
     let check = design::check(&problem, &judged(arguments, &problem)?, arguments.source.seed)?;
-    let json = report::check_json(&problem, &check);
+    let json = CheckResult::new(&problem, &check).to_json();
     results.write(&[("check.json", &json)])?;
     let written = results.path("check.json");
     common.tell(&json, || {
-        format!("{}\nWritten to {}\n", report::check_text(&problem, &check), written.display())
+        let problem_word = shell_word(common.problem());
+        let next = if check.suffices() {
+            format!("measure such poses, then flexcal identify {problem_word} --data MEASURED.csv")
+        } else {
+            format!("flexcal plan {problem_word} --poses N chooses poses that tell more")
+        };
+        let text = report::check_text(&problem, &check);
+        format!("{text}\nWritten to {}\nNext: {next}\n", written.display())
     })?;
     if check.suffices() {
         return Ok(Outcome::Done);

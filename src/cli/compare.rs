@@ -5,6 +5,7 @@ use std::error::Error;
 use clap::Args;
 use flexcal::fit::{self, CompareOptions};
 use flexcal::report::{self, PlotData};
+use flexcal::results::{ComparisonResult, Document as _};
 
 use super::diagnostic;
 use super::input::{Common, Input};
@@ -34,10 +35,19 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let comparison = Line::during(common.talks(), None, |progress| {
         fit::compare(&problem, &data, &CompareOptions { paper: arguments.paper, progress })
     })?;
-    let json = report::compare_json(&problem, &comparison);
+    let json = ComparisonResult::new(&problem, &comparison).to_json();
     let shown = PlotData::of_comparison(&problem, &data, &comparison)?;
     let told = report::comparison_report(&problem, &comparison, &shown);
     results.write_report(&[("compare.json", &json)], &told)?;
-    common.tell(&json, || report::compare_text(&problem, &comparison) + &results.written())?;
+    common.tell(&json, || {
+        let text = report::compare_text(&problem, &comparison);
+        let lacks = report::lacks_something(&comparison.joint);
+        let (command, what) = if lacks {
+            ("loop", "looks for what the model lacks")
+        } else {
+            ("identify", "writes the estimate of the joint fit")
+        };
+        format!("{text}{}Next: flexcal {command} {} {what}\n", results.written(), common.named())
+    })?;
     Ok(diagnostic::judged(&comparison.joint, common.quiet))
 }

@@ -5,11 +5,13 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use flexcal::error::InputErrorKind;
+use flexcal::fit;
 use flexcal::fit::SavedEstimate;
 use flexcal::measurement::Measurements;
 use flexcal::model::Model;
 use flexcal::problem::Problem;
-use flexcal::{fit, report};
+use flexcal::report::{self, shell_word};
+use flexcal::results::{CompensationResult, Document as _};
 
 use super::diagnostic;
 use super::input::Common;
@@ -111,10 +113,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     };
     let commands = fit::compensate(&problem, &model, &x, &sought)?;
     results.write(&[("commands.csv", &report::commands_csv(&problem, &targets, &commands))])?;
-    common.tell(&report::commands_json(&problem, &commands), || {
+    common.tell(&CompensationResult::new(&problem, &commands).to_json(), || {
         let written = results.path("commands.csv");
+        let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
         format!(
-            "{}\nWritten to {}\n",
+            "{}\nWritten to {}\n\
+             Next: measure with these commands, then flexcal predict {problem_word} --estimate {estimate} --data MEASURED.csv judges them\n",
             report::commands_text(&problem, &targets, &commands),
             written.display()
         )

@@ -9,6 +9,7 @@ use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
 use flexcal::problem::Problem;
 use flexcal::report::{self, ExportErrors, Exported};
+use flexcal::results::Document as _;
 use flexcal::urdf::{Chain, Robot, YamlFormat, export, joint_origins, yaml};
 
 use super::diagnostic;
@@ -121,7 +122,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         moved: moved.as_deref(),
         errors,
     };
-    flags.tell(&report::export_json(&exported), || report::export_text(&exported))?;
+    flags.tell(&exported.result().to_json(), || report::export_text(&exported))?;
     if !estimates.trusted {
         diagnostic::warn("the estimate is not to be trusted, and so is this file not");
     }

@@ -1,20 +1,18 @@
 //! `flexcal identify`.
 
 use std::error::Error;
-use std::path::Path;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use flexcal::fit::{
-    self, FindingCode, Identification, IdentifyError, Options, SolverChoice, Strategy,
-};
-use flexcal::report::{self, PlotData, shell_word};
+use flexcal::fit::{self, IdentifyError, Options, SolverChoice, Strategy};
+use flexcal::report::{self, PlotData};
+use flexcal::results::{Document as _, IdentificationResult};
 
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::output::REPORT;
 use super::progress::Line;
-use super::{diagnostic, interrupt, output};
+use super::{diagnostic, interrupt, next, output};
 
 /// Arguments of `flexcal identify`.
 #[derive(Debug, Args)]
@@ -74,7 +72,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 sources => Ok((sources?, found)),
             }
         })?;
-    let json = report::estimate_json(&problem, &identification);
+    let json = IdentificationResult::new(&problem, &identification).to_json();
     let shown = PlotData::of_identification(&problem, &data, &identification)?;
     let told = report::identification_report(&problem, &identification, &shown);
     let residuals = report::residuals_csv(
@@ -91,37 +89,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             report::estimate_brief(&problem, &identification, output::columns())
         };
         let sources = sources.as_ref().map_or_else(String::new, |words| format!("\n{words}\n"));
-        let next = next(common, &identification, &results.path("estimate.json"));
+        let is_structured = shown.findings.is_structured();
+        let estimate = results.path("estimate.json");
+        let next = next::after_fit(common, &identification, is_structured, &estimate);
         format!("{told}{sources}{}Next: {next}\n", results.written())
     })?;
     if let (Some(words), true, false) = (&sources, common.json, common.quiet) {
         diagnostic::warn(words);
     }
     Ok(diagnostic::judged(&identification, common.quiet))
-}
-
-/// What to do after a fit, in one line.
-fn next(common: &Common, found: &Identification, estimate: &Path) -> String {
-    let named = common.named();
-    match report::show_influential_rows(found, &common.problem_file()) {
-        Some(look) => format!(
-            "{look}; where nothing is wrong, flexcal loop {named} looks for what the model lacks"
-        ),
-        // Of what says so little neither a cause nor a correction can be told.
-        None if !found.is_trusted() || report::tells_little(found) => {
-            format!("flexcal check {named} says what the poses can tell")
-        }
-        None if found.has(FindingCode::PriorsDecide) => {
-            format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
-        }
-        None if report::lacks_something(found) => {
-            format!("flexcal loop {named} looks for what the model lacks")
-        }
-        None => {
-            let [problem, estimate] = [common.problem(), estimate].map(shell_word);
-            format!(
-                "flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv corrects commands"
-            )
-        }
-    }
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use flexcal::report;
+use flexcal::results::{Document as _, InitResult};
 use flexcal::urdf::{Chain, Robot, describe};
 
 use super::flags::Flags;
@@ -42,7 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         flags.claim("init", &description.name, vec![arguments.urdf.clone()], &["problem.toml"])?;
     results.write(&[("problem.toml", &description.text)])?;
     let file = results.path("problem.toml");
-    let json = report::init_json(&chain, &description, &file);
+    let json = InitResult::new(&chain, &description, &file).to_json();
     flags.tell(&json, || report::init_text(&chain, &description, &results.folder))?;
     Ok(Outcome::Done)
 }

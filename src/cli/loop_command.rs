@@ -7,14 +7,15 @@ use std::{fs, io};
 use clap::Args;
 use flexcal::fit::Options;
 use flexcal::problem::Problem;
-use flexcal::report::{self, PlotData, shell_word};
+use flexcal::report::{self, PlotData};
+use flexcal::results::{Document as _, LoopResult};
 use flexcal::select;
 
 use super::input::Common;
 use super::outcome::Outcome;
 use super::output::{REPORT, WriteError};
 use super::progress::Line;
-use super::{diagnostic, interrupt, output};
+use super::{diagnostic, interrupt, next, output};
 
 /// Arguments of `flexcal loop`.
 #[derive(Debug, Args)]
@@ -48,7 +49,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let options = Options::default().with_influential_rows().with_stop(stop.clone());
     let close = |sink| select::close(&problem, &data, &options.with_progress(sink));
     let closure = Line::during(common.talks(), stop, close)?;
-    let json = report::loop_json(&problem, &closure);
+    let result = LoopResult::new(&problem, &closure);
+    let json = result.to_json();
     fs::create_dir_all(&results.folder)
         .map_err(|source| WriteError::Io { path: results.folder.clone(), source })?;
     let files = common
@@ -75,27 +77,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let told = if arguments.verbose {
             report::loop_text(&problem, &closure)
         } else {
-            report::loop_brief(&problem, &closure, output::columns())
+            let all = format!("flexcal loop {} -v", common.named());
+            report::loop_brief(&problem, &closure, output::columns(), &all)
         };
-        let next = match report::show_influential_rows(&closure.before.fit, &common.problem_file())
-        {
-            Some(look) => format!("Next: {look}\n"),
-            None if closure.interrupted => {
-                "Next: the same command again, to look to the end\n".to_owned()
-            }
-            None if closure.after.is_trusted() => {
-                let closed = shell_word(&results.path("problem.closed.toml"));
-                format!(
-                    "Next: flexcal identify {closed} -v lists the parameters of the final fit\n"
-                )
-            }
-            None => String::new(),
-        };
-        told + &results.written() + &next
+        let next = next::after_loop(common, &problem, &closure.before.fit, &result, &results);
+        format!("{told}{}Next: {next}\n", results.written())
     })?;
     let outcome = diagnostic::judged(&closure.after, common.quiet);
     if closure.interrupted {
-        diagnostic::warn(&report::interrupted(&closure));
+        diagnostic::warn(&report::interrupted(closure.rounds.len()));
     }
     Ok(if closure.interrupted { Outcome::Interrupted } else { outcome })
 }

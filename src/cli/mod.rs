@@ -17,6 +17,7 @@ mod input;
 mod interrupt;
 mod loop_command;
 mod man;
+mod next;
 mod outcome;
 mod output;
 mod plan;

@@ -10,7 +10,8 @@ use flexcal::design::{
 use flexcal::measurement::Measurements;
 use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
-use flexcal::report;
+use flexcal::report::{self, shell_word};
+use flexcal::results::{Document as _, PlanResult};
 
 use super::diagnostic;
 use super::input::Common;
@@ -172,13 +173,19 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let (plan, separated) = result?;
     let criterion = separated.as_ref().map_or(&criterion, |separated| &separated.criterion);
-    let json = report::plan_json(&problem, criterion, source.seed, &plan, separated.as_ref());
+    let json =
+        PlanResult::new(&problem, criterion, source.seed, &plan, separated.as_ref()).to_json();
     let table = report::poses_csv(&problem, &plan.poses);
     results.write(&[("plan.csv", &table), ("plan.json", &json)])?;
     common.tell(&json, || {
         let text = report::plan_text(&problem, criterion, &plan, separated.as_ref());
         let table = results.path("plan.csv");
-        format!("{text}\nWritten to {}, what it promises to plan.json beside it\n", table.display())
+        let (problem, word) = (shell_word(common.problem()), shell_word(&table));
+        format!(
+            "{text}\nWritten to {}, what it promises to plan.json beside it\n\
+             Next: measure these poses, add the columns x_mm, y_mm, z_mm, then flexcal identify {problem} --data {word}\n",
+            table.display()
+        )
     })?;
     if plan.suffices {
         return Ok(Outcome::Done);

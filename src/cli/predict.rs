@@ -7,7 +7,8 @@ use clap::Args;
 use flexcal::fit::{self, SavedEstimate};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::{HeldOut, Problem};
-use flexcal::report;
+use flexcal::report::{self, shell_word};
+use flexcal::results::{Document as _, PredictionErrors};
 
 use super::diagnostic;
 use super::input::Common;
@@ -63,17 +64,28 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             .as_ref()
             .map(|all| ("residuals.csv", report::residuals_csv(&problem, &rows, all))),
     );
-    let errors =
-        prediction.errors.as_ref().map(|errors| report::errors_json(errors, &prediction.spreads));
+    let errors = prediction
+        .errors
+        .as_ref()
+        .map(|own| PredictionErrors::new(own, &prediction.spreads).to_json());
     texts.extend(errors.clone().map(|json| ("errors.json", json)));
     let borrowed: Vec<(&str, &str)> =
         texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
     results.write(&borrowed)?;
-    common.tell(errors.as_deref().unwrap_or("{}\n"), || {
+    common.tell(errors.as_deref().unwrap_or(&PredictionErrors::default().to_json()), || {
         let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
         let text = report::prediction_text(&problem, arm, &prediction);
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
-        format!("{text}\nWritten to {}: {}\n", results.folder.display(), names.join(", "))
+        let problem = shell_word(common.problem());
+        let next = match &arguments.estimate {
+            Some(file) => format!(
+                "flexcal compensate {problem} --estimate {} --data TARGETS.csv corrects commands",
+                shell_word(file)
+            ),
+            None => format!("flexcal identify {problem} writes an estimate for --estimate"),
+        };
+        let folder = results.folder.display();
+        format!("{text}\nWritten to {folder}: {}\nNext: {next}\n", names.join(", "))
     })?;
     Ok(if trusted { Outcome::Done } else { Outcome::NotTrusted })
 }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use flexcal::files::StagedFile;
 use flexcal::report::{self, shell_word};
+use flexcal::results::{Document as _, MisprintResult, StudyResult};
 use flexcal::study::{self, CellResult, MisprintStudy, Request, Shard, Store, Study};
 
 use super::diagnostic;
@@ -177,7 +178,7 @@ fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn 
     let found = study::replicate(study, || bar.iter().for_each(FitBar::advance));
     bar.iter().for_each(FitBar::clear);
     let found = found?;
-    let json = report::replica_json(study, &found);
+    let json = MisprintResult::new(study, &found).to_json();
     results.write_report(&[(names[0], &json)], &report::replica_report(study, &found))?;
     common.flags.tell(&json, || report::replica_text(study, &found) + &results.written())?;
     Ok(Outcome::Done)
@@ -201,7 +202,7 @@ fn finish(
     stores: &[Store],
 ) -> Result<Outcome, Box<dyn Error>> {
     let found = study::collect(study, stores)?;
-    let json = report::study_json(study, &found);
+    let json = StudyResult::new(study, &found).to_json();
     let texts = [
         (NAMES[0], json.as_str()),
         (NAMES[1], &report::study_parameters_csv(study, &found)),

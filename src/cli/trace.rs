@@ -4,12 +4,13 @@ use std::error::Error;
 
 use clap::Args;
 use flexcal::fit::Options;
+use flexcal::results::{Document as _, TraceResult};
 use flexcal::{report, select};
 
-use super::diagnostic;
 use super::input::{Common, Input};
 use super::outcome::Outcome;
 use super::progress::Line;
+use super::{diagnostic, next};
 
 /// Arguments of `flexcal trace`.
 #[derive(Debug, Args)]
@@ -31,11 +32,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let trace = Line::during(common.talks(), None, |sink| {
         select::trace(&problem, &data, &Options::default().with_progress(sink))
     })?;
-    let json = report::trace_json(&problem, &trace);
+    let result = TraceResult::new(&problem, &trace);
+    let json = result.to_json();
     results.write(&[("trace.json", &json)])?;
     let written = results.path("trace.json");
     common.tell(&json, || {
-        format!("{}\nWritten to {}\n", report::trace_text(&problem, &trace), written.display())
+        let (text, next) =
+            (report::trace_text(&problem, &trace), next::after_trace(common, &result));
+        format!("{text}\nWritten to {}\nNext: {next}\n", written.display())
     })?;
     Ok(diagnostic::judged(&trace.fit, common.quiet))
 }

@@ -3,19 +3,17 @@
 
 use std::path::PathBuf;
 
-use serde::Serialize;
-
 use super::document::{Block, Headline, Table};
 use super::errors::rows_in;
 use super::figures::range;
 use super::identify::BEFORE;
-use super::json::{list, object, to_text};
 use super::quantity::{about_three_digits, counted, mm, number};
 use super::render::{report, text};
 use super::table;
 use crate::fit::{Acceptance, AcceptancePose, Accuracy, Identification};
 use crate::measurement::Measurements;
 use crate::problem::{HeldOut, Problem};
+use crate::results::{AcceptanceResult, Condition, Input};
 
 /// Cycles that ISO 9283 asks for in each pose.
 const CYCLES: usize = 30;
@@ -32,24 +30,6 @@ pub struct AcceptanceRecord {
     pub commit: Option<String>,
     /// The instrument, in words.
     pub instrument: Option<String>,
-}
-
-/// AP over the held-out poses, as JSON.
-fn accuracy_entry(of: &Accuracy) -> impl Serialize + use<> {
-    object! {
-        mean_mm: of.mean.value * 1e3,
-        interval_95_mm: [of.mean.low * 1e3, of.mean.high * 1e3],
-        rms_mm: of.rms * 1e3,
-        max_mm: of.max * 1e3,
-    }
-}
-
-/// A range under which the held-out poses were measured, in the unit that is shown.
-#[derive(Debug, Serialize)]
-struct Condition {
-    of: String,
-    unit: String,
-    range: (f64, f64),
 }
 
 fn repeated(judged: &Acceptance) -> impl Iterator<Item = &AcceptancePose> {
@@ -105,21 +85,25 @@ fn conditions(problem: &Problem, rows: &Measurements, judged: &Acceptance) -> Ve
     joints.chain(places).chain(measured).collect()
 }
 
-/// The machine-readable record, ending in a line break.
-pub fn acceptance_json(
+/// Collects the record of an acceptance.
+pub fn acceptance_result(
     problem: &Problem,
     rows: &Measurements,
     found: &Identification,
     judged: &Acceptance,
     record: &AcceptanceRecord,
-) -> String {
-    to_text(&object! {
-        problem: &problem.name,
+) -> AcceptanceResult {
+    let input = |(file, sha256): &(PathBuf, Option<String>)| Input {
+        file: file.display().to_string(),
+        sha256: sha256.clone(),
+    };
+    AcceptanceResult {
+        problem: problem.name.clone(),
         flexcal: env!("CARGO_PKG_VERSION"),
-        commit: &record.commit,
+        commit: record.commit.clone(),
         arm_digest: problem.digest(),
-        inputs: list(&record.inputs, |(file, sha256)| object! { file: file.display().to_string(), sha256: sha256 }),
-        instrument: &record.instrument,
+        inputs: record.inputs.iter().map(input).collect(),
+        instrument: record.instrument.clone(),
         position_sigma_mm: problem.data.position_sigma.map(|sigma| sigma * 1e3),
         protocol: protocol(problem),
         strategy: found.strategy.as_str(),
@@ -129,12 +113,11 @@ pub fn acceptance_json(
         identification_rows: rows_in(found, |errors| errors.identification),
         held_out_rows: found.fitted.held_out.n,
         poses: judged.poses.len(),
-        before: accuracy_entry(&judged.before),
-        after: accuracy_entry(&judged.after),
-        // Poses that were measured several times, and the largest RP among them.
+        before: (&judged.before).into(),
+        after: (&judged.after).into(),
         repeated_poses: repeated(judged).count(),
         repeatability_max_mm: repeatability(judged).map(|most| most * 1e3),
-    })
+    }
 }
 
 /// The accuracy in brief, ending in a line break.

@@ -1,65 +1,14 @@
 //! What `check` says and writes.
 
-use serde::Serialize;
-
+use super::detection;
 use super::document::{Block, Table};
-use super::forecast::{assumptions, cells, expected};
-use super::json::{list, object, to_text, unidentified};
+use super::forecast::{assumptions, cells};
 use super::parameters::{conditioning, unidentifiable};
 use super::quantity::{counted, mm};
 use super::render::text;
-use super::{detection, json};
 use crate::design::{Check, ExpectedParameter, Forecast, Prediction, PredictionPoses};
 use crate::fit::rows_of_kind;
 use crate::problem::Problem;
-
-fn lengths(own: &Prediction) -> impl Serialize + use<> {
-    object! { median_mm: own.median * 1e3, most_mm: own.quantile_95 * 1e3, rms_mm: own.rms * 1e3 }
-}
-
-/// A check as JSON text.
-pub fn check_json(problem: &Problem, check: &Check) -> String {
-    let (forecast, noise) = (&check.forecast, check.noise);
-    let found = &forecast.identifiability;
-    let with_noise =
-        noise.filter(|_| positions(check)).map(|noise| check.prediction.rms.hypot(noise) * 1e3);
-    to_text(&object! {
-        problem: &problem.name,
-        poses: forecast.poses,
-        sufficient: check.suffices(),
-        rank: found.rank,
-        // With all poses of the series.
-        attainable_rank: check.growth.attainable_rank,
-        ..json::conditioning(found, check.coordinates),
-        parameters: list(&forecast.expected, expected),
-        unidentified: unidentified(&found.unidentifiable, |k| forecast.expected[k].name.as_str()),
-        // Root mean square length of the error of one position measured with the σ of the poses; of
-        // tilts alone none.
-        noise_mm: noise.map(|noise| noise * 1e3),
-        prediction: object! {
-            judged_in: match check.predicted_at {
-                PredictionPoses::Ranges => "ranges",
-                PredictionPoses::HeldOut => "held-out",
-                PredictionPoses::Same => "same",
-            },
-            ..lengths(&check.prediction),
-            // Of measured − predicted there: with the noise of the measurement.
-            held_out_rms_mm: with_noise,
-        },
-        growth: list(&check.growth.steps, |own| object! {
-            poses: own.poses,
-            rank: own.rank,
-            open: own.undetermined,
-            well_identified: own.well_identified,
-            ..lengths(&own.prediction),
-        }),
-        // Least number of poses that see everything and predict as exactly as one position is
-        // measured.
-        enough: check.growth.enough,
-        // From what size on each effect of the catalogue would be found.
-        detectable: detection::entry(&check.detection),
-    })
-}
 
 /// A check in words, ending in a line break.
 pub fn check_text(problem: &Problem, check: &Check) -> String {

@@ -1,94 +1,164 @@
-//! What `loop` says: what was found, before and after, and what remains.
+//! Texts of `loop`: one screen, all of it on the terminal, and the report.
 
 use std::fmt::Write as _;
 
 use super::document::{Block, Headline, Point, Table, code, named, some_of};
-use super::errors::{
-    NOMINAL, both_parts, held_out_rows, in_unit, mean_and_rms, measure, row, rows_of, shown, unit,
-    unpredicted, with_unit,
-};
+use super::errors::{NOMINAL, both_parts, held_out_rows, measure, rows_of, unpredicted};
 use super::figures::{self, PlotData};
 use super::identify::{
     BEFORE, all_told, beware, fitted_parameters, mean, poses, spread, why_not_trusted,
 };
-use super::noise::{carried, size};
+use super::noise::{carried, expected, short, size};
 use super::parameters::{lower_waves, parameters};
 use super::quantity::{counted, decimals, number, or_dash, p_value};
-use super::render::{Report, report, text};
+use super::render::{Report, report, text, text_within};
 use super::trace::percent;
-use super::unexplained::{correction, not_looked_for, unexplained, wrong_limits};
-use super::verdict::{called, counts, is_beside, stand_in, verdict};
+use super::unexplained::{correction, places, to_declare, unexplained};
+use super::verdict::{causes, counts, stand_in, title, verdict};
 use super::{effect, findings, trace};
-use crate::fit::{ErrorSummary, Errors, Identification};
 use crate::problem::Problem;
-use crate::select::{ClosedLoop, Found, ReferenceCheck, ReferenceVerdict, Round};
+use crate::results::{FoundEffect, Gain, LoopResult, Step, Summary, TraceResult, Witness};
+use crate::select::ClosedLoop;
 
-/// Alternatives that are named in words; the page names twice as many.
+/// Alternatives that a text names; the page names twice as many.
 const SHOWN_ALTERNATIVES: usize = 4;
-/// Candidates that a report shows.
-const SHOWN: usize = 8;
+/// Candidates of the ranking that a report shows.
+const SHOWN_CANDIDATES: usize = 8;
 /// Rows that are named of those that took no part.
 const SHOWN_ROWS: usize = 3;
 /// Limits of the declared problem that are named.
-const LIMITS: usize = 3;
+const SHOWN_LIMITS: usize = 3;
+/// Lines of a screen, less those that say where results are and what to do next.
+const SCREEN_LINES: usize = 22;
+/// Arm with the effects of the extended problem.
+const EXTENDED: &str = "with what was found";
 
-/// What to know before one reads what was found: rows that carry the misfit, cautions, what was not
-/// looked for, rows set aside.
-pub(super) fn to_know<'a>(problem: &Problem, closure: &ClosedLoop) -> Vec<Block<'a>> {
-    let mut blocks: Vec<Block> = carried(&closure.before.fit).into_iter().collect();
-    blocks.extend(cautions(closure));
-    blocks.extend(not_looked_for(problem, closure).map(Block::Text));
-    blocks.extend(set_aside(problem, closure));
+/// Returns the outcome on one screen of this many columns, ending in a line break; `all` names the
+/// command that prints the rest.
+pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize, all: &str) -> String {
+    let result = &LoopResult::new(problem, closure);
+    let text = |blocks: &[Block]| text_within(blocks, columns);
+    let mut blocks = head(problem, closure, result);
+    // The held-out rows, without their empty column of χ².
+    let mut table = errors(closure, result);
+    table.rows.truncate(table.rows.len() / 2);
+    table.header.pop();
+    table.rows.iter_mut().for_each(|row| _ = row.pop());
+    blocks.push(Block::Table(table));
+    blocks.extend(gained(closure, result));
+    let end = remains(closure, result, all)
+        .map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
+    let points: Vec<Point> = causes(result).map(cause).collect();
+    if points.is_empty() {
+        return text(&blocks) + &end;
+    }
+    blocks.push(Block::heading("What was found"));
+    let height = |points: &[Point]| text(&[Block::Ranking(points.to_vec())]).lines().count();
+    let rest = text(&blocks).lines().count() + end.lines().count();
+    let room = SCREEN_LINES.saturating_sub(rest);
+    let fits = |count: &usize| {
+        // One line is for where the others are.
+        let note = usize::from(*count < points.len());
+        height(&points[..*count]) + note <= room
+    };
+    let shown = (1..=points.len()).rev().find(fits).unwrap_or(1);
+    let hidden = points.len() - shown;
+    blocks.push(Block::Ranking(points[..shown].to_vec()));
+    let more = if hidden == 0 {
+        String::new()
+    } else {
+        format!("     and {hidden} more: {all} lists them, loop.json holds them\n")
+    };
+    text(&blocks) + &more + &end
+}
+
+/// Returns the cause with its size ± 1 σ, its probability and what it is not told from.
+fn cause(found: &FoundEffect) -> Point {
+    let mut facts = effect::values(&found.effect.effect, &found.parameters);
+    let law = found.claims.as_ref().map(|claims| claims.law.probability);
+    facts.extend(law.map(|law| format!("probability of the law {}", percent(law))));
+    let alternatives = found.alternatives.iter().map(|other| other.description.clone());
+    let others = named(alternatives, 1, "");
+    let others = if others.is_empty() { others } else { format!("; not told from: {others}") };
+    let details = if facts.is_empty() { Vec::new() } else { vec![facts.join("; ")] };
+    Point { text: title(found) + &others, details, mark: None }
+}
+
+/// Returns title, rows, verdict, and what to know before the causes are read.
+fn head<'a>(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
+    let mut blocks = vec![
+        Block::Text(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
+        Block::Text(verdict(result, closure.after.sigma_scale < 1.0)),
+    ];
+    blocks.extend(to_know(problem, closure, result));
     blocks
 }
 
-/// Rows that took no part in the choice of effects; nothing to say without any.
-fn set_aside<'a>(problem: &Problem, closure: &ClosedLoop) -> Option<Block<'a>> {
-    let rows = &closure.set_aside;
+/// Returns what to know first: declarations that are missing, influential rows, cautions, and rows
+/// set aside.
+fn to_know<'a>(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
+    let declare = to_declare(problem, closure, result).into_iter().map(Block::Note);
+    let mut blocks: Vec<Block> = declare.collect();
+    blocks.extend(carried(&closure.before.fit));
+    blocks.extend(cautions(closure, result));
+    blocks.extend(set_aside(problem, result));
+    blocks
+}
+
+/// Names rows that took no part in the choice of effects.
+fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
+    let rows = &result.set_aside;
     let treatment = if problem.robust.is_some() {
-        "The robust loss keeps the fit from such rows"
+        "The robust loss limits their influence on the fit"
     } else {
-        "The fit counts such rows in full; a section [robust] would limit them"
+        "They count in full in the fit; a section [robust] would limit them"
+    };
+    let location = |row: &crate::results::Row| match row.line {
+        Some(line) => format!("{}:{line}", row.file),
+        None => row.file.clone(),
     };
     let words = format!(
-        "{} too far off to be noise took no part in the choice of effects: {}. {treatment}.",
+        "{} with gross errors took no part in the choice of effects: {}. {treatment}.",
         counted(rows.len(), "pose"),
-        named(rows.iter().map(ToString::to_string), SHOWN_ROWS, ", ")
+        named(rows.iter().map(location), SHOWN_ROWS, ", ")
     );
     (!rows.is_empty()).then_some(Block::Text(words))
 }
 
-/// What the loop came to as text, ending in a line break.
+/// Returns the outcome as text, ending in a line break.
 pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
-    let mut blocks = vec![
-        Block::Text(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
-        Block::Text(verdict(closure)),
-    ];
-    blocks.extend(to_know(problem, closure));
-    blocks.extend([Block::Table(errors(closure)), Block::Text(gain(closure))]);
+    let result = &LoopResult::new(problem, closure);
+    let mut blocks = head(problem, closure, result);
+    blocks.extend([Block::Table(errors(closure, result)), Block::Text(gain(closure, result))]);
     let failed = findings::failed(&closure.before.findings);
     if !failed.is_empty() {
-        blocks.push(Block::heading("What the declared problem leaves (checks that failed)"));
+        blocks.push(Block::heading("Residual tests that the declared problem fails"));
         blocks.push(Block::list(failed));
     }
-    blocks.extend(found(closure, SHOWN_ALTERNATIVES));
+    blocks.extend(found(result, SHOWN_ALTERNATIVES));
     let failed = findings::failed(&closure.findings);
-    if !closure.unexplained.is_empty() || (!failed.is_empty() && !closure.effects.is_empty()) {
+    if result.unexplained.is_some() || (!failed.is_empty() && !result.effects.is_empty()) {
         blocks.push(Block::heading("What remains"));
-        let unexplained = unexplained(problem, closure).into_iter();
-        // Without effects the checks are those above.
-        let failed = failed.into_iter().filter(|_| !closure.effects.is_empty());
+        let unexplained = unexplained(problem, closure, result).into_iter();
+        // Without effects the tests are those above.
+        let failed = failed.into_iter().filter(|_| !result.effects.is_empty());
         blocks.push(Block::list(unexplained.chain(failed)));
     }
     text(&blocks)
 }
 
-/// The report of `loop`.
+/// Returns the report of `loop`.
 pub fn loop_report(problem: &Problem, closure: &ClosedLoop, plots: &PlotData) -> Report {
-    report(problem, "closed loop", &blocks(problem, closure, plots))
+    let result = LoopResult::new(problem, closure);
+    report(problem, "closed loop", &blocks(problem, closure, &result, plots))
 }
 
-fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -> Vec<Block<'a>> {
+fn blocks<'a>(
+    problem: &Problem,
+    closure: &'a ClosedLoop,
+    result: &LoopResult,
+    plots: &'a PlotData,
+) -> Vec<Block<'a>> {
     let (fit, after) = (&closure.before.fit, &closure.after);
     let file = format!("the estimate.json of {}", code("flexcal identify problem.closed.toml"));
     let counts = format!(
@@ -98,35 +168,36 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
         rows_of(fit, |errors| errors.held_out)
     );
     let mut blocks = vec![
-        Block::Headline(headline(problem, closure)),
-        Block::Text(verdict(closure)),
+        Block::Headline(headline(problem, closure, result)),
+        Block::Text(verdict(result, after.sigma_scale < 1.0)),
         Block::Text(counts),
     ];
-    blocks.extend(to_know(problem, closure));
+    blocks.extend(to_know(problem, closure, result));
     blocks.extend(beware(after, plots));
     blocks.extend([
-        Block::Table(errors(closure)),
-        Block::Text(gain(closure)),
+        Block::Table(errors(closure, result)),
+        Block::Text(gain(closure, result)),
         Block::figures([figures::errors(plots), figures::vectors(plots)]),
         Block::Poses(plots),
         Block::heading("What the declared problem leaves"),
     ]);
     blocks.extend(findings::blocks(&closure.before.findings));
+    let traced = TraceResult::new(problem, &closure.before);
     let every = format!("{} writes them all", code("flexcal trace"));
-    let mut ranking = trace::ranking(problem, &closure.before, SHOWN, &every);
+    let mut ranking = trace::ranking(problem, &traced, SHOWN_CANDIDATES, &every);
     ranking.insert(1, Block::figures([figures::ranking(&closure.before)]));
     blocks.extend(ranking);
     blocks.push(Block::Page(trace::not_seen(&closure.before)));
-    blocks.extend(rounds(closure));
-    blocks.extend(sureness(closure));
-    blocks.push(Block::Words(found(closure, SHOWN_ALTERNATIVES)));
-    blocks.push(Block::Page(found(closure, 2 * SHOWN_ALTERNATIVES)));
+    blocks.extend(rounds(closure, result));
+    blocks.extend(sureness(result));
+    blocks.push(Block::Words(found(result, SHOWN_ALTERNATIVES)));
+    blocks.push(Block::Page(found(result, 2 * SHOWN_ALTERNATIVES)));
     let causes = plots.causes.iter().zip(1..);
     blocks.push(Block::figures(
         causes.map(|(cause, number)| Some(cause.draw_effect(number, &plots.shown))),
     ));
     blocks.push(Block::heading("What remains"));
-    let unexplained = unexplained(problem, closure).into_iter().map(Point::from);
+    let unexplained = unexplained(problem, closure, result).into_iter().map(Point::from);
     let (tests, page) = (findings::all(&closure.findings), findings::each(&closure.findings));
     blocks.extend([
         Block::Words(vec![Block::List(unexplained.clone().chain(tests).collect())]),
@@ -146,34 +217,30 @@ fn blocks<'a>(problem: &Problem, closure: &'a ClosedLoop, plots: &'a PlotData) -
     blocks
 }
 
-/// What it came to at one glance: with the correction, if there is one.
-fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
+/// Returns the outcome at a glance, with the smooth correction if there is one.
+fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Headline {
     let (fit, after) = (&closure.before.fit, &closure.after);
     let (first, last) = (fit.fitted.held_out, after.fitted.held_out);
     let correction = correction(closure);
     let (best, with) = match correction {
-        Some(correction) => (correction.held_out, ", empirical correction included"),
+        Some(correction) => (correction.held_out, ", smooth correction included"),
         None => (last, ""),
     };
-    let gain = closure.gain;
-    let digits = decimals(in_unit(&last, gain.high - gain.low), 4).max(2);
+    let (_, unit) = result.after.errors.held_out.norms();
     let mut facts = vec![
-        ("Verdict", closure.verdict.as_str().replace('-', " ")),
-        ("Effects found", counts(closure)),
+        ("Verdict", result.verdict.as_str().replace('-', " ")),
+        ("Effects found", counts(result)),
         poses(after),
         fitted_parameters(after),
         size("Residual before", fit),
         size("Residual after", after),
         ("Held out, after", spread(&last)),
     ];
-    facts.extend(
-        correction.map(|_| ("Without the correction", format!("{} {}", mean(&last), unit(&last)))),
-    );
-    facts.extend((!closure.effects.is_empty() && gain.value.is_finite()).then(|| {
-        let [value, low, high] =
-            [gain.value, gain.low, gain.high].map(|value| number(in_unit(&last, value), digits));
-        let unit = unit(&last);
-        ("Gain of the effects", format!("{value} {unit}, 95 % interval {low} to {high} {unit}"))
+    facts.extend(correction.map(|_| ("Without the correction", format!("{} {unit}", mean(&last)))));
+    facts.extend(known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
+        let digits = decimals(high - low, 4).max(2);
+        let [mean, low, high] = [mean, low, high].map(|value| number(value, digits));
+        ("Gain of the effects", format!("{mean} {unit}, {low} to {high} {unit} (95 %)"))
     }));
     facts.extend(
         (!problem.effects.is_empty())
@@ -182,63 +249,102 @@ fn headline(problem: &Problem, closure: &ClosedLoop) -> Headline {
     let of = format!("{}{with}", held_out_rows(after));
     let mut states =
         vec![(BEFORE, mean(&fit.registered.held_out)), ("as declared, fitted", mean(&first))];
-    if !closure.effects.is_empty() || correction.is_some() {
-        states.push(("with what was found", mean(&best)));
+    if !result.effects.is_empty() || correction.is_some() {
+        states.push((EXTENDED, mean(&best)));
     }
-    Headline { states, unit: unit(&last), of, facts }
+    Headline { states, unit, of, facts }
 }
 
-/// Why the final fit is not to be trusted, and limits of the declared problem that effects may
-/// stand for.
-fn cautions<'a>(closure: &ClosedLoop) -> Vec<Block<'a>> {
+/// Returns reasons for doubt: a fit that is not to be trusted, and limits for which an effect may
+/// stand.
+fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let (before, after) = (&closure.before.fit, &closure.after);
-    let untrusted = (!after.is_trusted()).then(|| format!("Beware: {}.", why_not_trusted(after)));
+    let untrusted = (!result.trusted).then(|| format!("Beware: {}.", why_not_trusted(after)));
     let bounds =
         before.estimates.iter().filter(|own| own.at_bound.is_some()).map(|own| own.name.clone());
     let held = bounds.chain(before.active_constraints.iter().map(|own| own.words.clone()));
-    let held = named(held, LIMITS, ", ");
-    let limits = (!held.is_empty() && !closure.effects.is_empty()).then(|| {
+    let held = named(held, SHOWN_LIMITS, ", ");
+    let limits = (!held.is_empty() && !result.effects.is_empty()).then(|| {
         format!(
-            "Limits hold the fit as declared ({held}): where one is wrong, an effect that was found may only stand for it. \
+            "Limits are active in the declared fit ({held}). If one is wrong, an effect that was found may only compensate for it. \
              flexcal identify -v shows what each costs."
         )
     });
-    let wrong = wrong_limits(closure).map(|(limit, probability)| {
-        format!(
-            "The limit {limit}, which holds the fit, is most probably wrong, or hides a cause ({}): flexcal identify -v shows what it costs; moved out or \
-             left away, it lets the loop look further.",
-            percent(probability)
-        )
-    });
-    untrusted.into_iter().chain(wrong).chain(limits).map(Block::Note).collect()
+    untrusted.into_iter().chain(limits).map(Block::Note).collect()
 }
 
-/// Errors of the nominal arm, the declared problem and the closed one.
-pub(super) fn errors(closure: &ClosedLoop) -> Table {
-    let (before, after) = (&closure.before.fit, &closure.after);
-    let mut rows = Vec::new();
-    for (poses, of, is_fitted) in [
-        ("held out", (|errors: &Errors| errors.held_out) as fn(&Errors) -> ErrorSummary, false),
-        ("identification", |errors| errors.identification, true),
-    ] {
-        let chi2 = |fit: &Identification| {
-            fit.reduced_chi2.filter(|_| is_fitted).map_or_else(String::new, |chi2| number(chi2, 2))
-        };
-        rows.extend([
-            [row(poses, NOMINAL, &of(&before.registered)), vec![String::new()]].concat(),
-            [row("", "as declared, fitted", &of(&before.fitted)), vec![chi2(before)]].concat(),
-            [row("", "with what was found", &of(&after.fitted)), vec![chi2(after)]].concat(),
-        ]);
+/// Returns the errors of the nominal arm, of the declared and of the extended problem.
+fn errors(closure: &ClosedLoop, result: &LoopResult) -> Table {
+    let LoopResult { registered, before, after, .. } = result;
+    let row = |rows: &str, arm: &str, summary: &Summary, chi2: Option<f64>| {
+        let (norms, _) = summary.norms();
+        let chi2 = chi2.map_or_else(String::new, |chi2| number(chi2, 2));
+        let norms = norms.map(|value| number(value, 4));
+        [vec![rows.to_owned(), arm.to_owned()], norms.to_vec(), vec![chi2]].concat()
+    };
+    let (fitted, extended) = (&before.errors, &after.errors);
+    let declared = "as declared, fitted";
+    let mut rows = vec![
+        row("held out", NOMINAL, &registered.held_out, None),
+        row("", declared, &fitted.held_out, None),
+        row("", EXTENDED, &extended.held_out, None),
+        row("identification", NOMINAL, &registered.identification, None),
+        row("", declared, &fitted.identification, before.reduced_chi2),
+        row("", EXTENDED, &extended.identification, after.reduced_chi2),
+    ];
+    if result.effects.is_empty() {
+        rows.retain(|row| row[1] != EXTENDED);
     }
-    if closure.effects.is_empty() {
-        rows.retain(|row| row[1] != "with what was found");
-    }
-    let header = [measure(&after.fitted.held_out), "", "mean", "rms", "max", "χ²/ν"];
+    let header = [measure(&closure.after.fitted.held_out), "", "mean", "rms", "max", "χ²/ν"];
     Table { minor: vec![3, 4], ..Table::new(&header, rows, &[0, 1]) }
 }
 
-/// How the figures are to be read, with the gain and how sure it is.
-fn gain(closure: &ClosedLoop) -> String {
+/// Returns the gain on held-out rows, if effects were found and it is a number.
+fn known_gain(result: &LoopResult) -> Option<Gain> {
+    result.gain().filter(|gain| !result.effects.is_empty() && gain.mean.is_finite())
+}
+
+/// States the gain with its interval, and the size of the residual, for one screen.
+fn gained<'a>(closure: &ClosedLoop, result: &LoopResult) -> Option<Block<'a>> {
+    let (_, unit) = result.after.errors.held_out.norms();
+    let rows = if result.after.errors.held_out.kind.is_none() { "poses" } else { "rows" };
+    let gain = known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
+        let [mean, low, high] = [mean, low, high].map(|value| number(value, 4));
+        format!(
+            "Gain on the held-out {rows}: {mean} {unit} in the mean, {low} to {high} {unit} (95 %)."
+        )
+    });
+    let chi2 = match (result.before.reduced_chi2, result.after.reduced_chi2) {
+        (Some(before), Some(after)) if !result.effects.is_empty() => {
+            format!("χ²/ν of the residual: {} before, {} after", short(before), short(after))
+        }
+        (Some(before), _) => format!("χ²/ν of the residual: {}", short(before)),
+        _ => return gain.map(Block::Text),
+    };
+    let too_large = if !result.effects.is_empty() && closure.after.sigma_scale < 1.0 {
+        " The declared σ is too large."
+    } else {
+        ""
+    };
+    let chi2 = format!("{chi2}; {}.{too_large}", expected(&closure.after));
+    Some(Block::Text(gain.into_iter().chain([chi2]).collect::<Vec<_>>().join(" ")))
+}
+
+/// States what is left, and where it is shown.
+fn remains(closure: &ClosedLoop, result: &LoopResult, all: &str) -> Option<String> {
+    let failed = findings::failed(&closure.findings).len();
+    let places = if result.size_alone().is_none() { places(result) } else { Vec::new() };
+    let structure = (!places.is_empty())
+        .then(|| format!("structure without a known law ({})", places.join(", ")));
+    let tests = (failed > 0).then(|| format!("{} failed", counted(failed, "residual test")));
+    let parts: Vec<String> = structure.into_iter().chain(tests).collect();
+    (!parts.is_empty()).then(|| {
+        format!("What remains: {}. {all} lists it, report.html shows it.", parts.join(", "))
+    })
+}
+
+/// States the gain and how the figures are to be read.
+fn gain(closure: &ClosedLoop, result: &LoopResult) -> String {
     let (before, after) = (&closure.before, &closure.after);
     let another = findings::another_size(&before.findings, before.fit.reduced_chi2)
         .or_else(|| findings::another_size(&closure.findings, after.reduced_chi2));
@@ -246,48 +352,33 @@ fn gain(closure: &ClosedLoop) -> String {
         ("the nominal arm", &before.fit.registered),
         ("the arm as declared, fitted", &before.fit.fitted),
     ];
-    arms.extend((!closure.effects.is_empty()).then_some(("what was found", &after.fitted)));
-    let unknown = unpredicted(&arms);
-    let chi2 =
-        "χ²/ν is the residual's size against the declared noise: 1 where only noise is left.";
-    let notes = [Some(chi2.to_owned()), another, unknown]
-        .into_iter()
-        .flatten()
-        .collect::<Vec<_>>()
-        .join(" ");
-    let (gain, of) = (closure.gain, &after.fitted.held_out);
-    if closure.effects.is_empty() || !gain.value.is_finite() {
-        return notes;
-    }
-    let (takes, off, what) =
-        if gain.value < 0.0 { ("adds", "to", "; below 0 it adds") } else { ("takes", "off", "") };
+    arms.extend((!result.effects.is_empty()).then_some(("what was found", &after.fitted)));
+    let chi2 = "χ²/ν compares the residual with the declared noise: 1 if only noise is left.";
+    let notes = [Some(chi2.to_owned()), another, unpredicted(&arms)];
+    let notes = notes.into_iter().flatten().collect::<Vec<_>>().join(" ");
+    let Some(Gain { mean, interval_95: [low, high] }) = known_gain(result) else { return notes };
+    let (_, unit) = result.after.errors.held_out.norms();
+    let falls = if mean < 0.0 { "rises" } else { "falls" };
+    let [size, low, high] = [mean.abs(), low, high].map(|value| number(value, 4));
     format!(
-        "What was found {takes} {} {off} the mean error of the {} (95 % interval of what it takes off {} to {}{what}). They took no \
-         part in any choice. {notes}",
-        with_unit(of, gain.value.abs()),
+        "With what was found the mean error of the {} {falls} by {size} {unit} (gain {low} to {high} {unit}, 95 %). They took no part \
+         in any choice. {notes}",
         held_out_rows(after),
-        shown(of, gain.low),
-        with_unit(of, gain.high),
     )
 }
 
-/// Every effect that was found.
-fn found<'a>(closure: &ClosedLoop, alternatives: usize) -> Vec<Block<'a>> {
-    if closure.effects.is_empty() {
+/// Lists every effect of the extended problem.
+fn found<'a>(result: &LoopResult, alternatives: usize) -> Vec<Block<'a>> {
+    if result.effects.is_empty() {
         return Vec::new();
     }
-    let mut blocks = vec![
-        Block::heading("What was found"),
-        Block::Ranking(
-            closure.effects.iter().map(|found| point(closure, found, alternatives)).collect(),
-        ),
-    ];
-    if let Some(prior) = &closure.harmonic_prior {
-        let sigmas = || prior.by_order.iter().map(|own| own.1.to_degrees());
+    let points = result.effects.iter().map(|found| point(result, found, alternatives)).collect();
+    let mut blocks = vec![Block::heading("What was found"), Block::Ranking(points)];
+    if let Some(prior) = &result.harmonic_prior {
+        let sigmas = || prior.iter().map(|order| order.sigma_rad.to_degrees());
         blocks.push(Block::Text(format!(
-            "Many harmonics were found: every order up to the highest that stands out is in the model, with one prior for all \
-             joints of {} to {} ° by order, as wide as all of them are there and of the scale that predicts poses best where part \
-             of a joint's range is left out.",
+            "Many harmonics were found. The model has every order up to the highest significant one, with one prior for all joints: \
+             1 σ of {} to {} ° by order. Its scale predicts best the poses in left-out parts of the joints' ranges.",
             number(sigmas().fold(f64::INFINITY, f64::min), 6),
             number(sigmas().fold(0.0, f64::max), 6)
         )));
@@ -295,73 +386,65 @@ fn found<'a>(closure: &ClosedLoop, alternatives: usize) -> Vec<Block<'a>> {
     blocks
 }
 
-fn point(closure: &ClosedLoop, found: &Found, alternatives: usize) -> Point {
-    let mut details: Vec<String> = stand_in(closure, found).into_iter().collect();
-    details.extend(effect::values(found));
+fn point(result: &LoopResult, found: &FoundEffect, alternatives: usize) -> Point {
+    let mut details: Vec<String> = stand_in(found).into_iter().collect();
+    details.extend(effect::values(&found.effect.effect, &found.parameters));
     details.extend(found.claims.as_ref().map(trace::claimed));
     details.extend(found.stability.map(|share| {
-        format!("named in {} % of weighings without a fifth of the poses", number(share * 100.0, 0))
+        format!(
+            "named in {} % of refits on random 80 % subsets of the poses",
+            number(share * 100.0, 0)
+        )
     }));
-    details.extend(
-        found
-            .reference_check
-            .as_ref()
-            .map(|own| format!("{} by {}, which took no part", says(own), own.data)),
-    );
-    let mut chance = if is_beside(found) {
-        format!(
-            "p-value {}: nothing speaks for it by itself; it is in the model together with others",
-            p_value(found.p_value)
-        )
+    details.extend(found.witness.as_ref().map(witness));
+    let mut chance = format!("p {}", p_value(found.p_value));
+    chance.push_str(if found.is_only_with_others() {
+        ": not significant by itself; it is in the model together with others"
     } else {
-        format!(
-            "p-value {}: chance alone would do as well with that probability",
-            p_value(found.p_value)
-        )
-    };
-    if let Some(then) = closure.held_out_once(found) {
-        let _ =
-            write!(chance, "; held-out error once it was in the model: {}", mean_and_rms(&then));
+        ": probability that noise alone does as well"
+    });
+    let then = found.held_out_after;
+    if then != result.after.errors.held_out {
+        let ([mean, rms, _], unit) = then.norms();
+        let _ = write!(
+            chance,
+            "; held-out error once it was in the model: mean {} {unit}, rms {} {unit}",
+            number(mean, 4),
+            number(rms, 4)
+        );
     }
     details.push(chance);
     if !found.alternatives.is_empty() {
-        let others = found.alternatives.iter().map(|other| closure.before.describe(other));
+        let others = found.alternatives.iter().map(|other| other.description.clone());
         let (mut others, more) = some_of(others, alternatives);
-        others.extend((more > 0).then(|| format!("and {more} more")));
+        others.extend((more > 0).then(|| format!("{more} more in loop.json")));
         details.push(format!("these data do not distinguish it from: {}", others.join("; ")));
     }
-    Point { text: called(closure, found), details, mark: None }
+    Point { text: title(found), details, mark: None }
 }
 
-/// What a witness says, in a word.
-pub(super) fn says(own: &ReferenceCheck) -> &'static str {
-    match own.verdict {
-        ReferenceVerdict::Corroborated => "corroborated",
-        ReferenceVerdict::Contradicted => "contradicted",
-    }
+fn witness(witness: &Witness) -> String {
+    format!("{} by {}, which took no part in the fit", witness.says, witness.data)
 }
 
-/// What each round of fit, trace and refit came to.
-fn rounds(closure: &ClosedLoop) -> Vec<Block<'_>> {
-    if closure.rounds.is_empty() {
+/// Returns the rounds of fit, trace and refit with their errors.
+fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
+    if result.steps.is_empty() {
         return Vec::new();
     }
-    let row = |(k, step): (usize, &Round)| {
+    let row = |(k, step): (usize, &Step)| {
         let effects: Vec<String> =
             step.effects.iter().map(|effect| closure.before.describe(effect)).collect();
         let effects = if effects.is_empty() { "none".to_owned() } else { effects.join("; ") };
-        let errors =
-            [step.identification.rms.norm, step.held_out.mean.norm, step.held_out.rms.norm];
-        [
-            vec![(k + 1).to_string(), effects],
-            errors.map(|error| shown(&step.held_out, error)).to_vec(),
-        ]
-        .concat()
+        let ([_, fitted_rms, _], _) = step.errors.identification.norms();
+        let ([mean, rms, _], _) = step.errors.held_out.norms();
+        let errors = [fitted_rms, mean, rms].map(|error| number(error, 4));
+        [vec![(k + 1).to_string(), effects], errors.to_vec()].concat()
     };
     let is_angle = closure.after.fitted.held_out.is_angle();
     let rms = if is_angle { "identification rms, °" } else { "identification rms, mm" };
     let header = ["round", "effects in the model", rms, "held out mean", "held out rms"];
-    let rows = closure.rounds.iter().enumerate().map(row).collect();
+    let rows = result.steps.iter().enumerate().map(row).collect();
     vec![
         Block::heading("Rounds"),
         Block::figures([figures::rounds(closure)]),
@@ -369,27 +452,28 @@ fn rounds(closure: &ClosedLoop) -> Vec<Block<'_>> {
     ]
 }
 
-/// How sure each choice is: chance, its law, fits to part of the poses, and data that took no part.
-fn sureness<'a>(closure: &ClosedLoop) -> Option<Block<'a>> {
+/// Returns the status of each effect with its grounds.
+fn sureness<'a>(result: &LoopResult) -> Option<Block<'a>> {
     let share = |part: f64| format!("{} %", number(part * 100.0, 0));
-    let row = |found: &Found| {
-        let witness =
-            found.reference_check.as_ref().map(|own| format!("{} by {}", says(own), own.data));
+    let row = |found: &FoundEffect| {
+        let ([mean, ..], _) = found.held_out_after.norms();
+        let witness = found.witness.as_ref().map(|own| format!("{} by {}", own.says, own.data));
         vec![
-            closure.before.describe(&found.effect),
+            found.effect.description.clone(),
+            found.status.as_str().to_owned(),
             p_value(found.p_value),
-            or_dash(found.claims.as_ref(), |claims| share(claims.law.1)),
+            or_dash(found.claims.as_ref(), |claims| share(claims.law.probability)),
             or_dash(found.stability, share),
             or_dash(witness, |words| words),
-            shown(&found.held_out_after, found.held_out_after.mean.norm),
+            number(mean, 4),
         ]
     };
-    let is_angle = closure.after.fitted.held_out.is_angle();
-    let mean = if is_angle { "held out mean, °" } else { "held out mean, mm" };
-    let header = ["effect", "p by chance", "law", "resampled", "data that took no part", mean];
-    let note = "law: its probability against every other at the same place; resampled: the share of weighings without a fifth of the poses \
-                that name it; held out mean: once it was in the model";
-    let table =
-        Table::new(&header, closure.effects.iter().map(row).collect(), &[0, 4]).noted(&[note]);
-    (!closure.effects.is_empty()).then_some(Block::Table(table))
+    let (_, unit) = result.after.errors.held_out.norms();
+    let mean = if unit == "°" { "held out mean, °" } else { "held out mean, mm" };
+    let header = ["effect", "status", "p", "law", "refits", "data outside the fit", mean];
+    let note = "p: probability that noise alone does as well; law: probability of the law against every other at its place; refits: share of \
+                refits on random 80 % subsets of the poses that name it; held out mean: once it was in the model";
+    let rows = result.effects.iter().map(row).collect();
+    let table = Table::new(&header, rows, &[0, 1, 5]).noted(&[note]);
+    (!result.effects.is_empty()).then_some(Block::Table(table))
 }

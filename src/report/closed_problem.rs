@@ -9,9 +9,9 @@ use toml_edit::{
 
 use super::effect::values;
 use super::quantity::p_value;
-use super::verdict::is_beside;
 use crate::error::one_line;
 use crate::problem::{Argument, Effect, Problem};
+use crate::results::ParameterValue;
 use crate::select::{ClosedLoop, Found, HarmonicPrior, Status};
 
 /// The `text` of `problem` with the effects that were found declared and its data in `files`, as
@@ -204,21 +204,22 @@ fn arguments(effect: &Effect) -> Value {
     Value::InlineTable(arguments.into_iter().map(value).collect())
 }
 
-/// What is known of an effect that was found, line by line.
+/// Returns comments on an effect that was found: p-value, status and values.
 fn comments(found: &Found, closure: &ClosedLoop) -> Vec<String> {
-    let sure = match found.status == Status::Found {
-        _ if is_beside(found) => "; nothing speaks for it by itself",
-        true => "",
-        false => "; that this is the law is not sure",
+    let doubt = match (found.status, &found.claims) {
+        (Status::Found, _) => "",
+        (Status::Located, None) => "; not significant by itself",
+        _ => "; that this is the law is not sure",
     };
     let first = format!(
-        "Found by flexcal loop: {}, p-value {}{sure}.",
+        "Found by flexcal loop: {}, p-value {}{doubt}.",
         closure.before.describe(&found.effect),
         p_value(found.p_value)
     );
-    // A custom effect may say of itself what it likes, in several lines.
+    let parameters: Vec<_> = found.estimates.iter().map(ParameterValue::new).collect();
+    // A custom effect may describe itself in several lines.
     std::iter::once(first)
-        .chain(values(found))
+        .chain(values(&found.effect, &parameters))
         .map(|line| one_line(&line.replace('\n', " ")))
         .collect()
 }

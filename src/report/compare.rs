@@ -1,24 +1,20 @@
 //! What `compare` says and writes: every strategy, solver and ablation, and the paper's tables 2
 //! and 3 from each procedure.
 
-use std::borrow::Cow;
-
-use serde::{Serialize, Serializer};
-
 use super::document::{Block, Headline, Table, code};
 use super::errors::{both_parts, held_out_rows, noun, shown, unit};
 use super::figures::{self, PlotData};
 use super::identify::{
     BEFORE, beware, counts, errors, fitted_parameters, mean, no_errors, poses, remainder,
 };
-use super::json::{both, list, object, to_text};
 use super::noise::size;
-use super::paper_tables::{table_2, table_3, tables, title};
+use super::paper_tables::{table_2, table_3, title};
 use super::quantity::{counted, number, or_dash};
 use super::render::{Report, report, text};
-use crate::fit::{Baseline, Comparison, Errors, Identification, SolverChoice};
+use crate::fit::{Comparison, Errors, Identification};
 use crate::model::Ablation;
 use crate::problem::Problem;
+use crate::results::ComparedFit;
 
 /// Columns of the rows of a comparison, after the first; the time differs from run to run.
 const ROWS: [&str; 9] = [
@@ -35,84 +31,10 @@ const ROWS: [&str; 9] = [
 /// Place of the time among all columns.
 const TIME: usize = 7;
 
-/// One fit among others.
-#[derive(Debug, Serialize)]
-struct Row<'a> {
-    strategy: Cow<'a, str>,
-    solver: &'a str,
-    #[serde(flatten, serialize_with = "errors_of_both")]
-    errors: &'a Errors,
-    iterations: u64,
-    evaluations: u64,
-    seconds: f64,
-    termination: &'a str,
-    trusted: bool,
-    reduced_chi2: Option<f64>,
-    condition_number: Option<f64>,
-}
-
-impl<'a> From<&'a Identification> for Row<'a> {
-    fn from(own: &'a Identification) -> Self {
-        Self {
-            strategy: own.strategy.as_str().into(),
-            solver: own.solver.as_str(),
-            errors: &own.fitted,
-            iterations: own.iterations,
-            evaluations: own.evaluations,
-            seconds: own.seconds,
-            termination: own.termination.as_str(),
-            trusted: own.is_trusted(),
-            reduced_chi2: own.reduced_chi2,
-            condition_number: Some(own.identifiability().condition_number()),
-        }
-    }
-}
-
-impl<'a> From<&'a Baseline> for Row<'a> {
-    fn from(own: &'a Baseline) -> Self {
-        Self {
-            strategy: own.name().into(),
-            solver: SolverChoice::PseudoInverse.as_str(),
-            errors: &own.errors,
-            iterations: own.iterations,
-            evaluations: own.evaluations,
-            seconds: own.seconds,
-            termination: own.termination.as_str(),
-            trusted: own.termination.converged(),
-            reduced_chi2: None,
-            condition_number: None,
-        }
-    }
-}
-
-fn errors_of_both<S: Serializer>(errors: &Errors, serializer: S) -> Result<S::Ok, S::Error> {
-    both(errors).serialize(serializer)
-}
-
-/// Every strategy and solver, the paper's own last.
-fn fits(comparison: &Comparison) -> Vec<Row<'_>> {
-    comparison
-        .strategies
-        .iter()
-        .map(Row::from)
-        .chain(comparison.paper.iter().map(Row::from))
-        .collect()
-}
-
-/// A comparison as JSON text, ending in a line break.
-pub fn compare_json(problem: &Problem, comparison: &Comparison) -> String {
-    to_text(&object! {
-        problem: &problem.name,
-        registered: both(&comparison.joint.registered),
-        rows: fits(comparison),
-        // One part of the elasticity that is kept, strategy joint.
-        ablations: list(&comparison.ablations, |(part, found)| object! {
-            elasticity: part.as_str(),
-            parameters: found.unknowns.len(),
-            ..Row::from(found),
-        }),
-        procedures: list(&comparison.procedures, |own| tables(comparison, own)),
-    })
+/// Returns every strategy and solver, those of the paper last.
+fn fits(comparison: &Comparison) -> impl Iterator<Item = (ComparedFit, &Errors)> {
+    let strategies = comparison.strategies.iter().map(|own| (own.into(), &own.fitted));
+    strategies.chain(comparison.paper.iter().map(|own| (own.into(), &own.errors)))
 }
 
 /// A comparison as text, ending in a line break.
@@ -229,7 +151,7 @@ fn strategies(comparison: &Comparison) -> Table {
     side_by_side(
         comparison,
         "strategy",
-        fits(comparison).iter().map(|fit| cells(&fit.strategy, fit)).collect(),
+        fits(comparison).map(|(fit, errors)| cells(&fit.strategy, &fit, errors)).collect(),
     )
 }
 
@@ -237,7 +159,7 @@ fn strategies(comparison: &Comparison) -> Table {
 fn in_full(comparison: &Comparison) -> Table {
     let mut table = untimed(strategies(comparison));
     table.header.extend(["fitted mean", "held out, largest"]);
-    for (row, Row { errors, .. }) in table.rows.iter_mut().zip(fits(comparison)) {
+    for (row, (_, errors)) in table.rows.iter_mut().zip(fits(comparison)) {
         row.extend([
             shown(&errors.identification, errors.identification.mean.norm),
             shown(&errors.held_out, errors.held_out.max.norm),
@@ -248,7 +170,9 @@ fn in_full(comparison: &Comparison) -> Table {
 
 /// One row for each part of the elasticity.
 fn parts(comparison: &Comparison) -> Table {
-    let row = |(part, found): &(Ablation, Identification)| cells(part.as_str(), &found.into());
+    let row = |(part, found): &(Ablation, Identification)| {
+        cells(part.as_str(), &found.into(), &found.fitted)
+    };
     side_by_side(comparison, "elasticity", comparison.ablations.iter().map(row).collect())
 }
 
@@ -266,13 +190,13 @@ fn untimed(mut table: Table) -> Table {
     Table { left: vec![0, 1, 8], ..table }
 }
 
-fn cells(name: &str, fit: &Row) -> Vec<String> {
+fn cells(name: &str, fit: &ComparedFit, errors: &Errors) -> Vec<String> {
     vec![
         name.to_owned(),
         fit.solver.to_owned(),
-        shown(&fit.errors.held_out, fit.errors.held_out.mean.norm),
-        shown(&fit.errors.held_out, fit.errors.held_out.rms.norm),
-        shown(&fit.errors.identification, fit.errors.identification.rms.norm),
+        shown(&errors.held_out, errors.held_out.mean.norm),
+        shown(&errors.held_out, errors.held_out.rms.norm),
+        shown(&errors.identification, errors.identification.rms.norm),
         fit.iterations.to_string(),
         fit.evaluations.to_string(),
         number(fit.seconds * 1e3, 1),

@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use super::document::Block;
-use super::json::{list, object, to_text};
 use super::quantity::{fixed, mm, number};
 use super::render::text;
 use super::table;
@@ -11,50 +10,16 @@ use crate::files::csv;
 use crate::fit::Command;
 use crate::measurement::Measurements;
 use crate::problem::Problem;
-
-/// Over the targets that can be reached, as the model expects it: the mean miss \[mm\] with the
-/// commands in the file and with those found, and the mean turn \[°\] likewise where orientations
-/// are desired.
-fn means(commands: &[Command]) -> [[Option<f64>; 2]; 2] {
-    let mean = |of: &dyn Fn(&Command) -> Option<f64>| {
-        let all: Vec<f64> =
-            commands.iter().filter(|command| command.is_reached()).filter_map(of).collect();
-        (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
-    };
-    let misses =
-        [mean(&|command| Some(command.seed_miss)), mean(&|command| Some(command.miss.norm()))];
-    let turns = [mean(&|command| command.seed_turn), mean(&|command| Some(command.turn?.norm()))];
-    let finite = |all: [Option<f64>; 2], to: fn(f64) -> f64| {
-        all.map(|mean| mean.map(to).filter(|mean| mean.is_finite()))
-    };
-    [finite(misses, |miss| miss * 1e3), finite(turns, f64::to_degrees)]
-}
-
-/// What came of it, as JSON text.
-pub fn commands_json(problem: &Problem, commands: &[Command]) -> String {
-    let [[miss_before, miss], [turn_before, turn]] = means(commands);
-    let (reached, unreached): (Vec<&Command>, Vec<&Command>) =
-        commands.iter().partition(|command| command.is_reached());
-    to_text(&object! {
-        problem: &problem.name,
-        targets: commands.len(),
-        reached: reached.len(),
-        mean_miss_before_mm: miss_before,
-        mean_miss_mm: miss,
-        mean_turn_before_deg: turn_before,
-        mean_turn_deg: turn,
-        // Rows of the targets that cannot be reached, counted from 1.
-        unreached: list(unreached, |command| command.row + 1),
-    })
-}
+use crate::results::CompensationResult;
 
 /// What came of it, in words; targets that cannot be reached are named by file and line.
 pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Command]) -> String {
-    let reached = commands.iter().filter(|command| command.is_reached()).count();
-    let mut words =
-        format!("{}\n{reached} of {} targets can be reached", problem.title, commands.len());
-    let [misses, turns] = means(commands);
-    if let [Some(before), Some(after)] = misses {
+    let result = CompensationResult::new(problem, commands);
+    let mut words = format!(
+        "{}\n{} of {} targets can be reached",
+        problem.title, result.reached, result.targets
+    );
+    if let (Some(before), Some(after)) = (result.mean_miss_before_mm, result.mean_miss_mm) {
         let _ = write!(
             words,
             ": {} mm from them on average with these commands, {} mm with those in the file, \
@@ -63,7 +28,7 @@ pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Comm
             number(before, 4)
         );
     }
-    if let [Some(before), Some(after)] = turns {
+    if let (Some(before), Some(after)) = (result.mean_turn_before_deg, result.mean_turn_deg) {
         let _ = write!(
             words,
             "; turned by {}° on average, {}° before",

@@ -1,38 +1,13 @@
 //! Which effects poses would show, for programs and for people.
 
-use serde::Serialize;
-
 use super::document::{Block, Table, code};
 use super::effect;
 use super::forecast::size as shown;
-use super::json::{list, object};
 use crate::problem::Effect;
 use crate::select::{Detectable, Detection, Size};
 
 /// Effects of a family on a screen.
 const SHOWN: usize = 3;
-
-/// All of it as JSON, sizes in SI.
-pub(super) fn entry(detection: &Detection) -> impl Serialize {
-    let size = |own: &'_ Size| {
-        object! {
-            parameters: own.parameters.clone(),
-            unit: own.unit.symbol(),
-            prior_sigma: own.prior,
-            found_from: own.worst,
-            found_from_at_best: own.best,
-        }
-    };
-    object! {
-        power: detection.power,
-        level: detection.level,
-        // Whether the poses have no times yet: effects that remember what was before a pose need
-        // them.
-        times_assumed: detection.times_assumed,
-        effects: list(&detection.effects, |own| object! { ..&own.effect, sizes: list(&own.sizes, size) }),
-        untestable: effect::untestable(detection.untestable.clone()),
-    }
-}
 
 /// The hardest of each family, and what is not to be seen.
 pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {

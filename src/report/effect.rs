@@ -1,81 +1,61 @@
-//! Effects as results name them.
-
-use serde::Serialize;
+//! Effects in words: values of their parameters, and many effects in few lines.
 
 use super::document::{Point, code};
-use super::json::{list, object};
 use super::quantity::{decimals, number};
-use crate::fit::Estimate;
 use crate::problem::Effect;
-use crate::select::{Found, Trace};
+use crate::results::{ParameterValue, joined};
 
-/// Decimals of a value at most.
+/// Most decimals of a value.
 const MOST: usize = 6;
-/// Parameters of one effect that are listed one by one.
+/// Most parameters of one effect that are listed one by one.
 pub(super) const MOST_LISTED: usize = 8;
-/// Waves of a joint that are shown of more.
+/// Harmonics of a joint that are shown if there are more.
 pub(super) const SHOWN_WAVES: usize = 4;
 
-/// Effects that these data cannot show, each with the reason, as JSON.
-pub(super) fn untestable(all: Vec<(Effect, &'static str)>) -> Vec<impl Serialize> {
-    list(all, |(effect, reason)| object! { ..effect, reason: reason })
-}
-
-/// In words and, unless that is long, as a problem declares it.
-pub(super) fn both(effect: &Effect, trace: &Trace) -> String {
-    match effect {
-        Effect::JointHarmonic { orders, .. } if orders.len() > MOST_LISTED => {
-            trace.describe(effect)
-        }
-        _ => format!("{}: {}", trace.describe(effect), code(&effect.declaration())),
+/// Lists the parameters of an effect with their values; of many harmonics the amplitudes of the
+/// largest.
+pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<String> {
+    let line = |name: &str, own: &ParameterValue| format!("{name} = {}", value(own));
+    let orders = orders(effect).unwrap_or_default();
+    if parameters.len() <= MOST_LISTED || parameters.len() != 2 * orders.len() {
+        return parameters.iter().map(|own| line(&own.name, own)).collect();
     }
-}
-
-/// The parameters of an effect that was found with their values, a line each; of many waves the
-/// highest, by their height.
-pub(super) fn values(found: &Found) -> Vec<String> {
-    let line = |name: &str, estimate: &Estimate| format!("{name} = {}", value(estimate));
-    let estimates = &found.estimates;
-    let orders = orders(&found.effect).unwrap_or_default();
-    if estimates.len() <= MOST_LISTED || estimates.len() != 2 * orders.len() {
-        return estimates.iter().map(|estimate| line(&estimate.name, estimate)).collect();
-    }
-    let mut waves: Vec<(u32, Estimate)> =
-        orders.iter().copied().zip(estimates.chunks_exact(2).map(height)).collect();
+    let mut waves: Vec<(u32, ParameterValue)> =
+        orders.iter().copied().zip(parameters.chunks_exact(2).map(amplitude)).collect();
     waves.sort_by(|(_, a), (_, b)| b.estimate.total_cmp(&a.estimate));
     let highest = waves
         .iter()
         .take(SHOWN_WAVES)
-        .map(|(order, height)| line(&format!("amplitude of order {order}"), height));
+        .map(|(order, wave)| line(&format!("amplitude of order {order}"), wave));
     let lower = waves.len().saturating_sub(SHOWN_WAVES);
-    highest.chain((lower > 0).then(|| format!("and {lower} lower ones, in loop.json"))).collect()
+    highest.chain((lower > 0).then(|| format!("{lower} smaller ones in loop.json"))).collect()
 }
 
-/// Height of a sine and a cosine of one order, with its standard error; the two taken as
-/// uncorrelated.
-fn height(pair: &[Estimate]) -> Estimate {
+/// Returns the amplitude of a sine and a cosine of one order, taken as uncorrelated.
+fn amplitude(pair: &[ParameterValue]) -> ParameterValue {
     let (sine, cosine) = (&pair[0], &pair[1]);
-    let height = sine.estimate.hypot(cosine.estimate);
-    let error = sine.std_error.zip(cosine.std_error).map(|(of_sine, of_cosine)| {
-        (sine.estimate * of_sine).hypot(cosine.estimate * of_cosine) / height.max(f64::MIN_POSITIVE)
+    let amplitude = sine.estimate.hypot(cosine.estimate);
+    let std_error = sine.std_error.zip(cosine.std_error).map(|(of_sine, of_cosine)| {
+        (sine.estimate * of_sine).hypot(cosine.estimate * of_cosine)
+            / amplitude.max(f64::MIN_POSITIVE)
     });
-    Estimate { estimate: height, std_error: error, ..sine.clone() }
+    ParameterValue { estimate: amplitude, std_error, ..sine.clone() }
 }
 
-/// A parameter with its error in a unit for people: `4.12 ± 0.05 µrad/(m·K)`.
-fn value(estimate: &Estimate) -> String {
-    let unit = estimate.unit.display(estimate.estimate);
-    let scaled = estimate.estimate * unit.factor;
-    match estimate.std_error.map(|error| error * unit.factor) {
+/// Returns a value with its standard error in a readable unit: `4.12 ± 0.05 µrad/(m·K)`.
+fn value(parameter: &ParameterValue) -> String {
+    let unit = parameter.unit.display(parameter.estimate);
+    let scaled = parameter.estimate * unit.factor;
+    match parameter.std_error.map(|error| error * unit.factor) {
         Some(error) => {
             let digits = decimals(error, MOST);
             format!("{} ± {} {}", number(scaled, digits), number(error, digits), unit.symbol)
         }
-        None => format!("{} {}, its error unknown", number(scaled, MOST), unit.symbol),
+        None => format!("{} {}, no standard error", number(scaled, MOST), unit.symbol),
     }
 }
 
-/// Points of effects in groups, each with its reason.
+/// Returns a point for each group of effects, with its reason.
 pub(super) fn reasons<'a>(effects: impl IntoIterator<Item = (Effect, &'a str)>) -> Vec<Point> {
     grouped(effects)
         .into_iter()
@@ -83,7 +63,7 @@ pub(super) fn reasons<'a>(effects: impl IntoIterator<Item = (Effect, &'a str)>) 
         .collect()
 }
 
-/// Effects in groups, in one line.
+/// Returns a line for each group of effects.
 pub(super) fn listed<'a>(effects: impl IntoIterator<Item = &'a Effect>) -> Vec<String> {
     grouped(effects.into_iter().map(|effect| (effect.clone(), ())))
         .into_iter()
@@ -91,25 +71,7 @@ pub(super) fn listed<'a>(effects: impl IntoIterator<Item = &'a Effect>) -> Vec<S
         .collect()
 }
 
-/// Effects that are parts of one, as the harmonics of a joint, taken together where they share a
-/// reason, in the order in which they come.
-pub(super) fn joined<R: Copy + PartialEq>(
-    effects: impl IntoIterator<Item = (Effect, R)>,
-) -> Vec<(Effect, R)> {
-    let mut all: Vec<(Effect, R)> = Vec::new();
-    for (effect, reason) in effects {
-        let same = |(known, why): &mut (Effect, R)| {
-            let both = known.joined(&effect).filter(|_| *why == reason);
-            both.map(|both| *known = both).is_some()
-        };
-        if !all.iter_mut().any(same) {
-            all.push((effect, reason));
-        }
-    }
-    all
-}
-
-/// Effects in one line for each family and reason: "`backlash` at joints 1, 2, 3".
+/// Groups effects by family and reason, each group in words: "`backlash` at joints 1, 2, 3".
 fn grouped<R: Copy + PartialEq>(
     effects: impl IntoIterator<Item = (Effect, R)>,
 ) -> Vec<(String, R)> {
@@ -132,7 +94,7 @@ fn orders(effect: &Effect) -> Option<&[u32]> {
     if let Effect::JointHarmonic { orders, .. } = effect { Some(orders) } else { None }
 }
 
-/// Effects of many time constants or distances, by their places alone.
+/// Names effects with many time constants or distances by their places alone.
 fn of_places(members: &[Effect]) -> String {
     let mut places: Vec<String> = Vec::new();
     for place in members

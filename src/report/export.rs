@@ -6,7 +6,6 @@ use nalgebra::{DVector, Vector3};
 
 use super::document::{Block, Table};
 use super::errors;
-use super::json::{list, object, summary, to_text};
 use super::quantity::{mm, number};
 use super::render::text;
 use crate::fit::{ErrorSummary, Placement, SavedEstimate, rows_of_kind};
@@ -14,6 +13,7 @@ use crate::measurement::Dataset;
 use crate::model::Model;
 use crate::model::parameter::ParameterSite;
 use crate::problem::Problem;
+use crate::results::{ExportResult, ExportedErrors, Origin, Summary};
 use crate::urdf::MovedOrigin;
 
 /// What to do about a geometry that lacks what stood beside it.
@@ -68,24 +68,28 @@ pub struct Exported<'a> {
     pub errors: Option<ExportErrors>,
 }
 
-/// What was written, as JSON text.
-pub fn export_json(exported: &Exported) -> String {
-    let moved = |own: &'_ MovedOrigin| {
-        object! {
+impl Exported<'_> {
+    /// Collects what was written.
+    pub fn result(&self) -> ExportResult {
+        let origin = |own: &MovedOrigin| Origin {
             joint: own.joint.clone(),
-            xyz_m: <[f64; 3]>::from(own.xyz),
-            rpy_rad: <[f64; 3]>::from(own.rpy),
+            xyz_m: own.xyz.into(),
+            rpy_rad: own.rpy.into(),
             moved_mm: own.distance * 1e3,
             turned_deg: own.angle.to_degrees(),
+        };
+        let errors = |errors: ExportErrors| ExportedErrors {
+            whole: Summary::of(&errors.whole),
+            rigid: Summary::of(&errors.rigid),
+        };
+        ExportResult {
+            problem: self.problem.name.clone(),
+            file: self.file.map(|file| file.display().to_string()),
+            origins: self.moved.map(|moved| moved.iter().map(origin).collect()),
+            held_out: self.errors.map(errors),
+            not_held: left_out(self),
         }
-    };
-    to_text(&object! {
-        problem: &exported.problem.name,
-        file: exported.file.map(|file| file.display().to_string()),
-        origins: exported.moved.map(|all| list(all, moved)),
-        held_out: exported.errors.map(|own| object! { whole: summary(&own.whole), rigid: summary(&own.rigid) }),
-        not_held: left_out(exported),
-    })
+    }
 }
 
 /// What the model has beyond the geometry of the chain.

@@ -1,33 +1,8 @@
 //! Tests of what a fit leaves, for programs and for people.
 
-use serde::Serialize;
-
 use super::document::{Block, Mark, Point};
-use super::json::{list, object};
 use super::quantity::number;
-use crate::residual_tests::{Covariate, Findings, ResidualTest, Test};
-
-/// What a test is about: the order of the rows in the plural.
-fn named(covariate: &Covariate) -> String {
-    if *covariate == Covariate::Row { "rows".to_owned() } else { covariate.to_string() }
-}
-
-/// Every test as JSON; `bounds`: where chance keeps the statistic.
-pub(super) fn entries(findings: &Findings) -> Vec<impl Serialize> {
-    list(&findings.tests, |check| {
-        let outcome = check.outcome.as_ref().ok();
-        object! {
-            check: check.name(),
-            about: check.about().as_ref().map(named),
-            structure: check.is_structure(),
-            failed: check.failed(),
-            statistic: outcome.map(|outcome| outcome.statistic),
-            bounds: outcome.map(|outcome| outcome.bounds),
-            p_value: outcome.map(|outcome| outcome.p_value),
-            words: check.to_string(),
-        }
-    })
-}
+use crate::residual_tests::{Findings, ResidualTest, Test};
 
 /// The tests that failed, in words.
 pub(super) fn failed(findings: &Findings) -> Vec<String> {

@@ -1,9 +1,6 @@
-//! ExpectedParameter standard errors as people and programs read them.
-
-use serde::Serialize;
+//! Expected standard errors as people and programs read them.
 
 use super::document::Block;
-use super::json::object;
 use super::quantity::{counted, decimals, number, or_dash, two_digits};
 use crate::design::ExpectedParameter;
 use crate::problem::{HeldOut, Problem};
@@ -11,19 +8,6 @@ use crate::quantity::Display;
 
 /// Decimals of any value at most.
 const MOST: usize = 6;
-
-/// A parameter before anything is measured, as JSON.
-pub(super) fn expected(own: &ExpectedParameter) -> impl Serialize {
-    object! {
-        name: &own.name,
-        unit: own.unit.symbol(),
-        nominal: own.nominal,
-        prior_sigma: own.prior,
-        std_error: own.std_error,
-        identified: own.identified,
-        identified_at_nominal: own.identified_at_nominal,
-    }
-}
 
 /// Nominal value and some errors \[SI\] of a parameter in a unit for display: cells, and the unit.
 pub(super) fn cells(expected: &ExpectedParameter, errors: &[Option<f64>]) -> (Vec<String>, String) {

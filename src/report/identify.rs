@@ -1,10 +1,5 @@
 //! What `identify` says and writes: `estimate.json`, its text, and the report on one fit.
 
-use std::collections::BTreeMap;
-
-use serde::Serialize;
-use serde_json::value::{RawValue, to_raw_value};
-
 use super::around::around;
 use super::document::{Block, Headline, Table};
 use super::errors::{
@@ -12,10 +7,7 @@ use super::errors::{
 };
 use super::figures::{self, PlotData};
 use super::findings;
-use super::json::{
-    self, both, keyed, kind, list, object, sizes, to_text, unidentified, unless_empty,
-};
-use super::limits::{alternation, price_entry, shadow_prices};
+use super::limits::{alternation, shadow_prices};
 use super::noise::{carried, noise, outliers, size};
 use super::parameters::{
     conditioning, correlations, lower_waves, more_unidentifiable, parameters, unidentifiable, weak,
@@ -23,129 +15,12 @@ use super::parameters::{
 use super::quantity::{counted, mm, number};
 use super::render::{Report, report, text};
 use crate::fit::{
-    ActiveConstraint, ErrorSummary, Errors, Estimate, Identification, InfluentialRows,
-    JointSources, Noise, OrientationErrors, Outlier, PointSpread,
+    ActiveConstraint, ErrorSummary, Errors, Identification, JointSources, OrientationErrors,
 };
-use crate::least_squares::solver::AtBound;
 use crate::problem::Problem;
 
 /// The file that holds everything.
 const FILE: &str = "estimate.json";
-
-fn document(problem: &Problem, found: &Identification) -> impl Serialize {
-    let is_angle = found.fitted.identification.is_angle();
-    let name = |k: usize| found.unknowns[k].as_str();
-    object! {
-        problem: &problem.name,
-        arm_digest: problem.digest(),
-        strategy: found.strategy.as_str(),
-        solver: found.solver.as_str(),
-        solver_reason: found.solver_reason,
-        termination: found.termination.as_str(),
-        trusted: found.is_trusted(),
-        iterations: found.iterations,
-        alternation: found.alternation.map(|own| object! { sweeps: own.sweeps, contraction: own.contraction }),
-        seconds: found.seconds,
-        registered: both(&found.registered),
-        ..both(&found.fitted),
-        ?kinds: unless_empty(list(&found.kinds, kind)),
-        // At each point that was touched.
-        ?spread: unless_empty(by_point(&found.spreads)),
-        reduced_chi2: found.reduced_chi2,
-        first_time_s: found.first_time,
-        estimated_sigma_mm: match found.noise {
-            Noise::Declared | Noise::Unknown => None,
-            Noise::Estimated(sigma) => Some(sigma * 1e3),
-        },
-        chance: found.chance,
-        noise_factor: found.noise_factor,
-        // Of the kind of rows that errors are told of.
-        sigma_taken_mm: (!is_angle).then_some(found.sigma_taken * 1e3),
-        ?sigma_taken_deg: is_angle.then(|| found.sigma_taken.to_degrees()),
-        rank: found.identifiability().rank,
-        ..json::conditioning(found.identifiability(), found.coordinates),
-        orientation: found.orientation.as_ref().map(turns),
-        parameters: list(&found.estimates, parameter),
-        unidentified: unidentified(&found.identifiability().unidentifiable, name),
-        weak: unidentified(&found.weak, name),
-        covariance: covariance(found),
-        correlations: list(found.strong_correlations(), |(one, other, correlation)| {
-            object! { parameters: [one, other], correlation: correlation }
-        }),
-        active_constraints: list(&found.active_constraints, active_constraint),
-        outliers: list(&found.outliers, outlier),
-        misfit_carried_by: found.influential_rows.as_ref().map(influential_rows),
-        cautions: found.reasons_to_ask(),
-        findings: &found.findings,
-    }
-}
-
-/// The spread of the target at each point with the nominal and with the identified arm.
-fn by_point(all: &[(PointSpread, PointSpread, bool)]) -> BTreeMap<&str, impl Serialize> {
-    let change = |(before, after, held_out): &(PointSpread, PointSpread, bool)| {
-        object! { n: before.n, held_out: *held_out, registered_mm: before.mean * 1e3, ..json::spread(after) }
-    };
-    all.iter().map(|own| (own.0.point.as_str(), change(own))).collect()
-}
-
-fn parameter(own: &Estimate) -> impl Serialize {
-    object! {
-        name: &own.name,
-        unit: own.unit.symbol(),
-        nominal: own.nominal,
-        estimate: own.estimate,
-        std_error: own.std_error,
-        at_bound: own.at_bound.map(|bound| side(bound, ["lower", "upper"])),
-        shadow_price: own.shadow_price.map(|price| price_entry(price, own.unit)),
-        identified: own.identified,
-        fitted: own.fitted,
-    }
-}
-
-/// Errors of orientation before and after.
-fn turns(found: &OrientationErrors) -> impl Serialize + use<> {
-    let both = |errors: &Errors| {
-        object! { identification: sizes(&errors.identification, true), held_out: sizes(&errors.held_out, true) }
-    };
-    let sigma_taken = found.sigma_taken.to_degrees();
-    object! { registered: both(&found.registered), ..both(&found.fitted), sigma_taken_deg: sigma_taken }
-}
-
-fn active_constraint(own: &ActiveConstraint) -> impl Serialize {
-    object! {
-        constraint: &own.words,
-        side: side(own.side, ["at_least", "at_most"]),
-        line: own.location.line,
-        shadow_price: price_entry(own.shadow_price, own.unit),
-    }
-}
-
-fn outlier(own: &Outlier) -> impl Serialize + use<> {
-    let (size, is_tilt) = (own.error.norm(), own.kind == "tilt");
-    object! {
-        file: own.location.file.display().to_string(),
-        line: own.location.line,
-        // Counted from 1 over all files.
-        pose_row: own.row + 1,
-        ..keyed("error", is_tilt, if is_tilt { size.to_degrees() } else { size * 1e3 }),
-        sigmas: own.distance,
-    }
-}
-
-/// A few rows without which the fit would explain the others far better.
-pub(super) fn influential_rows(own: &InfluentialRows) -> impl Serialize {
-    object! { rows: list(&own.rows, outlier), reduced_chi2_without: own.reduced_chi2 }
-}
-
-fn side(bound: AtBound, [lower, upper]: [&'static str; 2]) -> &'static str {
-    if bound == AtBound::Lower { lower } else { upper }
-}
-
-/// The result of an identification as JSON text, ending in a line break; SI units except where a
-/// key says otherwise.
-pub fn estimate_json(problem: &Problem, found: &Identification) -> String {
-    to_text(&document(problem, found))
-}
 
 /// A result as a table with its story, ending in a line break.
 pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
@@ -375,18 +250,6 @@ pub(super) fn all_told<'a>(found: &Identification, plots: &PlotData, file: &str)
     let mut blocks = vec![Block::heading("What the poses can tell"), Block::figures(figures)];
     blocks.extend(told(found, file));
     blocks
-}
-
-/// Rows of the covariance in the order of the parameters, a row a line: entry (k, k) is the square
-/// of the standard error; null where one of the two parameters has none.
-fn covariance(found: &Identification) -> Vec<Box<RawValue>> {
-    let n = found.estimates.len();
-    let has_error = |k: usize| found.estimates[k].std_error.is_some();
-    let entry =
-        |j: usize, k: usize| found.covariance.of(j, k).filter(|_| has_error(j) && has_error(k));
-    (0..n)
-        .filter_map(|j| to_raw_value(&(0..n).map(|k| entry(j, k)).collect::<Vec<_>>()).ok())
-        .collect()
 }
 
 /// What the poses can tell, in words.

@@ -3,23 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::json::{object, to_text};
 use super::shell::shell_word;
 use crate::urdf::{Chain, Description, HELD_OUT, SIGMA_MM};
-
-/// What was made, as JSON text.
-pub fn init_json(chain: &Chain, description: &Description, file: &Path) -> String {
-    let (base, tip) = chain.ends();
-    to_text(&object! {
-        problem: &description.name,
-        file: file.display().to_string(),
-        base: base,
-        tip: tip,
-        // Those that move, from base to tip.
-        joints: chain.joint_names(),
-        notes: &description.notes,
-    })
-}
 
 /// What was made, in words, and what comes next.
 pub fn init_text(chain: &Chain, description: &Description, folder: &Path) -> String {

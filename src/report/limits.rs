@@ -1,19 +1,10 @@
 //! What `identify` says of bounds, constraints and stages that take turns.
 
-use serde::Serialize;
-
 use super::document::Block;
-use super::json::object;
 use super::quantity::{decimals, number, two_digits};
 use crate::fit::{ActiveConstraint, Alternation, Estimate, Identification, ShadowPrice};
 use crate::least_squares::solver::AtBound;
 use crate::quantity::Unit;
-
-/// What a limit costs, as JSON.
-pub(super) fn price_entry(price: ShadowPrice, unit: Unit) -> impl Serialize {
-    let (rms_mm, per) = price.in_mm(unit);
-    object! { multiplier: price.multiplier, rms_mm: rms_mm, per: per }
-}
 
 /// What bounds and constraints cost; nothing to say without any.
 pub(super) fn shadow_prices<'a>(found: &Identification) -> Option<Block<'a>> {

@@ -22,9 +22,7 @@ mod findings;
 mod forecast;
 mod identify;
 mod init;
-mod json;
 mod limits;
-mod loop_json;
 mod noise;
 mod paper_tables;
 mod parameters;
@@ -42,32 +40,29 @@ mod trace;
 mod unexplained;
 mod verdict;
 
-pub use acceptance::{AcceptanceRecord, acceptance_json, acceptance_page, acceptance_text};
-pub use brief::{estimate_brief, loop_brief, tells_little};
-pub use check::{check_json, check_text, why_not_sufficient};
-pub use closed_loop::{loop_report, loop_text};
+pub use acceptance::{AcceptanceRecord, acceptance_page, acceptance_result, acceptance_text};
+pub use brief::{estimate_brief, tells_little};
+pub use check::{check_text, why_not_sufficient};
+pub use closed_loop::{loop_brief, loop_report, loop_text};
 pub use closed_problem::closed_problem;
 pub use columns::{Column, Columns, residual_columns, residuals_csv};
-pub use compare::{compare_json, compare_text, comparison_report};
-pub use compensate::{commands_csv, commands_json, commands_text};
-pub use export::{ExportErrors, Exported, export_json, export_text};
+pub use compare::{compare_text, comparison_report};
+pub use compensate::{commands_csv, commands_text};
+pub use export::{ExportErrors, Exported, export_text};
 pub use figures::{
     Cause, Contribution, Coverage, PlotData, Point, PoseError, Quantity, Stage, StageErrors,
     is_figure,
 };
-pub use identify::{
-    estimate_json, estimate_text, identification_report, joint_sources_text, why_not_trusted,
-};
-pub use init::{init_json, init_text};
-pub use loop_json::loop_json;
+pub use identify::{estimate_text, identification_report, joint_sources_text, why_not_trusted};
+pub use init::init_text;
 pub use noise::{lacks_something, show_influential_rows};
-pub use plan::{plan_json, plan_text};
+pub use plan::plan_text;
 pub use poses::poses_csv;
-pub use predict::{errors_json, prediction_text, predictions_csv};
+pub use predict::{prediction_text, predictions_csv};
 pub use render::Report;
-pub use replica::{replica_json, replica_report, replica_text};
+pub use replica::{replica_report, replica_text};
 pub use shell::shell_word;
-pub use study::{study_csv, study_json, study_parameters_csv, study_text, study_timing_csv};
+pub use study::{study_csv, study_parameters_csv, study_text, study_timing_csv};
 pub use table::Command;
-pub use trace::{trace_json, trace_text};
+pub use trace::trace_text;
 pub use verdict::interrupted;

@@ -1,4 +1,4 @@
-//! How large the residual of a fit is against the declared σ, and which rows are beyond it.
+//! Sentences about the size of the residual against the declared σ, outliers and influential rows.
 
 use std::path::Path;
 
@@ -8,87 +8,109 @@ use super::quantity::{counted, decimals, mm, number};
 use crate::fit::{FindingCode, Identification, Noise, Outlier, size_of_kind};
 use crate::problem::Problem;
 
-/// Outliers that fit on a screen.
+/// Outliers on one screen.
 const SHOWN_OUTLIERS: usize = 20;
-/// Rows that are named of those that carry the misfit.
-const SHOWN_CARRIERS: usize = 3;
-/// The file that holds them all.
+/// Influential rows that are named.
+const SHOWN_INFLUENTIAL: usize = 3;
+/// File that holds all of them.
 const FILE: &str = "estimate.json";
 
-/// How large the residual is against the declared noise.
+/// States the size of the residual against the declared noise.
 pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
-    let of = &found.fitted.identification;
-    match (found.noise, found.reduced_chi2) {
-        (Noise::Estimated(sigma), _) => format!(
-            "No σ is declared; the scatter about the fit gives {} per coordinate, model errors included.",
-            with_unit(of, sigma)
-        ),
+    let errors = &found.fitted.identification;
+    let has_too_few_rows =
+        found.has(FindingCode::PriorsDecide) || found.has(FindingCode::TooFewEquations);
+    let chi2 = match (found.noise, found.reduced_chi2) {
+        (Noise::Estimated(sigma), _) => {
+            return format!(
+                "No σ is declared; the scatter of the residual is {} per coordinate, model errors included.",
+                with_unit(errors, sigma)
+            );
+        }
         (Noise::Unknown, _) => {
-            "No σ is declared, and the fit leaves nothing over to estimate it from: there are no standard errors."
-                .to_owned()
+            return "No σ is declared, and the fit leaves no degree of freedom to estimate it: there are no standard errors."
+                .to_owned();
         }
-        (Noise::Declared, Some(_))
-            if found.has(FindingCode::PriorsDecide) || found.has(FindingCode::TooFewEquations) =>
-        {
-            "There are not enough different poses to judge the declared σ, or the model.".to_owned()
+        (Noise::Declared, Some(_)) if has_too_few_rows => {
+            return "There are too few different poses to judge the declared σ, or the model."
+                .to_owned();
         }
-        (Noise::Declared, None) => "There are not enough measurements to judge the declared σ.".to_owned(),
-        (Noise::Declared, Some(chi2)) if contradicted(found) => {
-            let declared = problem.data.position_sigma.filter(|_| of.kind == "position");
-            let declared =
-                declared.map_or_else(String::new, |s| format!(" ({} mm)", mm(s, decimals(s * 1e3, 12).max(4))));
-            let size = number(found.noise_factor.sqrt(), if found.noise_factor > 1.0 { 1 } else { 3 });
-            // The σ of several kinds, which may have units of their own, are all multiplied by the
-            // same.
-            let taken = if found.kinds.is_empty() {
-                format!("a σ of {} {}", brief(of, found.sigma_taken), unit(of))
-            } else {
-                format!("every declared σ times {size}")
-            };
-            let chance = found.chance.map_or_else(String::new, |(low, high)| {
-                format!("; chance gives {} to {}", number(low, 2), number(high, 2))
-            });
-            let (size, cause) = if found.noise_factor > 1.0 {
-                let cause = match &found.influential_rows {
-                    Some(own) if own.rows.len() == 1 => {
-                        format!("which 1 {} too far off to be noise carries", noun(found))
-                    }
-                    Some(own) => format!("which {} {}s too far off to be noise carry", own.rows.len(), noun(found)),
-                    None => "so the model lacks something".to_owned(),
-                };
-                (format!("{size} times the declared σ{declared}"), cause)
-            } else {
-                (format!("{size} of the declared σ{declared}"), "which is too large".to_owned())
-            };
-            format!(
-                "Reduced χ² is {}{chance}: the scatter is {size},\n\
-                 {cause}. Fit and standard errors take {taken}, which residual and priors speak for.",
-                short(chi2)
-            )
+        (Noise::Declared, None) => {
+            return "There are too few measurements to judge the declared σ.".to_owned();
         }
-        (Noise::Declared, Some(chi2)) => {
-            let of_chance = found.chance.filter(|&(low, high)| chi2 < low || chi2 > high);
-            let Some((low, high)) = of_chance else {
-                return format!("Reduced χ² is {}: the model explains the data to the declared σ.", number(chi2, 2));
-            };
-            let (than, what) = if chi2 > high { ("more", "explains") } else { ("less", "stands for") };
-            format!(
-                "Reduced χ² is {}; chance gives {} to {}: the fit leaves {than} than the declared σ {what}.\n\
-                 Fit and standard errors take the declared σ: residual and priors together do not speak for another one.",
-                short(chi2),
-                number(low, 2),
-                number(high, 2)
-            )
-        }
+        (Noise::Declared, Some(chi2)) => chi2,
+    };
+    let is_expected = found.chance.is_none_or(|(low, high)| (low..=high).contains(&chi2));
+    if contradicted(found) {
+        return format!(
+            "Reduced χ² is {}; {}.\n{}",
+            short(chi2),
+            expected(found),
+            other_sigma(problem, found)
+        );
+    }
+    if is_expected {
+        return format!(
+            "Reduced χ² is {}: the model explains the data to the declared σ.",
+            number(chi2, 2)
+        );
+    }
+    let (size, what) = if chi2 > 1.0 { ("larger", "explains") } else { ("smaller", "predicts") };
+    format!(
+        "Reduced χ² is {}; {}: the residual is {size} than the declared σ {what}.\n\
+         Fit and standard errors keep the declared σ: residuals and priors together give no clear evidence for another one.",
+        short(chi2),
+        expected(found),
+    )
+}
+
+/// States the interval of χ²/ν for noise alone.
+pub(super) fn expected(found: &Identification) -> String {
+    match found.chance {
+        Some((low, high)) => format!(
+            "expected {} to {} (99.9 %) if only noise is left",
+            number(low, 2),
+            number(high, 2)
+        ),
+        None => "1 is expected if only noise is left".to_owned(),
     }
 }
 
-/// Whether residual and priors contradict the declared σ.
+/// States the σ that the fit took where residuals and priors contradict the declared one.
+fn other_sigma(problem: &Problem, found: &Identification) -> String {
+    let errors = &found.fitted.identification;
+    let sigma = problem.data.position_sigma.filter(|_| errors.kind == "position");
+    let declared = sigma.map_or_else(String::new, |sigma| {
+        format!(" ({} mm)", mm(sigma, decimals(sigma * 1e3, 12).max(4)))
+    });
+    let is_larger = found.noise_factor > 1.0;
+    let size = number(found.noise_factor.sqrt(), if is_larger { 1 } else { 3 });
+    // Several kinds of rows may have several units: one factor holds for all of them.
+    let taken = if found.kinds.is_empty() {
+        format!("σ = {} {}", brief(errors, found.sigma_taken), unit(errors))
+    } else {
+        format!("every declared σ times {size}")
+    };
+    let cause = match &found.influential_rows {
+        _ if !is_larger => "so the declared σ is too large".to_owned(),
+        Some(influential) => {
+            let rows = influential.rows.len();
+            format!("mostly because of {} with gross errors", counted(rows, noun(found)))
+        }
+        None => "so the model lacks something".to_owned(),
+    };
+    format!(
+        "The scatter is {size} × the declared σ{declared}, {cause}. Fit and standard errors take {taken}, estimated from residuals and \
+         priors."
+    )
+}
+
+/// Returns true if residuals and priors contradict the declared σ.
 fn contradicted(found: &Identification) -> bool {
     found.noise == Noise::Declared && (found.noise_factor - 1.0).abs() > 1e-9
 }
 
-/// Whether a fit leaves more than the declared noise explains.
+/// Returns true if a fit leaves more than the declared noise explains.
 pub fn lacks_something(found: &Identification) -> bool {
     let by_chi2 =
         || found.reduced_chi2.zip(found.chance).is_some_and(|(chi2, (_, high))| chi2 > high);
@@ -96,15 +118,15 @@ pub fn lacks_something(found: &Identification) -> bool {
         && if contradicted(found) { found.noise_factor > 1.0 } else { by_chi2() }
 }
 
-/// A χ² / ν with two decimals, or two digits where it is small.
+/// Formats χ²/ν with two decimals, or with two significant digits if it is small.
 pub(super) fn short(chi2: f64) -> String {
     number(chi2, decimals(chi2, 6).clamp(2, 6))
 }
 
-/// Poses whose residual is too long to be noise; nothing to say without any.
+/// Lists the rows with gross errors, if there are any.
 pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<Block<'a>> {
     let treatment = if problem.robust.is_some() {
-        "the robust loss keeps them from ruling the fit"
+        "the robust loss limits their influence"
     } else {
         "they count in full; a section [robust] would limit them"
     };
@@ -120,53 +142,48 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
         )
     };
     let points = first_of(found.outliers.iter().map(point), SHOWN_OUTLIERS, FILE);
-    let are = if n == 1 { "is" } else { "are" };
-    let words = format!(
-        "{n} of {} {are} too far off to be noise ({treatment}):",
-        counted(all, noun(found))
-    );
+    let have = if n == 1 { "has a gross error" } else { "have gross errors" };
+    let words = format!("{n} of {} {have} ({treatment}):", counted(all, noun(found)));
     (n > 0).then_some(Block::Lines(words, points))
 }
 
-/// The rows that carry what the fit does not explain, and what it would leave without them; nothing
-/// to say without any.
+/// Names the influential rows and the size of the residual without them, if there are any.
 pub(super) fn carried<'a>(found: &Identification) -> Option<Block<'a>> {
-    let own = found.influential_rows.as_ref()?;
-    let row = |own: &Outlier| {
-        format!("{} ({})", own.location, size_of_kind(own.kind, own.error.norm(), 3))
+    let influential = found.influential_rows.as_ref()?;
+    let row = |row: &Outlier| {
+        format!("{} ({})", row.location, size_of_kind(row.kind, row.error.norm(), 3))
     };
-    let (carry, them) = if own.rows.len() == 1 { ("carries", "it") } else { ("carry", "them") };
-    let of = &found.fitted.identification;
-    let left = match (own.reduced_chi2, found.reduced_chi2) {
-        (Some(without), Some(all)) => {
-            format!("χ²/ν is {} instead of {}", short(without), short(all))
+    let (cause, them) =
+        if influential.rows.len() == 1 { ("causes", "it") } else { ("cause", "them") };
+    let errors = &found.fitted.identification;
+    let left = match (influential.reduced_chi2, found.reduced_chi2) {
+        (Some(without), Some(with)) => {
+            format!("χ²/ν is {} instead of {}", short(without), short(with))
         }
-        _ => {
-            format!(
-                "the scatter is {} instead of {}",
-                with_unit(of, own.sigma_taken),
-                with_unit(of, found.sigma_taken)
-            )
-        }
+        _ => format!(
+            "the scatter is {} instead of {}",
+            with_unit(errors, influential.sigma_taken),
+            with_unit(errors, found.sigma_taken)
+        ),
     };
     Some(Block::Text(format!(
-        "{} {carry} most of what the fit leaves: {}. Without {them} {left}.",
-        counted(own.rows.len(), noun(found)),
-        named(own.rows.iter().map(row), SHOWN_CARRIERS, ", ")
+        "{} {cause} most of the residual: {}. Without {them} {left}.",
+        counted(influential.rows.len(), noun(found)),
+        named(influential.rows.iter().map(row), SHOWN_INFLUENTIAL, ", ")
     )))
 }
 
-/// What to do about such rows, for a problem of that name, in one line.
+/// Says what to do about influential rows of the problem in a file, in one line.
 pub fn show_influential_rows(found: &Identification, problem: &Path) -> Option<String> {
-    let own = found.influential_rows.as_ref()?;
-    let rows = named(own.rows.iter().map(|own| own.location.to_string()), SHOWN_CARRIERS, ", ");
+    let rows = found.influential_rows.as_ref()?.rows.iter();
+    let rows = named(rows.map(|row| row.location.to_string()), SHOWN_INFLUENTIAL, ", ");
     Some(format!(
-        "look at {rows}; a section [robust] in {} limits what such rows do",
+        "check {rows}; a section [robust] in {} would limit the influence of such rows",
         problem.display()
     ))
 }
 
-/// How large the residual is, in brief.
+/// Returns the size of the residual as a fact of a headline.
 pub(super) fn size(term: &'static str, found: &Identification) -> (&'static str, String) {
     let size = match (found.noise, found.reduced_chi2) {
         (Noise::Declared, Some(chi2)) => format!("χ²/ν {}", short(chi2)),
@@ -174,7 +191,7 @@ pub(super) fn size(term: &'static str, found: &Identification) -> (&'static str,
             let of = &found.fitted.identification;
             format!("{} {} per coordinate", brief(of, sigma), unit(of))
         }
-        _ => "not to be judged".to_owned(),
+        _ => "cannot be judged".to_owned(),
     };
     (term, size)
 }

@@ -1,13 +1,9 @@
 //! Tables 2 and 3 of the paper and the numbers of its figure 13, in its own terms, from any
 //! procedure.
 
-use nalgebra::Vector3;
-use serde::Serialize;
-
 use super::document::Table;
-use super::json::{list, object, summary};
 use super::quantity::{mm, number, or_dash};
-use crate::fit::{AxisValues, Before, Comparison, ErrorSummary, Procedure, TableEntry};
+use crate::fit::{AxisValues, Comparison, ErrorSummary, Procedure, TableEntry};
 use crate::paper::published::{BEFORE, Published, WITH_ELASTICITY, WITHOUT_ELASTICITY};
 use crate::paper::{Form, StiffnessStage};
 
@@ -16,53 +12,6 @@ const SEEN: f64 = 0.9;
 
 /// Parameters of a joint in table 2.
 const FIELDS: [&str; 5] = ["α °", "a mm", "θ °", "d mm", "β °"];
-
-/// Errors and parameters of one procedure in the paper's terms.
-pub(super) fn tables(comparison: &Comparison, own: &Procedure) -> impl Serialize + use<> {
-    let Before { errors: before, registered, .. } = &comparison.before;
-    object! {
-        procedure: own.name(),
-        // Of joints that have such parameters.
-        table_2: list(&own.geometry, |(joint, [alpha, a, theta, d, beta])| object! {
-            joint: *joint,
-            alpha_deg: entry(alpha, f64::to_degrees),
-            a_mm: entry(a, millimetres),
-            theta_deg: entry(theta, f64::to_degrees),
-            d_mm: entry(d, millimetres),
-            beta_deg: entry(beta, f64::to_degrees),
-        }),
-        // Of the held-out poses; before: nominal arm without elasticity, in the measured frames.
-        table_3: object! {
-            before_registered: *registered,
-            before: summary(&ErrorSummary::of(before)),
-            after: summary(&ErrorSummary::of(&own.after)),
-            ignoring_elasticity: own.ignoring.as_ref().map(|errors| summary(&ErrorSummary::of(errors))),
-        },
-        // x, y, z of measured − predicted of each held-out pose [mm].
-        figure_13: object! {
-            before_mm: by_pose(before),
-            after_mm: by_pose(&own.after),
-            ignoring_elasticity_mm: own.ignoring.as_ref().map(|errors| by_pose(errors)),
-        },
-    }
-}
-
-fn entry(own: &TableEntry, to: fn(f64) -> f64) -> impl Serialize + use<> {
-    object! {
-        nominal: to(own.nominal),
-        identified: to(own.identified),
-        change: to(own.identified - own.nominal),
-        seen: own.seen,
-    }
-}
-
-fn millimetres(length: f64) -> f64 {
-    length * 1e3
-}
-
-fn by_pose(errors: &[Vector3<f64>]) -> Vec<[f64; 3]> {
-    errors.iter().map(|error| (error * 1e3).into()).collect()
-}
 
 /// What a procedure is, in words.
 pub(super) fn title(own: &Procedure) -> String {

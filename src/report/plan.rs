@@ -1,55 +1,13 @@
 //! What `plan` says and writes.
 
 use super::document::{Block, Table};
-use super::forecast::{assumptions, cells, expected};
-use super::json::{list, object, to_text, unidentified};
+use super::forecast::{assumptions, cells};
 use super::parameters::{conditioning, unidentifiable};
 use super::quantity::{counted, number, or_dash};
 use super::render::text;
-use super::{json, separation};
+use super::separation;
 use crate::design::{Criterion, PairSeparation, Plan};
 use crate::problem::Problem;
-
-/// A plan as JSON text; `separated` where it tells two effects apart.
-pub fn plan_json(
-    problem: &Problem,
-    criterion: &Criterion,
-    seed: u64,
-    plan: &Plan,
-    separated: Option<&PairSeparation>,
-) -> String {
-    let Plan { planned, .. } = plan;
-    let (meaningful, name) = (plan.meaningful(), |k: usize| planned.expected[k].name.as_str());
-    to_text(&object! {
-        problem: &problem.name,
-        criterion: criterion.as_str(),
-        seed: seed,
-        // Planned, and measured in any case.
-        poses: plan.poses.len(),
-        given: plan.given,
-        candidates: plan.candidates,
-        sufficient: plan.suffices,
-        // ln of the criterion: of each start, and what was reached.
-        starts: &plan.starts,
-        value: plan.value,
-        // Geometric mean of random_std_error / std_error over `gain_over`.
-        gain: plan.gain(&meaningful),
-        gain_over: list(&meaningful, |&k| name(k)),
-        rank: planned.identifiability.rank,
-        // With all candidates, and poses without which that rank cannot be reached.
-        attainable_rank: plan.attainable_rank,
-        least_poses: plan.least_poses,
-        ..json::conditioning(&planned.identifiability, plan.coordinates),
-        // After planned poses, and after random ones.
-        parameters: list(planned.expected.iter().enumerate(), |(k, own)| object! {
-            ..expected(own),
-            random_std_error: plan.random_error(k),
-        }),
-        unidentified: unidentified(&planned.identifiability.unidentifiable, name),
-        // How well it tells two effects apart.
-        ?separation: separated.map(separation::entry),
-    })
-}
 
 /// That the poses are fewer than it takes to see all that such poses can; nothing to say where they
 /// are not.

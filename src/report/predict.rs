@@ -1,35 +1,17 @@
 //! What `predict` says and writes.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::around::unsteady;
 use super::columns::{self, Column};
 use super::document::{Block, Table};
 use super::errors::{measure, sizes};
-use super::json::{list, object, spread, summary, to_text, unless_empty};
 use super::quantity::counted;
 use super::render::text;
 use super::table;
-use crate::fit::{ErrorSummary, ErrorsBySession, PointSpread, Prediction};
+use crate::fit::{ErrorSummary, Prediction};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
-
-/// Errors of all rows and of each session, and the spread at each point, as JSON text, ending in a
-/// line break.
-pub fn errors_json(errors: &ErrorsBySession, spreads: &[PointSpread]) -> String {
-    let spread = |own: &PointSpread| object! { n: own.n, ..spread(own) };
-    let spreads: BTreeMap<&str, _> =
-        spreads.iter().map(|own| (own.point.as_str(), spread(own))).collect();
-    let sessions: BTreeMap<&str, _> =
-        errors.sessions.iter().map(|(name, own)| (name.as_str(), summary(own))).collect();
-    to_text(&object! {
-        all: summary(&errors.all),
-        ?kinds: unless_empty(list(&errors.kinds, summary)),
-        sessions: sessions,
-        ?spread: unless_empty(spreads),
-    })
-}
 
 /// Predicted positions as CSV: file and line of each row, what names it, its commands, and where
 /// the arm will be.

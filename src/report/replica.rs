@@ -1,10 +1,7 @@
 //! What a study of the misprints says and writes.
 
-use serde::Serialize;
-
 use super::document::{Block, Headline, Table};
 use super::figures;
-use super::json::{list, object, summary, to_text};
 use super::quantity::{mm, number, or_dash};
 use super::render::{Report, report, text};
 use crate::fit::ErrorSummary;
@@ -18,61 +15,7 @@ use crate::study::{
 const STAGES: [&str; 4] =
     ["stiffness known", "as declared", "from positions", "from load differences"];
 
-fn document(study: &MisprintStudy, found: &ReplicaResults) -> impl Serialize {
-    let sizes = Misprint::ALL.iter().zip(&found.sizes);
-    object! {
-        study: &study.name,
-        problem: &study.problem.name,
-        seed: study.seed,
-        specimens: study.specimens,
-        identification_poses: study.identification,
-        held_out_poses: study.held_out,
-        position_sigma_mm: study.truth.noise_sigma * 1e3,
-        rigid_leaves_mm: study.rigid_leaves * 1e3,
-        misprints: list(sizes, |(own, size)| object! {
-            misprint: own.as_str(),
-            place: own.place(),
-            moves_mm: size * 1e3,
-        }),
-        cases: list(&study.cases, |case| object! {
-            links_over_joints: case.links_over_joints,
-            payload_kg: case.load.and_then(|load| load.payload),
-            hoist_N: case.load.and_then(|load| load.hoist),
-            specimens: list(found.of_case(case), |own| specimen(own, found)),
-        }),
-    }
-}
-
-/// Held-out errors of one specimen; null where an iteration does not converge.
-fn specimen(own: &Replica, found: &ReplicaResults) -> impl Serialize {
-    let left = |left: &HeldOutError| left.as_ref().map(summary);
-    object! {
-        scale: own.scale,
-        before: summary(&own.before),
-        rigid: left(&own.rigid),
-        geometry_only: summary(&own.geometry_only),
-        joint: summary(&own.joint),
-        joint_both_loads: summary(&own.joint_twice),
-        readings: list(found.readings.iter().zip(&own.by_reading), |(named, stages)| object! {
-            reading: &named.name,
-            stiffness_known: left(&stages[0]),
-            as_declared: left(&stages[1]),
-            from_positions: left(&stages[2]),
-            from_load_differences: left(&stages[3]),
-        }),
-        rivals: list(AlternativeModel::EACH.into_iter().zip(&own.by_alternative), |(rival, own)| object! {
-            rival: rival.words().0,
-            held_out: left(own),
-        }),
-    }
-}
-
-/// A study of the misprints as JSON text, ending in a line break.
-pub fn replica_json(study: &MisprintStudy, found: &ReplicaResults) -> String {
-    to_text(&document(study, found))
-}
-
-/// The same as text, ending in a line break.
+/// Returns the results of a study of the misprints as text, ending in a line break.
 pub fn replica_text(study: &MisprintStudy, found: &ReplicaResults) -> String {
     let mut blocks = vec![Block::lines(format!("{}\n{}", study.title, counts(study)))];
     blocks.extend(tables(study, found));

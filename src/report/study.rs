@@ -1,9 +1,6 @@
 //! What `study` says and writes: a line a cell, `study.json`, and tables for other programs.
 
-use serde::Serialize;
-
 use super::document::{Block, Table};
-use super::json::{list, object, to_text};
 use super::quantity::{number, or_dash};
 use super::render::text;
 use crate::files;
@@ -12,46 +9,6 @@ use crate::study::{CellResult, Results, Source, Study};
 /// First columns of every table.
 const CELL: &str = "cell,position_sigma_mm,identification_poses,strategy,solver";
 
-fn entry<'a>(study: &'a Study, result: &'a CellResult) -> impl Serialize {
-    let CellResult { cell, tally, .. } = result;
-    let rms = &tally.held_out_rms;
-    object! {
-        position_sigma_mm: millimetres(cell.sigma),
-        identification_poses: cell.poses,
-        strategy: cell.strategy.as_str(),
-        solver: cell.solver.as_str(),
-        fits: tally.fits,
-        failed: tally.failed(),
-        failure_rate: result.failure_rate(),
-        // Fits that are not to be trusted, by reason.
-        failures: &tally.failures,
-        // Mean and rms over fits and poses, the others of the rms of each fit.
-        held_out_mm: object! {
-            mean: in_mm(tally.held_out_mean.mean()),
-            rms: in_mm(rms.rms()),
-            rms_sd: in_mm(rms.deviation()),
-            rms_max: in_mm(rms.largest()),
-        },
-        reduced_chi2: tally.reduced_chi2.mean(),
-        coverage: result.coverage(),
-        // Over its spread.
-        largest_bias: result.largest_bias(study).map(|(own, bias)| object! { parameter: &own.name, bias_sd: bias }),
-        iterations_mean: tally.iterations.mean(),
-        iterations_max: tally.iterations.largest(),
-        parameters: list(result.parameters(study), |own| object! {
-            name: &own.parameter.name,
-            unit: own.unit(),
-            fits: own.fits,
-            bias: own.bias,
-            spread: own.spread,
-            rms_error: own.rms_error,
-            with_std_error: own.with_std_error,
-            std_error: own.std_error,
-            coverage: own.coverage,
-        }),
-    }
-}
-
 fn in_mm(metres: Option<f64>) -> Option<f64> {
     metres.map(|value| value * 1e3)
 }
@@ -59,20 +16,6 @@ fn in_mm(metres: Option<f64>) -> Option<f64> {
 /// A noise level as it was written: 0.1 mm are not 0.10000000000000001 mm.
 fn millimetres(metres: f64) -> f64 {
     (metres * 1e15).round() / 1e12
-}
-
-/// A study as JSON text, ending in a line break; SI units except where a key says otherwise, and
-/// without times.
-pub fn study_json(study: &Study, results: &Results) -> String {
-    to_text(&object! {
-        study: &study.name,
-        problem: &study.problem.name,
-        data: study.source.as_str(),
-        seed: study.seed,
-        repetitions: study.repetitions,
-        held_out_poses: study.held_out,
-        cells: list(&results.cells, |cell| entry(study, cell)),
-    })
 }
 
 /// A study as text, ending in a line break.

@@ -1,220 +1,202 @@
-//! What `loop` says of structure whose law is not known.
+//! Sentences of `loop` about structure whose law is not known.
 
 use std::fmt::Write as _;
 
 use super::document::code;
-use super::errors::{shown, with_unit};
 use super::quantity::{number, p_value};
-use super::trace::EVEN;
+use super::trace::{EVEN, percent};
 use crate::model::effect::NO_REFERENCE;
 use crate::model::parameter::holds_all;
 use crate::problem::{Effect, JointKind, Problem};
 use crate::residual_tests::Covariate;
-use crate::select::{
-    Claims, ClosedLoop, Correction, HELD_FIXED, Hypothesis, HypothesisKind, REFUSED, Site,
-    Unexplained,
-};
+use crate::results::{LoopResult, Structure, Summary};
+use crate::select::{ClosedLoop, Correction, HELD_FIXED, REFUSED};
 
-/// The correction of structure without a law, if there is one.
+/// Returns the correction of structure without a law, if there is one.
 pub(super) fn correction(closure: &ClosedLoop) -> Option<&Correction> {
     closure.unexplained.iter().find_map(|left| left.correction.as_ref())
 }
 
-/// The residual in units of the declared σ, where its size is all that is left to explain.
-pub(super) fn size_alone(closure: &ClosedLoop) -> Option<f64> {
-    let nowhere = closure.unexplained.iter().all(|left| left.site.is_none());
-    closure.findings.size_alone().filter(|_| nowhere && !closure.unexplained.is_empty())
-}
-
-/// Where structure is.
-pub(super) fn place(left: &Unexplained) -> String {
-    left.site.map_or_else(|| "nowhere in particular".to_owned(), |part| part.to_string())
-}
-
-/// Why a law was not tried: what its rules say comes before what the problem lacks, for a reference
-/// does not free what is held.
+/// Returns the reason for which an effect was not tried. A rule that holds its parameters fixed
+/// comes before a missing reference temperature, which would not free them.
 fn untried(problem: &Problem, (effect, reason): &(Effect, &'static str)) -> &'static str {
     let is_held = *reason == NO_REFERENCE && holds_all(problem, &effect.parameters(problem));
     if is_held { HELD_FIXED } else { reason }
 }
 
-/// What of the table was of no use, and what makes it so.
-pub(super) fn not_looked_for(problem: &Problem, closure: &ClosedLoop) -> Option<String> {
-    let needs = closure.before.untestable.iter().any(|own| untried(problem, own) == NO_REFERENCE);
-    let why = "The table has temperatures, and no law of them was looked for, only functions without one: declare";
-    needs.then(|| {
-        format!("{why} {}, at which the arm is as declared.", code("reference_temperature_C"))
-    })
+/// Lists what the problem should declare before the causes are read: a reference temperature,
+/// masses, or a limit moved out.
+pub(super) fn to_declare(
+    problem: &Problem,
+    closure: &ClosedLoop,
+    result: &LoopResult,
+) -> Vec<String> {
+    let mut declarations = Vec::new();
+    if result.structures().any(is_sag) {
+        declarations.push(format!(
+            "Declare the masses: gravity acts, and the problem declares none. Give each link {} and {} in {}, and each compliant \
+             joint or link its stiffness or {}.",
+            code("mass_kg"),
+            code("com_m"),
+            code("[[joint.body]]"),
+            code("joint-compliance"),
+        ));
+    }
+    if closure.before.untestable.iter().any(|own| untried(problem, own) == NO_REFERENCE) {
+        declarations.push(format!(
+            "Declare {} in [data], the temperature at which the arm is as declared. Without it no law of the measured temperatures was \
+             tried.",
+            code("reference_temperature_C")
+        ));
+    }
+    declarations.extend(wrong_limits(result).map(|(limit, probability)| {
+        format!(
+            "Move the limit {limit} out, or remove it: with probability {} it is wrong, or hides a cause. flexcal identify -v shows \
+             its cost.",
+            percent(probability)
+        )
+    }));
+    declarations
 }
 
-/// Each place where structure is left whose law is not known, once for everything that would be
-/// said of it alike.
-pub(super) fn places(closure: &ClosedLoop) -> Vec<String> {
-    let mut said: Vec<(String, String)> = Vec::new();
-    for left in &closure.unexplained {
-        let words = located(left);
-        if !said.iter().any(|(known, _)| *known == words) {
-            said.push((words, place(left)));
+/// Returns the places of structure without a law, each once.
+pub(super) fn places(result: &LoopResult) -> Vec<&str> {
+    let mut places: Vec<&str> = Vec::new();
+    for left in result.structures() {
+        if !places.contains(&left.place.as_str()) {
+            places.push(&left.place);
         }
     }
-    said.into_iter().map(|(_, place)| place).collect()
+    places
 }
 
-/// Structure whose law is not known.
-pub(super) fn unexplained(problem: &Problem, closure: &ClosedLoop) -> Vec<String> {
-    if closure.unexplained.is_empty() {
+/// Describes structure whose law is not known, sentence by sentence.
+pub(super) fn unexplained(
+    problem: &Problem,
+    closure: &ClosedLoop,
+    result: &LoopResult,
+) -> Vec<String> {
+    if result.unexplained.is_none() {
         return Vec::new();
     }
-    if let Some(size) = size_alone(closure) {
+    if let Some(size) = result.size_alone() {
         return vec![format!(
-            "Its size alone is beyond chance ({} × the declared σ): either σ is declared too small, or a cause is at work that these poses show \
-             nowhere in particular.",
+            "Only the size of the residual is significant ({} × the declared σ). Either the declared σ is too small, or a cause \
+             acts that these poses do not locate.",
             number(size, 1)
         )];
     }
-    // Functions of several forms may be left at one place.
     let mut sentences: Vec<String> = Vec::new();
-    for words in closure.unexplained.iter().map(located) {
+    for words in result.structures().map(located) {
         if !sentences.contains(&words) {
             sentences.push(words);
         }
     }
-    // A limit that is wrong is no function, and nothing was tried in its place.
-    if closure.unexplained.iter().all(|left| wrong_limit(left).is_some()) {
+    // A wrong limit is no function, and no law was tried in its place.
+    if result.structures().all(|left| left.limit.is_some()) {
         return sentences;
     }
     let mut catalogue =
         "No effect of the catalogue explains it better than a function without a law".to_owned();
     for (why, words) in [
         (HELD_FIXED, "[parameters] holds them fixed"),
-        (REFUSED, "[parameters] speaks of them in another unit"),
+        (REFUSED, "[parameters] gives them another unit"),
         (NO_REFERENCE, NO_REFERENCE),
     ] {
         match closure.before.untestable.iter().filter(|own| untried(problem, own) == why).count() {
             0 => {}
             1 => {
-                _ = write!(catalogue, "; one was not tried because {}", words.replace("them", "it"))
+                let words = words.replace("them", "it");
+                _ = write!(catalogue, "; one was not tried because {words}");
             }
             count => _ = write!(catalogue, "; {count} were not tried because {words}"),
         }
     }
     sentences.push(catalogue + ".");
-    if closure.unexplained.iter().any(is_sag) {
-        sentences.push(format!(
-            "The problem declares no mass, and gravity acts: give each link its mass and its centre, {} with {} and {}, and what gives way its \
-             stiffness or {}.",
-            code("[[joint.body]]"),
-            code("mass_kg"),
-            code("com_m"),
-            code("joint-compliance"),
-        ));
-    }
     match correction(closure) {
-        None => {
-            sentences.push(
-                "No empirical correction would improve the prediction of poses that it was not fitted to.".to_owned(),
-            );
-        }
+        None => sentences.push(
+            "No smooth correction would improve the prediction of poses left out of its fit."
+                .to_owned(),
+        ),
         Some(correction) => sentences.extend(corrected(problem, closure, correction)),
     }
     sentences
 }
 
-/// Whether what is left is sag under weight that is not declared.
-fn is_sag(left: &Unexplained) -> bool {
-    left.claims.as_ref().is_some_and(|claims| claims.law.0.kind == HypothesisKind::Sag)
+/// Returns true if the structure is sag under weight that is not declared.
+fn is_sag(left: &Structure) -> bool {
+    left.law.as_deref() == Some("sag")
 }
 
-/// The limit of the declared problem that is wrong, in words, by what is left, and how probable
-/// that is.
-fn wrong_limit(left: &Unexplained) -> Option<(&str, f64)> {
-    let Claims {
-        law: (Hypothesis { kind: HypothesisKind::Limit(limit), .. }, probability), ..
-    } = left.claims.as_ref()?
-    else {
-        return None;
-    };
-    Some((limit, *probability))
-}
-
-/// Limits of the declared problem that are wrong, each with its probability, where that is more
-/// than even.
-pub(super) fn wrong_limits(closure: &ClosedLoop) -> impl Iterator<Item = (&str, f64)> {
-    closure
-        .unexplained
-        .iter()
-        .filter_map(wrong_limit)
+/// Iterates over limits of the declared problem that are wrong with a probability above one half.
+fn wrong_limits(result: &LoopResult) -> impl Iterator<Item = (&str, f64)> {
+    let limit = |left: &'_ Structure| left.claims.as_ref().map_or(0.0, |own| own.law.probability);
+    result
+        .structures()
+        .filter_map(move |left| Some((left.limit.as_deref()?, limit(left))))
         .filter(|(_, probability)| *probability >= EVEN)
 }
 
-/// One finding without a law.
-fn located(left: &Unexplained) -> String {
-    let on = left.depends_on.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-    let chance = format!("p-value at most {}", p_value(left.p_value));
-    let of = |probability: f64| number(probability, 2);
-    if let Some((limit, probability)) = wrong_limit(left) {
+/// Describes the place and the inputs of one structure.
+fn located(left: &Structure) -> String {
+    let (place, inputs) = (&left.place, left.depends_on.join(", "));
+    let Some(claims) = &left.claims else {
+        let inputs = if inputs.is_empty() { inputs } else { format!(", dependent on {inputs}") };
+        return format!("Structure is left: {place}{inputs} (p {}).", p_value(left.p_value));
+    };
+    let chance = format!("p at most {}", p_value(left.p_value));
+    let law = percent(claims.law.probability);
+    if let Some(limit) = &left.limit {
         return format!(
-            "The limit {limit}, which holds the fit, is wrong or hides a cause, probability {} ({chance}).",
-            of(probability)
+            "The limit {limit}, which is active, is wrong or hides a cause: probability {law} ({chance})."
         );
     }
-    match (&left.claims, on.as_str()) {
-        (Some(claims), "") => {
-            format!(
-                "Structure at {}, probability {}; what it depends on is not known ({chance}).",
-                place(left),
-                of(claims.place.1)
-            )
-        }
-        (Some(claims), _) if is_sag(left) => format!(
-            "Under weight that is not declared {} gives way, probability {} ({chance}).",
-            if left.site == Some(Site::Arm) { "the arm".to_owned() } else { place(left) },
-            of(claims.law.1)
-        ),
-        (Some(claims), on) => format!(
-            "Structure at {}, probability {}, that depends on {on}, probability {}; its law is not known ({chance}).",
-            place(left),
-            of(claims.place.1),
-            of(claims.depends_on.1)
-        ),
-        (None, "") => format!("Structure is left: {} (p {}).", place(left), p_value(left.p_value)),
-        (None, on) => format!(
-            "Structure is left: {}, depending on {on} (p {}).",
-            place(left),
-            p_value(left.p_value)
-        ),
+    if is_sag(left) {
+        let what = if place == "arm" { "the arm" } else { place };
+        return format!("Undeclared weight deflects {what}: probability {law} ({chance}).");
     }
+    let at = percent(claims.place.probability);
+    if inputs.is_empty() {
+        return format!(
+            "Error at {place} ({at}); its inputs and its law are not known ({chance})."
+        );
+    }
+    format!(
+        "Error at {place} ({at}) that depends on {inputs} ({}); its law is not known ({chance}).",
+        percent(claims.depends_on.probability)
+    )
 }
 
-/// What a correction does, and as far as it reaches.
+/// States the gain of a correction and the range in which it holds.
 fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -> Vec<String> {
-    let before = closure.after.fitted.held_out;
     let Correction { ranges, beyond, cross_validated: (without, with), held_out, .. } = correction;
-    let does = if held_out.rms.norm < before.rms.norm { "improves" } else { "does not improve" };
+    let ([mean, rms, _], unit) = Summary::of(held_out).norms();
+    let ([mean_before, rms_before, _], _) = Summary::of(&closure.after.fitted.held_out).norms();
+    let improves = if rms < rms_before { "improves" } else { "does not improve" };
+    let [without, with] = [*without, *with].map(|error| super::errors::in_unit(held_out, error));
+    let show = |value: f64| number(value, 4);
     let mut sentences = vec![format!(
-        "A smooth correction there {does} the prediction of held-out poses: mean {} to {}, rms {} to {}; of identification poses \
-         left out in turn rms {} to {}. It names no cause and is not part of {}.",
-        shown(held_out, before.mean.norm),
-        with_unit(held_out, held_out.mean.norm),
-        shown(held_out, before.rms.norm),
-        with_unit(held_out, held_out.rms.norm),
-        shown(held_out, *without),
-        with_unit(held_out, *with),
+        "A smooth correction there {improves} the prediction of held-out poses: mean {} to {} {unit}, rms {} to {} {unit}. For \
+         identification poses left out in turn the rms changes from {} to {} {unit}. The correction names no cause and is not part \
+         of {}.",
+        show(mean_before),
+        show(mean),
+        show(rms_before),
+        show(rms),
+        show(without),
+        show(with),
         code("problem.closed.toml"),
     )];
     let range = |(covariate, range): &(Covariate, (f64, f64))| {
-        let (factor, unit) = unit(problem, covariate);
-        format!(
-            "{covariate} from {} to {}{unit}",
-            number(range.0 * factor, 2),
-            number(range.1 * factor, 2)
-        )
+        let (factor, unit) = unit_of(problem, covariate);
+        let [low, high] = [range.0, range.1].map(|value| number(value * factor, 2));
+        format!("{covariate} from {low} to {high}{unit}")
     };
     let ranges: Vec<String> =
         ranges.iter().filter(|(of, _)| *of != Covariate::Position).map(range).collect();
     if !ranges.is_empty() {
         sentences.push(format!(
-            "It holds for {}, as far as the identification poses reach; beyond, it keeps its last value ({beyond} of {} held-out poses).",
+            "It holds for {}, the range of the identification poses; outside it keeps its last value ({beyond} of {} held-out poses).",
             ranges.join(", "),
             held_out.n
         ));
@@ -222,8 +204,8 @@ fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -
     sentences
 }
 
-/// Factor from SI to the unit in which people read a quantity of the poses.
-pub(super) fn unit(problem: &Problem, covariate: &Covariate) -> (f64, &'static str) {
+/// Returns the factor from SI units to the displayed unit of a quantity, and that unit.
+fn unit_of(problem: &Problem, covariate: &Covariate) -> (f64, &'static str) {
     match covariate {
         Covariate::Temperature => (1.0, " °C"),
         Covariate::Time => (1.0 / 3600.0, " h"),

@@ -49,12 +49,17 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("design", &[GROUND, BELOW_FIT, &["fit", "select"]]),
     // Many fits to what model or rig measure.
     ("study", &[GROUND, BELOW_FIT, &["fit", "rig", "files"]]),
+    // Results as data, which reports put into words.
+    (
+        "results",
+        &[GROUND, BELOW_FIT, &["fit", "residual_tests", "select", "design", "study", "urdf"]],
+    ),
     (
         "report",
         &[
             GROUND,
             BELOW_FIT,
-            &["fit", "residual_tests", "select", "design", "study", "files", "urdf"],
+            &["fit", "residual_tests", "select", "design", "study", "files", "urdf", "results"],
         ],
     ),
     (
@@ -62,10 +67,21 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
         &[
             GROUND,
             BELOW_FIT,
-            &["fit", "select", "design", "study", "report", "rig", "files", "urdf"],
+            &[
+                "fit",
+                "residual_tests",
+                "select",
+                "design",
+                "study",
+                "results",
+                "report",
+                "rig",
+                "files",
+                "urdf",
+            ],
         ],
     ),
-    ("main", &[GROUND, BELOW_FIT, &["fit", "select", "design", "study", "report", "rig", "cli"]]),
+    ("main", &[&["cli"]]),
 ];
 const BELOW_FIT: &[&str] = &["mechanics", "model", "paper", "least_squares", "numeric", "random"];
 

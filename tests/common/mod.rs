@@ -6,3 +6,4 @@ pub mod arms;
 pub mod bounded;
 pub mod effects;
 pub mod made;
+pub mod schema;

@@ -14,7 +14,8 @@ use flexcal::least_squares::solver::{
 };
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
-use flexcal::report::{estimate_json, estimate_text};
+use flexcal::report::estimate_text;
+use flexcal::results::{Document as _, IdentificationResult};
 use flexcal::select::trace;
 
 struct Silent;
@@ -105,7 +106,8 @@ fn an_active_constraint_holds_exactly_and_is_named() {
     );
     let text = estimate_text(&problem, &held);
     assert!(text.contains("Held by a constraint") && text.contains(words[1]), "{text}");
-    let json: serde_json::Value = serde_json::from_str(&estimate_json(&problem, &held)).unwrap();
+    let json: serde_json::Value =
+        serde_json::from_str(&IdentificationResult::new(&problem, &held).to_json()).unwrap();
     assert_eq!(json["active_constraints"][0]["side"], "at_least");
     assert_eq!(json["active_constraints"][1]["constraint"], words[1]);
     assert_eq!(json["active_constraints"][0]["line"], 86);
@@ -278,7 +280,9 @@ fn shadow_prices_are_differences_of_fits() {
     let gained = 1e3 * (fall(&tight) - fall(&loose)) / 0.01;
     assert!(price > 0.0 && (gained / price - 1.0).abs() < 0.3, "{price} against {gained}");
     assert!(estimate_text(&problem(""), &tight).contains("What limits cost"));
-    assert!(estimate_json(&problem(""), &tight).contains("\"shadow_price\": {"));
+    assert!(
+        IdentificationResult::new(&problem(""), &tight).to_json().contains("\"shadow_price\": {")
+    );
 }
 
 /// As the page of the problem tells it: the limit that is wrong is dear, the others are cheap.

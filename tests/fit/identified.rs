@@ -12,7 +12,7 @@ use flexcal::fit::{
 use flexcal::measurement::Dataset;
 use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
-use flexcal::report::estimate_json;
+use flexcal::results::{Document as _, IdentificationResult};
 use serde_json::Value;
 
 fn lunar() -> (Problem, Dataset, Identification) {
@@ -25,7 +25,8 @@ fn lunar() -> (Problem, Dataset, Identification) {
 #[test]
 fn the_covariance_is_that_of_the_standard_errors() {
     let (problem, _, found) = lunar();
-    let json: Value = serde_json::from_str(&estimate_json(&problem, &found)).unwrap();
+    let json: Value =
+        serde_json::from_str(&IdentificationResult::new(&problem, &found).to_json()).unwrap();
     for (k, estimate) in found.estimates.iter().enumerate() {
         let told = &json["covariance"][k];
         assert_eq!(told.as_array().unwrap().len(), found.estimates.len());
@@ -156,7 +157,7 @@ fn configurations_of_another_arm_are_an_error() {
 #[test]
 fn a_saved_estimate_predicts_what_the_fit_predicts() {
     let (problem, data, found) = lunar();
-    let json = estimate_json(&problem, &found);
+    let json = IdentificationResult::new(&problem, &found).to_json();
     let saved = SavedEstimate::parse(&json, Path::new("estimate.json")).unwrap();
     let again = predict(&problem, Some(&saved), &data.measurements, Some(&data.split)).unwrap();
     let (own, residuals) =

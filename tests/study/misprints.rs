@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use assert_cmd::Command;
-use flexcal::report;
+use flexcal::results::{Document as _, MisprintResult};
 use flexcal::study::{MisprintStudy, ReplicaResults, Request, Spread, replicate};
 
 const FILE: &str = "problems/lunar-sampler/MISPRINTS.toml";
@@ -37,7 +37,8 @@ fn replicas_repeat_and_tell_readings_and_stages_apart() {
         pool.install(|| replicate(&study, || {}).unwrap())
     };
     let found = on(1);
-    assert_eq!(report::replica_json(&study, &found), report::replica_json(&study, &on(3)));
+    let json = |found| MisprintResult::new(&study, found).to_json();
+    assert_eq!(json(&found), json(&on(3)));
     for own in &found.replicas {
         assert!((own.rigid.unwrap().mean.norm / study.rigid_leaves - 1.0).abs() < 1e-3);
     }

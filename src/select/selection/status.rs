@@ -1,21 +1,25 @@
 //! Status of each effect, which says what may be claimed of it, and the verdict that follows.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use crate::select::reference_check::ReferenceVerdict;
 
 /// Probability of a law from which on it is the most probable one at its place.
 const EVEN: f64 = 0.5;
 
 /// What may be claimed of an effect in the extended problem, the strongest claim first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Status {
-    /// Its law is as probable as [`stated`](crate::select::SelectionRules::stated) asks for, or the
-    /// F test alone decided for it.
+    /// The effect acts; the probability of its law is at least
+    /// [`stated`](crate::select::SelectionRules::stated).
     Found,
-    /// Its law is more probable than all others together, but less than `stated`.
+    /// Its law is more probable than all others together.
     Probable,
-    /// Only the place of the error is claimed, if anything; the law is one candidate.
+    /// At most the place is known; the law is one candidate.
     Located,
-    /// Data outside the fit contradict it.
+    /// Data outside the fit contradict the effect.
     Contradicted,
 }
 
@@ -48,11 +52,12 @@ impl Status {
 }
 
 /// Outcome of the loop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// No effect was found and the residual shows no structure.
     NothingFound,
-    /// The effects with status [`Status::Found`] alone leave a residual that passes the tests.
+    /// Effects with status `found` alone leave a residual that passes the tests.
     Explained,
     /// Structure is left, or no effect is sure.
     Unexplained,

@@ -1,0 +1,98 @@
+//! The command that fits a result best as the next one.
+
+use std::path::Path;
+
+use flexcal::fit::{FindingCode, Identification};
+use flexcal::problem::{PoseRanges, Problem};
+use flexcal::report::{self, shell_word};
+use flexcal::results::{LoopResult, TraceResult};
+use flexcal::select::Verdict;
+
+use super::input::Common;
+use super::output::Results;
+
+/// Poses that a plan proposes to tell two effects apart.
+const SEPARATING_POSES: usize = 12;
+
+/// Names the command after a fit of which `is_structured` says whether its residual has structure.
+pub fn after_fit(
+    common: &Common,
+    found: &Identification,
+    is_structured: bool,
+    estimate: &Path,
+) -> String {
+    let named = common.named();
+    match report::show_influential_rows(found, &common.problem_file()) {
+        Some(look) => {
+            format!(
+                "{look}; if they are right, flexcal loop {named} looks for what the model lacks"
+            )
+        }
+        // Of a fit that says so little neither a cause nor a correction follows.
+        None if !found.is_trusted() || report::tells_little(found) => {
+            format!("flexcal check {named} says what the poses can tell")
+        }
+        None if found.has(FindingCode::PriorsDecide) => {
+            format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
+        }
+        None if is_structured || report::lacks_something(found) => {
+            format!("flexcal loop {named} looks for what the model lacks")
+        }
+        None => {
+            let [problem, estimate] = [common.problem(), estimate].map(shell_word);
+            format!(
+                "flexcal compensate {problem} --estimate {estimate} --data TARGETS.csv corrects commands"
+            )
+        }
+    }
+}
+
+/// Names the command after a loop, which wrote its `results`.
+pub fn after_loop(
+    common: &Common,
+    problem: &Problem,
+    fit: &Identification,
+    result: &LoopResult,
+    results: &Results,
+) -> String {
+    let named = common.named();
+    if let Some(look) = report::show_influential_rows(fit, &common.problem_file()) {
+        return look;
+    }
+    if result.interrupted {
+        return "the same command again, to search to the end".to_owned();
+    }
+    if !result.trusted {
+        return format!("flexcal identify {named} -v, once the input is corrected");
+    }
+    let pair = result.effects.iter().find_map(|found| {
+        Some((&found.effect, found.alternatives.first()?)).filter(|_| found.is_doubted())
+    });
+    if let (Some((effect, rival)), true) = (pair, PoseRanges::of(problem).is_ok()) {
+        return format!(
+            "flexcal plan {named} --poses {SEPARATING_POSES} --separate '{}' '{}' chooses poses that tell the two apart",
+            effect.declaration, rival.declaration
+        );
+    }
+    let closed = shell_word(&results.path("problem.closed.toml"));
+    match result.verdict {
+        Verdict::Unexplained => {
+            format!("flexcal trace {named} ranks candidates and names what these data cannot show")
+        }
+        Verdict::NothingFound => format!("flexcal identify {named} writes the estimate to apply"),
+        Verdict::Explained => {
+            format!(
+                "flexcal identify {closed} writes the estimate to apply; -v lists its parameters"
+            )
+        }
+    }
+}
+
+/// Names the command after a trace.
+pub fn after_trace(common: &Common, result: &TraceResult) -> String {
+    let is_pointed = result.ranking.first().is_some_and(|own| own.p_value < result.level);
+    match is_pointed || result.structured {
+        true => format!("flexcal loop {} adds what is missing and fits again", common.named()),
+        false => format!("flexcal identify {} writes the estimate to apply", common.named()),
+    }
+}

@@ -1,0 +1,166 @@
+//! Results of commands that apply an estimate or prepare a problem: `predict` (errors.json),
+//! `compensate`, `export` and `init` (with `--json`).
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::document::Document;
+use super::identification::Spread;
+use super::summary::Summary;
+use crate::fit::{Command, ErrorsBySession, PointSpread};
+use crate::problem::Problem;
+use crate::urdf::{Chain, Description};
+
+/// Errors of predictions against measurements.
+#[derive(Debug, Default, Serialize, JsonSchema)]
+pub struct PredictionErrors {
+    /// Errors of all rows of the first kind; absent if the rows hold no measurements.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub all: Option<Summary>,
+    /// Errors of each kind of rows, if there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub kinds: Vec<Summary>,
+    pub sessions: BTreeMap<String, Summary>,
+    /// Spread of the target at each touched point.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub spread: BTreeMap<String, SpreadAtPoint>,
+}
+
+impl Document for PredictionErrors {
+    const FORMAT: &'static str = "flexcal-errors";
+}
+
+/// Spread of the target over the rows at one point.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct SpreadAtPoint {
+    pub n: usize,
+    #[serde(flatten)]
+    pub spread: Spread,
+}
+
+impl PredictionErrors {
+    /// Collects errors and spreads.
+    pub fn new(errors: &ErrorsBySession, spreads: &[PointSpread]) -> Self {
+        let spread = |own: &PointSpread| {
+            (own.point.clone(), SpreadAtPoint { n: own.n, spread: Spread::new(own) })
+        };
+        let sessions = errors.sessions.iter();
+        Self {
+            all: Some(Summary::of(&errors.all)),
+            kinds: errors.kinds.iter().map(Summary::of).collect(),
+            sessions: sessions.map(|(name, own)| (name.clone(), Summary::of(own))).collect(),
+            spread: spreads.iter().map(spread).collect(),
+        }
+    }
+}
+
+/// Commands that bring the arm to targets. Means are over the targets that are reached.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct CompensationResult {
+    pub problem: String,
+    pub targets: usize,
+    pub reached: usize,
+    /// Predicted mean distance with the commands of the file.
+    pub mean_miss_before_mm: Option<f64>,
+    /// Predicted mean distance with the commands found.
+    pub mean_miss_mm: Option<f64>,
+    pub mean_turn_before_deg: Option<f64>,
+    pub mean_turn_deg: Option<f64>,
+    /// Rows of the targets that cannot be reached, from 1.
+    pub unreached: Vec<usize>,
+}
+
+impl Document for CompensationResult {
+    const FORMAT: &'static str = "flexcal-compensate";
+}
+
+/// File with the identified geometry.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ExportResult {
+    pub problem: String,
+    pub file: Option<String>,
+    /// Origins that moved in a URDF.
+    pub origins: Option<Vec<Origin>>,
+    pub held_out: Option<ExportedErrors>,
+    /// Parts of the model that the file cannot hold.
+    pub not_held: Vec<String>,
+}
+
+impl Document for ExportResult {
+    const FORMAT: &'static str = "flexcal-export";
+}
+
+/// Origin of a joint in a URDF.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Origin {
+    pub joint: String,
+    pub xyz_m: [f64; 3],
+    pub rpy_rad: [f64; 3],
+    pub moved_mm: f64,
+    pub turned_deg: f64,
+}
+
+/// Errors on held-out rows of the whole model and of its rigid geometry.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ExportedErrors {
+    pub whole: Summary,
+    pub rigid: Summary,
+}
+
+/// Problem made from a URDF.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct InitResult {
+    pub problem: String,
+    pub file: String,
+    pub base: String,
+    pub tip: String,
+    /// Moving joints from base to tip.
+    pub joints: Vec<String>,
+    pub notes: Vec<String>,
+}
+
+impl Document for InitResult {
+    const FORMAT: &'static str = "flexcal-init";
+}
+
+impl CompensationResult {
+    /// Counts the targets that are reached, and averages over them.
+    pub fn new(problem: &Problem, commands: &[Command]) -> Self {
+        let (reached, missed): (Vec<&Command>, Vec<&Command>) =
+            commands.iter().partition(|command| command.is_reached());
+        let mean = |of: fn(&Command) -> Option<f64>, to: fn(f64) -> f64| {
+            let values: Vec<f64> = reached.iter().filter_map(|command| of(command)).collect();
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            Some(to(mean)).filter(|mean| mean.is_finite())
+        };
+        let mm: fn(f64) -> f64 = |length| length * 1e3;
+        Self {
+            problem: problem.name.clone(),
+            targets: commands.len(),
+            reached: reached.len(),
+            mean_miss_before_mm: mean(|command| Some(command.seed_miss), mm),
+            mean_miss_mm: mean(|command| Some(command.miss.norm()), mm),
+            mean_turn_before_deg: mean(|command| command.seed_turn, f64::to_degrees),
+            mean_turn_deg: mean(|command| Some(command.turn?.norm()), f64::to_degrees),
+            unreached: missed.iter().map(|command| command.row + 1).collect(),
+        }
+    }
+}
+
+impl InitResult {
+    /// Collects what was made of a chain, written to `file`.
+    pub fn new(chain: &Chain, description: &Description, file: &Path) -> Self {
+        let (base, tip) = chain.ends();
+        Self {
+            problem: description.name.clone(),
+            file: file.display().to_string(),
+            base: base.to_owned(),
+            tip: tip.to_owned(),
+            joints: chain.joint_names(),
+            notes: description.notes.iter().map(ToString::to_string).collect(),
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! Hypotheses about a residual, and what is claimed of them with which probability.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::effect::EffectKeys;
+use crate::problem::Effect;
+use crate::residual_tests::Covariate;
+use crate::select::{self, HypothesisKind, Trace};
+
+/// Hypothesis: a law at a place, or a function of unknown law.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Hypothesis {
+    /// Effect, if the law is one of the catalogue.
+    #[schemars(with = "Option<EffectKeys>")]
+    pub effect: Option<Effect>,
+    /// Name of the effect, or of the kind of function.
+    pub law: String,
+    pub description: String,
+    pub place: String,
+    pub depends_on: Vec<String>,
+}
+
+impl Hypothesis {
+    /// Names a hypothesis about the traced data.
+    pub(super) fn new(hypothesis: &select::Hypothesis, trace: &Trace) -> Self {
+        Self {
+            effect: hypothesis.effect().cloned(),
+            law: law_name(&hypothesis.kind).to_owned(),
+            description: describe(hypothesis, |effect| trace.describe(effect)),
+            place: hypothesis.site.to_string(),
+            depends_on: hypothesis.depends_on.iter().map(ToString::to_string).collect(),
+        }
+    }
+}
+
+/// Claim with its probability.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Claim<T> {
+    pub value: T,
+    pub probability: f64,
+}
+
+/// Claims about a cause, from the weakest to the strongest.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Claims {
+    /// That something acts at this place.
+    pub place: Claim<String>,
+    /// That something acts there that depends on these quantities and no others.
+    pub depends_on: Claim<Vec<String>>,
+    /// That this is the law, and no function of unknown law acts there; null if no law is known.
+    pub law: Claim<Option<String>>,
+    pub description: String,
+}
+
+impl Claims {
+    /// Names the claims about the traced data.
+    pub(super) fn new(claims: &select::Claims, trace: &Trace) -> Self {
+        let select::Claims { place, depends_on, law } = claims;
+        let name = law.0.effect().map(|effect| effect.name().to_owned());
+        let words = depends_on.0.iter().map(ToString::to_string).collect();
+        Self {
+            place: Claim { value: place.0.to_string(), probability: place.1 },
+            depends_on: Claim { value: words, probability: depends_on.1 },
+            law: Claim { value: name, probability: law.1 },
+            description: describe(&law.0, |effect| trace.describe(effect)),
+        }
+    }
+}
+
+/// Returns the name of a law in result files.
+pub(super) fn law_name(law: &HypothesisKind) -> &str {
+    match law {
+        HypothesisKind::Effect(effect) => effect.name(),
+        HypothesisKind::NearHarmonic(_) => "near-harmonic",
+        HypothesisKind::PerPose => "per-pose",
+        HypothesisKind::Wandering => "wandering",
+        HypothesisKind::Linear => "linear",
+        HypothesisKind::Sag => "sag",
+        HypothesisKind::Limit(_) => "limit",
+        _ => "smooth",
+    }
+}
+
+/// Describes a hypothesis in words; `effect_words` describes an effect.
+fn describe(hypothesis: &select::Hypothesis, effect_words: impl Fn(&Effect) -> String) -> String {
+    let (place, inputs) = (hypothesis.site, joined_words(&hypothesis.depends_on));
+    match &hypothesis.kind {
+        HypothesisKind::Effect(effect) => effect_words(effect),
+        HypothesisKind::NearHarmonic(1) => {
+            format!("{place}: a function of {inputs} with a period of one revolution, law unknown")
+        }
+        HypothesisKind::NearHarmonic(order) => {
+            format!(
+                "{place}: a function of {inputs} with about {order} periods a revolution, law unknown"
+            )
+        }
+        HypothesisKind::PerPose => {
+            format!("{place}: an error that differs in every pose and depends on no known quantity")
+        }
+        HypothesisKind::Wandering => format!(
+            "{place}: a random drift in {inputs}, in which each reading follows the one before"
+        ),
+        HypothesisKind::Linear => format!(
+            "{place}: an error linear in the position, such as a scale for each axis, or shear"
+        ),
+        HypothesisKind::Sag => {
+            format!("{place}: deflection under weight that the problem does not declare")
+        }
+        HypothesisKind::Limit(limit) => {
+            format!("{place}: the limit {limit}, which is active, is wrong")
+        }
+        _ => format!("{place}: a smooth function of {inputs}, law unknown"),
+    }
+}
+
+/// Joins the names of quantities by "and".
+fn joined_words(covariates: &[Covariate]) -> String {
+    covariates.iter().map(ToString::to_string).collect::<Vec<_>>().join(" and ")
+}

@@ -1,0 +1,375 @@
+//! Result of `loop`: loop.json.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::claims::{Claims, law_name};
+use super::document::Document;
+use super::effect::{EffectKeys, NamedEffect};
+use super::identification::{FindingKeys, InfluentialRowSet};
+use super::residual_test::ResidualTest;
+use super::summary::{Errors, KindErrors, Summary, by_unit, in_unit};
+use crate::fit::{Estimate, Finding, Identification};
+use crate::problem::{Effect, Problem};
+use crate::quantity::Unit;
+use crate::residual_tests::Covariate;
+use crate::select::{self, ClosedLoop, HypothesisKind, ReferenceVerdict, Status, Trace, Verdict};
+
+/// Place of structure that only the residual tests see.
+const NOWHERE: &str = "nowhere in particular";
+
+/// Result of the search for missing effects.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct LoopResult {
+    pub problem: String,
+    pub verdict: Verdict,
+    /// Present and true if the search was stopped before its end.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub interrupted: bool,
+    pub trusted: bool,
+    /// True if the residual of the last fit could be tested for structure.
+    pub tested: bool,
+    /// Errors of the nominal arm, with base and tool fitted where they are free.
+    pub registered: Errors,
+    /// Fit of the declared problem.
+    pub before: Fit,
+    /// Fit of the extended problem.
+    pub after: Fit,
+    /// Errors with the effects of status `found` alone.
+    pub with_found: Errors,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_gain_mm: Option<Gain>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_gain_deg: Option<Gain>,
+    /// Effects of the extended problem that were not declared.
+    pub effects: Vec<FoundEffect>,
+    /// Strongest structure whose law is unknown.
+    pub unexplained: Option<Structure>,
+    /// Rows with gross errors, which took no part in the choice of effects.
+    pub set_aside: Vec<Row>,
+    /// Further structure whose law is unknown, most probable first.
+    pub further: Vec<Structure>,
+    /// Common prior of the harmonics of all joints.
+    pub harmonic_prior: Option<Vec<OrderPrior>>,
+    /// Rounds of the search.
+    pub steps: Vec<Step>,
+    pub checks_before: Vec<ResidualTest>,
+    pub checks_after: Vec<ResidualTest>,
+    /// Findings of the checks of the last fit.
+    #[schemars(with = "Vec<FindingKeys>")]
+    pub findings: Vec<Finding>,
+}
+
+impl Document for LoopResult {
+    const FORMAT: &'static str = "flexcal-loop";
+}
+
+/// Fit of a problem.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Fit {
+    #[serde(flatten)]
+    pub errors: Errors,
+    pub reduced_chi2: Option<f64>,
+    pub misfit_carried_by: Option<InfluentialRowSet>,
+    /// Errors of each kind of rows, if there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub kinds: Vec<KindErrors>,
+}
+
+/// Decrease of the mean error on held-out rows.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Gain {
+    pub mean: f64,
+    /// Bootstrap interval over configurations, 95 %.
+    pub interval_95: [f64; 2],
+}
+
+/// Effect that the loop added to the problem.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct FoundEffect {
+    #[serde(flatten)]
+    pub effect: NamedEffect,
+    pub status: Status,
+    /// Null if no evidence was evaluated.
+    pub claims: Option<Claims>,
+    /// Share of refits without a fifth of the configurations that name the effect.
+    pub stability: Option<f64>,
+    /// Verdict of data outside the fit.
+    pub witness: Option<Witness>,
+    /// Probability that noise alone gains as much, corrected for all candidates.
+    pub p_value: f64,
+    pub parameters: Vec<ParameterValue>,
+    /// Effects that these data cannot tell from it, most probable first.
+    pub alternatives: Vec<NamedEffect>,
+    /// Held-out errors after the first round with the effect.
+    pub held_out_after: Summary,
+}
+
+/// Verdict of data that took no part in the fit.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct Witness {
+    pub data: String,
+    /// `corroborated` or `contradicted`.
+    pub says: &'static str,
+}
+
+/// Value of a parameter of an effect, SI units.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct ParameterValue {
+    pub name: String,
+    #[serde(serialize_with = "symbol")]
+    #[schemars(with = "String")]
+    pub unit: Unit,
+    pub estimate: f64,
+    pub std_error: Option<f64>,
+}
+
+/// Structure whose law is unknown.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Structure {
+    /// Place of the error.
+    #[serde(rename = "where")]
+    pub place: String,
+    pub depends_on: Vec<String>,
+    /// Kind of function, for example `smooth`, `sag`, `wandering` or `limit`; null if only the
+    /// residual tests see the structure.
+    pub law: Option<String>,
+    /// Limit of the declared problem that is wrong, or that hides a cause.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub limit: Option<String>,
+    pub claims: Option<Claims>,
+    /// Upper limit of the probability that noise alone makes the structure.
+    pub p_value: f64,
+    pub held_out_with_empirical_correction: Option<Summary>,
+    pub correction: Option<Correction>,
+}
+
+/// Smooth correction of the structure, without a law.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Correction {
+    /// Range of each input, SI units; beyond it the correction keeps its last value.
+    pub ranges: Vec<(String, (f64, f64))>,
+    /// Number of held-out rows outside these ranges.
+    pub held_out_beyond: usize,
+    /// Rms error of poses left out in turn, without and with the correction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cross_validated_rms_mm: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cross_validated_rms_deg: Option<[f64; 2]>,
+}
+
+/// Row of a file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Row {
+    pub file: String,
+    pub line: Option<usize>,
+}
+
+/// Prior of the harmonics of one order.
+#[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
+pub struct OrderPrior {
+    pub order: u32,
+    pub sigma_rad: f64,
+}
+
+/// Round of the search.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Step {
+    #[schemars(with = "Vec<EffectKeys>")]
+    pub effects: Vec<Effect>,
+    #[serde(flatten)]
+    pub errors: Errors,
+}
+
+impl LoopResult {
+    /// Collects the result of a loop.
+    pub fn new(problem: &Problem, closure: &ClosedLoop) -> Self {
+        let (before, held_out) = (&closure.before, &closure.after.fitted.held_out);
+        let gain = {
+            let in_unit = |value: f64| in_unit(held_out, value);
+            let select::Interval { value, low, high } = closure.gain;
+            Gain { mean: in_unit(value), interval_95: [in_unit(low), in_unit(high)] }
+        };
+        let is_angle = held_out.is_angle();
+        let mut structures = closure.unexplained.iter().map(|left| Structure::new(left, before));
+        let prior = closure.harmonic_prior.as_ref().map(|prior| {
+            let order = |&(order, sigma_rad): &(u32, f64)| OrderPrior { order, sigma_rad };
+            prior.by_order.iter().map(order).collect()
+        });
+        Self {
+            problem: problem.name.clone(),
+            verdict: closure.verdict,
+            interrupted: closure.interrupted,
+            trusted: closure.after.is_trusted(),
+            tested: closure.findings.is_testable(),
+            registered: Errors::of(&before.fit.registered),
+            before: Fit::new(&before.fit),
+            after: Fit::new(&closure.after),
+            with_found: Errors::of(&closure.with_found),
+            held_out_gain_mm: (!is_angle).then_some(gain),
+            held_out_gain_deg: is_angle.then_some(gain),
+            effects: closure.effects.iter().map(|found| FoundEffect::new(found, before)).collect(),
+            unexplained: structures.next(),
+            further: structures.collect(),
+            set_aside: closure.set_aside.iter().map(Row::new).collect(),
+            harmonic_prior: prior,
+            steps: closure.rounds.iter().map(Step::new).collect(),
+            checks_before: ResidualTest::all(&before.findings),
+            checks_after: ResidualTest::all(&closure.findings),
+            findings: closure.after.findings.clone(),
+        }
+    }
+
+    /// Iterates over the effects with a status.
+    pub fn with_status(&self, status: Status) -> impl Iterator<Item = &FoundEffect> {
+        self.effects.iter().filter(move |found| found.status == status)
+    }
+
+    /// Iterates over structure whose law is unknown, most probable first.
+    pub fn structures(&self) -> impl Iterator<Item = &Structure> {
+        self.unexplained.iter().chain(&self.further)
+    }
+
+    /// Returns the test of the size of the residual against the declared σ, if it could be made.
+    fn size_test(&self) -> Option<(&ResidualTest, f64)> {
+        let test = self.checks_after.iter().find(|test| test.check == "reduced-chi-squared")?;
+        Some((test, test.statistic?))
+    }
+
+    /// Returns the size of the residual over the declared σ, if its size alone is significant and
+    /// no structure is seen in it.
+    pub fn size_alone(&self) -> Option<f64> {
+        let (size, chi2) = self.size_test()?;
+        let failed = self.checks_after.iter().filter(|test| test.structure && test.failed);
+        let is_alone = failed.count() == 1 && size.failed && chi2 > 1.0;
+        let mut structures = self.structures().peekable();
+        let is_nowhere = structures.peek().is_some() && structures.all(|own| own.place == NOWHERE);
+        (is_alone && is_nowhere).then(|| chi2.sqrt())
+    }
+
+    /// Returns the size of the residual over the declared σ, if it is significantly smaller.
+    pub fn overstated_sigma(&self) -> Option<f64> {
+        let (size, chi2) = self.size_test()?;
+        let (low, _) = size.bounds?;
+        (chi2 < low).then(|| chi2.max(0.0).sqrt())
+    }
+
+    /// Returns the decrease of the mean held-out error, in mm or ° as its key says.
+    pub fn gain(&self) -> Option<Gain> {
+        self.held_out_gain_mm.or(self.held_out_gain_deg)
+    }
+}
+
+impl Fit {
+    fn new(fit: &Identification) -> Self {
+        Self {
+            errors: Errors::of(&fit.fitted),
+            reduced_chi2: fit.reduced_chi2,
+            misfit_carried_by: fit.influential_rows.as_ref().map(InfluentialRowSet::new),
+            kinds: KindErrors::all(&fit.kinds),
+        }
+    }
+}
+
+impl FoundEffect {
+    fn new(found: &select::Found, trace: &Trace) -> Self {
+        let named = |effect: &Effect| NamedEffect::new(effect, trace);
+        let witness = |check: &select::ReferenceCheck| Witness {
+            data: check.data.clone(),
+            says: match check.verdict {
+                ReferenceVerdict::Corroborated => "corroborated",
+                ReferenceVerdict::Contradicted => "contradicted",
+            },
+        };
+        Self {
+            effect: named(&found.effect),
+            status: found.status,
+            claims: found.claims.as_ref().map(|claims| Claims::new(claims, trace)),
+            stability: found.stability,
+            witness: found.reference_check.as_ref().map(witness),
+            p_value: found.p_value,
+            parameters: found.estimates.iter().map(ParameterValue::new).collect(),
+            alternatives: found.alternatives.iter().map(named).collect(),
+            held_out_after: Summary::of(&found.held_out_after),
+        }
+    }
+
+    /// Returns true for a cause that acts by itself but whose law is not sure.
+    pub fn is_doubted(&self) -> bool {
+        matches!(self.status, Status::Probable | Status::Located) && !self.is_only_with_others()
+    }
+
+    /// Returns true if the effect is in the model only together with others: no evidence was
+    /// evaluated for it, and by itself it is not significant.
+    pub fn is_only_with_others(&self) -> bool {
+        self.claims.is_none() && self.status == Status::Located
+    }
+}
+
+impl ParameterValue {
+    /// Converts an estimate.
+    pub(crate) fn new(estimate: &Estimate) -> Self {
+        Self {
+            name: estimate.name.clone(),
+            unit: estimate.unit,
+            estimate: estimate.estimate,
+            std_error: estimate.std_error,
+        }
+    }
+}
+
+impl Structure {
+    fn new(left: &select::Unexplained, trace: &Trace) -> Self {
+        let correction = left.correction.as_ref();
+        let law = left.claims.as_ref().map(|claims| &claims.law.0.kind);
+        Self {
+            place: left.site.map_or_else(|| NOWHERE.to_owned(), |site| site.to_string()),
+            depends_on: left.depends_on.iter().map(ToString::to_string).collect(),
+            law: law.map(|law| law_name(law).to_owned()),
+            limit: law.and_then(|law| match law {
+                HypothesisKind::Limit(limit) => Some(limit.clone()),
+                _ => None,
+            }),
+            claims: left.claims.as_ref().map(|claims| Claims::new(claims, trace)),
+            p_value: left.p_value,
+            held_out_with_empirical_correction: correction.map(|own| Summary::of(&own.held_out)),
+            correction: correction.map(Correction::new),
+        }
+    }
+}
+
+impl Correction {
+    fn new(correction: &select::Correction) -> Self {
+        let (without, with) = correction.cross_validated;
+        let is_angle = correction.held_out.is_angle();
+        let [(without_mm, without_deg), (with_mm, with_deg)] =
+            [without, with].map(|value| by_unit(is_angle, value));
+        let range = |(input, range): &(Covariate, (f64, f64))| (input.to_string(), *range);
+        Self {
+            ranges: correction.ranges.iter().map(range).collect(),
+            held_out_beyond: correction.beyond,
+            cross_validated_rms_mm: without_mm.zip(with_mm).map(Into::into),
+            cross_validated_rms_deg: without_deg.zip(with_deg).map(Into::into),
+        }
+    }
+}
+
+impl Row {
+    fn new(location: &crate::error::Location) -> Self {
+        Self { file: location.file.display().to_string(), line: location.line }
+    }
+}
+
+impl Step {
+    fn new(round: &select::Round) -> Self {
+        let select::Round { effects, identification, held_out } = round;
+        let errors =
+            Errors { identification: Summary::of(identification), held_out: Summary::of(held_out) };
+        Self { effects: effects.clone(), errors }
+    }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes fields by reference")]
+pub(super) fn symbol<S: serde::Serializer>(unit: &Unit, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(unit.symbol())
+}

@@ -1,0 +1,69 @@
+//! Head of every JSON result, and its JSON Schema.
+
+use schemars::generate::SchemaSettings;
+use schemars::transform::{RecursiveTransform, Transform as _};
+use schemars::{JsonSchema, Schema};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+/// Version of the result formats. It rises when a key is removed or changes its meaning.
+pub const FORMAT_VERSION: u32 = 2;
+
+/// Name and version of the program that writes the results.
+pub const PROGRAM: &str = concat!("flexcal ", env!("CARGO_PKG_VERSION"));
+
+/// Result that is written as JSON in a format of its own.
+pub trait Document: Serialize + JsonSchema + Sized {
+    /// Name of the format, for example `flexcal-loop`.
+    const FORMAT: &'static str;
+
+    /// Returns the JSON text of the result, ending in a line break: `format` and `program` first,
+    /// then its own keys. Numbers that are not finite are written as null.
+    fn to_json(&self) -> String {
+        let format = Format { name: Self::FORMAT, version: FORMAT_VERSION };
+        let file = File { format, program: PROGRAM, content: self };
+        let mut text = serde_json::to_string_pretty(&file).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
+    /// Returns the JSON Schema (draft 2020-12) of the format, ending in a line break.
+    fn schema() -> String {
+        let settings = SchemaSettings::draft2020_12().for_serialize();
+        let mut schema = settings.into_generator().into_root_schema_for::<File<Self>>();
+        RecursiveTransform(adapted).transform(&mut schema);
+        schema.insert("title".to_owned(), Self::FORMAT.into());
+        if let Some(format) = schema.pointer_mut("/$defs/Format/properties") {
+            *format = json!({ "name": { "const": Self::FORMAT }, "version": { "const": FORMAT_VERSION } });
+        }
+        let mut text = serde_json::to_string_pretty(&schema).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+}
+
+/// Name and version of the format of a file.
+#[derive(Serialize, JsonSchema)]
+struct Format {
+    name: &'static str,
+    version: u32,
+}
+
+/// Result with its head.
+#[derive(Serialize, JsonSchema)]
+struct File<T> {
+    format: Format,
+    /// Program and version that wrote the file.
+    program: &'static str,
+    #[serde(flatten)]
+    content: T,
+}
+
+/// Lets every number be null, since numbers that are not finite are written so, and removes
+/// annotations of Rust types such as `"format": "double"`.
+fn adapted(schema: &mut Schema) {
+    schema.remove("format");
+    if schema.get("type").and_then(Value::as_str) == Some("number") {
+        schema.insert("type".to_owned(), json!(["number", "null"]));
+    }
+}

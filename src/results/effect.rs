@@ -1,0 +1,74 @@
+//! Effects as results name them.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::problem::Effect;
+use crate::select::Trace;
+
+/// Effect with its arguments, as in problem.toml: `{"effect": "gear-ratio", "joint": 3}`.
+#[derive(JsonSchema)]
+#[schemars(rename = "Effect")]
+#[expect(dead_code, reason = "stands for the serialised effect in schemas")]
+pub(super) struct EffectKeys {
+    /// Name in problem.toml; its arguments are further keys.
+    effect: String,
+}
+
+/// Effect, with words for it.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct NamedEffect {
+    #[serde(flatten)]
+    #[schemars(with = "EffectKeys")]
+    pub effect: Effect,
+    /// What the effect is, in words.
+    pub description: String,
+    /// Line that declares it in an `[[effect]]` of problem.toml.
+    pub declaration: String,
+}
+
+impl NamedEffect {
+    /// Describes an effect with the quantities that the traced data have.
+    pub fn new(effect: &Effect, trace: &Trace) -> Self {
+        Self {
+            description: trace.describe(effect),
+            declaration: effect.declaration(),
+            effect: effect.clone(),
+        }
+    }
+}
+
+/// Effect that these data cannot show.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct Untestable {
+    #[serde(flatten)]
+    #[schemars(with = "EffectKeys")]
+    pub effect: Effect,
+    pub reason: &'static str,
+}
+
+impl Untestable {
+    /// Joins parts of one effect that have the same reason.
+    pub(super) fn all(effects: &[(Effect, &'static str)]) -> Vec<Self> {
+        let entry = |(effect, reason)| Self { effect, reason };
+        joined(effects.iter().cloned()).into_iter().map(entry).collect()
+    }
+}
+
+/// Joins effects that are parts of one, such as the harmonics of a joint, if they share a reason.
+/// The order is that of their first parts.
+pub(crate) fn joined<R: Copy + PartialEq>(
+    effects: impl IntoIterator<Item = (Effect, R)>,
+) -> Vec<(Effect, R)> {
+    let mut groups: Vec<(Effect, R)> = Vec::new();
+    for (effect, reason) in effects {
+        let joins = |(group, why): &mut (Effect, R)| {
+            let union = group.joined(&effect).filter(|_| *why == reason);
+            union.map(|union| *group = union).is_some()
+        };
+        if !groups.iter_mut().any(joins) {
+            groups.push((effect, reason));
+        }
+    }
+    groups
+}

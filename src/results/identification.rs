@@ -1,0 +1,389 @@
+//! Result of `identify`: estimate.json.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::value::{RawValue, to_raw_value};
+
+use super::document::Document;
+use super::summary::{Errors, KindErrors, by_unit};
+use crate::fit::{
+    self, ActiveConstraint, Estimate, Finding, Identification, InfluentialRows, Noise,
+    OrientationErrors, Outlier, PointSpread, ShadowPrice,
+};
+use crate::least_squares::solver::AtBound;
+use crate::least_squares::{Identifiability, UnidentifiableCombination};
+use crate::problem::Problem;
+use crate::quantity::Unit;
+
+/// Identified arm. Values are in SI units unless the key names another unit.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct IdentificationResult {
+    pub problem: String,
+    /// SHA-256 of all declarations that predictions depend on.
+    pub arm_digest: String,
+    pub strategy: &'static str,
+    pub solver: &'static str,
+    /// Reason for which `auto` chose the solver; null if the user named it.
+    pub solver_reason: Option<&'static str>,
+    pub termination: &'static str,
+    pub trusted: bool,
+    pub iterations: u64,
+    pub alternation: Option<Alternation>,
+    pub seconds: f64,
+    /// Errors of the nominal arm, with base and tool fitted where they are free.
+    pub registered: Errors,
+    #[serde(flatten)]
+    pub fitted: Errors,
+    /// Errors of each kind of rows, if there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub kinds: Vec<KindErrors>,
+    /// Spread of the target at each touched point.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub spread: BTreeMap<String, SpreadChange>,
+    pub reduced_chi2: Option<f64>,
+    /// Start time of the time-dependent effects.
+    pub first_time_s: f64,
+    /// 1 σ of a coordinate estimated from the residuals, if the problem declares none.
+    pub estimated_sigma_mm: Option<f64>,
+    /// Interval of `reduced_chi2` for noise alone, with probability 0.999.
+    pub chance: Option<(f64, f64)>,
+    pub noise_factor: f64,
+    /// 1 σ of a coordinate in the fit; null if the rows measure angles.
+    pub sigma_taken_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma_taken_deg: Option<f64>,
+    pub rank: usize,
+    #[serde(flatten)]
+    pub conditioning: Conditioning,
+    pub orientation: Option<Orientation>,
+    pub parameters: Vec<Parameter>,
+    pub unidentified: Vec<Combination>,
+    /// Combinations that the data determine too weakly to be estimated.
+    pub weak: Vec<Combination>,
+    /// Covariance of the estimates in the order of `parameters`; null where one of the two has no
+    /// standard error.
+    #[schemars(with = "Vec<Vec<Option<f64>>>")]
+    pub covariance: Vec<Box<RawValue>>,
+    pub correlations: Vec<Correlation>,
+    pub active_constraints: Vec<Constraint>,
+    pub outliers: Vec<OutlierRow>,
+    pub misfit_carried_by: Option<InfluentialRowSet>,
+    pub cautions: Vec<String>,
+    /// Findings of the checks of the fit.
+    #[schemars(with = "Vec<FindingKeys>")]
+    pub findings: Vec<Finding>,
+}
+
+/// Finding of a check of the fit.
+#[derive(JsonSchema)]
+#[schemars(rename = "Finding")]
+#[expect(dead_code, reason = "stands for the serialised finding in schemas")]
+pub(super) struct FindingKeys {
+    /// Stable code; docs/findings.md explains each.
+    code: String,
+    /// `error`, `warning` or `note`.
+    severity: String,
+    /// Numbers and names of the case, SI units.
+    numbers: BTreeMap<String, serde_json::Value>,
+    text: String,
+    remedy: String,
+}
+
+impl Document for IdentificationResult {
+    const FORMAT: &'static str = "flexcal-estimate";
+}
+
+/// Accelerated sweeps of the sequential strategy.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Alternation {
+    pub sweeps: u64,
+    /// Factor by which one sweep alone would reduce the error near the optimum.
+    pub contraction: Option<f64>,
+}
+
+/// Condition number and observability indices.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Conditioning {
+    pub condition_number: f64,
+    /// Indices O1 to O5.
+    pub observability: BTreeMap<&'static str, f64>,
+}
+
+impl Conditioning {
+    /// Computes the indices for this number of measured coordinates.
+    pub(super) fn new(found: &Identifiability, coordinates: usize) -> Self {
+        let names = ["O1", "O2", "O3", "O4", "O5"];
+        let observability = names.into_iter().zip(found.observability(coordinates)).collect();
+        Self { condition_number: found.condition_number(), observability }
+    }
+}
+
+/// Estimated parameter.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Parameter {
+    pub name: String,
+    pub unit: &'static str,
+    pub nominal: f64,
+    pub estimate: f64,
+    pub std_error: Option<f64>,
+    /// Bound at which the estimate lies, `lower` or `upper`.
+    pub at_bound: Option<&'static str>,
+    pub shadow_price: Option<Price>,
+    /// Share of the information that comes from the data, 0 to 1.
+    pub identified: f64,
+    pub fitted: bool,
+}
+
+/// Cost of an active limit.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Price {
+    /// Lagrange multiplier.
+    pub multiplier: f64,
+    /// Decrease of the rms residual if the limit moved out by one `per`.
+    pub rms_mm: f64,
+    pub per: &'static str,
+}
+
+/// Linear combination of parameters.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Combination {
+    /// Weight of each parameter.
+    pub combination: BTreeMap<String, f64>,
+    pub singular_value: f64,
+}
+
+impl Combination {
+    /// Lists combinations by the names of the parameters.
+    pub(super) fn all(
+        combinations: &[UnidentifiableCombination],
+        name: impl Fn(usize) -> String,
+    ) -> Vec<Self> {
+        let entry = |own: &UnidentifiableCombination| Self {
+            combination: own.weights.iter().map(|&(k, weight)| (name(k), weight)).collect(),
+            singular_value: own.singular_value,
+        };
+        combinations.iter().map(entry).collect()
+    }
+}
+
+/// Correlated pair of parameters.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Correlation {
+    pub parameters: [String; 2],
+    pub correlation: f64,
+}
+
+/// Constraint that limits the estimates.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Constraint {
+    pub constraint: String,
+    /// `at_least` or `at_most`.
+    pub side: &'static str,
+    pub line: Option<usize>,
+    pub shadow_price: Price,
+}
+
+/// Row whose residual is too large to be noise.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct OutlierRow {
+    pub file: String,
+    pub line: Option<usize>,
+    /// Number of the row, from 1 over all files.
+    pub pose_row: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_deg: Option<f64>,
+    /// Length of the whitened residual over the scatter of all rows.
+    pub sigmas: f64,
+}
+
+/// Few rows whose removal removes most of the misfit.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct InfluentialRowSet {
+    pub rows: Vec<OutlierRow>,
+    pub reduced_chi2_without: Option<f64>,
+}
+
+/// Errors of orientation, if it is fitted.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Orientation {
+    pub registered: Errors,
+    #[serde(flatten)]
+    pub fitted: Errors,
+    pub sigma_taken_deg: f64,
+}
+
+/// Spread of the target about its mean over the rows at one point.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Spread {
+    pub mean_mm: f64,
+    /// Direction of the largest spread, measuring frame.
+    pub along: [f64; 3],
+    /// Share of the squared spread in that direction.
+    pub share: f64,
+}
+
+impl Spread {
+    /// Converts the spread at a point.
+    pub(super) fn new(spread: &PointSpread) -> Self {
+        Self { mean_mm: spread.mean * 1e3, along: spread.along.into(), share: spread.share }
+    }
+}
+
+/// Spread at a point with the nominal arm and with the identified arm.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct SpreadChange {
+    pub n: usize,
+    pub held_out: bool,
+    pub registered_mm: f64,
+    #[serde(flatten)]
+    pub fitted: Spread,
+}
+
+impl IdentificationResult {
+    /// Collects the result of a fit.
+    pub fn new(problem: &Problem, found: &Identification) -> Self {
+        let identifiability = found.identifiability();
+        let is_angle = found.fitted.identification.is_angle();
+        let (sigma_taken_mm, sigma_taken_deg) = by_unit(is_angle, found.sigma_taken);
+        let name = |k: usize| found.unknowns[k].clone();
+        let spread = |(before, after, held_out): &(PointSpread, PointSpread, bool)| {
+            let change = SpreadChange {
+                n: before.n,
+                held_out: *held_out,
+                registered_mm: before.mean * 1e3,
+                fitted: Spread::new(after),
+            };
+            (before.point.clone(), change)
+        };
+        let correlations = found.strong_correlations().into_iter();
+        Self {
+            problem: problem.name.clone(),
+            arm_digest: problem.digest(),
+            strategy: found.strategy.as_str(),
+            solver: found.solver.as_str(),
+            solver_reason: found.solver_reason,
+            termination: found.termination.as_str(),
+            trusted: found.is_trusted(),
+            iterations: found.iterations,
+            alternation: found.alternation.map(|fit::Alternation { sweeps, contraction }| {
+                Alternation { sweeps: sweeps as u64, contraction }
+            }),
+            seconds: found.seconds,
+            registered: Errors::of(&found.registered),
+            fitted: Errors::of(&found.fitted),
+            kinds: KindErrors::all(&found.kinds),
+            spread: found.spreads.iter().map(spread).collect(),
+            reduced_chi2: found.reduced_chi2,
+            first_time_s: found.first_time,
+            estimated_sigma_mm: match found.noise {
+                Noise::Declared | Noise::Unknown => None,
+                Noise::Estimated(sigma) => Some(sigma * 1e3),
+            },
+            chance: found.chance,
+            noise_factor: found.noise_factor,
+            sigma_taken_mm,
+            sigma_taken_deg,
+            rank: identifiability.rank,
+            conditioning: Conditioning::new(identifiability, found.coordinates),
+            orientation: found.orientation.as_ref().map(Orientation::new),
+            parameters: found.estimates.iter().map(Parameter::new).collect(),
+            unidentified: Combination::all(&identifiability.unidentifiable, name),
+            weak: Combination::all(&found.weak, name),
+            covariance: covariance(found),
+            correlations: correlations
+                .map(|(a, b, correlation)| Correlation { parameters: [a, b], correlation })
+                .collect(),
+            active_constraints: found.active_constraints.iter().map(Constraint::new).collect(),
+            outliers: found.outliers.iter().map(OutlierRow::new).collect(),
+            misfit_carried_by: found.influential_rows.as_ref().map(InfluentialRowSet::new),
+            cautions: found.reasons_to_ask(),
+            findings: found.findings.clone(),
+        }
+    }
+}
+
+impl Parameter {
+    fn new(estimate: &Estimate) -> Self {
+        Self {
+            name: estimate.name.clone(),
+            unit: estimate.unit.symbol(),
+            nominal: estimate.nominal,
+            estimate: estimate.estimate,
+            std_error: estimate.std_error,
+            at_bound: estimate.at_bound.map(|bound| side(bound, ["lower", "upper"])),
+            shadow_price: estimate.shadow_price.map(|price| Price::new(price, estimate.unit)),
+            identified: estimate.identified,
+            fitted: estimate.fitted,
+        }
+    }
+}
+
+impl Price {
+    fn new(price: ShadowPrice, unit: Unit) -> Self {
+        let (rms_mm, per) = price.in_mm(unit);
+        Self { multiplier: price.multiplier, rms_mm, per }
+    }
+}
+
+impl Constraint {
+    fn new(active: &ActiveConstraint) -> Self {
+        Self {
+            constraint: active.words.clone(),
+            side: side(active.side, ["at_least", "at_most"]),
+            line: active.location.line,
+            shadow_price: Price::new(active.shadow_price, active.unit),
+        }
+    }
+}
+
+impl OutlierRow {
+    fn new(outlier: &Outlier) -> Self {
+        let (error_mm, error_deg) = by_unit(outlier.kind == "tilt", outlier.error.norm());
+        Self {
+            file: outlier.location.file.display().to_string(),
+            line: outlier.location.line,
+            pose_row: outlier.row + 1,
+            error_mm,
+            error_deg,
+            sigmas: outlier.distance,
+        }
+    }
+}
+
+impl InfluentialRowSet {
+    /// Converts the rows.
+    pub(super) fn new(influential: &InfluentialRows) -> Self {
+        Self {
+            rows: influential.rows.iter().map(OutlierRow::new).collect(),
+            reduced_chi2_without: influential.reduced_chi2,
+        }
+    }
+}
+
+impl Orientation {
+    fn new(errors: &OrientationErrors) -> Self {
+        Self {
+            registered: Errors::of_angles(&errors.registered),
+            fitted: Errors::of_angles(&errors.fitted),
+            sigma_taken_deg: errors.sigma_taken.to_degrees(),
+        }
+    }
+}
+
+fn side(bound: AtBound, [lower, upper]: [&'static str; 2]) -> &'static str {
+    if bound == AtBound::Lower { lower } else { upper }
+}
+
+/// Returns the rows of the covariance, each as JSON text on a line of its own.
+fn covariance(found: &Identification) -> Vec<Box<RawValue>> {
+    let n = found.estimates.len();
+    let has_error = |k: usize| found.estimates[k].std_error.is_some();
+    let entry =
+        |j: usize, k: usize| found.covariance.of(j, k).filter(|_| has_error(j) && has_error(k));
+    let rows = (0..n).map(|j| (0..n).map(|k| entry(j, k)).collect::<Vec<_>>());
+    rows.filter_map(|row| to_raw_value(&row).ok()).collect()
+}

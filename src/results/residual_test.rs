@@ -1,0 +1,48 @@
+//! Tests of the residual of a fit.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::residual_tests::{self, Covariate, Findings};
+
+/// Test of the residual.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct ResidualTest {
+    /// Name of the test.
+    pub check: &'static str,
+    /// Quantity in whose order, or on which, the test looks for dependence.
+    pub about: Option<String>,
+    /// True if a failure means structure that an effect could explain.
+    pub structure: bool,
+    pub failed: bool,
+    /// Value of the statistic; null if the test could not be made.
+    pub statistic: Option<f64>,
+    /// Interval of the statistic for noise alone, at the level of the test.
+    pub bounds: Option<(f64, f64)>,
+    pub p_value: Option<f64>,
+    pub words: String,
+}
+
+impl ResidualTest {
+    /// Lists the tests in the order in which they were made.
+    pub(super) fn all(findings: &Findings) -> Vec<Self> {
+        let about = |covariate: Covariate| match covariate {
+            Covariate::Row => "rows".to_owned(),
+            covariate => covariate.to_string(),
+        };
+        let entry = |test: &residual_tests::ResidualTest| {
+            let outcome = test.outcome.as_ref().ok();
+            Self {
+                check: test.name(),
+                about: test.about().map(about),
+                structure: test.is_structure(),
+                failed: test.failed(),
+                statistic: outcome.map(|outcome| outcome.statistic),
+                bounds: outcome.map(|outcome| outcome.bounds),
+                p_value: outcome.map(|outcome| outcome.p_value),
+                words: test.to_string(),
+            }
+        };
+        findings.tests.iter().map(entry).collect()
+    }
+}

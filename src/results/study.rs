@@ -1,0 +1,273 @@
+//! Results of `study`: study.json and misprints.json.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::document::Document;
+use super::summary::Summary;
+use crate::paper::Misprint;
+use crate::study::{
+    self, AlternativeModel, Case, CellResult, HeldOutError, MisprintStudy, Replica, ReplicaResults,
+    Results, Study,
+};
+
+/// Many fits to simulated measurements whose truth is known. SI units unless a key names another.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct StudyResult {
+    pub study: String,
+    pub problem: String,
+    /// Source of the measurements.
+    pub data: &'static str,
+    pub seed: u64,
+    pub repetitions: usize,
+    pub held_out_poses: usize,
+    pub cells: Vec<Cell>,
+}
+
+impl Document for StudyResult {
+    const FORMAT: &'static str = "flexcal-study";
+}
+
+/// Fits under one condition.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Cell {
+    pub position_sigma_mm: f64,
+    pub identification_poses: usize,
+    pub strategy: &'static str,
+    pub solver: &'static str,
+    pub fits: u64,
+    pub failed: u64,
+    pub failure_rate: f64,
+    /// Number of fits that are not to be trusted, by reason.
+    pub failures: BTreeMap<String, u64>,
+    pub held_out_mm: HeldOut,
+    /// Mean over the fits.
+    pub reduced_chi2: Option<f64>,
+    /// Share of estimates within 1.96 standard errors of the truth.
+    pub coverage: Option<f64>,
+    pub largest_bias: Option<LargestBias>,
+    pub iterations_mean: Option<f64>,
+    pub iterations_max: Option<f64>,
+    pub parameters: Vec<StudiedParameter>,
+}
+
+/// Held-out error over the fits.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct HeldOut {
+    /// Mean over fits and poses.
+    pub mean: Option<f64>,
+    /// Rms over fits and poses.
+    pub rms: Option<f64>,
+    /// Standard deviation of the rms of a fit.
+    pub rms_sd: Option<f64>,
+    pub rms_max: Option<f64>,
+}
+
+/// Largest bias of any parameter over the spread of its estimates.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct LargestBias {
+    pub parameter: String,
+    pub bias_sd: f64,
+}
+
+/// Errors of the estimates of one parameter.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct StudiedParameter {
+    pub name: String,
+    pub unit: &'static str,
+    pub fits: u64,
+    pub bias: Option<f64>,
+    pub spread: Option<f64>,
+    pub rms_error: Option<f64>,
+    /// Number of fits that gave a standard error.
+    pub with_std_error: u64,
+    pub std_error: Option<f64>,
+    pub coverage: Option<f64>,
+}
+
+/// Study of the misprints of [Chen2021].
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct MisprintResult {
+    pub study: String,
+    pub problem: String,
+    pub seed: u64,
+    pub specimens: usize,
+    pub identification_poses: usize,
+    pub held_out_poses: usize,
+    pub position_sigma_mm: f64,
+    /// Mean held-out error of the rigid fit, to which the elasticity was scaled.
+    pub rigid_leaves_mm: f64,
+    pub misprints: Vec<MisprintSize>,
+    pub cases: Vec<StudiedCase>,
+}
+
+impl Document for MisprintResult {
+    const FORMAT: &'static str = "flexcal-misprints";
+}
+
+/// Largest change of the end point by a misprint.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct MisprintSize {
+    pub misprint: &'static str,
+    pub place: &'static str,
+    pub moves_mm: f64,
+}
+
+/// Specimens under one load.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct StudiedCase {
+    pub links_over_joints: f64,
+    pub payload_kg: Option<f64>,
+    #[serde(rename = "hoist_N")]
+    pub hoist: Option<f64>,
+    pub specimens: Vec<Specimen>,
+}
+
+/// Held-out errors of one specimen; null where an iteration does not converge.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Specimen {
+    pub scale: f64,
+    pub before: Summary,
+    pub rigid: Option<Summary>,
+    pub geometry_only: Summary,
+    pub joint: Summary,
+    pub joint_both_loads: Summary,
+    pub readings: Vec<Reading>,
+    pub rivals: Vec<Rival>,
+}
+
+/// Errors of one reading of the formulas, by the source of the stiffness.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Reading {
+    pub reading: String,
+    pub stiffness_known: Option<Summary>,
+    pub as_declared: Option<Summary>,
+    pub from_positions: Option<Summary>,
+    pub from_load_differences: Option<Summary>,
+}
+
+/// Errors of an alternative model.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Rival {
+    pub rival: &'static str,
+    pub held_out: Option<Summary>,
+}
+
+impl StudyResult {
+    /// Collects the results of a study, without times.
+    pub fn new(study: &Study, results: &Results) -> Self {
+        Self {
+            study: study.name.clone(),
+            problem: study.problem.name.clone(),
+            data: study.source.as_str(),
+            seed: study.seed,
+            repetitions: study.repetitions,
+            held_out_poses: study.held_out,
+            cells: results.cells.iter().map(|cell| Cell::new(study, cell)).collect(),
+        }
+    }
+}
+
+impl Cell {
+    fn new(study: &Study, result: &CellResult) -> Self {
+        let CellResult { cell, tally, .. } = result;
+        let in_mm = |length: Option<f64>| length.map(|length| length * 1e3);
+        let rms = &tally.held_out_rms;
+        let parameter = |own: study::ParameterResult| StudiedParameter {
+            name: own.parameter.name.clone(),
+            unit: own.unit(),
+            fits: own.fits,
+            bias: own.bias,
+            spread: own.spread,
+            rms_error: own.rms_error,
+            with_std_error: own.with_std_error,
+            std_error: own.std_error,
+            coverage: own.coverage,
+        };
+        let bias = result.largest_bias(study);
+        Self {
+            // As it was written: 0.1 mm and not 0.10000000000000001 mm.
+            position_sigma_mm: (cell.sigma * 1e15).round() / 1e12,
+            identification_poses: cell.poses,
+            strategy: cell.strategy.as_str(),
+            solver: cell.solver.as_str(),
+            fits: tally.fits,
+            failed: tally.failed(),
+            failure_rate: result.failure_rate(),
+            failures: tally.failures.clone(),
+            held_out_mm: HeldOut {
+                mean: in_mm(tally.held_out_mean.mean()),
+                rms: in_mm(rms.rms()),
+                rms_sd: in_mm(rms.deviation()),
+                rms_max: in_mm(rms.largest()),
+            },
+            reduced_chi2: tally.reduced_chi2.mean(),
+            coverage: result.coverage(),
+            largest_bias: bias
+                .map(|(own, bias_sd)| LargestBias { parameter: own.name.clone(), bias_sd }),
+            iterations_mean: tally.iterations.mean(),
+            iterations_max: tally.iterations.largest(),
+            parameters: result.parameters(study).map(parameter).collect(),
+        }
+    }
+}
+
+impl MisprintResult {
+    /// Collects the results of a study of the misprints.
+    pub fn new(study: &MisprintStudy, found: &ReplicaResults) -> Self {
+        let size = |(misprint, size): (&Misprint, &f64)| MisprintSize {
+            misprint: misprint.as_str(),
+            place: misprint.place(),
+            moves_mm: size * 1e3,
+        };
+        let case = |case: &Case| StudiedCase {
+            links_over_joints: case.links_over_joints,
+            payload_kg: case.load.and_then(|load| load.payload),
+            hoist: case.load.and_then(|load| load.hoist),
+            specimens: found.of_case(case).map(|own| Specimen::new(own, found)).collect(),
+        };
+        Self {
+            study: study.name.clone(),
+            problem: study.problem.name.clone(),
+            seed: study.seed,
+            specimens: study.specimens,
+            identification_poses: study.identification,
+            held_out_poses: study.held_out,
+            position_sigma_mm: study.truth.noise_sigma * 1e3,
+            rigid_leaves_mm: study.rigid_leaves * 1e3,
+            misprints: Misprint::ALL.iter().zip(&found.sizes).map(size).collect(),
+            cases: study.cases.iter().map(case).collect(),
+        }
+    }
+}
+
+impl Specimen {
+    fn new(own: &Replica, found: &ReplicaResults) -> Self {
+        let left = |left: &HeldOutError| left.as_ref().map(Summary::of);
+        let reading = |(named, [known, declared, positions, differences]): (
+            &study::NamedReading,
+            &[HeldOutError; 4],
+        )| Reading {
+            reading: named.name.clone(),
+            stiffness_known: left(known),
+            as_declared: left(declared),
+            from_positions: left(positions),
+            from_load_differences: left(differences),
+        };
+        let rivals = AlternativeModel::EACH.into_iter().zip(&own.by_alternative);
+        Self {
+            scale: own.scale,
+            before: Summary::of(&own.before),
+            rigid: left(&own.rigid),
+            geometry_only: Summary::of(&own.geometry_only),
+            joint: Summary::of(&own.joint),
+            joint_both_loads: Summary::of(&own.joint_twice),
+            readings: found.readings.iter().zip(&own.by_reading).map(reading).collect(),
+            rivals: rivals
+                .map(|(rival, own)| Rival { rival: rival.words().0, held_out: left(own) })
+                .collect(),
+        }
+    }
+}

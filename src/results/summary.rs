@@ -1,0 +1,126 @@
+//! Error summaries: mean, largest and root-mean-square errors of rows of one kind.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::fit::{self, AxisValues, ErrorSummary};
+
+/// Values along the axes of the measuring frame, and of the Euclidean norm.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Axes {
+    pub x: f64,
+    pub y: f64,
+    pub z: f64,
+    pub norm: f64,
+}
+
+/// Error summary of the rows of one kind. The keys of the sizes name their unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Summary {
+    /// Kind of the rows; absent for measured positions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kind: Option<&'static str>,
+    /// Number of rows.
+    pub n: usize,
+    #[serde(flatten)]
+    pub sizes: Sizes,
+}
+
+/// Mean absolute value, largest absolute value and root mean square, along each axis and of the
+/// norm.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Sizes {
+    Lengths { mean_mm: Axes, max_mm: Axes, rms_mm: Axes },
+    Angles { mean_deg: Axes, max_deg: Axes, rms_deg: Axes },
+}
+
+impl Summary {
+    /// Creates the summary of rows, in ° if their errors are angles.
+    pub fn of(errors: &ErrorSummary) -> Self {
+        let kind = Some(errors.kind).filter(|kind| !matches!(*kind, "" | "position"));
+        Self { kind, n: errors.n, sizes: Sizes::of(errors, errors.is_angle()) }
+    }
+
+    /// Returns mean, root mean square and largest value of the norm, and their unit.
+    pub fn norms(&self) -> ([f64; 3], &'static str) {
+        let (axes, unit) = match &self.sizes {
+            Sizes::Lengths { mean_mm, max_mm, rms_mm } => ([mean_mm, rms_mm, max_mm], "mm"),
+            Sizes::Angles { mean_deg, max_deg, rms_deg } => ([mean_deg, rms_deg, max_deg], "°"),
+        };
+        (axes.map(|axes| axes.norm), unit)
+    }
+}
+
+impl Sizes {
+    /// Converts sizes [m] to mm, or \[rad\] to °.
+    fn of(errors: &ErrorSummary, is_angle: bool) -> Self {
+        let axes = |values: &AxisValues| {
+            let in_unit = |value: f64| if is_angle { value.to_degrees() } else { value * 1e3 };
+            let [x, y, z, norm] = [values.x, values.y, values.z, values.norm].map(in_unit);
+            Axes { x, y, z, norm }
+        };
+        let [mean, max, rms] = [&errors.mean, &errors.max, &errors.rms].map(axes);
+        if is_angle {
+            Self::Angles { mean_deg: mean, max_deg: max, rms_deg: rms }
+        } else {
+            Self::Lengths { mean_mm: mean, max_mm: max, rms_mm: rms }
+        }
+    }
+}
+
+/// Error summaries of the rows that are fitted and of those held out.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct Errors {
+    pub identification: Summary,
+    pub held_out: Summary,
+}
+
+impl Errors {
+    /// Creates both summaries.
+    pub fn of(errors: &fit::Errors) -> Self {
+        Self {
+            identification: Summary::of(&errors.identification),
+            held_out: Summary::of(&errors.held_out),
+        }
+    }
+
+    /// Creates both summaries of angles, where the kind of the rows does not say so.
+    pub(super) fn of_angles(errors: &fit::Errors) -> Self {
+        let of = |errors: &ErrorSummary| Summary {
+            kind: None,
+            n: errors.n,
+            sizes: Sizes::of(errors, true),
+        };
+        Self { identification: of(&errors.identification), held_out: of(&errors.held_out) }
+    }
+}
+
+/// Errors of the rows of one kind, of the registered nominal arm and of the fitted arm.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
+pub struct KindErrors {
+    pub registered: Errors,
+    #[serde(flatten)]
+    pub fitted: Errors,
+}
+
+impl KindErrors {
+    /// Creates the errors of every kind of rows.
+    pub(super) fn all(kinds: &[(fit::Errors, fit::Errors)]) -> Vec<Self> {
+        let of = |(registered, fitted): &(fit::Errors, fit::Errors)| Self {
+            registered: Errors::of(registered),
+            fitted: Errors::of(fitted),
+        };
+        kinds.iter().map(of).collect()
+    }
+}
+
+/// Splits a value \[m\] or \[rad\] between the keys `…_mm` and `…_deg`, converted to their unit.
+pub(super) fn by_unit(is_angle: bool, value: f64) -> (Option<f64>, Option<f64>) {
+    ((!is_angle).then_some(value * 1e3), is_angle.then_some(value.to_degrees()))
+}
+
+/// Converts a value to the unit in which errors of this kind of rows are given: mm, or ° of tilts.
+pub(super) fn in_unit(errors: &ErrorSummary, value: f64) -> f64 {
+    if errors.is_angle() { value.to_degrees() } else { value * 1e3 }
+}

@@ -1,0 +1,187 @@
+//! Result of `trace`: trace.json.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::claims::{Claims, Hypothesis};
+use super::document::Document;
+use super::effect::{EffectKeys, NamedEffect, Untestable, joined};
+use super::identification::FindingKeys;
+use super::residual_test::ResidualTest;
+use super::summary::{Errors, by_unit};
+use crate::fit::{ErrorSummary, Finding};
+use crate::problem::{Effect, Problem};
+use crate::select::{self, TellingPose, Trace};
+
+/// Least probability of a hypothesis set in trace.json.
+const LEAST_PROBABILITY: f64 = 0.01;
+
+/// Effects that the residual of a fit points to.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct TraceResult {
+    pub problem: String,
+    pub trusted: bool,
+    #[serde(flatten)]
+    pub errors: Errors,
+    pub reduced_chi2: Option<f64>,
+    /// True if the tests see structure that an effect could explain.
+    pub structured: bool,
+    pub checks: Vec<ResidualTest>,
+    /// Number of candidates tried, orders and times counted.
+    pub tried: usize,
+    /// Corrected p-value below which a candidate is significant.
+    pub level: f64,
+    /// Candidates, best first.
+    pub ranking: Vec<Candidate>,
+    /// Hypothesis sets, most probable first; the empty set is noise alone.
+    pub explanations: Vec<HypothesisSet>,
+    /// Claims about the most probable set.
+    pub claims: Vec<Claims>,
+    pub untestable: Vec<Untestable>,
+    /// Effects that the fitted parameters absorb completely.
+    #[schemars(with = "Vec<EffectKeys>")]
+    pub absorbed: Vec<Effect>,
+    /// Findings of the checks of the fit.
+    #[schemars(with = "Vec<FindingKeys>")]
+    pub findings: Vec<Finding>,
+}
+
+impl Document for TraceResult {
+    const FORMAT: &'static str = "flexcal-trace";
+}
+
+/// Candidate effect.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Candidate {
+    #[serde(flatten)]
+    pub effect: NamedEffect,
+    /// Probability that noise alone does as well, corrected for the candidates tried.
+    pub p_value: f64,
+    pub f: f64,
+    /// Degrees of freedom of the numerator of `f`.
+    pub freedom: usize,
+    /// Expected decrease of the rms error of the identification poses.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected_gain_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected_gain_deg: Option<f64>,
+    /// Decrease of the rms error of poses left out in turn.
+    pub cross_validated_gain_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cross_validated_gain_deg: Option<f64>,
+    /// Confounded effects.
+    pub alike: Vec<Confounded>,
+    /// Pose that would tell the effect from the first confounded one.
+    pub told_apart: Option<ToldApart>,
+}
+
+/// Effect that is hard to tell from a candidate on these poses.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Confounded {
+    #[serde(flatten)]
+    pub effect: NamedEffect,
+    /// Largest principal angle between the two: 0 for identical, 90 for unrelated effects.
+    pub angle_deg: f64,
+}
+
+/// Pose at which two effects differ.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ToldApart {
+    #[schemars(with = "EffectKeys")]
+    pub from: Effect,
+    /// Configuration, rad or m.
+    pub q: Vec<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target: Option<String>,
+    pub payload_kg: Option<f64>,
+    #[serde(rename = "hoist_N")]
+    pub hoist: Option<f64>,
+    #[serde(rename = "temperature_C")]
+    pub temperature: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub difference_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub difference_deg: Option<f64>,
+}
+
+/// Set of hypotheses that act together.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct HypothesisSet {
+    pub probability: f64,
+    pub hypotheses: Vec<Hypothesis>,
+}
+
+impl TraceResult {
+    /// Collects the result of a trace.
+    pub fn new(problem: &Problem, trace: &Trace) -> Self {
+        let errors = &trace.fit.fitted.identification;
+        let evidence = trace.evidence.as_ref();
+        let sets = evidence.map_or(&[][..], |evidence| &evidence.sets);
+        let set = |set: &select::HypothesisSet| HypothesisSet {
+            probability: set.probability,
+            hypotheses: set.hypotheses.iter().map(|own| Hypothesis::new(own, trace)).collect(),
+        };
+        let absorbed = joined(trace.absorbed.iter().cloned().map(|effect| (effect, ())));
+        Self {
+            problem: problem.name.clone(),
+            trusted: trace.fit.is_trusted(),
+            errors: Errors::of(&trace.fit.fitted),
+            reduced_chi2: trace.fit.reduced_chi2,
+            structured: trace.findings.is_structured(),
+            checks: ResidualTest::all(&trace.findings),
+            tried: trace.tried,
+            level: trace.level,
+            ranking: trace.ranking.iter().map(|own| Candidate::new(own, trace, errors)).collect(),
+            explanations: sets
+                .iter()
+                .filter(|set| set.probability > LEAST_PROBABILITY)
+                .map(set)
+                .collect(),
+            claims: evidence.map_or_else(Vec::new, |evidence| {
+                let claims = |own| Claims::new(&evidence.claims(own), trace);
+                evidence.best().iter().map(claims).collect()
+            }),
+            untestable: Untestable::all(&trace.untestable),
+            absorbed: absorbed.into_iter().map(|(effect, ())| effect).collect(),
+            findings: trace.fit.findings.clone(),
+        }
+    }
+}
+
+impl Candidate {
+    fn new(ranked: &select::Ranked, trace: &Trace, errors: &ErrorSummary) -> Self {
+        let by_unit = |value: f64| by_unit(errors.is_angle(), value);
+        let (expected_gain_mm, expected_gain_deg) = by_unit(ranked.gain);
+        let (cross_validated_gain_mm, cross_validated_gain_deg) =
+            ranked.cross_validated.map_or((None, None), by_unit);
+        let alike = |(effect, angle): &(Effect, f64)| Confounded {
+            effect: NamedEffect::new(effect, trace),
+            angle_deg: angle.to_degrees(),
+        };
+        let told_apart = |pose: &TellingPose| {
+            let (difference_mm, difference_deg) = by_unit(pose.difference);
+            ToldApart {
+                from: pose.other.clone(),
+                q: pose.configuration.clone(),
+                target: pose.target.clone(),
+                payload_kg: pose.payload,
+                hoist: pose.hoist,
+                temperature: pose.temperature,
+                difference_mm,
+                difference_deg,
+            }
+        };
+        Self {
+            effect: NamedEffect::new(&ranked.effect, trace),
+            p_value: ranked.p_value,
+            f: ranked.f.0,
+            freedom: ranked.f.1,
+            expected_gain_mm,
+            expected_gain_deg,
+            cross_validated_gain_mm,
+            cross_validated_gain_deg,
+            alike: ranked.alike.iter().map(alike).collect(),
+            told_apart: ranked.telling_pose.as_ref().map(told_apart),
+        }
+    }
+}
