@@ -79,6 +79,7 @@ pub mod measurement;
 pub mod mechanics;
 pub mod model;
 mod numeric;
+pub mod observation;
 pub mod paper;
 #[deny(clippy::indexing_slicing)]
 pub mod problem;

@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 
 use crate::measurement::Measurements;
-use crate::problem::Observation;
+use crate::observation::{Observation, kind_named};
+use crate::quantity::Unit;
 
 /// A value per axis of the measuring frame and for the Euclidean norm \[m\].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -78,7 +79,7 @@ pub(super) fn of_kind(
 impl ErrorSummary {
     /// Whether the errors are angles \[rad\], as those of tilts are.
     pub fn is_angle(&self) -> bool {
-        self.kind == "tilt"
+        kind_named(self.kind).unit == Unit::Angle
     }
 
     /// Of the errors measured − predicted of positions \[m\].

@@ -37,7 +37,7 @@ impl Model {
     /// what is read of it.
     #[must_use]
     pub fn without_instrument_errors(self) -> Self {
-        Self { instrument: self.instrument.without_instrument_errors(), ..self }
+        Self { instrument: self.instrument.without_errors(), ..self }
     }
 
     /// A commanded model with corrections to the joints that follow others as further parameters.

@@ -58,7 +58,7 @@ impl Model {
                 }
                 for &joint in &moving {
                     let mut own = jacobian.column_mut(joint);
-                    own += arm.instrument.slope(&pose.setup, joint);
+                    own += arm.instrument.command_slope(&pose.setup, joint);
                 }
                 // Who follows another takes no command.
                 moving.iter().skip(own).for_each(|&joint| jacobian.column_mut(joint).fill(0.0));

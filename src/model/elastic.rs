@@ -3,7 +3,7 @@
 //! What a parameter does to its own part is taken alone, and virtual work tells what that does to
 //! the target; parameters that change loads go through the whole statics, one by one.
 
-use nalgebra::{DVector, Vector3};
+use nalgebra::Vector3;
 use num_dual::Dual64;
 
 use super::Model;
@@ -42,7 +42,7 @@ struct Whole {
 
 impl Elastic {
     /// Of `arm`, which is the model's at `x`.
-    pub fn new(model: &Model, x: &DVector<f64>, arm: Arm<f64>, inputs: Vec<Input>) -> Self {
+    pub fn new(model: &Model, x: &[f64], arm: Arm<f64>, inputs: Vec<Input>) -> Self {
         let (mut apart, mut whole) = (Vec::new(), Vec::new());
         for input in inputs {
             match part_of(&arm, input.site).filter(|_| Sensitivity::applies_to(&arm)) {
@@ -81,8 +81,7 @@ impl Elastic {
     /// frame, measuring frame, `None` where the pose has no equilibrium.
     pub fn write(
         &mut self,
-        commanded: &PoseView,
-        setup: &PoseView,
+        (commanded, setup): (&PoseView, &PoseView),
         base: &Frame<f64>,
         (tip, target): (usize, &Vector3<f64>),
         rows: &mut Rows,
@@ -128,7 +127,7 @@ fn part_of(arm: &Arm<f64>, site: ParameterSite) -> Option<Segment> {
 }
 
 /// The arm at `x` with the derivative of some inputs, of which no two act on the same part.
-pub(super) fn seed_arm(model: &Model, x: &DVector<f64>, inputs: &[&Input]) -> Arm<Dual64> {
+pub(super) fn seed_arm(model: &Model, x: &[f64], inputs: &[&Input]) -> Arm<Dual64> {
     let is_seeded = |k: usize| inputs.iter().any(|input| input.parameter == Some(k));
     let mut arm = model.arm(|k| Dual64::new(x[k], f64::from(u8::from(is_seeded(k)))));
     let seed = Dual64::from(0.0).derivative();

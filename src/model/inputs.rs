@@ -1,5 +1,5 @@
 //! The scalars of the arm that parameters act on: one derivative serves every parameter that is
-//! driven at one place.
+//! regressors at one place.
 
 use super::Model;
 use crate::model::parameter::{ParameterSite, Regressor};
@@ -13,7 +13,7 @@ pub(super) struct Input {
     /// Its column.
     pub column: Option<usize>,
     /// Columns of the parameters that add to the scalar, each multiplied by its regressor.
-    pub driven: Vec<(usize, Regressor)>,
+    pub regressors: Vec<(usize, Regressor)>,
 }
 
 /// Inputs of the arm for some unknowns, whose column is their place in the list.
@@ -33,7 +33,7 @@ pub(super) fn inputs(model: &Model, unknowns: &[usize]) -> Vec<Input> {
                 site: parameter.site,
                 parameter: None,
                 column: None,
-                driven: Vec::new(),
+                regressors: Vec::new(),
             });
             inputs.len() - 1
         });
@@ -41,7 +41,7 @@ pub(super) fn inputs(model: &Model, unknowns: &[usize]) -> Vec<Input> {
         if parameter.regressor.is_constant() {
             (input.parameter, input.column) = (Some(k), Some(column));
         } else {
-            input.driven.push((column, parameter.regressor));
+            input.regressors.push((column, parameter.regressor));
         }
     }
     inputs

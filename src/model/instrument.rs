@@ -1,4 +1,4 @@
-//! What the measuring instrument makes of a position, and what turns under it.
+//! Errors of the measuring instrument, and rotations of the bases under it.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -6,35 +6,37 @@ use crate::model::parameter::{Parameter, ParameterSite, Regressor};
 use crate::problem::PoseView;
 use crate::spatial::Frame;
 
-/// Errors of the measuring instrument: p (1 + s) + E p + Σ dᵢ·driverᵢ; and turns of all bases by
-/// the rotation vector Σ ωᵢ·driverᵢ, about the measuring frame's origin.
+/// Error model of the measuring instrument.
+///
+/// A position p reads as p (1 + s) + E p + Σ dᵢ·regressorᵢ. All bases rotate about the measuring
+/// frame's origin by the rotation vector Σ ωᵢ·regressorᵢ.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Instrument {
-    /// s.
+    /// Relative scale error s.
     pub scale: f64,
-    /// E; `None` where nobody asks.
+    /// Strain E; `None` if no parameter of it is free.
     strain: Option<Matrix3<f64>>,
-    /// Axis, regressor and size [m per unit of the regressor].
+    /// Axis, regressor and size [m per unit of the regressor] of each displacement d.
     shifts: Vec<(usize, Regressor, f64)>,
-    /// The same of turns [rad per unit of the regressor].
-    turns: Vec<(usize, Regressor, f64)>,
+    /// Axis, regressor and size [rad per unit of the regressor] of each rotation ω.
+    rotations: Vec<(usize, Regressor, f64)>,
 }
 
 impl Instrument {
-    /// The same with the free parameters at the full parameter vector `x`.
+    /// Returns the instrument with the free parameters at the full parameter vector `x`.
     pub fn with(&self, parameters: &[Parameter], x: &[f64]) -> Self {
         let mut instrument = self.clone();
         for (parameter, &x) in parameters.iter().zip(x) {
             match parameter.site {
                 ParameterSite::Scale => instrument.scale += x,
                 ParameterSite::Strain { entry } => {
-                    *instrument.strain.get_or_insert_with(Matrix3::zeros) += strained(entry) * x;
+                    *instrument.strain.get_or_insert_with(Matrix3::zeros) += unit_strain(entry) * x;
                 }
                 ParameterSite::Shift { axis } => {
                     instrument.shifts.push((axis, parameter.regressor, x))
                 }
                 ParameterSite::Turn { axis } => {
-                    instrument.turns.push((axis, parameter.regressor, x))
+                    instrument.rotations.push((axis, parameter.regressor, x))
                 }
                 _ => {}
             }
@@ -42,73 +44,94 @@ impl Instrument {
         instrument
     }
 
-    /// What is true of the arm's surroundings: bases that move with covariates, and no errors of
-    /// the instrument.
-    pub fn without_instrument_errors(&self) -> Self {
-        let moves = |all: &[(usize, Regressor, f64)]| {
-            all.iter()
-                .filter(|(_, regressor, _)| matches!(regressor, Regressor::Covariate(_)))
-                .copied()
-                .collect()
+    /// Returns the part that moves the arm itself: bases that follow covariates. Errors of the
+    /// instrument are left out.
+    pub fn without_errors(&self) -> Self {
+        let follow_covariates = |terms: &[(usize, Regressor, f64)]| {
+            let terms = terms.iter().copied();
+            terms.filter(|(_, regressor, _)| matches!(regressor, Regressor::Covariate(_))).collect()
         };
-        Self { scale: 0.0, strain: None, shifts: moves(&self.shifts), turns: moves(&self.turns) }
+        Self {
+            scale: 0.0,
+            strain: None,
+            shifts: follow_covariates(&self.shifts),
+            rotations: follow_covariates(&self.rotations),
+        }
     }
 
-    /// What is measured of a position, measuring frame \[m\].
+    /// Returns the reading of a position, measuring frame \[m\].
     #[inline]
-    pub fn of(&self, position: &Vector3<f64>, setup: &PoseView) -> Vector3<f64> {
-        let mut seen = position * (1.0 + self.scale);
+    pub fn reading(&self, position: &Vector3<f64>, setup: &PoseView) -> Vector3<f64> {
+        let mut reading = position * (1.0 + self.scale);
         if let Some(strain) = self.strain {
-            seen += strain * position;
+            reading += strain * position;
         }
         for &(axis, regressor, size) in &self.shifts {
-            seen[axis] += size * regressor.value(setup);
+            reading[axis] += size * regressor.value(setup);
         }
-        seen
+        reading
     }
 
-    /// What the strain makes of derivatives that the scale is already in; `None` where there is
-    /// none.
-    pub fn strains(&self) -> Option<Matrix3<f64>> {
+    /// Returns the derivative of the reading of a position \[m\] with respect to a parameter at an
+    /// instrument's `site`; 0 for other sites.
+    pub fn slope(
+        site: ParameterSite,
+        position: &Vector3<f64>,
+        regressor: Regressor,
+        setup: &PoseView,
+    ) -> Vector3<f64> {
+        match site {
+            ParameterSite::Scale => *position,
+            ParameterSite::Strain { entry } => unit_strain(entry) * position,
+            ParameterSite::Shift { axis } => Vector3::ith(axis, regressor.value(setup)),
+            _ => Vector3::zeros(),
+        }
+    }
+
+    /// Returns I + E / (1 + s): the factor from derivatives that contain the scale to those of the
+    /// reading; `None` without a strain.
+    pub fn relative_strain(&self) -> Option<Matrix3<f64>> {
         self.strain.map(|strain| Matrix3::identity() + strain / (1.0 + self.scale))
     }
 
-    /// Whether bases turn.
-    pub fn turns(&self) -> bool {
-        !self.turns.is_empty()
+    /// Returns true if effects rotate the bases.
+    pub fn rotates_bases(&self) -> bool {
+        !self.rotations.is_empty()
     }
 
-    /// By how much bases turn in a pose, a rotation vector, measuring frame \[rad\].
-    pub fn turn(&self, setup: &PoseView) -> Vector3<f64> {
-        let mut turn = Vector3::zeros();
-        for &(axis, regressor, size) in &self.turns {
-            turn[axis] += size * regressor.value(setup);
-        }
-        turn
+    /// Returns the rotation vector of all bases in a pose, measuring frame \[rad\].
+    pub fn base_rotation(&self, setup: &PoseView) -> Vector3<f64> {
+        sum(&self.rotations, |regressor| regressor.value(setup))
     }
 
-    /// A base in a pose, measuring frame.
+    /// Returns the frame of a base in a pose, measuring frame.
     #[inline]
     pub fn base(&self, base: &Frame<f64>, setup: &PoseView) -> Frame<f64> {
-        if self.turns() {
-            Frame::from_rotation_vector(Vector3::zeros(), &self.turn(setup)).compose(base)
+        if self.rotates_bases() {
+            Frame::from_rotation_vector(Vector3::zeros(), &self.base_rotation(setup)).compose(base)
         } else {
             *base
         }
     }
 
-    /// What the command of a joint, counted from 0, changes in the shifts \[m/rad\] or \[m/m\].
-    pub fn slope(&self, setup: &PoseView, joint: usize) -> Vector3<f64> {
-        let mut slope = Vector3::zeros();
-        for &(axis, regressor, size) in &self.shifts {
-            slope[axis] += size * regressor.slope(setup, joint);
-        }
-        slope
+    /// Returns the derivative of the displacements with respect to the command of a joint, counted
+    /// from 0 [m/rad] or \[m/m\].
+    pub fn command_slope(&self, setup: &PoseView, joint: usize) -> Vector3<f64> {
+        sum(&self.shifts, |regressor| regressor.slope(setup, joint))
     }
 }
 
-/// ∂E by one of its entries, in the order of [`ParameterSite::Strain`].
-pub(super) fn strained(entry: usize) -> Matrix3<f64> {
+/// Returns Σ size × value of the regressor, by axis.
+fn sum(terms: &[(usize, Regressor, f64)], value: impl Fn(Regressor) -> f64) -> Vector3<f64> {
+    let mut sum = Vector3::zeros();
+    for &(axis, regressor, size) in terms {
+        sum[axis] += size * value(regressor);
+    }
+    sum
+}
+
+/// Returns ∂E by one of its entries, in the order of [`ParameterSite::Strain`].
+fn unit_strain(entry: usize) -> Matrix3<f64> {
     const PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
     let mut matrix = Matrix3::zeros();
     if let Some(place) = PLACES.get(entry) {

@@ -6,32 +6,33 @@ mod command;
 mod command_jacobian;
 mod command_residuals;
 mod commands;
-mod derivative;
+mod derivatives;
 mod driven;
 pub mod effect;
 mod elastic;
 mod enter;
 mod inputs;
 mod instrument;
-mod known;
-mod observation;
+mod jacobian;
+mod linear_model;
+mod orientation;
 pub mod parameter;
-mod parts;
 mod pose;
-mod poses;
+mod pose_residuals;
+mod predictions;
+mod predictor;
 mod rigid;
 mod rows;
 mod series;
 mod terms;
 mod tilt;
-mod turn;
 
 pub use crate::mechanics::CentreLine;
 pub use ablation::Ablation;
 pub use command_residuals::CommandResiduals;
-pub(crate) use known::LinearModel;
+pub(crate) use linear_model::LinearModel;
 pub use pose::{MeasuredOrientation, Pose};
-pub use poses::PoseResiduals;
+pub use pose_residuals::PoseResiduals;
 
 use nalgebra::Vector3;
 
@@ -40,13 +41,13 @@ use crate::mechanics::{Arm, Joint};
 use crate::model::parameter::{
     LinearConstraint, Parameter, ParameterSite, Regressor, constrain, resolve,
 };
+use crate::observation::FixtureValues;
 use crate::problem::{BasePose, Effect, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 use commands::Commands;
 use driven::Driven;
 use instrument::Instrument;
-pub(crate) use observation::FixtureValues;
 
 /// What predicts positions, as a function of the free parameters.
 #[derive(Debug, Clone)]
@@ -103,7 +104,11 @@ impl Model {
             targets: own.iter().map(|own| own.at).collect(),
             target_joints: own.iter().map(|own| own.joint).collect(),
             turned: own.iter().map(|own| own.rotation).collect(),
-            fixtures: problem.fixtures.iter().map(FixtureValues::declared).collect(),
+            fixtures: problem
+                .fixtures
+                .iter()
+                .map(|fixture| FixtureValues::new(fixture.kind, &fixture.known))
+                .collect(),
             declared: problem.fixtures.iter().map(|own| own.known.clone()).collect(),
             parameters,
         })

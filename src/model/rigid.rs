@@ -65,8 +65,7 @@ impl Rigid {
     #[inline]
     pub fn write(
         &mut self,
-        commanded: &PoseView,
-        setup: &PoseView,
+        (commanded, setup): (&PoseView, &PoseView),
         base: &Frame<f64>,
         (tip, target): (usize, &Vector3<f64>),
         rows: &mut Rows,

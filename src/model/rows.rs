@@ -1,4 +1,4 @@
-//! Where the derivatives of one pose are written.
+//! Rows of a block that hold the derivatives of one pose.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,28 +9,23 @@ use crate::problem::PoseView;
 
 /// Three rows of a block.
 pub(super) struct Rows<'a> {
+    /// Block that holds the rows.
     pub block: &'a mut Block,
+    /// First of the three rows.
     pub row: usize,
-    /// From a derivative of the prediction to one of the residual (measured − predicted) / σ.
+    /// Factor from a derivative of the prediction to one of the residual (measured − predicted) / σ.
     pub scale: f64,
 }
 
 impl Rows<'_> {
+    /// Writes a derivative of the prediction.
     #[inline]
     pub fn put(&mut self, column: usize, derivative: &Vector3<f64>) {
         let out = &mut self.block.column_mut(column)[self.row..self.row + 3];
         out.copy_from_slice((derivative * self.scale).as_slice());
     }
 
-    /// What is there already, multiplied by a matrix from the left.
-    pub fn turn(&mut self, by: &Matrix3<f64>) {
-        for column in 0..self.block.parameters() {
-            let own = &mut self.block.column_mut(column)[self.row..self.row + 3];
-            let turned = by * Vector3::new(own[0], own[1], own[2]);
-            own.copy_from_slice(turned.as_slice());
-        }
-    }
-
+    /// Writes a derivative of the prediction if it has a column.
     #[inline]
     pub fn put_if(&mut self, column: Option<usize>, derivative: impl FnOnce() -> Vector3<f64>) {
         if let Some(column) = column {
@@ -38,15 +33,35 @@ impl Rows<'_> {
         }
     }
 
-    /// Writes the derivative with respect to an input for each parameter that acts there.
+    /// Adds to a derivative of the prediction.
+    pub fn add(&mut self, column: usize, derivative: &Vector3<f64>) {
+        let out = &mut self.block.column_mut(column)[self.row..self.row + 3];
+        out.iter_mut().zip(derivative).for_each(|(out, add)| *out += add * self.scale);
+    }
+
+    /// Multiplies all columns by a matrix from the left.
+    pub fn multiply(&mut self, matrix: &Matrix3<f64>) {
+        for column in 0..self.block.parameters() {
+            let out = &mut self.block.column_mut(column)[self.row..self.row + 3];
+            let product = matrix * Vector3::new(out[0], out[1], out[2]);
+            out.copy_from_slice(product.as_slice());
+        }
+    }
+
+    /// Writes the derivative with respect to an input for each parameter that acts on it.
     #[inline]
     pub fn put_input(&mut self, input: &Input, commanded: &PoseView, derivative: &Vector3<f64>) {
-        if let Some(column) = input.column {
-            self.put(column, derivative);
-        }
+        self.put_if(input.column, || *derivative);
         let mut waves = Waves::default();
-        for &(column, regressor) in &input.driven {
+        for &(column, regressor) in &input.regressors {
             self.put(column, &(derivative * waves.value(regressor, commanded)));
         }
+    }
+}
+
+/// Sets all derivatives of points to zero: those of the last row may be of another base.
+pub(super) fn clear(points: &mut Block) {
+    for column in 0..points.parameters() {
+        points.column_mut(column).fill(0.0);
     }
 }

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::dialect::{self, Dialect};
-use super::fixture::Observation;
 use super::item::Item;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
+use crate::observation::Observation;
 use crate::quantity::Unit;
 
 /// Maximum number of measurement files.

@@ -11,6 +11,7 @@ use super::item::Item;
 use super::joint::Joint;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
+use crate::observation::FixtureKind;
 use crate::quantity::Unit;
 use crate::spatial::MAX_NORMAL_TILT;
 
@@ -30,55 +31,6 @@ pub struct Fixture {
     pub location: Location,
 }
 
-/// Kind of a fixture, which determines its coordinates.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum FixtureKind {
-    /// Point that the target is brought to (socket, touch point): x, y, z \[m\].
-    Point,
-    /// Point to which distances are measured: x, y, z \[m\].
-    Anchor,
-    /// Plane n·x = d with n = exp(\[(rx, ry, 0)\]×) ẑ. Near −ẑ (rx above 3π/4) n = −exp(\[(rx − π,
-    /// ry, 0)\]×) ẑ. Coordinates rx, ry \[rad\], d \[m\].
-    Plane,
-    /// Sphere: centre x, y, z and radius \[m\].
-    Sphere,
-}
-
-impl FixtureKind {
-    /// Returns the word that names its table, its column and its parameters.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Point => "point",
-            Self::Anchor => "anchor",
-            Self::Plane | Self::Sphere => "surface",
-        }
-    }
-
-    /// Returns the names of its coordinates, as used in parameter names.
-    pub fn fields(self) -> &'static [&'static str] {
-        match self {
-            Self::Point | Self::Anchor => &["x", "y", "z"],
-            Self::Plane => &["rx", "ry", "d"],
-            Self::Sphere => &["x", "y", "z", "radius"],
-        }
-    }
-
-    /// Returns the keys that declare one of its coordinates.
-    pub fn declared_by(self, axis: usize) -> &'static str {
-        match (self, axis) {
-            (Self::Plane, _) => "normal and at_m",
-            (Self::Sphere, 3) => "radius_m",
-            _ => "at_m",
-        }
-    }
-
-    /// Returns the unit of one of its coordinates.
-    pub fn unit(self, axis: usize) -> Unit {
-        if self == Self::Plane && axis < 2 { Unit::Angle } else { Unit::Length }
-    }
-}
-
 /// Known distance between two points: `[[distance]]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnownDistance {
@@ -90,100 +42,6 @@ pub struct KnownDistance {
     pub sigma: f64,
     /// Place in the file, for errors.
     pub location: Location,
-}
-
-/// Quantity that a row measures; fixtures are indices into
-/// [`Problem::fixtures`](super::Problem::fixtures).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
-pub enum Observation {
-    /// Position of the target in the measuring frame: three residuals, six with its orientation.
-    #[default]
-    Position,
-    /// Contact of the target with a point: three residuals.
-    Point(usize),
-    /// Distance from the target to an anchor: one residual.
-    Distance(usize),
-    /// Distance of the target from a surface, 0 in contact: one residual.
-    Surface(usize),
-    /// Tilts of the x and y axes of a frame against the horizontal: two residuals. Frame 0 is the
-    /// arm's base, frame i that of joint i.
-    Tilt(usize),
-    /// Distance between two points, in which the arm takes no part: one residual. The indices are
-    /// narrow to keep the enum small.
-    Between(u32, u32),
-}
-
-impl Observation {
-    /// Returns the number of measured coordinates, without those of an orientation.
-    pub fn coordinates(self) -> usize {
-        match self {
-            Self::Position | Self::Point(_) => 3,
-            Self::Tilt(_) => 2,
-            Self::Distance(_) | Self::Surface(_) | Self::Between(..) => 1,
-        }
-    }
-
-    /// Returns the square root of [`coordinates`](Self::coordinates).
-    pub(crate) fn root(self) -> f64 {
-        (self.coordinates() as f64).sqrt()
-    }
-
-    /// Returns the name of its kind in results.
-    pub fn kind(self) -> &'static str {
-        match self {
-            Self::Position => "position",
-            Self::Point(_) => "point",
-            Self::Distance(_) => "distance",
-            Self::Surface(_) => "surface",
-            Self::Tilt(_) => "tilt",
-            Self::Between(..) => "known distance",
-        }
-    }
-
-    /// Returns the fixture that the target is measured against, if there is one.
-    pub fn fixture(self) -> Option<usize> {
-        self.fixtures()[0].filter(|_| self.is_of_arm())
-    }
-
-    /// Returns the fixtures that take part in the observation.
-    pub fn fixtures(self) -> [Option<usize>; 2] {
-        match self {
-            Self::Position | Self::Tilt(_) => [None; 2],
-            Self::Point(fixture) | Self::Distance(fixture) | Self::Surface(fixture) => {
-                [Some(fixture), None]
-            }
-            Self::Between(first, second) => [Some(first as usize), Some(second as usize)],
-        }
-    }
-
-    /// Returns numbers that are equal exactly for equal observations.
-    pub(crate) fn key(self) -> [usize; 3] {
-        let [first, second] =
-            self.fixtures().map(|fixture| fixture.map_or(0, |fixture| fixture + 1));
-        let frame = if let Self::Tilt(frame) = self { frame + 1 } else { 0 };
-        [first, second, 4 * frame + self.coordinates()]
-    }
-
-    /// Returns true if its numbers are angles \[rad\], false if they are lengths \[m\].
-    pub fn is_angle(self) -> bool {
-        matches!(self, Self::Tilt(_))
-    }
-
-    /// Returns true if it measures a position in the measuring frame.
-    pub fn is_position(self) -> bool {
-        self == Self::Position
-    }
-
-    /// Returns true for a contact with a point. Its residual is expressed along the axes of the
-    /// arm's base and therefore does not depend on a common displacement of arm and point.
-    pub fn is_point(self) -> bool {
-        matches!(self, Self::Point(_))
-    }
-
-    /// Returns true if the arm takes part in the observation.
-    pub fn is_of_arm(self) -> bool {
-        !matches!(self, Self::Between(..))
-    }
 }
 
 /// Returns the frame that a word names: `base`, a joint by its name, or `joint3`. The word `tool`

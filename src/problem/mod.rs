@@ -30,6 +30,7 @@ use nalgebra::Vector3;
 
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
 
+pub use crate::observation::{FixtureKind, Observation};
 pub(crate) use argument::HIGHEST_ORDER;
 pub use argument::{Argument, FreeLength, Mount};
 pub use conditions::{PoseConditions, PoseRanges, PoseView};
@@ -37,7 +38,7 @@ pub use constraints::{Constraint, ConstraintTerm, Limit, LimitKind};
 pub use data::{Data, DeclaredCovariate, HeldOut, JointSource};
 pub use dialect::{ColumnRule, ColumnSelector, Delimiter, Dialect, Missing, RotationKind};
 pub use effect::{Custom, Effect, EffectDeclaration};
-pub use fixture::{Fixture, FixtureKind, KnownDistance, Observation};
+pub use fixture::{Fixture, KnownDistance};
 pub use joint::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement};
 pub use parameters::{Freedom, ParameterRule, Quantities};
 pub(crate) use past::PoseTable;

@@ -1,6 +1,8 @@
 //! Tables about rows of measurements, column by column: what CSV files and the Python package have
 //! in common.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::quantity::fixed;
@@ -8,7 +10,9 @@ use super::table;
 use crate::files::csv;
 use crate::fit::Residual;
 use crate::measurement::{Labels, Measurements};
-use crate::problem::{Observation, Problem};
+use crate::observation::{Kind, Observation};
+use crate::problem::Problem;
+use crate::quantity::Unit;
 
 /// The cells of a column.
 #[derive(Debug, Clone, PartialEq)]
@@ -103,7 +107,7 @@ pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Res
     let picked: Vec<usize> = residuals.iter().map(|residual| residual.row).collect();
     let mut columns = names(problem, rows, &picked);
     let turned = residuals.iter().any(|residual| residual.orientation.is_some());
-    let kinds = columns_of_kinds(rows);
+    let kinds = kinds_of(rows);
     let predicted_turn = |own: &Residual| {
         let (turn, measured) = own.orientation.zip(rows.orientations.as_ref())?;
         Some((UnitQuaternion::from_scaled_axis(-turn) * measured[own.row]).scaled_axis())
@@ -116,11 +120,14 @@ pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Res
         columns.push((name, Column::Numbers(residuals.iter().map(cell).collect(), Some(decimals))));
     };
     for (word, value, turn) in both {
-        for (kind, axes) in &kinds {
+        for kind in &kinds {
+            let (group, axes) = kind.residuals;
+            let is_angle = kind.unit == Unit::Angle;
             let (unit, factor) =
-                if *kind == "tilt" { ("deg", 180.0 / std::f64::consts::PI) } else { ("mm", 1e3) };
+                if is_angle { ("deg", 180.0 / std::f64::consts::PI) } else { ("mm", 1e3) };
             for (k, axis) in axes.iter().enumerate() {
-                let is_own = |own: &Residual| columns_of(rows.observation(own.row)).0 == *kind;
+                let is_own =
+                    |own: &Residual| rows.observation(own.row).description().residuals.0 == group;
                 let cell =
                     |own: &Residual| if is_own(own) { value(own)[k] * factor } else { f64::NAN };
                 add(format!("{word}_{axis}_{unit}"), 6, &cell);
@@ -149,24 +156,10 @@ pub fn residuals_csv(problem: &Problem, rows: &Measurements, residuals: &[Residu
     to_csv(&residual_columns(problem, rows, residuals), residuals.len())
 }
 
-/// The columns of a kind of rows, and how that is called: positions and contacts with points share
-/// theirs.
-fn columns_of(observation: Observation) -> (&'static str, &'static [&'static str]) {
-    match observation {
-        Observation::Position | Observation::Point(_) => ("position", &["x", "y", "z"]),
-        Observation::Distance(_) | Observation::Between(..) => ("distance", &["distance"]),
-        Observation::Surface(_) => ("offset", &["offset"]),
-        Observation::Tilt(_) => ("tilt", &["tilt_x", "tilt_y"]),
-    }
-}
-
-/// The columns that some rows need.
-fn columns_of_kinds(rows: &Measurements) -> Vec<(&'static str, &'static [&'static str])> {
-    let mut all: Vec<(&'static str, &'static [&'static str])> = Vec::new();
-    for own in rows.kinds().into_iter().map(columns_of) {
-        if !all.contains(&own) {
-            all.push(own);
-        }
-    }
-    if all.is_empty() { vec![columns_of(Observation::Position)] } else { all }
+/// Returns the kinds of rows in a table, one for each group of residual columns.
+fn kinds_of(rows: &Measurements) -> Vec<&'static Kind> {
+    let mut kinds: Vec<&Kind> = rows.kinds().into_iter().map(Observation::description).collect();
+    let mut groups = BTreeSet::new();
+    kinds.retain(|kind| groups.insert(kind.residuals.0));
+    if kinds.is_empty() { vec![Observation::Position.description()] } else { kinds }
 }

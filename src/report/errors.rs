@@ -1,21 +1,15 @@
 //! Errors of arms in words: before and after, and poses whose errors nobody knows.
 
 use super::quantity::{about_three_digits, counted, number};
-use crate::fit::{ErrorSummary, Errors, Identification, rows_of_kind};
+use crate::fit::{ErrorSummary, Errors, Identification};
+use crate::observation::kind_named;
 
 /// The arm before anything was identified.
 pub(super) const NOMINAL: &str = "nominal arm, base and tool fitted";
 
 /// What errors of a kind of rows are, and in which unit they are shown.
 pub(super) fn measure(of: &ErrorSummary) -> &'static str {
-    match of.kind {
-        "point" => "missed point, mm",
-        "distance" => "distance, mm",
-        "surface" => "distance from the surface, mm",
-        "tilt" => "tilt, °",
-        "known distance" => "known distance, mm",
-        _ => "error, mm",
-    }
+    kind_named(of.kind).error_label
 }
 
 /// An error, or the difference of two, of the kind of rows of `of` in the unit in which it is
@@ -31,11 +25,7 @@ pub(super) fn shown(of: &ErrorSummary, value: f64) -> String {
 
 /// The axes along which errors of a kind of rows are told.
 pub(super) fn axes(of: &ErrorSummary) -> usize {
-    match of.kind {
-        "position" | "point" => 3,
-        "tilt" => 2,
-        _ => 0,
-    }
+    Some(kind_named(of.kind).numbers).filter(|numbers| *numbers > 1).unwrap_or(0)
 }
 
 /// The same with its unit.
@@ -96,12 +86,8 @@ pub(super) fn held_out_rows(found: &Identification) -> String {
 
 /// How many rows of a kind there are, with an adjective that ends in a space.
 fn counted_rows(found: &Identification, of: &ErrorSummary, adjective: &str) -> String {
-    let many = rows_of_kind(of.kind);
-    let (one, many) = match of.kind {
-        "point" => ("contact with a point", many),
-        "distance" => ("distance", many),
-        "surface" => ("contact with a surface", many),
-        "tilt" => ("row of tilts", many),
+    let (one, many) = match kind_named(of.kind).row {
+        words if words.0 != "pose" => words,
         _ if !found.kinds.is_empty() => ("position", "positions"),
         _ if found.several_targets && adjective.is_empty() => ("point", "points"),
         _ => ("pose", "poses"),

@@ -4,8 +4,9 @@ use super::quantity::fixed;
 use super::table::{Command, commands, sessions, word};
 use crate::files::csv;
 use crate::measurement::Measurements;
+use crate::observation::references;
 use crate::problem::fixture::frame_word;
-use crate::problem::{HeldOut, Observation, Problem};
+use crate::problem::{HeldOut, Problem};
 
 /// Poses as CSV: the columns of measurements but for the positions; ready to be measured and
 /// completed.
@@ -78,8 +79,8 @@ fn sigmas(poses: &Measurements) -> Option<Vec<String>> {
 /// `frame`, those that there are.
 fn surroundings(problem: &Problem, poses: &Measurements) -> Vec<(String, Vec<String>)> {
     let word = |row: usize| match poses.observation(row) {
-        Observation::Tilt(frame) => {
-            Some(("frame", frame_word(frame, &problem.joints, problem.tool.joint)))
+        tilt if tilt.is_angle() => {
+            Some(("frame", frame_word(tilt.frame(), &problem.joints, problem.tool.joint)))
         }
         own => own
             .fixture()
@@ -93,8 +94,8 @@ fn surroundings(problem: &Problem, poses: &Measurements) -> Vec<(String, Vec<Str
         };
         words.iter().map(cell).collect()
     };
-    let all = ["point", "anchor", "surface", "frame"].map(|kind| (kind.to_owned(), column(kind)));
-    all.into_iter().filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty())).collect()
+    let all = references().map(|kind| (kind.to_owned(), column(kind)));
+    all.filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty())).collect()
 }
 
 /// Six decimals, without zeros at the end.

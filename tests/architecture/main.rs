@@ -13,7 +13,8 @@ use source::{Source, sources};
 const LONGEST: usize = 660;
 
 /// What is read from files, and what it is made of.
-const GROUND: &[&str] = &["scalar", "spatial", "quantity", "error", "problem", "measurement"];
+const GROUND: &[&str] =
+    &["scalar", "spatial", "quantity", "error", "observation", "problem", "measurement"];
 
 /// Each room of the house and the rooms that it may use, from the ground up.
 const STOREYS: &[(&str, &[&[&str]])] = &[
@@ -21,12 +22,14 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("quantity", &[]),
     ("spatial", &[&["scalar"]]),
     ("error", &[]),
+    // Kinds of rows, each with its prediction.
+    ("observation", &[&["scalar", "quantity", "spatial"]]),
     // Files up to a size, written whole or not at all, and tables.
     ("files", &[]),
     // Small methods: medians, bisection, random numbers.
     ("numeric", &[]),
     ("random", &[]),
-    ("problem", &[&["quantity", "error", "spatial", "files"]]),
+    ("problem", &[&["quantity", "error", "spatial", "observation", "files"]]),
     ("measurement", &[&["quantity", "error", "problem", "files"]]),
     // Least squares knows no arms.
     ("least_squares", &[&["scalar", "error", "numeric"]]),
@@ -35,7 +38,16 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("rig", &[&["scalar", "spatial", "quantity", "error", "problem", "files", "random"]]),
     (
         "model",
-        &[&["scalar", "spatial", "quantity", "error", "problem", "mechanics", "least_squares"]],
+        &[&[
+            "scalar",
+            "spatial",
+            "quantity",
+            "error",
+            "observation",
+            "problem",
+            "mechanics",
+            "least_squares",
+        ]],
     ),
     // The paper checks the model, so it shares no physics with it.
     ("paper", &[&["spatial", "error", "problem", "least_squares"]]),
@@ -87,7 +99,7 @@ const BELOW_FIT: &[&str] = &["mechanics", "model", "paper", "least_squares", "nu
 
 /// Rooms that read no files.
 const WITHOUT_FILES: &[&str] =
-    &["scalar", "spatial", "quantity", "least_squares", "mechanics", "model"];
+    &["scalar", "spatial", "quantity", "observation", "least_squares", "mechanics", "model"];
 const FILES: &[&str] = &["std::fs", "std::path", "std::io", "csv::", "toml::", "serde_json::"];
 
 /// Rooms that print.

@@ -8,7 +8,8 @@ use crate::fit::identification::IdentifyError;
 use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
 use crate::measurement::{Dataset, Measurements};
-use crate::model::{FixtureValues, Model, Pose};
+use crate::model::{Model, Pose};
+use crate::observation::FixtureValues;
 use crate::problem::{Observation, Problem};
 use crate::spatial::Frame;
 
@@ -188,7 +189,7 @@ pub(in crate::fit) fn in_space(
     match rows.observation(row) {
         Observation::Point(point) => {
             let residual = bases[rows.session.of_row[row]].vector(residual);
-            (fixtures[point].place() - residual, residual)
+            (fixtures[point].position() - residual, residual)
         }
         _ => (rows.positions[row] - residual, *residual),
     }

@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 
 use crate::fit::stages::placement::Placement;
-use crate::problem::Observation;
+use crate::observation::{Observation, kind_named};
+use crate::quantity::Unit;
 
 /// Identification rows that measure one kind of thing; lengths \[m\], angles of tilts \[rad\].
 pub(in crate::fit) struct RowKind {
@@ -45,9 +46,9 @@ const HUGE: f64 = 1e6;
 /// Writes an error with its unit: degrees with one decimal more for tilts \[rad\], millimetres for
 /// others \[m\].
 pub(crate) fn size(kind: &str, error: f64, decimals: usize) -> String {
-    match kind {
+    match kind_named(kind).unit {
         _ if !error.is_finite() => "more than numbers hold".to_owned(),
-        "tilt" => format!("{:.*}°", decimals + 1, error.to_degrees()),
+        Unit::Angle => format!("{:.*}°", decimals + 1, error.to_degrees()),
         _ if error < HUGE => format!("{:.*} mm", decimals, error * 1e3),
         _ => format!("{:.2e} mm", error * 1e3),
     }
@@ -55,33 +56,17 @@ pub(crate) fn size(kind: &str, error: f64, decimals: usize) -> String {
 
 /// Returns the noun for rows of a kind.
 pub(crate) fn rows(kind: &str) -> &'static str {
-    match kind {
-        "point" => "contacts with points",
-        "distance" => "distances",
-        "surface" => "contacts with surfaces",
-        "tilt" => "rows of tilts",
-        _ => "poses",
-    }
+    kind_named(kind).row.1
 }
 
 /// Returns the noun for what rows of a kind measure.
 pub(in crate::fit) fn measured(kind: &str) -> &'static str {
-    match kind {
-        "position" => "measurements",
-        "tilt" => "tilts",
-        _ => rows(kind),
-    }
+    kind_named(kind).measured
 }
 
 /// Returns what to check in a table where the arm misses rows of a kind.
 pub(in crate::fit) fn named(kind: &str) -> &'static str {
-    match kind {
-        "point" => "the names in the column point",
-        "distance" => "the names in the column anchor",
-        "surface" => "the names in the column surface",
-        "tilt" => "the names in the column frame",
-        _ => "whether base and session are declared",
-    }
+    kind_named(kind).suspects
 }
 
 #[cfg(test)]

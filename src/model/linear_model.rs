@@ -1,4 +1,4 @@
-//! Derivatives that are known at a point, for a fit that begins there.
+//! Linear model of residuals at a point: their Jacobian, reused by a fit that starts there.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -11,93 +11,96 @@ use crate::least_squares::Block;
 use crate::least_squares::kernel::sum_of_squares;
 use crate::model::parameter::Parameter;
 
-/// Part of a number by which it may differ where it is the same but for rounding.
-const ROUNDING: f64 = 1e-9;
+/// Relative difference up to which two numbers, or two residual vectors, count as the same.
+const MAX_RELATIVE_DIFFERENCE: f64 = 1e-9;
 
-/// Whitened residuals of some poses and their derivatives at a point, by parameter; three rows a
-/// pose.
+/// Whitened residuals of some rows and their derivatives at a point, by the name of the parameter;
+/// three residuals a row.
 ///
-/// A model of the same arm with further effects, which do nothing while their parameters are 0, has
-/// the same ones there, and columns of these effects beside them. A name stands for the same
-/// parameter in both.
+/// A model of the same arm with more effects has the same residuals and derivatives at this point,
+/// because an effect does nothing while its parameters are 0. Only the columns of the new effects
+/// have to be formed. A name stands for the same parameter in both models.
 #[derive(Debug, Clone)]
 pub(crate) struct LinearModel {
-    /// Of each parameter its deviation from nominal, and its column if it has one.
+    /// Deviation of each parameter from nominal, and its column if it has one.
     parameters: BTreeMap<String, (f64, Option<usize>)>,
-    /// 1 σ of each pose \[m\].
+    /// 1 σ of each row.
     sigma: Vec<f64>,
     jacobian: Arc<DMatrix<f64>>,
     residual: Arc<DVector<f64>>,
 }
 
 impl LinearModel {
-    /// At the full parameter vector `x` of a model with these `parameters`, of poses of these 1 σ
-    /// \[m\]; the first columns of the Jacobian are those of the `unknowns`.
+    /// Creates the linear model at the full parameter vector `x` of a model with these
+    /// `parameters`. The first columns of the Jacobian are those of the `unknowns`; `sigma` is the
+    /// 1 σ of each row.
     pub fn new(
         (parameters, x): (&[Parameter], &DVector<f64>),
         unknowns: &[usize],
         sigma: Vec<f64>,
         (jacobian, residual): (Arc<DMatrix<f64>>, Arc<DVector<f64>>),
     ) -> Self {
-        let column = |k: usize| unknowns.iter().position(|own| *own == k);
-        let own = parameters.iter().zip(x).enumerate();
-        let parameters = own.map(|(k, (own, x))| (own.name.clone(), (*x, column(k)))).collect();
+        let column = |k: usize| unknowns.iter().position(|unknown| *unknown == k);
+        let entry = |(k, (parameter, x)): (usize, (&Parameter, &f64))| {
+            (parameter.name.clone(), (*x, column(k)))
+        };
+        let parameters = parameters.iter().zip(x).enumerate().map(entry).collect();
         Self { parameters, sigma, jacobian, residual }
     }
 
-    /// Which of the unknowns have no column; `None` where `x` is another point, or poses are not as
-    /// many.
-    pub fn lacking(
-        &self,
-        poses: &[Pose],
-        (parameters, x): (&[Parameter], &DVector<f64>),
-        unknowns: &[usize],
-    ) -> Option<Vec<usize>> {
-        let is_there = |(own, x): (&Parameter, &f64)| {
-            let known = self.parameters.get(&own.name).map_or(0.0, |(known, _)| *known);
-            (x - known).abs() <= ROUNDING * (own.nominal.abs() + known.abs())
-        };
-        let is_it = poses.len() == self.sigma.len() && parameters.iter().zip(x).all(is_there);
-        let lacks = |&j: &usize| self.column(&parameters[unknowns[j]]).is_none();
-        is_it.then(|| (0..unknowns.len()).filter(lacks).collect())
-    }
-
-    fn column(&self, parameter: &Parameter) -> Option<usize> {
-        self.parameters.get(&parameter.name)?.1
-    }
-
-    /// Fills the block of some poses from what is known and from the columns of `new`, those
-    /// `lacking`, and its residual; not where that residual is not the known one.
+    /// Fills the block of some rows at the full parameter vector `x`: known columns are copied, the
+    /// others and the residual are formed by `write`, which takes their unknowns.
+    ///
+    /// Returns false, with the block unchanged, if `x` is another point or the rows are others.
     pub fn fill(
         &self,
-        block: &mut Block,
         (poses, items): (&[Pose], Range<usize>),
-        (parameters, unknowns): (&[Parameter], &[usize]),
-        (new, lacking): (&Block, &[usize]),
+        (parameters, x): (&[Parameter], &[f64]),
+        unknowns: &[usize],
+        block: &mut Block,
+        write: impl Fn(&[usize], &mut Block),
     ) -> bool {
-        let first = 3 * items.start;
-        let units: Vec<f64> = items.map(|pose| self.sigma[pose] / poses[pose].sigma).collect();
-        let known = |column: &[f64], row: usize| column[first + row] * units[row / 3];
-        let residual = new.column(new.parameters());
-        let missed = |(row, here): (usize, &f64)| here - known(self.residual.as_slice(), row);
-        let missed = sum_of_squares(&residual.iter().enumerate().map(missed).collect::<Vec<f64>>());
-        if !missed.is_finite() || missed > ROUNDING * ROUNDING * sum_of_squares(residual) {
+        if poses.len() != self.sigma.len() || !self.is_at(parameters, x) {
             return false;
         }
-        for (j, &k) in unknowns.iter().enumerate() {
-            if let Some(column) = self.column(&parameters[k]) {
-                let column = self.jacobian.column(column);
-                let column = column.as_slice();
-                block
-                    .column_mut(j)
-                    .iter_mut()
-                    .enumerate()
-                    .for_each(|(row, out)| *out = known(column, row));
-            }
+        let column = |&k: &usize| self.parameters.get(&parameters[k].name)?.1;
+        let known: Vec<Option<usize>> = unknowns.iter().map(column).collect();
+        let is_new = |j: &usize| known[*j].is_none();
+        let new: Vec<usize> = (0..unknowns.len()).filter(is_new).collect();
+        let mut formed = Block::zeros(block.rows(), new.len());
+        write(&new.iter().map(|&j| unknowns[j]).collect::<Vec<_>>(), &mut formed);
+
+        let first = 3 * items.start;
+        let units: Vec<f64> = items.map(|row| self.sigma[row] / poses[row].sigma).collect();
+        let in_units = |column: &[f64], row: usize| column[first + row] * units[row / 3];
+        let residual = formed.column(new.len());
+        let difference =
+            |(row, here): (usize, &f64)| here - in_units(self.residual.as_slice(), row);
+        let differences: Vec<f64> = residual.iter().enumerate().map(difference).collect();
+        let squares = sum_of_squares(&differences);
+        let largest = MAX_RELATIVE_DIFFERENCE * MAX_RELATIVE_DIFFERENCE * sum_of_squares(residual);
+        if !squares.is_finite() || squares > largest {
+            return false;
         }
-        let places = lacking.iter().copied().chain([unknowns.len()]).enumerate();
-        places.for_each(|(own, j)| block.column_mut(j).copy_from_slice(new.column(own)));
+        for (j, column) in known.iter().enumerate() {
+            let Some(column) = column else { continue };
+            let column = self.jacobian.column(*column);
+            let out = block.column_mut(j).iter_mut().enumerate();
+            out.for_each(|(row, out)| *out = in_units(column.as_slice(), row));
+        }
+        for (j, out) in new.iter().copied().chain([unknowns.len()]).enumerate() {
+            block.column_mut(out).copy_from_slice(formed.column(j));
+        }
         true
+    }
+
+    /// Returns true if `x` is the point of the linear model, to rounding.
+    fn is_at(&self, parameters: &[Parameter], x: &[f64]) -> bool {
+        parameters.iter().zip(x).all(|(parameter, x)| {
+            let known = self.parameters.get(&parameter.name).map_or(0.0, |(known, _)| *known);
+            let size = parameter.nominal.abs() + known.abs();
+            (x - known).abs() <= MAX_RELATIVE_DIFFERENCE * size
+        })
     }
 }
 

@@ -1,0 +1,178 @@
+//! Derivatives of bases and targets, and of the arm between them.
+
+use nalgebra::Vector3;
+use num_dual::DualSVec64;
+
+use super::elastic::Elastic;
+use super::rigid::Rigid;
+use super::rows::Rows;
+use crate::problem::{BasePose, PoseView};
+use crate::scalar::{gradient, seeded};
+use crate::spatial::{Frame, rotation_axes};
+
+/// Base frame with the derivatives of its six coordinates, and the columns of these.
+#[derive(Clone)]
+pub(super) struct Base {
+    /// Frame, measuring frame.
+    pub frame: Frame<f64>,
+    /// Directions in which its translation's coordinates move it, measuring frame.
+    pub directions: [Vector3<f64>; 3],
+    /// Derivatives of its axes with respect to its rotation vector.
+    rotation_slopes: [Frame<f64>; 3],
+    /// Columns of effects that rotate it about the measuring frame's origin, with the derivative of
+    /// that rotation.
+    effect_slopes: Vec<(usize, Frame<f64>)>,
+    /// Columns of translation and rotation vector.
+    pub columns: [Option<usize>; 6],
+}
+
+/// Target with the derivatives of its six coordinates, and the columns of these.
+pub(super) struct Target {
+    /// Index of the joint whose frame carries it.
+    pub joint: usize,
+    /// Position in that frame \[m\].
+    pub position: Vector3<f64>,
+    /// Axes in that frame.
+    pub axes: [Vector3<f64>; 3],
+    /// Derivatives of the axes with respect to its rotation vector.
+    rotation_slopes: [Frame<f64>; 3],
+    /// Columns of position and rotation vector.
+    pub columns: [Option<usize>; 6],
+}
+
+/// Method that differentiates the arm with respect to its parameters.
+pub(super) enum ArmDerivatives {
+    /// Motion by motion.
+    Rigid(Rigid),
+    /// Through the statics.
+    Elastic(Box<Elastic>),
+}
+
+impl Base {
+    /// Creates the base at a pose in the measuring frame, without columns.
+    pub fn new(pose: &BasePose) -> Self {
+        Self {
+            frame: Frame::from_rotation_vector(pose.translation, &pose.rotation),
+            directions: [Vector3::x(), Vector3::y(), Vector3::z()],
+            rotation_slopes: rotation_slopes(&pose.rotation),
+            effect_slopes: Vec::new(),
+            columns: [None; 6],
+        }
+    }
+
+    /// Returns the base rotated by the vector `turn` \[rad\] about the measuring frame's origin.
+    ///
+    /// `columns` are (axis, column, factor): each parameter adds factor × its value to a coordinate
+    /// of `turn`.
+    pub fn rotated(
+        &self,
+        turn: &Vector3<f64>,
+        columns: impl Iterator<Item = (usize, usize, f64)>,
+    ) -> Self {
+        let rotation = Frame::from_rotation_vector(Vector3::zeros(), turn);
+        let (slopes, inverse) = (rotation_slopes(turn), rotation.inverse());
+        let column = |(axis, column, factor): (usize, usize, f64)| {
+            let slope = slopes[axis].compose(&inverse);
+            (column, Frame { axes: slope.axes.map(|axis| axis * factor), origin: Vector3::zeros() })
+        };
+        Self {
+            frame: rotation.compose(&self.frame),
+            directions: self.directions.map(|axis| rotation.vector(&axis)),
+            rotation_slopes: self.rotation_slopes.map(|slope| rotation.compose(&slope)),
+            effect_slopes: columns.map(column).collect(),
+            columns: self.columns,
+        }
+    }
+
+    /// Returns, for each parameter that rotates the base, its column and the derivative of a point
+    /// \[m\] that moves with the base, measuring frame.
+    pub fn point_slopes<'b>(
+        &'b self,
+        point: &Vector3<f64>,
+    ) -> impl Iterator<Item = (usize, Vector3<f64>)> + 'b {
+        let (in_base, point) = (self.frame.resolve(&(point - self.frame.origin)), *point);
+        let rotation_vector =
+            self.rotation_columns().map(move |(column, slope)| (column, slope.vector(&in_base)));
+        let effects =
+            self.effect_slopes.iter().map(move |(column, slope)| (*column, slope.vector(&point)));
+        rotation_vector.chain(effects)
+    }
+
+    /// Returns, for each parameter that rotates the base, its column and the angular velocity ω of
+    /// the axes e, measuring frame: ω = ½ Σ eₖ × deₖ.
+    pub fn angular_velocities(&self) -> impl Iterator<Item = (usize, Vector3<f64>)> + '_ {
+        let axes = &self.frame.axes;
+        let rotation_vector = self.rotation_columns().map(|(column, slope)| (column, slope.axes));
+        let effects = self.effect_slopes.iter();
+        let effects =
+            effects.map(|(column, slope)| (*column, axes.map(|axis| slope.vector(&axis))));
+        rotation_vector
+            .chain(effects)
+            .map(|(column, slopes)| (column, angular_velocity(axes, &slopes)))
+    }
+
+    fn rotation_columns(&self) -> impl Iterator<Item = (usize, &Frame<f64>)> {
+        let columns = self.columns[3..].iter().zip(&self.rotation_slopes);
+        columns.filter_map(|(column, slope)| Some(((*column)?, slope)))
+    }
+}
+
+impl Target {
+    /// Creates the target at a position \[m\] and with a rotation vector \[rad\] in the frame of a
+    /// joint, without columns.
+    pub fn new(joint: usize, position: Vector3<f64>, rotation: &Vector3<f64>) -> Self {
+        Self {
+            joint,
+            position,
+            axes: rotation_axes(rotation),
+            rotation_slopes: rotation_slopes(rotation),
+            columns: [None; 6],
+        }
+    }
+
+    /// Returns, for each free coordinate of its rotation vector, its column and the derivatives of
+    /// the target's axes, in the frame that carries it.
+    pub fn axis_slopes(&self) -> impl Iterator<Item = (usize, &[Vector3<f64>; 3])> {
+        let columns = self.columns[3..].iter().zip(&self.rotation_slopes);
+        columns.filter_map(|(column, slope)| Some(((*column)?, &slope.axes)))
+    }
+}
+
+impl ArmDerivatives {
+    /// Writes the derivatives of a point \[m\] in the frame of a joint with respect to the arm's
+    /// parameters. Returns that frame, measuring frame, or `None` if the pose has no equilibrium.
+    ///
+    /// `commanded` is the pose as commanded, `setup` with the corrections of its commands.
+    #[inline]
+    pub(super) fn write(
+        &mut self,
+        (commanded, setup): (&PoseView, &PoseView),
+        base: &Base,
+        (joint, point): (usize, &Vector3<f64>),
+        rows: &mut Rows,
+    ) -> Option<Frame<f64>> {
+        let (setups, point) = ((commanded, setup), (joint, point));
+        match self {
+            Self::Rigid(rigid) => Some(rigid.write(setups, &base.frame, point, rows)),
+            Self::Elastic(elastic) => elastic.write(setups, &base.frame, point, rows),
+        }
+    }
+}
+
+/// Returns the angular velocity of axes from their derivatives: ω = ½ Σ eₖ × deₖ.
+pub(super) fn angular_velocity(
+    axes: &[Vector3<f64>; 3],
+    slopes: &[Vector3<f64>; 3],
+) -> Vector3<f64> {
+    axes.iter().zip(slopes).map(|(axis, slope)| axis.cross(slope) * 0.5).sum()
+}
+
+/// Returns the derivatives of the axes of the rotation exp(`[w]×`) with respect to w.
+fn rotation_slopes(w: &Vector3<f64>) -> [Frame<f64>; 3] {
+    let seeded_w: Vector3<DualSVec64<3>> = Vector3::from_fn(|i, _| seeded(w[i], Some(i)));
+    let axes = rotation_axes(&seeded_w).map(|axis| axis.map(|coordinate| gradient(&coordinate)));
+    std::array::from_fn(|k| Frame {
+        axes: axes.map(|axis| axis.map(|g| g[k])),
+        origin: Vector3::zeros(),
+    })
+}

@@ -1,0 +1,244 @@
+//! Residuals of rows with their derivatives, by dual numbers where the structure of the arm keeps
+//! them small.
+//!
+//! A base or a target moves the position rigidly, and on a rigid arm so does every parameter of a
+//! link. On an elastic arm the loads move too.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::Model;
+use super::commands::Commands;
+use super::derivatives::{ArmDerivatives, Base, Target};
+use super::elastic::Elastic;
+use super::inputs::inputs;
+use super::instrument::Instrument;
+use super::orientation;
+use super::pose::Pose;
+use super::predictor::fixtures_of;
+use super::rigid::Rigid;
+use super::rows::{Rows, clear};
+use super::tilt::TiltDerivatives;
+use crate::least_squares::Block;
+use crate::model::parameter::{ParameterSite, Regressor};
+use crate::observation::{FixtureValues, Needs, Scene};
+use crate::spatial::Frame;
+
+/// Writer of residuals and Jacobian rows at one parameter vector, used for every row.
+pub(super) struct JacobianWriter {
+    commands: Commands,
+    instrument: Instrument,
+    /// Columns of the instrument's errors, with site and regressor.
+    instrument_columns: Vec<(ParameterSite, Regressor, usize)>,
+    /// Columns of effects that rotate every base: axis, regressor, column.
+    base_rotations: Vec<(usize, Regressor, usize)>,
+    bases: Vec<Base>,
+    targets: Vec<Target>,
+    fixtures: Vec<FixtureValues<f64>>,
+    /// Columns of the numbers of each fixture.
+    fixture_columns: Vec<[Option<usize>; 4]>,
+    /// Derivatives of tilts, if some are measured.
+    tilts: Option<TiltDerivatives>,
+    arm: ArmDerivatives,
+    /// Derivatives of points on the arm, reused from row to row.
+    points: Block,
+}
+
+impl JacobianWriter {
+    /// Creates a writer at the full parameter vector `x`; `unknowns[j]` is the parameter of column
+    /// j. Only an `oriented` writer takes orientations, only a `tilted` one takes tilts.
+    pub fn new(
+        model: &Model,
+        x: &[f64],
+        unknowns: &[usize],
+        (oriented, tilted): (bool, bool),
+    ) -> Self {
+        let arm = model.arm(|k| x[k]);
+        let mut bases: Vec<Base> = model.base_poses(x).iter().map(Base::new).collect();
+        let places = model.target_positions(x).into_iter().zip(model.target_rotations(x));
+        let target = |(index, (position, rotation))| {
+            Target::new(model.target_joint(index), position, &rotation)
+        };
+        let mut targets: Vec<Target> = places.enumerate().map(target).collect();
+        let fixtures = model.fixtures(x);
+        let mut fixture_columns = vec![[None; 4]; fixtures.len()];
+        let (mut instrument_columns, mut base_rotations) = (Vec::new(), Vec::new());
+        for (column, &k) in unknowns.iter().enumerate() {
+            let parameter = &model.parameters[k];
+            match parameter.site {
+                ParameterSite::Base { base, axis } => bases[base].columns[axis] = Some(column),
+                ParameterSite::Target { target, axis } => {
+                    targets[target].columns[axis] = Some(column)
+                }
+                ParameterSite::Fixture { fixture, axis, .. } => {
+                    fixture_columns[fixture][axis] = Some(column)
+                }
+                ParameterSite::Turn { axis } => {
+                    base_rotations.push((axis, parameter.regressor, column))
+                }
+                ParameterSite::Scale
+                | ParameterSite::Strain { .. }
+                | ParameterSite::Shift { .. } => {
+                    instrument_columns.push((parameter.site, parameter.regressor, column))
+                }
+                ParameterSite::Joint { .. }
+                | ParameterSite::Beam { .. }
+                | ParameterSite::Arm(_) => {}
+            }
+        }
+        let inputs = inputs(model, unknowns);
+        let tilts = tilted.then(|| TiltDerivatives::new(model, x, arm.clone(), inputs.clone()));
+        let arm = if arm.is_elastic() {
+            ArmDerivatives::Elastic(Box::new(Elastic::new(model, x, arm, inputs)))
+        } else {
+            ArmDerivatives::Rigid(Rigid::new(&arm, inputs))
+        };
+        let point_rows = match (oriented, fixtures.is_empty()) {
+            (true, _) => orientation::POINT_ROWS,
+            (false, false) => 3,
+            (false, true) => 0,
+        };
+        Self {
+            commands: model.commands(x),
+            instrument: model.instrument_at(x),
+            instrument_columns,
+            base_rotations,
+            bases,
+            targets,
+            fixtures,
+            fixture_columns,
+            tilts,
+            arm,
+            points: Block::zeros(point_rows, unknowns.len()),
+        }
+    }
+
+    /// Writes the whitened residual of a row and its derivatives into three rows of a block of
+    /// zeros, six with its orientation.
+    #[inline]
+    pub fn write(&mut self, pose: &Pose, block: &mut Block, row: usize) {
+        if pose.observation.is_position() {
+            self.write_position(pose, block, row);
+        } else {
+            self.write_other(pose, block, row);
+        }
+    }
+
+    /// Writes a row that is not a position: the derivatives of its prediction, times those of the
+    /// target, of the base and of the fixtures.
+    fn write_other(&mut self, pose: &Pose, block: &mut Block, row: usize) {
+        let (observation, last_column) = (pose.observation, block.parameters());
+        let mut rows = Rows { block, row, scale: -1.0 / pose.sigma };
+        let lost = Vector3::from_element(f64::NAN);
+        let fixtures = fixtures_of(observation, |fixture| self.fixtures[fixture]);
+        let mut scene = Scene { fixtures, ..Scene::default() };
+        let mut slopes = None;
+        match observation.description().needs {
+            Needs::Fixtures => {}
+            Needs::Frame => {
+                let Some(tilts) = &mut self.tilts else { return };
+                let setup = self.commands.apply(&pose.setup);
+                let tilts = tilts.write((&pose.setup, &setup), observation, &mut rows);
+                rows.put(last_column, &tilts.map_or(lost, |tilts| tilts - pose.measured));
+                return;
+            }
+            Needs::Target => {
+                let (base, target) = (&self.bases[pose.base], &self.targets[pose.target]);
+                let rotated = self.rotated(base, pose);
+                let base = rotated.as_ref().unwrap_or(base);
+                let setup = self.commands.apply(&pose.setup);
+                let points = &mut self.points;
+                clear(points);
+                let mut moves = Rows { block: points, row: 0, scale: 1.0 };
+                let point = (target.joint, &target.position);
+                let Some(frame) = self.arm.write((&pose.setup, &setup), base, point, &mut moves)
+                else {
+                    rows.put(last_column, &lost);
+                    return;
+                };
+                scene.target = write_placement(&frame, base, target, &mut moves);
+                scene.base = base.frame.axes;
+                let by = slopes.insert(observation.slopes(&scene));
+                for column in 0..points.parameters() {
+                    let moved = points.column(column);
+                    let moved = Vector3::new(moved[0], moved[1], moved[2]);
+                    rows.put(column, &(by.by_target * moved));
+                }
+                if by.by_base != Matrix3::zeros() {
+                    for (column, velocity) in base.angular_velocities() {
+                        rows.add(column, &(by.by_base * velocity));
+                    }
+                }
+            }
+        }
+        let slopes = slopes.unwrap_or_else(|| observation.slopes(&scene));
+        for (fixture, by) in observation.fixtures().into_iter().flatten().zip(&slopes.by_fixtures) {
+            for (&column, by) in self.fixture_columns[fixture].iter().zip(by.column_iter()) {
+                rows.put_if(column, || by.into_owned());
+            }
+        }
+        rows.put(last_column, &(slopes.value - pose.measured));
+    }
+
+    /// Returns the base as effects rotate it in a pose; `None` if none does.
+    fn rotated(&self, base: &Base, pose: &Pose) -> Option<Base> {
+        self.instrument.rotates_bases().then(|| {
+            let columns = self
+                .base_rotations
+                .iter()
+                .map(|&(axis, regressor, column)| (axis, column, regressor.value(&pose.setup)));
+            base.rotated(&self.instrument.base_rotation(&pose.setup), columns)
+        })
+    }
+
+    #[inline]
+    fn write_position(&mut self, pose: &Pose, block: &mut Block, row: usize) {
+        let (base, target) = (&self.bases[pose.base], &self.targets[pose.target]);
+        let rotated = self.rotated(base, pose);
+        let base = rotated.as_ref().unwrap_or(base);
+        let setup = self.commands.apply(&pose.setup);
+        let per_sigma = -1.0 / pose.sigma;
+        let last_column = block.parameters();
+        let mut rows = Rows { block, row, scale: per_sigma * (1.0 + self.instrument.scale) };
+        let (setups, point) = ((&pose.setup, &setup), (target.joint, &target.position));
+        let Some(frame) = self.arm.write(setups, base, point, &mut rows) else {
+            rows.put(last_column, &Vector3::from_element(f64::NAN));
+            return;
+        };
+        let predicted = write_placement(&frame, base, target, &mut rows);
+        if let Some(strain) = self.instrument.relative_strain() {
+            rows.multiply(&strain);
+        }
+        rows.scale = per_sigma;
+        for &(site, regressor, column) in &self.instrument_columns {
+            rows.put(column, &Instrument::slope(site, &predicted, regressor, &pose.setup));
+        }
+        let reading = self.instrument.reading(&predicted, &pose.setup);
+        rows.put(last_column, &(reading - pose.measured));
+        if let Some(measured) = &pose.orientation {
+            let place = orientation::Place { setups, base, target, frame: &frame };
+            orientation::write(&mut self.arm, &mut self.points, &place, measured, (block, row + 3));
+        }
+    }
+}
+
+/// Writes the derivatives of the target's position with respect to base and target; returns that
+/// position, measuring frame \[m\]. `frame` carries the target.
+#[inline]
+fn write_placement(
+    frame: &Frame<f64>,
+    base: &Base,
+    target: &Target,
+    rows: &mut Rows,
+) -> Vector3<f64> {
+    let position = frame.point(&target.position);
+    for (axis, &column) in base.columns.iter().take(3).enumerate() {
+        rows.put_if(column, || base.directions[axis]);
+    }
+    for (column, slope) in base.point_slopes(&position) {
+        rows.put(column, &slope);
+    }
+    for (axis, &column) in target.columns.iter().take(3).enumerate() {
+        rows.put_if(column, || frame.axes[axis]);
+    }
+    position
+}

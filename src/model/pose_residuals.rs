@@ -1,0 +1,172 @@
+//! Measured rows as a least-squares problem.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::{DVector, Vector3};
+use rayon::prelude::*;
+
+use super::Model;
+use super::jacobian::JacobianWriter;
+use super::linear_model::LinearModel;
+use super::pose::Pose;
+use super::predictor::{Prediction, Predictor};
+use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
+
+/// Residuals of a row without and with an orientation.
+const POSITION: usize = 3;
+const POSE: usize = 6;
+
+/// Whitened residuals (measured − predicted) / σ of some rows as a function of some of the
+/// parameters.
+///
+/// A row has three residuals, 0 behind the numbers that it measures. If any row has an orientation
+/// that is fitted, each has six: the last three are log(R Rₚᵀ) / σ of measured R and predicted Rₚ,
+/// measuring frame, and 0 for rows without an orientation.
+pub struct PoseResiduals<'a> {
+    model: &'a Model,
+    poses: Arc<Vec<Pose<'a>>>,
+    /// Indices of the unknown parameters.
+    unknowns: Vec<usize>,
+    /// Full parameter vector, with the values of the parameters that are not unknown.
+    fixed: DVector<f64>,
+    residuals_per_row: usize,
+    measures_tilts: bool,
+    /// Derivatives at a point where the residuals may be linearised.
+    linear_model: Option<&'a LinearModel>,
+}
+
+impl<'a> PoseResiduals<'a> {
+    /// Creates the residuals of `poses`. The parameters listed in `unknowns` vary, the others keep
+    /// their values in `fixed`.
+    pub fn new(
+        model: &'a Model,
+        poses: impl Into<Arc<Vec<Pose<'a>>>>,
+        unknowns: Vec<usize>,
+        fixed: DVector<f64>,
+    ) -> Self {
+        let poses = poses.into();
+        let oriented = poses.iter().any(|pose| pose.orientation.is_some());
+        let residuals_per_row = if oriented { POSE } else { POSITION };
+        let measures_tilts = poses.iter().any(|pose| pose.observation.is_angle());
+        Self {
+            model,
+            poses,
+            unknowns,
+            fixed,
+            residuals_per_row,
+            measures_tilts,
+            linear_model: None,
+        }
+    }
+
+    /// Reuses the derivatives of `linear_model` at its point.
+    #[must_use]
+    pub(crate) fn with_linear_model(self, linear_model: Option<&'a LinearModel>) -> Self {
+        Self { linear_model, ..self }
+    }
+
+    /// Returns the full parameter vector for unknowns `x`.
+    pub fn full(&self, x: &DVector<f64>) -> DVector<f64> {
+        let mut full = self.fixed.clone();
+        for (&k, &value) in self.unknowns.iter().zip(x.iter()) {
+            full[k] = value;
+        }
+        full
+    }
+
+    /// Returns the unknowns' entries of a full parameter vector.
+    pub fn reduced(&self, full: &DVector<f64>) -> DVector<f64> {
+        DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| full[k]))
+    }
+
+    /// Returns the rows.
+    pub fn poses(&self) -> &[Pose<'a>] {
+        &self.poses
+    }
+
+    /// Returns the indices of the unknown parameters.
+    pub fn unknowns(&self) -> &[usize] {
+        &self.unknowns
+    }
+
+    /// Returns measured − predicted of each row \[m\] or \[rad\]; NaN without equilibrium.
+    pub fn position_errors(&self, x: &DVector<f64>) -> Vec<Vector3<f64>> {
+        self.errors(x, |pose, predicted| pose.measured - predicted.numbers)
+    }
+
+    /// Returns the rotation vectors from the predicted to the measured orientations, measuring
+    /// frame \[rad\]; 0 for rows without one, NaN without equilibrium.
+    pub fn orientation_errors(&self, x: &DVector<f64>) -> Vec<Vector3<f64>> {
+        self.errors(x, |_, predicted| predicted.turn.unwrap_or_default())
+    }
+
+    fn errors(
+        &self,
+        x: &DVector<f64>,
+        error: impl Fn(&Pose, &Prediction) -> Vector3<f64> + Sync,
+    ) -> Vec<Vector3<f64>> {
+        let full = self.full(x);
+        let chunk = |poses: &[Pose]| {
+            let mut predictor = Predictor::new(self.model, full.as_slice());
+            poses.iter().map(|pose| error(pose, &predictor.predict(pose))).collect::<Vec<_>>()
+        };
+        if self.poses.len() <= CHUNK_ITEMS {
+            return chunk(&self.poses);
+        }
+        self.poses.par_chunks(CHUNK_ITEMS).flat_map_iter(chunk).collect()
+    }
+}
+
+impl LeastSquares for PoseResiduals<'_> {
+    fn parameters(&self) -> usize {
+        self.unknowns.len()
+    }
+
+    fn items(&self) -> usize {
+        self.poses.len()
+    }
+
+    fn rows_per_item(&self) -> usize {
+        self.residuals_per_row
+    }
+
+    fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
+        let mut predictor = Predictor::new(self.model, self.full(x).as_slice());
+        for (pose, out) in
+            self.poses[items].iter().zip(out.chunks_exact_mut(self.residuals_per_row))
+        {
+            let predicted = predictor.predict(pose);
+            let (position, turn) = out.split_at_mut(POSITION);
+            position.copy_from_slice(((pose.measured - predicted.numbers) / pose.sigma).as_slice());
+            let sigma = pose.orientation.map_or(1.0, |orientation| orientation.sigma);
+            let error = predicted.turn.unwrap_or_default() / sigma;
+            turn.iter_mut().zip(&error).for_each(|(out, error)| *out = *error);
+        }
+    }
+
+    fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
+        let full = self.full(x);
+        let write = |unknowns: &[usize], block: &mut Block| {
+            let kinds = (self.residuals_per_row == POSE, self.measures_tilts);
+            let mut writer = JacobianWriter::new(self.model, full.as_slice(), unknowns, kinds);
+            for (k, pose) in self.poses[items.clone()].iter().enumerate() {
+                writer.write(pose, block, self.residuals_per_row * k);
+            }
+        };
+        let usable = self.linear_model.filter(|_| self.residuals_per_row == POSITION);
+        let is_reused = usable.is_some_and(|linear_model| {
+            let parameters = &self.model.parameters;
+            linear_model.fill(
+                (&self.poses, items.clone()),
+                (parameters, full.as_slice()),
+                &self.unknowns,
+                block,
+                write,
+            )
+        });
+        if !is_reused {
+            write(&self.unknowns, block);
+        }
+    }
+}

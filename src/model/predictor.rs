@@ -1,0 +1,167 @@
+//! Predictions of rows at one parameter vector.
+
+use nalgebra::Vector3;
+
+use super::Model;
+use super::commands::Commands;
+use super::instrument::Instrument;
+use super::pose::Pose;
+use super::tilt::{TiltDerivatives, rigid_frame_axes};
+use crate::mechanics::{Arm, StaticState, Workspace};
+use crate::observation::{FixtureValues, Needs, Observation, Scene};
+use crate::problem::PoseView;
+use crate::spatial::{Frame, rotation_axes, rotation_between};
+
+/// Arm with its set-up at one parameter vector, ready to predict one row after another.
+pub(super) struct Predictor<'m> {
+    model: &'m Model,
+    /// Full parameter vector.
+    x: Vec<f64>,
+    /// Returns true if nothing deflects and no effect acts on the arm.
+    is_rigid: bool,
+    arm: Arm<f64>,
+    bases: Vec<Frame<f64>>,
+    targets: Vec<Vector3<f64>>,
+    /// Axes of the targets in the frames that carry them.
+    target_axes: Vec<[Vector3<f64>; 3]>,
+    fixtures: Vec<FixtureValues<f64>>,
+    instrument: Instrument,
+    commands: Commands,
+    tilts: Option<TiltDerivatives>,
+    state: StaticState,
+    workspace: Workspace<f64>,
+}
+
+/// Predicted row.
+pub(super) struct Prediction {
+    /// Predicted numbers \[m\] or \[rad\], followed by zeros.
+    pub numbers: Vector3<f64>,
+    /// Rotation vector from the predicted to the measured orientation, measuring frame \[rad\]; 0
+    /// if none was measured, `None` if the row has no orientation.
+    pub turn: Option<Vector3<f64>>,
+}
+
+impl<'m> Predictor<'m> {
+    /// Creates a predictor at the full parameter vector `x`.
+    pub fn new(model: &'m Model, x: &[f64]) -> Self {
+        Self {
+            model,
+            x: x.to_vec(),
+            is_rigid: false,
+            arm: model.arm(|k| x[k]),
+            bases: model.base_frames(x),
+            targets: model.target_positions(x),
+            target_axes: model.target_rotations(x).iter().map(rotation_axes).collect(),
+            fixtures: model.fixtures(x),
+            instrument: model.instrument_at(x),
+            commands: model.commands(x),
+            tilts: None,
+            state: StaticState::default(),
+            workspace: Workspace::default(),
+        }
+    }
+
+    /// Creates a predictor of the geometry alone: nothing deflects, and no effect acts on the arm.
+    pub fn rigid(model: &'m Model, x: &[f64]) -> Self {
+        let commands = Commands::new(&model.driven, &[], &[]);
+        Self { is_rigid: true, commands, ..Self::new(model, x) }
+    }
+
+    /// Returns the frame that carries the target, arm base frame; `None` without equilibrium.
+    #[inline]
+    pub fn target_frame(&mut self, pose: &Pose) -> Option<Frame<f64>> {
+        let setup = self.commands.apply(&pose.setup);
+        let joint = self.model.target_joint(pose.target);
+        if self.is_rigid {
+            return Some(self.arm.rigid_frame(&setup, joint));
+        }
+        let Self { arm, workspace, state, .. } = self;
+        arm.equilibrate_at(&setup, joint, workspace, state).ok()?;
+        Some(state.frame)
+    }
+
+    /// Returns the pose with the corrections of its commands.
+    pub fn setup<'b>(&'b mut self, pose: &'b Pose) -> PoseView<'b> {
+        self.commands.apply(&pose.setup)
+    }
+
+    /// Returns the position of the target in the frame that carries it \[m\].
+    pub fn target(&self, pose: &Pose) -> Vector3<f64> {
+        self.targets[pose.target]
+    }
+
+    /// Returns the frame of the base in a pose, measuring frame.
+    #[inline]
+    pub fn base(&self, pose: &Pose) -> Frame<f64> {
+        self.instrument.base(&self.bases[pose.base], &pose.setup)
+    }
+
+    /// Returns the axes of the target in a pose whose target is carried by `frame` in the `base`,
+    /// measuring frame.
+    #[inline]
+    pub fn axes(&self, pose: &Pose, base: &Frame<f64>, frame: &Frame<f64>) -> [Vector3<f64>; 3] {
+        self.target_axes[pose.target].map(|axis| base.vector(&frame.vector(&axis)))
+    }
+
+    /// Returns the predicted row; NaN if the pose has no equilibrium.
+    #[inline]
+    pub fn predict(&mut self, pose: &Pose) -> Prediction {
+        let lost = Vector3::from_element(f64::NAN);
+        self.try_predict(pose)
+            .unwrap_or(Prediction { numbers: lost, turn: pose.orientation.map(|_| lost) })
+    }
+
+    fn try_predict(&mut self, pose: &Pose) -> Option<Prediction> {
+        let observation = pose.observation;
+        let mut scene = Scene {
+            fixtures: fixtures_of(observation, |fixture| self.fixtures[fixture]),
+            ..Scene::default()
+        };
+        let mut turn = None;
+        match observation.description().needs {
+            Needs::Fixtures => {}
+            Needs::Frame => {
+                (scene.frame, scene.gravity) = (self.frame_axes(pose)?, self.arm.gravity);
+            }
+            Needs::Target => {
+                let frame = self.target_frame(pose)?;
+                let base = self.base(pose);
+                let position = base.point(&frame.point(&self.target(pose)));
+                turn = pose.orientation.map(|orientation| {
+                    orientation.axes().map_or(Vector3::zeros(), |measured| {
+                        rotation_between(&self.axes(pose, &base, &frame), &measured)
+                    })
+                });
+                scene.base = base.axes;
+                scene.target = if observation.is_position() {
+                    self.instrument.reading(&position, &pose.setup)
+                } else {
+                    position
+                };
+            }
+        }
+        Some(Prediction { numbers: observation.predict(&scene), turn })
+    }
+
+    /// Returns the axes of the frame whose tilt is measured, arm base frame.
+    fn frame_axes(&mut self, pose: &Pose) -> Option<[Vector3<f64>; 3]> {
+        let frame = pose.observation.frame();
+        let setup = self.commands.apply(&pose.setup);
+        if self.is_rigid {
+            return Some(rigid_frame_axes(&self.arm, &setup, frame));
+        }
+        let Self { model, x, arm, tilts, .. } = self;
+        let tilts =
+            tilts.get_or_insert_with(|| TiltDerivatives::new(model, x, arm.clone(), Vec::new()));
+        tilts.axes(&setup, frame)
+    }
+}
+
+/// Returns the values of the fixtures that a row refers to.
+#[inline]
+pub(super) fn fixtures_of(
+    observation: Observation,
+    values: impl Fn(usize) -> FixtureValues<f64>,
+) -> [FixtureValues<f64>; 2] {
+    observation.fixtures().map(|fixture| fixture.map(&values).unwrap_or_default())
+}

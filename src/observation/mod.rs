@@ -1,0 +1,198 @@
+//! Kinds of measured rows: for each one file with its columns, units and words, and its prediction,
+//! generic over the scalar.
+//!
+//! A new sensor takes a file with a `KIND` and a `predict`, and a line in the table below. What a
+//! prediction may use is a [`Scene`]; the model fills it in, and follows its derivatives back to
+//! the free parameters.
+
+mod distance;
+mod fixture;
+mod kind;
+mod known_distance;
+mod point;
+mod position;
+mod scene;
+mod surface;
+mod tilt;
+
+pub use fixture::{FixtureKind, FixtureValues};
+pub use kind::{Kind, Needs};
+pub use scene::Scene;
+
+use nalgebra::{Matrix3, Matrix3x4, SVector, Vector3};
+
+use crate::quantity::Unit;
+use crate::scalar::{Scalar, gradient, seeded};
+use crate::spatial::rotate;
+
+/// Predicted numbers of a row and their first derivatives.
+#[derive(Debug, Clone, Copy)]
+pub struct Slopes {
+    /// Predicted numbers, followed by zeros.
+    pub value: Vector3<f64>,
+    /// Derivative with respect to the position of the target.
+    pub by_target: Matrix3<f64>,
+    /// Derivative with respect to a small rotation of the base's axes, measuring frame [1/rad].
+    pub by_base: Matrix3<f64>,
+    /// Derivatives with respect to the numbers of the fixtures.
+    pub by_fixtures: [Matrix3x4<f64>; 2],
+}
+
+/// Count of inputs of a prediction: target 3, rotation of the base 3, two fixtures of 4.
+const INPUTS: usize = 14;
+
+/// Declares [`Observation`] and hands each variant on to the file of its kind.
+macro_rules! observations {
+    ($($(#[$doc:meta])* $variant:ident $(($($index:ident: $type:ty),+))? => $kind:ident,)+) => {
+        /// Quantity measured by a row. Fixtures are counted in the order of
+        /// `Problem::fixtures`.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+        pub enum Observation {
+            $($(#[$doc])* $variant $(($($type),+))?,)+
+        }
+
+        /// Every kind of rows, in the order of [`Observation`].
+        const KINDS: &[&Kind] = &[$(&$kind::KIND),+];
+
+        impl Observation {
+            /// Returns the columns, units and words of this kind of rows.
+            pub fn description(self) -> &'static Kind {
+                match self { $(Self::$variant { .. } => &$kind::KIND,)+ }
+            }
+
+            /// Returns the predicted numbers of a row \[m\] or \[rad\], followed by zeros.
+            #[inline]
+            pub fn predict<S: Scalar>(self, scene: &Scene<S>) -> Vector3<S> {
+                match self { $(Self::$variant { .. } => $kind::predict(scene),)+ }
+            }
+
+            /// Returns the indices that the variant carries.
+            fn indices(self) -> [Option<usize>; 2] {
+                match self {
+                    $(Self::$variant $(($($index),+))? => pair(&[$($($index as usize),+)?]),)+
+                }
+            }
+        }
+    };
+}
+
+observations! {
+    /// Position of the target, measuring frame: three numbers, six with its orientation.
+    #[default]
+    Position => position,
+    /// Contact of the target with a point.
+    Point(fixture: usize) => point,
+    /// Distance from the target to an anchor.
+    Distance(fixture: usize) => distance,
+    /// Distance of the target from a surface, 0 in contact.
+    Surface(fixture: usize) => surface,
+    /// Tilts of the x and the y axis of a frame against the horizontal. Frame 0 is the arm's base,
+    /// frame i that of joint i.
+    Tilt(frame: usize) => tilt,
+    /// Known distance between two points, without the arm. Two narrow indices take the space of
+    /// one.
+    Between(first: u32, second: u32) => known_distance,
+}
+
+fn pair(indices: &[usize]) -> [Option<usize>; 2] {
+    [indices.first().copied(), indices.get(1).copied()]
+}
+
+/// Returns the kind of rows called `name`; positions if no kind has this name.
+pub(crate) fn kind_named(name: &str) -> &'static Kind {
+    KINDS.iter().find(|kind| kind.name == name).copied().unwrap_or(&position::KIND)
+}
+
+/// Returns the columns that name the fixtures and frames measured against.
+pub(crate) fn references() -> impl Iterator<Item = &'static str> {
+    KINDS.iter().map(|kind| kind.reference).filter(|reference| !reference.is_empty())
+}
+
+impl Observation {
+    /// Returns the count of numbers that a row measures, without an orientation.
+    pub fn coordinates(self) -> usize {
+        self.description().numbers
+    }
+
+    /// Returns the square root of [`Observation::coordinates`].
+    pub(crate) fn root(self) -> f64 {
+        (self.coordinates() as f64).sqrt()
+    }
+
+    /// Returns the name of the kind in files and results.
+    pub fn kind(self) -> &'static str {
+        self.description().name
+    }
+
+    /// Returns the fixture that the target is measured against, if there is one.
+    pub fn fixture(self) -> Option<usize> {
+        self.fixtures()[0].filter(|_| self.is_of_arm())
+    }
+
+    /// Returns the fixtures that the row refers to.
+    pub fn fixtures(self) -> [Option<usize>; 2] {
+        if self.description().needs == Needs::Frame { [None; 2] } else { self.indices() }
+    }
+
+    /// Returns numbers that differ for any two observations that differ.
+    pub(crate) fn key(self) -> [usize; 3] {
+        let [first, second] =
+            self.fixtures().map(|fixture| fixture.map_or(0, |fixture| fixture + 1));
+        let frame = if self.is_angle() { self.frame() + 1 } else { 0 };
+        [first, second, 4 * frame + self.coordinates()]
+    }
+
+    /// Returns true if the numbers are angles \[rad\], false if they are lengths \[m\].
+    pub fn is_angle(self) -> bool {
+        self.description().unit == Unit::Angle
+    }
+
+    /// Returns true if the row measures a position in the measuring frame.
+    pub fn is_position(self) -> bool {
+        self == Self::Position
+    }
+
+    /// Returns true if the target touches a point. The residual is resolved in the axes of the
+    /// arm's base: then it does not depend on where arm and point stand together.
+    pub fn is_point(self) -> bool {
+        matches!(self, Self::Point(_))
+    }
+
+    /// Returns true if the arm's configuration has a part in the prediction.
+    pub fn is_of_arm(self) -> bool {
+        self.description().needs != Needs::Fixtures
+    }
+
+    /// Returns the frame whose tilt is measured; 0 for other rows.
+    pub(crate) fn frame(self) -> usize {
+        self.indices()[0].filter(|_| self.description().needs == Needs::Frame).unwrap_or(0)
+    }
+
+    /// Returns the predicted numbers of a row with their derivatives with respect to the target,
+    /// the axes of the base and the fixtures.
+    pub(crate) fn slopes(self, scene: &Scene<f64>) -> Slopes {
+        let seed = |value: f64, k: usize| seeded::<INPUTS>(value, Some(k));
+        let turn = Vector3::from_fn(|i, _| seed(0.0, 3 + i));
+        let mut first = 6;
+        let fixtures = scene.fixtures.map(|fixture| {
+            first += 4;
+            FixtureValues {
+                kind: fixture.kind,
+                numbers: std::array::from_fn(|k| seed(fixture.numbers[k], first - 4 + k)),
+            }
+        });
+        let predicted = self.predict(&Scene {
+            target: Vector3::from_fn(|i, _| seed(scene.target[i], i)),
+            base: scene.base.map(|axis| rotate(&turn, &axis.map(Into::into))),
+            fixtures,
+            ..Scene::default()
+        });
+        let rows: [SVector<f64, INPUTS>; 3] = std::array::from_fn(|i| gradient(&predicted[i]));
+        Slopes {
+            value: predicted.map(|number| number.re),
+            by_target: Matrix3::from_fn(|i, j| rows[i][j]),
+            by_base: Matrix3::from_fn(|i, j| rows[i][3 + j]),
+            by_fixtures: [6, 10].map(|first| Matrix3x4::from_fn(|i, j| rows[i][first + j])),
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! Tilt of a frame of the arm against gravity, as an inclinometer measures it.
+
+use nalgebra::Vector3;
+
+use super::{Kind, Needs, Scene};
+use crate::quantity::Unit;
+use crate::scalar::Scalar;
+
+pub(super) const KIND: Kind = Kind {
+    name: "tilt",
+    numbers: 2,
+    unit: Unit::Angle,
+    needs: Needs::Frame,
+    reference: "frame",
+    residuals: ("tilt", &["tilt_x", "tilt_y"]),
+    error_label: "tilt, °",
+    row: ("row of tilts", "rows of tilts"),
+    measured: "tilts",
+    suspects: "the names in the column frame",
+};
+
+/// Smallest squared cosine of a tilt, so that a tilt of a right angle has a derivative.
+const MIN_SQUARED_COSINE: f64 = 1e-18;
+
+/// Predicts the angles τ of the frame's x and y axes above the horizontal \[rad\]: sin τ = a·u for
+/// an axis a and the direction u against gravity.
+pub(super) fn predict<S: Scalar>(scene: &Scene<S>) -> Vector3<S> {
+    let (zero, gravity) = (S::from(0.0), scene.gravity);
+    let weight = gravity.dot(&gravity).sqrt();
+    let up =
+        if weight.re() > 0.0 { -gravity / weight } else { Vector3::new(zero, zero, S::from(1.0)) };
+    let tilt = |axis: &Vector3<S>| {
+        let sine = axis.dot(&up);
+        let level = axis.cross(&up);
+        let cosine = (level.dot(&level) + MIN_SQUARED_COSINE).sqrt();
+        sine.atan2(cosine)
+    };
+    Vector3::new(tilt(&scene.frame[0]), tilt(&scene.frame[1]), zero)
+}
