@@ -1,42 +1,45 @@
-//! The adjoint sweep: derivatives of the position at rest, by virtual work.
+//! Adjoint sweep: derivatives of the position at equilibrium, by virtual work.
 //!
-//! With Λ the influence of the moments' equations (see [`super::statics`]), each coordinate of p +
-//! Λ·(G − x) changes with the place of every load, section and segment. Walking inwards from the
-//! target, the wrench that does that change as virtual work on everything passed so far is kept for
-//! each of the three coordinates: a load f at r adds the force f × W, with W the Λ-weighted axes of
-//! all sections inwards of it; a section adds what its own place and axes do to its moment. A
-//! segment's derivative is then the work of that wrench on the segment's twist, and for the spring
-//! of a joint what turning the joint does to its moment. For the moments themselves this is Λ
-//! again, so that Λ is a fixed point of the sweep, reached by the same contraction as the
-//! equilibrium itself.
+//! Λ is the influence of the moments' equations (see [`super::statics`]). PerCoordinate coordinate of p +
+//! Λ·(G − x) changes with the place of every load, section and segment. The sweep runs from the
+//! target to the base and keeps, for each of the three coordinates, the wrench whose virtual work
+//! equals that change. A load f at r adds the force f × W, where W is the sum of the Λ-weighted
+//! axes of all sections between base and load. A section adds the change of its moment with its
+//! place and axes. The derivative of a segment is the work of the wrench on the segment's twist;
+//! the spring of a joint adds the change of its moment. For the moments themselves this derivative
+//! is Λ again. Λ is therefore a fixed point of the sweep, reached by the same contraction as the
+//! equilibrium.
 //!
-//! Where branches meet, the wrenches of all of them add up. A branch without the target carries the
-//! virtual forces of its loads alone: that is how its masses, by bending the trunk, move the target
-//! of another.
+//! Where branches meet, their wrenches add up. A branch without the target carries the virtual
+//! forces of its loads alone: its masses bend the trunk and so move the target of another branch.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::statics::{HOVERING, MAX_PASSES, SETTLED, StaticsError};
-use super::tape::{Column, Each, Felt, Load, Section, Step, Tape};
+use super::linearised_arm::{
+    EndTwist, LinearisedArm, Load, MomentAxes, PerCoordinate, Section, Step,
+};
+use super::statics::{
+    MAX_ACCEPTED_CHANGE, MAX_EQUILIBRIUM_PASSES, MAX_RELATIVE_CHANGE, StaticsError,
+};
 use crate::spatial::Frame;
 
-/// The wrench about the base origin that does the coordinates' change as virtual work.
+/// Wrenches about the base origin whose virtual work is the change of each coordinate.
 #[derive(Debug, Clone, Copy, Default)]
-struct Virtual {
-    force: Each,
-    moment: Each,
+struct VirtualWrench {
+    force: PerCoordinate,
+    moment: PerCoordinate,
 }
 
-impl Virtual {
-    fn add(&mut self, at: &Vector3<f64>, force: &Each) {
+impl VirtualWrench {
+    fn add(&mut self, at: &Vector3<f64>, force: &PerCoordinate) {
         for (i, force) in force.iter().enumerate() {
             self.moment[i] += at.cross(force);
             self.force[i] += force;
         }
     }
 
-    /// Work on a segment's end.
-    fn on(&self, column: &Column) -> Vector3<f64> {
+    /// Returns the virtual work on the twist of a segment's end.
+    fn work_on(&self, column: &EndTwist) -> Vector3<f64> {
         let each = |i: usize| {
             self.moment[i].dot(&column.rotation) + self.force[i].dot(&column.translation)
         };
@@ -44,43 +47,44 @@ impl Virtual {
     }
 }
 
-impl Tape {
-    /// Finds Λ, then the derivatives of the position `at` \[m\] of the target with respect to all
+impl LinearisedArm {
+    /// Finds Λ, then the derivatives of the target's position `at` \[m\] with respect to all
     /// parameters.
     pub(super) fn differentiate(&mut self, at: &Vector3<f64>) -> Result<(), StaticsError> {
         self.find_influence(at)?;
-        self.weigh_loads();
-        self.adjoint_sweep(at, Sought::Parameters);
+        self.update_virtual_forces();
+        self.adjoint_sweep(at, SweepResult::Parameters);
         Ok(())
     }
 
-    /// Sweeps until Λ is its own image.
+    /// Repeats the sweep until Λ reproduces itself.
     fn find_influence(&mut self, at: &Vector3<f64>) -> Result<(), StaticsError> {
         self.anderson.restart();
-        let mut hovers = false;
-        for _ in 0..MAX_PASSES {
-            self.weigh_loads();
-            self.adjoint_sweep(at, Sought::Influence);
+        let mut is_accepted = false;
+        for _ in 0..MAX_EQUILIBRIUM_PASSES {
+            self.update_virtual_forces();
+            self.adjoint_sweep(at, SweepResult::Influence);
             let Self { influence, image, anderson, .. } = self;
             let largest = image.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let change =
                 influence.iter().zip(&*image).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
-            if change <= SETTLED * largest {
+            if change <= MAX_RELATIVE_CHANGE * largest {
                 return Ok(());
             }
-            hovers = change <= HOVERING * largest && image.iter().all(|x| x.is_finite());
+            is_accepted =
+                change <= MAX_ACCEPTED_CHANGE * largest && image.iter().all(|x| x.is_finite());
             anderson.advance(influence, image);
         }
-        if hovers { Ok(()) } else { Err(StaticsError::NotSettled) }
+        if is_accepted { Ok(()) } else { Err(StaticsError::NotSettled) }
     }
 
-    /// What a move of each load does.
-    fn weigh_loads(&mut self) {
+    /// Sets the virtual force of each load, f × W.
+    fn update_virtual_forces(&mut self) {
         let Self { steps, loads, influence, .. } = self;
         let mut weights = [Vector3::zeros(); 3];
         let mut forks = Vec::new();
-        let weigh = |load: &mut Load, weights: &Each| {
-            load.virtually = weights.each_ref().map(|w| load.force.cross(w))
+        let weigh = |load: &mut Load, weights: &PerCoordinate| {
+            load.virtual_force = weights.each_ref().map(|w| load.force.cross(w))
         };
         for step in steps {
             match step {
@@ -89,17 +93,17 @@ impl Tape {
                     loads[segment.loads.clone()].iter_mut().for_each(|load| weigh(load, &weights));
                 }
                 Step::Section(section) => {
-                    let own = section.weights(influence);
-                    (0..3).for_each(|i| weights[i] += own[i]);
+                    let section_weights = section.weights(influence);
+                    (0..3).for_each(|i| weights[i] += section_weights[i]);
                 }
-                Step::Fork { further } => forks.extend((0..*further).map(|_| weights)),
+                Step::Fork { branches } => forks.extend((0..*branches).map(|_| weights)),
                 Step::Branch => weights = forks.pop().unwrap_or(weights),
             }
         }
     }
 
-    /// From the tips, the target among them, to the base.
-    fn adjoint_sweep(&mut self, at: &Vector3<f64>, sought: Sought) {
+    /// Sweeps from all tips to the base and writes either the image of Λ or the derivatives.
+    fn adjoint_sweep(&mut self, at: &Vector3<f64>, result: SweepResult) {
         let Self {
             steps,
             target,
@@ -113,17 +117,17 @@ impl Tape {
             ..
         } = self;
         image.fill(0.0);
-        let (mut wrench, mut branches) = (Virtual::default(), Vec::new());
+        let (mut wrench, mut ends) = (VirtualWrench::default(), Vec::new());
         for (index, step) in steps.iter().enumerate().rev() {
             if index + 1 == *target {
                 wrench.add(at, &Frame::identity().axes);
             }
             match step {
-                Step::Load(load) => wrench.add(&loads[*load].at, &loads[*load].virtually),
-                Step::Section(section) => section.act(influence, &mut wrench),
-                Step::Branch => branches.push(std::mem::take(&mut wrench)),
-                Step::Fork { further } => {
-                    for branch in (0..*further).filter_map(|_| branches.pop()) {
+                Step::Load(load) => wrench.add(&loads[*load].at, &loads[*load].virtual_force),
+                Step::Section(section) => section.add_to(influence, &mut wrench),
+                Step::Branch => ends.push(std::mem::take(&mut wrench)),
+                Step::Fork { branches } => {
+                    for branch in (0..*branches).filter_map(|_| ends.pop()) {
                         for i in 0..3 {
                             wrench.force[i] += branch.force[i];
                             wrench.moment[i] += branch.moment[i];
@@ -131,43 +135,47 @@ impl Tape {
                     }
                 }
                 Step::Segment(segment) => {
-                    let own = &loads[segment.loads.clone()];
-                    let work = |lane: usize| {
-                        let column = &columns[segment.column(lane)];
-                        let mut work = wrench.on(column);
+                    let segment_loads = &loads[segment.loads.clone()];
+                    let work = |direction: usize| {
+                        let column = &columns[segment.column(direction)];
+                        let mut work = wrench.work_on(column);
                         if column.pull != 0.0 {
-                            // A spring adds to the moment of the joint's own section.
-                            let own = 3 * segment.unknowns.start;
-                            work += Vector3::from_fn(|i, _| influence[own + i] * column.pull);
+                            // A spring adds to the moment of its joint's section.
+                            let first = 3 * segment.unknowns.start;
+                            work += Vector3::from_fn(|i, _| influence[first + i] * column.pull);
                         }
-                        for (load, moved) in own.iter().zip(&moves[segment.moves(lane)]) {
-                            work += Vector3::from_fn(|i, _| load.virtually[i].dot(moved));
+                        for (load, moved) in
+                            segment_loads.iter().zip(&moves[segment.moves(direction)])
+                        {
+                            work += Vector3::from_fn(|i, _| load.virtual_force[i].dot(moved));
                         }
                         work
                     };
-                    match sought {
-                        Sought::Influence => {
-                            for (lane, unknown) in
-                                (segment.moment_lane..).zip(segment.unknowns.clone())
+                    match result {
+                        SweepResult::Influence => {
+                            for (direction, unknown) in
+                                (segment.moment_direction..).zip(segment.unknowns.clone())
                             {
-                                // What tilts does so in two halves.
+                                // A part that tilts has two halves, which both contribute.
                                 image[3 * unknown..][..3]
                                     .iter_mut()
-                                    .zip(&work(lane))
+                                    .zip(&work(direction))
                                     .for_each(|(a, w)| *a += w);
                             }
                         }
-                        Sought::Parameters => {
-                            for lane in segment.parameter_lane..segment.lanes {
-                                derivatives[segment.index * *stride + lane] += work(lane);
+                        SweepResult::Parameters => {
+                            for direction in segment.parameter_direction..segment.directions {
+                                derivatives[segment.index * *stride + direction] += work(direction);
                             }
                         }
                     }
-                    if segment.turns {
+                    if segment.rotates {
                         let turned = Matrix3::from_columns(&[work(0), work(1), work(2)]);
                         for (i, about_root) in turned.row_iter().enumerate() {
-                            wrench.force[i] +=
-                                own.iter().map(|load| load.virtually[i]).sum::<Vector3<f64>>();
+                            wrench.force[i] += segment_loads
+                                .iter()
+                                .map(|load| load.virtual_force[i])
+                                .sum::<Vector3<f64>>();
                             wrench.moment[i] = segment.root.vector(&about_root.transpose())
                                 + segment.root.origin.cross(&wrench.force[i]);
                         }
@@ -178,16 +186,16 @@ impl Tape {
     }
 }
 
-/// What an adjoint sweep is for.
+/// Result that an adjoint sweep computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Sought {
+enum SweepResult {
     Influence,
     Parameters,
 }
 
 impl Section {
-    /// Λ-weighted axes.
-    fn weights(&self, influence: &[f64]) -> Each {
+    /// Returns the sum of the section's axes, weighted by Λ.
+    fn weights(&self, influence: &[f64]) -> PerCoordinate {
         let mut weights = [Vector3::zeros(); 3];
         for (axis, influence) in self
             .axes
@@ -201,11 +209,11 @@ impl Section {
         weights
     }
 
-    /// The section's moment is a·(M − r × F): its own place r and axes a, where they turn with the
-    /// arm, move.
-    fn act(&self, influence: &[f64], wrench: &mut Virtual) {
+    /// Adds the change of the section's moment a·(M − r × F) with its place r, and with its axes a
+    /// if they move with the arm.
+    fn add_to(&self, influence: &[f64], wrench: &mut VirtualWrench) {
         let weights = self.weights(influence);
-        if self.felt == Felt::OnTheArm {
+        if self.moment_axes == MomentAxes::Moving {
             for (moment, weight) in wrench.moment.iter_mut().zip(&weights) {
                 *moment += weight.cross(&self.moment);
             }

@@ -1,15 +1,15 @@
-//! Anderson's acceleration of a contraction.
+//! Anderson acceleration of a fixed-point iteration.
 
-/// Earlier differences that are used.
-const DEPTH: usize = 4;
-/// A difference that the others explain up to this part, in squares, is rounding.
-const EXPLAINED: f64 = 1e-20;
-/// A pass that shrinks the residual less than this finds no contraction to speed up: it is taken as
-/// it is.
-const CONTRACTS: f64 = 0.5;
+/// Maximum number of earlier differences that are used.
+const MAX_PAIRS: usize = 4;
+/// Smallest squared part of a difference that is independent of the others; below it lies rounding.
+const MIN_INDEPENDENT_PART: f64 = 1e-20;
+/// Largest ratio of residuals of two passes that counts as a contraction. Slower passes are not
+/// accelerated.
+const MAX_CONTRACTION: f64 = 0.5;
 
-/// A difference of residuals g(x) − x, orthogonal to the others, with that of the images g(x) it
-/// belongs to; its square is zero where it says nothing.
+/// Difference of two residuals g(x) − x, orthogonal to the other pairs, with the difference of the
+/// images g(x). `squares` is zero if the pair is linearly dependent.
 #[derive(Debug, Clone, Default)]
 struct Pair {
     residual: Vec<f64>,
@@ -17,32 +17,33 @@ struct Pair {
     squares: f64,
 }
 
-/// Speeds up x ← g(x) by what earlier passes tell of g's slope: g(x) less the part of the
-/// differences of images whose residuals make up this one.
-/// [Anderson 1965; Walker & Ni 2011]
+/// Anderson acceleration of x ← g(x).
+///
+/// The differences of earlier residuals approximate the current residual, and the same combination
+/// of image differences is taken off g(x). [Anderson 1965; Walker & Ni 2011]
 #[derive(Debug, Clone, Default)]
 pub(super) struct Anderson {
-    pairs: [Pair; DEPTH],
-    /// Pairs in use, and passes made.
+    pairs: [Pair; MAX_PAIRS],
+    /// Number of pairs in use, and number of passes made.
     used: usize,
     passes: usize,
     last: Pair,
 }
 
 impl Anderson {
-    /// Forgets everything.
+    /// Discards all earlier passes.
     pub fn restart(&mut self) {
         (self.used, self.passes) = (0, 0);
     }
 
-    /// Replaces x by the next one to try, given `image` g(x).
+    /// Replaces x by the next iterate, given `image` g(x).
     pub fn advance(&mut self, x: &mut [f64], image: &[f64]) {
         let Self { pairs, used, passes, last } = self;
         let residual = |k: usize| image[k] - x[k];
         let n = x.len();
         let squares: f64 = (0..n).map(|k| residual(k) * residual(k)).sum();
-        if *passes > 0 && squares < CONTRACTS * CONTRACTS * last.squares {
-            let (oldest, newer) = (*used % DEPTH, (*used).min(DEPTH));
+        if *passes > 0 && squares < MAX_CONTRACTION * MAX_CONTRACTION * last.squares {
+            let (oldest, newer) = (*used % MAX_PAIRS, (*used).min(MAX_PAIRS));
             let mut pair = std::mem::take(&mut pairs[oldest]);
             set(&mut pair.residual, n, |k| residual(k) - last.residual[k]);
             set(&mut pair.image, n, |k| image[k] - last.image[k]);
@@ -57,7 +58,7 @@ impl Anderson {
                 subtract(&mut pair.image, part, &other.image);
             }
             pair.squares = dot(&pair.residual, &pair.residual);
-            if pair.squares <= EXPLAINED * whole {
+            if pair.squares <= MIN_INDEPENDENT_PART * whole {
                 pair.squares = 0.0;
             }
             pairs[oldest] = pair;
@@ -70,7 +71,7 @@ impl Anderson {
         last.squares = squares;
         *passes += 1;
         x.copy_from_slice(image);
-        for pair in pairs[..(*used).min(DEPTH)].iter().filter(|pair| pair.squares > 0.0) {
+        for pair in pairs[..(*used).min(MAX_PAIRS)].iter().filter(|pair| pair.squares > 0.0) {
             subtract(x, dot(&last.residual, &pair.residual) / pair.squares, &pair.image);
         }
     }
@@ -93,7 +94,7 @@ fn subtract(a: &mut [f64], factor: f64, b: &[f64]) {
 mod tests {
     use super::*;
 
-    /// A contraction of three unknowns with two slow directions, a little bent.
+    /// Contraction of three unknowns with two slow directions and weak nonlinearity.
     fn image(x: &[f64]) -> Vec<f64> {
         let [a, b, c] = [x[0], x[1], x[2]];
         vec![
@@ -103,7 +104,7 @@ mod tests {
         ]
     }
 
-    /// Passes until the residual is below rounding, and where.
+    /// Returns the passes until the residual is below rounding, and the fixed point.
     fn passes(mut next: impl FnMut(&mut Vec<f64>, &[f64])) -> (usize, Vec<f64>) {
         let mut x = vec![0.0; 3];
         for pass in 1.. {

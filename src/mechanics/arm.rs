@@ -1,4 +1,4 @@
-//! The arm: joints, and what acts on it as a whole.
+//! Arm: joints, and the quantities that act on the arm as a whole.
 
 use nalgebra::Vector3;
 
@@ -8,39 +8,39 @@ use crate::problem::{Equilibrium, PoseView, Problem, Tree};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
-/// An arm, or several on one trunk, with its parameters as scalars S; predicts in its own base
-/// frame.
+/// Arm, or several arms on one trunk, with parameters of the scalar type S. Predictions are in its
+/// base frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arm<S> {
     /// Gravity, arm base frame [m/s²].
     pub gravity: Vector3<S>,
-    /// On which arm the loads act.
+    /// Configuration on which the loads act: rigid or deflected.
     pub equilibrium: Equilibrium,
-    /// Closed-form elements per beam.
+    /// Number of closed-form elements per beam.
     pub beam_elements: usize,
     /// Joints from the base outwards, branch by branch.
     pub joints: Vec<Joint<S>>,
-    /// How they stand on each other.
+    /// Order in which the joints follow each other.
     pub tree: Tree,
-    /// Index of the joint whose frame carries a payload; `None`: the last one.
+    /// Index of the joint whose frame carries the payload; the last joint if `None`.
     pub payload_on: Option<usize>,
-    /// Where a payload hangs, in that frame \[m\].
+    /// Position of the payload in that frame \[m\].
     pub payload_at: Vector3<f64>,
-    /// Payload where the pose gives none \[kg\].
+    /// Payload mass of poses that give none \[kg\].
     pub payload_mass: f64,
-    /// By how much a payload is heavier than declared, whenever one is carried \[kg\].
+    /// Excess of the payload mass over the declared one, in poses with a payload \[kg\].
     pub payload_error: S,
-    /// How ropes pull other than declared.
+    /// Errors of the hoists' force and direction.
     pub rope: Option<HoistError<S>>,
     /// Flexibility of the base about its x and y [rad/(N·m)].
     pub mounting: Option<[S; 2]>,
-    /// λ from loads on the rigid arm (0) to loads on the bent arm (1), where the declared statics
-    /// are undeflected.
+    /// Mixing factor λ from loads on the rigid arm (0) to loads on the deflected arm (1); used with
+    /// undeflected statics only.
     pub mixing: Option<S>,
 }
 
 impl Arm<f64> {
-    /// The arm as the problem declares it.
+    /// Creates the arm as the problem declares it.
     pub fn nominal(problem: &Problem) -> Self {
         Self {
             gravity: problem.gravity,
@@ -58,7 +58,7 @@ impl Arm<f64> {
         }
     }
 
-    /// The same arm with its parameters as constants of another scalar.
+    /// Converts the arm to another scalar type, with constant parameters.
     pub fn lift<S: Scalar>(&self) -> Arm<S> {
         Arm {
             gravity: self.gravity.map(S::from),
@@ -78,10 +78,10 @@ impl Arm<f64> {
 }
 
 impl<S: Scalar> Arm<S> {
-    /// Whether any joint or link deflects.
+    /// Returns true if a joint, a link or the base deflects.
     pub fn is_elastic(&self) -> bool {
         let gives = |joint: &Joint<S>| {
-            joint.turns()
+            joint.has_twist()
                 || joint.lateral.is_some()
                 || joint.slide.is_some()
                 || joint.beam.is_some()
@@ -89,12 +89,12 @@ impl<S: Scalar> Arm<S> {
         self.mounting.is_some() || self.joints.iter().any(gives)
     }
 
-    /// Index of the last joint.
+    /// Returns the index of the last joint.
     pub(crate) fn last(&self) -> usize {
         self.joints.len().saturating_sub(1)
     }
 
-    /// The frame of the joint `tip` of the arm that does not deflect, arm base frame.
+    /// Returns the frame of the joint `tip` of the undeflected arm, arm base frame.
     pub(crate) fn rigid_frame(&self, setup: &PoseView, tip: usize) -> Frame<S> {
         let mut frame = Frame::identity();
         for (index, (joint, &q)) in self.joints.iter().zip(setup.configuration).enumerate() {
@@ -105,8 +105,8 @@ impl<S: Scalar> Arm<S> {
         frame
     }
 
-    /// For each joint its axis, a point \[m\] and a direction, and the frame behind it, of the arm
-    /// that does not deflect; arm base frame.
+    /// Returns for each joint of the undeflected arm its axis, as a point \[m\] and a direction,
+    /// and the frame behind it, arm base frame.
     pub fn rigid_joints(&self, configuration: &[f64]) -> Vec<(Vector3<S>, Vector3<S>, Frame<S>)> {
         let mut frame = Frame::identity();
         let mut forks = vec![frame; self.tree.extra_branches_at_base()];
@@ -115,7 +115,7 @@ impl<S: Scalar> Arm<S> {
                 frame = forks.pop().unwrap_or(frame);
             }
             let mut root = frame;
-            joint.root(&mut root);
+            joint.advance_to_axis(&mut root);
             joint.advance(&mut frame, q);
             forks.extend((0..self.tree.extra_branches_on(index)).map(|_| frame));
             (root.origin, root.axes[2], frame)
@@ -123,7 +123,7 @@ impl<S: Scalar> Arm<S> {
         self.joints.iter().zip(configuration).enumerate().map(along).collect()
     }
 
-    /// Payload of a pose \[kg\].
+    /// Returns the payload mass of a pose \[kg\].
     pub(super) fn payload(&self, setup: &PoseView) -> S {
         let declared = setup.payload.copied().unwrap_or(self.payload_mass);
         if declared > 0.0 { self.payload_error + declared } else { S::from(declared) }

@@ -1,41 +1,41 @@
-//! The Euler–Bernoulli cantilever in closed form, in three dimensions.
+//! Euler–Bernoulli cantilever in closed form, in three dimensions.
 //!
-//! Root frame: x along the beam, the tip at x = L. Every load is a wrench at a station or spread
-//! evenly; deflections superpose. L may be negative (the link runs along −x); rigidities then enter
-//! with the sign of L, which leaves every formula as it stands.
+//! Root frame: x along the beam, tip at x = L. PerCoordinate load is a wrench at a station or spread evenly,
+//! and deflections superpose. L may be negative (the link runs along −x). Rigidities then take the
+//! sign of L, and every formula stays as it is.
 
 use nalgebra::Vector3;
 
 use super::imperfection::Strain;
 use crate::scalar::Scalar;
 
-/// Flexibilities of a uniform beam; 0 means rigid.
+/// Flexibilities of a uniform beam; 0 is rigid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flexibility<S> {
-    /// 1/EA [1/N].
+    /// Axial flexibility 1/EA [1/N].
     pub axial: S,
-    /// `1/EI_y` [1/(N·m²)]: bends in the x-z plane.
+    /// Bending flexibility `1/EI_y` in the x-z plane [1/(N·m²)].
     pub about_y: S,
-    /// `1/EI_z` [1/(N·m²)]: bends in the x-y plane.
+    /// Bending flexibility `1/EI_z` in the x-y plane [1/(N·m²)].
     pub about_z: S,
-    /// 1/GJ [1/(N·m²)].
+    /// Torsional flexibility 1/GJ [1/(N·m²)].
     pub twist: S,
-    /// Couplings `k_y`, `k_z` [1/(N·m²)] of twist with bending about y and z: curvature `k_y M_x`,
-    /// rate of twist `k_y M_y`, the same about z; with `k_y`² ≤ `about_y`·`twist` no load gains
-    /// energy.
+    /// Couplings `k_y`, `k_z` of twist with bending about y and z [1/(N·m²)]: curvature `k_y M_x`
+    /// and rate of twist `k_y M_y`, likewise about z. The strain energy is positive if `k_y`² ≤
+    /// `about_y`·`twist`.
     pub coupling: Option<[S; 2]>,
 }
 
 impl Flexibility<f64> {
-    /// Nothing gives way.
+    /// Flexibility of a rigid beam.
     pub const RIGID: Self =
         Self { axial: 0.0, about_y: 0.0, about_z: 0.0, twist: 0.0, coupling: None };
 }
 
-/// Force \[N\] and moment [N·m] at one point, in one frame.
+/// Force and moment at one point, in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wrench<S> {
-    /// Force \[N\].
+    /// Force vector \[N\].
     pub force: Vector3<S>,
     /// Moment about the point [N·m].
     pub moment: Vector3<S>,
@@ -44,51 +44,52 @@ pub struct Wrench<S> {
 /// Displacement \[m\] and small rotation vector \[rad\] of a section, root frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Deflection<S> {
-    /// Displacement of the axis \[m\].
+    /// Displacement of the beam's axis \[m\].
     pub displacement: Vector3<S>,
-    /// Rotation vector \[rad\].
+    /// Small rotation vector \[rad\].
     pub rotation: Vector3<S>,
 }
 
 impl<S: Scalar> Deflection<S> {
-    /// No deflection.
+    /// Creates a deflection of zero.
     pub fn zero() -> Self {
         let zero = Vector3::from_element(S::from(0.0));
         Self { displacement: zero, rotation: zero }
     }
 }
 
-/// What a unit load does: geometry only, shared by both bending planes.
+/// Response to a unit load: geometry only, shared by both bending planes.
 #[derive(Clone, Copy)]
 struct Shape<S> {
-    /// Deflection per force and flexibility \[m³\] (evenly spread: per N/m \[m⁴\]).
+    /// Deflection per force and flexibility \[m³\]; for a spread load per N/m \[m⁴\].
     deflection_of_force: S,
-    /// Slope per force and flexibility \[m²\] (\[m³\]).
+    /// Slope per force and flexibility \[m²\]; for a spread load \[m³\].
     slope_of_force: S,
     /// Deflection per moment and flexibility \[m²\].
     deflection_of_moment: S,
-    /// Slope per moment and flexibility, also stretch and twist \[m\].
+    /// Slope per moment and flexibility \[m\], which is also stretch per force and twist per
+    /// torque.
     slope_of_moment: S,
 }
 
-/// A clamped uniform beam with its loads, all in the root frame.
+/// Clamped uniform beam with its loads, all in the root frame.
 #[derive(Debug)]
 pub struct Cantilever<'a, S> {
     /// Signed length L \[m\].
     pub length: S,
-    /// Flexibilities, those of a beam along +x.
+    /// Flexibilities of a beam along +x.
     pub flexibility: Flexibility<S>,
-    /// Evenly spread load [N/m] over the signed length: total force / L.
+    /// Evenly spread load [N/m], the total force over the signed length.
     pub spread: Vector3<S>,
-    /// Strain without load, the same all along.
+    /// Strain without load, uniform along the beam.
     pub strain: Option<Strain<S>>,
-    /// Point loads: station s \[m\] between 0 and L, and wrench there. The tip load is the one at s
-    /// = L.
+    /// Point loads: station s \[m\] between 0 and L, and the wrench there. The tip load is at s =
+    /// L.
     pub points: &'a [(S, Wrench<S>)],
 }
 
 impl<S: Scalar> Cantilever<'_, S> {
-    /// Deflection of the section at `x` \[m\], 0 ≤ x/L ≤ 1.
+    /// Returns the deflection of the section at `x` \[m\], 0 ≤ x/L ≤ 1.
     ///
     /// Load F, M at s, for x ≤ s:  δ = F (s x²/2 − x³/6)/EI + M x²/(2EI),  φ = F (s x − x²/2)/EI +
     /// M x/EI; beyond s the beam stays straight. Spread load q:  δ = q (L²x²/4 − L x³/6 +
@@ -130,12 +131,12 @@ impl<S: Scalar> Cantilever<'_, S> {
         out
     }
 
-    /// Deflection of the tip, x = L.
+    /// Returns the deflection of the tip, x = L.
     pub fn tip(&self) -> Deflection<S> {
         self.at(self.length)
     }
 
-    /// Mean displacement along the beam \[m\]: that of its own centre of mass.
+    /// Returns the mean displacement along the beam \[m\], which is that of its centre of mass.
     pub fn mean_displacement(&self) -> Vector3<S> {
         let l = self.length;
         let k = self.signed_flexibility();
@@ -203,8 +204,8 @@ impl<S: Scalar> Cantilever<'_, S> {
         }
     }
 
-    /// Strain without load turns the section at x by κ x and moves it by ε x along and κ x²/2
-    /// across.
+    /// Adds the strain without load: at x a rotation κ x, an elongation ε x and a deflection κ
+    /// x²/2.
     fn superpose_strain(&self, out: &mut Deflection<S>, x: S, half_square: S) {
         let Some(Strain { axial, curvature: [about_y, about_z] }) = self.strain else { return };
         out.displacement.x += axial * x;
@@ -215,7 +216,8 @@ impl<S: Scalar> Cantilever<'_, S> {
     }
 }
 
-/// Rotation about z is +slope in y; rotation about y is −slope in z.
+/// Adds the deflection by one wrench. A rotation about z is +slope in y, a rotation about y is
+/// −slope in z.
 fn superpose<S: Scalar>(
     out: &mut Deflection<S>,
     k: &Flexibility<S>,
@@ -232,7 +234,7 @@ fn superpose<S: Scalar>(
     out.rotation.y += k.about_y * (m.y * shape.slope_of_moment - f.z * shape.slope_of_force);
     out.rotation.z += k.about_z * (m.z * shape.slope_of_moment + f.y * shape.slope_of_force);
     if let Some([k_y, k_z]) = k.coupling {
-        // The torsional moment is the same all along: it bends as a moment does.
+        // The torsional moment is constant along the beam and bends as a moment does.
         out.displacement.y += k_z * m.x * shape.deflection_of_moment;
         out.displacement.z -= k_y * m.x * shape.deflection_of_moment;
         out.rotation.x += k_y * (m.y * shape.slope_of_moment - f.z * shape.slope_of_force)

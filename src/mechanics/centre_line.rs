@@ -1,4 +1,4 @@
-//! The arm as a line, for pictures of it.
+//! Centre line of the arm, for drawings.
 
 use nalgebra::Vector3;
 
@@ -7,27 +7,28 @@ use super::forward::Bend;
 use super::statics::{StaticState, StaticsError, Workspace};
 use crate::problem::PoseView;
 
-/// Elements by which a beam is drawn at least.
-const ELEMENTS: usize = 4;
+/// Minimum number of elements by which a beam is drawn.
+const MIN_DRAWN_ELEMENTS: usize = 4;
 
-/// An arm as a line from its base to the frame of its target: each joint before and after it
-/// turned, and points along its beams.
+/// Arm as a line from its base to the frame of its target: each joint before and after its
+/// rotation, and points along its beams.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct CentreLine {
-    /// Where nothing gives way \[m\].
+    /// Points of the undeflected arm, arm base frame \[m\].
     pub rigid: Vec<Vector3<f64>>,
-    /// The same points at rest under their loads \[m\].
+    /// Same points at equilibrium under the loads \[m\].
     pub bent: Vec<Vector3<f64>>,
 }
 
 impl Arm<f64> {
-    /// The line of the arm to the frame of the joint `tip` in a pose, arm base frame.
+    /// Returns the line of the arm to the frame of the joint `tip` in a pose, arm base frame.
     ///
     /// # Errors
     /// The arm is too soft for its loads.
     pub fn centre_line(&self, setup: &PoseView, tip: usize) -> Result<CentreLine, StaticsError> {
-        let drawn = Self { beam_elements: self.beam_elements.max(ELEMENTS), ..self.clone() };
-        let (mut ws, mut rest) = (Workspace::default(), StaticState::default());
+        let drawn =
+            Self { beam_elements: self.beam_elements.max(MIN_DRAWN_ELEMENTS), ..self.clone() };
+        let (mut ws, mut state) = (Workspace::default(), StaticState::default());
         drawn.gather_forces(setup, &[], &mut ws);
         drawn.walk(setup, Bend::Rigid, tip, &mut ws);
         let mut rigid = vec![Vector3::zeros()];
@@ -35,7 +36,7 @@ impl Arm<f64> {
         if !drawn.is_elastic() {
             return Ok(CentreLine { bent: rigid.clone(), rigid });
         }
-        drawn.equilibrate_at(setup, tip, &mut ws, &mut rest)?;
+        drawn.equilibrate_at(setup, tip, &mut ws, &mut state)?;
         let mut bent = vec![Vector3::zeros()];
         bent.append(&mut ws.trail);
         Ok(CentreLine { rigid, bent })

@@ -1,45 +1,46 @@
-//! A gravity compensator: a spring that takes off part of the moment about a joint's axis.
+//! Gravity compensator: a spring that relieves a joint of part of its moment.
 
 use crate::scalar::Scalar;
 
-/// Part of the larger arm of a spring below which its length is none: the line of its pull has no
+/// Smallest length of a spring relative to its longer lever. The pull of a shorter spring has no
 /// direction.
-const NONE: f64 = 1e-9;
+const MIN_RELATIVE_LENGTH: f64 = 1e-9;
 
-/// A spring between what stands before a joint and the link behind it, in the plane across the
-/// joint's axis.
+/// Spring between the part before a joint and the link behind it, in the plane across the joint's
+/// axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Compensator<S> {
-    /// End A on what stands before the joint, x and y of the frame that has not yet turned, its
-    /// origin on the axis \[m\].
+    /// End A on the part before the joint \[m\]: x and y of the frame before the joint's rotation,
+    /// whose origin lies on the axis.
     pub anchor: [f64; 2],
-    /// End B on the link, x and y of the frame that has turned \[m\].
+    /// End B on the link \[m\]: x and y of the rotated frame.
     pub lever: [f64; 2],
-    /// Length l₀ at which it pulls with its preload alone \[m\].
+    /// Length l₀ at which the pull equals the preload \[m\].
     pub free_length: f64,
-    /// Rate k [N/m].
+    /// Spring rate k [N/m].
     pub rate: S,
     /// Preload F₀ \[N\].
     pub preload: S,
 }
 
 impl<S: Scalar> Compensator<S> {
-    /// Moment about the joint's axis on the link behind it [N·m], to be added to that of the loads
-    /// beyond the joint.
+    /// Returns the moment about the joint's axis on the link behind it [N·m], which adds to that of
+    /// the loads beyond the joint.
     ///
     /// τ = F · `(P × A)_z` / l,  F = k (l − l₀) + F₀,  P = Rz(φ) B,  l = |A − P|
     ///
-    /// `angle` is (sin, cos) of φ = θ + q as the joint has turned, its twist included. F > 0 pulls
-    /// the ends together: τ > 0 turns B towards A about +z. `(P × A)_z` / l is the distance of the
-    /// line of pull from the axis. Where the ends meet, that line has no direction, and of F only k
-    /// l counts, whose moment k `(P × A)_z` is smooth. Everything between axis and ends is rigid.
+    /// `angle` is (sin, cos) of φ = θ + q, including the joint's twist. F > 0 pulls the ends
+    /// together: τ > 0 turns B towards A about +z. `(P × A)_z` / l is the distance of the line of
+    /// pull from the axis. Where the ends meet, that line has no direction; then only the part k l
+    /// of F counts, whose moment k `(P × A)_z` is smooth. The parts between axis and ends are
+    /// rigid.
     pub fn moment(&self, (sin, cos): (S, S)) -> S {
         let ([ax, ay], [bx, by]) = (self.anchor, self.lever);
         let (px, py) = (cos * bx - sin * by, sin * bx + cos * by);
         let area = px * ay - py * ax;
         let (x, y) = (px - ax, py - ay);
         let square = x * x + y * y;
-        let least = NONE * ax.hypot(ay).max(bx.hypot(by));
+        let least = MIN_RELATIVE_LENGTH * ax.hypot(ay).max(bx.hypot(by));
         if square.re() <= least * least {
             return self.rate * area;
         }
@@ -49,7 +50,7 @@ impl<S: Scalar> Compensator<S> {
 }
 
 impl Compensator<f64> {
-    /// The same as constants of another scalar.
+    /// Converts the spring to another scalar type, with constant parameters.
     pub(super) fn lift<S: Scalar>(&self) -> Compensator<S> {
         Compensator {
             anchor: self.anchor,
@@ -73,12 +74,12 @@ mod tests {
 
     #[test]
     fn a_spring_of_a_right_angle_pulls_with_its_height_over_the_hypotenuse() {
-        // 0.3, 0.4, 0.5 m: F = k (0.5 − 0.2) + F₀, 0.24 m from the axis, and the link turns from x
-        // towards y.
+        // Sides of 0.3, 0.4 and 0.5 m: F = k (0.5 − 0.2) + F₀ acts 0.24 m from the axis and turns
+        // the link from x towards y.
         let (k, f) = (2e3, 150.0);
         let moment = spring(k, f).moment((0.0, 1.0));
         assert!((moment - (k * 0.3 + f) * 0.24).abs() < 1e-10, "{moment} N·m");
-        // Turned the other way it pulls it back, and not at all in line.
+        // At half a turn the pull is reversed; in line with the axis it has no moment.
         let half_turn = spring(k, f).moment((0.0, -1.0));
         assert!((half_turn + moment).abs() < 1e-10, "{half_turn} N·m");
         assert!(spring(k, f).moment((1.0, 0.0)).abs() < 1e-10);
@@ -100,9 +101,9 @@ mod tests {
             for seeded in 0..3 {
                 let seed =
                     |value: f64, number| Dual64::new(value, f64::from(u8::from(seeded == number)));
-                let mut own = spring.lift::<Dual64>();
-                (own.rate, own.preload) = (seed(1e5, 0), seed(1e4, 1));
-                let moment = own.moment(seed(angle, 2).sin_cos());
+                let mut seeded_spring = spring.lift::<Dual64>();
+                (seeded_spring.rate, seeded_spring.preload) = (seed(1e5, 0), seed(1e4, 1));
+                let moment = seeded_spring.moment(seed(angle, 2).sin_cos());
                 assert!(
                     moment.re.is_finite() && moment.eps.is_finite(),
                     "{angle} rad, {seeded}: {moment}"

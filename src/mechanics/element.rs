@@ -1,4 +1,4 @@
-//! One beam element on the bent arm.
+//! Beam element on the deflected arm.
 
 use nalgebra::Vector3;
 
@@ -7,64 +7,64 @@ use super::{Cantilever, Deflection, Flexibility, Wrench};
 use crate::scalar::Scalar;
 use crate::spatial::{Frame, rotate};
 
-/// A load on a beam.
+/// Force on a beam.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LinkLoad<S> {
-    /// Which element carries it.
+    /// Number of the element that carries it.
     pub element: usize,
-    /// Place in the beam's frame \[m\].
+    /// Position in the beam's frame \[m\].
     pub at: Vector3<S>,
     /// Force, arm base frame \[N\].
     pub force: Vector3<S>,
-    /// Whether a rope pulls there, whose force may depend on the place.
+    /// True for the force of a rope, which may depend on the position.
     pub rope: bool,
 }
 
-/// A stretch of a beam with everything that acts on it, forces in the arm base frame.
+/// Part of a beam with all its loads; forces in the arm base frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Element<'a, S> {
-    /// Number along the beam.
+    /// Number of the element along the beam.
     pub number: usize,
     /// Signed length \[m\].
     pub length: S,
-    /// Where it begins along the beam \[m\].
+    /// Start of the element along the beam \[m\].
     pub start: S,
     pub flexibility: Flexibility<S>,
-    /// Strain without load.
+    /// Strain of the beam without load.
     pub strain: Option<Strain<S>>,
-    /// Own weight \[N\].
+    /// Weight of the element \[N\].
     pub weight: Vector3<S>,
     /// Loads of the whole beam.
     pub loads: &'a [LinkLoad<S>],
-    /// Force of everything beyond the tip \[N\], and its moment about the tip [N·m].
+    /// Resultant at the tip of everything beyond it: force \[N\], and moment about the tip [N·m].
     pub tip: Wrench<S>,
 }
 
-/// An element that has bent.
+/// Element deflected by its loads.
 ///
-/// Deflections are taken relative to the chord from root to tip and forces are resolved along it:
-/// what the closed form neglects (the axial force's lever on the bent axis, the shortening of a
-/// bent axis) is then small of higher order. The chord's frame has half the tip's twist, as the
-/// section in the middle has: rotations and bending planes then err alike on both sides of it, and
+/// Deflections are relative to the chord from root to tip, and forces are resolved along it. The
+/// effects that the closed form neglects (the axial force's lever on the bent axis, the shortening
+/// of a bent axis) are then of higher order. The chord's frame has half the twist of the tip, as
+/// the section in the middle has. Rotations and bending planes then err equally on both sides, and
 /// the error of n elements falls with n².
 pub(super) struct BentElement<'a, S> {
     element: &'a Element<'a, S>,
     cantilever: Cantilever<'a, S>,
-    /// Deflection of the tip.
+    /// Deflection at the tip.
     tip: Deflection<S>,
-    /// Frame at the root, x along the chord, turned about it by half the twist.
+    /// Frame at the root, x along the chord, rotated about it by half the twist.
     chord: Frame<S>,
     /// Rotation vector from the undeflected section at the root to the chord's frame \[rad\].
     lean: Vector3<S>,
 }
 
 impl<S: Scalar> Element<'_, S> {
-    /// Loads on this element.
+    /// Returns the loads on this element.
     pub fn own_loads(&self) -> impl Iterator<Item = &LinkLoad<S>> {
         self.loads.iter().filter(|load| load.element == self.number)
     }
 
-    /// The clamped beam with its loads resolved in `axes`; `points` is memory.
+    /// Returns the clamped beam with its loads resolved in `axes`; `points` is reused memory.
     fn cantilever<'p>(
         &self,
         axes: &Frame<S>,
@@ -88,8 +88,8 @@ impl<S: Scalar> Element<'_, S> {
         }
     }
 
-    /// The section that carries a load, measured from the element's root, and the rigid arm from
-    /// there to it \[m\].
+    /// Returns the section that carries a load, measured from the element's root, and the rigid
+    /// offset from there to the load \[m\].
     fn station_and_offset(&self, load: &LinkLoad<S>) -> (S, Vector3<S>) {
         let x = load.at.x - self.start;
         let part = x.re() / self.length.re();
@@ -103,8 +103,8 @@ impl<S: Scalar> Element<'_, S> {
         (station, Vector3::new(x - station, load.at.y, load.at.z))
     }
 
-    /// Tip frame to first order [Chen2021, eq. 20-22 as corrected]: loads resolved in the frame
-    /// `rigid` of the rigid arm.
+    /// Returns the tip frame to first order [Chen2021, eq. 20-22 as corrected], with loads resolved
+    /// in the frame `rigid` of the undeflected arm.
     pub fn first_order_tip(
         &self,
         root: Frame<S>,
@@ -119,7 +119,7 @@ impl<S: Scalar> Element<'_, S> {
         tip
     }
 
-    /// The element bent by its loads, clamped at `root`.
+    /// Deflects the element, clamped at `root`, by its loads.
     pub fn bend<'p>(
         &'p self,
         root: &Frame<S>,
@@ -141,7 +141,7 @@ impl<S: Scalar> Element<'_, S> {
         BentElement { element: self, cantilever, tip, chord: leaning(&lean), lean }
     }
 
-    /// Where a load hangs on the straight element, arm base frame \[m\].
+    /// Returns the position of a load on the straight element, arm base frame \[m\].
     pub fn straight_point(&self, root: &Frame<S>, load: &LinkLoad<S>) -> Vector3<S> {
         let (station, mut local) = self.station_and_offset(load);
         local.x += station;
@@ -150,7 +150,7 @@ impl<S: Scalar> Element<'_, S> {
 }
 
 impl<S: Scalar> BentElement<'_, S> {
-    /// Place of a load, arm base frame \[m\].
+    /// Returns the position of a load, arm base frame \[m\].
     pub fn point(&self, load: &LinkLoad<S>) -> Vector3<S> {
         let (station, offset) = self.element.station_and_offset(load);
         let Deflection { displacement, rotation } = self.cantilever.at(station);
@@ -159,13 +159,13 @@ impl<S: Scalar> BentElement<'_, S> {
         self.chord.point(&(axis + rotate(&(rotation - self.lean), &offset)))
     }
 
-    /// Centre of mass of the element itself, arm base frame \[m\].
+    /// Returns the centre of mass of the element, arm base frame \[m\].
     pub fn centre_of_mass(&self) -> Vector3<S> {
         let along = Vector3::new(self.element.length * 0.5, S::from(0.0), S::from(0.0));
         self.chord.point(&(along + self.cantilever.mean_displacement() - self.lean.cross(&along)))
     }
 
-    /// Frame at the tip, arm base frame.
+    /// Returns the frame at the tip, arm base frame.
     pub fn tip(&self) -> Frame<S> {
         let mut tip = self.chord;
         tip.translate_x(self.element.length + self.tip.displacement.x);

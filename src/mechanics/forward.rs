@@ -1,5 +1,5 @@
-//! The forward pass from the base to the tips, branch by branch: frames, loads, and the sections
-//! whose moments bend something.
+//! Forward pass from the base to the tips, branch by branch: frames, loads, and the sections whose
+//! moments deflect the arm.
 
 use nalgebra::Vector3;
 
@@ -14,48 +14,48 @@ use crate::problem::PoseView;
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
-/// How the walk bends the arm.
+/// Deflection of the arm in a forward pass.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Bend<'a, S> {
-    /// Not at all; records events.
+    /// No deflection; records_events events.
     Rigid,
-    /// By these moments, on the bent arm; records events.
+    /// Deflection by these moments; records_events events.
     Bent(&'a [S]),
-    /// The same segment by segment. Each segment begins at a frame without derivatives, so that its
-    /// end tells what its own numbers do. With a rotation vector, whose value is zero, beam
-    /// elements first turn by it: their end then tells what turning their root does.
-    Apart(&'a [S], Option<&'a Vector3<S>>),
-    /// By these moments, with forces resolved in the frames of the last rigid walk; records
-    /// nothing.
+    /// Deflection by these moments, segment by segment. PerCoordinate segment starts at a frame without
+    /// derivatives, so that the derivatives of its end come from its own parameters. With a
+    /// rotation vector (of value zero), beam elements first rotate by it: their ends then have the
+    /// derivatives with respect to a rotation of their root.
+    BySegment(&'a [S], Option<&'a Vector3<S>>),
+    /// Deflection by these moments, with forces resolved in the frames of the last undeflected
+    /// pass; records_events no events.
     FirstOrder(&'a [S]),
 }
 
-/// Where a walk has got to.
+/// State of a forward pass.
 struct Walk<'a, S> {
     setup: &'a PoseView<'a>,
     bend: Bend<'a, S>,
     frame: Frame<S>,
     /// Index of the next unknown moment.
     next: usize,
-    /// The joint whose frame is sought.
+    /// Joint whose frame is returned.
     tip: usize,
 }
 
 impl<S: Scalar> Walk<'_, S> {
-    /// The next N unknown moments; `None` on the rigid arm.
+    /// Returns the next N unknown moments; `None` on the undeflected arm.
     fn moments<const N: usize>(&mut self) -> Option<[S; N]> {
         let first = self.next;
         self.next += N;
         match self.bend {
             Bend::Rigid => None,
-            Bend::Bent(moments) | Bend::Apart(moments, _) | Bend::FirstOrder(moments) => {
+            Bend::Bent(moments) | Bend::BySegment(moments, _) | Bend::FirstOrder(moments) => {
                 Some(std::array::from_fn(|k| moments[first + k]))
             }
         }
     }
 
-    /// Ends a segment that bends by the last `unknowns` moments, if the arm is walked segment by
-    /// segment.
+    /// Ends a segment that deflects by the last `unknowns` moments, in a pass segment by segment.
     fn cut(
         &mut self,
         segment: Segment,
@@ -63,7 +63,7 @@ impl<S: Scalar> Walk<'_, S> {
         events: &mut Vec<Event<S>>,
         cuts: &mut Vec<Cut<S>>,
     ) {
-        if let Bend::Apart(..) = self.bend {
+        if let Bend::BySegment(..) = self.bend {
             cuts.push(Cut {
                 frame: self.frame,
                 segment,
@@ -74,8 +74,8 @@ impl<S: Scalar> Walk<'_, S> {
         }
     }
 
-    /// Tilts by flexibilities [rad/(N·m)] about x and y; the moments are felt along the axes half
-    /// way.
+    /// Tilts the frame by flexibilities [rad/(N·m)] about x and y. The moments act about the axes
+    /// at half the tilt.
     fn tilt(&mut self, [about_x, about_y]: &[S; 2], segment: Segment, ws: &mut Workspace<S>) {
         let half = self
             .moments()
@@ -84,7 +84,7 @@ impl<S: Scalar> Walk<'_, S> {
             self.frame.rotate(half);
             self.cut(segment, 2, &mut ws.events, &mut ws.cuts);
         }
-        if self.records() {
+        if self.records_events() {
             let [x, y, _] = self.frame.axes;
             ws.events.push(Event::Tilt { at: self.frame.origin, axes: [x, y] });
         }
@@ -94,12 +94,12 @@ impl<S: Scalar> Walk<'_, S> {
         }
     }
 
-    /// Goes along a slide of `length` L \[m\], negative along −z, with `flexibility` 1/EI
-    /// [1/(N·m²)]: a cantilever without weight that everything beyond loads at its end.
+    /// Moves along a slide of `length` L \[m\], negative along −z, with `flexibility` 1/EI
+    /// [1/(N·m²)]: a weightless cantilever loaded at its end.
     ///
-    /// δ = F L³/(3EI) + M L²/(2EI),  φ = F L²/(2EI) + M L/(EI). Along it the moment changes evenly:
-    /// two tilts at the points of Gauss and Legendre, each by the moment there times L/(2EI), sum
-    /// that up exactly. Small slopes only.
+    /// δ = F L³/(3EI) + M L²/(2EI),  φ = F L²/(2EI) + M L/(EI). The moment is linear along the
+    /// slide. Two tilts at the Gauss–Legendre points, each by the moment there times L/(2EI),
+    /// integrate it exactly. Small slopes only.
     fn slide(&mut self, flexibility: S, length: S, segment: Segment, ws: &mut Workspace<S>) {
         let half = flexibility * length * (0.5 * length.re().signum());
         let mut passed = 0.0;
@@ -111,35 +111,34 @@ impl<S: Scalar> Walk<'_, S> {
         self.frame.translate_z(length * (1.0 - passed));
     }
 
-    /// Takes note of a place from which `further` branches begin besides the next one.
-    fn fork(&self, further: usize, ws: &mut Workspace<S>) {
-        if further > 0 {
-            ws.forks.extend((0..further).map(|_| self.frame));
-            if self.records() {
-                ws.events.push(Event::Fork { further });
+    /// Records a place where `branches` start besides the next one.
+    fn fork(&self, branches: usize, ws: &mut Workspace<S>) {
+        if branches > 0 {
+            ws.forks.extend((0..branches).map(|_| self.frame));
+            if self.records_events() {
+                ws.events.push(Event::Fork { branches });
             }
         }
     }
 
-    /// Goes back to the last such place that has a branch left.
+    /// Returns to the last place that has a branch left.
     fn branch(&mut self, ws: &mut Workspace<S>) {
         self.frame = ws.forks.pop().unwrap_or(self.frame);
-        if self.records() {
+        if self.records_events() {
             ws.events.push(Event::Branch);
         }
     }
 
-    fn records(&self) -> bool {
+    fn records_events(&self) -> bool {
         !matches!(self.bend, Bend::FirstOrder(_))
     }
 }
 
 impl<S: Scalar> Arm<S> {
-    /// Forces of ropes, and beyond each link; only ropes that lean depend on how the arm bends, by
-    /// the unknowns `state`.
+    /// Computes the forces of ropes and the forces beyond each link. Only ropes that lean depend on
+    /// the deflection, by the unknowns `state`.
     ///
-    /// Before there is a state (empty) leaning ropes are taken as if their hooks were above the
-    /// base.
+    /// With an empty state, leaning ropes are taken as if their hooks were above the base.
     pub(super) fn gather_forces(&self, setup: &PoseView, state: &[S], ws: &mut Workspace<S>) {
         let zero = Vector3::from_element(S::from(0.0));
         let mut hooks = state.chunks_exact(2);
@@ -183,12 +182,12 @@ impl<S: Scalar> Arm<S> {
         }
     }
 
-    /// Index of the joint whose frame carries a payload.
+    /// Returns the index of the joint whose frame carries the payload.
     fn payload_joint(&self) -> usize {
         self.payload_on.unwrap_or_else(|| self.last())
     }
 
-    /// Force of a rope \[N\].
+    /// Returns the force of a rope \[N\].
     fn pull(&self, hoist: &Hoist, setup: &PoseView, hook: impl FnOnce() -> [S; 2]) -> Vector3<S> {
         let tension = setup.hoist.copied().unwrap_or(hoist.force);
         match &self.rope {
@@ -197,13 +196,13 @@ impl<S: Scalar> Arm<S> {
         }
     }
 
-    /// Number of unknowns that are places of hooks.
+    /// Returns the number of unknowns that are positions of hooks.
     fn hook_unknowns(&self) -> usize {
         let hoists = || self.joints.iter().filter_map(|joint| joint.beam.as_ref()?.hoist.as_ref());
         self.rope.as_ref().map_or(0, |_| 2 * hoists().count())
     }
 
-    /// Walks through all branches; returns the frame of the joint `tip`, arm base frame.
+    /// Passes through all branches; returns the frame of the joint `tip`, arm base frame.
     pub(super) fn walk(
         &self,
         setup: &PoseView,
@@ -233,7 +232,7 @@ impl<S: Scalar> Arm<S> {
             if self.tree.begins_branch(i) {
                 walk.branch(ws);
             }
-            joint.begin(&mut walk.frame);
+            joint.advance_to_link(&mut walk.frame);
             if matches!(bend, Bend::Rigid) {
                 ws.rigid_roots.push(walk.frame);
             }
@@ -249,14 +248,15 @@ impl<S: Scalar> Arm<S> {
             if let Some(lateral) = &joint.lateral {
                 walk.tilt(lateral, Segment::Joint(i), ws);
             }
-            let (mut twist, mut slip) = (None, None);
-            if joint.turns() {
+            let (mut twist, mut play_offset) = (None, None);
+            if joint.has_twist() {
                 let approach = setup.approach.map(|approach| approach[i]);
                 twist = walk.moments().map(|[moment]| joint.twist(moment, approach));
-                slip = joint.slip(approach);
+                play_offset = joint.play_offset(approach);
             }
-            let Coordinates { angle, offset } = joint.turned(setup.configuration[i], slip, twist);
-            if joint.turns() && walk.records() {
+            let Coordinates { angle, offset } =
+                joint.coordinates_with(setup.configuration[i], play_offset, twist);
+            if joint.has_twist() && walk.records_events() {
                 let pull = joint.compensator.as_ref().map(|spring| spring.moment(angle));
                 ws.events.push(Event::Axis {
                     at: walk.frame.origin,
@@ -265,7 +265,7 @@ impl<S: Scalar> Arm<S> {
                 });
             }
             walk.frame.rotate_z(angle);
-            let mut turned = usize::from(joint.turns());
+            let mut turned = usize::from(joint.has_twist());
             if let Some(flexibility) = joint.slide {
                 walk.cut(Segment::Joint(i), turned, &mut ws.events, &mut ws.cuts);
                 walk.slide(flexibility, offset, Segment::Joint(i), ws);
@@ -279,7 +279,7 @@ impl<S: Scalar> Arm<S> {
             }
             ws.keep(&walk.frame);
             walk.cut(Segment::Joint(i), turned, &mut ws.events, &mut ws.cuts);
-            if walk.records() {
+            if walk.records_events() {
                 for body in &joint.bodies {
                     let force = self.gravity * S::from(body.mass);
                     ws.events
@@ -288,7 +288,7 @@ impl<S: Scalar> Arm<S> {
             }
             if i == self.payload_joint() {
                 let payload = self.payload(setup);
-                if walk.records() && payload.re() != 0.0 {
+                if walk.records_events() && payload.re() != 0.0 {
                     let at = walk.frame.point(&self.payload_at.map(S::from));
                     ws.events.push(Event::Load { at, force: self.gravity * payload });
                 }
@@ -302,7 +302,7 @@ impl<S: Scalar> Arm<S> {
         found
     }
 
-    /// Walks along the beam of joint `link`, element by element.
+    /// Passes along the beam of joint `link`, element by element.
     fn walk_beam(&self, beam: &Beam<S>, link: usize, walk: &mut Walk<S>, ws: &mut Workspace<S>) {
         let Workspace {
             events,
@@ -319,14 +319,14 @@ impl<S: Scalar> Arm<S> {
         let elements = self.beam_elements;
         let length = self.joints[link].a / elements as f64;
         self.load_beam(beam, ropes[link], length, link_loads);
-        let of_pose = walk.setup.strains.and_then(|all| all.get(link).copied());
-        let strain = beam.strain.as_ref().map(|strain| strain.and(of_pose.unwrap_or_default()));
+        let of_pose = walk.setup.strains.and_then(|strains| strains.get(link).copied());
+        let strain = beam.strain.as_ref().map(|strain| strain.plus(of_pose.unwrap_or_default()));
         let weight = self.gravity * S::from(beam.mass / elements as f64);
         for number in 0..elements {
-            let further =
+            let branches =
                 link_loads.iter().filter(|load| load.element > number).map(|load| load.force);
-            let further =
-                weight * S::from((elements - 1 - number) as f64) + further.sum::<Vector3<S>>();
+            let branches =
+                weight * S::from((elements - 1 - number) as f64) + branches.sum::<Vector3<S>>();
             let moment =
                 walk.moments().map_or_else(|| Vector3::from_element(S::from(0.0)), Vector3::from);
             let element = Element {
@@ -337,10 +337,10 @@ impl<S: Scalar> Arm<S> {
                 strain,
                 weight,
                 loads: link_loads,
-                tip: Wrench { force: beyond[link] + further, moment },
+                tip: Wrench { force: beyond[link] + branches, moment },
             };
             let mut root = walk.frame;
-            if let Bend::Apart(_, Some(turn)) = walk.bend {
+            if let Bend::BySegment(_, Some(turn)) = walk.bend {
                 root.rotate(turn);
             }
             match walk.bend {
@@ -361,7 +361,7 @@ impl<S: Scalar> Arm<S> {
                     walk.frame.translate_x(length);
                     events.push(Event::Tip { at: walk.frame.origin });
                 }
-                Bend::Bent(_) | Bend::Apart(..) => {
+                Bend::Bent(_) | Bend::BySegment(..) => {
                     let bent = element.bend(&root, points);
                     events.push(Event::Load { at: bent.centre_of_mass(), force: weight });
                     for load in element.own_loads() {

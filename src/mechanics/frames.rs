@@ -1,29 +1,29 @@
-//! Frames along the arm at rest, with derivatives.
+//! Frames along the arm at equilibrium, with derivatives.
 
 use num_dual::Dual64;
 
 use super::arm::Arm;
 use super::forward::Bend;
-use super::statics::{MAX_PASSES, SETTLED, StaticState};
+use super::statics::{MAX_EQUILIBRIUM_PASSES, MAX_RELATIVE_CHANGE, StaticState};
 use super::workspace::Workspace;
 use crate::problem::{Equilibrium, PoseView};
 use crate::spatial::Frame;
 
 impl Arm<Dual64> {
-    /// The frame behind the arm's mounting and that behind every joint, arm base frame, of a pose
-    /// that the same arm without derivatives has brought to `rest`.
+    /// Returns the frame behind the mounting and the frames behind all joints, arm base frame.
+    /// `state` is the equilibrium of the same arm without derivatives.
     ///
-    /// The moments' derivatives follow from the fixed point x = G(x) of [`super::statics`] by
-    /// passing through it until they settle too.
+    /// The derivatives of the moments follow from the fixed point x = G(x) of [`super::statics`],
+    /// iterated until they settle.
     pub(crate) fn frames(
         &self,
         setup: &PoseView,
-        rest: &StaticState,
+        state: &StaticState,
         ws: &mut Workspace<Dual64>,
     ) -> Vec<Frame<Dual64>> {
         ws.keeps_frames = true;
         self.gather_forces(setup, &[], ws);
-        self.walk(setup, Bend::Rigid, rest.tip, ws);
+        self.walk(setup, Bend::Rigid, state.tip, ws);
         ws.sum_moments();
         let mut moments = ws.next_moments.clone();
         if !self.is_elastic() || moments.is_empty() {
@@ -31,24 +31,24 @@ impl Arm<Dual64> {
         }
         let mut first_order = None;
         if self.equilibrium == Equilibrium::Undeflected {
-            self.lean_ropes(setup, &moments, ws);
-            self.walk(setup, Bend::FirstOrder(&moments), rest.tip, ws);
+            self.update_leaning_ropes(setup, &moments, ws);
+            self.walk(setup, Bend::FirstOrder(&moments), state.tip, ws);
             let frames = std::mem::take(&mut ws.frames);
             let Some(mixing) = self.mixing else { return frames };
             first_order = Some((frames, mixing));
         }
-        if rest.moments.len() == moments.len() {
-            moments = rest.moments.iter().map(|&x| Dual64::from(x)).collect();
+        if state.moments.len() == moments.len() {
+            moments = state.moments.iter().map(|&x| Dual64::from(x)).collect();
         }
-        for _ in 0..MAX_PASSES {
-            self.lean_ropes(setup, &moments, ws);
-            self.walk(setup, Bend::Bent(&moments), rest.tip, ws);
+        for _ in 0..MAX_EQUILIBRIUM_PASSES {
+            self.update_leaning_ropes(setup, &moments, ws);
+            self.walk(setup, Bend::Bent(&moments), state.tip, ws);
             ws.sum_moments();
             let largest = ws.next_moments.iter().fold(0.0_f64, |m, x| m.max(x.eps.abs()));
             let both = moments.iter().zip(&ws.next_moments);
             let change = both.fold(0.0_f64, |m, (a, b)| m.max((a.eps - b.eps).abs()));
             moments.clone_from(&ws.next_moments);
-            if change <= SETTLED * largest || !change.is_finite() {
+            if change <= MAX_RELATIVE_CHANGE * largest || !change.is_finite() {
                 break;
             }
         }

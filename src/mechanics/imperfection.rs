@@ -1,70 +1,70 @@
-//! What an arm may do beyond its declared parameters; every term is inert at zero.
+//! Deviations of an arm from its declared parameters; every term vanishes at zero.
 
 use nalgebra::Vector3;
 
 use crate::scalar::Scalar;
 
-/// Moment at which play is taken up to three quarters [N·m].
+/// Moment at which tanh has taken up 76 % of the play [N·m].
 const PLAY_MOMENT: f64 = 1.0;
-/// tanh does not differ from 1 from here on: 2 exp(−2x) is below half a unit in the last place.
-const FLAT: f64 = 20.0;
+/// Argument from which on tanh is 1 to rounding: 2 exp(−2x) is below half a unit in the last place.
+const SATURATED_TANH: f64 = 20.0;
 
-/// How a joint turns about its axis other than in proportion to the moment.
+/// Rotation of a joint about its axis that is not proportional to the moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nonlinear<S> {
     /// Angle per cube of the moment [rad/(N·m)³].
     pub cubic: S,
-    /// Play \[rad\], \[m\] where the joint slides: taken up by the direction of approach; where
-    /// that is not known by the moment, which moves no joint along its slide.
+    /// Play \[rad\], of a prismatic joint \[m\]. The direction of approach takes it up; if that is
+    /// unknown, the moment does, except in a prismatic joint.
     pub play: S,
 }
 
-/// A mass on a link's axis that nobody declared.
+/// Undeclared point mass on a link's axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AddedMass<S> {
-    /// Mass \[kg\].
+    /// Size of the mass \[kg\].
     pub mass: S,
     /// Distance from the link's root \[m\].
     pub at: S,
 }
 
-/// How ropes pull other than declared.
+/// Errors of the declared force and direction of hoists.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoistError<S> {
     /// Relative error of the force.
     pub force: S,
     /// Lean of the direction, x and y of the base frame.
     pub lean: [S; 2],
-    /// Change of the lean with the hook's x and y [1/m].
+    /// Derivative of the lean with respect to the hook's x and y [1/m].
     pub trolley: S,
 }
 
 impl<S: Scalar> Nonlinear<S> {
-    /// Angle under a moment [N·m]; its play counts where the moment `takes_up_play`.
+    /// Returns the angle under a moment [N·m]; the play counts if the moment `takes_up_play`.
     pub(super) fn twist(&self, moment: S, takes_up_play: bool) -> S {
         let cubic = self.cubic * moment * moment * moment;
         if takes_up_play { cubic + self.play * tanh(moment / PLAY_MOMENT) * 0.5 } else { cubic }
     }
 }
 
-/// tanh x with its derivative 1 − tanh² x, finite at any x: from [`FLAT`] on they are 1 and 0 to
-/// rounding, where sinh x / cosh x of dual numbers overflows.
+/// Returns tanh x with its derivative 1 − tanh² x, finite at any x. From [`SATURATED_TANH`] on they
+/// are 1 and 0 to rounding, where sinh x / cosh x of dual numbers overflows.
 fn tanh<S: Scalar>(x: S) -> S {
-    if x.re().abs() < FLAT { x.tanh() } else { S::from(x.re().signum()) }
+    if x.re().abs() < SATURATED_TANH { x.tanh() } else { S::from(x.re().signum()) }
 }
 
-/// Strain of a beam without load, as of one that is warm.
+/// Strain of a beam without load, for example of a warm beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strain<S> {
     /// Elongation per length.
     pub axial: S,
-    /// Curvature about y and z, turning per metre of +x [1/m].
+    /// Curvatures about y and z along +x [1/m].
     pub curvature: [S; 2],
 }
 
 impl<S: Scalar> Strain<S> {
-    /// With that of one pose: elongation, then curvatures.
-    pub(super) fn and(&self, [axial, y, z]: [f64; 3]) -> Self {
+    /// Adds the strain of one pose: elongation, then curvatures.
+    pub(super) fn plus(&self, [axial, y, z]: [f64; 3]) -> Self {
         Self {
             axial: self.axial + axial,
             curvature: [self.curvature[0] + y, self.curvature[1] + z],
@@ -73,8 +73,8 @@ impl<S: Scalar> Strain<S> {
 }
 
 impl<S: Scalar> HoistError<S> {
-    /// Force \[N\] of a tension \[N\] in a declared direction, with the hook at these x and y
-    /// \[m\], base frame.
+    /// Returns the force \[N\] of a rope with a tension \[N\] in a declared direction; x and y of
+    /// the hook \[m\], arm base frame.
     pub(super) fn pull(
         &self,
         direction: &Vector3<f64>,
@@ -90,28 +90,28 @@ impl<S: Scalar> HoistError<S> {
 }
 
 impl Nonlinear<f64> {
-    /// The same as constants of another scalar.
+    /// Converts to another scalar type, with constant parameters.
     pub(super) fn lift<S: Scalar>(&self) -> Nonlinear<S> {
         Nonlinear { cubic: S::from(self.cubic), play: S::from(self.play) }
     }
 }
 
 impl Strain<f64> {
-    /// The same as constants of another scalar.
+    /// Converts to another scalar type, with constant parameters.
     pub(super) fn lift<S: Scalar>(&self) -> Strain<S> {
         Strain { axial: S::from(self.axial), curvature: self.curvature.map(S::from) }
     }
 }
 
 impl AddedMass<f64> {
-    /// The same as constants of another scalar.
+    /// Converts to another scalar type, with constant parameters.
     pub(super) fn lift<S: Scalar>(&self) -> AddedMass<S> {
         AddedMass { mass: S::from(self.mass), at: S::from(self.at) }
     }
 }
 
 impl HoistError<f64> {
-    /// The same as constants of another scalar.
+    /// Converts to another scalar type, with constant parameters.
     pub(super) fn lift<S: Scalar>(&self) -> HoistError<S> {
         HoistError {
             force: S::from(self.force),

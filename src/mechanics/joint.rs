@@ -1,4 +1,4 @@
-//! A joint with the link before it.
+//! Joint with the link before it.
 
 use nalgebra::Vector3;
 
@@ -9,17 +9,17 @@ use crate::problem::{self, JointKind};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
-/// An angle with its sine and cosine, taken once per arm rather than once per pose.
+/// Angle with its sine and cosine, computed once per arm rather than once per pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Angle<S> {
-    /// The angle \[rad\].
+    /// Size of the angle \[rad\].
     pub value: S,
-    /// (sin, cos).
+    /// Sine and cosine of the angle.
     pub sin_cos: (S, S),
 }
 
 impl<S: Scalar> Angle<S> {
-    /// From radians.
+    /// Creates an angle from radians.
     pub fn new(value: S) -> Self {
         Self { value, sin_cos: value.sin_cos() }
     }
@@ -34,12 +34,12 @@ impl Angle<f64> {
     }
 }
 
-/// A transform of six numbers: Txyz Rz(yaw) Ry(pitch) Rx(roll), as URDF has it.
+/// Transform of six numbers: Txyz Rz(yaw) Ry(pitch) Rx(roll), as in URDF.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement<S> {
-    /// Origin \[m\].
+    /// Position of the origin \[m\].
     pub xyz: Vector3<S>,
-    /// Roll, pitch and yaw.
+    /// Angles roll, pitch and yaw.
     pub rpy: [Angle<S>; 3],
 }
 
@@ -64,47 +64,46 @@ impl<S: Scalar> Placement<S> {
     }
 }
 
-/// One joint with the link before it: `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β)  [Chen2021, eq. 1],
-/// behind the placement where there is one.
+/// Joint with the link before it: `T_i` = Rx(α) Tx(a) Rz(θ+q) Tz(d) Ry(β)  [Chen2021, eq. 1],
+/// behind the placement if there is one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint<S> {
-    /// What q does.
+    /// Motion by q: rotation, translation or none.
     pub kind: JointKind,
-    /// A transform before all others.
+    /// Constant transform before all others.
     pub placement: Option<Placement<S>>,
-    /// α.
+    /// Twist angle α of the link.
     pub alpha: Angle<S>,
-    /// a \[m\].
+    /// Length a of the link \[m\].
     pub a: S,
-    /// θ \[rad\].
+    /// Offset θ of the joint angle \[rad\].
     pub theta: S,
-    /// d \[m\].
+    /// Offset d along the joint axis \[m\].
     pub d: S,
-    /// β.
+    /// Tilt β behind the joint.
     pub beta: Angle<S>,
-    /// Torsional flexibility 1/k about `z_i` [rad/(N·m)]; `None`: rigid.
+    /// Torsional flexibility 1/k about `z_i` [rad/(N·m)]; rigid if `None`.
     pub flexibility: Option<S>,
-    /// Turning about `z_i` that is not in proportion to the moment.
+    /// Rotation about `z_i` that is not proportional to the moment.
     pub nonlinear: Option<Nonlinear<S>>,
-    /// Flexibility about x and y of the frame that has not yet turned [rad/(N·m)].
+    /// Flexibility about x and y before the joint's rotation [rad/(N·m)].
     pub lateral: Option<[S; 2]>,
-    /// Flexibility 1/EI of the slide, a cantilever that is as long as the joint's own d + q
-    /// [1/(N·m²)].
+    /// Flexibility 1/EI of the slide, a cantilever of length d + q [1/(N·m²)].
     pub slide: Option<S>,
-    /// Spring that takes off part of the moment about `z_i`.
+    /// Spring that takes up part of the moment about `z_i`.
     pub compensator: Option<Compensator<S>>,
-    /// Elastic link along a.
+    /// Elastic link along the length a.
     pub beam: Option<Beam<S>>,
     /// Masses carried by frame i.
     pub bodies: Vec<PointMass>,
 }
 
-/// A joint in a pose.
+/// Coordinates of a joint in a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coordinates<S> {
-    /// (sin, cos) of θ + q.
+    /// Sine and cosine of θ + q.
     pub angle: (S, S),
-    /// d + q \[m\].
+    /// Displacement d + q along the axis \[m\].
     pub offset: S,
 }
 
@@ -128,7 +127,7 @@ impl Joint<f64> {
         }
     }
 
-    /// The same joint with its parameters as constants of another scalar.
+    /// Converts the joint to another scalar type, with constant parameters.
     pub fn lift<S: Scalar>(&self) -> Joint<S> {
         Joint {
             kind: self.kind,
@@ -150,12 +149,12 @@ impl Joint<f64> {
 }
 
 impl<S: Scalar> Joint<S> {
-    /// Whether the joint gives way about its axis.
-    pub(super) fn turns(&self) -> bool {
+    /// Returns true if the joint deflects about its axis.
+    pub(super) fn has_twist(&self) -> bool {
         self.flexibility.is_some() || self.nonlinear.is_some()
     }
 
-    /// Angle about the axis under a moment [N·m] about it.
+    /// Returns the angle about the axis under a moment [N·m] about it.
     pub(super) fn twist(&self, moment: S, approach: Option<f64>) -> S {
         let linear =
             self.flexibility.map_or_else(|| S::from(0.0), |flexibility| flexibility * moment);
@@ -165,21 +164,26 @@ impl<S: Scalar> Joint<S> {
             .map_or(linear, |nonlinear| linear + nonlinear.twist(moment, takes_up_play))
     }
 
-    /// What play adds to the joint's coordinate when it came from a known direction \[rad\] or
-    /// \[m\].
-    pub(super) fn slip(&self, approach: Option<f64>) -> Option<S> {
+    /// Returns the offset of the joint's coordinate by play, if the direction of approach is known
+    /// \[rad\] or \[m\].
+    pub(super) fn play_offset(&self, approach: Option<f64>) -> Option<S> {
         self.nonlinear
             .as_ref()
             .zip(approach)
             .map(|(nonlinear, approach)| nonlinear.play * (0.5 * approach))
     }
 
-    /// Where a configuration puts the joint, `slip` added to q and `twist` to the angle.
-    pub(super) fn turned(&self, q: f64, slip: Option<S>, twist: Option<S>) -> Coordinates<S> {
-        let (mut angle, mut offset) = self.moved(q);
-        match (slip, self.kind) {
-            (Some(slip), JointKind::Prismatic) => offset += slip,
-            (Some(slip), _) => angle += slip,
+    /// Returns the coordinates in a configuration with `play_offset` added to q and `twist` to the angle.
+    pub(super) fn coordinates_with(
+        &self,
+        q: f64,
+        play_offset: Option<S>,
+        twist: Option<S>,
+    ) -> Coordinates<S> {
+        let (mut angle, mut offset) = self.theta_and_d(q);
+        match (play_offset, self.kind) {
+            (Some(play_offset), JointKind::Prismatic) => offset += play_offset,
+            (Some(play_offset), _) => angle += play_offset,
             (None, _) => {}
         }
         if let Some(twist) = twist {
@@ -188,16 +192,16 @@ impl<S: Scalar> Joint<S> {
         Coordinates { angle: angle.sin_cos(), offset }
     }
 
-    /// Where a configuration puts the joint.
+    /// Returns the coordinates in a configuration.
     #[inline]
     pub fn coordinates(&self, q: f64) -> Coordinates<S> {
-        let (angle, offset) = self.moved(q);
+        let (angle, offset) = self.theta_and_d(q);
         Coordinates { angle: angle.sin_cos(), offset }
     }
 
-    /// θ and d of a configuration: q adds to one of them.
+    /// Returns θ and d, one of them with q added.
     #[inline]
-    fn moved(&self, q: f64) -> (S, S) {
+    fn theta_and_d(&self, q: f64) -> (S, S) {
         match self.kind {
             JointKind::Revolute => (self.theta + q, self.d),
             JointKind::Prismatic => (self.theta, self.d + q),
@@ -205,31 +209,30 @@ impl<S: Scalar> Joint<S> {
         }
     }
 
-    /// Moves `frame` to where the link begins: through the placement, if there is one, and Rx(α).
-    pub(super) fn begin(&self, frame: &mut Frame<S>) {
+    /// Moves `frame` to the start of the link: through the placement, if there is one, and Rx(α).
+    pub(super) fn advance_to_link(&self, frame: &mut Frame<S>) {
         if let Some(placement) = &self.placement {
             placement.advance(frame);
         }
         frame.rotate_x(self.alpha.sin_cos);
     }
 
-    /// Moves `frame` through the part of a rigid `T_i` before the joint turns: the placement and
-    /// Rx(α) Tx(a).
-    pub(super) fn root(&self, frame: &mut Frame<S>) {
-        self.begin(frame);
+    /// Moves `frame` to the axis of the joint, undeflected: the placement and Rx(α) Tx(a).
+    pub(super) fn advance_to_axis(&self, frame: &mut Frame<S>) {
+        self.advance_to_link(frame);
         frame.translate_x(self.a);
     }
 
-    /// Moves `frame` to the joint's axis at q = 0: through `T_i` but for Ry(β).
-    pub(crate) fn walk_to_axis(&self, frame: &mut Frame<S>) {
-        self.root(frame);
+    /// Moves `frame` through `T_i` at q = 0, without Ry(β).
+    pub(crate) fn advance_to_zero(&self, frame: &mut Frame<S>) {
+        self.advance_to_axis(frame);
         frame.rotate_z(self.theta.sin_cos());
         frame.translate_z(self.d);
     }
 
-    /// Moves `frame` through the whole rigid `T_i`.
+    /// Moves `frame` through the whole undeflected `T_i`.
     pub(super) fn advance(&self, frame: &mut Frame<S>, q: f64) {
-        self.root(frame);
+        self.advance_to_axis(frame);
         let Coordinates { angle, offset } = self.coordinates(q);
         frame.rotate_z(angle);
         frame.translate_z(offset);

@@ -1,4 +1,4 @@
-//! Links and the masses and ropes on them.
+//! Links, and the masses and ropes on them.
 
 use nalgebra::Vector3;
 
@@ -7,44 +7,44 @@ use super::imperfection::{AddedMass, Strain};
 use crate::problem;
 use crate::scalar::Scalar;
 
-/// A point mass on its carrier.
+/// Point mass on a link or a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointMass {
-    /// Mass \[kg\].
+    /// Size of the mass \[kg\].
     pub mass: f64,
-    /// Position in the carrier's frame \[m\].
+    /// Position in the frame that carries it \[m\].
     pub at: Vector3<f64>,
 }
 
-/// A suspension force on a beam.
+/// Suspension force on a beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hoist {
-    /// Hook in the beam's frame \[m\].
+    /// Position of the hook in the beam's frame \[m\].
     pub at: Vector3<f64>,
-    /// Force where the pose gives none \[N\].
+    /// Force in poses that give none \[N\].
     pub force: f64,
     /// Unit direction, arm base frame.
     pub direction: Vector3<f64>,
 }
 
-/// An elastic link along a joint's a, clamped after Rx(α).
+/// Elastic link along a joint's a, clamped after Rx(α).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Beam<S> {
-    /// Own mass, spread evenly \[kg\].
+    /// Mass of the beam, spread evenly \[kg\].
     pub mass: f64,
-    /// Flexibilities.
+    /// Axial, bending and torsional flexibilities.
     pub flexibility: Flexibility<S>,
-    /// Carried masses, beam frame.
+    /// Point masses on the beam, beam frame.
     pub masses: Vec<PointMass>,
-    /// Suspension.
+    /// Suspension force, if the beam has a hoist.
     pub hoist: Option<Hoist>,
-    /// Strain without load, beside that of each pose; `None`: it has none in any pose.
+    /// Strain without load, to which that of each pose adds; `None` if it has none in any pose.
     pub strain: Option<Strain<S>>,
-    /// A mass that nobody declared.
+    /// Undeclared mass on the beam.
     pub added: Option<AddedMass<S>>,
 }
 
-/// Bodies fixed to a carrier.
+/// Converts declared bodies to point masses.
 pub(super) fn point_masses(bodies: &[problem::Body]) -> Vec<PointMass> {
     bodies.iter().map(|body| PointMass { mass: body.mass, at: body.position }).collect()
 }
@@ -72,7 +72,7 @@ impl Beam<f64> {
         }
     }
 
-    /// The same link with its parameters as constants of another scalar.
+    /// Converts the link to another scalar type, with constant parameters.
     pub(super) fn lift<S: Scalar>(&self) -> Beam<S> {
         Beam {
             mass: self.mass,

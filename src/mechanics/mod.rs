@@ -1,4 +1,4 @@
-//! The arm's physics, generic over the scalar: frames, elastic links and joints, static
+//! Physics of the arm, generic over the scalar: frames, elastic links and joints, static
 //! equilibrium.
 
 mod adjoint;
@@ -12,13 +12,13 @@ mod forward;
 mod frames;
 mod imperfection;
 mod joint;
+mod linearise;
 mod link;
-mod record;
 mod segment;
 mod sensitivity;
 
+mod linearised_arm;
 mod statics;
-mod tape;
 mod workspace;
 
 pub use arm::Arm;

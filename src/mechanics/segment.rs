@@ -1,37 +1,37 @@
-//! Segments of the arm: each is differentiated alone, by the few numbers that act on it.
+//! Segments of the arm, each differentiated with respect to the few parameters that act on it.
 //!
-//! A segment is the base that tilts, a joint, or a beam element; between segments only a frame is
-//! handed on. Segments do not feel each other, so that numbers of different segments share one
-//! direction of a forward pass in dual numbers. The adjoint sweep (`adjoint.rs`) chains them.
+//! A segment is the mounting, a joint, or a beam element. Segments pass on only a frame, so
+//! parameters of different segments share one direction of a forward pass in dual numbers. The
+//! adjoint sweep (`adjoint.rs`) chains the segments.
 
 use super::arm::Arm;
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
-/// Where a slide tilts, as parts of its length: the points of Gauss and Legendre, (1 ∓ 1/√3)/2.
+/// Positions of the tilts of a slide, relative to its length: Gauss–Legendre points (1 ∓ 1/√3)/2.
 pub(super) const SLIDE_TILTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
-/// A segment of the arm.
+/// Part of the arm between two frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Segment {
-    /// The base, where it tilts.
+    /// Mounting of the base, which tilts.
     Mounting,
-    /// A joint with its α, and its a where no beam lies along it.
+    /// Joint with its α, and with its a if it has no beam.
     Joint(usize),
-    /// The beam along a joint's a; a segment for every element, with the same parameters.
+    /// Beam along a joint's a: one segment for every element, all with the same parameters.
     Beam(usize),
 }
 
 impl Segment {
-    /// The first direction that is left for parameters: a beam's root turns in three, an element
-    /// bends by three moments, a joint tilts by two and turns by one.
-    pub fn first_lane(self) -> usize {
+    /// Returns the first direction of parameters. Before it lie three rotations of a beam's root
+    /// and three moments of an element, or two tilts and one rotation of a joint.
+    pub fn first_parameter_direction(self) -> usize {
         if self.is_beam() { 6 } else { 3 }
     }
 
-    /// Direction of the first of the `count` moments that bend the segment at once.
-    pub(super) fn moment_lane(self, count: usize) -> usize {
+    /// Returns the direction of the first of `count` moments that deflect the segment together.
+    pub(super) fn moment_direction(self, count: usize) -> usize {
         match (self, count) {
             (Self::Beam(_), _) => 3,
             (_, 2) => 0,
@@ -43,7 +43,7 @@ impl Segment {
         matches!(self, Self::Beam(_))
     }
 
-    /// Place in a list of all segments.
+    /// Returns the index in a list of all segments.
     pub(super) fn index(self) -> usize {
         match self {
             Self::Mounting => 0,
@@ -53,21 +53,21 @@ impl Segment {
     }
 }
 
-/// The end of a segment.
+/// End of a segment.
 #[derive(Debug, Clone)]
 pub(super) struct Cut<S> {
-    /// The frame there.
+    /// Frame at the end.
     pub frame: Frame<S>,
     pub segment: Segment,
-    /// Index of the first moment that bends the segment, and how many there are.
+    /// Index of the first moment that deflects the segment, and number of these moments.
     pub unknowns: (usize, usize),
 }
 
-/// Directions of all moments of an arm, in their order.
-pub(super) fn moment_lanes<S: Scalar>(arm: &Arm<S>) -> Vec<usize> {
-    let mut lanes = Vec::new();
+/// Returns the directions of all moments of an arm, in their order.
+pub(super) fn moment_directions<S: Scalar>(arm: &Arm<S>) -> Vec<usize> {
+    let mut directions = Vec::new();
     let mut add = |segment: Segment, count: usize| {
-        lanes.extend((0..count).map(|k| segment.moment_lane(count) + k))
+        directions.extend((0..count).map(|k| segment.moment_direction(count) + k))
     };
     if arm.mounting.is_some() {
         add(Segment::Mounting, 2);
@@ -79,7 +79,7 @@ pub(super) fn moment_lanes<S: Scalar>(arm: &Arm<S>) -> Vec<usize> {
         if joint.lateral.is_some() {
             add(Segment::Joint(i), 2);
         }
-        if joint.turns() {
+        if joint.has_twist() {
             add(Segment::Joint(i), 1);
         }
         if joint.slide.is_some() {
@@ -88,7 +88,7 @@ pub(super) fn moment_lanes<S: Scalar>(arm: &Arm<S>) -> Vec<usize> {
             }
         }
     }
-    lanes
+    directions
 }
 
 impl<S: Scalar> Cut<S> {

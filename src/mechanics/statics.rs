@@ -1,15 +1,16 @@
-//! Static equilibrium: which moments bend the arm, and where its end point comes to rest.
+//! Static equilibrium: moments that deflect the arm, and position of its target.
 //!
-//! The unknowns x of equilibrium are the moments at the sections that bend: three at every beam
-//! element's tip, one about every flexible joint, two where something tilts; and the places of
-//! hooks whose ropes may lean. A walk with moments x places every load, and the loads give moments
-//! G(x). The rigid walk's moments are the paper's first order; x = G(x) is equilibrium on the bent
-//! arm. With P(x) the target position, its total derivative needs no iteration in dual numbers:
+//! The unknowns x are the moments at the sections that deflect (three at every beam element's tip,
+//! one about every flexible joint, two where a part tilts), and the positions of hooks whose ropes
+//! may lean. A forward pass with moments x places every load, and the loads give moments G(x). The
+//! moments of the undeflected pass are the paper's first order; x = G(x) is equilibrium on the
+//! deflected arm. With P(x) the target position,
 //!
 //! p = P(x*) + Λ (G(x*) − x*),  Λ = `P_x` (I − `G_x`)⁻¹,
 //!
-//! has the value and the first derivatives of the equilibrium position when the walk is made in
-//! dual numbers at the real fixed point x* (implicit function theorem, in adjoint form).
+//! has the value and the first derivatives of the equilibrium position, if the pass is made in dual
+//! numbers at the real fixed point x* (implicit function theorem, in adjoint form). No iteration in
+//! dual numbers is needed.
 
 use nalgebra::Vector3;
 use num_dual::Dual64;
@@ -22,43 +23,41 @@ use crate::spatial::Frame;
 
 pub use super::workspace::Workspace;
 
-/// Passes after which a fixed point that has not settled is given up: the arm is too soft for its
-/// loads.
-pub(super) const MAX_PASSES: usize = 200;
-/// Moments have settled when they change by less than this part of the largest.
-pub(super) const SETTLED: f64 = 1e-13;
-/// Λ whose last pass changed it by less than this part of the largest hovers about its fixed point:
-/// rounding keeps it from settling further, and no derivative feels it.
-pub(super) const HOVERING: f64 = 1e-9;
-/// Rounding of a moment relative to the sum of its terms, which cancel where a hoist balances the
-/// arm.
-const ROUNDING: f64 = 1e-15;
-/// Why a pose has no static equilibrium.
+/// Maximum number of passes towards a fixed point; beyond it the arm is too soft for its loads.
+pub(super) const MAX_EQUILIBRIUM_PASSES: usize = 200;
+/// Largest relative change of the moments, or of Λ, at convergence.
+pub(super) const MAX_RELATIVE_CHANGE: f64 = 1e-13;
+/// Largest relative change of Λ in its last pass that is still accepted: rounding may keep Λ from
+/// settling further, and the derivatives do not change.
+pub(super) const MAX_ACCEPTED_CHANGE: f64 = 1e-9;
+/// Rounding of a moment relative to the sum of its terms, which cancel if a hoist balances the arm.
+const MOMENT_ROUNDING: f64 = 1e-15;
+/// Reason why a pose has no static equilibrium.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StaticsError {
-    /// The bent arm keeps bending: too soft for its loads.
+    /// Deflections that grow from pass to pass: the arm is too soft for its loads.
     #[error("the deflection does not settle: the arm is too soft for its loads")]
     NotSettled,
 }
 
-/// A pose in static equilibrium.
+/// Pose in static equilibrium.
 #[derive(Debug, Clone, Default)]
 pub struct StaticState {
-    /// The frame that was asked for, of the joint `tip`, arm base frame.
+    /// Frame of the joint `tip`, arm base frame.
     pub frame: Frame<f64>,
     pub(super) tip: usize,
     /// Moments x* [N·m].
     pub(super) moments: Vec<f64>,
-    /// Λ, shape = (3, moments), row after row [m/(N·m)]; empty until asked for.
+    /// Influence Λ, shape = (3, moments), row-major [m/(N·m)]; empty until it is computed.
     pub(super) adjoint: Vec<f64>,
-    /// `P_x`, shape = (3, moments), and `G_x`, column after column.
+    /// `P_x`, shape = (3, moments), row-major, and `G_x`, column-major.
     position_response: Vec<f64>,
     moment_response: Vec<f64>,
 }
 
 impl Arm<f64> {
-    /// Brings one pose to rest, to see where the last frame is.
+    /// Computes the equilibrium of one pose and the frame of the last joint.
     ///
     /// # Errors
     /// The arm is too soft for its loads.
@@ -71,7 +70,7 @@ impl Arm<f64> {
         self.equilibrate_at(setup, self.last(), ws, pose)
     }
 
-    /// The same, to see where the frame of the joint `tip` is, counted from 0.
+    /// Computes the equilibrium of one pose and the frame of the joint `tip`, counted from 0.
     ///
     /// # Errors
     /// The arm is too soft for its loads.
@@ -94,7 +93,7 @@ impl Arm<f64> {
         ws.sum_moments();
         pose.moments.extend_from_slice(&ws.next_moments);
         let first_order = if self.is_first_order() {
-            self.lean_ropes(setup, &pose.moments, ws);
+            self.update_leaning_ropes(setup, &pose.moments, ws);
             pose.frame = self.walk(setup, Bend::FirstOrder(&pose.moments), tip, ws);
             let Some(mixing) = self.mixing else { return Ok(()) };
             Some((pose.frame, mixing))
@@ -102,8 +101,8 @@ impl Arm<f64> {
             None
         };
         ws.anderson.restart();
-        for _ in 0..MAX_PASSES {
-            self.lean_ropes(setup, &pose.moments, ws);
+        for _ in 0..MAX_EQUILIBRIUM_PASSES {
+            self.update_leaning_ropes(setup, &pose.moments, ws);
             pose.frame = self.walk(setup, Bend::Bent(&pose.moments), tip, ws);
             ws.sum_moments();
             let largest = ws.next_moments.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -115,7 +114,9 @@ impl Arm<f64> {
             if !change.is_finite() {
                 break;
             }
-            if change <= SETTLED * largest || change <= ROUNDING * ws.turning() {
+            if change <= MAX_RELATIVE_CHANGE * largest
+                || change <= MOMENT_ROUNDING * ws.moment_scale()
+            {
                 if let Some((first_order, mixing)) = &first_order {
                     pose.frame = mixed(first_order, &pose.frame, *mixing);
                 }
@@ -127,15 +128,14 @@ impl Arm<f64> {
     }
 }
 
-/// (1 − λ) of one frame and λ of another, point by point; no frame between, but every point of it
-/// is.
+/// Returns (1 − λ) of one frame plus λ of another, point by point; the result is not orthonormal.
 fn mixed<S: Scalar>(one: &Frame<S>, other: &Frame<S>, mixing: S) -> Frame<S> {
     let mix = |one: &Vector3<S>, other: &Vector3<S>| one + (other - one) * mixing;
     let axes = std::array::from_fn(|i| mix(&one.axes[i], &other.axes[i]));
     Frame { axes, origin: mix(&one.origin, &other.origin) }
 }
 
-/// Differentiates equilibrium with respect to its moments.
+/// Differentiates the equilibrium with respect to its moments.
 #[derive(Debug, Clone)]
 pub struct AdjointSolver {
     arm: Arm<Dual64>,
@@ -143,16 +143,16 @@ pub struct AdjointSolver {
 }
 
 impl AdjointSolver {
-    /// For poses of `arm`.
+    /// Creates the solver for poses of `arm`.
     pub fn new(arm: &Arm<f64>) -> Self {
         Self { arm: arm.lift(), ws: Workspace::default() }
     }
 
-    /// Fills in Λ of an equilibrated pose for the target at `target` \[m\], in the frame that the
-    /// pose was brought to rest for.
+    /// Computes Λ of a pose at equilibrium for the target at `target` \[m\], in the frame for which
+    /// the equilibrium was computed.
     ///
     /// # Errors
-    /// Λ does not settle: a little more load, and the arm would not come to rest.
+    /// Λ does not settle: with a little more load, the arm would have no equilibrium.
     pub fn adjoint(
         &mut self,
         setup: &PoseView,
@@ -172,7 +172,7 @@ impl AdjointSolver {
             moments.clear();
             moments.extend(pose.moments.iter().map(|&x| Dual64::from(x)));
             moments[j] = moments[j].derivative();
-            self.arm.lean_ropes(setup, &moments, &mut self.ws);
+            self.arm.update_leaning_ropes(setup, &moments, &mut self.ws);
             let frame = self.arm.walk(setup, Bend::Bent(&moments), pose.tip, &mut self.ws);
             self.ws.sum_moments();
             let position = frame.point(&target);
@@ -191,7 +191,7 @@ impl AdjointSolver {
 }
 
 impl StaticState {
-    /// Λ = `P_x` + Λ `G_x` by the same contraction as the equilibrium itself.
+    /// Solves Λ = `P_x` + Λ `G_x` by the same contraction as the equilibrium.
     fn solve_adjoint(&mut self) -> Result<(), StaticsError> {
         let n = self.moments.len();
         self.adjoint.clear();
@@ -201,10 +201,9 @@ impl StaticState {
             let adjoint = &mut self.adjoint[row * n..(row + 1) * n];
             let scale = direct.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let mut change = 0.0_f64;
-            for _ in 0..MAX_PASSES {
+            for _ in 0..MAX_EQUILIBRIUM_PASSES {
                 change = 0.0;
-                // In place from the tip inwards (Gauss–Seidel): outboard moments act on everything
-                // inboard.
+                // Gauss–Seidel from the tip inwards: outboard moments act on everything inboard.
                 for j in (0..n).rev() {
                     let column = &self.moment_response[j * n..(j + 1) * n];
                     let next =
@@ -212,14 +211,14 @@ impl StaticState {
                     change = change.max((next - adjoint[j]).abs());
                     adjoint[j] = next;
                 }
-                if change <= SETTLED * scale {
+                if change <= MAX_RELATIVE_CHANGE * scale {
                     break;
                 }
             }
             let largest = adjoint.iter().fold(scale, |m, x| m.max(x.abs()));
-            // No number compares with NaN.
+            // A comparison with NaN is always false.
             if change.is_nan()
-                || change > HOVERING * largest
+                || change > MAX_ACCEPTED_CHANGE * largest
                 || adjoint.iter().any(|x| !x.is_finite())
             {
                 return Err(StaticsError::NotSettled);
@@ -230,11 +229,11 @@ impl StaticState {
 }
 
 impl<S: Scalar> Arm<S> {
-    /// Position \[m\] of the target at `target` \[m\] in the pose's frame, arm base frame, with its
-    /// exact first derivatives.
+    /// Returns the position \[m\] of the target at `target` \[m\] in the pose's frame, arm base
+    /// frame, with its exact first derivatives.
     ///
-    /// `pose` is the same pose brought to rest with the real parts of this arm's parameters, and
-    /// for loads on the bent arm its Λ for the same target.
+    /// `pose` is the equilibrium of the same pose with the real parts of this arm's parameters; for
+    /// loads on the deflected arm it contains Λ of the same target.
     pub fn target_position(
         &self,
         setup: &PoseView,
@@ -253,7 +252,7 @@ impl<S: Scalar> Arm<S> {
             ws.sum_moments();
             moments.clear();
             moments.extend_from_slice(&ws.next_moments);
-            self.lean_ropes(setup, &moments, ws);
+            self.update_leaning_ropes(setup, &moments, ws);
             self.walk(setup, Bend::FirstOrder(&moments), pose.tip, ws).point(&target)
         });
         let position = match (first_order, self.mixing) {
@@ -268,7 +267,7 @@ impl<S: Scalar> Arm<S> {
         position
     }
 
-    /// The position on the bent arm; `moments` is memory.
+    /// Returns the position on the deflected arm; `moments` is reused memory.
     fn at_rest(
         &self,
         setup: &PoseView,
@@ -279,7 +278,7 @@ impl<S: Scalar> Arm<S> {
     ) -> Vector3<S> {
         moments.clear();
         moments.extend(pose.moments.iter().map(|&x| S::from(x)));
-        self.lean_ropes(setup, moments, ws);
+        self.update_leaning_ropes(setup, moments, ws);
         let mut position = self.walk(setup, Bend::Bent(moments), pose.tip, ws).point(target);
         ws.sum_moments();
         let n = moments.len();
@@ -292,13 +291,18 @@ impl<S: Scalar> Arm<S> {
         position
     }
 
-    /// Whether the declared statics take the loads on the rigid arm.
+    /// Returns true if the loads act on the undeflected arm.
     fn is_first_order(&self) -> bool {
         self.equilibrium == Equilibrium::Undeflected
     }
 
-    /// Gathers forces again where ropes lean with the unknowns.
-    pub(super) fn lean_ropes(&self, setup: &PoseView, state: &[S], ws: &mut Workspace<S>) {
+    /// Updates the forces of ropes that lean with the unknowns.
+    pub(super) fn update_leaning_ropes(
+        &self,
+        setup: &PoseView,
+        state: &[S],
+        ws: &mut Workspace<S>,
+    ) {
         if self.rope.is_some() {
             self.gather_forces(setup, state, ws);
         }
@@ -309,7 +313,7 @@ impl<S: Scalar> Arm<S> {
 mod tests {
     use super::*;
 
-    /// Two moments, each of which makes the other `factor` times itself.
+    /// Returns two moments, each of which multiplies the other by `factor`.
     fn pose(factor: f64) -> StaticState {
         StaticState {
             moments: vec![0.0; 2],
@@ -324,7 +328,7 @@ mod tests {
         let mut near = pose(0.5);
         assert_eq!(near.solve_adjoint(), Ok(()));
         assert!(
-            near.adjoint.iter().all(|own| (own - 2.0).abs() < 1e-12),
+            near.adjoint.iter().all(|entry| (entry - 2.0).abs() < 1e-12),
             "1 / (1 − 1/2): {:?}",
             near.adjoint
         );

@@ -1,4 +1,4 @@
-//! What a walk along the arm leaves behind, and the moments of the loads it has met.
+//! Results of a forward pass along the arm, and the moments of its loads.
 
 use nalgebra::Vector3;
 
@@ -9,60 +9,60 @@ use super::segment::Cut;
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
-/// What the walk passes, in order from the base outwards.
+/// Event of a forward pass, in order from the base outwards.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Event<S> {
     /// A force \[N\] at a point \[m\].
     Load { at: Vector3<S>, force: Vector3<S> },
-    /// The tip of a beam element: its three moments are unknowns.
+    /// Tip of a beam element: its three moments are unknown.
     Tip { at: Vector3<S> },
-    /// A flexible joint: the moment about its axis is an unknown, of all loads beyond and of the
-    /// spring that may pull there [N·m].
+    /// Flexible joint: the moment about its axis is unknown. It is the sum of all loads beyond and
+    /// of a spring's pull [N·m].
     Axis { at: Vector3<S>, axis: Vector3<S>, pull: Option<S> },
-    /// What tilts about two axes: the moments about them are unknowns.
+    /// Tilt about two axes: the moments about them are unknown.
     Tilt { at: Vector3<S>, axes: [Vector3<S>; 2] },
-    /// The end of a segment of the arm that was walked alone.
+    /// End of a segment, in a pass segment by segment.
     Cut,
-    /// As many branches as this, besides the one that comes next, begin here.
-    Fork { further: usize },
-    /// The last branch has ended, and the next one begins where the last fork has one left.
+    /// Start of this many branches besides the next one.
+    Fork { branches: usize },
+    /// End of a branch; the next one starts at the last fork that has one left.
     Branch,
 }
 
-/// Memory for walks, reused from pose to pose.
+/// Memory for forward passes, reused from pose to pose.
 #[derive(Debug, Clone)]
 pub struct Workspace<S> {
     pub(super) events: Vec<Event<S>>,
     pub(super) moments: Vec<S>,
     pub(super) next_moments: Vec<S>,
-    /// Where each hook is, x and y in the arm base frame \[m\], if ropes may lean: unknowns before
-    /// all moments.
+    /// Position of each hook, x and y in the arm base frame \[m\], if ropes may lean; unknowns
+    /// before all moments.
     pub(super) hooks: Vec<[S; 2]>,
-    /// Where the segments of the arm end, if it is walked segment by segment.
+    /// Ends of segments, in a pass segment by segment.
     pub(super) cuts: Vec<Cut<S>>,
-    /// How many events the walk had passed at the frame of the joint that was asked for.
+    /// Number of events before the frame of the requested joint.
     pub(super) passed: usize,
-    /// Frames at which branches are still to begin, the last first.
+    /// Frames at which branches are still to start, the last first.
     pub(super) forks: Vec<Frame<S>>,
-    /// Mass \[kg\] and hoists' force \[N\] of branches whose fork is still to come, and the same of
-    /// forces and moments.
+    /// Mass \[kg\] and hoist force \[N\] of branches whose fork is still to come; likewise forces
+    /// and moments.
     pub(super) weights: Vec<(S, Vector3<S>)>,
     pub(super) wrenches: Vec<(Vector3<S>, Vector3<S>)>,
-    /// Frame behind the mounting and behind each joint in the last walk, where they are kept.
+    /// Frames behind the mounting and behind each joint in the last pass, if they are kept.
     pub(super) frames: Vec<Frame<S>>,
     pub(super) keeps_frames: bool,
-    /// Force of each link's rope \[N\], zero without one.
+    /// Force of each link's rope \[N\]; zero without a rope.
     pub(super) ropes: Vec<Vector3<S>>,
     /// Force of everything beyond each joint's link \[N\].
     pub(super) beyond: Vec<Vector3<S>>,
-    /// Frame at each link's root in the last rigid walk.
+    /// Frame at each link's root in the last undeflected pass.
     pub(super) rigid_roots: Vec<Frame<S>>,
-    /// Where the last walk came by: ends of beam elements, and each joint before and after it
-    /// turned, arm base frame \[m\].
+    /// Points of the last pass, arm base frame \[m\]: ends of beam elements, and each joint before
+    /// and after its rotation.
     pub(super) trail: Vec<Vector3<S>>,
     pub(super) link_loads: Vec<LinkLoad<S>>,
     pub(super) points: Vec<(S, Wrench<S>)>,
-    /// What passes towards equilibrium have shown.
+    /// Acceleration of the passes towards equilibrium.
     pub(super) anderson: Anderson,
 }
 
@@ -92,9 +92,9 @@ impl<S> Default for Workspace<S> {
 }
 
 impl Workspace<f64> {
-    /// Sum of the sizes of all moments about the base in the last walk, and of those of springs
-    /// [N·m].
-    pub(super) fn turning(&self) -> f64 {
+    /// Returns the sum of the magnitudes of all moments about the base in the last pass, springs
+    /// included [N·m].
+    pub(super) fn moment_scale(&self) -> f64 {
         let term = |event: &Event<f64>| match event {
             Event::Load { at, force } => at.norm() * force.norm(),
             Event::Axis { pull: Some(pull), .. } => pull.abs(),
@@ -105,7 +105,7 @@ impl Workspace<f64> {
 }
 
 impl<S: Scalar> Workspace<S> {
-    /// Keeps a frame that the walk passes, if frames are kept.
+    /// Appends a frame of the pass, if frames are kept.
     #[inline]
     pub(super) fn keep(&mut self, frame: &Frame<S>) {
         if self.keeps_frames {
@@ -113,8 +113,7 @@ impl<S: Scalar> Workspace<S> {
         }
     }
 
-    /// The unknowns as the last walk gives them: places of hooks \[m\], then moments where
-    /// something bends [N·m].
+    /// Computes the unknowns of the last pass: positions of hooks \[m\], then moments [N·m].
     pub(super) fn sum_moments(&mut self) {
         let Self { events, next_moments, hooks, wrenches, .. } = self;
         let zero = Vector3::from_element(S::from(0.0));
@@ -144,8 +143,8 @@ impl<S: Scalar> Workspace<S> {
                     wrenches.push((force_sum, moment_sum));
                     (force_sum, moment_sum) = (zero, zero);
                 }
-                Event::Fork { further } => {
-                    for (force, moment) in (0..*further).filter_map(|_| wrenches.pop()) {
+                Event::Fork { branches } => {
+                    for (force, moment) in (0..*branches).filter_map(|_| wrenches.pop()) {
                         force_sum += force;
                         moment_sum += moment;
                     }

@@ -48,17 +48,17 @@ impl Elastic {
             match part_of(&arm, input.site).filter(|_| Sensitivity::applies_to(&arm)) {
                 Some(part) => {
                     let before = apart.iter().filter(|(_, of, _)| *of == part).count();
-                    apart.push((input, part, part.first_lane() + before));
+                    apart.push((input, part, part.first_parameter_direction() + before));
                 }
                 None => whole.push(Whole { arm: seed_arm(model, x, &[&input]), input }),
             }
         }
         let parts = (!apart.is_empty()).then(|| {
             let count = |part| apart.iter().filter(|(_, of, _)| *of == part).count();
-            let seeded = |lane| {
+            let seeded = |direction| {
                 let of_lane: Vec<&Input> = apart
                     .iter()
-                    .filter(|(_, _, own)| *own == lane)
+                    .filter(|(_, _, own)| *own == direction)
                     .map(|(input, _, _)| input)
                     .collect();
                 seed_arm(model, x, &of_lane)
@@ -91,8 +91,12 @@ impl Elastic {
         match parts {
             Some(Parts { sensitivity, inputs }) => {
                 sensitivity.differentiate(setup, target, rest).ok()?;
-                for (input, part, lane) in inputs {
-                    rows.put_input(input, commanded, &base.vector(&sensitivity.of(*part, *lane)));
+                for (input, part, direction) in inputs {
+                    rows.put_input(
+                        input,
+                        commanded,
+                        &base.vector(&sensitivity.derivative(*part, *direction)),
+                    );
                 }
             }
             None if !whole.is_empty() => response.adjoint(setup, target, rest).ok()?,

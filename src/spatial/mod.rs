@@ -1,5 +1,4 @@
-//! Frames and rotations in three dimensions, generic over the scalar and differentiable everywhere
-//! they are used.
+//! Frames and rotations in three dimensions, generic over the scalar and differentiable.
 
 mod frame;
 mod placement;

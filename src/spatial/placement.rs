@@ -1,11 +1,12 @@
-//! Frames given by xyz and roll, pitch, yaw, as URDF has them.
+//! Frames given by xyz and roll, pitch, yaw, as in URDF.
 
 use nalgebra::Vector3;
 
 use super::Frame;
 
 impl Frame<f64> {
-    /// Txyz Rz(yaw) Ry(pitch) Rx(roll), `xyz` \[m\], `rpy` \[rad\] in the order roll, pitch, yaw.
+    /// Creates the frame Txyz Rz(yaw) Ry(pitch) Rx(roll) from `xyz` \[m\] and `rpy` \[rad\] in the
+    /// order roll, pitch, yaw.
     pub fn from_xyz_rpy(xyz: &Vector3<f64>, rpy: &Vector3<f64>) -> Self {
         let mut frame = Self { origin: *xyz, ..Self::identity() };
         frame.rotate_z(rpy.z.sin_cos());
@@ -14,9 +15,10 @@ impl Frame<f64> {
         frame
     }
 
-    /// Roll, pitch and yaw \[rad\] of the axes, yaw 0 where pitch is a right angle.
+    /// Returns roll, pitch and yaw \[rad\]; yaw is 0 if pitch is a right angle.
     ///
-    /// Yaw is told from the x axis, and roll from what is left: to rounding at every pitch.
+    /// Yaw follows from the x axis and roll from the remaining rotation, which is exact to rounding
+    /// at every pitch.
     pub fn roll_pitch_yaw(&self) -> Vector3<f64> {
         let [x, y, z] = &self.axes;
         let level = x.x.hypot(x.y);
@@ -26,7 +28,7 @@ impl Frame<f64> {
         Vector3::new(roll, (-x.z).atan2(level), yaw)
     }
 
-    /// The reference frame, as seen from this one.
+    /// Returns the reference frame in this frame.
     #[must_use]
     pub fn inverse(&self) -> Self {
         let axes = [0, 1, 2].map(|k| self.axes.map(|axis| axis[k]).into());
@@ -43,10 +45,10 @@ mod tests {
     #[test]
     fn angles_come_back_at_every_pitch() {
         let angles = [0.0, 0.3, -1.2, FRAC_PI_2, -FRAC_PI_2, FRAC_PI_2 - 1e-9, PI, 1.57, -2.9];
-        let all = angles.iter().flat_map(|&roll| {
+        let combinations = angles.iter().flat_map(|&roll| {
             angles.iter().flat_map(move |&pitch| angles.map(|yaw| [roll, pitch, yaw]))
         });
-        for rpy in all {
+        for rpy in combinations {
             let frame = Frame::from_xyz_rpy(&Vector3::new(1.0, -2.0, 0.5), &rpy.into());
             let again = Frame::from_xyz_rpy(&frame.origin, &frame.roll_pitch_yaw());
             let off = (0..3).map(|k| (frame.axes[k] - again.axes[k]).norm()).fold(0.0, f64::max);

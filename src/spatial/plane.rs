@@ -1,16 +1,16 @@
-//! The normal of a plane by two numbers.
+//! Normal of a plane by two numbers.
 
 use nalgebra::Vector3;
 
 use super::rotate;
 use crate::scalar::Scalar;
 
-/// Largest tilt of a normal against ẑ, and least rx of one that is told by its opposite \[rad\].
+/// Largest angle between a normal and ẑ, beyond which the opposite normal is parameterised \[rad\].
 pub const MAX_NORMAL_TILT: f64 = 0.75 * std::f64::consts::PI;
 
-/// The normal of a plane from its first two numbers \[rad\]: exp(\[(rx, ry, 0)\]×) ẑ, which is
-/// singular at −ẑ; with rx above 3π/4 it is −exp(\[(rx − π, ry, 0)\]×) ẑ, which is not. With ry = 0
-/// both are the same.
+/// Returns the normal of a plane from its first two numbers \[rad\]: exp(\[(rx, ry, 0)\]×) ẑ. This
+/// is singular at −ẑ; for rx above 3π/4 the normal is −exp(\[(rx − π, ry, 0)\]×) ẑ, which is not.
+/// Both agree for ry = 0.
 pub fn plane_normal<S: Scalar>(rx: S, ry: S) -> Vector3<S> {
     let of = |rx: S| {
         let zero = S::from(0.0);

@@ -1,11 +1,11 @@
-//! The exponential of rotations.
+//! Exponential and logarithm of rotations.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::scalar::Scalar;
 
-/// Below this squared angle \[rad²\] the exponential uses its power series, exact to rounding
-/// there.
+/// Squared angle below which the exponential uses its power series, exact to rounding there
+/// \[rad²\].
 const SERIES_BELOW: f64 = 0.01;
 
 /// Rotates `vector` by the rotation vector `w` \[rad\]: exp(`[w]×`) v.
@@ -19,7 +19,7 @@ pub fn rotate<S: Scalar>(w: &Vector3<S>, vector: &Vector3<S>) -> Vector3<S> {
     vector + first * a + second * b
 }
 
-/// The columns of the rotation matrix exp(`[w]×`) of a rotation vector `w` \[rad\].
+/// Returns the columns of the rotation matrix exp(`[w]×`) of a rotation vector `w` \[rad\].
 ///
 /// R = cos φ I + A `[w]×` + B w wᵀ with A and B as in [`rotate`], cos φ = 1 − B φ².
 pub fn rotation_axes<S: Scalar>(w: &Vector3<S>) -> [Vector3<S>; 3] {
@@ -36,18 +36,17 @@ pub fn rotation_axes<S: Scalar>(w: &Vector3<S>) -> [Vector3<S>; 3] {
     ]
 }
 
-/// The rotation vector \[rad\], in the reference frame, that turns the axes `from` into `to`:
-/// log(R₂ R₁ᵀ), at most half a turn.
+/// Returns the rotation vector \[rad\], in the reference frame, that rotates the axes `from` into
+/// `to`: log(R₂ R₁ᵀ), at most half a turn.
 pub fn rotation_between(from: &[Vector3<f64>; 3], to: &[Vector3<f64>; 3]) -> Vector3<f64> {
     let turn = Matrix3::from_columns(to) * Matrix3::from_columns(from).transpose();
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turn)).scaled_axis()
 }
 
-/// How log(exp(`[w]×`) exp(`[δ]×`)) changes with a small δ at 0: J⁻¹ = I + ½ `[w]×` + C `[w]×`², C
-/// = (1 − φ/2 cot φ/2) / φ².
+/// Returns the inverse right Jacobian of SO(3), the derivative of log(exp(`[w]×`) exp(`[δ]×`)) at δ
+/// = 0: J⁻¹ = I + ½ `[w]×` + C `[w]×`², C = (1 − φ/2 cot φ/2) / φ².
 ///
-/// The inverse of the right Jacobian of SO(3) at a rotation vector w \[rad\] of less than a turn.
-/// [Chirikjian 2012, ch. 10]
+/// The rotation vector w \[rad\] is shorter than a turn. [Chirikjian 2012, ch. 10]
 pub fn inverse_right_jacobian(w: &Vector3<f64>) -> Matrix3<f64> {
     let squared = w.norm_squared();
     let c = if squared < SERIES_BELOW {
@@ -60,34 +59,34 @@ pub fn inverse_right_jacobian(w: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::identity() + cross * 0.5 + cross * cross * c
 }
 
-/// A plain vector turned about the x axis, given (sin, cos).
+/// Rotates a real vector about the x axis, given (sin, cos).
 #[inline]
 pub fn rotated_about_x<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
     let (y, z) = turn(sin_cos, vector.y, vector.z);
     Vector3::new(S::from(vector.x), y, z)
 }
 
-/// A plain vector turned about the y axis, given (sin, cos).
+/// Rotates a real vector about the y axis, given (sin, cos).
 #[inline]
 pub fn rotated_about_y<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
     let (z, x) = turn(sin_cos, vector.z, vector.x);
     Vector3::new(x, S::from(vector.y), z)
 }
 
-/// A plain vector turned about the z axis, given (sin, cos).
+/// Rotates a real vector about the z axis, given (sin, cos).
 #[inline]
 pub fn rotated_about_z<S: Scalar>(sin_cos: (S, S), vector: &Vector3<f64>) -> Vector3<S> {
     let (x, y) = turn(sin_cos, vector.x, vector.y);
     Vector3::new(x, y, S::from(vector.z))
 }
 
-/// Coordinates in a plane turned by an angle, given (sin, cos).
+/// Rotates coordinates in a plane by an angle, given (sin, cos).
 #[inline]
 fn turn<S: Scalar>((sin, cos): (S, S), u: f64, v: f64) -> (S, S) {
     (cos * u - sin * v, sin * u + cos * v)
 }
 
-/// (sin φ / φ, (1 − cos φ) / φ²) from φ² \[rad²\].
+/// Returns (sin φ / φ, (1 − cos φ) / φ²) from φ² \[rad²\].
 fn coefficients<S: Scalar>(squared: S) -> (S, S) {
     if squared.re() < SERIES_BELOW {
         let horner = |c: [f64; 5]| {

@@ -57,7 +57,7 @@ impl Steps {
     pub fn of(arm: &Arm<f64>) -> Self {
         let (mut before, mut step) = (Vec::new(), Frame::identity());
         for joint in &arm.joints {
-            joint.walk_to_axis(&mut step);
+            joint.advance_to_zero(&mut step);
             if joint.kind != JointKind::Fixed {
                 before.push(std::mem::take(&mut step));
             }

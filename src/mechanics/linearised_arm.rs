@@ -1,0 +1,230 @@
+//! Forward pass segment by segment, linearised about an equilibrium.
+
+use std::ops::Range;
+
+use nalgebra::Vector3;
+
+use super::anderson::Anderson;
+use crate::spatial::Frame;
+
+/// One vector for each coordinate of the position.
+pub(super) type PerCoordinate = [Vector3<f64>; 3];
+
+/// Motion of a segment's end with one parameter: a point r beyond the end moves by rotation × r +
+/// translation.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct EndTwist {
+    /// Rotation vector per unit of the parameter \[rad\].
+    pub rotation: Vector3<f64>,
+    /// Displacement of the point at the base origin per unit \[m\].
+    pub translation: Vector3<f64>,
+    /// Change of the spring's moment about a joint's axis per unit [N·m].
+    pub pull: f64,
+}
+
+/// Axes of a section's moment: fixed in space, or moving with the arm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum MomentAxes {
+    Fixed,
+    Moving,
+}
+
+/// Element of a forward pass, in order from the base outwards.
+#[derive(Debug, Clone)]
+pub(super) enum Step {
+    /// Force on a rigid part, by its index.
+    Load(usize),
+    /// Place of unknown moments.
+    Section(Section),
+    /// Segment of the arm.
+    Segment(LinearisedSegment),
+    /// Start of this many branches besides the next one.
+    Fork { branches: usize },
+    /// End of a branch; the next one starts at the last fork that has one left.
+    Branch,
+}
+
+/// Segment with the indices of its derivatives: one twist for each of its directions, and the moves
+/// of its loads in each.
+///
+/// The first three directions of a segment that `rotates` are rotations of its root, in the root's
+/// axes.
+#[derive(Debug, Clone, Default)]
+pub(super) struct LinearisedSegment {
+    /// Index in a list of all segments.
+    pub index: usize,
+    pub root: Frame<f64>,
+    pub tip: Frame<f64>,
+    pub rotates: bool,
+    /// Moments that deflect it, and their first direction.
+    pub unknowns: Range<usize>,
+    pub moment_direction: usize,
+    /// First direction of its parameters, and end of all directions.
+    pub parameter_direction: usize,
+    pub directions: usize,
+    /// Events of the forward pass that are its loads.
+    pub events: Range<usize>,
+    /// Event of its axis, if it is a joint that deflects about it.
+    pub axis: Option<usize>,
+    /// Indices of its loads, twists and moves, set by [`LinearisedArm::push_segment`].
+    pub loads: Range<usize>,
+    pub first_column: usize,
+    pub first_move: usize,
+}
+
+impl LinearisedSegment {
+    pub fn column(&self, direction: usize) -> usize {
+        self.first_column + direction
+    }
+
+    pub fn moves(&self, direction: usize) -> Range<usize> {
+        let first = self.first_move + direction * self.loads.len();
+        first..first + self.loads.len()
+    }
+}
+
+/// Place where moments are unknown.
+#[derive(Debug, Clone)]
+pub(super) struct Section {
+    pub at: Vector3<f64>,
+    pub axes: PerCoordinate,
+    pub unknowns: Range<usize>,
+    pub moment_axes: MomentAxes,
+    /// Force of all loads beyond, and their moment about the section.
+    pub force: Vector3<f64>,
+    pub moment: Vector3<f64>,
+}
+
+/// Force at a point, base frame, with the virtual force: the work that moving the point does.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Load {
+    pub at: Vector3<f64>,
+    pub force: Vector3<f64>,
+    pub virtual_force: PerCoordinate,
+}
+
+/// Sum of forces, and of their moments about the base origin.
+#[derive(Default)]
+struct Sums {
+    force: Vector3<f64>,
+    moment: Vector3<f64>,
+}
+
+impl Sums {
+    fn add(&mut self, load: &Load) {
+        self.force += load.force;
+        self.moment += load.at.cross(&load.force);
+    }
+}
+
+/// Pose at equilibrium, linearised segment by segment, from which derivatives of the position
+/// follow.
+#[derive(Debug, Clone, Default)]
+pub(super) struct LinearisedArm {
+    pub steps: Vec<Step>,
+    /// Number of steps before the target.
+    pub target: usize,
+    pub loads: Vec<Load>,
+    pub columns: Vec<EndTwist>,
+    pub moves: Vec<Vector3<f64>>,
+    /// Influence Λ, three coordinates of each moment [m/(N·m)], and its image in the last sweep.
+    pub influence: Vec<f64>,
+    pub image: Vec<f64>,
+    pub anderson: Anderson,
+    /// Derivatives of the position with respect to the parameters, by segment and direction.
+    pub derivatives: Vec<Vector3<f64>>,
+    /// Number of directions of each segment there.
+    pub stride: usize,
+}
+
+impl LinearisedArm {
+    /// Creates an empty linearisation of `segments` with at most `directions` each.
+    pub fn new(parts: usize, directions: usize) -> Self {
+        Self {
+            derivatives: vec![Vector3::zeros(); parts * directions],
+            stride: directions,
+            ..Self::default()
+        }
+    }
+
+    /// Returns the derivative of the position with respect to the parameter in a direction of a
+    /// segment.
+    pub fn derivative(&self, part: usize, direction: usize) -> Vector3<f64> {
+        self.derivatives[part * self.stride + direction]
+    }
+
+    pub fn clear(&mut self) {
+        self.steps.clear();
+        self.loads.clear();
+        self.columns.clear();
+        self.moves.clear();
+        self.influence.clear();
+        self.image.clear();
+        self.derivatives.fill(Vector3::zeros());
+    }
+
+    pub fn push_load(&mut self, at: Vector3<f64>, force: Vector3<f64>) {
+        self.steps.push(Step::Load(self.loads.len()));
+        self.loads.push(Load { at, force, virtual_force: [Vector3::zeros(); 3] });
+    }
+
+    pub fn push_section(
+        &mut self,
+        at: Vector3<f64>,
+        axes: &[Vector3<f64>],
+        moment_axes: MomentAxes,
+    ) {
+        let first = self.influence.len() / 3;
+        self.influence.resize(3 * (first + axes.len()), 0.0);
+        self.image.resize(self.influence.len(), 0.0);
+        let mut axes_with_zeros = [Vector3::zeros(); 3];
+        axes_with_zeros[..axes.len()].copy_from_slice(axes);
+        let (force, moment) = (Vector3::zeros(), Vector3::zeros());
+        self.steps.push(Step::Section(Section {
+            at,
+            axes: axes_with_zeros,
+            unknowns: first..first + axes.len(),
+            moment_axes,
+            force,
+            moment,
+        }));
+    }
+
+    /// Appends a segment; the last loads are its own.
+    pub fn push_segment(&mut self, mut segment: LinearisedSegment) {
+        segment.loads = self.loads.len() - segment.events.len()..self.loads.len();
+        (segment.first_column, segment.first_move) = (self.columns.len(), self.moves.len());
+        self.columns.resize(segment.first_column + segment.directions, EndTwist::default());
+        self.moves.resize(
+            segment.first_move + segment.directions * segment.loads.len(),
+            Vector3::zeros(),
+        );
+        self.steps.truncate(self.steps.len() - segment.loads.len());
+        self.steps.push(Step::Segment(segment));
+    }
+
+    /// Sums the loads beyond every section, once all steps are there.
+    pub fn sum_loads(&mut self) {
+        let mut sums = Sums::default();
+        let mut ends = Vec::new();
+        for step in self.steps.iter_mut().rev() {
+            match step {
+                Step::Load(load) => sums.add(&self.loads[*load]),
+                Step::Segment(segment) => {
+                    self.loads[segment.loads.clone()].iter().for_each(|load| sums.add(load))
+                }
+                Step::Section(section) => {
+                    section.force = sums.force;
+                    section.moment = sums.moment - section.at.cross(&sums.force);
+                }
+                Step::Branch => ends.push(std::mem::take(&mut sums)),
+                Step::Fork { branches } => {
+                    for branch in (0..*branches).filter_map(|_| ends.pop()) {
+                        sums.force += branch.force;
+                        sums.moment += branch.moment;
+                    }
+                }
+            }
+        }
+    }
+}
