@@ -1,32 +1,32 @@
-//! Models that leave a part of the elasticity out.
+//! Models with a part of the elasticity left out.
 
 use super::Model;
 use crate::mechanics::Flexibility;
 use crate::model::parameter::{ArmField, BeamField, ParameterSite};
 
-/// What an ablated model keeps of the elasticity; what effects add to loads and to the shape of the
-/// arm stays.
+/// Part of the elasticity that an ablated model keeps. Loads and shape changes by effects are
+/// always kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Ablation {
-    /// Nothing: geometry alone.
+    /// No elasticity: geometry alone.
     Rigid,
-    /// Whatever turns joints, the bending of slides, and the base.
+    /// Rotation of joints, bending of slides, and the base.
     JointsOnly,
     /// Stretch, bending and twist of the links.
     LinksOnly,
-    /// Bending of the links.
+    /// Bending of the links alone.
     BendingOnly,
-    /// Everything.
+    /// All of the elasticity.
     All,
 }
 
 impl Ablation {
-    /// In order from least to most.
+    /// All ablations, from least to most elasticity.
     pub const EACH: [Self; 5] =
         [Self::Rigid, Self::JointsOnly, Self::LinksOnly, Self::BendingOnly, Self::All];
 
-    /// Name in results.
+    /// Returns the name in results.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Rigid => "rigid",
@@ -65,7 +65,8 @@ impl Ablation {
 }
 
 impl Model {
-    /// The same model with a part of its elasticity left out, and the parameters that describe it.
+    /// Returns the model with a part of its elasticity left out, together with the parameters of
+    /// that part.
     #[must_use]
     pub fn ablated(&self, ablation: Ablation) -> Self {
         let mut model = self.clone();
@@ -79,7 +80,7 @@ impl Model {
             if matches!(ablation, Ablation::Rigid | Ablation::LinksOnly | Ablation::BendingOnly) {
                 (joint.flexibility, joint.lateral, joint.slide) = (None, None, None);
             }
-            // A rigid link that changes with temperature is still walked along.
+            // The forward pass still needs a rigid link that changes with temperature.
             if ablation == Ablation::Rigid
                 && joint.beam.as_ref().is_some_and(|beam| beam.strain.is_none())
             {

@@ -1,4 +1,4 @@
-//! Residuals of poses as functions of the joint commands.
+//! Residuals of rows as a function of the joint commands.
 
 use std::ops::Range;
 
@@ -8,26 +8,25 @@ use super::{Model, Pose, PoseResiduals};
 use crate::least_squares::{Block, LeastSquares};
 use crate::problem::Problem;
 
-/// Residuals of poses over corrections to the commands of an arm, from the configurations of the
-/// poses.
+/// Residuals of rows as a function of corrections to the commanded configurations.
 ///
-/// A joint that follows another moves by ratio × the correction of its leader.
+/// A mimic joint moves by ratio × the correction of its leader.
 pub struct CommandResiduals<'a> {
-    /// Over the commands, then over the coordinates of followers.
+    /// Residuals over the commands, followed by the coordinates of mimic joints.
     joints: PoseResiduals<'a>,
     commands: usize,
-    /// Column of its leader and ratio of every follower.
+    /// Column of the leader and ratio of each mimic joint.
     followers: Vec<(usize, f64)>,
 }
 
 impl<'a> CommandResiduals<'a> {
-    /// Of `arm` with `commands` commands, whose parameters are those of [`Model::with_free_commands`] and
-    /// then those of [`Model::with_mimic_joints`].
+    /// Creates the residuals of `arm` with `commands` commands. Its parameters are those of
+    /// [`Model::with_free_commands`], followed by those of [`Model::with_mimic_joints`].
     pub fn new(problem: &Problem, arm: &'a Model, commands: usize, poses: Vec<Pose<'a>>) -> Self {
         let moving = arm.moving_joints();
         let follower = |joint: &usize| {
             let mimic = problem.joints[*joint].mimic?;
-            Some((moving.iter().position(|&own| own == mimic.joint)?, mimic.ratio))
+            Some((moving.iter().position(|&joint| joint == mimic.joint)?, mimic.ratio))
         };
         let followers = moving.iter().skip(commands).filter_map(follower).collect();
         let unknowns = (0..moving.len()).collect();
@@ -35,8 +34,8 @@ impl<'a> CommandResiduals<'a> {
         Self { joints, commands, followers }
     }
 
-    /// Corrections to all coordinates, of followers as well.
-    fn all(&self, x: &DVector<f64>) -> DVector<f64> {
+    /// Returns the corrections to all coordinates, mimic joints included.
+    fn all_corrections(&self, x: &DVector<f64>) -> DVector<f64> {
         let followers = self.followers.iter().map(|&(leader, ratio)| ratio * x[leader]);
         DVector::from_iterator(
             self.commands + self.followers.len(),
@@ -59,21 +58,21 @@ impl LeastSquares for CommandResiduals<'_> {
     }
 
     fn residuals(&self, x: &DVector<f64>, items: Range<usize>, out: &mut [f64]) {
-        self.joints.residuals(&self.all(x), items, out);
+        self.joints.residuals(&self.all_corrections(x), items, out);
     }
 
     fn linearise(&self, x: &DVector<f64>, items: Range<usize>, block: &mut Block) {
         let count = self.commands + self.followers.len();
-        let mut all = Block::zeros(block.rows(), count);
-        self.joints.linearise(&self.all(x), items, &mut all);
+        let mut full = Block::zeros(block.rows(), count);
+        self.joints.linearise(&self.all_corrections(x), items, &mut full);
         for column in 0..self.commands {
-            block.column_mut(column).copy_from_slice(all.column(column));
+            block.column_mut(column).copy_from_slice(full.column(column));
         }
         for (&(leader, ratio), column) in self.followers.iter().zip(self.commands..) {
-            for (out, own) in block.column_mut(leader).iter_mut().zip(all.column(column)) {
-                *out += ratio * own;
+            for (out, derivative) in block.column_mut(leader).iter_mut().zip(full.column(column)) {
+                *out += ratio * derivative;
             }
         }
-        block.column_mut(self.commands).copy_from_slice(all.column(count));
+        block.column_mut(self.commands).copy_from_slice(full.column(count));
     }
 }

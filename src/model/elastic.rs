@@ -1,47 +1,47 @@
-//! Derivatives of an elastic arm with respect to its own parameters.
+//! Derivatives of an elastic arm with respect to its parameters.
 //!
-//! What a parameter does to its own part is taken alone, and virtual work tells what that does to
-//! the target; parameters that change loads go through the whole statics, one by one.
+//! A parameter of one segment is differentiated within that segment, and virtual work gives the
+//! motion of the target. A parameter that changes loads goes through the whole statics.
 
 use nalgebra::Vector3;
 use num_dual::Dual64;
 
 use super::Model;
-use super::enter::enter;
 use super::inputs::Input;
 use super::rows::Rows;
+use super::sites::set_site;
 use crate::mechanics::{AdjointSolver, Angle, Arm, Segment, Sensitivity, StaticState, Workspace};
 use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
 use crate::problem::PoseView;
 use crate::spatial::Frame;
 
-/// An elastic arm, part by part where its parameters act on one part alone, else one by one through
-/// the whole arm.
+/// Elastic arm, differentiated segment by segment for parameters of one segment, and as a whole for
+/// the others.
 pub(super) struct Elastic {
     parts: Option<Parts>,
-    response: AdjointSolver,
+    adjoint: AdjointSolver,
     whole: Vec<Whole>,
     arm: Arm<f64>,
-    rest: StaticState,
-    /// Memory for walks.
+    state: StaticState,
+    /// Memory for forward passes.
     real: Workspace<f64>,
     ws: Workspace<Dual64>,
 }
 
-/// An arm to be taken apart, and the direction of each input in its part.
+/// Parameters of single segments, with the direction of each in its segment.
 struct Parts {
     sensitivity: Sensitivity,
     inputs: Vec<(Input, Segment, usize)>,
 }
 
-/// An input with the arm that has it seeded.
+/// Input of the whole arm, with the arm in which it is seeded.
 struct Whole {
     arm: Arm<Dual64>,
     input: Input,
 }
 
 impl Elastic {
-    /// Of `arm`, which is the model's at `x`.
+    /// Creates the derivatives of `arm`, which is that of the model at `x`.
     pub fn new(model: &Model, x: &[f64], arm: Arm<f64>, inputs: Vec<Input>) -> Self {
         let (mut apart, mut whole) = (Vec::new(), Vec::new());
         for input in inputs {
@@ -56,29 +56,29 @@ impl Elastic {
         let parts = (!apart.is_empty()).then(|| {
             let count = |part| apart.iter().filter(|(_, of, _)| *of == part).count();
             let seeded = |direction| {
-                let of_lane: Vec<&Input> = apart
+                let of_direction: Vec<&Input> = apart
                     .iter()
-                    .filter(|(_, _, own)| *own == direction)
+                    .filter(|(_, _, its_direction)| *its_direction == direction)
                     .map(|(input, _, _)| input)
                     .collect();
-                seed_arm(model, x, &of_lane)
+                seed_arm(model, x, &of_direction)
             };
             Parts { sensitivity: Sensitivity::new(&arm, count, seeded), inputs: apart.clone() }
         });
-        let (response, rest) = (AdjointSolver::new(&arm), StaticState::default());
+        let (adjoint, state) = (AdjointSolver::new(&arm), StaticState::default());
         Self {
             parts,
-            response,
+            adjoint,
             whole,
             arm,
-            rest,
+            state,
             real: Workspace::default(),
             ws: Workspace::default(),
         }
     }
 
-    /// Writes the derivatives of a target \[m\] in the frame of the joint `tip`; returns that
-    /// frame, measuring frame, `None` where the pose has no equilibrium.
+    /// Writes the derivatives of a target \[m\] in the frame of the joint `tip`. Returns that
+    /// frame, measuring frame, or `None` without equilibrium.
     pub fn write(
         &mut self,
         (commanded, setup): (&PoseView, &PoseView),
@@ -86,11 +86,11 @@ impl Elastic {
         (tip, target): (usize, &Vector3<f64>),
         rows: &mut Rows,
     ) -> Option<Frame<f64>> {
-        let Self { parts, response, whole, arm, rest, real, ws } = self;
-        arm.equilibrate_at(setup, tip, real, rest).ok()?;
+        let Self { parts, adjoint, whole, arm, state, real, ws } = self;
+        arm.equilibrate_at(setup, tip, real, state).ok()?;
         match parts {
             Some(Parts { sensitivity, inputs }) => {
-                sensitivity.differentiate(setup, target, rest).ok()?;
+                sensitivity.differentiate(setup, target, state).ok()?;
                 for (input, part, direction) in inputs {
                     rows.put_input(
                         input,
@@ -99,22 +99,22 @@ impl Elastic {
                     );
                 }
             }
-            None if !whole.is_empty() => response.adjoint(setup, target, rest).ok()?,
+            None if !whole.is_empty() => adjoint.adjoint(setup, target, state).ok()?,
             None => {}
         }
         for Whole { arm, input } in whole {
-            let position = arm.target_position(setup, target, rest, ws);
+            let position = arm.target_position(setup, target, state, ws);
             rows.put_input(
                 input,
                 commanded,
                 &base.vector(&position.map(|coordinate| coordinate.eps)),
             );
         }
-        Some(base.compose(&rest.frame))
+        Some(base.compose(&state.frame))
     }
 }
 
-/// The part on which alone an input acts; none where it changes loads.
+/// Returns the segment that alone contains an input; `None` if the input changes loads.
 fn part_of(arm: &Arm<f64>, site: ParameterSite) -> Option<Segment> {
     match site {
         ParameterSite::Joint { joint, field: JointField::A }
@@ -130,7 +130,7 @@ fn part_of(arm: &Arm<f64>, site: ParameterSite) -> Option<Segment> {
     }
 }
 
-/// The arm at `x` with the derivative of some inputs, of which no two act on the same part.
+/// Returns the arm at `x` with some inputs seeded, no two of which belong to the same segment.
 pub(super) fn seed_arm(model: &Model, x: &[f64], inputs: &[&Input]) -> Arm<Dual64> {
     let is_seeded = |k: usize| inputs.iter().any(|input| input.parameter == Some(k));
     let mut arm = model.arm(|k| Dual64::new(x[k], f64::from(u8::from(is_seeded(k)))));
@@ -147,7 +147,7 @@ pub(super) fn seed_arm(model: &Model, x: &[f64], inputs: &[&Input]) -> Arm<Dual6
                     _ => joint.theta += seed,
                 }
             }
-            ParameterSite::Beam { .. } => enter(&mut arm, input.site, 0.0, seed, &mut [seed; 2]),
+            ParameterSite::Beam { .. } => set_site(&mut arm, input.site, 0.0, seed, &mut [seed; 2]),
             _ => {}
         }
     }

@@ -1,22 +1,24 @@
-//! The scalars of the arm that parameters act on: one derivative serves every parameter that is
-//! regressors at one place.
+//! Scalars of the arm that parameters act on. One derivative serves all parameters at the same
+//! site.
 
 use super::Model;
 use crate::model::parameter::{ParameterSite, Regressor};
 
-/// A scalar of the arm with the columns of the parameters that act on it.
+/// Scalar of the arm with the columns of the parameters that act on it.
 #[derive(Debug, Clone)]
 pub(super) struct Input {
     pub site: ParameterSite,
-    /// The parameter that is this scalar, if it is an unknown.
+    /// Parameter that equals this scalar, if it is an unknown.
     pub parameter: Option<usize>,
-    /// Its column.
+    /// Column of that parameter.
     pub column: Option<usize>,
-    /// Columns of the parameters that add to the scalar, each multiplied by its regressor.
+    /// Columns of the parameters that add to the scalar, each with the regressor that multiplies
+    /// it.
     pub regressors: Vec<(usize, Regressor)>,
 }
 
-/// Inputs of the arm for some unknowns, whose column is their place in the list.
+/// Returns the inputs of the arm for some unknowns; the column of an unknown is its place in the
+/// list.
 pub(super) fn inputs(model: &Model, unknowns: &[usize]) -> Vec<Input> {
     let mut inputs: Vec<Input> = Vec::new();
     for (column, &k) in unknowns.iter().enumerate() {
@@ -27,8 +29,8 @@ pub(super) fn inputs(model: &Model, unknowns: &[usize]) -> Vec<Input> {
         ) {
             continue;
         }
-        let known = inputs.iter().position(|input| input.site == parameter.site);
-        let index = known.unwrap_or_else(|| {
+        let existing = inputs.iter().position(|input| input.site == parameter.site);
+        let index = existing.unwrap_or_else(|| {
             inputs.push(Input {
                 site: parameter.site,
                 parameter: None,

@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Model;
-use super::commands::Commands;
+use super::command_terms::CommandTerms;
 use super::derivatives::{ArmDerivatives, Base, Target};
 use super::elastic::Elastic;
 use super::inputs::inputs;
@@ -25,7 +25,7 @@ use crate::spatial::Frame;
 
 /// Writer of residuals and Jacobian rows at one parameter vector, used for every row.
 pub(super) struct JacobianWriter {
-    commands: Commands,
+    commands: CommandTerms,
     instrument: Instrument,
     /// Columns of the instrument's errors, with site and regressor.
     instrument_columns: Vec<(ParameterSite, Regressor, usize)>,

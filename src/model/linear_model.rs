@@ -64,8 +64,8 @@ impl LinearModel {
             return false;
         }
         let column = |&k: &usize| self.parameters.get(&parameters[k].name)?.1;
-        let known: Vec<Option<usize>> = unknowns.iter().map(column).collect();
-        let is_new = |j: &usize| known[*j].is_none();
+        let columns: Vec<Option<usize>> = unknowns.iter().map(column).collect();
+        let is_new = |j: &usize| columns[*j].is_none();
         let new: Vec<usize> = (0..unknowns.len()).filter(is_new).collect();
         let mut formed = Block::zeros(block.rows(), new.len());
         write(&new.iter().map(|&j| unknowns[j]).collect::<Vec<_>>(), &mut formed);
@@ -82,7 +82,7 @@ impl LinearModel {
         if !squares.is_finite() || squares > largest {
             return false;
         }
-        for (j, column) in known.iter().enumerate() {
+        for (j, column) in columns.iter().enumerate() {
             let Some(column) = column else { continue };
             let column = self.jacobian.column(*column);
             let out = block.column_mut(j).iter_mut().enumerate();
@@ -97,9 +97,10 @@ impl LinearModel {
     /// Returns true if `x` is the point of the linear model, to rounding.
     fn is_at(&self, parameters: &[Parameter], x: &[f64]) -> bool {
         parameters.iter().zip(x).all(|(parameter, x)| {
-            let known = self.parameters.get(&parameter.name).map_or(0.0, |(known, _)| *known);
-            let size = parameter.nominal.abs() + known.abs();
-            (x - known).abs() <= MAX_RELATIVE_DIFFERENCE * size
+            let entry = self.parameters.get(&parameter.name);
+            let known_x = entry.map_or(0.0, |(x, _)| *x);
+            let size = parameter.nominal.abs() + known_x.abs();
+            (x - known_x).abs() <= MAX_RELATIVE_DIFFERENCE * size
         })
     }
 }
@@ -127,68 +128,73 @@ mod tests {
     }
 
     #[test]
-    fn known_columns_are_those_formed_anew() {
-        are_those_formed_anew(RIGID, 1.0);
+    fn columns_of_a_linear_model_equal_fresh_ones() {
+        columns_equal_fresh_ones(RIGID, 1.0);
     }
 
     #[test]
-    fn known_columns_of_an_arm_that_bends_are_those_formed_anew_also_of_poses_that_were_set_aside()
-    {
-        are_those_formed_anew(ELASTIC, 1e6);
+    fn columns_for_an_elastic_arm_equal_fresh_ones_for_other_sigma() {
+        columns_equal_fresh_ones(ELASTIC, 1e6);
     }
 
-    /// With σ of some poses so many times as large where the derivatives were formed.
-    fn are_those_formed_anew(arm: &str, aside: f64) {
+    /// Multiplies σ of some poses by `factor` where the derivatives are formed.
+    fn columns_equal_fresh_ones(arm: &str, factor: f64) {
         let configurations: Vec<[f64; 2]> =
             (0..600).map(|k| [0.01 * f64::from(k), 2.0 * (0.03 * f64::from(k)).sin()]).collect();
-        let seen = Vector3::new(0.1, 0.2, 0.3);
-        let pose = |own, sigma| Pose {
-            setup: PoseView::from_configuration(own),
+        let measured = Vector3::new(0.1, 0.2, 0.3);
+        let pose = |configuration, sigma| Pose {
+            setup: PoseView::from_configuration(configuration),
             base: 0,
             target: 0,
             observation: Observation::Position,
-            measured: &seen,
+            measured: &measured,
             sigma,
             orientation: None,
         };
-        let sigma = |k: usize, aside: f64| if k % 100 == 7 { 1e-3 * aside } else { 1e-3 };
-        let poses = |times: f64, aside: f64| -> Vec<Pose> {
-            let own = configurations.iter().enumerate();
-            own.map(|(k, own)| pose(own, times * sigma(k, aside))).collect()
+        let sigma = |k: usize, factor: f64| if k % 100 == 7 { 1e-3 * factor } else { 1e-3 };
+        let poses = |times: f64, factor: f64| -> Vec<Pose> {
+            let configurations = configurations.iter().enumerate();
+            configurations.map(|(k, q)| pose(q, times * sigma(k, factor))).collect()
         };
         let (plain, more) = (
             model(arm, ""),
             model(arm, "[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 3] }\n"),
         );
-        let names =
-            |model: &Model| model.parameters.iter().map(|own| own.name.clone()).collect::<Vec<_>>();
+        let names = |model: &Model| {
+            model.parameters.iter().map(|parameter| parameter.name.clone()).collect::<Vec<_>>()
+        };
         let x = DVector::from_fn(plain.parameters.len(), |j, _| 0.01 * (1.0 + j as f64));
         let unknowns = |model: &Model| (0..model.parameters.len()).collect::<Vec<_>>();
-        let residuals = PoseResiduals::new(&plain, poses(1.0, aside), unknowns(&plain), x.clone());
+        let residuals = PoseResiduals::new(&plain, poses(1.0, factor), unknowns(&plain), x.clone());
         let (mut columns, residual) = jacobian_and_residual(&residuals, &x);
-        // What is known is taken as it is: a mark shows that it was.
+        // A changed entry shows that the column was reused.
         columns.column_mut(0)[5] += 1.0;
-        let all = names(&plain);
-        let known = LinearModel::new(
+        let names_there = names(&plain);
+        let linear_model = LinearModel::new(
             (&plain.parameters, &x),
             &unknowns(&plain),
-            (0..600).map(|k| sigma(k, aside)).collect(),
+            (0..600).map(|k| sigma(k, factor)).collect(),
             (columns.into(), residual.into()),
         );
-        let at = |name: &String| all.iter().position(|own| own == name).map_or(0.0, |j| x[j]);
+        let at = |name: &String| {
+            names_there.iter().position(|other| other == name).map_or(0.0, |j| x[j])
+        };
         let start = DVector::from_iterator(more.parameters.len(), names(&more).iter().map(at));
         let fresh = PoseResiduals::new(&more, poses(2.0, 1.0), unknowns(&more), start.clone());
-        let begun = PoseResiduals::new(&more, poses(2.0, 1.0), unknowns(&more), start.clone())
-            .with_linear_model(Some(&known));
-        let ((expected, there), (found, own)) =
-            (jacobian_and_residual(&fresh, &start), jacobian_and_residual(&begun, &start));
+        let reused = PoseResiduals::new(&more, poses(2.0, 1.0), unknowns(&more), start.clone())
+            .with_linear_model(Some(&linear_model));
+        let ((expected, residual_there), (found, found_residual)) =
+            (jacobian_and_residual(&fresh, &start), jacobian_and_residual(&reused, &start));
         let mut difference = found - &expected;
-        let first = names(&more).iter().position(|name| *name == all[0]).unwrap();
+        let first = names(&more).iter().position(|name| *name == names_there[0]).unwrap();
         assert!((difference[(5, first)] - 0.5).abs() < 1e-9);
         difference[(5, first)] = 0.0;
-        assert!(difference.amax() < 1e-11 * expected.amax() && (own - there).amax() < 1e-12);
-        // Elsewhere nothing is known.
+        assert!(
+            difference.amax() < 1e-11 * expected.amax()
+                && (found_residual - residual_there).amax() < 1e-12
+        );
+        // At another point nothing is reused.
         let moved = start.add_scalar(1e-4);
-        assert!(jacobian_and_residual(&begun, &moved) == jacobian_and_residual(&fresh, &moved));
+        assert!(jacobian_and_residual(&reused, &moved) == jacobian_and_residual(&fresh, &moved));
     }
 }

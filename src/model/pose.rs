@@ -1,48 +1,49 @@
-//! A pose as the model sees it.
+//! Measured rows as the model takes them.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::problem::{Observation, PoseView};
 
-/// One measured pose as the model sees it.
+/// Measured row with its conditions.
 #[derive(Debug, Clone, Copy)]
 pub struct Pose<'a> {
-    /// What was set.
+    /// Configuration and conditions.
     pub setup: PoseView<'a>,
-    /// Which base.
+    /// Index of the base.
     pub base: usize,
-    /// Which target.
+    /// Index of the target.
     pub target: usize,
-    /// What is measured of it.
+    /// Quantity that is measured.
     pub observation: Observation,
-    /// The measured numbers, zeros behind them \[m\]: the position, measuring frame; a distance; 0
-    /// of a contact.
+    /// Measured numbers, followed by zeros \[m\] or \[rad\]: a position in the measuring frame, a
+    /// distance, tilts, 0 for a contact.
     pub measured: &'a Vector3<f64>,
-    /// 1 σ of each of them \[m\].
+    /// 1 σ of each number \[m\] or \[rad\].
     pub sigma: f64,
-    /// The orientation of the target, where it counts.
+    /// Orientation of the target, if it is fitted.
     pub orientation: Option<MeasuredOrientation<'a>>,
 }
 
 impl Pose<'_> {
-    /// How many numbers are measured: those of the observation, and three of an orientation that
-    /// counts.
+    /// Returns the count of measured numbers: those of the observation, and three of a fitted
+    /// orientation.
     pub fn coordinates(&self) -> usize {
         self.observation.coordinates() + if self.orientation.is_some() { 3 } else { 0 }
     }
 }
 
-/// A measured orientation of a target.
+/// Measured orientation of a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredOrientation<'a> {
-    /// As measured, measuring frame; `None`: as predicted, of poses that are still to be measured.
+    /// Orientation in the measuring frame; `None` for planned poses, which count as measured
+    /// without error.
     pub measured: Option<&'a UnitQuaternion<f64>>,
     /// 1 σ about each axis \[rad\].
     pub sigma: f64,
 }
 
 impl MeasuredOrientation<'_> {
-    /// Its axes, measuring frame, where it was measured.
+    /// Returns the measured axes, measuring frame, if the orientation was measured.
     pub fn axes(&self) -> Option<[Vector3<f64>; 3]> {
         let measured = self.measured?;
         Some([Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| measured * axis))
@@ -55,7 +56,7 @@ mod tests {
 
     #[test]
     fn a_million_poses_have_room() {
-        // Of a million, 192 MB: what fits hold of each pose besides its numbers.
+        // A fit keeps 192 MB for a million poses besides their numbers.
         assert!(size_of::<Pose>() <= 192, "{}", size_of::<Pose>());
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Model;
-use super::commands::Commands;
+use super::command_terms::CommandTerms;
 use super::instrument::Instrument;
 use super::pose::Pose;
 use super::tilt::{TiltDerivatives, rigid_frame_axes};
@@ -26,7 +26,7 @@ pub(super) struct Predictor<'m> {
     target_axes: Vec<[Vector3<f64>; 3]>,
     fixtures: Vec<FixtureValues<f64>>,
     instrument: Instrument,
-    commands: Commands,
+    commands: CommandTerms,
     tilts: Option<TiltDerivatives>,
     state: StaticState,
     workspace: Workspace<f64>,
@@ -63,7 +63,7 @@ impl<'m> Predictor<'m> {
 
     /// Creates a predictor of the geometry alone: nothing deflects, and no effect acts on the arm.
     pub fn rigid(model: &'m Model, x: &[f64]) -> Self {
-        let commands = Commands::new(&model.driven, &[], &[]);
+        let commands = CommandTerms::new(&model.fixed_terms, &[], &[]);
         Self { is_rigid: true, commands, ..Self::new(model, x) }
     }
 

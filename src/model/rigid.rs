@@ -1,9 +1,9 @@
-//! Derivatives of a rigid arm with respect to its own parameters.
+//! Derivatives of a rigid arm with respect to its parameters.
 //!
-//! Every parameter belongs to one motion. Inwards, the target is carried through each motion in
-//! dual numbers, which tells what its parameter does in the frame before it; outwards, that frame
-//! chains on in plain numbers. Of a tree of joints that is the way from the base to the target;
-//! parameters elsewhere do nothing.
+//! Every parameter belongs to one motion. An inward pass carries the target through each motion in
+//! dual numbers and gives its derivative in the frame before that motion. An outward pass computes
+//! these frames in real numbers. In a tree of joints, both follow the path from base to target;
+//! parameters elsewhere have no effect.
 
 use nalgebra::Vector3;
 use num_dual::Dual64;
@@ -15,34 +15,34 @@ use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{PoseView, Tree};
 use crate::spatial::{Frame, rotated_about_x, rotated_about_y, rotated_about_z};
 
-/// A rigid arm, motion by motion.
+/// Rigid arm, differentiated motion by motion.
 pub(super) struct Rigid {
     links: Vec<Link>,
     tree: Tree,
     inputs: Vec<Input>,
-    /// Of the pose at hand, from the last link to the first.
+    /// Derivatives of the current pose, from the last link to the first.
     carried: Vec<Carried>,
-    /// The same of the links that have a placement: what its six numbers do.
+    /// Derivatives with respect to the placements of these links, for links that have one.
     placed: Vec<[Vector3<f64>; 6]>,
 }
 
-/// A link with each of its parameters seeded, and which input each is: the five of its motions, and
-/// the six of its placement.
+/// Link with each of its parameters seeded, and the index of the input of each: five motions, and
+/// six numbers of the placement.
 struct Link {
     joint: Joint<Dual64>,
     inputs: [Option<usize>; 5],
     placing: [Option<usize>; 6],
 }
 
-/// What the parameters of a link do to the target, each in the frame before its own motion, and
-/// where q puts the joint.
+/// Derivatives of the target with respect to the parameters of a link, each in the frame before its
+/// motion, and the joint's coordinates.
 struct Carried {
     derivatives: [Vector3<f64>; 5],
     coordinates: Coordinates<Dual64>,
 }
 
 impl Rigid {
-    /// Of an arm whose own parameters are `inputs`.
+    /// Creates the derivatives of an arm with respect to `inputs`.
     pub fn new(arm: &Arm<f64>, inputs: Vec<Input>) -> Self {
         let mut links: Vec<Link> = arm.joints.iter().map(Link::seeded).collect();
         for (index, input) in inputs.iter().enumerate() {
@@ -75,8 +75,8 @@ impl Rigid {
         placed.clear();
         let mut point = *target;
         let way = || {
-            let all = links.iter().zip(setup.configuration).enumerate();
-            all.filter(|(joint, _)| tree.path_contains(*joint, tip)).map(|(_, own)| own)
+            let path = links.iter().zip(setup.configuration).enumerate();
+            path.filter(|(joint, _)| tree.path_contains(*joint, tip)).map(|(_, link)| link)
         };
         for (link, &q) in way().rev() {
             let coordinates = link.joint.coordinates(q);
@@ -92,7 +92,7 @@ impl Rigid {
         let mut frame = *base;
         for ((link, _), Carried { derivatives, coordinates }) in way().zip(carried.iter().rev()) {
             if let Some((placement, derivatives)) =
-                link.joint.placement.as_ref().and_then(|own| Some((own, placed.pop()?)))
+                link.joint.placement.as_ref().and_then(|placement| Some((placement, placed.pop()?)))
             {
                 place(placement, &mut frame, |place, frame| {
                     if let Some(input) = link.placing[place] {
@@ -120,9 +120,10 @@ impl Link {
         let angle = |angle: Angle<f64>| Angle::new(seed(angle.value));
         let (alpha, beta) = (angle(joint.alpha), angle(joint.beta));
         let (a, theta, d) = (seed(joint.a), seed(joint.theta), seed(joint.d));
-        let placement = joint
-            .placement
-            .map(|own| Placement { xyz: own.xyz.map(seed), rpy: own.rpy.map(angle) });
+        let placement = joint.placement.map(|placement| Placement {
+            xyz: placement.xyz.map(seed),
+            rpy: placement.rpy.map(angle),
+        });
         Self {
             joint: Joint { placement, alpha, a, theta, d, beta, ..joint.lift() },
             inputs: [None; 5],
@@ -130,8 +131,8 @@ impl Link {
         }
     }
 
-    /// Carries a point \[m\] from the frame after the link to the frame before it, with what α, a,
-    /// θ, d, β do to it.
+    /// Carries a point \[m\] from the frame behind the link to the frame before it. Also returns
+    /// its derivatives with respect to α, a, θ, d, β.
     #[inline]
     fn carry(
         &self,
@@ -148,7 +149,7 @@ impl Link {
         ([by_alpha, by_a, by_theta, by_d, by_beta], point)
     }
 
-    /// Moves `frame` through the link; `before` sees it before each motion.
+    /// Moves `frame` through the link; calls `before` with the frame before each motion.
     #[inline]
     fn advance(
         &self,
@@ -170,8 +171,8 @@ impl Link {
     }
 }
 
-/// Carries a point \[m\] from behind a placement to before it, with what x, y, z, roll, pitch, yaw
-/// do to it, each in the frame before its own motion.
+/// Carries a point \[m\] from behind a placement to before it. Also returns its derivatives with
+/// respect to x, y, z, roll, pitch, yaw, each in the frame before its motion.
 fn carry_through(
     placement: &Placement<Dual64>,
     point: &Vector3<f64>,
@@ -184,7 +185,7 @@ fn carry_through(
     ([x, y, z, by_roll, by_pitch, by_yaw], point + placement.xyz.map(|coordinate| coordinate.re))
 }
 
-/// Moves `frame` through a placement; `before` sees it before each motion.
+/// Moves `frame` through a placement; calls `before` with the frame before each motion.
 fn place(
     placement: &Placement<Dual64>,
     frame: &mut Frame<f64>,
@@ -201,12 +202,12 @@ fn place(
     frame.rotate_x(real(roll.sin_cos));
 }
 
-/// (sin, cos) without derivatives.
+/// Returns (sin, cos) without derivatives.
 fn real((sin, cos): (Dual64, Dual64)) -> (f64, f64) {
     (sin.re, cos.re)
 }
 
-/// The derivative of a vector, and its value.
+/// Returns the derivative and the value of a vector.
 #[inline]
 fn derivative(vector: &Vector3<Dual64>) -> (Vector3<f64>, Vector3<f64>) {
     (vector.map(|coordinate| coordinate.eps), vector.map(|coordinate| coordinate.re))

@@ -1,4 +1,4 @@
-//! From `[[constraint]]` to linear inequalities between unknowns.
+//! Linear inequalities between unknowns, from `[[constraint]]`.
 
 use super::Parameter;
 use super::resolve::{EffectParameter, candidates};
@@ -6,42 +6,42 @@ use crate::error::{InputError, InputErrorKind, Location};
 use crate::problem::{Constraint, Limit, LimitKind, Problem};
 use crate::quantity::Unit;
 
-/// lower ≤ Σ cₖ xₖ ≤ upper over unknowns xₖ; infinite where there is no limit.
+/// Constraint lower ≤ Σ cₖ xₖ ≤ upper on unknowns xₖ; a missing limit is infinite.
 ///
-/// Geometry enters by its value, Σ cₖ (nominalₖ + xₖ), stiffness and rigidity by its logarithm, Σ
-/// cₖ (ln nominalₖ + xₖ) in SI units: both are linear in x. The nominal part, fixed parameters with
-/// it, is taken off the limits.
+/// Geometry enters by its value, Σ cₖ (nominalₖ + xₖ), stiffness and rigidity by the logarithm, Σ
+/// cₖ (ln nominalₖ + xₖ) in SI units. Both are linear in x. The nominal part, with all fixed
+/// parameters, is subtracted from the limits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearConstraint {
-    /// Free parameters and their coefficients.
+    /// Indices of free parameters, with their coefficients.
     pub terms: Vec<(usize, f64)>,
     /// Lower limit on Σ c x.
     pub lower: f64,
     /// Upper limit on Σ c x.
     pub upper: f64,
-    /// The sum in words: `ln A.EI − ln B.EI`.
+    /// Text of the sum: `ln A.EI − ln B.EI`.
     pub sum: String,
-    /// The limits in words, lower and upper: `≥ 0`.
+    /// Text of the lower and upper limit: `≥ 0`.
     pub limits: [Option<String>; 2],
-    /// Where it stands in the problem file.
+    /// Location in the problem file.
     pub location: Location,
 }
 
 impl LinearConstraint {
-    /// The same constraint on the parameters listed in `kept`, counted anew; `None` where it speaks
-    /// of another one.
+    /// Returns the constraint on the parameters listed in `kept`, with new indices; `None` if it
+    /// contains another parameter.
     pub fn on(&self, kept: &[usize]) -> Option<Self> {
-        let place = |&(k, c): &(usize, f64)| Some((kept.iter().position(|&other| other == k)?, c));
+        let place = |&(k, c): &(usize, f64)| Some((kept.iter().position(|&kept| kept == k)?, c));
         let terms = self.terms.iter().map(place).collect::<Option<Vec<_>>>()?;
         Some(Self { terms, ..self.clone() })
     }
 }
 
-/// The constraints of `problem` on its free `parameters`.
+/// Creates the constraints of `problem` on its free `parameters`.
 ///
 /// # Errors
-/// A name that is not a parameter, kinds that do not add up, a limit of another kind, or nothing
-/// free.
+/// A name is no parameter, units do not match, a limit has another unit, or no parameter of the
+/// constraint is free.
 pub fn constrain(
     problem: &Problem,
     bases: &[String],
@@ -49,13 +49,17 @@ pub fn constrain(
     effects: &[EffectParameter],
     parameters: &[Parameter],
 ) -> Result<Vec<LinearConstraint>, InputError> {
-    let all = candidates(problem, bases, targets, effects);
+    let candidates = candidates(problem, bases, targets, effects);
     let known: Vec<(String, Unit, f64)> =
-        all.into_iter().map(|c| (c.name.clone(), c.unit(), c.nominal)).collect();
-    problem.constraints.iter().map(|constraint| one(constraint, &known, parameters)).collect()
+        candidates.into_iter().map(|c| (c.name.clone(), c.unit(), c.nominal)).collect();
+    problem
+        .constraints
+        .iter()
+        .map(|constraint| resolve_constraint(constraint, &known, parameters))
+        .collect()
 }
 
-fn one(
+fn resolve_constraint(
     constraint: &Constraint,
     known: &[(String, Unit, f64)],
     parameters: &[Parameter],
@@ -141,7 +145,7 @@ fn alternatives(kind: LimitKind) -> &'static str {
     }
 }
 
-/// A limit for people: nine digits, so that conversions do not show.
+/// Formats a limit with nine digits, so that unit conversions do not show.
 fn shown(limit: &Limit) -> String {
     let (value, unit) = match limit.kind {
         LimitKind::Angle => (limit.value.to_degrees(), "°"),

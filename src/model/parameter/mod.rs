@@ -1,8 +1,8 @@
 //! Free parameters: names, units, priors and bounds, resolved from the problem's rules.
 //!
-//! An unknown x is a deviation from nominal: additive for angles \[rad\] and lengths \[m\],
-//! ln(value / nominal) for stiffnesses and rigidities, so that x = 0 is nominal everywhere and a
-//! stiffness never turns negative.
+//! An unknown x is a deviation from nominal. It is additive for angles \[rad\] and lengths \[m\]
+//! and equals ln(value / nominal) for stiffnesses and rigidities. So x = 0 is nominal everywhere,
+//! and a stiffness stays positive.
 
 mod constraint;
 mod name;
@@ -18,53 +18,53 @@ pub(crate) use resolve::{holds_all, refuses, rule_of};
 
 use crate::quantity::Unit;
 
-/// A free parameter.
+/// Free parameter of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
     /// Name as in the problem file: `joint2.alpha`, `A.EI`, `base[B].rx`.
     pub name: String,
-    /// Where it enters the model.
+    /// Site in the model.
     pub site: ParameterSite,
-    /// What it is multiplied by there.
+    /// Factor that multiplies the parameter at its site.
     pub regressor: Regressor,
-    /// Nominal value, SI.
+    /// Nominal value, in SI units.
     pub nominal: f64,
     /// 1 σ of the Gaussian prior on x about 0.
     pub sigma: Option<f64>,
-    /// Lower bound on x, −∞ where there is none.
+    /// Lower bound on x; −∞ without a bound.
     pub lower: f64,
-    /// Upper bound on x, +∞ where there is none.
+    /// Upper bound on x; +∞ without a bound.
     pub upper: f64,
 }
 
 impl Parameter {
-    /// Kind of quantity.
+    /// Returns the unit of its value.
     pub fn unit(&self) -> Unit {
         unit(self.site, self.regressor)
     }
 
-    /// Value at x, SI.
+    /// Returns the value at x, in SI units.
     pub fn value(&self, x: f64) -> f64 {
         if self.unit().is_relative() { self.nominal * x.exp() } else { self.nominal + x }
     }
 
-    /// x of a value, SI; the inverse of [`Parameter::value`].
+    /// Returns x of a value in SI units; the inverse of [`Parameter::value`].
     pub fn deviation(&self, value: f64) -> f64 {
         if self.unit().is_relative() { (value / self.nominal).ln() } else { value - self.nominal }
     }
 
-    /// Standard error of the value from that of x, SI.
+    /// Returns the standard error of the value from that of x, in SI units.
     pub fn value_error(&self, x: f64, error: f64) -> f64 {
         if self.unit().is_relative() { self.value(x) * error } else { error }
     }
 
-    /// Whether x has a lower or an upper bound.
+    /// Returns true if x has a lower or an upper bound.
     pub fn is_bounded(&self) -> bool {
         self.lower.is_finite() || self.upper.is_finite()
     }
 }
 
-/// Kind of a quantity that is multiplied by `regressor` before it enters at `site`.
+/// Returns the unit of a parameter that is multiplied by `regressor` at `site`.
 pub(crate) fn unit(site: ParameterSite, regressor: Regressor) -> Unit {
     match (regressor, site.unit()) {
         (Regressor::Warming { .. } | Regressor::Lagging { .. }, of) => match of {

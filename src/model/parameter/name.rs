@@ -1,76 +1,76 @@
-//! Where a parameter enters the model, and what it is called.
+//! Sites of parameters in the model, and their names.
 
 use crate::problem::FixtureKind;
 use crate::quantity::Unit;
 
-/// Where a parameter enters the model; joints are counted from 0, [`ParameterSite::of_joint`] takes the
-/// numbers of files.
+/// Site of a parameter in the model. Joints are counted from 0; [`ParameterSite::of_joint`] takes
+/// the numbers of files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ParameterSite {
-    /// A field of a joint.
+    /// Field of a joint.
     Joint {
         /// Index of the joint.
         joint: usize,
-        /// Which field.
+        /// Field of that joint.
         field: JointField,
     },
-    /// A field of the beam before a joint.
+    /// Field of the beam before a joint.
     Beam {
         /// Index of the joint that carries the beam.
         joint: usize,
-        /// Which field.
+        /// Field of that beam.
         field: BeamField,
     },
-    /// What acts on the arm as a whole.
+    /// Quantity of the arm as a whole.
     Arm(ArmField),
-    /// A coordinate of a base pose: translation x, y, z, then rotation vector x, y, z.
+    /// Coordinate of a base pose: translation x, y, z, then rotation vector x, y, z.
     Base {
         /// Index of the base.
         base: usize,
-        /// 0..6.
+        /// Coordinate 0 to 5.
         axis: usize,
     },
-    /// A coordinate of a target in the frame that carries it: x, y, z, then the rotation vector of
-    /// its orientation x, y, z.
+    /// Coordinate of a target in the frame that carries it: position x, y, z, then rotation vector
+    /// x, y, z.
     Target {
         /// Index of the target.
         target: usize,
-        /// 0..6.
+        /// Coordinate 0 to 5.
         axis: usize,
     },
-    /// A number of a fixture, in the order of [`FixtureKind::fields`].
+    /// Number of a fixture, in the order of [`FixtureKind::fields`].
     Fixture {
         /// Index of the fixture.
         fixture: usize,
-        /// What it is.
+        /// Kind of the fixture.
         kind: FixtureKind,
-        /// Which number.
+        /// Index of the number.
         axis: usize,
     },
-    /// A displacement of every measured position, measuring frame.
+    /// Displacement of every measured position, measuring frame.
     Shift {
-        /// 0..3.
+        /// Axis 0, 1 or 2.
         axis: usize,
     },
-    /// A turn of every base about an axis of the measuring frame, through that frame's origin; a
-    /// regressor's alone.
+    /// Rotation of every base about an axis through the measuring frame's origin; always with a
+    /// regressor.
     Turn {
-        /// 0..3.
+        /// Axis 0, 1 or 2.
         axis: usize,
     },
-    /// A relative error of every measured coordinate.
+    /// Relative error of every measured coordinate.
     Scale,
-    /// An entry of the strain E of the measuring frame, in which p is measured as p + E p, E
-    /// triangular: xx, yy, zz, xy, xz, yz.
+    /// Entry of the strain E of the measuring frame: p reads as p + E p. E is triangular, in the
+    /// order xx, yy, zz, xy, xz, yz.
     Strain {
-        /// 0..6.
+        /// Entry 0 to 5.
         entry: usize,
     },
 }
 
-/// A field of a joint that may be free: first the letters of [Chen2021, eq. 1], then what effects
-/// add.
+/// Field of a joint that may be free: first the letters of [Chen2021, eq. 1], then the fields of
+/// effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[expect(missing_docs, reason = "letters need no words")]
 #[non_exhaustive]
@@ -81,24 +81,24 @@ pub enum JointField {
     D,
     Beta,
     Stiffness,
-    /// Added to 1/k [rad/(N·m)].
+    /// Addition to the compliance 1/k [rad/(N·m)].
     Compliance,
     /// Angle per cube of the moment [rad/(N·m)³].
     Cubic,
-    /// Play: half of it each way, as the direction of approach says, or the moment where that is
-    /// not known \[rad\].
+    /// Play \[rad\]: half of it to each side, by the direction of approach, or by the moment if
+    /// that is unknown.
     Play,
-    /// Play of a joint that slides, which only a direction of approach takes up \[m\].
+    /// Play of a prismatic joint \[m\], taken up by the direction of approach only.
     SlidingPlay,
-    /// Flexibility about x before the joint turns [rad/(N·m)].
+    /// Flexibility about x before the joint's rotation [rad/(N·m)].
     LateralX,
-    /// Flexibility about y before the joint turns [rad/(N·m)].
+    /// Flexibility about y before the joint's rotation [rad/(N·m)].
     LateralY,
     /// Flexibility 1/EI of the slide [1/(N·m²)].
     SlideFlexibility,
-    /// Rate of the spring of a gravity compensator [N/m].
+    /// Spring rate of a gravity compensator [N/m].
     SpringRate,
-    /// Preload of that spring \[N\].
+    /// Preload of a gravity compensator \[N\].
     SpringPreload,
     /// Coordinates of a fixed joint's placement \[m\].
     X,
@@ -110,23 +110,23 @@ pub enum JointField {
     Yaw,
 }
 
-/// A field of a beam that may be free: rigidities, then what effects add.
+/// Field of a beam that may be free: rigidities, then the fields of effects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum BeamField {
-    /// EA.
+    /// Axial rigidity EA \[N\].
     Axial,
-    /// EI about y and z, equal in nominal.
+    /// Bending rigidity EI about y and z, equal in nominal [N·m²].
     Bending,
-    /// `EI_y`.
+    /// Bending rigidity `EI_y` [N·m²].
     BendingY,
-    /// `EI_z`.
+    /// Bending rigidity `EI_z` [N·m²].
     BendingZ,
-    /// GJ.
+    /// Torsional rigidity GJ [N·m²].
     Twist,
-    /// ln of EI about z over the value that it shares with EI about y.
+    /// Logarithm of the ratio of EI about z to the EI common to y and z.
     Anisotropy,
-    /// Added to 1/EI about y and z [1/(N·m²)].
+    /// Addition to 1/EI about y and z [1/(N·m²)].
     Flexibility,
     /// Coupling of twist with bending about y [1/(N·m²)].
     CouplingY,
@@ -138,17 +138,17 @@ pub enum BeamField {
     BowZ,
     /// Elongation per length without load.
     Stretch,
-    /// A mass on the beam's axis \[kg\].
+    /// Point mass on the beam's axis \[kg\].
     AddedMass,
-    /// Where that mass is, from the root \[m\].
+    /// Position of that mass, from the root \[m\].
     AddedAt,
 }
 
-/// What acts on the arm as a whole.
+/// Quantity of the arm as a whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ArmField {
-    /// Added to every payload that is carried \[kg\].
+    /// Addition to the mass of every payload \[kg\].
     Payload,
     /// Relative error of the hoist's force.
     HoistForce,
@@ -156,46 +156,46 @@ pub enum ArmField {
     HoistLeanX,
     /// Lean of the hoist's direction along y.
     HoistLeanY,
-    /// Change of that lean with the hook's place [1/m].
+    /// Derivative of that lean with respect to the hook's position [1/m].
     HoistTrolley,
     /// Flexibility of the base about x [rad/(N·m)].
     MountingX,
     /// Flexibility of the base about y [rad/(N·m)].
     MountingY,
-    /// Gravity turned about x \[rad\].
+    /// Rotation of gravity about x \[rad\].
     GravityX,
-    /// Gravity turned about y \[rad\].
+    /// Rotation of gravity about y \[rad\].
     GravityY,
-    /// λ between loads on the rigid arm, 0, and on the bent arm, 1.
+    /// Mixing factor λ from loads on the undeflected arm (0) to loads on the deflected arm (1).
     Mixing,
 }
 
 impl ArmField {
-    /// Whether it is a coordinate of the rotation vector that turns gravity.
+    /// Returns true for a coordinate of the rotation vector of gravity.
     pub fn turns_gravity(self) -> bool {
         matches!(self, Self::GravityX | Self::GravityY)
     }
 }
 
 impl JointField {
-    /// The geometric fields, in the order of the transform.
+    /// Geometric fields, in the order of the transform.
     pub const GEOMETRY: [Self; 5] = [Self::Alpha, Self::A, Self::Theta, Self::D, Self::Beta];
 
-    /// The fields of a placement by xyz and rpy, in the order of files.
+    /// Fields of a placement by xyz and rpy, in the order of files.
     pub const PLACEMENT: [Self; 6] =
         [Self::X, Self::Y, Self::Z, Self::Roll, Self::Pitch, Self::Yaw];
 
-    /// Its place in a placement: x, y, z, roll, pitch, yaw.
+    /// Returns the index in a placement: x, y, z, roll, pitch, yaw.
     pub fn placement(self) -> Option<usize> {
-        Self::PLACEMENT.iter().position(|&own| own == self)
+        Self::PLACEMENT.iter().position(|&field| field == self)
     }
 
-    /// Whether it is geometry that a problem declares.
+    /// Returns true for geometry that a problem declares.
     pub fn is_geometry(self) -> bool {
         Self::GEOMETRY.contains(&self) || self.placement().is_some()
     }
 
-    /// Name after the dot.
+    /// Returns the part of the parameter's name after the dot.
     pub fn name(self) -> &'static str {
         match self {
             Self::Alpha => "alpha",
@@ -224,26 +224,26 @@ impl JointField {
 }
 
 impl BeamField {
-    /// The strains without load, in the order in which poses have them.
+    /// Strains without load, in the order of `PoseView::strains`.
     pub const STRAINS: [Self; 3] = [Self::Stretch, Self::BowY, Self::BowZ];
 
-    /// Whether it is a strain without load.
+    /// Returns true for a strain without load.
     pub fn is_strain(self) -> bool {
         Self::STRAINS.contains(&self)
     }
 
-    /// Whether it says how a beam gives way to loads.
+    /// Returns true for a field that describes the beam's deflection under loads.
     pub fn is_rigidity(self) -> bool {
         let of_effects = matches!(self, Self::Flexibility | Self::CouplingY | Self::CouplingZ);
         of_effects || self.is_declared()
     }
 
-    /// Whether it is a rigidity that a problem declares.
+    /// Returns true for a rigidity that a problem declares.
     pub fn is_declared(self) -> bool {
         matches!(self, Self::Axial | Self::Bending | Self::BendingY | Self::BendingZ | Self::Twist)
     }
 
-    /// Name after the dot.
+    /// Returns the part of the parameter's name after the dot.
     pub fn name(self) -> &'static str {
         match self {
             Self::Axial => "EA",
@@ -265,12 +265,12 @@ impl BeamField {
 }
 
 impl ParameterSite {
-    /// A field of a joint that is numbered from 1, as in files.
+    /// Creates the site of a field of a joint that is numbered from 1, as in files.
     pub fn of_joint(number: usize, field: JointField) -> Self {
         Self::Joint { joint: number.wrapping_sub(1), field }
     }
 
-    /// Kind of quantity.
+    /// Returns the unit of a parameter without regressor.
     pub fn unit(self) -> Unit {
         match self {
             Self::Joint { field, .. } => match field {
@@ -326,7 +326,7 @@ impl ParameterSite {
         }
     }
 
-    /// Whether the site describes elasticity or loads rather than geometry.
+    /// Returns true for elasticity and loads, false for geometry.
     pub fn is_elastic(self) -> bool {
         match self {
             Self::Joint { field, .. } => {
@@ -344,12 +344,12 @@ impl ParameterSite {
         }
     }
 
-    /// Whether it turns a target, which positions do not show.
+    /// Returns true for the orientation of a target, which positions do not depend on.
     pub fn turns_target(self) -> bool {
         matches!(self, Self::Target { axis: 3.., .. })
     }
 
-    /// Whether the site belongs to the set-up (base, target, fixture) rather than to the arm.
+    /// Returns true for the set-up (base, target, fixture), false for the arm.
     pub fn is_placement(self) -> bool {
         matches!(self, Self::Base { .. } | Self::Target { .. } | Self::Fixture { .. })
     }

@@ -1,4 +1,4 @@
-//! From the rules of `[parameters]` to free parameters.
+//! Free parameters from the rules of `[parameters]`.
 
 use super::{BeamField, JointField, Parameter, ParameterSite, Regressor, unit};
 use crate::error::{InputError, InputErrorKind};
@@ -7,17 +7,17 @@ use crate::problem::pattern::matches;
 use crate::problem::{Fixture, Freedom, ParameterRule, Placement, Problem, Quantities};
 use crate::quantity::Unit;
 
-/// A scalar of the model that a rule may free.
+/// Scalar of the model that a rule may free.
 pub(super) struct Candidate {
     pub(super) name: String,
-    /// The name without the session or target in brackets, which patterns may use as well.
+    /// Name without the session or target in brackets, which patterns may use as well.
     plain: String,
     pub(super) site: ParameterSite,
     pub(super) regressor: Regressor,
     pub(super) nominal: f64,
-    /// For a parameter of an effect, which is free with this prior where no rule speaks of it.
-    of_effect: Option<f64>,
-    /// Whether nothing is known of it, so that it is free where no rule speaks of it.
+    /// Default prior of a parameter of an effect, which is free unless a rule holds it.
+    effect_sigma: Option<f64>,
+    /// True for an undeclared number, which is free unless a rule holds it.
     unknown: bool,
 }
 
@@ -31,25 +31,25 @@ impl Candidate {
     }
 }
 
-/// A parameter of a declared effect.
+/// Parameter of a declared effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectParameter {
-    /// `gear-ratio[3].error`
+    /// Name such as `gear-ratio[3].error`.
     pub name: String,
-    /// The name without the place in brackets: `gear-ratio.error`.
+    /// Name without the place in brackets: `gear-ratio.error`.
     pub plain: String,
-    /// Where it enters.
+    /// Site in the model.
     pub site: ParameterSite,
-    /// What it is multiplied by there.
+    /// Factor that multiplies the parameter at its site.
     pub regressor: Regressor,
-    /// Value of no effect, or where an effect of no size would be.
+    /// Value at which the effect vanishes, or the place of an effect of zero size.
     pub nominal: f64,
-    /// 1 σ of a prior that leaves every realistic size possible.
+    /// 1 σ of a prior that allows every realistic size.
     pub sigma: f64,
 }
 
 impl EffectParameter {
-    /// Kind of quantity.
+    /// Returns the unit of its value.
     pub fn unit(&self) -> Unit {
         unit(self.site, self.regressor)
     }
@@ -59,13 +59,13 @@ impl EffectParameter {
     }
 }
 
-/// Free parameters of `problem` with one base per name in `bases` and one target per name in
-/// `targets`.
+/// Returns the free parameters of `problem` with one base per name in `bases` and one target per
+/// name in `targets`.
 ///
-/// A single unnamed base or target (the empty word) goes without brackets: `base.x`.
+/// A single base or target with an empty name has no brackets: `base.x`.
 ///
 /// # Errors
-/// A rule matches nothing, or gives a quantity of the wrong kind.
+/// A rule matches nothing, or gives a quantity of the wrong unit.
 pub fn resolve(
     problem: &Problem,
     bases: &[String],
@@ -79,7 +79,7 @@ pub fn resolve(
         for (candidate, decision) in candidates.iter().zip(&mut decided) {
             if candidate.matches(rule) {
                 matched = true;
-                if candidate.of_effect.is_some() && !fits(rule, candidate.unit()) {
+                if candidate.effect_sigma.is_some() && !fits(rule, candidate.unit()) {
                     continue;
                 }
                 *decision = Some(rule);
@@ -93,7 +93,7 @@ pub fn resolve(
                 }
             }
             let undeclared = undeclared(problem, &rule.pattern, &known);
-            // Effects that are held are not looked for.
+            // Effects that a rule holds are not searched.
             if undeclared.is_some() && matches!(rule.freedom, Freedom::Fixed) {
                 continue;
             }
@@ -116,11 +116,11 @@ pub fn resolve(
             return Err(rule.location.clone().error(kind));
         }
         let none = Quantities::default();
-        let (sigma, min, max) = match (rule.map(|rule| &rule.freedom), candidate.of_effect) {
+        let (sigma, min, max) = match (rule.map(|rule| &rule.freedom), candidate.effect_sigma) {
             (Some(Freedom::Free { sigma, min, max }), _) => {
                 (of_kind(sigma, candidate.unit()), min, max)
             }
-            // Of a unit that nobody knows there is no size that is too great.
+            // In an unknown unit, no size is too large.
             (None, Some(sigma)) => (Some(sigma).filter(|sigma| sigma.is_finite()), &none, &none),
             (None, None) if candidate.unknown => (None, &none, &none),
             (Some(Freedom::Fixed), _) | (None, None) => continue,
@@ -144,7 +144,7 @@ pub fn resolve(
     Ok(parameters)
 }
 
-/// The rule of `problem` that decides on a parameter of an effect, declared or not.
+/// Returns the rule of `problem` that decides on a parameter of an effect, declared or not.
 pub fn rule_of<'a>(problem: &'a Problem, parameter: &EffectParameter) -> Option<&'a ParameterRule> {
     problem
         .parameters
@@ -153,9 +153,9 @@ pub fn rule_of<'a>(problem: &'a Problem, parameter: &EffectParameter) -> Option<
         .find(|rule| parameter.is_named(rule) && fits(rule, parameter.unit()))
 }
 
-/// The mistake of a pattern that is about effects which nothing declares, if it is one.
+/// Returns the error of a pattern that matches only effects which the problem does not declare.
 fn undeclared(problem: &Problem, pattern: &str, known: &[String]) -> Option<InputErrorKind> {
-    // Of `hoist-force.error`, `gear-ratio[3].error`.
+    // The word before the dot or bracket of `hoist-force.error`, `gear-ratio[3].error`.
     let head = |name: &str| name.split(['.', '[']).next().unwrap_or_default().to_owned();
     let wanted = head(pattern);
     if known.iter().any(|name| matches(&wanted, &head(name))) {
@@ -167,8 +167,7 @@ fn undeclared(problem: &Problem, pattern: &str, known: &[String]) -> Option<Inpu
     Some(InputErrorKind::EffectNotDeclared { effects: effects.join(", "), write })
 }
 
-/// Whether the rules of `problem` hold all of these parameters of an effect that it does not
-/// declare.
+/// Returns true if the rules of `problem` hold all of these parameters of an undeclared effect.
 pub fn holds_all(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     let held = |parameter| {
         rule_of(problem, parameter).is_some_and(|rule| matches!(rule.freedom, Freedom::Fixed))
@@ -176,21 +175,21 @@ pub fn holds_all(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     !parameters.is_empty() && parameters.iter().all(held)
 }
 
-/// Whether a rule of `problem` for effects alone would be a mistake with these parameters, for it
-/// gives none of their kind.
+/// Returns true if a rule of `problem` for effects alone would be an error with these parameters,
+/// because it gives no quantity in their unit.
 pub fn refuses(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     let none = [String::new()];
     let is_for_arm = |rule| {
         candidates(problem, &none, &none, &[]).iter().any(|candidate| candidate.matches(rule))
     };
     let misses = |rule: &ParameterRule| {
-        parameters.iter().any(|own| own.is_named(rule) && !fits(rule, own.unit()))
+        parameters.iter().any(|parameter| parameter.is_named(rule) && !fits(rule, parameter.unit()))
     };
     problem.parameters.iter().any(|rule| misses(rule) && !is_for_arm(rule))
 }
 
-/// Every scalar of the model, in a fixed order: joints, their beams, bases, targets, fixtures,
-/// effects.
+/// Returns every scalar of the model, in a fixed order: joints, their beams, bases, targets,
+/// fixtures, effects.
 pub(super) fn candidates(
     problem: &Problem,
     bases: &[String],
@@ -204,36 +203,42 @@ pub(super) fn candidates(
         site,
         regressor: Regressor::Constant,
         nominal,
-        of_effect: None,
+        effect_sigma: None,
         unknown: false,
     };
-    for (joint, own) in problem.joints.iter().enumerate() {
-        let geometry: Vec<(JointField, f64)> = match &own.placement {
+    for (joint, declared_joint) in problem.joints.iter().enumerate() {
+        let geometry: Vec<(JointField, f64)> = match &declared_joint.placement {
             Some(Placement { xyz, rpy }) => JointField::PLACEMENT
                 .into_iter()
                 .zip(xyz.iter().chain(rpy.iter()).copied())
                 .collect(),
             None => JointField::GEOMETRY
                 .into_iter()
-                .zip([own.alpha, own.a, own.theta, own.d, own.beta])
+                .zip([
+                    declared_joint.alpha,
+                    declared_joint.a,
+                    declared_joint.theta,
+                    declared_joint.d,
+                    declared_joint.beta,
+                ])
                 .collect(),
         };
-        let stiffness = own.stiffness.map(|k| (JointField::Stiffness, k));
+        let stiffness = declared_joint.stiffness.map(|k| (JointField::Stiffness, k));
         for (field, nominal) in geometry.into_iter().chain(stiffness) {
             let name = format!("joint{}.{}", joint + 1, field.name());
             out.push(declared(name.clone(), name, ParameterSite::Joint { joint, field }, nominal));
         }
     }
-    for (joint, own) in problem.joints.iter().enumerate() {
-        let Some(beam) = &own.beam else { continue };
+    for (joint, declared_joint) in problem.joints.iter().enumerate() {
+        let Some(beam) = &declared_joint.beam else { continue };
         let bending = if beam.ei_y == beam.ei_z {
             [(BeamField::Bending, beam.ei_y), (BeamField::BendingZ, None)]
         } else {
             [(BeamField::BendingY, beam.ei_y), (BeamField::BendingZ, beam.ei_z)]
         };
-        let all =
+        let rigidities =
             [(BeamField::Axial, beam.ea), bending[0], bending[1], (BeamField::Twist, beam.gj)];
-        for (field, nominal) in all {
+        for (field, nominal) in rigidities {
             let Some(nominal) = nominal else { continue };
             let name = format!("{}.{}", beam.name, field.name());
             out.push(declared(name.clone(), name, ParameterSite::Beam { joint, field }, nominal));
@@ -257,10 +262,11 @@ pub(super) fn candidates(
         }
     }
     for (target, word) in targets.iter().enumerate() {
-        // A word that names no target is refused where the model is made.
-        let Ok(own) = problem.target(word) else { continue };
-        let turned = own.rotation.iter().filter(|_| problem.data.orientation_sigma.is_some());
-        let pose = own.at.iter().chain(turned);
+        // The constructor of the model refuses a word that names no target.
+        let Ok(declared_target) = problem.target(word) else { continue };
+        let rotation =
+            declared_target.rotation.iter().filter(|_| problem.data.orientation_sigma.is_some());
+        let pose = declared_target.at.iter().chain(rotation);
         for (axis, (suffix, &nominal)) in
             ["x", "y", "z", "rx", "ry", "rz"].iter().zip(pose).enumerate()
         {
@@ -277,13 +283,13 @@ pub(super) fn candidates(
         for (axis, (field, known)) in kind.fields().iter().zip(known).enumerate() {
             let site = ParameterSite::Fixture { fixture, kind: *kind, axis };
             let (word, nominal) = (kind.word(), known.unwrap_or(0.0));
-            let own = declared(
+            let candidate = declared(
                 format!("{word}[{name}].{field}"),
                 format!("{word}.{field}"),
                 site,
                 nominal,
             );
-            out.push(Candidate { unknown: known.is_none(), ..own });
+            out.push(Candidate { unknown: known.is_none(), ..candidate });
         }
     }
     out.extend(effects.iter().cloned().map(|effect| Candidate {
@@ -292,14 +298,14 @@ pub(super) fn candidates(
         site: effect.site,
         regressor: effect.regressor,
         nominal: effect.nominal,
-        of_effect: Some(effect.sigma),
+        effect_sigma: Some(effect.sigma),
         unknown: false,
     }));
     out
 }
 
-/// Every quantity of a rule must fit a parameter that it matches, and every such parameter one
-/// quantity, if there are any.
+/// Checks that every quantity of a rule fits a parameter that it matches, and that every such
+/// parameter has a quantity, if there are any.
 fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), InputError> {
     let Freedom::Free { sigma, min, max } = &rule.freedom else { return Ok(()) };
     let fail = |kind| Err(rule.location.clone().error(kind));
@@ -310,10 +316,10 @@ fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), Inp
     }
     let matched: Vec<&Candidate> =
         candidates.iter().filter(|candidate| candidate.matches(rule)).collect();
-    // A rule that speaks of others as well leaves the effects that it does not fit as they are.
-    let all_of_effects = matched.iter().all(|candidate| candidate.of_effect.is_some());
+    // A rule that also matches other parameters leaves effects of another unit unchanged.
+    let all_of_effects = matched.iter().all(|candidate| candidate.effect_sigma.is_some());
     let missing = |candidate: &&&Candidate| {
-        (all_of_effects || candidate.of_effect.is_none()) && !given(candidate.unit())
+        (all_of_effects || candidate.effect_sigma.is_none()) && !given(candidate.unit())
     };
     if let Some(candidate) = matched.iter().find(missing) {
         let (parameter, suffixes) = (candidate.name.clone(), suffixes(candidate.unit()));
@@ -328,13 +334,13 @@ fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), Inp
     Ok(())
 }
 
-/// Whether a rule can be meant for a quantity of this kind: it holds it, frees it, or gives its
+/// Returns true if a rule can apply to a quantity of this unit: it holds it, frees it, or gives its
 /// unit.
 fn fits(rule: &ParameterRule, unit: Unit) -> bool {
     let Freedom::Free { sigma, min, max } = &rule.freedom else { return true };
-    let all = [sigma, min, max];
-    all.iter().all(|q| **q == Quantities::default())
-        || all.iter().any(|q| of_kind(q, unit).is_some())
+    let quantities = [sigma, min, max];
+    quantities.iter().all(|q| **q == Quantities::default())
+        || quantities.iter().any(|q| of_kind(q, unit).is_some())
 }
 
 fn suffixes(unit: Unit) -> &'static str {

@@ -1,58 +1,58 @@
-//! A model whose unknowns are the joint commands.
+//! Models whose free parameters are corrections to the joint commands.
 
 use nalgebra::DVector;
 
 use super::Model;
-use super::driven::Driven;
+use super::command_term::CommandTerm;
 use crate::mechanics::Arm;
 use crate::model::parameter::{JointField, Parameter, ParameterSite, Regressor};
 use crate::problem::{Joint, JointKind, Problem};
 
 impl Model {
-    /// The arm with parameters `x`, whose free parameters are now the corrections to its moving
-    /// joints' commands.
+    /// Returns the arm at the parameters `x`, with corrections to the commands of its moving joints
+    /// as free parameters.
     ///
-    /// A correction to q is one to θ of a revolute joint and to d of a prismatic one. Bases and
-    /// targets stay as in `x`.
+    /// The correction adds to θ of a revolute joint and to d of a prismatic joint. Bases and
+    /// targets keep their values at `x`.
     #[must_use]
     pub fn with_free_commands(&self, problem: &Problem, x: &DVector<f64>) -> Self {
         let arm = self.arm(|k| x[k]);
         let parameters = commands(problem, &arm, Joint::command_kind);
         Self {
             nominal: arm,
-            driven: Driven::all(&self.driven, &self.parameters, x.as_slice()),
+            fixed_terms: CommandTerm::all(&self.fixed_terms, &self.parameters, x.as_slice()),
             instrument: self.instrument_at(x.as_slice()),
             bases: self.base_poses(x.as_slice()),
             targets: self.target_positions(x.as_slice()),
             target_joints: self.target_joints.clone(),
             fixtures: self.fixtures(x.as_slice()),
             declared: self.declared.clone(),
-            turned: self.target_rotations(x.as_slice()),
+            target_rotations: self.target_rotations(x.as_slice()),
             parameters,
             constraints: Vec::new(),
         }
     }
 
-    /// The same without what effects make of the measurement: it predicts where the target is, not
-    /// what is read of it.
+    /// Returns the model without errors of the instrument: it predicts the position of the target,
+    /// not the reading.
     #[must_use]
     pub fn without_instrument_errors(self) -> Self {
         Self { instrument: self.instrument.without_errors(), ..self }
     }
 
-    /// A commanded model with corrections to the joints that follow others as further parameters.
+    /// Adds corrections to the mimic joints as free parameters to a model with free commands.
     #[must_use]
     pub fn with_mimic_joints(mut self, problem: &Problem) -> Self {
-        let of = |joint: &Joint| if joint.mimic.is_some() { joint.kind } else { JointKind::Fixed };
-        self.parameters.extend(commands(problem, &self.nominal, of));
+        let kind =
+            |joint: &Joint| if joint.mimic.is_some() { joint.kind } else { JointKind::Fixed };
+        self.parameters.extend(commands(problem, &self.nominal, kind));
         self
     }
 
-    /// The full parameter vector for values \[SI\] by name, or the first name that `value` does not
-    /// know.
+    /// Returns the full parameter vector of values by name \[SI\].
     ///
     /// # Errors
-    /// A free parameter has no value.
+    /// A free parameter has no value; its name is returned.
     pub fn parameter_vector(
         &self,
         value: impl Fn(&str) -> Option<f64>,
@@ -64,12 +64,12 @@ impl Model {
         entries.collect::<Result<Vec<f64>, String>>().map(DVector::from_vec)
     }
 
-    /// Whether something that is not free follows the joints' commands.
+    /// Returns true if a term that is not free depends on the joints' commands.
     pub fn follows_commands(&self) -> bool {
-        self.driven.iter().any(|driven| driven.regressor.follows_commands())
+        self.fixed_terms.iter().any(|term| term.regressor.follows_commands())
     }
 
-    /// Joints that the parameters of a commanded model move, in their order.
+    /// Returns the joints that the parameters of a model with free commands move, in their order.
     pub fn moving_joints(&self) -> Vec<usize> {
         let joint = |parameter: &Parameter| match parameter.site {
             ParameterSite::Joint { joint, .. } => Some(joint),
@@ -79,13 +79,14 @@ impl Model {
     }
 }
 
-/// Corrections to the coordinates of joints, each of the kind that `of` says.
-fn commands(problem: &Problem, arm: &Arm<f64>, of: fn(&Joint) -> JointKind) -> Vec<Parameter> {
+/// Creates the corrections to the coordinates of joints, according to the joint kind that `kind`
+/// returns.
+fn commands(problem: &Problem, arm: &Arm<f64>, kind: fn(&Joint) -> JointKind) -> Vec<Parameter> {
     let joints = problem.joints.iter().zip(&arm.joints).enumerate();
-    let corrected = joints.filter_map(|(joint, (declared, own))| {
-        let (field, nominal) = match of(declared) {
-            JointKind::Revolute => (JointField::Theta, own.theta),
-            JointKind::Prismatic => (JointField::D, own.d),
+    let corrected = joints.filter_map(|(joint, (declared, nominal_joint))| {
+        let (field, nominal) = match kind(declared) {
+            JointKind::Revolute => (JointField::Theta, nominal_joint.theta),
+            JointKind::Prismatic => (JointField::D, nominal_joint.d),
             JointKind::Fixed => return None,
         };
         Some(Parameter {

@@ -1,4 +1,4 @@
-//! How a parameter enters the arm, by its site.
+//! Sites of parameters in the arm.
 
 use crate::mechanics::{
     AddedMass, Angle, Arm, Beam, Compensator, Flexibility, HoistError, Nonlinear, Strain,
@@ -9,8 +9,8 @@ use crate::scalar::Scalar;
 use crate::spatial::rotate;
 use nalgebra::Vector3;
 
-/// Makes room at a site for an effect's parameter, whose value without the effect is `nominal`.
-pub(super) fn prepare(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64) {
+/// Prepares a site for an effect's parameter, whose value without the effect is `nominal`.
+pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64) {
     match site {
         ParameterSite::Joint { joint, field } => {
             let joint = &mut arm.joints[joint];
@@ -65,8 +65,8 @@ pub(super) fn prepare(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64) {
     }
 }
 
-/// Puts the spring of an effect where it is, without any pull, unless the joint has one.
-pub(super) fn place(arm: &mut Arm<f64>, effect: &Effect) {
+/// Adds the spring of an effect, without force, unless the joint has a spring.
+pub(super) fn add_spring(arm: &mut Arm<f64>, effect: &Effect) {
     if let Effect::GravityCompensator { joint, anchor, lever, free_length } = effect
         && let Some(joint) = arm.joints.get_mut(joint.wrapping_sub(1))
     {
@@ -77,7 +77,7 @@ pub(super) fn place(arm: &mut Arm<f64>, effect: &Effect) {
     }
 }
 
-/// A link that was declared rigid, ready to bend.
+/// Creates a weightless rigid beam, to which flexibility can be added.
 fn weightless() -> Beam<f64> {
     Beam {
         mass: 0.0,
@@ -89,15 +89,17 @@ fn weightless() -> Beam<f64> {
     }
 }
 
-/// Turns gravity by the rotation vector (x, y, 0) \[rad\].
-pub(super) fn turn_gravity<S: Scalar>(arm: &mut Arm<S>, [x, y]: [S; 2]) {
+/// Rotates gravity by the rotation vector (x, y, 0) \[rad\].
+pub(super) fn rotate_gravity<S: Scalar>(arm: &mut Arm<S>, [x, y]: [S; 2]) {
     arm.gravity = rotate(&Vector3::new(x, y, S::from(0.0)), &arm.gravity);
 }
 
-/// Sets a site of the arm to its nominal value and a deviation x; effects add to what is declared.
+/// Sets a site of the arm to its nominal value plus a deviation x. Effects add to the declared
+/// value.
 ///
-/// The turn of gravity is collected in `tilt`: both of its angles belong to one rotation vector.
-pub(super) fn enter<S: Scalar>(
+/// The angles that rotate gravity are collected in `tilt`, because both belong to one rotation
+/// vector.
+pub(super) fn set_site<S: Scalar>(
     arm: &mut Arm<S>,
     site: ParameterSite,
     nominal: f64,
@@ -136,17 +138,17 @@ pub(super) fn enter<S: Scalar>(
                     joint.compensator.iter_mut().for_each(|spring| spring.preload += x)
                 }
                 (JointField::SlideFlexibility, ..) => {
-                    joint.slide = Some(joint.slide.map_or(x, |known| known + x))
+                    joint.slide = Some(joint.slide.map_or(x, |declared| declared + x))
                 }
                 _ => {}
             }
         }
         ParameterSite::Beam { joint, field } => {
             if let Some(beam) = &mut arm.joints[joint].beam {
-                enter_beam(beam, field, nominal, x);
+                set_beam(beam, field, nominal, x);
             }
         }
-        ParameterSite::Arm(field) => enter_arm(arm, field, x, tilt),
+        ParameterSite::Arm(field) => set_arm(arm, field, x, tilt),
         ParameterSite::Base { .. }
         | ParameterSite::Target { .. }
         | ParameterSite::Fixture { .. }
@@ -157,22 +159,28 @@ pub(super) fn enter<S: Scalar>(
     }
 }
 
-fn enter_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: S) {
-    let all = &mut beam.flexibility;
+fn set_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: S) {
+    let flexibilities = &mut beam.flexibility;
     let flexibility = (-x).exp() / nominal;
     match (field, &mut beam.strain, &mut beam.added) {
-        (BeamField::Axial, ..) => all.axial = flexibility,
-        (BeamField::Bending, ..) => (all.about_y, all.about_z) = (flexibility, flexibility),
-        (BeamField::BendingY, ..) => all.about_y = flexibility,
-        (BeamField::BendingZ, ..) => all.about_z = flexibility,
-        (BeamField::Twist, ..) => all.twist = flexibility,
-        (BeamField::Anisotropy, ..) => all.about_z *= (-x).exp(),
-        (BeamField::Flexibility, ..) => {
-            all.about_y += x;
-            all.about_z += x;
+        (BeamField::Axial, ..) => flexibilities.axial = flexibility,
+        (BeamField::Bending, ..) => {
+            (flexibilities.about_y, flexibilities.about_z) = (flexibility, flexibility)
         }
-        (BeamField::CouplingY, ..) => all.coupling = all.coupling.map(|[y, z]| [y + x, z]),
-        (BeamField::CouplingZ, ..) => all.coupling = all.coupling.map(|[y, z]| [y, z + x]),
+        (BeamField::BendingY, ..) => flexibilities.about_y = flexibility,
+        (BeamField::BendingZ, ..) => flexibilities.about_z = flexibility,
+        (BeamField::Twist, ..) => flexibilities.twist = flexibility,
+        (BeamField::Anisotropy, ..) => flexibilities.about_z *= (-x).exp(),
+        (BeamField::Flexibility, ..) => {
+            flexibilities.about_y += x;
+            flexibilities.about_z += x;
+        }
+        (BeamField::CouplingY, ..) => {
+            flexibilities.coupling = flexibilities.coupling.map(|[y, z]| [y + x, z])
+        }
+        (BeamField::CouplingZ, ..) => {
+            flexibilities.coupling = flexibilities.coupling.map(|[y, z]| [y, z + x])
+        }
         (BeamField::BowY, Some(strain), _) => strain.curvature[0] += x,
         (BeamField::BowZ, Some(strain), _) => strain.curvature[1] += x,
         (BeamField::Stretch, Some(strain), _) => strain.axial += x,
@@ -183,12 +191,12 @@ fn enter_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: 
     }
 }
 
-fn enter_arm<S: Scalar>(arm: &mut Arm<S>, field: ArmField, x: S, tilt: &mut [S; 2]) {
+fn set_arm<S: Scalar>(arm: &mut Arm<S>, field: ArmField, x: S, tilt: &mut [S; 2]) {
     match (field, &mut arm.rope, &mut arm.mounting) {
         (ArmField::Payload, ..) => arm.payload_error += x,
         (ArmField::GravityX, ..) => tilt[0] += x,
         (ArmField::GravityY, ..) => tilt[1] += x,
-        (ArmField::Mixing, ..) => arm.mixing = Some(arm.mixing.map_or(x, |known| known + x)),
+        (ArmField::Mixing, ..) => arm.mixing = Some(arm.mixing.map_or(x, |declared| declared + x)),
         (ArmField::HoistForce, Some(rope), _) => rope.force += x,
         (ArmField::HoistLeanX, Some(rope), _) => rope.lean[0] += x,
         (ArmField::HoistLeanY, Some(rope), _) => rope.lean[1] += x,

@@ -1,4 +1,4 @@
-//! Which parameters of custom effects the model has room for.
+//! Checks of the parameters of custom effects.
 
 use super::effect;
 use crate::error::{InputError, InputErrorKind};
@@ -7,9 +7,9 @@ use crate::model::parameter::{
 };
 use crate::problem::{Effect, EffectDeclaration, Joint, JointKind, Problem};
 
-/// Whether the custom effects among those of `problem` find room in its model beside everything
-/// else.
-pub(super) fn check_customs(
+/// Checks that every custom effect of `problem` has sites in the model besides all other
+/// parameters.
+pub(super) fn check_custom_effects(
     problem: &Problem,
     bases: usize,
     targets: usize,
@@ -29,11 +29,11 @@ pub(super) fn check_customs(
 }
 
 impl Effect {
-    /// Whether a custom effect finds room in the model of `problem` beside what is declared; others
-    /// always do.
+    /// Checks that a custom effect has sites in the model of `problem` besides the declared
+    /// parameters. Effects of the catalogue always have.
     ///
     /// # Errors
-    /// Its name is taken, or one of its parameters enters where the model has no room for it.
+    /// Its name is taken, or the model has no site for one of its parameters.
     pub fn check_room(&self, problem: &Problem) -> Result<(), InputErrorKind> {
         check_custom(problem, 1, 1, effect::parameters(problem), self)
     }
@@ -63,7 +63,7 @@ fn check_custom(
     Ok(())
 }
 
-/// Whether `parameter` finds room beside the declared arm and `others`.
+/// Checks that the site of `parameter` exists and is free besides the declared arm and `others`.
 fn check(
     problem: &Problem,
     bases: usize,
@@ -72,7 +72,7 @@ fn check(
     parameter: &EffectParameter,
 ) -> Result<(), InputErrorKind> {
     let name = || parameter.name.clone();
-    if !exists(problem, bases, targets, parameter) {
+    if !has_site(problem, bases, targets, parameter) {
         return Err(InputErrorKind::SiteAbsent { name: name() });
     }
     if parameter.regressor.is_constant() {
@@ -81,7 +81,7 @@ fn check(
         if is_declared(parameter.site) || others.iter().any(same) {
             return Err(InputErrorKind::SiteOccupied { name: name() });
         }
-    } else if !is_drivable(problem, parameter.site, parameter.regressor) {
+    } else if !can_evaluate(problem, parameter.site, parameter.regressor) {
         return Err(InputErrorKind::RegressorNotAllowed { name: name() });
     }
     let twin = |other: &EffectParameter| other.name == parameter.name;
@@ -92,10 +92,10 @@ fn check(
     }
 }
 
-/// Whether the arm has what the parameter enters and what drives it.
-fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectParameter) -> bool {
+/// Returns true if the arm has the site of the parameter and the quantity of its regressor.
+fn has_site(problem: &Problem, bases: usize, targets: usize, parameter: &EffectParameter) -> bool {
     let joints = problem.joints.len();
-    let driven = match parameter.regressor {
+    let has_quantity = match parameter.regressor {
         Regressor::Command(joint)
         | Regressor::Travel(joint)
         | Regressor::LoadedSide { joint, .. }
@@ -118,12 +118,15 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
         | Regressor::Settling(_) => true,
         Regressor::Covariate(which) => which < problem.data.covariates.len(),
     };
-    driven
+    has_quantity
         && match parameter.site {
             ParameterSite::Joint {
                 joint,
                 field: JointField::SpringRate | JointField::SpringPreload,
-            } => problem.effects.iter().any(|own| own.effect.compensated() == Some(joint + 1)),
+            } => problem
+                .effects
+                .iter()
+                .any(|declared| declared.effect.compensated() == Some(joint + 1)),
             ParameterSite::Joint { joint, .. } => joint < joints,
             ParameterSite::Beam { joint, field } => {
                 problem.joints.get(joint).is_some_and(|joint| match field {
@@ -136,14 +139,14 @@ fn exists(problem: &Problem, bases: usize, targets: usize, parameter: &EffectPar
             ParameterSite::Fixture { fixture, kind, axis } => problem
                 .fixtures
                 .get(fixture)
-                .is_some_and(|own| own.kind == kind && axis < kind.fields().len()),
+                .is_some_and(|fixture| fixture.kind == kind && axis < kind.fields().len()),
             ParameterSite::Shift { axis } | ParameterSite::Turn { axis } => axis < 3,
             ParameterSite::Strain { entry } => entry < 6,
             ParameterSite::Arm(_) | ParameterSite::Scale => true,
         }
 }
 
-/// Whether the problem's own parameters are there.
+/// Returns true if the problem itself has parameters at the site.
 fn is_declared(site: ParameterSite) -> bool {
     match site {
         ParameterSite::Joint { field, .. } => field.is_geometry() || field == JointField::Stiffness,
@@ -159,8 +162,8 @@ fn is_declared(site: ParameterSite) -> bool {
     }
 }
 
-/// Whether the model can tell the quantity anew for every pose.
-fn is_drivable(problem: &Problem, site: ParameterSite, regressor: Regressor) -> bool {
+/// Returns true if the model can evaluate the regressor at the site in every pose.
+fn can_evaluate(problem: &Problem, site: ParameterSite, regressor: Regressor) -> bool {
     match site {
         ParameterSite::Joint { joint, field } => match problem.joints[joint].kind {
             JointKind::Revolute => field == JointField::Theta,

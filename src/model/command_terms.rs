@@ -1,29 +1,30 @@
-//! Poses as joints and beams take them, with all that adds to their commands.
+//! Poses with all terms that add to their commands.
 
-use super::driven::{Driven, Place};
-use super::series::Series;
+use super::command_term::{CommandTerm, TermSite};
+use super::harmonic_sum::HarmonicSum;
 use crate::model::parameter::{Parameter, Waves};
 use crate::problem::PoseView;
 
-/// Poses with what drives them added, one at a time.
+/// Sum of the terms that add to commands and strains, evaluated for one pose at a time.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Commands {
-    series: Vec<Series>,
-    /// What is in none of these.
-    others: Vec<Driven>,
+pub(super) struct CommandTerms {
+    series: Vec<HarmonicSum>,
+    /// Terms that are in no series.
+    others: Vec<CommandTerm>,
     configuration: Vec<f64>,
     strains: Vec<[f64; 3]>,
 }
 
-impl Commands {
-    /// Of what is known to drive and the free parameters at the full parameter vector `x`.
-    pub fn new(known: &[Driven], parameters: &[Parameter], x: &[f64]) -> Self {
-        let mut others = Driven::all(known, parameters, x);
-        let series = Series::take(&mut others);
+impl CommandTerms {
+    /// Creates the sum of the fixed terms and of the free parameters at the full parameter vector
+    /// `x`.
+    pub fn new(fixed: &[CommandTerm], parameters: &[Parameter], x: &[f64]) -> Self {
+        let mut others = CommandTerm::all(fixed, parameters, x);
+        let series = HarmonicSum::take(&mut others);
         Self { series, others, ..Self::default() }
     }
 
-    /// The pose as the joints and beams take it.
+    /// Returns the pose with all terms added to its configuration and strains.
     #[inline]
     pub fn apply<'b>(&'b mut self, setup: &PoseView<'b>) -> PoseView<'b> {
         if self.others.is_empty() && self.series.is_empty() {
@@ -36,12 +37,12 @@ impl Commands {
         let others = self
             .others
             .iter()
-            .map(|own| (own.place, own.value * waves.value(own.regressor, setup)));
-        let series = self.series.iter().map(|own| (own.place, own.value(setup.configuration)));
-        for (place, added) in others.chain(series) {
-            match place {
-                Place::Joint(joint) => self.configuration[joint] += added,
-                Place::Strain { joint, which } => {
+            .map(|term| (term.site, term.value * waves.value(term.regressor, setup)));
+        let series = self.series.iter().map(|sum| (sum.site, sum.value(setup.configuration)));
+        for (site, added) in others.chain(series) {
+            match site {
+                TermSite::Joint(joint) => self.configuration[joint] += added,
+                TermSite::Strain { joint, which } => {
                     self.strains.resize(self.configuration.len(), [0.0; 3]);
                     self.strains[joint][which] += added;
                 }
@@ -62,26 +63,26 @@ mod tests {
 
     #[test]
     fn waves_other_drivers_and_strains_add_up() {
-        let strain = Place::Strain { joint: 1, which: 2 };
+        let strain = TermSite::Strain { joint: 1, which: 2 };
         let waves = (1..=20).flat_map(|order| {
             let value = 1e-3 / f64::from(order);
             [
-                (Place::Joint(0), Regressor::Sine(1, order), value),
+                (TermSite::Joint(0), Regressor::Sine(1, order), value),
                 (strain, Regressor::Cosine(0, order), -value),
             ]
         });
         let others = [
-            (Place::Joint(0), Regressor::Warming { reference: 20.0 }, 1e-4),
-            (Place::Joint(1), Regressor::Command(0), 0.5),
-            (Place::Strain { joint: 0, which: 0 }, Regressor::Elapsed, 1e-6),
+            (TermSite::Joint(0), Regressor::Warming { reference: 20.0 }, 1e-4),
+            (TermSite::Joint(1), Regressor::Command(0), 0.5),
+            (TermSite::Strain { joint: 0, which: 0 }, Regressor::Elapsed, 1e-6),
         ];
-        let known: Vec<Driven> = waves
+        let terms: Vec<CommandTerm> = waves
             .chain(others)
-            .map(|(place, regressor, value)| Driven { place, regressor, value })
+            .map(|(site, regressor, value)| CommandTerm { site, regressor, value })
             .collect();
-        let mut commands = Commands::new(&known, &[], &[]);
+        let mut commands = CommandTerms::new(&terms, &[], &[]);
         assert!(commands.series.len() == 2 && commands.others.len() == 3);
-        // A pose with strains of the last one would show it.
+        // Strains that remained from the last pose would be noticed.
         for configuration in [[0.3, -1.2], [0.9, 0.4]] {
             let pose = PoseView {
                 temperature: Some(&31.0),
@@ -89,10 +90,10 @@ mod tests {
                 ..PoseView::from_configuration(&configuration)
             };
             let (mut joints, mut strains) = (configuration, [[0.0; 3]; 2]);
-            for Driven { place, regressor, value } in &known {
-                match *place {
-                    Place::Joint(joint) => joints[joint] += value * regressor.value(&pose),
-                    Place::Strain { joint, which } => {
+            for CommandTerm { site, regressor, value } in &terms {
+                match *site {
+                    TermSite::Joint(joint) => joints[joint] += value * regressor.value(&pose),
+                    TermSite::Strain { joint, which } => {
                         strains[joint][which] += value * regressor.value(&pose)
                     }
                 }
