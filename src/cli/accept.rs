@@ -59,18 +59,18 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(diagnostic::judged(&found, common.quiet))
 }
 
-/// Digest of a file; none of a pipe, which has been read.
+/// Returns the digest of a file; `None` for a pipe, which cannot be read again.
 fn sha256(file: &Path) -> Option<String> {
     file.is_file().then(|| fs::read(file).ok()).flatten().map(|bytes| digest(&bytes))
 }
 
-/// The commit of the git repository around a file, as its HEAD names it.
+/// Returns the commit at HEAD of the git repository around a file.
 fn commit(file: &Path) -> Option<String> {
     let whole = file.canonicalize().ok()?;
     let git =
         whole.ancestors().skip(1).map(|folder| folder.join(".git")).find(|git| git.exists())?;
     let read = |path: PathBuf| Some(fs::read_to_string(path).ok()?.trim().to_owned());
-    // A worktree's .git is a file that names its folder, and that one the folder of the references.
+    // In a worktree .git is a file that names its folder, which names the folder of the references.
     let folder = match read(git.clone()) {
         Some(text) => git.parent()?.join(text.strip_prefix("gitdir: ")?),
         None => git,

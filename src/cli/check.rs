@@ -36,7 +36,7 @@ pub struct Arguments {
     source: Source,
 }
 
-/// A check that has no poses.
+/// Check without valid poses.
 #[derive(Debug, thiserror::Error)]
 enum PosesError {
     #[error(
@@ -49,7 +49,7 @@ enum PosesError {
     Twice,
 }
 
-/// Checks, writes `check.json`, and prints what is to be expected.
+/// Runs the check, writes `check.json`, and prints what to expect.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let problem = Problem::read(common.problem())?;
@@ -75,7 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(Outcome::NotTrusted)
 }
 
-/// The poses that the arguments mean.
+/// Returns the poses that the arguments name.
 fn judged(arguments: &Arguments, problem: &Problem) -> Result<CheckedPoses, Box<dyn Error>> {
     let Arguments { common, poses, source } = arguments;
     let poses = poses.map(|poses| poses as usize);

@@ -21,8 +21,8 @@ use super::progress::Line;
 pub struct Arguments {
     #[command(flatten)]
     common: Common,
-    /// Let the procedure of [Chen2021] take part; it does anyway where the problem declares the
-    /// paper's arm
+    /// Include the procedure of [Chen2021]; it is always included if the problem declares the paper's
+    /// arm
     #[arg(long)]
     paper: bool,
 }

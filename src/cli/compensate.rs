@@ -39,7 +39,7 @@ pub struct Arguments {
     frame: Frame,
 }
 
-/// Where targets are seen from.
+/// Frame of the targets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Frame {
     /// The measuring frame, as measurements
@@ -48,19 +48,19 @@ enum Frame {
     Base,
 }
 
-/// No targets.
+/// Missing table of targets.
 #[derive(Debug, thiserror::Error)]
 #[error("no targets; name them with --data")]
 struct NoTargets;
 
-/// Finds commands, writes `commands.csv`, and says what they reach.
+/// Finds commands, writes `commands.csv`, and prints which targets they reach.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     if common.data().is_empty() {
         return Err(NoTargets.into());
     }
     let mut problem = Problem::read(common.problem())?;
-    // Targets are not split: every row is one.
+    // Every row is a target.
     problem.data.held_out = None;
     let results = common.results(
         "compensate",
@@ -74,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         return Err(targets.location(row).error(InputErrorKind::NoTarget).into());
     }
     common.warn(&warnings);
-    // Targets may be waypoints alone.
+    // Targets may be waypoints without positions.
     for missing in fit::missing_target_columns(&problem, &targets).iter().filter(|_| !common.quiet)
     {
         diagnostic::warn(&format!("{missing}; commands leave out what depends on it"));
@@ -85,9 +85,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let model = estimate.model(model);
     let (x, trusted) = (estimate.vector(&problem, &model)?, estimate.trusted);
     if !trusted {
-        diagnostic::warn("the estimate is not to be trusted, and so are the commands not");
+        diagnostic::warn("the estimate is not to be trusted, so the commands are not either");
     }
-    // Waypoints go with the base, wherever it is.
+    // Waypoints move with the base.
     let is_seen = targets.position_measured && matches!(arguments.frame, Frame::Measuring);
     if is_seen && estimate.leaves_base_open() && !common.quiet {
         diagnostic::warn(
@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
              happens to be assumed; --frame base takes them in the frame of the base",
         );
     }
-    // As they are shown, and as they are sought: in the measuring frame.
+    // Targets as shown, and as sought in the measuring frame.
     let (targets, sought) = match (targets.position_measured, arguments.frame) {
         (false, _) => {
             let waypoints = fit::waypoints(&problem, &model, &x, &targets)?;

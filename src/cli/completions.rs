@@ -20,7 +20,7 @@ pub struct Arguments {
     shell: Shell,
 }
 
-/// Prints what makes a shell complete the arguments of `flexcal`.
+/// Prints the script with which a shell completes the arguments of `flexcal`.
 pub fn run(arguments: &Arguments, mut flexcal: Command) -> Result<Outcome, Box<dyn Error>> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut flexcal, "flexcal", &mut script);

@@ -1,23 +1,23 @@
-//! What is said of work under way: where it stands, and how long it may take.
+//! Progress of a running fit or loop in words, with an estimate of the time left.
 
 use std::fmt;
 
 use flexcal::fit::{COST_TOLERANCE, Progress};
 
-/// Steps beyond which nothing is said of the time that is left.
+/// Number of remaining steps beyond which no time left is stated.
 const FORESEEN: f64 = 200.0;
 
-/// Where work stands. Times in seconds since it began.
+/// Progress of the work; times in seconds since its start.
 #[derive(Debug, Default)]
 pub struct Course {
     round: Option<Round>,
     finishing: bool,
     step: Option<Step>,
-    /// When progress was last told of.
+    /// Time of the last report of progress.
     now: f64,
-    /// When the fit at hand began, of a problem or of a round.
+    /// Start time of the current fit.
     fit_begun: Option<f64>,
-    /// Fits of rounds that are done, the one before the first among them, and their time.
+    /// Number of finished fits, the one before the first round included, and their total time.
     fits_done: (f64, f64),
 }
 
@@ -28,7 +28,7 @@ struct Round {
     last: Option<String>,
     fit: usize,
     fits: usize,
-    /// When the round may end.
+    /// Expected end of the round.
     end: Option<f64>,
 }
 
@@ -38,16 +38,16 @@ struct Step {
     unknowns: usize,
     poses: usize,
     cost: f64,
-    /// What the last step that lowered the cost took off it.
+    /// Decrease of the cost by the last successful step.
     gain: Option<f64>,
-    /// When the first step of its solver was done.
+    /// End time of the first step of the solver.
     begun: (u64, f64),
-    /// Time that its solver may yet take.
+    /// Expected remaining time of the solver.
     left: Option<f64>,
 }
 
 impl Course {
-    /// Takes note of progress at the time `now`.
+    /// Records progress at the time `now`.
     pub fn take(&mut self, progress: &Progress, now: f64) {
         self.now = now;
         match progress {
@@ -94,8 +94,8 @@ impl Course {
 }
 
 impl Step {
-    /// The step after this one. Time is left for as many steps as gains need that go on to fall as
-    /// the last two did.
+    /// Updates the state for the next step. The time left covers the steps until gains vanish that fall
+    /// at the rate of the last two.
     fn next(self, iteration: u64, cost: f64, now: f64) -> Self {
         let gain = self.cost - cost;
         let each = (now - self.begun.1) / (iteration - self.begun.0) as f64;
@@ -141,7 +141,7 @@ impl fmt::Display for Course {
     }
 }
 
-/// The time that is left of something, where any is.
+/// Formats the time left, if there is any.
 fn about(f: &mut fmt::Formatter<'_>, left: Option<f64>, of: &str) -> fmt::Result {
     match left {
         Some(left) if left >= 90.0 => write!(f, ", about {:.0} min left of the {of}", left / 60.0),

@@ -1,4 +1,4 @@
-//! Errors and warnings on the terminal, with the line that is meant.
+//! Errors and warnings on the terminal, with the line of the file that they concern.
 
 use std::error::Error;
 use std::io::Write as _;
@@ -14,7 +14,7 @@ use flexcal::report;
 
 use super::outcome::Outcome;
 
-/// Wide enough that messages keep to one line.
+/// Width of messages, large enough for one line.
 const WIDTH: usize = 1000;
 
 /// Prints an error to standard error.
@@ -28,12 +28,12 @@ pub fn print(error: &(dyn Error + 'static)) {
     );
 }
 
-/// A mistake in the input that an argument avoids.
+/// Adds the argument that avoids a mistake in the input.
 fn with_argument(error: &InputError) -> Option<String> {
     matches!(*error.kind, InputErrorKind::NoDataFiles).then(|| format!("{error} or with --data"))
 }
 
-/// An error of a design in terms of the arguments that bring it about, where it is about one.
+/// Describes an error of a design by the arguments that cause it.
 fn by_arguments(error: &DesignError) -> Option<String> {
     match error {
         DesignError::NoRange(_) => Some(format!(
@@ -61,8 +61,8 @@ pub fn warn(message: &str) {
     show(Level::WARNING, message, None);
 }
 
-/// What a command comes to that made a fit; warns where that is not to be trusted, or stands on
-/// priors. Exit status 1 has its reason in one line even where the command is to be quiet.
+/// Returns the outcome of a command that made a fit, and prints its warnings. The reason for exit
+/// status 1 is printed even if the command is quiet.
 pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
     if !fit.is_trusted() {
         warn(&report::why_not_trusted(fit));

@@ -52,7 +52,7 @@ pub struct Arguments {
     flags: Flags,
 }
 
-/// A form of YAML.
+/// Dialect of YAML.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Format {
     /// The calibration file of a Universal Robots driver
@@ -61,7 +61,7 @@ enum Format {
     RosYaml,
 }
 
-/// Writes the identified geometry, and says what it leaves out.
+/// Writes the identified geometry, and prints what the file cannot hold.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let flags = &arguments.flags;
     let problem = Problem::read(&arguments.problem)?;
@@ -105,7 +105,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let files = if arguments.data.is_empty() { &problem.data.files } else { &arguments.data };
     let inputs = [&[own, arguments.estimate.clone()], arguments.urdf.as_slice(), files].concat();
     let results = Results::claim("export", folder, inputs, &[&name], (flags.force, flags.quiet))?;
-    // Measurements that the problem names need not be at hand any more.
+    // Measurements that the problem names may have been removed.
     let at_hand =
         !arguments.data.is_empty() || !files.is_empty() && files.iter().all(|file| file.is_file());
     if let Some(absent) =
@@ -124,12 +124,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     };
     flags.tell(&exported.result().to_json(), || report::export_text(&exported))?;
     if !estimates.trusted {
-        diagnostic::warn("the estimate is not to be trusted, and so is this file not");
+        diagnostic::warn("the estimate is not to be trusted, so this file is not either");
     }
     Ok(if estimates.trusted { Outcome::Done } else { Outcome::NotTrusted })
 }
 
-/// Errors on held-out rows of the whole model and of its geometry alone.
+/// Computes the held-out errors of the whole model and of its rigid geometry.
 fn errors(
     problem: &Problem,
     files: &[PathBuf],

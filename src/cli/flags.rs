@@ -8,7 +8,7 @@ use flexcal::error::Warning;
 use super::diagnostic;
 use super::output::{self, Results, WriteError};
 
-/// Where results go, and who reads along.
+/// Folder of the results, and format of the output.
 #[derive(Debug, Clone, Args)]
 pub struct Flags {
     /// Folder for results [default: out/<name of the problem>]
@@ -21,18 +21,18 @@ pub struct Flags {
     /// Print the result as JSON on standard output, and nothing else
     #[arg(long)]
     pub json: bool,
-    /// Print nothing but errors (and the JSON, where it is asked for)
+    /// Print nothing but errors (and the JSON, if requested)
     #[arg(short, long)]
     pub quiet: bool,
 }
 
 impl Flags {
-    /// Whether people read along.
+    /// Returns true if the output is for people.
     pub fn talks(&self) -> bool {
         !self.json && !self.quiet
     }
 
-    /// Prints a result: as JSON where that is asked for, in words where people read along.
+    /// Prints a result as JSON or as text.
     pub fn tell(&self, json: &str, words: impl FnOnce() -> String) -> Result<(), WriteError> {
         match (self.json, self.quiet) {
             (true, _) => output::print_json(json),
@@ -41,20 +41,20 @@ impl Flags {
         }
     }
 
-    /// Prints warnings, unless it is to be quiet.
+    /// Prints warnings unless the command is quiet.
     pub fn warn(&self, warnings: &[Warning]) {
         if !self.quiet {
             diagnostic::print_warnings(warnings);
         }
     }
 
-    /// The folder for results of what is called `name`.
+    /// Returns the folder for the results of the problem or study `name`.
     pub fn folder(&self, name: &str) -> PathBuf {
         self.out.clone().unwrap_or_else(|| Path::new("out").join(name))
     }
 
-    /// Where `command`, which reads `inputs`, writes the results called `names` of what is called
-    /// `name`.
+    /// Claims the results called `names` of the problem or study `name`, for a `command` that reads
+    /// `inputs`.
     pub fn claim(
         &self,
         command: &'static str,

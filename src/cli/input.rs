@@ -1,4 +1,4 @@
-//! Arguments that every command takes, and the input they name.
+//! Arguments that most commands take, and the input that they name.
 
 use std::error::Error;
 use std::ops::Deref;
@@ -14,7 +14,7 @@ use super::diagnostic;
 use super::flags::Flags;
 use super::output::{Results, WriteError};
 
-/// Problem, data, and where results go.
+/// Problem, data, and folder of the results.
 #[derive(Debug, Args)]
 pub struct Common {
     /// A problem.toml, or the folder that holds one [default: the current folder]
@@ -27,7 +27,7 @@ pub struct Common {
     pub flags: Flags,
 }
 
-/// Everything else that stands among the flags.
+/// Gives access to the flags of every command.
 impl Deref for Common {
     type Target = Flags;
 
@@ -36,15 +36,15 @@ impl Deref for Common {
     }
 }
 
-/// Everything that was read.
+/// Problem, data, and claimed results.
 pub struct Input {
     pub problem: Problem,
     pub data: Dataset,
     pub results: Results,
 }
 
-/// The problem among the arguments, and the files of `--data`, which takes what follows: the last
-/// of several is the problem where none is named, if it is a folder or a TOML file, as no table is.
+/// Separates the problem from the files of `--data`, which takes all words that follow. If no problem
+/// is named, the last word is the problem if it is a folder or a TOML file.
 fn split<'a>(named: Option<&'a Path>, data: &'a [PathBuf]) -> (&'a Path, &'a [PathBuf]) {
     let is_problem =
         |path: &Path| path.is_dir() || path.extension().is_some_and(|ending| ending == "toml");
@@ -56,12 +56,12 @@ fn split<'a>(named: Option<&'a Path>, data: &'a [PathBuf]) -> (&'a Path, &'a [Pa
 }
 
 impl Common {
-    /// The problem's file or folder.
+    /// Returns file or folder of the problem.
     pub fn problem(&self) -> &Path {
         split(self.named.as_deref(), &self.data).0
     }
 
-    /// The problem, and the measurement files where any are named, as arguments of another command.
+    /// Formats the problem, and the named measurement files, as arguments of another command.
     pub fn named(&self) -> String {
         let data: Vec<String> =
             self.data().iter().map(|file| format!(" {}", shell_word(file))).collect();
@@ -70,12 +70,12 @@ impl Common {
         format!("{}{data}", shell_word(self.problem()))
     }
 
-    /// The measurement files that are named, none where those of the problem count.
+    /// Returns the named measurement files; empty if those of the problem are used.
     pub fn data(&self) -> &[PathBuf] {
         split(self.named.as_deref(), &self.data).1
     }
 
-    /// Reads the problem and its measurements, once `command` may write the results called `names`.
+    /// Claims the results called `names` for a `command`, then reads the problem and its measurements.
     pub fn read(&self, command: &'static str, names: &[&str]) -> Result<Input, Box<dyn Error>> {
         let problem = Problem::read(self.problem())?;
         let results = self.results(command, &problem, &[], names)?;
@@ -92,18 +92,18 @@ impl Common {
         Dataset::from_measurements(problem, measurements)
     }
 
-    /// Says that no parameter is to be identified.
+    /// Warns if no parameter is free.
     pub fn say_if_nothing_is_free(&self, problem: &Problem) {
         if problem.parameters.is_empty() && !self.quiet {
             diagnostic::warn(
-                "nothing is free: the nominal arm is judged as it is; to identify it, write [parameters] with lines such as \
+                "no parameter is free, so the nominal arm is judged; to identify it, write [parameters] with lines such as \
                  \"joint*.alpha\" = { sigma_deg = 1.0 }, \"joint*.a\" = { sigma_mm = 5.0 }, \"joint*.theta\" = { sigma_deg = 1.0 }, \
                  \"joint*.d\" = { sigma_mm = 5.0 }, \"base.*\" = { free = true }",
             );
         }
     }
 
-    /// Says that the search for effects leaves orientations out, where the problem fits them.
+    /// Warns that the search for effects ignores orientations, if the problem fits them.
     pub fn say_of_orientation(&self, problem: &Problem, data: &mut Dataset) {
         if problem.data.fits_orientation {
             let warning = Warning {
@@ -115,8 +115,7 @@ impl Common {
         }
     }
 
-    /// Where `command` writes the results called `names`; besides problem and data it reads
-    /// `others`.
+    /// Claims the results called `names` for a `command` that reads problem, data and `others`.
     pub fn results(
         &self,
         command: &'static str,
@@ -124,24 +123,24 @@ impl Common {
         others: &[PathBuf],
         names: &[&str],
     ) -> Result<Results, WriteError> {
-        let own = [self.problem_file()];
-        let inputs = [&own, others, &problem.data.files, self.data()].concat();
+        let file = [self.problem_file()];
+        let inputs = [&file, others, &problem.data.files, self.data()].concat();
         self.claim(command, &self.results_name(problem), inputs, names)
     }
 
-    /// The measurement files.
+    /// Returns the measurement files.
     pub fn files<'a>(&'a self, problem: &'a Problem) -> &'a [PathBuf] {
         if self.data().is_empty() { &problem.data.files } else { self.data() }
     }
 
-    /// The problem file itself.
+    /// Returns the path of the problem file.
     pub fn problem_file(&self) -> PathBuf {
         let problem = self.problem();
         if problem.is_dir() { problem.join("problem.toml") } else { problem.to_owned() }
     }
 
-    /// Name of the results of `problem`; those of a `problem.closed.toml` do not go where those of
-    /// the problem went that it comes from.
+    /// Returns the name of the results; a `problem.closed.toml` has another one than the problem from
+    /// which it was made.
     fn results_name(&self, problem: &Problem) -> String {
         let file = self.problem_file();
         let variant = file.file_stem().and_then(|stem| stem.to_str()?.strip_prefix("problem."));

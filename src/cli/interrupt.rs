@@ -1,20 +1,20 @@
-//! What an interrupt from the keyboard (SIGINT, Ctrl-C) does to a command that can end early.
+//! Interrupts from the keyboard (SIGINT, Ctrl-C) during commands that can end early.
 
 use std::process::exit;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use flexcal::fit::Stop;
 
-/// Exit status of what an interrupt ends with nothing written: 128 + SIGINT, as shells count.
+/// Exit status after an interrupt with nothing written: 128 + SIGINT, as in shells.
 pub const STATUS: u8 = 130;
 
-/// Held while files take their names.
+/// Lock that is held while files take their names.
 static WRITING: Mutex<()> = Mutex::new(());
 
-/// What the first interrupt asks to end; the second one ends the process at once, between files
-/// rather than among them.
+/// Returns the request that the first interrupt makes. The second one ends the process at once, but
+/// not while files take their names.
 ///
-/// An interrupt that is ignored, or handled by a program that this one is a part of, stays so.
+/// Interrupts that are ignored, or handled by the host program, stay so.
 pub fn stop() -> Stop {
     static STOP: OnceLock<Stop> = OnceLock::new();
     let stop = STOP.get_or_init(|| {
@@ -33,7 +33,7 @@ pub fn stop() -> Stop {
     stop.clone()
 }
 
-/// Keeps interrupts from ending the process as long as what it returns is held.
+/// Prevents interrupts from ending the process while the returned guard is held.
 pub fn unbroken() -> MutexGuard<'static, ()> {
     WRITING.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,4 +1,4 @@
-//! Arguments, progress and printing; nothing else in flexcal prints.
+//! Command line: arguments, progress and printing. No other module prints.
 
 #![allow(rustdoc::invalid_html_tags, reason = "<name> in a help text is for the terminal")]
 
@@ -59,13 +59,13 @@ enum Command {
     Init(init::Arguments),
     /// Fit the free parameters of a problem and report them with their errors.
     Identify(identify::Arguments),
-    /// Put every strategy and solver, and every part of the elasticity left out, side by side.
+    /// Compare strategies, solvers, and fits without parts of the elasticity.
     Compare(compare::Arguments),
     /// Rank the effects that the residual points to; changes nothing.
     Trace(trace::Arguments),
     /// Find the effects that a problem lacks and add them, until nothing is left to find.
     Loop(loop_command::Arguments),
-    /// Say where an identified arm will be, and what measurements leave of that, without another
+    /// Predict where an identified arm will be, and its error against measurements, without another
     /// fit.
     Predict(predict::Arguments),
     /// Find the joint commands that bring the arm, as identified, to desired positions.
@@ -76,11 +76,11 @@ enum Command {
     /// Write the identified geometry into the URDF that the problem came from, or as YAML for a
     /// regressor.
     Export(export::Arguments),
-    /// Say what measurements in some poses will tell, before anyone makes them.
+    /// Forecast what measurements at some poses will tell.
     Check(check::Arguments),
     /// Choose the poses that identify best.
     Plan(plan::Arguments),
-    /// Make measurements of a known arm on the virtual test rig.
+    /// Simulate measurements of a known arm on the virtual test rig.
     Simulate(simulate::Arguments),
     /// Compare strategies over many fits to simulated measurements whose truth is known.
     Study(study::Arguments),
@@ -90,13 +90,13 @@ enum Command {
     Man(man::Arguments),
 }
 
-/// Runs the command line, `arguments` being the program's name and what follows it: exit status 0
+/// Runs the command line; `arguments` begin with the name of the program. Returns the exit status: 0
 /// done, 1 the fit is not to be trusted, 2 bad input, 130 interrupted with nothing written.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
-            // Nothing is left to tell when even that cannot be printed.
+            // If the message cannot be printed, nothing more can be reported.
             let _ = error.print();
             return if error.use_stderr() { 2 } else { 0 };
         }

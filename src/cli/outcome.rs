@@ -1,12 +1,12 @@
-//! What a command says to the shell.
+//! Outcome of a command, which decides its exit status.
 
-/// What a command came to.
+/// Outcome of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// Exit status 0.
+    /// The command is done: exit status 0.
     Done,
-    /// Exit status 1: the fit is not to be trusted.
+    /// The fit is not to be trusted: exit status 1.
     NotTrusted,
-    /// Exit status 1: what was written is of work that ended early.
+    /// The results are of work that ended early: exit status 1.
     Interrupted,
 }

@@ -10,11 +10,11 @@ use flexcal::report::{Report, is_figure};
 
 use super::{diagnostic, interrupt};
 
-/// Names of the files of a report, and of the folder of its figures.
+/// Names of the files of a report.
 pub const REPORT: [&str; 2] = ["report.md", "report.html"];
 const FIGURES: &str = "figures";
 
-/// A result that could not be written.
+/// Result that cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     #[error("cannot write {}: {source}", path.display())]
@@ -32,22 +32,22 @@ pub enum WriteError {
     Foreign { path: PathBuf },
 }
 
-/// Where the results of a command go, and which files they may replace: those that flexcal wrote
-/// there, unless they are read.
+/// Results of a command. They may replace files that flexcal wrote in their folder, except files that
+/// the command reads.
 pub struct Results {
     pub folder: PathBuf,
     command: &'static str,
-    /// What the command may write, figures left out.
+    /// Names of the files that the command may write, without figures.
     names: Vec<String>,
-    /// Files that the command or its problem reads.
+    /// Paths of the files that the command or its problem reads.
     inputs: Vec<PathBuf>,
     force: bool,
     quiet: bool,
 }
 
 impl Results {
-    /// The results of `command` in `folder`, once nothing stands in the way of those called
-    /// `names`; a later one of [`write`](Self::write) may have more.
+    /// Claims the results of `command` called `names` in `folder`, if no other file is in their way.
+    /// [`write`](Self::write) may write more files.
     pub fn claim(
         command: &'static str,
         folder: PathBuf,
@@ -65,31 +65,30 @@ impl Results {
         Ok(claimed)
     }
 
-    /// Files that are there under names of figures, of which nobody knows yet which a page will
-    /// have.
+    /// Returns the existing files with names of figures, which a new page may replace.
     fn figures(&self) -> Vec<String> {
         let Ok(entries) = fs::read_dir(self.folder.join(FIGURES)) else { return Vec::new() };
         let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
         names.filter(|name| is_figure(name)).map(|name| format!("{FIGURES}/{name}")).collect()
     }
 
-    /// Says where the results are.
+    /// States where the results are.
     pub fn written(&self) -> String {
         format!("\nWritten to {}: {}\n", self.folder.display(), self.names.join(", "))
     }
 
-    /// Path of a result.
+    /// Returns the path of a result.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 
-    /// Writes texts by name, each whole or not at all, and none before all of them are on the disk.
+    /// Writes texts by name, each whole or not at all, after all of them are on the disk.
     pub fn write(&self, texts: &[(&str, &str)]) -> Result<(), WriteError> {
         self.keep(texts, |_| false)
     }
 
-    /// The same with a report: `report.md`, `report.html` and its figures in `figures`, from where
-    /// those of an older page go.
+    /// Writes texts and a report: `report.md`, `report.html` and its figures, which replace those of an
+    /// older page.
     pub fn write_report(&self, texts: &[(&str, &str)], report: &Report) -> Result<(), WriteError> {
         let drawn: Vec<(String, &str)> = report
             .figures
@@ -101,15 +100,14 @@ impl Results {
         let texts: Vec<(&str, &str)> = texts.iter().copied().chain(told).chain(figures).collect();
         let is_older = |name: &str| {
             let figure = name.strip_prefix("figures/").is_some_and(is_figure);
-            figure && drawn.iter().all(|(own, _)| own != name)
+            figure && drawn.iter().all(|(drawn, _)| drawn != name)
         };
         self.keep(&texts, is_older)
     }
 
-    /// Writes files all or none, as far as file systems allow: what can be in the way is found
-    /// before the first is in its place. Files of the record of which `is_older` says so are
-    /// removed, and what the same command wrote before and has none of now: it would stand beside
-    /// results that it does not belong to.
+    /// Writes all files or none, as far as file systems allow: obstacles are found before the first file
+    /// takes its place. Removes recorded files that `is_older` selects, and earlier files of the same
+    /// command that it does not write now.
     fn keep(
         &self,
         texts: &[(&str, &str)],
@@ -119,8 +117,8 @@ impl Results {
         texts.iter().try_for_each(|(name, _)| self.check(&record, name))?;
         let others = self.others(&record, texts);
         let is_left = |name: &str| {
-            let claimed = self.names.iter().any(|own| own == name)
-                && texts.iter().all(|(own, _)| *own != name);
+            let claimed = self.names.iter().any(|claimed| claimed == name)
+                && texts.iter().all(|(written, _)| *written != name);
             claimed && record.writer(&self.folder, name) == Some(self.command)
         };
         let is_ours = |name: &&str| {
@@ -160,8 +158,7 @@ impl Results {
         Ok(())
     }
 
-    /// The first of these files that is there and another command's, a report before all others,
-    /// with that command.
+    /// Returns the first file that another command wrote, with that command; reports come first.
     fn others(&self, record: &FolderRecord, texts: &[(&str, &str)]) -> Option<(String, String)> {
         let other = |&(name, _): &(&str, &str)| {
             let writer =
@@ -183,7 +180,7 @@ impl Results {
             .map_err(|source| WriteError::Io { path: FolderRecord::file(&self.folder), source })
     }
 
-    /// Whether a result may take its name.
+    /// Checks that a result may take its name.
     fn check(&self, record: &FolderRecord, name: &str) -> Result<(), WriteError> {
         let path = self.path(name);
         let why = |why| Err(WriteError::InTheWay { path: path.clone(), why });
@@ -216,19 +213,19 @@ impl Results {
     }
 }
 
-/// Columns of the terminal that reads standard output; as many as wanted where none does.
+/// Returns the columns of the terminal on standard output, unlimited if there is none.
 pub fn columns() -> usize {
     terminal_size::terminal_size_of(io::stdout())
         .map_or(usize::MAX, |(width, _)| usize::from(width.0).max(40))
 }
 
-/// Prints to standard output what people read, without characters that do something to their
-/// terminal; a closed pipe ends the printing quietly.
+/// Prints text to standard output without control characters; a closed pipe ends the printing
+/// quietly.
 pub fn print(text: &str) -> Result<(), WriteError> {
     print_all(&escape_hidden(text))
 }
 
-/// Prints JSON to standard output: such characters stand in its texts alone, and are escaped there.
+/// Prints JSON to standard output, with control characters in its strings escaped.
 pub fn print_json(json: &str) -> Result<(), WriteError> {
     let mut text = String::with_capacity(json.len());
     for character in json.chars() {
@@ -244,7 +241,7 @@ pub fn print_json(json: &str) -> Result<(), WriteError> {
     print_all(&text)
 }
 
-/// Prints a text as it is, for other programs.
+/// Prints a text unchanged, for other programs.
 pub fn print_all(text: &str) -> Result<(), WriteError> {
     match anstream::stdout().write_all(text.as_bytes()) {
         Err(source) if source.kind() != io::ErrorKind::BrokenPipe => {

@@ -39,11 +39,11 @@ pub struct Arguments {
     /// Number of poses to measure
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=10_000))]
     poses: u32,
-    /// What to make small
+    /// Quantity to minimise
     #[arg(long, value_enum, ignore_case = true, default_value_t = CriterionArgument::S)]
     criterion: CriterionArgument,
-    /// Choose the poses that tell two effects apart; each as trace and loop name it and as a
-    /// problem declares it
+    /// Choose poses that separate two effects, each as trace and loop print it and as a problem
+    /// declares it
     #[arg(long, value_name = "EFFECT", num_args = 2, conflicts_with = "criterion")]
     separate: Vec<String>,
     /// Box that the nominal target stays in, frame of the arm's base
@@ -56,7 +56,7 @@ pub struct Arguments {
     source: Source,
 }
 
-/// So many finite numbers with commas between them.
+/// Parses `N` finite numbers with commas between them.
 fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let numbers = text
         .split(',')
@@ -67,7 +67,7 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
         .ok_or_else(|| format!("not {N} numbers with commas between them"))
 }
 
-/// Where the target may go, if anything is said.
+/// Returns the workspace of the arguments, if they restrict it.
 fn workspace(arguments: &Arguments) -> Result<Option<Workspace>, WorkspaceError> {
     let room = match arguments.workspace_mm.map(|room| room.map(|x| x * 1e-3)) {
         Some([x0, x1, y0, y1, z0, z1]) if x0 < x1 && y0 < y1 && z0 < z1 => {
@@ -85,7 +85,7 @@ fn workspace(arguments: &Arguments) -> Result<Option<Workspace>, WorkspaceError>
     Ok(said.then_some(Workspace { corners: room, planes }))
 }
 
-/// A workspace that makes no sense.
+/// Invalid workspace.
 #[derive(Debug, thiserror::Error)]
 enum WorkspaceError {
     #[error(
@@ -123,7 +123,7 @@ impl From<CriterionArgument> for Criterion {
     }
 }
 
-/// Plans, writes `plan.csv` and `plan.json`, and prints what the plan promises.
+/// Makes the plan, writes `plan.csv` and `plan.json`, and prints what the plan promises.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
     let declared = Problem::read(common.problem())?;
@@ -190,11 +190,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if plan.suffices {
         return Ok(Outcome::Done);
     }
-    diagnostic::warn("the plan leaves parameters without a prior undecided: plan more poses");
+    diagnostic::warn("the plan does not determine all parameters without a prior: plan more poses");
     Ok(Outcome::NotTrusted)
 }
 
-/// The two effects to tell apart, if there are any.
+/// Returns the two effects to separate, if they are named.
 fn pair(named: &[String], problem: &Problem) -> Result<Option<EffectPair>, Box<dyn Error>> {
     let [one, other] = named else { return Ok(None) };
     let read = |text: &String| problem.effect(text, Path::new("--separate"));

@@ -1,4 +1,4 @@
-//! Where poses that are still to be measured come from.
+//! Source of poses that are still to be measured.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use flexcal::rig::Truth;
 
 use super::flags::Flags;
 
-/// Ranges or a table.
+/// Ranges or tables of poses.
 #[derive(Debug, Args)]
 pub struct Source {
     /// Tables of poses to take, with the columns of measurements; positions are not needed
@@ -27,7 +27,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// The files that are named.
+    /// Returns the files that are named.
     pub fn files(&self) -> Vec<PathBuf> {
         let truth = self
             .truth
@@ -36,7 +36,7 @@ impl Source {
         self.candidates.iter().cloned().chain(truth).collect()
     }
 
-    /// The table of candidates, if one is named.
+    /// Reads the table of candidates, if one is named.
     pub fn table(
         &self,
         problem: &Problem,
@@ -50,19 +50,19 @@ impl Source {
         Ok(Some(poses))
     }
 
-    /// Where poses may lie, with all that may be set there.
+    /// Returns the ranges of the poses, with all quantities that can be set.
     pub fn all_ranges(&self, problem: &Problem) -> Result<PoseRanges, DesignError> {
         let Some(file) = &self.truth else { return PoseRanges::of(problem) };
         Ok(Truth::read(file, problem)?.poses)
     }
 
-    /// The same without temperatures and sides on which no declared effect depends: they need not
-    /// be set.
+    /// Returns the ranges without temperatures and approach directions on which no declared effect
+    /// depends.
     pub fn ranges(&self, problem: &Problem) -> Result<PoseRanges, DesignError> {
         Ok(self.all_ranges(problem)?.relevant_to(problem))
     }
 
-    /// The same, if it is known: a TRUTH.toml that is named must be right, limits may be missing.
+    /// Returns the ranges if they are known. A named TRUTH.toml must be valid; limits may be missing.
     pub fn known_ranges(&self, problem: &Problem) -> Result<Option<PoseRanges>, DesignError> {
         match self.all_ranges(problem) {
             Err(DesignError::NoRange(_)) => Ok(None),

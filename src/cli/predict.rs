@@ -35,10 +35,10 @@ pub struct Arguments {
     estimate: Option<PathBuf>,
 }
 
-/// What it may write.
+/// Names of the files that the command may write.
 const RESULTS: [&str; 3] = ["predictions.csv", "residuals.csv", "errors.json"];
 
-/// Predicts, writes what was predicted and what measurements leave of it, and prints the errors.
+/// Predicts, writes predictions and their residuals, and prints the errors.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let problem = Problem::read(common.problem())?;
@@ -49,10 +49,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let estimate = arguments.estimate.as_deref().map(SavedEstimate::read).transpose()?;
     let trusted = estimate.as_ref().is_none_or(|estimate| estimate.trusted);
     if !trusted {
-        diagnostic::warn("the estimate is not to be trusted, and so are the predictions not");
+        diagnostic::warn("the estimate is not to be trusted, so the predictions are not either");
     }
-    // Rows that nobody divided are predicted all the same; chance divides those that were fitted,
-    // no others.
+    // Rows without a split are predicted too. A random split applies only to the fitted rows.
     let by_chance = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }));
     let split = Split::new(&problem, &rows).ok().filter(|_| !by_chance || common.data().is_empty());
     let prediction = fit::predict(&problem, estimate.as_ref(), &rows, split.as_ref())?;

@@ -8,12 +8,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::course::Course;
 
-/// Work faster than this shows nothing.
+/// Time before which no progress is shown.
 const PATIENCE: Duration = Duration::from_millis(500);
-/// Time between two pictures of a line that goes on by itself.
+/// Time between two refreshes of the line.
 const TICK: Duration = Duration::from_millis(200);
 
-/// A line of progress and what feeds it.
+/// Line of progress with its source.
 pub struct Line {
     bar: ProgressBar,
     begun: Instant,
@@ -23,12 +23,12 @@ pub struct Line {
 }
 
 impl Line {
-    /// A line that has not begun to show.
+    /// Creates a line that is not shown yet.
     pub fn new() -> Arc<Self> {
         Self::until(None)
     }
 
-    /// The same of work that `stop` ends early.
+    /// Creates a line of work that `stop` ends early.
     fn until(stop: impl Into<Option<Stop>>) -> Arc<Self> {
         let bar = ProgressBar::new_spinner();
         let shown = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}");
@@ -42,8 +42,7 @@ impl Line {
         })
     }
 
-    /// Does some work, which reports to a line of progress where that is `shown`; the line is gone
-    /// when the work is done.
+    /// Runs work that reports to a line of progress if that is `shown`, and clears the line afterwards.
     pub fn during<T>(
         shown: bool,
         stop: impl Into<Option<Stop>>,
@@ -57,7 +56,7 @@ impl Line {
         done
     }
 
-    /// What the library reports to.
+    /// Returns the sink to which the library reports.
     fn sink(self: &Arc<Self>) -> ProgressSink {
         let line = Arc::clone(self);
         Arc::new(move |progress| line.show(&progress))
@@ -73,7 +72,7 @@ impl Line {
         });
     }
 
-    /// Shows a message, once it is time to show anything.
+    /// Shows a message, unless the work has just begun.
     pub fn say(&self, message: impl FnOnce() -> String) {
         if self.begun.elapsed() > PATIENCE && !self.bar.is_hidden() {
             self.ticking.call_once(|| self.bar.enable_steady_tick(TICK));
@@ -82,17 +81,17 @@ impl Line {
         }
     }
 
-    /// Takes the line away.
+    /// Clears the line.
     pub fn clear(&self) {
         self.bar.finish_and_clear();
     }
 }
 
-/// A bar of how many fits of a study are done, with the time left.
+/// Bar of the finished fits of a study, with the time left.
 pub struct FitBar(ProgressBar);
 
 impl FitBar {
-    /// A bar of which `kept` of `fits` fits have been done before.
+    /// Creates a bar of `fits` fits, of which `kept` are finished already.
     pub fn new(fits: u64, kept: u64) -> Self {
         let bar = ProgressBar::new(fits);
         let shown = "{wide_bar} {human_pos} of {human_len} fits, {eta} left";
@@ -104,12 +103,12 @@ impl FitBar {
         Self(bar)
     }
 
-    /// One more fit is done.
+    /// Counts one more fit.
     pub fn advance(&self) {
         self.0.inc(1);
     }
 
-    /// Takes the bar away.
+    /// Clears the bar.
     pub fn clear(&self) {
         self.0.finish_and_clear();
     }

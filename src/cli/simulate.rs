@@ -24,8 +24,8 @@ pub struct Arguments {
     /// A problem.toml, or the folder that holds one [default: the current folder]
     #[arg(default_value = ".", hide_default_value = true)]
     problem: PathBuf,
-    /// How the true arm differs from the problem, and from where poses are drawn; or the folder
-    /// that holds it
+    /// True deviations of the arm from the problem, and ranges of the poses; or the folder that holds
+    /// the file
     #[arg(long, value_name = "TRUTH.toml")]
     truth: PathBuf,
     /// Number of poses, drawn in the ranges of [poses]
@@ -47,8 +47,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let truth = Truth::read(&arguments.truth, &problem)?;
     let inside =
         |path: &Path, name: &str| if path.is_dir() { path.join(name) } else { path.to_owned() };
-    let own = [inside(&arguments.problem, "problem.toml"), inside(&arguments.truth, "TRUTH.toml")];
-    let inputs = [&own[..], &problem.data.files, &arguments.data].concat();
+    let files =
+        [inside(&arguments.problem, "problem.toml"), inside(&arguments.truth, "TRUTH.toml")];
+    let inputs = [&files[..], &problem.data.files, &arguments.data].concat();
     let flags = &arguments.flags;
     let results =
         flags.claim("simulate", &problem.name, inputs, &["measurements.csv", "truth.json"])?;
@@ -58,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     };
     let (json, table) = (simulation.truth_json(), results.path("measurements.csv"));
     results.write(&[("measurements.csv", &simulation.csv()), ("truth.json", &json)])?;
-    // A fraction is divided by whoever reads the rows.
+    // A fraction is split when the rows are read.
     let divided = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }))
         || simulation.held_out() > 0;
     flags.tell(&json, || {
@@ -74,7 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(Outcome::Done)
 }
 
-/// What the rows of the tables set, and the target that each names.
+/// Reads the conditions and the target of each row of the tables.
 fn poses_of(
     arguments: &Arguments,
     problem: &Problem,

@@ -38,11 +38,11 @@ pub struct Arguments {
     study: Option<PathBuf>,
     #[command(flatten)]
     flags: Flags,
-    /// Do the i-th of n shares alone, and write no results: that is for `study merge`
+    /// Make only the i-th of n shares, without results, which `study merge` writes
     #[arg(long, value_name = "i/n", conflicts_with = "json")]
     shard: Option<Shard>,
-    /// Write FILE once all is done, with exit status 0: what a workflow waits for; an older FILE is
-    /// removed first
+    /// Write FILE once all is done, with exit status 0, for workflows that wait for it; an older FILE
+    /// is removed first
     #[arg(long, value_name = "FILE")]
     done: Option<PathBuf>,
 }
@@ -53,7 +53,7 @@ enum Merge {
     Merge {
         #[command(flatten)]
         common: Common,
-        /// Folders of the shares, where they are not DIR
+        /// Folders of the shares, if they are not DIR
         #[arg(long, value_name = "FOLDER", num_args = 1..)]
         from: Vec<PathBuf>,
     },
@@ -68,14 +68,14 @@ struct Common {
     flags: Flags,
 }
 
-/// The file of `--done`.
+/// File of `--done`.
 struct Sentinel<'a>(&'a Path);
 
 impl<'a> Sentinel<'a> {
-    /// What it says.
+    /// Content of the file.
     const TEXT: &'static str = "flexcal study: done\n";
 
-    /// The file at `path`, removed until the work is done; what `--done` did not write is an error.
+    /// Removes the file at `path` until the work is done. Errors if `--done` did not write it.
     fn claim(path: &'a Path) -> Result<Self, WriteError> {
         let io = |source| WriteError::Io { path: path.to_owned(), source };
         if path.symlink_metadata().is_ok() {
@@ -96,30 +96,30 @@ impl<'a> Sentinel<'a> {
     }
 }
 
-/// A folder of shares that is not there.
+/// Missing folder of shares.
 #[derive(Debug, thiserror::Error)]
 #[error("--from {}: no such folder", folder.display())]
 struct NoFolder {
     folder: PathBuf,
 }
 
-/// The results.
+/// Names of the results.
 const NAMES: [&str; 4] = ["study.json", "parameters.csv", "timing.csv", "study.csv"];
 
 impl Common {
-    /// Where the results go.
+    /// Claims the results of a study.
     fn results(&self, study: &Study) -> Result<Results, WriteError> {
         self.claim(&study.name, &study.files, &NAMES)
     }
 
-    /// The same of a study called `name`, which reads `files` and writes `names`.
+    /// Claims the results `names` of the study `name`, which reads `files`.
     fn claim(&self, name: &str, files: &[PathBuf], names: &[&str]) -> Result<Results, WriteError> {
         self.flags.claim("study", name, files.to_vec(), names)
     }
 }
 
-/// Does the fits that are not done yet, or merges; then writes `study.csv`, `study.json`,
-/// `parameters.csv`, `timing.csv` and prints the table.
+/// Makes the open fits, or merges shares; then writes `study.csv`, `study.json`, `parameters.csv`,
+/// `timing.csv` and prints the table.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(Merge::Merge { common, from }) = &arguments.merge {
         let study = Study::read(&common.study)?;
@@ -132,7 +132,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let stores: Vec<Store> = folders.iter().map(|folder| Store::new(folder)).collect();
         return finish(common, &study, &results, &stores);
     }
-    // Without a subcommand clap asks for these.
+    // Without a subcommand clap requires a study.
     let Some(study) = arguments.study.clone() else { return Ok(Outcome::Done) };
     let common = &Common { study, flags: arguments.flags.clone() };
     let sentinel = arguments.done.as_deref().map(Sentinel::claim).transpose()?;
@@ -143,12 +143,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(outcome)
 }
 
-/// Does the fits of a study, or of a share of it.
+/// Makes the fits of a study, or of a share of it.
 fn work(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Error>> {
     let study = match Request::read(&common.study)? {
         Request::Fits(study) => *study,
         Request::Misprints(study) if shard.is_none() => return misprints(common, &study),
-        // Reads it as what has shares, which says what is wrong.
+        // Reading it as a study with shares names the mistake.
         Request::Misprints(_) => Study::read(&common.study)?,
     };
     if study.problem.data.fits_orientation && !common.flags.quiet {
@@ -169,7 +169,7 @@ fn work(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Error>
     Ok(Outcome::Done)
 }
 
-/// Does a study of the misprints; writes `misprints.json` and the reports, and prints the tables.
+/// Runs a study of the misprints, writes `misprints.json` and the reports, and prints the tables.
 fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn Error>> {
     let names = ["misprints.json", REPORT[0], REPORT[1]];
     let results = common.claim(&study.name, &study.files, &names)?;
@@ -186,8 +186,8 @@ fn misprints(common: &Common, study: &MisprintStudy) -> Result<Outcome, Box<dyn 
 
 fn fit(common: &Common, study: &Study, store: &Store, shard: Shard) -> Result<(), Box<dyn Error>> {
     let parts = study::pending(study, store, shard)?;
-    let own = study.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index));
-    let all: usize = own.map(|(_, part)| part.repetitions.len()).sum();
+    let share = study.parts().into_iter().enumerate().filter(|(index, _)| shard.holds(*index));
+    let all: usize = share.map(|(_, part)| part.repetitions.len()).sum();
     let open: usize = parts.iter().map(|part| part.repetitions.len()).sum();
     let bar = common.flags.talks().then(|| FitBar::new(all as u64, (all - open) as u64));
     let done = study::run(study, store, &parts, || bar.iter().for_each(FitBar::advance));
@@ -217,6 +217,6 @@ fn finish(
             table.display()
         )
     })?;
-    let hopeless = |cell: &CellResult| cell.tally.failed() == cell.tally.fits;
-    Ok(if found.cells.iter().any(hopeless) { Outcome::NotTrusted } else { Outcome::Done })
+    let has_failed = |cell: &CellResult| cell.tally.failed() == cell.tally.fits;
+    Ok(if found.cells.iter().any(has_failed) { Outcome::NotTrusted } else { Outcome::Done })
 }

@@ -1,5 +1,4 @@
-//! What `accept` says and writes: the accuracy of an arm before and after, with what it was
-//! measured under and by, to be signed.
+//! Record of `accept`, to be signed: accuracy before and after, conditions and inputs.
 
 use std::path::PathBuf;
 
@@ -15,20 +14,20 @@ use crate::measurement::Measurements;
 use crate::problem::{HeldOut, Problem};
 use crate::results::{AcceptanceResult, Condition, Input};
 
-/// Cycles that ISO 9283 asks for in each pose.
+/// Cycles in each pose that ISO 9283 requires.
 const CYCLES: usize = 30;
 
-/// What the numbers are of.
-const JUDGED: &str = "These are errors of predicted positions: what a controller reaches with commands corrected by them is not judged.";
+/// Scope of the figures.
+const SCOPE: &str = "These are errors of predicted positions. The accuracy that a controller reaches with corrected commands is not judged.";
 
-/// Which inputs a certificate is of, and what no file says.
+/// Inputs of a record, and facts that no file holds.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct AcceptanceRecord {
-    /// Each file that was read with its SHA-256; `None` of what cannot be read again.
+    /// Each input file with its SHA-256, `None` if it cannot be read again.
     pub inputs: Vec<(PathBuf, Option<String>)>,
-    /// Commit of the repository in which the problem stands.
+    /// Commit of the repository that holds the problem.
     pub commit: Option<String>,
-    /// The instrument, in words.
+    /// Description of the instrument.
     pub instrument: Option<String>,
 }
 
@@ -40,7 +39,7 @@ fn repeatability(judged: &Acceptance) -> Option<f64> {
     repeated(judged).filter_map(|pose| pose.repeatability).max_by(f64::total_cmp)
 }
 
-/// How the held-out poses were chosen.
+/// Describes how the held-out poses were chosen.
 fn protocol(problem: &Problem) -> String {
     let chosen = match &problem.data.held_out {
         Some(HeldOut::Fraction { fraction, seed }) => {
@@ -50,7 +49,7 @@ fn protocol(problem: &Problem) -> String {
             )
         }
         Some(HeldOut::Session(name)) => {
-            format!("every row of session {name}, whose base and tool alone were fitted to it")
+            format!("every row of session {name}, to which its base and tool alone were fitted")
         }
         Some(HeldOut::Column(name)) => format!("rows that the column {name} marks as validation"),
         _ => "rows that the column split marks as validation".to_owned(),
@@ -58,17 +57,17 @@ fn protocol(problem: &Problem) -> String {
     format!("held out: {chosen}; they took part in no fit of the arm and in no choice")
 }
 
-/// Ranges over the held-out poses.
+/// Returns the range of each quantity over the held-out poses.
 fn conditions(problem: &Problem, rows: &Measurements, judged: &Acceptance) -> Vec<Condition> {
-    let own = || judged.poses.iter().flat_map(|pose| pose.rows.iter().copied());
+    let rows_judged = || judged.poses.iter().flat_map(|pose| pose.rows.iter().copied());
     let condition = |of: &str, unit: &str, value: &dyn Fn(usize) -> f64| Condition {
         of: of.to_owned(),
         unit: unit.to_owned(),
-        range: range(own().map(value)),
+        range: range(rows_judged().map(value)),
     };
-    let joints = table::commands(problem).into_iter().map(|own| {
-        condition(&own.name(), &own.symbol(), &|row| {
-            rows.configuration(row)[own.joint] * own.factor()
+    let joints = table::commands(problem).into_iter().map(|joint| {
+        condition(&joint.name(), &joint.symbol(), &|row| {
+            rows.configuration(row)[joint.joint] * joint.factor()
         })
     });
     let places = ["x", "y", "z"].into_iter().enumerate();
@@ -120,7 +119,7 @@ pub fn acceptance_result(
     }
 }
 
-/// The accuracy in brief, ending in a line break.
+/// Returns the accuracy in brief, ending in a line break.
 pub fn acceptance_text(problem: &Problem, judged: &Acceptance) -> String {
     let poses = counted(judged.poses.len(), "held-out pose");
     let mut blocks =
@@ -129,7 +128,7 @@ pub fn acceptance_text(problem: &Problem, judged: &Acceptance) -> String {
     text(&blocks)
 }
 
-/// The page to sign.
+/// Returns the page to sign.
 pub fn acceptance_page(
     problem: &Problem,
     rows: &Measurements,
@@ -149,15 +148,15 @@ pub fn acceptance_page(
     let trust = if found.is_trusted() {
         "The fit is trusted."
     } else {
-        "Beware: the fit is not to be trusted."
+        "Warning: the fit is not to be trusted."
     };
     let sigma = problem.data.position_sigma.map_or("not declared".to_owned(), |sigma| {
         format!("{} mm per coordinate, 1 σ", mm(sigma, 4))
     });
     let instrument = record.instrument.as_deref().unwrap_or("not named");
-    let conditions = conditions(problem, rows, judged).into_iter().map(|own| {
-        let shown = [own.range.0, own.range.1].map(|value| number(value, 1));
-        [vec![own.of], shown.to_vec(), vec![own.unit]].concat()
+    let conditions = conditions(problem, rows, judged).into_iter().map(|condition| {
+        let shown = [condition.range.0, condition.range.1].map(|value| number(value, 1));
+        [vec![condition.of], shown.to_vec(), vec![condition.unit]].concat()
     });
     let inputs = record.inputs.iter().map(|(file, digest)| {
         vec![
@@ -180,7 +179,7 @@ pub fn acceptance_page(
             conditions.collect(),
             &[0, 3],
         )),
-        Block::heading("What it is of"),
+        Block::heading("Arm and inputs"),
         Block::Text(format!(
             "Arm {}; strategy {}, solver {}; digest of the declared arm {}.",
             problem.name,
@@ -189,7 +188,7 @@ pub fn acceptance_page(
             problem.digest()
         )),
     ]);
-    blocks.extend(record.commit.as_ref().map(|commit| Block::Text(format!("HEAD of the repository around the problem: {commit}; whether files differ from it is told by their digests alone."))));
+    blocks.extend(record.commit.as_ref().map(|commit| Block::Text(format!("HEAD of the repository around the problem: {commit}. Only the digests show whether files differ from it."))));
     blocks.extend([
         Block::Table(Table::new(&["input", "SHA-256"], inputs.collect(), &[0, 1])),
         Block::heading("Accepted"),
@@ -198,12 +197,12 @@ pub fn acceptance_page(
     report(problem, "acceptance", &blocks).html
 }
 
-/// AP before and after, what that is of, and what repeated poses say.
+/// Returns AP before and after, the scope of the figures, and the repeatability.
 fn judgement<'a>(judged: &Acceptance) -> [Block<'a>; 3] {
-    [Block::Table(accuracy(judged)), Block::Text(JUDGED.to_owned()), Block::Text(repeats(judged))]
+    [Block::Table(accuracy(judged)), Block::Text(SCOPE.to_owned()), Block::Text(repeats(judged))]
 }
 
-/// AP before and after.
+/// Returns the table of AP before and after.
 fn accuracy(judged: &Acceptance) -> Table {
     let row = |name: &str, of: &Accuracy| {
         let values =
@@ -220,11 +219,11 @@ fn accuracy(judged: &Acceptance) -> Table {
     Table::new(&header, rows, &[0]).noted(&[notes])
 }
 
-/// What repeated poses say.
+/// States the repeatability of repeated poses.
 fn repeats(judged: &Acceptance) -> String {
     match repeatability(judged) {
         Some(most) => format!(
-            "Pose repeatability RP (l̄ + 3 S of the distances to the barycentre): at most {} mm over {}. ISO 9283 asks for {CYCLES} cycles \
+            "Pose repeatability RP (l̄ + 3 S of the distances to the barycentre): at most {} mm over {}. ISO 9283 requires {CYCLES} cycles \
              a pose.",
             mm(most, 4),
             match repeated(judged).count() {
@@ -233,7 +232,7 @@ fn repeats(judged: &Acceptance) -> String {
             }
         ),
         None => format!(
-            "No held-out pose was measured three times: nothing is said of repeatability, for which ISO 9283 asks {CYCLES} cycles a pose."
+            "No held-out pose was measured three times, so repeatability is not judged; ISO 9283 requires {CYCLES} cycles a pose."
         ),
     }
 }

@@ -1,11 +1,11 @@
-//! What is told of rows that measure against points, anchors and surfaces.
+//! Errors of rows that measure against points, anchors and surfaces.
 
 use super::document::{Block, Table};
 use super::errors::{measure, shown};
 use super::quantity::{mm, number};
 use crate::fit::{ErrorSummary, Identification, PointSpread};
 
-/// Errors of every kind of rows where there are several, and the spread of the target at points.
+/// Returns tables of errors by kind of rows, if there are several, and of the spread at points.
 pub(super) fn around<'a>(found: &Identification) -> Vec<Block<'a>> {
     let row = |kind: &str, rows: &str, before: &ErrorSummary, after: &ErrorSummary| {
         let values = [before.rms.norm, after.rms.norm].map(|value| shown(after, value));
@@ -21,7 +21,7 @@ pub(super) fn around<'a>(found: &Identification) -> Vec<Block<'a>> {
     });
     let rows: Vec<Vec<String>> = kinds.collect();
     if !rows.is_empty() {
-        let header = ["rms of the rows' own residuals", "", "rows", "before", "after"];
+        let header = ["rms by kind of row", "", "rows", "before", "after"];
         blocks.push(Block::Table(Table::new(&header, rows, &[0, 1])));
     }
     let spreads = found.spreads.iter().map(|(before, after, held_out)| {
@@ -42,23 +42,24 @@ pub(super) fn around<'a>(found: &Identification) -> Vec<Block<'a>> {
             "mean distance of the predicted target from its mean over the rows at one point"
                 .to_owned(),
         );
-        table.notes.extend(unsteady(found.spreads.iter().map(|own| &own.1)));
+        table.notes.extend(unsteady(found.spreads.iter().map(|spread| &spread.1)));
         blocks.push(Block::Table(table));
     }
     blocks
 }
 
-/// What is to be said of points that spread far more than the others, a sentence each.
+/// Returns a sentence for each point with a far larger spread than the others.
 pub(super) fn unsteady<'a>(all: impl IntoIterator<Item = &'a PointSpread>) -> Vec<String> {
-    let sentence = |(own, times): (&PointSpread, f64)| {
-        let [x, y, z] = [own.along.x, own.along.y, own.along.z].map(|value| number(value, 2));
+    let sentence = |(spread, times): (&PointSpread, f64)| {
+        let [x, y, z] =
+            [spread.along.x, spread.along.y, spread.along.z].map(|value| number(value, 2));
         format!(
-            "{} spreads by {} mm, {} times the median of all points, {} % of it along ({x}, {y}, {z}): what it is fixed to may have moved \
-             or given way",
-            own.point,
-            mm(own.mean, 3),
+            "the spread at {} is {} mm, {} times the median of all points, {} % of it along ({x}, {y}, {z}): its support may have moved \
+             or yielded",
+            spread.point,
+            mm(spread.mean, 3),
             number(times, 1),
-            number(100.0 * own.share, 0),
+            number(100.0 * spread.share, 0),
         )
     };
     PointSpread::unsteady(all).into_iter().map(sentence).collect()

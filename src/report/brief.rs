@@ -11,8 +11,8 @@ use super::render::text_within;
 use crate::fit::{Estimate, Identification, size_of_kind};
 use crate::problem::Problem;
 
-/// A fit on one screen of so many columns, ending in a line break: errors, how large the residual
-/// is, and what to look at.
+/// Returns a fit on one screen of this many columns, ending in a line break: errors, size of the
+/// residual, parameters and remarks.
 pub fn estimate_brief(problem: &Problem, found: &Identification, columns: usize) -> String {
     let mut blocks = vec![
         headline(problem, found),
@@ -24,64 +24,67 @@ pub fn estimate_brief(problem: &Problem, found: &Identification, columns: usize)
     text_within(&blocks, columns)
 }
 
-/// Whether the data, rather than its prior, say what a parameter is.
-fn is_well(own: &Estimate) -> bool {
-    own.at_bound.is_none() && own.fitted && own.identified > 0.9
+/// Returns true if the data determine a parameter, rather than its prior.
+fn is_identified(estimate: &Estimate) -> bool {
+    estimate.at_bound.is_none() && estimate.fitted && estimate.identified > 0.9
 }
 
-/// Whether a fit found no parameter well.
+/// Returns true if the data determine no parameter.
 pub fn tells_little(found: &Identification) -> bool {
-    !found.estimates.iter().any(is_well)
+    !found.estimates.iter().any(is_identified)
 }
 
-/// How many parameters are known how well.
+/// Counts the parameters by how well they are identified.
 fn parameters(estimates: &[Estimate]) -> String {
-    let count = |is: fn(&Estimate) -> bool| estimates.iter().filter(|own| is(own)).count();
-    let held = count(|own| own.at_bound.is_some() || !own.fitted);
-    let well = count(is_well);
-    let in_part = count(|own| own.at_bound.is_none() && own.fitted && own.identified > 0.1) - well;
+    let count =
+        |is: fn(&Estimate) -> bool| estimates.iter().filter(|estimate| is(estimate)).count();
+    let held = count(|estimate| estimate.at_bound.is_some() || !estimate.fitted);
+    let well = count(is_identified);
+    let in_part = count(|estimate| {
+        estimate.at_bound.is_none() && estimate.fitted && estimate.identified > 0.1
+    }) - well;
     let parts =
         [(in_part, "in part"), (estimates.len() - held - well - in_part, "hardly"), (held, "held")];
-    let rest: Vec<String> =
-        parts.iter().filter(|own| own.0 > 0).map(|(n, how)| format!(", {n} {how}")).collect();
-    let rest = rest.concat();
+    let others: Vec<String> =
+        parts.iter().filter(|part| part.0 > 0).map(|(n, how)| format!(", {n} {how}")).collect();
+    let others = others.concat();
     format!(
-        "{} of {} identified well{rest}; -v lists them.",
+        "{} of {} identified well{others}; -v lists them.",
         well,
         counted(estimates.len(), "parameter")
     )
 }
 
-/// What the tables would tell at length.
+/// Lists remarks that the tables of the whole text explain.
 fn worth_a_look(found: &Identification) -> Vec<String> {
     let mut points = Vec::new();
-    if let Some(own) = &found.orientation {
+    if let Some(orientation) = &found.orientation {
         let mean = |of: &crate::fit::Errors| number(of.held_out.mean.norm.to_degrees(), 4);
         points.push(format!(
             "orientation: {} ° before, {} ° after, mean of the held-out poses",
-            mean(&own.registered),
-            mean(&own.fitted)
+            mean(&orientation.registered),
+            mean(&orientation.fitted)
         ));
     }
     let farthest = found.outliers.iter().max_by(|a, b| a.distance.total_cmp(&b.distance));
-    points.extend(farthest.map(|own| {
+    points.extend(farthest.map(|outlier| {
         let n = counted(found.outliers.len(), noun(found));
         format!(
-            "{n} too far off to be noise, the farthest {}: {}",
-            own.location,
-            size_of_kind(own.kind, own.error.norm(), 3)
+            "{n} with gross errors, the largest at {}: {}",
+            outlier.location,
+            size_of_kind(outlier.kind, outlier.error.norm(), 3)
         )
     }));
-    points.extend(unsteady(found.spreads.iter().map(|own| &own.1)));
+    points.extend(unsteady(found.spreads.iter().map(|spread| &spread.1)));
     let of_parameters =
         format!("of {} not identifiable", counted(found.unknowns.len(), "parameter"));
     let counts = [
         (found.identifiability().unidentifiable.len(), "combination", of_parameters.as_str()),
-        (found.weak.len(), "combination", "seen too weakly"),
+        (found.weak.len(), "combination", "determined too weakly"),
         (correlated(found).len(), "pair", "correlated by more than 0.9"),
         (found.active_constraints.len(), "constraint", "at its limit"),
     ];
-    let counts = counts.into_iter().filter(|own| own.0 > 0);
+    let counts = counts.into_iter().filter(|part| part.0 > 0);
     points.extend(counts.map(|(n, noun, what)| format!("{} {what}", counted(n, noun))));
     points
 }

@@ -1,4 +1,4 @@
-//! What `check` says and writes.
+//! Text of `check`.
 
 use super::detection;
 use super::document::{Block, Table};
@@ -10,7 +10,7 @@ use crate::design::{Check, ExpectedParameter, Forecast, Prediction, PredictionPo
 use crate::fit::rows_of_kind;
 use crate::problem::Problem;
 
-/// A check in words, ending in a line break.
+/// Returns the check as text, ending in a line break.
 pub fn check_text(problem: &Problem, check: &Check) -> String {
     let forecast = &check.forecast;
     let names: Vec<String> =
@@ -22,11 +22,11 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
     });
     let header = ["parameter", "nominal", "prior ± 1 σ", "± 1 σ", "unit", "identified"];
     let mut notes = vec![
-        "± 1 σ: to be expected of the estimate; identified: the share that the data will give, the rest is prior or choice",
+        "± 1 σ: expected standard error; identified: share of the information from the data, the remainder is prior or choice",
     ];
-    if forecast.expected.iter().any(goes_with_others) {
+    if forecast.expected.iter().any(is_confounded_at_nominal) {
         notes.push(
-            "a share with “to”: at the nominal arm, where the parameter goes with others (below), and of arms drawn from the priors",
+            "a share with “to”: at the nominal arm, where the parameter is confounded with others (below), and over arms drawn from the priors",
         );
     }
     let mut blocks = vec![
@@ -41,40 +41,40 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
         unidentifiable(&forecast.identifiability, &names, "check.json"),
         Block::lines(prediction(check)),
         Block::lines(
-            "With more or fewer such poses (rank; parameters of the arm identified to 90 % or more; error of prediction):",
+            "With more or fewer such poses (rank; parameters of the arm identified to 90 % or more; error of predictions):",
         ),
         Block::Table(growth(check)),
         Block::lines(enough(check)),
     ];
-    // Where the poses are measured ones, the held-out ones are none of them.
+    // Measured poses do not include the held-out ones.
     let all = (check.predicted_at != PredictionPoses::HeldOut).then_some(forecast.poses);
     blocks.extend(assumptions(problem, &forecast.expected, all));
     blocks.extend(detection::blocks(&check.detection));
     text(&blocks)
 }
 
-/// Shares of the data that differ by more than this are shown both.
-const APART: f64 = 0.05;
+/// Difference of two shares from which on both are shown.
+const SHOWN_DIFFERENCE: f64 = 0.05;
 
-/// Whether the poses hardly tell a parameter at the nominal arm, and tell it at arms drawn from the
-/// priors.
-fn goes_with_others(expected: &ExpectedParameter) -> bool {
+/// Returns true if a parameter is confounded with others at the nominal arm, but identified at arms
+/// drawn from the priors.
+fn is_confounded_at_nominal(expected: &ExpectedParameter) -> bool {
     let nominal = expected.identified_at_nominal;
-    nominal < Forecast::WELL_IDENTIFIED && expected.identified - nominal > APART
+    nominal < Forecast::WELL_IDENTIFIED && expected.identified - nominal > SHOWN_DIFFERENCE
 }
 
-/// The share of a parameter that the data will give.
+/// Formats the share of information that the data will give.
 fn share(expected: &ExpectedParameter) -> String {
     let percent = |share: f64| format!("{:3.0}", share * 100.0);
-    let own = percent(expected.identified);
-    if goes_with_others(expected) {
-        format!("{} to {} %", percent(expected.identified_at_nominal), own.trim_start())
+    let share = percent(expected.identified);
+    if is_confounded_at_nominal(expected) {
+        format!("{} to {} %", percent(expected.identified_at_nominal), share.trim_start())
     } else {
-        format!("{own} %")
+        format!("{share} %")
     }
 }
 
-/// Why poses do not suffice, in one line.
+/// States in one line why poses do not suffice.
 pub fn why_not_sufficient(check: &Check) -> String {
     let (forecast, different) = (&check.forecast, check.different);
     let (of, parameters) = (forecast.poses, check.without_prior);
@@ -82,7 +82,7 @@ pub fn why_not_sufficient(check: &Check) -> String {
     if open > 0 {
         let noun = if open == 1 { "combination" } else { "combinations" };
         return format!(
-            "these poses leave {open} {noun} of parameters without a prior undecided that others would decide: more poses are \
+            "these poses do not determine {open} {noun} of parameters without a prior that other poses would determine: more poses are \
              needed"
         );
     }
@@ -113,13 +113,13 @@ fn prediction(check: &Check) -> String {
         ),
         None => "Tilts measure no length to compare that with.".to_owned(),
     };
-    let [median, most, rms] = [median, quantile_95, rms].map(|own| mm(own, 3));
+    let [median, most, rms] = [median, quantile_95, rms].map(|length| mm(length, 3));
     format!(
-        "The identified arm will predict positions {place} to {median} mm (median), {most} mm (95 %), {rms} mm (rms).\n{noise}"
+        "Expected error of predicted positions {place}: {median} mm (median), {most} mm (95 %), {rms} mm (rms).\n{noise}"
     )
 }
 
-/// Whether the poses measure positions.
+/// Returns true if the poses measure positions.
 fn positions(check: &Check) -> bool {
     check.noise_of == "position"
 }
@@ -143,11 +143,10 @@ fn growth(check: &Check) -> Table {
 fn enough(check: &Check) -> String {
     match check.growth.enough {
         Some(enough) => format!(
-            "From {enough} poses on they identify all that such poses can, and predictions are as accurate as one measured position."
+            "{enough} poses suffice: they identify all that such poses can, and predictions are as accurate as one measured position."
         ),
         None if check.noise.is_none() => {
-            "From how many poses on predictions are accurate enough is not said: nothing measured is a length."
-                .to_owned()
+            "No number of poses is recommended, because nothing measured is a length.".to_owned()
         }
         None => format!(
             "Even {} poses do not make predictions as accurate as one measured position.",

@@ -260,9 +260,13 @@ fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Hea
 fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let (before, after) = (&closure.before.fit, &closure.after);
     let untrusted = (!result.trusted).then(|| format!("Beware: {}.", why_not_trusted(after)));
-    let bounds =
-        before.estimates.iter().filter(|own| own.at_bound.is_some()).map(|own| own.name.clone());
-    let held = bounds.chain(before.active_constraints.iter().map(|own| own.words.clone()));
+    let bounds = before
+        .estimates
+        .iter()
+        .filter(|estimate| estimate.at_bound.is_some())
+        .map(|estimate| estimate.name.clone());
+    let held =
+        bounds.chain(before.active_constraints.iter().map(|constraint| constraint.words.clone()));
     let held = named(held, SHOWN_LIMITS, ", ");
     let limits = (!held.is_empty() && !result.effects.is_empty()).then(|| {
         format!(
@@ -457,7 +461,8 @@ fn sureness<'a>(result: &LoopResult) -> Option<Block<'a>> {
     let share = |part: f64| format!("{} %", number(part * 100.0, 0));
     let row = |found: &FoundEffect| {
         let ([mean, ..], _) = found.held_out_after.norms();
-        let witness = found.witness.as_ref().map(|own| format!("{} by {}", own.says, own.data));
+        let witness =
+            found.witness.as_ref().map(|check| format!("{} by {}", check.says, check.data));
         vec![
             found.effect.description.clone(),
             found.status.as_str().to_owned(),

@@ -1,4 +1,4 @@
-//! `problem.closed.toml`: the problem as its author wrote it, with what was found declared.
+//! Text of `problem.closed.toml`: the problem as written, with the found effects declared.
 
 use std::path::PathBuf;
 
@@ -14,8 +14,8 @@ use crate::problem::{Argument, Effect, Problem};
 use crate::results::ParameterValue;
 use crate::select::{ClosedLoop, Found, HarmonicPrior, Status};
 
-/// The `text` of `problem` with the effects that were found declared and its data in `files`, as
-/// seen from where the text will stand; everything else stays as it was written, comments included.
+/// Adds the found effects to the `text` of `problem`, and names its data `files` as seen from the
+/// folder of the new text. All else stays as written, comments included.
 ///
 /// # Errors
 /// The text is not TOML.
@@ -28,7 +28,7 @@ pub fn closed_problem(
     let declared: Vec<Effect> =
         problem.effects.iter().map(|declared| declared.effect.clone()).collect();
     let of = |effect: &Effect| closure.effects.iter().find(|found| found.effect == *effect);
-    // What data that took no part contradict is not declared.
+    // Effects that data outside the fit contradict are not declared.
     let holds = |effect: &Effect| {
         declared.contains(effect)
             || of(effect).is_none_or(|found| found.status != Status::Contradicted)
@@ -48,7 +48,7 @@ pub fn closed_problem(
     }
 }
 
-/// The text with a prior for all harmonics of joints at the end of `[parameters]`.
+/// Adds the prior of the harmonics of all joints to the end of `[parameters]`.
 fn with_rules(text: &str, prior: &HarmonicPrior) -> Result<String, TomlError> {
     let mut document: DocumentMut = text.parse()?;
     let parameters = document.entry("parameters").or_insert_with(|| Item::Table(Table::new()));
@@ -58,24 +58,22 @@ fn with_rules(text: &str, prior: &HarmonicPrior) -> Result<String, TomlError> {
             parameters.insert(&pattern, Item::Value(Value::InlineTable(sigma)));
         }
     }
-    // A table in one line has no room for a comment.
+    // An inline table cannot hold a comment.
     if let Some((first, _)) = prior.rules().next()
         && let Some(mut key) = document
             .get_mut("parameters")
             .and_then(Item::as_table_mut)
             .and_then(|all| all.key_mut(&first))
     {
-        key.leaf_decor_mut().set_prefix(
-            "# Found by flexcal loop: with this prior, what is left out is predicted best.\n",
-        );
+        key.leaf_decor_mut()
+            .set_prefix("# Found by flexcal loop: this prior predicts left-out poses best.\n");
     }
     Ok(document.to_string())
 }
 
-/// The text with the effects `closed`, each with comments, in the place of those `declared`.
+/// Replaces the `declared` effects of the text by the `closed` ones, each with comments.
 ///
-/// The loop keeps what was declared in its order, gives it further orders at most, and adds behind
-/// it.
+/// The loop keeps the order of the declared effects, adds harmonics to them at most, and appends.
 fn edited(
     text: &str,
     declared: &[Effect],
@@ -102,18 +100,18 @@ fn edited(
     Ok(document.to_string())
 }
 
-/// Says of a custom effect, in comments at the end, that no file can declare it.
+/// Appends a comment that no file can declare a custom effect.
 fn say(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     let rest = document.trailing().as_str().unwrap_or_default();
     let lines: String = comments.iter().flat_map(|line| ["# ", line, "\n"]).collect();
-    let own = one_line(&effect.name_and_place());
+    let name = one_line(&effect.name_and_place());
     let more = format!(
-        "# {own} is an effect of one's own: no file declares it, only the program that defines it.\n"
+        "# {name} is a custom effect: no file declares it, only the program that defines it.\n"
     );
     document.set_trailing(format!("{rest}\n{lines}{more}"));
 }
 
-/// Writes the names of the data files.
+/// Replaces the names of the data files.
 fn name_files(data: &mut dyn TableLike, files: &[PathBuf]) {
     let slashes = |file: &PathBuf| file.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
     let mut names = Value::Array(files.iter().map(slashes).collect());
@@ -126,7 +124,7 @@ fn name_files(data: &mut dyn TableLike, files: &[PathBuf]) {
     }
 }
 
-/// Appends an effect with comments above it.
+/// Appends an effect below its comments.
 fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     let lines: String = comments.iter().flat_map(|line| ["# ", line, "\n"]).collect();
     if let Some(Item::Value(Value::Array(known))) = document.get_mut("effect") {
@@ -136,7 +134,7 @@ fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
         known.push_formatted(value);
         return;
     }
-    // What stands at the end of the file stays before what is added.
+    // Text at the end of the file stays before the added effects.
     let rest = document.trailing().as_str().unwrap_or_default().to_owned();
     document.set_trailing(RawString::default());
     let mut table = Table::new();
@@ -151,7 +149,7 @@ fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     }
 }
 
-/// The last place in the file where one of an item's tables stands.
+/// Returns the last position in the file of the tables of an item.
 fn last_position(item: &Item) -> isize {
     let of_table = |table: &Table| {
         let below = table.iter().map(|(_, item)| last_position(item)).max();
@@ -164,7 +162,7 @@ fn last_position(item: &Item) -> isize {
     }
 }
 
-/// Gives the effect that was declared as number `k` other arguments.
+/// Replaces the arguments of the effect that was declared as number `k`.
 fn replace(document: &mut DocumentMut, k: usize, effect: &Effect) {
     let declared: Option<&mut dyn TableLike> = match document.get_mut("effect") {
         Some(Item::ArrayOfTables(tables)) => {
@@ -181,7 +179,7 @@ fn replace(document: &mut DocumentMut, k: usize, effect: &Effect) {
     }
 }
 
-/// The arguments of an effect; `true` stands for none.
+/// Returns the arguments of an effect, `true` if it has none.
 fn arguments(effect: &Effect) -> Value {
     let arguments = effect.arguments();
     if arguments.is_empty() {
@@ -267,14 +265,14 @@ mod tests {
                 String::new()
             }
         }
-        let own = || Effect::custom(Creep);
+        let custom = || Effect::custom(Creep);
         let text =
             "[[effect]]\njoint-harmonic = { joint = 1, orders = [1] }\n\n[data]\nfiles = []\n";
         let harmonic = |orders: &[u32]| Effect::JointHarmonic { joint: 1, orders: orders.to_vec() };
         let expected = "[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 2] }\n\n[data]\nfiles = [\"../data.csv\"]\n\n\
                         # found\n[[effect]]\ngear-ratio = { joint = 3 }\n\n# found\n\
-                        # joint-creep 3 is an effect of one's own: no file declares it, only the program that defines it.\n";
-        assert_eq!(edit(text, &[harmonic(&[1])], &[harmonic(&[1, 2]), own(), gear()]), expected);
+                        # joint-creep 3 is a custom effect: no file declares it, only the program that defines it.\n";
+        assert_eq!(edit(text, &[harmonic(&[1])], &[harmonic(&[1, 2]), custom(), gear()]), expected);
     }
 
     #[test]

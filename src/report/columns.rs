@@ -1,5 +1,4 @@
-//! Tables about rows of measurements, column by column: what CSV files and the Python package have
-//! in common.
+//! Tables about rows of measurements, column by column, for CSV files and the Python package.
 
 use std::collections::BTreeSet;
 
@@ -14,23 +13,22 @@ use crate::observation::{Kind, Observation};
 use crate::problem::Problem;
 use crate::quantity::Unit;
 
-/// The cells of a column.
+/// Cells of a column.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Column {
-    /// Words, empty where a row has none.
+    /// Words, empty for rows without one.
     Words(Labels),
-    /// Whole numbers.
+    /// Non-negative integers.
     Counts(Vec<usize>),
-    /// Numbers, NaN where a row has none, and their decimals in a text: as many as they need where
-    /// nothing is said.
+    /// Numbers, NaN for rows without one, and their decimals in texts; `None` for as many as needed.
     Numbers(Vec<f64>, Option<usize>),
-    /// True or false.
+    /// Truth values.
     Flags(Vec<bool>),
 }
 
 impl Column {
-    /// The cell of a row as text.
+    /// Returns the cell of a row as text.
     fn cell(&self, row: usize) -> String {
         match self {
             Self::Words(labels) => table::word(labels, row),
@@ -42,16 +40,16 @@ impl Column {
     }
 }
 
-/// Columns with their names.
+/// Columns and their names, in the order of the table.
 pub type Columns = Vec<(String, Column)>;
 
-/// Columns of `rows` rows as CSV.
+/// Formats columns of this many rows as CSV.
 pub(super) fn to_csv(columns: &Columns, rows: usize) -> String {
     let header = columns.iter().map(|(name, _)| name.clone()).collect();
     csv(header, (0..rows).map(|row| columns.iter().map(|(_, column)| column.cell(row)).collect()))
 }
 
-/// What names the rows `picked`: file, line, and the words and numbers of their table that do.
+/// Returns the columns that name the picked rows: file, line, pose, session, target and fixtures.
 pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) -> Columns {
     let of_row = |of: &dyn Fn(usize) -> usize| picked.iter().map(|&row| of(row)).collect();
     let labels = |all: &Labels| {
@@ -79,42 +77,44 @@ pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) ->
             add(name, labels(all));
         }
     }
-    // What contacts speak of, a column for each word that names some.
+    // Fixtures of contacts, a column for each kind.
     let fixture = |row: usize| problem.fixtures.get(rows.observation(row).fixture()?);
     let mut known = Vec::new();
-    for word in (0..rows.len()).filter_map(fixture).map(|own| own.kind.word()) {
+    for word in (0..rows.len()).filter_map(fixture).map(|fixture| fixture.kind.word()) {
         if !known.contains(&word) {
             known.push(word);
         }
     }
     for word in known {
         let named = |row: usize| {
-            fixture(row).filter(|own| own.kind.word() == word).map_or("", |own| own.name.as_str())
+            fixture(row)
+                .filter(|fixture| fixture.kind.word() == word)
+                .map_or("", |fixture| fixture.name.as_str())
         };
         add(word, Column::Words(picked.iter().map(|&row| named(row)).collect()));
     }
     columns
 }
 
-/// A word for what is predicted or left, that of a residual, and its rotation vector.
+/// Word of a group of columns, with the vector and the rotation vector of a residual.
 type Part<'a> =
     (&'static str, fn(&Residual) -> Vector3<f64>, &'a dyn Fn(&Residual) -> Option<Vector3<f64>>);
 
-/// What an arm leaves of measurements, a row for each residual: what names it; predicted and left,
-/// in mm and ° and the columns of what some row measures; the length of what is left in units of σ,
-/// whether it is an outlier, and held out.
+/// Returns the table of residuals: columns that name the row, predicted values and residuals in mm
+/// and ° of everything that some row measures, `whitened` (length in units of σ), `outlier` and
+/// `held_out`.
 pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Residual]) -> Columns {
     let picked: Vec<usize> = residuals.iter().map(|residual| residual.row).collect();
     let mut columns = names(problem, rows, &picked);
     let turned = residuals.iter().any(|residual| residual.orientation.is_some());
     let kinds = kinds_of(rows);
-    let predicted_turn = |own: &Residual| {
-        let (turn, measured) = own.orientation.zip(rows.orientations.as_ref())?;
-        Some((UnitQuaternion::from_scaled_axis(-turn) * measured[own.row]).scaled_axis())
+    let predicted_turn = |residual: &Residual| {
+        let (turn, measured) = residual.orientation.zip(rows.orientations.as_ref())?;
+        Some((UnitQuaternion::from_scaled_axis(-turn) * measured[residual.row]).scaled_axis())
     };
     let both: [Part; 2] = [
-        ("predicted", |own| own.predicted, &predicted_turn),
-        ("residual", |own| own.position, &|own: &Residual| own.orientation),
+        ("predicted", |residual| residual.predicted, &predicted_turn),
+        ("residual", |residual| residual.position, &|residual: &Residual| residual.orientation),
     ];
     let mut add = |name: String, decimals, cell: &dyn Fn(&Residual) -> f64| {
         columns.push((name, Column::Numbers(residuals.iter().map(cell).collect(), Some(decimals))));
@@ -126,32 +126,34 @@ pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Res
             let (unit, factor) =
                 if is_angle { ("deg", 180.0 / std::f64::consts::PI) } else { ("mm", 1e3) };
             for (k, axis) in axes.iter().enumerate() {
-                let is_own =
-                    |own: &Residual| rows.observation(own.row).description().residuals.0 == group;
-                let cell =
-                    |own: &Residual| if is_own(own) { value(own)[k] * factor } else { f64::NAN };
+                let is_of_kind = |residual: &Residual| {
+                    rows.observation(residual.row).description().residuals.0 == group
+                };
+                let cell = |residual: &Residual| {
+                    if is_of_kind(residual) { value(residual)[k] * factor } else { f64::NAN }
+                };
                 add(format!("{word}_{axis}_{unit}"), 6, &cell);
             }
         }
         for (k, axis) in ["rx", "ry", "rz"].into_iter().enumerate().filter(|_| turned) {
-            add(format!("{word}_{axis}_deg"), 7, &|own| {
-                turn(own).map_or(f64::NAN, |turn| turn[k].to_degrees())
+            add(format!("{word}_{axis}_deg"), 7, &|residual| {
+                turn(residual).map_or(f64::NAN, |turn| turn[k].to_degrees())
             });
         }
     }
     add("whitened".to_owned(), 4, &Residual::length);
     columns.push((
         "outlier".to_owned(),
-        Column::Flags(residuals.iter().map(|own| own.outlier).collect()),
+        Column::Flags(residuals.iter().map(|residual| residual.outlier).collect()),
     ));
     columns.push((
         "held_out".to_owned(),
-        Column::Flags(residuals.iter().map(|own| own.held_out).collect()),
+        Column::Flags(residuals.iter().map(|residual| residual.held_out).collect()),
     ));
     columns
 }
 
-/// The same as CSV.
+/// Returns the table of residuals as CSV.
 pub fn residuals_csv(problem: &Problem, rows: &Measurements, residuals: &[Residual]) -> String {
     to_csv(&residual_columns(problem, rows, residuals), residuals.len())
 }

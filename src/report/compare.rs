@@ -1,5 +1,4 @@
-//! What `compare` says and writes: every strategy, solver and ablation, and the paper's tables 2
-//! and 3 from each procedure.
+//! Texts of `compare`: every strategy, solver and ablation, and the paper's tables 2 and 3.
 
 use super::document::{Block, Headline, Table, code};
 use super::errors::{both_parts, held_out_rows, noun, shown, unit};
@@ -16,7 +15,7 @@ use crate::model::Ablation;
 use crate::problem::Problem;
 use crate::results::ComparedFit;
 
-/// Columns of the rows of a comparison, after the first; the time differs from run to run.
+/// Columns of a comparison after the first; only the time differs from run to run.
 const ROWS: [&str; 9] = [
     "solver",
     "held out mean",
@@ -28,16 +27,16 @@ const ROWS: [&str; 9] = [
     "condition",
     "termination",
 ];
-/// Place of the time among all columns.
+/// Index of the column with the time.
 const TIME: usize = 7;
 
 /// Returns every strategy and solver, those of the paper last.
 fn fits(comparison: &Comparison) -> impl Iterator<Item = (ComparedFit, &Errors)> {
-    let strategies = comparison.strategies.iter().map(|own| (own.into(), &own.fitted));
-    strategies.chain(comparison.paper.iter().map(|own| (own.into(), &own.errors)))
+    let strategies = comparison.strategies.iter().map(|found| (found.into(), &found.fitted));
+    strategies.chain(comparison.paper.iter().map(|paper| (paper.into(), &paper.errors)))
 }
 
-/// A comparison as text, ending in a line break.
+/// Returns the comparison as text, ending in a line break.
 pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
     let joint = &comparison.joint;
     let (poses, held_out) = (joint.fitted.identification.n, joint.fitted.held_out.n);
@@ -51,30 +50,32 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
     blocks.extend(no_errors(joint).map(|words| Block::lines(format!("  –: {words}"))));
     blocks.push(Block::Table(strategies(comparison)));
     if !comparison.paper.is_empty() && !problem.effects.is_empty() {
-        blocks.push(Block::lines("  paper: its own closed forms, without the declared effects"));
+        blocks.push(Block::lines(
+            "  paper: the closed forms of [Chen2021], without the declared effects",
+        ));
     }
     blocks.push(Block::Table(parts(comparison)));
     text(&blocks)
 }
 
-/// Whether every row measures a position.
+/// Returns true if every row measures a position.
 fn of_positions(found: &Identification) -> bool {
     noun(found) == "pose"
 }
 
-/// Tables 2 and 3 from each procedure.
+/// Returns tables 2 and 3 of the paper from each procedure.
 fn in_the_papers_shape(comparison: &Comparison) -> Vec<Block<'_>> {
-    let tables = |own| {
+    let tables = |procedure| {
         [
-            Block::heading(&title(own)),
-            Block::Table(table_2(own)),
-            Block::Table(table_3(comparison, own)),
+            Block::heading(&title(procedure)),
+            Block::Table(table_2(procedure)),
+            Block::Table(table_3(comparison, procedure)),
         ]
     };
     comparison.procedures.iter().flat_map(tables).collect()
 }
 
-/// The report of `compare`.
+/// Returns the report of `compare`.
 pub fn comparison_report(problem: &Problem, comparison: &Comparison, plots: &PlotData) -> Report {
     report(problem, "comparison", &blocks(problem, comparison, plots))
 }
@@ -116,7 +117,7 @@ fn blocks<'a>(
         Block::Figures(vec![figures::strategies(comparison)]),
         Block::Words(vec![Block::Table(untimed(strategies(comparison)))]),
         Block::Page(vec![Block::Table(in_full(comparison))]),
-        Block::heading("What each part of the elasticity is worth"),
+        Block::heading("Gain of each part of the elasticity"),
         Block::figures([figures::ablations(comparison)]),
         Block::Table(untimed(parts(comparison))),
     ];
@@ -125,12 +126,17 @@ fn blocks<'a>(
             "From each procedure, as in tables 2 and 3 and figure 13 of the paper",
         ));
     }
-    for own in &comparison.procedures {
-        blocks.push(Block::Text(format!("{}.", title(own))));
-        blocks.extend([Block::Table(table_2(own)), Block::Table(table_3(comparison, own))]);
-        // The errors of the joint fit stand further below.
+    for procedure in &comparison.procedures {
+        blocks.push(Block::Text(format!("{}.", title(procedure))));
+        blocks.extend([
+            Block::Table(table_2(procedure)),
+            Block::Table(table_3(comparison, procedure)),
+        ]);
+        // The errors of the joint fit follow below.
         blocks.extend(
-            own.paper.map(|_| Block::Figures(vec![figures::of_procedure(&comparison.before, own)])),
+            procedure.paper.map(|_| {
+                Block::Figures(vec![figures::of_procedure(&comparison.before, procedure)])
+            }),
         );
     }
     blocks.push(Block::heading("Everything fitted at once"));
@@ -146,7 +152,7 @@ fn blocks<'a>(
     blocks
 }
 
-/// One row for each strategy and solver.
+/// Returns the table with a row for each strategy and solver.
 fn strategies(comparison: &Comparison) -> Table {
     side_by_side(
         comparison,
@@ -155,7 +161,7 @@ fn strategies(comparison: &Comparison) -> Table {
     )
 }
 
-/// The same without times, with further errors.
+/// Returns the table of strategies without times, with two more errors.
 fn in_full(comparison: &Comparison) -> Table {
     let mut table = untimed(strategies(comparison));
     table.header.extend(["fitted mean", "held out, largest"]);
@@ -168,7 +174,7 @@ fn in_full(comparison: &Comparison) -> Table {
     table
 }
 
-/// One row for each part of the elasticity.
+/// Returns the table with a row for each part of the elasticity.
 fn parts(comparison: &Comparison) -> Table {
     let row = |(part, found): &(Ablation, Identification)| {
         cells(part.as_str(), &found.into(), &found.fitted)
@@ -183,7 +189,7 @@ fn side_by_side(comparison: &Comparison, first: &'static str, rows: Vec<Vec<Stri
     Table { minor: vec![1, 4, 5, 6, 7, 8], ..Table::new(&header, rows, &[0, 1, 9]) }
 }
 
-/// Without the time taken: the same input gives the same page.
+/// Removes the column with the time, so that the same input gives the same page.
 fn untimed(mut table: Table) -> Table {
     table.header.remove(TIME);
     table.rows.iter_mut().for_each(|row| _ = row.remove(TIME));

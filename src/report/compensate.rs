@@ -1,4 +1,4 @@
-//! What `compensate` says and writes: commands as a table to run, and what they come to.
+//! Text and table of `compensate`.
 
 use std::fmt::Write as _;
 
@@ -12,7 +12,7 @@ use crate::measurement::Measurements;
 use crate::problem::Problem;
 use crate::results::CompensationResult;
 
-/// What came of it, in words; targets that cannot be reached are named by file and line.
+/// Returns the outcome as text, with file and line of the targets that cannot be reached.
 pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Command]) -> String {
     let result = CompensationResult::new(problem, commands);
     let mut words = format!(
@@ -48,31 +48,29 @@ pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Comm
     text(&[Block::Lines(words, points)])
 }
 
-/// Decimals of commands: a nanometre, or a nanoradian.
+/// Decimals of commands, to a nanometre or a nanoradian.
 const DECIMALS: usize = 9;
 
-/// Joints that take a command, named and in the unit as the table of targets has them: index, name,
-/// factor from SI.
+/// Returns index, column name and factor from SI of each commanded joint, as in the table of targets.
 fn columns(problem: &Problem, targets: &Measurements) -> Vec<(usize, String, f64)> {
     if targets.command_columns.is_empty() {
         let columns = table::commands(problem).into_iter();
-        return columns.map(|own| (own.joint, own.column(), own.factor())).collect();
+        return columns.map(|column| (column.joint, column.column(), column.factor())).collect();
     }
     targets
         .command_columns
         .iter()
-        .map(|own| (own.joint, own.name.clone(), own.unit.recip()))
+        .map(|column| (column.joint, column.name.clone(), column.unit.recip()))
         .collect()
 }
 
-/// The cell of an angle \[rad\] in degrees, empty where there is none.
+/// Formats an angle \[rad\] in degrees; empty for `None`.
 fn degrees(angle: Option<f64>) -> String {
     angle.map_or_else(String::new, |angle| fixed(angle.to_degrees(), 6))
 }
 
-/// Commands as CSV: q of every moving joint (empty where the target is out of reach) with the names
-/// and units of the table of targets, the desired position and orientation with what was set, and
-/// how far from them the model expects the arm.
+/// Returns commands as CSV: q of every moving joint (empty if the target is out of reach) with the
+/// names and units of the table of targets, desired pose and conditions, and predicted distances.
 pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Command]) -> String {
     let (mut header, mut lines) = (Vec::new(), vec![Vec::new(); commands.len()]);
     let mut add = |name: &str, cell: &dyn Fn(&Command) -> String| {
@@ -80,39 +78,39 @@ pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Comma
         lines.iter_mut().zip(commands).for_each(|(line, command)| line.push(cell(command)));
     };
     for (joint, name, factor) in columns(problem, targets) {
-        // A controller must not be given a command that does not lead there.
-        let show = |own: &Command| {
-            if own.is_reached() { own.configuration[joint] * factor } else { f64::NAN }
+        // A controller must not receive a command that misses the target.
+        let show = |command: &Command| {
+            if command.is_reached() { command.configuration[joint] * factor } else { f64::NAN }
         };
-        add(&name, &|own| fixed(show(own), DECIMALS));
+        add(&name, &|command| fixed(show(command), DECIMALS));
     }
     for (axis, name) in ["x_mm", "y_mm", "z_mm"].into_iter().enumerate() {
-        add(name, &|own| fixed(targets.positions[own.row][axis] * 1e3, 4));
+        add(name, &|command| fixed(targets.positions[command.row][axis] * 1e3, 4));
     }
     let turned = commands.iter().any(|command| command.turn.is_some());
     for (axis, name) in ["rx_deg", "ry_deg", "rz_deg"].into_iter().enumerate().filter(|_| turned) {
-        add(name, &|own| {
-            degrees(targets.orientation(own.row).map(|desired| desired.scaled_axis()[axis]))
+        add(name, &|command| {
+            degrees(targets.orientation(command.row).map(|desired| desired.scaled_axis()[axis]))
         });
     }
     for (name, labels) in
         [("session", table::sessions(targets)), ("target", targets.target.as_ref())]
     {
         if let Some(labels) = labels {
-            add(name, &|own| table::word(labels, own.row));
+            add(name, &|command| table::word(labels, command.row));
         }
     }
     for (name, values) in [("payload_kg", &targets.payload), ("hoist_N", &targets.hoist)] {
         if let Some(values) = values {
-            add(name, &|own| fixed(values[own.row], 4));
+            add(name, &|command| fixed(values[command.row], 4));
         }
     }
-    add("miss_mm", &|own| fixed(own.miss.norm() * 1e3, 4));
-    add("miss_before_mm", &|own| fixed(own.seed_miss * 1e3, 4));
+    add("miss_mm", &|command| fixed(command.miss.norm() * 1e3, 4));
+    add("miss_before_mm", &|command| fixed(command.seed_miss * 1e3, 4));
     if turned {
-        add("turn_deg", &|own| degrees(own.turn.map(|turn| turn.norm())));
-        add("turn_before_deg", &|own| degrees(own.seed_turn));
+        add("turn_deg", &|command| degrees(command.turn.map(|turn| turn.norm())));
+        add("turn_before_deg", &|command| degrees(command.seed_turn));
     }
-    add("reached", &|own| own.is_reached().to_string());
+    add("reached", &|command| command.is_reached().to_string());
     csv(header, lines)
 }

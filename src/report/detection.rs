@@ -1,4 +1,4 @@
-//! Which effects poses would show, for programs and for people.
+//! Effects that measurements at some poses would show, in words.
 
 use super::document::{Block, Table, code};
 use super::effect;
@@ -6,33 +6,34 @@ use super::forecast::size as shown;
 use crate::problem::Effect;
 use crate::select::{Detectable, Detection, Size};
 
-/// Effects of a family on a screen.
-const SHOWN: usize = 3;
+/// Effects of a family on one screen.
+const SHOWN_EFFECTS: usize = 3;
 
-/// The hardest of each family, and what is not to be seen.
+/// Returns the least visible effects of each family, and those that stay invisible.
 pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
-    let seen = |own: &&Detectable| own.sizes.iter().any(Size::is_within_prior);
+    let seen = |effect: &&Detectable| effect.sizes.iter().any(Size::is_within_prior);
     let (mut visible, mut hidden): (Vec<&Detectable>, Vec<&Detectable>) =
         detection.effects.iter().partition(seen);
-    // Of an argument that is searched, as a time, one that is seen is enough.
-    let places: Vec<String> = visible.iter().map(|own| own.effect.name_and_place()).collect();
-    hidden
-        .retain(|own| !own.effect.is_searched() || !places.contains(&own.effect.name_and_place()));
-    let needs_times = |own: &&Detectable| detection.times_assumed && own.effect.has_memory();
+    // One visible value of a searched argument, for example a time, is enough.
+    let places: Vec<String> = visible.iter().map(|effect| effect.effect.name_and_place()).collect();
+    hidden.retain(|effect| {
+        !effect.effect.is_searched() || !places.contains(&effect.effect.name_and_place())
+    });
+    let needs_times = |effect: &&Detectable| detection.times_assumed && effect.effect.has_memory();
     let if_timed: Vec<&Effect> =
-        visible.iter().copied().filter(needs_times).map(|own| &own.effect).collect();
-    visible.retain(|own| !needs_times(own));
+        visible.iter().copied().filter(needs_times).map(|effect| &effect.effect).collect();
+    visible.retain(|effect| !needs_times(effect));
     let mut families: Vec<&str> = Vec::new();
-    for own in &visible {
-        if !families.contains(&own.effect.name()) {
-            families.push(own.effect.name());
+    for effect in &visible {
+        if !families.contains(&effect.effect.name()) {
+            families.push(effect.effect.name());
         }
     }
     let rows: Vec<Vec<String>> =
         families.into_iter().flat_map(|family| hardest(&visible, family)).collect();
     let mut blocks = vec![Block::Text(format!(
-        "How large an effect must be to be found (in {:.0} of 100 such sets, at the level of the loop), the {SHOWN} hardest of \
-         each family:",
+        "Size from which on an effect is found in {:.0} of 100 such sets of measurements, for the {SHOWN_EFFECTS} least visible effects \
+         of each family:",
         detection.power * 100.0
     ))];
     if !rows.is_empty() {
@@ -47,37 +48,37 @@ pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
         )));
     }
     if !hidden.is_empty() {
-        let list = effect::listed(hidden.into_iter().map(|own| &own.effect)).join("; ");
+        let list = effect::listed(hidden.into_iter().map(|effect| &effect.effect)).join("; ");
         blocks.push(Block::Text(format!(
-            "Not with these poses, even at the size of their prior: {list}."
+            "Not visible with these poses, even at the size of their prior: {list}."
         )));
     }
     if !detection.untestable.is_empty() {
-        blocks.push(Block::heading("Not with measurements of this kind"));
+        blocks.push(Block::heading("Not visible with measurements of this kind"));
         blocks.push(Block::List(effect::reasons(detection.untestable.iter().cloned())));
     }
     blocks
 }
 
-/// Rows of a family: the effect at each place that is hardest to see, the hardest first.
+/// Returns rows of a family: the least visible effect at each place, least visible first.
 fn hardest(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
-    let mut own: Vec<(&Detectable, f64)> = Vec::new();
+    let mut members: Vec<(&Detectable, f64)> = Vec::new();
     for effect in shown.iter().filter(|effect| effect.effect.name() == family) {
         let sizes = effect.sizes.iter();
         let part =
             sizes.map(|size| size.worst.unwrap_or(f64::INFINITY) / size.prior).fold(0.0, f64::max);
-        own.push((effect, part));
+        members.push((effect, part));
     }
-    own.sort_by(|a, b| b.1.total_cmp(&a.1));
+    members.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut places: Vec<String> = Vec::new();
-    let rows = own.iter().filter(|(effect, _)| {
+    let rows = members.iter().filter(|(effect, _)| {
         // Times of a shift are not places.
         let place = effect.effect.name_and_place();
         let new = !places.contains(&place);
         places.push(place);
         new
     });
-    rows.take(SHOWN)
+    rows.take(SHOWN_EFFECTS)
         .flat_map(|(effect, _)| effect.sizes.iter().map(|size| row(&effect.effect, size)))
         .collect()
 }

@@ -1,58 +1,57 @@
-//! A report in blocks: told once, shown on terminals, as Markdown and as a page.
+//! Report as a list of blocks, which are shown on terminals, as Markdown and as a page.
 //!
-//! Words come with [`code`] marked. Figures, folds and the like are shown by the page alone;
-//! [`Block::Page`] and [`Block::Words`] hold what only one kind of reader gets.
+//! Texts mark [`code`]. Only the page shows figures and folds; [`Block::Page`] and [`Block::Words`]
+//! hold blocks for one kind of output alone.
 
 use super::figures::{Drawing, PlotData};
 
-/// Marks of code in words: control characters, so that no title has them on purpose and terminals
-/// drop them.
+/// Marks around code in texts: control characters, which titles do not contain and terminals drop.
 pub(super) const CODE: (char, char) = ('\u{2}', '\u{3}');
 
-/// A part of a report.
+/// Block of a report.
 #[derive(Debug, Clone)]
 pub(super) enum Block<'a> {
-    /// Title of what follows.
+    /// Title of the blocks that follow.
     Heading(String),
-    /// Running text.
+    /// Paragraph of text.
     Text(String),
-    /// What to beware of.
+    /// Paragraph that warns.
     Note(String),
-    /// Lines that a terminal shows as they are broken here, and points below them.
+    /// Lines with fixed line breaks, and points below them.
     Lines(String, Vec<String>),
-    /// Points, each with its details.
+    /// Bullet list with details.
     List(Vec<Point>),
-    /// Points that are numbered from 1.
+    /// List numbered from 1, with details.
     Ranking(Vec<Point>),
-    /// Numbers.
+    /// Table of texts and numbers.
     Table(Table),
-    /// Lines to fill in by hand, each with what goes there; on the page alone.
+    /// Labelled lines to fill in by hand; on the page alone.
     Blanks(Vec<&'static str>),
-    /// What it came to, at one glance; on the page alone.
+    /// Outcome at a glance; on the page alone.
     Headline(Headline),
-    /// Drawings side by side; on the page alone.
+    /// Figures side by side; on the page alone.
     Figures(Vec<Drawing>),
-    /// Every pose that the figures draw, to look at one by one; on the page alone.
+    /// List of all drawn poses; on the page alone.
     Poses(&'a PlotData),
-    /// What a page shows on demand: its title, what it holds, and where it is found on paper; on
-    /// the page alone.
+    /// Title and blocks that the page shows on demand, and where to find them on paper; on the page
+    /// alone.
     Folded(String, Vec<Block<'a>>, String),
-    /// On the page alone.
+    /// Blocks on the page alone.
     Page(Vec<Block<'a>>),
-    /// Everywhere but on the page.
+    /// Blocks everywhere but on the page.
     Words(Vec<Block<'a>>),
 }
 
-/// A point of a list.
+/// Point of a list.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Point {
     pub text: String,
     pub details: Vec<String>,
-    /// How a test went, if it is one.
+    /// Outcome, if the point is a test.
     pub mark: Option<Mark>,
 }
 
-/// How a test went.
+/// Outcome of a test.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mark {
     Failed,
@@ -60,36 +59,36 @@ pub(super) enum Mark {
     Untested,
 }
 
-/// Rows and columns; numbers stand to the right, the columns in `left` to the left.
+/// Table; numbers are aligned to the right, the columns in `left` to the left.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Table {
     pub header: Vec<&'static str>,
     pub rows: Vec<Vec<String>>,
     pub left: Vec<usize>,
-    /// How to read it: below it on terminals, above it on the page.
+    /// Notes on how to read it: below it on terminals, above it on the page.
     pub notes: Vec<String>,
-    /// Columns that a narrow page leaves out.
+    /// Indices of columns that a narrow page leaves out.
     pub minor: Vec<usize>,
-    /// A last column that is drawn, on the page alone.
+    /// Last column of bars, on the page alone.
     pub bars: Option<(&'static str, Vec<Bar>)>,
 }
 
-/// A change in units of its standard error.
+/// Change of a parameter in units of its standard error.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Bar {
     pub change: Option<f64>,
-    /// Where it rests: 0 its lower bound, 1 its upper one.
+    /// Active bound: 0 for the lower one, 1 for the upper one.
     pub bound: Option<f64>,
 }
 
-/// What it came to, at one glance.
+/// Outcome at a glance.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Headline {
-    /// States of the arm from the first to the last, each with its error.
+    /// States of the arm in order, each with its error.
     pub states: Vec<(&'static str, String)>,
     /// Unit of the errors.
     pub unit: &'static str,
-    /// Of what.
+    /// Rows to which the errors belong.
     pub of: String,
     pub facts: Vec<(&'static str, String)>,
 }
@@ -99,17 +98,17 @@ impl Block<'_> {
         Self::Heading(text.to_owned())
     }
 
-    /// Those figures for which there is something to draw.
+    /// Creates a block of the figures that are present.
     pub fn figures(drawn: impl IntoIterator<Item = Option<Drawing>>) -> Self {
         Self::Figures(drawn.into_iter().flatten().collect())
     }
 
-    /// Points without details.
+    /// Creates a list of points without details.
     pub fn list(points: impl IntoIterator<Item = String>) -> Self {
         Self::List(points.into_iter().map(Point::from).collect())
     }
 
-    /// Lines without points.
+    /// Creates lines without points.
     pub fn lines(words: impl Into<String>) -> Self {
         Self::Lines(words.into(), Vec::new())
     }
@@ -131,12 +130,12 @@ impl Table {
     }
 }
 
-/// Words as code.
+/// Marks words as code.
 pub(super) fn code(words: &str) -> String {
     format!("{}{words}{}", CODE.0, CODE.1)
 }
 
-/// The first `most` of some words, and where the others are.
+/// Returns the first `most` words, and a note with the number of others and their file.
 pub(super) fn first_of(
     words: impl IntoIterator<Item = String>,
     most: usize,
@@ -147,14 +146,14 @@ pub(super) fn first_of(
     shown
 }
 
-/// "a, b and 3 more": the first `most` of some words.
+/// Joins the first `most` words and counts the others: "a, b and 3 more".
 pub(super) fn named(words: impl IntoIterator<Item = String>, most: usize, between: &str) -> String {
     let (shown, more) = some_of(words, most);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     shown.join(between) + &more
 }
 
-/// The first `most` of some words, and how many more there are.
+/// Returns the first `most` words and the number of others.
 pub(super) fn some_of(
     words: impl IntoIterator<Item = String>,
     most: usize,

@@ -15,10 +15,10 @@ pub(super) const SHOWN_WAVES: usize = 4;
 /// Lists the parameters of an effect with their values; of many harmonics the amplitudes of the
 /// largest.
 pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<String> {
-    let line = |name: &str, own: &ParameterValue| format!("{name} = {}", value(own));
+    let line = |name: &str, parameter: &ParameterValue| format!("{name} = {}", value(parameter));
     let orders = orders(effect).unwrap_or_default();
     if parameters.len() <= MOST_LISTED || parameters.len() != 2 * orders.len() {
-        return parameters.iter().map(|own| line(&own.name, own)).collect();
+        return parameters.iter().map(|parameter| line(&parameter.name, parameter)).collect();
     }
     let mut waves: Vec<(u32, ParameterValue)> =
         orders.iter().copied().zip(parameters.chunks_exact(2).map(amplitude)).collect();
@@ -99,7 +99,7 @@ fn of_places(members: &[Effect]) -> String {
     let mut places: Vec<String> = Vec::new();
     for place in members
         .iter()
-        .filter_map(|effect| effect.arguments().first().and_then(|(_, own)| own.place()))
+        .filter_map(|effect| effect.arguments().first().and_then(|(_, argument)| argument.place()))
     {
         if !places.contains(&place) {
             places.push(place);
@@ -126,7 +126,7 @@ fn group(members: &[Effect]) -> String {
         (Effect::TrackerSettling { .. }, 2..) => {
             return format!("{} of {} time constants", code(name), members.len());
         }
-        (own, 2..) if own.has_memory() => return of_places(members),
+        (effect, 2..) if effect.has_memory() => return of_places(members),
         _ => {}
     }
     let place = |effect: &Effect| match effect {

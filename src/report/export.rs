@@ -1,4 +1,4 @@
-//! What `export` says: what has moved, what that is worth, and what is left out.
+//! Result and text of `export`: moved origins, errors, and what the file cannot hold.
 
 use std::path::Path;
 
@@ -16,22 +16,23 @@ use crate::problem::Problem;
 use crate::results::{ExportResult, ExportedErrors, Origin, Summary};
 use crate::urdf::MovedOrigin;
 
-/// What to do about a geometry that lacks what stood beside it.
-const ALONE: &str = "A controller that knows geometry alone may do better with one that was fitted alone: identify the problem without its \
-                     effects (and with --strategy rigid where joints or links give way), export that, and compare its error.";
+/// Advice for a geometry whose error is larger without the rest of the model.
+const ADVICE: &str = "If the controller uses geometry alone, a geometry fitted alone may be better: identify the problem without its effects (and \
+                     with --strategy rigid if joints or links are compliant), export it, and compare the errors.";
 
-/// Errors on held-out rows, of the first kind that the table has.
+/// Errors on the held-out rows of the first kind in the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExportErrors {
-    /// Of the model with everything that was identified.
+    /// Errors of the whole identified model.
     pub whole: ErrorSummary,
-    /// Of its geometry alone, with the same base and tool.
+    /// Errors of its rigid geometry, with the same base and tool.
     pub rigid: ErrorSummary,
 }
 
 impl ExportErrors {
-    /// On the held-out rows of `data`; `x` are the deviations that were identified, in the order of
-    /// the model's parameters, in a `saved` estimate or from the same data.
+    /// Computes the errors on the held-out rows of `data`. `x` are the identified deviations in the
+    /// order of the model's parameters; `saved` is the estimate that they come from, if it was read
+    /// from a file.
     pub fn of(
         model: &Model,
         x: &DVector<f64>,
@@ -53,30 +54,30 @@ impl ExportErrors {
     }
 }
 
-/// What was written.
+/// Exported file, with what is reported about it.
 #[derive(Debug, Clone, Copy)]
 pub struct Exported<'a> {
-    /// The problem as declared.
+    /// Declared problem.
     pub problem: &'a Problem,
-    /// Its model.
+    /// Model of the problem.
     pub model: &'a Model,
-    /// The file, where one was written.
+    /// Path of the file, if one was written.
     pub file: Option<&'a Path>,
-    /// The origins that have moved, in a URDF.
+    /// Moved origins of a URDF.
     pub moved: Option<&'a [MovedOrigin]>,
-    /// Errors, where measurements are at hand.
+    /// Errors, if measurements are available.
     pub errors: Option<ExportErrors>,
 }
 
 impl Exported<'_> {
-    /// Collects what was written.
+    /// Returns the result as data.
     pub fn result(&self) -> ExportResult {
-        let origin = |own: &MovedOrigin| Origin {
-            joint: own.joint.clone(),
-            xyz_m: own.xyz.into(),
-            rpy_rad: own.rpy.into(),
-            moved_mm: own.distance * 1e3,
-            turned_deg: own.angle.to_degrees(),
+        let origin = |origin: &MovedOrigin| Origin {
+            joint: origin.joint.clone(),
+            xyz_m: origin.xyz.into(),
+            rpy_rad: origin.rpy.into(),
+            moved_mm: origin.distance * 1e3,
+            turned_deg: origin.angle.to_degrees(),
         };
         let errors = |errors: ExportErrors| ExportedErrors {
             whole: Summary::of(&errors.whole),
@@ -92,7 +93,7 @@ impl Exported<'_> {
     }
 }
 
-/// What the model has beyond the geometry of the chain.
+/// Lists the parts of the model beyond the geometry of the chain.
 fn left_out(exported: &Exported) -> Vec<String> {
     let mut left_out: Vec<String> = Vec::new();
     for (number, joint) in (1..).zip(&exported.problem.joints) {
@@ -103,7 +104,7 @@ fn left_out(exported: &Exported) -> Vec<String> {
             left_out.push(format!("elastic link {}", beam.name));
         }
     }
-    left_out.extend(exported.problem.effects.iter().map(|own| own.effect.declaration()));
+    left_out.extend(exported.problem.effects.iter().map(|declared| declared.effect.declaration()));
     let set_up = |parameter: &&crate::model::parameter::Parameter| {
         matches!(parameter.site, ParameterSite::Base { .. } | ParameterSite::Target { .. })
     };
@@ -120,12 +121,12 @@ fn left_out(exported: &Exported) -> Vec<String> {
     left_out
 }
 
-/// What was written, in words.
+/// Returns the result as text.
 pub fn export_text(exported: &Exported) -> String {
     let mut blocks = Vec::new();
     if let Some(moved) = exported.moved {
-        let row = |own: &MovedOrigin| {
-            vec![own.joint.clone(), mm(own.distance, 4), number(own.angle.to_degrees(), 5)]
+        let row = |origin: &MovedOrigin| {
+            vec![origin.joint.clone(), mm(origin.distance, 4), number(origin.angle.to_degrees(), 5)]
         };
         blocks.push(Block::Table(Table::new(
             &["origin of", "moved, mm", "turned, °"],
@@ -142,12 +143,15 @@ pub fn export_text(exported: &Exported) -> String {
             errors::mean_and_rms(rigid)
         )));
         if rigid.mean.norm > 1.1 * whole.mean.norm {
-            blocks.push(Block::Note(ALONE.to_owned()));
+            blocks.push(Block::Note(ADVICE.to_owned()));
         }
     }
     let left_out = left_out(exported);
     if !left_out.is_empty() {
-        blocks.push(Block::Lines("The file cannot hold".to_owned(), left_out));
+        blocks.push(Block::Lines(
+            "Parts of the model that the file cannot hold".to_owned(),
+            left_out,
+        ));
     }
     blocks.extend(exported.file.map(|file| Block::lines(format!("Written to {}", file.display()))));
     text(&blocks)

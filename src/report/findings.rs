@@ -1,15 +1,15 @@
-//! Tests of what a fit leaves, for programs and for people.
+//! Tests of the residual of a fit, in words.
 
 use super::document::{Block, Mark, Point};
 use super::quantity::number;
 use crate::residual_tests::{Findings, ResidualTest, Test};
 
-/// The tests that failed, in words.
+/// Describes the tests that failed.
 pub(super) fn failed(findings: &Findings) -> Vec<String> {
     findings.tests.iter().filter(|check| check.failed()).map(ToString::to_string).collect()
 }
 
-/// Why the tests name another χ²/ν than the fit's own `chi2`; nothing where both read the same.
+/// States why the tests have another χ²/ν than the fit, if both differ in the shown digits.
 pub(super) fn another_size(findings: &Findings, chi2: Option<f64>) -> Option<String> {
     let size = findings
         .tests
@@ -19,8 +19,8 @@ pub(super) fn another_size(findings: &Findings, chi2: Option<f64>) -> Option<Str
         .as_ref()
         .ok()?;
     (number(size.statistic, 2) != number(chi2?, 2)).then(|| {
-        "The checks have a χ²/ν of their own: they leave outliers out and let stiffnesses that the problem holds equal \
-         differ."
+        "The χ²/ν of the residual tests differs from that of the fit: they leave outliers out, and let stiffnesses differ that the \
+         problem holds equal."
             .to_owned()
     })
 }
@@ -34,22 +34,22 @@ fn point(check: &ResidualTest) -> Point {
     Point { text: check.to_string(), mark: Some(mark), ..Point::default() }
 }
 
-/// Every test with its verdict: those that failed, those that passed, those that could not be made;
-/// covariates that nothing depends on in one line.
+/// Lists the tests: failed, passed, then those that could not be made. Quantities without dependence
+/// share one line.
 pub(super) fn all(findings: &Findings) -> Vec<Point> {
     let of = |mark: Mark| {
         findings
             .tests
             .iter()
             .map(|check| (check, point(check)))
-            .filter(move |(_, own)| own.mark == Some(mark))
+            .filter(move |(_, point)| point.mark == Some(mark))
     };
     let (free, other): (Vec<_>, Vec<_>) =
         of(Mark::Passed).partition(|(check, _)| matches!(check.test, Test::Dependence { .. }));
     let free: Vec<String> =
         free.iter().filter_map(|(check, _)| Some(check.about()?.to_string())).collect();
     let free = (!free.is_empty()).then(|| Point {
-        text: format!("residuals do not depend beyond chance on {}", free.join(", ")),
+        text: format!("residuals do not depend significantly on {}", free.join(", ")),
         mark: Some(Mark::Passed),
         ..Point::default()
     });
@@ -57,12 +57,12 @@ pub(super) fn all(findings: &Findings) -> Vec<Point> {
     points.chain(of(Mark::Untested).map(|(_, point)| point)).collect()
 }
 
-/// Every test in the order in which they were made.
+/// Lists the tests in the order in which they were made.
 pub(super) fn each(findings: &Findings) -> Vec<Point> {
     findings.tests.iter().map(point).collect()
 }
 
-/// Every test: in brief in words, each by itself on the page.
+/// Returns the tests: in brief in texts, one by one on the page.
 pub(super) fn blocks<'a>(findings: &Findings) -> Vec<Block<'a>> {
     let (brief, page) = (Block::List(all(findings)), Block::List(each(findings)));
     vec![Block::Words(vec![brief]), Block::Page(vec![page])]

@@ -1,4 +1,4 @@
-//! What `identify` says and writes: `estimate.json`, its text, and the report on one fit.
+//! Texts of `identify`: all of it on the terminal, and the report on one fit.
 
 use super::around::around;
 use super::document::{Block, Headline, Table};
@@ -19,10 +19,10 @@ use crate::fit::{
 };
 use crate::problem::Problem;
 
-/// The file that holds everything.
+/// File that holds the whole result.
 const FILE: &str = "estimate.json";
 
-/// A result as a table with its story, ending in a line break.
+/// Returns the result as text, ending in a line break.
 pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
     let mut blocks = vec![
         headline(problem, found),
@@ -39,7 +39,7 @@ pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
     text(&blocks)
 }
 
-/// The report of `identify`.
+/// Returns the report of `identify`.
 pub fn identification_report(
     problem: &Problem,
     found: &Identification,
@@ -74,7 +74,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     blocks
 }
 
-/// Why a fit is not to be trusted, in one line.
+/// States in one line why a fit is not to be trusted.
 pub fn why_not_trusted(found: &Identification) -> String {
     match found.first_error() {
         Some(reason) => format!("the fit is not to be trusted: {reason}"),
@@ -82,7 +82,7 @@ pub fn why_not_trusted(found: &Identification) -> String {
     }
 }
 
-/// What was fitted to what, and how it ended, in three lines.
+/// States in three lines what was fitted to what, and how the fit ended.
 pub(super) fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'a> {
     let reason = found.solver_reason.map(|reason| format!(" (auto: {reason})")).unwrap_or_default();
     Block::lines(format!(
@@ -99,7 +99,7 @@ pub(super) fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'
     ))
 }
 
-/// What was fitted to what, and how it ended.
+/// States what was fitted to what, and how the fit ended.
 pub(super) fn counts(found: &Identification) -> String {
     let beware = if found.is_trusted() {
         String::new()
@@ -117,15 +117,14 @@ pub(super) fn counts(found: &Identification) -> String {
     )
 }
 
-/// What the terminal warns of, apart from a fit that is not to be trusted; nothing to say without
-/// any.
+/// Lists the warnings of the terminal, except that a fit is not to be trusted.
 pub(super) fn beware<'a>(found: &Identification, plots: &PlotData) -> Option<Block<'a>> {
     let points: Vec<String> =
         plots.warnings.iter().map(ToString::to_string).chain(found.reasons_to_ask()).collect();
     (!points.is_empty()).then(|| Block::Lines("Warnings:".to_owned(), points))
 }
 
-/// What was fitted: several targets in one pose are points of it.
+/// Counts the fitted rows; several targets in one pose are points of it.
 fn measured(found: &Identification) -> String {
     let rows = rows_of(found, |errors| errors.identification);
     if found.several_targets {
@@ -157,12 +156,12 @@ pub(super) fn errors_by_axis(found: &Identification) -> Table {
     let mut table = Table::new(&header, rows, &[0, 1]);
     table
         .notes
-        .push("before: nominal arm, with base and tool fitted where they are free".to_owned());
+        .push("before: nominal arm, with its base and tool fitted if they are free".to_owned());
     table.notes.extend(no_errors(found).map(|words| format!("–: {words}")));
     table
 }
 
-/// Rows of errors before and after, on both kinds of poses.
+/// Returns rows of errors before and after, on identification and held-out poses.
 fn before_and_after(
     (before, after): (&Errors, &Errors),
     row: impl Fn(&str, &str, &ErrorSummary) -> Vec<String>,
@@ -175,7 +174,7 @@ fn before_and_after(
     ]
 }
 
-/// Errors of orientation before and after, where it is fitted.
+/// Returns errors of orientation before and after, if orientation is fitted.
 fn orientation<'a>(found: &Identification) -> Option<Block<'a>> {
     let OrientationErrors { registered, fitted, .. } = found.orientation.as_ref()?;
     let row = |poses: &str, when: &str, of: &ErrorSummary| {
@@ -187,7 +186,7 @@ fn orientation<'a>(found: &Identification) -> Option<Block<'a>> {
     Some(Block::Table(Table::new(&["orientation, °", "", "mean", "rms", "max"], rows, &[0, 1])))
 }
 
-/// Before and after, on both kinds of poses.
+/// Returns the errors before and after, on held-out and identification poses.
 pub(super) fn errors<'a>(found: &Identification) -> Vec<Block<'a>> {
     let (before, after) = (&found.registered, &found.fitted);
     let rows = vec![
@@ -204,19 +203,19 @@ pub(super) fn errors<'a>(found: &Identification) -> Vec<Block<'a>> {
     std::iter::once(table).chain(no_errors(found).map(Block::Note)).collect()
 }
 
-/// Poses whose errors an identification does not know.
+/// Names the poses without an equilibrium in an identification.
 pub(super) fn no_errors(found: &Identification) -> Option<String> {
     unpredicted(&[("the nominal arm", &found.registered), ("the arm as identified", &found.fitted)])
 }
 
-/// The residual, the parameters, and what the poses can tell; `file` holds what is left out.
+/// Returns the blocks on residual, parameters and identifiability; `file` holds what is left out.
 pub(super) fn remainder<'a>(
     problem: &Problem,
     found: &'a Identification,
     plots: &'a PlotData,
     file: &str,
 ) -> Vec<Block<'a>> {
-    let mut blocks = vec![Block::heading("What is left"), Block::lines(noise(problem, found))];
+    let mut blocks = vec![Block::heading("Residual"), Block::lines(noise(problem, found))];
     blocks.extend(carried(found));
     blocks.extend(outliers(problem, found));
     blocks.push(Block::figures([
@@ -235,7 +234,7 @@ pub(super) fn remainder<'a>(
     blocks
 }
 
-/// What limits and turns of the stages did to a fit.
+/// Returns the blocks on active limits and on alternating stages.
 fn limits<'a>(found: &Identification) -> Vec<Block<'a>> {
     [active_constraints(found), shadow_prices(found), alternation(found)]
         .into_iter()
@@ -243,16 +242,16 @@ fn limits<'a>(found: &Identification) -> Vec<Block<'a>> {
         .collect()
 }
 
-/// What the poses can tell, in figures and words.
+/// Returns the blocks on identifiability, with figures.
 pub(super) fn all_told<'a>(found: &Identification, plots: &PlotData, file: &str) -> Vec<Block<'a>> {
     let figures =
         [figures::correlation(&plots.correlations), figures::spectrum(found.identifiability())];
-    let mut blocks = vec![Block::heading("What the poses can tell"), Block::figures(figures)];
+    let mut blocks = vec![Block::heading("Identifiability"), Block::figures(figures)];
     blocks.extend(told(found, file));
     blocks
 }
 
-/// What the poses can tell, in words.
+/// Returns the blocks on identifiability, in words.
 fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
     let mut blocks = vec![
         conditioning(found.identifiability(), found.unknowns.len(), found.coordinates),
@@ -264,7 +263,7 @@ fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
     blocks
 }
 
-/// Which of commands and readings of the joints fits better, in one line.
+/// States in one line which of joint commands and joint readings fits better.
 pub fn joint_sources_text(sources: &JointSources) -> String {
     let JointSources { used, commanded, read } = *sources;
     let better = sources.better();
@@ -281,21 +280,21 @@ pub fn joint_sources_text(sources: &JointSources) -> String {
     )
 }
 
-/// The constraints that hold parameters back; nothing to say without any.
+/// Lists the active constraints, if there are any.
 fn active_constraints<'a>(found: &Identification) -> Option<Block<'a>> {
     let point = |active: &ActiveConstraint| {
         let line = active.location.line.map_or_else(String::new, |line| format!("line {line}: "));
         format!("{line}{}", active.words)
     };
-    let words = "Held by a constraint (standard errors are those along it):".to_owned();
+    let words = "Active constraints (standard errors are along them):".to_owned();
     let points: Vec<String> = found.active_constraints.iter().map(point).collect();
     (!points.is_empty()).then_some(Block::Lines(words, points))
 }
 
-/// The arm before, in a headline.
+/// Name of the arm before identification, in a headline.
 pub(super) const BEFORE: &str = "nominal arm";
 
-/// A mean error in a headline.
+/// Formats a mean error for a headline.
 pub(super) fn mean(of: &ErrorSummary) -> String {
     brief(of, of.mean.norm)
 }

@@ -1,4 +1,4 @@
-//! What `init` says.
+//! Text of `init`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use super::shell::shell_word;
 use crate::urdf::{Chain, Description, HELD_OUT, SIGMA_MM};
 
-/// What was made, in words, and what comes next.
+/// Returns what was made, and the next steps.
 pub fn init_text(chain: &Chain, description: &Description, folder: &Path) -> String {
     let (base, tip) = chain.ends();
     let joints = chain.joint_names();

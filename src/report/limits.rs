@@ -1,4 +1,4 @@
-//! What `identify` says of bounds, constraints and stages that take turns.
+//! Sentences of `identify` on active limits and on alternating stages.
 
 use super::document::Block;
 use super::quantity::{decimals, number, two_digits};
@@ -6,7 +6,7 @@ use crate::fit::{ActiveConstraint, Alternation, Estimate, Identification, Shadow
 use crate::least_squares::solver::AtBound;
 use crate::quantity::Unit;
 
-/// What bounds and constraints cost; nothing to say without any.
+/// Lists the costs of active bounds and constraints, if there are any.
 pub(super) fn shadow_prices<'a>(found: &Identification) -> Option<Block<'a>> {
     let line = |name: &str, price: ShadowPrice, unit: Unit| {
         let (fall, per) = price.in_mm(unit);
@@ -20,25 +20,27 @@ pub(super) fn shadow_prices<'a>(found: &Identification) -> Option<Block<'a>> {
             estimate.unit,
         ))
     };
-    let constraint = |own: &ActiveConstraint| line(&own.words, own.shadow_price, own.unit);
+    let constraint =
+        |active: &ActiveConstraint| line(&active.words, active.shadow_price, active.unit);
     let bounds = found.estimates.iter().filter_map(bound);
     let points: Vec<String> =
         bounds.chain(found.active_constraints.iter().map(constraint)).collect();
     let words =
-        "What limits cost (moved out by so much, the rms residual of the fit would fall by so much):".to_owned();
+        "Cost of active limits (decrease of the rms residual of the fit if the limit moves out):"
+            .to_owned();
     (!points.is_empty()).then_some(Block::Lines(words, points))
 }
 
-/// How slowly a sequential strategy converges by itself.
+/// States the rate at which a sequential strategy converges without acceleration.
 pub(super) fn alternation<'a>(found: &Identification) -> Option<Block<'a>> {
     let Alternation { sweeps, contraction } = found.alternation?;
     let slow = contraction.map_or_else(String::new, |rate| {
         format!(
-            "; by itself each sweep would leave {} of the error",
+            "; without acceleration each sweep would leave {} of the error",
             number(rate, decimals(1.0 - rate, 6))
         )
     });
     Some(Block::lines(format!(
-        "Stiffness and geometry took turns in {sweeps} accelerated sweeps{slow}."
+        "Stiffness and geometry alternated in {sweeps} accelerated sweeps{slow}."
     )))
 }

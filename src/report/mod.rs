@@ -1,7 +1,7 @@
-//! Results as people and programs read them.
+//! Texts, pages and tables of results.
 //!
-//! One file a command: its facts as JSON and as blocks (`document`), which `render` shows on
-//! terminals, as Markdown and as a page. `figures` draws what only a page shows.
+//! Each command has a file that puts its result into blocks (`document`). `render` shows blocks on
+//! terminals, as Markdown and as a page; `figures` draws the figures of pages.
 
 mod acceptance;
 mod around;

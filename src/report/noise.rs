@@ -130,15 +130,15 @@ pub(super) fn outliers<'a>(problem: &Problem, found: &Identification) -> Option<
     } else {
         "they count in full; a section [robust] would limit them"
     };
-    let known = found.outliers.iter().filter(|own| own.kind == "known distance").count();
+    let known = found.outliers.iter().filter(|outlier| outlier.kind == "known distance").count();
     let (n, all) = (found.outliers.len(), rows_in(found, |errors| errors.identification) + known);
-    let point = |own: &Outlier| {
-        let known = if own.kind == "known distance" { " (known distance)" } else { "" };
+    let point = |outlier: &Outlier| {
+        let known = if outlier.kind == "known distance" { " (known distance)" } else { "" };
         format!(
             "{}{known}: {}, {} σ of the scatter",
-            own.location,
-            size_of_kind(own.kind, own.error.norm(), 3),
-            number(own.distance, 1)
+            outlier.location,
+            size_of_kind(outlier.kind, outlier.error.norm(), 3),
+            number(outlier.distance, 1)
         )
     };
     let points = first_of(found.outliers.iter().map(point), SHOWN_OUTLIERS, FILE);

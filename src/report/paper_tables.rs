@@ -1,5 +1,4 @@
-//! Tables 2 and 3 of the paper and the numbers of its figure 13, in its own terms, from any
-//! procedure.
+//! Tables 2 and 3 of [Chen2021] from any procedure.
 
 use super::document::Table;
 use super::quantity::{mm, number, or_dash};
@@ -7,15 +6,15 @@ use crate::fit::{AxisValues, Comparison, ErrorSummary, Procedure, TableEntry};
 use crate::paper::published::{BEFORE, Published, WITH_ELASTICITY, WITHOUT_ELASTICITY};
 use crate::paper::{Form, StiffnessStage};
 
-/// A parameter of which the data gave less than this part by itself is marked.
-const SEEN: f64 = 0.9;
+/// Share of information from the data below which a parameter is marked.
+const MARKED_BELOW: f64 = 0.9;
 
-/// Parameters of a joint in table 2.
+/// Header of the parameters of a joint in table 2.
 const FIELDS: [&str; 5] = ["α °", "a mm", "θ °", "d mm", "β °"];
 
-/// What a procedure is, in words.
-pub(super) fn title(own: &Procedure) -> String {
-    let Some((form, stage)) = own.paper else {
+/// Describes a procedure.
+pub(super) fn title(procedure: &Procedure) -> String {
+    let Some((form, stage)) = procedure.paper else {
         return "Everything fitted at once (joint)".to_owned();
     };
     let form = match form {
@@ -28,17 +27,17 @@ pub(super) fn title(own: &Procedure) -> String {
         StiffnessStage::Positions => "stiffness from positions at nominal geometry",
         _ => "stiffness from load differences",
     };
-    format!("The paper's closed forms and eq. 45, {form}, {stage} ({})", own.name())
+    format!("The paper's closed forms and eq. 45, {form}, {stage} ({})", procedure.name())
 }
 
-/// Table 2: nominal, identified, error of each joint's geometry; what the data do not see by itself
-/// in brackets.
-pub(super) fn table_2(own: &Procedure) -> Table {
+/// Returns table 2: nominal value, identified value and change of the geometry of each joint, in
+/// brackets if the data determine it only in combination with others.
+pub(super) fn table_2(procedure: &Procedure) -> Table {
     let show = |place: usize, value: f64| {
         if place.is_multiple_of(2) { number(value.to_degrees(), 3) } else { mm(value, 2) }
     };
     let marked = |entry: &TableEntry, text: String| match entry.seen {
-        Some(seen) if seen < SEEN => format!("({text})"),
+        Some(seen) if seen < MARKED_BELOW => format!("({text})"),
         _ => text,
     };
     let row = |(joint, entries): &(usize, [TableEntry; 5])| {
@@ -52,19 +51,19 @@ pub(super) fn table_2(own: &Procedure) -> Table {
         });
         std::iter::once(joint.to_string()).chain(nominal).chain(identified).chain(change).collect()
     };
-    let rows = own.geometry.iter().map(row).collect();
+    let rows = procedure.geometry.iter().map(row).collect();
     let header =
         [&["joint"], &FIELDS[..], &["→ α °"], &FIELDS[1..], &["Δ α °"], &FIELDS[1..]].concat();
     Table::new(&header, rows, &[])
-        .noted(&["( ): seen by these data in combination with others alone, or hardly; –: not identified, or fixed"])
+        .noted(&["( ): determined by these data only in combination with others, or hardly; –: not identified, or fixed"])
 }
 
-/// Table 3: errors of the held-out poses before, with elasticity, ignoring it, and the reductions;
-/// for the paper's arm its figures beside them.
-pub(super) fn table_3(comparison: &Comparison, own: &Procedure) -> Table {
+/// Returns table 3: errors of the held-out poses before, with elasticity and ignoring it, with the
+/// reductions, and the published figures for the paper's arm.
+pub(super) fn table_3(comparison: &Comparison, procedure: &Procedure) -> Table {
     let before = ErrorSummary::of(&comparison.before.errors);
     let (after, ignoring) =
-        (ErrorSummary::of(&own.after), own.ignoring.as_deref().map(ErrorSummary::of));
+        (ErrorSummary::of(&procedure.after), procedure.ignoring.as_deref().map(ErrorSummary::of));
     let elastic = ignoring.is_some();
     let mut header = vec!["held out, mm", "axis", "before"];
     header.extend(if elastic { ["with elasticity", "− %"] } else { ["identified", "− %"] });
@@ -83,8 +82,8 @@ pub(super) fn table_3(comparison: &Comparison, own: &Procedure) -> Table {
                 [Some(value(&after)), ignoring.as_ref().map(value)],
             ));
             if beside {
-                let [before, with, without] =
-                    [&BEFORE, &WITH_ELASTICITY, &WITHOUT_ELASTICITY].map(|own| printed(own)[axis]);
+                let [before, with, without] = [&BEFORE, &WITH_ELASTICITY, &WITHOUT_ELASTICITY]
+                    .map(|errors| printed(errors)[axis]);
                 row.extend(reduced(before, [Some(with), Some(without)]));
             }
             rows.push(row);
@@ -106,16 +105,18 @@ pub(super) fn table_3(comparison: &Comparison, own: &Procedure) -> Table {
     Table::new(&header, rows, &[0, 1]).noted(&notes)
 }
 
-/// Which values of table 3: its word, ours, and the published ones.
+/// Kind of error in table 3: its word, the computed and the published values.
 type Kind = (&'static str, fn(&ErrorSummary) -> &AxisValues, fn(&Published) -> [f64; 4]);
-const KINDS: [Kind; 2] =
-    [("max", |own| &own.max, |own| own.max), ("mean", |own| &own.mean, |own| own.mean)];
+const KINDS: [Kind; 2] = [
+    ("max", |errors| &errors.max, |errors| errors.max),
+    ("mean", |errors| &errors.mean, |errors| errors.mean),
+];
 
 fn on(values: &AxisValues, axis: usize) -> f64 {
     [values.x, values.y, values.z, values.norm][axis]
 }
 
-/// A value \[mm\], and each of those after it with its reduction.
+/// Formats a value \[mm\], and each later value with its reduction.
 fn reduced(before: f64, after: [Option<f64>; 2]) -> Vec<String> {
     let pair = |after: f64| [number(after, 4), number(100.0 * (1.0 - after / before), 2)];
     std::iter::once(number(before, 4)).chain(after.into_iter().flatten().flat_map(pair)).collect()

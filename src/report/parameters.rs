@@ -1,4 +1,4 @@
-//! The table of parameters, and what the data cannot tell.
+//! Parameters in words: their table, unidentifiable and weak combinations, correlations.
 
 use std::collections::BTreeMap;
 
@@ -13,25 +13,25 @@ use crate::model::parameter::Regressor;
 use crate::problem::Problem;
 use crate::quantity::Unit;
 
-/// Decimals of a value that has no error.
-const PLAIN: usize = 4;
-/// Decimals of any value at most.
-const MOST: usize = 6;
-/// Weights in an unidentifiable combination that are worth naming.
-const NAMED: f64 = 0.02;
-/// Terms of an unidentifiable combination that are named, the largest.
-const MOST_NAMED: usize = 8;
-/// Unidentifiable combinations and correlations that fit on a screen.
-const SHOWN: usize = 12;
-/// Columns of the table of parameters.
+/// Decimals of a value without a standard error.
+const DEFAULT_DECIMALS: usize = 4;
+/// Most decimals of a value.
+const MAX_DECIMALS: usize = 6;
+/// Least absolute weight of a term that is named in an unidentifiable combination.
+const MIN_WEIGHT: f64 = 0.02;
+/// Most terms of an unidentifiable combination that are named.
+const MAX_TERMS: usize = 8;
+/// Most combinations and correlations that a text lists.
+const MAX_LISTED: usize = 12;
+/// Header of the table of parameters.
 const HEADER: [&str; 7] =
     ["parameter", "nominal", "estimate", "change", "± 1 σ", "unit", "identified"];
 
-/// A row of the table with its bar.
+/// Row of the table of parameters with its bar.
 type Line = (Vec<String>, Bar);
 
-/// Joint, from 1, and order of every coefficient of a harmonic that `problem` declares, by the
-/// parameter's name.
+/// Returns the joint (from 1) and the order of every coefficient of a declared harmonic, by the
+/// name of the parameter.
 fn harmonics(problem: &Problem) -> BTreeMap<String, (usize, u32)> {
     let of = |regressor: &Regressor| match *regressor {
         Regressor::Sine(joint, order) | Regressor::Cosine(joint, order) => Some((joint + 1, order)),
@@ -39,12 +39,12 @@ fn harmonics(problem: &Problem) -> BTreeMap<String, (usize, u32)> {
     };
     effect::parameters(problem)
         .into_iter()
-        .filter_map(|own| Some((own.name, of(&own.regressor)?)))
+        .filter_map(|parameter| Some((parameter.name, of(&parameter.regressor)?)))
         .collect()
 }
 
-/// The harmonics of joints that have more coefficients than are listed one by one: for each of
-/// these joints the orders that are shown, the highest waves, and how many lower ones there are.
+/// Selects the harmonics of joints with more coefficients than are listed one by one. Returns for
+/// each of these joints the orders of the largest amplitudes, and the number of smaller ones.
 fn highest(
     estimates: &[Estimate],
     harmonics: &BTreeMap<String, (usize, u32)>,
@@ -67,8 +67,8 @@ fn highest(
     joints.into_iter().map(shown).collect()
 }
 
-/// Nominal, estimate, change and standard error of every free parameter; of many waves of a joint
-/// the highest. The others are in `file`, and folded on the page.
+/// Returns the table of all free parameters. Of many harmonics of a joint it shows the largest; the
+/// others are in `file`, and folded on the page.
 pub(super) fn parameters<'a>(
     problem: &Problem,
     found: &Identification,
@@ -81,20 +81,20 @@ pub(super) fn parameters<'a>(
         let wave = harmonics
             .get(&estimate.name)
             .and_then(|(joint, order)| Some((joint, order, high.get(joint)?)));
-        let own = (row(estimate), bar(estimate));
+        let line = (row(estimate), bar(estimate));
         match wave {
-            Some((_, order, (orders, _))) if !orders.contains(order) => lower.push(own),
-            _ => shown.push(own),
+            Some((_, order, (orders, _))) if !orders.contains(order) => lower.push(line),
+            _ => shown.push(line),
         }
         let Some((joint, _, (_, more))) = wave else { continue };
         let later = &found.estimates[k + 1..];
         if *more > 0
             && !later
                 .iter()
-                .any(|other| harmonics.get(&other.name).is_some_and(|(own, _)| own == joint))
+                .any(|other| harmonics.get(&other.name).is_some_and(|(of, _)| of == joint))
         {
             let mut cells = vec![String::new(); HEADER.len()];
-            cells[0] = format!("and {more} lower harmonics of joint {joint}");
+            cells[0] = format!("and {more} smaller harmonics of joint {joint}");
             shown.push((cells, Bar::default()));
         }
     }
@@ -108,26 +108,26 @@ pub(super) fn parameters<'a>(
     };
     let count = lower.len();
     let mut notes: Vec<String> =
-        (count > 0).then(|| format!("lower harmonics: in {file}")).into_iter().collect();
+        (count > 0).then(|| format!("smaller harmonics: in {file}")).into_iter().collect();
     if found.estimates.iter().any(|estimate| estimate.std_error.is_none()) {
         notes.push(
-            "–: no standard error: the data do not identify it, or only in a combination with others, a bound holds it, or \
-             it was not fitted"
+            "–: no standard error, because the data identify the parameter only in a combination with others or not at all, a bound is \
+             active, or it was not fitted"
                 .to_owned(),
         );
     }
     notes.push(
-        "identified: by how much surer it is than its own prior, from data or priors of what goes with it; the rest is prior, \
-         bound, or choice within unidentifiable combinations"
+        "identified: share of the information that comes from the data or from priors of related parameters; the remainder comes from \
+         its prior, a bound, or the choice within unidentifiable combinations"
             .to_owned(),
     );
     notes.extend(sizes(&found.prior_sizes));
     let mut blocks = vec![Block::Table(Table { notes, ..table(shown) })];
     if count > 0 {
-        let on_paper = format!("The lower harmonics are left out on paper: they are in {file}.");
+        let on_paper = format!("The smaller harmonics are left out on paper: they are in {file}.");
         let folded = vec![Block::Table(table(lower))];
         blocks.push(Block::Folded(
-            format!("The lower harmonics: {count} coefficients"),
+            format!("The smaller harmonics: {count} coefficients"),
             folded,
             on_paper,
         ));
@@ -135,51 +135,51 @@ pub(super) fn parameters<'a>(
     blocks
 }
 
-/// What rules of priors the deviations found speak for, where they contradict those declared.
+/// Names the sizes of priors that the estimated deviations suggest where they contradict the
+/// declared ones.
 fn sizes(sizes: &[PriorSize]) -> Option<String> {
-    let rule = |own: &PriorSize| {
-        let unit = own.unit.display(own.declared);
+    let rule = |size: &PriorSize| {
+        let unit = size.unit.display(size.declared);
         let [found, declared] =
-            [own.found, own.declared].map(|sigma| two_digits(sigma * unit.factor, MOST));
-        format!("{} {found} {} instead of {declared}", own.pattern, unit.symbol)
+            [size.found, size.declared].map(|sigma| two_digits(sigma * unit.factor, MAX_DECIMALS));
+        format!("{} {found} {} instead of {declared}", size.pattern, unit.symbol)
     };
     let rules: Vec<String> = sizes.iter().map(rule).collect();
     (!rules.is_empty()).then(|| {
         format!(
-            "priors: the deviations found speak for other sizes, 1 σ of all parameters of a kind: {}; a prior of the right size \
-             may predict better where poses are few",
+            "priors: the estimated deviations suggest another 1 σ: {}; a prior of the right size may predict better if poses are few",
             rules.join(", ")
         )
     })
 }
 
-/// What Markdown says below the table where waves are left out.
+/// Returns the note of Markdown below the table if harmonics are left out.
 pub(super) fn lower_waves<'a>(
     problem: &Problem,
     found: &Identification,
     file: &str,
 ) -> Option<Block<'a>> {
     let some = highest(&found.estimates, &harmonics(problem)).values().any(|(_, more)| *more > 0);
-    some.then(|| Block::Words(vec![Block::Text(format!("Lower harmonics: in {file}."))]))
+    some.then(|| Block::Words(vec![Block::Text(format!("Smaller harmonics: in {file}."))]))
 }
 
 fn row(estimate: &Estimate) -> Vec<String> {
     let unit = estimate.unit.display(estimate.nominal);
     let error = estimate.std_error.map(|error| error * unit.factor);
-    let digits = error.map_or(PLAIN, |error| decimals(error, MOST));
+    let digits = error.map_or(DEFAULT_DECIMALS, |error| decimals(error, MAX_DECIMALS));
     let show = |value: f64| number(value * unit.factor, digits);
     vec![
         estimate.name.clone(),
-        number(estimate.nominal * unit.factor, digits.min(PLAIN)),
+        number(estimate.nominal * unit.factor, digits.min(DEFAULT_DECIMALS)),
         show(estimate.estimate),
         show(estimate.estimate - estimate.nominal),
         or_dash(error, |error| number(error, digits)),
         unit.symbol,
-        verdict(estimate),
+        identified(estimate),
     ]
 }
 
-/// The change in standard errors.
+/// Returns the change of a parameter in units of its standard error.
 fn bar(estimate: &Estimate) -> Bar {
     let error = estimate.std_error.filter(|error| *error > 0.0);
     Bar {
@@ -188,8 +188,8 @@ fn bar(estimate: &Estimate) -> Bar {
     }
 }
 
-/// How well a parameter is identified, in a word and a share.
-fn verdict(estimate: &Estimate) -> String {
+/// Returns the share of information from the data, with a word for it.
+fn identified(estimate: &Estimate) -> String {
     let share = format!("{:3.0} %", estimate.identified * 100.0);
     match (estimate.at_bound, estimate.fitted) {
         (Some(AtBound::Lower), _) => "at its lower bound".to_owned(),
@@ -205,7 +205,7 @@ fn verdict(estimate: &Estimate) -> String {
     }
 }
 
-/// Whether the standard error is larger than any calibration would accept: 1°, 10 mm, or half the
+/// Returns true if the standard error exceeds what a calibration can accept: 1°, 10 mm, or half the
 /// value of a stiffness.
 fn is_vague(estimate: &Estimate) -> bool {
     let limit = match estimate.unit {
@@ -219,7 +219,7 @@ fn is_vague(estimate: &Estimate) -> bool {
     estimate.std_error.is_none_or(|error| error > limit)
 }
 
-/// The combinations that no measurement sees; `file` holds them all.
+/// Lists the combinations of parameters that no measurement determines; `file` holds them all.
 pub(super) fn unidentifiable<'a>(
     found: &Identifiability,
     unknowns: &[String],
@@ -227,22 +227,27 @@ pub(super) fn unidentifiable<'a>(
 ) -> Block<'a> {
     let unidentifiable = &found.unidentifiable;
     if unidentifiable.is_empty() {
-        return Block::lines("Every combination of the parameters is identifiable there.");
+        return Block::lines(
+            "All combinations of the parameters are identifiable at the nominal arm.",
+        );
     }
     let is = if unidentifiable.len() == 1 { "is" } else { "are" };
     let words = format!(
-        "{} of {} combinations of parameters {is} not identifiable there (they can change together in these\n\
-         proportions, each scaled by its effect, and no predicted position moves):",
+        "{} of {} combinations of parameters {is} not identifiable at the nominal arm (a change in these proportions,\n\
+         each scaled by its effect, moves no predicted position):",
         unidentifiable.len(),
         unknowns.len()
     );
-    let mut points =
-        first_of(unidentifiable.iter().map(|own| combination_words(own, unknowns)), SHOWN, file);
+    let mut points = first_of(
+        unidentifiable.iter().map(|combination| combination_words(combination, unknowns)),
+        MAX_LISTED,
+        file,
+    );
     points.extend(without_tracker(unidentifiable, unknowns).into_iter().map(str::to_owned));
     Block::Lines(words, points)
 }
 
-/// What contacts and distances leave open for want of a reference, in words.
+/// Names what contacts and distances leave open because a reference is missing.
 fn without_tracker(
     unidentifiable: &[UnidentifiableCombination],
     unknowns: &[String],
@@ -256,28 +261,28 @@ fn without_tracker(
             || of(name, &["tool"])
             || (is_around(name) && !["rx", "ry"].contains(&&*field(name)))
     };
-    let holds = |own: &UnidentifiableCombination, is: &dyn Fn(&str) -> bool| {
-        own.weights.iter().any(|&(k, _)| is(&unknowns[k]))
+    let any = |combination: &UnidentifiableCombination, is: &dyn Fn(&str) -> bool| {
+        combination.weights.iter().any(|&(k, _)| is(&unknowns[k]))
     };
-    let all = |own: &UnidentifiableCombination, is: &dyn Fn(&str) -> bool| {
-        own.weights.iter().all(|&(k, _)| is(&unknowns[k]))
+    let all = |combination: &UnidentifiableCombination, is: &dyn Fn(&str) -> bool| {
+        combination.weights.iter().all(|&(k, _)| is(&unknowns[k]))
     };
-    let place = |own: &UnidentifiableCombination| {
-        holds(own, &|name| name.starts_with("base"))
-            && all(own, &|name| name.starts_with("base") || is_around(name))
+    let place = |combination: &UnidentifiableCombination| {
+        any(combination, &|name| name.starts_with("base"))
+            && all(combination, &|name| name.starts_with("base") || is_around(name))
     };
-    // What only shifts everything moves points along one axis; a scale moves them along all three.
-    let size = |own: &UnidentifiableCombination| {
-        let along = |axis: &str| holds(own, &|name| is_around(name) && field(name) == axis);
-        all(own, &is_length)
+    // A translation moves the points along one axis, a scale along all three.
+    let size = |combination: &UnidentifiableCombination| {
+        let along = |axis: &str| any(combination, &|name| is_around(name) && field(name) == axis);
+        all(combination, &is_length)
             && ["x", "y", "z"].into_iter().all(along)
-            && holds(own, &|name| name.starts_with("joint"))
+            && any(combination, &|name| name.starts_with("joint"))
     };
     let mut words = Vec::new();
     if unidentifiable.iter().any(place) {
         words.push(
-            "where the base stands: nothing is measured against a place that is known in the measuring frame; hold base.* \
-             (fixed = true), or declare where a point or an anchor is (at_m)",
+            "the pose of the base: no row refers to a known place in the measuring frame; fix base.* (fixed = true), or declare the place \
+             of a point or an anchor (at_m)",
         );
     }
     if unidentifiable.iter().any(size) {
@@ -286,26 +291,30 @@ fn without_tracker(
     words
 }
 
-/// The combinations that are seen too weakly; nothing to say without any.
+/// Lists the combinations that the data determine too weakly, if there are any.
 pub(super) fn weak<'a>(found: &Identification, file: &str) -> Option<Block<'a>> {
     let count = found.weak.len();
     let (noun, hold) =
         if count == 1 { ("combination", "is held") } else { ("combinations", "are held") };
     let words = format!(
-        "{count} {noun} of parameters {hold} where the fit met {}: seen too weakly (moved by the arm's own size, 1 rad\n\
-         or a factor of 100, all measured coordinates together change by less than {WEAK_THRESHOLD} σ):",
+        "{count} {noun} of parameters {hold} at {} start, because the data determine {} too weakly (a change by the size of\n\
+         the arm, 1 rad or a factor of 100 moves all measured coordinates together by less than {WEAK_THRESHOLD} σ):",
+        if count == 1 { "its" } else { "their" },
         if count == 1 { "it" } else { "them" }
     );
-    let points =
-        first_of(found.weak.iter().map(|own| combination_words(own, &found.unknowns)), SHOWN, file);
+    let points = first_of(
+        found.weak.iter().map(|combination| combination_words(combination, &found.unknowns)),
+        MAX_LISTED,
+        file,
+    );
     (count > 0).then_some(Block::Lines(words, points))
 }
 
-/// Those that [`unidentifiable`] leaves out, on the page.
+/// Lists on the page the combinations that [`unidentifiable`] leaves out.
 pub(super) fn more_unidentifiable<'a>(found: &Identification, file: &str) -> Option<Block<'a>> {
-    let unidentifiable = found.identifiability().unidentifiable.iter().skip(SHOWN);
+    let unidentifiable = found.identifiability().unidentifiable.iter().skip(MAX_LISTED);
     let words: Vec<String> =
-        unidentifiable.map(|own| combination_words(own, &found.unknowns)).collect();
+        unidentifiable.map(|combination| combination_words(combination, &found.unknowns)).collect();
     let count = words.len();
     let on_paper = format!("{count} more are left out on paper: they are in {file}.");
     (count > 0).then(|| {
@@ -319,50 +328,52 @@ fn combination_words(combination: &UnidentifiableCombination, unknowns: &[String
         return format!("{} alone", name(k));
     }
     let mut named: Vec<&(usize, f64)> =
-        combination.weights.iter().filter(|(_, weight)| weight.abs() > NAMED).collect();
-    // Equal weights differ by rounding from machine to machine: sort by what is shown.
+        combination.weights.iter().filter(|(_, weight)| weight.abs() > MIN_WEIGHT).collect();
+    // The rounding of equal weights differs between machines: sort by the shown digits.
     let shown = |weight: f64| (weight.abs() * 100.0).round();
     named.sort_by(|a, b| shown(b.1).total_cmp(&shown(a.1)).then(a.0.cmp(&b.0)));
     let mut terms: Vec<String> = named
         .iter()
-        .take(MOST_NAMED)
+        .take(MAX_TERMS)
         .map(|(k, weight)| {
             format!("{} {:.2} {}", if *weight < 0.0 { '−' } else { '+' }, weight.abs(), name(*k))
         })
         .collect();
-    if named.len() > MOST_NAMED {
-        terms.push(format!("… and {} smaller", named.len() - MOST_NAMED));
+    if named.len() > MAX_TERMS {
+        terms.push(format!("… and {} smaller", named.len() - MAX_TERMS));
     }
     terms.join(" ")
 }
 
-/// Pairs of parameters that go together, but for those that one unidentifiable combination ties:
-/// that is told by itself.
+/// Returns pairs of correlated parameters, without pairs within one unidentifiable combination.
 pub(super) fn correlated(found: &Identification) -> Vec<(String, String, f64)> {
     let tied = |a: &str, b: &str| {
-        let holds = |own: &UnidentifiableCombination, name: &str| {
-            own.weights.iter().any(|&(k, _)| found.unknowns[k] == name)
+        let holds = |combination: &UnidentifiableCombination, name: &str| {
+            combination.weights.iter().any(|&(k, _)| found.unknowns[k] == name)
         };
-        found.identifiability().unidentifiable.iter().any(|own| holds(own, a) && holds(own, b))
+        let mut combinations = found.identifiability().unidentifiable.iter();
+        combinations.any(|combination| holds(combination, a) && holds(combination, b))
     };
     found.strong_correlations().into_iter().filter(|(a, b, _)| !tied(a, b)).collect()
 }
 
-/// The same in words; `file` holds them all.
+/// Lists pairs of correlated parameters; `file` holds them all.
 pub(super) fn correlations<'a>(found: &Identification, file: &str) -> Block<'a> {
     let pairs = correlated(found).into_iter().map(|(a, b, correlation)| {
         let sign = if correlation < 0.0 { '−' } else { '+' };
         format!("{a} and {b}: {sign}{:.3}", correlation.abs())
     });
-    let points = first_of(pairs, SHOWN, file);
+    let points = first_of(pairs, MAX_LISTED, file);
     let words = match points.as_slice() {
         [] => "No two other parameters are correlated by more than 0.9.",
-        _ => "Correlated by more than 0.9 (their sum or difference is known better than each):",
+        _ => {
+            "Correlated by more than 0.9 (the data determine their sum or difference better than each):"
+        }
     };
     Block::Lines(words.to_owned(), points)
 }
 
-/// Rank, condition number and observability indices, in one line.
+/// States rank, condition number and observability indices in one line.
 pub(super) fn conditioning<'a>(
     found: &Identifiability,
     unknowns: usize,

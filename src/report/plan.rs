@@ -1,4 +1,4 @@
-//! What `plan` says and writes.
+//! Text of `plan`.
 
 use super::document::{Block, Table};
 use super::forecast::{assumptions, cells};
@@ -9,8 +9,7 @@ use super::separation;
 use crate::design::{Criterion, PairSeparation, Plan};
 use crate::problem::Problem;
 
-/// That the poses are fewer than it takes to see all that such poses can; nothing to say where they
-/// are not.
+/// States that the poses are too few to determine all that such poses can, if they are.
 fn too_few<'a>(plan: &Plan) -> Option<Block<'a>> {
     let Plan { attainable_rank, least_poses, .. } = *plan;
     let (rank, poses) = (plan.planned.identifiability.rank, plan.poses.len());
@@ -20,18 +19,18 @@ fn too_few<'a>(plan: &Plan) -> Option<Block<'a>> {
             counted(least_poses, "pose")
         )
     } else {
-        "more poses may see more".to_owned()
+        "more poses may determine more".to_owned()
     };
     (rank < attainable_rank).then(|| {
         Block::Text(format!(
-            "Too few poses: they see {rank} of the {attainable_rank} combinations of the {} that such poses can see; {at_least}. What \
-             they do not see rests on priors, if on anything.",
+            "Too few poses: they determine {rank} of the {attainable_rank} combinations of the {} that such poses can determine; \
+             {at_least}. The other combinations rest on priors, if there are any.",
             counted(plan.planned.expected.len(), "parameter")
         ))
     })
 }
 
-/// A plan in words; `separated` where it tells two effects apart; ending in a line break.
+/// Returns the plan as text, ending in a line break; `separated` if it separates two effects.
 pub fn plan_text(
     problem: &Problem,
     criterion: &Criterion,
@@ -45,13 +44,15 @@ pub fn plan_text(
     let rows = planned.expected.iter().enumerate().map(|(k, expected)| {
         let random = plan.random_error(k);
         let (mut row, unit) = cells(expected, &[expected.prior, random, expected.std_error]);
-        row.push(or_dash(random.zip(expected.std_error), |(random, own)| number(random / own, 2)));
+        row.push(or_dash(random.zip(expected.std_error), |(random, planned)| {
+            number(random / planned, 2)
+        }));
         row.push(unit);
         row
     });
     let header = ["parameter", "nominal", "prior ± 1 σ", "random", "planned", "gain", "unit"];
     let note = format!(
-        "planned: expected 1 σ of the estimate; random: the same after random poses, median of {} draws; gain: random / planned",
+        "planned: expected standard error (1 σ); random: the same after random poses, median of {} draws; gain: random / planned",
         plan.random.len()
     );
     let meaningful = plan.meaningful();

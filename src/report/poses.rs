@@ -1,4 +1,4 @@
-//! Poses to measure, as a table.
+//! Table of poses to measure.
 
 use super::quantity::fixed;
 use super::table::{Command, commands, sessions, word};
@@ -8,10 +8,9 @@ use crate::observation::references;
 use crate::problem::fixture::frame_word;
 use crate::problem::{HeldOut, Problem};
 
-/// Poses as CSV: the columns of measurements but for the positions; ready to be measured and
-/// completed.
+/// Returns poses as CSV with the columns of measurements, except the positions.
 ///
-/// Where the problem names a column that marks held-out rows, every pose is one to identify with.
+/// If the problem names a column that marks held-out rows, it marks every pose for identification.
 pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     let (joints, session) = (commands(problem), sessions(poses));
     let split = match &problem.data.held_out {
@@ -30,10 +29,10 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     )];
     columns.extend(split.map(|name| (name, vec!["identification".to_owned(); poses.len()])));
     columns.extend(surroundings(problem, poses));
-    columns.extend(joints.iter().map(|own| {
-        let commands =
-            (0..poses.len()).map(|row| plain(poses.configuration(row)[own.joint] * own.factor()));
-        (own.column(), commands.collect())
+    columns.extend(joints.iter().map(|joint| {
+        let commands = (0..poses.len())
+            .map(|row| plain(poses.configuration(row)[joint.joint] * joint.factor()));
+        (joint.column(), commands.collect())
     }));
     let optional = [
         ("session", session.map(words)),
@@ -51,9 +50,9 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
         .extend(optional.into_iter().filter_map(|(name, column)| Some((name.to_owned(), column?))));
     let known = poses.covariates.len() == problem.data.covariates.len() * poses.len();
     columns.extend(problem.data.covariates.iter().enumerate().filter(|_| known).map(
-        |(which, own)| {
+        |(which, covariate)| {
             let values = (0..poses.len()).map(|row| plain(poses.covariates_of(row)[which]));
-            (own.name.clone(), values.collect())
+            (covariate.name.clone(), values.collect())
         },
     ));
     if let Some(approach) = &poses.approach {
@@ -67,7 +66,7 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     csv(columns.iter().map(|(name, _)| name.clone()).collect(), lines)
 }
 
-/// 1 σ of each row \[mm\], none of tilts: the one that is declared.
+/// Returns the declared 1 σ of each row \[mm\]; empty for tilts.
 fn sigmas(poses: &Measurements) -> Option<Vec<String>> {
     let cell = |(row, sigma): (usize, &f64)| {
         if poses.observation(row).is_angle() { String::new() } else { plain(sigma * 1e3) }
@@ -75,22 +74,22 @@ fn sigmas(poses: &Measurements) -> Option<Vec<String>> {
     poses.sigma.as_ref().map(|sigmas| sigmas.iter().enumerate().map(cell).collect())
 }
 
-/// The columns that say against what each row is to be measured: `point`, `anchor`, `surface`,
-/// `frame`, those that there are.
+/// Returns the columns that name the fixture or frame of each row: `point`, `anchor`, `surface`,
+/// `frame`.
 fn surroundings(problem: &Problem, poses: &Measurements) -> Vec<(String, Vec<String>)> {
     let word = |row: usize| match poses.observation(row) {
         tilt if tilt.is_angle() => {
             Some(("frame", frame_word(tilt.frame(), &problem.joints, problem.tool.joint)))
         }
-        own => own
+        fixture => fixture
             .fixture()
-            .and_then(|own| problem.fixtures.get(own))
-            .map(|own| (own.kind.word(), own.name.clone())),
+            .and_then(|fixture| problem.fixtures.get(fixture))
+            .map(|fixture| (fixture.kind.word(), fixture.name.clone())),
     };
     let words: Vec<_> = (0..poses.len()).map(word).collect();
     let column = |kind: &str| -> Vec<String> {
-        let cell = |own: &Option<(&str, String)>| {
-            own.clone().filter(|(word, _)| *word == kind).unwrap_or_default().1
+        let cell = |word: &Option<(&str, String)>| {
+            word.clone().filter(|(word, _)| *word == kind).unwrap_or_default().1
         };
         words.iter().map(cell).collect()
     };
@@ -98,7 +97,7 @@ fn surroundings(problem: &Problem, poses: &Measurements) -> Vec<(String, Vec<Str
     all.filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty())).collect()
 }
 
-/// Six decimals, without zeros at the end.
+/// Formats a value with six decimals, without trailing zeros.
 fn plain(value: f64) -> String {
     let text = fixed(value, 6);
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

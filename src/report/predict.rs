@@ -1,4 +1,4 @@
-//! What `predict` says and writes.
+//! Text and table of `predict`.
 
 use std::fmt::Write as _;
 
@@ -13,8 +13,7 @@ use crate::fit::{ErrorSummary, Prediction};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
 
-/// Predicted positions as CSV: file and line of each row, what names it, its commands, and where
-/// the arm will be.
+/// Returns predictions as CSV: columns that name the row, commands, and the predicted pose.
 pub fn predictions_csv(problem: &Problem, rows: &Measurements, prediction: &Prediction) -> String {
     let all: Vec<usize> = (0..prediction.positions.len()).collect();
     let mut columns = columns::names(problem, rows, &all);
@@ -24,8 +23,8 @@ pub fn predictions_csv(problem: &Problem, rows: &Measurements, prediction: &Pred
             Column::Numbers(all.iter().map(|&row| of(row)).collect(), Some(decimals)),
         ));
     };
-    for own in table::commands(problem) {
-        add(own.column(), 7, &|row| rows.configuration(row)[own.joint] * own.factor());
+    for joint in table::commands(problem) {
+        add(joint.column(), 7, &|row| rows.configuration(row)[joint.joint] * joint.factor());
     }
     for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
         add(format!("predicted_{axis}_mm"), 6, &|row| prediction.positions[row][k] * 1e3);
@@ -38,7 +37,7 @@ pub fn predictions_csv(problem: &Problem, rows: &Measurements, prediction: &Pred
     columns::to_csv(&columns, all.len())
 }
 
-/// What came of a prediction, in words.
+/// Returns the prediction for an arm as text.
 pub fn prediction_text(problem: &Problem, arm: &str, prediction: &Prediction) -> String {
     let mut words = format!(
         "{}\n{} predicted for {arm}",
@@ -56,22 +55,24 @@ pub fn prediction_text(problem: &Problem, arm: &str, prediction: &Prediction) ->
     let mut blocks = vec![Block::lines(words)];
     if !prediction.placed.is_empty() {
         let names = prediction.placed.join(", ");
-        blocks.push(Block::lines(format!("Fitted to these rows, with the arm as it is: {names}")));
+        blocks.push(Block::lines(format!("Fitted to these rows, with the arm held: {names}")));
     }
     if let Some(errors) = &prediction.errors {
         let row = |name: &str, of: &ErrorSummary| {
             [vec![name.to_owned(), of.n.to_string()], sizes(of).to_vec()].concat()
         };
-        let named = |(name, own): &(String, ErrorSummary)| {
-            let kind = if own.kind == errors.all.kind {
+        let named = |(name, errors_of): &(String, ErrorSummary)| {
+            let kind = if errors_of.kind == errors.all.kind {
                 String::new()
             } else {
-                format!(": {}", measure(own))
+                format!(": {}", measure(errors_of))
             };
-            row(&format!("session {name}{kind}"), own)
+            row(&format!("session {name}{kind}"), errors_of)
         };
         let mut rows = vec![row("all rows", &errors.all)];
-        rows.extend(errors.kinds.iter().skip(1).map(|own| row(measure(own), own)));
+        rows.extend(
+            errors.kinds.iter().skip(1).map(|errors_of| row(measure(errors_of), errors_of)),
+        );
         rows.extend(errors.sessions.iter().map(named));
         blocks.push(Block::Table(Table::new(
             &[measure(&errors.all), "rows", "mean", "rms", "max"],

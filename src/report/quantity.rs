@@ -1,12 +1,12 @@
-//! Numbers with units, as people read them.
+//! Formats of numbers in texts and tables.
 
-/// From here on numbers are written with a power of ten.
+/// Magnitude from which on numbers have a power of ten.
 const HUGE: f64 = 1e12;
-/// p-values below this are not told apart: so small a one says more about the assumed distribution
-/// than about chance.
+/// Least p-value that is written out: a smaller one says more about the assumed distribution than
+/// about the data.
 const LEAST_P: f64 = 1e-16;
 
-/// Decimals that show `error` with two significant digits, at most `most`.
+/// Returns the decimals that show `error` with two significant digits, at most `most`.
 pub(super) fn decimals(error: f64, most: usize) -> usize {
     if error <= 0.0 || !error.is_finite() {
         return most;
@@ -21,18 +21,18 @@ pub(super) fn decimals(error: f64, most: usize) -> usize {
     wanted
 }
 
-/// `value` with two digits that count, and at most `most` decimals.
+/// Formats `value` with two significant digits and at most `most` decimals.
 pub(super) fn two_digits(value: f64, most: usize) -> String {
     number(value, decimals(value, most))
 }
 
-/// `value` with about three digits, and at most four decimals.
+/// Formats `value` with about three significant digits and at most four decimals.
 pub(super) fn about_three_digits(value: f64) -> String {
     number(value, (decimals(value, 4) + 1).min(4))
 }
 
-/// `value` with `decimals`, never as "-0"; as `1.234e300` where it is huge, "–" where there is
-/// none.
+/// Formats `value` with `decimals`, never as "-0"; huge values as `1.234e300`, and values that are
+/// not finite as "–".
 pub(super) fn number(value: f64, decimals: usize) -> String {
     match value.abs() {
         size if size < HUGE => fixed(value, decimals),
@@ -41,7 +41,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     }
 }
 
-/// `value` with `decimals`, never as "-0", for tables that programs read; nothing where it is not
+/// Formats `value` with `decimals` for tables that programs read, never as "-0"; empty if it is not
 /// finite.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
@@ -54,22 +54,22 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// "1 pose", "3 poses".
+/// Formats a count with its noun: "1 pose", "3 poses".
 pub(super) fn counted(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
-/// A length \[m\] in mm with `decimals`.
+/// Formats a length \[m\] in mm with `decimals`.
 pub(super) fn mm(length: f64, decimals: usize) -> String {
     number(length * 1e3, decimals)
 }
 
-/// What is there, in words; "–" where there is nothing.
+/// Formats a value by `words`, or returns "–" if there is none.
 pub(super) fn or_dash<T>(value: Option<T>, words: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| "–".to_owned(), words)
 }
 
-/// A p-value: `0.003`, `2e-9`, `below 1e-16`.
+/// Formats a p-value: `0.003`, `2e-9`, `below 1e-16`.
 pub(super) fn p_value(p: f64) -> String {
     match p {
         p if p < LEAST_P => "below 1e-16".to_owned(),

@@ -1,4 +1,4 @@
-//! What a study of the misprints says and writes.
+//! Text and report of a study of the misprints of [Chen2021].
 
 use super::document::{Block, Headline, Table};
 use super::figures;
@@ -11,7 +11,7 @@ use crate::study::{
     AlternativeModel, Case, HeldOutError, MisprintStudy, Replica, ReplicaResults, Spread,
 };
 
-/// What a stage takes for the stiffness, in the order of a replica's results.
+/// Source of the stiffness of each stage, in the order of the results of a replica.
 const STAGES: [&str; 4] =
     ["stiffness known", "as declared", "from positions", "from load differences"];
 
@@ -22,21 +22,24 @@ pub fn replica_text(study: &MisprintStudy, found: &ReplicaResults) -> String {
     text(&blocks)
 }
 
-/// The report of a study of the misprints.
+/// Returns the report of a study of the misprints.
 pub fn replica_report(study: &MisprintStudy, found: &ReplicaResults) -> Report {
     let main = main_case(study, found);
     let error = |pick: fn(&Replica) -> HeldOutError| {
-        let spread = Spread::of(main.iter().map(|own| Some(pick(own)?.mean.norm)));
+        let spread = Spread::of(main.iter().map(|replica| Some(pick(replica)?.mean.norm)));
         or_dash(spread, |spread| mm(spread.mean, 3))
     };
     let head = Headline {
         unit: "mm",
         states: vec![
-            ("elasticity ignored", error(|own| own.rigid)),
-            ("corrected formulas, stiffness known", error(|own| own.reading_error(0, 0))),
+            ("elasticity ignored", error(|replica| replica.rigid)),
+            ("corrected formulas, stiffness known", error(|replica| replica.reading_error(0, 0))),
         ],
         of: "held-out poses".to_owned(),
-        facts: vec![("Everything fitted at once", format!("{} mm", error(|own| Some(own.joint))))],
+        facts: vec![(
+            "Everything fitted at once",
+            format!("{} mm", error(|replica| Some(replica.joint))),
+        )],
     };
     let mut blocks = vec![Block::Headline(head), Block::Text(counts(study))];
     blocks.push(Block::Figures(vec![figures::misprints(study, found)]));
@@ -57,7 +60,7 @@ fn counts(study: &MisprintStudy) -> String {
     )
 }
 
-/// The specimens that everything is tried on.
+/// Returns the specimens on which everything is tried.
 fn main_case<'a>(study: &MisprintStudy, found: &'a ReplicaResults) -> Vec<&'a Replica> {
     study.cases.first().map_or_else(Vec::new, |case| found.of_case(case).collect())
 }
@@ -73,7 +76,7 @@ fn tables<'a>(study: &MisprintStudy, found: &ReplicaResults) -> Vec<Block<'a>> {
     ]
 }
 
-/// Mean ± standard deviation; how many converged where not all did.
+/// Formats mean ± standard deviation, with the number of converged fits if not all converged.
 fn shown(spread: Option<Spread>, show: impl Fn(f64) -> String) -> String {
     let Some(Spread { mean, deviation, count: (there, all) }) = spread else {
         return "diverges".to_owned();
@@ -85,10 +88,13 @@ fn shown(spread: Option<Spread>, show: impl Fn(f64) -> String) -> String {
 fn procedures(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let main = main_case(study, found);
     let row = |(place, named): (usize, &crate::study::NamedReading)| {
-        let size =
-            Misprint::ALL.iter().zip(&found.sizes).find(|(own, _)| Some(**own) == named.misprint);
+        let size = Misprint::ALL
+            .iter()
+            .zip(&found.sizes)
+            .find(|(misprint, _)| Some(**misprint) == named.misprint);
         let cell = |stage: usize| {
-            let means = main.iter().map(|own| Some(own.reading_error(place, stage)?.mean.norm));
+            let means =
+                main.iter().map(|replica| Some(replica.reading_error(place, stage)?.mean.norm));
             shown(Spread::of(means), |value| mm(value, 3))
         };
         let head =
@@ -107,25 +113,29 @@ fn others(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let main = main_case(study, found);
     let row = |name: &str, of: fn(&Replica) -> HeldOutError, published: Option<&Published>| {
         let of_kind = |kind: fn(&ErrorSummary) -> f64| {
-            shown(Spread::of(main.iter().map(|own| of(own).as_ref().map(kind))), |value| {
+            shown(Spread::of(main.iter().map(|replica| of(replica).as_ref().map(kind))), |value| {
                 mm(value, 3)
             })
         };
-        let [mean, max] = [published.map(|own| own.mean[3]), published.map(|own| own.max[3])];
+        let [mean, max] =
+            [published.map(|table| table.mean[3]), published.map(|table| table.max[3])];
         let paper = [mean, max].map(|value| or_dash(value, |value| number(value, 3)));
-        let own =
-            [of_kind(|own| own.mean.norm), of_kind(|own| own.max.norm), of_kind(|own| own.mean.z)];
-        let z = or_dash(published, |own| number(own.mean[2], 3));
+        let simulated = [
+            of_kind(|errors| errors.mean.norm),
+            of_kind(|errors| errors.max.norm),
+            of_kind(|errors| errors.mean.z),
+        ];
+        let z = or_dash(published, |table| number(table.mean[2], 3));
         let [mean, max] = paper;
-        [vec![name.to_owned()], own.to_vec(), vec![mean, max, z]].concat()
+        [vec![name.to_owned()], simulated.to_vec(), vec![mean, max, z]].concat()
     };
     let rows = vec![
-        row("before: nominal arm, rigid", |own| Some(own.before), Some(&BEFORE)),
-        row("elasticity ignored, eq. 45", |own| own.rigid, Some(&WITHOUT_ELASTICITY)),
-        row("elasticity considered", |own| own.reading_error(0, 0), Some(&WITH_ELASTICITY)),
-        row("geometry-only, this model", |own| Some(own.geometry_only), None),
-        row("joint fit, this model", |own| Some(own.joint), None),
-        row("joint fit, both loads", |own| Some(own.joint_twice), None),
+        row("before: nominal arm, rigid", |replica| Some(replica.before), Some(&BEFORE)),
+        row("elasticity ignored, eq. 45", |replica| replica.rigid, Some(&WITHOUT_ELASTICITY)),
+        row("elasticity considered", |replica| replica.reading_error(0, 0), Some(&WITH_ELASTICITY)),
+        row("geometry-only, this model", |replica| Some(replica.geometry_only), None),
+        row("joint fit, this model", |replica| Some(replica.joint), None),
+        row("joint fit, both loads", |replica| Some(replica.joint_twice), None),
     ];
     let header = ["held out, mm", "mean", "max", "mean |z|", "paper: mean", "max", "mean |z|"];
     Table::new(&header, rows, &[0]).noted(&[
@@ -137,12 +147,12 @@ fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
     let main = main_case(study, found);
     let row = |name: &str, summary: &str, left: &dyn Fn(&Replica) -> HeldOutError| {
         let ratio = |case: &Case| {
-            let ratios = found.of_case(case).map(|own| own.ratio(left(own)));
+            let ratios = found.of_case(case).map(|replica| replica.ratio(left(replica)));
             shown(Spread::of(ratios), |value| number(value, 3))
         };
-        let of_z = |own: &&Replica| left(own).map(|left| left.mean.z / left.mean.norm);
+        let of_z = |replica: &&Replica| left(replica).map(|left| left.mean.z / left.mean.norm);
         let along = shown(Spread::of(main.iter().map(of_z)), |value| number(value, 2));
-        let largest = Spread::of(main.iter().map(|own| own.largest_ratio(left(own))));
+        let largest = Spread::of(main.iter().map(|replica| replica.largest_ratio(left(replica))));
         let cases: Vec<String> = study.cases.iter().map(ratio).collect();
         let largest = shown(largest, |value| number(value, 2));
         [vec![name.to_owned(), summary.to_owned()], cases, vec![along, largest]].concat()
@@ -151,13 +161,13 @@ fn ratios(study: &MisprintStudy, found: &ReplicaResults) -> Table {
         .readings
         .iter()
         .enumerate()
-        .map(|(place, named)| row(&named.name, &named.summary, &|own| own.reading_error(place, 0)))
+        .map(|(place, named)| {
+            row(&named.name, &named.summary, &|replica| replica.reading_error(place, 0))
+        })
         .collect();
-    rows.extend(
-        AlternativeModel::EACH.map(|rival| {
-            row(rival.words().0, rival.words().1, &|own| own.alternative_error(rival))
-        }),
-    );
+    rows.extend(AlternativeModel::EACH.map(|rival| {
+        row(rival.words().0, rival.words().1, &|replica| replica.alternative_error(rival))
+    }));
     let [with, without] = [&WITH_ELASTICITY, &WITHOUT_ELASTICITY];
     let paper =
         [with.mean[3] / without.mean[3], with.mean[2] / with.mean[3], with.max[3] / without.max[3]];

@@ -1,9 +1,8 @@
-//! Commands to copy.
+//! Words of commands to copy.
 
 use std::path::Path;
 
-/// A path as a word of a command: in quotes where a shell would take it apart, or read it
-/// otherwise.
+/// Formats a path as a word of a command, in quotes if a shell would split or expand it.
 pub fn shell_word(path: &Path) -> String {
     let word = path.display().to_string();
     let is_plain = |letter: char| letter.is_alphanumeric() || "/._-+,:=@%\\".contains(letter);

@@ -1,4 +1,4 @@
-//! What `study` says and writes: a line a cell, `study.json`, and tables for other programs.
+//! Text of `study`, and its tables for other programs.
 
 use super::document::{Block, Table};
 use super::quantity::{number, or_dash};
@@ -6,19 +6,19 @@ use super::render::text;
 use crate::files;
 use crate::study::{CellResult, Results, Source, Study};
 
-/// First columns of every table.
+/// Header of the first columns of every table.
 const CELL: &str = "cell,position_sigma_mm,identification_poses,strategy,solver";
 
 fn in_mm(metres: Option<f64>) -> Option<f64> {
     metres.map(|value| value * 1e3)
 }
 
-/// A noise level as it was written: 0.1 mm are not 0.10000000000000001 mm.
+/// Converts a noise level to mm as it was written: 0.1 and not 0.10000000000000001.
 fn millimetres(metres: f64) -> f64 {
     (metres * 1e15).round() / 1e12
 }
 
-/// A study as text, ending in a line break.
+/// Returns the study as text, ending in a line break.
 pub fn study_text(study: &Study, results: &Results) -> String {
     let by = match study.source {
         Source::Model => "the model itself",
@@ -36,8 +36,8 @@ pub fn study_text(study: &Study, results: &Results) -> String {
     let header: Vec<&str> = header.split('|').collect();
     let rows = results.cells.iter().map(|cell| line(study, cell)).collect();
     let shown = Table::new(&header, rows, &[2, 3, 10]).noted(&[
-        "held out: measured − predicted, noise included; covered: by ± 1.96 standard errors, 95 % if those are right;",
-        "largest bias: of all parameters, over its spread; ms: middle fit",
+        "held out: measured − predicted, noise included; covered: share of estimates within 1.96 standard errors, 95 % if these are right;",
+        "largest bias: of any parameter, over the spread of its estimates; ms: median time of a fit",
     ]);
     text(&[Block::lines(head), Block::Table(shown)])
 }
@@ -65,7 +65,7 @@ fn line(study: &Study, result: &CellResult) -> Vec<String> {
     ]
 }
 
-/// `study.csv`: one line a cell.
+/// Returns `study.csv` with a line for each cell.
 pub fn study_csv(study: &Study, results: &Results) -> String {
     let header = "fits,failed,failure_rate,held_out_mean_mm,held_out_rms_mm,held_out_rms_sd_mm,held_out_rms_max_mm,\
                   reduced_chi2,coverage,largest_bias_sd,largest_bias_of,iterations_mean,iterations_max";
@@ -93,7 +93,8 @@ pub fn study_csv(study: &Study, results: &Results) -> String {
     csv(header, results.cells.iter().enumerate().map(line))
 }
 
-/// `parameters.csv`: one line a cell and parameter; relative: of ln(value).
+/// Returns `parameters.csv` with a line for each parameter of each cell; the unit `relative` stands
+/// for ln(value).
 pub fn study_parameters_csv(study: &Study, results: &Results) -> String {
     let header = "parameter,unit,fits,bias,spread,rms_error,with_std_error,std_error,coverage";
     let lines = results.cells.iter().enumerate().flat_map(|(index, cell)| {
@@ -115,7 +116,7 @@ pub fn study_parameters_csv(study: &Study, results: &Results) -> String {
     csv(header, lines)
 }
 
-/// `timing.csv`: one line a cell; the only result that differs from run to run.
+/// Returns `timing.csv` with a line for each cell, the only result that differs from run to run.
 pub fn study_timing_csv(results: &Results) -> String {
     let line = |(index, cell): (usize, &CellResult)| {
         let timing = cell.timing();
@@ -128,7 +129,7 @@ pub fn study_timing_csv(results: &Results) -> String {
     csv("fits,median_ms,slowest_ms,total_s", results.cells.iter().enumerate().map(line))
 }
 
-/// Which cell, counted from 1.
+/// Returns the first columns, which name the cell, numbered from 1.
 fn leading(index: usize, result: &CellResult) -> Vec<String> {
     let cell = &result.cell;
     let sigma = millimetres(cell.sigma).to_string();
@@ -136,7 +137,7 @@ fn leading(index: usize, result: &CellResult) -> Vec<String> {
     [vec![(index + 1).to_string(), sigma, cell.poses.to_string()], words.to_vec()].concat()
 }
 
-/// The shortest text that is read back as the same number; empty where there is none.
+/// Formats a number by the shortest text that is read back as the same; empty for `None`.
 fn plain(value: Option<f64>) -> String {
     value.map(|value| value.to_string()).unwrap_or_default()
 }

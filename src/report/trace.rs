@@ -69,7 +69,7 @@ fn headline(problem: &Problem, fit: &Identification) -> String {
 
 /// Lists the hypothesis sets with their probabilities, and the claims about the most probable one.
 fn hypothesis_sets<'a>(result: &TraceResult) -> Vec<Block<'a>> {
-    let words = |own: &Hypothesis| own.description.clone();
+    let words = |hypothesis: &Hypothesis| hypothesis.description.clone();
     let point = |set: &HypothesisSet| {
         let causes: Vec<String> = set.hypotheses.iter().map(words).collect();
         let causes =
@@ -212,11 +212,11 @@ fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
 
 /// Describes a pose: joints, target, payload, hoist, temperature.
 fn pose_words(problem: &Problem, pose: &ToldApart) -> String {
-    let joint = |own: Command| {
-        let unit = if own.unit == Unit::Angle { "°" } else { " mm" };
-        format!("{} {}{unit}", own.name(), number(pose.q[own.joint] * own.factor(), 1))
+    let value = |joint: Command| {
+        let unit = if joint.unit == Unit::Angle { "°" } else { " mm" };
+        format!("{} {}{unit}", joint.name(), number(pose.q[joint.joint] * joint.factor(), 1))
     };
-    let mut words: Vec<String> = commands(problem).into_iter().map(joint).collect();
+    let mut words: Vec<String> = commands(problem).into_iter().map(value).collect();
     words.extend(pose.target.as_ref().map(|target| format!("target {target}")));
     words.extend(pose.payload_kg.map(|mass| format!("payload {} kg", number(mass, 2))));
     words.extend(pose.hoist.map(|force| format!("hoist {} N", number(force, 1))));

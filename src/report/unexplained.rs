@@ -42,7 +42,7 @@ pub(super) fn to_declare(
             code("joint-compliance"),
         ));
     }
-    if closure.before.untestable.iter().any(|own| untried(problem, own) == NO_REFERENCE) {
+    if closure.before.untestable.iter().any(|untested| untried(problem, untested) == NO_REFERENCE) {
         declarations.push(format!(
             "Declare {} in [data], the temperature at which the arm is as declared. Without it no law of the measured temperatures was \
              tried.",
@@ -103,7 +103,13 @@ pub(super) fn unexplained(
         (REFUSED, "[parameters] gives them another unit"),
         (NO_REFERENCE, NO_REFERENCE),
     ] {
-        match closure.before.untestable.iter().filter(|own| untried(problem, own) == why).count() {
+        match closure
+            .before
+            .untestable
+            .iter()
+            .filter(|untested| untried(problem, untested) == why)
+            .count()
+        {
             0 => {}
             1 => {
                 let words = words.replace("them", "it");
@@ -130,7 +136,8 @@ fn is_sag(left: &Structure) -> bool {
 
 /// Iterates over limits of the declared problem that are wrong with a probability above one half.
 fn wrong_limits(result: &LoopResult) -> impl Iterator<Item = (&str, f64)> {
-    let limit = |left: &'_ Structure| left.claims.as_ref().map_or(0.0, |own| own.law.probability);
+    let limit =
+        |left: &'_ Structure| left.claims.as_ref().map_or(0.0, |claims| claims.law.probability);
     result
         .structures()
         .filter_map(move |left| Some((left.limit.as_deref()?, limit(left))))
