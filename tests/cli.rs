@@ -1,4 +1,4 @@
-//! The command line as users meet it.
+//! Tests of the command line.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
@@ -25,7 +25,7 @@ mod results;
 #[path = "cli/strategies.rs"]
 mod strategies;
 
-/// A folder with a copy of the lunar sampler's problem and data, to spoil.
+/// Temporary folder with a copy of the lunar sampler's problem and data.
 struct Bench {
     folder: tempfile::TempDir,
 }
@@ -51,7 +51,7 @@ impl Bench {
         fs::write(self.path(name), text.replacen(from, to, 1)).unwrap();
     }
 
-    /// Keeps the header, then maps every other line of the data, counted from 2.
+    /// Keeps the header and maps every other line of the data, counted from 2.
     fn map_data(&self, map: impl Fn(usize, &str) -> Option<String>) {
         let text = fs::read_to_string(self.path("a-none.csv")).unwrap();
         let lines: Vec<String> = text

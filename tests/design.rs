@@ -1,4 +1,4 @@
-//! Plans and forecasts: the exchange, what it promises against what measurements then give, and the
+//! Plans and forecasts: the exchange algorithm, predictions against results of fits, and the
 //! commands.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]

@@ -1,5 +1,5 @@
-//! Every effect of the catalogue in the model: against the virtual rig, at zero, its derivatives,
-//! and found from data.
+//! Effects of the catalogue in the model: against the virtual rig, at zero, derivatives, and
+//! recovery from data.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 #![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]

@@ -1,5 +1,4 @@
-//! Rows that measure something else than positions: contacts with points and surfaces, distances to
-//! anchors.
+//! Rows that measure contacts with points and surfaces, distances to anchors, or tilts.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 #![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]

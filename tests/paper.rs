@@ -1,5 +1,5 @@
-//! The paper's closed forms: each group of equations, each misprint, and the iteration, on the
-//! lunar sampler.
+//! Closed forms of the paper on the lunar sampler: each group of equations, each misprint, and the
+//! iteration.
 
 #![expect(
     clippy::unwrap_used,

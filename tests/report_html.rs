@@ -1,5 +1,4 @@
-//! The report for people: whole, self-contained, the same every time, and with everything in it
-//! that was found.
+//! HTML report: complete, self-contained, reproducible, with all findings.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
@@ -15,7 +14,7 @@ use flexcal::select::close;
 use nalgebra::Vector3;
 use serde_json::Value;
 
-/// Elements without an end.
+/// Elements without an end tag.
 const VOID: [&str; 4] = ["meta", "link", "input", "!DOCTYPE"];
 
 fn case(file: &str) -> (Problem, Dataset) {
@@ -25,7 +24,7 @@ fn case(file: &str) -> (Problem, Dataset) {
     (problem, data)
 }
 
-/// The first element that is not closed in its turn.
+/// Returns the first element that is not closed in order.
 fn badly_nested(text: &str) -> Option<String> {
     let mut open: Vec<&str> = Vec::new();
     let mut rest = text;
@@ -47,14 +46,14 @@ fn badly_nested(text: &str) -> Option<String> {
     open.pop().map(str::to_owned)
 }
 
-/// What a page knows of its poses.
+/// Returns the pose data of a page.
 fn poses(page: &Report) -> Vec<Value> {
     let (_, after) = page.html.split_once("id=\"poses\">").unwrap();
     let store: Value = serde_json::from_str(after.split_once("</script>").unwrap().0).unwrap();
     store["poses"].as_array().unwrap().clone()
 }
 
-/// What every page and figure must be.
+/// Checks the properties of every page and figure.
 fn check(page: &Report) {
     assert_eq!(badly_nested(&page.html), None);
     let namespace = "http://www.w3.org/2000/svg";
@@ -65,7 +64,7 @@ fn check(page: &Report) {
             assert!(!outside.contains(reference), "{name} has {reference}");
         }
     }
-    // One script that is its own, and what it knows of the poses; none in the figures.
+    // The scripts of a page are its script and its data; figures have none.
     let scripts: Vec<&str> =
         page.html.split("<script").skip(1).map(|text| text.split('>').next().unwrap()).collect();
     assert_eq!(scripts, [" type=\"application/json\" id=\"poses\"", ""]);
@@ -75,11 +74,11 @@ fn check(page: &Report) {
         assert!(report::is_figure(name), "{name}");
         assert_eq!(badly_nested(figure), None, "{name}");
         assert!(figure.starts_with("<svg ") && figure.contains("aria-label=\""), "{name}");
-        // The file needs nothing of the page: paper of its own, colours written out, others where
-        // it is dark.
+        // A figure file does not depend on the page: it has a background and explicit colours for
+        // light and dark themes.
         assert!(!figure.contains("var(") && figure.contains("fill=\"#ffffff\""), "{name}");
         assert!(figure.contains("prefers-color-scheme:dark"), "{name}");
-        // The same poses have the same colour in every legend.
+        // The colours of poses are the same in every legend.
         for (kind, colour) in [("\nfitted pose", "\"#A3ADB8\""), ("\nheld-out pose", "\"#1F2328\"")]
         {
             for (before, _) in figure.match_indices(kind).map(|(at, _)| figure.split_at(at)) {
@@ -88,7 +87,7 @@ fn check(page: &Report) {
                 assert!(!is_mark || mark.contains(colour), "{name}: {mark} for {kind}");
             }
         }
-        // Labels carry their units, but where there are none: numbers without one have no brackets.
+        // Labels have units in brackets, except labels of dimensionless numbers.
         let labelled = figure.matches('[').count()
             - figure.matches("[fill=").count()
             - figure.matches("[stroke=").count();
@@ -97,7 +96,7 @@ fn check(page: &Report) {
         assert!((labelled >= 1) != without, "{name} has no axis with a unit");
         assert!(!figure.contains("[1]") && !figure.contains("−0 "), "{name}");
     }
-    // The data of each figure, in the page itself.
+    // Data of each figure in the page.
     for data in page
         .html
         .split("href=\"data:text/csv;charset=utf-8,")
@@ -108,7 +107,7 @@ fn check(page: &Report) {
         assert!(lines.len() > 1 && lines[0].contains(','), "{data}");
     }
     assert_eq!(page.html.matches(".csv\" href=\"data:text/csv").count(), page.figures.len());
-    // Every dot of a pose is one that the page knows.
+    // Every dot of a pose refers to a pose in the data of the page.
     let poses = poses(page);
     let known: Vec<u64> = poses.iter().map(|pose| pose["row"].as_u64().unwrap()).collect();
     let dots = page
@@ -141,17 +140,17 @@ fn a_closed_loop_shows_what_it_found() {
             assert!(page.html.contains(&estimate.name), "{}", estimate.name);
         }
     }
-    // Each pose's own measurement of the drift lies about the fitted line.
+    // The partial residuals of the drift scatter about the fitted line.
     let cause = &shown.causes[0];
     let (first, last) = (cause.curve[0], cause.curve[cause.curve.len() - 1]);
     let slope = (last.1 - first.1) / (last.0 - first.0);
     assert!((slope * 3600.0 / 0.707e-3 - 1.0).abs() < 0.25, "{slope}");
     let off: f64 = cause.points.iter().map(|point| (point.y - slope * point.x).powi(2)).sum();
     assert!((off / cause.points.len() as f64).sqrt() < 0.2e-3);
-    // The headline tells the whole gain.
+    // The headline shows all stages.
     let states = ["nominal arm", "as declared, fitted", "with what was found"];
     assert!(states.iter().all(|state| page.html.contains(&format!("class=\"label\">{state}<"))));
-    // Each effect contributes, in millimetres over the workspace.
+    // Each effect contributes millimetres over the workspace.
     let drift =
         shown.contributions.iter().find(|own| own.name.starts_with("tracker-drift")).unwrap();
     assert!(drift.is_effect && (0.2e-3..3e-3).contains(&drift.moved), "{drift:?}");
@@ -183,7 +182,7 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     }
     let page = report::identification_report(&problem, &found, &shown);
     check(&page);
-    // Every check with its verdict, on the page and in Markdown.
+    // Every test appears with its verdict on the page and in Markdown.
     assert!(shown.findings.tests.len() > 5);
     for check in &shown.findings.tests {
         let verdict = match (&check.outcome, check.failed()) {
@@ -200,7 +199,7 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
     assert!(told.contains("- passed: ") && told.contains("## What the poses can tell"), "{told}");
     assert!(found.estimates.iter().all(|estimate| told.contains(&estimate.name)));
     assert!(shown.correlations.names.iter().all(|name| page.html.contains(name.as_str())));
-    // A title can switch nothing off.
+    // Markup in a title has no effect.
     let titled = Problem { title: "A ` <b> & *\u{1}\u{1b}[31m".to_owned(), ..problem };
     let report = report::identification_report(&titled, &found, &shown);
     check(&report);
@@ -238,7 +237,7 @@ fn poses_without_an_equilibrium_are_counted_and_left_out() {
             .count()
     };
     let whole = PlotData::of_identification(&problem, &data, &found).unwrap();
-    // One dot fewer in each of the four panels for each of the three poses.
+    // Each of the three poses removes one dot from each of the four panels.
     assert_eq!(dots(&page) + 12, dots(&report::identification_report(&problem, &found, &whole)));
     for text in [
         report::identification_report(&problem, &found, &shown).markdown,
@@ -259,7 +258,7 @@ fn the_pose_behind_the_largest_residual_is_named_and_flattens_nothing() {
     let shown = PlotData::of_identification(&problem, &data, &found).unwrap();
     let page = report::identification_report(&problem, &found, &shown);
     check(&page);
-    // The arm ends where it predicts the target, one tool away from its last joint, and gives way.
+    // The arm ends one tool length before the predicted target, and is deflected.
     let tool = problem.tool.target.norm();
     for (&row, arm) in shown.shown.iter().zip(&shown.arms) {
         let (pose, arm) = (&shown.residuals[row], arm.as_ref().unwrap());
@@ -275,7 +274,7 @@ fn the_pose_behind_the_largest_residual_is_named_and_flattens_nothing() {
                 && (tip - arm.rigid[arm.rigid.len() - 1]).norm() > 1e-3
         );
     }
-    // The first row of the table, and in the data of every figure that has it.
+    // The pose is in the first row of the table, and in the data of every figure that contains it.
     let place = shown.residuals[row].place.clone();
     assert_eq!(place, format!("a-none.csv:{}", data.measurements.location(row).line.unwrap()));
     let first = page.html.split("<tr data-row=\"").nth(1).unwrap();
@@ -287,8 +286,8 @@ fn the_pose_behind_the_largest_residual_is_named_and_flattens_nothing() {
     let own = poses(&page).into_iter().find(|pose| pose["row"] == row).unwrap();
     assert!((own["after"][0].as_f64().unwrap() - shown.residuals[row].error.x * 1e3).abs() < 1e-3);
     assert_eq!(own["q"].as_array().unwrap().len(), 4);
-    // It stands at the rim with a note, and the others keep their room: their mean size is more
-    // than a tenth of the panel.
+    // It is at the edge with a note, and the other residuals keep their space: their mean length
+    // exceeds a tenth of the panel.
     let order = &page.figures.iter().find(|(name, _)| name == "residual-order.svg").unwrap().1;
     assert!(order.contains("1 beyond"), "{order}");
     let tagged = order.split("<circle data-p=\"").skip(1).take(28);

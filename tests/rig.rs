@@ -1,5 +1,5 @@
-//! The virtual test rig against golden positions, hand calculations, its effects, and the rest of
-//! the program.
+//! Virtual test rig: golden positions, hand calculations, effects, and use by the rest of the
+//! program.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 #![expect(clippy::float_cmp, reason = "what is written reads back exactly")]

@@ -1,5 +1,4 @@
-//! Solvers against certified results, and what they promise at the edges: rank deficiency, bounds,
-//! threads.
+//! Solvers: certified results, rank deficiency, bounds, and independence of threads.
 
 #![expect(clippy::unwrap_used, reason = "tests may panic")]
 

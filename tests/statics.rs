@@ -1,5 +1,4 @@
-//! What statics must obey whatever the formulas: beams of the textbook, reciprocity, symmetry,
-//! convergence, limits.
+//! Statics independent of the formulas: textbook beams, reciprocity, symmetry, convergence, limits.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 

@@ -1,5 +1,5 @@
-//! Studies: the same bytes however they are interrupted, shared out and threaded; statistics that
-//! mean what they say; and bad input.
+//! Studies: identical results after interruption, sharding and threading; meaningful statistics;
+//! input errors.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
@@ -18,7 +18,7 @@ use flexcal::results::{Document as _, StudyResult};
 use flexcal::study::{Results, Shard, Store, Study, collect, pending, run};
 use serde_json::Value;
 
-/// Three rigid joints, few parameters: a fit takes a moment.
+/// Problem of three rigid joints with few parameters, whose fit is fast.
 const ARM: &str = r#"
 name = "small"
 [[joint]]
@@ -53,14 +53,14 @@ q2_deg = [-40, 80]
 q3_deg = [-120, -10]
 "#;
 
-/// Cells, and parts of 50 fits at most.
+/// Number of cells; parts have at most 50 fits.
 const CELLS: usize = 4;
 const PARTS: usize = 12;
 
-/// The results that have to repeat.
+/// Result files that have to repeat exactly.
 const RESULTS: [&str; 3] = ["study.csv", "study.json", "parameters.csv"];
 
-/// A folder with a study.
+/// Temporary folder with a study.
 struct Bench {
     folder: tempfile::TempDir,
 }
@@ -88,12 +88,12 @@ impl Bench {
         Study::read(&self.path("STUDY.toml")).unwrap()
     }
 
-    /// The texts of the results in a folder.
+    /// Returns the texts of the results in a folder.
     fn results(&self, out: &str) -> Vec<String> {
         RESULTS.iter().map(|name| fs::read_to_string(self.path(out).join(name)).unwrap()).collect()
     }
 
-    /// Finished parts in a folder of results.
+    /// Returns the number of finished parts in a folder of results.
     fn parts(&self, out: &str) -> usize {
         let Ok(entries) = fs::read_dir(self.path(out).join("cells")) else { return 0 };
         entries
@@ -107,7 +107,7 @@ impl Bench {
     }
 }
 
-/// Does what is open of a share, on so many threads.
+/// Runs the pending parts of a shard on a number of threads.
 fn run_on(threads: usize, study: &Study, store: &Store, shard: Shard) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let open = pending(study, store, shard).unwrap();
@@ -170,8 +170,8 @@ fn declared_effects_are_drawn_and_found_again() {
                 continue;
             }
             let number = |column: &str| row[place(column)].parse::<f64>().unwrap();
-            // Drawn from priors of 1e-2 (gear ratio) and 1e-3: a fit of 30 poses knows better, and
-            // how much.
+            // Values are drawn from priors of 1e-2 (gear ratio) and 1e-3: a fit of 30 poses is more
+            // accurate, and reports how much.
             let (fits, rms, coverage) = (number("fits"), number("rms_error"), number("coverage"));
             assert!(
                 fits > 35.0 && rms > 0.0 && rms < 9e-4 && coverage > 0.8,
@@ -181,7 +181,7 @@ fn declared_effects_are_drawn_and_found_again() {
         }
         assert_eq!(seen, 2 * 5, "{source}: five parameters of effects by two solvers");
     }
-    // What the poses cannot show is a mistake at the effect.
+    // An effect that the poses cannot show is an error at the effect.
     bench.edit("problem.toml", "gear-ratio = { joint = 2 }", "joint-thermal-drift = { joint = 2 }");
     bench.edit("problem.toml", "[data]", "[data]\nreference_temperature_C = 20");
     let error = text_of_error(&bench.flexcal(&["study", "."]).code(2));
@@ -268,13 +268,13 @@ fn finished_parts_are_kept_and_no_others_used() {
     assert_eq!(fits(&study), CELLS * 120);
     let first = texts(&study, &collect(&study, std::slice::from_ref(&store)).unwrap());
     assert_eq!(fits(&study), 0, "everything is there");
-    // One more noise level: the others' fits are still theirs.
+    // One more noise level keeps the parts of the others.
     bench.edit("STUDY.toml", "[0.05, 0.2]", "[0.1, 0.05, 0.2]");
     assert_eq!(fits(&bench.study()), 2 * 120);
-    // More repetitions: full parts stay, the last one of 20 is done again within one of 50.
+    // More repetitions keep full parts; the last one of 20 is replaced by one of 50.
     bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 150");
     assert_eq!(fits(&bench.study()), 6 * 50);
-    // Other arms, poses, noise: nothing is.
+    // Other arms, poses or noise keep no part.
     for (file, from, to) in [
         ("STUDY.toml", "seed = 7", "seed = 8"),
         ("STUDY.toml", "held_out_poses = 10", "held_out_poses = 11"),
@@ -284,7 +284,7 @@ fn finished_parts_are_kept_and_no_others_used() {
         bench.edit(file, from, to);
         assert_eq!(fits(&bench.study()), 6 * 150, "{to}");
     }
-    // And back.
+    // The original study finds its parts again.
     fs::write(bench.path("STUDY.toml"), STUDY).unwrap();
     fs::write(bench.path("problem.toml"), ARM).unwrap();
     assert_eq!(fits(&bench.study()), 0);
@@ -315,7 +315,7 @@ fn damaged_and_foreign_parts_are_not_used() {
 #[test]
 fn a_killed_study_goes_on_and_ends_alike() {
     let bench = Bench::new();
-    // Enough fits to be caught in the act.
+    // Enough fits to interrupt the study.
     bench.edit("STUDY.toml", "repetitions = 120", "repetitions = 2000");
     let start = || {
         let mut process = Process::new(assert_cmd::cargo::cargo_bin!("flexcal"));
@@ -349,7 +349,7 @@ fn shares_of_the_command_line_merge_to_the_same_bytes() {
         assert!(table.contains(expected), "{expected} missing in:\n{table}");
     }
     for share in ["1/3", "2/3", "3/3"] {
-        // In one folder, and each in its own.
+        // All shards in one folder, and each in a separate one.
         let done = format!("done/{}", &share[..1]);
         bench
             .flexcal(&["study", "STUDY.toml", "--out", "shared", "--shard", share, "--done", &done])
@@ -361,7 +361,7 @@ fn shares_of_the_command_line_merge_to_the_same_bytes() {
             .success();
         assert!(!bench.path("shared/study.csv").exists() && bench.parts(&own) == PARTS / 3);
     }
-    // What was true before is not true until it is again; another file stays.
+    // Outdated results are removed until they are complete again; other files stay.
     bench.flexcal(&["study", "no-such.toml", "--done", "done/1"]).code(2);
     bench.flexcal(&["study", "STUDY.toml", "--done", "STUDY.toml"]).code(2);
     assert!(!bench.path("done/1").exists() && bench.path("STUDY.toml").exists());
@@ -403,14 +403,14 @@ fn figures_are_what_they_say() {
     for cell in cells {
         assert_eq!((number(&cell["fits"]), number(&cell["failed"])), (1000.0, 0.0));
         assert!((number(&cell["reduced_chi2"]) - 1.0).abs() < 0.05, "{}", cell["reduced_chi2"]);
-        // Of the noise on three axes, and of the estimates.
+        // Figures of the noise on three axes, and of the estimates.
         let noise = number(&cell["position_sigma_mm"]) * 3.0_f64.sqrt();
         let rms = number(&cell["held_out_mm"]["rms"]);
         assert!(rms > noise && rms < 1.5 * noise, "{rms} against {noise}");
         for parameter in cell["parameters"].as_array().unwrap() {
             let of = |key: &str| number(&parameter[key]);
             let (bias, spread, claimed) = (of("bias"), of("spread"), of("std_error"));
-            // Four standard deviations of each figure.
+            // The limit is four standard deviations of each figure.
             assert!(bias.abs() < 4.0 * spread / 1000.0_f64.sqrt(), "{parameter}");
             assert!((spread / claimed - 1.0).abs() < 4.0 / 2000.0_f64.sqrt(), "{parameter}");
             assert!(
@@ -419,8 +419,8 @@ fn figures_are_what_they_say() {
             );
         }
     }
-    // The same arms, poses and noise: solvers that find the minimum find the same one; four times
-    // the noise, four times the spread, nearly.
+    // The same arms, poses and noise: solvers that find the minimum agree; four times the noise
+    // gives nearly four times the scatter.
     let spread = |cell: usize, k: usize| number(&cells[cell]["parameters"][k]["spread"]);
     for k in 0..5 {
         assert!((spread(0, k) / spread(1, k) - 1.0).abs() < 1e-4);

@@ -1,6 +1,6 @@
-//! The loop against the independent rig, in many sets of measurements of which the truth is known.
+//! The loop on many data sets of the independent rig with known truth.
 //!
-//! A representative part runs with all other tests; the whole, with its figures: `docs/sweep.md`.
+//! A representative part runs with all other tests; `docs/sweep.md` has the figures of the whole.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 #![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]

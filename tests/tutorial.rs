@@ -1,7 +1,7 @@
-//! docs/tutorial.md, lived through: its files written, its commands run, every line that it shows
+//! Test of docs/tutorial.md: its files are written, its commands run, and the lines it shows
 //! compared.
 //!
-//! `FLEXCAL_REFILL=1 cargo test --test tutorial` writes what is printed into the page instead.
+//! `FLEXCAL_REFILL=1 cargo test --test tutorial` writes the printed output into the page instead.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
@@ -11,13 +11,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A block between fences: what stands behind the opening one, and its lines.
+/// Fenced block: the info string of its opening fence, and its lines.
 struct Block<'a> {
     info: &'a str,
     lines: Vec<&'a str>,
 }
 
-/// Text of the page around and within its blocks.
+/// Part of the page: text or block.
 enum Part<'a> {
     Text(&'a str),
     Block(Block<'a>),
@@ -45,7 +45,7 @@ fn parts(page: &str) -> Vec<Part<'_>> {
     parts
 }
 
-/// Arguments of a command, what stands between quotes of one kind kept together.
+/// Splits a command into arguments; quoted text stays together.
 fn words(command: &str) -> Vec<String> {
     let (mut words, mut quote): (Vec<Option<String>>, Option<char>) = (vec![None], None);
     for letter in command.chars() {
@@ -59,7 +59,7 @@ fn words(command: &str) -> Vec<String> {
     words.into_iter().flatten().collect()
 }
 
-/// What a command prints in a folder.
+/// Returns the output of a command in a folder.
 fn printed(command: &str, folder: &Path) -> String {
     let words = words(command);
     let (program, arguments) = words.split_first().unwrap();
@@ -76,7 +76,8 @@ fn printed(command: &str, folder: &Path) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The lines of `text` that a block shows: all, or ranges counted from 1, `…` between them.
+/// Returns the lines of `text` that a block shows: all, or ranges counted from 1 with `…` between
+/// them.
 fn chosen(text: &str, ranges: &str) -> Vec<String> {
     let lines: Vec<&str> = text.trim_end().lines().collect();
     if ranges.is_empty() {
@@ -103,7 +104,7 @@ fn chosen(text: &str, ranges: &str) -> Vec<String> {
     shown
 }
 
-/// A line without the time that a fit took.
+/// Removes the duration of a fit from a line.
 fn timeless(line: &str) -> &str {
     match line.rsplit_once(" steps, ") {
         Some((before, time)) if time.ends_with(" s") => before,
@@ -167,7 +168,7 @@ fn what_is_left_out_is_marked() {
     );
 }
 
-/// The pages of the documentation, the README first.
+/// Returns the pages of the documentation, the README first.
 fn pages() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let docs = fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path());
@@ -197,7 +198,7 @@ fn every_page_is_in_the_book_and_every_link_leads_somewhere() {
     }
 }
 
-/// The commands of a page that stand on lines of their own, without comments.
+/// Returns the commands on separate lines of a page, without comments.
 fn commands(page: &str) -> Vec<String> {
     let page = page.replace("\\\n", "");
     let lines = page.lines().filter_map(|line| line.strip_prefix("    "));
@@ -205,7 +206,7 @@ fn commands(page: &str) -> Vec<String> {
     commands.map(|line| line.split(" # ").next().unwrap().trim_end().to_owned()).collect()
 }
 
-/// A URDF of the arm in problems/panda, links panda_link0 to panda_link8.
+/// Returns a URDF of the arm in problems/panda, with the links panda_link0 to panda_link8.
 fn panda_urdf() -> String {
     const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
     let origins = [
@@ -250,7 +251,7 @@ fn an_own_arm_goes_the_way_of_the_readme_to_its_end() {
     for command in &commands {
         said.push(printed(command, folder.path()));
         if command.starts_with("flexcal init ") {
-            // What others do with an instrument, the rig does here.
+            // The rig simulates the measurements that a user takes with an instrument.
             let truth = root.join("problems/panda/TRUTH.toml");
             let measure = format!(
                 "flexcal simulate panda --truth '{}' --poses 80 --seed 1 --out rig",
@@ -302,14 +303,14 @@ fn commands_of_the_documentation_are_understood() {
     let mut understood = 0;
     for page in pages() {
         for command in commands(&fs::read_to_string(&page).unwrap()) {
-            // Where there are no files, arguments are all that can be understood.
+            // Without files only the arguments can be checked.
             let (_, said) = run(&command, empty.path());
             assert!(!said.contains("try '--help'"), "{}: {command}: {said}", page.display());
             understood += 1;
         }
     }
     assert!(understood > 20, "{understood}");
-    // Those of the list of commands do what they say, but for what takes minutes.
+    // The quick commands of the command list run successfully.
     let list = fs::read_to_string(root.join("docs/commands.md")).unwrap();
     let own = |command: &String| {
         command.contains("lunar-sampler")

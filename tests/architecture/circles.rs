@@ -1,10 +1,10 @@
-//! Circles between files: a file that uses another which, over any number of steps, uses it.
+//! Detection of circular use between files.
 
 use std::collections::BTreeMap;
 
 use super::source::Source;
 
-/// The file in which a path ends, what is passed on by `pub use` followed to where it is defined.
+/// Returns the file in which a path ends; re-exports by `pub use` are followed to the definition.
 fn target(
     sources: &[Source],
     of_module: &BTreeMap<&[String], usize>,
@@ -23,8 +23,8 @@ fn target(
     None
 }
 
-/// Files that use each other in a circle, each circle once; `main.rs` and `lib.rs` stand above the
-/// house.
+/// Returns the groups of files that use each other in a circle, each once; `main.rs` and `lib.rs`
+/// are exempt.
 pub fn circles(sources: &[Source]) -> Vec<String> {
     let named = |source: &Source| !["lib", "main"].contains(&source.room());
     let of_module: BTreeMap<&[String], usize> = sources

@@ -1,5 +1,5 @@
-//! The rules of the house, read from the source: who may use whom, no circles, who prints, how long
-//! a file gets.
+//! Rules of the source, read from its text: allowed uses between modules, no circles, where
+//! printing is allowed, and the length of files.
 
 #![expect(clippy::unwrap_used, clippy::expect_used, reason = "a test that fails may panic")]
 
@@ -9,14 +9,14 @@ mod source;
 use circles::circles;
 use source::{Source, sources};
 
-/// Lines from which on a file needs a reason.
+/// Number of lines above which a test fails.
 const LONGEST: usize = 660;
 
-/// What is read from files, and what it is made of.
+/// Modules of input data and their parts.
 const GROUND: &[&str] =
     &["scalar", "spatial", "quantity", "error", "observation", "problem", "measurement"];
 
-/// Each room of the house and the rooms that it may use, from the ground up.
+/// Top-level modules from the bottom up, each with the modules that it may use.
 const STOREYS: &[(&str, &[&[&str]])] = &[
     ("scalar", &[]),
     ("quantity", &[]),
@@ -24,16 +24,16 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("error", &[]),
     // Kinds of rows, each with its prediction.
     ("observation", &[&["scalar", "quantity", "spatial"]]),
-    // Files up to a size, written whole or not at all, and tables.
+    // Atomic file output with size limits, and tables.
     ("files", &[]),
-    // Small methods: medians, bisection, random numbers.
+    // Small numerical methods: medians, bisection, random numbers.
     ("numeric", &[]),
     ("random", &[]),
     ("problem", &[&["quantity", "error", "spatial", "observation", "files"]]),
     ("measurement", &[&["quantity", "error", "problem", "files"]]),
-    // Least squares knows no arms.
+    // Least squares is independent of robots.
     ("least_squares", &[&["scalar", "error", "numeric"]]),
-    // The physics knows no sensors; the test rig shares no physics.
+    // Mechanics is independent of sensors; the test rig shares no mechanics.
     ("mechanics", &[&["scalar", "spatial", "error", "problem"]]),
     ("rig", &[&["scalar", "spatial", "quantity", "error", "problem", "files", "random"]]),
     (
@@ -49,19 +49,19 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
             "least_squares",
         ]],
     ),
-    // The paper checks the model, so it shares no physics with it.
+    // The paper is a check of the model, so it shares no mechanics with it.
     ("paper", &[&["spatial", "error", "problem", "least_squares"]]),
     ("fit", &[GROUND, BELOW_FIT, &["files"]]),
-    // Statistical tests of a residual know no arms and no fits.
+    // Statistical tests of a residual are independent of arms and fits.
     ("residual_tests", &[&["error", "problem", "model", "numeric"]]),
     ("select", &[GROUND, BELOW_FIT, &["fit", "residual_tests"]]),
-    // Arms from URDF and back.
+    // Import and export of URDF.
     ("urdf", &[&["spatial", "error", "problem", "mechanics", "model", "least_squares", "random"]]),
-    // Which poses to measure, and what they will tell.
+    // Choice of poses, and forecasts of their measurement.
     ("design", &[GROUND, BELOW_FIT, &["fit", "select"]]),
-    // Many fits to what model or rig measure.
+    // Monte Carlo studies with data from the model or the rig.
     ("study", &[GROUND, BELOW_FIT, &["fit", "rig", "files"]]),
-    // Results as data, which reports put into words.
+    // Results as data, which reports turn into text and figures.
     (
         "results",
         &[GROUND, BELOW_FIT, &["fit", "residual_tests", "select", "design", "study", "urdf"]],
@@ -97,17 +97,17 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
 ];
 const BELOW_FIT: &[&str] = &["mechanics", "model", "paper", "least_squares", "numeric", "random"];
 
-/// Rooms that read no files.
+/// Modules that read no files.
 const WITHOUT_FILES: &[&str] =
     &["scalar", "spatial", "quantity", "observation", "least_squares", "mechanics", "model"];
 const FILES: &[&str] = &["std::fs", "std::path", "std::io", "csv::", "toml::", "serde_json::"];
 
-/// Rooms that print.
+/// Modules that print.
 const PRINTING: &[&str] = &["cli", "main"];
 const PRINTS: &[&str] =
     &["println!", "eprintln!", "print!", "eprint!", "dbg!", "io::stdout", "io::stderr"];
 
-/// Uses of rooms that are not below.
+/// Returns the uses of modules that are not below.
 fn upward(source: &Source) -> Vec<String> {
     let room = source.room();
     if room == "lib" {
@@ -129,7 +129,7 @@ fn upward(source: &Source) -> Vec<String> {
     broken
 }
 
-/// Lines of a room in `rooms` (or outside of them) that hold one of `words`.
+/// Returns the lines of a module that contain one of `words`.
 fn holding(source: &Source, words: &[&str]) -> Vec<String> {
     let found = source.code().filter_map(|(line, code)| {
         let word = words.iter().find(|word| {
@@ -210,7 +210,7 @@ fn circles_are_found() {
         Source::new("a/d.rs", "use super::{A, B};\n"),
     ];
     assert_eq!(circles(&sources), ["a/b.rs uses a/c.rs\n  a/c.rs uses a/b.rs"]);
-    // What a module's own file defines is no use of the module's other files.
+    // A definition in the file of a module is no use of the module's other files.
     assert_eq!(circles(&sources[2..]), [] as [&str; 0]);
 }
 

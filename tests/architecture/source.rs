@@ -1,4 +1,4 @@
-//! Source files and what they use, read token by token.
+//! Reader of source files and of the paths they use, token by token.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -6,22 +6,21 @@ use std::path::{Path, PathBuf};
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
-/// A source file: its path below `src`, its text, and the paths that it names.
+/// Source file: path below `src`, text, and used paths.
 pub struct Source {
     pub path: PathBuf,
     pub text: String,
-    /// Module path, `["mechanics", "beam"]`; empty for lib.rs.
+    /// Module path, for example `["mechanics", "beam"]`; empty for lib.rs.
     pub module: Vec<String>,
-    /// Paths from the root of the crate that the file uses, with their lines; what it only passes
-    /// on is not among them.
+    /// Paths from the crate root that the file uses, with their lines, without re-exports.
     pub uses: Vec<(usize, Vec<String>)>,
-    /// Names that it passes on (`pub use`), with the paths they stand for.
+    /// Re-exported names (`pub use`) with the paths they stand for.
     pub passed_on: BTreeMap<String, Vec<String>>,
-    /// Modules that it declares in files of their own.
+    /// Modules declared in separate files.
     pub children: Vec<String>,
 }
 
-/// A path as written, with the name that it gets.
+/// Path as written, with the name it is imported under.
 struct Import {
     line: usize,
     path: Vec<String>,
@@ -83,7 +82,7 @@ impl Source {
         Self { path, text: text.to_owned(), module, uses, passed_on, children }
     }
 
-    /// The room that the file belongs to.
+    /// Returns the top-level module of the file.
     pub fn room(&self) -> &str {
         match self.path.iter().next().and_then(|first| first.to_str()) {
             Some("lib.rs") | None => "lib",
@@ -91,8 +90,7 @@ impl Source {
         }
     }
 
-    /// Lines without comments, counted from 1. Texts with // in them count as comments from there
-    /// on.
+    /// Returns the lines without comments, counted from 1. A text that contains // is cut there.
     pub fn code(&self) -> impl Iterator<Item = (usize, &str)> {
         self.text
             .lines()
@@ -105,12 +103,12 @@ impl Source {
     }
 }
 
-/// What one file names.
+/// Reader of the names in one file.
 struct Reader<'a> {
     module: &'a [String],
     imports: Vec<Import>,
     children: Vec<String>,
-    /// Paths in the code, first segment as written or `crate`.
+    /// Paths in the code, with the first segment as written or `crate`.
     paths: Vec<(usize, Vec<String>)>,
 }
 
@@ -136,7 +134,7 @@ impl Reader<'_> {
                     k = end;
                 }
                 (_, Some("mod")) => {
-                    // Modules of tests in the file are no part of the house.
+                    // Test modules in the file are not checked.
                     if is(k + 2, ';') {
                         self.children.extend(word(k + 1));
                     }
@@ -163,7 +161,7 @@ impl Reader<'_> {
         }
     }
 
-    /// One tree of a `use`.
+    /// Reads one tree of a `use` declaration.
     fn tree(&mut self, tokens: &[TokenTree], before: &[String], is_public: bool) {
         let mut path = before.to_vec();
         let line = tokens.first().map_or(0, |token| token.span().start().line);
@@ -196,8 +194,8 @@ impl Reader<'_> {
         self.imports.push(Import { line, path, name, is_public });
     }
 
-    /// `super` and `self` told from the root of the crate; the library of the command line is the
-    /// crate, too.
+    /// Resolves `super` and `self` from the crate root; for the command line the library counts as
+    /// the crate.
     fn absolute(&self, path: Vec<String>) -> Vec<String> {
         let ups = path.iter().take_while(|word| *word == "super").count();
         let root = || vec!["crate".to_owned()];
@@ -213,7 +211,7 @@ impl Reader<'_> {
     }
 }
 
-/// Every file below `src`.
+/// Returns every file below `src`.
 pub fn sources() -> Vec<Source> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let (mut folders, mut sources) = (vec![root.clone()], Vec::new());

@@ -1,4 +1,4 @@
-//! Commands that bring the arm to where it should be, tried on the virtual rig.
+//! Compensated commands, checked on the virtual rig.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ fn case(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases").join(name)
 }
 
-/// Measurements from CSV text, as the problem reads them.
+/// Reads measurements from CSV text.
 fn measured(text: &str, problem: &Problem) -> Measurements {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("measurements.csv");
@@ -39,8 +39,8 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
     let rows = &data.measurements;
     let found = identify(&problem, &data, &Options::default()).unwrap();
 
-    // Where the nominal arm would be in the held-out configurations is where the true arm should
-    // be.
+    // The true arm should reach the positions that the nominal arm predicts in the held-out
+    // configurations.
     let nominal = Arm::nominal(&problem);
     let (mut ws, mut rest) = (Workspace::default(), StaticState::default());
     let mut targets = rows.clone();
@@ -72,7 +72,7 @@ fn fifty_targets_are_reached_after_twenty_eight_noisy_poses() {
     assert!(mean(0) > 10.0 && mean(1) < 0.2);
 }
 
-/// The case's problem with one piece of its text replaced.
+/// Returns the case's problem with one piece of its text replaced.
 fn changed(from: &str, to: &str) -> String {
     let text = fs::read_to_string(case("problem.toml")).unwrap();
     assert!(text.contains(from), "{from}");
@@ -84,7 +84,7 @@ fn the_digest_is_of_what_predictions_depend_on() {
     let digest =
         |from, to| Problem::parse(&changed(from, to), Path::new("problem.toml")).unwrap().digest();
     let own = digest("", "");
-    // On every machine.
+    // The digest does not depend on the machine.
     assert_eq!(own, "843194ed2f0f49648c76b13cbc088316658d12dbee573d3f7cbb8807d2c1078b");
     for (from, to) in [
         ("name = \"elbow\"", "name = \"knee\"\nmax_deg = 300"),
@@ -102,7 +102,7 @@ fn the_digest_is_of_what_predictions_depend_on() {
         ("a_m = 1.95", "a_m = 1.950001"),
         ("stiffness_N_m_per_rad = 5.2e4", ""),
         ("mass_kg = 4.2", "mass_kg = 4.3"),
-        // Two that exchange their names exchange their estimates.
+        // Exchanged names exchange the estimates.
         ("name = \"A\"", "name = \"C\""),
         ("beam_elements = 1", "beam_elements = 2"),
         ("-9.80665", "-9.81"),
@@ -120,7 +120,8 @@ fn the_digest_is_of_what_predictions_depend_on() {
     assert_eq!(seen.len(), count);
 }
 
-/// Waypoints have no more than the joints; what an effect would do there is left out, and said.
+/// Waypoints contain only joint coordinates; effects of other conditions are omitted, with a
+/// warning.
 #[test]
 fn targets_without_what_an_effect_follows_are_reached_without_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -149,7 +150,7 @@ fn targets_without_what_an_effect_follows_are_reached_without_it() {
         "there",
     ]);
     let told = String::from_utf8_lossy(&done.get_output().stderr).into_owned();
-    // One for each of the two effects.
+    // There is one warning for each of the two effects.
     assert_eq!(told.matches("commands leave out what depends on it").count(), 2, "{told}");
     assert!(path("there/commands.csv").exists(), "{told}");
 }
@@ -193,7 +194,7 @@ fn an_estimate_of_another_arm_is_refused() {
         message.contains("estimate.json: was identified with another declared arm"),
         "{message}"
     );
-    // What older versions wrote says nothing of the arm.
+    // Estimates of older versions contain no digest of the arm.
     let mut old: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert!(old.as_object_mut().unwrap().remove("arm_digest").is_some());
     fs::write(path("estimate.json"), old.to_string()).unwrap();
@@ -212,7 +213,7 @@ fn limits_are_kept_and_targets_out_of_reach_are_named() {
     let commands = compensate(&problem, &arm, &x, &targets).unwrap();
     assert!(!commands[0].is_reached() && commands[0].miss.norm() > 4.0);
     assert!(commands.iter().all(|command| (-0.2..=0.3).contains(&command.configuration[1])));
-    // Where the shoulder starts well inside its range, a correction is enough.
+    // A correction suffices where the shoulder starts well inside its range.
     let inside = commands
         .iter()
         .skip(1)
@@ -228,7 +229,7 @@ fn redundancy_stays_near_the_seed() {
     let arm = model(&problem, &rows);
     let x = nalgebra::DVector::zeros(arm.parameters.len());
     for command in compensate(&problem, &arm, &x, &rows).unwrap() {
-        // Four joints and three coordinates: the way is a correction, not another posture.
+        // With four joints and three coordinates the result is a correction, not another posture.
         let seed = rows.configuration(command.row);
         let step: f64 = command
             .configuration
@@ -243,7 +244,7 @@ fn redundancy_stays_near_the_seed() {
 
 #[test]
 fn a_joint_that_follows_moves_with_its_leader() {
-    // A palletiser: the plate stays level, and one more joint slides as the shoulder turns.
+    // In this palletiser the plate stays level, and one more joint slides as the shoulder turns.
     let text = "name = 'level'\n[[joint]]\nd_m = 0.4\n[[joint]]\nalpha_deg = 90\ntheta_deg = 60\nmin_deg = -60\nmax_deg = 60\n\
                 [[joint]]\na_m = 0.6\ntheta_deg = -90\n[[joint]]\na_m = 0.5\nmimic = { joint = 2, ratio = -1 }\n\
                 [[joint]]\nkind = 'prismatic'\nmimic = { joint = 3, ratio = 0.1 }\n[tool]\ntarget_m = [0.1, 0.02, 0.05]\n\

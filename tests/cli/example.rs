@@ -1,4 +1,4 @@
-//! The example of thirty lines: it has no more, and it finds what it put in.
+//! Example of thirty lines: its length, and that it finds the simulated effect.
 
 use std::process::Command;
 

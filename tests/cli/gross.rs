@@ -1,4 +1,4 @@
-//! Rows with gross mistakes, copied rows, and why a quiet command ends with status 1.
+//! Gross errors and copied rows, and the one-line reason for exit status 1 of a quiet command.
 
 use std::fs;
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::{Bench, text};
 
-/// Moves x of a line of the data by so much [mm].
+/// Adds an error to x in one line of the data [mm].
 fn spoil(bench: &Bench, spoiled: usize, by: f64) {
     let place = header(bench).iter().position(|name| name == "x_mm").unwrap();
     bench.map_data(|line, row| {
@@ -67,7 +67,7 @@ fn a_row_that_carries_the_misfit_is_named_and_to_be_looked_at() {
     ] {
         assert!(out.contains(expected), "{expected} missing in:\n{out}");
     }
-    // The robust loss that is advised leaves nothing to say.
+    // With the recommended robust loss there is no remark.
     bench.edit("problem.toml", "[parameters]", "[robust]\nloss = \"huber\"\n\n[parameters]");
     let (_, out, _) = run(&bench, "identify . --out out");
     assert!(!out.contains("carries") && out.contains("the model explains the data"), "{out}");
@@ -109,7 +109,7 @@ fn copies_are_named_whatever_their_number_and_time_and_repeats_are_not() {
         last + 2
     );
     assert!(err.contains(&expected), "{expected} missing in:\n{err}");
-    // The same pose read anew.
+    // A repeated measurement of the same pose is no copy.
     with(&[line(6, &[("time_s", "90000"), ("x_mm", "1400.001")])]);
     assert!(!run(&bench, "identify . --out out").2.contains("last digit"));
     // Coarse digits repeat by chance.
@@ -121,7 +121,7 @@ fn copies_are_named_whatever_their_number_and_time_and_repeats_are_not() {
 #[test]
 fn quiet_says_in_one_line_why_the_status_is_1() {
     let bench = Bench::new();
-    // x and y exchanged make another arm.
+    // Exchanging x and y makes a different arm.
     bench.edit("a-none.csv", "x_mm,y_mm", "y_mm,x_mm");
     for command in ["identify", "trace"] {
         let (status, out, err) = run(&bench, &format!("{command} . --quiet --out out"));

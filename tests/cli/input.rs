@@ -1,5 +1,4 @@
-//! What is asked for, and what is wrong with it: exit status, messages, and that bad input leaves
-//! nothing behind.
+//! Arguments and input errors: exit status, messages, and no output after bad input.
 
 use std::fs;
 use std::path::Path;
@@ -23,11 +22,11 @@ fn the_problem_may_stand_behind_the_data_or_in_the_current_folder() {
         bench.path("out/lunar-sampler/estimate.json").exists()
             && bench.path("elsewhere/estimate.json").exists()
     );
-    // A closed problem has a folder of its own.
+    // A closed problem gets a separate folder.
     fs::copy(bench.path("problem.toml"), bench.path("problem.closed.toml")).unwrap();
     run("identify problem.closed.toml --quiet").success();
     assert!(bench.path("out/lunar-sampler-closed/estimate.json").exists());
-    // What is planned can be rehearsed.
+    // A plan can be simulated.
     let truth = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/truth.toml");
     fs::copy(truth, bench.path("truth.toml")).unwrap();
     let room = "--workspace-mm=-4000,4000,0,4000,-4000,4000 --keep-out-mm 1,0,0,-500";
@@ -80,7 +79,7 @@ fn too_few_equations_are_not_trusted() {
     assert_eq!(json["trusted"], false);
 }
 
-/// What is spoiled, how, and what the message must name.
+/// File edit that makes an error, and the words that the message must contain.
 type Mistake = (&'static str, fn(&Bench), &'static [&'static str]);
 
 const DATA: &str = "a-none.csv";

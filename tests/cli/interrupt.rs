@@ -1,4 +1,4 @@
-//! Interrupts (SIGINT), sent when the line of progress on a terminal says how far the work is.
+//! Interrupts (SIGINT) sent at a chosen point of the progress line on a terminal.
 
 use std::fs;
 use std::io::Read as _;
@@ -8,10 +8,10 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
-/// Poses that a loop takes seconds for in each round.
+/// Number of poses for which a round of the loop takes seconds.
 const POSES: usize = 400;
 
-/// Measurements of an arm with an effect, most of them to identify from.
+/// Writes measurements of an arm with an effect, most of them for identification.
 fn measured(folder: &Path) {
     let arm = Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/lunar-sampler");
     let poses = (POSES + 20).to_string();
@@ -32,21 +32,21 @@ fn measured(folder: &Path) {
     fs::copy(arm.join("problem.toml"), folder.join("problem.toml")).unwrap();
 }
 
-/// flexcal on a terminal.
+/// Run of flexcal on a pseudo-terminal.
 struct Terminal {
     script: Child,
     output: ChildStdout,
-    /// What it has shown.
+    /// Output shown so far.
     shown: String,
 }
 
 impl Terminal {
-    /// `script` gives it the terminal and passes on what it shows, after the number of its process.
+    /// Starts the command through `script`, which provides the terminal; the first output is its
+    /// process id.
     fn run(folder: &Path, arguments: &str) -> Self {
         let command =
             format!("echo pid=$$.; exec '{}' {arguments}", cargo_bin!("flexcal").display());
-        // Where tests run in the background interrupts are ignored, and what they start would
-        // inherit that.
+        // Background test runs ignore interrupts, and child processes would inherit that.
         let mut script = Command::new("env")
             .args(["--default-signal=INT", "script", "-qefc", &command, "/dev/null"])
             .current_dir(folder)
@@ -59,7 +59,7 @@ impl Terminal {
         Self { script, output, shown: String::new() }
     }
 
-    /// Waits until it has shown `words`.
+    /// Waits until the output contains `words`.
     fn wait_for(&mut self, words: &str) {
         let mut piece = [0; 4096];
         while !self.shown.contains(words) {
@@ -80,7 +80,7 @@ impl Terminal {
         );
     }
 
-    /// Its exit status, and all that it has shown.
+    /// Returns the exit status and the complete output.
     fn end(mut self) -> (Option<i32>, String) {
         let mut rest = Vec::new();
         self.output.read_to_end(&mut rest).unwrap();
@@ -115,7 +115,7 @@ fn an_interrupted_loop_tells_what_it_has_found() {
     let report = fs::read_to_string(folder.join("once/report.md")).unwrap();
     assert!(report.contains("Search interrupted after 1 round"), "{report}");
 
-    // Again before the story is finished: nothing is written.
+    // A second interrupt before the report is written leaves no output.
     let mut twice = run("twice");
     twice.wait_for("round 2");
     twice.interrupt();
@@ -125,7 +125,7 @@ fn an_interrupted_loop_tells_what_it_has_found() {
     assert_eq!(status, Some(130), "{shown}");
     assert!(!folder.join("twice").exists());
 
-    // Before there is anything to tell.
+    // An interrupt before the first result leaves no output.
     let mut early =
         Terminal::run(folder, "identify . --data data.csv --strategy sequential --out early");
     early.wait_for("step ");

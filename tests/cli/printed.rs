@@ -1,4 +1,4 @@
-//! What is printed, and how much of it.
+//! Content and length of printed output.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -70,7 +70,7 @@ fn identify_prints_a_table_and_writes_the_estimate() {
     assert!(unidentifiable["singular_value"].as_f64().unwrap() < 1e-9);
 }
 
-/// Arms to look at, each with measurements: its own, or from the rig.
+/// Writes arms with measurements, given or simulated.
 fn arms(folder: &Path) -> Vec<[String; 2]> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let named = |path: PathBuf| path.to_str().unwrap().to_owned();
@@ -117,7 +117,7 @@ fn what_is_printed_fits_on_a_screen_unless_more_is_asked_for() {
                 lines(&brief) <= 25 && lines(&whole) > lines(&brief),
                 "{command} {data}:\n{brief}"
             );
-            // But for the next command, whose paths are as long as they are.
+            // The next command may be longer because of its paths.
             let own = brief.lines().filter(|line| !line.starts_with("Next: "));
             assert!(
                 own.map(|line| line.chars().count()).all(|width| width <= 110),
@@ -136,7 +136,7 @@ fn commands_to_copy_keep_paths_whole_and_one_is_no_plural() {
     let bench = Bench::new();
     let out = text(&bench.identify(&["-o", "my results"]).success().get_output().stdout);
     assert!(out.contains(" 'my results/"), "{out}");
-    // One of the held-out rows alone.
+    // A single held-out row remains.
     let mut held_out = 0;
     let measured = fs::read_to_string(bench.path("a-none.csv")).unwrap();
     let kept = measured.lines().filter(|row| {
@@ -169,7 +169,7 @@ fn the_readme_shows_what_is_printed() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let readme = std::cell::RefCell::new(fs::read_to_string(root.join("README.md")).unwrap());
     let refills = std::env::var_os("FLEXCAL_REFILL").is_some();
-    // The third line of a fit ends in the time it took.
+    // The third line of a fit ends with its duration.
     let timeless = |text: &str| -> Vec<String> {
         text.trim_end()
             .lines()
@@ -207,7 +207,7 @@ fn the_readme_shows_what_is_printed() {
     if refills {
         fs::write(root.join("docs/effect.svg"), &drawn).unwrap();
     }
-    // Another machine may round a coordinate elsewhere.
+    // Coordinates may round differently on another machine.
     let shapes = |svg: &str| svg.replace(|c: char| c.is_ascii_digit() || c == '.', "");
     let kept = fs::read_to_string(root.join("docs/effect.svg")).unwrap();
     assert_eq!(shapes(&kept), shapes(&drawn), "FLEXCAL_REFILL=1 draws it anew");
@@ -225,7 +225,7 @@ fn the_readme_shows_what_is_printed() {
     assert!(readme.borrow().lines().count() < 120, "one page");
 }
 
-/// What a command prints in the folder of the package, its line breaks taken for spaces.
+/// Returns the output of a command in the package folder, with line breaks as spaces.
 fn screen(arguments: &[&str]) -> String {
     let out = tempfile::tempdir().unwrap();
     let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
@@ -248,7 +248,7 @@ fn limits_that_hold_the_declared_fit_are_said_beside_what_was_found() {
     let expected =
         "Limits hold the fit as declared (joint3.stiffness, A.GJ): where one is wrong, an effect";
     assert!(printed.contains(expected) && printed.contains("What was found"), "{printed}");
-    // Where nothing was found no effect stands for a limit; one that is wrong is said to be.
+    // Without effects no effect replaces a limit; a wrong limit is reported.
     let printed = screen(&["loop", "problems/service-arm"]);
     let expected =
         "The limit of joint4.a, which holds the fit, is most probably wrong, or hides a cause";

@@ -1,4 +1,4 @@
-//! Results on disk: the same every time, and in nobody's way.
+//! Result files: reproducible, and without overwriting foreign files.
 
 use std::fs;
 
@@ -25,7 +25,7 @@ fn a_result_that_cannot_be_written_is_an_error() {
     fs::write(bench.path("taken"), "a file where a folder is wanted").unwrap();
     let assert = bench.identify(&["--out", "taken"]).code(2);
     assert!(text(&assert.get_output().stderr).contains("cannot write"));
-    // What is in the way of one file keeps all away.
+    // One file that cannot be written prevents all output.
     fs::create_dir_all(bench.path("page/report.html")).unwrap();
     bench.identify(&["--out", "page"]).code(2);
     assert_eq!(fs::read_dir(bench.path("page")).unwrap().count(), 1);
@@ -72,8 +72,7 @@ fn figures_of_an_older_page_go_and_other_files_stay() {
     assert!(
         ["effect-mine.svg", "mine.svg", "ranking.txt", "residual-order.svg"].into_iter().all(there)
     );
-    // One that some page may have and that is not flexcal's keeps all of them away, before any work
-    // is done.
+    // A foreign file with the name of a figure prevents all output before any work.
     write("effect-1.svg");
     let error = text(&flexcal("identify").code(2).get_output().stderr);
     assert!(error.contains("figures/effect-1.svg is there and not as flexcal wrote it"), "{error}");

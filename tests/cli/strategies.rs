@@ -1,4 +1,4 @@
-//! Strategies, solvers, effects and what is compared with what.
+//! Strategies, solvers, declared effects, and comparisons.
 
 use std::fs;
 
@@ -45,7 +45,7 @@ fn strategies_and_solvers_are_what_they_say() {
     assert!(text(&assert.get_output().stderr).contains("does not keep the bounds"));
 }
 
-/// A bench whose problem declares effects, with few other parameters.
+/// Returns a bench whose problem declares effects and frees few other parameters.
 fn bench_with_effects() -> Bench {
     let bench = Bench::new();
     let text = fs::read_to_string(bench.path("problem.toml")).unwrap();
@@ -102,7 +102,7 @@ fn effects_that_cannot_act_are_bad_input() {
     );
 }
 
-/// The JSON of a command that succeeds.
+/// Returns the JSON of a command that succeeds.
 fn json(bench: &Bench, arguments: &[&str]) -> Value {
     let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
     let done =
@@ -110,7 +110,7 @@ fn json(bench: &Bench, arguments: &[&str]) -> Value {
     serde_json::from_slice(&done.get_output().stdout).unwrap()
 }
 
-/// Names of the procedures in a comparison.
+/// Returns the names of the procedures in a comparison.
 fn procedures(comparison: &Value) -> Vec<&str> {
     comparison["procedures"]
         .as_array()
@@ -224,12 +224,12 @@ fn compare_on_an_arm_of_ones_own_leaves_the_paper_out_unless_asked() {
     }
     let asked = json(&bench, &["compare", ".", "--paper", "--out", "asked"]);
     assert_eq!(procedures(&asked), ["joint", "paper-rigid"]);
-    // A base that nobody knows has to be found first.
+    // A free base without a prior has to be registered first.
     bench.edit("problem.toml", "[parameters]\n", "[parameters]\n\"base.*\" = { free = true }\n");
     let placed = json(&bench, &["compare", ".", "--out", "out"]);
     assert_eq!(placed["procedures"][0]["table_3"]["before_registered"], true);
     assert!(placed["procedures"][0]["table_2"][0]["a_mm"]["seen"].is_null(), "fixed");
-    // A fixed joint has none of these parameters, and comes from no side.
+    // A fixed joint has none of these parameters and no approach side.
     bench.edit(
         "problem.toml",
         "[tool]\n",
@@ -265,7 +265,7 @@ fn an_arm_identified_as_rigid_is_used_as_rigid() {
         json(&bench, &["identify", ".", "--strategy", "geometry-only", "--out", "geometry"]);
     let rms = |found: &Value| found["held_out"]["rms_mm"]["norm"].as_f64().unwrap();
     assert!(rms(&found) > 3.0 * rms(&geometry), "{} {}", rms(&found), rms(&geometry));
-    // Where the rigid arm is predicted to be is where its commands bring it.
+    // The commands bring the arm to the positions predicted by the rigid model.
     let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
     let arguments = [
         "compensate",

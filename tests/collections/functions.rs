@@ -1,10 +1,10 @@
-//! Residuals of the problems, in the notation of the paper.
+//! Residual functions of the problems, in the notation of the paper.
 
 use std::f64::consts::PI;
 
 use num_dual::DualNum;
 
-/// The scalar of a residual function: a number or a dual number.
+/// Scalar of a residual function: a real or a dual number.
 pub trait Scalar: DualNum<f64> + Copy {}
 
 impl<T: DualNum<f64> + Copy> Scalar for T {}
@@ -91,7 +91,7 @@ pub fn gulf<D: Scalar>(x: &[D]) -> Vec<D> {
         .map(|i| {
             let t = f64::from(i) / 100.0;
             let y = 25.0 + (-50.0 * t.ln()).powf(2.0 / 3.0);
-            // |y − x₂| to the power x₃.
+            // Term |y − x₂| to the power x₃.
             let distance = -x[1] + y;
             let distance = if distance.re() < 0.0 { -distance } else { distance };
             (-((x[2] * distance.ln()).exp()) / x[0]).exp() - t
@@ -263,7 +263,7 @@ pub fn brown_almost_linear<D: Scalar>(x: &[D]) -> Vec<D> {
     x[..n - 1].iter().map(|&x| x + total - (n as f64 + 1.0)).chain([product - 1.0]).collect()
 }
 
-/// x with zeros before and after.
+/// Returns x with a zero before and after.
 fn padded<D: Scalar>(x: &[D]) -> Vec<D> {
     [c(0.0)].into_iter().chain(x.iter().copied()).chain([c(0.0)]).collect()
 }
@@ -347,8 +347,8 @@ pub fn linear_zeros_50<D: Scalar>(x: &[D]) -> Vec<D> {
     linear_zeros(x, 50)
 }
 
-/// Means of the shifted Chebyshev polynomials T₁ … `T_m` over the points, minus their integrals
-/// over [0, 1].
+/// Returns the means of the shifted Chebyshev polynomials T₁ … `T_m` over the points, minus their
+/// integrals over [0, 1].
 fn chebyshev_means<D: Scalar>(x: &[D], m: usize) -> Vec<D> {
     let mut rows = vec![c::<D>(0.0); m];
     for &x in x {

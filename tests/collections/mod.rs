@@ -1,5 +1,5 @@
-//! Collections of least-squares problems with known minima, which tests and benches share: residual
-//! functions written once, generic over the scalar, as problems with exact derivatives.
+//! Collections of least-squares problems with known minima, shared by tests and benchmarks:
+//! residual functions generic over the scalar, as problems with exact derivatives.
 
 #![allow(
     dead_code,
@@ -17,7 +17,7 @@ use flexcal::least_squares::{Block, LeastSquares};
 use nalgebra::DVector;
 use num_dual::Dual64;
 
-/// A residual function of a few unknowns, evaluated as one item.
+/// Residual function of a few unknowns, evaluated as one item.
 pub struct Analytic {
     pub unknowns: usize,
     pub rows: usize,

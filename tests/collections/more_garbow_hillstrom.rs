@@ -7,14 +7,14 @@ use num_dual::Dual64;
 use super::Analytic;
 use super::functions as f;
 
-/// A problem with its standard start and known minima.
+/// Problem with its standard start and known minima.
 pub struct Problem {
     pub name: &'static str,
     pub analytic: Analytic,
     pub start: Vec<f64>,
-    /// ‖r‖² of every known local minimum (or infimum); beyond the paper's, those that MINPACK's
-    /// driver reports (Osborne 2: norm 1.337840, Chebyquad n = 1: 1.886238 and 1.884248) and those
-    /// derived where they stand.
+    /// Value ‖r‖² of every known local minimum (or infimum). Minima beyond the paper are those that
+    /// MINPACK's driver reports (Osborne 2: norm 1.337840, Chebyquad n = 1: 1.886238 and 1.884248)
+    /// and those derived next to them.
     pub minima: Vec<f64>,
 }
 
@@ -32,7 +32,7 @@ macro_rules! problem {
     }};
 }
 
-/// Every problem.
+/// Returns every problem.
 pub fn problems() -> Vec<Problem> {
     let ramp = |n: usize, g: fn(f64) -> f64| {
         (1..=n).map(|j| g(j as f64 / (n as f64 + 1.0))).collect::<Vec<_>>()
@@ -50,10 +50,10 @@ pub fn problems() -> Vec<Problem> {
         ),
         problem!("Powell badly scaled (3)", powell_badly_scaled, 2, [0.0, 1.0], [0.0]),
         problem!("Brown badly scaled (4)", brown_badly_scaled, 3, [1.0, 1.0], [0.0]),
-        // Along x₂ → 1, x₁ (x₂ − 1) = const the residuals tend to yᵢ + i·const: infimum 14.203125 −
-        // 13.875²/14.
+        // Along x₂ → 1, x₁ (x₂ − 1) = const the residuals tend to yᵢ + i·const: the infimum is
+        // 14.203125 − 13.875²/14.
         problem!("Beale (5)", beale, 3, [1.0, 1.0], [0.0, 14.203_125 - 13.875 * 13.875 / 14.0]),
-        // The second with one unknown at −∞ (one-dimensional minimisation by SciPy:
+        // The second minimum has one unknown at −∞ (one-dimensional minimisation by SciPy:
         // 259.58019013425326).
         problem!(
             "Jennrich–Sampson (6)",
@@ -67,7 +67,7 @@ pub fn problems() -> Vec<Problem> {
         problem!("Gaussian (9)", gaussian, 15, [0.4, 1.0, 0.0], [1.12793e-8]),
         problem!("Meyer (10)", meyer, 16, [0.02, 4000.0, 250.0], [87.945_8]),
         problem!("Gulf (11)", gulf, 99, [5.0, 2.5, 0.15], [0.0]),
-        // The second with x₂ → ∞ (SciPy least_squares from 0, 100, 200: 0.0755887407549974).
+        // The second minimum has x₂ → ∞ (SciPy least_squares from 0, 100, 200: 0.0755887407549974).
         problem!(
             "Box three-dimensional (12)",
             box3,

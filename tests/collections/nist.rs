@@ -11,21 +11,21 @@ use num_dual::Dual64;
 
 use super::functions::Scalar;
 
-/// y(b, x) of one data set.
+/// Model function y(b, x) of one data set.
 type Model<D> = fn(&[D], &[f64]) -> D;
 
-/// Data sets of the highest level of difficulty.
+/// Names of the data sets of the highest level of difficulty.
 pub const HIGHER_DIFFICULTY: [&str; 8] =
     ["mgh09", "thurber", "boxbod", "rat42", "mgh10", "eckerle4", "rat43", "bennett5"];
 
-/// A data set with its model, starts and certified values.
+/// Data set with its model, starts and certified values.
 pub struct Dataset {
     pub name: &'static str,
     pub starts: [DVector<f64>; 2],
     pub certified: DVector<f64>,
-    /// ‖r‖² there.
+    /// Value ‖r‖² at the certified values.
     pub rss: f64,
-    /// (y, predictors).
+    /// Observations as (y, predictors).
     observations: Vec<(f64, Vec<f64>)>,
     value: Model<f64>,
     dual: Model<Dual64>,
@@ -105,7 +105,8 @@ fn nelson<D: Scalar>(b: &[D], x: &[f64]) -> D {
     b[0] - b[1] * x[0] * (-b[2] * x[1]).exp()
 }
 
-/// Quotient of polynomials with `top` coefficients above and 1 + the others below.
+/// Returns a quotient of polynomials with `top` coefficients in the numerator and 1 + the others in
+/// the denominator.
 fn rational<D: Scalar>(b: &[D], x: f64, top: usize) -> D {
     let polynomial = |b: &[D]| b.iter().rev().fold(D::from(0.0), |sum, &b| sum * x + b);
     polynomial(&b[..top]) / (polynomial(&b[top..]) * x + 1.0)
@@ -190,7 +191,7 @@ fn parse(name: &'static str, text: &str, value: Model<f64>, dual: Model<Dual64>)
     }
 }
 
-/// Every data set, in the order of difficulty that NIST gives.
+/// Returns every data set, in NIST's order of difficulty.
 pub fn datasets() -> Vec<Dataset> {
     let mut nelson = dataset!("nelson", nelson);
     // NIST models the logarithm of the response.

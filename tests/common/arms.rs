@@ -1,4 +1,4 @@
-//! The arms of the tests.
+//! Arms of the tests.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
@@ -11,7 +11,7 @@ use flexcal::model::parameter::{JointField, Parameter, ParameterSite};
 use flexcal::problem::Problem;
 use nalgebra::DVector;
 
-/// Table 2 of [Chen2021]: identified α°, a m, θ°, d m, β° of each joint.
+/// Identified α \[°\], a \[m\], θ \[°\], d \[m\], β \[°\] of each joint [Chen2021, table 2].
 pub const TABLE_2: [[f64; 5]; 4] = [
     [0.019, 0.0, -0.008, 0.097, 0.304],
     [89.996, -0.002, 0.304, -0.084, 0.007],
@@ -19,35 +19,35 @@ pub const TABLE_2: [[f64; 5]; 4] = [
     [-0.019, 1.766, -0.790, -0.092, 0.005],
 ];
 
-/// An arm with everything that the lunar sampler lacks: a fixed and a prismatic joint, a link along
-/// −x, bending stiffnesses that differ, a rope that leans, a payload away from the target.
+/// Arm with the features that the lunar sampler lacks: a fixed and a prismatic joint, a link along
+/// −x, different bending stiffnesses, an inclined rope, and a payload away from the target.
 pub const ODD: &str = include_str!("odd.toml");
 
-/// A tree of joints: branches of branches, one on the base, beams, a rope, a target in the midst of
-/// the arm.
+/// Tree of joints with nested branches, one on the base, beams, a rope, and a target inside the
+/// arm.
 pub const TREE: &str = include_str!("tree.toml");
 
-/// A path below the package's folder.
+/// Returns a path below the package folder.
 pub fn path(relative: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(relative)
 }
 
-/// A file of `tests/golden`.
+/// Returns a path in `tests/golden`.
 pub fn golden(name: &str) -> PathBuf {
     path("tests/golden").join(name)
 }
 
-/// The lunar sampler.
+/// Reads the problem of the lunar sampler.
 pub fn golden_problem() -> Problem {
     Problem::read(&golden("problem.toml")).unwrap()
 }
 
-/// A problem from its text.
+/// Parses a problem from its text.
 pub fn parse(text: &str) -> Problem {
     Problem::parse(text, Path::new("problem.toml")).unwrap()
 }
 
-/// The problem in `file` with the section `[parameters]` replaced by these lines.
+/// Reads the problem in `file` with the section `[parameters]` replaced by `rules`.
 pub fn with_parameters(file: &str, rules: &str) -> Problem {
     let text = fs::read_to_string(path(file)).unwrap();
     let (before, after) = text.split_once("[parameters]\n").unwrap();
@@ -58,13 +58,13 @@ pub fn with_parameters(file: &str, rules: &str) -> Problem {
     problem
 }
 
-/// Measurements in `files` below the package's folder.
+/// Reads measurements from `files` below the package folder.
 pub fn measured(problem: &Problem, files: &[&str]) -> Measurements {
     let files: Vec<PathBuf> = files.iter().map(|file| path(file)).collect();
     Measurements::read(&files, problem).unwrap().0
 }
 
-/// Table 2 in place of the nominal geometry.
+/// Replaces the nominal geometry by that of table 2.
 pub fn table_2(mut arm: Arm<f64>) -> Arm<f64> {
     for (joint, [alpha, a, theta, d, beta]) in arm.joints.iter_mut().zip(TABLE_2) {
         joint.alpha = Angle::new(alpha.to_radians());
@@ -74,7 +74,7 @@ pub fn table_2(mut arm: Arm<f64>) -> Arm<f64> {
     arm
 }
 
-/// Table 2 as deviations of free parameters; zero for what it does not hold.
+/// Returns table 2 as deviations of free parameters; zero for parameters outside the table.
 pub fn table_2_deviations(parameters: &[Parameter]) -> DVector<f64> {
     let of = |parameter: &Parameter| {
         let ParameterSite::Joint { joint, field } = parameter.site else { return 0.0 };
@@ -92,7 +92,7 @@ pub fn table_2_deviations(parameters: &[Parameter]) -> DVector<f64> {
     DVector::from_iterator(parameters.len(), parameters.iter().map(of))
 }
 
-/// Nothing in the arm bends.
+/// Makes all joints and links rigid.
 pub fn without_elasticity(mut problem: Problem) -> Problem {
     for joint in &mut problem.joints {
         (joint.stiffness, joint.beam) = (None, None);

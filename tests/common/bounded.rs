@@ -1,4 +1,4 @@
-//! The lunar sampler within bounds and constraints, as solvers see it: σ as declared, from nominal
+//! Lunar sampler within bounds and constraints as a solver problem: declared σ, start at nominal
 //! values.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/cases/bounded");
 
-/// A problem of `tests/cases/bounded`.
+/// Problem of `tests/cases/bounded`.
 pub struct Bounded {
     pub problem: Problem,
     pub data: Dataset,
@@ -26,7 +26,7 @@ pub struct Bounded {
     placement: Placement,
 }
 
-/// Every so many-th row is off by so much along x in what [`Bounded::spoilt`] makes [m].
+/// Spacing of the rows with gross errors in [`Bounded::spoilt`], and the error along x [m].
 const SPOILT: (usize, f64) = (7, 5e-3);
 
 impl Bounded {
@@ -53,7 +53,7 @@ impl Bounded {
         Self { problem, data, model, bounds, rows, placement }
     }
 
-    /// The same with gross errors among its measurements.
+    /// Adds gross errors to the measurements.
     pub fn spoilt(mut self) -> Self {
         self.data
             .measurements
@@ -87,7 +87,7 @@ impl Bounded {
         LinearRows { matrix, constant: self.nominal() }
     }
 
-    /// With the priors.
+    /// Returns the objective with the priors.
     pub fn fit<'a>(&self, residuals: &'a PoseResiduals<'a>) -> Fit<'a, PoseResiduals<'a>> {
         Fit::new(residuals).with_rows(self.priors()).unwrap()
     }

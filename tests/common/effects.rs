@@ -1,16 +1,16 @@
-//! Every effect of the catalogue with a strength of a realistic size.
+//! Effects of the catalogue with values of realistic size.
 
 use flexcal::problem::{Effect, FreeLength};
 
-/// An effect and its strength in SI units.
+/// Effect with its values in SI units.
 pub type Strong = (Effect, Vec<f64>);
 
-/// A spring at a joint between two points of the plane across its axis \[m\].
+/// Returns a spring at a joint between two points of the plane across its axis \[m\].
 pub fn compensator(joint: usize, anchor: [f64; 2], lever: [f64; 2], free_length: f64) -> Effect {
     Effect::GravityCompensator { joint, anchor, lever, free_length: FreeLength(free_length) }
 }
 
-/// Every family on the lunar sampler, for which its second link, which is rigid, has a length.
+/// Returns an effect of every family on the lunar sampler, whose second, rigid link gets a length.
 pub fn of_lunar_sampler() -> Vec<Strong> {
     let link = || "B".to_owned();
     vec![

@@ -1,4 +1,4 @@
-//! Measurements that the model itself makes.
+//! Measurements simulated by the model.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 
@@ -12,8 +12,8 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-/// `count` configurations, angles within ±`reach` [rad] and offsets within ±0.3 m; positions are
-/// still to be measured.
+/// Returns `count` configurations with angles within ±`reach` [rad] and offsets within ±0.3 m,
+/// without positions.
 pub fn at_random(
     problem: &Problem,
     count: usize,
@@ -31,7 +31,7 @@ pub fn at_random(
     Dataset::builder(configurations, vec![Vector3::zeros(); count]).measurements().unwrap()
 }
 
-/// The same, with the targets of the problem measured one after the other.
+/// Assigns the targets of the problem to the rows in turn.
 pub fn of_targets(problem: &Problem, rows: Measurements) -> Measurements {
     let words = problem.target_words();
     let target = (!problem.targets.is_empty())
@@ -39,26 +39,26 @@ pub fn of_targets(problem: &Problem, rows: Measurements) -> Measurements {
     Measurements { target, ..rows }
 }
 
-/// Labels of the rows, in order of appearance.
+/// Returns labels of the rows, in order of appearance.
 pub fn labels<'a>(words: impl Iterator<Item = &'a str>) -> Labels {
     words.collect()
 }
 
-/// The rows with these numbers, with no sessions and targets but their own.
+/// Returns the given rows, with only the sessions and targets that occur in them.
 pub fn part(measurements: &Measurements, rows: impl IntoIterator<Item = usize>) -> Measurements {
     let mut part = measurements.select(&rows.into_iter().collect::<Vec<usize>>());
-    let own = |all: &Labels| labels(all.of_row.iter().map(|&word| all.names[word].as_str()));
-    (part.session, part.target) = (own(&part.session), part.target.as_ref().map(own));
+    let relabelled = |all: &Labels| labels(all.of_row.iter().map(|&word| all.names[word].as_str()));
+    (part.session, part.target) = (relabelled(&part.session), part.target.as_ref().map(relabelled));
     part
 }
 
-/// The model of a problem with the bases and targets of its measurements.
+/// Returns the model of a problem with the bases and targets of its measurements.
 pub fn model_of(problem: &Problem, measurements: &Measurements) -> Model {
     let placement = Placement::of(measurements);
     Model::new(problem, &placement.bases, &placement.targets).unwrap()
 }
 
-/// Positions of every row at the full parameter vector `x` [m].
+/// Returns the positions of every row at the full parameter vector `x` [m].
 pub fn predicted(
     problem: &Problem,
     measurements: &Measurements,
@@ -70,7 +70,7 @@ pub fn predicted(
     model.predict(poses, x)
 }
 
-/// Measures every row on the arm at `x`, with noise of 1 σ = `sigma` [m] on each coordinate.
+/// Simulates measurements of every row at `x`, with noise of 1 σ = `sigma` [m] on each coordinate.
 pub fn measure(
     problem: &Problem,
     rows: &mut Measurements,
@@ -84,7 +84,7 @@ pub fn measure(
     }
 }
 
-/// Deviations drawn from the priors; parameters without one vary by `size`.
+/// Draws deviations from the priors; parameters without a prior have the standard deviation `size`.
 pub fn draw(model: &Model, size: impl Fn(Unit) -> f64, rng: &mut ChaCha8Rng) -> DVector<f64> {
     let drawn = model.parameters.iter().map(|parameter| {
         let sigma = parameter.sigma.unwrap_or_else(|| size(parameter.unit()));
@@ -97,12 +97,12 @@ pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// The first `count` rows to identify with, the others held out.
+/// Splits the rows: the first `count` for identification, the others held out.
 pub fn split_at(count: usize, measurements: &Measurements) -> Split {
     Split { identification: (0..count).collect(), held_out: (count..measurements.len()).collect() }
 }
 
-/// Rows as a table to read: joints, positions, the split, and sessions and targets where there are
+/// Returns the rows as a table: joints, positions, split, and sessions and targets if there are
 /// any.
 pub fn csv(problem: &Problem, Dataset { measurements: rows, split }: &Dataset) -> String {
     let unit = |kind: JointKind| if kind == JointKind::Prismatic { "m" } else { "rad" };
@@ -113,10 +113,11 @@ pub fn csv(problem: &Problem, Dataset { measurements: rows, split }: &Dataset) -
         .map(|(k, joint)| format!("q{}_{}", k + 1, unit(joint.kind)))
         .collect();
     header.extend(["x_m", "y_m", "z_m", "split"].map(str::to_owned));
-    let sessions = Some(&rows.session).filter(|own| own.names.iter().any(|name| !name.is_empty()));
+    let sessions =
+        Some(&rows.session).filter(|labels| labels.names.iter().any(|name| !name.is_empty()));
     let labels = [("session", sessions), ("target", rows.target.as_ref())];
     let labels: Vec<(&str, &Labels)> =
-        labels.into_iter().filter_map(|(name, own)| Some((name, own?))).collect();
+        labels.into_iter().filter_map(|(name, words)| Some((name, words?))).collect();
     header.extend(labels.iter().map(|(name, _)| (*name).to_owned()));
     let mut text = header.join(",") + "\n";
     for (row, position) in rows.positions.iter().enumerate() {
@@ -124,13 +125,13 @@ pub fn csv(problem: &Problem, Dataset { measurements: rows, split }: &Dataset) -
         let mut cells: Vec<String> = numbers.map(f64::to_string).collect();
         let held_out = split.held_out.contains(&row);
         cells.push(if held_out { "validation" } else { "identification" }.to_owned());
-        cells.extend(labels.iter().map(|(_, own)| own.names[own.of_row[row]].clone()));
+        cells.extend(labels.iter().map(|(_, words)| words.names[words.of_row[row]].clone()));
         text += &(cells.join(",") + "\n");
     }
     text
 }
 
-/// The same with the rows themselves.
+/// Returns the rows with the split of [`split_at`].
 pub fn divided(count: usize, measurements: &Measurements) -> Dataset {
     Dataset::new(measurements.clone(), split_at(count, measurements))
 }

@@ -1,4 +1,4 @@
-//! What several tests share: arms and measurements that the model itself makes.
+//! Shared fixtures of the tests: arms, and measurements simulated by the model.
 
 #![allow(dead_code, reason = "each test takes what it needs")]
 

@@ -1,4 +1,4 @@
-//! What the tests of this theme share.
+//! Shared fixtures of the design tests.
 
 use std::path::Path;
 
@@ -13,14 +13,14 @@ use rand_chacha::ChaCha8Rng;
 use super::common::arms::path;
 use super::common::made::{model_of, normal};
 
-/// The lunar sampler and what the test rig knows about it.
+/// Returns the lunar sampler and the truth of the test rig.
 pub fn lunar() -> (Problem, Truth) {
     let problem = Problem::read(&path("tests/cases")).unwrap();
     let truth = Truth::read(Path::new(&path("tests/cases/truth.toml")), &problem).unwrap();
     (problem, truth)
 }
 
-/// The same arm with orientations fitted beside positions.
+/// Returns the lunar sampler with fitted orientations.
 pub fn oriented() -> Problem {
     let text = std::fs::read_to_string(path("tests/cases/problem.toml")).unwrap();
     let text = text.replace(
@@ -36,20 +36,19 @@ pub fn oriented() -> Problem {
     problem
 }
 
-/// The ranges of joints, payload and hoist from which the test rig draws.
+/// Returns the ranges of joints, payload and hoist from which the test rig draws.
 pub fn ranges(truth: &Truth) -> PoseRanges {
     PoseRanges { temperature: None, approach: false, ..truth.poses.clone() }
 }
 
-/// Every row fitted, and the same rows as if held out.
+/// Fits every row; the same rows are also held out.
 pub fn fit(problem: &Problem, rows: &Measurements) -> Identification {
     let all: Vec<usize> = (0..rows.len()).collect();
     let split = Split { identification: all.clone(), held_out: all };
     identify(problem, &Dataset::new(rows.clone(), split), &Options::default()).unwrap()
 }
 
-/// A true arm on the test rig, drawn from `seed`, and its deviations from nominal as the model
-/// counts them.
+/// Draws a true arm on the test rig, and its deviations from nominal in the model's parameters.
 pub fn true_arm(
     problem: &Problem,
     truth: &Truth,
@@ -58,7 +57,7 @@ pub fn true_arm(
 ) -> (Rig, DVector<f64>) {
     let simulation = simulate(problem, truth, 1, seed).unwrap();
     let value = |name: &str| {
-        // One EI in the model is an EIy and an EIz on the rig; the first stands for both.
+        // One EI in the model is an EIy and an EIz on the rig; the first is used for both.
         let known = simulation
             .parameters
             .iter()
@@ -85,7 +84,7 @@ pub fn measure(rig: &Rig, rows: &mut Measurements, sigma: f64, seed: u64) {
     }
 }
 
-/// Root mean square of entry `k`.
+/// Returns the root mean square of entry `k`.
 pub fn rms(errors: &[DVector<f64>], k: usize) -> f64 {
     (errors.iter().map(|error| error[k] * error[k]).sum::<f64>() / errors.len() as f64).sqrt()
 }

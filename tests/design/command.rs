@@ -1,4 +1,4 @@
-//! The commands as users meet them: results, exit status, messages, help, colours.
+//! Commands `plan` and `check`: results, exit status, messages, help, colours.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use assert_cmd::Command;
 use flexcal::problem::{DeclaredCovariate, JointKind};
 use serde_json::Value;
 
-/// A folder for results, and flexcal run in the package's folder.
+/// Temporary folder for results, with flexcal run in the package folder.
 struct Bench {
     folder: tempfile::TempDir,
 }
@@ -36,7 +36,7 @@ impl Bench {
         command
     }
 
-    /// Standard output of a run that ends with this status, and standard error.
+    /// Runs a command that ends with `status`; returns standard output and standard error.
     fn run(&self, status: i32, arguments: &str, more: &[&str]) -> (String, String) {
         let assert = self.flexcal(arguments, more).assert().code(status);
         let output = assert.get_output();
@@ -99,12 +99,12 @@ fn a_plan_can_be_checked_and_measured() {
         let all = json["parameters"].as_array().unwrap();
         all.iter().find(|p| p["name"] == name).unwrap()["std_error"].as_f64().unwrap()
     };
-    // Nominal there, over arms of the prior here.
+    // The plan refers to the nominal arm, the check to arms of the prior.
     let ratio = found(&check, "joint2.alpha") / found(&plan, "joint2.alpha");
     assert!((0.8..1.5).contains(&ratio), "{ratio}");
 }
 
-/// A table of candidates within the ranges of the test rig.
+/// Returns a table of candidates within the ranges of the test rig.
 fn drawn(count: usize) -> String {
     let (problem, truth) = super::bench::lunar();
     let poses =
@@ -166,7 +166,7 @@ fn a_check_names_what_would_be_found() {
         (Some("gear-ratio[2].error"), Some("1"))
     );
     assert!(size["found_from"].as_f64().unwrap() < size["prior_sigma"].as_f64().unwrap());
-    // Every order of every joint is there.
+    // Every order of every joint is listed.
     assert_eq!(effects.iter().filter(|own| own["effect"] == "joint-harmonic").count(), 240);
 }
 
@@ -185,7 +185,7 @@ fn without_times_nothing_that_remembers_is_promised() {
     };
     assert_eq!((names("effects"), names("untestable") > 0), (0, true), "{check}");
     assert_eq!(check["detectable"]["times_assumed"], false);
-    // What is still to be measured may well be measured with its times.
+    // Poses that are still to be measured may get measured times.
     let (out, _) = bench.run(0, "check tests/cases --truth tests/cases/truth.toml --poses 60", &[]);
     let (table, rest) = out.split_once("Only if time_s is measured too").unwrap();
     assert!(rest.contains("joint-hysteresis") && !table.contains("joint-hysteresis"), "{out}");
@@ -452,7 +452,7 @@ fn a_plan_of_too_few_poses_says_how_many_it_takes() {
 fn what_the_nominal_arm_does_not_tell_is_not_said_to_be_identified() {
     let bench = Bench::new();
     let (out, _) = bench.run(0, "check problems/ur10-urdf --poses 40", &[]);
-    // joint5.theta and joint6.a go together where the target sits at the origin of the last frame.
+    // joint5.theta and joint6.a are confounded if the target is at the origin of the last frame.
     assert!(out.contains("+ 0.71 joint5.theta + 0.71 joint6.a"), "{out}");
     let line = |name: &str| {
         out.lines().find(|line| line.trim_start().starts_with(name)).unwrap().to_owned()

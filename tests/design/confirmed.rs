@@ -1,4 +1,5 @@
-//! What plans promise, measured on the virtual test rig, which shares no physics with the model.
+//! Promised gains of plans, measured on the virtual test rig, which shares no mechanics with the
+//! model.
 
 use flexcal::design::{Candidates, Criterion, Extremes, Plan, PlanOptions, plan};
 use flexcal::problem::Problem;
@@ -8,14 +9,14 @@ use rayon::prelude::*;
 
 use super::bench::{fit, lunar, measure, ranges, rms, true_arm};
 
-/// What the fit of one arm is off by, and the standard errors that it states.
+/// Errors of the fit of one arm, with the standard errors that it reports.
 struct Fitted {
     error: DVector<f64>,
     stated: DVector<f64>,
 }
 
-/// Fits of arms drawn from TRUTH.toml, each measured anew: in the planned poses, and in as many
-/// drawn anew.
+/// Fits arms drawn from TRUTH.toml with new noise: in the planned poses, and in as many random
+/// ones.
 fn fits(problem: &Problem, truth: &Truth, plan: &Plan, arms: u64) -> [Vec<Fitted>; 2] {
     let within = ranges(truth);
     [true, false].map(|planned| {
@@ -35,8 +36,8 @@ fn fits(problem: &Problem, truth: &Truth, plan: &Plan, arms: u64) -> [Vec<Fitted
     })
 }
 
-/// Geometric mean over parameters of something after random poses over the same after planned ones,
-/// root mean squares.
+/// Returns the geometric mean over parameters of the ratio of a quantity after random poses to that
+/// after planned ones (root mean squares).
 fn gain(
     fits: &[Vec<Fitted>; 2],
     of: impl Fn(&Fitted) -> &DVector<f64>,
@@ -67,7 +68,7 @@ fn planned_poses_give_smaller_errors_than_random_ones() {
     assert!(measured > 1.7, "{measured}");
 }
 
-/// The figures of docs/plan.md.
+/// Computes the figures of docs/plan.md.
 #[test]
 #[ignore = "minutes: cargo test --release --test design -- --ignored --nocapture planned"]
 fn planned_poses_halve_the_errors() {

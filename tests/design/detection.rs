@@ -1,4 +1,4 @@
-//! Sizes from which effects would be found, against what sets that have them show.
+//! Detectable sizes of effects, compared with data sets that contain the effects.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use super::bench::{lunar, ranges};
 use super::common::made::{draw, measure, model_of};
 
-/// The lunar sampler, its stiffnesses known to 20 %, and 28 poses.
+/// Returns the lunar sampler with stiffnesses known to 20 %, and 28 poses.
 fn bench() -> (Problem, Measurements) {
     let (mut problem, truth) = lunar();
     for rule in &mut problem.parameters {
@@ -28,7 +28,8 @@ fn bench() -> (Problem, Measurements) {
     (problem, rows)
 }
 
-/// Whether a trace of the poses finds an effect of this size in an arm drawn from the priors.
+/// Returns true if a trace of the poses finds an effect of this size in an arm drawn from the
+/// priors.
 fn is_found(problem: &Problem, rows: &Measurements, effect: &Effect, size: f64, seed: u64) -> bool {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut with = problem.clone();
@@ -63,7 +64,8 @@ fn written(effect: &Effect) -> String {
     }
 }
 
-/// Shares of sets in which effects of their stated size, times `factor`, are found.
+/// Returns the shares of data sets in which effects of their stated size, times `factor`, are
+/// found.
 fn power(factor: f64, sets: u64) -> Vec<(Effect, f64)> {
     let (problem, rows) = bench();
     let detection = detectable(&problem, &rows).unwrap();
@@ -99,7 +101,7 @@ fn effects_of_half_that_size_are_found_in_few() {
     assert!(mean < 0.4, "{all:?}");
 }
 
-/// The figures of docs/plan.md.
+/// Computes the figures of docs/plan.md.
 #[test]
 #[ignore = "minutes: cargo test --release --test design -- --ignored --nocapture stated_size"]
 fn effects_of_the_stated_size_are_found_as_often_as_stated() {
@@ -124,7 +126,7 @@ fn what_the_fit_takes_up_is_not_to_be_seen() {
     assert!(size(Effect::GearRatio { joint: 2 }).is_within_prior());
     let sides = size(Effect::JointLateralCompliance { joint: 2 });
     assert!(sides.best < sides.worst || sides.worst.is_none(), "{sides:?}");
-    // Four times the poses show half the size.
+    // Four times the poses detect half the size.
     let (_, truth) = lunar();
     let more = ranges(&truth).draw(&problem, 112, Extremes::No, 4, 0);
     let finer = detectable(&problem, &more).unwrap();
@@ -133,7 +135,7 @@ fn what_the_fit_takes_up_is_not_to_be_seen() {
         finer.effects.iter().find(|own| own.effect == effect).unwrap().sizes[0].worst.unwrap();
     let ratio = size(effect).worst.unwrap() / fine;
     assert!((1.5..3.5).contains(&ratio), "{ratio}");
-    // What needs a temperature says so.
+    // An effect that needs a temperature says so.
     assert!(
         finer
             .untestable

@@ -1,5 +1,4 @@
-//! The exchange: it never worsens, ends where no single exchange helps, and counts what its
-//! criterion says.
+//! Exchange algorithm: it never increases the criterion and ends where no single exchange helps.
 
 use flexcal::design::{
     Candidates, Criterion, DesignError, Exchange, Extremes, Forecast, PlanOptions, Sensitivity,
@@ -26,7 +25,7 @@ fn criteria() -> [Criterion; 6] {
     ]
 }
 
-/// Forty candidates of the lunar sampler.
+/// Returns forty candidates of the lunar sampler.
 fn candidates() -> (Vec<Parameter>, Sensitivity) {
     candidates_of(&lunar().0)
 }
@@ -59,7 +58,7 @@ fn it_never_worsens_and_ends_where_no_exchange_of_one_pose_helps() {
         distinct.dedup();
         assert_eq!(distinct.len(), POSES, "{name}");
         assert!((exchange.value(&found.chosen) - found.value()).abs() < 1e-9, "{name}");
-        // Every exchange, reckoned afresh and not by updates.
+        // Every exchange is evaluated from scratch, not by updates.
         for place in 0..POSES {
             for other in (0..candidates.len()).filter(|other| !found.chosen.contains(other)) {
                 let mut swapped = found.chosen.clone();

@@ -1,4 +1,4 @@
-//! What a check expects of given poses, against what many fits then show.
+//! Forecast errors compared with the errors of many fits.
 
 use flexcal::design::{Check, CheckedPoses, ExpectedParameter, Extremes, check};
 use flexcal::measurement::Measurements;
@@ -13,8 +13,8 @@ use super::bench::{fit, lunar, ranges, rms};
 use super::common::arms::with_parameters;
 use super::common::made::{at_random, draw, measure, model_of, predicted};
 
-/// Errors of the estimates, in x, and of predictions in `elsewhere` [m], of arms drawn from the
-/// priors, each measured anew.
+/// Returns the errors of the estimates, in x, and of predictions in `elsewhere` [m], for arms drawn
+/// from the priors with new noise.
 fn errors(
     problem: &Problem,
     rows: &Measurements,
@@ -22,7 +22,7 @@ fn errors(
     runs: u64,
 ) -> (Vec<DVector<f64>>, f64) {
     let model = model_of(problem, rows);
-    // Bases without a prior stand within 1 mm and 1 mrad of where the problem puts them.
+    // Bases without a prior are within 1 mm and 1 mrad of the declared position.
     let free = |_: Unit| 1e-3;
     let of = |run: u64| {
         let mut random = ChaCha8Rng::seed_from_u64(run);
@@ -41,13 +41,13 @@ fn errors(
     (all.into_iter().map(|(error, _)| error).collect(), prediction)
 }
 
-/// 1 σ of x.
+/// Returns the expected 1 σ of x.
 fn expected_x(expected: &ExpectedParameter) -> Option<f64> {
     let relative = !matches!(expected.unit, Unit::Angle | Unit::Length);
     expected.std_error.map(|error| if relative { error / expected.nominal } else { error })
 }
 
-/// Actual over expected standard errors, by name.
+/// Returns the ratios of actual to expected standard errors, by name.
 fn ratios(check: &Check, errors: &[DVector<f64>]) -> Vec<(String, f64)> {
     let own = check.forecast.expected.iter().enumerate();
     own.filter_map(|(k, expected)| {
@@ -56,7 +56,7 @@ fn ratios(check: &Check, errors: &[DVector<f64>]) -> Vec<(String, f64)> {
     .collect()
 }
 
-/// Poses, a check of them, and what `runs` fits show.
+/// Compares a check of some poses with the results of `runs` fits.
 fn compare(
     problem: &Problem,
     rows: &Measurements,
@@ -73,8 +73,8 @@ fn compare(
     (ratios(&check, &errors), prediction / check.prediction.rms)
 }
 
-/// The lunar sampler, its stiffnesses known to 20 %: arms half as stiff as declared do not all
-/// stand.
+/// Compares for the lunar sampler with stiffnesses known to 20 %; some arms half as stiff as
+/// declared have no equilibrium.
 fn lunar_case(runs: u64) -> (Vec<(String, f64)>, f64) {
     let (mut problem, truth) = lunar();
     for rule in &mut problem.parameters {
@@ -86,7 +86,7 @@ fn lunar_case(runs: u64) -> (Vec<(String, f64)>, f64) {
     compare(&problem, &draw(32, 0), &draw(60, 10), runs)
 }
 
-/// A UR10 whose base is free, without a prior, and takes the place of joint 1's own geometry.
+/// Compares for a UR10 whose free base, without a prior, replaces the geometry of joint 1.
 fn ur10_case(runs: u64) -> (Vec<(String, f64)>, f64) {
     let rules = "\"joint*.a*\" = { sigma_deg = 0.1, sigma_mm = 1.0 }\n\"joint*.theta\" = { sigma_deg = 0.1 }\n\
                  \"joint*.d\" = { sigma_mm = 1.0 }\n\"joint*.beta\" = { sigma_deg = 0.1 }\n\
@@ -98,7 +98,7 @@ fn ur10_case(runs: u64) -> (Vec<(String, f64)>, f64) {
     compare(&problem, &rows, &elsewhere, runs)
 }
 
-/// ln of the geometric mean of the ratios, and the furthest of them.
+/// Returns the logarithm of the geometric mean of the ratios, and the most extreme ratio.
 fn summary(ratios: &[(String, f64)]) -> (f64, &(String, f64)) {
     let mean = ratios.iter().map(|(_, ratio)| ratio.ln()).sum::<f64>() / ratios.len() as f64;
     (mean, ratios.iter().max_by(|a, b| a.1.ln().abs().total_cmp(&b.1.ln().abs())).unwrap())
@@ -110,13 +110,13 @@ fn expected_errors_are_those_of_many_fits() {
         let (ratios, prediction) = case;
         assert!(ratios.len() >= least, "{ratios:?}");
         let (mean, furthest) = summary(&ratios);
-        // 120 fits know an error to 6 %.
+        // 120 fits determine a standard error to 6 %.
         assert!(mean.abs() < 0.08 && furthest.1.ln().abs() < 0.3, "{} {furthest:?}", mean.exp());
         assert!(prediction.ln().abs() < 0.15, "{prediction}");
     }
 }
 
-/// The figures of docs/plan.md.
+/// Computes the figures of docs/plan.md.
 #[test]
 #[ignore = "minutes: cargo test --release --test design -- --ignored --nocapture expected"]
 fn expected_errors_are_those_of_very_many_fits() {

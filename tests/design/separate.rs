@@ -1,5 +1,5 @@
-//! Poses planned to tell two effects apart, measured on the virtual test rig: does the loop name
-//! the right one?
+//! Plans that separate two effects, measured on the virtual test rig: the loop must name the right
+//! effect.
 
 use std::path::Path;
 
@@ -17,10 +17,10 @@ use super::bench::{lunar, measure, ranges, true_arm};
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// Two effects as a problem declares them, and their strengths on the rig, SI.
+/// Two effects as a problem declares them, with their values on the rig, SI units.
 type Case = ([&'static str; 2], [&'static [f64]; 2]);
 
-/// What 28 random poses hardly tell apart (docs/sweep.md).
+/// Pairs of effects that 28 random poses hardly separate (docs/sweep.md).
 const CASES: [Case; 3] = [
     (
         ["gear-ratio = { joint = 3 }", "joint-harmonic = { joint = 3, orders = [1] }"],
@@ -40,8 +40,8 @@ fn pair(problem: &Problem, names: [&str; 2]) -> Result<EffectPair, DesignError> 
     EffectPair::new(problem, names.map(|name| problem.effect(name, Path::new("test")).unwrap()))
 }
 
-/// 28 poses that tell the two apart, chosen among candidates within the ranges of the rig, or among
-/// few of them.
+/// Plans 28 poses that separate the two effects, chosen from candidates within the ranges of the
+/// rig, or from few of them.
 fn planned(
     problem: &Problem,
     truth: &Truth,
@@ -66,17 +66,17 @@ fn planned(
     (plan.poses, told)
 }
 
-/// Whether the loop names the effect that an arm drawn from TRUTH.toml has, and nothing else, from
-/// these poses.
+/// Returns true if the loop names only the effect of an arm drawn from TRUTH.toml, from these
+/// poses.
 fn is_named(
     problem: &Problem,
     truth: &Truth,
     poses: &Measurements,
-    own: &(Effect, &[f64]),
+    true_effect: &(Effect, &[f64]),
     seed: u64,
 ) -> bool {
     let mut truth = truth.clone();
-    let (effect, strengths) = own;
+    let (effect, strengths) = true_effect;
     truth.effects = vec![
         TrueEffect::new(Cause::Catalogued(effect.clone()), strengths, &problem.joints).unwrap(),
     ];
@@ -92,7 +92,7 @@ fn is_named(
     closure.effects.len() == 1 && closure.effects[0].effect == *effect
 }
 
-/// One table below the other.
+/// Concatenates two tables.
 fn below(one: &Measurements, other: &Measurements) -> Measurements {
     let mut all = one.clone();
     let both = |one: &mut Option<Vec<f64>>, other: &Option<Vec<f64>>| {
@@ -110,8 +110,8 @@ fn below(one: &Measurements, other: &Measurements) -> Measurements {
     all
 }
 
-/// In how many of the seeds the loop names each of the two where it is at work: from planned poses,
-/// and from as many random ones, drawn anew for each seed.
+/// Counts in how many seeds the loop names each effect: from planned poses, and from as many random
+/// ones.
 fn named(case: &Case, few: bool, seeds: u64) -> ([usize; 2], [usize; 2], PairSeparation) {
     let (problem, truth) = lunar();
     let (names, strengths) = case;
@@ -143,7 +143,7 @@ fn planned_poses_tell_apart_what_random_ones_confuse() {
     assert!(told.planned.angle.unwrap() > told.random(|own| own.angle));
 }
 
-/// The figures of docs/plan.md.
+/// Computes the figures of docs/plan.md.
 #[test]
 #[ignore = "minutes: cargo test --release --test design -- --ignored --nocapture right_effect"]
 fn the_right_effect_is_named_from_planned_poses() {
@@ -196,7 +196,7 @@ fn a_spring_is_told_from_a_wave_of_its_joint() {
     let spring = "gravity-compensator = { joint = 2, anchor_m = [0.1, -0.25], lever_m = [0.3, 0.15], free_length_m = 0 }";
     let spring = problem.effect(spring, Path::new("test")).unwrap().effect;
     let wave = Effect::JointHarmonic { joint: 2, orders: vec![1] };
-    // By its preload alone: its rate does what a wave does.
+    // The preload separates them; the rate acts like a wave.
     let angle = separation(&problem, &poses, [&spring, &wave]).unwrap().angle.unwrap();
     assert!(angle > 0.02, "{angle} rad");
 }

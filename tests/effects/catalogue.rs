@@ -1,4 +1,4 @@
-//! Every family with strengths of a realistic size on two arms, and poses in which everything acts.
+//! Effects of every family with realistic values on two arms, and poses in which all of them act.
 
 use std::path::Path;
 
@@ -18,8 +18,8 @@ use crate::common::arms::{ODD, TREE, golden_problem, parse};
 use crate::common::effects::{Strong, compensator, of_lunar_sampler};
 use crate::common::made::{at_random, of_targets};
 
-/// The lunar sampler with an offset before its shoulder, which may bend, and everything that acts
-/// on it.
+/// Returns the lunar sampler with an offset before its shoulder that may bend, and all effects that
+/// act on it.
 pub fn lunar() -> (Problem, Vec<Strong>) {
     let mut arm = golden_problem();
     arm.joints[1].a = 0.3;
@@ -27,7 +27,7 @@ pub fn lunar() -> (Problem, Vec<Strong>) {
     (arm, of_lunar_sampler())
 }
 
-/// The arm with every kind of joint, a link along −x and a leaning rope.
+/// Returns the arm with every kind of joint, a link along −x and an inclined rope, with effects.
 pub fn odd() -> (Problem, Vec<Strong>) {
     let mut arm = parse(ODD);
     arm.data.reference_temperature = Some(20.0);
@@ -83,7 +83,7 @@ pub fn odd() -> (Problem, Vec<Strong>) {
     (arm, all)
 }
 
-/// A tree of joints, with effects on its trunk and on several of its branches.
+/// Returns a tree of joints with effects on its trunk and several branches.
 pub fn tree() -> (Problem, Vec<Strong>) {
     let mut arm = parse(TREE);
     arm.parameters.clear();
@@ -121,7 +121,7 @@ pub fn tree() -> (Problem, Vec<Strong>) {
     (arm, all)
 }
 
-/// Columns of one's own.
+/// Returns declarations of covariates.
 fn covariates(names: &[&str]) -> Vec<DeclaredCovariate> {
     let location = Location::file(Path::new("problem.toml"));
     let own = |name: &&str| DeclaredCovariate {
@@ -132,7 +132,7 @@ fn covariates(names: &[&str]) -> Vec<DeclaredCovariate> {
     names.iter().map(own).collect()
 }
 
-/// The arm with an effect declared; that of equilibrium needs the statics without it.
+/// Declares effects in an arm; the equilibrium effect needs statics on the rigid arm.
 pub fn declared(arm: &Problem, effects: &[Effect]) -> Problem {
     let mut arm = arm.clone();
     if effects.contains(&Effect::DeflectedEquilibrium) {
@@ -145,13 +145,12 @@ pub fn declared(arm: &Problem, effects: &[Effect]) -> Problem {
     arm
 }
 
-/// The same effect for the rig.
+/// Returns an effect for the rig.
 pub fn in_truth(arm: &Problem, (effect, values): &Strong) -> TrueEffect {
     TrueEffect::new(Cause::Catalogued(effect.clone()), values, &arm.joints).unwrap()
 }
 
-/// Random poses in which every effect may act, of the targets one after the other, every second
-/// with directions of approach if wanted.
+/// Draws poses in which every effect may act, with targets in turn and approach sides if requested.
 pub fn poses(arm: &Problem, count: usize, approaches: bool, rng: &mut ChaCha8Rng) -> Measurements {
     let mut rows = of_targets(arm, at_random(arm, count, 1.5, rng));
     let n = arm.joints.len();
@@ -173,12 +172,12 @@ pub fn poses(arm: &Problem, count: usize, approaches: bool, rng: &mut ChaCha8Rng
     rows
 }
 
-/// What was set in a row, for the rig.
+/// Returns the conditions of a row for the rig.
 pub fn conditions(rows: &Measurements, row: usize) -> PoseConditions {
     rows.conditions(row)
 }
 
-/// Numbers of the parameters of effects.
+/// Returns the indices of the parameters of effects.
 pub fn of_effects(model: &Model) -> Vec<usize> {
     let is_effect = |name: &str| {
         let family = name.split(['[', '.']).next().unwrap();
@@ -187,7 +186,7 @@ pub fn of_effects(model: &Model) -> Vec<usize> {
     (0..model.parameters.len()).filter(|&k| is_effect(&model.parameters[k].name)).collect()
 }
 
-/// The full parameter vector with these strengths of the declared effects, everything else nominal.
+/// Returns the full parameter vector with these effect values and all other parameters nominal.
 pub fn strengths(model: &Model, values: &[f64]) -> DVector<f64> {
     let mut x = DVector::zeros(model.parameters.len());
     let places = of_effects(model);

@@ -1,4 +1,4 @@
-//! Commands for an arm whose effects follow its commands, tried on the virtual rig.
+//! Commands for an arm whose effects depend on its commands, checked on the virtual rig.
 
 use flexcal::fit::compensate;
 use flexcal::problem::Effect;
@@ -21,7 +21,7 @@ fn a_gear_ratio_and_harmonics_are_taken_at_the_command() {
     ];
     let problem = declared(&arm, &effects.clone().map(|(effect, _)| effect));
     let mut targets = poses(&arm, 10, true, &mut ChaCha8Rng::seed_from_u64(1));
-    // Where the arm without effects would be.
+    // The targets are the positions of the arm without effects.
     targets.positions =
         predicted(&arm, &targets, &DVector::zeros(model_of(&arm, &targets).parameters.len()));
     let model = model_of(&problem, &targets);

@@ -1,4 +1,4 @@
-//! Derivatives of effects by dual numbers against extrapolated differences.
+//! Derivatives of effects by dual numbers, compared with extrapolated differences.
 
 use flexcal::fit::Placement;
 use flexcal::least_squares::{check_jacobian, jacobian};
@@ -15,11 +15,11 @@ use crate::common::arms::path;
 use crate::common::effects::{Strong, compensator};
 use crate::common::made::{labels, model_of};
 
-/// Largest difference of a column of the Jacobian, relative to its norm.
+/// Largest allowed difference of a column of the Jacobian, relative to its norm.
 const WORST: f64 = 1e-7;
 
-/// How far each parameter may move: thrice a realistic strength, or what the arm's own parameters
-/// vary by.
+/// Returns the difference steps: three times a realistic value, or the variation of the arm's
+/// parameters.
 fn steps(model: &Model, values: &[f64]) -> DVector<f64> {
     let of_arm = |unit| match unit {
         Unit::Angle | Unit::Length => 0.1,
@@ -37,8 +37,7 @@ fn steps(model: &Model, values: &[f64]) -> DVector<f64> {
     step
 }
 
-/// Checks the columns of `unknowns` at `x`; the names of those without effect must be the ones in
-/// `silent`.
+/// Checks the columns of `unknowns` at `x`; exactly the parameters in `silent` must have no effect.
 fn check_at(
     what: &str,
     problem: &Problem,
@@ -65,7 +64,7 @@ fn check_at(
     assert_eq!(without, silent, "{what}: parameters without effect");
 }
 
-/// One effect at a time or all at once, at zero and off it.
+/// Checks effects one at a time or together, at zero and away from it.
 fn check(
     what: &str,
     arm: &Problem,
@@ -97,8 +96,8 @@ fn check(
         &silent_at_zero,
     );
     let mut strong = strengths(&model, &values);
-    // Play that a moment takes up turns about within 1 N·m: where it counts, the arm's own
-    // parameters stay.
+    // Play that moments take up changes sign within 1 N·m, so the parameters of the arm
+    // stay fixed there.
     for k in unknowns.iter().filter(|k| !of_effects(&model).contains(k)) {
         strong[*k] = 0.01;
     }
@@ -159,8 +158,8 @@ fn all_effects_at_once_with_everything_else_free_in_two_sessions() {
 
 #[test]
 fn a_spring_with_everything_else_free() {
-    // A spring whose moment changes with the joint by a tenth of the joint's own stiffness: what
-    // turns the joint changes its load.
+    // The moment of this spring changes with the joint by a tenth of the joint's stiffness, so a
+    // rotation of the joint changes its load.
     let soft = |mut arm: Problem| {
         arm.joints
             .iter_mut()
@@ -223,13 +222,13 @@ fn what_drives_the_joints_of_a_rigid_arm() {
         check("UR10", &arm, std::slice::from_ref(effect), &rows, false, &[]);
     }
     check("UR10", &arm, &effects, &rows, false, &[]);
-    // With play or compliance the same arm is not rigid any more.
+    // With play or compliance the same arm is no longer rigid.
     let soft = [effects.as_slice(), &[(Effect::Backlash { joint: 3 }, vec![5e-4])]].concat();
     rows.approach = poses(&arm, 16, true, &mut ChaCha8Rng::seed_from_u64(8)).approach;
     check("UR10 with play", &arm, &soft, &rows, false, &[]);
 }
 
-/// The arm and its poses with all loads and stiffnesses times `factor`: it bends as before, under
+/// Scales all loads and stiffnesses of an arm and its poses by `factor`: equal deflections under
 /// other moments.
 fn loaded(arm: &Problem, rows: &Measurements, factor: f64) -> (Problem, Measurements) {
     let (mut arm, mut rows) = (arm.clone(), rows.clone());
@@ -250,7 +249,7 @@ fn loaded(arm: &Problem, rows: &Measurements, factor: f64) -> (Problem, Measurem
 fn every_effect_under_any_load() {
     let (arm, all) = lunar();
     let plain = poses(&arm, 4, false, &mut ChaCha8Rng::seed_from_u64(9));
-    // An upper bound of the moments: everything at the end of the outstretched arm.
+    // Upper bound of the moments: all masses at the end of the outstretched arm.
     let bodies = |joint: &Joint| joint.bodies.iter().map(|body| body.mass).sum::<f64>();
     let beam = |joint: &Joint| joint.beam.iter().map(|own| own.mass).sum::<f64>();
     let mass = plain.payload.iter().flatten().fold(0.0_f64, |most, mass| most.max(*mass))
@@ -271,8 +270,8 @@ fn every_effect_under_any_load() {
                 exact.iter().all(|value| value.is_finite()),
                 "{effect:?} at {moment} N·m: {exact}"
             );
-            // Steps that move the target by a tenth of a millimetre; the place of a mass that is
-            // not there moves nothing.
+            // Steps move the target by a tenth of a millimetre; the position of a zero mass moves
+            // nothing.
             let norms: Vec<f64> = exact.column_iter().map(|column| column.norm()).collect();
             let step = DVector::from_iterator(
                 norms.len(),

@@ -1,4 +1,4 @@
-//! Declared effects are found from 28 noisy poses, within their errors.
+//! Recovery of declared effects from 28 noisy poses, within their errors.
 
 use flexcal::fit::{Identification, Options, identify, identify_model};
 use flexcal::measurement::Measurements;
@@ -13,10 +13,10 @@ use crate::catalogue::{conditions, declared, in_truth, lunar, odd, of_effects, p
 use crate::common::arms::{ODD, parse, path};
 use crate::common::made::{divided, draw, labels, measure, model_of, normal};
 
-/// 1 σ of a coordinate [m].
+/// Standard deviation of a coordinate [m].
 const NOISE: f64 = 2e-5;
 
-/// Checks the estimates of effects: within 4 σ of the truth, and better known than before.
+/// Checks the estimates of effects: within 4 σ of the truth, and more accurate than the prior.
 fn check(problem: &Problem, rows: &Measurements, truth: &DVector<f64>, found: &Identification) {
     let model = model_of(problem, rows);
     assert!(found.is_trusted(), "{:?}", found.findings);
@@ -36,7 +36,7 @@ fn check(problem: &Problem, rows: &Measurements, truth: &DVector<f64>, found: &I
 #[test]
 fn every_effect_is_found_beside_the_arm_s_own_errors() {
     let (arm, all) = lunar();
-    // The lunar sampler has no slide.
+    // The lunar sampler has no prismatic joint.
     let (with_slide, more) = odd();
     let slides = more.iter().filter(|(effect, _)| matches!(effect, Effect::SlideBending { .. }));
     let cases =
@@ -48,7 +48,7 @@ fn every_effect_is_found_beside_the_arm_s_own_errors() {
         let mut rng = ChaCha8Rng::seed_from_u64(100 + number as u64);
         let mut rows = poses(&problem, 36, true, &mut rng);
         let model = model_of(&problem, &rows);
-        // Errors as large as those of a real arm; the priors of the problem are wider.
+        // Errors are as large as those of a real arm; the priors of the problem are wider.
         let mut truth = 0.3 * draw(&model, |_| 0.0, &mut rng);
         let strong = strengths(&model, values);
         for k in of_effects(&model) {
@@ -78,8 +78,8 @@ fn several_effects_of_the_rig_are_found_at_once() {
         let some: Vec<_> = all.into_iter().filter(|(effect, _)| chosen(effect)).collect();
         let effects: Vec<Effect> = some.iter().map(|(effect, _)| effect.clone()).collect();
         let values: Vec<f64> = some.iter().flat_map(|(_, values)| values.clone()).collect();
-        // The waves of a slide are long beside its travel: only a wide prior leaves room for what
-        // these poses say.
+        // Waves of a prismatic joint are long compared with its travel, so their prior must be
+        // wide.
         if arm.name == "odd" {
             arm.parameters.extend(
                 parse(&format!("{ODD}\n\"*-harmonic.*\" = {{ sigma_mm = 5.0 }}")).parameters.pop(),

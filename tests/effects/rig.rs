@@ -1,4 +1,4 @@
-//! The model's effects do what those of the rig do, which shares no physics with it; and nothing at
+//! Effects of the model compared with those of the rig, which shares no mechanics with it, and at
 //! zero.
 
 use flexcal::measurement::Measurements;
@@ -12,9 +12,9 @@ use crate::catalogue::{conditions, declared, in_truth, lunar, odd, poses, streng
 use crate::common::effects::Strong;
 use crate::common::made::{model_of, predicted};
 
-/// Part of an effect by which model and rig may differ.
+/// Allowed relative difference between model and rig.
 const PART: f64 = 0.005;
-/// What they may differ by besides [m].
+/// Allowed absolute difference between model and rig [m].
 const FLOOR: f64 = 1e-6;
 
 fn measured(arm: &Problem, effects: &[Strong], rows: &Measurements) -> Vec<Vector3<f64>> {
@@ -25,8 +25,7 @@ fn measured(arm: &Problem, effects: &[Strong], rows: &Measurements) -> Vec<Vecto
     (0..rows.len()).map(|row| rig.pose_of(word(row), &conditions(rows, row)).unwrap().0).collect()
 }
 
-/// Compares what an effect changes: largest change, largest difference, and whether that is
-/// allowed.
+/// Compares the displacement by an effect: largest displacement, largest difference, and the limit.
 fn check(arm: &Problem, effect: &Strong, rows: &Measurements) {
     let with = declared(arm, std::slice::from_ref(&effect.0));
     let x = strengths(&model_of(&with, rows), &effect.1);
@@ -48,8 +47,7 @@ fn check(arm: &Problem, effect: &Strong, rows: &Measurements) {
         (change, difference) = (change.max(expected.norm()), difference.max(off));
     }
     println!("{:8.4} mm, off by {:.5} mm  {:?}", change * 1e3, difference * 1e3, effect.0);
-    // No moment moves a joint along its slide: without a direction of approach its play does
-    // nothing.
+    // A moment moves no prismatic joint: without an approach side its play has no effect.
     let slides = |joint: usize| arm.joints[joint - 1].kind == JointKind::Prismatic;
     let silent = match effect.0 {
         Effect::DeflectedEquilibrium => true,

@@ -1,4 +1,4 @@
-//! What the rules of `[parameters]` make of the parameters of effects.
+//! Rules of `[parameters]` for the parameters of effects.
 
 use flexcal::model::parameter::Parameter;
 use flexcal::problem::Problem;
@@ -32,7 +32,7 @@ station-shift = { at_time_s = 90 }
 payload-mass = true
 ";
 
-/// The odd arm with effects and these rules alone.
+/// Returns the odd arm with effects and only these rules.
 fn problem(rules: &str) -> Problem {
     let (arm, _) = ODD.split_once("[parameters]").unwrap();
     parse(&format!("{arm}{EFFECTS}[parameters]\n{rules}\n"))
@@ -123,13 +123,13 @@ fn rules_for_everything_reach_effects_as_far_as_they_fit_them() {
     let all = resolved("\"*\" = { free = true }").unwrap();
     assert!(NAMES.iter().all(|name| find(&all, name).unwrap().sigma.is_none()));
     assert!(resolved("\"*\" = { fixed = true }").unwrap().is_empty());
-    // What is no angle, length or stiffness keeps the prior of the catalogue.
+    // A parameter that is no angle, length or stiffness keeps the prior of the catalogue.
     let sized = resolved("\"*\" = { sigma_deg = 1, sigma_mm = 30, sigma_relative = 0.5 }").unwrap();
     assert_eq!(find(&sized, "gear-ratio[3].error").unwrap().sigma, Some(0.01));
     assert_eq!(find(&sized, "payload-mass.mass").unwrap().sigma, Some(2.0));
     assert_eq!(find(&sized, "station-shift[90].x").unwrap().sigma, Some(0.03));
     assert_eq!(find(&sized, "joint3.a").unwrap().sigma, Some(0.03));
-    // A later rule about the arm alone leaves effects to the one before.
+    // A later rule for the arm does not change effects.
     let later = resolved("\"*\" = { fixed = true }\n\"joint*.theta\" = { sigma_deg = 1 }").unwrap();
     assert!(later.len() == 5 && NAMES.iter().all(|name| find(&later, name).is_none()));
 }
@@ -169,7 +169,7 @@ fn rules_that_do_not_fit_are_mistakes() {
 #[test]
 fn what_a_rule_could_not_take_is_not_looked_for() {
     let (arm, _) = ODD.split_once("[parameters]").unwrap();
-    // In millimetres, for play of the slide: the other joints turn.
+    // A rule in millimetres applies to the play of the prismatic joint; the other joints rotate.
     let rule = "\"backlash.*\" = { sigma_mm = 1 }";
     let text = format!(
         "{arm}[[effect]]\nbacklash = {{ joint = 4 }}\n[parameters]\n{rule}\n[data]\nposition_sigma_mm = 0.1\n"
@@ -184,7 +184,7 @@ fn what_a_rule_could_not_take_is_not_looked_for() {
         .map(|(e, _)| e.name())
         .collect();
     assert_eq!(refused, ["backlash"; 3], "{:?}", detection.untestable);
-    // Whatever is looked for can be declared.
+    // Every effect that is searched can be declared.
     for found in &detection.effects {
         let both = [problem.effects[0].effect.clone(), found.effect.clone()];
         assert!(

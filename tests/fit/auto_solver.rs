@@ -1,4 +1,4 @@
-//! The solver that `auto` takes, held against the table of `benches/RESULTS.md`.
+//! Solver choice of `auto`, compared with the table of `benches/RESULTS.md`.
 
 #![expect(clippy::panic, reason = "a test that fails may panic")]
 
@@ -16,11 +16,11 @@ use flexcal::least_squares::solver::{
 use flexcal::model::Model;
 use flexcal::problem::Problem;
 
-/// The solver of `auto` takes at most this many times as long, summed over a class, as the fastest
-/// that reaches every optimum.
+/// Allowed ratio of the time of `auto`, summed over a class, to that of the fastest solver that
+/// reaches every optimum.
 const SLOWER: f64 = 2.0;
 
-/// The classes of the table, and whether their models have bounds.
+/// Classes of the table; true if their models have bounds.
 const CLASSES: [(&str, bool); 8] = [
     ("rigid, identifiable", false),
     ("rigid, redundant", false),
@@ -32,16 +32,16 @@ const CLASSES: [(&str, bool); 8] = [
     ("Moré–Garbow–Hillstrom", false),
 ];
 
-/// A row of the table.
+/// Row of the table.
 struct Row<'a> {
     solver: &'a str,
     problem: &'a str,
     optimum: &'a str,
-    /// [ms]
+    /// Time of the solver [ms].
     time: f64,
 }
 
-/// The rows of a section.
+/// Returns the rows of a section.
 fn rows<'a>(page: &'a str, class: &str) -> Vec<Row<'a>> {
     let (_, section) = page.split_once(&format!("\n## {class}\n")).unwrap();
     let section = section.split("\n## ").next().unwrap();
@@ -69,7 +69,7 @@ fn auto(bounded: bool) -> (SolverChoice, Option<&'static str>) {
     (SolverChoice::Auto.decide(&model), SolverChoice::Auto.reason(&model))
 }
 
-/// What the solver named `pick` does in these rows that it should not.
+/// Returns the faults of the solver `pick` in these rows.
 fn faults(rows: &[Row], pick: &str) -> Vec<String> {
     let of = |solver: &str| rows.iter().filter(|row| row.solver == solver).collect::<Vec<_>>();
     let missed = |rows: &[&Row]| rows.iter().filter(|row| !row.optimum.starts_with("yes")).count();
@@ -108,8 +108,8 @@ fn auto_takes_what_the_table_recommends() {
     assert_eq!(sections, CLASSES.len() + 1, "every section but the summary is a class");
 }
 
-/// As the table says, with fits made here: what `auto` takes comes to the optimum, by no more
-/// evaluations than twice those of the thriftiest that does.
+/// Checks the choice on fits: `auto` reaches the optimum with at most twice the evaluations of the
+/// most economical solver.
 #[test]
 fn auto_is_best_where_bounds_bind() {
     for (name, solvers) in [("stiffness", 4), ("tight-geometry", 4), ("mild-constraints", 2)] {
@@ -155,7 +155,7 @@ fn auto_is_best_where_bounds_bind() {
     }
 }
 
-/// The same under robust losses, with gross errors in the data.
+/// Checks the choice under robust losses, with gross errors in the data.
 #[test]
 fn auto_is_best_under_robust_losses() {
     let own = Bounded::read("stiffness").spoilt();

@@ -1,4 +1,5 @@
-//! What data cannot see: held while it cannot, let go once it can, and never passed off as known.
+//! Unidentifiable combinations: fixed while unidentifiable, released once identifiable, never
+//! reported as known.
 
 use crate::common::arms::{measured as read, parse, path, with_parameters};
 use crate::common::made::{at_random, divided, labels, measure, model_of, split_at};
@@ -11,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 
 const SIGMA: f64 = 5e-5;
 
-/// Two parallel axes, whose offsets along them the nominal arm cannot tell apart.
+/// Returns an arm with two parallel axes, whose offsets the nominal arm cannot separate.
 fn parallel(free: &str) -> Problem {
     parse(&format!(
         "name = 'parallel'\n[[joint]]\nd_m = 0.3\n[[joint]]\nalpha_deg = 90\nd_m = 0.1\n[[joint]]\na_m = 0.5\nd_m = 0.05\n\
@@ -23,7 +24,7 @@ fn estimate<'a>(found: &'a Identification, name: &str) -> &'a Estimate {
     found.estimate(name).unwrap()
 }
 
-/// Ninety noisy poses of the arm with these deviations, sixty of them to identify.
+/// Simulates ninety noisy poses of the arm with these deviations, sixty for identification.
 fn measured(problem: &Problem, truth: &[(&str, f64)]) -> Dataset {
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut rows = at_random(problem, 90, 2.0, &mut rng);

@@ -1,4 +1,4 @@
-//! `[[constraint]]` on the lunar sampler: exact where active, without effect where not.
+//! `[[constraint]]` on the lunar sampler: exact if active, without effect otherwise.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ fn cases() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases")
 }
 
-/// The lunar sampler's problem with more text at its end.
+/// Returns the problem of the lunar sampler with text appended.
 fn problem(more: &str) -> Problem {
     let file = cases().join("problem.toml");
     let text = fs::read_to_string(&file).unwrap();
@@ -89,8 +89,8 @@ fn an_active_constraint_holds_exactly_and_is_named() {
     assert!((held_ratio / limit - 1.0).abs() < 1e-9, "{held_ratio} on {limit}, free {ratio}");
     let sum = estimate(&held, "joint3.a").estimate + estimate(&held, "joint4.a").estimate;
     assert!((sum - reach + 2e-5).abs() < 1e-9 * reach, "{sum} on {}", reach - 2e-5);
-    // Along the constraints both vary together: the logarithms alike, the lengths against each
-    // other.
+    // Along the constraints both parameters vary together: logarithms equally, lengths in opposite
+    // directions.
     let relative = |of: &Estimate| of.std_error.unwrap() / of.estimate;
     assert!((relative(a) / relative(b) - 1.0).abs() < 1e-6, "{} {}", relative(a), relative(b));
     let length = |name| estimate(&held, name).std_error.unwrap();
@@ -113,7 +113,7 @@ fn an_active_constraint_holds_exactly_and_is_named() {
     assert_eq!(json["active_constraints"][0]["line"], 86);
     assert_eq!(json["outliers"], serde_json::json!([]));
 
-    // Alone, the stiffnesses keep the constraint between them and know of no other.
+    // With stiffnesses alone free, only the constraint between them applies.
     let stiffness = Options::default().with_strategy(Strategy::StiffnessOnly);
     let alone = run(&problem, &stiffness).unwrap();
     assert!(alone.active_constraints.iter().all(|active| active.words == words[0]));
@@ -200,7 +200,7 @@ fn what_cannot_be_is_refused() {
 
 #[test]
 fn checks_are_of_what_a_constraint_leaves() {
-    // 10 mm less than the links have: the fit misses, and so must the residual that is checked.
+    // The links are 10 mm longer than allowed: the fit misses, and so must the checked residual.
     let problem = problem(&constraint("\"joint3.a\" = 1, \"joint4.a\" = 1", "at_most_mm = 3690"));
     let (measurements, _) = Measurements::read(&[cases().join("a-none.csv")], &problem).unwrap();
     let data = Dataset::from_measurements(&problem, measurements).unwrap();
@@ -214,11 +214,11 @@ fn checks_are_of_what_a_constraint_leaves() {
     assert!((checked / fitted - 1.0).abs() < 0.1, "{checked} of {fitted}");
 }
 
-/// Optima at the declared σ: bounds and constraints that bind a little, and against the truth,
-/// where residuals stay hundreds of σ long.
+/// Optima at the declared σ with bounds and constraints that bind slightly, or that contradict the
+/// truth and leave residuals of hundreds of σ.
 ///
-/// Reached alike by the active set, the interior point and other starts; steps were 428 and over
-/// 500 without second derivatives, 113 and 70 with steps measured by the columns of J.
+/// Active set, interior point and other starts reach the same optimum. Without second derivatives
+/// the fits took 428 and more than 500 steps; with steps scaled by the columns of J, 113 and 70.
 #[test]
 fn bounds_against_the_truth_are_fitted_to_the_optimum() {
     let cases = [
@@ -252,7 +252,7 @@ fn bounds_against_the_truth_are_fitted_to_the_optimum() {
             assert!((cost / optimum - 1.0).abs() < 1e-8, "{name}, {within:?}: {cost:.12e}");
             assert!(iterations <= most, "{name}, {within:?}: {iterations} steps");
         }
-        // What users get: the σ that the residual speaks for.
+        // Users get the estimates at the σ estimated from the residual.
         let fitted = identify(&own.problem, &own.data, &Options::default()).unwrap();
         println!("  identified after {} steps", fitted.iterations);
         assert!(
@@ -263,7 +263,7 @@ fn bounds_against_the_truth_are_fitted_to_the_optimum() {
     }
 }
 
-/// The price of a limit is what moving it gains.
+/// Checks that a shadow price is the gain from moving the limit.
 #[test]
 fn shadow_prices_are_differences_of_fits() {
     let at = |limit: f64| {
@@ -285,7 +285,7 @@ fn shadow_prices_are_differences_of_fits() {
     );
 }
 
-/// As the page of the problem tells it: the limit that is wrong is dear, the others are cheap.
+/// Checks the example of the problem page: the wrong limit has a high price, the others a low one.
 #[test]
 fn the_service_arm_shows_which_limit_is_wrong() {
     let problem = Problem::read(&arms::path("problems/service-arm/problem.toml")).unwrap();
@@ -294,7 +294,7 @@ fn the_service_arm_shows_which_limit_is_wrong() {
     let price = |name: &str| estimate(&found, name).shadow_price.unwrap().rms;
     let [bench] = &found.active_constraints[..] else { panic!("{:?}", found.active_constraints) };
     assert_eq!(bench.words, "joint3.a + joint4.a ≤ 1200.1 mm");
-    // 0.1 mm of length against 10 % of rigidity.
+    // 0.1 mm of length is compared with 10 % of rigidity.
     let dear = 1e-4 * price("joint4.a").min(bench.shadow_price.rms);
     let cheap = 0.1 * price("upper.EI").max(price("fore.EI"));
     assert!(dear > 20.0 * cheap, "{dear} against {cheap}");

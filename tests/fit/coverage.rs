@@ -1,5 +1,5 @@
-//! Standard errors mean what they say: over many made-up data sets, they cover the truth at the
-//! nominal rate.
+//! Coverage of standard errors: over many simulated data sets they cover the truth at the nominal
+//! rate.
 
 #![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
 
@@ -16,26 +16,26 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// Share of a normal variable within one and two standard deviations.
+/// Probability that a normal variable is within one and two standard deviations.
 const NORMAL: [(f64, f64); 2] = [(1.0, 0.682_689), (2.0, 0.954_500)];
-/// Limits in standard deviations of the shares.
+/// Allowed deviation of a share, in its standard deviations.
 const LIMIT: f64 = 4.0;
 
-/// Share of fits that may fail.
+/// Allowed share of failed fits.
 const FAILURES: f64 = 0.005;
 
-/// One fit: (estimate − truth) / σ of each parameter that something was learned of, and χ²/ν.
+/// Score of one fit: (estimate − truth) / σ of each informed parameter, and χ²/ν.
 struct Score {
     z: Vec<Option<f64>>,
     reduced_chi2: f64,
 }
 
-/// What is fitted again and again, each time to a new arm and new noise.
+/// Fit that is repeated with new arms and new noise.
 struct Trial {
     problem: Problem,
     rows: Measurements,
     model: Model,
-    /// Spread of the truth where there is no prior.
+    /// Standard deviation of the truth of a parameter without a prior.
     spread: fn(Unit) -> f64,
 }
 
@@ -45,7 +45,7 @@ impl Trial {
         Self { problem, rows, model, spread }
     }
 
-    /// `None` where the fit itself says that it is not to be trusted.
+    /// Scores one fit; `None` if the fit reports that it is not trusted.
     fn score(&self, seed: u64) -> Option<Score> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let truth = draw(&self.model, self.spread, &mut rng);
@@ -64,14 +64,14 @@ impl Trial {
             return None;
         }
         let z = found.estimates.iter().enumerate().map(|(k, estimate)| {
-            // Of x, which is a logarithm for stiffnesses.
+            // The error is that of x, which is a logarithm for stiffnesses.
             let scale = if estimate.unit.is_relative() { estimate.estimate } else { 1.0 };
             estimate.std_error.map(|error| (found.x[k] - truth[k]) / (error / scale))
         });
         Some(Score { z: z.collect(), reduced_chi2: found.reduced_chi2.unwrap() })
     }
 
-    /// Scores `fits` fits and holds them against the normal distribution.
+    /// Scores `fits` fits and compares them with the normal distribution.
     fn check(&self, what: &str, fits: u64) {
         let scores: Vec<Score> =
             (0..fits).into_par_iter().filter_map(|seed| self.score(seed)).collect();
@@ -119,7 +119,7 @@ impl Trial {
     }
 }
 
-/// Share of values within ±`limit`, and how many values there are.
+/// Returns the share of values within ±`limit`, and the number of values.
 fn share(values: impl Iterator<Item = f64>, limit: f64) -> (f64, f64) {
     let (mut inside, mut all) = (0.0, 0.0);
     for value in values {
@@ -129,7 +129,7 @@ fn share(values: impl Iterator<Item = f64>, limit: f64) -> (f64, f64) {
     (inside / all, all)
 }
 
-/// Mean and its standard error.
+/// Returns the mean and its standard error.
 fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
@@ -137,7 +137,7 @@ fn mean_and_error(values: &[f64]) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
-/// The lunar sampler with its priors, in the 28 poses of the example.
+/// Returns the lunar sampler with its priors, in the 28 poses of the example.
 fn lunar_sampler() -> Trial {
     let problem = Problem::read(&path("tests/cases")).unwrap();
     let rows = measured(&problem, &["tests/cases/a-none.csv"]);
@@ -147,7 +147,7 @@ fn lunar_sampler() -> Trial {
     Trial::new(problem, rows, |_| unreachable!())
 }
 
-/// A rigid UR10 without any prior; what the poses cannot tell apart stays fixed.
+/// Returns a rigid UR10 without priors; parameters that the poses cannot separate are fixed.
 fn ur10() -> Trial {
     let text = std::fs::read_to_string(path("problems/ur10-ipa/problem.toml")).unwrap();
     let (arm, _) = text.split_once("[parameters]").unwrap();
@@ -158,8 +158,8 @@ fn ur10() -> Trial {
     let rows = at_random(&all, 60, 2.8, &mut ChaCha8Rng::seed_from_u64(17));
     let model = model_of(&all, &rows);
     let n = model.parameters.len();
-    // From the tool inwards, each parameter that the nominal arm shows apart from those already
-    // chosen.
+    // From the tool inwards, each parameter that the nominal arm separates from those already
+    // chosen is freed.
     let poses = Placement::of(&rows).poses(&rows, &(0..rows.len()).collect::<Vec<_>>(), 1.0);
     let columns = jacobian(
         &PoseResiduals::new(&model, poses, (0..n).collect(), DVector::zeros(n)),

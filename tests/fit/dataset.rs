@@ -1,4 +1,4 @@
-//! Data sets from plain arrays.
+//! Data sets built from arrays.
 
 use crate::common::arms::path;
 use flexcal::fit::{Options, identify, jacobian};
@@ -74,7 +74,7 @@ fn files_give_the_same_rows_as_measurements_and_split() {
     assert_eq!((data.split.identification.len(), data.split.held_out.len()), (28, 50));
 }
 
-/// The table of the lunar sampler, column by column.
+/// Returns the table of the lunar sampler, column by column.
 fn in_memory() -> Vec<(String, ColumnValues)> {
     let text = std::fs::read_to_string(path("problems/lunar-sampler/measurements.csv")).unwrap();
     let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());

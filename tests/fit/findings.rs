@@ -1,4 +1,4 @@
-//! `docs/findings.md` lists the codes of findings as the code has them.
+//! Agreement of `docs/findings.md` with the codes of findings.
 
 use std::fmt::Write as _;
 

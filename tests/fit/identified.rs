@@ -1,4 +1,4 @@
-//! An identification as data: estimates by name, covariance, correlations, predictions, residuals.
+//! Identification as data: estimates by name, covariance, correlations, predictions, residuals.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -52,7 +52,7 @@ fn the_covariance_is_that_of_the_standard_errors() {
 
 #[test]
 fn an_active_constraint_is_in_the_correlations() {
-    // Two rigidities held in their order: both are one number.
+    // Two rigidities whose order binds have the same value.
     let text = std::fs::read_to_string(path("tests/cases/problem.toml")).unwrap();
     let text = text + "\n[[constraint]]\nterms = { 'A.EI' = 1.0, 'B.EI' = -1.0 }\nat_most = 0.0\n";
     let problem = Problem::parse(&text, &path("tests/cases/problem.toml")).unwrap();
@@ -86,7 +86,7 @@ fn predictions_are_measurements_less_residuals() {
         squares += if residual.held_out { residual.position.norm_squared() } else { 0.0 };
     }
     assert!(((squares / 50.0).sqrt() / found.fitted.held_out.rms.norm - 1.0).abs() < 1e-12);
-    // The same poses as plain arrays.
+    // The same poses are given as arrays.
     let rows = &data.measurements;
     let poses = Dataset::poses((0..rows.len()).map(|row| rows.configuration(row)));
     let poses = poses
@@ -117,7 +117,7 @@ fn what_was_not_identified_predicts_nothing() {
         matches!(&error, IdentifyError::NoEstimate { name } if name == "joint2.stiffness"),
         "{error}"
     );
-    // Nor does a problem that lacks what was identified.
+    // A problem that lacks an identified parameter predicts nothing, either.
     found.estimates[gone].name = "joint2.stiffness".to_owned();
     assert!(found.predict(&problem, &data.measurements).is_ok());
     problem.parameters.clear();
@@ -166,7 +166,7 @@ fn a_saved_estimate_predicts_what_the_fit_predicts() {
         assert!((one - other).norm() < 1e-12, "{one}{other}");
         assert_eq!(residual.held_out, data.split.held_out.contains(&residual.row));
     }
-    // Rows without positions are predicted, and judge nothing.
+    // Rows without positions are predicted but not compared.
     let rows = &data.measurements;
     let bare =
         Dataset::poses((0..rows.len()).map(|row| rows.configuration(row))).measurements().unwrap();
@@ -174,7 +174,7 @@ fn a_saved_estimate_predicts_what_the_fit_predicts() {
     assert!(
         bare.residuals.is_none() && bare.errors.is_none() && bare.positions.len() == rows.len()
     );
-    // Without an estimate it is the nominal arm.
+    // Without an estimate the nominal arm predicts.
     let nominal = predict(&problem, None, rows, None).unwrap().errors.unwrap();
     let (own, other) = (&found.registered.identification, &found.registered.held_out);
     let registered = (28.0 * own.mean.norm + 50.0 * other.mean.norm) / 78.0;
@@ -191,8 +191,8 @@ fn a_saved_estimate_predicts_what_the_fit_predicts() {
     assert!(expected, "{error}");
 }
 
-/// A rigid arm of three joints and the tables of two sessions whose bases differ; session B holds a
-/// gross error.
+/// Writes a rigid arm of three joints and the tables of two sessions with different bases; session
+/// B has a gross error.
 fn two_sessions(folder: &Path) -> impl Fn(&str) -> assert_cmd::assert::Assert + '_ {
     let problem = "name = 'arm'\n[[joint]]\nd_m = 0.4\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = 0.6\n\
                    [tool]\ntarget_m = [0.5, 0.1, 0.0]\n[parameters]\n'joint3.a' = { sigma_mm = 3 }\n'base.*' = { free = true }\n\
@@ -255,7 +255,7 @@ fn an_estimate_applies_to_another_session_without_a_refit() {
             .starts_with("file,line,pose,session,target,q1_deg,q2_deg,q3_deg,predicted_x_mm,")
     );
     assert_eq!(read("fit/residuals.csv").lines().count(), 41);
-    // Where nothing was measured, nobody knows where the arm of a new session stands.
+    // Without measurements the base of a new session is unknown.
     let bare: Vec<String> = read("B.csv")
         .lines()
         .map(|line| line.splitn(7, ',').take(6).collect::<Vec<_>>().join(","))

@@ -1,5 +1,5 @@
-//! What cannot be meant is said: held-out rows that do not belong to the fit, sessions that are not
-//! tied down, gross mistakes without priors, targets counted as poses.
+//! Implausible data are reported: held-out rows that do not belong to the fit, undetermined
+//! sessions, gross errors without priors, and targets counted as poses.
 
 use crate::common::arms::parse;
 use crate::common::made::{at_random, divided, draw, labels, measure, model_of};
@@ -30,7 +30,7 @@ pub fn text(parameters: &str) -> String {
     )
 }
 
-/// Sixty poses to identify and thirty held out.
+/// Simulates sixty poses for identification and thirty held-out ones.
 pub fn measured(problem: &Problem, seed: u64) -> Dataset {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut rows = at_random(problem, 90, 2.0, &mut rng);
@@ -86,8 +86,8 @@ fn held_out_rows_are_judged() {
     }
 }
 
-/// An arm of which the model lacks something that the few poses at one end of the range turn into
-/// wrong parameters.
+/// Returns an arm with an unmodelled effect that few poses at one end of the range turn into wrong
+/// parameters.
 pub fn worse_than_none() -> (String, Dataset) {
     let text = text("'joint*' = { sigma_deg = 1, sigma_mm = 20 }\n'tool.*' = { sigma_mm = 20 }");
     let problem = parse(&text);
@@ -123,7 +123,7 @@ fn a_session_needs_points_that_tie_its_base_down() {
         let mut data = measured(&problem, 2);
         let word = |row| if rows.contains(&row) { "B" } else { "A" };
         data.measurements.session = labels((0..90).map(word));
-        // Each session has a tool of its own: that of B is not fitted here.
+        // Each session has a separate tool: that of B is not fitted here.
         data.measurements.target = Some(labels((0..90).map(|_| "t")));
         let found = fit(&problem, &data);
         found
@@ -163,7 +163,7 @@ fn gross_mistakes_are_asked_about_without_priors_too() {
             found.findings
         );
     }
-    // The same numbers read by the other convention: Rz(θ) Tz(d) Tx(a) Rx(α).
+    // The same numbers in the other convention: Rz(θ) Tz(d) Tx(a) Rx(α).
     let mut standard = problem.clone();
     let n = standard.joints.len();
     for joint in 0..n {
@@ -213,15 +213,14 @@ fn what_may_have_been_misread_is_said() {
         data.measurements.configurations.iter_mut().skip(2).step_by(5).for_each(|q| *q = -*q)
     });
     assert_eq!(reversed, [Misreading::Reversed { joint: 3 }.to_string()]);
-    // A tool that is free goes where it belongs, far beyond its prior.
+    // A free tool moves to its true position, far beyond its prior.
     let held = arm("'joint*' = { sigma_deg = 0.3, sigma_mm = 2 }\n'base.*' = { free = true }");
     let far = with(&|problem, _| {
         *problem = held.clone();
         problem.tool.target *= 1e3;
     });
     assert_eq!(far, [Misreading::TargetInMillimetres.to_string()]);
-    // Lengths of the arm in millimetres: that the angles leave less than they are explains it no
-    // better.
+    // Lengths of the arm in millimetres: angles read as another unit explain the data no better.
     let long = |problem: &mut Problem, data: &mut Dataset, unit: f64| {
         problem.joints[2].a *= 1e3;
         let column = |joint| CommandColumn { joint, name: format!("q{}", joint + 1), unit };
@@ -238,7 +237,7 @@ fn what_may_have_been_misread_is_said() {
         lengths.chain(&mut problem.tool.target).for_each(|length| *length *= 1e3);
     });
     assert_eq!(all, [Misreading::ArmInMillimetres.to_string()]);
-    // What the columns are declared as they were not misread for.
+    // Columns with a declared unit are not suspected of another one.
     let impossible = with(&|problem, data| {
         scaled(1.0 / degree)(problem, data);
         long(&mut problem.clone(), data, degree);
@@ -249,7 +248,7 @@ fn what_may_have_been_misread_is_said() {
         data.measurements.position_unit = Some(1.0);
     });
     assert!(!metres.contains(&Misreading::Metres.to_string()), "{metres:?}");
-    // What none of them explains.
+    // No misreading explains shuffled rows.
     let shuffled = with(&|_, data| data.measurements.positions.rotate_left(1));
     assert!(shuffled.is_empty());
 }
@@ -275,7 +274,8 @@ fn what_a_robust_loss_sets_aside_is_no_reason_for_distrust() {
 
 #[test]
 fn targets_of_one_pose_are_points_not_poses() {
-    // Seven poses of three targets: 42 coordinates of the arm and 3 of the targets' shape, not 63.
+    // Seven poses of three targets have 42 coordinates of the arm and 3 of the shape of the
+    // targets, not 63.
     let problem = arm(&format!("{PRIORS}\n'base.*' = {{ free = true }}"));
     let mut rng = ChaCha8Rng::seed_from_u64(6);
     let poses = at_random(&problem, 17, 2.0, &mut rng);

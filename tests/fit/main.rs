@@ -1,4 +1,4 @@
-//! What a fit finds, what it claims, and what it says of data that cannot be meant.
+//! Results of fits, their reported accuracy, and warnings on implausible data.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 

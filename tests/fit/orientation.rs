@@ -1,4 +1,4 @@
-//! Orientations fitted beside positions, on arms of the virtual rig.
+//! Orientations fitted together with positions, on arms of the virtual rig.
 
 use std::fs;
 use std::path::Path;
@@ -15,7 +15,7 @@ use flexcal::rig::{Simulation, Truth, simulate};
 use flexcal::select::close;
 use nalgebra::{DVector, UnitQuaternion, Vector3};
 
-/// The UR10 with all of its geometry, base and tool free, orientations measured to 0.02°.
+/// Returns the UR10 with free geometry, base and tool, and orientations measured to 0.02°.
 fn ur10() -> Problem {
     let text = fs::read_to_string(path("problems/ur10-ipa/problem.toml")).unwrap();
     let (arm, _) = text.split_once("[parameters]").unwrap();
@@ -75,7 +75,7 @@ fn derivatives_of_orientations_are_those_of_differences() {
         let rows: Vec<usize> = (0..6).collect();
         let poses = placement.oriented_poses(&data.measurements, &rows, (1e-3, Some(1e-3)));
         let residuals = PoseResiduals::new(&model, poses, (0..n).collect(), DVector::zeros(n));
-        // Bases turned by some 0.3 rad.
+        // Bases are rotated by about 0.3 rad.
         let size = |k: usize| if model.parameters[k].site.is_placement() { 0.3 } else { 2e-3 };
         let at = DVector::from_fn(n, |k, _| size(k) * (k as f64 + 0.5).sin());
         let checked = check_jacobian(&residuals, &at, &DVector::from_element(n, 1e-2));
@@ -99,7 +99,7 @@ fn orientations_lower_the_errors_of_the_wrist_as_theory_says() {
         "{:?}",
         both.reduced_chi2
     );
-    // (JᵀJ + P)⁻¹ of both kinds of rows, at the nominal arm.
+    // Expected covariance (JᵀJ + P)⁻¹ of both kinds of rows at the nominal arm.
     let expected = |problem: &Problem| {
         let site = flexcal::design::Site::new(problem, &[&data.measurements]).unwrap();
         let told = site.sensitivity(&data.measurements.select(&data.split.identification), None);
@@ -130,7 +130,7 @@ fn orientations_lower_the_errors_of_the_wrist_as_theory_says() {
         let (fell, theory) = (before / after, without(name) / with(name));
         println!("{name}: {fell:.3}, theory {theory:.3}");
         assert!(fell > 0.999, "{name}: {fell}");
-        // Where the prior decides, nominal and fitted arm differ in what it leaves to the data.
+        // If the prior dominates, nominal and fitted arm differ in the share of the data.
         if estimates.iter().all(|own| own.identified > 0.99) {
             compared += 1;
             assert!((fell / theory - 1.0).abs() < 0.1, "{name}: {fell}, theory {theory}");
@@ -171,7 +171,8 @@ fn standard_errors_cover_the_truth() {
     let share =
         f64::from(u32::try_from(inside).unwrap()) / f64::from(u32::try_from(count).unwrap());
     println!("{inside} of {count} within 1.96 σ");
-    // 0.95; of 24 fits with some 12 independent directions each, chance leaves 0.91 to 0.99 (3 σ).
+    // The expected share is 0.95; with 24 fits of about 12 independent directions, 0.91 to 0.99 is
+    // within 3 σ.
     assert!(count > 300 && (0.91..0.99).contains(&share), "{inside} of {count}");
 }
 
@@ -204,7 +205,7 @@ fn base_and_tool_are_found_from_poses_without_a_guess() {
         "{:?}",
         found.reduced_chi2
     );
-    // What is to be fitted has to be measured.
+    // Fitted orientations have to be measured.
     data.measurements.orientations = None;
     let error = identify(&problem, &data, &Options::default()).unwrap_err().to_string();
     assert!(
@@ -221,7 +222,7 @@ fn commands_keep_orientations() {
     let rows = &data.measurements;
     let placement = Placement::of(rows);
     let model = Model::new(&problem, &placement.bases, &placement.targets).unwrap();
-    // Waypoints: where the nominal arm would have been.
+    // Waypoints are the poses that the nominal arm predicts.
     let targets = waypoints(&problem, &model, &found.x, rows).unwrap();
     let commands = compensate(&problem, &model, &found.x, &targets).unwrap();
     let (mut before, mut after) = (Vec::new(), Vec::new());
@@ -247,7 +248,7 @@ fn commands_keep_orientations() {
         mean(&after)
     );
     assert!(after.len() > 50 && mean(&before) > 0.2 && mean(&after) < 0.05);
-    // The same targets as the base sees them.
+    // The same targets in the frame of the base.
     let base = model.base_frames(found.x.as_slice())[0];
     let mut of_base = targets.clone();
     let turn = UnitQuaternion::from_matrix(&nalgebra::Matrix3::from_columns(&base.axes));

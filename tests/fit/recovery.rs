@@ -1,4 +1,4 @@
-//! Exact measurements give back the arm that made them.
+//! Recovery of the true arm from exact measurements.
 
 use crate::common::arms::{
     golden, golden_problem, measured, parse, path, table_2_deviations, with_parameters,
@@ -35,7 +35,7 @@ fn rng() -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(42)
 }
 
-/// Half the sum of squares of residuals and priors on the identification rows.
+/// Returns half the sum of squares of residuals and priors on the identification rows.
 fn cost(problem: &Problem, rows: &Measurements, split: &Split, x: &DVector<f64>) -> f64 {
     let rows = part(rows, split.identification.iter().copied());
     let sigma = problem.data.position_sigma.unwrap();
@@ -50,7 +50,7 @@ fn cost(problem: &Problem, rows: &Measurements, split: &Split, x: &DVector<f64>)
     0.5 * (data / sigma.powi(2) + priors)
 }
 
-/// Rigid lunar sampler with the measured positions of Table 2's arm, rounded to a nanometre.
+/// Returns the rigid lunar sampler with positions of the arm of table 2, rounded to a nanometre.
 fn rigid_rows(problem: &Problem) -> Measurements {
     let mut reader = csv::Reader::from_path(golden("rigid.csv")).unwrap();
     let table: Vec<Vec<f64>> = reader
@@ -72,7 +72,7 @@ fn all_that_rigid_positions_tell_of_table_2_comes_back() {
     let rows = rigid_rows(&problem);
     let found = fit(&problem, &rows, &split_at(28, &rows));
     assert!(found.fitted.held_out.max.norm < 1e-9, "{:?}", found.fitted.held_out);
-    // β1 turns about the axis of θ2; d2, d3 and d4 lie along parallel axes.
+    // β1 rotates about the axis of θ2; d2, d3 and d4 are along parallel axes.
     let unidentifiable: Vec<Vec<&str>> = found
         .identifiability()
         .unidentifiable
@@ -89,8 +89,8 @@ fn all_that_rigid_positions_tell_of_table_2_comes_back() {
         error[found.estimates.iter().position(|estimate| estimate.name == name).unwrap()]
     };
     for (estimate, error) in found.estimates.iter().zip(&error) {
-        // The unidentifiable ones stay near nominal; what is left of them after the first order
-        // others make up for.
+        // Unidentifiable parameters stay near nominal; other parameters compensate the remainder
+        // beyond first order.
         let limit = if estimate.identified > 0.999_999 { 2e-5 } else { 0.01 };
         assert!(error.abs() < limit, "{}: off by {error:e}", estimate.name);
     }
@@ -142,7 +142,7 @@ fn stiffnesses_come_back_from_exact_positions() {
 
 #[test]
 fn geometry_and_stiffness_come_back_together() {
-    // The stretch of a link is hardly seen: without a prior its EA may run away.
+    // The stretch of a link is hardly identifiable: without a prior its EA may diverge.
     let rules =
         "\"joint*\" = { free = true }\n\"*.EI\" = { free = true }\n\"*.GJ\" = { free = true }";
     let problem = with_parameters("tests/golden/problem.toml", rules);
@@ -166,8 +166,8 @@ fn geometry_and_stiffness_come_back_together() {
     }
 }
 
-/// A UR10 whose poses of two sessions were measured from two sides, with two targets, a row in
-/// three of the first session with the other session's target.
+/// Simulates a UR10 in two sessions measured from two sides, with two targets; every third row of
+/// the first session has the target of the other.
 fn two_sessions(problem: &Problem, per_session: usize, sigma: f64) -> (Measurements, DVector<f64>) {
     let mut rng = rng();
     let mut rows = at_random(problem, 2 * per_session, 2.8, &mut rng);
@@ -191,7 +191,7 @@ fn index(parameters: &[Parameter], name: &str) -> usize {
     parameters.iter().position(|parameter| parameter.name == name).unwrap()
 }
 
-/// Parameters of the UR10 that positions of the target tell apart, bases and targets.
+/// Free parameters of the UR10 that target positions separate, with bases and targets.
 const UR10: &str = "\"joint2.a\" = { free = true }\n\"joint2.theta\" = { free = true }\n\"joint3.a\" = { free = true }\n\
                     \"joint3.alpha\" = { free = true }\n\"joint3.theta\" = { free = true }\n\"joint4.*\" = { free = true }\n\
                     \"joint4.beta\" = { fixed = true }\n\"joint5.theta\" = { free = true }\n\"tool.*\" = { free = true }\n\
@@ -297,8 +297,8 @@ fn a_target_seen_in_held_out_rows_alone_does_not_touch_the_arm() {
     }
 }
 
-/// The lunar sampler's example poses, measured on an arm off nominal by these parts of the priors'
-/// sizes.
+/// Simulates the example poses of the lunar sampler with deviations of the given fractions of the
+/// prior sizes.
 fn slightly_off(problem: &Problem, geometry: f64, stiffness: f64) -> (Measurements, Split) {
     let mut rows = measured(problem, &["tests/cases/a-none.csv"]);
     let model = model_of(problem, &rows);
@@ -313,7 +313,7 @@ fn slightly_off(problem: &Problem, geometry: f64, stiffness: f64) -> (Measuremen
 
 #[test]
 fn stage_by_stage_settles_where_everything_at_once_does() {
-    // Without joint zeros, which flexible joints resemble: with them a sweep gains too little.
+    // Joint zeros, which resemble flexible joints, stay fixed, since they slow the sweeps down.
     let rules = "\"joint*.a\" = { sigma_mm = 30.0 }\n\"joint*.alpha\" = { sigma_deg = 1.0 }\n\
                  \"joint*.stiffness\" = { sigma_relative = 0.5 }\n\"A.*\" = { sigma_relative = 0.5 }\n\
                  \"B.*\" = { sigma_relative = 0.5 }\n\"tool.*\" = { sigma_mm = 5.0 }";
@@ -385,7 +385,7 @@ fn a_bound_that_binds_is_kept_exactly_and_reported() {
         assert!((parameter.lower..=parameter.upper).contains(&found.x[k]));
     }
 
-    // The same bounds where none of them binds give the unbounded fit.
+    // The same bounds without an active one give the unbounded fit.
     truth[a] = 0.004;
     truth[ei] = 1.05_f64.ln();
     measure(&problem, &mut rows, &truth, 0.0, &mut rng());

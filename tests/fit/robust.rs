@@ -1,4 +1,4 @@
-//! Gross errors in the lunar sampler's data: what they do to a fit, with and without a robust loss.
+//! Gross errors in the data of the lunar sampler, with and without a robust loss.
 
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ fn lunar(case: &str) -> (Problem, Dataset) {
     (problem, data)
 }
 
-/// Moves every 33rd identification row by 5 mm, each in another direction; the rows moved.
+/// Moves every 33rd identification row by 5 mm in different directions; returns these rows.
 fn spoil(Dataset { measurements, split }: &mut Dataset) -> Vec<usize> {
     let rows: Vec<usize> = split.identification.iter().copied().skip(7).step_by(33).collect();
     for (k, &row) in rows.iter().enumerate() {
@@ -73,8 +73,8 @@ fn a_robust_loss_keeps_gross_errors_from_ruling_the_fit() {
             assert_eq!(outlier.location, data.measurements.location(outlier.row));
         }
         assert!((robust.reduced_chi2.unwrap() - 1.0).abs() < 0.25 && robust.noise_factor < 1.5);
-        // Errors of a robust fit are a little larger than those of a clean one, by what the loss
-        // gives away.
+        // Standard errors of a robust fit exceed those of a clean one slightly, by the loss of
+        // efficiency.
         for (robust, clean) in robust.estimates.iter().zip(&clean.estimates) {
             if let (Some(robust_error), Some(error)) = (robust.std_error, clean.std_error) {
                 let ratio = robust_error / error;

@@ -1,5 +1,5 @@
-//! Nothing runs off: combinations that data see too weakly are held and named, and no trusted
-//! parameter leaves the arm.
+//! Bounded estimates: weakly determined combinations are fixed and named, and no trusted parameter
+//! leaves the size of the arm.
 
 use crate::common::arms::parse;
 use crate::common::made::{at_random, divided, draw, measure, model_of};
@@ -18,7 +18,7 @@ pub const PRIORS: &str = "'joint*.alpha' = { sigma_deg = 0.5 }
 'joint*.beta' = { sigma_deg = 0.5 }
 ";
 
-/// An elbow arm with three axes that are parallel up to `twist` [°].
+/// Returns an elbow arm with three axes that are parallel up to `twist` [°].
 fn elbow(twist: f64, parameters: &str) -> Problem {
     parse(&text(twist, parameters))
 }
@@ -31,7 +31,7 @@ pub fn text(twist: f64, parameters: &str) -> String {
     )
 }
 
-/// Sixty noisy poses and thirty held out, of an arm that is off by 0.1° and 1 mm.
+/// Simulates sixty noisy poses and thirty held-out ones of an arm with errors of 0.1° and 1 mm.
 pub fn measured(problem: &Problem, seed: u64) -> Dataset {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut rows = at_random(problem, 90, 2.5, &mut rng);
@@ -42,7 +42,7 @@ pub fn measured(problem: &Problem, seed: u64) -> Dataset {
     divided(60, &rows)
 }
 
-/// Lengths by name that moved by more than a centimetre.
+/// Returns the lengths that moved by more than a centimetre.
 fn far(found: &Identification) -> Vec<String> {
     let lengths = found
         .estimates
@@ -55,7 +55,7 @@ fn far(found: &Identification) -> Vec<String> {
 #[test]
 fn what_is_seen_too_weakly_is_held_and_named() {
     let free = format!("{PRIORS}'joint*.d' = {{ free = true }}\n'tool.*' = {{ free = true }}");
-    // Blind at the nominal arm, or hardly seen there; with bounds as without.
+    // Combinations are unidentifiable or weak at the nominal arm, with bounds and without.
     for (twist, bound) in
         [(0.0, ""), (0.002, ""), (0.0, "\n'joint1.a' = { sigma_mm = 3, min_mm = -50 }")]
     {
@@ -103,8 +103,8 @@ fn what_is_seen_well_enough_is_not_held() {
 
 #[test]
 fn no_trusted_parameter_leaves_the_arm() {
-    // The measuring frame is three metres above the arm's base, and nothing but a link may take
-    // that up.
+    // The measuring frame is three metres above the base of the arm, and only a link may absorb
+    // that.
     let problem = elbow(0.0, "'joint1.d' = { free = true }");
     let mut data = measured(&problem, 1);
     for position in &mut data.measurements.positions {

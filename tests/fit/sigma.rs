@@ -1,5 +1,4 @@
-//! A declared σ that the residual contradicts decides nothing: priors and data are weighed by the
-//! scatter there is.
+//! A wrongly declared σ has no influence: priors and data are weighted by the actual scatter.
 
 use crate::common::arms::{measured, parse, path};
 use flexcal::fit::{Identification, Options, identify};
@@ -9,7 +8,7 @@ use flexcal::report::estimate_text;
 use flexcal::rig::{Truth, simulate};
 use flexcal::select::{Verdict, close};
 
-/// The lunar sampler with another declared σ [m], and the measurements of a case.
+/// Reads the lunar sampler with another declared σ [m], and the measurements of a case.
 fn case(name: &str, sigma: f64) -> (Problem, Dataset) {
     let mut problem = Problem::read(&path("tests/cases/problem.toml")).unwrap();
     problem.data.position_sigma = Some(sigma);
@@ -24,8 +23,8 @@ fn fit(name: &str, sigma: f64) -> (Problem, Identification) {
     (problem, found)
 }
 
-/// Largest difference of two fits in standard errors of the first, and largest ratio of the
-/// standard errors.
+/// Returns the largest difference of two fits in standard errors of the first, and the largest
+/// ratio of standard errors.
 fn apart(one: &Identification, other: &Identification) -> (f64, f64) {
     let pairs = one.estimates.iter().zip(&other.estimates);
     let both =
@@ -90,11 +89,11 @@ fn a_sigma_of_each_row_is_raised_by_the_model_s_error() {
     data.measurements.sigma = Some(all);
     let found = identify(&problem, &data, &Options::default()).unwrap();
     let (_, alike) = fit("c-link-thermal-bending", 5e-5);
-    // Half of the rows do not rule the other half: the model's error is the same for all.
+    // Half of the rows do not dominate the others: the model error is the same for all.
     assert!(apart(&alike, &found).0 < 0.5, "{:?}", apart(&alike, &found));
 }
 
-/// What made the loop see a scale of the tracker in noise.
+/// Truth for which the loop once reported a scale error of the tracker in noise.
 const TRUTH: &str = "[random]
 'joint*' = { sigma_deg = 0.1, sigma_mm = 1 }
 'tool.*' = { sigma_mm = 1 }
@@ -110,7 +109,7 @@ q6_deg = [-180, 180]
 identification = 60
 ";
 
-/// An elbow arm by its declared σ [mm].
+/// Returns the problem of an elbow arm with a declared σ [mm].
 pub fn elbow(sigma: f64) -> String {
     format!(
         "name = 'elbow'\n[[joint]]\nd_m = 0.1273\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = -0.612\n[[joint]]\n\
@@ -120,7 +119,7 @@ pub fn elbow(sigma: f64) -> String {
     )
 }
 
-/// Its measurements on the rig, with noise of 0.05 mm.
+/// Simulates its measurements on the rig, with noise of 0.05 mm.
 pub fn simulated(seed: u64) -> Dataset {
     let problem = parse(&elbow(0.05));
     let truth = Truth::parse(TRUTH, std::path::Path::new("truth.toml"), &problem).unwrap();

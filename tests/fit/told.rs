@@ -1,5 +1,5 @@
-//! What the command line says of fits that cannot be meant, and that the estimates of those that
-//! can stay near the arm.
+//! Messages of the command line on implausible data, and estimates that stay near the arm where
+//! possible.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -15,21 +15,21 @@ use crate::common::arms::{parse, path};
 use crate::common::made::{at_random, csv, divided, draw, labels, measure, model_of};
 use crate::{judged, runaway, sigma};
 
-/// Free lengths take up any unit.
+/// Free lengths, which absorb a wrong unit.
 const LENGTHS: &str =
     "'joint*.a' = { free = true }\n'joint*.d' = { free = true }\n'tool.*' = { free = true }";
 
-/// What a command prints.
+/// Output of a command.
 struct Told {
     status: i32,
-    /// Warnings and the report.
+    /// Warnings and report.
     text: String,
-    /// estimate.json or loop.json.
+    /// Content of estimate.json or loop.json.
     json: Value,
 }
 
 impl Told {
-    /// A command on a problem, whose section `[data]` is the last, and its table.
+    /// Runs a command on a problem, whose last section is `[data]`, and a table.
     fn by(command: &str, problem: &str, table: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
@@ -55,7 +55,7 @@ impl Told {
         }
     }
 
-    /// Name, estimate, nominal value and standard error of each parameter.
+    /// Returns name, estimate, nominal value and standard error of each parameter.
     fn parameters(&self) -> impl Iterator<Item = (&str, f64, f64, Option<f64>)> {
         let number = |own: &Value, key: &str| own[key].as_f64();
         self.json["parameters"].as_array().into_iter().flatten().map(move |own| {
@@ -69,7 +69,7 @@ impl Told {
         })
     }
 
-    /// Parameters of the arm that moved by more than 0.1 m or rad.
+    /// Returns the parameters of the arm that moved by more than 0.1 m or rad.
     fn far(&self) -> Vec<String> {
         self.parameters()
             .filter(|(name, estimate, nominal, _)| {
@@ -84,10 +84,10 @@ impl Told {
     }
 }
 
-/// A case: what it is, the problem, the data, the exit status, and what has to be said.
+/// Case: description, problem, data, exit status, and required message.
 type Case = (&'static str, String, Dataset, i32, &'static str);
 
-/// Sixty poses of the arm of [`judged`] and thirty held out, spoiled.
+/// Returns sixty poses of the arm of [`judged`] and thirty held-out ones, with errors added.
 fn spoiled(
     name: &'static str,
     parameters: &str,
@@ -105,7 +105,7 @@ fn positions(data: &mut Dataset) -> &mut Vec<Vector3<f64>> {
     &mut data.measurements.positions
 }
 
-/// Rows in a session of their own, with a tool of its own where they are held out.
+/// Assigns rows to another session, with another tool if they are held out.
 fn session(rows: &'static [usize]) -> impl Fn(&mut Dataset) {
     move |data| {
         let word = |row| if rows.contains(&row) { "B" } else { "A" };
@@ -114,7 +114,7 @@ fn session(rows: &'static [usize]) -> impl Fn(&mut Dataset) {
     }
 }
 
-/// The identification rows once more in place of the first held-out ones.
+/// Replaces the first held-out rows by identification rows.
 fn copied(count: usize) -> impl Fn(&mut Dataset) {
     move |data| {
         let rows: Vec<usize> = (0..60).chain(0..count).chain(60 + count..90).collect();
@@ -122,7 +122,7 @@ fn copied(count: usize) -> impl Fn(&mut Dataset) {
     }
 }
 
-/// Seven poses of three targets, seven held out.
+/// Returns seven poses of three targets, seven of them held out.
 fn three_targets() -> Case {
     let text = judged::text(&format!("{}\n'base.*' = {{ free = true }}", judged::PRIORS));
     let problem = parse(&text);
@@ -151,7 +151,7 @@ fn spoiled_ones() -> Vec<Case> {
     let mut robust =
         spoiled("gross errors that a loss sets aside", priors, 0, "rows.csv:22", gross);
     robust.1 = robust.1.replacen("[parameters]", "[robust]\nloss = 'huber'\n[parameters]", 1);
-    // Rz(θ) Tz(d) Tx(a) Rx(α): what stands in a joint belongs to the next.
+    // Rz(θ) Tz(d) Tx(a) Rx(α): a and α of a joint belong to the next one.
     let standard = |mut case: Case| {
         let swapped = "[[joint]]\nd_m = 0.4\nalpha_deg = 90\na_m = 0.15\n[[joint]]\na_m = 0.6\n[[joint]]\nalpha_deg = -90\na_m = 0.12\n\
                        [[joint]]\nd_m = 0.62\nalpha_deg = 90\n[[joint]]\n[tool]";
@@ -199,7 +199,7 @@ fn spoiled_ones() -> Vec<Case> {
     ]
 }
 
-/// Free offsets along parallel axes, and what the measuring frame is off by.
+/// Returns cases with free offsets along parallel axes and an offset of the measuring frame.
 fn running_off() -> Vec<Case> {
     let free =
         format!("{}'joint*.d' = {{ free = true }}\n'tool.*' = {{ free = true }}", runaway::PRIORS);

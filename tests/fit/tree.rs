@@ -1,4 +1,4 @@
-//! Two arms on one torso, measured on the virtual test rig: what a fit and the loop make of it.
+//! Two arms on one torso, measured on the virtual test rig: fit and loop.
 
 use flexcal::fit::{Options, Placement, compensate, identify, seen_in_base, waypoints};
 use flexcal::measurement::{Dataset, Measurements, Split};
@@ -12,10 +12,10 @@ use std::path::Path;
 
 use crate::common::arms::{parse, path};
 
-/// Arms that are drawn.
+/// Number of arms that are drawn.
 const SEEDS: u64 = 24;
 
-/// The problem and its truth, with a piece of each exchanged.
+/// Reads the problem and its truth, with a piece of each replaced.
 fn two_arms(problem: (&str, &str), truth: (&str, &str)) -> (Problem, Truth) {
     let read = |name: &str, (old, new): (&str, &str)| {
         let text = std::fs::read_to_string(path("problems/two-arms").join(name)).unwrap();
@@ -48,7 +48,7 @@ fn the_truth_of_both_arms_comes_back_within_its_standard_errors() {
             else {
                 continue;
             };
-            // Waist and base say the same, and the truth of the waist is not nominal.
+            // Waist and base are confounded, and the truth of the waist is not nominal.
             let Some(error) = estimate.std_error.filter(|_| !estimate.name.starts_with("base"))
             else {
                 continue;
@@ -69,7 +69,7 @@ fn the_truth_of_both_arms_comes_back_within_its_standard_errors() {
         share(1.0),
         share(2.0)
     );
-    // Errors of one fit hang together: the limits are those of some 15 independent ones a fit.
+    // Errors of one fit are correlated: the limits assume about 15 independent ones per fit.
     assert!(
         z.len() > 40 * chi2.len()
             && (share(1.0) - 0.683).abs() < 0.08
@@ -78,7 +78,7 @@ fn the_truth_of_both_arms_comes_back_within_its_standard_errors() {
     assert!((mean - 1.0).abs() < 0.1);
 }
 
-/// The chest is declared rigid: the loads of both arms lean it, and both hands show it.
+/// The chest is declared rigid: the loads of both arms tilt it, and both hands show it.
 #[test]
 fn a_torso_that_gives_way_under_both_arms_is_named() {
     let effect =
@@ -103,7 +103,7 @@ fn commands_are_corrected_in_the_branch_of_their_target_alone() {
     let Placement { bases, targets, .. } = Placement::of(&data.measurements);
     let model = Model::new(&problem, &bases, &targets).unwrap();
     let mut wanted = data.measurements.select(&(0..8).collect::<Vec<_>>());
-    // The right wrist beyond its limit of 100°, where the left hand is measured.
+    // The right wrist exceeds its limit of 100° in rows that measure the left hand.
     for row in (0..8).filter(|&row| simulation.rows[row].target == "left") {
         wanted.configurations[row * 11 + 10] = 115_f64.to_radians();
     }
@@ -124,7 +124,7 @@ fn commands_are_corrected_in_the_branch_of_their_target_alone() {
     }
 }
 
-/// Six joints that move lead to the right hand, five to the left one.
+/// Six moving joints lead to the right hand, five to the left one.
 #[test]
 fn waypoints_keep_the_orientation_of_the_targets_that_can_have_one() {
     let (mut problem, truth) = two_arms(("", ""), ("", ""));

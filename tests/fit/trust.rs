@@ -1,4 +1,4 @@
-//! Fits that say nothing are not trusted, whatever the command.
+//! Fits without information are not trusted by any command.
 
 use std::fs;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 use serde_json::Value;
 
-/// A SCARA: two joints that turn, a slide, a wrist.
+/// Problem of a SCARA: two revolute joints, a prismatic one, a wrist.
 const ARM: &str = "name = 'scara'
 title = 'SCARA'
 [[joint]]
@@ -46,18 +46,18 @@ const TRUTH: &str = "[random]\n'*' = { sigma_deg = 0.05, sigma_mm = 0.3 }
 [poses]\nq1_deg = [-130, 130]\nq2_deg = [-145, 145]\nq3_mm = [0, 200]\nq4_deg = [-180, 180]\npayload_kg = [0, 2]
 approach = false\nidentification = 40\n";
 
-/// A folder with an arm and its measurements.
+/// Temporary folder with an arm and its measurements.
 struct Bench {
     folder: tempfile::TempDir,
 }
 
 impl Bench {
-    /// Sixty poses of the rig, of which `edit` makes the table that is fitted.
+    /// Simulates sixty poses on the rig; `edit` changes the table before the fit.
     fn new(parameters: &str, edit: impl Fn(Vec<&str>) -> Vec<String>) -> Self {
         let bench = Self { folder: tempfile::tempdir().unwrap() };
         fs::write(bench.path("problem.toml"), format!("{ARM}{parameters}{DATA}")).unwrap();
         fs::write(bench.path("TRUTH.toml"), TRUTH).unwrap();
-        // The folder that holds it is as good as the file.
+        // The folder may be given in place of the file.
         let out = bench.run(&[
             "simulate", ".", "--truth", ".", "--poses", "60", "--seed", "3", "--out", "rig",
         ]);
@@ -76,7 +76,7 @@ impl Bench {
         command.current_dir(self.folder.path()).args(arguments).output().unwrap()
     }
 
-    /// Status, standard output and error of a command on the arm.
+    /// Returns status, standard output and standard error of a command on the arm.
     fn command(&self, command: &str, more: &[&str]) -> (i32, String, String) {
         let out = self.run(&[&[command, ".", "--out", "out"], more].concat());
         let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
@@ -88,7 +88,7 @@ impl Bench {
     }
 }
 
-/// Header, `count` identification rows, each of the first `poses` ones again and again, and the
+/// Returns the header, `count` identification rows that repeat the first `poses` ones, and the
 /// held-out rows.
 fn repeated(lines: &[&str], poses: usize, count: usize) -> Vec<String> {
     let of = |word: &str| {
@@ -117,7 +117,7 @@ fn poses_measured_again_decide_nothing() {
         status == 1 && err.contains("3 measured coordinates for 6 parameters without a prior"),
         "{err}"
     );
-    // Enough of them need no word, and so do those that are measured again.
+    // Enough different poses need no remark, and neither do repeated ones among them.
     for all in [
         Bench::new(PRIORS, |lines| repeated(&lines, 8, 30)),
         Bench::new(BASE, |lines| repeated(&lines, 3, 3)),
@@ -151,7 +151,7 @@ fn a_check_does_not_trust_what_a_fit_would_not() {
         status == 1 && err.contains("1 of the 30 poses differ and measure 3 coordinates"),
         "{err}"
     );
-    // The second joint never moves: what it would tell, poses within its limits would.
+    // The second joint never moves, but poses within its limits would determine its parameter.
     let free = "[parameters]\n'joint1.theta' = { free = true }\n'joint2.theta' = { free = true }\n'joint3.a' = { free = true }\n";
     let still = |lines: Vec<&str>| {
         let hold = |(k, line): (usize, &&str)| {
@@ -193,7 +193,7 @@ fn poses_are_different_where_it_matters() {
     let soft = rigid.replacen("d_m = 0.35", "d_m = 0.35\nstiffness_N_m_per_rad = 4e4", 1);
     let same = |_: usize, _: &mut Vec<String>| {};
     assert_eq!(count(&rigid, &same), [0, 1, 0, 1]);
-    // Encoders read what they read.
+    // Encoder readings scatter.
     let noisy = |row: usize, cells: &mut Vec<String>| {
         if row > 0 {
             cells[2] = (cells[2].parse::<f64>().unwrap() + 0.002 * row as f64).to_string();
@@ -227,7 +227,7 @@ fn wrong_units_are_told_before_anything_else() {
         status == 1 && err.contains("misses the measurements by") && err.contains("check units"),
         "{err}"
     );
-    // Also where the fit did not converge.
+    // The message also appears if the fit did not converge.
     let problem = Problem::read(&metres.path("problem.toml")).unwrap();
     let fit = |table: &str, max_steps| {
         let (data, _) = Dataset::read_files(&[metres.path(table)], &problem).unwrap();
@@ -240,7 +240,7 @@ fn wrong_units_are_told_before_anything_else() {
         "otherwise this shows nothing: {}",
         stopped.termination
     );
-    // An arm that was near is not blamed for a solver that is stopped.
+    // A fit that was stopped close to the arm does not suspect its units.
     let near = fit("rig/measurements.csv", Some(1));
     assert!(near.has(FindingCode::NotConverged), "{:?}", near.findings);
     let radians = Bench::new(PRIORS, |lines| {
@@ -299,7 +299,7 @@ fn a_mistyped_column_is_an_error_and_other_warnings_are_in_the_report() {
             format!("m.csv:1: column {name}: not a column that is known; a letter off {meant}");
         assert!(status == 2 && err.contains(&expected), "{name}: {err}");
     }
-    // Of another name, or of what decides nothing, it is passed over.
+    // A column with another name, or without influence, only gives a warning.
     for name in ["room", "post"] {
         let bench = with(name);
         let (status, _, err) = bench.command("identify", &[]);
@@ -354,7 +354,7 @@ fn nothing_that_is_printed_is_infinite() {
             assert_eq!(numbers(&csv), 0, "{huge}: {csv}");
         }
     }
-    // Priors that say everything or nothing.
+    // Extremely narrow or wide priors.
     for sigma in ["1e-300", "1e300", "1e-12"] {
         let rules = format!(
             "[parameters]\n'joint*.*' = {{ sigma_deg = {sigma}, sigma_mm = {sigma} }}\n'tool.*' = {{ sigma_mm = {sigma} }}\n"

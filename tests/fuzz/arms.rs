@@ -1,6 +1,6 @@
-//! Small arms with everything that their commands read; a fit of one takes a moment.
+//! Small arms with every input that commands read, whose fit is fast.
 
-/// A file of a folder with its text.
+/// File names with their texts.
 pub type Texts = Vec<(&'static str, Vec<u8>)>;
 
 const RIGID: &str = "name = \"arm\"\ntitle = \"Two joints and a slide\"\n[[joint]]\nd_m = 0.3\nmin_deg = -170\nmax_deg = 170\n\
@@ -34,7 +34,7 @@ const TARGETS: [&str; 2] = [
     "q1_deg,q2_deg,q3_deg,x_mm,y_mm,z_mm,payload_kg\n10,20,-30,1060,190,250,1\n-40,30,-60,900,-700,200,0\n",
 ];
 
-/// The files of an arm but those that commands make of them: measurements, and an estimate.
+/// Returns the input files of an arm, without measurements and estimate, which commands make.
 pub fn texts(elastic: bool) -> Texts {
     let (problem, truth) = if elastic { (ELASTIC, ELASTIC_TRUTH) } else { (RIGID, RIGID_TRUTH) };
     let poses = &truth[truth.find("[poses]").unwrap()..];

@@ -1,5 +1,5 @@
-//! The whole program on mutated inputs: exit status, time, memory, JSON, finite numbers, nothing
-//! written on bad input, the same for any number of threads.
+//! The program on mutated inputs: exit status, time, memory, JSON, finite numbers, no output after
+//! bad input, and the same results for any number of threads.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -17,7 +17,7 @@ use super::arms::{Texts, texts};
 use super::mutation::mutated;
 use super::run::{LONGEST, Ran, files, flexcal};
 
-/// Commands with what each reads; the first file is mutated most.
+/// Commands with the files that each reads; the first file is mutated most often.
 const COMMANDS: [(&str, &[&str]); 18] = [
     ("identify .", &["problem.toml", "rows.csv"]),
     ("identify . --strategy sequential", &["problem.toml", "rows.csv"]),
@@ -45,7 +45,7 @@ const COMMANDS: [(&str, &[&str]); 18] = [
     ("study .", &["STUDY.toml", "problem.toml", "TRUTH.toml"]),
 ];
 
-/// Both arms with what their commands make of them.
+/// Both arms with the files that commands make of them.
 struct Arms([Texts; 2]);
 
 impl Arms {
@@ -75,7 +75,7 @@ fn write(folder: &Path, texts: &Texts) {
     }
 }
 
-/// What input k does wrong; its status and time.
+/// Runs a command on input k and returns its status and time, or a description of the failure.
 fn tried(k: u64, arms: &Arms, place: &Path) -> Result<(i32, Duration), String> {
     let mut random = ChaCha8Rng::seed_from_u64(k);
     let (command, reads) = COMMANDS[random.random_range(0..COMMANDS.len())];
@@ -155,7 +155,7 @@ fn tried(k: u64, arms: &Arms, place: &Path) -> Result<(i32, Duration), String> {
     Ok((status, ran.time))
 }
 
-/// What was printed without times.
+/// Returns the printed output without durations.
 fn timeless(ran: &Ran) -> Value {
     fn without(value: &mut Value) {
         match value {
@@ -172,11 +172,11 @@ fn timeless(ran: &Ran) -> Value {
     value
 }
 
-/// A word for a number that is none, as Rust writes it; inputs hold none.
+/// Returns a word for a number that is not finite, as Rust writes it; inputs contain none.
 fn not_finite(text: &str) -> Option<&'static str> {
     let is_word = |word: &str| {
         text.match_indices(word).any(|(place, _)| {
-            // In quotes stands what a reader would have taken.
+            // Quoted words are alternatives that a reader would accept.
             let letter = |c: char| c.is_alphanumeric() || "_`\"".contains(c);
             !text[..place].ends_with(letter) && !text[place + word.len()..].starts_with(letter)
         })
@@ -184,8 +184,7 @@ fn not_finite(text: &str) -> Option<&'static str> {
     ["NaN", "inf"].into_iter().find(|word| is_word(word))
 }
 
-/// Tries so many inputs from `from` on, on every core; says what came of them, and keeps what
-/// failed.
+/// Runs `count` inputs from `from` on in parallel, reports the results, and keeps failed inputs.
 fn run(from: u64, count: u64) {
     let folder = tempfile::tempdir().unwrap();
     let arms = Arms::new(folder.path());

@@ -1,9 +1,9 @@
-//! How a text is changed.
+//! Mutations of a text.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Pieces that mean something to some reader.
+/// Pieces with a meaning to some reader.
 const PIECES: [&[u8]; 24] = [
     b"\0",
     b"\xff",
@@ -31,13 +31,13 @@ const PIECES: [&[u8]; 24] = [
     b"true",
 ];
 
-/// Numbers at which something may break.
+/// Numbers that are likely to cause failures.
 const NUMBERS: [&str; 22] = [
     "0", "-0.0", "1", "-1", "2", "3", "0.5", "1e-9", "-1e-9", "1e-160", "1e-308", "1e9", "-1e9",
     "1e20", "1e77", "1e150", "-1e150", "1e151", "90", "180", "-180", "360",
 ];
 
-/// A text changed in one to three places.
+/// Mutates a text in one to three places.
 pub fn mutated(text: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
     let mut text = text.to_vec();
     for _ in 0..random.random_range(1..4) {
@@ -50,7 +50,7 @@ pub fn mutated(text: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
     text
 }
 
-/// One of its numbers replaced.
+/// Replaces one of the numbers.
 fn with_another_number(text: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
     let is_part = |byte: &u8| byte.is_ascii_digit() || b".-+eE".contains(byte);
     let mut numbers = Vec::new();
@@ -73,7 +73,7 @@ fn with_another_number(text: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
     [&text[..first], other, &text[end..]].concat()
 }
 
-/// A line taken out, doubled, or put elsewhere.
+/// Removes, duplicates or moves a line.
 fn with_other_lines(text: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
     let mut lines: Vec<&[u8]> = text.split_inclusive(|byte| *byte == b'\n').collect();
     if lines.len() < 2 {
@@ -88,7 +88,7 @@ fn with_other_lines(text: &[u8], random: &mut ChaCha8Rng) -> Vec<u8> {
     lines.concat()
 }
 
-/// Cut off, a piece put in, taken out or doubled.
+/// Truncates the text, or inserts, removes or duplicates a piece.
 fn with_other_bytes(mut text: Vec<u8>, random: &mut ChaCha8Rng) -> Vec<u8> {
     let place = random.random_range(0..=text.len());
     let end = (place + random.random_range(0..40)).min(text.len());

@@ -1,28 +1,28 @@
-//! One run of the program, watched.
+//! One run of the program with limits on time and memory.
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Most time of the processors that a run may take [s].
+/// Largest processor time of a run [s].
 pub const LONGEST: u64 = 20;
-/// Time after which it hangs, or the machine has too much to do.
+/// Time after which a run counts as hanging.
 const PATIENCE: Duration = Duration::from_secs(600);
-/// Largest memory that it may ask for [KiB].
+/// Largest address space of a run [KiB].
 const MEMORY: u64 = 2 << 20;
 
-/// What came of a run.
+/// Outcome of a run.
 pub struct Ran {
-    /// Exit status; none of a run that was ended from outside.
+    /// Exit status; `None` if the run was killed.
     pub status: Option<i32>,
-    /// By the clock.
+    /// Elapsed time of the run.
     pub time: Duration,
     pub out: String,
     pub err: String,
 }
 
-/// Runs the program in a folder; what it prints goes through files beside it.
+/// Runs the program in a folder; its output is redirected to files.
 pub fn flexcal(folder: &Path, arguments: &[&str], threads: usize) -> Ran {
     let printed = [folder.with_extension("out"), folder.with_extension("err")];
     let limited = format!("ulimit -v {MEMORY}; ulimit -t {LONGEST}; exec \"$0\" \"$@\"");
@@ -55,7 +55,7 @@ pub fn flexcal(folder: &Path, arguments: &[&str], threads: usize) -> Ran {
     Ran { status, time, out, err }
 }
 
-/// Every file below a folder.
+/// Returns every file below a folder.
 pub fn files(folder: &Path) -> Vec<PathBuf> {
     let mut all = Vec::new();
     let mut folders = vec![folder.to_owned()];

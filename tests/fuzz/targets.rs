@@ -1,5 +1,5 @@
-//! Each reader of the library on mutations of its corpus: it accepts them, or says what is wrong on
-//! one line.
+//! Readers of the library on mutations of their corpus: each accepts the text or reports an error
+//! on one line.
 
 use std::error::Error;
 use std::fs;
@@ -20,12 +20,12 @@ use rand_chacha::ChaCha8Rng;
 use super::arms::texts;
 use super::mutation::mutated;
 
-/// Mutations of each file of the corpus in the short run.
+/// Number of mutations of each corpus file in the short run.
 const SHORT: u64 = 100;
 
-/// What a reader says of a text.
+/// Result of a reader.
 type Said = Result<(), Box<dyn Error>>;
-/// A reader, by the name of its folder in the corpus.
+/// Reader with the name of its folder in the corpus.
 type Target = (&'static str, fn(&[u8], &Bench) -> Said);
 const TARGETS: [Target; 7] = [
     ("problem", problem),
@@ -37,7 +37,7 @@ const TARGETS: [Target; 7] = [
     ("urdf", urdf),
 ];
 
-/// A folder to put files in, and an arm for what is read against one.
+/// Temporary folder for files, with an arm for inputs that need one.
 struct Bench {
     folder: tempfile::TempDir,
     arm: Problem,
@@ -71,7 +71,7 @@ fn problem(text: &[u8], bench: &Bench) -> Said {
 
 fn table(text: &[u8], bench: &Bench) -> Said {
     let (data, _) = Dataset::read_files(&[bench.file("rows.csv", text)], &bench.arm)?;
-    // Whatever can be read can be fitted, or said not to be.
+    // A readable table can be fitted, or gives an error.
     let _ = identify(&bench.arm, &data, &Options::default());
     Ok(())
 }
@@ -98,7 +98,7 @@ fn targets(text: &[u8], bench: &Bench) -> Said {
 
 fn estimate(text: &[u8], bench: &Bench) -> Said {
     let saved = SavedEstimate::read(&bench.file("estimate.json", text))?;
-    // Whatever can be read can be applied, or said not to be of this arm.
+    // A readable estimate can be applied, or is refused as one of another arm.
     match predict(&bench.arm, Some(&saved), &bench.rows, None) {
         Err(PredictError::Estimate(error)) => Err(error.into()),
         _ => Ok(()),
@@ -114,7 +114,7 @@ fn urdf(text: &[u8], bench: &Bench) -> Said {
     Ok(())
 }
 
-/// The files that a reader begins with.
+/// Returns the corpus files of a reader.
 fn corpus(name: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(name);
     let mut paths: Vec<PathBuf> =

@@ -1,4 +1,4 @@
-//! Whole identifications of the example cases and of a measured robot.
+//! Identification of the example cases and of a measured robot.
 
 #![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
 
@@ -11,7 +11,7 @@ use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
-/// Fits one of `tests/cases`: held-out rms of the norm below `limit_mm`, χ² within its 99.9 %
+/// Fits a case of `tests/cases`: held-out rms of the norm below `limit_mm`, χ² within its 99.9 %
 /// limits.
 fn check(case: &str, limit_mm: f64) {
     let problem = Problem::read(&path("tests/cases")).unwrap();
@@ -32,8 +32,8 @@ fn check(case: &str, limit_mm: f64) {
     assert!(low < chi2 && chi2 < high, "{case}: χ²/ν {chi2} is outside of {low:.3} to {high:.3}");
 }
 
-/// 99.9 % limits of χ²/ν with ν no larger than the coordinates less the parameters that the data
-/// gave.
+/// Returns the 99.9 % limits of χ²/ν, with ν at most the number of coordinates less the effective
+/// parameters.
 fn chi2_limits(found: &Identification) -> (f64, f64) {
     let given: f64 = found.estimates.iter().map(|estimate| estimate.identified).sum();
     let freedom = found.coordinates as f64 - given;
@@ -51,7 +51,7 @@ fn two_hundred_poses_of_the_lunar_sampler() {
     check("tests/cases/h-none-large.csv", 0.10);
 }
 
-/// Folder of the measured UR10, where it is at hand.
+/// Returns the folder of the measured UR10, if available.
 fn ur10() -> Option<PathBuf> {
     let folder = std::env::var_os("FLEXCAL_UR10_DATA")
         .map_or_else(|| path("../shared/measured/ur10-ipa"), PathBuf::from);
@@ -61,7 +61,7 @@ fn ur10() -> Option<PathBuf> {
 #[test]
 fn three_sessions_of_a_measured_ur10() {
     let Some(folder) = ur10() else {
-        // Not by `eprintln!`: what that writes is shown for failed tests alone.
+        // `eprintln!` would show its text for failed tests only.
         let why =
             "no session_A.csv of the measured UR10 at hand; name its folder in FLEXCAL_UR10_DATA";
         writeln!(std::io::stderr().lock(), "three_sessions_of_a_measured_ur10 skipped: {why}")

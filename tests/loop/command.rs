@@ -1,5 +1,4 @@
-//! `trace` and `loop` as users meet them: what they write, key by key, and that the closed problem
-//! is input again.
+//! Commands `trace` and `loop`: their results, key by key, and the closed problem as input.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -9,16 +8,16 @@ use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 use serde_json::Value;
 
-/// A case whose arm has a link that bows with temperature.
+/// Case with a link that bends with temperature.
 const THERMAL: &str = "c-link-thermal-bending.csv";
-/// A case without any effect.
+/// Case without an effect.
 const NONE: &str = "a-none.csv";
-/// A case with two effects.
+/// Case with two effects.
 const TWO: &str = "f-two.csv";
-/// A case with an effect that the catalogue does not hold.
+/// Case with an effect outside the catalogue.
 const OUTSIDE: &str = "g-not-in-catalogue.csv";
 
-/// A folder with the lunar sampler's problem and the data of one case, in a folder of its own.
+/// Temporary folder with the lunar sampler's problem and the data of one case.
 struct Bench {
     folder: tempfile::TempDir,
 }
@@ -56,13 +55,13 @@ impl Bench {
             .assert()
     }
 
-    /// The JSON of a run that succeeds.
+    /// Returns the JSON of a run that succeeds.
     fn json(&self, arguments: &[&str]) -> Value {
         let assert = self.run(&[arguments, &["--json"]].concat()).success();
         serde_json::from_slice(&assert.get_output().stdout).unwrap()
     }
 
-    /// What a run that succeeds prints.
+    /// Returns the printed output of a run that succeeds.
     fn told(&self, arguments: &[&str]) -> String {
         text(&self.run(arguments).success().get_output().stdout)
     }
@@ -72,7 +71,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
 }
 
-/// Every key is there.
+/// Asserts that every key exists.
 fn has(value: &Value, keys: &[&str]) {
     for key in keys {
         assert!(value.get(key).is_some(), "{key} missing in {value:#}");
@@ -91,7 +90,7 @@ fn is_summary(value: &Value, poses: u64) {
     }
 }
 
-/// Fits from different starts end within the solver's tolerance of each other, far below any noise.
+/// Asserts that two results agree within the solver's tolerance, far below any noise.
 fn are_alike(one: &Value, other: &Value) {
     if let (Value::Object(one), Value::Object(other)) = (one, other) {
         assert!(one.keys().eq(other.keys()), "{one:?} {other:?}");
@@ -263,7 +262,7 @@ fn structure_without_a_name_is_said_to_be_left() {
         left["where"].is_string() && left["depends_on"][0].is_string() && left["p_value"].is_f64()
     );
     is_summary(&left["held_out_with_empirical_correction"], 50);
-    // Lines break anywhere.
+    // The output is compared without line breaks.
     let told = bench.told(&["loop", "arm", "-v"]).split_whitespace().collect::<Vec<_>>().join(" ");
     for words in
         ["Unexplained", "What remains", left["where"].as_str().unwrap(), "it keeps its last value"]

@@ -1,5 +1,5 @@
-//! An effect that no catalogue holds, added by a user of the library without touching it: declared,
-//! fitted, traced and found by the loop. The walk-through of docs/effects.md.
+//! Effect added by a user of the library: declared, fitted, traced and found by the loop, as
+//! described in docs/effects.md.
 
 use crate::common::arms::golden_problem;
 use crate::common::made::{at_random, divided, normal};
@@ -16,8 +16,8 @@ use nalgebra::{DVector, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// A motor that warms up while the arm works: its joint creeps with time, and sags by a bump of the
-/// payload that it carries.
+/// Motor that warms up during operation: its joint drifts with time, and sags as a bump function of
+/// the payload.
 #[derive(Debug)]
 struct Creep {
     /// Number of the joint, from 1.
@@ -55,7 +55,7 @@ fn creep(joint: usize) -> Effect {
     Effect::custom(Creep { joint })
 }
 
-/// Terms of any kind, at no place.
+/// Effect with arbitrary terms and no place.
 #[derive(Debug)]
 struct Terms(&'static str, Vec<Term>);
 
@@ -91,7 +91,7 @@ fn bench() -> (Problem, Measurements) {
     (problem, rows)
 }
 
-/// Measurements in which joint 3 creeps and sags by these amounts.
+/// Simulates measurements in which joint 3 drifts and sags by these amounts.
 fn crept(rate: f64, sag: f64) -> (Problem, Dataset) {
     let (problem, mut rows) = bench();
     let declared = problem.with_effect(creep(3));
@@ -141,7 +141,7 @@ fn trace_and_loop_find_it() {
     let closure = close(&problem, &data, &options).unwrap();
     assert!(closure.effects.iter().any(|found| found.effect == creep(3)), "{:?}", closure.effects);
     assert_eq!(closure.before.describe(&creep(3)), "the motor of joint 3 creeps\nand = [sags");
-    // What it says of itself stays a comment of the closed problem, in however many lines it does.
+    // The description stays a comment of the closed problem, over any number of lines.
     let text = std::fs::read_to_string(crate::common::arms::golden("problem.toml")).unwrap();
     let closed = flexcal::report::closed_problem(&text, &problem, &closure, &[]).unwrap();
     assert!(

@@ -1,8 +1,8 @@
-//! Explanations of residuals whose cause is often in no catalogue: data of an independent
-//! simulator, noise 0.05 mm a coordinate.
+//! Evidence for residuals whose cause is often outside the catalogue: data of an independent
+//! simulator, noise of 0.05 mm per coordinate.
 //!
-//! `out-*`: the lunar sampler with one cause that no effect holds; `six-*`: an arm of six joints
-//! with about 1 kN·m at joint 2 and none to two effects of the catalogue.
+//! `out-*`: the lunar sampler with one cause that no effect describes. `six-*`: an arm of six
+//! joints, with about 1 kN·m at joint 2, and zero to two effects of the catalogue.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde_json::Value;
 
-/// A law that is stated: from this probability on.
+/// Probability from which a law is stated.
 const STATED: f64 = 0.9;
 
 fn folder() -> PathBuf {
@@ -35,7 +35,7 @@ fn truths(prefix: &str) -> Vec<(String, Value)> {
     all.into_iter().filter(|(name, _)| name.starts_with(prefix)).collect()
 }
 
-/// With rules before those of the problem.
+/// Computes the evidence of a data set, with rules before those of the problem.
 fn of(problem: &str, rules: &str, name: &str) -> Evidence {
     let path = folder().join(problem);
     let text = fs::read_to_string(&path).unwrap().replacen(
@@ -48,7 +48,7 @@ fn of(problem: &str, rules: &str, name: &str) -> Evidence {
     trace(&problem, &data, &Options::default()).unwrap().evidence.unwrap()
 }
 
-/// Effects whose law is stated.
+/// Returns the effects whose law is stated.
 fn stated(evidence: &Evidence) -> Vec<String> {
     let stated = |hypothesis: &&Hypothesis| {
         hypothesis.effect().is_some() && evidence.claims(hypothesis).law.1 >= STATED
@@ -57,16 +57,16 @@ fn stated(evidence: &Evidence) -> Vec<String> {
     evidence.best().iter().filter(stated).filter_map(name).collect()
 }
 
-/// Families that hold a cause of the cases outside the catalogue, switched off.
+/// Rules that switch off families which hold a cause of the cases outside the catalogue.
 const UNKNOWN: &str = "'frame-strain*' = { fixed = true }\n'payload-backlash*' = { fixed = true }\n'tracker-settling*' = { fixed = true }\n\
                        'joint-wave*' = { fixed = true }\n'twist-bending*' = { fixed = true }\n'*-lag*' = { fixed = true }\n\
                        'joint-hysteresis*' = { fixed = true }\n";
-/// The causes that they hold.
+/// Cases whose causes these families hold.
 const BY_NOW: [(&str, &str); 8] = [
     ("out-frame", "frame-strain"),
     ("out-payload", "payload-backlash"),
     ("out-settling", "tracker-settling"),
-    // Beyond the harmonics that are listed.
+    // The order is above the listed harmonics.
     ("out-order-100", "joint-harmonic"),
     ("out-twist", "twist-bending"),
     ("out-hysteresis", "joint-hysteresis"),
@@ -103,7 +103,7 @@ fn causes_outside_the_catalogue_are_located_and_get_no_law() {
     }
     assert_eq!(cases.len(), 17);
     assert!(lost.is_empty(), "not located: {lost:?}");
-    // Settling that is over after a few poses looks like a move of the station.
+    // Settling that ends after a few poses resembles a move of the station.
     assert!(wrong.len() <= 1, "wrong laws stated: {wrong:?}");
 }
 
@@ -128,7 +128,7 @@ fn effects_of_a_heavy_arm_are_named() {
         }
         for effect in effects {
             let wanted = effect["effect"].as_str().unwrap();
-            // With a first joint that stands upright, its tilt is the base's.
+            // A tilt of an upright first joint is confounded with one of the base.
             let aliases = ["base-compliance", "joint-lateral-compliance"];
             let is_it = |hypothesis: &Hypothesis| {
                 let own = hypothesis.effect().map(Effect::name);
@@ -153,8 +153,8 @@ fn noise_explains_itself() {
     }
 }
 
-/// Seven joints as those of a light arm: α \[°\], a and d \[m\], and mass \[kg\] and centre \[m\]
-/// of each link.
+/// Seven joints like those of a light arm: α \[°\], a and d \[m\], mass \[kg\] and centre of mass
+/// \[m\] of each link.
 const SEVEN: [(f64, f64, f64, f64, [f64; 3]); 7] = [
     (0.0, 0.0, 0.333, 4.97, [0.0, 0.0, -0.05]),
     (-90.0, 0.0, 0.0, 0.65, [0.0, -0.03, 0.0]),
@@ -184,7 +184,7 @@ fn noise_in_which_a_reading_follows_the_last_is_called_that() {
         (&HypothesisKind::Wandering, Site::Measurement, &[Covariate::Time][..])
     );
     assert!(evidence.probability(|own| own.kind == HypothesisKind::Wandering) >= STATED);
-    // A drift that goes to and fro once in all is smooth: it does not wander.
+    // A drift with a single oscillation is smooth, not a random walk.
     let (mut data, _) = Dataset::read_files(&[cases.join("h-none-large.csv")], &problem).unwrap();
     let last = data.measurements.time.iter().copied().fold(0.0, f64::max);
     for (position, time) in data.measurements.positions.iter_mut().zip(&data.measurements.time) {
@@ -199,7 +199,7 @@ fn noise_in_which_a_reading_follows_the_last_is_called_that() {
     assert!(evidence.probability(|own| own.kind == HypothesisKind::Wandering) < 1.0 - STATED);
 }
 
-/// The arm with the masses of its links, or without.
+/// Returns the arm with the masses of its links, or without.
 fn seven(masses: bool) -> Problem {
     use std::fmt::Write as _;
     let mut text = "name = 'seven'\n".to_owned();
@@ -278,7 +278,8 @@ fn a_fixed_point_measured_again_speaks_for_or_against_a_drift() {
     }
 }
 
-/// A column with a lift and a boom that carries a payload at its end; the boom runs along +z or −z.
+/// Returns a column with a lift and a boom with a payload at its end; the boom extends along +z or
+/// −z.
 fn boom(turned: f64) -> Problem {
     let text = format!(
         "name = 'boom'\n[[joint]]\nd_m = 0.4\n[[joint]]\nkind = 'prismatic'\n[[joint]]\nkind = 'prismatic'\nalpha_deg = {turned}\n\
@@ -349,7 +350,7 @@ fn what_follows_a_covariate_is_named_and_other_functions_of_it_are_not() {
         let evidence = trace(&problem, &data, &Options::default()).unwrap().evidence.unwrap();
         assert_eq!(stated(&evidence), ["covariate"], "{:?}", evidence.best());
         assert_eq!(evidence.best()[0].site.to_string(), name);
-        // The same quantity told by a curve of it: no line is its law.
+        // A curved function of the same quantity is no linear law.
         let bent = |value: &mut f64| *value = (*value / 2.0).powi(3);
         data.measurements.covariates.iter_mut().step_by(2).for_each(bent);
         data.measurements
@@ -383,7 +384,7 @@ fn a_station_that_is_set_up_anew_moves_and_turns() {
     let closure = close(&problem, &data, &Options::default()).unwrap();
     let [found] = closure.effects.as_slice() else { panic!("{:?}", closure.effects) };
     let Effect::StationMove { at_time: moved } = found.effect else { panic!("{found:?}") };
-    // Between the same two poses.
+    // Both shifts are between the same two poses.
     let before = |time: f64| data.measurements.time.iter().filter(|own| **own < time).count();
     assert_eq!(before(moved), before(at_time), "{moved}");
     assert!((found.status == Status::Found) && closure.verdict == Verdict::Explained, "{found:?}");
@@ -391,8 +392,8 @@ fn a_station_that_is_set_up_anew_moves_and_turns() {
     for (own, truth) in found.estimates.iter().zip(truth) {
         assert!((own.estimate - truth).abs() < 4.0 * own.std_error.unwrap(), "{own:?} {truth}");
     }
-    // Three fixed points that moved and turned with it say so, and such that stayed where they were
-    // say that it did not.
+    // Three fixed points that moved with the station confirm the move; points that stayed
+    // contradict it.
     let turn = Rotation3::new(Vector3::from(turn.map(f64::to_radians)));
     for (moves, says) in
         [(true, ReferenceVerdict::Corroborated), (false, ReferenceVerdict::Contradicted)]
@@ -564,8 +565,7 @@ fn an_order_between_whole_numbers_is_neither_where_a_joint_moves_little() {
             evidence.sets[0]
         );
     }
-    // A whole number is the more common one, and a wave of no whole number is not ruled out beside
-    // it.
+    // An integer order is more common, but a non-integer wave is not excluded.
     for seed in 1..=4 {
         let evidence = evidence(whole, seed);
         let wave = evidence
@@ -592,7 +592,7 @@ fn an_outlier_among_few_poses_is_set_aside_and_named() {
             "{:?}",
             closure.unexplained
         );
-        // Words alone: where its lines break depends on the length of the file's name.
+        // Line breaks depend on the length of the file name, so only words are compared.
         let text = flexcal::report::loop_text(&problem, &closure);
         let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(
@@ -610,7 +610,7 @@ fn beside_a_fit_that_is_not_to_be_trusted_nothing_is_claimed() {
     let (Dataset { mut measurements, split }, _) =
         Dataset::read_files(&[cases.join("a-none.csv")], &problem).unwrap();
     let joints = measurements.joints;
-    // Degrees taken for radians.
+    // Degrees are read as radians.
     measurements
         .configurations
         .iter_mut()

@@ -1,5 +1,5 @@
-//! Joints with harmonics of many orders: all orders, one prior, no harm where nothing was measured;
-//! and as much is found from any number of poses in any order.
+//! Joints with harmonics of many orders: all orders under one prior, no harm outside the measured
+//! range, and the same result for any number and order of poses.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -17,12 +17,12 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 const POSES: usize = 1500;
-/// Orders of each joint that is not true to its command.
+/// Number of orders of each joint with an error.
 const ORDERS: u32 = 24;
-/// Where the part of joint 1's range begins that is held out [rad].
+/// Start of the held-out part of the range of joint 1 [rad].
 const BEYOND: f64 = 0.8;
 
-/// Three joints and two links without weight.
+/// Returns an arm of three joints and two massless links.
 fn arm() -> Problem {
     parse(
         "name = 'wavy'\n[[joint]]\nd_m = 0.3\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = 0.6\n[tool]\n\
@@ -31,7 +31,7 @@ fn arm() -> Problem {
     )
 }
 
-/// The arm as it is, measured: waves of joints 1 and 2, high orders smaller than low ones.
+/// Simulates the arm with waves of joints 1 and 2, whose amplitude decreases with the order.
 fn measured(problem: &Problem, random: &mut ChaCha8Rng) -> Measurements {
     let mut text =
         "[random]\n'joint*.theta' = { sigma_deg = 0.1 }\n[noise]\nposition_sigma_mm = 0.05\n\
@@ -51,7 +51,7 @@ fn measured(problem: &Problem, random: &mut ChaCha8Rng) -> Measurements {
     table(&simulate(problem, &truth, POSES, 3).unwrap().rows)
 }
 
-/// Orders of a declared effect.
+/// Returns the orders of a declared effect.
 fn orders(declared: &EffectDeclaration) -> Option<&Vec<u32>> {
     match &declared.effect {
         Effect::JointHarmonic { orders, .. } => Some(orders),
@@ -59,12 +59,12 @@ fn orders(declared: &EffectDeclaration) -> Option<&Vec<u32>> {
     }
 }
 
-/// Whether every order up to the highest is there.
+/// Returns true if every order up to the highest is present.
 fn is_dense(orders: &[u32]) -> bool {
     orders.len() > 5 && (1..).zip(orders).all(|(order, known)| order == *known)
 }
 
-/// Root mean square of the length of errors at some rows [m].
+/// Returns the root mean square error length at some rows [m].
 fn rms(problem: &Problem, measured: &Measurements, found: &Identification, rows: &[usize]) -> f64 {
     let predicted = predicted(problem, measured, &found.x);
     let squares: f64 =
@@ -119,7 +119,7 @@ fn many_waves_fade_out_where_nothing_was_measured() {
     assert!(closure.effects.iter().all(|found| found.p_value < 0.05), "{:?}", closure.effects);
 }
 
-/// Two joints, each with twelve harmonics, and little else.
+/// Returns a problem of two joints, each with twelve harmonics.
 fn two_joints() -> Problem {
     parse(
         "name = 'two joints'\n[[joint]]\nd_m = 0.3\n[[joint]]\nalpha_deg = 90\n[tool]\ntarget_m = [0.5, 0.05, 0.0]\n\
@@ -127,8 +127,8 @@ fn two_joints() -> Problem {
     )
 }
 
-/// The verdict and the effects by name, place and orders, on the first `identification` rows; the
-/// last hundred are held out.
+/// Returns the verdict and the effects by name, place and orders, from the first `identification`
+/// rows; the last hundred are held out.
 fn found(
     problem: &Problem,
     measured: &Measurements,

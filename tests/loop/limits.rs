@@ -1,4 +1,4 @@
-//! Limits that bind: one that is wrong is said to be, and is no effect.
+//! Active limits: a wrong limit is reported and is no effect.
 
 use std::path::Path;
 
@@ -29,7 +29,7 @@ fn a_link_longer_than_its_tolerance_is_no_effect() {
         said.contains("The limit of joint4.a, which holds the fit, is most probably wrong"),
         "{said}"
     );
-    // Nothing was tried in its place.
+    // No effect is tried in its place.
     assert!(
         !said.contains("No effect of the catalogue") && !said.contains("No empirical correction"),
         "{said}"

@@ -1,4 +1,4 @@
-//! From a fit to the cause of what it leaves: screening, evidence, rules, checks, the command.
+//! From a fit to the causes of its residual: screening, evidence, rules, checks, commands.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 

@@ -1,5 +1,5 @@
-//! Score screening: a candidate whose derivative is not a number is named as such, and the others
-//! are judged without it.
+//! Score screening: a candidate whose derivative is not a number is named, and the others are
+//! tested without it.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use flexcal::model::parameter::{ParameterSite, Regressor};
 use flexcal::problem::{Effect, Problem};
 use flexcal::select::{NOT_FINITE, trace};
 
-/// A drift with the temperature above one that no thermometer shows.
+/// Drift with the temperature relative to a reference that is not a number.
 #[derive(Debug)]
 struct Endless;
 

@@ -1,4 +1,4 @@
-//! docs/selection.md has every number of the search, and each as it is.
+//! Agreement of docs/selection.md with the numbers of the search.
 
 use std::fs;
 use std::path::Path;

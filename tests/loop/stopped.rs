@@ -1,4 +1,4 @@
-//! A loop that is stopped claims nothing of what it did not look at.
+//! A stopped loop claims nothing on hypotheses that it did not test.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -1,5 +1,4 @@
-//! Arms of several kinds, what each may do beyond its declared parameters, and what they are
-//! measured against.
+//! Arms of several kinds, effects that they may have, and fixtures they are measured against.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -10,24 +9,24 @@ use nalgebra::Vector3;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// A key of `[[effect]]` and its value.
+/// Key of `[[effect]]` with its value.
 pub type Strength = (&'static str, f64);
-/// An effect as TRUTH.toml declares it, and its strengths.
+/// Effect as TRUTH.toml declares it, with its values.
 pub type Lacking = (&'static str, &'static [Strength]);
 
-/// An arm, where its joints go, and effects as TRUTH.toml writes them at a size that nobody
-/// overlooks.
+/// Arm with the ranges of its joints, and effects of clearly visible size as TRUTH.toml writes
+/// them.
 pub struct Kind {
     pub name: &'static str,
-    /// Its problem up to `[data]`.
+    /// Text of its problem up to `[data]`.
     pub text: &'static str,
     /// Range of each joint as `[poses]` writes it.
     pub ranges: &'static [&'static str],
-    /// Effect, and its strengths by key.
+    /// Effects with their values by key.
     pub effects: &'static [Lacking],
 }
 
-/// Seven joints and no masses, as a URDF without inertias gives them.
+/// Seven joints without masses, as from a URDF without inertias.
 const SEVEN: &str = r#"
 name = "seven"
 joint = [
@@ -50,7 +49,7 @@ tool.target_m = [0.05, 0.02, 0.1]
 "joint7.d" = { fixed = true }
 "#;
 
-/// Six joints, three of them parallel, heavy links, declared rigid.
+/// Six joints, three of them parallel, with heavy links, declared rigid.
 const SIX: &str = r#"
 name = "six"
 joint = [
@@ -75,7 +74,7 @@ tool.target_m = [0.03, 0.02, 0.12]
 "joint6.d" = { fixed = true }
 "#;
 
-/// A SCARA.
+/// SCARA with four joints.
 const SCARA: &str = r#"
 name = "scara"
 dh = "standard"
@@ -97,7 +96,7 @@ tool.target_m = [0.06, 0.0, 0.05]
 "tool.z" = { fixed = true }
 "#;
 
-/// Three slides and a wrist.
+/// Gantry of three prismatic joints with a wrist.
 const GANTRY: &str = r#"
 name = "gantry"
 joint = [
@@ -121,7 +120,7 @@ tool.target_m = [0.25, 0.0, 0.03]
 "tool.*" = { sigma_mm = 5 }
 "#;
 
-/// All of them.
+/// All arms of the tests.
 pub const ARMS: [Kind; 5] = [
     Kind {
         name: "elbow",
@@ -260,26 +259,26 @@ pub const ARMS: [Kind; 5] = [
     },
 ];
 
-/// How an arm is measured.
+/// Way of measuring an arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Measured {
-    /// A tracker, in poses of another kind.
+    /// A tracker measures positions of other poses.
     Positions,
-    /// Six sockets, the distance of two of them known.
+    /// Six sockets, two of them at a known distance.
     Sockets,
-    /// Four draw wires, their anchors unknown.
+    /// Four draw wires with unknown anchors.
     Wires,
-    /// Three ball bars of known length, their anchors unknown.
+    /// Three ball bars of known length with unknown anchors.
     Bars,
-    /// A table top, a wall and a ball are touched.
+    /// Contacts with a table top, a wall and a ball.
     Touches,
     /// Three sockets, and an inclinometer on the third frame and the last.
     Tilts,
-    /// Ten positions, then sockets and touches.
+    /// Ten positions, then sockets and contacts.
     Mixed,
 }
 
-/// Those without a tracker, and how many rows each has.
+/// Ways of measuring without a tracker, with their numbers of rows.
 pub const WITHOUT_TRACKER: [(Measured, usize); 6] = [
     (Measured::Sockets, 120),
     (Measured::Wires, 200),
@@ -289,14 +288,14 @@ pub const WITHOUT_TRACKER: [(Measured, usize); 6] = [
     (Measured::Mixed, 130),
 ];
 
-/// What stands around an arm: as the problem declares it, and where it truly is.
+/// Fixtures of an arm: as the problem declares them, and at their true positions.
 pub struct Around {
     pub declared: String,
     pub truth: String,
 }
 
 impl Kind {
-    /// Its problem, measured so.
+    /// Returns the problem of the arm, measured in a given way.
     pub fn problem(&self, how: Measured, around: &Around) -> Problem {
         let base = if how == Measured::Positions { "\"base.*\" = { free = true }\n" } else { "" };
         let beta = if self.name == "elbow" { "\"joint*.beta\" = { fixed = true }\n" } else { "" };
@@ -311,12 +310,12 @@ impl Kind {
         .unwrap()
     }
 
-    /// Where it truly stands, and the poses: text of TRUTH.toml.
+    /// Returns the text of TRUTH.toml: true positions of the fixtures, and the poses.
     pub fn truth(&self, how: Measured, around: &Around, effect: &str) -> String {
         let geometry = self.text.split_once("[parameters]").unwrap().1;
         let random = |line: &&str| line.contains("sigma") || line.contains("fixed");
         let still = |line: &str| line.replace("fixed = true", "sigma_deg = 0, sigma_mm = 0");
-        // What the data cannot tell is true as declared.
+        // Parameters that the data cannot determine are true as declared.
         let random: String = geometry
             .lines()
             .filter(random)
@@ -335,8 +334,7 @@ impl Kind {
         )
     }
 
-    /// What surrounds it for one way of measuring: places that the nominal arm reaches, drawn from
-    /// the seed.
+    /// Draws the fixtures for one way of measuring at positions that the nominal arm reaches.
     pub fn around(&self, how: Measured, seed: u64) -> Around {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let nothing = Around { declared: String::new(), truth: String::new() };

@@ -1,4 +1,4 @@
-//! Mistakes in what is measured against, and what such rows cannot tell.
+//! Errors in fixtures and their rows, and quantities that such rows cannot determine.
 
 use std::path::Path;
 
@@ -86,7 +86,7 @@ fn rows() {
         let error = table(&around, &text);
         assert!(error.contains(words), "{columns} {cells}: {error}");
     }
-    // A word of which the problem declares nothing, beside others of which it does and alone.
+    // A word of an undeclared kind, together with declared ones and alone.
     let surface =
         "[[surface]]\nname = \"table\"\nkind = \"plane\"\n[data]\nsurface_sigma_mm = 0.05\n";
     for (around, location) in [(surface, ":2: column point"), ("", ":1: column point")] {
@@ -104,8 +104,7 @@ fn rows() {
     assert!(error.contains("write distance_sigma_mm in [data]"), "{error}");
 }
 
-/// Without a known length the size of everything is open, and without a tracker the place of the
-/// base: both are named.
+/// Without a known length the scale is unidentifiable, without a tracker the base: both are named.
 #[test]
 fn what_contacts_cannot_tell_is_named() {
     let free = AROUND.replace(
@@ -128,8 +127,8 @@ fn what_contacts_cannot_tell_is_named() {
     assert!(found.identifiability().unidentifiable.len() >= 6);
 }
 
-/// Distances to anchors on a line, wherever these are known to be, leave a turn of the base about
-/// the line open.
+/// Distances to anchors on a line leave a rotation of the base about the line unidentifiable, for
+/// any position of the anchors.
 #[test]
 fn collinear_anchors_leave_a_turn_of_the_base_open() {
     let at = |(name, [x, y, z]): &(&str, [f64; 3])| {
@@ -168,9 +167,8 @@ fn what_nobody_knows_is_neither_held_nor_about_zero() {
     }
 }
 
-/// Names that were exchanged in some rows leave misses that no noise explains, whatever the rows
-/// measure; the nominal arm, which puts a single point in places millimetres apart, is no reason to
-/// ask.
+/// Names exchanged in some rows leave residuals that noise cannot explain. A single point that the
+/// nominal arm places millimetres apart is no reason for a warning.
 #[test]
 fn exchanged_names_are_not_trusted() {
     let alone = "[[point]]\nname = \"left\"\n[data]\npoint_sigma_mm = 0.05\nheld_out = { fraction = 0.2, seed = 1 }\n";
@@ -218,7 +216,7 @@ fn exchanged_names_are_not_trusted() {
     }
 }
 
-/// The rig needs no σ of positions where none is measured and nothing scatters like one.
+/// The rig needs no σ of positions if none is measured and no other kind uses it.
 #[test]
 fn noise_of_what_is_measured() {
     let around =

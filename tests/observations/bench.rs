@@ -1,4 +1,4 @@
-//! An arm of six joints that touches points and surfaces of its surroundings on the rig.
+//! Arm of six joints that touches points and surfaces of its surroundings on the rig.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::common::made::normal;
 
-/// What all problems of this arm begin with.
+/// Common beginning of all problems of this arm.
 pub const ARM: &str = r#"
 name = "arm"
 joint = [
@@ -37,7 +37,7 @@ tool.target_m = [0.05, 0.02, 0.15]
 "joint6.d" = { fixed = true }
 "#;
 
-/// What surrounds the arm, and σ of each kind of rows.
+/// Fixtures of the arm, and σ of each kind of rows.
 pub const AROUND: &str = r#"
 [[point]]
 name = "left"
@@ -69,7 +69,7 @@ tilt_sigma_deg = 0.002
 held_out = { fraction = 0.2, seed = 1 }
 "#;
 
-/// Where all that is.
+/// True positions of the points.
 pub const POINTS: [(&str, [f64; 3]); 3] =
     [("left", [0.7, 0.25, 0.3]), ("right", [0.6, -0.3, 0.5]), ("top", [0.4, 0.3, 0.8])];
 pub const ANCHORS: [(&str, [f64; 3]); 2] = [("A", [1.5, 0.5, 1.2]), ("B", [-0.3, -1.4, 0.8])];
@@ -78,19 +78,19 @@ pub const HEIGHT: f64 = 0.2;
 pub const CENTRE: [f64; 3] = [0.6, 0.3, 0.4];
 pub const RADIUS: f64 = 0.2;
 
-/// 1 σ of everything that is measured [m].
+/// Standard deviation of every measurement [m].
 const SIGMA: f64 = 5e-5;
 
 /// Anchors on a line.
 pub const LINE: [(&str, [f64; 3]); 3] =
     [("A", [1.5, 0.5, 1.2]), ("B", [1.5, -0.5, 1.2]), ("C", [1.5, -1.5, 1.2])];
 
-/// A problem with this arm.
+/// Returns a problem with this arm.
 pub fn problem(more: &str) -> Problem {
     Problem::parse(&format!("{ARM}{more}"), Path::new("problem.toml")).unwrap()
 }
 
-/// The true arm: every free number of the declared one moved as its prior says.
+/// Draws the true arm from the priors of the declared one.
 pub fn true_arm(problem: &Problem, seed: u64) -> (Problem, Vec<(String, f64)>) {
     let mut arm = problem.clone();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -126,7 +126,7 @@ pub fn true_arm(problem: &Problem, seed: u64) -> (Problem, Vec<(String, f64)>) {
     (arm, truth)
 }
 
-/// A table in which the arm goes from one of `kinds` to the next.
+/// Simulator of a table in which the kinds of rows alternate.
 pub struct Bench {
     rig: Rig,
     random: ChaCha8Rng,
@@ -142,7 +142,7 @@ impl Bench {
         self.rig.position(&conditions).unwrap()
     }
 
-    /// Tilts of the last frame's x and y axes [°].
+    /// Returns the tilts of the x and y axes of the last frame [°].
     fn tilts(&self, q: &[f64]) -> [f64; 2] {
         let conditions = PoseConditions { configuration: q.to_vec(), ..PoseConditions::default() };
         let (_, turned) = self.rig.pose(&conditions).unwrap();
@@ -159,8 +159,7 @@ impl Bench {
             .collect()
     }
 
-    /// A configuration in which `miss` of the target's position is nothing, near one drawn at
-    /// random.
+    /// Returns a configuration in which `miss` of the target position vanishes, near a random one.
     pub fn contact(&mut self, miss: &dyn Fn(&Vector3<f64>) -> Vec<f64>) -> Vec<f64> {
         loop {
             let mut q = DVector::from_vec(self.anywhere());
@@ -188,7 +187,7 @@ impl Bench {
         SIGMA * normal(&mut self.random)
     }
 
-    /// So many rows of each of `kinds`, in turn, as CSV.
+    /// Returns `rows` rows of each of `kinds`, in turn, as CSV.
     pub fn table(&mut self, kinds: &[&str], rows: usize) -> String {
         let mut text = String::from(
             "q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,x_mm,y_mm,z_mm,point,anchor,distance_mm,surface,offset_mm,frame,tilt_x_deg,tilt_y_deg\n",
@@ -243,7 +242,7 @@ impl Bench {
     }
 }
 
-/// The rows of a table in a problem.
+/// Reads the rows of a table in a problem.
 pub fn read(problem: &Problem, table: &str) -> Dataset {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("rows.csv");

@@ -1,4 +1,4 @@
-//! Derivatives of every kind of row against extrapolated differences.
+//! Derivatives of every kind of row, compared with extrapolated differences.
 
 use flexcal::fit::Placement;
 use flexcal::least_squares::{check_jacobian, jacobian};
@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::bench::{AROUND, Bench, problem, read};
 use crate::common::made::{draw, model_of};
 
-/// Largest difference of a column of the Jacobian, relative to its norm.
+/// Largest allowed difference of a column of the Jacobian, relative to its norm.
 const WORST: f64 = 1e-7;
 
 #[test]
@@ -25,7 +25,7 @@ fn derivatives_of_every_kind() {
         let table = Bench::new(problem.clone(), 3)
             .table(&["position", "point", "distance", "plane", "sphere", "tilt"], 8);
         let rows = read(&problem, &table).measurements;
-        // Tilts of every frame, the base among them.
+        // Tilts of every frame, including the base.
         let mut rows = rows;
         for row in 0..rows.len() {
             if let Observation::Tilt(frame) = &mut rows.observations[row] {
@@ -55,7 +55,7 @@ fn derivatives_of_every_kind() {
             "{what}: {} {column:?}",
             model.parameters[worst].name
         );
-        // Every fixture is seen.
+        // Every fixture has a non-zero derivative.
         let exact = jacobian(&residuals, &x);
         for (k, parameter) in model.parameters.iter().enumerate() {
             assert!(exact.column(k).norm() > 0.0, "{what}: {} has no effect", parameter.name);

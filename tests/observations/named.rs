@@ -1,9 +1,9 @@
-//! Effects that arms of several kinds lack, named from rows of every kind without a tracker; the
-//! same poses measured with one are the control.
+//! Identification of effects on arms of several kinds from rows of every kind without a tracker;
+//! the same poses measured with a tracker are the control.
 //!
-//! A case is *distinguishable* from its rows where one who knows the effect sees it: declared, it
-//! lowers the squares of the fit, priors among them, by more than 30, and no other effect of the
-//! catalogue comes within 6 of that, each in a fit of its own.
+//! A case is *distinguishable* if an observer who knows the effect can see it. When declared, it
+//! reduces the squares of the fit (priors included) by more than 30. No other effect of the
+//! catalogue, each in a separate fit, comes within 6 of that.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -22,50 +22,50 @@ use crate::arms::{ARMS, Around, Kind, Lacking, Measured, Strength, WITHOUT_TRACK
 use crate::bench::read;
 use crate::common::made::model_of;
 
-/// Squares that an effect takes off where it is seen.
+/// Reduction of squares from which an effect is visible.
 const SEEN: f64 = 30.0;
-/// Squares by which every other one must fall short of it.
+/// Difference in squares to the next effect from which an effect is distinguishable.
 const APART: f64 = 6.0;
 
-/// What the loop made of an effect.
+/// Outcome of the loop for one effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Outcome {
-    /// The right law at the right place, at 0.9 or more.
+    /// The true law at the true place, with probability 0.9 or more.
     Named,
-    /// Below that, or among the alternatives.
+    /// The true law with a lower probability, or among the alternatives.
     Listed,
-    /// Its place alone.
+    /// Only the true place.
     Located,
-    /// Another law at 0.9 or more.
+    /// A wrong law with probability 0.9 or more.
     Wrong,
-    /// Something else below 0.9 or elsewhere.
+    /// Another law with a lower probability, or at another place.
     Elsewhere,
     Nothing,
 }
 
-/// A set through the loop.
-struct CheckedPoses {
+/// Result of the loop for one data set.
+struct LoopVerdict {
     outcome: Outcome,
-    /// Laws at 0.9 or more that are not true.
+    /// Number of wrong laws with probability 0.9 or more.
     ghosts: usize,
     said: String,
 }
 
-/// One effect of one arm, seen by one kind of rows and by a tracker.
+/// One effect of one arm, measured by one kind of rows and by a tracker.
 struct Case {
     arm: &'static str,
     how: Measured,
     is_distinguishable: bool,
     is_distinguishable_to_tracker: bool,
-    contacts: CheckedPoses,
-    tracker: CheckedPoses,
+    contacts: LoopVerdict,
+    tracker: LoopVerdict,
 }
 
 fn sets(otherwise: u64) -> u64 {
     std::env::var("FLEXCAL_SWEEP").ok().and_then(|number| number.parse().ok()).unwrap_or(otherwise)
 }
 
-/// Σ r²/σ² of the rows and priors.
+/// Returns Σ r²/σ² of the rows and priors.
 fn squares(found: &Identification, problem: &Problem, data: &Dataset) -> f64 {
     let model = model_of(problem, &data.measurements);
     let pull =
@@ -75,7 +75,8 @@ fn squares(found: &Identification, problem: &Problem, data: &Dataset) -> f64 {
     found.reduced_chi2.unwrap() * freedom + found.x.iter().enumerate().map(pull).sum::<f64>()
 }
 
-/// Whether an effect is seen and no other of the ranking comes near it, and by how much.
+/// Returns the reduction of squares by an effect, and its lead over the other effects of the
+/// ranking.
 fn distinguishable(
     problem: &Problem,
     data: &Dataset,
@@ -108,7 +109,7 @@ fn distinguishable(
     (without - own, nearest - own)
 }
 
-/// Family and place, the true orders among those of a harmonic.
+/// Returns true if family and place agree; a harmonic must contain the true orders.
 fn is_the_same(named: &Effect, truth: &Effect) -> bool {
     match (named, truth) {
         (
@@ -119,7 +120,7 @@ fn is_the_same(named: &Effect, truth: &Effect) -> bool {
     }
 }
 
-fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> CheckedPoses {
+fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> LoopVerdict {
     let part = |effect: &Effect| effect.terms(problem).first().map(|term| Site::of(term.site));
     let is_true = |effect: &Effect| truth.is_some_and(|truth| is_the_same(effect, truth));
     let at_place = |at: Option<Site>| truth.is_some_and(|truth| at.is_some() && part(truth) == at);
@@ -171,16 +172,16 @@ fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Che
         chi2(&closed.before.fit),
         chi2(&closed.after)
     );
-    CheckedPoses { outcome, ghosts: wrong, said }
+    LoopVerdict { outcome, ghosts: wrong, said }
 }
 
-/// The rows of a simulation in a problem.
+/// Reads the rows of a simulation in a problem.
 fn rows(problem: &Problem, simulated: &Simulation) -> Dataset {
     read(problem, &simulated.csv())
 }
 
-/// The effect with its strengths as TRUTH.toml writes it, of a size from a quarter of the listed
-/// one to twice it.
+/// Returns the text of an effect for TRUTH.toml, with a size from a quarter to twice the listed
+/// one.
 fn written(effect: Option<&Lacking>, seed: u64) -> (String, f64) {
     let factor = 2.0_f64.powf(ChaCha8Rng::seed_from_u64(seed ^ 0x517e).random_range(-2.0..1.0));
     let line = |&(key, value): &Strength| format!("{key} = {}\n", value * factor);
@@ -202,7 +203,7 @@ fn one(arm: &Kind, (how, count): (Measured, usize), effect: Option<&Lacking>, se
         arm.name,
         effect.map_or("nothing", |own| own.0)
     );
-    // The true arm may not reach what the nominal one does: then other places are drawn.
+    // The true arm may not reach positions of the nominal one: then others are drawn.
     let (problem, contacts) = (0..10)
         .find_map(|attempt| {
             let around = arm.around(how, seed + 100_000 * attempt);
@@ -251,8 +252,8 @@ fn one(arm: &Kind, (how, count): (Measured, usize), effect: Option<&Lacking>, se
     }
 }
 
-/// Figures of some sets: how many, how many are distinguishable, and of these named, listed,
-/// located, wrong, elsewhere, nothing.
+/// Counts of data sets: total, distinguishable, and of these named, listed, located, wrong,
+/// elsewhere, nothing.
 #[derive(Default, Clone)]
 struct Row {
     sets: usize,
@@ -262,7 +263,7 @@ struct Row {
 }
 
 impl Row {
-    fn add(&mut self, is_shown: bool, judged: &CheckedPoses) {
+    fn add(&mut self, is_shown: bool, judged: &LoopVerdict) {
         self.sets += 1;
         if is_shown {
             self.shown += 1;
@@ -283,15 +284,15 @@ impl Row {
     }
 }
 
-/// Every effect of every arm, and none, once for each seed: those whose name holds the words of
-/// `FLEXCAL_ONLY`, in a table.
+/// Runs every effect of every arm, and none, for each seed, and prints a table. `FLEXCAL_ONLY`
+/// restricts the names.
 fn run(seeds: Range<u64>) -> (Row, Row) {
     let only = std::env::var("FLEXCAL_ONLY").unwrap_or_default();
     let mut work = Vec::new();
     for seed in seeds {
         for (a, arm) in (0..).zip(&ARMS) {
             for (e, effect) in (0..).zip(arm.effects.iter().map(Some).chain([None])) {
-                // With each seed the next way of measuring, so that six have all of them.
+                // The way of measuring changes with the seed, so that six seeds cover all of them.
                 let measured =
                     WITHOUT_TRACKER[usize::try_from(a + e + seed).unwrap() % WITHOUT_TRACKER.len()];
                 let name = format!(
@@ -348,10 +349,10 @@ fn an_effect_is_named_and_nothing_else() {
     let cases = [
         (arm("elbow"), (Measured::Wires, 200), Some(0), 100),
         (arm("elbow"), (Measured::Tilts, 150), Some(3), 3),
-        // The x axis of the third frame stands upright, where its tilt has no derivative.
+        // The x axis of the third frame is vertical, where its tilt has no derivative.
         (arm("gantry"), (Measured::Tilts, 150), Some(1), 54001),
-        // A slide that alone moves along its axis: beside each socket its commands differ by noise
-        // alone.
+        // A prismatic joint that alone moves along its axis: at each socket its commands differ
+        // by noise only.
         (arm("scara"), (Measured::Sockets, 120), None, 3007),
     ];
     cases.into_par_iter().for_each(|(arm, measured, effect, seed)| {

@@ -1,4 +1,4 @@
-//! Contacts whose σ is declared larger than it is.
+//! Contacts with a declared σ that is too large.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use flexcal::select::close;
 
 use crate::bench::read;
 
-/// Four joints whose hand is set into two sockets and on a table.
+/// Four joints whose hand is placed in two sockets and on a table.
 const IN_SOCKETS: &str = "name = 'in sockets'
 joint = [
   { d_m = 0.5 },
@@ -41,7 +41,7 @@ point_sigma_mm = 0.05
 surface_sigma_mm = 0.05
 ";
 
-/// One more compliance than declared, noise of 0.03 mm.
+/// Truth with one more compliance than declared, and noise of 0.03 mm.
 const GIVES_WAY: &str = "[parameters]
 'point[left].x' = { mm = 400 }
 'point[left].y' = { mm = 150 }
@@ -69,7 +69,8 @@ q4_deg = [-110, 110]
 
 #[test]
 fn the_sigma_that_a_fit_supports_speaks_for_no_effect() {
-    // Declared too large, σ is what each fit leaves: a smaller one is no better explanation.
+    // σ is declared too large and therefore estimated by each fit: a smaller σ is no better
+    // explanation.
     let problem = Problem::parse(IN_SOCKETS, Path::new("problem.toml")).unwrap();
     let truth = Truth::parse(GIVES_WAY, Path::new("TRUTH.toml"), &problem).unwrap();
     for seed in [1, 2, 3, 4] {
@@ -80,8 +81,8 @@ fn the_sigma_that_a_fit_supports_speaks_for_no_effect() {
         let (law, own) = (found.claims.as_ref().unwrap().law.1, found.effect.name_and_place());
         let share = 1.0 / (1 + found.alternatives.len()) as f64;
         println!("{seed}: {own} {law:.3}, an even share {share:.3}");
-        // What is held is the most probable, and has more than its even share: two rigidities, a
-        // compliance and a stiffness that changes do nearly as well.
+        // The selected law is the most probable and exceeds its even share: two rigidities, a
+        // compliance and a stiffness that changes fit nearly as well.
         assert!(law > share, "{seed}: {own} {law}, {:?}", found.alternatives);
         assert!(law > 0.3 && !(law >= 0.9 && own != "joint-compliance 2"), "{seed}: {own} {law}");
     }

@@ -1,4 +1,4 @@
-//! The truth is found from rows of every kind, within its standard errors.
+//! Recovery of the truth from rows of every kind, within standard errors.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use crate::bench::{ANCHORS, AROUND, Bench, CENTRE, POINTS, problem, read, true_arm};
 
-/// Deviations from the truth in standard errors.
+/// Returns the deviations from the truth in standard errors.
 fn deviations(found: &Identification, truth: &[(String, f64)]) -> Vec<(String, f64)> {
     let one = |(name, value): &(String, f64)| {
         let estimate = found.estimate(name)?;
@@ -65,8 +65,8 @@ fn each_kind_and_all_together_find_the_arm() {
     }
 }
 
-/// How often one and two standard errors hold the truth, over arms drawn anew: 68.3 and 95.4 % of
-/// the estimates of each kind of rows.
+/// Checks the coverage over random arms: one and two standard errors contain 68.3 and 95.4 % of the
+/// estimates of each kind of rows.
 #[test]
 #[ignore = "a study of some minutes"]
 fn coverage_of_each_kind() {
@@ -100,7 +100,7 @@ fn coverage_of_each_kind() {
             100.0 * one,
             100.0 * two
         );
-        // Estimates of one arm move together: 60 arms count.
+        // Estimates of one arm are correlated: 60 arms are the sample size.
         assert!(
             (one - 0.683).abs() < 0.05 && (two - 0.954).abs() < 0.025,
             "{kinds:?}: {one} {two}"
@@ -135,7 +135,7 @@ fn a_point_of_held_out_rows_alone_is_found_on_them() {
     assert!(top.2 && top.0.mean > 5.0 * top.1.mean && top.1.mean < 0.2e-3);
 }
 
-/// A socket that gives way along one direction is named, and no other point.
+/// A socket that is compliant along one direction is named, and no other point.
 #[test]
 fn a_point_that_gives_way_is_named() {
     let text = AROUND.replace("{ fraction = 0.2, seed = 1 }", "{ column = \"split\" }");
@@ -167,13 +167,13 @@ fn a_point_that_gives_way_is_named() {
     );
 }
 
-/// Horizontal planes above and below the arm's base, touched with and without offsets; a declared
-/// normal that is freed decides the side.
+/// Horizontal planes above and below the arm's base, touched with and without offsets; a free
+/// declared normal determines the side.
 #[test]
 fn planes_of_either_side_are_found() {
     for (height, up) in [(0.2, 1.0), (0.2, -1.0), (-0.2, 1.0), (-0.2, -1.0)] {
         for (step, declared) in [(2e-3, false), (0.0, true), (0.0, false)] {
-            // Without offsets to tell the side it is that of the arm's base.
+            // Without offsets the side is that of the arm's base.
             let up = if step == 0.0 && !declared { -f64::signum(height) } else { up };
             let normal = Vector3::new(0.03 * up, -0.02, up).normalize();
             let plane = "name = \"table\"\nkind = \"plane\"\n";

@@ -1,4 +1,4 @@
-//! Error summaries of every kind of rows in every file of results, against residuals.csv.
+//! Error summaries of every kind of rows in all result files, compared with residuals.csv.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,7 +10,7 @@ use serde_json::Value;
 
 use crate::bench::{ARM, AROUND, Bench, LINE, problem, read, true_arm};
 
-/// Runs a command in a folder; what it prints.
+/// Runs a command in a folder and returns its output.
 fn run(folder: &Path, command: &str, out: &str, more: &[&str]) -> String {
     let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
     let assert = flexcal
@@ -26,8 +26,7 @@ fn json(folder: &Path, name: &str) -> Value {
     serde_json::from_str(&fs::read_to_string(folder.join(name)).unwrap()).unwrap()
 }
 
-/// Lengths of the residuals of residuals.csv by kind of rows, part of the data and session \[mm\]
-/// or \[°\].
+/// Residual lengths of residuals.csv by kind of rows, part of the data and session \[mm\] or \[°\].
 struct Residuals(Vec<(&'static str, String, String, f64)>);
 
 impl Residuals {
@@ -55,8 +54,8 @@ impl Residuals {
         Self(rows.deserialize().map(|row| of_row(row.unwrap())).collect())
     }
 
-    /// The summary `err` is of the rows of `kind` for which `part` holds, given whether they are
-    /// held out and their session.
+    /// Asserts that the summary `err` is that of the rows of `kind` for which `part` holds, given
+    /// part of the data and session.
     fn agree(&self, err: &Value, kind: &str, part: impl Fn(&str, &str) -> bool, what: &str) {
         let own: Vec<f64> = self
             .0
@@ -78,7 +77,7 @@ impl Residuals {
         }
     }
 
-    /// Both parts of the data in `both` are of `kind`.
+    /// Asserts that both parts of the data in `both` are of `kind`.
     fn both_agree(&self, both: &Value, kind: &str, what: &str) {
         self.agree(&both["identification"], kind, |held_out, _| held_out == "false", what);
         self.agree(&both["held_out"], kind, |held_out, _| held_out == "true", what);
@@ -101,7 +100,7 @@ fn error_summaries_are_of_the_rows_own_residuals_and_say_their_kind() {
         fs::write(folder.join("problem.toml"), format!("{ARM}{AROUND}files = [\"rows.csv\"]\n"))
             .unwrap();
         let (arm, _) = true_arm(&problem(AROUND), 3);
-        // A session B holds every second row, or the tilts alone.
+        // Session B contains every second row, or only the tilts.
         let session = |(k, line): (usize, &str)| match k {
             0 => format!("{line},session\n"),
             _ if kinds.len() == 1 => format!("{line},{}\n", ["A", "B"][k % 2]),
@@ -150,8 +149,7 @@ fn error_summaries_are_of_the_rows_own_residuals_and_say_their_kind() {
             );
         }
 
-        // Several kinds: each in every file; the first in what is printed, with its number and
-        // unit.
+        // Every file contains all kinds; the printed output shows the first, with its unit.
         let own = |file: &Value| file["kinds"].as_array().map_or(0, Vec::len);
         let expected = if kinds.len() > 1 { kinds.len() + 1 } else { 0 };
         let known = usize::from(kinds == ["point"]);
@@ -178,8 +176,7 @@ fn error_summaries_are_of_the_rows_own_residuals_and_say_their_kind() {
     }
 }
 
-/// What is measured against something that is not there, or by too little, ends with exit status 2
-/// and where it stands.
+/// Rows with an undeclared or underdetermined fixture end with exit status 2 and name their place.
 #[test]
 fn bad_references_end_with_status_2_and_write_nothing() {
     let q = "0.1,0.2,0.3,0.4,0.5,0.6";
@@ -201,7 +198,7 @@ fn bad_references_end_with_status_2_and_write_nothing() {
         fs::write(folder.path().join("rows.csv"), format!("{header}\n{contacts}\n{q},{cells}\n"))
             .unwrap();
         for command in ["identify", "loop", "trace", "predict"] {
-            // To predict, too few rows leave open where a point is.
+            // For a prediction, too few rows leave the position of a point undetermined.
             let words = match cells {
                 "top,,,,,," if command == "predict" => {
                     "the rows do not determine point[top].x, and there is no estimate to take it from"
@@ -225,7 +222,7 @@ fn bad_references_end_with_status_2_and_write_nothing() {
     }
 }
 
-/// A plan from contacts says what to touch, with the known distance beside all of them.
+/// A plan from contacts lists what to touch, together with all known distances.
 #[test]
 fn a_plan_of_contacts_says_what_to_touch() {
     let folder = tempfile::tempdir().unwrap();
@@ -252,7 +249,7 @@ fn a_plan_of_contacts_says_what_to_touch() {
     }
     assert!(kinds["point"] >= 2 && kinds.values().sum::<usize>() == 60, "{kinds:?}");
 
-    // Contacts with a plane are one number each, tilts two.
+    // A contact with a plane has one coordinate, a tilt has two.
     let problem = problem(AROUND);
     let rows = read(&problem, &table).measurements;
     let of_kind = |kind: &str| {
@@ -276,7 +273,7 @@ fn a_plan_of_contacts_says_what_to_touch() {
     }
 }
 
-/// A problem of the bench in a folder, and so many rows of each of `kinds`.
+/// Writes a problem of the bench and `rows` rows of each of `kinds` to a folder.
 fn bench(around: &str, kinds: &[&str], rows: usize) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("problem.toml"), format!("{ARM}{around}files = [\"rows.csv\"]\n"))
@@ -286,7 +283,7 @@ fn bench(around: &str, kinds: &[&str], rows: usize) -> tempfile::TempDir {
     folder
 }
 
-/// Pose accuracy is of positions: of nothing else, and of all of them.
+/// Pose accuracy uses positions only, and all of them.
 #[test]
 fn positions_alone_are_accepted() {
     let folder = bench(AROUND, &["point", "plane", "tilt"], 40);
@@ -318,8 +315,8 @@ fn positions_alone_are_accepted() {
     assert!(page.contains(&format!("Rows that were fitted: {all}.")), "{page}");
 }
 
-/// The geometry that is exported is judged with points, anchors and surfaces where they were found:
-/// of an arm that does not give way it is the whole model, whatever is measured.
+/// The exported geometry is evaluated with the identified points, anchors and surfaces; for a rigid
+/// arm it is the whole model, whatever is measured.
 #[test]
 fn an_exported_geometry_is_judged_by_what_rows_measure() {
     for kinds in
@@ -365,8 +362,8 @@ fn an_exported_geometry_is_judged_by_what_rows_measure() {
     }
 }
 
-/// Sockets of unknown places say nothing of where the base is: targets in the measuring frame are
-/// not promised without a word.
+/// Sockets at unknown positions do not determine the base: targets in the measuring frame give a
+/// warning.
 #[test]
 fn commands_from_sockets_alone_are_for_the_frame_of_the_base() {
     let around = AROUND.replace("[[anchor]]", "[[anchor]]\nat_m = [1, 1, 1]");
@@ -398,7 +395,7 @@ fn commands_from_sockets_alone_are_for_the_frame_of_the_base() {
         assert!(output.status.success(), "{error}");
         assert_eq!(error.contains("--frame base"), is_said, "{error}");
     }
-    // What to give comes before what is missing of poses that nobody touches anything in.
+    // The missing option is reported before missing columns of the poses.
     let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
     let refused = flexcal
         .current_dir(folder)
@@ -409,8 +406,8 @@ fn commands_from_sockets_alone_are_for_the_frame_of_the_base() {
     assert!(error.contains("write --candidates FILE.csv") || error.contains("min_deg"), "{error}");
 }
 
-/// Lengths and angles have no σ together, rows of one number no axes, and rows without positions no
-/// place in figures of positions.
+/// Lengths and angles have no common σ, scalar rows have no axes, and rows without positions do not
+/// appear in figures of positions.
 #[test]
 fn every_kind_is_told_in_its_own_terms() {
     let small = AROUND.replace("0.05", "0.01").replace("0.002", "0.0004");
@@ -434,7 +431,7 @@ fn every_kind_is_told_in_its_own_terms() {
     );
     assert!(!folder.join("fit/figures/residual-vectors.svg").exists());
 
-    // √3 of the σ of distances, which tilts do not blur.
+    // √3 of the σ of distances, without the tilts.
     let checked = run(folder, "check", "check", &[]);
     let checked = checked.split_whitespace().collect::<Vec<_>>().join(" ");
     let words =
@@ -450,7 +447,7 @@ fn every_kind_is_told_in_its_own_terms() {
     assert!(!page.contains("known distance\","), "{page}");
     assert!(page.contains(r#""position":[70"#) || page.contains(r#""position":[69"#), "{page}");
 
-    // The paper's tables are of positions.
+    // The tables of the paper are of positions.
     let compared = run(folder, "compare", "compare", &[]);
     assert!(
         !compared.contains("max x") && compared.contains("contacts with points to identify"),

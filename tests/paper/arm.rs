@@ -1,4 +1,4 @@
-//! The lunar sampler, its golden positions, and what the dual-number model says of it.
+//! Lunar sampler with its golden positions, and the results of the dual-number model.
 
 use flexcal::least_squares::jacobian;
 use flexcal::model::parameter::Parameter;
@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::common::arms::{ODD, TABLE_2, golden, golden_problem, parse, without_elasticity};
 
-/// A row of `tests/golden`: values in m, three a group.
+/// Row of `tests/golden`: values in m, in groups of three.
 pub struct Row {
     pub q: Vec<f64>,
     pub payload: f64,
@@ -41,13 +41,13 @@ pub fn rows(name: &str) -> Vec<Row> {
     reader.records().map(|record| row(record.unwrap())).collect()
 }
 
-/// The lunar sampler with loads on the rigid arm, every parameter of the arm free and without
-/// prior.
+/// Returns the lunar sampler with loads on the rigid arm; every parameter of the arm is free
+/// without prior.
 pub fn problem() -> Problem {
     prepared(golden_problem())
 }
 
-/// An arm in general position, so that every term matters, prepared likewise.
+/// Returns an arm in general position, prepared in the same way, so that every term matters.
 pub fn odd_problem() -> Problem {
     prepared(parse(ODD))
 }
@@ -62,7 +62,7 @@ fn prepared(mut problem: Problem) -> Problem {
     problem
 }
 
-/// A prepared problem without elasticity.
+/// Removes the elasticity of a prepared problem.
 pub fn rigid(problem: Problem) -> Problem {
     let mut problem = without_elasticity(problem);
     problem
@@ -71,7 +71,7 @@ pub fn rigid(problem: Problem) -> Problem {
     problem
 }
 
-/// A configuration of the odd arm for each of the sampler's.
+/// Returns a configuration of the odd arm for each of the sampler's.
 pub fn odd_rows(name: &str) -> Vec<Row> {
     let mut rows = rows(name);
     for row in &mut rows {
@@ -92,7 +92,7 @@ pub fn table_2() -> Vec<Mdh> {
     TABLE_2.into_iter().map(row).collect()
 }
 
-/// e = table 2 − nominal, shape = (20).
+/// Returns e = table 2 − nominal, shape = (20).
 pub fn table_2_errors(problem: &Problem) -> DVector<f64> {
     let nominal = Parameters::nominal(problem).geometry;
     let pairs = nominal.into_iter().zip(table_2());
@@ -103,7 +103,7 @@ pub fn table_2_errors(problem: &Problem) -> DVector<f64> {
     DVector::from_iterator(20, errors)
 }
 
-/// Nominal parameters, and the same with the geometry of table 2.
+/// Returns nominal parameters, and the same with the geometry of table 2.
 pub fn both(problem: &Problem) -> [Parameters; 2] {
     let nominal = Parameters::nominal(problem);
     [nominal.clone(), Parameters { geometry: table_2(), ..nominal }]
@@ -122,7 +122,7 @@ pub fn model(problem: &Problem) -> Model {
     Model::new(problem, &[String::new()], &[String::new()]).unwrap()
 }
 
-/// ∂(position)/∂x of one pose by dual numbers, shape = (3, parameters of the model).
+/// Returns ∂(position)/∂x of one pose by dual numbers, shape = (3, parameters of the model).
 pub fn dual_jacobian(model: &Model, row: &Row, x: &DVector<f64>) -> DMatrix<f64> {
     let pose = Pose {
         setup: row.setup(),
@@ -137,7 +137,7 @@ pub fn dual_jacobian(model: &Model, row: &Row, x: &DVector<f64>) -> DMatrix<f64>
     -jacobian(&residuals, x)
 }
 
-/// Where each parameter of the model stands in e = [e₁ … e_n]; `None` for a flexibility.
+/// Returns the index of a model parameter in e = [e₁ … e_n]; `None` for a flexibility.
 pub fn place_in_e(parameter: &Parameter) -> Option<usize> {
     let (joint, field) = parameter.name.strip_prefix("joint")?.split_once('.')?;
     let field = ["alpha", "a", "theta", "d", "beta"].iter().position(|name| *name == field)?;

@@ -1,4 +1,4 @@
-//! Eq. 3-27: deflections of links and joints, and what they do to the end point.
+//! Deflections of links and joints, and their displacement of the end point, eq. 3-27.
 
 use flexcal::model::parameter::{BeamField, JointField, ParameterSite};
 use flexcal::paper::{
@@ -25,11 +25,11 @@ fn link_b_of_eq_3_to_5_from_forces_resolved_by_hand() {
     let phi_3 = row.q[1] + row.q[2];
     let phi_4 = phi_3 + row.q[3];
     let l = 1.75;
-    // Frame of link B: x along it, y up from it, z to the left; weights pull to (−sin φ₃, −cos φ₃).
+    // Frame of link B: x along it, y upward, z to the left; weights pull to (−sin φ₃, −cos φ₃).
     let m_4 = 3.6 + payload;
     let (g_r, g_n) = (-m_4 * g * phi_3.sin(), -m_4 * g * phi_3.cos());
     let m_v = -g * (3.6 * 0.13 + payload * 0.22) * phi_4.cos();
-    // Levers along z, from link B's axis: d_4 − 0.06 for the sampler and d_4 − 0.09 for the
+    // Levers along z from the axis of link B: d_4 − 0.06 for the sampler and d_4 − 0.09 for the
     // payload.
     let lever = (3.6 * -0.16 + payload * -0.19) / m_4;
     let (q_r, q_n) = (-3.1 * g / l * phi_3.sin(), -3.1 * g / l * phi_3.cos());
@@ -47,7 +47,7 @@ fn link_b_of_eq_3_to_5_from_forces_resolved_by_hand() {
         terms.bend_y.1,
         q_n * l.powi(3) / 6.0 + (c_n * r * r + g_n * l * l + 2.0 * m_v * l) / 2.0 + hoist,
     );
-    // What bends towards +z: −M_y, from weights along x with levers along z.
+    // Moments that bend towards +z: −M_y, from weights along x with levers along z.
     let (mc_n, m4_n) = (-r_z * c_r, -lever * g_r);
     near(terms.bend_z.0, (mc_n * r * r + m4_n * l * l + 2.0 * mc_n * r * (l - r)) / 2.0);
     near(terms.bend_z.1, mc_n * r + m4_n * l);
@@ -122,7 +122,7 @@ fn torsion_of_eq_8_to_11_with_the_arm_stretched_out() {
     );
 }
 
-/// Δ as a 4 × 4 matrix, eq. 5.
+/// Returns Δ as a 4 × 4 matrix, eq. 5.
 fn differential(d: &Vector6<f64>) -> Matrix4<f64> {
     #[rustfmt::skip]
     let matrix = Matrix4::new(
@@ -187,7 +187,7 @@ fn d_f_of_eq_27_agrees_with_the_independent_simulator_only_when_corrected() {
             }
         }
         println!("{form:?}: joints, link A, link B, all: {worst:.5?} mm");
-        // What the paper prints of joints is right while β = 0.
+        // The printed formulas for joints are right while β = 0.
         assert!(
             worst[0] < 0.003
                 && worst[1..].iter().all(|worst| if good { *worst < 0.003 } else { *worst > 3.0 })
@@ -209,7 +209,7 @@ fn elastic_columns_equal_dual_numbers_in_the_limit_of_small_deflection() {
         (&odd, Parameters::nominal(&odd), &odd_rows("first_order.csv")),
     ] {
         let model = model(problem);
-        // x = ln(stiffness / nominal): everything 10¹⁰ times as stiff.
+        // x = ln(stiffness / nominal), with all stiffnesses multiplied by 10¹⁰.
         let geometry = parameters.geometry.clone();
         let x = DVector::from_iterator(
             model.parameters.len(),

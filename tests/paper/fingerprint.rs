@@ -1,4 +1,4 @@
-//! Table 2 identifies Δβ₁ = Δθ₂ = 0.304°: which sign of α₂ does that speak for?
+//! Sign of α₂ implied by Δβ₁ = Δθ₂ = 0.304° in table 2.
 
 use flexcal::measurement::Dataset;
 use flexcal::paper::{Chain, Form, Measured, Options, Parameters, StiffnessStage, identify};
@@ -6,7 +6,7 @@ use flexcal::problem::{PoseView, Problem};
 
 use crate::common::arms::{path, without_elasticity};
 
-/// Errors of table 2 [° and m], but with the 2 · 0.304° of β₁ and θ₂ shared unevenly.
+/// Errors of table 2 [° and m], with 2 · 0.304° divided unevenly between β₁ and θ₂.
 const ERRORS: [[f64; 5]; 4] = [
     [0.019, 0.0, -0.008, -0.003, 0.5],
     [-0.004, -0.002, 0.108, 0.016, 0.007],
@@ -14,8 +14,8 @@ const ERRORS: [[f64; 5]; 4] = [
     [-0.019, 0.016, -0.790, 0.008, 0.005],
 ];
 
-/// What eq. 45 makes of exact positions of the rigid lunar sampler in its 28 poses: errors [α a θ d
-/// β] of each joint [° and m].
+/// Applies eq. 45 to exact positions of the rigid lunar sampler in its 28 poses; returns the errors
+/// [α a θ d β] of each joint [° and m].
 fn identified(alpha_2: f64) -> Vec<[f64; 5]> {
     let mut problem = Problem::read(&path("problems/lunar-sampler")).unwrap();
     let (data, _) = Dataset::read(&problem).unwrap();
@@ -28,7 +28,7 @@ fn identified(alpha_2: f64) -> Vec<[f64; 5]> {
             *field += if k % 2 == 0 { error.to_radians() } else { error };
         }
     }
-    // The same poses in space: with the other sign of α₂, θ₂ to θ₄ turn the other way.
+    // The same positions: with the other sign of α₂, θ₂ to θ₄ change their sign.
     let turned = |row: usize| -> Vec<f64> {
         let q = data.measurements.configuration(row);
         q.iter().enumerate().map(|(k, q)| if k > 0 && alpha_2 > 0.0 { -q } else { *q }).collect()
@@ -73,7 +73,7 @@ fn equal_errors_of_beta_1_and_theta_2_speak_for_alpha_2_of_minus_90() {
         (up[0][beta] + up[1][theta]).abs() < 1e-3 && up[0][beta].abs() > 0.1,
         "their difference is seen"
     );
-    // Against it: offsets along parallel axes share as evenly, where table 2 has 16, 5 and 8 mm.
+    // Counter-evidence: offsets along parallel axes share evenly, but table 2 has 16, 5 and 8 mm.
     let d = 3;
     for found in [down, up] {
         let offsets = [found[1][d], found[2][d], found[3][d]].map(|offset| offset * 1e3);

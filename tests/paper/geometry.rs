@@ -1,4 +1,4 @@
-//! Eq. 1-2 and 28-42: frames, geometric errors, end-point error, least squares.
+//! Frames, geometric errors, end-point error and least squares, eq. 1-2 and 28-42.
 
 use flexcal::paper::{Chain, Form, Parameters, least_squares};
 use nalgebra::{DMatrix, DVector};
@@ -14,7 +14,7 @@ fn frames_of_eq_1_and_2_meet_the_independent_simulator() {
     for row in rows("rigid.csv") {
         for (parameters, expected) in both(&problem).iter().zip(&row.values) {
             let position = Chain::new(&problem, &parameters.geometry, &row.q).position();
-            // The file has six digits after the point, in mm.
+            // The file has six decimals in mm.
             assert!((position - expected).norm() < 1e-9, "{}", (position - expected).norm());
         }
     }
@@ -66,7 +66,7 @@ fn error_of_eq_39_to_41_drops_second_order_and_the_coupling() {
                 geometry.fields_mut().into_iter().zip(e).for_each(|(field, e)| *field += h * e);
             }
             let there = end(&problem, &moved, &row, Form::Corrected);
-            // D_End(E') of eq. 40 with the geometry exact, without and with the deflection at E'.
+            // D_End(E') of eq. 40 with exact geometry, without and with the deflection at E'.
             let with_old_deflection = there.chain.position() - at_nominal.chain.position()
                 + at_nominal.deflection(&nominal);
             let exact = there.position(&moved) - at_nominal.chain.position();
@@ -90,7 +90,7 @@ fn least_squares_of_eq_43_and_44_is_the_pseudo_inverse() {
     let b = DVector::from_fn(9, |i, _| (i as f64 + 0.3).cos());
     let x = least_squares(&a, &b, 0.0).unwrap();
     assert!(a.tr_mul(&(&a * &x - &b)).amax() < 1e-14);
-    // Two equal columns: the shortest solution shares between them.
+    // With two equal columns the minimum-norm solution shares between them.
     let mut twice = a.clone();
     let first = a.column(0).clone_owned();
     twice.set_column(3, &first);

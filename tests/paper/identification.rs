@@ -1,4 +1,4 @@
-//! The paper's procedure end to end, eq. 42-45, on positions of the dual-number model.
+//! Complete procedure of the paper, eq. 42-45, on positions of the dual-number model.
 
 use flexcal::least_squares::solver::Termination;
 use flexcal::mechanics::{StaticState, Workspace};
@@ -11,11 +11,11 @@ use nalgebra::{DVector, Vector3};
 
 use super::arm::{Row, end, model, place_in_e, problem, rows, table_2_errors};
 
-/// Poses fitted; the others judge.
+/// Number of fitted poses; the others are held out.
 const FITTED: usize = 28;
 
-/// Positions of the sampler with `part` of the errors of table 2 and stiffnesses multiplied by
-/// `stiffness`.
+/// Simulates positions of the sampler with a fraction `part` of the errors of table 2 and
+/// stiffnesses multiplied by `stiffness`.
 fn measured<'a>(
     problem: &Problem,
     rows: &'a [Row],
@@ -39,7 +39,7 @@ fn measured<'a>(
         .collect()
 }
 
-/// Mean distance [mm] between measured and expected positions.
+/// Returns the mean distance [mm] between measured and predicted positions.
 fn mean_error(
     problem: &Problem,
     rows: &[Row],
@@ -60,7 +60,7 @@ struct Case<'a> {
 }
 
 impl Case<'_> {
-    /// Identifies, and judges by the mean error on the other poses [mm].
+    /// Identifies, and returns the mean error at the other poses [mm].
     fn run(&self, options: Options) -> (Identified, f64) {
         let found = identify(self.problem, &self.poses[..FITTED], &options).unwrap();
         let error = self.judge(&found.parameters, options.reading);
@@ -85,7 +85,7 @@ fn stiffness_first_works_where_the_geometry_is_nominal() {
     assert!(case.judge(&Parameters::nominal(&problem), Reading::default()) > 7.0);
     let (found, error) = case.run(corrected(StiffnessStage::Positions));
     assert!(error < 0.2 && found.iteration.termination.converged());
-    // What is left is of second order: positions bend round corners, D_f does not.
+    // The remaining error is of second order: positions move along arcs, D_f does not.
     let (_, error) = case.run(corrected(StiffnessStage::Nominal));
     assert!(
         (1.0..2.5).contains(&error),
@@ -152,7 +152,7 @@ fn printed_forms_find_the_arm_less_well() {
 #[test]
 fn load_differences_find_the_stiffness_beside_geometric_errors() {
     let (problem, rows) = (problem(), rows("equilibrium.csv"));
-    // Every pose again under a load that lifts the arm.
+    // Every pose is measured again under a load that lifts the arm.
     let lifted = |row: &Row| Row {
         q: row.q.clone(),
         payload: 0.0,

@@ -1,4 +1,4 @@
-//! Solvers of eq. 45: the pseudo-inverse iteration, and argmin's Gauss–Newton method beside it.
+//! Solvers of eq. 45: pseudo-inverse iteration and argmin's Gauss–Newton method.
 
 use flexcal::least_squares::solver::{
     Divergence, GaussNewtonSettings, PseudoInverseSettings, Settings, Termination, minimise,
@@ -10,7 +10,7 @@ use nalgebra::{DVector, Vector3};
 
 use super::arm::{Row, model, problem, rigid, rows};
 
-/// Poses of the rigid arm measured with the geometry of table 2, exactly.
+/// Returns exact poses of the rigid arm with the geometry of table 2.
 fn poses(rows: &[Row]) -> Vec<Pose<'_>> {
     let pose = |row| Pose {
         setup: Row::setup(row),
@@ -24,7 +24,7 @@ fn poses(rows: &[Row]) -> Vec<Pose<'_>> {
     rows.iter().map(pose).collect()
 }
 
-/// Parameters that the poses tell apart, most visible first.
+/// Returns the parameters that the poses separate, in descending order of visibility.
 fn identifiable(model: &Model, poses: &[Pose]) -> Vec<usize> {
     let n = model.parameters.len();
     let x = DVector::zeros(n);
@@ -114,7 +114,7 @@ fn gauss_newton_reports_a_singular_jacobian() {
     let problem = rigid(problem());
     let model = model(&problem);
     let rows = rows("rigid.csv");
-    // The target on axis 4: nothing there for θ₄ to move.
+    // With the target on axis 4, θ₄ moves nothing.
     let mut on_axis = problem.clone();
     on_axis.tool.target.fill(0.0);
     let hidden = Model::new(&on_axis, &[String::new()], &[String::new()]).unwrap();

@@ -1,4 +1,4 @@
-//! Every misprint of the paper, and its size on the lunar sampler.
+//! Misprints of the paper, and their size on the lunar sampler.
 
 use flexcal::paper::published::{
     BEFORE, ERRORS, NOMINAL, Published, WITH_ELASTICITY, is_published_arm,
@@ -12,7 +12,7 @@ fn largest(of: impl Iterator<Item = f64>) -> f64 {
     of.fold(0.0, f64::max)
 }
 
-/// Largest change [mm] of `D_f` by one misprint over the golden poses.
+/// Returns the largest change [mm] of `D_f` by one misprint over the golden poses.
 fn elastic(problem: &Problem, parameters: &Parameters, rows: &[Row], misprint: Misprint) -> f64 {
     let size = |row: &Row| {
         let deflection =
@@ -23,7 +23,7 @@ fn elastic(problem: &Problem, parameters: &Parameters, rows: &[Row], misprint: M
     largest(rows.iter().map(size))
 }
 
-/// Largest change [mm] of `D_g` at table 2 by one misprint.
+/// Returns the largest change [mm] of `D_g` at table 2 by one misprint.
 fn geometric(problem: &Problem, rows: &[Row], misprint: Misprint) -> f64 {
     let (nominal, e) = (Parameters::nominal(problem), table_2_errors(problem));
     let size = |row: &Row| {
@@ -83,7 +83,7 @@ fn misprints_of_the_geometric_formulas_have_these_sizes() {
         println!("{misprint:?}: {size:.5} mm of D_g at table 2");
         assert!(limit.contains(&size), "{misprint:?} {size}");
     }
-    // What β alone moves at table 2 is what an E_j without β cannot follow by itself.
+    // The displacement by β alone at table 2 is what an E_j without β misses.
     let only_beta = e.map_with_location(|k, _, e| if k % 5 == 4 { e } else { 0.0 });
     let size = largest(rows.iter().map(|row| {
         (end(&problem, &nominal, row, Form::Corrected).jacobian() * &only_beta).norm() * 1e3
@@ -104,7 +104,7 @@ fn table_1_as_printed_turns_the_arm_over() {
     let there = position(&problem, &row.q);
     println!("table 1, α₂ = −90°: {:.1} mm", (there - here).norm() * 1e3);
     assert!((there - here).norm() > 1.0);
-    // The two tables are the same arm once θ₂ to θ₄ and the offsets along their axes change sign.
+    // Both tables describe the same arm if θ₂ to θ₄ and the offsets along their axes change sign.
     problem.joints[1..].iter_mut().for_each(|joint| joint.d = -joint.d);
     problem.tool.target.z = -problem.tool.target.z;
     let mirrored = position(&problem, &[row.q[0], -row.q[1], -row.q[2], -row.q[3]]);
@@ -118,8 +118,7 @@ fn lengths_of_the_tables_are_metres() {
     let largest = rows("rigid.csv").iter().map(|row| row.values[0].norm()).fold(0.0, f64::max);
     println!("tables 1 and 2: links of {reach:.3} m, not mm; errors of 49 mm need them");
     assert!(reach > 3.7 && largest < reach + 0.7);
-    // Read in mm, the angles of table 2 move the end point by micrometres, not by the 49 mm of
-    // table 3.
+    // Read in mm, table 2 moves the end point by micrometres, not by the 49 mm of table 3.
     let mut small = problem.clone();
     for joint in &mut small.joints {
         (joint.a, joint.d) = (joint.a * 1e-3, joint.d * 1e-3);

@@ -1,4 +1,4 @@
-//! Tables as other programs write them, read with a map.
+//! Tables of other programs, read with a column map.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 const ARM: &str = "name = 'arm'\n[[joint]]\n[[joint]]\na_m = 0.5\n";
 
-/// A laser tracker's report: comments, a decimal comma, shots that were missed, a date.
+/// Report of a laser tracker: comments, decimal commas, missed shots, dates.
 const TRACKER: (&str, &str) = (
     "'Collection::Group::Target' = 'pose'\n'X' = 'x_mm'\n'Y' = 'y_mm'\n'Z' = 'z_mm'\n'A1' = 'q1_deg'\n'A2' = 'q2_deg'\n'Timestamp' = 'time'\n\
      [data.format]\ncomment = '//'\ndecimal = ','\nmissing = '0,0,0'\n",
@@ -20,8 +20,8 @@ const TRACKER: (&str, &str) = (
      // 14:03:30.5;0,02\n",
 );
 
-/// A motion capture system's export: lines above the header, names that stand several times, empty
-/// cells where a body was lost.
+/// Export of a motion capture system: lines above the header, repeated names, empty cells for a
+/// lost body.
 const CAPTURE: (&str, &str) = (
     "'Time (Seconds)' = 'time_s'\n'#7' = 'x_m'\n'#8' = 'y_m'\n'#9' = 'z_m'\n'joint_1' = 'q1_rad'\n'joint_2' = 'q2_rad'\n[data.format]\nmissing = ''\n",
     "Format Version,1.23,Take Name,arm,Capture Frame Rate,120.0\n\n,Type,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,Rigid Body,,\n\
@@ -114,7 +114,7 @@ fn sizes_that_no_arm_has_are_said() {
         "{words}"
     );
     assert_eq!(said(&arm("target_mm = [220, 0, -90]"), &table("deg")), "");
-    // A column of one's own that nobody named.
+    // An unmapped column of the user.
     let words = said(&arm(""), "q1_deg,q2_deg,x_m,y_m,z_m,humidity\n1,2,3,4,5,40\n");
     assert!(words.contains("column humidity") && words.contains("[data.covariates]"), "{words}");
     let warm = |of: f64| {
@@ -224,7 +224,7 @@ fn wrong_maps_are_named() {
     }
 }
 
-/// The arm with two columns of its owner's, and whatever follows `[data.covariates]`.
+/// Returns the arm with two covariates, and the given lines after `[data.covariates]`.
 fn with_covariates(rest: &str) -> Result<Problem, InputError> {
     let text = format!(
         "{ARM}[data.covariates]\n'tilt_deg' = 'tilt of the carriage'\n'oil' = 'pressure of the oil'\n{rest}"
@@ -330,7 +330,7 @@ fn fixed_points_are_read_like_shots_of_the_arm() {
         "{warnings:?}"
     );
 
-    // The name of the file stands for the session of fixed points too.
+    // The file name is the session of fixed points, too.
     let named = format!("{ARM}[data.columns]\n'#file' = 'session'\n");
     let table = "q1_deg,q2_deg,x_m,y_m,z_m,nest\n1,2,3,4,5,\n,,1,2,3,N1\n";
     let files = [("A.csv", table), ("B.csv", table)];
@@ -385,7 +385,7 @@ fn a_lost_position_takes_no_contact_with_it() {
     );
 }
 
-/// A table under two lines of words, with columns of its own names.
+/// Table below two lines of text, with unusual column names.
 const UNDER_WORDS: &str =
     "Tracker 7 of hall 2\nA,B\njoint_1,joint_2,Target X,y_mm,z_mm\n1,2,3,4,5\n";
 
@@ -396,20 +396,20 @@ fn the_entry_of_a_map_that_is_misspelt_is_to_blame_and_no_other() {
     let error =
         |map: &str| read(&problem(map), &[("rows.csv", UNDER_WORDS)]).unwrap_err().to_string();
     read(&problem(&right), &[("rows.csv", UNDER_WORDS)]).unwrap();
-    // The header is found by the names that are right.
+    // The header is found by the correct names.
     let said = error(&right.replace("Target X", "Traget X"));
     assert!(
         said.contains("data.columns.\"Traget X\"") && said.contains("did you mean Target X?"),
         "{said}"
     );
-    // A name that the table has itself.
+    // A name that the table already contains.
     let said = error(&right.replace("\"x_mm\"", "\"y_mm\""));
     assert!(
         said.contains("data.columns.\"Target X\": the table has a column y_mm of its own"),
         "{said}"
     );
     assert!(said.contains("none that is x_m or x_mm"), "{said}");
-    // A name that another entry has.
+    // A name that another entry already has.
     let said = error(&right.replace("\"q2_deg\"", "\"q1_deg\""));
     assert!(
         said.contains("data.columns.joint_2: given already as column q1_deg (joint_1)"),
@@ -439,7 +439,7 @@ fn times_that_are_no_dates_are_named_with_what_is_expected() {
     ] {
         assert!(said.contains(words), "{said}");
     }
-    // What a map names is meant.
+    // A column named in the map is used.
     let map = "\"when\" = \"time\"\n\"q1_deg\" = \"q1_deg\"";
     let said = read(&problem(map), &[("rows.csv", table)]).unwrap_err().to_string();
     assert!(

@@ -1,5 +1,4 @@
-//! What commands do to files that are there: what they replace, what they leave, and what they
-//! read.
+//! File handling of commands: what they replace, keep and read.
 
 #![cfg(unix)]
 use std::ffi::OsStr;
@@ -13,14 +12,14 @@ use std::time::Duration;
 use assert_cmd::Command;
 use assert_cmd::assert::Assert;
 
-/// Two rigid joints: a fit takes a moment.
+/// Problem of two rigid joints, whose fit is fast.
 const ARM: &str = "name = 'arm'\n[[joint]]\nd_m = 0.3\n[[joint]]\nalpha_deg = 90\na_m = 0.1\n[tool]\ntarget_m = [0.5, 0, 0]\n\
                    [parameters]\n'joint*.theta' = { sigma_deg = 1 }\n'tool.x' = { sigma_mm = 3 }\n[data]\n\
                    files = ['measurements.csv']\nposition_sigma_mm = 0.1\nreference_temperature_C = 20\n";
 const TRUTH: &str = "[random]\n'*' = { sigma_deg = 0.1, sigma_mm = 1 }\n[noise]\nposition_sigma_mm = 0.1\n\
                      [poses]\nq1_deg = [-90, 90]\nq2_deg = [-60, 60]\n";
 
-/// A folder with a problem and its data in `arm`.
+/// Temporary folder with a problem and its data in `arm`.
 struct Bench(tempfile::TempDir);
 
 impl Bench {
@@ -53,7 +52,8 @@ impl Bench {
         self.command(arguments).assert()
     }
 
-    /// What a command says that ends with status 2 and leaves the files of a folder as they are.
+    /// Returns the message of a command that ends with status 2 and leaves the files of a folder
+    /// unchanged.
     fn refused(&self, arguments: &str, folder: &str) -> String {
         let before = self.listing(folder);
         let error = text(&self.flexcal(arguments).code(2).get_output().stderr);
@@ -61,7 +61,7 @@ impl Bench {
         error
     }
 
-    /// Every file below a folder with its content.
+    /// Returns every file below a folder with its content.
     fn listing(&self, folder: &str) -> Vec<(PathBuf, Vec<u8>)> {
         let mut all = Vec::new();
         let mut folders = vec![self.path(folder)];
@@ -98,7 +98,7 @@ fn what_is_read_is_not_replaced() {
             && error.contains("--force"),
         "{error}"
     );
-    // Under whatever name: a link to the folder, and one to the file.
+    // Inputs are recognised under other names: a link to the folder, and one to the file.
     symlink(bench.path("arm"), bench.path("other")).unwrap();
     assert!(
         bench.refused(&simulate.replace("--out arm", "--out other"), "arm").contains("an input")
@@ -108,11 +108,11 @@ fn what_is_read_is_not_replaced() {
     assert!(
         bench.refused(&simulate.replace("--out arm", "--out linked"), "arm").contains("an input")
     );
-    // The problem that the loop wrote is one that it reads the next time.
+    // The problem that the loop wrote is the one that it reads next.
     bench.flexcal("loop arm --out closed");
     let error = bench.refused("loop closed/problem.closed.toml --out closed", "closed");
     assert!(error.contains("problem.closed.toml is an input"), "{error}");
-    // Who wants it says so.
+    // --force permits it.
     bench.flexcal(&format!("{simulate} --force")).success();
     assert_eq!(bench.read("arm/measurements.csv").lines().count(), 10);
 }
@@ -130,7 +130,7 @@ fn what_flexcal_did_not_write_is_not_replaced() {
         );
         fs::remove_file(bench.path("out").join(name)).unwrap();
     }
-    // What it wrote it replaces, its own and that of another command, which it says.
+    // Files of flexcal are replaced; those of another command with a message.
     for (command, said) in
         [("identify", None), ("identify", None), ("compare", Some("the report of identify"))]
     {
@@ -139,7 +139,7 @@ fn what_flexcal_did_not_write_is_not_replaced() {
         assert_eq!(said.map(|said| error.contains(said)), said.map(|_| true), "{error}");
         assert_eq!(error.contains("is replaced"), said.is_some(), "{error}");
     }
-    // Until somebody has worked on it.
+    // A changed file is not replaced.
     fs::write(bench.path("out/report.md"), bench.read("out/report.md") + "and a remark").unwrap();
     for command in ["identify", "compare", "loop"] {
         assert!(
@@ -172,7 +172,7 @@ fn results_of_an_earlier_table_do_not_stay_beside_those_of_another() {
     assert_eq!(there(), ["errors.json", "predictions.csv", "residuals.csv"]);
     bench.flexcal(poses).success();
     assert_eq!(there(), ["predictions.csv"]);
-    // What another command wrote stays, and what was changed since.
+    // Files of another command stay, and so do changed ones.
     bench.flexcal("predict arm --out out").success();
     bench.flexcal("identify arm --out out").success();
     fs::write(bench.path("out/errors.json"), "mine").unwrap();
@@ -191,8 +191,8 @@ fn links_are_not_followed() {
     let error = bench.refused("identify arm --out out", ".");
     assert!(error.contains("symbolic link"), "{error}");
     fs::remove_file(bench.path("out/figures")).unwrap();
-    // A result that is a link is not what flexcal wrote; with --force the link goes and what it led
-    // to stays.
+    // A result that is a link was not written by flexcal; --force replaces the link and leaves its
+    // target.
     fs::write(bench.path("elsewhere/mine"), "mine").unwrap();
     symlink("../elsewhere/mine", bench.path("out/report.md")).unwrap();
     assert!(bench.refused("identify arm --out out", ".").contains("out/report.md is there"));
@@ -221,7 +221,7 @@ fn a_command_that_is_killed_leaves_no_litter() {
         process.kill().unwrap();
         process.wait().unwrap();
         let left = whole("killed");
-        // Between the two calls that replace a file it has another name.
+        // During replacement a file has another name.
         let is_passing = |name: &String| {
             name.rsplit('/').next().is_some_and(|last| last.starts_with(".flexcal-"))
         };
@@ -233,10 +233,10 @@ fn a_command_that_is_killed_leaves_no_litter() {
         let known = |name: &String| expected.contains(name) || is_passing(name);
         assert!(left.iter().all(known), "after {} ms: {left:?}", 4 * delay);
     }
-    // Numbers of processes end at 4 194 304.
+    // Process ids do not exceed 4 194 304.
     bench.flexcal("identify arm --out killed").success();
     fs::write(bench.path("killed/figures/.flexcal-5000000-x"), "").unwrap();
-    // What is a minute old is taken away, that of a command killed above too.
+    // Files older than a minute are removed, including those of a killed command.
     for (path, _) in bench.listing("killed") {
         let left = fs::File::options().append(true).open(path).unwrap();
         left.set_modified(std::time::SystemTime::now() - Duration::from_secs(3600)).unwrap();
@@ -267,7 +267,7 @@ fn pipes_are_read_or_refused_at_once() {
     let error = text(&looped.write_stdin(table).assert().code(2).get_output().stderr);
     assert!(error.contains("/dev/stdin: loop names its data in problem.closed.toml"), "{error}");
     assert!(!bench.path("d").exists());
-    // A problem from a pipe is closed as well.
+    // A problem from a pipe can be closed, too.
     let closed = bench
         .command("loop /dev/stdin --out e --data arm/measurements.csv")
         .write_stdin(ARM)
@@ -287,7 +287,7 @@ fn names_need_not_be_utf8() {
     run("identify").success();
     assert!(bench.path(out).join("estimate.json").is_file());
     run("identify").success();
-    // What cannot be named in a file is refused before any work.
+    // A name that cannot be written to a file is refused before any work.
     let error = text(&run("loop").code(2).get_output().stderr);
     assert!(error.contains("the name of this file is not UTF-8"), "{error}");
     assert!(!bench.path(out).join("loop.json").exists());
@@ -313,7 +313,7 @@ fn the_same_rows_under_two_names_are_said() {
             "{error}"
         );
     }
-    // The problem names it too, and is not to blame.
+    // The problem names the file too, but is not to blame.
     let twice = "identify arm --data arm/measurements.csv arm/measurements.csv";
     let error = text(&bench.flexcal(twice).code(2).get_output().stderr);
     assert!(
@@ -416,7 +416,7 @@ fn an_acceptance_is_of_the_files_that_were_read() {
         (&record["instrument"], &record["commit"]),
         (&"tracker".into(), &serde_json::Value::Null)
     );
-    // Distances of 0.3, 0 and 0.3 mm from the middle: mean 0.2, spread √0.03.
+    // Distances of 0.3, 0 and 0.3 mm from the centre: mean 0.2, standard deviation √0.03.
     assert_eq!(record["repeated_poses"], 1);
     assert!(
         (record["repeatability_max_mm"].as_f64().unwrap() - (0.2 + 3.0 * 0.03_f64.sqrt())).abs()
@@ -444,7 +444,7 @@ fn an_acceptance_is_of_the_files_that_were_read() {
     ] {
         assert!(page.contains(words), "{words}");
     }
-    // A repository around the problem is named by its commit.
+    // A repository around the problem is identified by its commit.
     fs::create_dir_all(bench.path(".git/refs/heads")).unwrap();
     fs::write(bench.path(".git/HEAD"), "ref: refs/heads/main\n").unwrap();
     fs::write(bench.path(".git/refs/heads/main"), "0123abcd\n").unwrap();

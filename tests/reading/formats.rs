@@ -1,4 +1,4 @@
-//! Valid problems and measurements, and what they become.
+//! Valid problems and measurements, and the values read from them.
 
 #![expect(clippy::float_cmp, reason = "these conversions are exact")]
 
@@ -20,7 +20,7 @@ fn parse(text: &str) -> Problem {
     Problem::parse(text, Path::new("problem.toml")).unwrap()
 }
 
-/// Reads tables that are given as texts.
+/// Reads tables given as texts.
 fn read(problem: &Problem, tables: &[&str]) -> Result<(Measurements, Vec<Warning>), InputError> {
     let folder = TempDir::new().unwrap();
     let files: Vec<PathBuf> =
@@ -84,7 +84,7 @@ fn several_files_follow_each_other() {
 
 #[test]
 fn the_example_of_the_format_is_valid() {
-    // It shows one joint of several; the others and a length for the beam complete it.
+    // The example shows one joint of several; the others and a beam length complete it.
     let text = fs::read_to_string(Path::new(CASES).join("every-key.toml")).unwrap();
     let text = text.replacen("[joint.beam]", "a_m = 1.95\n[joint.beam]", 1);
     let problem = parse(&text.replacen("[tool]", "[[joint]]\n[[joint]]\n[tool]", 1));
@@ -230,7 +230,7 @@ fn every_effect_has_its_arguments() {
     let declared: Vec<_> =
         problem.effects.iter().map(|declaration| declaration.effect.clone()).collect();
     assert_eq!(declared, effects.map(|(_, effect)| effect));
-    // They are written as they are read.
+    // Effects are written in the form in which they are read.
     let bare = parse(text.split("[[effect]]").next().unwrap());
     for effect in declared.iter().filter(|effect| effect.name() != "gravity-compensator") {
         assert_eq!(bare.effect(&effect.declaration(), Path::new("again")).unwrap().effect, *effect);
@@ -281,7 +281,7 @@ fn columns_nobody_knows_are_passed_over_with_a_warning() {
         ["q1_deg", "joint 1"],
         ["operator", "known; ignored"],
         ["payloud_kgs", "(did you mean payload_kg?); ignored"],
-        // A column that is there already is not meant.
+        // A suggested column that already exists is not meant.
         ["yy_m", "known; ignored"],
         ["time", "time_s"],
     ];
@@ -347,7 +347,7 @@ fn a_fraction_keeps_rows_of_one_configuration_together() {
             "name = 'arm'\n[[joint]]\n[data]\nheld_out = {{ fraction = 0.3, seed = {seed} }}\n"
         ))
     };
-    // Four rows of each configuration, apart by less than a hundredth of a degree.
+    // Four rows of each configuration, less than a hundredth of a degree apart.
     let angle = |row: i32| f64::from(row % 25) + 0.001 * f64::from(row / 25);
     let rows: Vec<_> = (0..100).map(|row| format!("{},0,0,0\n", angle(row))).collect();
     let table = format!("q1_deg,x_m,y_m,z_m\n{}", rows.concat());
@@ -449,7 +449,7 @@ fn readings_stand_beside_commands_and_nests_apart() {
     let readings = parse(&format!("{text}[data]\njoints = 'read'\n"));
     let read_rows = read(&readings, &[table]).unwrap().0;
     assert_eq!(read_rows.configurations, other.configurations);
-    // Readings alone are enough where they count, and not where commands do.
+    // Readings suffice without commands if they are the source, and not otherwise.
     let alone = "q1_read_rad,q2_read_deg,x_m,y_m,z_m\n0.1,2,3,4,5\n";
     assert!(read(&readings, &[alone]).unwrap().0.with_other_joint_source().is_none());
     let error = read(&commanded, &[alone]).unwrap_err().to_string();

@@ -1,5 +1,4 @@
-//! Inputs that no arm has: too large, too many, too long. Each ends at once with status 2 and says
-//! so.
+//! Inputs beyond any arm (too large, too many, too long) end at once with status 2 and a message.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
 
-/// Longer than any of these may take, on any machine; they took from 8 s to for ever.
+/// Upper limit of the duration; without limits on input these cases took 8 s or did not end.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// The lunar sampler with its data.
+/// Temporary folder with the lunar sampler and its data.
 struct Bench(tempfile::TempDir);
 
 impl Bench {
@@ -31,7 +30,7 @@ impl Bench {
         fs::read_to_string(self.path(name)).unwrap()
     }
 
-    /// Status and what is said of a command, which must not take long.
+    /// Returns status and output of a command, which must end quickly.
     fn run(&self, arguments: &str) -> (i32, String) {
         let clock = Instant::now();
         let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));

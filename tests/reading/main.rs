@@ -1,4 +1,4 @@
-//! What is read and written: mistakes in the input, dialects, formats, files, limits, names.
+//! Reading and writing: input errors, dialects, formats, files, limits, names.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
 

@@ -1,4 +1,4 @@
-//! What a name can do: nothing to a terminal, to a report, to a figure.
+//! Names with special characters in terminal output, reports and figures.
 
 use std::fs;
 use std::path::PathBuf;
@@ -6,12 +6,12 @@ use std::path::PathBuf;
 use assert_cmd::Command;
 use flexcal::error::is_hidden;
 
-/// Escape sequences in both widths, a bell, a line break, a mark of writing direction, a tag, no
-/// character at all.
+/// Invisible texts: escape sequences of both widths, a bell, a line break, a mark of writing
+/// direction, a tag, a non-character.
 const HIDDEN: [&str; 8] =
     ["\u{1b}[2J", "\u{9b}31m", "\u{7}", "\n", "\u{202e}", "\u{200f}", "\u{e0041}", "\u{ffff}"];
 
-/// Names that can be seen and would do something in Markdown, HTML or SVG.
+/// Visible names with a meaning in Markdown, HTML or SVG.
 const ACTIVE: [&str; 8] = [
     "`x` ![x](https://example.org/x.png)",
     "[x](javascript:alert(1))",
@@ -28,7 +28,7 @@ const TABLE: &str = "q1_deg,q2_deg,x_mm,y_mm,z_mm,session,target,split\n";
 struct Bench(tempfile::TempDir);
 
 impl Bench {
-    /// A planar arm with a title; its session and target go by a name.
+    /// Creates a planar arm with a title; its session and target have the given name.
     fn new(title: &str, name: &str) -> Self {
         let bench = Self(tempfile::tempdir().unwrap());
         let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
@@ -57,7 +57,7 @@ impl Bench {
         self.0.path().join(name)
     }
 
-    /// Status and everything that is printed.
+    /// Returns the status and all printed output.
     fn run(&self, arguments: &str) -> (i32, String) {
         let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
         let output =
@@ -87,8 +87,8 @@ fn what_is_not_seen_is_refused_by_name_and_never_printed() {
             }
         }
     }
-    // Where the name is one of a file, a key, a column or a word that is wrong in itself, it is
-    // shown without what is hidden.
+    // If the name of a file, key, column or word is itself the error, it is shown without the
+    // invisible characters.
     let bench = Bench::new("arm", "A");
     for hidden in HIDDEN.iter().filter(|hidden| **hidden != "\n") {
         let (key, column) = (format!("k{hidden}k"), format!("c{hidden}c"));
@@ -133,7 +133,7 @@ fn what_is_seen_is_text_and_nothing_else() {
         assert!(status < 2 && printed.contains(name), "{name}: {printed}");
         let report = fs::read_to_string(bench.path("out/report.md")).unwrap();
         let left = ["](", "](http", "<script", "<!--", "`x`", "![", "https://", "www.e", "&lt;"];
-        // With its escapes taken out, no mark is left that a name brought.
+        // Without its escapes, the report contains no markup from a name.
         let unescaped: String = report
             .split("\\\\")
             .map(|part| {
@@ -156,13 +156,13 @@ fn what_is_seen_is_text_and_nothing_else() {
         }
         assert!(drawn > 3);
         let page = fs::read_to_string(bench.path("out/report.html")).unwrap();
-        // Its own script and what that knows of the poses.
+        // The only scripts are the page's script and its data.
         assert!(page.matches("<script").count() == 2 && !page.contains("<!-- x"), "{name}");
         assert_eq!(page.matches("</script>").count(), 2, "{name}");
     }
 }
 
-/// What is wrong with a text as XML, for the part of XML that figures have.
+/// Returns an error of a text as XML, for the subset that figures use.
 fn ill_formed(text: &str) -> Option<String> {
     let mut open: Vec<&str> = Vec::new();
     let mut rest = text;

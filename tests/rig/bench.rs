@@ -1,4 +1,4 @@
-//! Arms and poses that the tests share.
+//! Shared arms and poses of the rig tests.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ pub fn problem(text: &str) -> Problem {
     Problem::parse(text, Path::new("problem.toml")).unwrap()
 }
 
-/// An effect of the catalogue.
+/// Creates a true effect of the catalogue.
 pub fn effect(arm: &Problem, effect: Effect, values: &[f64]) -> TrueEffect {
     TrueEffect::new(Cause::Catalogued(effect), values, &arm.joints).unwrap()
 }
@@ -29,14 +29,14 @@ pub fn position(
     Rig::new(arm.clone(), effects).position(conditions).unwrap()
 }
 
-/// A row of `tests/golden`: what was set, and the columns of values [mm].
+/// Row of `tests/golden`: conditions, and the columns of values [mm].
 pub struct Golden {
     pub conditions: PoseConditions,
     pub values: Vec<f64>,
 }
 
 impl Golden {
-    /// Vector number `k` of the row [m].
+    /// Returns vector `k` of the row [m].
     pub fn vector(&self, k: usize) -> Vector3<f64> {
         Vector3::from_column_slice(&self.values[3 * k..3 * k + 3]) * 1e-3
     }
@@ -58,7 +58,7 @@ pub fn golden(name: &str) -> Vec<Golden> {
     reader.records().map(row).collect()
 }
 
-/// Table 2 of [Chen2021]: identified α°, a m, θ°, d m, β° of each joint.
+/// Identified α \[°\], a \[m\], θ \[°\], d \[m\], β \[°\] of each joint [Chen2021, table 2].
 const TABLE_2: [[f64; 5]; 4] = [
     [0.019, 0.0, -0.008, 0.097, 0.304],
     [89.996, -0.002, 0.304, -0.084, 0.007],
@@ -76,7 +76,7 @@ pub fn table_2() -> Problem {
     arm
 }
 
-/// The arm with every joint and beam stiffer by a factor; 0 makes it rigid.
+/// Multiplies the stiffness of every joint and beam by a factor; 0 makes it rigid.
 pub fn stiffer(mut arm: Problem, joints: f64, link_a: f64, link_b: f64) -> Problem {
     let by = |factor: f64, value: Option<f64>| {
         value.map(|value| value * factor).filter(|value| *value > 0.0)

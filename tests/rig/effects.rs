@@ -1,4 +1,4 @@
-//! Every effect is inert at zero, moves positions when it is not, and does what its law says.
+//! Effects of the rig: none at zero, a displacement otherwise, and the displacement of their law.
 
 use flexcal::problem::{Effect, PoseConditions, Problem};
 use flexcal::rig::{Cause, Shape, TrueEffect};
@@ -7,7 +7,8 @@ use nalgebra::Vector3;
 use super::bench::{effect, golden, lunar_sampler, position};
 use super::common::effects::{Strong, of_lunar_sampler};
 
-/// The lunar sampler as FORMAT declares it, with a rigid link, and a pose in which everything acts.
+/// Returns the lunar sampler as FORMAT declares it, with a rigid link, and a pose in which every
+/// effect acts.
 fn bench() -> (Problem, PoseConditions) {
     let mut arm = lunar_sampler();
     arm.joints[1].a = 0.3;
@@ -18,7 +19,8 @@ fn bench() -> (Problem, PoseConditions) {
     (arm, conditions)
 }
 
-/// Every effect of the catalogue with a strength, but one: the rig is always in equilibrium.
+/// Returns every effect of the catalogue with a value, except equilibrium, which the rig always
+/// has.
 fn catalogue() -> Vec<Strong> {
     of_lunar_sampler()
         .into_iter()
@@ -38,7 +40,7 @@ fn every_effect_is_inert_at_zero_and_moves_positions_when_it_is_not() {
             .norm();
         println!("{:6.3} mm  {cause:?}", moved * 1e3);
         assert!(moved > 1e-5, "{cause:?} moves the target by {moved} m");
-        // Each value matters by itself.
+        // Each value has an effect by itself.
         for (k, value) in strength.iter().enumerate().filter(|(_, value)| **value != 0.0) {
             if matches!(cause, Effect::UnmodelledMass { .. }) && k == 1 {
                 continue;
@@ -67,7 +69,7 @@ fn the_wrong_number_of_values_is_refused() {
     }
 }
 
-/// Checks that an effect does the same as a change of the arm or of what was set.
+/// Checks that an effect equals a change of the arm or of the conditions.
 fn check(cause: &Effect, values: &[f64], change: impl Fn(&mut Problem, &mut PoseConditions)) {
     let (arm, conditions) = bench();
     let with = position(&arm, vec![effect(&arm, cause.clone(), values)], &conditions);
@@ -154,8 +156,8 @@ fn the_rope_of_a_trolley_leans_with_its_hook() {
     let (arm, conditions) = bench();
     let trolley =
         position(&arm, vec![effect(&arm, Effect::HoistDirection, &[0.0, 0.0, 0.03])], &conditions);
-    // Lean the rope by hand, from where the straight arm holds the hook: 30 mm of deflection change
-    // it by 0.001.
+    // The rope leans from the position of the hook on the straight arm; the deflection of 30 mm
+    // changes the lean by 0.001.
     let stiff = super::bench::stiffer(arm.clone(), 0.0, 0.0, 0.0);
     let mut hook = stiff.clone();
     hook.joints[3].theta = -conditions.configuration[3];

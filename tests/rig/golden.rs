@@ -7,7 +7,7 @@ use flexcal::rig::Rig;
 
 use super::bench::{Golden, golden, lunar_sampler, position, stiffer, table_2};
 
-/// Largest distance [mm] from vector `k` of the rows.
+/// Returns the largest distance [mm] from vector `k` of the rows.
 fn worst(arm: &Problem, rows: &[Golden], k: usize) -> f64 {
     let distance =
         |row: &Golden| (position(arm, Vec::new(), &row.conditions) - row.vector(k)).norm() * 1e3;
@@ -27,8 +27,8 @@ fn rigid_positions_agree_to_a_nanometre() {
 fn small_displacements_agree_for_each_part() {
     let rows = golden("first_order.csv");
     let straight = stiffer(lunar_sampler(), 0.0, 0.0, 0.0);
-    // Deflections ten thousand times smaller are in the linear limit; scaled back they keep eleven
-    // digits.
+    // Deflections ten thousand times smaller are in the linear limit; scaled back, eleven digits
+    // remain.
     let scale = 1e4;
     let parts = [
         ("joints", [scale, 0.0, 0.0]),

@@ -1,4 +1,4 @@
-//! Results that can be checked by hand: a straight arm of one link, clamped or on one joint.
+//! Hand calculations: a straight arm of one link, clamped or on one joint.
 
 use flexcal::problem::{Effect, FreeLength, PoseConditions, Problem};
 use nalgebra::Vector3;
@@ -12,7 +12,7 @@ const EI: f64 = 4.0e4;
 const GJ: f64 = 3.0e4;
 const EA: f64 = 1.0e7;
 
-/// A horizontal cantilever along x, its end measured; `more` goes into the section of the beam.
+/// Returns a horizontal cantilever along x whose end is measured; `beam` is added to its section.
 fn cantilever(a: f64, beam: &str, tool: &str) -> Problem {
     problem(&format!(
         "name = 'cantilever'\n[[joint]]\na_m = {a}\n[joint.beam]\nname = 'A'\nEA_N = {EA}\nEIy_N_m2 = {EI}\n\
@@ -20,7 +20,7 @@ fn cantilever(a: f64, beam: &str, tool: &str) -> Problem {
     ))
 }
 
-/// A rigid horizontal link of 2 m behind one joint.
+/// Returns a rigid horizontal link of 2 m behind one joint.
 fn rigid() -> Problem {
     problem(
         "name = 'rigid'\n[[joint]]\nalpha_deg = 90\n[[joint]]\na_m = 2\nkind = 'fixed'\n\
@@ -94,7 +94,7 @@ fn a_hanging_soft_joint_comes_to_rest_and_a_column_that_buckles_does_not() {
         "name = 'pendulum'\n[[joint]]\nalpha_deg = 90\ntheta_deg = -80\nstiffness_N_m_per_rad = 20\n\
          [[joint]]\na_m = 2\nkind = 'fixed'\n",
     );
-    // M = P L cos(−80° + φ) lets the joint sag by φ = −M/20, from a fixed point that overshoots.
+    // M = P L cos(−80° + φ) lets the joint sag by φ = −M/20, from an iteration that overshoots.
     let end = position(&arm, Vec::new(), &at(10.0));
     let angle = end.z.atan2(end.x);
     near(angle - (-80.0_f64).to_radians(), -10.0 * G * 2.0 * angle.cos() / 20.0, 1e-9);
@@ -115,7 +115,7 @@ fn warmth_lengthens_and_bows_a_link() {
         let longer = effect(&arm, Effect::LinkThermalExpansion { link: link() }, &[12e-6]);
         near(position(&arm, vec![longer.clone()], &warm).x, a * (1.0 + 12e-6 * 15.0), 1e-14);
         assert_eq!(position(&arm, vec![longer], &at(0.0)).x, a);
-        // A bow is an arc: κ = k (T − T₀), z = −(1 − cos κL)/κ, the same on either side of the
+        // A bent link is an arc: κ = k (T − T₀), z = −(1 − cos κL)/κ, the same on either side of the
         // clamp.
         let bowed = effect(&arm, Effect::LinkThermalBending { link: link() }, &[1e-5, -2e-5]);
         let end = position(&arm, vec![bowed], &warm);
@@ -141,9 +141,9 @@ fn compliances_tilt_by_the_moment() {
         1e-11 * moment.powi(3) * arm_length,
         1e-9,
     );
-    // Joint 1's own x and y feel nothing.
+    // The load has no moment about x and y of joint 1.
     assert!(drop(Effect::JointLateralCompliance { joint: 1 }, &[1e-7, 1e-7]).abs() < 1e-15);
-    // Seen from joint 2, whose z points along −y as well; its y is up, its x along the link.
+    // In the frame of joint 2, whose z is also along −y, y is upward and x along the link.
     let mut upright = rigid();
     upright.joints[0].alpha = 0.0;
     let tilted = effect(&upright, Effect::JointLateralCompliance { joint: 1 }, &[0.0, 1e-7]);
@@ -152,8 +152,8 @@ fn compliances_tilt_by_the_moment() {
 
 #[test]
 fn a_spring_lifts_what_a_joint_carries() {
-    // A right angle of 0.3, 0.4 and 0.5 m at the joint, whose y is up: the spring is 0.3 m longer
-    // than free, its line 0.24 m from the axis.
+    // A right triangle of 0.3, 0.4 and 0.5 m at the joint, whose y is upward: the spring is 0.3 m
+    // longer than free, and its line is 0.24 m from the axis.
     let mut arm = rigid();
     arm.joints[0].stiffness = Some(1e7);
     let spring = |anchor| Effect::GravityCompensator {
@@ -169,7 +169,7 @@ fn a_spring_lifts_what_a_joint_carries() {
     near(turned(spring([0.0, 0.4]), &[500.0, 0.0]), 500.0 * 0.3 * 0.24, 1e-4);
     near(turned(spring([0.0, 0.4]), &[0.0, 70.0]), 70.0 * 0.24, 1e-4);
     near(turned(spring([0.0, -0.4]), &[500.0, 70.0]), -(500.0 * 0.3 + 70.0) * 0.24, 1e-4);
-    // A spring where nothing gives way does nothing.
+    // A spring on a rigid arm has no effect.
     let stiff = rigid();
     let still =
         position(&stiff, vec![effect(&stiff, spring([0.0, 0.4]), &[500.0, 70.0])], &at(3.0));
@@ -191,7 +191,7 @@ fn the_tracker_scales_drifts_and_shifts() {
     let step = [1e-4, 2e-4, 3e-4];
     is(shift(Effect::StationShift { at_time: 500.0 }, &step, &late), step);
     is(shift(Effect::StationShift { at_time: 501.0 }, &step, &late), [0.0; 3]);
-    // A quarter turn about z brings (2, 0, 0) to (0, 2, 0), and then it is moved.
+    // A quarter turn about z moves (2, 0, 0) to (0, 2, 0), followed by the translation.
     let quarter = [1e-4, 2e-4, 3e-4, 0.0, 0.0, std::f64::consts::FRAC_PI_2];
     is(
         shift(Effect::StationMove { at_time: 500.0 }, &quarter, &late),

@@ -1,4 +1,4 @@
-//! The closed-form beams against the rig, on arms with everything that a problem may declare.
+//! Closed-form beams compared with the rig, on arms with every declarable feature.
 
 use flexcal::mechanics::{Arm, StaticState, Workspace};
 use flexcal::problem::Problem;
@@ -9,7 +9,8 @@ use rand_chacha::ChaCha8Rng;
 
 use super::bench::{position, problem};
 
-/// Both planes apart, links along −x, prismatic and fixed joints, a leaning rope, gravity aslant.
+/// Different bending stiffnesses, links along −x, prismatic and fixed joints, an inclined rope,
+/// oblique gravity.
 const ARM: &str = "
 name = 'odd'
 gravity_m_s2 = [1.0, -2.0, -9.0]

@@ -1,5 +1,4 @@
-//! Simulated measurements: the same for the same seed, valid input of the rest, and their mistakes
-//! named.
+//! Simulated measurements: reproducible for a seed, valid as input, and located errors.
 
 use std::fs;
 use std::path::Path;

@@ -1,10 +1,10 @@
-//! What the tests of this theme share.
+//! Shared functions of the solver tests.
 
 use flexcal::least_squares::solver::{Bounds, Inequalities, Settings};
 use flexcal::least_squares::{Linearisation, Objective};
 use nalgebra::DVector;
 
-/// A function of the collections as a problem.
+/// Creates a problem from a function of the collections.
 macro_rules! analytic {
     ($function:ident, $unknowns:expr, $rows:expr) => {
         $crate::collections::Analytic {
@@ -30,7 +30,8 @@ pub fn tight() -> Settings {
     }
 }
 
-/// Fails the test when it is evaluated outside of bounds, or of rows by more than rounding.
+/// Objective that fails the test if it is evaluated outside bounds, or outside rows beyond
+/// rounding.
 pub struct Guarded<'a, O> {
     pub objective: O,
     pub bounds: &'a Bounds,

@@ -1,5 +1,5 @@
-//! Bounded Levenberg–Marquardt: agreement without active bounds, exact active bounds, and the
-//! answers of `SciPy`.
+//! Bounded Levenberg–Marquardt: agreement without active bounds, exact active bounds, and results
+//! of `SciPy`.
 
 use argmin::core::observers::Observe;
 use flexcal::least_squares::solver::{
@@ -116,7 +116,7 @@ fn several_active_bounds_as_scipy() {
                 other.iterations, other.termination, other.cost
             );
             assert!(other.cost >= cost * (1.0 - 1e-9), "{within:?}: {}", other.cost);
-            // The naive way may stop short.
+            // Clamped steps may stop early.
             assert!(
                 within == BoundMethod::Clamped || other.cost <= cost * (1.0 + 1e-8),
                 "{within:?}: {}",
@@ -142,8 +142,8 @@ fn several_active_bounds_as_scipy() {
 
 #[test]
 fn optimality_conditions_on_many_boxes() {
-    // Boxes around random-looking centres: the projected gradient vanishes and no multiplier has
-    // the wrong sign.
+    // Boxes around pseudo-random centres: the projected gradient vanishes and no multiplier has the
+    // wrong sign.
     let problem = analytic!(osborne2, 11, 65);
     let start = vector(&[1.3, 0.65, 0.65, 0.7, 0.6, 3.0, 5.0, 7.0, 2.0, 4.5, 5.5]);
     for case in 0..20 {
@@ -173,7 +173,7 @@ fn optimality_conditions_on_many_boxes() {
 
 #[test]
 fn a_corner_and_a_fixed_unknown() {
-    // Rosenbrock in a box away from its valley; the second unknown held.
+    // Rosenbrock in a box away from its valley, with the second unknown fixed.
     let problem = analytic!(rosenbrock, 2, 2);
     let corner = Bounds::new(vector(&[-1.5, -2.0]), vector(&[-0.5, -1.0])).unwrap();
     let solution = minimise_bounded(Fit::new(&problem), vector(&[-1.2, 1.0]), &corner, &tight());

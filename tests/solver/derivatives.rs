@@ -1,4 +1,4 @@
-//! The checker of derivatives: quiet on right ones, loud on a planted error.
+//! Derivative check: no finding on right derivatives, a finding on a wrong one.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use num_dual::Dual64;
 use crate::collections::Analytic;
 use crate::collections::functions as f;
 
-/// Scales one column of the derivatives.
+/// Problem with one scaled column of derivatives.
 struct Planted<P> {
     problem: P,
     column: usize,
@@ -69,7 +69,7 @@ fn a_planted_error_is_found_and_sized() {
 
 #[test]
 fn an_unknown_without_effect_and_one_with_little() {
-    // x₁ has no effect; x₂ a hundred-millionth of the effect of x₀.
+    // x₁ has no effect; x₂ has a hundred-millionth of the effect of x₀.
     fn rows<D: f::Scalar>(x: &[D]) -> Vec<D> {
         vec![x[0].sin() + x[1] * 0.0, x[0].exp() + x[2].sin() * 1e-8]
     }

@@ -8,7 +8,7 @@ use flexcal::least_squares::solver::{Settings, State, Termination, minimise, min
 use flexcal::least_squares::{Block, Fit, LeastSquares, LinearRows, RowsError};
 use nalgebra::{DMatrix, DVector};
 
-/// r = A x + b.
+/// Linear problem r = A x + b.
 struct Linear {
     matrix: DMatrix<f64>,
     constant: DVector<f64>,
@@ -46,7 +46,7 @@ fn wave(i: usize, j: usize) -> f64 {
     (1.0 + 3.7 * i as f64 + 1.9 * (j * j) as f64 + 0.31 * (i * j) as f64).sin()
 }
 
-/// A problem whose columns 1 and 4 are the same and whose column 2 is zero.
+/// Returns a problem with equal columns 1 and 4 and a zero column 2.
 fn redundant() -> Linear {
     let mut matrix = DMatrix::from_fn(40, 6, wave);
     let column = matrix.column(1).clone_owned();
@@ -63,7 +63,7 @@ fn redundant_unknowns_take_the_shortest_solution() {
     assert!(solution.termination.converged());
     assert!((&solution.x - &expected).norm() < 1e-12 * expected.norm());
     assert!(solution.iterations <= 3);
-    // From elsewhere the unidentifiable combinations x₁ − x₄ and x₂ stay as they were.
+    // From another start the unidentifiable combinations x₁ − x₄ and x₂ stay unchanged.
     let start = DVector::from_fn(6, |j, _| 1.0 + j as f64);
     let solution = minimise(Fit::new(&problem), start, &Settings::default());
     assert!((solution.x[1] - solution.x[4] + 3.0).abs() < 1e-12);
@@ -74,7 +74,7 @@ fn redundant_unknowns_take_the_shortest_solution() {
 #[test]
 fn linear_rows_decide_what_the_data_cannot() {
     let problem = redundant();
-    // x₁ − x₄ = 1 and x₂ = 5 as further rows.
+    // x₁ − x₄ = 1 and x₂ = 5 are added as rows.
     let mut matrix = DMatrix::zeros(2, 6);
     (matrix[(0, 1)], matrix[(0, 4)], matrix[(1, 2)]) = (1.0, -1.0, 2.0);
     let rows = LinearRows { matrix, constant: DVector::from_vec(vec![-1.0, -10.0]) };
@@ -87,7 +87,7 @@ fn linear_rows_decide_what_the_data_cannot() {
     assert_eq!(refused, Some(RowsError::Columns { columns: 5, parameters: 6 }));
 }
 
-/// r = ln x, defined for x > 0 only; the step from 3 is −3 ln 3.
+/// Problem r = ln x, defined for x > 0 only; the step from 3 is −3 ln 3.
 struct Logarithm;
 
 impl LeastSquares for Logarithm {
@@ -155,7 +155,7 @@ fn nothing_to_estimate_and_nothing_measured() {
     assert!((solution.cost - 2.0).abs() < 1e-15);
 }
 
-/// Counts iterations in a shared place and fails at the tenth.
+/// Observer that counts iterations and fails at the tenth.
 struct Watch(std::sync::Arc<std::sync::atomic::AtomicU64>);
 
 impl Observe<State> for Watch {

@@ -1,5 +1,5 @@
-//! Linear inequalities: agreement where none is active, exact active ones, never outside, and the
-//! answers of `SciPy`.
+//! Linear inequalities: agreement without active rows, exact active rows, no evaluation outside,
+//! and results of `SciPy`.
 
 use flexcal::least_squares::solver::{
     AtBound, Bounds, Inequalities, Termination, minimise, minimise_bounded, minimise_constrained,
@@ -12,7 +12,7 @@ use super::bench::{Guarded, analytic, tight, vector};
 
 const FREE: f64 = f64::INFINITY;
 
-/// Rows around a point, `room` wide on either side.
+/// Returns rows around a point with a margin `room` on either side.
 fn rows_around(x: &DVector<f64>, room: f64) -> Inequalities {
     let n = x.len();
     let matrix = DMatrix::from_fn(4, n, |i, j| (1.0 + 2.3 * i as f64 + 1.7 * (j * j) as f64).sin());
@@ -147,7 +147,7 @@ fn active_rows_as_scipy() {
             };
             assert!((values[i] - limit).abs() < 1e-13, "row {i}: {} on {limit}", values[i]);
         }
-        // A start far outside is moved to the nearest point within.
+        // An infeasible start is moved to the nearest feasible point.
         let start = DVector::from_fn(x.len(), |j, _| 3.0 - j as f64);
         let guarded = Guarded { objective: Fit::new(&problem), bounds: &bounds, rows: Some(&rows) };
         let again = minimise_constrained(guarded, start, &bounds, &rows, &tight());
@@ -161,7 +161,7 @@ fn active_rows_as_scipy() {
 
 #[test]
 fn optimality_conditions_on_many_polyhedra() {
-    // The gradient is a sum of normals of the active rows, with multipliers of the right sign.
+    // The gradient is a sum of normals of the active rows with multipliers of the right sign.
     let problem = analytic!(osborne2, 11, 65);
     let start = vector(&[1.3, 0.65, 0.65, 0.7, 0.6, 3.0, 5.0, 7.0, 2.0, 4.5, 5.5]);
     let bounds = Bounds::none(11);
@@ -211,7 +211,7 @@ fn a_row_on_one_unknown_is_a_bound() {
         Bounds::new(vector(&[-FREE; 6]), vector(&[FREE, 0.9, 0.5, FREE, 0.5, FREE])).unwrap();
     let bounded = minimise_bounded(Fit::new(&problem), DVector::zeros(6), &upper, &tight());
     let matrix = DMatrix::from_fn(3, 6, |i, j| f64::from(u8::from(j == [1, 2, 4][i])));
-    // One of them twice over: dependent rows do no harm.
+    // One row is given twice: dependent rows do no harm.
     let matrix = matrix.insert_row(3, 0.0);
     let matrix =
         DMatrix::from_fn(4, 6, |i, j| if i == 3 { 2.0 * matrix[(0, j)] } else { matrix[(i, j)] });
@@ -243,7 +243,7 @@ fn impossible_rows_are_refused() {
     assert!(one(0.0, 1.0, DMatrix::zeros(1, 2)).is_err());
     assert!(one(f64::NAN, 1.0, DMatrix::from_element(1, 2, 1.0)).is_err());
     assert!(Inequalities::new(DMatrix::zeros(2, 2), vector(&[0.0]), vector(&[0.0])).is_err());
-    // x₀ + x₁ ≥ 3 in the unit box.
+    // x₀ + x₁ ≥ 3 is infeasible in the unit box.
     let rows = one(3.0, FREE, DMatrix::from_element(1, 2, 1.0)).unwrap();
     let bounds = Bounds::new(vector(&[0.0, 0.0]), vector(&[1.0, 1.0])).unwrap();
     assert!(nearest(&vector(&[0.5, 0.5]), &bounds, &rows).is_none());
@@ -251,7 +251,7 @@ fn impossible_rows_are_refused() {
     let start = vector(&[0.5, 0.5]);
     let found = minimise_constrained(Fit::new(&problem), start, &bounds, &rows, &tight());
     assert_eq!(found.termination, Termination::Infeasible);
-    // x₀ + x₁ = 1.5, reached from (0.5, 0.5) along the shortest way.
+    // x₀ + x₁ = 1.5, reached from (0.5, 0.5) along the shortest path.
     let rows = one(1.5, 1.5, DMatrix::from_element(1, 2, 1.0)).unwrap();
     let moved = nearest(&vector(&[0.5, 0.5]), &bounds, &rows).unwrap();
     assert!((moved - vector(&[0.75, 0.75])).amax() < 1e-14);

@@ -1,21 +1,21 @@
-//! The least-squares problems of Moré, Garbow & Hillstrom, each from its standard start and from 10
-//! and 100 times it, as the regressor of MINPACK does.
+//! Problems of Moré, Garbow & Hillstrom, each from its standard start and from 10 and 100 times it,
+//! as in MINPACK's driver.
 
 use crate::collections::more_garbow_hillstrom::problems;
 use flexcal::least_squares::Fit;
 use flexcal::least_squares::solver::{Settings, Termination, minimise};
 use nalgebra::DVector;
 
-/// Starts from which no minimum is reached, and why.
+/// Starts from which no minimum is reached, with the reason.
 const LOST: [(&str, u32); 9] = [
-    // x₂ = 100: the derivative with respect to x₂ is e⁻¹⁰⁰, the residual flat.
+    // x₂ = 100: the derivative with respect to x₂ is e⁻¹⁰⁰, so the residual is flat.
     ("Powell badly scaled (3)", 100),
     // e⁴⁰⁰ squared overflows: the start is outside the domain.
     ("Jennrich–Sampson (6)", 100),
-    // Every derivative is zero at the start.
+    // All derivatives vanish at the start.
     ("Gulf (11)", 100),
     // Polynomials of degree n far outside [0, 1]: ‖r‖² falls by orders of magnitude, but not within
-    // the limit. MINPACK's regressor tries these from the standard start only.
+    // the iteration limit. MINPACK's driver tries these from the standard start only.
     ("Chebyquad, n = 8 (35)", 10),
     ("Chebyquad, n = 8 (35)", 100),
     ("Chebyquad, n = 9 (35)", 10),
@@ -24,8 +24,8 @@ const LOST: [(&str, u32); 9] = [
     ("Chebyquad, n = 10 (35)", 100),
 ];
 
-/// Whether ‖r‖² is one of the known minima to six digits (zero: to rounding of a residual of order
-/// one).
+/// Returns true if ‖r‖² is one of the known minima to six digits (zero: to rounding of a residual
+/// of order one).
 fn is_minimum(squares: f64, minima: &[f64]) -> bool {
     minima
         .iter()
@@ -44,7 +44,7 @@ fn known_minima_from_three_starts() {
     let mut lost = Vec::new();
     for problem in problems() {
         for factor in [1_u32, 10, 100] {
-            // A start at zero is its own multiple; the regressor of MINPACK uses the factor itself.
+            // A start at zero equals its multiples; MINPACK's driver uses the factor itself.
             let zero = factor > 1 && problem.start.iter().all(|&x| x == 0.0);
             let start =
                 problem.start.iter().map(|&x| f64::from(factor) * if zero { 1.0 } else { x });

@@ -6,8 +6,8 @@ use nalgebra::DVector;
 
 use crate::collections::nist::{Dataset, datasets};
 
-/// Digits that agree with the certified value, the worst parameter counting: −log₁₀ of the relative
-/// error.
+/// Returns the number of digits that agree with the certified values, −log₁₀ of the largest
+/// relative error of a parameter.
 fn digits(solution: &Solution, certified: &DVector<f64>) -> f64 {
     let error = |(x, c): (&f64, &f64)| -((x - c).abs() / c.abs()).max(1e-11).log10();
     solution
@@ -48,7 +48,7 @@ fn certified_values_are_a_minimum_of_the_stored_data() {
     use flexcal::least_squares::Objective;
     for dataset in datasets() {
         let rss = 2.0 * Fit::new(&dataset).cost(&dataset.certified);
-        // Eleven certified digits cannot reach the residual of Lanczos1, 1.4e-25.
+        // Eleven certified digits do not reach the residual of Lanczos1, 1.4e-25.
         let expected = if dataset.name == "lanczos1" {
             rss < 1e-20
         } else {
@@ -76,7 +76,8 @@ fn certified_from_the_far_start() {
     }
 }
 
-/// The defaults are meant for data with noise: what they leave is far below the standard errors.
+/// The default settings are meant for noisy data: their remaining error is far below the standard
+/// errors.
 #[test]
 fn four_digits_with_default_settings() {
     for dataset in datasets() {

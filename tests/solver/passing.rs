@@ -1,14 +1,14 @@
-//! Fits after which others follow: steps by derivatives of where they began.
+//! Provisional fits: steps with the derivatives of an earlier point.
 
 use std::ops::Range;
 
 use flexcal::least_squares::{Block, Fit, LeastSquares, Linearisation, Memory, Objective as _};
 use nalgebra::DVector;
 
-/// Amplitudes: enough for derivatives to be kept.
+/// Number of amplitudes, large enough for derivatives to be kept.
 const MANY: usize = 100;
 
-/// Waves of many orders, each with an amplitude, and a height times a slope.
+/// Waves of many orders with free amplitudes, and the product of a height and a slope.
 struct Waves {
     unit: f64,
 }
@@ -67,7 +67,7 @@ fn in_passing_derivatives_of_the_start_serve_in_any_unit() {
             (gradient(&found) - gradient(&plain)).norm() < 0.01 * gradient(&plain).norm(),
             "{unit}"
         );
-        // Differences are of the derivatives of each point.
+        // Second derivatives difference the exact derivatives of each point.
         let second = |fit: &Fit<Waves>| fit.curvature(x, &|_| true).unwrap();
         assert_eq!(second(&fit), second(&Fit::new(&waves)));
     }

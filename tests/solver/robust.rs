@@ -1,5 +1,4 @@
-//! Robust losses: the gradient is that of the cost, threads change nothing, and the answers are
-//! those of `SciPy`.
+//! Robust losses: gradient of the cost, independence of threads, and results of `SciPy`.
 
 use std::ops::Range;
 
@@ -10,7 +9,8 @@ use nalgebra::DVector;
 const HUBER: Loss = Loss::Huber { threshold: 1.345 };
 const L1: Loss = Loss::L1 { slope: 1.0, smoothing: 0.1 };
 
-/// x₀ exp(−x₁ t) − y(t), `rows` readings an item; every eleventh reading is grossly wrong.
+/// Decay x₀ exp(−x₁ t) − y(t) with `rows` readings per item; every eleventh reading has a gross
+/// error.
 struct Decay {
     items: usize,
     rows: usize,
@@ -108,7 +108,7 @@ fn threads_do_not_change_a_bit() {
     }
 }
 
-/// `SciPy` 1.17.1, one reading an item:
+/// Results of `SciPy` 1.17.1, one reading per item:
 ///
 /// ```python
 /// i = np.arange(60); t = 4 * i / 60

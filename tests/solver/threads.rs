@@ -70,7 +70,7 @@ fn with_threads<T: Send>(threads: usize, run: impl FnOnce() -> T + Send) -> T {
 
 #[test]
 fn threads_do_not_change_a_bit() {
-    // More than one group of chunks, the last one cut short.
+    // More than one group of chunks, with an incomplete last chunk.
     let problem = Waves { items: 70 * CHUNK_ITEMS + 17, unknowns: 7 };
     let fit = Fit::new(&problem);
     let x = DVector::from_fn(7, |j, _| 0.1 * j as f64);

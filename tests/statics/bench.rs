@@ -1,4 +1,4 @@
-//! What the tests of this theme share.
+//! Shared fixtures of the statics tests.
 
 use flexcal::mechanics::{
     Angle, Arm, Beam, Flexibility, Joint, StaticState, StaticsError, Workspace,
@@ -15,7 +15,7 @@ use super::common::made::at_random;
 
 pub const GRAVITY: f64 = 9.81;
 pub const LENGTH: f64 = 1.6;
-/// A beam so stiff that its deflection is linear to eight digits.
+/// Flexibility of a beam so stiff that its deflection is linear to eight digits.
 pub const STIFF: Flexibility<f64> =
     Flexibility { axial: 2e-9, about_y: 3e-7, about_z: 5e-7, twist: 7e-7, coupling: None };
 
@@ -46,7 +46,7 @@ pub fn beam(a: f64, mass: f64, flexibility: Flexibility<f64>) -> Joint<f64> {
     Joint { beam: Some(beam), ..joint(a) }
 }
 
-/// An arm under gravity along −z, loads on the bent arm, one element a beam.
+/// Returns an arm under gravity along −z, with loads on the deformed arm and one element per beam.
 pub fn arm(joints: Vec<Joint<f64>>) -> Arm<f64> {
     Arm {
         payload_error: 0.0,
@@ -76,7 +76,7 @@ pub fn position(arm: &Arm<f64>, q: &[f64], target: &Vector3<f64>) -> Vector3<f64
     frame(arm, q).unwrap().point(target)
 }
 
-/// The same arm with nothing that bends.
+/// Returns the same arm without elasticity.
 pub fn rigid(arm: &Arm<f64>) -> Arm<f64> {
     let mut arm = arm.clone();
     for joint in &mut arm.joints {
@@ -85,7 +85,7 @@ pub fn rigid(arm: &Arm<f64>) -> Arm<f64> {
     arm
 }
 
-/// Flexibilities multiplied by `factor`.
+/// Multiplies the flexibilities by `factor`.
 pub fn softer(arm: &Arm<f64>, factor: f64) -> Arm<f64> {
     let mut arm = arm.clone();
     for joint in &mut arm.joints {
@@ -100,7 +100,7 @@ pub fn softer(arm: &Arm<f64>, factor: f64) -> Arm<f64> {
     arm
 }
 
-/// Both arms of the tests in turn, each with some configurations.
+/// Returns both arms of the tests, each with some configurations.
 pub fn arms() -> [(Arm<f64>, Vec<Vec<f64>>); 2] {
     [golden_problem(), parse(ODD)].map(|problem| {
         let mut rng = ChaCha8Rng::seed_from_u64(2);

@@ -1,5 +1,5 @@
-//! Derivatives by dual numbers against extrapolated differences, for every parameter that can be
-//! free.
+//! Derivatives by dual numbers compared with extrapolated differences, for every parameter that can
+//! be free.
 
 #![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
 
@@ -15,13 +15,12 @@ use nalgebra::DVector;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// Largest difference of a column of the Jacobian, relative to its norm.
+/// Largest allowed difference of a column of the Jacobian, relative to its norm.
 const WORST: f64 = 1e-7;
-/// A column whose whole effect is below this part of the largest is that of a parameter without
-/// effect.
+/// Relative effect below which a column counts as that of a parameter without effect.
 const WITHOUT_EFFECT: f64 = 1e-12;
 
-/// Unknowns vary by some hundredths of these.
+/// Returns the size of which unknowns vary by some hundredths.
 fn size(unit: Unit) -> f64 {
     match unit {
         Unit::Angle | Unit::Length => 0.1,
@@ -29,8 +28,7 @@ fn size(unit: Unit) -> f64 {
     }
 }
 
-/// Checks every column at `x`; the names of parameters without effect must be those in
-/// `without_effect`.
+/// Checks every column at `x`; exactly the parameters in `without_effect` must have no effect.
 fn check_at(
     what: &str,
     problem: &Problem,
@@ -57,7 +55,7 @@ fn check_at(
         let name = parameter.name.as_str();
         if effect(j) < WITHOUT_EFFECT * largest {
             silent.push(name);
-            // Relative to 1e-9 of the largest effect: the differences vanish, too.
+            // The error is relative to 1e-9 of the largest effect: the differences vanish, too.
             assert!(column.relative_error < 1e-3, "{what}: {name} has an effect: {column:?}");
             continue;
         }
@@ -72,7 +70,7 @@ fn check_at(
     assert_eq!(silent, without_effect, "{what}: parameters without effect");
 }
 
-/// At zero, and at deviations drawn from the priors.
+/// Checks at zero, and at deviations drawn from the priors.
 fn check(
     what: &str,
     problem: &Problem,
@@ -136,8 +134,7 @@ fn every_parameter_of_an_arm_with_every_kind_of_joint_and_link() {
     }
 }
 
-/// Fixed joints given by xyz and rpy, and a joint that follows another, behind whatever stands
-/// before.
+/// Fixed joints given by xyz and rpy, and a joint that follows another, appended to an arm.
 const PLACED: &str = "[[joint]]\nkind = \"fixed\"\nxyz_m = [0.1, -0.2, 0.3]\nrpy_deg = [10, -80, 200]\n[[joint.body]]\nmass_kg = 1.5\n\
                       com_m = [0.1, 0, 0.2]\n[[joint]]\na_m = 0.2\nmimic = { joint = 1, ratio = -0.5 }\n[[joint]]\nkind = \"fixed\"\n\
                       xyz_m = [0, 0.1, 0]\n";
@@ -180,7 +177,7 @@ fn every_parameter_of_a_rigid_arm_with_sessions_and_targets() {
     rows.session = labels((0..16).map(|k| if k < 8 { "A" } else { "B" }));
     rows.target = Some(labels((0..16).map(|k| if k % 3 == 0 { "ball" } else { "mount" })));
     assert_eq!(model_of(&problem, &rows).parameters.len(), 30 + 2 * 6 + 2 * 3);
-    // On the nominal arm the target lies on axis 6, about which both of these turn it.
+    // On the nominal arm the target is on axis 6, about which both parameters rotate it.
     check("UR10", &problem, &rows, &["joint5.beta", "joint6.theta"], &[]);
 }
 
@@ -233,7 +230,7 @@ fn every_parameter_of_a_tree_with_targets_on_all_of_its_branches() {
     }
 }
 
-/// A problem with everything free.
+/// Returns a problem with every parameter free.
 fn free(file: &std::path::Path) -> Problem {
     let text = std::fs::read_to_string(file).unwrap();
     let (before, after) = text.split_once("[parameters]\n").unwrap();

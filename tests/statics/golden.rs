@@ -1,4 +1,4 @@
-//! Positions from an independent finite-segment simulator (`tests/golden`): no formula in common
+//! Positions of an independent finite-segment simulator (`tests/golden`), which shares no formula
 //! with the closed forms.
 
 use crate::common::arms::{golden, golden_problem, table_2};
@@ -58,7 +58,7 @@ fn position(arm: &Arm<f64>, problem: &Problem, row: &Row) -> Vector3<f64> {
     rest.frame.point(&problem.tool.target)
 }
 
-/// Largest distance [mm] between the arm's positions and column group `k` of the rows.
+/// Returns the largest distance [mm] between the arm's positions and column group `k` of the rows.
 fn worst(arm: &Arm<f64>, problem: &Problem, rows: &[Row], k: usize) -> f64 {
     rows.iter()
         .map(|row| (position(arm, problem, row) - row.vector(k)).norm() * 1e3)
@@ -79,8 +79,7 @@ fn first_order_displacements_agree_for_each_part() {
     let problem = golden_problem();
     let nominal = Arm::nominal(&problem);
     let rows = rows("first_order.csv");
-    // Deflections a million times smaller are in the linear limit; scaled back they keep ten
-    // digits.
+    // Deflections a million times smaller are in the linear limit; scaled back, ten digits remain.
     let soft = 1e-6;
     let parts = [
         ("joints", true, false, false),

@@ -1,4 +1,4 @@
-//! Many elements, no loads, small deflections, and loads too great for an equilibrium.
+//! Limits: many elements, no loads, small deflections, and loads without an equilibrium.
 
 use flexcal::fit::Placement;
 use flexcal::mechanics::{Arm, StaticState, StaticsError, Workspace};
@@ -98,7 +98,7 @@ fn a_pose_without_equilibrium_has_no_residual() {
     let problem = golden_problem();
     let rows = at_random(&problem, 3, 1.0, &mut ChaCha8Rng::seed_from_u64(1));
     let model = model_of(&problem, &rows);
-    // Stiffnesses 10⁻⁹ of nominal.
+    // Stiffnesses are 10⁻⁹ of nominal.
     let soft = model
         .parameters
         .iter()

@@ -1,4 +1,4 @@
-//! Maxwell–Betti: what one force does to another's place is what the other does to its.
+//! Maxwell–Betti reciprocity of forces and displacements.
 
 use flexcal::mechanics::{Hoist, Joint};
 use flexcal::problem::JointKind;
@@ -42,9 +42,9 @@ fn points_of_the_last_link_obey_reciprocity() {
 
 #[test]
 fn the_rope_and_the_payload_obey_reciprocity() {
-    // A rope along v at the hook moves the payload's place along u as much as a payload moves the
-    // hook. The hook's motion is that of the tip of the beam's inner part, which carries the rest
-    // of the arm as a rigid load.
+    // A rope along v at the hook moves the payload position along u as much as a payload moves the
+    // hook. The hook moves like the tip of the beam's inner part, which carries the rest of the arm
+    // as a rigid load.
     let (mut whole, configurations) = arms()[0].clone();
     let (hook, along_v) = (0.95, Vector3::new(0.3, -0.5, 1.0));
     whole = softer(&whole, 1e-6);

@@ -1,4 +1,4 @@
-//! An arm turned or mirrored as a whole is the same arm.
+//! Invariance under rotation and reflection of the whole arm.
 
 use flexcal::mechanics::{Angle, Arm, Beam, Joint};
 use flexcal::problem::{Equilibrium, JointKind};
@@ -35,7 +35,7 @@ fn an_arm_turned_with_gravity_is_the_same_arm() {
 
 #[test]
 fn an_arm_in_a_mirror_is_its_mirror_image() {
-    // In the plane x = 0: lengths along x and turns about y and z change their sign.
+    // Reflection in the plane x = 0: lengths along x and rotations about y and z change their sign.
     let mirror = Matrix3::from_diagonal(&Vector3::new(-1.0, 1.0, 1.0));
     for (arm, configurations) in arms() {
         let mut image = arm.clone();

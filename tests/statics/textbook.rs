@@ -1,4 +1,4 @@
-//! Single beams and joints against formulas of the textbook.
+//! Single beams and joints compared with textbook formulas.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -15,7 +15,7 @@ fn near(value: f64, expected: f64, relative: f64, what: &str) {
 
 #[test]
 fn a_hanging_beam_stretches_under_its_own_weight() {
-    // δ = q L² / (2 EA), downwards; upright it is pressed together by as much.
+    // δ = q L² / (2 EA), downwards; an upright beam is compressed by the same amount.
     for (beta, sign) in [(FRAC_PI_2, -1.0), (-FRAC_PI_2, 1.0)] {
         for elements in [1, 5] {
             let turned = Joint { beta: Angle::new(beta), ..joint(0.0) };
@@ -91,8 +91,8 @@ fn a_mass_beside_the_beam_twists_it() {
 
 #[test]
 fn twist_and_bending_are_coupled_both_ways() {
-    // A load W at the lever e beside the tip: M_x = −W e all along, M_y = W (L − x). About y the
-    // torsional moment adds −k_y W e to the curvature, about z −k_z W e; the bending moment turns
+    // A load W with the lever e at the tip: M_x = −W e along the beam, M_y = W (L − x). About y the
+    // torsional moment adds −k_y W e to the curvature, about z −k_z W e; the bending moment rotates
     // the tip by k_y W L²/2 about x.
     let (weight, lever, l, [k_y, k_z]) = (3.0 * GRAVITY, 0.4, LENGTH, [2e-7, -3e-7]);
     for elements in [1, 4] {
@@ -118,8 +118,8 @@ fn twist_and_bending_are_coupled_both_ways() {
 
 #[test]
 fn a_slide_sags_as_a_cantilever_as_long_as_it_is_out() {
-    // F L³/(3 EI) + M L²/(2 EI) with the slope F L²/(2 EI) + M L/(EI), L = |d + q|, whichever way
-    // it runs.
+    // F L³/(3 EI) + M L²/(2 EI) with the slope F L²/(2 EI) + M L/(EI), L = |d + q|, in either
+    // direction.
     let (weight, lever, l, k) = (12.0 * GRAVITY, 0.3, LENGTH, 3e-7);
     for (d, q) in [(l, 0.0), (0.2, l - 0.2), (-l, 0.0), (0.4, -l - 0.4)] {
         let turned = Angle::new(FRAC_PI_2);
@@ -136,7 +136,7 @@ fn a_slide_sags_as_a_cantilever_as_long_as_it_is_out() {
 
 #[test]
 fn a_spring_takes_off_part_of_the_moment() {
-    // A horizontal axis, a load at the lever L: M = −W L cos φ. A spring of no free length from the
+    // Horizontal axis, load at the lever L: M = −W L cos φ. A spring without free length from the
     // height h above the axis to the lever b along the link lifts it by k b h cos φ; with free
     // length and preload by (k (l − l₀) + F₀) b h cos φ / l.
     let (stiffness, mass, h, b, k) = (1e7, 4.0, 0.5, 0.4, 150.0);
@@ -161,7 +161,7 @@ fn a_spring_takes_off_part_of_the_moment() {
 
 #[test]
 fn a_flexible_joint_turns_by_moment_over_stiffness() {
-    // A horizontal axis, a load at the lever L: the load sinks by F L²/k.
+    // Horizontal axis, load at the lever L: the load sinks by F L²/k.
     let (stiffness, mass) = (1e7, 4.0);
     let axis =
         Joint { alpha: Angle::new(FRAC_PI_2), flexibility: Some(1.0 / stiffness), ..joint(0.0) };

@@ -1,4 +1,4 @@
-//! Two arms on a torso: where both hands rest, from transforms multiplied and moments summed here.
+//! Two arms on a torso: equilibrium from transforms and moments computed here.
 
 use flexcal::fit::Placement;
 use flexcal::least_squares::jacobian;
@@ -20,7 +20,8 @@ fn shift(x: f64, y: f64, z: f64) -> Isometry3<f64> {
     Translation3::new(x, y, z).into()
 }
 
-/// The joint's own frame before it turns, and behind it, with its coordinate and a twist.
+/// Returns the frame of a joint before its rotation, and behind it, with its coordinate and a
+/// twist.
 fn step(joint: &Joint, q: f64, twist: f64) -> (Isometry3<f64>, Isometry3<f64>) {
     let [x, y, z] =
         [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| move |angle: f64| turn(axis, angle));
@@ -36,8 +37,8 @@ fn step(joint: &Joint, q: f64, twist: f64) -> (Isometry3<f64>, Isometry3<f64>) {
     (before, z(joint.theta + q + twist) * shift(0.0, 0.0, joint.d + way) * y(joint.beta))
 }
 
-/// Where the frame of every joint rests in the frame of the base, after so many passes: each joint
-/// turns by the moment about its axis of all that stands on it, over its stiffness.
+/// Returns the frame of every joint in the base frame after some passes; each joint rotates by the
+/// moment about its axis of everything it carries, over its stiffness.
 fn at_rest(problem: &Problem, q: &[f64], payload: f64, passes: usize) -> Vec<Isometry3<f64>> {
     let joints = &problem.joints;
     let stands_on = |mut own: usize, other: usize| loop {
@@ -82,7 +83,7 @@ fn two_arms() -> Problem {
     Problem::read(&path("problems/two-arms")).unwrap()
 }
 
-/// The same configurations for both hands, one after the other, with a payload in the right one.
+/// Returns the same configurations for both hands in turn, with a payload in the right one.
 fn rows(problem: &Problem, payload: f64) -> Measurements {
     let mut rows = at_random(problem, 20, 1.0, &mut ChaCha8Rng::seed_from_u64(1));
     rows = rows.select(&(0..40).map(|row| row / 2).collect::<Vec<_>>());
@@ -90,7 +91,7 @@ fn rows(problem: &Problem, payload: f64) -> Measurements {
     of_targets(problem, rows)
 }
 
-/// Positions as they are computed here.
+/// Returns the positions computed here.
 fn by_hand(problem: &Problem, rows: &Measurements, passes: usize) -> Vec<Vector3<f64>> {
     let position = |row: usize| {
         let target = &problem.targets[row % 2];
@@ -118,7 +119,7 @@ fn both_hands_rest_where_the_moments_of_both_arms_put_them() {
         let (ours, theirs) = (by_model(&problem, &heavy), by_hand(&problem, &heavy, passes));
         let sag = farthest(&theirs, &by_hand(&problem, &heavy, 0));
         let off = farthest(&ours, &theirs);
-        // What the load of the right hand does to the left one.
+        // Displacement of the left hand by the load of the right one.
         let (ours_light, theirs_light) =
             (by_model(&problem, &light), by_hand(&problem, &light, passes));
         let (mut worst, mut least, mut most) = (0.0_f64, f64::INFINITY, 0.0_f64);
@@ -138,8 +139,8 @@ fn both_hands_rest_where_the_moments_of_both_arms_put_them() {
     }
 }
 
-/// A chain whose joints say on which they stand, and one with a second branch of nothing, are the
-/// chain to the last bit.
+/// A chain with explicit parents, and one with an additional empty branch, equal the chain to the
+/// bit.
 #[test]
 fn a_chain_by_parents_is_the_chain() {
     let text = std::fs::read_to_string(golden("problem.toml")).unwrap();

@@ -1,5 +1,4 @@
-//! Replicas of the paper's experiment: what they show, that they repeat, and what docs/paper.md
-//! says of them.
+//! Replicas of the paper's experiment: results, reproducibility, and agreement with docs/paper.md.
 
 use std::path::Path;
 
@@ -20,7 +19,7 @@ fn study() -> MisprintStudy {
     }
 }
 
-/// Mean of what a reading leaves over what the rigid fit leaves.
+/// Returns the mean ratio of the error of a reading to that of the rigid fit.
 fn ratio(found: &ReplicaResults, name: &str, stage: usize) -> f64 {
     let place = found.readings.iter().position(|own| own.name == name).unwrap();
     let ratios = found.replicas.iter().map(|own| own.ratio(own.reading_error(place, stage)));
@@ -90,7 +89,7 @@ fn mistakes_in_a_study_of_misprints_are_named() {
     }
 }
 
-/// Minutes without optimisation: `cargo test --release --test study -- --ignored the_page`.
+/// Takes minutes without optimisation: `cargo test --release --test study -- --ignored the_page`.
 #[test]
 #[ignore = "half a minute in a release build"]
 fn the_page_on_the_paper_shows_what_the_study_prints() {

@@ -1,5 +1,5 @@
-//! Arms of all kinds, with parameters free and with priors at random: nothing that is trusted runs
-//! off, and standard errors cover.
+//! Random arms with random free parameters and priors: no trusted estimate diverges, and standard
+//! errors cover the truth.
 
 use std::fmt::Write as _;
 
@@ -16,18 +16,18 @@ use rayon::prelude::*;
 use crate::common::arms::parse;
 use crate::common::made::{at_random, divided, draw, measure, model_of};
 
-/// 1 σ of a measured coordinate [m].
+/// Standard deviation of a measured coordinate [m].
 const SIGMA: f64 = 5e-5;
-/// Held-out poses of each arm.
+/// Number of held-out poses of each arm.
 const HELD_OUT: usize = 30;
-/// What a trusted estimate with a prior keeps to, in σ of it.
+/// Limit of a trusted estimate with a prior, in σ of the prior.
 const WITHIN: f64 = 5.0;
-/// Share of a normal variable within one and two standard deviations.
+/// Probability that a normal variable is within one and two standard deviations.
 const NORMAL: [(f64, f64); 2] = [(1.0, 0.682_689), (2.0, 0.954_500)];
 
-/// An arm with three to seven joints, most of them parallel or at right angles, a third of its
-/// parameters fixed, a third with a prior, a third free; the declared σ is the true one, ten times
-/// larger or ten times smaller.
+/// Draws an arm of three to seven joints, most of them parallel or at right angles. A third of the
+/// parameters is fixed, a third has a prior, a third is free. The declared σ is the true one, or
+/// ten times larger or smaller.
 fn arm(rng: &mut ChaCha8Rng) -> Problem {
     let joints = rng.random_range(3..=7);
     let mut text = "name = 'arm'\n".to_owned();
@@ -81,19 +81,19 @@ fn rule(text: &mut String, name: &str, rng: &mut ChaCha8Rng) {
     };
 }
 
-/// How the fit of one arm went.
+/// Outcome of the fit of one arm.
 struct Outcome {
     trusted: bool,
-    /// Estimates beyond what they may be, in words.
+    /// Descriptions of estimates beyond their limits.
     beyond: Vec<String>,
-    /// (estimate − truth) / standard error.
+    /// Values (estimate − truth) / standard error.
     z: Vec<f64>,
-    /// Root mean squared error on held-out poses in units of the noise.
+    /// Root mean square error at held-out poses in units of the noise.
     held_out: f64,
     weak: bool,
 }
 
-/// `None` where the arm drawn has nothing free.
+/// Fits one arm; `None` if it has no free parameter.
 fn one(seed: u64) -> Option<Outcome> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let problem = arm(&mut rng);
@@ -103,7 +103,7 @@ fn one(seed: u64) -> Option<Outcome> {
     if model.parameters.is_empty() {
         return None;
     }
-    // Without a prior as far off as with one.
+    // Parameters without a prior deviate as much as those with one.
     let truth = draw(&model, |unit| if unit == Unit::Length { 2e-3 } else { 5e-3 }, &mut rng);
     measure(&problem, &mut rows, &truth, SIGMA, &mut rng);
     let found = identify(&problem, &divided(poses, &rows), &Options::default()).ok()?;
@@ -128,14 +128,14 @@ fn one(seed: u64) -> Option<Outcome> {
 
 fn deviations(found: &Identification, truth: &DVector<f64>) -> Vec<f64> {
     let z = |(k, estimate): (usize, &flexcal::fit::Estimate)| {
-        // Of x, which is a logarithm for stiffnesses.
+        // The error is that of x, which is a logarithm for stiffnesses.
         let scale = if estimate.unit.is_relative() { estimate.estimate } else { 1.0 };
         estimate.std_error.map(|error| (found.x[k] - truth[k]) / (error / scale))
     };
     found.estimates.iter().enumerate().filter_map(z).collect()
 }
 
-/// Fits arms and asserts what is claimed of those that are trusted.
+/// Fits arms and asserts the claims on those that are trusted.
 fn run(seeds: std::ops::Range<u64>) {
     let all: Vec<Outcome> = seeds.into_par_iter().filter_map(one).collect();
     let trusted: Vec<&Outcome> = all.iter().filter(|own| own.trusted).collect();

@@ -1,4 +1,4 @@
-//! Sets of measurements of the lunar sampler on the rig.
+//! Data sets of the lunar sampler on the rig.
 
 use std::path::Path;
 
@@ -9,12 +9,12 @@ use flexcal::study::table;
 
 use crate::common::arms::path;
 
-/// 1 σ of a measured coordinate [m].
+/// Standard deviation of a measured coordinate [m].
 pub const SIGMA: f64 = 5e-5;
 /// Root mean square of the noise of a position [m].
 pub const NOISE: f64 = SIGMA * 1.732_050_807_568_877_2;
 
-/// Geometric errors of Table 2 of [Chen2021], as deviations from nominal.
+/// Geometric errors of table 2 of [Chen2021], as deviations from nominal.
 const TABLE_2: &str = r#"
 [parameters]
 "joint1.alpha" = { deg = 0.019 }
@@ -37,7 +37,7 @@ const TABLE_2: &str = r#"
 "joint4.beta" = { deg = 0.005 }
 "#;
 
-/// What differs from set to set, and in which poses it is measured.
+/// Random deviations of a data set, and its poses.
 const DRAWN: &str = r#"
 [random]
 "joint*.alpha" = { sigma_deg = 0.2 }
@@ -63,36 +63,36 @@ temperature_C = [17, 31]
 time_step_s = [60, 110]
 "#;
 
-/// The declared lunar sampler.
+/// Returns the declared lunar sampler.
 pub fn lunar() -> Problem {
     Problem::read(&path("tests/cases")).unwrap()
 }
 
-/// How many poses a set has.
+/// Number of poses of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Size {
     pub identification: usize,
     pub held_out: usize,
 }
 
-/// As in the paper.
+/// Number of poses in the paper.
 pub const SMALL: Size = Size { identification: 28, held_out: 50 };
-/// Where poses are no scarce thing.
+/// Number of poses for cases with many poses.
 pub const LARGE: Size = Size { identification: 200, held_out: 100 };
 
-/// Measurements whose truth is known.
+/// Measurements with known truth.
 pub struct Set {
     pub data: Dataset,
 }
 
-/// Measures an arm with these effects: Table 2's geometric errors at even seeds, others at odd
-/// ones; stiffnesses 18 % off nominal, each by itself, `EI_y` and `EI_z` too, although the problem
-/// declares them equal.
+/// Measures an arm with these effects. Geometric errors are those of table 2 at even seeds and
+/// others at odd ones. Stiffnesses deviate by 18 % independently, including `EI_y` and `EI_z`,
+/// although the problem declares them equal.
 pub fn measured(effects: &[TrueEffect], size: Size, seed: u64) -> Set {
     with_noise(effects, size, seed, DRAWN)
 }
 
-/// The same without noise.
+/// Measures an arm without noise.
 pub fn noiseless(size: Size, seed: u64) -> Set {
     with_noise(&[], size, seed, &DRAWN.replace("position_sigma_mm = 0.05", "position_sigma_mm = 0"))
 }
@@ -100,7 +100,7 @@ pub fn noiseless(size: Size, seed: u64) -> Set {
 fn with_noise(effects: &[TrueEffect], size: Size, seed: u64, drawn: &str) -> Set {
     let mut arm = lunar();
     for beam in arm.joints.iter_mut().filter_map(|joint| joint.beam.as_mut()) {
-        // A hair's breadth apart, so that each is drawn by itself.
+        // A tiny difference makes both rigidities separate parameters.
         beam.ei_z = beam.ei_y.map(|ei| ei * (1.0 + 1e-12));
     }
     let given = if seed.is_multiple_of(2) { TABLE_2 } else { "" };
@@ -114,12 +114,12 @@ fn with_noise(effects: &[TrueEffect], size: Size, seed: u64, drawn: &str) -> Set
     Set { data: Dataset::new(table(&rows), Split { identification, held_out }) }
 }
 
-/// An effect of the catalogue with its strengths in SI units.
+/// Creates an effect of the catalogue with values in SI units.
 pub fn catalogued(effect: &Effect, values: &[f64]) -> TrueEffect {
     TrueEffect::new(Cause::Catalogued(effect.clone()), values, &lunar().joints).unwrap()
 }
 
-/// A bump or step of a joint's coordinate; height, centre, width in degrees.
+/// Creates a bump or step of a joint coordinate; height, centre, width in degrees.
 pub fn outside(joint: usize, shape: Shape, values: [f64; 3]) -> TrueEffect {
     TrueEffect::new(Cause::Outside { joint, shape }, &values.map(f64::to_radians), &lunar().joints)
         .unwrap()

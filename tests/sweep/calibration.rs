@@ -1,6 +1,6 @@
-//! Whether what is stated is true as often as its probability says, and whether noise of many kinds
-//! is taken for an effect: `cargo test --release --test sweep calibration -- --ignored
-//! --nocapture`; `FLEXCAL_SWEEP=1 FLEXCAL_FIRST=5027` judges one set.
+//! Calibration of the stated probabilities, and false alarms on several kinds of noise: `cargo test
+//! --release --test sweep calibration -- --ignored --nocapture`; `FLEXCAL_SWEEP=1
+//! FLEXCAL_FIRST=5027` evaluates one set.
 
 use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, Measurements};
@@ -15,15 +15,15 @@ use rayon::prelude::*;
 use crate::bench::{LARGE, SIGMA, SMALL, Size, lunar, noiseless};
 use crate::families::{Lacking, catalogue, newest};
 use crate::full::{first, sets};
-use crate::judged::{CheckedPoses, Place, is_the_same, name, named};
+use crate::judged::{LoopVerdict, Place, is_the_same, name, named};
 
-/// From this probability on an effect is named as found.
+/// Probability from which an effect counts as found.
 const STATED: f64 = 0.9;
 
-/// One statement: its probability, and whether it is true.
+/// Statement with its probability; true if it is correct.
 type Statement = (f64, bool);
 
-/// One to three effects of different families, the first one of those `first`, the others of the
+/// Draws one to three effects of different families, the first from `first`, the others from the
 /// catalogue.
 fn drawn(first: &[Lacking], seed: u64) -> Vec<Lacking> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -32,7 +32,7 @@ fn drawn(first: &[Lacking], seed: u64) -> Vec<Lacking> {
     while chosen.len() < count {
         let all = if chosen.is_empty() { first } else { &others };
         let mut one = all[rng.random_range(0..all.len())].clone();
-        // From half the size to twice it, where it has one.
+        // The size is between half and twice the listed one.
         let factor = 2.0_f64.powf(rng.random_range(-1.0..1.0));
         let is_size = !matches!(one.effect, Effect::UnmodelledMass { .. });
         one.values
@@ -60,15 +60,15 @@ pub struct Set {
 fn judge(first: &[Lacking], seed: u64) -> Set {
     let lacking = drawn(first, seed);
     let size = [SMALL, Size { identification: 60, held_out: 50 }, LARGE][(seed % 3) as usize];
-    let judged = CheckedPoses::of(&lacking, size, seed);
+    let judged = LoopVerdict::of(&lacking, size, seed);
     println!("{}", judged.line(&name(&lacking), size, seed));
     let effects: Vec<Effect> = lacking.into_iter().map(|one| one.effect).collect();
     Set::of(&judged, &effects, (&lunar(), seed))
 }
 
 impl Set {
-    /// What is stated of a problem's data, beside the effects that are true.
-    pub fn of(judged: &CheckedPoses, truth: &[Effect], (problem, seed): (&Problem, u64)) -> Self {
+    /// Returns the statements on the data of a problem, with the true effects.
+    pub fn of(judged: &LoopVerdict, truth: &[Effect], (problem, seed): (&Problem, u64)) -> Self {
         if std::env::var_os("FLEXCAL_FIRST").is_some() {
             for found in &judged.closure.effects {
                 let others: Vec<String> = found.alternatives.iter().map(named).collect();
@@ -125,7 +125,8 @@ fn what_is_stated_of_the_newest_effects() {
     calibrated(|seed| judge(&newest(), seed), 7000, 120);
 }
 
-/// Judges so many sets from a seed on, and prints how true and how probable statements are.
+/// Evaluates `count` sets from a seed on, and prints how often statements are true at their
+/// probabilities.
 pub fn calibrated(judge: impl Fn(u64) -> Set + Sync + Send, seed: u64, count: u64) {
     let begin = first(seed);
     let all: Vec<Set> = (begin..begin + sets(count)).into_par_iter().map(judge).collect();
@@ -160,7 +161,7 @@ pub fn calibrated(judge: impl Fn(u64) -> Set + Sync + Send, seed: u64, count: u6
     assert!(100 * right >= 95 * sure.len(), "{right} of {} laws that were stated", sure.len());
 }
 
-/// Noise that is not as declared.
+/// Kind of noise that differs from the declared one.
 #[derive(Debug, Clone, Copy)]
 enum Kind {
     White,
@@ -173,7 +174,7 @@ enum Kind {
     ThreePoints,
 }
 
-/// Adds it, the same for the same seed.
+/// Adds the noise, reproducibly for a seed.
 fn disturbed(data: Dataset, kind: Kind, seed: u64) -> Dataset {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x5eed);
     let Dataset { mut measurements, mut split } = data;

@@ -1,17 +1,16 @@
-//! Every family at a realistic size: what is true on the rig, and how the declared problem lacks
-//! it.
+//! Effects of every family at a realistic size, and declared problems that lack them.
 
 use flexcal::problem::{Effect, Equilibrium, Problem};
 use flexcal::rig::TrueEffect;
 
 use crate::bench::{catalogued, lunar};
 
-/// An effect that the declared problem lacks.
+/// Effect that the declared problem lacks.
 #[derive(Clone)]
 pub struct Lacking {
-    /// What the loop should name.
+    /// Effect that the loop should name.
     pub effect: Effect,
-    /// Its strengths on the rig, SI; none where the declared problem leaves elasticity out.
+    /// Values on the rig, SI; none if the declared problem lacks elasticity instead.
     pub values: Vec<f64>,
 }
 
@@ -20,13 +19,13 @@ impl Lacking {
         Self { effect, values: values.to_vec() }
     }
 
-    /// What the rig has and the arm as declared in full has not.
+    /// Returns the effect on the rig that the fully declared arm lacks.
     pub fn on_the_rig(&self) -> Option<TrueEffect> {
         let at_rest = self.effect == Effect::DeflectedEquilibrium;
         (!self.values.is_empty() && !at_rest).then(|| catalogued(&self.effect, &self.values))
     }
 
-    /// Leaves out of a problem what the effect stands for.
+    /// Removes from a problem what the effect represents.
     pub fn leave_out(&self, problem: &mut Problem) {
         match &self.effect {
             Effect::DeflectedEquilibrium => problem.statics.equilibrium = Equilibrium::Undeflected,
@@ -43,7 +42,7 @@ impl Lacking {
     }
 }
 
-/// The declared problem without these effects.
+/// Returns the declared problem without these effects.
 pub fn declared(lacking: &[Lacking]) -> Problem {
     let mut problem = lunar();
     for one in lacking {
@@ -54,7 +53,7 @@ pub fn declared(lacking: &[Lacking]) -> Problem {
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
-/// One effect at a time.
+/// Returns single effects.
 pub fn catalogue() -> Vec<Lacking> {
     let harmonic = |joint, order, sin: f64, cos: f64| {
         Lacking::new(
@@ -135,8 +134,8 @@ pub fn catalogue() -> Vec<Lacking> {
     all
 }
 
-/// Effects with an argument that is searched, and a section that couples: what the catalogue took
-/// in last.
+/// Returns effects with a searched argument, and a coupled cross-section: the latest families of
+/// the catalogue.
 pub fn newest() -> Vec<Lacking> {
     let link = |name: &str| name.to_owned();
     let mut all = Vec::new();
@@ -170,7 +169,7 @@ pub fn newest() -> Vec<Lacking> {
     all
 }
 
-/// Two effects at once.
+/// Returns pairs of effects.
 pub fn pairs() -> Vec<Vec<Lacking>> {
     let per_hour = 1e-3 / 3600.0;
     let b = || "B".to_owned();
@@ -200,7 +199,7 @@ pub fn pairs() -> Vec<Vec<Lacking>> {
     ]
 }
 
-/// Three effects at once.
+/// Returns triples of effects.
 pub fn triples() -> Vec<Vec<Lacking>> {
     let with = |mut pair: Vec<Lacking>, third: Lacking| {
         pair.push(third);

@@ -1,4 +1,4 @@
-//! The whole sweep: `cargo test --release --test sweep -- --ignored --nocapture`.
+//! Complete sweep: `cargo test --release --test sweep -- --ignored --nocapture`.
 
 use std::env;
 use std::ops::Range;
@@ -8,32 +8,32 @@ use rayon::prelude::*;
 
 use crate::bench::{LARGE, SMALL, Size};
 use crate::families::{Lacking, catalogue, pairs, triples};
-use crate::judged::{CheckedPoses, name};
+use crate::judged::{LoopVerdict, name};
 use crate::outside::{KINDS, Left};
 
-/// Sets of each kind, unless `FLEXCAL_SWEEP` names another number.
+/// Returns the number of sets of each kind, from `FLEXCAL_SWEEP` if given.
 pub fn sets(otherwise: u64) -> u64 {
     env::var("FLEXCAL_SWEEP").ok().and_then(|number| number.parse().ok()).unwrap_or(otherwise)
 }
 
-/// First seed, unless `FLEXCAL_FIRST` names another.
+/// Returns the first seed, from `FLEXCAL_FIRST` if given.
 pub fn first(otherwise: u64) -> u64 {
     env::var("FLEXCAL_FIRST").map_or(otherwise, |seed| seed.parse().unwrap())
 }
 
-/// Sets from a seed on.
+/// Returns the seeds of the sets, from `from` on.
 fn seeds(from: u64, otherwise: u64) -> Range<u64> {
     let from = first(from);
     from..from + sets(otherwise)
 }
 
-/// Most distinguishable effects are named, nearly all named or stated as alternatives; noise alone
-/// says next to nothing.
+/// Asserts that most distinguishable effects are named, nearly all named or listed as alternatives,
+/// and that noise gives hardly any finding.
 fn run(kinds: &[Vec<Lacking>], size: Size, seeds: Range<u64>) {
     let all: Vec<(&Vec<Lacking>, u64)> =
         kinds.iter().flat_map(|kind| seeds.clone().map(move |seed| (kind, seed))).collect();
     let one = |(lacking, seed): (&Vec<Lacking>, u64)| {
-        let judged = CheckedPoses::of(lacking, size, seed);
+        let judged = LoopVerdict::of(lacking, size, seed);
         println!("{}", judged.line(&name(lacking), size, seed));
         let [shown, named, stated] = judged.counts();
         [
@@ -47,7 +47,7 @@ fn run(kinds: &[Vec<Lacking>], size: Size, seeds: Range<u64>) {
     let add = |a: [usize; 4], b: [usize; 4]| [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]];
     let [shown, named, stated, wrong] = all.into_par_iter().map(one).reduce(|| [0; 4], add);
     assert!(10 * named >= 8 * shown && 10 * stated >= 9 * shown, "{named} and {stated} of {shown}");
-    // At a rate of 5 %, of 200 more than a tenth come up once in 1000 times.
+    // At a rate of 5 %, more than a tenth of 200 occurs once in 1000 times.
     assert!(wrong <= sets.div_ceil(10), "{wrong} of {sets}");
 }
 

@@ -1,6 +1,5 @@
-//! A heavy six-joint arm of rigid links and rigid joints as declared, with one to three effects
-//! that industrial arms have: `cargo test --release --test sweep industrial -- --ignored
-//! --nocapture`.
+//! Heavy six-joint arm, declared with rigid links and joints, with one to three effects of
+//! industrial arms: `cargo test --release --test sweep industrial -- --ignored --nocapture`.
 
 use std::path::Path;
 
@@ -14,14 +13,14 @@ use rand_chacha::ChaCha8Rng;
 use crate::bench::{Set, Size};
 use crate::calibration::{Set as Stated, calibrated};
 use crate::families::Lacking;
-use crate::judged::{CheckedPoses, name};
+use crate::judged::{LoopVerdict, name};
 
-/// What differs from set to set, and in which poses it is measured.
+/// Random deviations of a data set, and its poses.
 const DRAWN: &str = "[random]\n'joint*.*' = { sigma_deg = 0.05, sigma_mm = 0.5 }\n[noise]\nposition_sigma_mm = 0.05\n[poses]\n\
                      q1_deg = [-160, 160]\nq2_deg = [-150, -10]\nq3_deg = [-80, 150]\nq4_deg = [-170, 170]\nq5_deg = [-110, 110]\n\
                      q6_deg = [-350, 350]\ntemperature_C = [18, 30]\ntime_step_s = [20, 40]\n";
 
-/// The arm of `tests/honest/six.toml`, its joints rigid.
+/// Returns the arm of `tests/honest/six.toml` with rigid joints.
 fn arm() -> Problem {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/honest/six.toml");
     let text = std::fs::read_to_string(&path).unwrap();
@@ -29,7 +28,7 @@ fn arm() -> Problem {
     Problem::parse(&rigid.join("\n"), &path).unwrap()
 }
 
-/// Effects of a realistic size.
+/// Returns effects of a realistic size.
 fn catalogue() -> Vec<Lacking> {
     let mut all = vec![
         Lacking::new(Effect::BaseCompliance, &[3e-7, 2e-7]),
@@ -38,7 +37,7 @@ fn catalogue() -> Vec<Lacking> {
         Lacking::new(Effect::JointCoupling { joint: 6, from: 5 }, &[8e-4]),
         Lacking::new(Effect::JointCoupling { joint: 5, from: 4 }, &[4e-4]),
     ];
-    // Twice each: what gives way at one joint mostly does at others.
+    // Listed twice: compliance at one joint usually comes with compliance at others.
     for (joint, compliance) in [(2, 1e-6), (3, 1.5e-6), (4, 1e-5), (5, 1e-5)].repeat(2) {
         all.push(Lacking::new(Effect::JointCompliance { joint }, &[compliance]));
     }
@@ -81,7 +80,7 @@ fn judge(seed: u64) -> Stated {
     let rows = simulate(&arm, &truth, size.identification + size.held_out, seed).unwrap().rows;
     let (held_out, identification) = (0..rows.len()).partition(|&row| rows[row].held_out);
     let set = Set { data: Dataset::new(table(&rows), Split { identification, held_out }) };
-    let judged = CheckedPoses::with(arm.clone(), &set, &effects);
+    let judged = LoopVerdict::with(arm.clone(), &set, &effects);
     println!("{}", judged.line(&name(&lacking), size, seed));
     Stated::of(&judged, &effects, (&arm, seed))
 }

@@ -1,4 +1,4 @@
-//! One set through the loop, and what the loop makes of it beside the truth.
+//! One data set through the loop, with the result compared with the truth.
 
 use flexcal::fit::{Identification, Options, identify};
 use flexcal::problem::{Effect, EffectDeclaration, Problem};
@@ -10,42 +10,42 @@ use crate::bench::{NOISE, SIGMA, Set, Size, measured};
 use crate::common::made::model_of;
 use crate::families::{Lacking, declared};
 
-/// Probability by chance above which an effect is not distinguishable, even for one who knows it.
+/// Probability by chance above which an effect is not distinguishable, even for an observer who
+/// knows it.
 const DISTINGUISHABLE: f64 = 1e-4;
 
-/// Where the loop has a true effect.
+/// Place of a true effect in the result of the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// Among the effects that were found.
+    /// Among the effects found.
     Found,
-    /// Among the alternatives to one of them.
+    /// Among the alternatives to an effect found.
     Alternative,
-    /// Neither, though others were found.
+    /// Absent, although other effects were found.
     Confused,
-    /// Nothing was found.
+    /// Absent, and no effect was found.
     Missed,
 }
 
-/// A set after the loop.
-pub struct CheckedPoses {
+/// Data set with the result of the loop.
+pub struct LoopVerdict {
     pub closure: ClosedLoop,
-    /// One per true effect.
+    /// Place of each true effect.
     pub places: Vec<Place>,
-    /// Whether the first effect found is the true one.
+    /// True if the first effect found is the true one.
     pub first: bool,
-    /// For each true effect: probability by chance of what the fit gains when it is declared after
-    /// all others.
+    /// Probability by chance of the gain from declaring each true effect after all others.
     pub chance: Vec<f64>,
-    /// Held-out rms of the position error over that of the noise: before, after, and with the true
+    /// Held-out rms position error relative to that of the noise: before, after, and with the true
     /// effects declared.
     pub before: f64,
     pub after: f64,
     pub best: f64,
-    /// The last of the problem as it is declared, its `EI_y` and `EI_z` as one.
+    /// Error with the problem as declared, with equal `EI_y` and `EI_z`.
     pub alike: f64,
 }
 
-impl CheckedPoses {
+impl LoopVerdict {
     /// Runs the loop on one set.
     pub fn of(lacking: &[Lacking], size: Size, seed: u64) -> Self {
         let on_the_rig: Vec<_> = lacking.iter().filter_map(Lacking::on_the_rig).collect();
@@ -54,7 +54,7 @@ impl CheckedPoses {
         Self::with(declared(lacking), &set, &all)
     }
 
-    /// The same of a problem, with the effects `all` in the data that it lacks.
+    /// Runs the loop on a set of another problem that lacks the effects `all`.
     pub fn with(problem: Problem, set: &Set, all: &[Effect]) -> Self {
         let closure = close(&problem, &set.data, &Options::default()).unwrap();
         let full = Squares::of(&problem, all, set);
@@ -91,8 +91,8 @@ impl CheckedPoses {
         }
     }
 
-    /// How many true effects are distinguishable, and of those named, and named or stated as
-    /// alternatives.
+    /// Returns the number of true effects that are distinguishable, and of those named, and named
+    /// or listed as alternatives.
     pub fn counts(&self) -> [usize; 3] {
         let shown =
             self.places.iter().zip(&self.chance).filter(|(_, chance)| **chance < DISTINGUISHABLE);
@@ -105,7 +105,7 @@ impl CheckedPoses {
         [places.len(), named, stated]
     }
 
-    /// One line of figures.
+    /// Returns the figures as one line.
     pub fn line(&self, name: &str, size: Size, seed: u64) -> String {
         let names = |effects: &mut dyn Iterator<Item = &Effect>| {
             effects.map(named).collect::<Vec<_>>().join(" + ")
@@ -146,7 +146,7 @@ impl CheckedPoses {
     }
 }
 
-/// Sum of squares of a fit with some effects declared, and what it is compared with.
+/// Sum of squares of a fit with some effects declared, with the quantities of its comparison.
 struct Squares {
     sum: f64,
     freedom: f64,
@@ -155,7 +155,7 @@ struct Squares {
 }
 
 impl Squares {
-    /// The best that one who knows the arm can do: `EI_y` and `EI_z` are fitted apart.
+    /// Fits as an observer who knows the arm: `EI_y` and `EI_z` are separate.
     fn of(problem: &Problem, effects: &[Effect], set: &Set) -> Self {
         let mut problem = problem.clone();
         for beam in problem.joints.iter_mut().filter_map(|joint| joint.beam.as_mut()) {
@@ -178,7 +178,7 @@ impl Squares {
         }
     }
 
-    /// F test of what `full` has more.
+    /// Returns the p value of the F test for the additional effects of `full`.
     fn chance_beside(&self, full: &Self) -> f64 {
         let more = full.parameters.saturating_sub(self.parameters).max(1) as f64;
         let f = (self.sum - full.sum).max(0.0) / more / (full.sum / full.freedom);
@@ -186,7 +186,7 @@ impl Squares {
     }
 }
 
-/// A problem with some effects declared.
+/// Declares effects in a problem.
 fn with(mut problem: Problem, effects: &[Effect]) -> Problem {
     let location = problem.data.location.clone();
     let declare =
@@ -195,7 +195,7 @@ fn with(mut problem: Problem, effects: &[Effect]) -> Problem {
     problem
 }
 
-/// Whether an effect that was named is the true one: family and place, orders among others, orders
+/// Returns true if a named effect is the true one: equal family and place, orders contained, orders
 /// of waves within a third of a cycle, times within a few poses, time constants and distances
 /// within a factor of two.
 pub fn is_the_same(named: &Effect, truth: &Effect) -> bool {
@@ -235,7 +235,7 @@ pub fn is_the_same(named: &Effect, truth: &Effect) -> bool {
     }
 }
 
-/// Name, place, orders.
+/// Returns name, place and orders of an effect.
 pub fn named(effect: &Effect) -> String {
     let orders = match effect {
         Effect::JointHarmonic { orders, .. } => format!("{orders:?}"),
@@ -244,18 +244,18 @@ pub fn named(effect: &Effect) -> String {
     format!("{} {}{orders}", effect.name(), effect.place()).trim().to_owned()
 }
 
-/// What a set lacks, with strengths.
+/// Returns the effects that a set lacks, with values.
 pub fn name(lacking: &[Lacking]) -> String {
     let one = |one: &Lacking| format!("{} {:?}", named(&one.effect), one.values);
     lacking.iter().map(one).collect::<Vec<_>>().join(" & ")
 }
 
-/// Covariates by name, with spaces between.
+/// Returns covariates by name, separated by spaces.
 pub fn words(covariates: &[Covariate]) -> String {
     covariates.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ")
 }
 
-/// Where structure without a law is, and what it depends on.
+/// Returns the place of unexplained structure, and the covariates it depends on.
 pub fn located(left: &Unexplained) -> String {
     let place = left.site.map_or_else(|| "nowhere".to_owned(), |part| part.to_string());
     format!("{place} {} p {:.1e}", words(&left.depends_on), left.p_value)

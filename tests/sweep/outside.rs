@@ -1,4 +1,4 @@
-//! What no catalogue holds: a bump or a step of one joint's coordinate.
+//! Effects outside the catalogue: a bump or a step of one joint coordinate.
 
 use flexcal::fit::Options;
 use flexcal::rig::Shape;
@@ -7,7 +7,7 @@ use flexcal::select::{ClosedLoop, Site, close};
 use crate::bench::{NOISE, Size, lunar, measured, outside};
 use crate::judged::{located, named, words};
 
-/// A bump or step: joint, shape; height, centre and width in degrees.
+/// Bump or step: joint, shape; height, centre and width in degrees.
 pub type Outside = (usize, Shape, [f64; 3]);
 
 /// Bumps and steps well within the range of each joint.
@@ -28,12 +28,12 @@ pub const KINDS: [Outside; 14] = [
     (4, Shape::Step, [0.2, 20.0, 10.0]),
 ];
 
-/// A set with one of them after the loop.
+/// Data set with one of them, with the result of the loop.
 pub struct Left {
     pub closure: ClosedLoop,
-    /// Whether it is located at the right joint, as a function of the right command.
+    /// True if it is located at the right joint, as a function of the right command.
     pub located: bool,
-    /// Held-out rms over that of the noise: before, and with the correction.
+    /// Held-out rms error relative to that of the noise: before, and with the correction.
     pub before: f64,
     pub corrected: Option<f64>,
 }
@@ -56,7 +56,7 @@ impl Left {
         }
     }
 
-    /// One line of figures.
+    /// Returns the figures as one line.
     pub fn line(&self, (joint, shape, values): Outside, size: Size, seed: u64) -> String {
         let place = self.closure.unexplained.first().map_or_else(String::new, located);
         let effects: Vec<String> =

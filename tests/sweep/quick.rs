@@ -1,4 +1,4 @@
-//! A representative part of the sweep, and the cases of `tests/cases`.
+//! Representative part of the sweep, and the cases of `tests/cases`.
 
 use flexcal::fit::{Options, identify};
 use flexcal::measurement::Dataset;
@@ -11,31 +11,31 @@ use rayon::prelude::*;
 use crate::bench::{NOISE, SMALL, lunar};
 use crate::common::arms::measured as read;
 use crate::families::{Lacking, catalogue, pairs};
-use crate::judged::{CheckedPoses, is_the_same, name};
+use crate::judged::{LoopVerdict, is_the_same, name};
 use crate::outside::Left;
 
-/// Sets of noise alone.
+/// Number of sets with noise only.
 const QUIET: u64 = 12;
 
 #[test]
 fn noise_alone_says_nothing() {
-    let one = |seed| (seed, CheckedPoses::of(&[], SMALL, seed));
-    let all: Vec<(u64, CheckedPoses)> = (600..600 + QUIET).into_par_iter().map(one).collect();
+    let one = |seed| (seed, LoopVerdict::of(&[], SMALL, seed));
+    let all: Vec<(u64, LoopVerdict)> = (600..600 + QUIET).into_par_iter().map(one).collect();
     let wrong: Vec<String> = all
         .iter()
         .filter(|(_, judged)| judged.closure.verdict != Verdict::NothingFound)
         .map(|(seed, judged)| judged.line("noise alone", SMALL, *seed))
         .collect();
-    // At a rate of 5 % three or more of 12 come up once in 50 times.
+    // At a rate of 5 %, three or more of 12 occur once in 50 times.
     assert!(wrong.len() <= 2, "{wrong:#?}");
 }
 
-/// Runs the loop on sets that lack something: how many true effects are distinguishable, named, and
-/// named or alternatives.
+/// Runs the loop on sets that lack effects; returns the numbers of true effects that are
+/// distinguishable, named, and named or alternatives.
 fn named_of(kinds: &[Vec<Lacking>], seed: u64) -> [usize; 3] {
     let one = |(k, kind): (usize, &Vec<Lacking>)| {
         let seed = seed + k as u64;
-        let judged = CheckedPoses::of(kind, SMALL, seed);
+        let judged = LoopVerdict::of(kind, SMALL, seed);
         println!("{}", judged.line(&name(kind), SMALL, seed));
         assert!(
             judged.after < judged.before + 1.0,
@@ -65,7 +65,7 @@ fn one_effect_is_named() {
 
 #[test]
 fn a_law_that_bends_the_fit_is_weighed_at_a_fit_of_its_own() {
-    // Linear about the fit without it, a function of the same command does better than the
+    // Linear about the fit without it, a function of the same command fits better than the
     // harmonic.
     let harmonic =
         |sin| Lacking::new(Effect::JointHarmonic { joint: 2, orders: vec![3] }, &[sin, 0.0]);
@@ -89,7 +89,7 @@ fn a_law_that_bends_the_fit_is_weighed_at_a_fit_of_its_own() {
         ),
     ];
     for (seed, kind) in kinds {
-        let judged = CheckedPoses::of(&kind, SMALL, seed);
+        let judged = LoopVerdict::of(&kind, SMALL, seed);
         let line = judged.line(&name(&kind), SMALL, seed);
         let wave = Effect::JointHarmonic { joint: 2, orders: vec![3] };
         assert!(judged.closure.effects.iter().any(|found| found.effect == wave), "{line}");
@@ -117,8 +117,8 @@ fn what_no_catalogue_holds_is_located_and_corrected() {
     });
 }
 
-/// A case of `tests/cases` through the loop: these effects and no others, the held-out rms of a fit
-/// for which they are declared, and that below `limit_mm`.
+/// Runs the loop on a case of `tests/cases`: it finds exactly these effects, and its held-out rms
+/// is that of a fit with these effects declared, and below `limit_mm`.
 fn case(file: &str, effects: &[Effect], limit_mm: f64) {
     let mut problem = lunar();
     let measurements = read(&problem, &[&format!("tests/cases/{file}.csv")]);

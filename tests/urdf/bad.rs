@@ -1,4 +1,4 @@
-//! URDFs with mistakes: exit status 2, a message with file and line, nothing written.
+//! Errors in URDF files: exit status 2, a located message, no output.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! Identified geometry written back.
+//! Export of identified geometry.
 
 use flexcal::mechanics::Arm;
 use flexcal::urdf::{Chain, Robot, YamlFormat, export, joint_origins, yaml};
@@ -12,8 +12,7 @@ use super::{apart, problem_of, robot, tips};
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
 
-/// The text without what stands in its `<origin>`s, and without origins that have a line of their
-/// own.
+/// Returns the text without the contents of its `<origin>`s, and without origins on separate lines.
 fn without_origins(text: &str) -> String {
     let mut kept = String::new();
     for (k, part) in text.split("<origin").enumerate() {
@@ -30,7 +29,7 @@ fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
     let original = robot("odd.urdf");
     let chain = Chain::new(&original, None, Some("tool")).unwrap();
     let mut problem = problem_of(&chain);
-    // Everything free, at both ends as well.
+    // Every parameter is free, including base and tool.
     problem.parameters.retain(|rule| !matches!(rule.freedom, flexcal::problem::Freedom::Fixed));
     let configurations: Vec<Vec<f64>> = (0..100)
         .map(|_| {
@@ -70,7 +69,7 @@ fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
     let names: Vec<&str> = exported.moved.iter().map(|origin| origin.joint.as_str()).collect();
     assert_eq!(names, ["stand", "rail", "shoulder", "elbow", "level", "wrist", "flange"]);
 
-    // Nothing identified: nothing moves but what was rounded in the file.
+    // Without identification nothing moves, except by rounding in the file.
     let same = export(&chain, &problem, &Arm::nominal(&problem)).unwrap();
     let rounded: Vec<&str> = same.moved.iter().map(|origin| origin.joint.as_str()).collect();
     assert_eq!(rounded, ["stand", "flange"]);

@@ -1,5 +1,4 @@
-//! Joints by xyz and rpy, standard DH, joints that follow others, the base by rpy, columns by joint
-//! names.
+//! Forms of joints: xyz and rpy, standard DH, followers, the base by rpy, columns by joint names.
 
 use std::path::Path;
 
@@ -43,7 +42,7 @@ fn standard_tables_are_read_in_their_order() {
     let [origin, x, z] = tips(&problem, &[[&q[..], &[0.0]].concat()], &DVector::zeros(0))[0];
     assert!((origin - expected.translation.vector).norm() < 1e-12);
     assert!((x - expected * Vector3::x()).norm() + (z - expected * Vector3::z()).norm() < 1e-12);
-    // The body moves with the first row; its frame here is that before a and α.
+    // The body moves with the first row; its frame here is the one before a and α.
     let body = &problem.joints[0].bodies[0];
     let before = turn(Vector3::z(), 10.0) * shift(0.0, 0.0, 0.4) * Point3::from(body.position);
     assert!((before - row(10.0, 0.4, 0.1, 90.0) * Point3::new(0.1, 0.2, 0.3)).norm() < 1e-12);
@@ -119,7 +118,7 @@ fn columns_may_be_called_by_the_names_of_joints() {
             .map_err(|error| error.to_string())
     };
     let pi = std::f64::consts::PI;
-    // x_mm is the measured position, whatever joints are called.
+    // x_mm is the measured position, whatever the names of joints.
     assert_eq!(
         read("shoulder_pan_joint_deg,q2_m,b c_rad,x_mm,y_mm,z_mm"),
         Ok((vec![pi, 2.0, 3.0, 0.0], 0))

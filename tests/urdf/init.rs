@@ -1,4 +1,4 @@
-//! Problems from URDF.
+//! Problems created from URDF.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use nalgebra::{DVector, Vector3};
 
 use super::{apart, problem_of, robot, tips};
 
-/// q of rail, shoulder, elbow and wrist \[m, rad\], then origin, x and z axis of the link `tool` in
-/// `world`: pinocchio 3, π/2 for 1.5708.
+/// Coordinates of rail, shoulder, elbow and wrist \[m, rad\], then origin, x and z axis of the link
+/// `tool` in `world`, computed by pinocchio 3 with π/2 for 1.5708.
 const STORED: [([f64; 4], [[f64; 3]; 3]); 6] = [
     (
         [0.009, 1.802, -1.423, 1.795],
@@ -62,7 +62,7 @@ const STORED: [([f64; 4], [[f64; 3]; 3]); 6] = [
     ),
 ];
 
-/// Places of centres of mass in the first of these configurations, from the same.
+/// Positions of centres of mass in the first of these configurations, from the same program.
 const MASSES: [(&str, f64, [f64; 3]); 3] = [
     ("camera", 0.4, [0.1094887249301, -0.708911820063, 1.1047579046006]),
     ("upper", 3.25, [0.0636153491049, -0.2344837820206, 0.8978169531132]),
@@ -106,7 +106,7 @@ fn a_chain_with_everything_is_as_another_program_has_it() {
     let off = apart(&tips(&problem, &configurations, &nominal), &stored);
     assert!(off < 1e-9, "{off:e}");
 
-    // Masses: the arm cut off behind the joint that carries one, with the target there.
+    // Centres of mass are compared as targets of the arm that ends at their joint.
     assert_eq!(
         problem.joints.iter().flat_map(|joint| &joint.bodies).count(),
         4,
@@ -152,8 +152,8 @@ fn a_problem_frees_what_positions_tell_apart_and_says_what_was_rounded() {
         &problem,
         &flexcal::measurement::Dataset::poses(&q).measurements().unwrap(),
     );
-    // Six of the base, three of the target, four between turning axes, one slide whose place does
-    // not matter.
+    // Six of the base, three of the target, four between revolute axes; the position of one
+    // prismatic joint does not matter.
     assert!(model.parameters.len() < 35, "{}", model.parameters.len());
     let chain = |base, tip| {
         Chain::new(&robot, base, tip).err().map(|error| error.to_string()).unwrap_or_default()
@@ -194,8 +194,8 @@ fn limits_that_exclude_each_other_are_said_to_be_none() {
     }
 }
 
-/// Two joints of the chain follow one another, the first a joint outside of it; and joints bear the
-/// names of rows that are no joints.
+/// Two joints of the chain follow each other, the first a joint outside the chain; the names of
+/// some joints are those of rows that are no joints.
 const FOLLOWERS: &str = r#"<robot name="followers">
 <link name="base"/><link name="side"/><link name="one"/><link name="two"/><link name="tip"/>
 <joint name="aside" type="revolute"><parent link="base"/><child link="side"/><limit lower="-1" upper="1"/></joint>
@@ -221,7 +221,7 @@ fn a_joint_follows_the_nearest_joint_of_the_chain() {
         "{:?}",
         described.notes
     );
-    // Two turns about parallel axes: the second by 0.25 − q.
+    // Two rotations about parallel axes: the second by 0.25 − q.
     let [origin, x, _] = tips(&problem, &[vec![0.0, 0.7, 0.0, 0.0]], &DVector::zeros(0))[0];
     let shoulder = nalgebra::Rotation3::from_euler_angles(0.4, 0.5, 0.6);
     let turn = |angle: f64| nalgebra::Rotation3::from_axis_angle(&Vector3::y_axis(), angle);

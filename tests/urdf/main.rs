@@ -1,4 +1,4 @@
-//! Arms from URDF, and back; the forms in which a problem may have joints besides.
+//! Import and export of URDF, and other forms of joints in a problem.
 
 #![expect(
     clippy::unwrap_used,
@@ -24,17 +24,17 @@ use flexcal::rig::{Truth, simulate};
 use flexcal::urdf::{Chain, Robot, describe};
 use nalgebra::{DVector, Vector3};
 
-/// A URDF of `tests/urdf`, as text and read.
+/// Reads a URDF of `tests/urdf`.
 pub(crate) fn robot(name: &str) -> Robot {
     Robot::read(&common::arms::path("tests/urdf").join(name)).unwrap()
 }
 
-/// The problem of a chain.
+/// Returns the problem of a chain.
 pub(crate) fn problem_of(chain: &Chain) -> Problem {
     Problem::parse(&describe(chain).unwrap().text, Path::new("problem.toml")).unwrap()
 }
 
-/// Origin, x and z axis of the last frame at configurations of all joints, with the parameters at
+/// Returns origin, x and z axis of the last frame for given configurations, with the parameters at
 /// `x`.
 pub(crate) fn tips(
     problem: &Problem,
@@ -52,7 +52,7 @@ pub(crate) fn tips(
     (0..rows.len()).map(|k| [origin[k], x[k] - origin[k], z[k] - origin[k]]).collect()
 }
 
-/// The largest difference of some frames.
+/// Returns the largest difference of frames.
 pub(crate) fn apart(one: &[[Vector3<f64>; 3]], other: &[[Vector3<f64>; 3]]) -> f64 {
     assert_eq!(one.len(), other.len());
     one.iter()
@@ -62,7 +62,7 @@ pub(crate) fn apart(one: &[[Vector3<f64>; 3]], other: &[[Vector3<f64>; 3]]) -> f
         .fold(0.0, f64::max)
 }
 
-/// Every arm of `problems` with a truth of its own is simulated and identified.
+/// Every arm of `problems` with a truth is simulated and identified.
 #[test]
 fn the_gallery_runs() {
     for arm in ["panda", "ur10-urdf", "scara", "gantry"] {

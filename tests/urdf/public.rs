@@ -1,4 +1,4 @@
-//! Public URDFs, against pinocchio: for who has them.
+//! Public URDF files compared with pinocchio, if available.
 //!
 //!     python3 -m venv /tmp/robots && /tmp/robots/bin/pip install pin example-robot-data
 //!     FLEXCAL_URDF_PYTHON=/tmp/robots/bin/python cargo test --test urdf public -- --ignored --nocapture

@@ -1,4 +1,4 @@
-//! Noise of many kinds is not structure: how often each check fails on it.
+//! False alarm rates of the residual tests on several kinds of noise.
 
 use std::time::Instant;
 
@@ -9,11 +9,11 @@ use rayon::prelude::*;
 
 use super::linear::{Linear, at_most, driven, heavy_tails, noise_only, normal, uneven};
 
-/// What the checks say of many problems.
+/// Results of the tests over many problems.
 struct Rates {
     structured: usize,
     failed: usize,
-    /// Name and covariate, p-values.
+    /// Name and covariate of each test, with its p values.
     p_values: Vec<(String, Vec<f64>)>,
 }
 
@@ -55,7 +55,7 @@ impl Rates {
         values.iter().filter(|&&p| p <= level).count() as f64 / values.len().max(1) as f64
     }
 
-    /// The check that most often has p ≤ `level`, and the share.
+    /// Returns the test with the largest share of p ≤ `level`, and the share.
     fn worst(&self, level: f64) -> (&str, f64) {
         let shares =
             self.p_values.iter().map(|(name, values)| (name.as_str(), Self::share(values, level)));
@@ -82,7 +82,7 @@ fn noise_is_not_structure() {
         rates.print(&format!("28 poses, {unknowns} unknowns, prior {prior:?}"));
         assert!(rates.structured <= at_most(problems, 0.01), "{} of {problems}", rates.structured);
         assert!(rates.failed <= at_most(problems, 0.01), "{} of {problems}", rates.failed);
-        // Each check by itself.
+        // Share of each test alone.
         let (name, share) = rates.worst(0.05);
         assert!(share <= at_most(problems, 0.05) as f64 / problems as f64, "{name} {share}");
     }

@@ -1,4 +1,5 @@
-//! What cannot be tested says why, odd inputs are taken, and threads change nothing.
+//! Untestable data give a reason, unusual inputs are accepted, and results do not depend on
+//! threads.
 
 use flexcal::residual_tests::{Covariate, CovariateValues, Findings, Sequence, Test, Untestable};
 use nalgebra::DVector;
@@ -78,7 +79,7 @@ fn odd_inputs_are_taken() {
             }
         }
     }
-    // A session a pose, times that are no numbers.
+    // One session per pose, and times that are no numbers.
     let mut linear = Linear::new(20, 5, None, 15);
     let noise = linear.noise();
     let residual = linear.leaves(noise);

@@ -1,4 +1,4 @@
-//! Linear fits with known structure in what they leave.
+//! Linear fits with known structure in their residuals.
 
 use flexcal::residual_tests::{
     Covariate, CovariateValues, Findings, FitResidual, ResidualTest, Test, test_residual,
@@ -10,10 +10,10 @@ use rand_distr::{Distribution, StandardNormal, StudentT};
 use rayon::prelude::*;
 use statrs::distribution::{Binomial, DiscreteCDF as _};
 
-/// A linear fit: 3 N data, p unknowns, with strong leverage.
+/// Linear fit with 3 N data, p unknowns and strong leverage.
 pub struct Linear {
     pub jacobian: DMatrix<f64>,
-    /// 1 σ of each unknown's prior.
+    /// Standard deviation of each unknown's prior.
     pub prior: Option<f64>,
     pub fitted: DMatrix<f64>,
     pub covariates: Vec<CovariateValues>,
@@ -21,12 +21,13 @@ pub struct Linear {
     pub session: Vec<usize>,
     pub setup: Vec<usize>,
     pub sigma_is_declared: bool,
-    /// Where the drawing of noise goes on.
+    /// Random generator of the noise.
     pub random: ChaCha8Rng,
 }
 
 impl Linear {
-    /// Columns smooth in the covariates, rows of some poses many times larger than those of others.
+    /// Creates columns that are smooth in the covariates; rows of some poses are many times larger
+    /// than others.
     pub fn new(poses: usize, unknowns: usize, prior: Option<f64>, seed: u64) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let joints = 6;
@@ -81,7 +82,7 @@ impl Linear {
         DVector::from_fn(3 * self.poses(), |_, _| normal(&mut self.random))
     }
 
-    /// What the fit leaves of data; with priors, of true unknowns drawn from them as well.
+    /// Returns the residual of data; with priors, true unknowns are drawn from them.
     pub fn leaves(&mut self, mut data: DVector<f64>) -> DVector<f64> {
         let p = self.jacobian.ncols();
         if let Some(sigma) = self.prior {
@@ -113,7 +114,7 @@ impl Linear {
         &self.covariates.iter().find(|known| known.covariate == *of).unwrap().values
     }
 
-    /// Adds a displacement as a function of the pose.
+    /// Adds a displacement that is a function of the pose.
     pub fn displace(data: &mut DVector<f64>, by: impl Fn(usize) -> Vector3<f64>) {
         for pose in 0..data.len() / 3 {
             let mut at = data.fixed_rows_mut::<3>(3 * pose);
@@ -126,7 +127,7 @@ pub fn normal(random: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(random)
 }
 
-/// The data's rows of Q of [J; prior rows].
+/// Returns the data rows of Q of [J; prior rows].
 pub fn factor(jacobian: &DMatrix<f64>, prior: Option<f64>) -> DMatrix<f64> {
     let (rows, p) = jacobian.shape();
     let mut stack = DMatrix::zeros(rows + if prior.is_some() { p } else { 0 }, p);
@@ -150,7 +151,7 @@ pub fn noise_only(
     }
 }
 
-/// Student's t with 3 degrees of freedom, σ not declared.
+/// Creates noise from Student's t with 3 degrees of freedom, σ not declared.
 pub fn heavy_tails(poses: usize, unknowns: usize) -> impl Fn(u64) -> (Linear, DVector<f64>) + Sync {
     move |seed| {
         let mut linear = Linear::new(poses, unknowns, None, 2000 + seed);
@@ -162,7 +163,7 @@ pub fn heavy_tails(poses: usize, unknowns: usize) -> impl Fn(u64) -> (Linear, DV
     }
 }
 
-/// Noise twice as large at every other pose, σ not declared.
+/// Creates noise twice as large at every other pose, σ not declared.
 pub fn uneven(seed: u64) -> (Linear, DVector<f64>) {
     let mut linear = Linear::new(28, 32, None, 3000 + seed);
     linear.sigma_is_declared = false;
@@ -176,7 +177,7 @@ pub fn uneven(seed: u64) -> (Linear, DVector<f64>) {
     (linear, residual)
 }
 
-/// A smooth function of one covariate, `size` σ of noise large.
+/// Tests a smooth function of one covariate with an amplitude of `size` σ of noise.
 pub fn driven(poses: usize, unknowns: usize, size: f64, seed: u64) -> Findings {
     let mut linear = Linear::new(poses, unknowns, None, 4000 + seed);
     linear.sigma_is_declared = false;
@@ -197,14 +198,14 @@ pub fn outliers(findings: &Findings) -> &ResidualTest {
     findings.tests.iter().find(|check| check.name() == "outliers").unwrap()
 }
 
-/// How many of `problems` may have what happens with probability `rate`: exceeded once in some 10
-/// 000 tests.
+/// Returns the number of `problems` with an event of probability `rate` that is exceeded once in
+/// about 10 000 tests.
 pub fn at_most(problems: u64, rate: f64) -> usize {
     let binomial = Binomial::new(rate, problems).unwrap();
     usize::try_from(binomial.inverse_cdf(1.0 - 1e-4)).unwrap()
 }
 
-/// Counts problems for which `holds`.
+/// Counts the problems for which `holds` is true.
 pub fn count(problems: u64, holds: impl Fn(u64) -> bool + Sync) -> usize {
     (0..problems).into_par_iter().filter(|&seed| holds(seed)).count()
 }

@@ -1,4 +1,4 @@
-//! Checks of what a fit leaves: no false alarms on noise, and structure found and named.
+//! Residual tests: no false alarms on noise, and detection of structure.
 //!
 //! `cargo test --release --test loop checks -- --ignored --nocapture` prints rates over many more
 //! problems, and times.

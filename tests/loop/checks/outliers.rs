@@ -1,4 +1,4 @@
-//! Poses that are far off, and noise with heavy tails, are named and are not structure.
+//! Outliers and heavy tails are named and do not count as structure.
 
 use flexcal::residual_tests::{Findings, Test};
 use nalgebra::{DVector, Vector3};

@@ -1,4 +1,4 @@
-//! Structure in what a fit leaves is found and named.
+//! Detection of structure in residuals.
 
 use flexcal::residual_tests::{Covariate, Findings, ResidualTest, Sequence, Test};
 use nalgebra::Vector3;
@@ -31,7 +31,7 @@ fn few_degrees_of_freedom_still_show_strong_structure() {
     assert!(found >= 25);
 }
 
-/// AR(1) noise in the order of time; `shuffled` rows are not in that order.
+/// Tests AR(1) noise in the order of time; `shuffled` rows are in another order.
 fn following(shuffled: bool, seed: u64) -> Findings {
     let mut linear = Linear::new(100, 20, None, 5000 + seed);
     linear.sigma_is_declared = false;
@@ -108,8 +108,7 @@ fn an_understated_sigma_fails_chi_squared_and_nothing_else() {
 fn repeats_show_a_lack_of_fit_without_sigma() {
     let repeated = |seed: u64, size: f64| {
         let mut linear = Linear::new(60, 12, None, 7000 + seed);
-        // Three poses of each setup: rows of the Jacobian are the same, and so is what the model
-        // lacks.
+        // Three poses of each setup have equal Jacobian rows and equal unmodelled displacements.
         linear.setup = (0..60).map(|pose| pose / 3).collect();
         linear.sigma_is_declared = false;
         for row in 0..180 {

@@ -1,4 +1,4 @@
-//! Whole problems and files that cannot be read.
+//! Errors of whole problems, and unreadable files.
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,5 +1,4 @@
-//! Mistakes in the input: each message names file, line and key; `tests/fuzz` has those changed at
-//! random.
+//! Input errors: each message names file, line and key; `tests/fuzz` has random mutations.
 
 #![expect(clippy::expect_used, reason = "a test that fails may panic")]
 

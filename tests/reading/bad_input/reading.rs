@@ -1,4 +1,4 @@
-//! What the tests of this theme share.
+//! Shared functions of the input tests.
 
 use std::fs;
 use std::path::Path;
@@ -14,7 +14,7 @@ pub fn problem(text: &str) -> Result<Problem, InputError> {
     Problem::parse(text, Path::new("problem.toml"))
 }
 
-/// Checks that a message is one line that holds every word.
+/// Asserts that a message is one line that contains every word.
 pub fn check(error: &InputError, mistake: &str, words: &[&str]) {
     let message = error.to_string();
     assert!(!message.contains('\n'), "{mistake}: {message}");
@@ -23,8 +23,8 @@ pub fn check(error: &InputError, mistake: &str, words: &[&str]) {
     }
 }
 
-/// Checks that each piece of text, put below the first joint, is a mistake whose message holds the
-/// words.
+/// Asserts that each piece of text, placed after the first joint, is an error whose message
+/// contains the words.
 pub fn check_problems(mistakes: &[(&str, &[&str])]) {
     for (text, words) in mistakes {
         let error = problem(&format!("{ARM}{text}\n")).expect_err(text);
@@ -33,7 +33,7 @@ pub fn check_problems(mistakes: &[(&str, &[&str])]) {
     }
 }
 
-/// Reads one table from a file and divides its rows.
+/// Reads one table from a file and splits its rows.
 pub fn table(problem_text: &str, table: &[u8]) -> Result<Split, InputError> {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("rows.csv");

@@ -1,4 +1,4 @@
-//! Sections of a problem.
+//! Errors in sections of a problem.
 
 use super::reading::{ARM, check, check_problems, problem, table};
 

@@ -1,4 +1,4 @@
-//! Tables of measurements.
+//! Errors in tables of measurements.
 
 use super::reading::{ARM, check, table};
 
