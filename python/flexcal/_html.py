@@ -87,7 +87,7 @@ def _mm(errors: dict[str, Any]) -> str:
 
 def _effect(entry: dict[str, Any]) -> str:
     law = ((entry.get("claims") or {}).get("law") or {}).get("probability")
-    sure = "" if law is None else f" (law: {100 * law:.0f} %)"
+    sure = f" ({escape(entry['status'])})" if law is None else f" ({escape(entry['status'])}, law {100 * law:.0f} %)"
     sizes = [
         f"{escape(own['name'])} = {own['estimate']:.4g}"
         + ("" if own["std_error"] is None else f" ± {own['std_error']:.2g}")

@@ -109,6 +109,12 @@ class _Fit(_Result):
         return self._fit.cautions
 
     @property
+    def findings(self) -> list[dict[str, Any]]:
+        """Findings of the checks of the fit: ``code``, ``severity``, ``numbers``, ``text`` and ``remedy`` of each
+        (docs/findings.md explains every code)."""
+        return list(json.loads(self._fit.json())["findings"])
+
+    @property
     def problem(self) -> Problem:
         """The problem that was fitted."""
         return self._problem
@@ -173,14 +179,16 @@ class ClosedLoop(_Fit):
 
     @property
     def verdict(self) -> str:
-        """``"explained"``, ``"unexplained"`` or ``"nothing-found"``."""
+        """``"explained"`` (the effects with status ``"found"`` alone leave noise), ``"unexplained"`` (structure is left, or no
+        effect is sure) or ``"nothing-found"``."""
         return str(self._document["verdict"])
 
     @cached_property
     def effects(self) -> pd.DataFrame:
         """What was found, a row each, in that order.
 
-        Columns: ``effect``, ``description``, ``p_value``; ``place``, ``depends_on`` and ``law`` with the probability that each
+        Columns: ``effect``, ``status`` (``"found"``, ``"probable"``, ``"located"`` or ``"contradicted"``: what may be claimed),
+        ``description``, ``declaration`` (the line for an ``[[effect]]`` of problem.toml), ``p_value``; ``place``, ``depends_on`` and ``law`` with the probability that each
         is claimed with (``place_probability`` …; None and NaN where no evidence was weighed); ``stability``.
         """
         return _effects(self._document["effects"])
@@ -397,11 +405,11 @@ def _effects(entries: list[dict[str, Any]]) -> pd.DataFrame:
     import pandas as pd
 
     claims = ("place", "depends_on", "law")
-    names = ["effect", "description", "p_value"]
+    names = ["effect", "status", "description", "declaration", "p_value"]
     names += [name for claim in claims for name in (claim, f"{claim}_probability")] + ["stability"]
     rows = []
     for entry in entries:
-        row = [entry["effect"], entry["description"], entry["p_value"]]
+        row = [entry[name] for name in ("effect", "status", "description", "declaration", "p_value")]
         for claim in claims:
             said = (entry.get("claims") or {}).get(claim) or {}
             row += [said.get("value"), said.get("probability")]

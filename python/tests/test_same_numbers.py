@@ -174,7 +174,7 @@ def test_results_agree(lunar: flexcal.Problem, identified: flexcal.Identificatio
         lengths = np.linalg.norm(residuals.filter(like="residual_"), axis=1)
         mean = result.errors["mean_mm"].xs("held_out", level="rows").iloc[-1]
         np.testing.assert_allclose(lengths[residuals["held_out"]].mean(), mean, rtol=1e-12)
-    assert closed.verdict == "explained"
+    assert closed.verdict == "explained" and list(closed.effects["status"]) == ["found"]
     assert list(closed.effects["law"]) == ["link-thermal-bending"] and closed.effects["law_probability"][0] > 0.9
     again = closed.closed_problem.identify(LUNAR / "measurements.csv")
     off = (again.parameters["estimate"] - closed.parameters["estimate"]) / closed.parameters["std_error"]

@@ -12,6 +12,8 @@ use crate::problem::{Joint, JointKind, Observation};
 
 #[derive(Serialize)]
 struct Document<'a> {
+    format: Value,
+    program: &'static str,
     problem: &'a str,
     seed: u64,
     poses: usize,
@@ -165,6 +167,8 @@ impl Simulation {
     /// Returns the text of `truth.json`.
     pub fn truth_json(&self) -> String {
         let document = Document {
+            format: serde_json::json!({ "name": "flexcal-truth", "version": 2 }),
+            program: concat!("flexcal ", env!("CARGO_PKG_VERSION")),
             problem: &self.problem,
             seed: self.seed,
             poses: self.rows.len(),

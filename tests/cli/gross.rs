@@ -41,10 +41,10 @@ fn a_row_that_carries_the_misfit_is_named_and_to_be_looked_at() {
     let (_, out, _) = run(&bench, "identify . --out out");
     let words = out.split_whitespace().collect::<Vec<_>>().join(" ");
     for expected in [
-        "which 1 pose too far off to be noise carries",
-        "1 pose carries most of what the fit leaves: ./a-none.csv:16 (",
+        "mostly because of 1 pose with gross errors",
+        "1 pose causes most of the residual: ./a-none.csv:16 (",
         "Without it χ²/ν is ",
-        "Next: look at ./a-none.csv:16; a section [robust] in ./problem.toml",
+        "Next: check ./a-none.csv:16; a section [robust] in ./problem.toml",
     ] {
         assert!(words.contains(expected), "{expected} missing in:\n{out}");
     }
@@ -61,16 +61,15 @@ fn a_row_that_carries_the_misfit_is_named_and_to_be_looked_at() {
     assert!(with.as_f64().unwrap() > 1e3 && without.as_f64().unwrap() < 2.0, "{with} {without}");
 
     let (_, out, _) = run(&bench, "loop . --out out");
-    for expected in [
-        "Look first at the rows that carry the misfit",
-        "Next: look at ./a-none.csv:16; a section [robust]",
-    ] {
+    for expected in
+        ["Check the influential rows first", "Next: check ./a-none.csv:16; a section [robust]"]
+    {
         assert!(out.contains(expected), "{expected} missing in:\n{out}");
     }
     // With the recommended robust loss there is no remark.
     bench.edit("problem.toml", "[parameters]", "[robust]\nloss = \"huber\"\n\n[parameters]");
     let (_, out, _) = run(&bench, "identify . --out out");
-    assert!(!out.contains("carries") && out.contains("the model explains the data"), "{out}");
+    assert!(!out.contains("causes most") && out.contains("the model explains the data"), "{out}");
 }
 
 #[test]
@@ -140,7 +139,7 @@ fn rows_that_an_effect_touches_alone_are_no_gross_ones() {
     fs::copy(cases.join("e-payload-mass.csv"), bench.path("a-none.csv")).unwrap();
     let (_, out, _) = run(&bench, "identify . --out out");
     assert!(
-        !out.contains("carr")
+        !out.contains("gross errors")
             && out.contains("\nNext: flexcal loop . looks for what the model lacks"),
         "{out}"
     );
@@ -161,7 +160,7 @@ fn a_row_that_carries_little_of_the_misfit_is_not_said_to() {
     for line in [16, 21, 60] {
         spoil(&bench, line, 0.35);
         let (_, out, _) = run(&bench, "identify . --out out");
-        assert!(out.contains("times the declared σ") && !out.contains("carr"), "{line} {out}");
+        assert!(out.contains("× the declared σ") && !out.contains("because of"), "{line} {out}");
         spoil(&bench, line, -0.35);
     }
 }

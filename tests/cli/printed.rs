@@ -245,16 +245,14 @@ fn the_screen_of_a_loop_says_what_an_effect_is_not_told_from() {
 #[test]
 fn limits_that_hold_the_declared_fit_are_said_beside_what_was_found() {
     let printed = screen(&["loop", "tests/cases/bounded/stiffness.toml"]);
-    let expected =
-        "Limits hold the fit as declared (joint3.stiffness, A.GJ): where one is wrong, an effect";
+    let expected = "Limits are active in the declared fit (joint3.stiffness, A.GJ). If one is wrong, an effect";
     assert!(printed.contains(expected) && printed.contains("What was found"), "{printed}");
     // Without effects no effect replaces a limit; a wrong limit is reported.
     let printed = screen(&["loop", "problems/service-arm"]);
-    let expected =
-        "The limit of joint4.a, which holds the fit, is most probably wrong, or hides a cause";
-    assert!(printed.contains(expected) && !printed.contains("Limits hold"), "{printed}");
+    let expected = "Move the limit of joint4.a out, or remove it: with probability";
+    assert!(printed.contains(expected) && !printed.contains("Limits are active"), "{printed}");
     let printed = screen(&["loop", "tests/cases", "--data", "tests/cases/a-none.csv"]);
-    assert!(!printed.contains("Limits hold"), "{printed}");
+    assert!(!printed.contains("Limits are active"), "{printed}");
 }
 
 #[test]

@@ -74,9 +74,8 @@ fn a_sigma_that_is_wrong_changes_no_estimate() {
                 "{name}: {chi2}"
             );
             let text = estimate_text(&problem, &found);
-            let cause =
-                if factor > 1.0 { "which is too large" } else { "the model lacks something" };
-            assert!(text.contains(cause) && text.contains("; chance gives "), "{text}");
+            let cause = if factor > 1.0 { "is too large" } else { "the model lacks something" };
+            assert!(text.contains(cause) && text.contains("if only noise is left"), "{text}");
         }
     }
 }

@@ -278,7 +278,7 @@ fn a_declared_sigma_that_is_wrong_changes_nothing() {
                 .filter_map(|(own, other)| Some((own.1 - other.1).abs() / other.3?))
                 .fold(0.0, f64::max);
             let held_out = told.held_out_mm() / expected.held_out_mm();
-            let said = told.text.contains("; chance gives ");
+            let said = told.text.contains("if only noise is left");
             if told.status != 0 || apart > 0.4 || (held_out - 1.0).abs() > 0.05 || !said {
                 let status = told.status;
                 let _ = writeln!(
