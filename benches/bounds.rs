@@ -1,6 +1,7 @@
-//! What bounds and constraints cost: whole identifications of the lunar sampler.
+//! Times of whole identifications of the lunar sampler without limits, with bounds and with
+//! constraints.
 //!
-//! Limits stay near the free optimum: far from it the residual is large, and Gauss–Newton steps
+//! The limits are near the free optimum: far from it the residual is large, and Gauss–Newton steps
 //! take hundreds of iterations with bounds and constraints alike.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench may panic")]
 
@@ -12,7 +13,7 @@ use flexcal::fit::{Options, identify};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::Problem;
 
-/// Rules of the problem file, and the same with bounds.
+/// Priors of the problem file and what replaces them: the same priors with bounds.
 const BOUNDS: [(&str, &str); 2] = [
     (
         "\"A.*\" = { sigma_relative = 0.5 }",
@@ -24,6 +25,7 @@ const BOUNDS: [(&str, &str); 2] = [
     ),
 ];
 
+/// Constraints appended to the problem file.
 const CONSTRAINTS: &str = "
 [[constraint]]
 terms = { \"A.EI\" = 1.0, \"B.EI\" = -1.0 }
@@ -33,7 +35,7 @@ terms = { \"joint3.a\" = 1, \"joint4.a\" = 1 }
 at_most_m = 3.7395
 ";
 
-/// 28 poses and 200.
+/// Measurements of 28 and of 200 poses, in `tests/cases`.
 const DATA: [&str; 2] = ["a-none.csv", "h-none-large.csv"];
 
 fn main() {

@@ -1,4 +1,4 @@
-//! Whole fits, from nominal parameters to the minimum.
+//! Times of whole fits, from nominal parameters to the minimum.
 #![allow(clippy::unwrap_used, clippy::wildcard_imports, missing_docs, reason = "a bench may panic")]
 
 mod common;
@@ -16,7 +16,7 @@ fn main() {
     divan::main();
 }
 
-/// From zero to the minimum.
+/// Minimises `objective` from the nominal parameters.
 fn fit(objective: &impl Objective) -> Solution {
     let solution =
         minimise(objective, DVector::zeros(objective.parameters()), &Settings::default());
@@ -29,7 +29,8 @@ fn bench_fit<P: LeastSquares>(bencher: Bencher, threads: usize, problem: &P) {
     bencher.bench_local(|| pool.install(|| fit(&Fit::new(divan::black_box(problem)))));
 }
 
-/// UR10, rigid, the 25 parameters that positions identify; the argument is the number of poses.
+/// UR10, rigid, with the 25 parameters that positions identify; the argument is the number of
+/// poses.
 #[divan::bench_group(name = "rigid", max_time = 4)]
 mod rigid {
     use super::*;
@@ -61,7 +62,8 @@ mod rigid {
     }
 }
 
-/// Lunar sampler, elastic, loads on the bent arm, 32 parameters with priors, 28 poses.
+/// Lunar sampler: elastic, with loads on the deflected arm, 32 parameters with priors, and 28
+/// poses.
 #[divan::bench]
 fn elastic(bencher: Bencher) {
     let lunar = Lunar::new();

@@ -1,4 +1,4 @@
-//! Residuals and derivatives of a block of poses; `items` are poses.
+//! Times of residuals and derivatives of a block of poses; an `item` is a pose.
 #![allow(clippy::unwrap_used, clippy::wildcard_imports, missing_docs, reason = "a bench may panic")]
 
 mod common;
@@ -11,7 +11,7 @@ use divan::counter::ItemsCount;
 use flexcal::least_squares::{Block, LeastSquares, check_jacobian};
 use nalgebra::{DMatrix, DVector};
 
-/// Poses of the rigid arm: a block as the fit makes them.
+/// Number of poses of the rigid arm; a fit evaluates them in blocks of this size.
 const POSES: usize = 256;
 
 fn main() {
@@ -20,14 +20,14 @@ fn main() {
     let x = Ur10::some_point(&residuals);
     let difference = common::difference(&Analytic::new(&ur10.model, &residuals), &residuals, &x);
     assert!(difference < 1e-9, "the hand-written Jacobian differs by {difference}");
-    let all = ur10.residuals(&(0..ur10.model.parameters.len()).collect::<Vec<usize>>());
-    check(&all, &Ur10::some_point(&all));
+    let all_residuals = ur10.residuals(&(0..ur10.model.parameters.len()).collect::<Vec<usize>>());
+    check(&all_residuals, &Ur10::some_point(&all_residuals));
     let lunar = Lunar::new();
     check(&lunar.residuals(), &DVector::from_element(lunar.parameters(), 1e-3));
     divan::main();
 }
 
-/// Only right derivatives are worth timing.
+/// Checks the derivatives of `problem` at `x` before they are timed.
 fn check(problem: &impl LeastSquares, x: &DVector<f64>) {
     let check = check_jacobian(problem, x, &DVector::from_element(x.len(), 1e-2));
     let (column, worst) = check.worst().unwrap();
@@ -37,7 +37,7 @@ fn check(problem: &impl LeastSquares, x: &DVector<f64>) {
     );
 }
 
-/// Residuals and Jacobian of all poses of `problem`.
+/// Times residuals and Jacobian of all poses of `problem`.
 fn linearise(bencher: Bencher, problem: &impl LeastSquares, x: &DVector<f64>) {
     let poses = problem.items();
     let mut block = Block::zeros(problem.rows_per_item() * poses, problem.parameters());
@@ -47,7 +47,7 @@ fn linearise(bencher: Bencher, problem: &impl LeastSquares, x: &DVector<f64>) {
     });
 }
 
-/// Residuals alone.
+/// Times the residuals of all poses of `problem` without derivatives.
 fn evaluate(bencher: Bencher, problem: &impl LeastSquares, x: &DVector<f64>) {
     let poses = problem.items();
     let mut out = vec![0.0; problem.rows_per_item() * poses];
@@ -56,7 +56,7 @@ fn evaluate(bencher: Bencher, problem: &impl LeastSquares, x: &DVector<f64>) {
     });
 }
 
-/// UR10, rigid, 33 geometric parameters.
+/// UR10, rigid, with 33 geometric parameters.
 #[divan::bench_group(name = "rigid")]
 mod rigid {
     use super::*;
@@ -94,7 +94,7 @@ mod rigid {
     }
 }
 
-/// Lunar sampler, elastic, loads on the bent arm, 32 parameters.
+/// Lunar sampler: elastic, with loads on the deflected arm and 32 parameters.
 #[divan::bench_group(name = "elastic")]
 mod elastic {
     use super::*;

@@ -1,4 +1,4 @@
-//! Rates of the solver's hot paths; the argument is the number of unknowns.
+//! Times of the solver's frequent operations; the argument is the number of unknowns.
 #![allow(clippy::unwrap_used, missing_docs, reason = "a bench may panic")]
 
 use divan::{Bencher, black_box};
@@ -12,11 +12,12 @@ fn main() {
     divan::main();
 }
 
+/// Returns a number between −1 and 1 that varies irregularly with `i`, to fill matrices.
 fn wave(i: usize) -> f64 {
     (1.7 * i as f64 + 0.3 * (i * i % 101) as f64).sin()
 }
 
-/// A block of 768 rows: 256 positions.
+/// Returns a block of 768 rows, those of 256 positions, with `n` columns.
 fn block(n: usize) -> Block {
     let mut block = Block::zeros(3 * 256, n);
     block.values_mut().iter_mut().enumerate().for_each(|(i, v)| *v = wave(i));
@@ -31,14 +32,14 @@ fn constant(n: usize) -> DVector<f64> {
     DVector::from_fn(n, |i, _| wave(i))
 }
 
-/// A block is absorbed by the running QR decomposition.
+/// Absorption of a block by the running QR decomposition.
 #[divan::bench(args = UNKNOWNS)]
 fn absorb(bencher: Bencher, n: usize) {
     let (source, mut triangle) = (block(n), Triangle::new(n));
     bencher.with_inputs(|| source.clone()).bench_local_refs(|block| triangle.absorb(block));
 }
 
-/// Two factors become one.
+/// Merging of two triangular factors.
 #[divan::bench(args = UNKNOWNS)]
 fn merge(bencher: Bencher, n: usize) {
     let mut triangle = Triangle::new(n);
@@ -53,7 +54,7 @@ fn gauss_newton_step(bencher: Bencher, n: usize) {
     bencher.bench_local(|| Factor::new(matrix.clone(), constant.clone(), 1e-12).gauss_newton());
 }
 
-/// A step of three tenths of the Gauss–Newton step's length.
+/// Step limited to three tenths of the length of the Gauss–Newton step.
 #[divan::bench(args = UNKNOWNS)]
 fn limited_step(bencher: Bencher, n: usize) {
     let (matrix, constant) = (triangle(n), constant(n));
@@ -62,7 +63,8 @@ fn limited_step(bencher: Bencher, n: usize) {
         .bench_local(|| Factor::new(matrix.clone(), constant.clone(), 1e-12).limited(0.3 * length));
 }
 
-/// ½‖R x + c‖² with a slope that is a half too steep, so that many equal iterations are needed.
+/// Objective ½‖R x + c‖² whose reported derivatives are 1.5 times the true ones, so that each step
+/// covers the same part of the distance and many equal iterations are needed.
 struct Steep {
     triangle: DMatrix<f64>,
     constant: DVector<f64>,
@@ -93,7 +95,7 @@ impl Objective for Steep {
     }
 }
 
-/// All iterations to the minimum.
+/// All iterations to the minimum; an `item` is an iteration.
 #[divan::bench(args = UNKNOWNS)]
 fn iterations(bencher: Bencher, n: usize) {
     let (objective, start) = (Steep::new(n), DVector::from_element(n, 1.0));
@@ -104,7 +106,7 @@ fn iterations(bencher: Bencher, n: usize) {
         .bench_local(|| minimise(black_box(&objective), start.clone(), &Settings::default()));
 }
 
-/// What an iteration takes for its evaluations.
+/// Evaluations of one iteration: the cost and the linearisation.
 #[divan::bench(args = UNKNOWNS)]
 fn evaluations(bencher: Bencher, n: usize) {
     let (objective, x) = (Steep::new(n), DVector::from_element(n, 1.0));

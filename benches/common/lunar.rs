@@ -1,4 +1,4 @@
-//! The lunar sampler: two elastic links and three elastic joints, statics on the bent arm, 32
+//! The lunar sampler: two elastic links, three elastic joints, loads on the deflected arm, and 32
 //! parameters with priors.
 
 use flexcal::fit::Placement;
@@ -8,7 +8,7 @@ use flexcal::model::{Model, PoseResiduals};
 use flexcal::problem::Problem;
 use nalgebra::{DMatrix, DVector};
 
-/// The arm and its 28 identification poses.
+/// The arm with its 28 identification poses.
 pub struct Lunar {
     model: Model,
     data: Dataset,
@@ -31,17 +31,17 @@ impl Lunar {
         }
     }
 
-    /// Number of parameters.
+    /// Returns the number of parameters.
     pub fn parameters(&self) -> usize {
         self.model.parameters.len()
     }
 
-    /// Number of identification poses.
+    /// Returns the number of identification poses.
     pub fn poses(&self) -> usize {
         self.data.split.identification.len()
     }
 
-    /// Residuals of the identification poses as a function of all parameters.
+    /// Returns the residuals of the identification poses as a function of all parameters.
     pub fn residuals(&self) -> PoseResiduals<'_> {
         let n = self.parameters();
         let poses = self.placement.poses(
@@ -52,7 +52,7 @@ impl Lunar {
         PoseResiduals::new(&self.model, poses, (0..n).collect(), DVector::zeros(n))
     }
 
-    /// The data with the priors of all parameters.
+    /// Returns the objective of `residuals` and the priors of all parameters.
     pub fn fit<'a>(&self, residuals: &'a PoseResiduals<'a>) -> Fit<'a, PoseResiduals<'a>> {
         let weights =
             self.model.parameters.iter().map(|parameter| parameter.sigma.unwrap().recip());

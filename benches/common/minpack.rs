@@ -1,4 +1,4 @@
-//! The MINPACK port of the crate `levenberg-marquardt` on the same residuals and derivatives.
+//! The MINPACK port of the crate `levenberg-marquardt` with flexcal's residuals and derivatives.
 
 use flexcal::least_squares::solver::{Bounds, Settings};
 use flexcal::least_squares::{LeastSquares, LinearRows, jacobian, residual_vector};
@@ -6,7 +6,8 @@ use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, MinimizationR
 use nalgebra::storage::Owned;
 use nalgebra::{DMatrix, DVector, Dyn};
 
-/// A problem as that crate sees it: residuals and Jacobian whole.
+/// A least-squares problem for that crate, which wants the whole residual vector and the whole
+/// Jacobian.
 pub struct Minpack<'a, P> {
     problem: &'a P,
     rows: Option<&'a LinearRows>,
@@ -15,23 +16,23 @@ pub struct Minpack<'a, P> {
 }
 
 impl<'a, P: LeastSquares> Minpack<'a, P> {
-    /// To be solved from `x`.
+    /// Problem without linear rows and bounds, to be solved from `x`.
     pub fn new(problem: &'a P, x: DVector<f64>) -> Self {
         Self { problem, rows: None, bounds: None, x }
     }
 
-    /// With linear rows below the data, as priors are.
+    /// Appends linear rows, for example priors, to the residuals.
     pub fn with_rows(self, rows: Option<&'a LinearRows>) -> Self {
         Self { rows, ..self }
     }
 
-    /// With every point that the solver asks for moved to the nearest one within bounds, which it
-    /// does not know of.
+    /// Moves every point that the solver asks for to the nearest one within `bounds`, of which the
+    /// solver is not informed.
     pub fn clamped(self, bounds: Option<&'a Bounds>) -> Self {
         Self { bounds, ..self }
     }
 
-    /// Where it ends, and why.
+    /// Solves the problem; returns the final point and the crate's report.
     pub fn solve(self, settings: &Settings) -> (DVector<f64>, MinimizationReport<f64>) {
         let solver = LevenbergMarquardt::new()
             .with_ftol(settings.cost_tolerance)
@@ -41,7 +42,7 @@ impl<'a, P: LeastSquares> Minpack<'a, P> {
         (end.x, report)
     }
 
-    /// ½‖r‖² at the minimum found from x = 0.
+    /// Returns ½‖r‖² at the minimum found from x = 0.
     pub fn minimise(problem: &'a P) -> f64 {
         let (_, report) =
             Self::new(problem, DVector::zeros(problem.parameters())).solve(&Settings::default());
@@ -71,10 +72,11 @@ impl<P: LeastSquares> LeastSquaresProblem<f64, Dyn, Dyn> for Minpack<'_, P> {
         Some(match self.rows {
             Some(rows) => {
                 let m = data.len();
-                let mut all = data.resize_vertically(m + rows.constant.len(), 0.0);
-                all.rows_mut(m, rows.constant.len())
+                let mut stacked = data.resize_vertically(m + rows.constant.len(), 0.0);
+                stacked
+                    .rows_mut(m, rows.constant.len())
                     .copy_from(&(&rows.matrix * &self.x + &rows.constant));
-                all
+                stacked
             }
             None => data,
         })
@@ -85,9 +87,9 @@ impl<P: LeastSquares> LeastSquaresProblem<f64, Dyn, Dyn> for Minpack<'_, P> {
         Some(match self.rows {
             Some(rows) => {
                 let m = data.nrows();
-                let mut all = data.resize_vertically(m + rows.matrix.nrows(), 0.0);
-                all.rows_mut(m, rows.matrix.nrows()).copy_from(&rows.matrix);
-                all
+                let mut stacked = data.resize_vertically(m + rows.matrix.nrows(), 0.0);
+                stacked.rows_mut(m, rows.matrix.nrows()).copy_from(&rows.matrix);
+                stacked
             }
             None => data,
         })

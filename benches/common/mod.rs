@@ -1,4 +1,4 @@
-//! Problems that the benches share.
+//! Problems shared by the benches.
 #![allow(dead_code, clippy::unwrap_used, reason = "each bench uses its part; a bench may panic")]
 
 pub mod analytic;
@@ -11,18 +11,19 @@ use std::path::{Path, PathBuf};
 use flexcal::least_squares::{LeastSquares, jacobian, residual_vector};
 use nalgebra::{DMatrix, DVector};
 
-/// A file of the repository.
+/// Returns the path of a file of the repository.
 pub fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
 }
 
-/// A pool of `threads`.
+/// Returns a thread pool of `threads` threads.
 pub fn pool(threads: usize) -> rayon::ThreadPool {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
 }
 
-/// Writes ∂r/∂x by central differences into `out`, m × n.
+/// Writes the m × n Jacobian ∂r/∂x by central differences into `out`.
 pub fn central_differences(problem: &impl LeastSquares, x: &DVector<f64>, out: &mut DMatrix<f64>) {
+    /// Step of each unknown, near the cube root of the machine precision [unit of the unknown].
     const STEP: f64 = 1e-6;
     for j in 0..x.len() {
         let at = |value: f64| {
@@ -34,7 +35,8 @@ pub fn central_differences(problem: &impl LeastSquares, x: &DVector<f64>, out: &
     }
 }
 
-/// Largest difference between the Jacobians of two problems, relative to the largest entry.
+/// Returns the largest difference between the Jacobians of two problems, relative to the largest
+/// entry.
 pub fn difference(one: &impl LeastSquares, other: &impl LeastSquares, x: &DVector<f64>) -> f64 {
     let (one, other) = (jacobian(one, x), jacobian(other, x));
     (&one - &other).amax() / other.amax()

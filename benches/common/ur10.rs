@@ -1,4 +1,4 @@
-//! A rigid UR10 with errors drawn at random, measured with noise.
+//! A rigid UR10 with random parameter errors and noisy measurements.
 
 use flexcal::least_squares::LeastSquares as _;
 use flexcal::least_squares::solver::Bounds;
@@ -10,16 +10,19 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-/// 1 σ of a measured coordinate [m].
+/// Standard deviation of the noise of a coordinate [m].
 pub const NOISE: f64 = 5e-5;
-/// 1 σ of the errors of the arm: angles [rad], lengths [m].
+/// Standard deviation of the parameter errors: angles [rad], lengths [m].
 const ERRORS: (f64, f64) = (4e-3, 2e-3);
-/// Bounds of the unknowns [σ of the errors]: a few of the true values lie beyond.
-const WITHIN: f64 = 1.5;
-/// Every so many-th pose has a gross error of up to so much on each coordinate [m].
-const GROSS: (usize, f64) = (10, 5e-3);
-/// Parameters that positions cannot tell from others: d of parallel axes, β where the next link has
-/// an α, and those of the last link that the target's coordinates replace.
+/// Bounds of the unknowns [standard deviations of the parameter errors], narrow enough that a few
+/// true values are outside.
+const BOUND: f64 = 1.5;
+/// A gross error is added to every `GROSS_INTERVAL`-th pose.
+const GROSS_INTERVAL: usize = 10;
+/// Largest gross error of a coordinate [m].
+const GROSS_ERROR: f64 = 5e-3;
+/// Parameters whose effect on positions other parameters have too: d of parallel axes, β where the
+/// next link has an α, and those of the last link that the target's coordinates replace.
 const REDUNDANT: [&str; 8] = [
     "joint1.beta",
     "joint2.d",
@@ -36,14 +39,14 @@ pub struct Ur10 {
     pub model: Model,
     pub configurations: Vec<[f64; 6]>,
     pub measured: Vec<Vector3<f64>>,
-    /// The 25 parameters that positions identify.
+    /// Indices of the 25 parameters that positions identify.
     pub identifiable: Vec<usize>,
-    /// All 33 of joints and target.
+    /// Indices of all 33 parameters of joints and target.
     pub geometric: Vec<usize>,
 }
 
 impl Ur10 {
-    /// With `poses` random configurations, the same on every run.
+    /// Measures `poses` random configurations, the same in every run.
     pub fn new(poses: usize) -> Self {
         let mut problem = Problem::read(&super::file("problems/ur10-ipa/problem.toml")).unwrap();
         problem.tool.target = Vector3::new(0.06, 0.04, 0.109);
@@ -79,12 +82,13 @@ impl Ur10 {
         ur10
     }
 
-    /// Residuals as a function of `unknowns`.
+    /// Returns the residuals as a function of `unknowns`, with the other parameters nominal.
     pub fn residuals(&self, unknowns: &[usize]) -> PoseResiduals<'_> {
         self.residuals_at(unknowns.to_vec(), DVector::zeros(self.model.parameters.len()))
     }
 
-    fn residuals_at(&self, unknowns: Vec<usize>, at: DVector<f64>) -> PoseResiduals<'_> {
+    /// Returns the residuals as a function of `unknowns`, with the other parameters from `fixed`.
+    fn residuals_at(&self, unknowns: Vec<usize>, fixed: DVector<f64>) -> PoseResiduals<'_> {
         let poses =
             self.configurations.iter().zip(&self.measured).map(|(configuration, measured)| Pose {
                 setup: PoseView::from_configuration(configuration),
@@ -95,27 +99,27 @@ impl Ur10 {
                 sigma: NOISE,
                 orientation: None,
             });
-        PoseResiduals::new(&self.model, poses.collect::<Vec<_>>(), unknowns, at)
+        PoseResiduals::new(&self.model, poses.collect::<Vec<_>>(), unknowns, fixed)
     }
 
-    /// Bounds on `unknowns`.
+    /// Returns symmetric bounds of `unknowns` around their nominal values.
     pub fn bounds(&self, unknowns: &[usize]) -> Bounds {
         let angle = |&k: &usize| self.model.parameters[k].unit() == flexcal::quantity::Unit::Angle;
-        let width = |k: &usize| WITHIN * if angle(k) { ERRORS.0 } else { ERRORS.1 };
+        let width = |k: &usize| BOUND * if angle(k) { ERRORS.0 } else { ERRORS.1 };
         let upper = DVector::from_iterator(unknowns.len(), unknowns.iter().map(width));
         Bounds::new(-&upper, upper).unwrap()
     }
 
-    /// The same arm with gross errors among its measurements.
+    /// Adds gross errors to some of the measurements.
     pub fn with_gross_errors(mut self) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(2026);
-        for measured in self.measured.iter_mut().step_by(GROSS.0) {
-            *measured += Vector3::from_fn(|_, _| random.random_range(-GROSS.1..GROSS.1));
+        for measured in self.measured.iter_mut().step_by(GROSS_INTERVAL) {
+            *measured += Vector3::from_fn(|_, _| random.random_range(-GROSS_ERROR..GROSS_ERROR));
         }
         self
     }
 
-    /// A parameter vector away from nominal, where derivatives are compared.
+    /// Returns a point away from the nominal one, at which derivatives are compared.
     pub fn some_point(residuals: &PoseResiduals) -> DVector<f64> {
         DVector::from_fn(residuals.parameters(), |k, _| 2e-3 * (k as f64 + 0.5).sin())
     }

@@ -1,12 +1,13 @@
-//! The same fits for other programs: writes their data, times flexcal's own.
+//! The fits of `benches/fit.rs` for other programs: writes their data, and times flexcal's fits.
 //!
-//!     peers write <poses> <unknowns> <kind> <csv>       data of `benches/fit.rs`; unknowns: 25 identifiable, or all 33
-//!     peers fit <poses> <unknowns> <kind> <repeats>     median time [ms] on one thread, final cost, steps tried
-//!     peers serve <name>                                a problem of `tests/cases/bounded`: limits, flexcal's optimum and times, then
-//!                                                       for each line x a line of residuals and derivatives
+//!     peers write <poses> <unknowns> <kind> <csv>     writes data, for 25 or all 33 unknowns
+//!     peers fit <poses> <unknowns> <kind> <repeats>   prints time [ms], cost and steps of a fit
+//!     peers serve <name>                              evaluates a problem of `tests/cases/bounded`
 //!
-//! kind: plain; box (bounds that a few true values lie beyond); huber, l1 (gross errors, and
-//! flexcal's losses)
+//! `kind` is `plain`, `box` (with bounds that exclude a few true values), `huber` or `l1` (with
+//! gross errors and flexcal's losses). A time is the median on one thread. `serve` prints limits,
+//! optimum and times, then for each line x of the standard input a line of residuals and
+//! derivatives.
 #![allow(
     clippy::expect_used,
     clippy::unwrap_used,
@@ -32,7 +33,7 @@ use flexcal::least_squares::solver::{Settings, minimise, minimise_bounded, minim
 use flexcal::least_squares::{Fit, Loss, Objective as _, jacobian, residual_vector};
 use nalgebra::DVector;
 
-/// Fits of which a median time is taken.
+/// Number of fits of which the median time is taken.
 const REPEATS: usize = 15;
 
 fn main() {
@@ -68,19 +69,21 @@ fn loss(kind: &str) -> Loss {
     }
 }
 
+/// Returns the set of parameters with the number `unknowns`.
 fn chosen<'a>(ur10: &'a Ur10, unknowns: &str) -> &'a [usize] {
     let sets = [&ur10.identifiable, &ur10.geometric];
     sets.into_iter().find(|set| set.len().to_string() == unknowns).expect("25 or 33 unknowns")
 }
 
-/// σ; the nominal α, a, θ, d, β of each joint and the target; which of these are unknown; lower and
-/// upper bounds of these, if any; the loss; a pose a line.
+/// Returns the data as lines: σ; the nominal α, a, θ, d, β of each joint and the target; the
+/// indices of the unknowns; their lower and upper bounds or an empty line; the loss; then a pose
+/// per line.
 fn csv(ur10: &Ur10, unknowns: &[usize], kind: &str) -> String {
     let mut out = format!("{NOISE}\n");
     let nominal: Vec<String> =
         ur10.geometric.iter().map(|&k| ur10.model.parameters[k].nominal.to_string()).collect();
-    let place = |k: &usize| ur10.geometric.iter().position(|g| g == k).unwrap().to_string();
-    let unknown: Vec<String> = unknowns.iter().map(place).collect();
+    let index = |k: &usize| ur10.geometric.iter().position(|g| g == k).unwrap().to_string();
+    let unknown: Vec<String> = unknowns.iter().map(index).collect();
     let bounds = ur10.bounds(unknowns);
     let bounds: Vec<String> =
         bounds.lower().iter().chain(bounds.upper()).map(f64::to_string).collect();
@@ -98,6 +101,7 @@ fn csv(ur10: &Ur10, unknowns: &[usize], kind: &str) -> String {
     out
 }
 
+/// Prints the median time of a fit [ms], the final cost and the number of steps.
 fn time(ur10: &Ur10, unknowns: &[usize], kind: &str, repeats: usize) {
     let residuals = ur10.residuals(unknowns);
     let objective = Fit::new(&residuals).with_loss(loss(kind));
@@ -111,7 +115,7 @@ fn time(ur10: &Ur10, unknowns: &[usize], kind: &str, repeats: usize) {
     println!("{:.4} {:.9e} {}", seconds * 1e3, solution.cost, solution.iterations);
 }
 
-/// Median time of a call [s].
+/// Returns the median time of a call [s].
 fn median<T>(repeats: usize, call: impl Fn() -> T) -> f64 {
     let timed = |_| {
         let begin = Instant::now();
@@ -123,51 +127,60 @@ fn median<T>(repeats: usize, call: impl Fn() -> T) -> f64 {
     times[times.len() / 2]
 }
 
-fn words<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
+/// Joins numbers by spaces.
+fn spaced<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
     values.into_iter().map(f64::to_string).collect::<Vec<String>>().join(" ")
 }
 
-/// Lower and upper bounds; the number of constraints and for each its limits and coefficients;
-/// flexcal's steps, cost, time and optimum, with the time of residuals and Jacobian once, both on
-/// one thread [s]. Then, for each line x, the whitened residuals with those of the priors, and the
-/// Jacobian row after row.
-fn serve(own: &Bounded) {
-    let residuals = own.residuals();
-    let fit = own.fit(&residuals);
-    let solve =
-        || minimise_constrained(&fit, own.nominal(), &own.bounds, &own.rows, &Settings::default());
-    let (found, pool) = (solve(), common::pool(1));
-    let (fitted, linearised) =
-        pool.install(|| (median(REPEATS, solve), median(10 * REPEATS, || fit.linearise(&found.x))));
+/// Prints the lower and upper bounds; the number of constraints and, for each, its limits and
+/// coefficients; flexcal's steps, cost, time, time of one evaluation of residuals and Jacobian,
+/// both on one thread [s], and optimum. Then prints, for each line x of the standard input, the
+/// whitened residuals with those of the priors and the Jacobian by rows.
+fn serve(bounded: &Bounded) {
+    let residuals = bounded.residuals();
+    let fit = bounded.fit(&residuals);
+    let solve = || {
+        minimise_constrained(
+            &fit,
+            bounded.nominal(),
+            &bounded.bounds,
+            &bounded.rows,
+            &Settings::default(),
+        )
+    };
+    let (solution, pool) = (solve(), common::pool(1));
+    let (fitted, linearised) = pool
+        .install(|| (median(REPEATS, solve), median(10 * REPEATS, || fit.linearise(&solution.x))));
     let mut out = std::io::stdout().lock();
     writeln!(
         out,
         "{}\n{}\n{}",
-        words(own.bounds.lower()),
-        words(own.bounds.upper()),
-        own.rows.len()
+        spaced(bounded.bounds.lower()),
+        spaced(bounded.bounds.upper()),
+        bounded.rows.len()
     )
     .unwrap();
-    for i in 0..own.rows.len() {
-        let (lower, upper) = (own.rows.lower()[i], own.rows.upper()[i]);
-        writeln!(out, "{lower} {upper} {}", words(&own.rows.matrix().row(i).clone_owned()))
+    for i in 0..bounded.rows.len() {
+        let (lower, upper) = (bounded.rows.lower()[i], bounded.rows.upper()[i]);
+        writeln!(out, "{lower} {upper} {}", spaced(&bounded.rows.matrix().row(i).clone_owned()))
             .unwrap();
     }
-    let (steps, cost) = (found.iterations, found.cost);
-    writeln!(out, "{steps} {cost} {fitted} {linearised} {}", words(&found.x)).unwrap();
-    let priors = own.priors();
+    let (steps, cost) = (solution.iterations, solution.cost);
+    writeln!(out, "{steps} {cost} {fitted} {linearised} {}", spaced(&solution.x)).unwrap();
+    let priors = bounded.priors();
     for line in std::io::stdin().lines() {
         let line = line.unwrap();
         let x = DVector::from_iterator(
-            found.x.len(),
+            solution.x.len(),
             line.split_whitespace().map(|word| word.parse().unwrap()),
         );
         let (data, slopes) =
             pool.install(|| (residual_vector(&residuals, &x), jacobian(&residuals, &x)));
-        let own = &priors.matrix * &x;
-        // Column after column of the transpose: row after row.
+        let prior_residuals = &priors.matrix * &x;
+        // The columns of the transpose are the rows of the Jacobian.
         let slopes = (slopes.transpose(), priors.matrix.transpose());
-        let rows = data.iter().chain(own.iter()).chain(slopes.0.iter()).chain(slopes.1.iter());
-        writeln!(out, "{}", words(rows)).unwrap();
+        let rows =
+            data.iter().chain(prior_residuals.iter()).chain(slopes.0.iter()).chain(slopes.1.iter());
+        writeln!(out, "{}", spaced(rows)).unwrap();
     }
 }

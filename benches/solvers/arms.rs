@@ -1,4 +1,4 @@
-//! The arms: a rigid UR10, and the lunar sampler bending under its loads.
+//! Problems of robot arms: a rigid UR10, and elastic arms under their loads.
 
 use flexcal::fit::Placement;
 use flexcal::least_squares::solver::Bounds;
@@ -16,48 +16,53 @@ use crate::common::file;
 use crate::common::ur10::Ur10;
 use crate::made;
 
-/// Errors of the arm, and bounds of its parameters [σ of the prior]: priors are wider than errors.
+/// Standard deviation of the errors of the lunar sampler, and its bounds [standard deviations of
+/// the priors].
 const ERRORS: f64 = 0.3;
-/// How far a far start is from the truth [σ of the prior], and how many there are.
+/// Distance of a far start from the true value of every parameter [standard deviations of the
+/// priors].
 const FAR: f64 = 5.0;
+/// Number of far starts.
 const FAR_STARTS: usize = 3;
 
-/// Limits of `tests/cases/bounded` that bind a little, much, and against the truth.
-const WITHIN: [&str; 5] = [
+/// Names of the limits of `tests/cases/bounded`: from slightly to strongly binding, and contrary to
+/// the truth.
+const LIMITS: [&str; 5] = [
     "stiffness",
     "tight-geometry",
     "mild-constraints",
     "against-the-truth",
     "constraints-against-the-truth",
 ];
-/// Losses with what `[robust]` calls them.
+/// Losses with their names in `[robust]`.
 const LOSSES: [(&str, Loss); 2] = [
     ("huber", Loss::Huber { threshold: Loss::HUBER_POSITION }),
     ("l1", Loss::L1 { slope: Loss::L1_POSITION, smoothing: Loss::L1_SMOOTHING }),
 ];
 
-/// Every arm with its poses.
+/// All arms with their poses.
 pub struct Arms {
     ur10: [Ur10; 3],
-    /// To be fitted within bounds.
+    /// Arms to be fitted with bounds.
     boxed: [Ur10; 2],
-    /// With gross errors.
+    /// Arms with gross errors of some measurements.
     gross: [Ur10; 3],
     pub lunar: [Lunar; 2],
-    /// Arms within limits, with their names.
-    within: Vec<(String, Bounded)>,
-    /// One with gross errors.
-    spoilt: Bounded,
+    /// Names and problems of the arms with limits.
+    limited: Vec<(String, Bounded)>,
+    /// Arm of `tests/cases/bounded` with gross errors of some measurements.
+    gross_bounded: Bounded,
 }
 
-/// The lunar sampler with errors drawn as wide as a part of its priors, as it would be measured.
+/// The lunar sampler with random parameter errors smaller than its priors, and its simulated
+/// measurements.
 pub struct Lunar {
     pub problem: Problem,
     pub data: Dataset,
     model: Model,
     placement: Placement,
     truth: DVector<f64>,
-    /// Points [`FAR`] away from the truth.
+    /// Starting points at the distance [`FAR`] from the truth.
     far: Vec<DVector<f64>>,
 }
 
@@ -68,7 +73,7 @@ impl Arms {
             lunar: [28, 200].map(Lunar::new),
             boxed: [28, 200].map(Ur10::new),
             gross: [28, 200, 1000].map(|poses| Ur10::new(poses).with_gross_errors()),
-            within: WITHIN
+            limited: LIMITS
                 .map(|name| (format!("lunar sampler, {name}"), Bounded::read(name)))
                 .into_iter()
                 .chain([(
@@ -76,7 +81,7 @@ impl Arms {
                     Bounded::of(Problem::read(&file("problems/service-arm")).unwrap()),
                 )])
                 .collect(),
-            spoilt: Bounded::read("stiffness").spoilt(),
+            gross_bounded: Bounded::read("stiffness").with_gross_errors(),
         }
     }
 
@@ -93,12 +98,13 @@ impl Arms {
             let bounds = Some(ur10.bounds(&ur10.identifiable));
             cases.push(Case { bounds, ..of_ur10(ur10, Class::Bounded, &ur10.identifiable, "") });
         }
-        for (name, own) in &self.within {
-            let rows = (!own.rows.is_empty()).then(|| own.rows.clone());
-            let case = Case::new(Class::Bounded, name.clone(), own.residuals(), own.nominal());
+        for (name, bounded) in &self.limited {
+            let rows = (!bounded.rows.is_empty()).then(|| bounded.rows.clone());
+            let case =
+                Case::new(Class::Bounded, name.clone(), bounded.residuals(), bounded.nominal());
             cases.push(Case {
-                priors: Some(own.priors()),
-                bounds: Some(own.bounds.clone()),
+                priors: Some(bounded.priors()),
+                bounds: Some(bounded.bounds.clone()),
                 rows,
                 ..case
             });
@@ -110,9 +116,9 @@ impl Arms {
                     ..of_ur10(ur10, Class::Robust, &ur10.identifiable, &format!(", {word}"))
                 });
             }
-            let (name, own) = (format!("lunar sampler, 28 poses, {word}"), &self.spoilt);
-            let case = Case::new(Class::Robust, name, own.residuals(), own.nominal());
-            cases.push(Case { loss, priors: Some(own.priors()), ..case });
+            let (name, bounded) = (format!("lunar sampler, 28 poses, {word}"), &self.gross_bounded);
+            let case = Case::new(Class::Robust, name, bounded.residuals(), bounded.nominal());
+            cases.push(Case { loss, priors: Some(bounded.priors()), ..case });
         }
         for lunar in &self.lunar {
             let nominal = DVector::zeros(lunar.truth.len());
@@ -176,6 +182,7 @@ impl Lunar {
         format!("lunar sampler, {} poses", self.data.measurements.len())
     }
 
+    /// Returns the standard deviations of the priors.
     fn sigmas(&self) -> DVector<f64> {
         DVector::from_iterator(
             self.truth.len(),
@@ -191,7 +198,7 @@ impl Lunar {
         PoseResiduals::new(&self.model, poses, (0..n).collect(), DVector::zeros(n))
     }
 
-    /// All parameters with their priors.
+    /// Returns the fit of all parameters with their priors from `start`.
     pub fn case(
         &self,
         class: Class,
@@ -208,11 +215,11 @@ impl Lunar {
     }
 }
 
-/// A UR10 from nominal values.
-fn of_ur10<'a>(ur10: &'a Ur10, class: Class, unknowns: &[usize], more: &str) -> Case<'a> {
+/// Returns the fit of `unknowns` of a UR10 from nominal values; `suffix` completes its name.
+fn of_ur10<'a>(ur10: &'a Ur10, class: Class, unknowns: &[usize], suffix: &str) -> Case<'a> {
     let residuals = ur10.residuals(unknowns);
     let name =
-        format!("UR10, {} parameters, {} poses{more}", unknowns.len(), ur10.configurations.len());
+        format!("UR10, {} parameters, {} poses{suffix}", unknowns.len(), ur10.configurations.len());
     let start = DVector::zeros(residuals.parameters());
     Case::new(class, name, residuals, start)
 }

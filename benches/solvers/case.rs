@@ -1,4 +1,4 @@
-//! The problems, and the classes that they belong to.
+//! The test problems and their classes.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use nalgebra::DVector;
 use crate::collections::{more_garbow_hillstrom, nist};
 use crate::watched::Watched;
 
-/// Kinds of problem; the table has a section for each.
+/// Class of problems; each has a section in the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
     Identifiable,
@@ -34,7 +34,7 @@ impl Class {
         Self::MoreGarbowHillstrom,
     ];
 
-    /// Heading of its section, which `tests/fit/auto_solver.rs` reads.
+    /// Heading of the section in the table, which `tests/fit/auto_solver.rs` reads.
     pub fn name(self) -> &'static str {
         match self {
             Self::Identifiable => "rigid, identifiable",
@@ -48,7 +48,7 @@ impl Class {
         }
     }
 
-    /// What its problems are, in a sentence or two.
+    /// Description of the problems in a few sentences.
     pub fn about(self) -> &'static str {
         match self {
             Self::Identifiable => {
@@ -89,7 +89,7 @@ impl Class {
     }
 }
 
-/// A least-squares problem with a start.
+/// A least-squares problem with a starting point.
 pub struct Case<'a> {
     pub class: Class,
     pub name: String,
@@ -97,17 +97,17 @@ pub struct Case<'a> {
     pub priors: Option<LinearRows>,
     pub start: DVector<f64>,
     pub bounds: Option<Bounds>,
-    /// Constraints beside the bounds.
+    /// Linear constraints in addition to the bounds.
     pub rows: Option<Inequalities>,
     pub loss: Loss,
-    /// ½‖r‖² at known minima; empty where the best that any solver finds has to do.
+    /// ½‖r‖² at the known minima; empty if the best result of all solvers serves as the optimum.
     pub minima: Vec<f64>,
     /// Relative accuracy of the known minima.
     pub accuracy: f64,
 }
 
 impl<'a> Case<'a> {
-    /// A problem of a class, without priors, limits and known minima.
+    /// Problem without priors, limits and known minima.
     pub fn new(
         class: Class,
         name: String,
@@ -128,7 +128,7 @@ impl<'a> Case<'a> {
         }
     }
 
-    /// How exactly all solvers are asked to converge.
+    /// Convergence tolerances that all solvers are given.
     pub fn settings(&self) -> Settings {
         match self.class {
             Class::Nist | Class::MoreGarbowHillstrom => Settings {
@@ -142,7 +142,7 @@ impl<'a> Case<'a> {
         }
     }
 
-    /// Time allowed to one run.
+    /// Time limit of one run.
     pub fn limit(&self) -> Duration {
         match self.class {
             Class::Nist | Class::MoreGarbowHillstrom => Duration::from_secs(1),
@@ -150,7 +150,7 @@ impl<'a> Case<'a> {
         }
     }
 
-    /// `data`, which may be the case's own or one that watches it, with the priors.
+    /// Returns the objective with the priors; `data` is the problem's `data` or a wrapper of it.
     pub fn fit<'b, P: LeastSquares>(&self, data: &'b P) -> Fit<'b, P> {
         let fit = Fit::new(data).with_loss(self.loss);
         match &self.priors {
@@ -159,11 +159,11 @@ impl<'a> Case<'a> {
         }
     }
 
-    /// ½Σρ, infinite outside the limits.
+    /// Returns ½Σρ, infinite outside the limits.
     pub fn cost(&self, x: &DVector<f64>) -> f64 {
         let inside = |bounds: &Bounds| {
-            let kept = |j| (bounds.lower()[j]..=bounds.upper()[j]).contains(&x[j]);
-            (0..x.len()).all(kept)
+            let is_within = |j| (bounds.lower()[j]..=bounds.upper()[j]).contains(&x[j]);
+            (0..x.len()).all(is_within)
         };
         if !self.bounds.as_ref().is_none_or(inside)
             || !self.rows.as_ref().is_none_or(|rows| rows.contain(x))
@@ -174,7 +174,7 @@ impl<'a> Case<'a> {
     }
 }
 
-/// NIST StRD of higher difficulty, and Moré–Garbow–Hillstrom.
+/// Returns the NIST problems of higher difficulty and those of Moré, Garbow & Hillstrom.
 pub fn collections() -> Vec<Case<'static>> {
     let mut cases = Vec::new();
     for start in 0..2 {

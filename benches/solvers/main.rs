@@ -1,7 +1,9 @@
-//! Every solver on every class of problem, side by side: which reach the optimum, at what price.
+//! Comparison of all solvers on all classes of problems: which reach the optimum, and at what cost.
 //!
-//!     cargo bench --bench solvers               all of it, written to benches/RESULTS.md and docs/solvers.svg
-//!     cargo bench --bench solvers -- WORD ...   classes and problems whose names hold one of the words; only printed
+//!     cargo bench --bench solvers               all problems; writes benches/RESULTS.md and
+//! docs/solvers.svg
+//!     cargo bench --bench solvers -- WORD ...   prints problems whose class or name contains a
+//! WORD
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
@@ -35,25 +37,25 @@ use row::Row;
 fn main() {
     let words: Vec<String> =
         std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
-    let asked = |class: &str, name: &str| {
+    let is_selected = |class: &str, name: &str| {
         words.is_empty()
             || words
                 .iter()
                 .any(|word| format!("{class}/{name}").to_lowercase().contains(&word.to_lowercase()))
     };
-    // Solvers that fail by a panic are reported in their rows.
+    // Panics of solvers are caught and reported in their rows, so their messages are not printed.
     std::panic::set_hook(Box::new(|_| ()));
     let arms = Arms::new();
     let mut rows: Vec<Row> = Vec::new();
     common::pool(1).install(|| {
         let cases = arms.cases().into_iter().chain(case::collections());
-        for case in cases.filter(|case| asked(case.class.name(), &case.name)) {
-            rows.extend(tell(row::measure(&case)));
+        for case in cases.filter(|case| is_selected(case.class.name(), &case.name)) {
+            rows.extend(report_progress(row::measure(&case)));
         }
         for arm in
-            arms.lunar.iter().filter(|arm| asked(case::Class::Sequential.name(), &arm.name()))
+            arms.lunar.iter().filter(|arm| is_selected(case::Class::Sequential.name(), &arm.name()))
         {
-            rows.extend(tell(row::sequential(arm)));
+            rows.extend(report_progress(row::sequential(arm)));
         }
     });
     rows.sort_by_key(|row| row.class);
@@ -65,8 +67,8 @@ fn main() {
     }
 }
 
-/// Says which problem is done.
-fn tell(rows: Vec<Row>) -> Vec<Row> {
+/// Prints how many solvers solved a problem, as progress, and returns the rows.
+fn report_progress(rows: Vec<Row>) -> Vec<Row> {
     if let Some(row) = rows.first() {
         let reached = rows.iter().filter(|row| row.reached.is_ok()).count();
         eprintln!(

@@ -1,4 +1,4 @@
-//! The solvers, each as it would be called.
+//! The compared solvers, each called through its public interface.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
@@ -17,7 +17,7 @@ use crate::common::minpack::Minpack;
 use crate::smooth::{lbfgs, trust_region};
 use crate::watched::Watched;
 
-/// A solver; names of those that `identify --solver` offers are theirs there.
+/// A solver; those offered by `identify --solver` have their names there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     LevenbergMarquardt,
@@ -30,24 +30,25 @@ pub enum Method {
     MinpackClamped,
 }
 
-struct Silent;
+/// Observer that does nothing.
+struct NoObserver;
 
-impl Observe<State> for Silent {}
+impl Observe<State> for NoObserver {}
 
-/// What a solver left behind.
+/// Result of a run of a solver on a problem.
 pub struct Run {
-    /// ½‖r‖² by the problem itself; infinite outside its limits.
+    /// ½Σρ evaluated by the problem, not by the solver; infinite outside the limits.
     pub cost: f64,
-    /// Steps tried.
+    /// Number of steps tried.
     pub iterations: u64,
     pub residuals: usize,
     pub jacobians: usize,
     pub seconds: f64,
-    /// Why it ended, unless it says that it has converged.
+    /// Reason of termination, unless the solver reports convergence.
     pub complaint: Option<String>,
 }
 
-/// Where a solver ended, by its own word.
+/// Final state as the solver reports it.
 pub struct End {
     pub x: DVector<f64>,
     pub iterations: u64,
@@ -83,10 +84,11 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::LevenbergMarquardt => "levenberg-marquardt",
-            Self::Bounded(within) => {
-                let own =
-                    SolverChoice::EACH.into_iter().find(|solver| solver.within() == Some(within));
-                own.map_or("bounded", SolverChoice::as_str)
+            Self::Bounded(bound_method) => {
+                let choice = SolverChoice::EACH
+                    .into_iter()
+                    .find(|solver| solver.within() == Some(bound_method));
+                choice.map_or("bounded", SolverChoice::as_str)
             }
             Self::GaussNewton => "gauss-newton",
             Self::PseudoInverse => "pseudo-inverse",
@@ -97,9 +99,9 @@ impl Method {
         }
     }
 
-    /// Whether its row tells something of this problem. Without bounds those that keep them all do
-    /// the same: one is enough.
-    pub fn tells(self, case: &Case) -> bool {
+    /// True if the solver takes part in the problem. Without bounds the solvers for bounds are the
+    /// same method, so only one takes part.
+    pub fn takes_part(self, case: &Case) -> bool {
         let (bounded, boxed) = (case.bounds.is_some(), case.rows.is_none());
         match self {
             Self::Bounded(BoundMethod::ActiveSet) => true,
@@ -111,7 +113,7 @@ impl Method {
         }
     }
 
-    /// Solves from the start; a solver that panics gives up where it began.
+    /// Solves the problem from its start; the result of a solver that panics is the start.
     pub fn run(self, case: &Case) -> Run {
         let watched = Watched::new(case.data.as_ref(), case.limit());
         let begin = Instant::now();
@@ -136,22 +138,23 @@ impl Method {
         }
     }
 
+    /// Calls the solver on `data`, the problem of `case` with counted evaluations.
     fn end(self, case: &Case, data: &Watched) -> End {
         let (start, settings) = (case.start.clone(), case.settings());
         let fit = case.fit(data);
         match self {
             Self::LevenbergMarquardt => minimise(fit, start, &settings).into(),
-            Self::Bounded(within) => {
+            Self::Bounded(bound_method) => {
                 let bounds = case.bounds.clone().unwrap_or_else(|| Bounds::none(data.parameters()));
                 let rows =
                     case.rows.clone().unwrap_or_else(|| Inequalities::none(data.parameters()));
                 minimise_constrained_by(
-                    within,
+                    bound_method,
                     fit,
                     start,
                     (&bounds, &rows),
                     &settings,
-                    None::<Silent>,
+                    None::<NoObserver>,
                 )
                 .into()
             }

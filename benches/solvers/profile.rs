@@ -1,7 +1,7 @@
-//! Performance profiles [Dolan & Moré 2002] as a picture.
+//! Performance profiles [Dolan & Moré 2002] as an SVG figure.
 //!
-//! ρ(τ) of a solver is the part of the problems on which it reaches the optimum in at most τ times
-//! the time of the fastest that does.
+//! The profile ρ(τ) of a solver is the fraction of the problems on which it reaches the optimum in
+//! at most τ times the time of the fastest solver that reaches it.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -9,14 +9,16 @@ use std::fmt::Write as _;
 use crate::case::Class;
 use crate::row::Row;
 
-/// Largest τ.
-const MOST: f64 = 100.0;
-/// Width and height of a panel, its left edge, and the distance between panels' upper edges [px].
+/// Largest τ of the figure.
+const LARGEST_RATIO: f64 = 100.0;
+/// Width and height of a panel [px].
 const SIZE: (f64, f64) = (540.0, 240.0);
+/// Left edge of the panels [px].
 const LEFT: f64 = 62.0;
+/// Distance between the upper edges of the panels [px].
 const STEP: f64 = 330.0;
-/// Colours that those tell apart who see some of them alike [Okabe & Ito 2008], and dashes for
-/// those who see none.
+/// Colours and dashes of the lines. The colours are distinguishable with colour blindness [Okabe &
+/// Ito 2008], the dashes without colours.
 const LINES: [(&str, &str); 7] = [
     ("#000000", ""),
     ("#0072b2", "9 4"),
@@ -27,8 +29,8 @@ const LINES: [(&str, &str); 7] = [
     ("#56b4e9", "1 2"),
 ];
 
-/// Solvers of every class, and those that keep bounds.
-const EVERYWHERE: [&str; 7] = [
+/// Solvers that take part in all classes.
+const GENERAL_SOLVERS: [&str; 7] = [
     "bounded",
     "levenberg-marquardt",
     "MINPACK port",
@@ -37,26 +39,29 @@ const EVERYWHERE: [&str; 7] = [
     "gauss-newton",
     "pseudo-inverse",
 ];
-const WITHIN: [&str; 5] =
+/// Solvers for bounds.
+const BOUND_SOLVERS: [&str; 5] =
     ["bounded", "interior-point", "reflective", "clamped", "MINPACK port, clamped"];
 
-/// Over all classes but `sequential`, which is a strategy, and over the bounded one.
+/// Draws the profiles over all classes except `sequential`, which is a strategy, and over the class
+/// `bounded`.
 pub fn picture(rows: &[Row]) -> String {
-    let all: Vec<&Row> = rows.iter().filter(|row| row.class != Class::Sequential).collect();
+    let joint_fits: Vec<&Row> = rows.iter().filter(|row| row.class != Class::Sequential).collect();
     let bounded: Vec<&Row> = rows.iter().filter(|row| row.class == Class::Bounded).collect();
     let mut out = String::from(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 860 680\" font-family=\"sans-serif\" font-size=\"13\" fill=\"#222\">\n\
          <title>Performance profiles of solvers</title>\n<rect width=\"860\" height=\"680\" fill=\"#fff\"/>\n",
     );
-    panel(&mut out, 40.0, "All classes", &all, &EVERYWHERE);
-    panel(&mut out, 40.0 + STEP, "Class “bounded”", &bounded, &WITHIN);
+    panel(&mut out, 40.0, "All classes", &joint_fits, &GENERAL_SOLVERS);
+    panel(&mut out, 40.0 + STEP, "Class “bounded”", &bounded, &BOUND_SOLVERS);
     out + "</svg>\n"
 }
 
+/// Draws one panel of `solvers` at the height `top` [px].
 fn panel(out: &mut String, top: f64, title: &str, rows: &[&Row], solvers: &[&str]) {
     let (width, height) = SIZE;
-    let x = |ratio: f64| LEFT + width * ratio.ln() / MOST.ln();
-    let y = |part: f64| top + height * (1.0 - part);
+    let x = |ratio: f64| LEFT + width * ratio.ln() / LARGEST_RATIO.ln();
+    let y = |fraction: f64| top + height * (1.0 - fraction);
     let problems: BTreeSet<(Class, &str)> =
         rows.iter().map(|row| (row.class, row.problem.as_str())).collect();
     let (right, below, count) = (LEFT + width, top + height, problems.len());
@@ -66,12 +71,12 @@ fn panel(out: &mut String, top: f64, title: &str, rows: &[&Row], solvers: &[&str
         top - 12.0
     )
     .unwrap();
-    for part in [0.0, 0.25, 0.5, 0.75, 1.0] {
-        let y = y(part);
+    for fraction in [0.0, 0.25, 0.5, 0.75, 1.0] {
+        let y = y(fraction);
         writeln!(out, "<path d=\"M{LEFT} {y:.1}H{right}\" stroke=\"#ddd\"/>").unwrap();
         writeln!(
             out,
-            "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{part}</text>",
+            "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{fraction}</text>",
             LEFT - 6.0,
             y + 4.0
         )
@@ -103,7 +108,9 @@ fn panel(out: &mut String, top: f64, title: &str, rows: &[&Row], solvers: &[&str
     for (k, (solver, (colour, dashes))) in solvers.iter().zip(LINES).enumerate() {
         let ratios = ratios(rows, &problems, solvers, solver);
         let mut path = format!("M{LEFT} {:.1}", y(0.0));
-        for (solved, ratio) in ratios.iter().take_while(|ratio| **ratio <= MOST).enumerate() {
+        for (solved, ratio) in
+            ratios.iter().take_while(|ratio| **ratio <= LARGEST_RATIO).enumerate()
+        {
             write!(path, "H{:.1}V{:.1}", x(*ratio), y((solved + 1) as f64 / count as f64)).unwrap();
         }
         let style = format!(
@@ -123,8 +130,8 @@ fn panel(out: &mut String, top: f64, title: &str, rows: &[&Row], solvers: &[&str
     }
 }
 
-/// Times of a solver over those of the fastest of `solvers` that reaches the optimum, sorted, of
-/// the problems on which it does.
+/// Returns the sorted ratios of the time of `solver` to that of the fastest of `solvers` that
+/// reaches the optimum, for the problems on which `solver` reaches it.
 fn ratios(
     rows: &[&Row],
     problems: &BTreeSet<(Class, &str)>,

@@ -1,4 +1,4 @@
-//! What the table says of a solver on a problem.
+//! Rows of the table: each solver on each problem.
 
 use std::time::Instant;
 
@@ -10,46 +10,47 @@ use crate::arms::Lunar;
 use crate::case::{Case, Class};
 use crate::method::{Method, Run};
 
-/// The optimum is reached at no more than this part above the best known ½‖r‖².
+/// The optimum counts as reached if the cost exceeds the lowest known one by at most this fraction.
 const REACHED: f64 = 1e-8;
-/// The same for a strategy that stops when a sweep gains less than 1e-6.
-const SETTLED: f64 = 1e-4;
-/// ½‖r‖² that counts as zero for residuals of order one.
+/// The same tolerance for the strategy `sequential`, which stops when a sweep gains less than 1e-6.
+const REACHED_BY_SWEEPS: f64 = 1e-4;
+/// Largest ½‖r‖² that counts as zero if the optimum is zero, for residuals of order one.
 const ZERO: f64 = 5e-15;
-/// Time for the repetitions of a solver on a problem [s], and how many there may be.
+/// Time for the repetitions of a solver on a problem [s].
 const BUDGET: f64 = 0.3;
+/// Largest number of repetitions.
 const REPETITIONS: usize = 201;
 
-/// A solver on a problem.
+/// Result of a solver on a problem.
 pub struct Row {
     pub class: Class,
     pub problem: String,
     pub solver: &'static str,
-    /// Or why not.
+    /// Whether the optimum is reached; otherwise what is wrong.
     pub reached: Result<(), String>,
-    /// What the solver said of its end, unless that it has converged.
+    /// Reason of termination, unless the solver reports convergence.
     pub complaint: Option<String>,
     pub iterations: u64,
     pub residuals: usize,
-    /// `None` where they are counted with the residuals.
+    /// `None` if they are counted together with the evaluations of residuals.
     pub jacobians: Option<usize>,
-    /// Median [s].
+    /// Median time [s].
     pub seconds: f64,
 }
 
-/// Every solver on `case`, repeated in turn.
+/// Runs the solvers that take part in `case`, with repetitions in turn.
 pub fn measure(case: &Case) -> Vec<Row> {
     let methods: Vec<Method> =
-        Method::EACH.into_iter().filter(|method| method.tells(case)).collect();
+        Method::EACH.into_iter().filter(|method| method.takes_part(case)).collect();
     let (runs, seconds) = repeated(methods.len(), |k| methods[k].run(case), |run| run.seconds);
-    let found = || runs.iter().map(|run| run.cost);
+    let costs = || runs.iter().map(|run| run.cost);
     let best = |listed: f64| {
-        let near = found().filter(|cost| (cost / listed - 1.0).abs() <= case.accuracy);
+        let near = costs().filter(|cost| (cost / listed - 1.0).abs() <= case.accuracy);
         near.reduce(f64::min).unwrap_or(listed)
     };
-    // What is listed to a few digits is made precise by those that come to it.
+    // Listed minima have few digits; the lowest cost near one is more accurate.
     let optima: Vec<f64> = match case.minima[..] {
-        [] => vec![found().fold(f64::INFINITY, f64::min)],
+        [] => vec![costs().fold(f64::INFINITY, f64::min)],
         _ => case
             .minima
             .iter()
@@ -70,6 +71,7 @@ pub fn measure(case: &Case) -> Vec<Row> {
     runs.iter().zip(seconds).zip(methods).map(row).collect()
 }
 
+/// Checks whether a run reached one of `optima`; the error describes where it ended.
 fn reached(run: &Run, optima: &[f64], case: &Case) -> Result<(), String> {
     if optima.iter().any(|&best| run.cost <= best * (1.0 + REACHED) + ZERO * f64::from(best == 0.0))
     {
@@ -90,20 +92,20 @@ fn reached(run: &Run, optima: &[f64], case: &Case) -> Result<(), String> {
     })
 }
 
-/// The strategy `sequential` with every solver that it may use.
+/// Runs the strategy `sequential` with each solver that it supports.
 pub fn sequential(arm: &Lunar) -> Vec<Row> {
-    let whole = arm.case(Class::Sequential, "", DVector::zeros(0), None);
-    let joint = Options::default();
+    let joint = arm.case(Class::Sequential, "", DVector::zeros(0), None);
+    let joint_options = Options::default();
     let cost = |options: &Options| {
         let begin = Instant::now();
-        let found = identify(&arm.problem, &arm.data, options).unwrap();
+        let identification = identify(&arm.problem, &arm.data, options).unwrap();
         let seconds = begin.elapsed().as_secs_f64();
-        (whole.cost(&found.x), found, seconds)
+        (joint.cost(&identification.x), identification, seconds)
     };
-    let (best, ..) = cost(&joint);
-    let tells =
+    let (best, ..) = cost(&joint_options);
+    let is_supported =
         |solver: &SolverChoice| matches!(solver.within(), None | Some(BoundMethod::ActiveSet));
-    let each: Vec<SolverChoice> = SolverChoice::EACH.into_iter().filter(tells).collect();
+    let each: Vec<SolverChoice> = SolverChoice::EACH.into_iter().filter(is_supported).collect();
     let solve = |k: usize| {
         cost(&Options::default().with_strategy(Strategy::Sequential).with_solver(each[k]))
     };
@@ -112,21 +114,21 @@ pub fn sequential(arm: &Lunar) -> Vec<Row> {
         (&(f64, flexcal::fit::Identification, f64), f64),
         SolverChoice,
     )| {
-        let (cost, found, _) = run;
+        let (cost, identification, _) = run;
         let gap = cost / best - 1.0;
         Row {
             class: Class::Sequential,
             problem: arm.name(),
             solver: solver.as_str(),
-            reached: if gap <= SETTLED {
+            reached: if gap <= REACHED_BY_SWEEPS {
                 Ok(())
             } else {
                 Err(format!("cost {gap:.1e} of the optimum above it"))
             },
-            complaint: (!found.termination.converged())
-                .then(|| found.termination.as_str().to_owned()),
-            iterations: found.iterations,
-            residuals: usize::try_from(found.evaluations).unwrap(),
+            complaint: (!identification.termination.converged())
+                .then(|| identification.termination.as_str().to_owned()),
+            iterations: identification.iterations,
+            residuals: usize::try_from(identification.evaluations).unwrap(),
             jacobians: None,
             seconds,
         }
@@ -134,8 +136,8 @@ pub fn sequential(arm: &Lunar) -> Vec<Row> {
     runs.iter().zip(seconds).zip(each).map(row).collect()
 }
 
-/// The first run of each of `count` solvers, and the median time of its repetitions, which are
-/// taken in turn.
+/// Returns the first run of each of `count` solvers and the median time of its repetitions; the
+/// solvers are repeated in turn, so that changes of the machine's speed affect all of them.
 fn repeated<T>(
     count: usize,
     mut run: impl FnMut(usize) -> T,

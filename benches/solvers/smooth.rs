@@ -1,9 +1,9 @@
-//! argmin's solvers of smooth functions on f = ½‖r‖², with the gradient Jᵀr and the Gauss–Newton
-//! Hessian JᵀJ.
+//! argmin's solvers of smooth functions applied to f = ½‖r‖², with the gradient Jᵀr and the
+//! Gauss–Newton Hessian JᵀJ.
 //!
-//! Neither chooses its own scale, so each unknown is measured in the length of its column of J at
-//! the start. argmin's trust region has no test for convergence, its L-BFGS one in absolute units:
-//! the adapter ends both by the tests on gradient and step that the other solvers use.
+//! These solvers do not scale the unknowns, so each is scaled by the norm of its column of J at the
+//! start. argmin's trust region has no convergence test, and its L-BFGS one in absolute units, so
+//! the adapter ends both by the tests of gradient and step of the other solvers.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -21,19 +21,20 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::method::End;
 
-/// Pairs of steps and gradients that L-BFGS remembers.
-const MEMORY: usize = 10;
-/// Iterations allowed to L-BFGS for one of the others.
-const SHORTER: u64 = 10;
-/// Costs asked for without a step, after which a solver is stuck.
-const IDLE: usize = 20;
+/// Number of pairs of steps and gradients that L-BFGS stores.
+const STORED_PAIRS: usize = 10;
+/// Number of iterations allowed to L-BFGS for each one of the other solvers, since its iterations
+/// are cheaper.
+const ITERATIONS_PER_STEP: u64 = 10;
+/// Number of evaluations at the last point after which a solver counts as stuck.
+const STUCK: usize = 20;
 
 type Vector = DVector<f64>;
 type Matrix = DMatrix<f64>;
 type State<G, H> = IterState<Vector, G, (), H, (), f64>;
 
-/// Steihaug's conjugate gradients within a radius; the first is ‖r‖, the length that orthogonal
-/// columns would need.
+/// Trust region with Steihaug's conjugate gradients. The first radius is ‖r‖, the length of the
+/// Gauss–Newton step for orthogonal columns of J.
 pub fn trust_region(objective: impl Objective, start: &Vector, settings: &Settings) -> End {
     let smooth = Smooth::new(objective, start, settings);
     let radius = smooth.residual.max(f64::MIN_POSITIVE);
@@ -46,32 +47,37 @@ pub fn trust_region(objective: impl Objective, start: &Vector, settings: &Settin
 /// Limited-memory BFGS with the line search of Moré and Thuente.
 pub fn lbfgs(objective: impl Objective, start: &Vector, settings: &Settings) -> End {
     let smooth = Smooth::new(objective, start, settings);
-    let solver = LBFGS::new(MoreThuenteLineSearch::new(), MEMORY).with_tolerance_grad(0.0).unwrap();
-    smooth.run(|state: State<Vector, ()>| state, solver, SHORTER * settings.max_iterations)
+    let solver =
+        LBFGS::new(MoreThuenteLineSearch::new(), STORED_PAIRS).with_tolerance_grad(0.0).unwrap();
+    smooth.run(
+        |state: State<Vector, ()>| state,
+        solver,
+        ITERATIONS_PER_STEP * settings.max_iterations,
+    )
 }
 
-/// The objective as argmin sees it, in scaled unknowns q = D x.
+/// The objective as a function of the scaled unknowns q = D x, for argmin.
 struct Smooth<'a, O> {
     objective: O,
     settings: &'a Settings,
     scale: Vector,
     /// ‖r‖ at the start.
     residual: f64,
-    seen: RefCell<Seen>,
+    history: RefCell<History>,
 }
 
-/// What the adapter remembers of a run, since argmin hands nothing back when it fails.
-struct Seen {
-    /// The last point with derivatives [x].
+/// State of a run kept outside argmin, which returns no state if a solver fails.
+struct History {
+    /// Last point x with derivatives.
     last: (Vector, Linearisation),
     best: (Vector, f64),
-    /// How often the cost was asked for where it is known.
+    /// Number of evaluations of the cost at the last point.
     idle: usize,
-    /// Whether the adapter has ended the run.
+    /// Whether and why the adapter ended the run.
     ended: Ended,
 }
 
-/// Why the adapter ends a run.
+/// Reason for which the adapter ends a run.
 #[derive(Clone, Copy)]
 enum Ended {
     Not,
@@ -79,12 +85,12 @@ enum Ended {
     Failed(&'static str),
 }
 
-/// Ends a run.
+/// Error by which the adapter makes argmin end a run.
 #[derive(Debug, thiserror::Error)]
 #[error("ended by the adapter")]
 struct Stop;
 
-/// Counts iterations.
+/// Observer that counts iterations.
 struct Counter(Rc<Cell<u64>>);
 
 impl<I> Observe<I> for Counter {
@@ -104,7 +110,7 @@ impl<'a, O: Objective> Smooth<'a, O> {
                 norms.map(|norm| if norm > 0.0 { norm } else { 1.0 }),
             ),
             residual: (2.0 * linearisation.cost).sqrt(),
-            seen: RefCell::new(Seen {
+            history: RefCell::new(History {
                 best: (start.clone(), linearisation.cost),
                 last: (start.clone(), linearisation),
                 idle: 0,
@@ -115,6 +121,7 @@ impl<'a, O: Objective> Smooth<'a, O> {
         }
     }
 
+    /// Runs `solver` from the start; `typed` fixes the type of argmin's state.
     fn run<G, H, S>(
         &self,
         typed: fn(State<G, H>) -> State<G, H>,
@@ -128,14 +135,14 @@ impl<'a, O: Objective> Smooth<'a, O> {
         H: Clone,
     {
         let iterations = Rc::new(Cell::new(0));
-        let begin = self.seen.borrow().last.0.component_mul(&self.scale);
+        let begin = self.history.borrow().last.0.component_mul(&self.scale);
         let result = Executor::new(self, solver)
             .configure(|state| typed(state).param(begin).max_iters(max_iterations))
             .add_observer(Counter(Rc::clone(&iterations)), ObserverMode::Always)
             .ctrlc(false)
             .timer(false)
             .run();
-        let complaint = match (self.seen.borrow().ended, result) {
+        let complaint = match (self.history.borrow().ended, result) {
             (Ended::Failed(why), _) => Some(why.to_owned()),
             (Ended::Not, Ok(result)) if result.state.get_iter() >= max_iterations => {
                 Some("iteration-limit".to_owned())
@@ -143,26 +150,28 @@ impl<'a, O: Objective> Smooth<'a, O> {
             (Ended::Not, Err(error)) => Some(error.to_string()),
             (Ended::Not | Ended::Converged, _) => None,
         };
-        End { x: self.seen.borrow().best.0.clone(), iterations: iterations.get(), complaint }
+        End { x: self.history.borrow().best.0.clone(), iterations: iterations.get(), complaint }
     }
 
+    /// Records why the run ends and returns the error that ends it.
     fn stop<T>(&self, ended: Ended) -> Result<T, Error> {
-        self.seen.borrow_mut().ended = ended;
+        self.history.borrow_mut().ended = ended;
         Err(Stop.into())
     }
 
-    /// Linearises at q, unless that was the last point, and judges the gradient there.
-    fn at<T>(&self, q: &Vector, use_it: impl Fn(&Linearisation) -> T) -> Result<T, Error> {
+    /// Applies `read` to the linearisation at q, which is computed unless q is the last point; ends
+    /// the run if the gradient is small enough.
+    fn at<T>(&self, q: &Vector, read: impl Fn(&Linearisation) -> T) -> Result<T, Error> {
         let x = q.component_div(&self.scale);
-        if self.seen.borrow().last.0 != x {
+        if self.history.borrow().last.0 != x {
             let linearisation = self.objective.linearise(&x);
-            let mut seen = self.seen.borrow_mut();
-            if linearisation.cost < seen.best.1 {
-                seen.best = (x.clone(), linearisation.cost);
+            let mut history = self.history.borrow_mut();
+            if linearisation.cost < history.best.1 {
+                history.best = (x.clone(), linearisation.cost);
             }
-            seen.last = (x, linearisation);
+            history.last = (x, linearisation);
         }
-        let Linearisation { cost, triangle, projected } = &self.seen.borrow().last.1.clone();
+        let Linearisation { cost, triangle, projected } = &self.history.borrow().last.1.clone();
         if !triangle.iter().chain(projected).all(|value| value.is_finite()) {
             return self.stop(Ended::Failed("derivatives-not-finite"));
         }
@@ -172,7 +181,7 @@ impl<'a, O: Objective> Smooth<'a, O> {
         if *cost == 0.0 || (0..q.len()).all(|j| cosine(j) <= self.settings.gradient_tolerance) {
             return self.stop(Ended::Converged);
         }
-        Ok(use_it(&self.seen.borrow().last.1))
+        Ok(read(&self.history.borrow().last.1))
     }
 }
 
@@ -182,19 +191,19 @@ impl<O: Objective> CostFunction for &Smooth<'_, O> {
 
     fn cost(&self, q: &Vector) -> Result<f64, Error> {
         let x = q.component_div(&self.scale);
-        let moved = (q - self.seen.borrow().last.0.component_mul(&self.scale)).norm();
-        if moved == 0.0 && self.seen.borrow().idle < IDLE {
-            self.seen.borrow_mut().idle += 1;
-            return Ok(self.seen.borrow().last.1.cost);
+        let moved = (q - self.history.borrow().last.0.component_mul(&self.scale)).norm();
+        if moved == 0.0 && self.history.borrow().idle < STUCK {
+            self.history.borrow_mut().idle += 1;
+            return Ok(self.history.borrow().last.1.cost);
         }
         if !moved.is_finite() || moved <= self.settings.step_tolerance * q.norm() {
             let failed = Ended::Failed("steps are not finite");
             return self.stop(if moved.is_finite() { Ended::Converged } else { failed });
         }
         let cost = self.objective.cost(&x);
-        let mut seen = self.seen.borrow_mut();
-        if cost < seen.best.1 {
-            seen.best = (x, cost);
+        let mut history = self.history.borrow_mut();
+        if cost < history.best.1 {
+            history.best = (x, cost);
         }
         Ok(cost)
     }

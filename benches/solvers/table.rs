@@ -1,4 +1,4 @@
-//! The page `benches/RESULTS.md`.
+//! The page `benches/RESULTS.md`, written as Markdown.
 
 use std::fmt::Write as _;
 use std::process::Command;
@@ -24,12 +24,12 @@ Written by `cargo bench --bench solvers`; do not edit. What the table means for 
   Not every solver takes part in every problem: three of those that keep bounds keep no constraints.
 ";
 
-/// Everything.
+/// Returns the whole page.
 pub fn page(rows: &[Row]) -> String {
     format!("{HEAD}\nMeasured on {}.\n\n{}", machine(), tables(rows))
 }
 
-/// A summary, then every class.
+/// Returns the summary and the tables of all classes.
 pub fn tables(rows: &[Row]) -> String {
     let mut out = String::from(
         "## Summary\n\n| class | solver | optimum reached | steps | time [ms] | × fastest |\n|---|---|---|---|---|---|\n",
@@ -37,7 +37,7 @@ pub fn tables(rows: &[Row]) -> String {
     for class in Class::EACH {
         summarise(&mut out, class, rows);
     }
-    price(&mut out, rows);
+    cost_of_limits(&mut out, rows);
     for class in Class::EACH {
         let mut of_class = rows.iter().filter(|row| row.class == class).peekable();
         if of_class.peek().is_none() {
@@ -60,6 +60,7 @@ pub fn tables(rows: &[Row]) -> String {
     out
 }
 
+/// Returns the cell that says whether the optimum is reached.
 fn verdict(row: &Row) -> String {
     let complaint = row.complaint.as_ref().map(|complaint| complaint.replace(['|', '\n'], " "));
     match (&row.reached, complaint) {
@@ -70,8 +71,8 @@ fn verdict(row: &Row) -> String {
     }
 }
 
-/// What limits cost: the solver that keeps them beside the one that does not, which ends outside.
-fn price(out: &mut String, rows: &[Row]) {
+/// Writes the cost of limits: `bounded`, which keeps them, in comparison with the unbounded fit.
+fn cost_of_limits(out: &mut String, rows: &[Row]) {
     let of = |solver: &'static str| {
         rows.iter().filter(move |row| row.class == Class::Bounded && row.solver == solver)
     };
@@ -94,6 +95,7 @@ fn price(out: &mut String, rows: &[Row]) {
     }
 }
 
+/// Writes the rows of a class in the summary.
 fn summarise(out: &mut String, class: Class, rows: &[Row]) {
     let mut solvers: Vec<&str> = Vec::new();
     for row in rows.iter().filter(|row| row.class == class) {
@@ -107,19 +109,25 @@ fn summarise(out: &mut String, class: Class, rows: &[Row]) {
             .collect::<Vec<_>>()
     };
     let total = |rows: &[&Row]| rows.iter().map(|row| row.seconds).sum::<f64>();
-    let all = |rows: &[&Row]| rows.iter().all(|row| row.reached.is_ok());
+    let all_reached = |rows: &[&Row]| rows.iter().all(|row| row.reached.is_ok());
     let most = solvers.iter().map(|solver| of(solver).len()).max().unwrap_or(0);
-    let fastest =
-        solvers.iter().map(|solver| of(solver)).filter(|rows| rows.len() == most && all(rows));
+    let fastest = solvers
+        .iter()
+        .map(|solver| of(solver))
+        .filter(|rows| rows.len() == most && all_reached(rows));
     let fastest = fastest.min_by(|a, b| total(a).total_cmp(&total(b))).unwrap_or_default();
     for solver in solvers {
         let rows = of(solver);
         let reached = rows.iter().filter(|row| row.reached.is_ok()).count();
         let steps: u64 = rows.iter().map(|row| row.iterations).sum();
-        let beside = fastest.iter().filter(|row| rows.iter().any(|own| own.problem == row.problem));
-        let beside: f64 = beside.map(|row| row.seconds).sum();
-        let factor =
-            if all(&rows) { format!("{:.2}", total(&rows) / beside) } else { "–".to_owned() };
+        let fastest_time =
+            fastest.iter().filter(|row| rows.iter().any(|other| other.problem == row.problem));
+        let fastest_time: f64 = fastest_time.map(|row| row.seconds).sum();
+        let factor = if all_reached(&rows) {
+            format!("{:.2}", total(&rows) / fastest_time)
+        } else {
+            "–".to_owned()
+        };
         let (count, time) = (rows.len(), milliseconds(total(&rows)));
         writeln!(
             out,
@@ -130,14 +138,14 @@ fn summarise(out: &mut String, class: Class, rows: &[Row]) {
     }
 }
 
-/// Three digits.
+/// Formats a time in milliseconds with three digits.
 fn milliseconds(seconds: f64) -> String {
     let time = 1e3 * seconds;
     let digits = [100.0, 10.0, 1.0, 0.1].iter().filter(|&&size| time < size).count();
     format!("{time:.digits$}")
 }
 
-/// Processor, cores, compiler.
+/// Describes the machine by processor, cores and compiler.
 fn machine() -> String {
     let cpus = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpus.lines().find_map(|line| line.strip_prefix("model name")?.split(": ").nth(1));

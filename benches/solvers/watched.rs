@@ -1,4 +1,4 @@
-//! A problem that counts how often it is evaluated, and ends when its time is up.
+//! A problem that counts its evaluations and stops a solver at a time limit.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
@@ -7,13 +7,13 @@ use std::time::{Duration, Instant};
 use flexcal::least_squares::{Block, LeastSquares};
 use nalgebra::DVector;
 
-/// The problem itself while there is time; after that no point lies in its domain, which ends any
-/// solver.
+/// Problem with counted evaluations. After the deadline all residuals are NaN, as outside the
+/// domain, which makes any solver stop.
 pub struct Watched<'a> {
     problem: &'a dyn LeastSquares,
     deadline: Instant,
     late: AtomicBool,
-    /// Items whose residuals were evaluated without and with derivatives.
+    /// Number of items evaluated without and with derivatives.
     items: [AtomicUsize; 2],
 }
 
@@ -27,17 +27,18 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// Evaluations of the whole residual alone, and of residual and Jacobian.
+    /// Returns the number of evaluations of the whole residual alone, and of residual and Jacobian.
     pub fn evaluations(&self) -> (usize, usize) {
         let count = |k: usize| self.items[k].load(Relaxed) / self.problem.items();
         (count(0), count(1))
     }
 
-    /// Whether the time was up before the solver came to its end.
+    /// True if the deadline passed before the solver ended.
     pub fn is_late(&self) -> bool {
         self.late.load(Relaxed)
     }
 
+    /// Counts items evaluated without (`k` = 0) or with derivatives; returns true after the deadline.
     fn count(&self, k: usize, items: usize) -> bool {
         self.items[k].fetch_add(items, Relaxed);
         let late = Instant::now() > self.deadline;

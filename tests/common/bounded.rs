@@ -26,7 +26,7 @@ pub struct Bounded {
     placement: Placement,
 }
 
-/// Spacing of the rows with gross errors in [`Bounded::spoilt`], and the error along x [m].
+/// Spacing of the rows with gross errors in [`Bounded::with_gross_errors`], and the error along x [m].
 const SPOILT: (usize, f64) = (7, 5e-3);
 
 impl Bounded {
@@ -54,7 +54,7 @@ impl Bounded {
     }
 
     /// Adds gross errors to the measurements.
-    pub fn spoilt(mut self) -> Self {
+    pub fn with_gross_errors(mut self) -> Self {
         self.data
             .measurements
             .positions

@@ -158,7 +158,7 @@ fn auto_is_best_where_bounds_bind() {
 /// Checks the choice under robust losses, with gross errors in the data.
 #[test]
 fn auto_is_best_under_robust_losses() {
-    let own = Bounded::read("stiffness").spoilt();
+    let own = Bounded::read("stiffness").with_gross_errors();
     let residuals = own.residuals();
     let free = auto(false).0;
     for loss in [
