@@ -1,4 +1,4 @@
-//! `flexcal accept`.
+//! Arguments and work of `flexcal accept`.
 
 use std::error::Error;
 use std::fs;

@@ -1,4 +1,4 @@
-//! `flexcal check`.
+//! Arguments and work of `flexcal check`.
 
 use std::error::Error;
 use std::path::PathBuf;

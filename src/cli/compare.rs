@@ -1,4 +1,4 @@
-//! `flexcal compare`.
+//! Arguments and work of `flexcal compare`.
 
 use std::error::Error;
 
@@ -21,8 +21,8 @@ use super::progress::Line;
 pub struct Arguments {
     #[command(flatten)]
     common: Common,
-    /// Include the procedure of [Chen2021]; it is always included if the problem declares the paper's
-    /// arm
+    /// Include the procedure of [Chen2021]; it is always included if the problem declares the
+    /// paper's arm
     #[arg(long)]
     paper: bool,
 }

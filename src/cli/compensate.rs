@@ -1,4 +1,4 @@
-//! `flexcal compensate`.
+//! Arguments and work of `flexcal compensate`.
 
 use std::error::Error;
 use std::path::PathBuf;

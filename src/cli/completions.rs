@@ -1,4 +1,4 @@
-//! `flexcal completions`.
+//! Arguments and work of `flexcal completions`.
 
 use std::error::Error;
 
@@ -15,7 +15,7 @@ use super::output;
   flexcal completions zsh > ~/.zfunc/_flexcal
   flexcal completions fish > ~/.config/fish/completions/flexcal.fish")]
 pub struct Arguments {
-    /// The shell
+    /// Shell whose script is printed
     #[arg(value_enum)]
     shell: Shell,
 }

@@ -94,8 +94,8 @@ impl Course {
 }
 
 impl Step {
-    /// Updates the state for the next step. The time left covers the steps until gains vanish that fall
-    /// at the rate of the last two.
+    /// Updates the state for the next step. The time left covers the steps until gains vanish that
+    /// fall at the rate of the last two.
     fn next(self, iteration: u64, cost: f64, now: f64) -> Self {
         let gain = self.cost - cost;
         let each = (now - self.begun.1) / (iteration - self.begun.0) as f64;

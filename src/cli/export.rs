@@ -1,4 +1,4 @@
-//! `flexcal export`.
+//! Arguments and work of `flexcal export`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use flexcal::fit::{Placement, SavedEstimate, check_columns};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
 use flexcal::problem::Problem;
-use flexcal::report::{self, ExportErrors, Exported};
+use flexcal::report::{self, ExportErrors, Exported, shell_word};
 use flexcal::results::Document as _;
 use flexcal::urdf::{Chain, Robot, YamlFormat, export, joint_origins, yaml};
 
@@ -52,7 +52,7 @@ pub struct Arguments {
     flags: Flags,
 }
 
-/// Dialect of YAML.
+/// Dialect of the exported YAML.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Format {
     /// The calibration file of a Universal Robots driver
@@ -122,7 +122,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         moved: moved.as_deref(),
         errors,
     };
-    flags.tell(&exported.result().to_json(), || report::export_text(&exported))?;
+    flags.tell(&exported.result().to_json(), || {
+        let [problem, estimate] = [&arguments.problem, &arguments.estimate].map(|path| shell_word(path));
+        format!(
+            "{}\nNext: flexcal predict {problem} --estimate {estimate} --data MEASURED.csv judges new measurements\n",
+            report::export_text(&exported)
+        )
+    })?;
     if !estimates.trusted {
         diagnostic::warn("the estimate is not to be trusted, so this file is not either");
     }

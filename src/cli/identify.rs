@@ -1,4 +1,4 @@
-//! `flexcal identify`.
+//! Arguments and work of `flexcal identify`.
 
 use std::error::Error;
 
@@ -23,10 +23,10 @@ use super::{diagnostic, interrupt, next, output};
 pub struct Arguments {
     #[command(flatten)]
     common: Common,
-    /// Which parameters are fitted together
+    /// Parameters that are fitted together
     #[arg(long, default_value = Strategy::Joint.as_str(), value_parser = words(Strategy::EACH, Strategy::as_str, Strategy::summary))]
     strategy: Strategy,
-    /// By which solver; auto keeps bounds and constraints where there are any
+    /// Solver; auto keeps bounds and constraints if there are any
     #[arg(long, default_value = SolverChoice::Auto.as_str(), value_parser = words(SolverChoice::CHOICES, SolverChoice::as_str, SolverChoice::summary))]
     solver: SolverChoice,
     /// Print every table: parameters, outliers, what the poses can tell

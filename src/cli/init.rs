@@ -1,4 +1,4 @@
-//! `flexcal init`.
+//! Arguments and work of `flexcal init`.
 
 use std::error::Error;
 use std::path::PathBuf;

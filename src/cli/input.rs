@@ -43,8 +43,8 @@ pub struct Input {
     pub results: Results,
 }
 
-/// Separates the problem from the files of `--data`, which takes all words that follow. If no problem
-/// is named, the last word is the problem if it is a folder or a TOML file.
+/// Separates the problem from the files of `--data`, which takes all words that follow. If no
+/// problem is named, the last word is the problem if it is a folder or a TOML file.
 fn split<'a>(named: Option<&'a Path>, data: &'a [PathBuf]) -> (&'a Path, &'a [PathBuf]) {
     let is_problem =
         |path: &Path| path.is_dir() || path.extension().is_some_and(|ending| ending == "toml");
@@ -75,7 +75,8 @@ impl Common {
         split(self.named.as_deref(), &self.data).1
     }
 
-    /// Claims the results called `names` for a `command`, then reads the problem and its measurements.
+    /// Claims the results called `names` for a `command`, then reads the problem and its
+    /// measurements.
     pub fn read(&self, command: &'static str, names: &[&str]) -> Result<Input, Box<dyn Error>> {
         let problem = Problem::read(self.problem())?;
         let results = self.results(command, &problem, &[], names)?;
@@ -139,8 +140,8 @@ impl Common {
         if problem.is_dir() { problem.join("problem.toml") } else { problem.to_owned() }
     }
 
-    /// Returns the name of the results; a `problem.closed.toml` has another one than the problem from
-    /// which it was made.
+    /// Returns the name of the results; a `problem.closed.toml` has another one than the problem
+    /// from which it was made.
     fn results_name(&self, problem: &Problem) -> String {
         let file = self.problem_file();
         let variant = file.file_stem().and_then(|stem| stem.to_str()?.strip_prefix("problem."));

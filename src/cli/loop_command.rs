@@ -1,4 +1,4 @@
-//! `flexcal loop`.
+//! Arguments and work of `flexcal loop`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -90,7 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(if closure.interrupted { Outcome::Interrupted } else { outcome })
 }
 
-/// Data that a closed problem cannot name.
+/// Data file that a closed problem cannot name.
 #[derive(Debug, thiserror::Error)]
 enum NoName {
     #[error("{}: loop names its data in problem.closed.toml, and this is no file that can be read again; save it as one", file.display())]
@@ -99,7 +99,7 @@ enum NoName {
     NotUtf8 { file: PathBuf },
 }
 
-/// Whether a closed problem can name a file: pipes and standard input cannot be read again.
+/// Checks that a closed problem can name a file, which pipes and standard input cannot offer again.
 fn nameable(file: &Path) -> Result<(), NoName> {
     let name = || file.to_owned();
     match file.canonicalize() {
@@ -116,7 +116,7 @@ fn nameable(file: &Path) -> Result<(), NoName> {
     }
 }
 
-/// A file as seen from a folder; absolute where no relative path leads there.
+/// Returns a file as seen from a folder, as an absolute path if no relative one exists.
 fn seen_from(folder: &Path, file: &Path) -> io::Result<PathBuf> {
     let (folder, file) = (folder.canonicalize()?, file.canonicalize()?);
     Ok(pathdiff::diff_paths(&file, folder).unwrap_or(file))

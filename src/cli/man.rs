@@ -1,4 +1,4 @@
-//! `flexcal man`.
+//! Arguments and work of `flexcal man`.
 
 use std::error::Error;
 use std::path::PathBuf;

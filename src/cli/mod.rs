@@ -90,8 +90,8 @@ enum Command {
     Man(man::Arguments),
 }
 
-/// Runs the command line; `arguments` begin with the name of the program. Returns the exit status: 0
-/// done, 1 the fit is not to be trusted, 2 bad input, 130 interrupted with nothing written.
+/// Runs the command line; `arguments` begin with the name of the program. Returns the exit status:
+/// 0 done, 1 the fit is not to be trusted, 2 bad input, 130 interrupted with nothing written.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,

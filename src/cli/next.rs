@@ -10,6 +10,7 @@ use flexcal::select::Verdict;
 
 use super::input::Common;
 use super::output::Results;
+use super::plan;
 
 /// Poses that a plan proposes to tell two effects apart.
 const SEPARATING_POSES: usize = 12;
@@ -65,13 +66,17 @@ pub fn after_loop(
     if !result.trusted {
         return format!("flexcal identify {named} -v, once the input is corrected");
     }
-    let pair = result.effects.iter().find_map(|found| {
-        Some((&found.effect, found.alternatives.first()?)).filter(|_| found.is_doubted())
+    // A plan separates effects within known ranges, unless they depend on time.
+    let doubted = result.effects.iter().filter(|found| found.is_doubted());
+    let mut pairs = doubted.filter_map(|found| {
+        let rival = found.alternatives.first()?;
+        Some([found.effect.declaration.clone(), rival.declaration.clone()])
     });
-    if let (Some((effect, rival)), true) = (pair, PoseRanges::of(problem).is_ok()) {
+    let can_be_planned =
+        |pair: &[String; 2]| PoseRanges::of(problem).is_ok() && plan::pair(pair, problem).is_ok();
+    if let Some([effect, rival]) = pairs.find(can_be_planned) {
         return format!(
-            "flexcal plan {named} --poses {SEPARATING_POSES} --separate '{}' '{}' chooses poses that tell the two apart",
-            effect.declaration, rival.declaration
+            "flexcal plan {named} --poses {SEPARATING_POSES} --separate '{effect}' '{rival}' chooses poses that tell the two apart"
         );
     }
     let closed = shell_word(&results.path("problem.closed.toml"));

@@ -32,8 +32,8 @@ pub enum WriteError {
     Foreign { path: PathBuf },
 }
 
-/// Results of a command. They may replace files that flexcal wrote in their folder, except files that
-/// the command reads.
+/// Results of a command. They may replace files that flexcal wrote in their folder, except files
+/// that the command reads.
 pub struct Results {
     pub folder: PathBuf,
     command: &'static str,
@@ -46,8 +46,8 @@ pub struct Results {
 }
 
 impl Results {
-    /// Claims the results of `command` called `names` in `folder`, if no other file is in their way.
-    /// [`write`](Self::write) may write more files.
+    /// Claims the results of `command` called `names` in `folder`, if no other file is in their
+    /// way. [`write`](Self::write) may write more files.
     pub fn claim(
         command: &'static str,
         folder: PathBuf,
@@ -87,8 +87,8 @@ impl Results {
         self.keep(texts, |_| false)
     }
 
-    /// Writes texts and a report: `report.md`, `report.html` and its figures, which replace those of an
-    /// older page.
+    /// Writes texts and a report: `report.md`, `report.html` and its figures, which replace those
+    /// of an older page.
     pub fn write_report(&self, texts: &[(&str, &str)], report: &Report) -> Result<(), WriteError> {
         let drawn: Vec<(String, &str)> = report
             .figures
@@ -105,9 +105,9 @@ impl Results {
         self.keep(&texts, is_older)
     }
 
-    /// Writes all files or none, as far as file systems allow: obstacles are found before the first file
-    /// takes its place. Removes recorded files that `is_older` selects, and earlier files of the same
-    /// command that it does not write now.
+    /// Writes all files or none, as far as file systems allow: obstacles are found before the first
+    /// file takes its place. Removes recorded files that `is_older` selects, and earlier files of
+    /// the same command that it does not write now.
     fn keep(
         &self,
         texts: &[(&str, &str)],

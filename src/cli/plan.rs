@@ -1,4 +1,4 @@
-//! `flexcal plan`.
+//! Arguments and work of `flexcal plan`.
 
 use std::error::Error;
 use std::path::Path;
@@ -85,7 +85,7 @@ fn workspace(arguments: &Arguments) -> Result<Option<Workspace>, WorkspaceError>
     Ok(said.then_some(Workspace { corners: room, planes }))
 }
 
-/// Invalid workspace.
+/// Workspace arguments that are invalid.
 #[derive(Debug, thiserror::Error)]
 enum WorkspaceError {
     #[error(
@@ -195,7 +195,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
 }
 
 /// Returns the two effects to separate, if they are named.
-fn pair(named: &[String], problem: &Problem) -> Result<Option<EffectPair>, Box<dyn Error>> {
+pub(super) fn pair(
+    named: &[String],
+    problem: &Problem,
+) -> Result<Option<EffectPair>, Box<dyn Error>> {
     let [one, other] = named else { return Ok(None) };
     let read = |text: &String| problem.effect(text, Path::new("--separate"));
     Ok(Some(EffectPair::new(problem, [read(one)?, read(other)?])?))

@@ -17,7 +17,7 @@ pub struct Source {
     /// Tables of poses to take, with the columns of measurements; positions are not needed
     #[arg(long, value_name = "FILE.csv", num_args = 1..)]
     pub candidates: Vec<PathBuf>,
-    /// Where poses may lie: [poses] of this file or of the one in this folder, instead of the
+    /// Ranges of the poses: [poses] of this file or of the one in this folder, instead of the
     /// limits of the joints (min_deg, max_deg)
     #[arg(long, value_name = "TRUTH.toml")]
     pub truth: Option<PathBuf>,
@@ -62,7 +62,8 @@ impl Source {
         Ok(self.all_ranges(problem)?.relevant_to(problem))
     }
 
-    /// Returns the ranges if they are known. A named TRUTH.toml must be valid; limits may be missing.
+    /// Returns the ranges if they are known. A named TRUTH.toml must be valid; limits may be
+    /// missing.
     pub fn known_ranges(&self, problem: &Problem) -> Result<Option<PoseRanges>, DesignError> {
         match self.all_ranges(problem) {
             Err(DesignError::NoRange(_)) => Ok(None),

@@ -1,4 +1,4 @@
-//! `flexcal predict`.
+//! Arguments and work of `flexcal predict`.
 
 use std::error::Error;
 use std::path::PathBuf;

@@ -42,7 +42,8 @@ impl Line {
         })
     }
 
-    /// Runs work that reports to a line of progress if that is `shown`, and clears the line afterwards.
+    /// Runs work that reports to a line of progress if that is `shown`, and clears the line
+    /// afterwards.
     pub fn during<T>(
         shown: bool,
         stop: impl Into<Option<Stop>>,
@@ -81,7 +82,7 @@ impl Line {
         }
     }
 
-    /// Clears the line.
+    /// Removes the line from the terminal.
     pub fn clear(&self) {
         self.bar.finish_and_clear();
     }
@@ -108,7 +109,7 @@ impl FitBar {
         self.0.inc(1);
     }
 
-    /// Clears the bar.
+    /// Removes the bar from the terminal.
     pub fn clear(&self) {
         self.0.finish_and_clear();
     }

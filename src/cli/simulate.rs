@@ -1,4 +1,4 @@
-//! `flexcal simulate`.
+//! Arguments and work of `flexcal simulate`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -24,8 +24,8 @@ pub struct Arguments {
     /// A problem.toml, or the folder that holds one [default: the current folder]
     #[arg(default_value = ".", hide_default_value = true)]
     problem: PathBuf,
-    /// True deviations of the arm from the problem, and ranges of the poses; or the folder that holds
-    /// the file
+    /// True deviations of the arm from the problem, and ranges of the poses; or the folder that
+    /// holds the file
     #[arg(long, value_name = "TRUTH.toml")]
     truth: PathBuf,
     /// Number of poses, drawn in the ranges of [poses]

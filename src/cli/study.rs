@@ -1,4 +1,4 @@
-//! `flexcal study`.
+//! Arguments and work of `flexcal study`.
 
 use std::error::Error;
 use std::fs;
@@ -41,8 +41,8 @@ pub struct Arguments {
     /// Make only the i-th of n shares, without results, which `study merge` writes
     #[arg(long, value_name = "i/n", conflicts_with = "json")]
     shard: Option<Shard>,
-    /// Write FILE once all is done, with exit status 0, for workflows that wait for it; an older FILE
-    /// is removed first
+    /// Write FILE once all is done, with exit status 0, for workflows that wait for it; an older
+    /// FILE is removed first
     #[arg(long, value_name = "FILE")]
     done: Option<PathBuf>,
 }
@@ -68,7 +68,7 @@ struct Common {
     flags: Flags,
 }
 
-/// File of `--done`.
+/// File that `--done` names.
 struct Sentinel<'a>(&'a Path);
 
 impl<'a> Sentinel<'a> {

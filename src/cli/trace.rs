@@ -1,4 +1,4 @@
-//! `flexcal trace`.
+//! Arguments and work of `flexcal trace`.
 
 use std::error::Error;
 

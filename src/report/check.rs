@@ -1,4 +1,4 @@
-//! Text of `check`.
+//! Text of `check`: what measurements at some poses will tell.
 
 use super::detection;
 use super::document::{Block, Table};

@@ -19,11 +19,12 @@ use crate::quantity::Unit;
 pub enum Column {
     /// Words, empty for rows without one.
     Words(Labels),
-    /// Non-negative integers.
+    /// Non-negative integers of the rows.
     Counts(Vec<usize>),
-    /// Numbers, NaN for rows without one, and their decimals in texts; `None` for as many as needed.
+    /// Numbers, NaN for rows without one, and their decimals in texts; `None` for as many as
+    /// needed.
     Numbers(Vec<f64>, Option<usize>),
-    /// Truth values.
+    /// Truth values of the rows.
     Flags(Vec<bool>),
 }
 

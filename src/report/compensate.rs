@@ -51,7 +51,8 @@ pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Comm
 /// Decimals of commands, to a nanometre or a nanoradian.
 const DECIMALS: usize = 9;
 
-/// Returns index, column name and factor from SI of each commanded joint, as in the table of targets.
+/// Returns index, column name and factor from SI of each commanded joint, as in the table of
+/// targets.
 fn columns(problem: &Problem, targets: &Measurements) -> Vec<(usize, String, f64)> {
     if targets.command_columns.is_empty() {
         let columns = table::commands(problem).into_iter();

@@ -13,9 +13,9 @@ pub(super) const CODE: (char, char) = ('\u{2}', '\u{3}');
 pub(super) enum Block<'a> {
     /// Title of the blocks that follow.
     Heading(String),
-    /// Paragraph of text.
+    /// Paragraph of running text.
     Text(String),
-    /// Paragraph that warns.
+    /// Paragraph with a warning.
     Note(String),
     /// Lines with fixed line breaks, and points below them.
     Lines(String, Vec<String>),

@@ -57,7 +57,7 @@ impl ExportErrors {
 /// Exported file, with what is reported about it.
 #[derive(Debug, Clone, Copy)]
 pub struct Exported<'a> {
-    /// Declared problem.
+    /// Problem as declared.
     pub problem: &'a Problem,
     /// Model of the problem.
     pub model: &'a Model,

@@ -34,8 +34,8 @@ fn point(check: &ResidualTest) -> Point {
     Point { text: check.to_string(), mark: Some(mark), ..Point::default() }
 }
 
-/// Lists the tests: failed, passed, then those that could not be made. Quantities without dependence
-/// share one line.
+/// Lists the tests: failed, passed, then those that could not be made. Quantities without
+/// dependence share one line.
 pub(super) fn all(findings: &Findings) -> Vec<Point> {
     let of = |mark: Mark| {
         findings

@@ -9,8 +9,8 @@ use crate::quantity::Display;
 /// Most decimals of a value.
 const MAX_DECIMALS: usize = 6;
 
-/// Formats nominal value and some errors \[SI\] of a parameter in a readable unit; returns cells and
-/// unit.
+/// Formats nominal value and some errors \[SI\] of a parameter in a readable unit; returns cells
+/// and unit.
 pub(super) fn cells(expected: &ExpectedParameter, errors: &[Option<f64>]) -> (Vec<String>, String) {
     let unit = expected.unit.display(expected.nominal);
     let digits = errors

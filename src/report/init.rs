@@ -1,4 +1,4 @@
-//! Text of `init`.
+//! Text of `init`: the problem that was made, and the next steps.
 
 use std::fmt::Write as _;
 use std::path::Path;

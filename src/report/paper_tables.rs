@@ -12,7 +12,7 @@ const MARKED_BELOW: f64 = 0.9;
 /// Header of the parameters of a joint in table 2.
 const FIELDS: [&str; 5] = ["α °", "a mm", "θ °", "d mm", "β °"];
 
-/// Describes a procedure.
+/// Describes a procedure in words.
 pub(super) fn title(procedure: &Procedure) -> String {
     let Some((form, stage)) = procedure.paper else {
         return "Everything fitted at once (joint)".to_owned();

@@ -1,4 +1,4 @@
-//! Text of `plan`.
+//! Text of `plan`: the poses to measure and what they promise.
 
 use super::document::{Block, Table};
 use super::forecast::{assumptions, cells};

@@ -1,4 +1,4 @@
-//! How well a plan separates two effects, in words.
+//! Separation of two effects by planned poses, in words.
 
 use super::document::{Block, Table};
 use super::forecast::size as shown;

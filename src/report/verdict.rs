@@ -128,7 +128,8 @@ fn found(result: &LoopResult) -> String {
     }
 }
 
-/// States that nothing was found although the residual is smaller than the declared σ by this ratio.
+/// States that nothing was found although the residual is smaller than the declared σ by this
+/// ratio.
 fn nothing_below(ratio: f64, takes_less: bool) -> String {
     let consequence = if takes_less {
         ", which is too large; causes are judged by the scatter of the residual instead"

@@ -19,7 +19,7 @@ pub struct AcceptanceResult {
     pub inputs: Vec<Input>,
     pub instrument: Option<String>,
     pub position_sigma_mm: Option<f64>,
-    /// How the held-out poses were chosen.
+    /// Description of the choice of the held-out poses.
     pub protocol: String,
     pub strategy: &'static str,
     pub solver: &'static str,
@@ -43,7 +43,7 @@ impl Document for AcceptanceResult {
     const FORMAT: &'static str = "flexcal-acceptance";
 }
 
-/// Input file.
+/// Input file with its digest.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Input {
     pub file: String,
@@ -59,7 +59,7 @@ pub struct Condition {
     pub range: (f64, f64),
 }
 
-/// Pose accuracy AP.
+/// Pose accuracy AP over the held-out poses.
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct PoseAccuracy {
     pub mean_mm: f64,

@@ -44,11 +44,12 @@ pub struct Claim<T> {
 /// Claims about a cause, from the weakest to the strongest.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Claims {
-    /// That something acts at this place.
+    /// Claim that something acts at this place.
     pub place: Claim<String>,
-    /// That something acts there that depends on these quantities and no others.
+    /// Claim that it depends on these quantities and no others.
     pub depends_on: Claim<Vec<String>>,
-    /// That this is the law, and no function of unknown law acts there; null if no law is known.
+    /// Claim that this is its law, and no function of unknown law acts there; null if none is
+    /// known.
     pub law: Claim<Option<String>>,
     pub description: String,
 }

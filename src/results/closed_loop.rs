@@ -109,7 +109,7 @@ pub struct FoundEffect {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Witness {
     pub data: String,
-    /// `corroborated` or `contradicted`.
+    /// Verdict, `corroborated` or `contradicted`.
     pub says: &'static str,
 }
 
@@ -307,7 +307,7 @@ impl FoundEffect {
 }
 
 impl ParameterValue {
-    /// Converts an estimate.
+    /// Converts the estimate of a parameter.
     pub(crate) fn new(estimate: &Estimate) -> Self {
         Self {
             name: estimate.name.clone(),

@@ -30,7 +30,7 @@ impl Document for ComparisonResult {
     const FORMAT: &'static str = "flexcal-compare";
 }
 
-/// Fit among others.
+/// One of the compared fits.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ComparedFit {
     pub strategy: String,

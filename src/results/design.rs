@@ -11,7 +11,7 @@ use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
 use crate::select::{self, Separation, Side};
 
-/// What measurements at some poses will tell.
+/// Forecast of what measurements at some poses will tell.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct CheckResult {
     pub problem: String,
@@ -27,7 +27,7 @@ pub struct CheckResult {
     /// Rms length of the error of one measured position; null if no length is measured.
     pub noise_mm: Option<f64>,
     pub prediction: JudgedPrediction,
-    /// The same with fewer and with more such poses.
+    /// Forecast for fewer and for more such poses.
     pub growth: Vec<GrowthStep>,
     /// Least number of poses that identify all and predict as accurately as one measurement.
     pub enough: Option<usize>,
@@ -67,7 +67,7 @@ pub struct PlanResult {
     pub conditioning: Conditioning,
     pub parameters: Vec<PlannedParameter>,
     pub unidentified: Vec<Combination>,
-    /// How well the plan separates two effects.
+    /// Separation of two effects by the plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separation: Option<SeparationResult>,
 }
@@ -163,7 +163,7 @@ pub struct DetectableSize {
     pub found_from_at_best: Option<f64>,
 }
 
-/// How well poses separate two effects.
+/// Separation of two effects by poses.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct SeparationResult {
     /// Largest principal angle between the two.

@@ -21,7 +21,7 @@ pub struct NamedEffect {
     #[serde(flatten)]
     #[schemars(with = "EffectKeys")]
     pub effect: Effect,
-    /// What the effect is, in words.
+    /// Description of the effect in words.
     pub description: String,
     /// Line that declares it in an `[[effect]]` of problem.toml.
     pub declaration: String,

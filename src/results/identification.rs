@@ -120,7 +120,7 @@ impl Conditioning {
     }
 }
 
-/// Estimated parameter.
+/// Free parameter with its estimate.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Parameter {
     pub name: String,
@@ -139,7 +139,7 @@ pub struct Parameter {
 /// Cost of an active limit.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Price {
-    /// Lagrange multiplier.
+    /// Lagrange multiplier of the limit.
     pub multiplier: f64,
     /// Decrease of the rms residual if the limit moved out by one `per`.
     pub rms_mm: f64,
@@ -179,7 +179,7 @@ pub struct Correlation {
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Constraint {
     pub constraint: String,
-    /// `at_least` or `at_most`.
+    /// Active side, `at_least` or `at_most`.
     pub side: &'static str,
     pub line: Option<usize>,
     pub shadow_price: Price,
@@ -355,7 +355,7 @@ impl OutlierRow {
 }
 
 impl InfluentialRowSet {
-    /// Converts the rows.
+    /// Converts influential rows to a result.
     pub(super) fn new(influential: &InfluentialRows) -> Self {
         Self {
             rows: influential.rows.iter().map(OutlierRow::new).collect(),

@@ -20,7 +20,7 @@ pub struct Summary {
     /// Kind of the rows; absent for measured positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<&'static str>,
-    /// Number of rows.
+    /// Number of rows summarised.
     pub n: usize,
     #[serde(flatten)]
     pub sizes: Sizes,
@@ -77,7 +77,7 @@ pub struct Errors {
 }
 
 impl Errors {
-    /// Creates both summaries.
+    /// Creates the summaries of both parts.
     pub fn of(errors: &fit::Errors) -> Self {
         Self {
             identification: Summary::of(&errors.identification),

@@ -31,7 +31,7 @@ pub struct TraceResult {
     pub tried: usize,
     /// Corrected p-value below which a candidate is significant.
     pub level: f64,
-    /// Candidates, best first.
+    /// Candidate effects, best first.
     pub ranking: Vec<Candidate>,
     /// Hypothesis sets, most probable first; the empty set is noise alone.
     pub explanations: Vec<HypothesisSet>,
@@ -50,7 +50,7 @@ impl Document for TraceResult {
     const FORMAT: &'static str = "flexcal-trace";
 }
 
-/// Candidate effect.
+/// Candidate effect of the ranking.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Candidate {
     #[serde(flatten)]
@@ -69,7 +69,7 @@ pub struct Candidate {
     pub cross_validated_gain_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_validated_gain_deg: Option<f64>,
-    /// Confounded effects.
+    /// Effects confounded with it.
     pub alike: Vec<Confounded>,
     /// Pose that would tell the effect from the first confounded one.
     pub told_apart: Option<ToldApart>,
