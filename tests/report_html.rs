@@ -92,7 +92,7 @@ fn check(page: &Report) {
             - figure.matches("[fill=").count()
             - figure.matches("[stroke=").count();
         let units = ["correlations", "misprints", "ranking", "residual-joints", "singular-values"];
-        let without = units.iter().any(|own| name.starts_with(own));
+        let without = units.iter().any(|unit| name.starts_with(unit));
         assert!((labelled >= 1) != without, "{name} has no axis with a unit");
         assert!(!figure.contains("[1]") && !figure.contains("−0 "), "{name}");
     }
@@ -151,8 +151,11 @@ fn a_closed_loop_shows_what_it_found() {
     let states = ["nominal arm", "as declared, fitted", "with what was found"];
     assert!(states.iter().all(|state| page.html.contains(&format!("class=\"label\">{state}<"))));
     // Each effect contributes millimetres over the workspace.
-    let drift =
-        shown.contributions.iter().find(|own| own.name.starts_with("tracker-drift")).unwrap();
+    let drift = shown
+        .contributions
+        .iter()
+        .find(|contribution| contribution.name.starts_with("tracker-drift"))
+        .unwrap();
     assert!(drift.is_effect && (0.2e-3..3e-3).contains(&drift.moved), "{drift:?}");
     let again = report::loop_report(&problem, &closure, &shown);
     assert_eq!(page, again);
@@ -175,7 +178,8 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
         shown.residuals.iter().filter(|r| !r.held_out).map(|r| r.error).collect();
     close(&fitted, &found.fitted.identification);
     // Strong correlations are those of the estimate.
-    let name = |name: &String| shown.correlations.names.iter().position(|own| own == name).unwrap();
+    let name =
+        |name: &String| shown.correlations.names.iter().position(|other| other == name).unwrap();
     for (a, b, rho) in found.strong_correlations() {
         let shown = shown.correlations.matrix[(name(&a), name(&b))];
         assert_eq!(shown.to_bits(), rho.to_bits(), "{a} {b}: {shown} {rho}");
@@ -283,9 +287,9 @@ fn the_pose_behind_the_largest_residual_is_named_and_flattens_nothing() {
         "{}",
         &first[..80]
     );
-    let own = poses(&page).into_iter().find(|pose| pose["row"] == row).unwrap();
-    assert!((own["after"][0].as_f64().unwrap() - shown.residuals[row].error.x * 1e3).abs() < 1e-3);
-    assert_eq!(own["q"].as_array().unwrap().len(), 4);
+    let pose = poses(&page).into_iter().find(|pose| pose["row"] == row).unwrap();
+    assert!((pose["after"][0].as_f64().unwrap() - shown.residuals[row].error.x * 1e3).abs() < 1e-3);
+    assert_eq!(pose["q"].as_array().unwrap().len(), 4);
     // It is at the edge with a note, and the other residuals keep their space: their mean length
     // exceeds a tenth of the panel.
     let order = &page.figures.iter().find(|(name, _)| name == "residual-order.svg").unwrap().1;

@@ -87,6 +87,6 @@ fn violations_are_found() {
     let schema: Value = serde_json::from_str(&schema).unwrap();
     let found = violations(&schema, &serde_json::json!({ "verdict": "perhaps", "effects": [{}] }));
     for place in [": required", "/verdict: ", "/effects/0: required"] {
-        assert!(found.iter().any(|own| own.contains(place)), "{place} not in {found:?}");
+        assert!(found.iter().any(|message| message.contains(place)), "{place} not in {found:?}");
     }
 }

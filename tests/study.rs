@@ -162,7 +162,7 @@ fn declared_effects_are_drawn_and_found_again() {
         bench.edit("STUDY.toml", &format!("\ndata = '{source}'"), "");
         let mut table = csv::Reader::from_path(bench.path(source).join("parameters.csv")).unwrap();
         let header = table.headers().unwrap().clone();
-        let place = |name: &str| header.iter().position(|own| own == name).unwrap();
+        let place = |name: &str| header.iter().position(|column| column == name).unwrap();
         let mut seen = 0;
         for row in table.records().map(Result::unwrap) {
             let name = &row[place("parameter")];
@@ -355,11 +355,11 @@ fn shares_of_the_command_line_merge_to_the_same_bytes() {
             .flexcal(&["study", "STUDY.toml", "--out", "shared", "--shard", share, "--done", &done])
             .success();
         assert_eq!(fs::read_to_string(bench.path(&done)).unwrap(), "flexcal study: done\n");
-        let own = format!("own-{}", &share[..1]);
+        let folder = format!("own-{}", &share[..1]);
         bench
-            .flexcal(&["study", "STUDY.toml", "--out", &own, "--shard", share, "--quiet"])
+            .flexcal(&["study", "STUDY.toml", "--out", &folder, "--shard", share, "--quiet"])
             .success();
-        assert!(!bench.path("shared/study.csv").exists() && bench.parts(&own) == PARTS / 3);
+        assert!(!bench.path("shared/study.csv").exists() && bench.parts(&folder) == PARTS / 3);
     }
     // Outdated results are removed until they are complete again; other files stay.
     bench.flexcal(&["study", "no-such.toml", "--done", "done/1"]).code(2);

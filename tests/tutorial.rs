@@ -50,7 +50,7 @@ fn words(command: &str) -> Vec<String> {
     let (mut words, mut quote): (Vec<Option<String>>, Option<char>) = (vec![None], None);
     for letter in command.chars() {
         match (quote, letter) {
-            (Some(own), _) if own == letter => quote = None,
+            (Some(mark), _) if mark == letter => quote = None,
             (None, '"' | '\'') => quote = Some(letter),
             (None, ' ') => words.push(None),
             _ => words.last_mut().unwrap().get_or_insert_default().push(letter),
@@ -243,8 +243,8 @@ fn panda_urdf() -> String {
 fn an_own_arm_goes_the_way_of_the_readme_to_its_end() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let readme = fs::read_to_string(root.join("README.md")).unwrap();
-    let (_, own) = readme.split_once("## Your own arm").unwrap();
-    let commands = commands(own.split("\n## ").next().unwrap());
+    let (_, section) = readme.split_once("## Your own arm").unwrap();
+    let commands = commands(section.split("\n## ").next().unwrap());
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("panda.urdf"), panda_urdf()).unwrap();
     let mut said = Vec::new();
@@ -312,11 +312,11 @@ fn commands_of_the_documentation_are_understood() {
     assert!(understood > 20, "{understood}");
     // The quick commands of the command list run successfully.
     let list = fs::read_to_string(root.join("docs/commands.md")).unwrap();
-    let own = |command: &String| {
+    let is_quick = |command: &String| {
         command.contains("lunar-sampler")
             && !["study", "plan"].contains(&words(command)[1].as_str())
     };
-    let quick: Vec<String> = commands(&list).into_iter().filter(own).collect();
+    let quick: Vec<String> = commands(&list).into_iter().filter(is_quick).collect();
     assert!(quick.len() >= 8, "{quick:?}");
     for command in quick.iter().filter(|_| cfg!(unix)) {
         let (status, said) = run(command, folder.path());

@@ -83,9 +83,9 @@ fn changed(from: &str, to: &str) -> String {
 fn the_digest_is_of_what_predictions_depend_on() {
     let digest =
         |from, to| Problem::parse(&changed(from, to), Path::new("problem.toml")).unwrap().digest();
-    let own = digest("", "");
+    let unchanged = digest("", "");
     // The digest does not depend on the machine.
-    assert_eq!(own, "843194ed2f0f49648c76b13cbc088316658d12dbee573d3f7cbb8807d2c1078b");
+    assert_eq!(unchanged, "843194ed2f0f49648c76b13cbc088316658d12dbee573d3f7cbb8807d2c1078b");
     for (from, to) in [
         ("name = \"elbow\"", "name = \"knee\"\nmax_deg = 300"),
         ("a_m = 1.95", "a_mm = 1950"),
@@ -94,10 +94,10 @@ fn the_digest_is_of_what_predictions_depend_on() {
         ("reference_temperature_C = 20.0", "reference_temperature_C = 25.0"),
         ("a-none.csv", "other.csv"),
     ] {
-        assert_eq!(digest(from, to), own, "{to}");
+        assert_eq!(digest(from, to), unchanged, "{to}");
     }
     let drift = "[[effect]]\njoint-thermal-drift = { joint = 2 }\n[parameters]";
-    let mut seen = vec![own];
+    let mut seen = vec![unchanged];
     for (from, to) in [
         ("a_m = 1.95", "a_m = 1.950001"),
         ("stiffness_N_m_per_rad = 5.2e4", ""),

@@ -91,7 +91,7 @@ fn copies_are_named_whatever_their_number_and_time_and_repeats_are_not() {
         let change = |(name, cell): (&String, &str)| {
             changes
                 .iter()
-                .find(|(own, _)| own == name)
+                .find(|(other, _)| other == name)
                 .map_or(cell.to_owned(), |(_, other)| (*other).to_owned())
         };
         names.iter().zip(row.split(',')).map(change).collect::<Vec<_>>().join(",")

@@ -118,9 +118,9 @@ fn what_is_printed_fits_on_a_screen_unless_more_is_asked_for() {
                 "{command} {data}:\n{brief}"
             );
             // The next command may be longer because of its paths.
-            let own = brief.lines().filter(|line| !line.starts_with("Next: "));
+            let lines = brief.lines().filter(|line| !line.starts_with("Next: "));
             assert!(
-                own.map(|line| line.chars().count()).all(|width| width <= 110),
+                lines.map(|line| line.chars().count()).all(|width| width <= 110),
                 "{command} {data}:\n{brief}"
             );
             for words in ["held out", "Written to out: ", "\nNext: flexcal "] {

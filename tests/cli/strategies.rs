@@ -116,7 +116,7 @@ fn procedures(comparison: &Value) -> Vec<&str> {
         .as_array()
         .unwrap()
         .iter()
-        .map(|own| own["procedure"].as_str().unwrap())
+        .map(|row| row["procedure"].as_str().unwrap())
         .collect()
 }
 
@@ -139,8 +139,9 @@ fn compare_has_the_papers_tables_from_each_procedure_of_its_arm() {
         rows.contains(&"paper-rigid") && rows.contains(&"rigid") && rows.contains(&"geometry-only"),
         "{rows:?}"
     );
-    for own in compared["procedures"].as_array().unwrap() {
-        let (table_2, table_3, figure) = (&own["table_2"], &own["table_3"], &own["figure_13"]);
+    for procedure in compared["procedures"].as_array().unwrap() {
+        let (table_2, table_3, figure) =
+            (&procedure["table_2"], &procedure["table_3"], &procedure["figure_13"]);
         assert_eq!(
             (table_2.as_array().unwrap().len(), &table_3["before_registered"]),
             (4, &false.into())
@@ -148,7 +149,7 @@ fn compare_has_the_papers_tables_from_each_procedure_of_its_arm() {
         let (beta, theta) = (&table_2[0]["beta_deg"], &table_2[1]["theta_deg"]);
         assert!(
             beta["seen"].as_f64().unwrap() < 0.6 && theta["seen"].as_f64().unwrap() < 0.6,
-            "{own}"
+            "{procedure}"
         );
         for (key, kind) in [
             ("before", "before_mm"),
@@ -166,7 +167,7 @@ fn compare_has_the_papers_tables_from_each_procedure_of_its_arm() {
                 "{key}"
             );
         }
-        let name = own["procedure"].as_str().unwrap();
+        let name = procedure["procedure"].as_str().unwrap();
         let figure = if name == "joint" { String::new() } else { format!("-{name}") };
         assert!(bench.path(&format!("out/figures/held-out-errors{figure}.svg")).exists(), "{name}");
     }
@@ -203,10 +204,10 @@ fn compare_on_an_arm_of_ones_own_leaves_the_paper_out_unless_asked() {
             "made",
         ],
     );
-    let own = json(&bench, &["compare", ".", "--out", "out"]);
-    assert_eq!(procedures(&own), ["joint"]);
+    let compared = json(&bench, &["compare", ".", "--out", "out"]);
+    assert_eq!(procedures(&compared), ["joint"]);
     assert!(
-        own["rows"].as_array().unwrap().iter().all(|row| row["strategy"] != "rigid"),
+        compared["rows"].as_array().unwrap().iter().all(|row| row["strategy"] != "rigid"),
         "nothing to ignore"
     );
     let page = fs::read_to_string(bench.path("out/report.md")).unwrap();
@@ -237,7 +238,7 @@ fn compare_on_an_arm_of_ones_own_leaves_the_paper_out_unless_asked() {
     );
     let held = json(&bench, &["compare", ".", "--out", "out"]);
     let joints = held["procedures"][0]["table_2"].as_array().unwrap();
-    assert_eq!(joints.iter().map(|own| own["joint"].as_u64().unwrap()).collect::<Vec<_>>(), [1, 2]);
+    assert_eq!(joints.iter().map(|row| row["joint"].as_u64().unwrap()).collect::<Vec<_>>(), [1, 2]);
     let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
     let traced = flexcal
         .current_dir(bench.folder.path())
@@ -255,7 +256,7 @@ fn compare_on_an_arm_of_ones_own_leaves_the_paper_out_unless_asked() {
 fn an_arm_identified_as_rigid_is_used_as_rigid() {
     let bench = Bench::new();
     let found = json(&bench, &["identify", ".", "--strategy", "rigid", "--out", "out"]);
-    let named = |own: &Value| own["name"].as_str().unwrap().to_owned();
+    let named = |row: &Value| row["name"].as_str().unwrap().to_owned();
     let names: Vec<String> = found["parameters"].as_array().unwrap().iter().map(named).collect();
     assert!(
         names.iter().all(|name| !name.ends_with("stiffness") && !name.ends_with("EI")),

@@ -41,7 +41,8 @@ impl Bounded {
         let (n, m) = (model.parameters.len(), model.constraints.len());
         let limit =
             |of: fn(&Parameter) -> f64| DVector::from_iterator(n, model.parameters.iter().map(of));
-        let bounds = Bounds::new(limit(|own| own.lower), limit(|own| own.upper)).unwrap();
+        let bounds =
+            Bounds::new(limit(|limits| limits.lower), limit(|limits| limits.upper)).unwrap();
         let mut matrix = DMatrix::zeros(m, n);
         for (i, constraint) in model.constraints.iter().enumerate() {
             constraint.terms.iter().for_each(|&(k, coefficient)| matrix[(i, k)] = coefficient);
@@ -49,7 +50,12 @@ impl Bounded {
         let side = |of: fn(&LinearConstraint) -> f64| {
             DVector::from_iterator(m, model.constraints.iter().map(of))
         };
-        let rows = Inequalities::new(matrix, side(|own| own.lower), side(|own| own.upper)).unwrap();
+        let rows = Inequalities::new(
+            matrix,
+            side(|constraint| constraint.lower),
+            side(|constraint| constraint.upper),
+        )
+        .unwrap();
         Self { problem, data, model, bounds, rows, placement }
     }
 
@@ -81,7 +87,8 @@ impl Bounded {
     }
 
     pub fn priors(&self) -> LinearRows {
-        let weights = self.model.parameters.iter().map(|own| own.sigma.map_or(0.0, f64::recip));
+        let weights =
+            self.model.parameters.iter().map(|parameter| parameter.sigma.map_or(0.0, f64::recip));
         let matrix =
             DMatrix::from_diagonal(&DVector::from_iterator(self.model.parameters.len(), weights));
         LinearRows { matrix, constant: self.nominal() }

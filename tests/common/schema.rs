@@ -27,13 +27,13 @@ fn validate(root: &Value, schema: &Value, value: &Value, at: &str, found: &mut V
                 true
             }
             "type" => match rule {
-                Value::Array(types) => types.iter().any(|own| is_of(value, own)),
-                own => is_of(value, own),
+                Value::Array(types) => types.iter().any(|name| is_of(value, name)),
+                name => is_of(value, name),
             },
             "const" => value == rule,
             "enum" => rule.as_array().unwrap().contains(value),
             "anyOf" => rule.as_array().unwrap().iter().any(holds),
-            "oneOf" => rule.as_array().unwrap().iter().filter(|own| holds(own)).count() == 1,
+            "oneOf" => rule.as_array().unwrap().iter().filter(|option| holds(option)).count() == 1,
             "allOf" => rule.as_array().unwrap().iter().all(holds),
             "required" => rule
                 .as_array()
@@ -59,7 +59,7 @@ fn validate(root: &Value, schema: &Value, value: &Value, at: &str, found: &mut V
             }
             "items" => {
                 let first =
-                    keywords.get("prefixItems").map_or(0, |own| own.as_array().unwrap().len());
+                    keywords.get("prefixItems").map_or(0, |items| items.as_array().unwrap().len());
                 for (k, value) in value.as_array().into_iter().flatten().enumerate().skip(first) {
                     validate(root, rule, value, &format!("{at}/{k}"), found);
                 }
@@ -74,8 +74,8 @@ fn validate(root: &Value, schema: &Value, value: &Value, at: &str, found: &mut V
             }
             "minimum" => value.as_f64().is_none_or(|number| number >= rule.as_f64().unwrap()),
             "maximum" => value.as_f64().is_none_or(|number| number <= rule.as_f64().unwrap()),
-            "minItems" => value.as_array().is_none_or(|own| own.len() >= length(rule)),
-            "maxItems" => value.as_array().is_none_or(|own| own.len() <= length(rule)),
+            "minItems" => value.as_array().is_none_or(|items| items.len() >= length(rule)),
+            "maxItems" => value.as_array().is_none_or(|items| items.len() <= length(rule)),
             other => {
                 assert!(ANNOTATIONS.contains(&other), "unknown keyword {other}");
                 true

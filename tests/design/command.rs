@@ -159,7 +159,7 @@ fn a_check_names_what_would_be_found() {
     );
     let effects = detectable["effects"].as_array().unwrap();
     let gear =
-        effects.iter().find(|own| own["effect"] == "gear-ratio" && own["joint"] == 2).unwrap();
+        effects.iter().find(|row| row["effect"] == "gear-ratio" && row["joint"] == 2).unwrap();
     let size = &gear["sizes"][0];
     assert_eq!(
         (size["parameters"][0].as_str(), size["unit"].as_str()),
@@ -167,7 +167,7 @@ fn a_check_names_what_would_be_found() {
     );
     assert!(size["found_from"].as_f64().unwrap() < size["prior_sigma"].as_f64().unwrap());
     // Every order of every joint is listed.
-    assert_eq!(effects.iter().filter(|own| own["effect"] == "joint-harmonic").count(), 240);
+    assert_eq!(effects.iter().filter(|row| row["effect"] == "joint-harmonic").count(), 240);
 }
 
 #[test]
@@ -181,7 +181,7 @@ fn without_times_nothing_that_remembers_is_promised() {
         serde_json::from_str(&fs::read_to_string(bench.path("check.json")).unwrap()).unwrap();
     let names = |key: &str| {
         let all = check["detectable"][key].as_array().unwrap();
-        all.iter().filter(|own| own["effect"] == "joint-hysteresis").count()
+        all.iter().filter(|row| row["effect"] == "joint-hysteresis").count()
     };
     assert_eq!((names("effects"), names("untestable") > 0), (0, true), "{check}");
     assert_eq!(check["detectable"]["times_assumed"], false);
@@ -380,10 +380,10 @@ fn every_command_has_examples() {
         "man",
     ] {
         assert!(help.contains(command), "{command} missing in:\n{help}");
-        let own = text(&flexcal(&[command, "--help"]).assert().success().get_output().stdout);
+        let help = text(&flexcal(&[command, "--help"]).assert().success().get_output().stdout);
         assert!(
-            own.contains("Examples:\n") && own.contains(&format!("\n  flexcal {command}")),
-            "{own}"
+            help.contains("Examples:\n") && help.contains(&format!("\n  flexcal {command}")),
+            "{help}"
         );
     }
 }
@@ -467,12 +467,12 @@ fn what_the_nominal_arm_does_not_tell_is_not_said_to_be_identified() {
     );
     let json: Value =
         serde_json::from_str(&fs::read_to_string(bench.path("check.json")).unwrap()).unwrap();
-    let own = json["parameters"]
+    let parameter = json["parameters"]
         .as_array()
         .unwrap()
         .iter()
-        .find(|own| own["name"] == "joint5.theta")
+        .find(|parameter| parameter["name"] == "joint5.theta")
         .unwrap();
-    assert!(own["identified"].as_f64().unwrap() > 0.99, "{own}");
-    assert!(own["identified_at_nominal"].as_f64().unwrap() < 0.5, "{own}");
+    assert!(parameter["identified"].as_f64().unwrap() > 0.99, "{parameter}");
+    assert!(parameter["identified_at_nominal"].as_f64().unwrap() < 0.5, "{parameter}");
 }

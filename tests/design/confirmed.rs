@@ -29,7 +29,8 @@ fn fits(problem: &Problem, truth: &Truth, plan: &Plan, arms: u64) -> [Vec<Fitted
             let (rig, x) = true_arm(problem, truth, &rows, arm);
             measure(&rig, &mut rows, truth.noise_sigma, 5000 + arm);
             let fitted = fit(problem, &rows);
-            let stated = fitted.estimates.iter().map(|own| own.std_error.unwrap_or(f64::NAN));
+            let stated =
+                fitted.estimates.iter().map(|estimate| estimate.std_error.unwrap_or(f64::NAN));
             Fitted { error: fitted.x - x, stated: DVector::from_vec(stated.collect()) }
         };
         (0..arms).into_par_iter().map(of).collect()
@@ -44,7 +45,7 @@ fn gain(
     parameters: &[usize],
 ) -> f64 {
     let [planned, random] =
-        fits.each_ref().map(|all| all.iter().map(|own| of(own).clone()).collect::<Vec<_>>());
+        fits.each_ref().map(|all| all.iter().map(|fit| of(fit).clone()).collect::<Vec<_>>());
     let logs = parameters.iter().map(|&k| (rms(&random, k) / rms(&planned, k)).ln());
     (logs.sum::<f64>() / parameters.len() as f64).exp()
 }
@@ -64,7 +65,7 @@ fn planned_poses_give_smaller_errors_than_random_ones() {
     assert!(meaningful.len() > 12, "{meaningful:?}");
     let promised = plan.gain(&meaningful).unwrap();
     assert!(promised > 2.0, "{promised}");
-    let measured = gain(&fits(&problem, &truth, &plan, 40), |own| &own.error, &meaningful);
+    let measured = gain(&fits(&problem, &truth, &plan, 40), |fit| &fit.error, &meaningful);
     assert!(measured > 1.7, "{measured}");
 }
 
@@ -88,15 +89,15 @@ fn planned_poses_halve_the_errors() {
                 (plan.meaningful(), (0..plan.planned.expected.len()).collect::<Vec<_>>());
             let found = fits(&problem, &truth, &plan, 1000);
             let (promised, measured) =
-                (plan.gain(&meaningful).unwrap(), gain(&found, |own| &own.error, &meaningful));
-            let stated = gain(&found, |own| &own.stated, &meaningful);
+                (plan.gain(&meaningful).unwrap(), gain(&found, |fit| &fit.error, &meaningful));
+            let stated = gain(&found, |fit| &fit.stated, &meaningful);
             println!(
                 "{} seed {seed}: promised {promised:.3}, measured {measured:.3}, stated {stated:.3} over {} parameters; over all {:.3}, \
                  {:.3}",
                 criterion.as_str(),
                 meaningful.len(),
                 plan.gain(&all).unwrap(),
-                gain(&found, |own| &own.error, &all),
+                gain(&found, |fit| &fit.error, &all),
             );
             if criterion == Criterion::S {
                 halved.push((stated, measured));

@@ -37,9 +37,10 @@ fn is_found(problem: &Problem, rows: &Measurements, effect: &Effect, size: f64, 
     with.effects.push(problem.effect(&text, Path::new("test")).unwrap());
     let model = model_of(&with, rows);
     let mut x = draw(&model, |_| 0.0, &mut random);
-    let own = effect.parameters(&with);
+    let parameters = effect.parameters(&with);
     let sign = if seed.is_multiple_of(2) { size } else { -size };
-    for (k, parameter) in model.parameters.iter().enumerate().filter(|(_, p)| p.name == own[0].name)
+    for (k, parameter) in
+        model.parameters.iter().enumerate().filter(|(_, p)| p.name == parameters[0].name)
     {
         assert!(parameter.sigma.is_some());
         x[k] = sign;
@@ -70,7 +71,7 @@ fn power(factor: f64, sets: u64) -> Vec<(Effect, f64)> {
     let (problem, rows) = bench();
     let detection = detectable(&problem, &rows).unwrap();
     let of = |effect: Effect| {
-        let stated = detection.effects.iter().find(|own| own.effect == effect).unwrap().sizes[0]
+        let stated = detection.effects.iter().find(|row| row.effect == effect).unwrap().sizes[0]
             .worst
             .unwrap();
         let found = (0..sets)
@@ -118,7 +119,7 @@ fn what_the_fit_takes_up_is_not_to_be_seen() {
     let (problem, rows) = bench();
     let detection = detectable(&problem, &rows).unwrap();
     let size = |effect: Effect| {
-        &detection.effects.iter().find(|own| own.effect == effect).unwrap().sizes[0]
+        &detection.effects.iter().find(|row| row.effect == effect).unwrap().sizes[0]
     };
     // No moment acts about the vertical axis of joint 1.
     assert!(!size(Effect::JointCompliance { joint: 1 }).is_within_prior());
@@ -132,7 +133,7 @@ fn what_the_fit_takes_up_is_not_to_be_seen() {
     let finer = detectable(&problem, &more).unwrap();
     let effect = Effect::GearRatio { joint: 2 };
     let fine =
-        finer.effects.iter().find(|own| own.effect == effect).unwrap().sizes[0].worst.unwrap();
+        finer.effects.iter().find(|row| row.effect == effect).unwrap().sizes[0].worst.unwrap();
     let ratio = size(effect).worst.unwrap() / fine;
     assert!((1.5..3.5).contains(&ratio), "{ratio}");
     // An effect that needs a temperature says so.

@@ -40,8 +40,9 @@ fn candidates_of(problem: &Problem) -> (Vec<Parameter>, Sensitivity) {
 
 #[test]
 fn it_never_worsens_and_ends_where_no_exchange_of_one_pose_helps() {
-    for (criterion, problem) in
-        criteria().into_iter().flat_map(|own| [(own.clone(), lunar().0), (own, oriented())])
+    for (criterion, problem) in criteria()
+        .into_iter()
+        .flat_map(|criterion| [(criterion.clone(), lunar().0), (criterion, oriented())])
     {
         let (parameters, candidates) = candidates_of(&problem);
         assert_eq!(candidates.coordinates, if problem.data.fits_orientation { 6 } else { 3 });
@@ -118,8 +119,8 @@ fn a_plan_counts_orientations_where_they_are_fitted() {
         let errors = told_by(&planned.poses).expected;
         let arm = errors
             .iter()
-            .filter(|own| !own.is_placement)
-            .filter_map(|own| own.std_error.map(f64::ln));
+            .filter(|estimate| !estimate.is_placement)
+            .filter_map(|estimate| estimate.std_error.map(f64::ln));
         arm.sum::<f64>()
     };
     let (with, without) = (judged(&problem), judged(&problem.positions_alone()));

@@ -49,11 +49,12 @@ fn expected_x(expected: &ExpectedParameter) -> Option<f64> {
 
 /// Returns the ratios of actual to expected standard errors, by name.
 fn ratios(check: &Check, errors: &[DVector<f64>]) -> Vec<(String, f64)> {
-    let own = check.forecast.expected.iter().enumerate();
-    own.filter_map(|(k, expected)| {
-        Some((expected.name.clone(), rms(errors, k) / expected_x(expected)?))
-    })
-    .collect()
+    let expectations = check.forecast.expected.iter().enumerate();
+    expectations
+        .filter_map(|(k, expected)| {
+            Some((expected.name.clone(), rms(errors, k) / expected_x(expected)?))
+        })
+        .collect()
 }
 
 /// Compares a check of some poses with the results of `runs` fits.

@@ -118,10 +118,10 @@ fn named(case: &Case, few: bool, seeds: u64) -> ([usize; 2], [usize; 2], PairSep
     let (planned, told) = planned(&problem, &truth, *names, few);
     let random = |seed| ranges(&truth).draw(&problem, 28, Extremes::No, 300 + seed, 0);
     let count = |side: usize, planned_poses: bool| {
-        let own = (told.effects[side].clone(), strengths[side]);
+        let strong_effect = (told.effects[side].clone(), strengths[side]);
         let right = |&seed: &u64| {
             let poses = if planned_poses { planned.clone() } else { random(seed) };
-            is_named(&problem, &truth, &poses, &own, seed)
+            is_named(&problem, &truth, &poses, &strong_effect, seed)
         };
         (0..seeds).into_par_iter().filter(right).count()
     };
@@ -132,15 +132,15 @@ fn named(case: &Case, few: bool, seeds: u64) -> ([usize; 2], [usize; 2], PairSep
 fn planned_poses_tell_apart_what_random_ones_confuse() {
     let (planned, _, told) = named(&CASES[1], true, 3);
     assert_eq!(planned, [3, 3]);
-    for (side, own) in told.planned.sides.iter().enumerate() {
-        let random = told.random(|random| random.sides[side].told.worst);
-        let least = own.told.worst.unwrap();
+    for (k, side) in told.planned.sides.iter().enumerate() {
+        let random = told.random(|random| random.sides[k].told.worst);
+        let least = side.told.worst.unwrap();
         assert!(least < 0.7 * random, "{least} {random}");
-        let size = own.found.worst.unwrap();
-        let p = told.random(|random| Some(random.sides[side].expected_p(size)));
-        assert!(own.expected_p(size) < p, "{} {p}", own.expected_p(size));
+        let size = side.found.worst.unwrap();
+        let p = told.random(|random| Some(random.sides[k].expected_p(size)));
+        assert!(side.expected_p(size) < p, "{} {p}", side.expected_p(size));
     }
-    assert!(told.planned.angle.unwrap() > told.random(|own| own.angle));
+    assert!(told.planned.angle.unwrap() > told.random(|random| random.angle));
 }
 
 /// Computes the figures of docs/plan.md.
@@ -154,13 +154,13 @@ fn the_right_effect_is_named_from_planned_poses() {
             "{:?}: planned {planned:?}, random {random:?} of 10; angle {:.1}° planned, {:.1}° random",
             case.0,
             angle(told.planned.angle.unwrap()),
-            angle(told.random(|own| own.angle)),
+            angle(told.random(|random| random.angle)),
         );
         for side in 0..2 {
             println!(
                 "  told from {:.3e} planned, {:.3e} random; strengths {:?}",
                 told.planned.sides[side].told.worst.unwrap(),
-                told.random(|own| own.sides[side].told.worst),
+                told.random(|random| random.sides[side].told.worst),
                 case.1[side],
             );
         }

@@ -124,12 +124,12 @@ pub fn tree() -> (Problem, Vec<Strong>) {
 /// Returns declarations of covariates.
 fn covariates(names: &[&str]) -> Vec<DeclaredCovariate> {
     let location = Location::file(Path::new("problem.toml"));
-    let own = |name: &&str| DeclaredCovariate {
+    let declared = |name: &&str| DeclaredCovariate {
         name: (*name).to_owned(),
         meaning: String::new(),
         location: location.clone(),
     };
-    names.iter().map(own).collect()
+    names.iter().map(declared).collect()
 }
 
 /// Declares effects in an arm; the equilibrium effect needs statics on the rigid arm.

@@ -251,7 +251,7 @@ fn every_effect_under_any_load() {
     let plain = poses(&arm, 4, false, &mut ChaCha8Rng::seed_from_u64(9));
     // Upper bound of the moments: all masses at the end of the outstretched arm.
     let bodies = |joint: &Joint| joint.bodies.iter().map(|body| body.mass).sum::<f64>();
-    let beam = |joint: &Joint| joint.beam.iter().map(|own| own.mass).sum::<f64>();
+    let beam = |joint: &Joint| joint.beam.iter().map(|segment| segment.mass).sum::<f64>();
     let mass = plain.payload.iter().flatten().fold(0.0_f64, |most, mass| most.max(*mass))
         + arm.joints.iter().map(|joint| bodies(joint) + beam(joint)).sum::<f64>();
     let reach: f64 = arm.joints.iter().map(|joint| joint.a.abs() + joint.d.abs()).sum();

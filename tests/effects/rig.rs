@@ -20,8 +20,9 @@ const FLOOR: f64 = 1e-6;
 fn measured(arm: &Problem, effects: &[Strong], rows: &Measurements) -> Vec<Vector3<f64>> {
     let effects = effects.iter().map(|effect| in_truth(arm, effect)).collect();
     let rig = Rig::new(arm.clone(), effects);
-    let word =
-        |row: usize| rows.target.as_ref().map_or("", |own| own.names[own.of_row[row]].as_str());
+    let word = |row: usize| {
+        rows.target.as_ref().map_or("", |targets| targets.names[targets.of_row[row]].as_str())
+    };
     (0..rows.len()).map(|row| rig.pose_of(word(row), &conditions(rows, row)).unwrap().0).collect()
 }
 

@@ -87,9 +87,9 @@ fn faults(rows: &[Row], pick: &str) -> Vec<String> {
         lost.map(|row| format!("{pick} on {}: {}", row.problem, row.optimum)).collect();
     for row in rows {
         let others = of(row.solver);
-        let [own, other] = [total(&picked, &others), total(&others, &picked)];
-        if missed(&others) == 0 && own > SLOWER * other {
-            faults.push(format!("{pick} takes {own} ms, {} only {other} ms", row.solver));
+        let [picked_time, other] = [total(&picked, &others), total(&others, &picked)];
+        if missed(&others) == 0 && picked_time > SLOWER * other {
+            faults.push(format!("{pick} takes {picked_time} ms, {} only {other} ms", row.solver));
         }
     }
     faults.dedup();
@@ -113,15 +113,15 @@ fn auto_takes_what_the_table_recommends() {
 #[test]
 fn auto_is_best_where_bounds_bind() {
     for (name, solvers) in [("stiffness", 4), ("tight-geometry", 4), ("mild-constraints", 2)] {
-        let own = Bounded::read(name);
-        let residuals = own.residuals();
-        let fit = own.fit(&residuals);
+        let bounded = Bounded::read(name);
+        let residuals = bounded.residuals();
+        let fit = bounded.fit(&residuals);
         let solve = |solver: SolverChoice| {
-            let (within, limits) = (solver.within().unwrap(), (&own.bounds, &own.rows));
+            let (within, limits) = (solver.within().unwrap(), (&bounded.bounds, &bounded.rows));
             let found = minimise_constrained_by(
                 within,
                 &fit,
-                own.nominal(),
+                bounded.nominal(),
                 limits,
                 &Settings::default(),
                 None::<Silent>,
@@ -132,15 +132,14 @@ fn auto_is_best_where_bounds_bind() {
                 solver.as_str(),
                 found.cost
             );
-            assert!((0..found.x.len()).all(
-                |j| own.bounds.lower()[j] <= found.x[j] && found.x[j] <= own.bounds.upper()[j]
-            ));
+            assert!((0..found.x.len()).all(|j| bounded.bounds.lower()[j] <= found.x[j]
+                && found.x[j] <= bounded.bounds.upper()[j]));
             found
         };
-        let keeps = SolverChoice::EACH.into_iter().filter(|solver| solver.keeps(&own.model));
+        let keeps = SolverChoice::EACH.into_iter().filter(|solver| solver.keeps(&bounded.model));
         let found: Vec<Solution> = keeps.map(solve).collect();
         assert_eq!(found.len(), solvers);
-        let auto = solve(SolverChoice::Auto.decide(&own.model));
+        let auto = solve(SolverChoice::Auto.decide(&bounded.model));
         let best = found.iter().map(|found| found.cost).fold(f64::INFINITY, f64::min);
         assert!(auto.cost <= best * (1.0 + 1e-8), "{name}: {:.12e} against {best:.12e}", auto.cost);
         let reached = found.iter().filter(|found| found.cost <= best * (1.0 + 1e-8));
@@ -158,14 +157,14 @@ fn auto_is_best_where_bounds_bind() {
 /// Checks the choice under robust losses, with gross errors in the data.
 #[test]
 fn auto_is_best_under_robust_losses() {
-    let own = Bounded::read("stiffness").with_gross_errors();
-    let residuals = own.residuals();
+    let bounded = Bounded::read("stiffness").with_gross_errors();
+    let residuals = bounded.residuals();
     let free = auto(false).0;
     for loss in [
         Loss::Huber { threshold: Loss::HUBER_POSITION },
         Loss::L1 { slope: Loss::L1_POSITION, smoothing: Loss::L1_SMOOTHING },
     ] {
-        let fit = || own.fit(&residuals).with_loss(loss);
+        let fit = || bounded.fit(&residuals).with_loss(loss);
         let found = [
             SolverChoice::LevenbergMarquardt,
             SolverChoice::GaussNewton,
@@ -174,12 +173,14 @@ fn auto_is_best_under_robust_losses() {
         .map(|solver| {
             let found = match solver {
                 SolverChoice::GaussNewton => {
-                    minimise_gauss_newton(fit(), own.nominal(), &GaussNewtonSettings::default())
+                    minimise_gauss_newton(fit(), bounded.nominal(), &GaussNewtonSettings::default())
                 }
-                SolverChoice::PseudoInverse => {
-                    minimise_pseudo_inverse(fit(), own.nominal(), &PseudoInverseSettings::default())
-                }
-                _ => minimise(fit(), own.nominal(), &Settings::default()),
+                SolverChoice::PseudoInverse => minimise_pseudo_inverse(
+                    fit(),
+                    bounded.nominal(),
+                    &PseudoInverseSettings::default(),
+                ),
+                _ => minimise(fit(), bounded.nominal(), &Settings::default()),
             };
             let (steps, count, cost) = (found.iterations, found.evaluations(), found.cost);
             println!(

@@ -229,17 +229,17 @@ fn bounds_against_the_truth_are_fitted_to_the_optimum() {
         ("mild-constraints", 4.087_276_052_119e2, 20),
     ];
     for (name, optimum, most) in cases {
-        let own = Bounded::read(name);
-        let residuals = own.residuals();
-        let fit = own.fit(&residuals);
+        let bounded = Bounded::read(name);
+        let residuals = bounded.residuals();
+        let fit = bounded.fit(&residuals);
         for (within, most) in
             [(BoundMethod::ActiveSet, most), (BoundMethod::InteriorPoint, most.max(20))]
         {
-            let limits = (&own.bounds, &own.rows);
+            let limits = (&bounded.bounds, &bounded.rows);
             let found = minimise_constrained_by(
                 within,
                 &fit,
-                own.nominal(),
+                bounded.nominal(),
                 limits,
                 &Settings::default(),
                 None::<Silent>,
@@ -253,7 +253,7 @@ fn bounds_against_the_truth_are_fitted_to_the_optimum() {
             assert!(iterations <= most, "{name}, {within:?}: {iterations} steps");
         }
         // Users get the estimates at the σ estimated from the residual.
-        let fitted = identify(&own.problem, &own.data, &Options::default()).unwrap();
+        let fitted = identify(&bounded.problem, &bounded.data, &Options::default()).unwrap();
         println!("  identified after {} steps", fitted.iterations);
         assert!(
             fitted.termination.converged() && fitted.iterations < 60,

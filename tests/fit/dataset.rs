@@ -108,7 +108,7 @@ fn a_table_in_memory_is_read_as_the_file_is() {
     );
     let replaced = |name: &str, values: ColumnValues| {
         let mut columns = in_memory();
-        columns.iter_mut().find(|(own, _)| own == name).unwrap().1 = values;
+        columns.iter_mut().find(|(column, _)| column == name).unwrap().1 = values;
         read(columns).unwrap_err().to_string()
     };
     let numbers = |row: usize, value: f64| {

@@ -60,7 +60,7 @@ fn an_active_constraint_is_in_the_correlations() {
     let found = identify(&problem, &data, &Options::default()).unwrap();
     assert_eq!(found.active_constraints.len(), 1);
     let all = found.correlations();
-    let place = |name: &str| all.names.iter().position(|own| own == name).unwrap();
+    let place = |name: &str| all.names.iter().position(|other| other == name).unwrap();
     assert!(all.matrix[(place("A.EI"), place("B.EI"))] > 0.999_999);
     assert!(
         found
@@ -160,9 +160,9 @@ fn a_saved_estimate_predicts_what_the_fit_predicts() {
     let json = IdentificationResult::new(&problem, &found).to_json();
     let saved = SavedEstimate::parse(&json, Path::new("estimate.json")).unwrap();
     let again = predict(&problem, Some(&saved), &data.measurements, Some(&data.split)).unwrap();
-    let (own, residuals) =
+    let (published, residuals) =
         (found.predict(&problem, &data.measurements).unwrap(), again.residuals.unwrap());
-    for ((one, other), residual) in own.iter().zip(&again.positions).zip(&residuals) {
+    for ((one, other), residual) in published.iter().zip(&again.positions).zip(&residuals) {
         assert!((one - other).norm() < 1e-12, "{one}{other}");
         assert_eq!(residual.held_out, data.split.held_out.contains(&residual.row));
     }
@@ -176,8 +176,8 @@ fn a_saved_estimate_predicts_what_the_fit_predicts() {
     );
     // Without an estimate the nominal arm predicts.
     let nominal = predict(&problem, None, rows, None).unwrap().errors.unwrap();
-    let (own, other) = (&found.registered.identification, &found.registered.held_out);
-    let registered = (28.0 * own.mean.norm + 50.0 * other.mean.norm) / 78.0;
+    let (identification, other) = (&found.registered.identification, &found.registered.held_out);
+    let registered = (28.0 * identification.mean.norm + 50.0 * other.mean.norm) / 78.0;
     assert!(
         (nominal.all.mean.norm / registered - 1.0).abs() < 0.1,
         "{}, registered {registered}",

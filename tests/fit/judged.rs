@@ -198,7 +198,7 @@ fn what_may_have_been_misread_is_said() {
     };
     let sized = |factor: f64| {
         move |_: &mut Problem, data: &mut Dataset| {
-            data.measurements.positions.iter_mut().for_each(|own| *own *= factor)
+            data.measurements.positions.iter_mut().for_each(|position| *position *= factor)
         }
     };
     let degree = std::f64::consts::PI / 180.0;
@@ -206,8 +206,9 @@ fn what_may_have_been_misread_is_said() {
     assert_eq!(with(&scaled(1.0 / degree)), [Misreading::Degrees.to_string()]);
     assert_eq!(with(&sized(1e3)), [Misreading::Millimetres.to_string()]);
     assert_eq!(with(&sized(1e-3)), [Misreading::Metres.to_string()]);
-    let mirrored =
-        with(&|_, data| data.measurements.positions.iter_mut().for_each(|own| own.swap_rows(0, 2)));
+    let mirrored = with(&|_, data| {
+        data.measurements.positions.iter_mut().for_each(|position| position.swap_rows(0, 2))
+    });
     assert_eq!(mirrored, [Misreading::Mirrored.to_string()]);
     let reversed = with(&|_, data| {
         data.measurements.configurations.iter_mut().skip(2).step_by(5).for_each(|q| *q = -*q)
@@ -233,7 +234,7 @@ fn what_may_have_been_misread_is_said() {
         );
     }
     let all = with(&|problem, _| {
-        let lengths = problem.joints.iter_mut().flat_map(|own| [&mut own.a, &mut own.d]);
+        let lengths = problem.joints.iter_mut().flat_map(|joint| [&mut joint.a, &mut joint.d]);
         lengths.chain(&mut problem.tool.target).for_each(|length| *length *= 1e3);
     });
     assert_eq!(all, [Misreading::ArmInMillimetres.to_string()]);

@@ -109,7 +109,8 @@ fn orientations_lower_the_errors_of_the_wrist_as_theory_says() {
         }
         let covariance = information.try_inverse().unwrap();
         move |name: &str| {
-            let k = site.model.parameters.iter().position(|own| own.name == name).unwrap();
+            let k =
+                site.model.parameters.iter().position(|parameter| parameter.name == name).unwrap();
             covariance[(k, k)].sqrt()
         }
     };
@@ -126,12 +127,14 @@ fn orientations_lower_the_errors_of_the_wrist_as_theory_says() {
         "tool.y",
     ] {
         let estimates = [&alone, &both].map(|found| found.estimate(name).unwrap());
-        let [Some(before), Some(after)] = estimates.map(|own| own.std_error) else { continue };
+        let [Some(before), Some(after)] = estimates.map(|estimate| estimate.std_error) else {
+            continue;
+        };
         let (fell, theory) = (before / after, without(name) / with(name));
         println!("{name}: {fell:.3}, theory {theory:.3}");
         assert!(fell > 0.999, "{name}: {fell}");
         // If the prior dominates, nominal and fitted arm differ in the share of the data.
-        if estimates.iter().all(|own| own.identified > 0.99) {
+        if estimates.iter().all(|estimate| estimate.identified > 0.99) {
             compared += 1;
             assert!((fell / theory - 1.0).abs() < 0.1, "{name}: {fell}, theory {theory}");
         }
@@ -141,7 +144,7 @@ fn orientations_lower_the_errors_of_the_wrist_as_theory_says() {
         found
             .orientation
             .as_ref()
-            .map(|own| (own.registered.held_out.mean.norm, own.fitted.held_out.mean.norm))
+            .map(|found| (found.registered.held_out.mean.norm, found.fitted.held_out.mean.norm))
     };
     let (before, after) = held_out(&both).unwrap();
     println!(
@@ -159,8 +162,11 @@ fn standard_errors_cover_the_truth() {
     for seed in 0..24 {
         let (simulation, data) = rig(&problem, 40, seed, "held_out = 0.1\n");
         let found = fit(&problem, &data);
-        for (estimate, truth) in found.estimates.iter().filter_map(|own| {
-            Some((own, simulation.parameters.iter().find(|truth| truth.name == own.name)?))
+        for (estimate, truth) in found.estimates.iter().filter_map(|estimate| {
+            Some((
+                estimate,
+                simulation.parameters.iter().find(|truth| truth.name == estimate.name)?,
+            ))
         }) {
             if let (Some(error), true) = (estimate.std_error, estimate.identified > 0.99) {
                 count += 1;

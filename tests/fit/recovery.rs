@@ -77,7 +77,9 @@ fn all_that_rigid_positions_tell_of_table_2_comes_back() {
         .identifiability()
         .unidentifiable
         .iter()
-        .map(|own| own.weights.iter().map(|&(j, _)| found.unknowns[j].as_str()).collect())
+        .map(|combination| {
+            combination.weights.iter().map(|&(j, _)| found.unknowns[j].as_str()).collect()
+        })
         .collect();
     assert_eq!(
         unidentifiable,

@@ -113,7 +113,7 @@ fn gross_errors_hide_no_effect_from_the_loop() {
     let squares = found(&problem);
     let rows = [5, 19].map(|place| data.measurements.location(data.split.identification[place]));
     assert_eq!(squares.set_aside, rows);
-    assert!(squares.effects.iter().all(|own| is_wave(&own.effect)), "{:?}", squares.effects);
+    assert!(squares.effects.iter().all(|chosen| is_wave(&chosen.effect)), "{:?}", squares.effects);
     problem.robust = Some(Robust { loss: RobustLoss::Huber, threshold: None });
     let robust = found(&problem);
     assert_eq!(robust.verdict, Verdict::Explained);

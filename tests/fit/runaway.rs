@@ -47,9 +47,9 @@ fn far(found: &Identification) -> Vec<String> {
     let lengths = found
         .estimates
         .iter()
-        .filter(|own| own.unit == Unit::Length && !own.name.starts_with("base"));
-    let moved = lengths.filter(|own| (own.estimate - own.nominal).abs() > 0.01);
-    moved.map(|own| format!("{}: {}", own.name, own.estimate)).collect()
+        .filter(|estimate| estimate.unit == Unit::Length && !estimate.name.starts_with("base"));
+    let moved = lengths.filter(|estimate| (estimate.estimate - estimate.nominal).abs() > 0.01);
+    moved.map(|estimate| format!("{}: {}", estimate.name, estimate.estimate)).collect()
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn what_is_seen_too_weakly_is_held_and_named() {
             let named: Vec<&str> = found
                 .weak
                 .iter()
-                .flat_map(|own| &own.weights)
+                .flat_map(|combination| &combination.weights)
                 .map(|(k, _)| found.unknowns[*k].as_str())
                 .collect();
             assert!(named.contains(&"joint3.d") && !named.contains(&"joint1.a"), "{at}: {named:?}");
@@ -96,9 +96,9 @@ fn what_is_seen_well_enough_is_not_held() {
     );
     let found = identify(&problem, &measured(&problem, 1), &Options::default()).unwrap();
     assert!(found.weak.is_empty(), "{:?}", found.weak);
-    let own = found.estimate("joint3.d").unwrap();
-    let error = own.std_error.unwrap();
-    assert!(error < 0.05 && own.estimate.abs() < 4.0 * error + 3e-3, "{own:?}");
+    let estimate = found.estimate("joint3.d").unwrap();
+    let error = estimate.std_error.unwrap();
+    assert!(error < 0.05 && estimate.estimate.abs() < 4.0 * error + 3e-3, "{estimate:?}");
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! A wrongly declared σ has no influence: priors and data are weighted by the actual scatter.
+//! Tests that a wrongly declared σ has no influence: priors and data are weighted by the actual
+//! scatter.
 
 use crate::common::arms::{measured, parse, path};
 use flexcal::fit::{Identification, Options, identify};

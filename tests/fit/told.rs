@@ -57,14 +57,14 @@ impl Told {
 
     /// Returns name, estimate, nominal value and standard error of each parameter.
     fn parameters(&self) -> impl Iterator<Item = (&str, f64, f64, Option<f64>)> {
-        let number = |own: &Value, key: &str| own[key].as_f64();
-        self.json["parameters"].as_array().into_iter().flatten().map(move |own| {
-            let value = |key| number(own, key).unwrap();
+        let number = |row: &Value, key: &str| row[key].as_f64();
+        self.json["parameters"].as_array().into_iter().flatten().map(move |row| {
+            let value = |key| number(row, key).unwrap();
             (
-                own["name"].as_str().unwrap(),
+                row["name"].as_str().unwrap(),
                 value("estimate"),
                 value("nominal"),
-                number(own, "std_error"),
+                number(row, "std_error"),
             )
         })
     }
@@ -142,7 +142,9 @@ fn spoiled_ones() -> Vec<Case> {
     let (priors, free) = (judged::PRIORS, judged::FREE);
     let based = &format!("{priors}\n'base.*' = {{ free = true }}");
     let scaled = |factor: f64| {
-        move |data: &mut Dataset| positions(data).iter_mut().for_each(|own| *own *= factor)
+        move |data: &mut Dataset| {
+            positions(data).iter_mut().for_each(|position| *position *= factor)
+        }
     };
     let off = |by: f64| move |data: &mut Dataset| positions(data)[77].y += by;
     let gross =
@@ -218,8 +220,8 @@ fn running_off() -> Vec<Case> {
     let raised = || {
         let text = runaway::text(0.0, "'joint1.d' = { free = true }");
         let mut data = runaway::measured(&parse(&text), 1);
-        for own in positions(&mut data) {
-            own.z += 3.0;
+        for position in positions(&mut data) {
+            position.z += 3.0;
         }
         ("a frame three metres above", text, data, 1, "times the arm's own size")
     };
@@ -275,7 +277,7 @@ fn a_declared_sigma_that_is_wrong_changes_nothing() {
             let apart = told
                 .parameters()
                 .zip(expected.parameters())
-                .filter_map(|(own, other)| Some((own.1 - other.1).abs() / other.3?))
+                .filter_map(|(row, other)| Some((row.1 - other.1).abs() / other.3?))
                 .fold(0.0, f64::max);
             let held_out = told.held_out_mm() / expected.held_out_mm();
             let said = told.text.contains("if only noise is left");
@@ -291,8 +293,12 @@ fn a_declared_sigma_that_is_wrong_changes_nothing() {
     for (seed, factor) in [(2, 10.0), (2, 100.0), (4, 10.0), (4, 100.0)] {
         let problem = sigma::elbow(0.05 * factor);
         let told = Told::by("loop", &problem, &csv(&parse(&problem), &sigma::simulated(seed)));
-        let found: Vec<&Value> =
-            told.json["effects"].as_array().unwrap().iter().map(|own| &own["effect"]).collect();
+        let found: Vec<&Value> = told.json["effects"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|effect| &effect["effect"])
+            .collect();
         if !found.is_empty() {
             let _ = writeln!(wrong, "seed {seed} × {factor}: finds {found:?}");
         }

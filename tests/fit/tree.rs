@@ -44,7 +44,8 @@ fn the_truth_of_both_arms_comes_back_within_its_standard_errors() {
         assert!(found.is_trusted(), "{:?}", found.findings);
         chi2.push(found.reduced_chi2.unwrap());
         for estimate in &found.estimates {
-            let Some(own) = simulation.parameters.iter().find(|own| own.name == estimate.name)
+            let Some(true_value) =
+                simulation.parameters.iter().find(|true_value| true_value.name == estimate.name)
             else {
                 continue;
             };
@@ -54,14 +55,15 @@ fn the_truth_of_both_arms_comes_back_within_its_standard_errors() {
                 continue;
             };
             let off = if estimate.unit.is_relative() {
-                (estimate.estimate / own.value).ln() / (error / estimate.estimate)
+                (estimate.estimate / true_value.value).ln() / (error / estimate.estimate)
             } else {
-                (estimate.estimate - own.value) / error
+                (estimate.estimate - true_value.value) / error
             };
             z.push(off.abs());
         }
     }
-    let share = |limit: f64| z.iter().filter(|own| **own < limit).count() as f64 / z.len() as f64;
+    let share =
+        |limit: f64| z.iter().filter(|score| **score < limit).count() as f64 / z.len() as f64;
     let mean = chi2.iter().sum::<f64>() / chi2.len() as f64;
     println!(
         "{} errors: {:.3} within 1 σ, {:.3} within 2 σ; mean χ²/ν {mean:.3}",
@@ -128,7 +130,7 @@ fn commands_are_corrected_in_the_branch_of_their_target_alone() {
 #[test]
 fn waypoints_keep_the_orientation_of_the_targets_that_can_have_one() {
     let (mut problem, truth) = two_arms(("", ""), ("", ""));
-    problem.joints.iter_mut().for_each(|own| own.limits = (f64::NEG_INFINITY, f64::INFINITY));
+    problem.joints.iter_mut().for_each(|joint| joint.limits = (f64::NEG_INFINITY, f64::INFINITY));
     let rows = table(&simulate(&problem, &truth, 6, 2).unwrap().rows);
     let Placement { bases, targets, .. } = Placement::of(&rows);
     let model = Model::new(&problem, &bases, &targets).unwrap();

@@ -270,7 +270,7 @@ fn a_factor_between_a_turn_and_a_slide_has_their_units() {
     assert_eq!(status, 0, "{err}");
     let json = bench.json("estimate.json");
     let parameters = json["parameters"].as_array().unwrap();
-    let of = |name: &str| parameters.iter().find(|own| own["name"] == name).unwrap();
+    let of = |name: &str| parameters.iter().find(|parameter| parameter["name"] == name).unwrap();
     for (name, unit, shown) in
         [("[3,4]", "m/rad", "mm/rad"), ("[2,3]", "rad/m", "°/m"), ("[2,1]", "1", "‰")]
     {

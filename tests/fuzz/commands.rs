@@ -117,7 +117,7 @@ fn tried(k: u64, arms: &Arms, place: &Path) -> Result<(i32, Duration), String> {
     }
     let written: Vec<PathBuf> = files(&place.join("out"))
         .into_iter()
-        .filter(|path| !path.parent().is_some_and(|own| own.ends_with("cells")))
+        .filter(|path| !path.parent().is_some_and(|folder| folder.ends_with("cells")))
         .collect();
     if status == 2 && !written.is_empty() {
         return Err(said("writes on bad input"));
@@ -130,7 +130,7 @@ fn tried(k: u64, arms: &Arms, place: &Path) -> Result<(i32, Duration), String> {
     }
     if [&ran.out, &ran.err]
         .into_iter()
-        .any(|text| text.chars().any(|own| own != '\n' && is_hidden(own)))
+        .any(|text| text.chars().any(|letter| letter != '\n' && is_hidden(letter)))
     {
         return Err(said("prints what is not seen"));
     }
@@ -140,7 +140,7 @@ fn tried(k: u64, arms: &Arms, place: &Path) -> Result<(i32, Duration), String> {
         if let Some(word) = not_finite(&text) {
             return Err(said(&format!("writes {word} to {}", path.display())));
         }
-        if path.extension().is_some_and(|own| own == "json")
+        if path.extension().is_some_and(|extension| extension == "json")
             && serde_json::from_str::<Value>(&text).is_err()
         {
             return Err(said(&format!("writes no JSON to {}", path.display())));

@@ -140,8 +140,8 @@ fn readers_stand_what_they_are_given() {
                     Ok(()) => accepted += 1,
                     Err(error) => {
                         let message = error.to_string();
-                        let clean =
-                            message.chars().all(|own| !is_hidden(own)) && !message.contains('\n');
+                        let clean = message.chars().all(|letter| !is_hidden(letter))
+                            && !message.contains('\n');
                         let named = match error.downcast_ref::<InputError>() {
                             Some(error) => error.location.file.file_name().is_some(),
                             None => message.contains("estimate.json: "),

@@ -25,7 +25,7 @@ const CASES: [(&str, &[&str]); 3] = [
 fn verdict_and_statuses_agree_in_data_text_report_and_json() {
     let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
     let cases =
-        CASES.into_iter().flat_map(|(file, tables)| tables.iter().map(move |own| (file, own)));
+        CASES.into_iter().flat_map(|(file, tables)| tables.iter().map(move |table| (file, table)));
     for (file, table) in cases {
         let problem = Problem::read(&tests.join(file)).unwrap();
         let (data, _) = Dataset::read_files(&[tests.join(table)], &problem).unwrap();

@@ -131,7 +131,7 @@ fn the_loop_writes_what_the_format_says() {
         .as_array()
         .unwrap()
         .iter()
-        .map(|own| own["name"].as_str().unwrap())
+        .map(|row| row["name"].as_str().unwrap())
         .collect();
     assert_eq!(names, ["link-thermal-bending[B].about_y", "link-thermal-bending[B].about_z"]);
     assert_eq!(found["parameters"][0]["unit"], "1/(m·K)");
@@ -209,9 +209,10 @@ fn a_declared_compensator_stays_as_it_is_and_is_not_looked_for() {
     let estimates = again["parameters"].as_array().unwrap();
     for (name, truth) in [("rate", 900.0), ("preload", 80.0)] {
         let name = format!("gravity-compensator[2].{name}");
-        let own = estimates.iter().find(|own| own["name"] == name.as_str()).unwrap();
+        let parameter =
+            estimates.iter().find(|parameter| parameter["name"] == name.as_str()).unwrap();
         let (value, error) =
-            (own["estimate"].as_f64().unwrap(), own["std_error"].as_f64().unwrap());
+            (parameter["estimate"].as_f64().unwrap(), parameter["std_error"].as_f64().unwrap());
         assert!((value - truth).abs() < 4.0 * error, "{name}: {value} ± {error}");
     }
 }
@@ -343,15 +344,20 @@ fn what_keeps_the_loop_from_finding_is_said() {
 #[test]
 fn a_declared_sigma_that_is_too_large_hides_no_cause() {
     let bench = Bench::new(TWO);
-    let own = |json: &Value| -> BTreeSet<String> {
-        json["effects"].as_array().unwrap().iter().map(|own| own["effect"].to_string()).collect()
+    let effects = |json: &Value| -> BTreeSet<String> {
+        json["effects"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|effects| effects["effect"].to_string())
+            .collect()
     };
-    let expected = own(&bench.json(&["loop", "arm", "--out", "right"]));
+    let expected = effects(&bench.json(&["loop", "arm", "--out", "right"]));
     bench.edit("arm/problem.toml", |text| {
         text.replace("position_sigma_mm = 0.05", "position_sigma_mm = 1.0")
     });
     let json = bench.json(&["loop", "arm", "--out", "large"]);
-    assert_eq!((own(&json), &json["verdict"]), (expected, &"explained".into()));
+    assert_eq!((effects(&json), &json["verdict"]), (expected, &"explained".into()));
     let told = bench.told(&["loop", "arm", "--out", "told"]);
     let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(told.contains("if only noise is left. The declared σ is too large."), "{told}");

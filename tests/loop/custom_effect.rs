@@ -73,7 +73,7 @@ impl CustomEffect for Terms {
     }
 }
 
-fn own(terms: Vec<Term>) -> Effect {
+fn custom(terms: Vec<Term>) -> Effect {
     Effect::custom(Terms("own", terms))
 }
 
@@ -122,8 +122,8 @@ fn an_effect_of_one_s_own_is_fitted_beside_the_declared_model() {
     let (problem, data) = crept(1.5e-7, -4e-4);
     let found = identify(&problem.with_effect(creep(3)), &data, &Options::default()).unwrap();
     for (name, truth) in [("joint-creep[3].rate", 1.5e-7), ("joint-creep[3].sag", -4e-4)] {
-        let own = found.estimates.iter().find(|estimate| estimate.name == name).unwrap();
-        let (estimate, error) = (own.estimate, own.std_error.unwrap());
+        let fitted = found.estimates.iter().find(|estimate| estimate.name == name).unwrap();
+        let (estimate, error) = (fitted.estimate, fitted.std_error.unwrap());
         assert!(
             (estimate - truth).abs() < 4.0 * error && error < 0.1 * truth.abs(),
             "{estimate} ± {error}"
@@ -181,7 +181,7 @@ fn rules_may_speak_of_it() {
 #[test]
 fn what_the_model_has_no_room_for_is_refused() {
     let (problem, rows) = bench();
-    let refused = |terms: Vec<Term>| model(&problem.with_effect(own(terms)), &rows).unwrap_err();
+    let refused = |terms: Vec<Term>| model(&problem.with_effect(custom(terms)), &rows).unwrap_err();
     let theta = ParameterSite::of_joint(3, JointField::Theta);
     assert!(matches!(
         refused(vec![Term::constant("x", theta, 1.0)]),
@@ -208,7 +208,7 @@ fn what_the_model_has_no_room_for_is_refused() {
     ];
     assert!(matches!(refused(twice), InputErrorKind::SiteOccupied { .. }));
     let beside = problem.with_effect(Effect::TrackerScale);
-    let scale = own(vec![Term::constant("x", ParameterSite::Scale, 1.0)]);
+    let scale = custom(vec![Term::constant("x", ParameterSite::Scale, 1.0)]);
     assert!(matches!(
         model(&beside.with_effect(scale), &rows),
         Err(InputErrorKind::SiteOccupied { .. })
@@ -235,7 +235,7 @@ fn any_free_slot_of_the_catalogue_serves() {
     ];
     let mut warm = rows;
     warm.temperature = Some((0..40).map(|k| 15.0 + f64::from(k % 7)).collect());
-    let model = model(&problem.with_effect(own(terms)), &warm).unwrap();
+    let model = model(&problem.with_effect(custom(terms)), &warm).unwrap();
     let n = model.parameters.len();
     let poses = Placement::of(&warm).poses(&warm, &[0, 1, 2, 3, 4], 1e-3);
     let residuals = PoseResiduals::new(&model, poses, (n - 3..n).collect(), DVector::zeros(n));

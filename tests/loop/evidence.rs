@@ -91,10 +91,10 @@ fn causes_outside_the_catalogue_are_located_and_get_no_law() {
             hypothesis.site.to_string() == truth["where"].as_str().unwrap()
         };
         let by_these = |hypothesis: &Hypothesis| {
-            let mut own: Vec<String> =
+            let mut variables: Vec<String> =
                 hypothesis.depends_on.iter().map(ToString::to_string).collect();
-            own.sort_unstable();
-            !own.is_empty() && own == depends_on
+            variables.sort_unstable();
+            !variables.is_empty() && variables == depends_on
         };
         if evidence.probability(here) < 0.5 && evidence.probability(by_these) < 0.5 {
             lost.push(name);
@@ -131,9 +131,9 @@ fn effects_of_a_heavy_arm_are_named() {
             // A tilt of an upright first joint is confounded with one of the base.
             let aliases = ["base-compliance", "joint-lateral-compliance"];
             let is_it = |hypothesis: &Hypothesis| {
-                let own = hypothesis.effect().map(Effect::name);
-                own == Some(wanted)
-                    || aliases.contains(&wanted) && own.is_some_and(|own| aliases.contains(&own))
+                let name = hypothesis.effect().map(Effect::name);
+                name == Some(wanted)
+                    || aliases.contains(&wanted) && name.is_some_and(|name| aliases.contains(&name))
             };
             assert!(evidence.probability(is_it) >= STATED, "{name}: {wanted} among {names:?}");
         }
@@ -183,7 +183,9 @@ fn noise_in_which_a_reading_follows_the_last_is_called_that() {
         (&only.kind, only.site, only.depends_on.as_slice()),
         (&HypothesisKind::Wandering, Site::Measurement, &[Covariate::Time][..])
     );
-    assert!(evidence.probability(|own| own.kind == HypothesisKind::Wandering) >= STATED);
+    assert!(
+        evidence.probability(|hypothesis| hypothesis.kind == HypothesisKind::Wandering) >= STATED
+    );
     // A drift with a single oscillation is smooth, not a random walk.
     let (mut data, _) = Dataset::read_files(&[cases.join("h-none-large.csv")], &problem).unwrap();
     let last = data.measurements.time.iter().copied().fold(0.0, f64::max);
@@ -196,7 +198,10 @@ fn noise_in_which_a_reading_follows_the_last_is_called_that() {
         (&only.kind, only.site, only.depends_on.as_slice()),
         (&HypothesisKind::Smooth, Site::Measurement, &[Covariate::Time][..])
     );
-    assert!(evidence.probability(|own| own.kind == HypothesisKind::Wandering) < 1.0 - STATED);
+    assert!(
+        evidence.probability(|hypothesis| hypothesis.kind == HypothesisKind::Wandering)
+            < 1.0 - STATED
+    );
 }
 
 /// Returns the arm with the masses of its links, or without.
@@ -231,7 +236,7 @@ fn sag_of_links_whose_masses_nobody_declared_is_called_that() {
     let data = Dataset::new(table(&rows), split);
     let evidence = trace(&light, &data, &Options::default()).unwrap().evidence.unwrap();
     assert!(
-        evidence.probability(|own| own.kind == HypothesisKind::Sag) > STATED,
+        evidence.probability(|hypothesis| hypothesis.kind == HypothesisKind::Sag) > STATED,
         "{:?}",
         evidence.best()
     );
@@ -266,15 +271,15 @@ fn a_fixed_point_measured_again_speaks_for_or_against_a_drift() {
             });
         }
         let closure = close(&problem, &data, &Options::default()).unwrap();
-        let own =
+        let hypothesis =
             |name: &str| closure.effects.iter().find(|found| found.effect.name() == name).unwrap();
-        let drift = own("tracker-drift");
+        let drift = hypothesis("tracker-drift");
         assert_eq!(drift.reference_check.as_ref().map(|check| check.verdict), says);
         assert_eq!(
             (drift.status == Status::Found, closure.verdict == Verdict::Explained),
             (moves > 0.0, moves > 0.0)
         );
-        assert_eq!(own("gear-ratio").reference_check, None);
+        assert_eq!(hypothesis("gear-ratio").reference_check, None);
     }
 }
 
@@ -315,8 +320,11 @@ fn a_slide_that_bends_as_it_goes_out_is_named() {
             (found.status == Status::Found) && closure.verdict == Verdict::Explained,
             "{found:?}"
         );
-        let own = &found.estimates[0];
-        assert!((own.estimate - strength).abs() < 4.0 * own.std_error.unwrap(), "{own:?}");
+        let estimate = &found.estimates[0];
+        assert!(
+            (estimate.estimate - strength).abs() < 4.0 * estimate.std_error.unwrap(),
+            "{estimate:?}"
+        );
     }
 }
 
@@ -385,12 +393,16 @@ fn a_station_that_is_set_up_anew_moves_and_turns() {
     let [found] = closure.effects.as_slice() else { panic!("{:?}", closure.effects) };
     let Effect::StationMove { at_time: moved } = found.effect else { panic!("{found:?}") };
     // Both shifts are between the same two poses.
-    let before = |time: f64| data.measurements.time.iter().filter(|own| **own < time).count();
+    let before =
+        |time: f64| data.measurements.time.iter().filter(|row_time| **row_time < time).count();
     assert_eq!(before(moved), before(at_time), "{moved}");
     assert!((found.status == Status::Found) && closure.verdict == Verdict::Explained, "{found:?}");
     let truth = shift.map(|mm: f64| mm * 1e-3).into_iter().chain(turn.map(f64::to_radians));
-    for (own, truth) in found.estimates.iter().zip(truth) {
-        assert!((own.estimate - truth).abs() < 4.0 * own.std_error.unwrap(), "{own:?} {truth}");
+    for (estimate, truth) in found.estimates.iter().zip(truth) {
+        assert!(
+            (estimate.estimate - truth).abs() < 4.0 * estimate.std_error.unwrap(),
+            "{estimate:?} {truth}"
+        );
     }
     // Three fixed points that moved with the station confirm the move; points that stayed
     // contradict it.
@@ -448,10 +460,18 @@ fn a_function_of_a_command_that_grows_with_temperature_is_located() {
         .unwrap()
         .evidence
         .unwrap();
-    let [own] = evidence.best() else { panic!("{:?}", evidence.best()) };
+    let [hypothesis] = evidence.best() else { panic!("{:?}", evidence.best()) };
     let on = [Covariate::Command(1), Covariate::Temperature];
-    assert_eq!((own.site, own.depends_on.as_slice()), (Site::Joint(1), &on[..]), "{own:?}");
-    assert!(evidence.claims(own).depends_on.1 >= STATED, "{:?}", evidence.claims(own));
+    assert_eq!(
+        (hypothesis.site, hypothesis.depends_on.as_slice()),
+        (Site::Joint(1), &on[..]),
+        "{hypothesis:?}"
+    );
+    assert!(
+        evidence.claims(hypothesis).depends_on.1 >= STATED,
+        "{:?}",
+        evidence.claims(hypothesis)
+    );
     assert_eq!(stated(&evidence), Vec::<String>::new());
 }
 
@@ -517,13 +537,14 @@ fn the_lead_of_a_screw_is_found() {
             .evidence
             .unwrap();
         assert_eq!(stated(&evidence), ["joint-wave"], "{:?}", evidence.best());
-        let Some(&Effect::JointWave { joint: own, order: found }) = evidence.best()[0].effect()
+        let Some(&Effect::JointWave { joint: named_joint, order: found }) =
+            evidence.best()[0].effect()
         else {
             panic!()
         };
         assert!(
-            own == joint && (found / order - 1.0).abs() < 1e-3,
-            "{joint} {order}: {own} {found}"
+            named_joint == joint && (found / order - 1.0).abs() < 1e-3,
+            "{joint} {order}: {named_joint} {found}"
         );
     }
 }
@@ -568,8 +589,9 @@ fn an_order_between_whole_numbers_is_neither_where_a_joint_moves_little() {
     // An integer order is more common, but a non-integer wave is not excluded.
     for seed in 1..=4 {
         let evidence = evidence(whole, seed);
-        let wave = evidence
-            .probability(|own| own.effect().is_some_and(|effect| effect.name() == "joint-wave"));
+        let wave = evidence.probability(|hypothesis| {
+            hypothesis.effect().is_some_and(|effect| effect.name() == "joint-wave")
+        });
         let law = evidence.claims_of(&harmonic(12)).unwrap().law.1;
         assert!(law > wave && wave > 0.02, "{seed}: {law} {wave}");
     }

@@ -48,7 +48,7 @@ fn an_effect_beside_limits_that_hold_is_named() {
         let names: Vec<&str> = closed.effects.iter().map(|found| found.effect.name()).collect();
         assert_eq!(names, ["joint-coupling"], "{seed}");
         let before = &closed.before.fit;
-        let limits = before.estimates.iter().filter(|own| own.at_bound.is_some()).count()
+        let limits = before.estimates.iter().filter(|estimate| estimate.at_bound.is_some()).count()
             + before.active_constraints.len();
         assert!(limits > 0, "{seed}: no limit holds this fit");
     }

@@ -111,8 +111,8 @@ fn what_contacts_cannot_tell_is_named() {
         "[[distance]]\nbetween = [\"left\", \"right\"]\nmm = 593.717104\nsigma_mm = 0.01\n",
         "",
     );
-    let own = format!("\"base.*\" = {{ free = true }}\n{free}");
-    let problem = problem(&own);
+    let text = format!("\"base.*\" = {{ free = true }}\n{free}");
+    let problem = problem(&text);
     let (arm, _) = true_arm(&problem, 2);
     let found = identify(
         &problem,
@@ -136,18 +136,18 @@ fn collinear_anchors_leave_a_turn_of_the_base_open() {
     };
     let around: String = LINE.iter().map(at).collect();
     let held_out = "held_out = { fraction = 0.2, seed = 1 }";
-    let own = format!(
+    let text = format!(
         "\"base.*\" = {{ free = true }}\n{around}[data]\ndistance_sigma_mm = 0.05\n{held_out}\n"
     );
-    let problem = problem(&own);
+    let problem = problem(&text);
     let (arm, _) = true_arm(&problem, 2);
     let data = read(&problem, &Bench::new(arm, 7).table(&["distance on a line"], 150));
     let found = identify(&problem, &data, &Options::default()).unwrap();
-    let named = |own: &UnidentifiableCombination| {
-        own.weights.iter().map(|&(k, _)| found.unknowns[k].clone()).collect::<Vec<String>>()
+    let named = |combination: &UnidentifiableCombination| {
+        combination.weights.iter().map(|&(k, _)| found.unknowns[k].clone()).collect::<Vec<String>>()
     };
     let all: Vec<Vec<String>> = found.identifiability().unidentifiable.iter().map(named).collect();
-    let of_base = |own: &&Vec<String>| own.iter().all(|name| name.starts_with("base."));
+    let of_base = |names: &&Vec<String>| names.iter().all(|name| name.starts_with("base."));
     let open: Vec<&Vec<String>> = all.iter().filter(of_base).collect();
     assert!(open.len() == 1 && open[0].contains(&"base.ry".to_owned()), "{all:?}");
     assert_eq!(found.estimate("base.ry").unwrap().std_error, None);

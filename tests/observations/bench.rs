@@ -121,7 +121,7 @@ pub fn true_arm(problem: &Problem, seed: u64) -> (Problem, Vec<(String, f64)>) {
         arm.joints
             .iter()
             .enumerate()
-            .filter_map(|(k, own)| Some((format!("joint{}.stiffness", k + 1), own.stiffness?))),
+            .filter_map(|(k, joint)| Some((format!("joint{}.stiffness", k + 1), joint.stiffness?))),
     );
     (arm, truth)
 }

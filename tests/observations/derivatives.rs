@@ -40,8 +40,10 @@ fn derivatives_of_every_kind() {
         let residuals =
             PoseResiduals::new(&model, poses, (0..model.parameters.len()).collect(), x.clone());
         let step = |unit| if matches!(unit, Unit::Angle | Unit::Length) { 0.1 } else { 0.5 };
-        let step =
-            DVector::from_iterator(x.len(), model.parameters.iter().map(|own| step(own.unit())));
+        let step = DVector::from_iterator(
+            x.len(),
+            model.parameters.iter().map(|parameter| step(parameter.unit())),
+        );
         let check = check_jacobian(&residuals, &x, &step);
         let (worst, column) = check.worst().unwrap();
         println!(

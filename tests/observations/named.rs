@@ -70,8 +70,8 @@ fn squares(found: &Identification, problem: &Problem, data: &Dataset) -> f64 {
     let model = model_of(problem, &data.measurements);
     let pull =
         |(k, x): (usize, &f64)| model.parameters[k].sigma.map_or(0.0, |sigma| (x / sigma).powi(2));
-    let freedom =
-        found.coordinates as f64 - found.estimates.iter().map(|own| own.identified).sum::<f64>();
+    let freedom = found.coordinates as f64
+        - found.estimates.iter().map(|estimate| estimate.identified).sum::<f64>();
     found.reduced_chi2.unwrap() * freedom + found.x.iter().enumerate().map(pull).sum::<f64>()
 }
 
@@ -85,7 +85,7 @@ fn distinguishable(
 ) -> (f64, f64) {
     let plain = &closed.before.fit;
     let start: Vec<(String, f64)> =
-        plain.estimates.iter().map(|own| (own.name.clone(), own.estimate)).collect();
+        plain.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate)).collect();
     let with = |effect: &Effect| {
         let problem = problem.with_effect(effect.clone());
         let found = identify(
@@ -97,7 +97,7 @@ fn distinguishable(
         Some(squares(&found, &problem, data))
     };
     let without = squares(plain, problem, data);
-    let own = with(truth).unwrap();
+    let true_cost = with(truth).unwrap();
     let others = closed
         .before
         .ranking
@@ -106,7 +106,7 @@ fn distinguishable(
         .filter(|other| !is_the_same(other, truth));
     let others: Vec<Effect> = others.cloned().collect();
     let nearest = others.par_iter().filter_map(with).reduce(|| f64::INFINITY, f64::min);
-    (without - own, nearest - own)
+    (without - true_cost, nearest - true_cost)
 }
 
 /// Returns true if family and place agree; a harmonic must contain the true orders.
@@ -114,8 +114,8 @@ fn is_the_same(named: &Effect, truth: &Effect) -> bool {
     match (named, truth) {
         (
             Effect::JointHarmonic { joint, orders },
-            Effect::JointHarmonic { joint: own, orders: wanted },
-        ) => joint == own && wanted.iter().all(|order| orders.contains(order)),
+            Effect::JointHarmonic { joint: true_joint, orders: wanted },
+        ) => joint == true_joint && wanted.iter().all(|order| orders.contains(order)),
         _ => named == truth,
     }
 }
@@ -137,7 +137,7 @@ fn judged(problem: &Problem, closed: &ClosedLoop, truth: Option<&Effect>) -> Loo
         () if wrong > 0 => Outcome::Wrong,
         () if listed => Outcome::Listed,
         () if structure().any(|left| at_place(left.site))
-            || such.iter().any(|own| at_place(part(&own.effect))) =>
+            || such.iter().any(|alternative| at_place(part(&alternative.effect))) =>
         {
             Outcome::Located
         }
@@ -201,7 +201,7 @@ fn one(arm: &Kind, (how, count): (Measured, usize), effect: Option<&Lacking>, se
     let name = format!(
         "{} {how:?} {} ×{factor:.2} seed {seed}",
         arm.name,
-        effect.map_or("nothing", |own| own.0)
+        effect.map_or("nothing", |kind| kind.0)
     );
     // The true arm may not reach positions of the nominal one: then others are drawn.
     let (problem, contacts) = (0..10)
@@ -218,7 +218,7 @@ fn one(arm: &Kind, (how, count): (Measured, usize), effect: Option<&Lacking>, se
     let tracker =
         simulate_poses(&bare, &truth_of(Measured::Positions, &nothing, &bare), poses, seed)
             .unwrap();
-    let lacking = contacts.truth.effects.first().and_then(|own| match own.cause() {
+    let lacking = contacts.truth.effects.first().and_then(|effect| match effect.cause() {
         Cause::Catalogued(effect) => Some(effect.clone()),
         _ => None,
     });
@@ -278,9 +278,9 @@ impl Row {
 
     fn line(&self) -> String {
         use Outcome::{Elsewhere, Listed, Located, Named, Nothing, Wrong};
-        let own = [Named, Listed, Located, Elsewhere, Nothing, Wrong]
+        let counts = [Named, Listed, Located, Elsewhere, Nothing, Wrong]
             .map(|outcome| self.count(outcome).to_string());
-        format!("{} | {} | {} | {}", self.sets, self.shown, own.join(" | "), self.ghosts)
+        format!("{} | {} | {} | {}", self.sets, self.shown, counts.join(" | "), self.ghosts)
     }
 }
 
@@ -299,7 +299,7 @@ fn run(seeds: Range<u64>) -> (Row, Row) {
                     "{} {:?} {}",
                     arm.name,
                     measured.0,
-                    effect.map_or("nothing", |own| own.0)
+                    effect.map_or("nothing", |kind| kind.0)
                 );
                 if only.split(',').all(|word| name.contains(word)) {
                     work.push((arm, measured, effect, 10_000 * seed + 1000 * a + e));

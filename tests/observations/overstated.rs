@@ -78,12 +78,15 @@ fn the_sigma_that_a_fit_supports_speaks_for_no_effect() {
         let closure = close(&problem, &data, &Options::default()).unwrap();
         assert_eq!(closure.effects.len(), 1, "{seed}: {:?}", closure.effects);
         let found = &closure.effects[0];
-        let (law, own) = (found.claims.as_ref().unwrap().law.1, found.effect.name_and_place());
+        let (law, named) = (found.claims.as_ref().unwrap().law.1, found.effect.name_and_place());
         let share = 1.0 / (1 + found.alternatives.len()) as f64;
-        println!("{seed}: {own} {law:.3}, an even share {share:.3}");
+        println!("{seed}: {named} {law:.3}, an even share {share:.3}");
         // The selected law is the most probable and exceeds its even share: two rigidities, a
         // compliance and a stiffness that changes fit nearly as well.
-        assert!(law > share, "{seed}: {own} {law}, {:?}", found.alternatives);
-        assert!(law > 0.3 && !(law >= 0.9 && own != "joint-compliance 2"), "{seed}: {own} {law}");
+        assert!(law > share, "{seed}: {named} {law}, {:?}", found.alternatives);
+        assert!(
+            law > 0.3 && !(law >= 0.9 && named != "joint-compliance 2"),
+            "{seed}: {named} {law}"
+        );
     }
 }

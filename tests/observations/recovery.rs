@@ -23,8 +23,8 @@ fn fixtures() -> Vec<(String, f64)> {
             .zip(place)
             .map(move |(axis, value)| (format!("{word}[{name}].{axis}"), value))
     };
-    let points = POINTS.into_iter().flat_map(|own| of("point", own));
-    let anchors = ANCHORS.into_iter().flat_map(|own| of("anchor", own));
+    let points = POINTS.into_iter().flat_map(|name| of("point", name));
+    let anchors = ANCHORS.into_iter().flat_map(|name| of("anchor", name));
     points.chain(anchors).chain(of("surface", ("ball", CENTRE))).collect()
 }
 
@@ -87,11 +87,12 @@ fn coverage_of_each_kind() {
                 read(&problem, &Bench::new(arm, 2000 + seed).table(kinds, 150 / kinds.len()));
             let found = identify(&problem, &data, &Options::default()).unwrap();
             assert!(found.is_trusted(), "{kinds:?}, seed {seed}: {:?}", found.findings);
-            all.extend(deviations(&found, &truth).into_iter().map(|own| own.1.abs()));
+            all.extend(deviations(&found, &truth).into_iter().map(|deviation| deviation.1.abs()));
             chi2.extend(found.reduced_chi2);
         }
-        let within =
-            |sigmas: f64| all.iter().filter(|own| **own < sigmas).count() as f64 / all.len() as f64;
+        let within = |sigmas: f64| {
+            all.iter().filter(|deviation| **deviation < sigmas).count() as f64 / all.len() as f64
+        };
         let (one, two) = (within(1.0), within(2.0));
         let mean = chi2.iter().sum::<f64>() / chi2.len() as f64;
         println!(
@@ -159,11 +160,11 @@ fn a_point_that_gives_way_is_named() {
         }
     }
     let found = identify(&problem, &read(&problem, &table), &Options::default()).unwrap();
-    let unsteady = PointSpread::unsteady(found.spreads.iter().map(|own| &own.1));
-    let [(own, times)] = unsteady.as_slice() else { panic!("{unsteady:?}") };
+    let unsteady = PointSpread::unsteady(found.spreads.iter().map(|spread| &spread.1));
+    let [(spread, times)] = unsteady.as_slice() else { panic!("{unsteady:?}") };
     assert!(
-        own.point == "soft" && own.along.y > 0.95 && own.share > 0.9 && *times > 3.0,
-        "{own:?} {times}"
+        spread.point == "soft" && spread.along.y > 0.95 && spread.share > 0.9 && *times > 3.0,
+        "{spread:?} {times}"
     );
 }
 
@@ -195,10 +196,10 @@ fn planes_of_either_side_are_found() {
             let value =
                 |field: &str| found.estimate(&format!("surface[table].{field}")).unwrap().estimate;
             let lean = [value("rx"), value("ry")];
-            let own = flexcal::spatial::plane_normal(lean[0], lean[1]);
+            let fitted_normal = flexcal::spatial::plane_normal(lean[0], lean[1]);
             assert!(
-                (own - normal).norm() < 1e-3 && (value("d") - height * up).abs() < 1e-3,
-                "{what}: {own} {}",
+                (fitted_normal - normal).norm() < 1e-3 && (value("d") - height * up).abs() < 1e-3,
+                "{what}: {fitted_normal} {}",
                 value("d")
             );
         }

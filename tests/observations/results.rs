@@ -38,7 +38,7 @@ impl Residuals {
             let numbers: Vec<f64> = row
                 .iter()
                 .filter(|(name, _)| name.starts_with("residual_"))
-                .filter_map(|own| own.1.parse().ok())
+                .filter_map(|column| column.1.parse().ok())
                 .collect();
             let kind = match () {
                 () if !cell("residual_tilt_x_deg").is_empty() => "tilt",
@@ -57,18 +57,18 @@ impl Residuals {
     /// Asserts that the summary `err` is that of the rows of `kind` for which `part` holds, given
     /// part of the data and session.
     fn agree(&self, err: &Value, kind: &str, part: impl Fn(&str, &str) -> bool, what: &str) {
-        let own: Vec<f64> = self
+        let errors: Vec<f64> = self
             .0
             .iter()
             .filter(|row| row.0 == kind && part(&row.1, &row.2))
             .map(|row| row.3)
             .collect();
-        let n = own.len();
+        let n = errors.len();
         assert_eq!(err["n"], n, "{what}: {err}");
         assert_eq!(err["kind"].as_str().unwrap_or("position"), kind, "{what}");
-        let mean = own.iter().sum::<f64>() / n.max(1) as f64;
-        let rms = (own.iter().map(|x| x * x).sum::<f64>() / n.max(1) as f64).sqrt();
-        let max = own.iter().copied().fold(0.0, f64::max);
+        let mean = errors.iter().sum::<f64>() / n.max(1) as f64;
+        let rms = (errors.iter().map(|x| x * x).sum::<f64>() / n.max(1) as f64).sqrt();
+        let max = errors.iter().copied().fold(0.0, f64::max);
         let (unit, other) = if kind == "tilt" { ("deg", "mm") } else { ("mm", "deg") };
         for (statistic, value) in [("mean", mean), ("max", max), ("rms", rms)] {
             let told = err[format!("{statistic}_{unit}")]["norm"].as_f64().unwrap();
@@ -150,11 +150,15 @@ fn error_summaries_are_of_the_rows_own_residuals_and_say_their_kind() {
         }
 
         // Every file contains all kinds; the printed output shows the first, with its unit.
-        let own = |file: &Value| file["kinds"].as_array().map_or(0, Vec::len);
+        let kind_count = |file: &Value| file["kinds"].as_array().map_or(0, Vec::len);
         let expected = if kinds.len() > 1 { kinds.len() + 1 } else { 0 };
         let known = usize::from(kinds == ["point"]);
-        assert_eq!([own(&estimate), own(&all["after"])], [expected + 2 * known; 2], "{measured:?}");
-        assert_eq!(own(&errors), if kinds.len() > 1 { kinds.len() } else { 0 });
+        assert_eq!(
+            [kind_count(&estimate), kind_count(&all["after"])],
+            [expected + 2 * known; 2],
+            "{measured:?}"
+        );
+        assert_eq!(kind_count(&errors), if kinds.len() > 1 { kinds.len() } else { 0 });
         for (k, kind) in kinds.iter().enumerate().filter(|_| kinds.len() > 1) {
             left.both_agree(&estimate["kinds"][k], kind, "estimate.json");
             after.both_agree(&all["after"]["kinds"][k], kind, "loop.json");
@@ -305,7 +309,7 @@ fn positions_alone_are_accepted() {
     let (estimate, record) =
         (json(folder, "fit/estimate.json"), json(folder, "signed/acceptance.json"));
     let kinds = estimate["kinds"].as_array().unwrap();
-    let all: u64 = kinds.iter().map(|own| own["identification"]["n"].as_u64().unwrap()).sum();
+    let all: u64 = kinds.iter().map(|kind| kind["identification"]["n"].as_u64().unwrap()).sum();
     assert_eq!(record["identification_rows"], all);
     assert_eq!([&record["poses"], &record["held_out_rows"]], [&estimate["held_out"]["n"]; 2]);
     let [accepted, fitted] =
@@ -355,9 +359,9 @@ fn an_exported_geometry_is_judged_by_what_rows_measure() {
                 "{kinds:?}"
             );
             let unit = if of["rms_deg"].is_object() { "rms_deg" } else { "rms_mm" };
-            let [own, fitted] =
+            let [listed, fitted] =
                 [of, &estimate["held_out"]].map(|of| of[unit]["norm"].as_f64().unwrap());
-            assert!((own / fitted - 1.0).abs() < 1e-6, "{kinds:?}, {arm}: {own} {fitted}");
+            assert!((listed / fitted - 1.0).abs() < 1e-6, "{kinds:?}, {arm}: {listed} {fitted}");
         }
     }
 }

@@ -137,7 +137,7 @@ fn lengths_of_the_tables_are_metres() {
 #[test]
 fn reductions_of_table_3_from_its_own_numbers() {
     let reduction = |before: f64, after: f64| 100.0 * (1.0 - after / before);
-    let [max, mean] = [|own: &Published| own.max[3], |own: &Published| own.mean[3]];
+    let [max, mean] = [|table: &Published| table.max[3], |table: &Published| table.mean[3]];
     assert!(
         (reduction(max(&BEFORE), max(&WITH_ELASTICITY)) - 88.68).abs() < 0.005,
         "the text prints 88.63 %"

@@ -234,9 +234,9 @@ fn with_covariates(rest: &str) -> Result<Problem, InputError> {
 
 #[test]
 fn covariates_of_ones_own_are_read_in_their_units() {
-    let own = with_covariates("").unwrap();
+    let problem = with_covariates("").unwrap();
     let table = "q1_deg,oil,q2_deg,x_m,y_m,z_m,tilt_deg\n1,100,2,3,4,5,-0.5\n2,101,2,3,4,5,0.25\n";
-    let (rows, warnings) = read(&own, &[("rows.csv", table)]).unwrap();
+    let (rows, warnings) = read(&problem, &[("rows.csv", table)]).unwrap();
     assert!(warnings.is_empty(), "{warnings:?}");
     assert_eq!(
         (rows.covariates_of(0), rows.covariates_of(1)),
@@ -248,7 +248,7 @@ fn covariates_of_ones_own_are_read_in_their_units() {
 
 #[test]
 fn wrong_covariates_are_named() {
-    let own = with_covariates("").unwrap();
+    let problem = with_covariates("").unwrap();
     for (table, words) in [
         (
             "q1_deg,q2_deg,x_m,y_m,z_m,tilt_deg,oill\n1,2,3,4,5,0,0\n",
@@ -259,14 +259,14 @@ fn wrong_covariates_are_named() {
             "rows.csv:2: column oil: \"hot\" is not a number",
         ),
     ] {
-        let error = read(&own, &[("rows.csv", table)]).map(|_| ()).unwrap_err().to_string();
+        let error = read(&problem, &[("rows.csv", table)]).map(|_| ()).unwrap_err().to_string();
         assert!(error.contains(words), "{error}");
     }
     let poses = tempfile::tempdir().unwrap();
     fs::write(poses.path().join("poses.csv"), "q1_deg,q2_deg\n1,2\n").unwrap();
     let files = [poses.path().join("poses.csv")];
     assert!(
-        Measurements::read_poses(&files, &own).is_ok(),
+        Measurements::read_poses(&files, &problem).is_ok(),
         "poses need a covariate only where an effect follows it"
     );
     let used = with_covariates("[[effect]]\ncovariate = { joint = 2, of = 'oil' }\n").unwrap();

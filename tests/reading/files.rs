@@ -162,7 +162,7 @@ fn results_of_an_earlier_table_do_not_stay_beside_those_of_another() {
     let there = || {
         let names = fs::read_dir(bench.path("out"))
             .unwrap()
-            .map(|own| own.unwrap().file_name().into_string().unwrap());
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap());
         let mut names: Vec<String> = names.filter(|name| !name.starts_with('.')).collect();
         names.sort();
         names
@@ -408,9 +408,9 @@ fn an_acceptance_is_of_the_files_that_were_read() {
     let record: serde_json::Value =
         serde_json::from_str(&bench.read("signed/acceptance.json")).unwrap();
     for (k, name) in ["arm/problem.toml", "arm/measurements.csv"].into_iter().enumerate() {
-        let own = &record["inputs"][k];
-        assert!(own["file"].as_str().unwrap().ends_with(name), "{own}");
-        assert_eq!(own["sha256"], flexcal::files::digest(&fs::read(bench.path(name)).unwrap()));
+        let input = &record["inputs"][k];
+        assert!(input["file"].as_str().unwrap().ends_with(name), "{input}");
+        assert_eq!(input["sha256"], flexcal::files::digest(&fs::read(bench.path(name)).unwrap()));
     }
     assert_eq!(
         (&record["instrument"], &record["commit"]),

@@ -82,7 +82,10 @@ fn what_is_not_seen_is_refused_by_name_and_never_printed() {
                     status == 2 && printed.contains(place) && printed.contains(&code),
                     "{place}{status} {printed:?}"
                 );
-                assert!(printed.chars().all(|own| own == '\n' || !is_hidden(own)), "{printed:?}");
+                assert!(
+                    printed.chars().all(|letter| letter == '\n' || !is_hidden(letter)),
+                    "{printed:?}"
+                );
                 assert!(!bench.path("out").exists());
             }
         }
@@ -116,7 +119,7 @@ fn what_is_not_seen_is_refused_by_name_and_never_printed() {
                 "{arguments:?}: {status} {printed:?}"
             );
             assert!(
-                printed.chars().all(|own| own == '\n' || !is_hidden(own)),
+                printed.chars().all(|letter| letter == '\n' || !is_hidden(letter)),
                 "{arguments:?}: {printed:?}"
             );
         }
@@ -191,7 +194,7 @@ fn ill_formed(text: &str) -> Option<String> {
             }
         }
     }
-    if text.chars().any(|own| own != '\n' && is_hidden(own)) {
+    if text.chars().any(|letter| letter != '\n' && is_hidden(letter)) {
         return Some("a hidden character".to_owned());
     }
     open.pop().map(str::to_owned)

@@ -142,9 +142,9 @@ const PLACED: &str = "[[joint]]\nkind = \"fixed\"\nxyz_m = [0.1, -0.2, 0.3]\nrpy
 #[test]
 fn every_parameter_of_an_arm_with_placements() {
     let rules =
-        ["x", "y", "z"].map(|own| format!("'joint*.{own}' = {{ sigma_mm = 30.0 }}\n")).concat()
+        ["x", "y", "z"].map(|field| format!("'joint*.{field}' = {{ sigma_mm = 30.0 }}\n")).concat()
             + &["roll", "pitch", "yaw"]
-                .map(|own| format!("'joint*.{own}' = {{ sigma_deg = 1.0 }}\n"))
+                .map(|field| format!("'joint*.{field}' = {{ sigma_deg = 1.0 }}\n"))
                 .concat();
     let odd = parse(&format!("{ODD}{rules}{PLACED}"));
     let everything = "[parameters]\n\"*\" = { sigma_deg = 1.0, sigma_mm = 30.0 }\n";
@@ -158,8 +158,11 @@ fn every_parameter_of_an_arm_with_placements() {
             problem.joints.iter().position(|joint| joint.mimic.is_some()).unwrap(),
         );
         rows.configurations.chunks_exact_mut(n).for_each(|row| row[follower] = 0.0);
-        let names: Vec<String> =
-            model_of(&problem, &rows).parameters.into_iter().map(|own| own.name).collect();
+        let names: Vec<String> = model_of(&problem, &rows)
+            .parameters
+            .into_iter()
+            .map(|parameter| parameter.name)
+            .collect();
         assert!(
             names.contains(&format!("joint{n}.pitch"))
                 && !names.contains(&format!("joint{n}.alpha")),

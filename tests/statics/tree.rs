@@ -25,8 +25,11 @@ fn shift(x: f64, y: f64, z: f64) -> Isometry3<f64> {
 fn step(joint: &Joint, q: f64, twist: f64) -> (Isometry3<f64>, Isometry3<f64>) {
     let [x, y, z] =
         [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| move |angle: f64| turn(axis, angle));
-    let placed = joint.placement.map_or(Isometry3::identity(), |own| {
-        shift(own.xyz.x, own.xyz.y, own.xyz.z) * z(own.rpy.z) * y(own.rpy.y) * x(own.rpy.x)
+    let placed = joint.placement.map_or(Isometry3::identity(), |frame| {
+        shift(frame.xyz.x, frame.xyz.y, frame.xyz.z)
+            * z(frame.rpy.z)
+            * y(frame.rpy.y)
+            * x(frame.rpy.x)
     });
     let (q, way) = match joint.kind {
         JointKind::Revolute => (q, 0.0),
@@ -41,10 +44,10 @@ fn step(joint: &Joint, q: f64, twist: f64) -> (Isometry3<f64>, Isometry3<f64>) {
 /// moment about its axis of everything it carries, over its stiffness.
 fn at_rest(problem: &Problem, q: &[f64], payload: f64, passes: usize) -> Vec<Isometry3<f64>> {
     let joints = &problem.joints;
-    let stands_on = |mut own: usize, other: usize| loop {
-        match joints[own].parent {
-            _ if own == other => return true,
-            Some(parent) => own = parent,
+    let stands_on = |mut joint: usize, other: usize| loop {
+        match joints[joint].parent {
+            _ if joint == other => return true,
+            Some(parent) => joint = parent,
             None => return false,
         }
     };
@@ -68,8 +71,8 @@ fn at_rest(problem: &Problem, q: &[f64], payload: f64, passes: usize) -> Vec<Iso
         masses.push((tool.joint, place(tool.joint, tool.payload_at), payload));
         for (k, joint) in joints.iter().enumerate() {
             let (at, axis) = (axes[k].translation.vector, axes[k] * Vector3::z());
-            let own = masses.iter().filter(|(carrier, ..)| stands_on(*carrier, k));
-            let moment: f64 = own
+            let carried = masses.iter().filter(|(carrier, ..)| stands_on(*carrier, k));
+            let moment: f64 = carried
                 .map(|(_, place, mass)| axis.dot(&(place - at).cross(&(problem.gravity * *mass))))
                 .sum();
             twists[k] = joint.stiffness.map_or(0.0, |stiffness| moment / stiffness);
@@ -175,16 +178,20 @@ fn a_chain_by_parents_is_the_chain() {
         of_chain.configurations.chunks(4).flat_map(|q| [q, &[0.3, -0.4]].concat()).collect();
     let columns = |problem: &Problem, rows: &Measurements| {
         let model = model_of(problem, rows);
-        let own: Vec<usize> = (0..model.parameters.len())
+        let indices: Vec<usize> = (0..model.parameters.len())
             .filter(|&k| {
                 let name = &model.parameters[k].name;
                 !name.starts_with("joint5") && !name.starts_with("joint6")
             })
             .collect();
         let poses = Placement::of(rows).poses(rows, &(0..rows.len()).collect::<Vec<_>>(), 1e-3);
-        let residuals =
-            PoseResiduals::new(&model, poses, own.clone(), DVector::zeros(model.parameters.len()));
-        jacobian(&residuals, &DVector::zeros(own.len()))
+        let residuals = PoseResiduals::new(
+            &model,
+            poses,
+            indices.clone(),
+            DVector::zeros(model.parameters.len()),
+        );
+        jacobian(&residuals, &DVector::zeros(indices.len()))
     };
     for equilibrium in [Equilibrium::Deflected, Equilibrium::Undeflected] {
         let with = |problem: &Problem| {

@@ -21,8 +21,9 @@ fn study() -> MisprintStudy {
 
 /// Returns the mean ratio of the error of a reading to that of the rigid fit.
 fn ratio(found: &ReplicaResults, name: &str, stage: usize) -> f64 {
-    let place = found.readings.iter().position(|own| own.name == name).unwrap();
-    let ratios = found.replicas.iter().map(|own| own.ratio(own.reading_error(place, stage)));
+    let place = found.readings.iter().position(|reading| reading.name == name).unwrap();
+    let ratios =
+        found.replicas.iter().map(|replica| replica.ratio(replica.reading_error(place, stage)));
     Spread::of(ratios).unwrap().mean
 }
 
@@ -38,8 +39,8 @@ fn replicas_repeat_and_tell_readings_and_stages_apart() {
     let found = on(1);
     let json = |found| MisprintResult::new(&study, found).to_json();
     assert_eq!(json(&found), json(&on(3)));
-    for own in &found.replicas {
-        assert!((own.rigid.unwrap().mean.norm / study.rigid_leaves - 1.0).abs() < 1e-3);
+    for replica in &found.replicas {
+        assert!((replica.rigid.unwrap().mean.norm / study.rigid_leaves - 1.0).abs() < 1e-3);
     }
     let [known, declared, positions, differences] =
         [0, 1, 2, 3].map(|stage| ratio(&found, "corrected", stage));

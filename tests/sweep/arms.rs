@@ -138,20 +138,20 @@ fn deviations(found: &Identification, truth: &DVector<f64>) -> Vec<f64> {
 /// Fits arms and asserts the claims on those that are trusted.
 fn run(seeds: std::ops::Range<u64>) {
     let all: Vec<Outcome> = seeds.into_par_iter().filter_map(one).collect();
-    let trusted: Vec<&Outcome> = all.iter().filter(|own| own.trusted).collect();
-    let beyond: Vec<&String> = trusted.iter().flat_map(|own| &own.beyond).collect();
-    let z: Vec<f64> = trusted.iter().flat_map(|own| own.z.iter().copied()).collect();
+    let trusted: Vec<&Outcome> = all.iter().filter(|outcome| outcome.trusted).collect();
+    let beyond: Vec<&String> = trusted.iter().flat_map(|outcome| &outcome.beyond).collect();
+    let z: Vec<f64> = trusted.iter().flat_map(|outcome| outcome.z.iter().copied()).collect();
     let covered = NORMAL
         .map(|(within, _)| z.iter().filter(|z| z.abs() < within).count() as f64 / z.len() as f64);
-    let worst = trusted.iter().map(|own| own.held_out).fold(0.0, f64::max);
-    let mut held_out: Vec<f64> = trusted.iter().map(|own| own.held_out).collect();
+    let worst = trusted.iter().map(|outcome| outcome.held_out).fold(0.0, f64::max);
+    let mut held_out: Vec<f64> = trusted.iter().map(|outcome| outcome.held_out).collect();
     held_out.sort_by(f64::total_cmp);
     println!(
         "{} arms, {} trusted ({} with weak combinations), {} estimates beyond; {} estimates with a standard error, {:.1} % \
          within 1 σ, {:.1} % within 2 σ; held-out rms over noise: median {:.2}, largest {worst:.1}",
         all.len(),
         trusted.len(),
-        trusted.iter().filter(|own| own.weak).count(),
+        trusted.iter().filter(|outcome| outcome.weak).count(),
         beyond.len(),
         z.len(),
         100.0 * covered[0],

@@ -83,10 +83,12 @@ impl Set {
         if let Some(flag) = judged.closure.after.first_error() {
             println!("  {seed} is not to be trusted: {flag}");
         }
-        let true_law = |effect: &Effect| truth.iter().any(|own| is_the_same(effect, own));
+        let true_law =
+            |effect: &Effect| truth.iter().any(|true_effect| is_the_same(effect, true_effect));
         let found = &judged.closure.effects;
         let part = |effect: &Effect| effect.terms(problem).first().map(|term| Site::of(term.site));
-        let true_place = |place: Site| truth.iter().any(|own| part(own) == Some(place));
+        let true_place =
+            |place: Site| truth.iter().any(|true_effect| part(true_effect) == Some(place));
         let claims = || found.iter().filter_map(|found| Some((found, found.claims.as_ref()?)));
         let others = judged.closure.unexplained.iter().filter_map(|left| left.claims.as_ref());
         let [shown, named, stated] = judged.counts();

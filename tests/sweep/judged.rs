@@ -201,36 +201,37 @@ fn with(mut problem: Problem, effects: &[Effect]) -> Problem {
 pub fn is_the_same(named: &Effect, truth: &Effect) -> bool {
     let within_two = |one: &f64, other: &f64| (one / other).ln().abs() < std::f64::consts::LN_2;
     match (named, truth) {
-        (Effect::JointWave { joint, order }, Effect::JointWave { joint: own, order: wanted }) => {
-            joint == own && (order - wanted).abs() < 1.0 / 3.0
-        }
+        (
+            Effect::JointWave { joint, order },
+            Effect::JointWave { joint: true_joint, order: wanted },
+        ) => joint == true_joint && (order - wanted).abs() < 1.0 / 3.0,
         (
             Effect::JointHysteresis { joint, distance },
-            Effect::JointHysteresis { joint: own, distance: wanted },
-        ) => joint == own && within_two(distance, wanted),
+            Effect::JointHysteresis { joint: true_joint, distance: wanted },
+        ) => joint == true_joint && within_two(distance, wanted),
         (
             Effect::JointThermalDriftLag { joint, time_constant },
-            Effect::JointThermalDriftLag { joint: own, time_constant: wanted },
-        ) => joint == own && within_two(time_constant, wanted),
+            Effect::JointThermalDriftLag { joint: true_joint, time_constant: wanted },
+        ) => joint == true_joint && within_two(time_constant, wanted),
         (
             Effect::LinkThermalBendingLag { link, time_constant },
-            Effect::LinkThermalBendingLag { link: own, time_constant: wanted },
+            Effect::LinkThermalBendingLag { link: true_link, time_constant: wanted },
         )
         | (
             Effect::LinkThermalExpansionLag { link, time_constant },
-            Effect::LinkThermalExpansionLag { link: own, time_constant: wanted },
-        ) => link == own && within_two(time_constant, wanted),
+            Effect::LinkThermalExpansionLag { link: true_link, time_constant: wanted },
+        ) => link == true_link && within_two(time_constant, wanted),
         (
             Effect::JointHarmonic { joint, orders },
-            Effect::JointHarmonic { joint: own, orders: wanted },
-        ) => joint == own && wanted.iter().all(|order| orders.contains(order)),
-        (Effect::StationShift { at_time }, Effect::StationShift { at_time: own }) => {
-            (at_time - own).abs() < 900.0
+            Effect::JointHarmonic { joint: true_joint, orders: wanted },
+        ) => joint == true_joint && wanted.iter().all(|order| orders.contains(order)),
+        (Effect::StationShift { at_time }, Effect::StationShift { at_time: true_time }) => {
+            (at_time - true_time).abs() < 900.0
         }
         (
             Effect::TrackerSettling { time_constant },
-            Effect::TrackerSettling { time_constant: own },
-        ) => within_two(time_constant, own),
+            Effect::TrackerSettling { time_constant: true_constant },
+        ) => within_two(time_constant, true_constant),
         _ => named == truth,
     }
 }

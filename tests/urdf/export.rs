@@ -45,7 +45,7 @@ fn exported_origins_have_the_identified_pose_and_nothing_else_moves() {
             x.len(),
             x.iter()
                 .zip(&model.parameters)
-                .map(|(x, own)| if own.name.starts_with("joint") { *x } else { 0.0 }),
+                .map(|(x, parameter)| if parameter.name.starts_with("joint") { *x } else { 0.0 }),
         )
     };
     let x = arm_only(&draw(&model, |_| 0.0, &mut rng));

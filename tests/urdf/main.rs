@@ -44,9 +44,9 @@ pub(crate) fn tips(
     let rows = Dataset::poses(configurations).measurements().unwrap();
     let all: Vec<usize> = (0..rows.len()).collect();
     let at = |target: Vector3<f64>| {
-        let mut own = problem.clone();
-        own.tool.target = target;
-        model_of(&own, &rows).predict(Placement::of(&rows).poses(&rows, &all, 1.0), x)
+        let mut moved = problem.clone();
+        moved.tool.target = target;
+        model_of(&moved, &rows).predict(Placement::of(&rows).poses(&rows, &all, 1.0), x)
     };
     let [origin, x, z] = [Vector3::zeros(), Vector3::x(), Vector3::z()].map(at);
     (0..rows.len()).map(|k| [origin[k], x[k] - origin[k], z[k] - origin[k]]).collect()
@@ -76,7 +76,7 @@ fn the_gallery_runs() {
         let fit = identify(&problem, &data, &Options::default()).unwrap();
         assert!(fit.is_trusted(), "{arm}");
         assert!(fit.fitted.held_out.mean.norm < 0.6 * fit.registered.held_out.mean.norm, "{arm}");
-        let all = fit.estimates.iter().filter(|own| own.std_error.is_none()).count();
+        let all = fit.estimates.iter().filter(|estimate| estimate.std_error.is_none()).count();
         assert_eq!(all, 0, "{arm}: what is free is told apart");
     }
 }

@@ -106,10 +106,10 @@ fn files_that_differ() {
         "twice",
         &["1.csv: named twice on the command line"],
     );
-    let own = folder.path().join("problem.toml");
-    fs::write(&own, format!("{ARM}\n[data]\nfiles = [\"1.csv\", \"./1.csv\"]\n")).unwrap();
-    let line = fs::read_to_string(&own).unwrap().lines().count();
-    let named = Problem::read(&own).unwrap();
+    let path = folder.path().join("problem.toml");
+    fs::write(&path, format!("{ARM}\n[data]\nfiles = [\"1.csv\", \"./1.csv\"]\n")).unwrap();
+    let line = fs::read_to_string(&path).unwrap().lines().count();
+    let named = Problem::read(&path).unwrap();
     let error = Measurements::read(&named.data.files, &named).unwrap_err();
     check(
         &error,
