@@ -44,7 +44,7 @@ impl Export {
         found: &Identification,
     ) -> Result<Self, InputError> {
         let robot = Robot::read(urdf)?;
-        let chain = Chain::of(&robot, problem)?;
+        let chain = Chain::from_problem(&robot, problem)?;
         let placement = Placement::of(&data.measurements);
         let model =
             found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);

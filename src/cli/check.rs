@@ -98,7 +98,7 @@ fn judged(arguments: &Arguments, problem: &Problem) -> Result<CheckedPoses, Box<
             })
         }
         (None, Some(poses)) => {
-            common.warn(problem.far_target().as_slice());
+            common.warn(&problem.plausibility_warnings());
             Ok(CheckedPoses::Drawn(source.all_ranges(problem)?, poses))
         }
         (None, None) => {

@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (text, moved, default) = match (&arguments.urdf, arguments.format) {
         (Some(file), _) => {
             let robot = Robot::read(file)?;
-            let export = export(&Chain::of(&robot, &problem)?, &problem, &arm)?;
+            let export = export(&Chain::from_problem(&robot, &problem)?, &problem, &arm)?;
             let name = file.file_name().unwrap_or_default().to_owned();
             (export.text, Some(export.moved), PathBuf::from(name))
         }

@@ -125,7 +125,9 @@ impl Common {
         names: &[&str],
     ) -> Result<Results, WriteError> {
         let file = [self.problem_file()];
-        let inputs = [&file, others, &problem.data.files, self.data()].concat();
+        let joint_files =
+            problem.data.joint_log.as_ref().map_or(&[][..], |log| log.files.as_slice());
+        let inputs = [&file, others, &problem.data.files, joint_files, self.data()].concat();
         self.claim(command, &self.results_name(problem), inputs, names)
     }
 

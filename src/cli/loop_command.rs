@@ -53,15 +53,19 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let json = result.to_json();
     fs::create_dir_all(&results.folder)
         .map_err(|source| WriteError::Io { path: results.folder.clone(), source })?;
-    let files = common
-        .files(&problem)
-        .iter()
-        .map(|file| seen_from(&results.folder, file))
-        .collect::<Result<Vec<_>, _>>()?;
+    let relative = |files: &[PathBuf]| -> io::Result<Vec<PathBuf>> {
+        files.iter().map(|file| seen_from(&results.folder, file)).collect()
+    };
+    let files = relative(common.files(&problem))?;
+    let joint_files =
+        relative(problem.data.joint_log.as_ref().map_or(&[], |log| log.files.as_slice()))?;
     let shown = PlotData::of_loop(&problem, &data, &closure)?;
     let texts = [
         ("loop.json", json.as_str()),
-        ("problem.closed.toml", &report::closed_problem(&text, &problem, &closure, &files)?),
+        (
+            "problem.closed.toml",
+            &report::closed_problem(&text, &problem, &closure, [&files, &joint_files])?,
+        ),
         (
             "residuals.csv",
             &report::residuals_csv(

@@ -1,12 +1,13 @@
 //! Kinds of input errors and their messages.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::NoRows;
 use super::near::{instead, meant, question};
-use super::shortened;
+use super::phrases::{difference, in_quotes, list, near, plural};
 use super::urdf::UrdfErrorKind;
 
 /// Kind of an input error.
@@ -42,9 +43,7 @@ pub enum InputErrorKind {
     Unreadable { source: io::Error },
     #[error("larger than {most} MiB; is it the right file?")]
     FileTooLarge { most: u64 },
-    #[error(
-        "the line is longer than {most} KiB; is it a table with its rows on lines of their own?"
-    )]
+    #[error("the line is longer than {most} KiB; is this a table with one row per line?")]
     LineTooLong { most: u64 },
     #[error("{found} {what}; at most {most}")]
     TooMany { what: &'static str, found: usize, most: usize },
@@ -76,10 +75,10 @@ pub enum InputErrorKind {
     // Errors of values.
     #[error("{value} is not a finite number")]
     NotFinite { value: String },
-    #[error("{value} is larger than 1e150, the largest number that can be reckoned with")]
+    #[error("{value} is larger than 1e150, the largest number that flexcal accepts")]
     MagnitudeTooLarge { value: String },
     #[error(
-        "holds a character that is not seen (U+{code:04X}: a control character, or a mark of writing direction); leave it out"
+        "contains an invisible character (U+{code:04X}: a control character, or a direction mark); remove it"
     )]
     Hidden { code: u32 },
     #[error("{value} is not a whole number of at least {least}")]
@@ -94,11 +93,11 @@ pub enum InputErrorKind {
     Negative { value: f64 },
     #[error("{value} is not above zero")]
     NotPositive { value: f64 },
-    #[error("{value} is not above zero; leave the key out where nothing gives way")]
+    #[error("{value} is not above zero; for a rigid part leave the key out")]
     StiffnessNotPositive { value: f64 },
     #[error("{value} is not between 0 and 1")]
     NotAFraction { value: f64 },
-    #[error("a direction has a length; [0, 0, 0] has none")]
+    #[error("[0, 0, 0] has no direction; write a vector that is not zero")]
     NoDirection,
     #[error("empty; write at least one character")]
     Empty,
@@ -117,36 +116,42 @@ pub enum InputErrorKind {
     )]
     BeamInStandardForm,
     #[error(
-        "a standard table has one chain and one tool, behind its last row; write it in the modified form (without dh = \"standard\")"
+        "a standard table describes one chain with one tool after its last row; write the table in the modified form (without dh = \"standard\")"
     )]
     NotInStandardForm,
-    #[error("{what} takes one chain of joints; this arm is a tree")]
+    #[error("{what} needs a single chain of joints, and this arm is a tree")]
     NotAChain { what: &'static str },
     #[error(
-        "{what} takes one tool behind the last joint; this arm has a [[target]], or its tool on another joint"
+        "{what} needs one tool on the last joint, and this arm has a [[target]], or its tool on another joint"
     )]
     NotOneTool { what: &'static str },
     #[error(
-        "joint {joint} cannot stand on joint {parent}: list it behind the joint that it stands on"
+        "joint {joint} cannot be mounted on joint {parent}: list it after the joint that carries it"
     )]
     ParentListedLater { joint: usize, parent: u64 },
     #[error(
-        "the branch of joint {parent} has ended; list everything that stands on a joint right behind it"
+        "the branch of joint {parent} has ended; list everything that a joint carries directly after it"
     )]
     BranchEnded { parent: u64 },
-    #[error("a fixed joint follows no other; leave mimic out, or give the joint another kind")]
+    #[error("a fixed joint cannot follow another one; leave mimic out, or write another kind")]
     FixedJointMimics,
-    #[error("joint {joint} takes no command of its own that another could follow")]
+    #[error(
+        "joint {joint} takes no command that another joint could follow; name a commanded joint"
+    )]
     LeaderNotCommanded { joint: u64 },
-    #[error("\"{name}\" cannot name a beam, for parameters go by it; leave out . * [ ] and spaces")]
+    #[error(
+        "\"{name}\" cannot name a beam, because its parameters contain the name; leave out . * [ ] and spaces"
+    )]
     NotABeamName { name: String },
-    #[error("\"{name}\" names other parameters; choose another name")]
+    #[error("\"{name}\" is the name of other parameters; choose another name")]
     ReservedName { name: String },
     #[error("another beam is called \"{name}\"; choose another name")]
     RepeatedBeamName { name: String },
 
     // Errors of points, anchors, surfaces and targets.
-    #[error("\"{name}\" cannot name {what}, for parameters go by it; leave out . * [ ] and spaces")]
+    #[error(
+        "\"{name}\" cannot name {what}, because parameter names contain it; leave out . * [ ] and spaces"
+    )]
     NotAFixtureName { what: &'static str, name: String },
     #[error("the rows name no target; each of them measures one of {}: add a column target", targets.join(", "))]
     TargetsUnnamed { targets: Vec<String> },
@@ -159,15 +164,17 @@ pub enum InputErrorKind {
     )]
     UnknownFixture { what: &'static str, name: String, known: Vec<String> },
     #[error(
-        "nobody knows where {parameter} is, so it can neither be held nor have a prior; write {write}"
+        "the place of {parameter} is not declared, so it can neither be fixed nor have a prior; write {write}"
     )]
     UnknownPlaceHeld { parameter: String, write: &'static str },
-    #[error("nobody knows where the {what} \"{name}\" is; declare about where: {write}")]
+    #[error(
+        "the place of the {what} \"{name}\" is not declared; declare it approximately: {write}"
+    )]
     PlaceUnknown { what: &'static str, name: String, write: &'static str },
-    #[error("a distance is between two different points, found {found}")]
+    #[error("a distance needs two different points, found {found}")]
     NotTwoPoints { found: usize },
     #[error(
-        "the {what} \"{name}\" is measured by {rows} row{} alone, which says nothing: its own place takes {numbers} numbers; \
+        "the {what} \"{name}\" is measured by {rows} row{} only, which do not determine its {numbers} unknown coordinates; \
          measure it again in other configurations, or declare where it is", plural(*rows)
     )]
     TooFewContacts { what: &'static str, name: String, rows: usize, numbers: usize },
@@ -175,11 +182,9 @@ pub enum InputErrorKind {
     IncompleteObservation { has: &'static str, lacks: &'static str },
     #[error("nothing is measured in this row: every column that could hold something is empty")]
     NothingMeasured,
-    #[error(
-        "the column means nothing in this problem, which does not declare {write}; declare what the column speaks of"
-    )]
+    #[error("the column has no meaning in this problem; declare {write}")]
     NotDeclared { write: &'static str },
-    #[error("rows of several kinds are weighed against each other; write {write} in [data]")]
+    #[error("rows of several kinds need their standard deviations; write {write} in [data]")]
     NoSigmaOfKind { write: String },
 
     // Errors of effects.
@@ -193,10 +198,12 @@ pub enum InputErrorKind {
     UnknownJoint { joint: u64, joints: usize },
     #[error("no beam is called \"{link}\"; there {}", list("is", links, "are none"))]
     UnknownLink { link: String, links: Vec<String> },
-    #[error("a joint is coupled to another one; for joint {joint} alone write gear-ratio")]
+    #[error(
+        "a joint cannot be coupled to itself; for an error of joint {joint} alone write gear-ratio"
+    )]
     CoupledToItself { joint: usize },
     #[error(
-        "\"{name}\" cannot name a covariate: it is one of flexcal's own columns, or holds one of [ ] , * ?"
+        "\"{name}\" cannot name a covariate: it is a column name of flexcal, or contains one of [ ] , * ?"
     )]
     NoCovariateName { name: String },
     #[error(
@@ -204,38 +211,42 @@ pub enum InputErrorKind {
         list("has", known, "has none")
     )]
     UnknownCovariate { name: String, known: Vec<String> },
-    #[error("every row names a fixed point in the column nest; none is of the arm")]
+    #[error(
+        "every row measures a fixed point (column nest) and none the arm; add rows of the arm with an empty cell"
+    )]
     NestsAlone,
-    #[error("the row names no position to go to: contacts, distances and tilts are no targets")]
+    #[error("the row has no target position; contacts, distances and tilts cannot be commanded")]
     NoTarget,
-    #[error("write joint = … or base = true, one of them")]
+    #[error("write either joint = … or base = true")]
     NotOnePlace,
     #[error("no order; write at least one, as in [1]")]
     NoOrders,
     #[error(
-        "{order} is no order; write a number of cycles a revolution, above 0 and up to {highest}"
+        "{order} is not a valid order; write a number of cycles per revolution above 0 and up to {highest}"
     )]
     NotAnOrder { order: f64, highest: f64 },
-    #[error("order {order} stands twice")]
+    #[error("order {order} is listed twice; keep one")]
     RepeatedOrder { order: u32 },
     #[error("declared already on line {line}")]
     RepeatedEffect { line: usize },
     #[error("order {order} of this joint is declared already on line {line}")]
     RepeatedHarmonic { order: u32, line: usize },
     #[error(
-        "joint {joint} is fixed and takes no command; leave the effect out, or free the joint's own parameters"
+        "joint {joint} is fixed and takes no command; leave the effect out, or free the joint's geometric parameters"
     )]
     NoCommand { joint: usize },
-    #[error("joint {joint} has no link that could bend: its a is 0")]
+    #[error("joint {joint} has no link that can bend, because its a is 0")]
     NoLink { joint: usize },
-    #[error("joint {joint} has no slide that could bend: it is not prismatic")]
+    #[error("joint {joint} has no slide that can bend, because it is not prismatic")]
     NoSlide { joint: usize },
-    #[error("joint {joint} does not turn: it is not revolute")]
+    #[error("joint {joint} does not rotate, because it is not revolute")]
     NotRevolute { joint: usize },
-    #[error("the end of a spring lies on the joint's axis, where its pull has no moment")]
+    #[error(
+        "the end of a spring lies on the joint's axis, where its force has no moment; move the point"
+    )]
     OnTheAxis,
     #[error(
-        "nothing gives way about the axis of joint {joint} that a compensator could relieve; give the joint its \
+        "joint {joint} is rigid, so a compensator has no effect on it; give the joint its \
          stiffness_N_m_per_rad, or declare joint-compliance = {{ joint = {joint} }} too"
     )]
     NothingToRelieve { joint: usize },
@@ -244,26 +255,26 @@ pub enum InputErrorKind {
     #[error("no beam has a hoist; add a section [joint.beam.hoist]")]
     NoHoist,
     #[error(
-        "the loads act on the bent arm already; with this effect write equilibrium = \"undeflected\" in [statics]"
+        "the loads already act on the deflected arm; with this effect write equilibrium = \"undeflected\" in [statics]"
     )]
     InEquilibriumAlready,
-    #[error("{name} enters where another parameter is already")]
+    #[error("{name} acts at the place of another parameter; choose another place")]
     SiteOccupied { name: String },
     #[error(
-        "{name} is driven, and only the coordinate of a moving joint and a shift of the measurement may be"
+        "{name} depends on a quantity of the pose, which is allowed only at the coordinate of a moving joint and for a shift of the measurement"
     )]
     RegressorNotAllowed { name: String },
-    #[error("{name} enters where the arm has nothing")]
+    #[error("{name} acts at a place that this arm does not have")]
     SiteAbsent { name: String },
-    #[error("the measurements cannot show this effect; they need {write}")]
+    #[error("the measurements contain no information about this effect; they need {write}")]
     NeedsColumn { write: &'static str },
 
     // Errors of rules in [parameters].
-    #[error("a name with dots stands in quotes: \"{name}\" = {{ … }}")]
+    #[error("a name with dots needs quotes: \"{name}\" = {{ … }}")]
     UnquotedName { name: String },
-    #[error("says nothing; write free = true, fixed = true, or a sigma, min or max")]
+    #[error("the rule is empty; write free = true, fixed = true, or a sigma, min or max")]
     EmptyRule,
-    #[error("a fixed parameter takes nothing else; leave out {other}")]
+    #[error("a fixed parameter has no other settings; leave out {other}")]
     FixedAndMore { other: String },
     #[error("{lower} is above {upper}")]
     LimitsCross { lower: String, upper: String },
@@ -275,23 +286,23 @@ pub enum InputErrorKind {
     )]
     MatchesNothing { pattern: String, known: Vec<String> },
     #[error(
-        "the pattern matches no parameter of this arm; those of {effects} are there once an [[effect]] declares it, \
+        "the pattern matches no parameter of this arm; parameters of {effects} exist if an [[effect]] declares it, \
          as in {write}"
     )]
     EffectNotDeclared { effects: String, write: String },
-    #[error("{parameter} takes {suffixes}; give that too, or a rule of its own")]
+    #[error("{parameter} needs {suffixes}; add that, or write a separate rule for it")]
     QuantityMissing { parameter: String, suffixes: &'static str },
-    #[error("no parameter that the pattern matches takes {suffixes}; leave it out")]
+    #[error("{suffixes} does not apply to any parameter that the pattern matches; leave it out")]
     QuantityUseless { suffixes: &'static str },
 
     // Errors of constraints.
-    #[error("a constraint speaks of angles, lengths, stiffnesses and rigidities only")]
+    #[error("a constraint may contain only angles, lengths, stiffnesses and rigidities")]
     NotConstrainable,
     #[error(
         "no terms; write the parameters and their coefficients, as in {{ \"A.EI\" = 1.0, \"B.EI\" = -1.0 }}"
     )]
     NoTerms,
-    #[error("a coefficient of 0 says nothing; leave the parameter out")]
+    #[error("a coefficient of 0 has no effect; leave the parameter out")]
     NoCoefficient,
     #[error("no limit; write at_least or at_most (with a unit for lengths and angles)")]
     NoLimit,
@@ -302,7 +313,7 @@ pub enum InputErrorKind {
     )]
     UnknownParameter { name: String, known: Vec<String> },
     #[error(
-        "does not add up with {other}: angles, lengths and logarithms of stiffnesses go in constraints of their own"
+        "cannot be added to {other}; write separate constraints for angles, for lengths and for logarithms of stiffnesses"
     )]
     MixedKinds { other: String },
     #[error("{parameter} takes {write}")]
@@ -321,14 +332,14 @@ pub enum InputErrorKind {
 
     // Errors in the truth of a simulation.
     #[error(
-        "a range is two numbers, the lower one first; for a fixed value write [{value}, {value}]"
+        "a range has two numbers, the lower one first; for a fixed value write [{value}, {value}]"
     )]
     OneNumber { value: f64 },
-    #[error("a range is two numbers, the lower one first; found {found}")]
+    #[error("a range has two numbers, the lower one first; found {found}")]
     NotARange { found: usize },
     #[error("no strength; write {write}")]
     NoStrength { write: String },
-    #[error("the test rig is always in equilibrium; write 1")]
+    #[error("the test rig always computes the equilibrium; write 1")]
     AlwaysInEquilibrium,
     #[error("needs temperatures; write {write}")]
     NeedsTemperature { write: &'static str },
@@ -338,25 +349,23 @@ pub enum InputErrorKind {
     NoSessions { session: String },
 
     // Errors of studies.
-    #[error("stands in the list already")]
+    #[error("is already in the list; remove it")]
     Repeated,
     #[error("the list is empty; write at least one value")]
     EmptyList,
-    #[error(
-        "a study of misprints is done at once, with neither shares nor parts; leave out --shard and merge"
-    )]
+    #[error("a study of misprints runs in one piece; leave out --shard and merge")]
     NotOfFits,
-    #[error("the study says how many poses there are; leave it out")]
+    #[error("the study sets the number of poses; leave this out")]
     PosesOfStudy,
     #[error(
-        "the model makes no measurements with effects that the problem does not declare; write data = \"rig\""
+        "the model cannot simulate effects that the problem does not declare; write data = \"rig\""
     )]
     NeedsRig,
     #[error(
         "{solver} does not keep the bounds and constraints of the problem; write bounded, interior-point or auto"
     )]
     SolverIgnoresBounds { solver: &'static str },
-    #[error("no parameter of the kind that {strategy} varies is free in the problem; leave it out")]
+    #[error("no parameter that {strategy} varies is free in the problem; leave the strategy out")]
     NothingToVary { strategy: &'static str },
 
     #[error(transparent)]
@@ -366,7 +375,7 @@ pub enum InputErrorKind {
     #[error("give one of column, fraction (with seed) or session")]
     NotOneHeldOut,
     #[error(
-        "no row is said to be held out; write held_out = {{ fraction = 0.3, seed = 1 }} in [data], or add a column split"
+        "no held-out rows are declared; write held_out = {{ fraction = 0.3, seed = 1 }} in [data], or add a column split"
     )]
     NoHeldOut,
     #[error("no rows are left to fit: {cause}")]
@@ -395,47 +404,63 @@ pub enum InputErrorKind {
     GivenFileRepeated,
     #[error("the file is empty; it begins with a header line such as q1_deg,x_mm,y_mm,z_mm")]
     EmptyTable,
+    #[error(
+        "the pose {name} is already on line {line}; give each pose of the joint table its own name"
+    )]
+    RepeatedPose { name: String, line: usize },
+    #[error(
+        "no row of the measurements has a partner in the joint table; check the column of the join (pose or time) and \
+         tolerance_s"
+    )]
+    NothingJoined,
     #[error("no rows below the header")]
     NoRowsBelowHeader,
     #[error("an Excel workbook; save its sheet as CSV")]
     Workbook,
-    #[error("columns are set apart by {found:?}; write delimiter = \"{found}\" in [data.format]")]
+    #[error(
+        "the columns are separated by {found:?}; write delimiter = \"{found}\" in [data.format]"
+    )]
     OtherDelimiter { found: char },
-    #[error("a decimal comma goes with another delimiter than a comma")]
+    #[error("a decimal comma needs another delimiter than the comma; write delimiter = \";\"")]
     DecimalDelimiter,
     #[error("{} has no such column{}; {}", file.display(), meant(name, known), in_quotes(known))]
     NoSuchColumn { file: PathBuf, name: String, known: Vec<String> },
-    #[error("{} has several columns of this name; say which by its place, as in \"#{place}\"", file.display())]
+    #[error("{} has several columns with this name; select one by its place, as in \"#{place}\"", file.display())]
     AmbiguousColumn { file: PathBuf, place: usize },
-    #[error(
-        "the table has a column {name} of its own, and none that is {write}; is that meant here?"
-    )]
+    #[error("the table has another column {name} and lacks {write}; is {write} meant here?")]
     MappedNameTaken { name: String, write: String },
-    #[error("not a column that flexcal knows{}", question(meant.as_deref()))]
+    #[error("not a column of flexcal{}", question(meant.as_deref()))]
     UnknownMeaning { meant: Option<String> },
-    #[error("the position of every row is the one that stands for nothing measured")]
+    #[error(
+        "every row has the position that marks missing measurements; check missing in [data.format]"
+    )]
     AllMissing,
-    #[error("qx, qy, qz, qw are no rotation: their squares do not add up to 1")]
+    #[error(
+        "qx, qy, qz, qw are not a rotation, because their squares do not add up to 1; check the columns"
+    )]
     NotAQuaternion,
     #[error(
-        "orientation is to be fitted, and the measurements hold none; add rx_deg, ry_deg, rz_deg or qx, qy, qz, qw"
+        "orientations are to be fitted, and the measurements contain none; add rx_deg, ry_deg, rz_deg or qx, qy, qz, qw"
     )]
     NoOrientation,
     #[error(
-        "orientation is weighed against position; write position_sigma_mm too, or a column sigma_mm"
+        "fitting orientations needs the standard deviation of positions; write position_sigma_mm too, or a column sigma_mm"
     )]
     NoPositionSigma,
     #[error("\"{value}\" is neither a number nor a time such as 2024-05-31T14:03:20.5")]
     NotATime { value: String },
     #[error(
-        "\"{value}\" is not a number; where numbers have a decimal comma, write decimal = \",\" in [data.format]"
+        "\"{value}\" is not a number; if numbers have a decimal comma, write decimal = \",\" in [data.format]"
     )]
     DecimalComma { value: String },
+    #[error(
+        "\"{value}\" has a decimal point, and [data.format] says decimal = \",\"; write the number with a comma and without \
+         thousands separators, or correct decimal"
+    )]
+    DecimalPoint { value: String },
     #[error("missing; add {write}{}", instead("column ", near.as_deref()))]
     MissingColumn { write: String, near: Option<String> },
-    #[error(
-        "not a column that is known; a letter off {meant}: write that, or a name that is not so near"
-    )]
+    #[error("unknown column, one letter away from {meant}; write {meant}, or a less similar name")]
     MistypedColumn { meant: String },
     #[error("given already as column {first}; keep one of the two")]
     RepeatedColumn { first: String },
@@ -445,7 +470,7 @@ pub enum InputErrorKind {
     ColumnLength { expected: usize, found: usize },
     #[error("the row has {found} fields, the header {expected}")]
     RowLength { expected: usize, found: usize },
-    #[error("a quote is opened and never closed")]
+    #[error("a quote is opened and not closed")]
     OpenQuote,
     #[error("the cell is empty")]
     EmptyCell,
@@ -455,113 +480,4 @@ pub enum InputErrorKind {
     NotADirection { value: f64 },
     #[error("\"{word}\" is neither identification nor validation")]
     UnknownSplit { word: String },
-}
-
-/// Reason why one part of the split is empty.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
-#[non_exhaustive]
-pub enum NoRows {
-    #[error("column {column} says {word} in every row")]
-    Column { column: String, word: &'static str },
-    #[error("every row is of session \"{session}\"")]
-    Session { session: String },
-    #[error(
-        "the {rows} rows have {configurations} joint configurations, too few for fraction {fraction}"
-    )]
-    Fraction { rows: usize, configurations: usize, fraction: String },
-}
-
-/// Kind of a warning, with its cause and remedy as message.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[non_exhaustive]
-#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
-pub enum WarningKind {
-    #[error("not a column that is known{}; ignored{}", question(meant.as_deref()), covariate(meant.as_deref()))]
-    ColumnIgnored { meant: Option<String> },
-    #[error("columns that [data.columns] does not name are ignored: {}", names.join(", "))]
-    Unmapped { names: Vec<String> },
-    #[error("nothing was measured in {rows} row{}, the first here: left out", plural(*rows))]
-    RowsMissing { rows: usize },
-    #[error(
-        "orientations take no part in the search for effects: its fits and its evidence are of positions"
-    )]
-    OrientationLeftOut,
-    #[error(
-        "rows are marked in the column split, and held_out divides them otherwise; held_out = {{ column = \"split\" }} follows the marks"
-    )]
-    SplitUnused,
-    #[error("joint {joint} takes no q; ignored")]
-    JointIgnored { joint: usize },
-    #[error("not a column that is known; ignored (write {write})")]
-    UnitIgnored { write: String },
-    #[error(
-        "{value:?} is no date and time such as 2024-05-31T14:03:20.5; ignored, so that the order of the rows is the time (write {write} for \
-         seconds)"
-    )]
-    NotADate { value: String, write: String },
-    #[error("the same as {first} to the last digit{}; measurements do not repeat so exactly, and a copy counts twice", repeated_rows(*rows, others))]
-    RowsRepeated { rows: usize, first: String, others: Vec<String> },
-    #[error("the time goes back by {back} s from the row before{}; rows are taken in the order of their times", additional_rows(*rows))]
-    TimeGoesBack { rows: usize, back: String },
-    #[error(
-        "commanded beyond its limits ({limits}) in {rows} row{}, furthest here: {worst}; used all the same", plural(*rows)
-    )]
-    BeyondLimits { rows: usize, worst: String, limits: String },
-    #[error("{value} is {turns} turns; if these are degrees, the columns end in _deg")]
-    ManyTurns { value: String, turns: String },
-    #[error("all temperatures are {least} °C or more; if these are kelvins, take 273.15 off")]
-    Kelvins { least: String },
-    #[error(
-        "{distance} m away from the last frame, and all links together are {links} m long; if these are millimetres, write target_mm"
-    )]
-    FarTarget { distance: String, links: String },
-}
-
-fn repeated_rows(rows: usize, named: &[String]) -> String {
-    let (further, left) = (rows.saturating_sub(1), rows.saturating_sub(1 + named.len()));
-    let left = if left > 0 { format!(" and {left} more") } else { String::new() };
-    let named = named.join(", ");
-    match further {
-        0 => String::new(),
-        1 => format!(", and 1 further row repeats another ({named})"),
-        _ => format!(", and {further} further rows repeat others ({named}{left})"),
-    }
-}
-
-fn additional_rows(rows: usize) -> String {
-    if rows > 1 {
-        format!(", and in {} further row{}", rows - 1, plural(rows - 1))
-    } else {
-        String::new()
-    }
-}
-
-/// Returns the hint for a column that does not resemble a known one.
-fn covariate(meant: Option<&str>) -> &'static str {
-    if meant.is_none() { " (what may bear on the arm is named in [data.covariates])" } else { "" }
-}
-
-fn plural(count: usize) -> &'static str {
-    if count == 1 { "" } else { "s" }
-}
-
-fn near(text: &str) -> String {
-    if text.is_empty() { String::new() } else { format!(", near `{text}`") }
-}
-
-fn difference(other: &Path, has: bool) -> String {
-    let says = if has { "has it, this file does not" } else { "does not have it" };
-    format!("{} {says}", other.display())
-}
-
-/// Returns names in quotes, as in `there are "a", "b"`.
-fn in_quotes(names: &[String]) -> String {
-    let names: Vec<String> =
-        names.iter().map(|name| format!("\"{}\"", shortened(name, 40))).collect();
-    list("there are", &names, "its header is empty")
-}
-
-fn list(verb: &str, names: &[String], none: &str) -> String {
-    if names.is_empty() { none.to_owned() } else { format!("{verb} {}", names.join(", ")) }
 }

@@ -3,8 +3,11 @@
 mod causes;
 mod kind;
 mod near;
+mod no_rows;
+mod phrases;
 mod plain;
 mod urdf;
+mod warning;
 
 use std::fmt;
 use std::ops::Range;
@@ -12,10 +15,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use causes::{message_with_causes, mistake};
-pub use kind::{InputErrorKind, NoRows, WarningKind};
+pub use kind::InputErrorKind;
 pub(crate) use near::{nearest, one_typo};
+pub use no_rows::NoRows;
 pub use plain::{escape_hidden, is_hidden, mask_hidden, one_line};
 pub use urdf::UrdfErrorKind;
+pub use warning::WarningKind;
 
 /// Byte-order mark of UTF-8 text.
 pub(crate) const BYTE_ORDER_MARK_UTF8: &[u8] = b"\xef\xbb\xbf";

@@ -14,18 +14,18 @@ pub enum UrdfErrorKind {
     #[error("not valid XML: {message}")]
     Syntax { message: String },
     #[error(
-        "begins a document type declaration, which may hold entities without end and is not read; a URDF needs none"
+        "contains a document type declaration, which is refused because it may expand without limit; remove it"
     )]
     DocumentType,
     #[error("not a URDF: its outermost element is <{found}>, not <robot>")]
     NotARobot { found: String },
-    #[error("a xacro, not a URDF yet; expand it first: xacro FILE.xacro > FILE.urdf")]
+    #[error("a xacro file, not a URDF; expand it first: xacro FILE.xacro > FILE.urdf")]
     Xacro,
     #[error("<{element}> has no attribute {attribute}")]
     NoAttribute { element: String, attribute: &'static str },
     #[error("<joint> has no element <{element}>")]
     NoElement { element: &'static str },
-    #[error("the name is empty, or holds a character that is not seen")]
+    #[error("the name is empty or contains an invisible character")]
     BadName,
     #[error("another {what} is called \"{name}\"")]
     Repeated { what: &'static str, name: String },
@@ -36,14 +36,14 @@ pub enum UrdfErrorKind {
     #[error("the axis has no direction")]
     NoAxis,
     #[error(
-        "a joint of type \"{kind}\" is not one that an arm can have; known: revolute, continuous, prismatic, fixed"
+        "a joint of type \"{kind}\" is not supported; supported types: revolute, continuous, prismatic, fixed"
     )]
     Kind { kind: String },
     #[error("no link is called \"{name}\"{}; the links are {}", meant(name, known), listed(known))]
     NoLink { name: String, known: Vec<String> },
     #[error("no joint is called \"{name}\"{}", meant(name, known))]
     NoJoint { name: String, known: Vec<String> },
-    #[error("joints follow each other in a circle by <mimic>")]
+    #[error("the joints follow each other in a cycle of <mimic>")]
     MimicCircle,
     #[error(
         "link \"{link}\" is the child of two joints, \"{first}\" and \"{second}\"; a URDF is a tree"
@@ -51,7 +51,7 @@ pub enum UrdfErrorKind {
     TwoParents { link: String, first: String, second: String },
     #[error("the joints form a loop through link \"{link}\"; a URDF is a tree")]
     Loop { link: String },
-    #[error("makes no problem: {key}: {why}")]
+    #[error("cannot be converted to a problem: {key}: {why}")]
     AsProblem { key: String, why: String },
     #[error("there are no links")]
     NoLinks,
@@ -72,10 +72,10 @@ pub enum UrdfErrorKind {
     )]
     OtherArm { joint: String, off: String },
     #[error(
-        "no joint behind \"{joint}\" has an origin that could hold what was identified behind it ({off}); let the chain end in a link on a fixed joint"
+        "no joint after \"{joint}\" has an origin that can hold the identified transform after it ({off}); choose a --tip behind a fixed joint"
     )]
     NoRoom { joint: String, off: String },
-    #[error("not an arm of Universal Robots' form: {why}")]
+    #[error("not an arm with the joint layout of Universal Robots: {why}")]
     NotUr { why: String },
 }
 

@@ -4,7 +4,7 @@
 mod record;
 mod staged;
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::Path;
 
@@ -17,8 +17,25 @@ pub use staged::StagedFile;
 /// The file cannot be read, or is larger ([`io::ErrorKind::FileTooLarge`]).
 pub fn read_limited(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(max_bytes + 1).read_to_end(&mut bytes)?;
+    open(path)?.take(max_bytes + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > max_bytes { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(bytes) }
+}
+
+/// Opens a file for reading. Returns an error for FIFOs, sockets and devices, which could block or
+/// never end. The standard input is allowed as `/dev/stdin`, `/dev/fd/N` or `/proc/self/fd/N`.
+///
+/// # Errors
+/// The file cannot be opened, or is neither a regular file nor a folder.
+pub fn open(path: &Path) -> io::Result<File> {
+    let kind = fs::metadata(path)?.file_type();
+    let descriptors = ["/dev/stdin", "/dev/fd", "/proc/self/fd"];
+    let is_descriptor = descriptors.iter().any(|start| path.starts_with(start));
+    if kind.is_file() || kind.is_dir() || is_descriptor {
+        File::open(path)
+    } else {
+        let message = "it is a FIFO, socket or device; give a regular file";
+        Err(io::Error::new(io::ErrorKind::InvalidInput, message))
+    }
 }
 
 /// Returns true if two paths lead to the same existing file, also through links.
@@ -31,12 +48,49 @@ pub fn same_file(first: &Path, second: &Path) -> bool {
     matches!((first.canonicalize(), second.canonicalize()), (Ok(first), Ok(second)) if first == second)
 }
 
-/// Returns CSV text with a header line; every line must have as many cells as the header.
+/// Returns CSV text with a header line; every line must have as many cells as the header. Words that
+/// a spreadsheet would run as a formula are escaped; see [`unescape_cell`].
 pub(crate) fn csv(header: Vec<String>, lines: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for line in std::iter::once(header).chain(lines) {
         // Writing to memory cannot fail.
-        let _ = writer.write_record(line);
+        let _ = writer.write_record(line.into_iter().map(escape_cell));
     }
     writer.into_inner().ok().and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default()
+}
+
+/// Returns true if a spreadsheet would run the word as a formula: it begins with `=`, `+`, `-`, `@`
+/// or a tab, perhaps after apostrophes, and is no number.
+fn is_formula(word: &str) -> bool {
+    let start = word.trim_start_matches('\'');
+    start.starts_with(['=', '+', '-', '@', '\t', '\r']) && start.parse::<f64>().is_err()
+}
+
+/// Escapes a word that a spreadsheet would run, by an apostrophe in front.
+fn escape_cell(word: String) -> String {
+    if is_formula(&word) { format!("'{word}") } else { word }
+}
+
+/// Returns the word of a cell without the apostrophe that protects it from spreadsheets.
+pub(crate) fn unescape_cell(cell: &str) -> &str {
+    cell.strip_prefix('\'').filter(|word| is_formula(word)).unwrap_or(cell)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formulas_are_escaped_and_read_back_unchanged() {
+        for word in ["=1+1", "+A1", "-x", "@SUM(A1)", "\tx", "'=1", "''-x"] {
+            let escaped = escape_cell(word.to_owned());
+            assert_eq!(escaped, format!("'{word}"));
+            assert_eq!(unescape_cell(&escaped), word);
+        }
+        for word in ["-1.5", "+2e-3", "-inf", "'quoted", "x=1", "", "'", "2024-05-31"] {
+            assert_eq!(escape_cell(word.to_owned()), word);
+            assert_eq!(unescape_cell(word), word);
+        }
+        assert_eq!(csv(vec!["a".to_owned()], [vec!["=1".to_owned()]]), "a\n'=1\n");
+    }
 }

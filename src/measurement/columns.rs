@@ -3,11 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::identity;
 
-use super::mapped::Names;
-use super::role::{COLUMNS_WITH_UNIT, COLUMNS_WITHOUT_UNIT, Role};
+use super::mapped::{Names, no_such};
+use super::meaning::{Meaning, Numbering, affects_results, split_unit, unit_of, word_of_row};
+use super::role::Role;
 use super::table::Table;
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind, nearest, one_typo};
-use crate::problem::{ColumnRule, HeldOut, Joint, JointKind, JointSource, Problem};
+use crate::problem::{ColumnRule, HeldOut, JointSource, Problem};
 use crate::quantity::Unit;
 
 /// Maximum number of unknown columns that get a suggestion.
@@ -54,12 +55,11 @@ impl Columns {
         let present: BTreeSet<&str> = named.iter().map(|name| split_unit(name).0).collect();
         let mut found: BTreeMap<Role, (String, Option<&ColumnRule>)> = BTreeMap::new();
         let mut names = BTreeMap::new();
-        let file = named.of_file.map(|rule| (rule.ours.as_str(), Some(rule)));
         let ours = named.iter().map(str::to_owned).collect();
         let mut columns = Self { read: Vec::new(), marked: None, file: None, names: ours };
         let (mut unknown, mut mistyped, mut unmapped) = (Vec::new(), None, Vec::new());
         let (mut shifted, mut hidden) = (None, None);
-        for (place, &(name, rule)) in named.of_place.iter().chain(&file).enumerate() {
+        for (place, name, rule) in named.mapped_first() {
             let location = || rule.map_or_else(|| table.column(name), |rule| rule.location.clone());
             let error = |kind| location().error(kind);
             let covariate = problem.data.covariates.iter().position(|known| known.name == name);
@@ -150,12 +150,30 @@ impl Columns {
         if let Some(error) = shifted {
             return Err(error);
         }
+        if let Some(rule) = named.unused.filter(|_| measured) {
+            let kind = WarningKind::MapUnused { file: table.file.clone() };
+            warnings.push(Warning { location: rule.location.clone(), kind });
+        }
         let required = columns.require(table, problem, measured, &numbering, &unknown);
-        required.map_err(|error| match hidden {
-            Some(hidden) => blame_rule(error, hidden),
-            None => error,
+        required.map_err(|error| match (hidden, named.unused) {
+            (Some(hidden), _) => blame_rule(error, hidden),
+            (None, Some(rule)) if matches!(*error.kind, InputErrorKind::MissingColumn { .. }) => {
+                no_such(rule, table)
+            }
+            _ => error,
         })?;
         mistyped.map_or(Ok(columns), Err)
+    }
+
+    /// Returns true if a table has a column of joint coordinates.
+    pub fn has_joints(table: &Table, problem: &Problem) -> bool {
+        let names = Names::map_present(table, &problem.data.dialect);
+        let numbering = Numbering::detect(names.iter().copied(), problem);
+        let is_joint = |name: &&str| {
+            let meaning = numbering.recognise(name, problem);
+            matches!(meaning, Ok(Meaning::Read(Role::Joint(_) | Role::Reading(_), _)))
+        };
+        names.iter().any(is_joint)
     }
 
     /// Checks that all required columns exist; `unknown` columns are suggested for missing ones.
@@ -366,230 +384,4 @@ fn blame_rule(error: InputError, (rule, name): (&ColumnRule, &str)) -> InputErro
             .error(InputErrorKind::MappedNameTaken { name: name.to_owned(), write }),
         kind => error.location.error(kind),
     }
-}
-
-/// Meaning of a column's name.
-enum Meaning {
-    Read(Role, fn(f64) -> f64),
-    Ignored(WarningKind),
-    /// No meaning.
-    Unknown,
-}
-
-/// Assignment of the numbers in column names to joints.
-struct Numbering {
-    /// Joint of each number; number 1 is element 0.
-    joints: Vec<usize>,
-}
-
-impl Numbering {
-    /// Chooses the numbering: by joint number, or by place among the moving joints.
-    fn detect<'a>(names: impl Iterator<Item = &'a str>, problem: &Problem) -> Self {
-        let numbers: Vec<usize> =
-            names.filter_map(|name| numbered(split_unit(name).0, "q")).collect();
-        let by_joint = || (0..problem.joints.len()).collect::<Vec<_>>();
-        let moving = problem
-            .joints
-            .iter()
-            .enumerate()
-            .filter(|(_, joint)| joint.command_kind() != JointKind::Fixed);
-        let moving: Vec<usize> = moving.map(|(index, _)| index).collect();
-        let by_number = moving.iter().all(|index| numbers.contains(&(index + 1)));
-        let by_order = (1..=moving.len()).all(|number| numbers.contains(&number))
-            && numbers.iter().all(|number| (1..=moving.len()).contains(number));
-        Self { joints: if !by_number && by_order { moving } else { by_joint() } }
-    }
-
-    fn joint(&self, number: usize) -> Option<usize> {
-        self.joints.get(number.checked_sub(1)?).copied()
-    }
-
-    fn number(&self, joint: usize) -> usize {
-        self.joints.iter().position(|&index| index == joint).unwrap_or(joint) + 1
-    }
-
-    /// Returns the column that an unknown name probably means, among those missing in the table.
-    fn meant(&self, name: &str, present: &BTreeSet<&str>, problem: &Problem) -> Option<String> {
-        let moving = || {
-            problem
-                .joints
-                .iter()
-                .enumerate()
-                .filter_map(|(k, joint)| Some((k, joint, unit_of(joint.command_kind())?)))
-        };
-        let joints = moving().map(|(index, _, unit)| (self.number(index), unit));
-        let named = moving().map(|(_, joint, unit)| (joint.name.clone(), unit));
-        let plain = COLUMNS_WITHOUT_UNIT
-            .iter()
-            .filter(|(_, role)| role.is_known_to(problem))
-            .map(|(name, _)| (*name).to_owned());
-        let approach = joints.clone().map(|(number, _)| format!("approach{number}"));
-        let measured = COLUMNS_WITH_UNIT.iter().filter(|(_, role, ..)| role.is_known_to(problem));
-        let measured = measured.map(|&(base, _, unit, _)| (base.to_owned(), unit));
-        let measured = measured.chain(joints.map(|(number, unit)| (format!("q{number}"), unit)));
-        let measured = measured
-            .chain(named)
-            .flat_map(|(base, unit)| unit.spellings(&base).collect::<Vec<_>>());
-        let lacking = |name: &String| !present.contains(split_unit(name).0);
-        nearest(name, plain.chain(approach).chain(measured).filter(lacking))
-    }
-
-    /// Returns the meaning of a column's name.
-    fn recognise(&self, name: &str, problem: &Problem) -> Result<Meaning, InputErrorKind> {
-        if let Some(meaning) = by_joint_name(name, problem) {
-            return meaning;
-        }
-        let plain = |role| Ok(Meaning::Read(role, identity));
-        if let Some((_, role)) = COLUMNS_WITHOUT_UNIT
-            .iter()
-            .find(|(known, role)| *known == name && role.is_known_to(problem))
-        {
-            return plain(*role);
-        }
-        if let Some(number) = numbered(name, "approach") {
-            let moves = |&joint: &usize| {
-                problem
-                    .joints
-                    .get(joint)
-                    .is_some_and(|joint| joint.command_kind() != JointKind::Fixed)
-            };
-            return match self.joint(number).filter(moves) {
-                Some(joint) => plain(Role::Approach(joint)),
-                None => Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number })),
-            };
-        }
-        if let Some((tilt, suffix)) = [("tilt_x", 0), ("tilt_y", 1)]
-            .into_iter()
-            .filter(|&(_, axis)| Role::Tilt(axis).is_known_to(problem))
-            .find_map(|(base, axis)| Some((Role::Tilt(axis), (base, name.strip_prefix(base)?))))
-        {
-            let (base, suffix) = suffix;
-            let unit = suffix.strip_prefix('_').and_then(|suffix| Unit::Angle.suffix(suffix));
-            let needed = || InputErrorKind::NeedsUnit {
-                noun: Unit::Angle.noun(),
-                write: Unit::Angle.alternatives(base),
-            };
-            return unit.map(|unit| Meaning::Read(tilt, unit.to_si)).ok_or_else(needed);
-        }
-        let (base, suffix) = split_unit(name);
-        let reading = suffix
-            .and_then(|suffix| suffix.strip_prefix("read_"))
-            .filter(|_| numbered(base, "q").is_some());
-        let suffix = reading.or(suffix);
-        let measured = COLUMNS_WITH_UNIT
-            .iter()
-            .find(|(known, role, ..)| *known == base && role.is_known_to(problem));
-        let (role, unit, strict) = if let Some(&(_, role, unit, strict)) = measured {
-            (role, unit, strict)
-        } else {
-            let Some(number) = numbered(base, "q") else { return Ok(Meaning::Unknown) };
-            let joint = self.joint(number);
-            let Some((joint, unit)) = joint.and_then(|joint| {
-                Some((joint, unit_of(problem.joints.get(joint)?.command_kind())?))
-            }) else {
-                return Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number }));
-            };
-            (if reading.is_some() { Role::Reading(joint) } else { Role::Joint(joint) }, unit, true)
-        };
-        let write = || {
-            unit.alternatives(&if reading.is_some() {
-                format!("{base}_read")
-            } else {
-                base.to_owned()
-            })
-        };
-        match suffix {
-            Some(suffix) => match unit.suffix(suffix) {
-                Some(suffix) => Ok(Meaning::Read(role, suffix.to_si)),
-                None if strict && Unit::all_suffixes().any(|known| known == suffix) => {
-                    Err(InputErrorKind::WrongUnit {
-                        noun: unit.noun(),
-                        suffix: suffix.to_owned(),
-                        write: write(),
-                    })
-                }
-                None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),
-            },
-            None if role == Role::Time => Ok(Meaning::Read(Role::Time, DATE_CONVERSION)),
-            None if strict => Err(InputErrorKind::NeedsUnit { noun: unit.noun(), write: write() }),
-            None => Ok(Meaning::Ignored(WarningKind::UnitIgnored { write: write() })),
-        }
-    }
-}
-
-/// Checks that the file's name can have this role, which must be a word.
-fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
-    match role {
-        Role::Session | Role::Target | Role::Point => Ok(role),
-        _ => Err(InputErrorKind::UnknownMeaning { meant: Some("session".to_owned()) }),
-    }
-}
-
-/// Conversion of a column `time` without a unit, which must hold dates.
-pub(super) const DATE_CONVERSION: fn(f64) -> f64 = |_| f64::NAN;
-
-/// Returns the meaning of a column named after a joint: `shoulder_pan_joint_rad`. Ambiguous joint
-/// names, and those that equal other columns, are not considered.
-fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputErrorKind>> {
-    let base = split_unit(name).0;
-    let other = COLUMNS_WITHOUT_UNIT.iter().any(|(known, _)| *known == name)
-        || numbered(base, "q").is_some();
-    let measured = COLUMNS_WITH_UNIT.iter().find(|(known, ..)| *known == base);
-    if other
-        || measured
-            .is_some_and(|(known, _, unit, _)| unit.spellings(known).any(|spelled| spelled == name))
-    {
-        return None;
-    }
-    let joint_of = |name: &str| {
-        let mut joints = problem.joints.iter().enumerate().filter(|(_, joint)| joint.name == name);
-        joints.next().filter(|_| joints.next().is_none())
-    };
-    let unit = |(index, joint): (usize, &Joint)| Some((index, unit_of(joint.command_kind())?));
-    if let Some((_, unit)) = joint_of(name).and_then(unit) {
-        return Some(Err(InputErrorKind::NeedsUnit {
-            noun: unit.noun(),
-            write: unit.alternatives(name),
-        }));
-    }
-    let (base, suffix) = name.rsplit_once('_')?;
-    let (index, unit) = joint_of(base).and_then(unit)?;
-    match unit.suffix(suffix) {
-        Some(suffix) => Some(Ok(Meaning::Read(Role::Joint(index), suffix.to_si))),
-        None if Unit::all_suffixes().any(|known| known == suffix) => {
-            let (suffix, write) = (suffix.to_owned(), unit.alternatives(base));
-            Some(Err(InputErrorKind::WrongUnit { noun: unit.noun(), suffix, write }))
-        }
-        None => None,
-    }
-}
-
-/// Returns true if results depend on the column; names of poses and orientations have no effect on
-/// the fit.
-fn affects_results(meant: &str) -> bool {
-    let base = split_unit(meant).0;
-    base != "pose"
-        && !COLUMNS_WITH_UNIT
-            .iter()
-            .any(|(known, role, ..)| *known == base && matches!(role, Role::Orientation(_)))
-}
-
-/// Returns the unit of a joint's coordinate, or `None` for a fixed joint.
-fn unit_of(joint: JointKind) -> Option<Unit> {
-    match joint {
-        JointKind::Revolute => Some(Unit::Angle),
-        JointKind::Prismatic => Some(Unit::Length),
-        JointKind::Fixed => None,
-    }
-}
-
-/// Splits `q1_deg` into `q1` and `deg`.
-fn split_unit(name: &str) -> (&str, Option<&str>) {
-    name.split_once('_').map_or((name, None), |(base, suffix)| (base, Some(suffix)))
-}
-
-/// Returns the number in `q12`.
-fn numbered(name: &str, prefix: &str) -> Option<usize> {
-    let number = name.strip_prefix(prefix)?;
-    if number.bytes().all(|byte| byte.is_ascii_digit()) { number.parse().ok() } else { None }
 }

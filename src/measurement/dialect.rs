@@ -46,8 +46,10 @@ impl Layout {
         let lines = text.split('\n').enumerate().take(MAX_HEADER_LINES);
         let candidates: Vec<(usize, &str)> =
             lines.filter(|(_, line)| !line.trim().is_empty() && !is_comment(line)).collect();
-        let delimiter_of =
-            |line: &str| dialect.delimiter.unwrap_or_else(|| most_frequent_delimiter(line));
+        let delimiter_of = |line: &str| match dialect.delimiter {
+            Some(declared) if !is_separated_otherwise(line, declared) => declared,
+            _ => most_frequent_delimiter(line),
+        };
         let names_in = |line: &str| {
             let cells = cells(line, delimiter_of(line));
             names.iter().filter(|name| cells.iter().any(|cell| cell == *name)).count()
@@ -76,6 +78,13 @@ impl Layout {
             Delimiter::Spaces => TAB,
         }
     }
+}
+
+/// Returns true if commas separate a header line and the declared delimiter does not occur in it, as
+/// in files written by flexcal.
+fn is_separated_otherwise(line: &str, declared: Delimiter) -> bool {
+    let Delimiter::Byte(declared) = declared else { return false };
+    line.contains(',') && !line.contains(char::from(declared))
 }
 
 /// Returns the most frequent delimiter of a header line.

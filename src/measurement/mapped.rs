@@ -1,7 +1,5 @@
 //! Names of a table's columns after the map of `[data.columns]`.
 
-use std::path::Path;
-
 use super::table::Table;
 use crate::error::{InputError, InputErrorKind};
 use crate::problem::{ColumnRule, ColumnSelector, Dialect};
@@ -13,46 +11,51 @@ pub(super) struct Names<'a> {
     pub of_place: Vec<(&'a str, Option<&'a ColumnRule>)>,
     /// Rule for the name of the file.
     pub of_file: Option<&'a ColumnRule>,
-    /// True if there is a map.
+    /// True if the map was applied.
     pub mapped: bool,
+    /// First rule without a column, if the map was not applied because the table has flexcal's
+    /// names.
+    pub unused: Option<&'a ColumnRule>,
 }
 
 impl<'a> Names<'a> {
     /// Applies the map to the columns of a table.
+    ///
+    /// A table that has none of the map's names is read by flexcal's names, so that files written
+    /// by flexcal are readable whatever the map says.
     ///
     /// # Errors
     /// The column of a rule does not exist or is ambiguous.
     pub fn map(table: &'a Table, dialect: &'a Dialect) -> Result<Self, InputError> {
         let mut of_place: Vec<(&str, Option<&ColumnRule>)> =
             table.header.iter().map(|name| (name.as_str(), None)).collect();
-        let mut of_file = None;
-        for rule in &dialect.columns {
+        let has = |name: &String| table.header.contains(name);
+        let rules = &dialect.columns;
+        let of_file = rules.iter().find(|rule| rule.theirs == ColumnSelector::File);
+        let is_foreign = |rule: &&ColumnRule| match &rule.theirs {
+            ColumnSelector::Name(name) => has(name),
+            ColumnSelector::Place(_) => !has(&rule.ours),
+            ColumnSelector::File => rules.len() == 1,
+        };
+        if !rules.iter().any(|rule| is_foreign(&rule)) {
+            let of_file = of_file.filter(|rule| !has(&rule.ours));
+            let unused = rules.iter().find(|rule| !has(&rule.ours));
+            let unused = unused.filter(|rule| rule.theirs != ColumnSelector::File);
+            return Ok(Self { of_place, of_file, mapped: false, unused });
+        }
+        for rule in rules {
             let place = match &rule.theirs {
-                ColumnSelector::File => {
-                    of_file = Some(rule);
-                    continue;
-                }
+                ColumnSelector::File => continue,
                 ColumnSelector::Place(number) => {
                     Some(number - 1).filter(|place| *place < of_place.len())
                 }
-                ColumnSelector::Name(name) => {
-                    let mut places = (0..)
-                        .zip(&table.header)
-                        .filter(|(_, header)| *header == name)
-                        .map(|(place, _)| place);
-                    let first = places.next();
-                    if let Some(other) = places.next() {
-                        let kind = InputErrorKind::AmbiguousColumn {
-                            file: table.file.clone(),
-                            place: other + 1,
-                        };
-                        return Err(rule.location.clone().error(kind));
-                    }
-                    first
-                }
+                ColumnSelector::Name(name) => only_place(rule, name, table)?,
             };
             let Some(entry) = place.and_then(|place| of_place.get_mut(place)) else {
-                return Err(no_such(rule, &table.file, &table.header));
+                if has(&rule.ours) {
+                    continue;
+                }
+                return Err(no_such(rule, table));
             };
             if let Some(first) = entry.1 {
                 let first = first.ours.clone();
@@ -60,25 +63,60 @@ impl<'a> Names<'a> {
             }
             *entry = (rule.ours.as_str(), Some(rule));
         }
-        Ok(Self { of_place, of_file, mapped: !dialect.columns.is_empty() })
+        Ok(Self { of_place, of_file, mapped: true, unused: None })
+    }
+
+    /// Applies those rules of the map whose column exists; other tables hold the other columns.
+    pub fn map_present(table: &'a Table, dialect: &'a Dialect) -> Vec<&'a str> {
+        let theirs = |header: &String| ColumnSelector::Name(header.clone());
+        let ours = |header: &'a String| {
+            let rule = dialect.columns.iter().find(|rule| rule.theirs == theirs(header));
+            rule.map_or(header.as_str(), |rule| rule.ours.as_str())
+        };
+        table.header.iter().map(ours).collect()
     }
 
     /// Iterates over flexcal's names of the columns.
     pub fn iter(&self) -> impl Iterator<Item = &'a str> + '_ {
         self.of_place.iter().map(|(name, _)| *name)
     }
+
+    /// Returns the columns with their places, mapped ones first: where another column has a name
+    /// that the map assigns, the map wins. The name of the file comes last.
+    pub fn mapped_first(&self) -> Vec<(usize, &'a str, Option<&'a ColumnRule>)> {
+        let file = self.of_file.map(|rule| (rule.ours.as_str(), Some(rule)));
+        let columns = self.of_place.iter().chain(&file).enumerate();
+        let mut columns: Vec<_> =
+            columns.map(|(place, &(name, rule))| (place, name, rule)).collect();
+        columns.sort_by_key(|(_, _, rule)| rule.is_none());
+        columns
+    }
+}
+
+/// Returns the place of the column called `name`, if there is one.
+fn only_place(rule: &ColumnRule, name: &str, table: &Table) -> Result<Option<usize>, InputError> {
+    let mut places =
+        (0..).zip(&table.header).filter(|(_, header)| *header == name).map(|(place, _)| place);
+    let first = places.next();
+    match places.next() {
+        Some(other) => Err(rule
+            .location
+            .clone()
+            .error(InputErrorKind::AmbiguousColumn { file: table.file.clone(), place: other + 1 })),
+        None => Ok(first),
+    }
 }
 
 /// Returns the error of a rule whose column does not exist.
-fn no_such(rule: &ColumnRule, file: &Path, header: &[String]) -> InputError {
+pub(super) fn no_such(rule: &ColumnRule, table: &Table) -> InputError {
     let name = match &rule.theirs {
         ColumnSelector::Name(name) => name.clone(),
         ColumnSelector::Place(place) => format!("#{place}"),
         ColumnSelector::File => "#file".to_owned(),
     };
     rule.location.clone().error(InputErrorKind::NoSuchColumn {
-        file: file.to_owned(),
+        file: table.file.clone(),
         name,
-        known: header.to_vec(),
+        known: table.header.clone(),
     })
 }

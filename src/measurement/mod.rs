@@ -13,12 +13,16 @@ mod dialect;
 #[deny(clippy::indexing_slicing)]
 mod duplicates;
 #[deny(clippy::indexing_slicing)]
+mod joined;
+#[deny(clippy::indexing_slicing)]
 mod labels;
 mod limits;
 #[deny(clippy::indexing_slicing)]
 mod lines;
 #[deny(clippy::indexing_slicing)]
 mod mapped;
+#[deny(clippy::indexing_slicing)]
+mod meaning;
 #[deny(clippy::indexing_slicing)]
 mod observed;
 mod order;
@@ -29,6 +33,8 @@ mod read;
 mod repeats;
 #[deny(clippy::indexing_slicing)]
 mod role;
+#[deny(clippy::indexing_slicing)]
+mod rows;
 mod settled;
 mod split;
 #[deny(clippy::indexing_slicing)]

@@ -2,20 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{UnitQuaternion, Vector3};
-
-use super::cells::{above_zero, direction, is_validation, not_negative};
 use super::columns::{Column, Columns};
-use super::labels::{LabelsBuilder, PoseNames, stems};
+use super::joined::JoinedLog;
 use super::limits::Commands;
-use super::observed::{self, Observed};
-use super::orientation::Cells;
+use super::observed;
 use super::role::Role;
+use super::rows::RowsBuilder;
 use super::table::Table;
-use super::{ColumnTable, CommandColumn, Labels, Measurements, NestReading, RowOrder};
+use super::{ColumnTable, Measurements};
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
 use crate::files::same_file;
-use crate::problem::{JointSource, Missing, Problem, RotationKind};
+use crate::problem::{Missing, Problem};
 
 impl Measurements {
     /// Reads files one after the other; also returns warnings, for example about ignored columns.
@@ -103,17 +100,28 @@ struct Tables<'a> {
     /// True if the poses have been measured.
     measured: bool,
     warnings: Vec<Warning>,
-    builder: Option<Builder>,
+    builder: Option<RowsBuilder>,
+    log: Option<JoinedLog>,
 }
 
 impl<'a> Tables<'a> {
     fn new(files: &'a [PathBuf], problem: &'a Problem, measured: bool) -> Self {
-        Self { files, problem, measured, warnings: Vec::new(), builder: None }
+        Self { files, problem, measured, warnings: Vec::new(), builder: None, log: None }
     }
 
     /// Reads all rows of a table; `index` is the number of its file.
     fn read(&mut self, index: usize, mut table: Table) -> Result<(), InputError> {
         let dialect = &self.problem.data.dialect;
+        let joint_log = self.problem.data.joint_log.as_ref();
+        let is_joined = self.measured && !Columns::has_joints(&table, self.problem);
+        let mut log = match (joint_log.filter(|_| is_joined), self.log.take()) {
+            (Some(_), Some(log)) => Some(log),
+            (Some(declared), None) => Some(JoinedLog::read(declared, self.problem)?),
+            (None, _) => None,
+        };
+        if let Some(log) = &mut log {
+            log.extend(&mut table, dialect)?;
+        }
         let mut columns = Columns::find(&table, self.problem, self.measured, &mut self.warnings)?;
         observed::check_target_column(&table, &columns, self.problem)?;
         if !table.next_row()? {
@@ -125,15 +133,22 @@ impl<'a> Tables<'a> {
         columns.settle_time(&table, &mut self.warnings)?;
         let rows = self
             .builder
-            .get_or_insert_with(|| Builder::new(self.files, &table, &columns, self.problem));
+            .get_or_insert_with(|| RowsBuilder::new(self.files, &table, &columns, self.problem));
         rows.same_columns(&table, &columns)?;
         let (before, mut left_out) = (rows.row_count(), LeftOut::default());
         loop {
+            let is_nest = columns.nest(&table).is_some();
+            let is_complete = match &mut log {
+                Some(log) if !is_nest => log.complete(&mut table)?,
+                _ => true,
+            };
             let missing = dialect
                 .missing
                 .as_ref()
                 .is_some_and(|missing| is_missing(missing, &table, &columns));
-            if missing && !columns.observes_at(&table) {
+            if !is_complete {
+                // The log lists the row.
+            } else if missing && !columns.observes_at(&table) {
                 left_out.count(&table);
             } else if let Some(name) = columns.nest(&table) {
                 rows.push_nest(index, name, &table, &columns)?;
@@ -159,6 +174,12 @@ impl<'a> Tables<'a> {
                 break;
             }
         }
+        if let Some(log) = &log
+            && rows.row_count() == before
+        {
+            log.warnings()?;
+        }
+        self.log = log;
         if rows.row_count() == before {
             return Err(Location::file(&table.file).error(InputErrorKind::AllMissing));
         }
@@ -168,13 +189,17 @@ impl<'a> Tables<'a> {
 
     /// Returns the measurements of all tables.
     fn finish(self) -> Result<(Measurements, Vec<Warning>), InputError> {
-        let Self { problem, measured, mut warnings, builder, .. } = self;
+        let Self { problem, measured, mut warnings, builder, log, .. } = self;
         match builder {
             Some(builder) => {
                 let (mut measurements, columns) = builder.finish();
                 if measurements.is_empty() {
                     let file = measurements.files.first().cloned().unwrap_or_default();
                     return Err(Location::file(&file).error(InputErrorKind::NestsAlone));
+                }
+                if let Some(log) = &log {
+                    warnings.extend(log.warnings()?);
+                    measurements.files.extend(log.files());
                 }
                 observed::add_known_distances(&mut measurements, problem)?;
                 let commands = commands(&columns);
@@ -183,7 +208,7 @@ impl<'a> Tables<'a> {
                 if measured {
                     warnings.extend(measurements.beyond_limits(problem, &commands));
                 }
-                warnings.extend(problem.far_target());
+                warnings.extend(problem.plausibility_warnings());
                 measurements.warnings.clone_from(&warnings);
                 Ok((measurements, warnings))
             }
@@ -235,30 +260,6 @@ fn is_missing(missing: &Missing, table: &Table, columns: &Columns) -> bool {
     }
 }
 
-/// Returns true if a table has as many commands as readings of joints.
-fn both_joints(columns: &Columns) -> bool {
-    let count = |reading: bool| {
-        let of_joint = |column: &&Column| matches!(column.role, Role::Joint(_) | Role::Reading(_));
-        columns
-            .read
-            .iter()
-            .filter(of_joint)
-            .filter(|column| column.role.is_reading() == reading)
-            .count()
-    };
-    count(true) > 0 && count(true) == count(false)
-}
-
-/// Returns the description of a column of commands, or `None` for another column.
-fn command(column: &Column, table: &Table) -> Option<CommandColumn> {
-    let Role::Joint(joint) = column.role else { return None };
-    Some(CommandColumn {
-        joint,
-        name: table.name_of(column.place).to_owned(),
-        unit: (column.to_si)(1.0),
-    })
-}
-
 /// Returns the columns of commands.
 fn commands(columns: &[(Column, String)]) -> Vec<Commands<'_>> {
     let joints = columns.iter().filter_map(|(column, name)| match column.role {
@@ -279,305 +280,5 @@ fn file_error(
         problem.data.files_location.clone().error(named)
     } else {
         Location::file(file).error(given)
-    }
-}
-
-/// Measurements under construction.
-struct Builder {
-    measurements: Measurements,
-    session: LabelsBuilder,
-    target: LabelsBuilder,
-    poses: PoseNames,
-    /// True if readings are the configurations.
-    uses_readings: bool,
-    /// True if rows may measure something other than positions.
-    mixed: bool,
-    /// True if rows name one of several declared targets.
-    names_targets: bool,
-    /// Convention of rx, ry and rz.
-    rotation: RotationKind,
-    /// Names of the files without extension, which may be the value of a column.
-    stems: Vec<String>,
-    /// Columns of the first file with their names.
-    columns: Vec<(Column, String)>,
-}
-
-impl Builder {
-    fn new(files: &[PathBuf], table: &Table, columns: &Columns, problem: &Problem) -> Self {
-        let list = |role| columns.has(role).then(Vec::new);
-        let names_targets = !problem.targets.is_empty();
-        let mixed = !problem.fixtures.is_empty() || problem.data.tilt_sigma.is_some();
-        let approach = columns.read.iter().any(|column| matches!(column.role, Role::Approach(_)));
-        let measurements = Measurements {
-            files: files.to_vec(),
-            origin: Vec::new(),
-            joints: problem.joints.len(),
-            configurations: Vec::new(),
-            other_configurations: both_joints(columns).then(Vec::new),
-            nests: Vec::new(),
-            observations: Vec::new(),
-            positions: Vec::new(),
-            position_measured: true,
-            position_unit: columns
-                .read
-                .iter()
-                .find(|column| column.role == Role::Position(0))
-                .map(|column| (column.to_si)(1.0)),
-            orientations: (columns.orientations() != (false, false)).then(Vec::new),
-            sigma: if mixed { Some(Vec::new()) } else { list(Role::Sigma) },
-            payload: list(Role::Payload),
-            hoist: list(Role::Hoist),
-            temperature: list(Role::Temperature),
-            time: Vec::new(),
-            time_measured: columns.has(Role::Time),
-            approach: approach.then(Vec::new),
-            covariates: Vec::new(),
-            pose: None,
-            pose_names: None,
-            session: Labels::default(),
-            target: (names_targets || columns.has(Role::Target)).then(Labels::default),
-            marked_held_out: columns.marked.map(|_| Vec::new()),
-            command_columns: columns
-                .read
-                .iter()
-                .filter_map(|column| command(column, table))
-                .collect(),
-            warnings: Vec::new(),
-            order: RowOrder::default(),
-        };
-        let poses = PoseNames::new(columns.has(Role::Pose));
-        let columns = columns
-            .read
-            .iter()
-            .map(|column| (*column, columns.name_of(column).to_owned()))
-            .collect();
-        let (session, target) = (LabelsBuilder::default(), LabelsBuilder::default());
-        Self {
-            measurements,
-            session,
-            target,
-            poses,
-            uses_readings: problem.data.joints == JointSource::Read,
-            mixed,
-            names_targets,
-            rotation: problem.data.dialect.rotation,
-            stems: stems(files),
-            columns,
-        }
-    }
-
-    /// Returns the number of rows so far, including those of fixed points.
-    fn row_count(&self) -> usize {
-        self.measurements.len() + self.measurements.nests.len()
-    }
-
-    /// Returns the name of a file without extension.
-    fn stem(&self, file: usize) -> &str {
-        self.stems.get(file).map_or("", String::as_str)
-    }
-
-    /// Checks that a file has the columns of the first one. The column `pose` is optional, and so
-    /// are the columns of observations and targets if rows measure different quantities.
-    fn same_columns(&self, table: &Table, columns: &Columns) -> Result<(), InputError> {
-        let differ = |name: &str, has| {
-            let other = self.measurements.files.first().cloned().unwrap_or_default();
-            Err(table.column(name).error(InputErrorKind::ColumnsDiffer { other, has }))
-        };
-        let of_observed = |role: Role| {
-            role.is_observed()
-                || role == Role::Sigma
-                || (role == Role::Target && self.names_targets)
-        };
-        let comes_and_goes = |role: Role| role == Role::Pose || (self.mixed && of_observed(role));
-        for (column, name) in self.columns.iter().filter(|(column, _)| !comes_and_goes(column.role))
-        {
-            if !columns.has(column.role) {
-                return differ(name, true);
-            }
-        }
-        for column in columns.read.iter().filter(|column| !comes_and_goes(column.role)) {
-            if !self.columns.iter().any(|(known, _)| known.role == column.role) {
-                return differ(table.name_of(column.place), false);
-            }
-        }
-        Ok(())
-    }
-
-    /// Appends the current row, which measures a fixed point.
-    fn push_nest(
-        &mut self,
-        file: usize,
-        name: &str,
-        table: &Table,
-        columns: &Columns,
-    ) -> Result<(), InputError> {
-        let narrow = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
-        let mut reading = NestReading {
-            origin: (narrow(file), narrow(table.line())),
-            name: name.to_owned(),
-            position: Vector3::zeros(),
-            time: None,
-            after: self.measurements.len(),
-            session: columns
-                .file
-                .filter(|role| *role == Role::Session)
-                .and(self.stems.get(file))
-                .cloned()
-                .unwrap_or_default(),
-            sigma: None,
-        };
-        for column in &columns.read {
-            match column.role {
-                Role::Position(axis) => {
-                    set(
-                        reading.position.as_mut_slice(),
-                        axis,
-                        (column.to_si)(table.number(column.place)?),
-                    );
-                }
-                Role::Time => reading.time = Some(table.time(column.place, column.to_si)?),
-                Role::Session => table.text(column.place)?.clone_into(&mut reading.session),
-                Role::Sigma => reading.sigma = Some(above_zero(table, column)?),
-                _ => {}
-            }
-        }
-        self.measurements.nests.push(reading);
-        Ok(())
-    }
-
-    /// Appends the observation of the current row.
-    fn push(
-        &mut self,
-        file: usize,
-        table: &Table,
-        columns: &Columns,
-        observed: &Observed,
-    ) -> Result<(), InputError> {
-        let Observed { observation, numbers, measured } = *observed;
-        let measurements = &mut self.measurements;
-        let joints = measurements.joints;
-        let row = measurements.len();
-        let narrow = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
-        measurements.origin.push((narrow(file), narrow(table.line())));
-        measurements.configurations.resize((row + 1) * joints, 0.0);
-        if let Some(other) = &mut measurements.other_configurations {
-            other.resize((row + 1) * joints, 0.0);
-        }
-        if let Some(approach) = &mut measurements.approach {
-            approach.resize((row + 1) * joints, 0.0);
-        }
-        if !measurements.time_measured {
-            measurements.time.push(row as f64);
-        }
-        let (mut position, mut pose, mut turned) = (numbers, None, Cells::default());
-        for column in columns
-            .read
-            .iter()
-            .filter(|column| observation.is_position() || !column.role.is_observed())
-        {
-            let number = || table.number(column.place).map(column.to_si);
-            match column.role {
-                Role::Joint(joint) | Role::Reading(joint) => {
-                    let value = number()?;
-                    if self.uses_readings == column.role.is_reading() {
-                        set(&mut measurements.configurations, row * joints + joint, value);
-                    } else if let Some(other) = &mut measurements.other_configurations {
-                        set(other, row * joints + joint, value);
-                    }
-                }
-                Role::Position(axis) => set(position.as_mut_slice(), axis, number()?),
-                Role::Sigma
-                    if self.mixed
-                        && (observation.is_angle() || table.text(column.place)?.is_empty()) => {}
-                Role::Sigma => push(&mut measurements.sigma, above_zero(table, column)?),
-                Role::Payload => push(&mut measurements.payload, not_negative(table, column)?),
-                Role::Hoist => push(&mut measurements.hoist, number()?),
-                Role::Temperature => push(&mut measurements.temperature, number()?),
-                Role::Time => measurements.time.push(table.time(column.place, column.to_si)?),
-                Role::Approach(joint) => {
-                    let direction = direction(table, column)?;
-                    if let Some(approach) = &mut measurements.approach {
-                        set(approach, row * joints + joint, direction);
-                    }
-                }
-                Role::Orientation(axis) => set(turned.angles.as_mut_slice(), axis, number()?),
-                Role::Quaternion(axis) => set(&mut turned.quaternion, axis, number()?),
-                // Columns are sorted by role, so covariates have the order of the problem.
-                Role::Covariate(_) => measurements.covariates.push(number()?),
-                Role::Split => _ = is_validation(table, column.place)?,
-                Role::Session => self.session.push(table.name(column.place)?),
-                // Tilts need no target; a named one has been checked.
-                Role::Target if self.names_targets && observation.is_angle() => {
-                    self.target.push(table.text(column.place)?);
-                }
-                Role::Target => self.target.push(table.name(column.place)?),
-                // These columns are empty or have been read by [`observed::of_row`].
-                Role::Nest
-                | Role::Point
-                | Role::Anchor
-                | Role::Distance
-                | Role::Surface
-                | Role::Offset
-                | Role::Frame
-                | Role::Tilt(_) => {}
-                Role::Pose => pose = Some(table.text(column.place)?),
-            }
-        }
-        match columns.file {
-            Some(Role::Session) => {
-                self.session.push(self.stems.get(file).map_or("", String::as_str))
-            }
-            Some(Role::Target) => self.target.push(self.stems.get(file).map_or("", String::as_str)),
-            _ => {}
-        }
-        if measurements.target.is_some() && self.target.labels.of_row.len() == row {
-            self.target.push("");
-        }
-        if let (Some(marked), Some(place)) = (&mut measurements.marked_held_out, columns.marked) {
-            marked.push(is_validation(table, place)?);
-        }
-        measurements.positions.push(position);
-        measurements.position_measured &= measured;
-        if self.mixed {
-            measurements.observations.push(observation);
-            measurements.sigma.iter_mut().for_each(|column| column.resize(row + 1, f64::NAN));
-        }
-        if let Some(orientations) = &mut measurements.orientations {
-            orientations.push(match columns.orientations() {
-                _ if !observation.is_position() => UnitQuaternion::identity(),
-                (true, _) => turned.of_angles(self.rotation),
-                _ => turned
-                    .of_quaternion()
-                    .ok_or_else(|| table.error(InputErrorKind::NotAQuaternion))?,
-            });
-        }
-        self.poses.push(pose);
-        Ok(())
-    }
-
-    /// Returns the measurements and the columns of the first file.
-    fn finish(self) -> (Measurements, Vec<(Column, String)>) {
-        let Self { mut measurements, session, target, poses, columns, .. } = self;
-        (measurements.pose, measurements.pose_names) = poses.finish();
-        measurements.session = session.labels;
-        if measurements.session.names.is_empty() {
-            let of_row = vec![0; measurements.len()];
-            measurements.session = Labels { names: vec![String::new()], of_row };
-        }
-        measurements.target = measurements.target.map(|_| target.labels);
-        (measurements, columns)
-    }
-}
-
-/// Sets an existing element of a list.
-fn set(list: &mut [f64], place: usize, value: f64) {
-    if let Some(element) = list.get_mut(place) {
-        *element = value;
-    }
-}
-
-fn push(list: &mut Option<Vec<f64>>, value: f64) {
-    if let Some(list) = list {
-        list.push(value);
     }
 }

@@ -1,6 +1,5 @@
 //! CSV file that is read record by record with line numbers.
 
-use std::fs::File;
 use std::io::{self, BufReader, Chain, Cursor, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -8,11 +7,13 @@ use std::sync::Arc;
 use csv::{ByteRecord, Reader, ReaderBuilder};
 
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
+use super::joined::CellStyle;
 use super::lines::{Lines, MAX_RECORD_KIB};
-use super::time::iso_8601;
+use super::time::date_time;
 use crate::error::{
     BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, is_hidden, lines,
 };
+use crate::files::{open, unescape_cell};
 use crate::problem::Dialect;
 use crate::problem::item::MAX_MAGNITUDE;
 
@@ -34,8 +35,11 @@ pub(super) struct Table {
     reader: Reader<NormalizedText<Lines<BufReader<TextFromStart>>>>,
     record: ByteRecord,
     line: usize,
-    delimiter: char,
-    decimal_comma: bool,
+    style: CellStyle,
+    /// Format of the appended cells of another table, and the number of cells before them.
+    appended: Option<(CellStyle, usize)>,
+    /// File and line of the appended cells of the current row.
+    partner: Option<(PathBuf, usize)>,
 }
 
 impl Table {
@@ -46,7 +50,7 @@ impl Table {
         dialect: &Dialect,
         missing: impl FnOnce() -> InputError,
     ) -> Result<Self, InputError> {
-        let input = File::open(file).map_err(|source| match source.kind() {
+        let input = open(file).map_err(|source| match source.kind() {
             io::ErrorKind::NotFound => missing(),
             _ => Location::file(file).error(InputErrorKind::Unreadable { source }),
         })?;
@@ -80,8 +84,12 @@ impl Table {
             reader,
             record: ByteRecord::new(),
             line: 1,
-            delimiter: char::from(layout.byte()),
-            decimal_comma: dialect.decimal_comma,
+            style: CellStyle {
+                delimiter: char::from(layout.byte()),
+                decimal_comma: dialect.decimal_comma,
+            },
+            appended: None,
+            partner: None,
         };
         if !table.advance()? {
             return Err(Location::file(file).at_line(1).error(InputErrorKind::EmptyTable));
@@ -101,7 +109,9 @@ impl Table {
         }
         for cell in &table.record {
             match std::str::from_utf8(cell.trim_ascii()) {
-                Ok(name) if !name.contains('\0') => table.header.push(name.to_owned()),
+                Ok(name) if !name.contains('\0') => {
+                    table.header.push(unescape_cell(name).to_owned())
+                }
                 // A header that is not text cannot be shown.
                 _ => return Err(header_error(InputErrorKind::HeaderNotUtf8)),
             }
@@ -119,8 +129,9 @@ impl Table {
         if !self.advance()? {
             return Ok(false);
         }
-        if self.record.len() != self.header.len() {
-            let (expected, found) = (self.header.len(), self.record.len());
+        let expected = self.appended.map_or(self.header.len(), |(_, own_cells)| own_cells);
+        if self.record.len() != expected {
+            let found = self.record.len();
             return Err(self.error(InputErrorKind::RowLength { expected, found }));
         }
         if !self.record.as_slice().is_ascii() {
@@ -161,6 +172,38 @@ impl Table {
         usize::try_from(self.reader.position().line()).unwrap_or(usize::MAX)
     }
 
+    /// Returns the format of the table's cells.
+    pub fn style(&self) -> CellStyle {
+        self.style
+    }
+
+    fn style_of(&self, place: usize) -> CellStyle {
+        self.appended
+            .filter(|&(_, own_cells)| place >= own_cells)
+            .map_or(self.style, |(style, _)| style)
+    }
+
+    /// Returns the cells of the row.
+    pub fn cells(&self) -> &ByteRecord {
+        &self.record
+    }
+
+    /// Adds columns of another table, whose cells are appended row by row.
+    pub fn extend_header(&mut self, names: Vec<String>, style: CellStyle) {
+        self.appended = Some((style, self.header.len()));
+        self.header.extend(names);
+    }
+
+    /// Appends cells of another table to the row; `partner` is their file and line.
+    pub fn append_cells<'a>(
+        &mut self,
+        cells: impl Iterator<Item = &'a [u8]>,
+        (file, line): (&Path, usize),
+    ) {
+        cells.for_each(|cell| self.record.push_field(cell));
+        self.partner = Some((file.to_owned(), line));
+    }
+
     /// Returns the line of the row, counted from 1.
     pub fn line(&self) -> usize {
         self.line
@@ -173,6 +216,7 @@ impl Table {
     /// Returns a cell of the row as text without surrounding white space.
     pub fn text(&self, place: usize) -> Result<&str, InputError> {
         std::str::from_utf8(self.cell(place))
+            .map(unescape_cell)
             .map_err(|_| self.cell_error(place, InputErrorKind::NotUtf8))
     }
 
@@ -201,14 +245,18 @@ impl Table {
     pub fn number(&self, place: usize) -> Result<f64, InputError> {
         let word = self.word(place)?;
         let value = || shortened(word);
-        let with_point = (self.decimal_comma && word.contains(',')).then(|| word.replace(',', "."));
+        let CellStyle { delimiter, decimal_comma } = self.style_of(place);
+        if decimal_comma && delimiter != ',' && word.contains('.') {
+            return Err(self.cell_error(place, InputErrorKind::DecimalPoint { value: value() }));
+        }
+        let with_point = (decimal_comma && word.contains(',')).then(|| word.replace(',', "."));
         match with_point.as_deref().unwrap_or(word).parse::<f64>() {
             Ok(number) if number.abs() <= MAX_MAGNITUDE => Ok(number),
             Ok(number) if number.is_finite() => {
                 Err(self.cell_error(place, InputErrorKind::MagnitudeTooLarge { value: value() }))
             }
             Ok(_) => Err(self.cell_error(place, InputErrorKind::NotFinite { value: value() })),
-            Err(_) if word.contains(',') && !self.decimal_comma => {
+            Err(_) if word.contains(',') && !decimal_comma => {
                 Err(self.cell_error(place, InputErrorKind::DecimalComma { value: value() }))
             }
             Err(_) => Err(self.cell_error(place, InputErrorKind::NotANumber { value: value() })),
@@ -219,7 +267,7 @@ impl Table {
     /// since 1970\].
     pub fn time(&self, place: usize, to_si: fn(f64) -> f64) -> Result<f64, InputError> {
         let word = self.word(place)?;
-        match iso_8601(word) {
+        match date_time(word) {
             Some(seconds) => Ok(seconds),
             None if word.bytes().filter(|byte| b"-:T".contains(byte)).count() > 1 => {
                 Err(self.cell_error(place, InputErrorKind::NotATime { value: shortened(word) }))
@@ -235,7 +283,7 @@ impl Table {
 
     /// Returns true if a cell of the row is a date and time.
     pub fn is_date(&self, place: usize) -> bool {
-        self.text(place).is_ok_and(|word| iso_8601(word).is_some())
+        self.text(place).is_ok_and(|word| date_time(word).is_some())
     }
 
     /// Returns the name of a column in the header.
@@ -266,7 +314,7 @@ impl Table {
         let (mut text, mut span) = (String::new(), None);
         for (index, cell) in self.record.iter().enumerate() {
             if index > 0 {
-                text.push(self.delimiter);
+                text.push(self.style.delimiter);
             }
             let start = text.len();
             text.push_str(&String::from_utf8_lossy(cell));
@@ -275,8 +323,11 @@ impl Table {
             }
         }
         let span = span.unwrap_or(0..text.len());
-        let excerpt = Excerpt { text: Arc::from(text), first_line: self.line, span };
-        Location { excerpt: Some(excerpt), ..Location::file(&self.file).at_line(self.line) }
+        let is_appended = |place| self.appended.is_some_and(|(_, own_cells)| place >= own_cells);
+        let partner = self.partner.as_ref().filter(|_| place.is_some_and(is_appended));
+        let (file, line) = partner.map_or((&self.file, self.line), |(file, line)| (file, *line));
+        let excerpt = Excerpt { text: Arc::from(text), first_line: line, span };
+        Location { excerpt: Some(excerpt), ..Location::file(file).at_line(line) }
     }
 }
 

@@ -1,12 +1,29 @@
 //! Dates and times.
 
+/// Parses a date and time of ISO 8601 or day first (`31.05.2024 14:03:20`) and returns the seconds
+/// since 1970-01-01T00:00 UTC.
+pub(super) fn date_time(text: &str) -> Option<f64> {
+    iso_8601(text).or_else(|| iso_8601(&iso_from_day_first(text.trim())?))
+}
+
+/// Rewrites `31.05.2024 14:03` as `2024-05-31 14:03`; day, month and hour may have one digit.
+fn iso_from_day_first(text: &str) -> Option<String> {
+    let (date, clock) = text.split_once([' ', 'T'])?;
+    let [day, month, year] = date.split('.').collect::<Vec<_>>()[..] else { return None };
+    let is_number = |word: &str| !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_digit());
+    let (hour, rest) = clock.trim_start().split_once(':')?;
+    let are_numbers = [day, month, year, hour].into_iter().all(is_number);
+    (are_numbers && year.len() == 4 && day.len() <= 2 && month.len() <= 2 && hour.len() <= 2)
+        .then(|| format!("{year}-{month:0>2}-{day:0>2} {hour:0>2}:{rest}"))
+}
+
 /// Parses a date and time of ISO 8601 and returns the seconds since 1970-01-01T00:00 UTC. Without a
 /// zone UTC is assumed.
 ///
 /// Accepted are the extended form (`2024-05-31T14:03:20.25+02:00`, also with a space instead of T)
 /// and the basic form (`20240531T140320Z`, also without T). In the extended form seconds may be
 /// absent; they may have a decimal point or comma.
-pub(super) fn iso_8601(text: &str) -> Option<f64> {
+fn iso_8601(text: &str) -> Option<f64> {
     let (clock, zone) = split_zone(text.trim());
     let plain: String = clock.chars().filter(|c| !"-:T ".contains(*c)).collect();
     let marks: String = clock.chars().filter(|c| "-:T ".contains(*c)).collect();
@@ -109,6 +126,19 @@ mod tests {
             ("", None),
         ] {
             assert_eq!(iso_8601(text), seconds, "{text}");
+        }
+        for (text, iso) in [
+            ("31.05.2024 14:03:20,25", "2024-05-31T14:03:20.25"),
+            ("1.2.2024 9:05", "2024-02-01T09:05"),
+            ("31.05.2024 14:03:20+02:00", "2024-05-31T14:03:20+02:00"),
+        ] {
+            assert_eq!(date_time(text), iso_8601(iso), "{text}");
+            assert!(date_time(text).is_some(), "{text}");
+        }
+        for text in
+            ["31.05.24 14:03", "31.05.2024", "05/31/2024 14:03", "32.05.2024 14:03", "1.2.3"]
+        {
+            assert_eq!(date_time(text), None, "{text}");
         }
     }
 }

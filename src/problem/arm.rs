@@ -4,12 +4,19 @@ use nalgebra::Vector3;
 
 use super::item::Item;
 use super::section::Section;
-use super::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement, effect, standard, tree};
-use crate::error::{InputError, InputErrorKind};
+use super::{
+    Beam, Body, Hoist, Joint, JointKind, Mimic, Placement, effect, plausible, standard, tree,
+};
+use crate::error::{InputError, InputErrorKind, Warning};
 use crate::quantity::Unit;
 
 /// Reads all `[[joint]]` tables, at least one. The flag is true if they use the standard DH form.
-pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<(Vec<Joint>, bool), InputError> {
+/// Implausible values are added to `warnings`.
+pub(super) fn joints(
+    root: &mut Section<'_, '_>,
+    warnings: &mut Vec<Warning>,
+) -> Result<(Vec<Joint>, bool), InputError> {
+    let form_is_declared = root.peek("dh").is_some();
     let form = root
         .word("dh", &["modified", "standard"], &[Form::Modified, Form::Standard])?
         .unwrap_or(Form::Modified);
@@ -22,10 +29,15 @@ pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<(Vec<Joint>, bool), I
             return Err(item.error(InputErrorKind::NotInStandardForm));
         }
         parents.push(parent);
+        warnings.extend(plausible::joint(&section));
         joints.push(joint(section, joints.len() + 1, (form, mimic.is_some()), &mut beams)?);
         mimics.push(mimic);
     }
     if joints.is_empty() {
+        if let Some(item) = root.peek("joints") {
+            let known = vec!["joint".to_owned()];
+            return Err(item.error(InputErrorKind::UnknownKey { key: "joints".to_owned(), known }));
+        }
         return Err(root.location().with_key("joint").error(InputErrorKind::NoJoints));
     }
     let can_lead: Vec<bool> = joints
@@ -36,6 +48,9 @@ pub(super) fn joints(root: &mut Section<'_, '_>) -> Result<(Vec<Joint>, bool), I
     for ((joint, section), parent) in joints.iter_mut().zip(mimics).zip(tree::parents(&parents)?) {
         joint.mimic = section.map(|section| mimic(section, &can_lead)).transpose()?;
         joint.parent = parent;
+    }
+    if !form_is_declared && root.peek("urdf").is_none() {
+        warnings.extend(plausible::form(&joints));
     }
     let is_standard = form == Form::Standard;
     Ok((if is_standard { standard::modified(joints) } else { joints }, is_standard))

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::dialect::{self, Dialect};
 use super::item::Item;
+use super::joint_log::{self, JointLog};
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::observation::Observation;
@@ -35,6 +36,8 @@ pub struct Data {
     pub reference_temperature: Option<f64>,
     /// Source of the configurations if a table has both commands and readings.
     pub joints: JointSource,
+    /// Second table with the joint coordinates; `None` if the measured table holds them.
+    pub joint_log: Option<JointLog>,
     /// Standard deviation of a measured orientation about each axis \[rad\]; `None` if orientations
     /// are not fitted.
     pub orientation_sigma: Option<f64>,
@@ -74,6 +77,11 @@ pub enum JointSource {
 }
 
 impl JointSource {
+    /// Words of the sources in the file, in the order of [`ALL`](Self::ALL).
+    pub(super) const WORDS: &'static [&'static str] = &["commanded", "read"];
+    /// All sources.
+    pub(super) const ALL: [Self; 2] = [Self::Commanded, Self::Read];
+
     /// Returns the word used in the file.
     pub fn as_str(self) -> &'static str {
         match self {
@@ -129,6 +137,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
             held_out: None,
             reference_temperature: None,
             joints: JointSource::Commanded,
+            joint_log: None,
             orientation_sigma: None,
             fits_orientation: false,
             dialect: Dialect::default(),
@@ -163,8 +172,15 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         held_out = Some(held_out_rows(item.section()?)?);
     }
     let reference_temperature = section.number("reference_temperature", Unit::Temperature)?;
-    let sources = [JointSource::Commanded, JointSource::Read];
-    let joints = section.word("joints", &["commanded", "read"], &sources)?.unwrap_or_default();
+    let (mut joints, mut joint_log) = (JointSource::default(), None);
+    if let Some(item) = section.peek("joints").filter(Item::holds_tables) {
+        let folder = file.file.parent().unwrap_or(Path::new(""));
+        let (log, source) = joint_log::read(&item, folder)?;
+        (joints, joint_log) = (source.unwrap_or_default(), Some(log));
+        section.get("joints");
+    } else if let Some(source) = section.word("joints", JointSource::WORDS, &JointSource::ALL)? {
+        joints = source;
+    }
     let orientation_sigma = section.positive("orientation_sigma", Unit::Angle, |value| {
         InputErrorKind::NotPositive { value }
     })?;
@@ -182,6 +198,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         held_out,
         reference_temperature,
         joints,
+        joint_log,
         orientation_sigma,
         fits_orientation: orientation_sigma.is_some(),
         dialect,

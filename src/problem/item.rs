@@ -147,6 +147,15 @@ impl<'a, 'i> Item<'a, 'i> {
         }
     }
 
+    /// Returns the text of a number as it is written, or `None` for another value.
+    pub fn written_number(&self) -> Option<&'a str> {
+        match self.value {
+            DeValue::Float(float) => Some(float.as_str()),
+            DeValue::Integer(integer) => Some(integer.as_str()),
+            _ => None,
+        }
+    }
+
     /// Returns an integer of at least `least`.
     pub fn whole(&self, least: u64) -> Result<u64, InputError> {
         let written = match self.value {

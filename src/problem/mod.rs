@@ -15,9 +15,11 @@ pub(crate) mod effects;
 pub(crate) mod fixture;
 pub(crate) mod item;
 mod joint;
+mod joint_log;
 mod parameters;
 mod past;
 pub(crate) mod pattern;
+mod plausible;
 pub(crate) mod quoted;
 pub(crate) mod read;
 mod robust;
@@ -28,7 +30,7 @@ mod tree;
 
 use nalgebra::Vector3;
 
-use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
+use crate::error::{InputError, InputErrorKind, Location, Warning};
 
 pub use crate::observation::{FixtureKind, Observation};
 pub(crate) use argument::HIGHEST_ORDER;
@@ -40,6 +42,7 @@ pub use dialect::{ColumnRule, ColumnSelector, Delimiter, Dialect, Missing, Rotat
 pub use effect::{Custom, Effect, EffectDeclaration};
 pub use fixture::{Fixture, KnownDistance};
 pub use joint::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement};
+pub use joint_log::{JoinRule, JointLog};
 pub use parameters::{Freedom, ParameterRule, Quantities};
 pub(crate) use past::PoseTable;
 pub(crate) use past::ThermalLag;
@@ -83,6 +86,8 @@ pub struct Problem {
     pub data: Data,
     /// Robust loss; `None` for least squares.
     pub robust: Option<Robust>,
+    /// Warnings about implausible values of the arm.
+    pub warnings: Vec<Warning>,
 }
 
 impl Problem {
@@ -154,33 +159,6 @@ impl Problem {
             "" => InputErrorKind::TargetsUnnamed { targets: known },
             _ => InputErrorKind::UnknownFixture { what: "target", name: word.to_owned(), known },
         }
-    }
-
-    /// Returns a warning if a target is farther from its frame than twice the length of the arm.
-    pub fn far_target(&self) -> Option<Warning> {
-        let length = |joint: &Joint| {
-            let placed = joint.placement.as_ref().map_or(0.0, |placement| placement.xyz.norm());
-            let (min, max) = joint.limits;
-            let travel =
-                if joint.kind == JointKind::Prismatic { min.abs().max(max.abs()) } else { 0.0 };
-            joint.a.hypot(joint.d) + placed + travel
-        };
-        let tool_location = || Location {
-            line: None,
-            excerpt: None,
-            ..self.data.location.clone().with_key("tool.target")
-        };
-        let farthest = self.targets.iter().max_by(|a, b| a.at.norm().total_cmp(&b.at.norm()));
-        let (location, target) = farthest.map_or_else(
-            || (tool_location(), self.tool.target),
-            |target| (target.location.clone(), target.at),
-        );
-        let (links, distance) = (self.joints.iter().map(length).sum::<f64>(), target.norm());
-        let kind = WarningKind::FarTarget {
-            distance: format!("{distance:.3}"),
-            links: format!("{links:.3}"),
-        };
-        (links > 0.0 && distance > 2.0 * links).then_some(Warning { location, kind })
     }
 }
 

@@ -49,6 +49,9 @@ pub struct Quantities {
 /// Maximum number of rules.
 const MAX_RULES: usize = 2000;
 
+/// Maximum length of a pattern [bytes], which bounds the work of matching all parameters.
+const MAX_PATTERN_BYTES: usize = 500;
+
 const KINDS: [Unit; 3] = [Unit::Angle, Unit::Length, Unit::Ratio];
 /// Nominal value on the scale of each kind: deviation 0 or ratio 1.
 const NOMINAL_VALUES: [f64; 3] = [0.0, 0.0, 1.0];
@@ -66,6 +69,7 @@ fn rule(pattern: &str, item: &Item<'_, '_>) -> Result<ParameterRule, InputError>
     if pattern.trim().is_empty() {
         return Err(item.error(InputErrorKind::Empty));
     }
+    item.check_count("characters in a pattern", pattern.len(), MAX_PATTERN_BYTES)?;
     let mut section = item.section()?;
     // TOML reads `tool.x = { … }` without quotes as a table `tool` with a table `x`.
     if let Some((inner, _)) = section.entries().into_iter().find(|(_, inner)| inner.holds_tables())

@@ -89,7 +89,8 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let gravity =
         root.vector("gravity", Unit::Acceleration)?.unwrap_or(Vector3::new(0.0, 0.0, -9.80665));
     let statics = statics(root.section("statics")?)?;
-    let (joints, is_standard) = arm::joints(&mut root)?;
+    let mut warnings = Vec::new();
+    let (joints, is_standard) = arm::joints(&mut root, &mut warnings)?;
     let carriers = CarrierJoints { joints: &joints, is_standard };
     let tool = target::tool(root.section("tool")?, &carriers)?;
     let targets = target::targets(&mut root, &tool, &carriers)?;
@@ -120,6 +121,7 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
         constraints,
         data,
         robust,
+        warnings,
     })
 }
 

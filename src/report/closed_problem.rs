@@ -14,8 +14,8 @@ use crate::problem::{Argument, Effect, Problem};
 use crate::results::ParameterValue;
 use crate::select::{ClosedLoop, Found, HarmonicPrior, Status};
 
-/// Adds the found effects to the `text` of `problem`, and names its data `files` as seen from the
-/// folder of the new text. All else stays as written, comments included.
+/// Adds the found effects to the `text` of `problem`, and names its data `files` (measurements,
+/// then the joint table) as seen from the folder of the new text. All else stays as written, comments included.
 ///
 /// # Errors
 /// The text is not TOML.
@@ -23,7 +23,7 @@ pub fn closed_problem(
     text: &str,
     problem: &Problem,
     closure: &ClosedLoop,
-    files: &[PathBuf],
+    files: [&[PathBuf]; 2],
 ) -> Result<String, TomlError> {
     let declared: Vec<Effect> =
         problem.effects.iter().map(|declared| declared.effect.clone()).collect();
@@ -78,11 +78,14 @@ fn edited(
     text: &str,
     declared: &[Effect],
     closed: &[(Effect, Vec<String>)],
-    files: &[PathBuf],
+    files: [&[PathBuf]; 2],
 ) -> Result<String, TomlError> {
     let mut document: DocumentMut = text.parse()?;
     if let Some(data) = document.get_mut("data").and_then(Item::as_table_like_mut) {
-        name_files(data, files);
+        name_files(data, files[0]);
+        if let Some(joints) = data.get_mut("joints").and_then(Item::as_table_like_mut) {
+            name_files(joints, files[1]);
+        }
     }
     let (customs, written): (Vec<_>, Vec<_>) =
         closed.iter().partition(|(effect, _)| effect.is_custom());
@@ -116,9 +119,9 @@ fn name_files(data: &mut dyn TableLike, files: &[PathBuf]) {
     let slashes = |file: &PathBuf| file.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
     let mut names = Value::Array(files.iter().map(slashes).collect());
     match data.get_mut("files") {
-        Some(Item::Value(known)) => {
-            *names.decor_mut() = known.decor().clone();
-            *known = names;
+        Some(Item::Value(current)) => {
+            *names.decor_mut() = current.decor().clone();
+            *current = names;
         }
         _ => _ = data.insert("files", Item::Value(names)),
     }
@@ -231,7 +234,7 @@ mod tests {
     fn edit(text: &str, declared: &[Effect], closed: &[Effect]) -> String {
         let closed: Vec<_> =
             closed.iter().map(|effect| (effect.clone(), vec!["found".to_owned()])).collect();
-        edited(text, declared, &closed, &FILES.map(PathBuf::from)).unwrap()
+        edited(text, declared, &closed, [&FILES.map(PathBuf::from), &[]]).unwrap()
     }
 
     fn gear() -> Effect {
@@ -314,6 +317,6 @@ mod tests {
         let text = "name = \"x\"\r\n[data]\r\nfiles = [\"data.csv\"]\r\n";
         let read: toml::Table = edit(text, &[], &[gear()]).parse().unwrap();
         assert_eq!(read["effect"][0]["gear-ratio"]["joint"].as_integer(), Some(3));
-        assert!(edited("name = ", &[], &[], &[]).is_err());
+        assert!(edited("name = ", &[], &[], [&[], &[]]).is_err());
     }
 }

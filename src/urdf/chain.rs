@@ -1,4 +1,4 @@
-//! The joints between two links, from axis to axis.
+//! Chain of joints between two links of a URDF.
 
 use nalgebra::Vector3;
 
@@ -7,43 +7,44 @@ use crate::error::{InputError, UrdfErrorKind};
 use crate::problem::Problem;
 use crate::spatial::Frame;
 
-/// Most joints of a chain: as many as a problem may have, with a fixed one at each end.
-const MOST_JOINTS: usize = 98;
+/// Maximum number of joints in a chain: the maximum of a problem, less a fixed joint at each end.
+const MAX_JOINTS: usize = 98;
 
-/// The joints of a robot from one link to another.
+/// Joints of a robot from one link to another.
 pub struct Chain<'a> {
     pub(super) robot: &'a Robot,
     pub(super) base: usize,
     pub(super) tip: usize,
     /// Indices of the joints from base to tip.
     pub(super) joints: Vec<usize>,
-    /// The moving ones.
+    /// Moving joints of the chain.
     pub(super) stages: Vec<Stage>,
-    /// What lies behind the last axis frame: the tip as seen from there.
+    /// Frame of the tip in the last axis frame.
     pub(super) end: Frame<f64>,
 }
 
-/// A moving joint: what lies between the axis frame before it and its own. An axis frame stands in
-/// a joint before it moves, its z along the axis.
+/// Moving joint of the chain. Its axis frame is the joint's frame before motion, turned so that z
+/// is the axis.
 pub(super) struct Stage {
     /// Index of the joint in the robot.
     pub joint: usize,
-    /// Its axis frame as seen from the axis frame before it, the addend of a mimic joint in it.
+    /// Axis frame in the previous axis frame, including the offset of a mimic joint.
     pub step: Frame<f64>,
-    /// The axis frame as seen from the joint's own frame.
+    /// Axis frame in the URDF's frame of the joint.
     pub axis: Frame<f64>,
     /// Stage whose command it follows, and the factor.
     pub mimic: Option<(usize, f64)>,
-    /// Addend of a mimic joint \[rad\] or \[m\].
+    /// Offset of a mimic joint \[rad\] or \[m\].
     pub addend: f64,
 }
 
 impl<'a> Chain<'a> {
-    /// The chain from `base` to `tip`; without them from the root to the only leaf below the base.
+    /// Finds the chain from `base` to `tip`. The defaults are the root and the only leaf below the
+    /// base.
     ///
     /// # Errors
-    /// A tree that is none, several roots or leaves to choose from, a joint that no arm has, no
-    /// joint that moves.
+    /// The links form no tree, several roots or leaves are possible, a joint type is unsupported,
+    /// or no joint moves.
     pub fn new(
         robot: &'a Robot,
         base: Option<&str>,
@@ -59,7 +60,7 @@ impl<'a> Chain<'a> {
             None => leaf(robot, &above, base)?,
         };
         let name =
-            |link: usize| robot.links.get(link).map_or(String::new(), |own| own.name.clone());
+            |link: usize| robot.links.get(link).map_or(String::new(), |link| link.name.clone());
         let (mut joints, mut passed, mut at) = (Vec::new(), Vec::new(), tip);
         while at != base {
             let Some((joint, parent)) = above.get(at).copied().flatten() else {
@@ -74,9 +75,10 @@ impl<'a> Chain<'a> {
             at = parent;
         }
         joints.reverse();
-        if joints.len() > MOST_JOINTS {
-            return Err(robot
-                .error(UrdfErrorKind::TooManyJoints { found: joints.len(), most: MOST_JOINTS }));
+        if joints.len() > MAX_JOINTS {
+            return Err(
+                robot.error(UrdfErrorKind::TooManyJoints { found: joints.len(), most: MAX_JOINTS })
+            );
         }
         let mut chain =
             Self { robot, base, tip, joints, stages: Vec::new(), end: Frame::identity() };
@@ -89,16 +91,16 @@ impl<'a> Chain<'a> {
         Ok(chain)
     }
 
-    /// The chain that a problem was made from, between the ends that it names.
+    /// Finds the chain of a problem that was made from a URDF.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
-    pub fn of(robot: &'a Robot, problem: &Problem) -> Result<Self, InputError> {
+    /// See [`new`](Self::new).
+    pub fn from_problem(robot: &'a Robot, problem: &Problem) -> Result<Self, InputError> {
         let ends = problem.urdf.as_ref();
         Self::new(robot, ends.map(|ends| ends.base.as_str()), ends.map(|ends| ends.tip.as_str()))
     }
 
-    /// Finds the stages.
+    /// Computes the stages and the end frame.
     fn walk(&mut self) -> Result<(), InputError> {
         let robot = self.robot;
         let (mut step, mut leaders) = (Frame::identity(), Vec::new());
@@ -111,12 +113,15 @@ impl<'a> Chain<'a> {
             if joint.kind == Kind::Fixed {
                 continue;
             }
+            if let Some((location, kind)) = &joint.broken_mimic {
+                return Err(location.clone().error(kind.clone().into()));
+            }
             let axis = axis_frame(&joint.axis);
             let (leader, addend) = self.leader(index)?;
             leaders.push(leader);
             step = moved(&step.compose(&axis), joint, addend);
             self.stages.push(Stage { joint: index, step, axis, mimic: None, addend });
-            // What follows is seen from the axis frame: back to the joint's own first.
+            // The next step starts in the joint's URDF frame, seen from the axis frame.
             step = axis.inverse();
         }
         self.end = step;
@@ -131,13 +136,13 @@ impl<'a> Chain<'a> {
         Ok(())
     }
 
-    /// The first joint of the chain whose command a joint follows in the end, with factor and
-    /// addend; none where no joint of the chain leads it, so that it is commanded itself.
+    /// Returns the joint of the chain that a joint finally follows, with factor and offset; `None`
+    /// if no joint of the chain leads it, so that it takes its own command.
     fn leader(&self, index: usize) -> Result<(Option<(usize, f64)>, f64), InputError> {
         let (mut factor, mut addend, mut at) = (1.0, 0.0, index);
         let mut last = (None, 0.0);
         for _ in 0..=self.robot.joints.len() {
-            let Some((leader, by, plus)) = self.robot.joints.get(at).and_then(|own| own.mimic)
+            let Some((leader, by, plus)) = self.robot.joints.get(at).and_then(|joint| joint.mimic)
             else {
                 return Ok(last);
             };
@@ -151,7 +156,7 @@ impl<'a> Chain<'a> {
         Err(self.robot.error_at(index, UrdfErrorKind::MimicCircle))
     }
 
-    /// Names of the moving joints.
+    /// Returns the names of the moving joints.
     pub fn joint_names(&self) -> Vec<String> {
         self.stages
             .iter()
@@ -159,26 +164,29 @@ impl<'a> Chain<'a> {
             .collect()
     }
 
-    /// Names of the first and the last link.
+    /// Returns the names of the first and the last link.
     pub fn ends(&self) -> (&str, &str) {
-        let name = |link: usize| self.robot.links.get(link).map_or("", |own| own.name.as_str());
+        let name = |link: usize| self.robot.links.get(link).map_or("", |link| link.name.as_str());
         (name(self.base), name(self.tip))
     }
 }
 
-/// A frame with its z along `axis`: none where that is z already, else the shortest turn.
+/// Returns a frame whose z is along `axis`, by the smallest rotation.
 fn axis_frame(axis: &Vector3<f64>) -> Frame<f64> {
-    let level = axis.x.hypot(axis.y);
+    let horizontal = axis.x.hypot(axis.y);
     let mut frame = Frame::identity();
-    if level > 0.0 || axis.z < 0.0 {
-        let about =
-            if level > 0.0 { Vector3::new(-axis.y, axis.x, 0.0) / level } else { Vector3::x() };
-        frame.rotate(&(about * level.atan2(axis.z)));
+    if horizontal > 0.0 || axis.z < 0.0 {
+        let about = if horizontal > 0.0 {
+            Vector3::new(-axis.y, axis.x, 0.0) / horizontal
+        } else {
+            Vector3::x()
+        };
+        frame.rotate(&(about * horizontal.atan2(axis.z)));
     }
     frame
 }
 
-/// `frame` after the joint has moved by q, its axis along z.
+/// Returns `frame` after the joint has moved by q along or about z.
 pub(super) fn moved(frame: &Frame<f64>, joint: &Joint, q: f64) -> Frame<f64> {
     let mut frame = *frame;
     match joint.kind {
@@ -189,19 +197,20 @@ pub(super) fn moved(frame: &Frame<f64>, joint: &Joint, q: f64) -> Frame<f64> {
     frame
 }
 
-/// The joint above each link and the link above that.
+/// Returns the joint above each link and that joint's parent link.
 fn parents(robot: &Robot) -> Result<Vec<Option<(usize, usize)>>, InputError> {
     let mut above: Vec<Option<(usize, usize)>> = vec![None; robot.links.len()];
-    let link = |index: usize| robot.links.get(index).map_or(String::new(), |own| own.name.clone());
+    let link =
+        |index: usize| robot.links.get(index).map_or(String::new(), |link| link.name.clone());
     for (index, joint) in robot.joints.iter().enumerate() {
         let Some(place) = above.get_mut(joint.child) else { continue };
         if let Some((first, _)) = place.replace((index, joint.parent)) {
-            let first = robot.joints.get(first).map_or(String::new(), |own| own.name.clone());
+            let first = robot.joints.get(first).map_or(String::new(), |link| link.name.clone());
             let (link, second) = (link(joint.child), joint.name.clone());
             return Err(robot.error_at(index, UrdfErrorKind::TwoParents { link, first, second }));
         }
     }
-    // Every link is at most as deep as there are links.
+    // In a tree no link is deeper than the number of links.
     for start in 0..robot.links.len() {
         let (mut at, mut steps) = (start, 0);
         while let Some((joint, parent)) = above.get(at).copied().flatten() {
@@ -230,16 +239,16 @@ fn root(robot: &Robot, above: &[Option<(usize, usize)>]) -> Result<usize, InputE
     }
 }
 
-/// The only link below `base` that no joint has as its parent.
+/// Returns the only link below `base` that is no joint's parent.
 fn leaf(robot: &Robot, above: &[Option<(usize, usize)>], base: usize) -> Result<usize, InputError> {
     let is_parent = |link: usize| robot.joints.iter().any(|joint| joint.parent == link);
-    // Moving joints from the base to a link, if it is below.
+    // Number of moving joints from the base to a link below it.
     let depth = |link: usize| {
         let (mut at, mut moving) = (link, 0);
         while at != base {
             let (joint, parent) = above.get(at).copied().flatten()?;
             moving +=
-                usize::from(robot.joints.get(joint).is_some_and(|own| own.kind != Kind::Fixed));
+                usize::from(robot.joints.get(joint).is_some_and(|joint| joint.kind != Kind::Fixed));
             at = parent;
         }
         Some(moving)
@@ -255,7 +264,7 @@ fn leaf(robot: &Robot, above: &[Option<(usize, usize)>], base: usize) -> Result<
         let plural = if *moving == 1 { "" } else { "s" };
         Some(format!("{} ({moving} moving joint{plural})", robot.links.get(*link)?.name))
     };
-    let base = robot.links.get(base).map_or(String::new(), |own| own.name.clone());
+    let base = robot.links.get(base).map_or(String::new(), |link| link.name.clone());
     Err(robot
         .error(UrdfErrorKind::Leaves { base, leaves: leaves.iter().filter_map(named).collect() }))
 }

@@ -1,4 +1,4 @@
-//! A chain as the text of a problem.
+//! Conversion of a chain to the text of a problem.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::fmt::Write as _;
@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 use super::chain::Chain;
 use super::free::distinguishable_parameters;
 use super::lines::Step;
+use super::notes;
 use super::read::Kind;
 use super::weights::weights;
 use crate::error::InputError;
@@ -17,71 +18,76 @@ use crate::problem::quoted::quoted;
 use crate::problem::read::FORBIDDEN_IN_FOLDER_NAMES;
 use crate::spatial::Frame;
 
-/// Smaller numbers than this are rounding, of a right angle written to eleven decimals as well
-/// \[rad\] or \[m\].
+/// Values below this are rounding errors, also of right angles written with eleven decimals \[rad\]
+/// or \[m\].
 const ROUNDING: f64 = 1e-11;
-/// 1 σ of a measured coordinate where nobody has said it yet: of a laser tracker in a workshop
+/// Default standard deviation of a measured coordinate, typical of a laser tracker in a workshop
 /// \[mm\].
 pub const SIGMA_MM: f64 = 0.05;
-/// Part of the poses that judge and are not fitted where nobody has said it yet.
+/// Default fraction of held-out poses.
 pub const HELD_OUT: f64 = 0.3;
-/// Most characters of a problem's name that come from a robot's.
-const LONGEST_NAME: usize = 60;
+/// Maximum length of a problem's name taken from the robot's [characters].
+const MAX_NAME_CHARS: usize = 60;
 
-/// A chain told as a problem.
+/// Range of a joint without limits: `check` and `plan` draw poses from it.
+const CONTINUOUS_RANGE: &str = "# A joint without limits: poses are planned within one turn.\n\
+     min_deg = -180\nmax_deg = 180\n";
+
+/// Problem made from a chain.
 #[derive(Debug, Clone)]
 pub struct Description {
     /// Name of the problem.
     pub name: String,
     /// Text of the `problem.toml`.
     pub text: String,
-    /// What a reader of it should know.
+    /// Notes for the user about assumptions and ignored parts.
     pub notes: Vec<String>,
 }
 
-/// A section `[[joint]]`.
+/// Table `[[joint]]` to be written.
 #[derive(Default)]
 struct Row {
     name: String,
     kind: &'static str,
-    /// xyz and rpy, of those that have them.
+    /// Placement by xyz and rpy, for fixed joints.
     placement: Option<Frame<f64>>,
     mimic: Option<(usize, f64)>,
-    /// α, a, θ, d, β.
+    /// Parameters α, a, θ, d, β.
     numbers: [f64; 5],
     limits: Option<(f64, f64)>,
-    /// Name, mass and centre of mass.
+    /// Name, mass and centre of mass of each body.
     bodies: Vec<(String, f64, Vector3<f64>)>,
 }
 
-/// The chain as a problem with a file of measurements still to be made.
+/// Converts a chain to a problem whose measurement file does not exist yet.
 ///
 /// # Errors
-/// Numbers so large that the text is no problem.
+/// A number of the URDF is too large for a problem.
 pub fn describe(chain: &Chain) -> Result<Description, InputError> {
     let mut notes = Vec::new();
     let rows = rows(chain, &mut notes);
     let name = name(&chain.robot.name);
     let arm = arm(chain, &name, &rows);
-    // What the arm cannot hold, the URDF cannot: numbers beyond any size.
+    // Only numbers of excessive size make this fail.
     let problem = Problem::parse(&arm, Path::new("problem.toml"))
         .map_err(|error| chain.robot.as_problem(&error))?;
     let free = distinguishable_parameters(&problem)?;
-    notes.extend(right_angles(chain));
+    notes.extend(notes::of_chain(chain));
     let text = format!("{arm}\n{}\n{}", parameters(&rows, &free), data(chain, &rows));
     Ok(Description { name, text, notes })
 }
 
-/// A name for a row that is no joint of the URDF: columns go by the names of joints.
-fn unlike_joints(chain: &Chain, name: &str) -> String {
+/// Returns `name`, changed if a joint of the URDF has it: columns are named after joints.
+fn avoid_joint_names(chain: &Chain, name: &str) -> String {
     let taken = chain.robot.joints.iter().any(|joint| joint.name == name);
     if taken { format!("{name} frame") } else { name.to_owned() }
 }
 
 fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
-    let mut steps: Vec<Step> = chain.stages.iter().map(|stage| Step::to(&stage.step)).collect();
+    let mut steps: Vec<Step> =
+        chain.stages.iter().map(|stage| Step::from_frame(&stage.step)).collect();
     let mut rows = Vec::new();
-    // The first axis may lie where no α and a reach it from the base.
+    // The first axis may be unreachable by α and a from the base.
     if let (Some(first), Some(stage)) = (steps.first_mut(), chain.stages.first())
         && [first.theta_before, first.d_before, first.beta]
             .iter()
@@ -89,20 +95,20 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
     {
         *first = Step::default();
         rows.push(Row {
-            name: unlike_joints(chain, "mounting"),
+            name: avoid_joint_names(chain, "mounting"),
             kind: "fixed",
             placement: Some(stage.step),
             ..Row::default()
         });
     }
     let lead = rows.len();
-    // What lies behind the last joint fits its θ and d, or is a joint of its own.
+    // The transform after the last joint becomes its θ and d if possible, otherwise a fixed joint.
     let [x, _, z] = &chain.end.axes;
     let on_axis = z.xy().norm() + chain.end.origin.xy().norm() < ROUNDING && z.z > 0.0;
     let end =
         Step { theta_before: x.y.atan2(x.x), d_before: chain.end.origin.z, ..Step::default() };
     steps.push(if on_axis { end } else { Step::default() });
-    for ((stage, own), next) in chain.stages.iter().zip(&steps).zip(steps.iter().skip(1)) {
+    for ((stage, step), next) in chain.stages.iter().zip(&steps).zip(steps.iter().skip(1)) {
         let Some(joint) = chain.robot.joints.get(stage.joint) else { continue };
         rows.push(Row {
             name: joint.name.clone(),
@@ -110,10 +116,10 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
             placement: None,
             mimic: stage.mimic.map(|(leader, ratio)| (leader + lead + 1, ratio)),
             numbers: [
-                own.alpha,
-                own.a,
-                own.theta + next.theta_before,
-                own.d + next.d_before,
+                step.alpha,
+                step.a,
+                step.theta + next.theta_before,
+                step.d + next.d_before,
                 next.beta,
             ],
             limits: Some(joint.limits).filter(|_| stage.mimic.is_none()),
@@ -135,7 +141,7 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
         }
     }
     if !on_axis {
-        let name = unlike_joints(chain, chain.ends().1);
+        let name = avoid_joint_names(chain, chain.ends().1);
         rows.push(Row { name, kind: "fixed", placement: Some(chain.end), ..Row::default() });
     }
     let mut frame = Frame::identity();
@@ -160,7 +166,7 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
     rows
 }
 
-/// `frame` behind a row with its q at zero.
+/// Returns `frame` after a row with q = 0.
 fn advanced(frame: &Frame<f64>, row: &Row) -> Frame<f64> {
     let mut frame = row.placement.as_ref().map_or(*frame, |placement| frame.compose(placement));
     let [alpha, a, theta, d, beta] = row.numbers;
@@ -172,24 +178,24 @@ fn advanced(frame: &Frame<f64>, row: &Row) -> Frame<f64> {
     frame
 }
 
-/// A name that is fit to name a folder.
+/// Returns a valid folder name.
 fn name(robot: &str) -> String {
     let fit: String = robot
         .chars()
         .map(|c| if FORBIDDEN_IN_FOLDER_NAMES.contains(c) || c.is_whitespace() { '-' } else { c })
         .collect();
     let fit: String =
-        fit.trim_matches(|c| c == '.' || c == '-').chars().take(LONGEST_NAME).collect();
+        fit.trim_matches(|c| c == '.' || c == '-').chars().take(MAX_NAME_CHARS).collect();
     if fit.is_empty() || fit.chars().any(crate::error::is_hidden) { "arm".to_owned() } else { fit }
 }
 
-/// A number to twelve decimals.
+/// Formats a number with at most twelve decimals.
 fn number(value: f64) -> String {
     let rounded = (value * 1e12).round() / 1e12;
     if rounded.is_finite() { (rounded + 0.0).to_string() } else { value.to_string() }
 }
 
-/// A limit of a joint, to six decimals.
+/// Formats a joint limit with at most six decimals.
 fn limit_number(value: f64) -> String {
     number((value * 1e6).round() / 1e6)
 }
@@ -208,7 +214,7 @@ fn list(values: &Vector3<f64>, text: impl Fn(f64) -> String) -> String {
     format!("[{}]", values.iter().map(|value| text(*value)).collect::<Vec<_>>().join(", "))
 }
 
-/// Everything up to `[parameters]`. Writing to a text cannot fail.
+/// Writes everything up to `[parameters]`; writing to a text cannot fail.
 fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
     let (base, tip) = chain.ends();
     let file = chain.robot.file().file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -241,14 +247,14 @@ fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
             );
         }
         let [alpha, a, theta, d, beta] = row.numbers;
-        let all = [
+        let parameters = [
             ("alpha_deg", alpha, true),
             ("a_m", a, false),
             ("theta_deg", theta, true),
             ("d_m", d, false),
             ("beta_deg", beta, true),
         ];
-        for (key, value, is_angle) in all {
+        for (key, value, is_angle) in parameters {
             if value.abs() > ROUNDING {
                 let _ = writeln!(
                     text,
@@ -258,6 +264,9 @@ fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
             }
         }
         if let Some((min, max)) = row.limits {
+            if row.kind == "revolute" && !min.is_finite() && !max.is_finite() {
+                text.push_str(CONTINUOUS_RANGE);
+            }
             let (unit, scale) = if row.kind == "prismatic" {
                 ("m", 1.0)
             } else {
@@ -281,7 +290,8 @@ fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
     text
 }
 
-/// `[parameters]`: priors for all, and those held that positions do not tell from others.
+/// Writes `[parameters]`: priors for all parameters, and rules that fix those which positions
+/// cannot distinguish.
 fn parameters(rows: &[Row], free: &[String]) -> String {
     let mut text = "[parameters]                                     # how far off the nominal arm may be, 1 σ\n\
                     \"joint*.*\" = { sigma_deg = 0.5, sigma_mm = 2.0 }\n\
@@ -309,7 +319,7 @@ fn parameters(rows: &[Row], free: &[String]) -> String {
     text
 }
 
-/// `[data]`.
+/// Writes the section `[data]`.
 fn data(chain: &Chain, rows: &[Row]) -> String {
     let moving = rows.iter().filter(|row| row.kind != "fixed" && row.mimic.is_none());
     let column =
@@ -326,30 +336,4 @@ fn data(chain: &Chain, rows: &[Row]) -> String {
         chain.ends().1
     );
     text
-}
-
-/// What was taken as a right angle, or half of one.
-fn right_angles(chain: &Chain) -> Option<String> {
-    let origins = chain.joints.iter().filter_map(|&index| chain.robot.joints.get(index));
-    let mut values: Vec<String> = Vec::new();
-    let mut joints = Vec::new();
-    for joint in origins {
-        let pairs = joint.origin.written.iter().zip(joint.origin.meant.iter());
-        let rounded: Vec<f64> = pairs
-            .filter(|(written, meant)| written.to_bits() != meant.to_bits())
-            .map(|(written, _)| written.abs())
-            .collect();
-        if !rounded.is_empty() {
-            joints.push(joint.name.as_str());
-        }
-        for value in rounded.into_iter().map(|value| value.to_string()) {
-            if !values.contains(&value) {
-                values.push(value);
-            }
-        }
-    }
-    (!values.is_empty()).then(|| {
-        let (values, joints) = (values.join(", "), joints.join(", "));
-        format!("{values} [rad] taken as the multiple of 45° that was rounded, at {joints}; more decimals are taken as they are")
-    })
 }

@@ -1,4 +1,4 @@
-//! Identified geometry written into the origins of a URDF, every other byte as it was.
+//! Export of identified geometry into the origins of a URDF; all other bytes stay unchanged.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -12,23 +12,23 @@ use crate::mechanics::Arm;
 use crate::problem::{JointKind, Problem};
 use crate::spatial::Frame;
 
-/// How far apart the nominal arm of a problem and its URDF may be \[rad\] or \[m\].
-const SAME: f64 = 1e-6;
-/// A remainder behind the last origin of the chain that may be left out \[rad\] or \[m\].
-const NOTHING: f64 = 1e-10;
-/// An origin that moves by less is left as it is written \[rad\] or \[m\].
-const UNMOVED: f64 = 1e-12;
+/// Tolerance between the nominal arms of problem and URDF \[rad\] or \[m\].
+const NOMINAL_TOLERANCE: f64 = 1e-6;
+/// Maximum transform after the chain's last origin that may be dropped \[rad\] or \[m\].
+const MAX_DROPPED: f64 = 1e-10;
+/// Minimum displacement for which an origin is rewritten \[rad\] or \[m\].
+const MIN_DISPLACEMENT: f64 = 1e-12;
 
-/// A URDF with moved origins.
+/// URDF with identified origins.
 #[derive(Debug, Clone)]
 pub struct Export {
-    /// The whole file.
+    /// Text of the whole file.
     pub text: String,
-    /// The origins that have moved, from base to tip.
+    /// Moved origins from base to tip.
     pub moved: Vec<MovedOrigin>,
 }
 
-/// An origin of a joint, as it was and as it is.
+/// Moved origin of a joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MovedOrigin {
     /// Name of the joint.
@@ -37,24 +37,24 @@ pub struct MovedOrigin {
     pub xyz: Vector3<f64>,
     /// Roll, pitch and yaw \[rad\], as written to the file.
     pub rpy: Vector3<f64>,
-    /// How far it has moved \[m\].
+    /// Distance that it moved \[m\].
     pub distance: f64,
-    /// How far it has turned \[rad\].
+    /// Angle that it turned \[rad\].
     pub angle: f64,
 }
 
-/// Between the axes of an arm: what lies before each moving joint, seen from the one before, and
-/// behind the last.
+/// Transforms between the axes of an arm: before each moving joint, relative to the previous one,
+/// and after the last.
 ///
-/// Our transforms in another order: `C_k` = Ry(`β_{k−1}`) … Rx(`α_k`) Tx(`a_k`) Rz(`θ_k`)
-/// Tz(`d_k`), fixed joints in between.
+/// They regroup the joint transforms: `C_k` = Ry(`β_{k−1}`) … Rx(`α_k`) Tx(`a_k`) Rz(`θ_k`)
+/// Tz(`d_k`), with fixed joints in between.
 pub(super) struct Steps {
     pub before: Vec<Frame<f64>>,
     pub end: Frame<f64>,
 }
 
 impl Steps {
-    pub fn of(arm: &Arm<f64>) -> Self {
+    pub fn new(arm: &Arm<f64>) -> Self {
         let (mut before, mut step) = (Vec::new(), Frame::identity());
         for joint in &arm.joints {
             joint.advance_to_zero(&mut step);
@@ -66,20 +66,20 @@ impl Steps {
         Self { before, end: step }
     }
 
-    /// Where each step leads that the chain's frames see: with the gauges of the nominal arm, so
-    /// that an arm without errors has the frames it had.
+    /// Returns the gauge of each axis: the transform from the chain's axis frame to that of the
+    /// nominal arm. With it an arm without errors keeps the frames of the file.
     ///
     /// # Errors
-    /// The nominal arm is not that of the chain.
+    /// The nominal arm differs from the chain.
     fn gauges(&self, chain: &Chain) -> Result<Vec<Frame<f64>>, InputError> {
         let mut gauges = vec![Frame::identity()];
         let mut gauge = Frame::identity();
         let names = chain.joint_names();
-        for ((stage, own), name) in chain.stages.iter().zip(&self.before).zip(&names) {
-            // B = G₋ C G⁻¹ with G a turn about the axis and a shift along it.
-            gauge = stage.step.inverse().compose(&gauge).compose(own);
+        for ((stage, step), name) in chain.stages.iter().zip(&self.before).zip(&names) {
+            // B = G₋ C G⁻¹, where G is a rotation about the axis and a shift along it.
+            gauge = stage.step.inverse().compose(&gauge).compose(step);
             let off = (gauge.axes[2].xy().norm(), gauge.origin.xy().norm());
-            if off.0 > SAME || off.1 > SAME || gauge.axes[2].z < 0.0 {
+            if off.0 > NOMINAL_TOLERANCE || off.1 > NOMINAL_TOLERANCE || gauge.axes[2].z < 0.0 {
                 return Err(chain.robot.error_at(
                     stage.joint,
                     UrdfErrorKind::OtherArm { joint: name.clone(), off: words(off) },
@@ -88,7 +88,7 @@ impl Steps {
             gauges.push(gauge);
         }
         let end = difference(&chain.end, &gauge.compose(&self.end));
-        if end.0 > SAME || end.1 > SAME {
+        if end.0 > NOMINAL_TOLERANCE || end.1 > NOMINAL_TOLERANCE {
             let joint = names.last().cloned().unwrap_or_default();
             return Err(chain.robot.error(UrdfErrorKind::OtherArm { joint, off: words(end) }));
         }
@@ -96,51 +96,50 @@ impl Steps {
     }
 }
 
-/// Angle \[rad\] and distance \[m\] between two frames.
-fn difference(one: &Frame<f64>, other: &Frame<f64>) -> (f64, f64) {
-    let rest = one.inverse().compose(other);
+/// Returns the angle \[rad\] and distance \[m\] between two frames.
+fn difference(first: &Frame<f64>, second: &Frame<f64>) -> (f64, f64) {
+    let relative = first.inverse().compose(second);
     let sines = Vector3::new(
-        rest.axes[1].z - rest.axes[2].y,
-        rest.axes[2].x - rest.axes[0].z,
-        rest.axes[0].y - rest.axes[1].x,
+        relative.axes[1].z - relative.axes[2].y,
+        relative.axes[2].x - relative.axes[0].z,
+        relative.axes[0].y - relative.axes[1].x,
     );
-    let cos = 0.5 * (rest.axes[0].x + rest.axes[1].y + rest.axes[2].z - 1.0);
-    ((0.5 * sines.norm()).atan2(cos), rest.origin.norm())
+    let cos = 0.5 * (relative.axes[0].x + relative.axes[1].y + relative.axes[2].z - 1.0);
+    ((0.5 * sines.norm()).atan2(cos), relative.origin.norm())
 }
 
 fn words((angle, distance): (f64, f64)) -> String {
     format!("{:.3e}° and {:.3e} mm", angle.to_degrees(), distance * 1e3)
 }
 
-/// `chain`, from which `problem` was made, with the geometry of `arm`.
+/// Writes the geometry of `arm` into `chain`, from which `problem` was made.
 ///
-/// The pose of the tip is then that of the rigid arm in every configuration; what one joint's
-/// numbers hold behind it goes into the next origin. Inertial data and everything beside the chain
-/// stay.
+/// The tip then has the pose of the rigid arm in every configuration. Parameters of one joint may
+/// enter the origin of the next. Inertial data and everything outside the chain stay unchanged.
 ///
 /// # Errors
-/// Problem and chain are not of one arm, or no origin is left behind the last joint that could hold
-/// what was identified there.
+/// Problem and chain describe different arms, or no origin follows the last joint that could hold
+/// its parameters.
 pub fn export(chain: &Chain, problem: &Problem, arm: &Arm<f64>) -> Result<Export, InputError> {
     problem.require_chain("export to a URDF")?;
     check_names(chain, problem)?;
-    let gauges = Steps::of(&Arm::nominal(problem)).gauges(chain)?;
-    let steps = Steps::of(arm);
+    let gauges = Steps::new(&Arm::nominal(problem)).gauges(chain)?;
+    let steps = Steps::new(arm);
     let mut patches = Patches { chain, text: Vec::new(), moved: Vec::new() };
-    // From the axis frame before, in the frames of the chain: its own joint's frame first.
+    // Frame of the previous joint in its axis frame, and the fixed joints passed since.
     let (mut from, mut fixed) = (Frame::identity(), Vec::new());
     let mut stages =
         chain.stages.iter().zip(&steps.before).zip(gauges.iter().zip(gauges.iter().skip(1)));
     let mut next = stages.next();
     for &index in &chain.joints {
         let Some(joint) = chain.robot.joints.get(index) else { continue };
-        let Some(((stage, step), (before, own))) =
+        let Some(((stage, step), (before, after))) =
             next.filter(|((stage, _), _)| stage.joint == index)
         else {
             fixed.push(index);
             continue;
         };
-        let step = before.compose(step).compose(&own.inverse());
+        let step = before.compose(step).compose(&after.inverse());
         let target =
             from.compose(&moved(&step, joint, -stage.addend)).compose(&stage.axis.inverse());
         let passed = patches.through(&fixed);
@@ -156,7 +155,7 @@ pub fn export(chain: &Chain, problem: &Problem, arm: &Arm<f64>) -> Result<Export
         patches.place(first, &target.compose(&behind.inverse()));
     } else {
         let off = difference(&Frame::identity(), &target);
-        if off.0 > NOTHING || off.1 > NOTHING {
+        if off.0 > MAX_DROPPED || off.1 > MAX_DROPPED {
             let joint = chain.joint_names().pop().unwrap_or_default();
             return Err(chain.robot.error(UrdfErrorKind::NoRoom { joint, off: words(off) }));
         }
@@ -182,13 +181,13 @@ fn as_written(origin: &Origin) -> Frame<f64> {
 
 struct Patches<'a> {
     chain: &'a Chain<'a>,
-    /// Parts of the text and what takes their place, in the order of the chain.
+    /// Replaced byte ranges with their new text, in the order of the chain.
     text: Vec<(Range<usize>, String)>,
     moved: Vec<MovedOrigin>,
 }
 
 impl Patches<'_> {
-    /// The frame behind some fixed joints, whose rounded angles are written out.
+    /// Returns the frame after some fixed joints and writes out their rounded angles.
     fn through(&mut self, joints: &[usize]) -> Frame<f64> {
         let mut frame = Frame::identity();
         for &index in joints {
@@ -200,12 +199,12 @@ impl Patches<'_> {
         frame
     }
 
-    /// Gives a joint another origin, unless that is the one it has.
+    /// Replaces the origin of a joint if it differs.
     fn place(&mut self, index: usize, frame: &Frame<f64>) {
         let Some(joint) = self.chain.robot.joints.get(index) else { return };
         let old = as_written(&joint.origin);
         let (angle, distance) = difference(&old, frame);
-        let (turned, shifted) = (angle > UNMOVED, distance > UNMOVED);
+        let (turned, shifted) = (angle > MIN_DISPLACEMENT, distance > MIN_DISPLACEMENT);
         if !turned && !shifted {
             return;
         }
@@ -216,17 +215,20 @@ impl Patches<'_> {
             joint.origin.written
         };
         let origin = &joint.origin;
-        let own = |name: &str, changed: bool, values: &Vector3<f64>, at: &Option<Range<usize>>| {
+        let patch = |name: &str,
+                     changed: bool,
+                     values: &Vector3<f64>,
+                     at: &Option<Range<usize>>| {
             match at {
                 Some(at) if changed => (Some((at.clone(), triple(values))), String::new()),
                 None if changed => (None, format!(" {name}=\"{}\"", triple(values))),
                 _ => (None, String::new()),
             }
         };
-        let (first, more) = own("xyz", shifted, &xyz, &origin.xyz_value);
-        let (second, further) = own("rpy", turned, &rpy, &origin.rpy_value);
+        let (first, more) = patch("xyz", shifted, &xyz, &origin.xyz_value);
+        let (second, also) = patch("rpy", turned, &rpy, &origin.rpy_value);
         self.text.extend([first, second].into_iter().flatten());
-        let more = format!("{more}{further}");
+        let more = format!("{more}{also}");
         if !more.is_empty() {
             let (at, more) = match &origin.element {
                 Some(element) => (element.start + "<origin".len(), more),
@@ -237,11 +239,11 @@ impl Patches<'_> {
         self.moved.push(MovedOrigin { joint: joint.name.clone(), xyz, rpy, distance, angle });
     }
 
-    /// Where an `<origin>` may stand in a joint that has none, and its text: before the first
-    /// child, with the same indent.
+    /// Returns position and text of a new `<origin>` in a joint without one: before the first
+    /// child, with its indentation.
     fn new_element(&self, joint: &Range<usize>, attributes: &str) -> (usize, String) {
         let text = self.chain.robot.source.text.get(joint.clone()).unwrap_or_default();
-        // The start tag ends at the first bracket outside of quotes.
+        // The start tag ends at the first bracket outside quotes.
         let mut quote = None;
         let end = text.char_indices().find(|&(_, c)| {
             match quote {
@@ -271,18 +273,18 @@ impl Patches<'_> {
     }
 }
 
-/// The same orientation in angles as near as can be to others: (r, p, y) and (r + π, π − p, y + π)
-/// are one.
+/// Returns the equivalent angles nearest to `old`: (r, p, y) and (r + π, π − p, y + π) are the same
+/// rotation.
 fn nearest(rpy: &Vector3<f64>, old: &Vector3<f64>) -> Vector3<f64> {
     let half = 0.5 * TAU;
     let near = |angles: Vector3<f64>| {
-        angles.zip_map(old, |own, old| own - ((own - old) / TAU).round() * TAU)
+        angles.zip_map(old, |angle, old| angle - ((angle - old) / TAU).round() * TAU)
     };
-    let [one, other] = [*rpy, Vector3::new(rpy.x + half, half - rpy.y, rpy.z + half)].map(near);
-    if (one - old).norm() <= (other - old).norm() { one } else { other }
+    let [first, second] = [*rpy, Vector3::new(rpy.x + half, half - rpy.y, rpy.z + half)].map(near);
+    if (first - old).norm() <= (second - old).norm() { first } else { second }
 }
 
-/// Three numbers, to 10⁻¹³.
+/// Returns three numbers, rounded to 10⁻¹³.
 fn triple(values: &Vector3<f64>) -> String {
     let number = |value: &f64| (((value * 1e13).round() / 1e13) + 0.0).to_string();
     values.iter().map(number).collect::<Vec<_>>().join(" ")

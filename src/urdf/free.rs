@@ -1,4 +1,4 @@
-//! Which parameters to free at first: as many as positions tell apart.
+//! Choice of the initially free parameters: as many as position measurements distinguish.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::RngExt as _;
@@ -12,16 +12,16 @@ use crate::problem::{
 };
 use crate::random::stream;
 
-/// A column adds something if that much of it is left beside those before \[1\].
-const NEW: f64 = 1e-3;
-/// Range of a joint without limits \[rad\], and of one that slides \[m\].
-const TURN: f64 = 3.0;
-const SLIDE: f64 = 0.5;
+/// Minimum fraction of a Jacobian column that must be independent of the earlier ones.
+const MIN_INDEPENDENT_FRACTION: f64 = 1e-3;
+/// Sampled range of a joint without limits \[rad\], or of a prismatic joint \[m\].
+const MAX_SAMPLED_ANGLE: f64 = 3.0;
+const MAX_SAMPLED_TRAVEL: f64 = 0.5;
 
-/// Names of the parameters that measured positions tell apart, of a target anywhere on the tool.
+/// Returns the names of the parameters that measured positions of an off-axis target distinguish.
 ///
-/// Base and tool come first, then α, a, θ, d of all joints, then β: each is taken if it moves
-/// positions in a way that none before it does, in poses drawn from the limits of the joints.
+/// Base and tool come first, then α, a, θ, d of all joints, then β. A parameter is chosen if its
+/// Jacobian column is independent of the chosen ones, at random poses within the joint limits.
 pub(super) fn distinguishable_parameters(problem: &Problem) -> Result<Vec<String>, InputError> {
     let mut problem = problem.clone();
     let location = Location::file(&problem.data.location.file);
@@ -39,8 +39,8 @@ pub(super) fn distinguishable_parameters(problem: &Problem) -> Result<Vec<String
     let mut draw = |joint: &crate::problem::Joint| {
         let reach = match joint.command_kind() {
             JointKind::Fixed => return 0.0,
-            JointKind::Revolute => TURN,
-            JointKind::Prismatic => SLIDE,
+            JointKind::Revolute => MAX_SAMPLED_ANGLE,
+            JointKind::Prismatic => MAX_SAMPLED_TRAVEL,
         };
         let (from, to) = (joint.limits.0.max(-reach), joint.limits.1.min(reach));
         from + (to - from) * random.random::<f64>()
@@ -64,35 +64,35 @@ pub(super) fn distinguishable_parameters(problem: &Problem) -> Result<Vec<String
     let columns =
         jacobian(&PoseResiduals::new(&model, poses, (0..count).collect(), zero.clone()), &zero);
     let mut order: Vec<usize> = (0..count).collect();
-    order.sort_by_key(|&k| model.parameters.get(k).map_or(0, turn));
+    order.sort_by_key(|&k| model.parameters.get(k).map_or(0, priority));
     let chosen = independent(&columns, &order);
     Ok(chosen.iter().filter_map(|&k| Some(model.parameters.get(k)?.name.clone())).collect())
 }
 
-/// When a parameter has its turn; those of one turn go in the order of the arm.
-fn turn(parameter: &Parameter) -> usize {
+/// Returns the priority of a parameter; equal priorities follow the order of the arm.
+fn priority(parameter: &Parameter) -> usize {
     let field = parameter.name.rsplit('.').next().unwrap_or_default();
     let fields = ["alpha", "a", "theta", "d", "beta"];
     if parameter.site.is_placement() {
         0
     } else {
-        1 + fields.iter().position(|own| *own == field).unwrap_or(fields.len())
+        1 + fields.iter().position(|known| *known == field).unwrap_or(fields.len())
     }
 }
 
-/// Those of the columns, in this order, that are no combination of the ones before.
+/// Returns the columns that are linearly independent of the earlier ones, in the given order.
 fn independent(columns: &DMatrix<f64>, order: &[usize]) -> Vec<usize> {
     let (mut basis, mut chosen): (Vec<DVector<f64>>, Vec<usize>) = (Vec::new(), Vec::new());
     for &k in order {
-        let mut rest = columns.column(k).into_owned();
-        let whole = rest.norm();
-        // Twice is enough for orthogonality to rounding.
-        for own in basis.iter().chain(&basis) {
-            rest.axpy(-own.dot(&rest), own, 1.0);
+        let mut residual = columns.column(k).into_owned();
+        let length = residual.norm();
+        // Two passes of Gram–Schmidt give orthogonality to rounding.
+        for direction in basis.iter().chain(&basis) {
+            residual.axpy(-direction.dot(&residual), direction, 1.0);
         }
-        let left = rest.norm();
-        if left > NEW * whole && whole > 0.0 {
-            basis.push(rest / left);
+        let left = residual.norm();
+        if left > MIN_INDEPENDENT_FRACTION * length && length > 0.0 {
+            basis.push(residual / left);
             chosen.push(k);
         }
     }

@@ -1,16 +1,16 @@
-//! What lies between two axes, in the numbers of our joints.
+//! Conversion of the transform between two axes to joint parameters.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::spatial::Frame;
 
-/// Sine of the angle below which axes count as parallel \[1\].
-const PARALLEL: f64 = 0.1;
-/// Shorter distances than this have no direction \[m\].
-const NO_DISTANCE: f64 = 1e-12;
+/// Sine of the angle below which axes count as parallel.
+const MAX_PARALLEL_SINE: f64 = 0.1;
+/// Distance below which a direction is undefined \[m\].
+const MIN_DISTANCE: f64 = 1e-12;
 
-/// Rz(θ₀) Tz(d₀) Ry(β) Rx(α) Tx(a) Rz(θ) Tz(d): the first two move along the axis before, the last
-/// two along the axis behind.
+/// Transform Rz(θ₀) Tz(d₀) Ry(β) Rx(α) Tx(a) Rz(θ) Tz(d) between two axes: the first two factors
+/// act along the first axis, the last two along the second.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Step {
     pub theta_before: f64,
@@ -23,11 +23,11 @@ pub(super) struct Step {
 }
 
 impl Step {
-    /// Of a frame on the axis behind, seen from one on the axis before: along the common normal,
-    /// with β = 0, where the axes cross; \[Hayati1983\] with d₀ = 0, so that it stays near, where
-    /// they are parallel or nearly so.
-    pub fn to(frame: &Frame<f64>) -> Self {
-        let mut step = if frame.axes[2].x.hypot(frame.axes[2].y) > PARALLEL {
+    /// Decomposes a frame on the second axis, given in a frame on the first axis. Crossing axes use
+    /// the common normal with β = 0. Parallel or nearly parallel axes use \[Hayati1983\] with d₀ =
+    /// 0, so that the origin stays near.
+    pub fn from_frame(frame: &Frame<f64>) -> Self {
+        let mut step = if frame.axes[2].x.hypot(frame.axes[2].y) > MAX_PARALLEL_SINE {
             crossing(frame)
         } else {
             parallel(frame)
@@ -38,8 +38,8 @@ impl Step {
         line.rotate_y(step.beta.sin_cos());
         line.rotate_x(step.alpha.sin_cos());
         line.translate_x(step.a);
-        let rest = line.inverse().compose(frame);
-        (step.theta, step.d) = (rest.axes[0].y.atan2(rest.axes[0].x), rest.origin.z);
+        let remainder = line.inverse().compose(frame);
+        (step.theta, step.d) = (remainder.axes[0].y.atan2(remainder.axes[0].x), remainder.origin.z);
         step
     }
 }
@@ -47,7 +47,7 @@ impl Step {
 fn crossing(frame: &Frame<f64>) -> Step {
     let (z, p) = (&frame.axes[2], &frame.origin);
     let sin = z.x.hypot(z.y);
-    // e_z × z, the direction of the common normal.
+    // Direction of the common normal, e_z × z.
     let (x, y) = (-z.y / sin, z.x / sin);
     let normal = y.atan2(x);
     let (theta_before, sign) = near_zero(normal);
@@ -65,11 +65,12 @@ fn parallel(frame: &Frame<f64>) -> Step {
     let foot = p - z * p.dot(z);
     let distance = foot.norm();
     let mut step = Step::default();
-    if distance > NO_DISTANCE {
+    if distance > MIN_DISTANCE {
         let (theta_before, sign) = near_zero(foot.y.atan2(foot.x));
         let along = foot * (sign / distance);
         (step.theta_before, step.a) = (theta_before, sign * distance);
-        // The normal is across the axis behind; its own z is lost to rounding where it is short.
+        // The normal is perpendicular to the second axis; its z component would lose digits for a
+        // short normal.
         let rise = -(along.x * z.x + along.y * z.y) / z.z;
         step.beta = (-rise).atan2(along.x.hypot(along.y));
     } else {
@@ -82,8 +83,8 @@ fn parallel(frame: &Frame<f64>) -> Step {
     step
 }
 
-/// The angle of a line without direction that lies in (−90°, 90°], and whether that is the
-/// direction given (1) or the other (−1).
+/// Reduces the angle of an undirected line to (−90°, 90°]; the sign is −1 if the direction was
+/// reversed.
 fn near_zero(angle: f64) -> (f64, f64) {
     const ROUNDING: f64 = 1e-9;
     if angle > FRAC_PI_2 + ROUNDING {
@@ -102,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_line_is_reached() {
+    fn decomposition_reproduces_the_frame() {
         let angles = [0.0, 1e-9, 0.02, -0.06, 0.09, 0.11, -1.0, FRAC_PI_2, 2.5, PI, PI - 0.01];
         for (roll, pitch) in angles.iter().flat_map(|roll| angles.map(|pitch| (*roll, pitch))) {
             for xyz in [
@@ -112,7 +113,7 @@ mod tests {
                 Vector3::y(),
             ] {
                 let frame = Frame::from_xyz_rpy(&xyz, &Vector3::new(roll, pitch, 0.7));
-                let step = Step::to(&frame);
+                let step = Step::from_frame(&frame);
                 let mut again = Frame::identity();
                 again.rotate_z(step.theta_before.sin_cos());
                 again.translate_z(step.d_before);

@@ -1,16 +1,16 @@
-//! Arms from URDF, and back: a chain of its joints as a problem, and identified origins written
-//! into the same file.
+//! Import of arms from URDF and export of identified origins to the same file.
 //!
-//! A URDF joint is a fixed transform, its origin, and then a turn about or a slide along any axis.
-//! What lies between two axes is told in the five numbers of our joints where that is possible
-//! (always but at both ends of the chain), so that the frames of a URDF and of its problem differ
-//! by a turn about and a shift along each joint's axis: its gauge.
+//! A URDF joint is a fixed transform, its origin, followed by a motion about or along any axis. The
+//! transform between two axes is converted to our five joint parameters where possible, which is
+//! always so except at the ends of the chain. The frames of a URDF and of its problem therefore
+//! differ by a rotation about and a shift along each joint's axis, called the gauge of that axis.
 
 mod chain;
 mod describe;
 mod export;
 mod free;
 mod lines;
+mod notes;
 mod number;
 mod read;
 mod universal_robots;

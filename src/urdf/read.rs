@@ -1,4 +1,4 @@
-//! From the text of a URDF to its links and joints.
+//! Reader of links and joints from the text of a URDF.
 
 use std::ops::Range;
 use std::path::Path;
@@ -6,77 +6,80 @@ use std::path::Path;
 use nalgebra::Vector3;
 use roxmltree::{Document as Xml, Node};
 
-use super::number::{meant_angle, numbers};
+use super::number::numbers;
 use crate::error::{InputError, InputErrorKind, Location, UrdfErrorKind, is_hidden, shortened};
 use crate::problem::item::Document;
+use crate::quantity::rounded_right_angle;
 use crate::spatial::Frame;
 
-/// Numbers, and where they stand.
+/// Numbers with their byte range in the text.
 type Placed<const N: usize> = ([f64; N], Range<usize>);
 
-/// A robot as its URDF says.
+/// Robot described by a URDF.
 pub struct Robot {
     pub(super) source: Document,
-    /// Its name.
+    /// Name of the robot.
     pub name: String,
     pub(super) links: Vec<Link>,
     pub(super) joints: Vec<Joint>,
 }
 
-/// A link with what it weighs.
+/// Link with its mass.
 pub(super) struct Link {
     pub name: String,
-    /// Mass \[kg\], if it has one.
+    /// Mass \[kg\]; 0 without inertial data.
     pub mass: f64,
     /// Centre of mass, link frame \[m\].
     pub com: Vector3<f64>,
 }
 
-/// What a joint does.
+/// Type of a joint.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Kind {
     Revolute,
     Prismatic,
     Fixed,
-    /// What no arm has.
+    /// Joint type that is not supported.
     Other(String),
 }
 
-/// A joint between two links.
+/// Joint between two links.
 pub(super) struct Joint {
     pub name: String,
     pub kind: Kind,
     pub parent: usize,
     pub child: usize,
     pub origin: Origin,
-    /// Unit axis of what moves, joint frame.
+    /// Unit axis of the motion, joint frame.
     pub axis: Vector3<f64>,
-    /// Range of q, infinite where none is given.
+    /// Range of q \[rad\] or \[m\], infinite without limits.
     pub limits: (f64, f64),
-    /// Limits whose lower one is above the upper one, which are none.
+    /// Limits that are ignored because the lower one is above the upper one.
     pub reversed_limits: Option<(f64, f64)>,
-    /// Index of the joint that it follows, factor and addend.
+    /// Index of the joint that it follows, factor and offset.
     pub mimic: Option<(usize, f64, f64)>,
-    /// Its element as bytes of the text.
+    /// Error of a `<mimic>` that cannot be followed; it matters only if the chain needs the joint.
+    pub broken_mimic: Option<(Location, UrdfErrorKind)>,
+    /// Byte range of its element in the text.
     pub span: Range<usize>,
 }
 
-/// A joint's `<origin>`.
+/// Element `<origin>` of a joint.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Origin {
     pub xyz: Vector3<f64>,
     /// Roll, pitch, yaw as written \[rad\].
     pub written: Vector3<f64>,
-    /// The same as meant: π/2 for 1.5708.
+    /// Roll, pitch, yaw with rounded right angles restored \[rad\]: π/2 for 1.5708.
     pub meant: Vector3<f64>,
-    /// The element and the values of its attributes as bytes of the text, where they are there.
+    /// Byte ranges of the element and its attribute values, if present.
     pub element: Option<Range<usize>>,
     pub xyz_value: Option<Range<usize>>,
     pub rpy_value: Option<Range<usize>>,
 }
 
 impl Origin {
-    /// The transform as meant.
+    /// Returns the transform with restored right angles.
     pub fn frame(&self) -> Frame<f64> {
         Frame::from_xyz_rpy(&self.xyz, &self.meant)
     }
@@ -86,21 +89,21 @@ impl Robot {
     /// Reads a URDF file.
     ///
     /// # Errors
-    /// The first mistake found, a file that cannot be read among them.
+    /// The first error in the file, or the file cannot be read.
     pub fn read(file: &Path) -> Result<Self, InputError> {
         let source = Document::read(file, InputErrorKind::Urdf(UrdfErrorKind::Missing))?;
-        Self::of(source)
+        Self::from_document(source)
     }
 
-    /// Reads a URDF from its text; `file` names it in messages.
+    /// Parses a URDF; `file` names the text in messages.
     ///
     /// # Errors
-    /// The first mistake found.
+    /// The first error in the text.
     pub fn parse(text: &str, file: &Path) -> Result<Self, InputError> {
-        Self::of(Document { file: file.to_owned(), text: text.into() })
+        Self::from_document(Document { file: file.to_owned(), text: text.into() })
     }
 
-    fn of(source: Document) -> Result<Self, InputError> {
+    fn from_document(source: Document) -> Result<Self, InputError> {
         let text = source.text.clone();
         let xml = Xml::parse(&text).map_err(|error| {
             let location = Location::file(&source.file).at_line(error.pos().row as usize);
@@ -113,33 +116,33 @@ impl Robot {
         Ok(Self { source, ..robot })
     }
 
-    /// A mistake at a joint.
+    /// Returns an error at a joint.
     pub(super) fn error_at(&self, joint: usize, mistake: UrdfErrorKind) -> InputError {
         match self.joints.get(joint) {
-            Some(own) => {
-                self.source.locate(own.span.start..own.span.start + 1).error(mistake.into())
+            Some(joint) => {
+                self.source.locate(joint.span.start..joint.span.start + 1).error(mistake.into())
             }
             None => self.error(mistake),
         }
     }
 
-    /// A mistake of the whole.
+    /// Returns an error about the whole file.
     pub(super) fn error(&self, mistake: UrdfErrorKind) -> InputError {
         Location::file(&self.source.file).error(mistake.into())
     }
 
-    /// A mistake that is seen only in the problem made of it.
+    /// Returns the error for a URDF whose numbers make an invalid problem.
     pub(super) fn as_problem(&self, error: &InputError) -> InputError {
         let key = error.location.key.clone().unwrap_or_default();
         self.error(UrdfErrorKind::AsProblem { key, why: error.kind.to_string() })
     }
 
-    /// The file that was read.
+    /// Returns the path of the file.
     pub fn file(&self) -> &Path {
         &self.source.file
     }
 
-    /// Index of a link.
+    /// Returns the index of a link.
     pub(super) fn link(&self, name: &str) -> Result<usize, InputError> {
         let unknown = || {
             let known = self.links.iter().map(|link| link.name.clone()).collect();
@@ -158,7 +161,7 @@ impl Reader<'_> {
         self.fail_at(node.range(), mistake)
     }
 
-    /// At the first line of a part of the text.
+    /// Returns an error at the first line of a part of the text.
     fn fail_at<T>(&self, span: Range<usize>, mistake: UrdfErrorKind) -> Result<T, InputError> {
         let line = self
             .source
@@ -178,7 +181,7 @@ impl Reader<'_> {
         }
         if let Some(node) = root
             .descendants()
-            .find(|node| node.tag_name().namespace().is_some_and(|own| own.contains("xacro")))
+            .find(|node| node.tag_name().namespace().is_some_and(|uri| uri.contains("xacro")))
         {
             return self.fail(node, UrdfErrorKind::Xacro);
         }
@@ -221,7 +224,7 @@ impl Reader<'_> {
         if bad { self.fail(node, UrdfErrorKind::BadName) } else { Ok(name.to_owned()) }
     }
 
-    /// N numbers of an attribute, and where they stand; `None` where it is not there.
+    /// Reads N numbers of an attribute with their byte range; `None` if it is absent.
     fn numbers<const N: usize>(
         &self,
         node: Node<'_, '_>,
@@ -242,7 +245,7 @@ impl Reader<'_> {
     fn link(&self, node: Node<'_, '_>) -> Result<Link, InputError> {
         let name = self.name(node)?;
         let child = |node: Node<'_, '_>, tag: &str| {
-            node.children().find(|own| own.has_tag_name(tag)).map(|own| own.id())
+            node.children().find(|child| child.has_tag_name(tag)).map(|child| child.id())
         };
         let get = |id| node.document().get_node(id);
         let Some(inertial) = child(node, "inertial").and_then(get) else {
@@ -273,7 +276,7 @@ impl Reader<'_> {
         names: &[&str],
     ) -> Result<Joint, InputError> {
         let name = self.name(node)?;
-        let child = |tag: &'static str| node.children().find(move |own| own.has_tag_name(tag));
+        let child = |tag: &'static str| node.children().find(move |child| child.has_tag_name(tag));
         let kind = match self.attribute(node, "type")? {
             "revolute" | "continuous" => Kind::Revolute,
             "prismatic" => Kind::Prismatic,
@@ -308,41 +311,31 @@ impl Reader<'_> {
                 None => return self.fail_at(span, UrdfErrorKind::NoAxis),
             };
         }
-        let turns_on = node.attribute("type") == Some("continuous");
-        let written = match child("limit").filter(|_| moves && !turns_on) {
+        let is_continuous = node.attribute("type") == Some("continuous");
+        let written = match child("limit").filter(|_| moves && !is_continuous) {
             Some(limit) => {
-                let one = |which| {
+                let limit_value = |which| {
                     Ok::<_, InputError>(
                         self.numbers::<1>(limit, which)?.map_or(0.0, |([value], _)| value),
                     )
                 };
-                Some((one("lower")?, one("upper")?))
+                Some((limit_value("lower")?, limit_value("upper")?))
             }
             None => None,
         };
-        // Both are 0 where they are left out; a range of nothing is none.
+        // Absent limits are 0; an empty range means no limits.
         let limits = written
             .filter(|(lower, upper)| lower < upper)
             .unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
         let reversed_limits = written.filter(|(lower, upper)| lower > upper);
-        let mimic = match child("mimic").filter(|_| moves) {
-            Some(element) => {
-                let leader = self.attribute(element, "joint")?;
-                let Some(leader) = names.iter().position(|name| *name == leader) else {
-                    let known = names.iter().map(|&name| name.to_owned()).collect();
-                    return self.fail(
-                        element,
-                        UrdfErrorKind::NoJoint { name: shortened(leader, 80), known },
-                    );
-                };
-                let one = |which, absent| {
-                    Ok::<_, InputError>(
-                        self.numbers::<1>(element, which)?.map_or(absent, |([value], _)| value),
-                    )
-                };
-                Some((leader, one("multiplier", 1.0)?, one("offset", 0.0)?))
-            }
-            None => None,
+        let mimic = child("mimic").filter(|_| moves).map(|element| self.mimic(element, names));
+        // The chain may not need this joint, so a broken element is no error yet.
+        let (mimic, broken_mimic) = match mimic.transpose() {
+            Ok(mimic) => (mimic, None),
+            Err(InputError { location, kind }) => match *kind {
+                InputErrorKind::Urdf(kind) => (None, Some((*location, kind))),
+                other => return Err(location.error(other)),
+            },
         };
         Ok(Joint {
             name,
@@ -354,8 +347,28 @@ impl Reader<'_> {
             limits,
             reversed_limits,
             mimic,
+            broken_mimic,
             span: node.range(),
         })
+    }
+
+    /// Reads the index of the leading joint, factor and offset of a `<mimic>`.
+    fn mimic(
+        &self,
+        element: Node<'_, '_>,
+        names: &[&str],
+    ) -> Result<(usize, f64, f64), InputError> {
+        let leader = self.attribute(element, "joint")?;
+        let Some(leader) = names.iter().position(|name| *name == leader) else {
+            let known = names.iter().map(|&name| name.to_owned()).collect();
+            let kind = UrdfErrorKind::NoJoint { name: shortened(leader, 80), known };
+            return self.fail(element, kind);
+        };
+        let number = |which, default| {
+            let found = self.numbers::<1>(element, which)?;
+            Ok::<_, InputError>(found.map_or(default, |([value], _)| value))
+        };
+        Ok((leader, number("multiplier", 1.0)?, number("offset", 0.0)?))
     }
 
     fn origin(&self, node: Node<'_, '_>) -> Result<Origin, InputError> {
@@ -366,8 +379,10 @@ impl Reader<'_> {
         if let Some((rpy, span)) = self.numbers::<3>(node, "rpy")? {
             (origin.written, origin.rpy_value) = (rpy.into(), Some(span));
             let words = node.attribute("rpy").unwrap_or_default().split_ascii_whitespace();
-            let meant: Vec<f64> =
-                words.zip(rpy).map(|(word, value)| meant_angle(word).unwrap_or(value)).collect();
+            let meant: Vec<f64> = words
+                .zip(rpy)
+                .map(|(word, value)| rounded_right_angle(word).unwrap_or(value))
+                .collect();
             origin.meant = Vector3::from_iterator(meant);
         }
         Ok(origin)

@@ -14,23 +14,23 @@ use std::f64::consts::FRAC_PI_2;
 use super::export::Steps;
 use crate::spatial::Frame;
 
-/// Names in the file.
+/// Names of the links in the calibration file.
 pub(super) const LINKS: [&str; 6] =
     ["shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
 const ROLLS: [f64; 6] = [0.0, FRAC_PI_2, 0.0, 0.0, FRAC_PI_2, -FRAC_PI_2];
-/// How far the nominal arm may be from the form \[rad\] or \[m\].
-const SAME: f64 = 1e-6;
+/// Tolerance between the nominal arm and the form above \[rad\] or \[m\].
+const FORM_TOLERANCE: f64 = 1e-6;
 
-/// Origins of the six links of an identified arm: its gauges are those that give the nominal arm
+/// Returns the origins of the six links of an identified arm, in gauges that give the nominal arm
 /// the form above.
 ///
 /// # Errors
-/// What of the nominal arm is not of that form.
+/// Description of the difference between the nominal arm and this form.
 pub(super) fn origins(nominal: &Steps, identified: &Steps) -> Result<Vec<Frame<f64>>, String> {
     if nominal.before.len() != LINKS.len() {
         return Err(format!("it has {} moving joints, not 6", nominal.before.len()));
     }
-    // The base of a problem is that of the controller, or turned by half a turn as base_link is.
+    // The base of a problem is that of the controller, or base_link, which is turned by 180°.
     let mut half = Frame::identity();
     half.rotate_z((0.0, -1.0));
     let gauges = gauges(nominal, &Frame::identity()).or_else(|_| gauges(nominal, &half))?;
@@ -39,7 +39,7 @@ pub(super) fn origins(nominal: &Steps, identified: &Steps) -> Result<Vec<Frame<f
         .before
         .iter()
         .zip(pairs)
-        .map(|(step, (before, own))| before.compose(step).compose(&own.inverse()))
+        .map(|(step, (before, after))| before.compose(step).compose(&after.inverse()))
         .collect())
 }
 
@@ -52,25 +52,24 @@ fn gauges(nominal: &Steps, base: &Frame<f64>) -> Result<Vec<Frame<f64>>, String>
         let frame = before.compose(step);
         let mut turned = Frame::identity();
         turned.rotate_x(roll.sin_cos());
-        // The turn about the axis that is left, and where on the axis the form has its origin.
-        let rest = turned.inverse().compose(&frame);
-        if rest.axes[2].xy().norm() > SAME || rest.axes[2].z < 0.0 {
+        // Remaining rotation about the axis and position of the origin along it.
+        let remainder = turned.inverse().compose(&frame);
+        if remainder.axes[2].xy().norm() > FORM_TOLERANCE || remainder.axes[2].z < 0.0 {
             return Err(format!("the axis of {link} does not lie as that maker's arms have it"));
         }
         let next = nominal.before.get(k + 1);
         let along = match k {
-            // Where the next axis comes nearest, so that the next origin has no shift along this
-            // one.
-            0 | 3 | 4 => rest.origin.z + next.map_or(0.0, nearest),
-            5 => rest.origin.z + nominal.end.origin.z,
+            // Point nearest to the next axis, so that the next origin has no shift along this axis.
+            0 | 3 | 4 => remainder.origin.z + next.map_or(0.0, nearest),
+            5 => remainder.origin.z + nominal.end.origin.z,
             _ => 0.0,
         };
-        let mut own = Frame::identity();
-        own.rotate_z((rest.axes[0].y, rest.axes[0].x));
-        own.translate_z(rest.origin.z - along);
-        before = own;
-        gauges.push(own);
-        let placed = frame.compose(&own.inverse()).origin;
+        let mut gauge = Frame::identity();
+        gauge.rotate_z((remainder.axes[0].y, remainder.axes[0].x));
+        gauge.translate_z(remainder.origin.z - along);
+        before = gauge;
+        gauges.push(gauge);
+        let placed = frame.compose(&gauge.inverse()).origin;
         let off = match k {
             0 => placed.xy().norm(),
             1 => placed.norm(),
@@ -78,7 +77,7 @@ fn gauges(nominal: &Steps, base: &Frame<f64>) -> Result<Vec<Frame<f64>>, String>
             3 => placed.y.abs(),
             _ => placed.xz().norm(),
         };
-        if off > SAME {
+        if off > FORM_TOLERANCE {
             return Err(format!(
                 "{link} lies {:.3} mm off where that maker's arms have it",
                 off * 1e3
@@ -88,9 +87,10 @@ fn gauges(nominal: &Steps, base: &Frame<f64>) -> Result<Vec<Frame<f64>>, String>
     Ok(gauges)
 }
 
-/// Where on the z axis another frame's z axis comes nearest \[m\]; 0 where they are parallel.
+/// Returns the z coordinate on this frame's z axis nearest to the z axis of `frame` \[m\]; 0 if
+/// they are parallel.
 fn nearest(frame: &Frame<f64>) -> f64 {
     let (z, p) = (&frame.axes[2], &frame.origin);
     let square = z.xy().norm_squared();
-    if square > SAME { (p.z - z.z * p.dot(z)) / square } else { 0.0 }
+    if square > FORM_TOLERANCE { (p.z - z.z * p.dot(z)) / square } else { 0.0 }
 }

@@ -1,4 +1,4 @@
-//! Masses of the links that an arm carries, in the frames of its problem.
+//! Masses of a URDF's links in the frames of the problem.
 
 use nalgebra::Vector3;
 
@@ -6,33 +6,33 @@ use super::chain::{Chain, moved};
 use super::read::Kind;
 use crate::spatial::Frame;
 
-/// A mass that a stage of the chain carries.
+/// Mass carried by a stage of the chain.
 pub(super) struct Weight {
-    /// Stage behind which the link is.
+    /// Stage after which the link follows.
     pub stage: usize,
     pub name: String,
-    /// \[kg\]
+    /// Mass \[kg\].
     pub mass: f64,
     /// Centre of mass with all joints at zero, frame of the chain's base \[m\].
     pub at: Vector3<f64>,
 }
 
-/// Every link with a mass behind a joint of the chain, and the joints beside the chain that move
-/// some of them.
+/// Returns all links with a mass after a joint of the chain, and the joints outside the chain that
+/// move some of them.
 pub(super) fn weights(chain: &Chain) -> (Vec<Weight>, Vec<String>) {
     let robot = chain.robot;
     let (mut weights, mut beside) = (Vec::new(), Vec::new());
-    // Links with their frames and the stages that carry them, from the base outwards.
+    // Links with their frames and carrying stages, from the base outwards.
     let mut open = vec![(chain.base, Frame::identity(), None)];
     while let Some((link, frame, carrier)) = open.pop() {
-        if let (Some(stage), Some(own)) = (carrier, robot.links.get(link))
-            && own.mass > 0.0
+        if let (Some(stage), Some(body)) = (carrier, robot.links.get(link))
+            && body.mass > 0.0
         {
             weights.push(Weight {
                 stage,
-                name: own.name.clone(),
-                mass: own.mass,
-                at: frame.point(&own.com),
+                name: body.name.clone(),
+                mass: body.mass,
+                at: frame.point(&body.com),
             });
         }
         for (index, joint) in
@@ -40,10 +40,10 @@ pub(super) fn weights(chain: &Chain) -> (Vec<Weight>, Vec<String>) {
         {
             let mut next = frame.compose(&joint.origin.frame());
             let stage = chain.stages.iter().position(|stage| stage.joint == index);
-            if let Some(own) = stage.and_then(|stage| chain.stages.get(stage)) {
-                // A joint that follows another may be off zero with it.
-                next =
-                    moved(&next.compose(&own.axis), joint, own.addend).compose(&own.axis.inverse());
+            if let Some(moving) = stage.and_then(|stage| chain.stages.get(stage)) {
+                // A mimic joint may be off zero when its leader is at zero.
+                next = moved(&next.compose(&moving.axis), joint, moving.addend)
+                    .compose(&moving.axis.inverse());
             } else if joint.kind != Kind::Fixed && carrier.is_some() {
                 beside.push(joint.name.clone());
             }

@@ -1,4 +1,4 @@
-//! Identified origins as YAML.
+//! Export of identified origins as YAML.
 
 use std::fmt::Write as _;
 
@@ -10,54 +10,54 @@ use crate::problem::{JointKind, Problem};
 use crate::spatial::Frame;
 use nalgebra::Vector3;
 
-/// For whom the file is.
+/// Recipient of the file, which determines its form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum YamlFormat {
-    /// The calibration of a Universal Robots driver: six links by name.
+    /// Calibration file of a Universal Robots driver: six links by name.
     UniversalRobots,
-    /// Every joint by its name.
+    /// All joints by name, for ROS.
     Ros,
 }
 
-/// The origin of a joint whose axis is the z of its frame, seen from the frame before it.
+/// Origin of a joint whose axis is the z of its frame, relative to the previous frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointOrigin {
-    /// Name of the joint, or of the link behind it.
+    /// Name of the joint, or of the link after it.
     pub name: String,
-    /// \[m\]
+    /// Origin \[m\].
     pub xyz: Vector3<f64>,
     /// Roll, pitch and yaw \[rad\].
     pub rpy: Vector3<f64>,
 }
 
-/// Origins of the joints of `arm`, which is `problem` as identified.
+/// Returns the origins of the joints of `arm`, which is the identified arm of `problem`.
 ///
 /// For ROS the frames are those of the problem, and a last origin leads to the tip. For Universal
-/// Robots they are those of that maker's description, from base_link_inertia to wrist_3_link; zero
-/// positions are those of the problem.
+/// Robots they are those of the manufacturer's description, from base_link_inertia to wrist_3_link.
+/// Zero positions are those of the problem.
 ///
 /// # Errors
-/// For Universal Robots: the arm is not of that form.
+/// The form is Universal Robots' and the arm does not have it.
 pub fn joint_origins(
     problem: &Problem,
     arm: &Arm<f64>,
     form: YamlFormat,
 ) -> Result<Vec<JointOrigin>, InputError> {
     problem.require_chain("export to YAML")?;
-    let steps = Steps::of(arm);
+    let steps = Steps::new(arm);
     let origin = |(name, frame): (String, Frame<f64>)| JointOrigin {
         name,
         xyz: frame.origin,
         rpy: frame.roll_pitch_yaw(),
     };
     if form == YamlFormat::UniversalRobots {
-        let nominal = Steps::of(&Arm::nominal(problem));
+        let nominal = Steps::new(&Arm::nominal(problem));
         let found = universal_robots::origins(&nominal, &steps);
-        let mistake = |why: String| {
+        let wrong_form = |why: String| {
             Location::file(&problem.data.location.file).error(UrdfErrorKind::NotUr { why }.into())
         };
-        let frames = found.map_err(mistake)?;
+        let frames = found.map_err(wrong_form)?;
         return Ok(universal_robots::LINKS
             .map(str::to_owned)
             .into_iter()
@@ -70,13 +70,13 @@ pub fn joint_origins(
         .iter()
         .filter(|joint| joint.kind != JointKind::Fixed)
         .map(|joint| joint.name.clone());
-    let mut all: Vec<JointOrigin> = moving.zip(steps.before).map(origin).collect();
+    let mut origins: Vec<JointOrigin> = moving.zip(steps.before).map(origin).collect();
     let tip = problem.urdf.as_ref().map_or("tip", |ends| ends.tip.as_str()).to_owned();
-    all.push(origin((tip, steps.end)));
-    Ok(all)
+    origins.push(origin((tip, steps.end)));
+    Ok(origins)
 }
 
-/// The origins as a file.
+/// Returns the origins as the text of a YAML file.
 pub fn yaml(origins: &[JointOrigin], form: YamlFormat) -> String {
     let mut text = match form {
         YamlFormat::UniversalRobots => {
@@ -104,14 +104,14 @@ pub fn yaml(origins: &[JointOrigin], form: YamlFormat) -> String {
     text
 }
 
-/// A number that YAML takes for a float.
+/// Returns a number that YAML reads as a float.
 fn float(value: f64) -> String {
     let rounded = (value * 1e13).round() / 1e13 + 0.0;
     let text = rounded.to_string();
     if text.contains('.') { text } else { format!("{text}.0") }
 }
 
-/// A key as it is, or in quotes.
+/// Returns a YAML key, quoted if needed.
 fn key(name: &str) -> String {
     let plain = name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c));

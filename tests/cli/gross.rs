@@ -103,7 +103,7 @@ fn copies_are_named_whatever_their_number_and_time_and_repeats_are_not() {
     with(&[line(6, &[("time_s", "90000"), ("pose", "201")]), line(9, &[])]);
     let (_, _, err) = run(&bench, "identify . --out out");
     let expected = format!(
-        "a-none.csv:{}: the same as ./a-none.csv:6 to the last digit, and 1 further row repeats another (./a-none.csv:{})",
+        "a-none.csv:{}: equal to ./a-none.csv:6 in all digits, and 1 further row repeats another (./a-none.csv:{})",
         last + 1,
         last + 2
     );

@@ -150,7 +150,7 @@ fn rules_that_do_not_fit_are_mistakes() {
         ),
         (
             "\"hoist-force.*\" = { free = true }",
-            "those of hoist-force are there once an [[effect]] declares it, as in hoist-force = true",
+            "parameters of hoist-force exist if an [[effect]] declares it, as in hoist-force = true",
         ),
         (
             "\"link-th*\" = { free = true }",

@@ -164,7 +164,7 @@ fn what_cannot_be_is_refused() {
         (
             "\"A.EI\" = 1, \"joint3.a\" = 1",
             "at_least = 0",
-            &["problem.toml:87", "does not add up with A.EI"],
+            &["problem.toml:87", "cannot be added to A.EI"],
         ),
         (
             "\"A.EI\" = 1",

@@ -143,7 +143,7 @@ fn trace_and_loop_find_it() {
     assert_eq!(closure.before.describe(&creep(3)), "the motor of joint 3 creeps\nand = [sags");
     // The description stays a comment of the closed problem, over any number of lines.
     let text = std::fs::read_to_string(crate::common::arms::golden("problem.toml")).unwrap();
-    let closed = flexcal::report::closed_problem(&text, &problem, &closure, &[]).unwrap();
+    let closed = flexcal::report::closed_problem(&text, &problem, &closure, [&[], &[]]).unwrap();
     assert!(
         closed.contains(
             "\n# Found by flexcal loop: the motor of joint 3 creeps and = [sags, p-value"

@@ -160,10 +160,7 @@ fn what_nobody_knows_is_neither_held_nor_about_zero() {
         let data = read(&problem, &Bench::new(problem.clone(), 7).table(&["distance"], 40));
         let error =
             identify(&problem, &data, &Options::default()).map(|_| ()).unwrap_err().to_string();
-        assert!(
-            error.contains("nobody knows where anchor[A].x is") && error.contains("at_m"),
-            "{error}"
-        );
+        assert!(error.contains("the place of anchor[A].x is") && error.contains("at_m"), "{error}");
     }
 }
 

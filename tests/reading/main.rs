@@ -4,6 +4,7 @@
 
 mod bad_input;
 mod dialects;
+mod exchange;
 mod files;
 mod formats;
 mod limits;

@@ -300,7 +300,7 @@ fn every_mistake_says_where_it_is() {
         ("[[effect]]\noutside = { joint = 1, shape = \"x\" }\n", &["none of bump, step"]),
         (
             "[[effect]]\ngravity-compensator = { joint = 1, anchor_m = [0, 1], lever_m = [1, 0], free_length_m = 0 }\nrate_N_per_m = 1",
-            &["effect[1].gravity-compensator: nothing gives way about the axis of joint 1"],
+            &["effect[1].gravity-compensator: joint 1 is rigid"],
         ),
         (
             "[[effect]]\ngravity-compensator = { joint = 2, anchor_m = [0, 1], lever_m = [1, 0], free_length_m = 0 }\nrate_N = 1",

@@ -123,7 +123,9 @@ fn universal_robots_get_their_six_links() {
         .unwrap_err()
         .to_string();
     assert!(
-        error.contains("not an arm of Universal Robots' form: it has 5 moving joints, not 6"),
+        error.contains(
+            "not an arm with the joint layout of Universal Robots: it has 5 moving joints, not 6"
+        ),
         "{error}"
     );
     let tree = Problem::read(&path("problems/two-arms")).unwrap();

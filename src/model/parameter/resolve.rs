@@ -318,8 +318,12 @@ fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), Inp
         candidates.iter().filter(|candidate| candidate.matches(rule)).collect();
     // A rule that also matches other parameters leaves effects of another unit unchanged.
     let all_of_effects = matched.iter().all(|candidate| candidate.effect_sigma.is_some());
+    // A rule written for the tool's position leaves its orientation free without a prior.
+    let has_position = matched.iter().any(|candidate| !candidate.site.turns_target());
     let missing = |candidate: &&&Candidate| {
-        (all_of_effects || candidate.effect_sigma.is_none()) && !given(candidate.unit())
+        (all_of_effects || candidate.effect_sigma.is_none())
+            && !given(candidate.unit())
+            && !(has_position && candidate.site.turns_target())
     };
     if let Some(candidate) = matched.iter().find(missing) {
         let (parameter, suffixes) = (candidate.name.clone(), suffixes(candidate.unit()));

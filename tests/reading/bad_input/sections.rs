@@ -82,10 +82,13 @@ fn trees_and_targets() {
     let ended = format!("{RIGHT}[[joint]]\nparent = 2");
     let twice = "[[target]]\nname = 'a'\n[[target]]\nname = 'a'";
     check_problems(&[
-        ("parent = 1", &[":3: joint[1].parent: joint 1 cannot stand on joint 1: list it behind"]),
+        (
+            "parent = 1",
+            &[":3: joint[1].parent: joint 1 cannot be mounted on joint 1: list it after"],
+        ),
         (
             "parent = 2\n[[joint]]\nparent = 1",
-            &[":3: joint[1].parent: joint 1 cannot stand on joint 2"],
+            &[":3: joint[1].parent: joint 1 cannot be mounted on joint 2"],
         ),
         ("[[joint]]\nparent = 7", &[":4: joint[2].parent: no joint 7; the arm has 2"]),
         ("parent = -1", &[":3: joint[1].parent: -1 is not a whole number of at least 0"]),
@@ -393,7 +396,7 @@ fn compensators() {
         (
             "gravity-compensator = { joint = 1, anchor_m = [0, 1], lever_m = [1, 0], free_length_m = 0 }",
             &[
-                ":4: effect[1].gravity-compensator: nothing gives way about the axis of joint 1",
+                ":4: effect[1].gravity-compensator: joint 1 is rigid",
                 "joint-compliance = { joint = 1 }",
             ],
         ),

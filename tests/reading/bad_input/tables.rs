@@ -29,7 +29,9 @@ fn headers() {
         ("q1_deg,x_m,y_m,z_m,note,note\n", &["rows.csv:1: column note: given already"]),
         (
             "q1_deg|x_m|y_m|z_m\n",
-            &["rows.csv:1: columns are set apart by '|'; write delimiter = \"|\" in [data.format]"],
+            &[
+                "rows.csv:1: the columns are separated by '|'; write delimiter = \"|\" in [data.format]",
+            ],
         ),
         ("q1_deg,x_m,y_m,z_m,sigma\n", &["rows.csv:1: column sigma: a length needs a unit"]),
         (
@@ -84,7 +86,7 @@ fn rows() {
         ("1,,2,3,", &["rows.csv:3: column x_mm: the cell is empty"]),
         ("1,2,3", &["rows.csv:3: the row has 3 fields, the header 5"]),
         ("1,2,3,4,5,6", &["rows.csv:3: the row has 6 fields, the header 5"]),
-        ("1,2,3,\"4,5", &["rows.csv:3: a quote is opened and never closed"]),
+        ("1,2,3,\"4,5", &["rows.csv:3: a quote is opened and not closed"]),
         ("\0\0\0", &["rows.csv:3: the row has 1 fields"]),
         ("\0,1,2,3,", &["rows.csv:3: column q1_deg: \"\\u{0}\" is not a number"]),
         (

@@ -1,0 +1,100 @@
+//! Kinds of warnings and their messages.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use super::near::question;
+use super::phrases::plural;
+
+/// Kind of a warning, with its cause and remedy as message.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
+pub enum WarningKind {
+    #[error("unknown column{}; ignored{}", question(meant.as_deref()), covariate(meant.as_deref()))]
+    ColumnIgnored { meant: Option<String> },
+    #[error("no column of {} has a name of [data.columns]; the table is read by flexcal's names", file.display())]
+    MapUnused { file: PathBuf },
+    #[error("columns that [data.columns] does not name are ignored: {}", names.join(", "))]
+    Unmapped { names: Vec<String> },
+    #[error("{rows} row{} without a partner in the other table, the first here{}; left out", plural(*rows), listed(*rows, others))]
+    WithoutPartner { rows: usize, others: Vec<String> },
+    #[error("{rows} row{} without a measurement, the first here; left out", plural(*rows))]
+    RowsMissing { rows: usize },
+    #[error("the search for effects uses positions only, not orientations")]
+    OrientationLeftOut,
+    #[error(
+        "rows are marked in the column split, but held_out selects others; held_out = {{ column = \"split\" }} follows the marks"
+    )]
+    SplitUnused,
+    #[error("joint {joint} has no coordinate q; ignored")]
+    JointIgnored { joint: usize },
+    #[error("unknown column; ignored (write {write})")]
+    UnitIgnored { write: String },
+    #[error(
+        "{value:?} is not a date and time such as 2024-05-31T14:03:20.5; ignored, and rows count in their order instead (write {write} for \
+         seconds)"
+    )]
+    NotADate { value: String, write: String },
+    #[error("equal to {first} in all digits{}; measurements do not repeat so exactly, and a copied row counts twice", repeated_rows(*rows, others))]
+    RowsRepeated { rows: usize, first: String, others: Vec<String> },
+    #[error("the time is {back} s earlier than in the previous row{}; rows are used in the order of their times", additional_rows(*rows))]
+    TimeGoesBack { rows: usize, back: String },
+    #[error(
+        "commanded beyond its limits ({limits}) in {rows} row{}, furthest here: {worst}; used all the same", plural(*rows)
+    )]
+    BeyondLimits { rows: usize, worst: String, limits: String },
+    #[error(
+        "{value} looks like radians of {degrees}°, and the key means degrees; write {radians} = {value}, or {degrees} here"
+    )]
+    LooksLikeRadians { value: String, degrees: String, radians: String },
+    #[error(
+        "{value} m is long for a part of an arm; if these are millimetres, write {millimetres} = {value}"
+    )]
+    LooksLikeMillimetres { value: String, millimetres: String },
+    #[error(
+        "the table has the zeros of standard DH (α of the first row is set, α and a of the last are 0) and is read as \
+         modified DH; write dh = \"standard\" or dh = \"modified\" before the first [[joint]]"
+    )]
+    LooksLikeStandardForm,
+    #[error("{value} is {turns} turns; if these are degrees, the columns end in _deg")]
+    ManyTurns { value: String, turns: String },
+    #[error("all temperatures are {least} °C or more; if these are kelvins, subtract 273.15")]
+    Kelvins { least: String },
+    #[error(
+        "{distance} m from the last frame, while all links together are {links} m long; if these are millimetres, write target_mm"
+    )]
+    FarTarget { distance: String, links: String },
+}
+
+fn repeated_rows(rows: usize, named: &[String]) -> String {
+    let (further, left) = (rows.saturating_sub(1), rows.saturating_sub(1 + named.len()));
+    let left = if left > 0 { format!(" and {left} more") } else { String::new() };
+    let named = named.join(", ");
+    match further {
+        0 => String::new(),
+        1 => format!(", and 1 further row repeats another ({named})"),
+        _ => format!(", and {further} further rows repeat others ({named}{left})"),
+    }
+}
+
+fn additional_rows(rows: usize) -> String {
+    if rows > 1 {
+        format!(", and in {} further row{}", rows - 1, plural(rows - 1))
+    } else {
+        String::new()
+    }
+}
+
+/// Returns the hint for a column that does not resemble a known one.
+fn covariate(meant: Option<&str>) -> &'static str {
+    if meant.is_none() { " (name it in [data.covariates] if the arm may depend on it)" } else { "" }
+}
+
+/// Returns the rows after the first in words.
+fn listed(rows: usize, others: &[String]) -> String {
+    let left = rows.saturating_sub(1 + others.len());
+    let left = if left > 0 { format!(" and {left} more") } else { String::new() };
+    if others.is_empty() { String::new() } else { format!(", then {}{left}", others.join(", ")) }
+}

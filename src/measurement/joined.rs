@@ -1,0 +1,241 @@
+//! Join of a table of measured positions with a table of joint coordinates.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+use csv::ByteRecord;
+
+use super::mapped::Names;
+use super::table::Table;
+use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
+use crate::problem::{Dialect, JoinRule, JointLog, Problem};
+use crate::quantity::Unit;
+
+/// Maximum number of rows without a partner that a warning lists.
+const MAX_LISTED_ROWS: usize = 10;
+
+/// Rows of the joint table with their keys.
+pub(super) struct JoinedLog {
+    rule: JoinRule,
+    location: Location,
+    header: Vec<String>,
+    /// Flexcal's names of the columns.
+    names: Vec<String>,
+    style: CellStyle,
+    rows: Vec<LogRow>,
+    of_name: HashMap<String, usize>,
+    /// Row indices in the order of their times, for a join by time.
+    by_time: Vec<usize>,
+    /// Columns of the current table that are appended from the log.
+    appended: Vec<usize>,
+    /// Column of the key in the current table, and its conversion to seconds.
+    key: Option<Key>,
+    /// Number of rows requested so far, for a join by order.
+    requested: usize,
+    unpaired: Vec<Location>,
+    paired: usize,
+}
+
+/// Format of the cells of a table.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CellStyle {
+    pub delimiter: char,
+    pub decimal_comma: bool,
+}
+
+/// Column that pairs rows, and its conversion to seconds if it holds times.
+#[derive(Clone, Copy)]
+struct Key {
+    place: usize,
+    to_si: fn(f64) -> f64,
+}
+
+struct LogRow {
+    file: PathBuf,
+    line: usize,
+    cells: ByteRecord,
+    time: f64,
+    is_used: bool,
+}
+
+impl JoinedLog {
+    /// Reads the joint table that the problem declares.
+    ///
+    /// # Errors
+    /// A file cannot be read, its columns differ from those of the first, the key column is
+    /// missing, or a name occurs twice.
+    pub fn read(log: &JointLog, problem: &Problem) -> Result<Self, InputError> {
+        let dialect = &problem.data.dialect;
+        let mut joined = Self {
+            rule: log.by,
+            location: log.location.clone(),
+            header: Vec::new(),
+            names: Vec::new(),
+            style: CellStyle { delimiter: ',', decimal_comma: false },
+            rows: Vec::new(),
+            of_name: HashMap::new(),
+            by_time: Vec::new(),
+            appended: Vec::new(),
+            key: None,
+            requested: 0,
+            unpaired: Vec::new(),
+            paired: 0,
+        };
+        for file in &log.files {
+            let kind = InputErrorKind::DataFileMissing { path: file.clone() };
+            let missing = || log.location.clone().error(kind);
+            joined.read_file(Table::open(file, dialect, missing)?, dialect)?;
+        }
+        let mut by_time: Vec<usize> = (0..joined.rows.len()).collect();
+        let time = |row: &usize| joined.rows.get(*row).map_or(f64::NAN, |row| row.time);
+        by_time.sort_by(|a, b| time(a).total_cmp(&time(b)));
+        joined.by_time = by_time;
+        if joined.rows.is_empty() {
+            return Err(log.location.clone().error(InputErrorKind::NoDataFiles));
+        }
+        Ok(joined)
+    }
+
+    fn read_file(&mut self, mut table: Table, dialect: &Dialect) -> Result<(), InputError> {
+        if self.header.is_empty() {
+            self.header.clone_from(&table.header);
+            let names = Names::map_present(&table, dialect);
+            self.names = names.into_iter().map(str::to_owned).collect();
+            self.style = table.style();
+        } else if self.header != table.header {
+            let first = self.rows.first().map(|row| row.file.clone()).unwrap_or_default();
+            let different = |name: &&String| !self.header.contains(*name);
+            let name = table.header.iter().find(different);
+            let kind = InputErrorKind::ColumnsDiffer { other: first, has: false };
+            return Err(table.column(name.map_or("", String::as_str)).error(kind));
+        }
+        let key = self.find_key(&table, &self.names)?;
+        while table.next_row()? {
+            let mut time = f64::NAN;
+            match (self.rule, key) {
+                (JoinRule::Time { .. }, Some(key)) => time = table.time(key.place, key.to_si)?,
+                (JoinRule::Name, Some(key)) => {
+                    let name = table.name(key.place)?.to_owned();
+                    if let Some(&first) = self.of_name.get(&name) {
+                        let line = self.rows.get(first).map_or(0, |row| row.line);
+                        let kind = InputErrorKind::RepeatedPose { name, line };
+                        return Err(table.cell_error(key.place, kind));
+                    }
+                    self.of_name.insert(name, self.rows.len());
+                }
+                _ => {}
+            }
+            let (file, line, cells) = (table.file.clone(), table.line(), table.cells().clone());
+            self.rows.push(LogRow { file, line, cells, time, is_used: false });
+        }
+        Ok(())
+    }
+
+    /// Returns the column by which rows are paired; `None` for a join by order.
+    fn find_key(&self, table: &Table, names: &[String]) -> Result<Option<Key>, InputError> {
+        let place = |wanted: &str| names.iter().position(|name| name == wanted);
+        let (key, write) = match self.rule {
+            JoinRule::Order => return Ok(None),
+            JoinRule::Name => {
+                let key = place("pose").map(|place| Key { place, to_si: std::convert::identity });
+                (key, "pose")
+            }
+            JoinRule::Time { .. } => {
+                let with_unit = Unit::Time.suffixes().iter().find_map(|suffix| {
+                    let place = place(&format!("time_{}", suffix.name))?;
+                    Some(Key { place, to_si: suffix.to_si })
+                });
+                let date = || place("time").map(|place| Key { place, to_si: |_| f64::NAN });
+                (with_unit.or_else(date), "time_s or time")
+            }
+        };
+        let kind = InputErrorKind::MissingColumn { write: write.to_owned(), near: None };
+        key.map(Some).ok_or_else(|| table.column(write).error(kind))
+    }
+
+    /// Prepares a table of positions: appends the columns that only the joint table has.
+    ///
+    /// # Errors
+    /// The table lacks the key column.
+    pub fn extend(&mut self, table: &mut Table, dialect: &Dialect) -> Result<(), InputError> {
+        let names: Vec<String> =
+            Names::map_present(table, dialect).into_iter().map(str::to_owned).collect();
+        self.key = self.find_key(table, &names)?;
+        let is_new = |place: &usize| {
+            let (name, header) = (self.names.get(*place), self.header.get(*place));
+            name.is_some_and(|name| !names.contains(name))
+                && header.is_some_and(|header| !table.header.contains(header))
+        };
+        self.appended = (0..self.header.len()).filter(is_new).collect();
+        let headers = self.appended.iter().filter_map(|&place| self.header.get(place).cloned());
+        table.extend_header(headers.collect(), self.style);
+        Ok(())
+    }
+
+    /// Appends the cells of the partner to the current row; returns false if it has none.
+    ///
+    /// # Errors
+    /// The key cell of the row is empty or invalid.
+    pub fn complete(&mut self, table: &mut Table) -> Result<bool, InputError> {
+        let partner = match (self.rule, self.key) {
+            (JoinRule::Name, Some(key)) => self.of_name.get(table.name(key.place)?).copied(),
+            (JoinRule::Time { tolerance }, Some(key)) => {
+                self.nearest(table.time(key.place, key.to_si)?, tolerance)
+            }
+            _ => Some(self.requested).filter(|&row| row < self.rows.len()),
+        };
+        self.requested += 1;
+        let Some(row) = partner.and_then(|partner| self.rows.get_mut(partner)) else {
+            self.unpaired.push(Location::file(&table.file).at_line(table.line()));
+            return Ok(false);
+        };
+        row.is_used = true;
+        self.paired += 1;
+        let cells = self.appended.iter().map(|&place| row.cells.get(place).unwrap_or_default());
+        table.append_cells(cells, (&row.file, row.line));
+        Ok(true)
+    }
+
+    /// Returns the row nearest to a time \[s\], if it is within the tolerance \[s\].
+    fn nearest(&self, time: f64, tolerance: f64) -> Option<usize> {
+        let time_of = |&row: &usize| self.rows.get(row).map_or(f64::NAN, |row| row.time);
+        let after = self.by_time.partition_point(|row| time_of(row) < time);
+        let around = [after.checked_sub(1), Some(after)].into_iter().flatten();
+        let candidates = around.filter_map(|place| self.by_time.get(place));
+        let distance = |row: &usize| (time_of(row) - time).abs();
+        candidates
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .copied()
+            .filter(|row| distance(row) <= tolerance)
+    }
+
+    /// Returns the files of the joint table.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let mut files: Vec<PathBuf> = self.rows.iter().map(|row| row.file.clone()).collect();
+        files.dedup();
+        files
+    }
+
+    /// Returns warnings about rows without a partner. A log that is joined by time has more rows
+    /// than positions, so its unused rows are not listed.
+    ///
+    /// # Errors
+    /// No row has a partner.
+    pub fn warnings(&self) -> Result<Vec<Warning>, InputError> {
+        if self.paired == 0 && self.requested > 0 {
+            return Err(self.location.clone().error(InputErrorKind::NothingJoined));
+        }
+        let unused = self.rows.iter().filter(|row| !row.is_used);
+        let unused: Vec<Location> = match self.rule {
+            JoinRule::Time { .. } => Vec::new(),
+            _ => unused.map(|row| Location::file(&row.file).at_line(row.line)).collect(),
+        };
+        let warning = |rows: &[Location]| {
+            let location = rows.first()?.clone();
+            let listed = rows.iter().skip(1).take(MAX_LISTED_ROWS).map(ToString::to_string);
+            let kind = WarningKind::WithoutPartner { rows: rows.len(), others: listed.collect() };
+            Some(Warning { location, kind })
+        };
+        Ok([warning(&self.unpaired), warning(&unused)].into_iter().flatten().collect())
+    }
+}

@@ -1,0 +1,64 @@
+//! Reader of `joints = { files = […], by = … }`: a second table that holds the joint coordinates.
+
+use std::path::{Path, PathBuf};
+
+use super::data::JointSource;
+use super::item::Item;
+use crate::error::{InputError, InputErrorKind, Location};
+use crate::quantity::Unit;
+
+/// Table of joint coordinates that is joined to the table of measured positions.
+#[derive(Debug, Clone)]
+pub struct JointLog {
+    /// Files of the joint table, resolved against the problem's folder.
+    pub files: Vec<PathBuf>,
+    /// Rule that pairs the rows of both tables.
+    pub by: JoinRule,
+    /// Place in the file, for errors.
+    pub location: Location,
+}
+
+/// Rule that pairs the rows of two tables.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum JoinRule {
+    /// Rows with the same word in the column `pose`.
+    Name,
+    /// The k-th row of one table with the k-th row of the other.
+    Order,
+    /// Rows nearest in time, at most `tolerance` apart \[s\].
+    Time {
+        /// Maximum time between two paired rows \[s\].
+        tolerance: f64,
+    },
+}
+
+/// Maximum time between paired rows if the file states none \[s\].
+const DEFAULT_TOLERANCE: f64 = 0.5;
+
+/// Reads the table, and the joint source that its optional key `source` names.
+pub(super) fn read(
+    item: &Item<'_, '_>,
+    folder: &Path,
+) -> Result<(JointLog, Option<JointSource>), InputError> {
+    let mut section = item.section()?;
+    let names = section.require("files", "files = [\"controller.csv\"]")?;
+    let names = names.list("a list of file names")?;
+    let files = names.iter().map(|name| Ok(folder.join(name.text()?))).collect::<Result<_, _>>()?;
+    let rules = ["name", "order", "time"];
+    let word = section.word("by", &["name", "order", "time"], &rules)?;
+    let write = rules.map(|rule| format!("by = \"{rule}\"")).join(" or ");
+    let word = word.ok_or_else(|| section.missing("by", write))?;
+    let not_positive = |value| InputErrorKind::NotPositive { value };
+    let by = match word {
+        "name" => JoinRule::Name,
+        "order" => JoinRule::Order,
+        _ => JoinRule::Time {
+            tolerance: section
+                .positive("tolerance", Unit::Time, not_positive)?
+                .unwrap_or(DEFAULT_TOLERANCE),
+        },
+    };
+    let source = section.word("source", JointSource::WORDS, &JointSource::ALL)?;
+    section.finish()?;
+    Ok((JointLog { files, by, location: item.location() }, source))
+}

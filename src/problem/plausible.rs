@@ -1,0 +1,87 @@
+//! Warnings about values of the arm that are probably in another unit or convention.
+
+use super::section::Section;
+use super::{Joint, JointKind, Problem};
+use crate::error::{Location, Warning, WarningKind};
+use crate::quantity::rounded_right_angle;
+
+/// Maximum plausible length of a row of the joint table \[m\].
+const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
+/// Minimum number of rows in which the form of a table can be recognised.
+const MIN_ROWS: usize = 3;
+
+/// Returns warnings about a `[[joint]]`: angles that look like radians, lengths that look like
+/// millimetres.
+pub(super) fn joint(section: &Section<'_, '_>) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    for key in ["alpha_deg", "theta_deg", "beta_deg"] {
+        let Some(item) = section.peek(key) else { continue };
+        let angle = item.written_number().and_then(|text| Some((text, rounded_right_angle(text)?)));
+        if let Some((text, angle)) = angle {
+            let kind = WarningKind::LooksLikeRadians {
+                value: text.to_owned(),
+                degrees: format!("{:.0}", angle.to_degrees()),
+                radians: format!("{}_rad", key.trim_end_matches("_deg")),
+            };
+            warnings.push(Warning { location: item.location(), kind });
+        }
+    }
+    for key in ["a_m", "d_m"] {
+        let Some(item) = section.peek(key) else { continue };
+        let length = item.number().ok().filter(|length| length.abs() > MAX_PLAUSIBLE_LENGTH);
+        if let Some(length) = length {
+            let millimetres = format!("{}_mm", key.trim_end_matches("_m"));
+            let kind = WarningKind::LooksLikeMillimetres { value: length.to_string(), millimetres };
+            warnings.push(Warning { location: item.location(), kind });
+        }
+    }
+    warnings
+}
+
+/// Returns a warning if a table without the key `dh` has the zeros of a standard DH table: none in
+/// α of the first row, and both in α and a of the last.
+pub(super) fn form(joints: &[Joint]) -> Option<Warning> {
+    let (first, last) = (joints.first()?, joints.last()?);
+    let is_standard = joints.len() >= MIN_ROWS
+        && first.alpha != 0.0
+        && (last.alpha, last.a) == (0.0, 0.0)
+        && joints.iter().all(|joint| joint.kind != JointKind::Fixed && joint.beta == 0.0);
+    is_standard.then(|| Warning {
+        location: first.location.clone(),
+        kind: WarningKind::LooksLikeStandardForm,
+    })
+}
+
+impl Problem {
+    /// Returns warnings about values of the arm that are probably in another unit or convention.
+    pub fn plausibility_warnings(&self) -> Vec<Warning> {
+        self.warnings.iter().cloned().chain(self.far_target()).collect()
+    }
+
+    /// Returns a warning if a target is farther from its frame than twice the length of the arm.
+    fn far_target(&self) -> Option<Warning> {
+        let length = |joint: &Joint| {
+            let placed = joint.placement.as_ref().map_or(0.0, |placement| placement.xyz.norm());
+            let (min, max) = joint.limits;
+            let travel =
+                if joint.kind == JointKind::Prismatic { min.abs().max(max.abs()) } else { 0.0 };
+            joint.a.hypot(joint.d) + placed + travel
+        };
+        let tool_location = || Location {
+            line: None,
+            excerpt: None,
+            ..self.data.location.clone().with_key("tool.target")
+        };
+        let farthest = self.targets.iter().max_by(|a, b| a.at.norm().total_cmp(&b.at.norm()));
+        let (location, target) = farthest.map_or_else(
+            || (tool_location(), self.tool.target),
+            |target| (target.location.clone(), target.at),
+        );
+        let (links, distance) = (self.joints.iter().map(length).sum::<f64>(), target.norm());
+        let kind = WarningKind::FarTarget {
+            distance: format!("{distance:.3}"),
+            links: format!("{links:.3}"),
+        };
+        (links > 0.0 && distance > 2.0 * links).then_some(Warning { location, kind })
+    }
+}

@@ -1,0 +1,83 @@
+//! Notes about a URDF whose numbers look wrong or were interpreted.
+
+use std::f64::consts::TAU;
+
+use super::chain::Chain;
+use super::read::{Joint, Kind};
+
+/// Maximum plausible angle of an origin \[rad\]: one turn, with a margin for rounding.
+const MAX_PLAUSIBLE_ANGLE: f64 = TAU + 0.01;
+/// Maximum plausible length of an origin \[m\]; no joint of an arm is farther from the previous one.
+const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
+
+/// Returns the notes about a chain and about joints beside it.
+pub(super) fn of_chain(chain: &Chain) -> Vec<String> {
+    let joints: Vec<&Joint> =
+        chain.joints.iter().filter_map(|&index| chain.robot.joints.get(index)).collect();
+    let mut notes: Vec<String> = right_angles(&joints).into_iter().collect();
+    notes.extend(joints.iter().filter_map(|joint| degrees(joint)));
+    notes.extend(joints.iter().filter_map(|joint| millimetres(joint)));
+    notes.extend(joints.iter().filter_map(|joint| unlimited_slide(joint)));
+    let beside =
+        chain.robot.joints.iter().enumerate().filter(|(index, _)| !chain.joints.contains(index));
+    notes.extend(beside.filter_map(|(_, joint)| {
+        let (_, kind) = joint.broken_mimic.as_ref()?;
+        Some(format!(
+            "{}: <mimic>: {kind}; ignored, because the joint is beside the chain",
+            joint.name
+        ))
+    }));
+    notes
+}
+
+/// Returns a note if an angle of an origin is more than one turn.
+fn degrees(joint: &Joint) -> Option<String> {
+    let angle = joint.origin.written.iter().find(|angle| angle.abs() > MAX_PLAUSIBLE_ANGLE)?;
+    Some(format!(
+        "{}: rpy holds {angle} rad, which is more than one turn; if the URDF has degrees there, convert them to radians \
+         and run init again",
+        joint.name
+    ))
+}
+
+/// Returns a note if an origin is implausibly far from the previous one.
+fn millimetres(joint: &Joint) -> Option<String> {
+    let length = joint.origin.xyz.iter().find(|length| length.abs() > MAX_PLAUSIBLE_LENGTH)?;
+    Some(format!(
+        "{}: xyz holds {length} m; if the URDF has millimetres there, convert them to metres and run init again",
+        joint.name
+    ))
+}
+
+/// Returns a note if a prismatic joint has no limits, which planning needs.
+fn unlimited_slide(joint: &Joint) -> Option<String> {
+    let is_unlimited = !joint.limits.0.is_finite() || !joint.limits.1.is_finite();
+    (joint.kind == Kind::Prismatic && is_unlimited && joint.mimic.is_none()).then(|| {
+        format!("{}: slides without limits; write min_m and max_m in its [[joint]] before check or plan", joint.name)
+    })
+}
+
+/// Returns a note about angles that were read as multiples of 45°.
+fn right_angles(origins: &[&Joint]) -> Option<String> {
+    let mut values: Vec<String> = Vec::new();
+    let mut joints = Vec::new();
+    for joint in origins {
+        let pairs = joint.origin.written.iter().zip(joint.origin.meant.iter());
+        let rounded: Vec<f64> = pairs
+            .filter(|(written, meant)| written.to_bits() != meant.to_bits())
+            .map(|(written, _)| written.abs())
+            .collect();
+        if !rounded.is_empty() {
+            joints.push(joint.name.as_str());
+        }
+        for value in rounded.into_iter().map(|value| value.to_string()) {
+            if !values.contains(&value) {
+                values.push(value);
+            }
+        }
+    }
+    (!values.is_empty()).then(|| {
+        let (values, joints) = (values.join(", "), joints.join(", "));
+        format!("{values} [rad] taken as the multiple of 45° that was rounded, at {joints}; more decimals are taken as they are")
+    })
+}
