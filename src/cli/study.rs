@@ -206,7 +206,7 @@ fn finish(
     let texts = [
         (NAMES[0], json.as_str()),
         (NAMES[1], &report::study_parameters_csv(study, &found)),
-        (NAMES[2], &report::study_timing_csv(&found)),
+        (NAMES[2], &report::study_timing_csv(study, &found)),
         (NAMES[3], &report::study_csv(study, &found)),
     ];
     results.write(&texts)?;
