@@ -5,6 +5,8 @@
 
 #[path = "study/misprints.rs"]
 mod misprints;
+#[path = "common/schema.rs"]
+mod schema;
 
 use std::fs;
 use std::path::PathBuf;
@@ -237,6 +239,7 @@ fn threads_shares_and_order_change_nothing() {
     let whole = Store::new(&bench.path("whole"));
     run_on(1, &study, &whole, Shard::WHOLE);
     let expected = texts(&study, &collect(&study, std::slice::from_ref(&whole)).unwrap());
+    schema::assert_valid(&StudyResult::schema(), &expected[1]);
     assert_eq!(expected[0].lines().count(), 1 + CELLS);
     assert_eq!(expected[2].lines().count(), 1 + CELLS * study.parameters.len());
     for (threads, shares) in [(2, 1), (3, 3), (2, 5), (1, 20)] {

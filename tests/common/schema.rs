@@ -5,6 +5,13 @@ use serde_json::Value;
 /// Keywords that only annotate.
 const ANNOTATIONS: [&str; 5] = ["$schema", "$defs", "title", "description", "default"];
 
+/// Asserts that a JSON text satisfies the JSON text of a schema.
+pub fn assert_valid(schema: &str, json: &str) {
+    let (schema, value) =
+        (serde_json::from_str(schema).unwrap(), serde_json::from_str(json).unwrap());
+    assert_eq!(violations(&schema, &value), Vec::<String>::new());
+}
+
 /// Lists the places at which a value violates a schema; panics at a keyword that it does not know.
 pub fn violations(schema: &Value, value: &Value) -> Vec<String> {
     let mut found = Vec::new();
