@@ -24,6 +24,7 @@ use crate::fit::uncertainty::active_constraint::ActiveConstraint;
 use crate::fit::uncertainty::covariance::Collected;
 use crate::fit::uncertainty::noise::{Noise, fitted, taken};
 use crate::fit::uncertainty::prior_sizes::prior_sizes;
+use crate::fit::uncertainty::refuted_priors::refuted_priors;
 use crate::fit::uncertainty::statistics::Statistics;
 use crate::fit::warm_start::WarmStart;
 use crate::fit::{Errors, Placement, Progress, ProgressSink, SolverChoice, Stop, Strategy};
@@ -32,7 +33,7 @@ use crate::least_squares::{Loss, Memory};
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::Model;
 use crate::model::parameter::Parameter;
-use crate::problem::{Effect, Problem, Robust, RobustLoss};
+use crate::problem::{Effect, ParameterRule, Problem, Robust, RobustLoss, pattern};
 
 /// How to identify: [`Options::default()`] with what the `with_…` methods change.
 #[derive(Clone, Default)]
@@ -348,6 +349,17 @@ fn fit_rows(
         Vec::new()
     };
     let findings = if asked {
+        let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
+        let refuted_priors = match (noise, fitting.loss) {
+            (Noise::Declared, Loss::Squares) => refuted_priors(
+                &fitting.with_declared_noise().whole(),
+                &end.x,
+                &held,
+                &rules(problem, &unknowns),
+                noise_factor,
+            ),
+            _ => Vec::new(),
+        };
         findings(&CheckedFit {
             fitting: &fitting,
             problem,
@@ -359,8 +371,14 @@ fn fit_rows(
             held_out_outliers: &held_out_outliers,
             whole: &whole,
             has_declared_noise,
+            noise,
+            noise_factor,
+            sigma_taken,
+            covariance: &statistics.covariance,
+            refuted_priors: &refuted_priors,
             poses: &enough,
             not_converged: not_converged.as_ref(),
+            hidden: &statistics.hidden,
             prior_sizes: &prior_sizes,
             spreads: &spreads,
         })
@@ -489,6 +507,22 @@ fn estimated(
         }
     }
     Ok((estimates, covariance, not_converged))
+}
+
+/// Returns the pattern of the rule of `[parameters]` that gives each unknown its prior.
+fn rules(problem: &Problem, unknowns: &[&Parameter]) -> Vec<Option<String>> {
+    let rule = |parameter: &&Parameter| {
+        parameter.sigma?;
+        let name = &parameter.name;
+        let plain = name.find('[').zip(name.find(']'));
+        let plain = plain
+            .map_or_else(|| name.clone(), |(from, to)| [&name[..from], &name[to + 1..]].concat());
+        let is_of = |rule: &&ParameterRule| {
+            pattern::matches(&rule.pattern, name) || pattern::matches(&rule.pattern, &plain)
+        };
+        Some(problem.parameters.iter().rev().find(is_of)?.pattern.clone())
+    };
+    unknowns.iter().map(rule).collect()
 }
 
 /// Reports the reason for which a fit did not converge.

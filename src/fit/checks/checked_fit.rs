@@ -1,6 +1,6 @@
 //! Input of the checks: a fit with everything that they look at.
 
-use nalgebra::{DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::finding::Finding;
 use super::outliers::Outlier;
@@ -10,8 +10,10 @@ use super::row_kind::{RowKind, spread};
 use crate::fit::errors::Errors;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::fit::stages::stage::Stage;
-use crate::fit::uncertainty::noise::together;
+use crate::fit::uncertainty::hidden_by_bound::HiddenByBound;
+use crate::fit::uncertainty::noise::{Noise, together};
 use crate::fit::uncertainty::prior_sizes::PriorSize;
+use crate::fit::uncertainty::refuted_priors::RefutedPrior;
 use crate::least_squares::Loss;
 use crate::problem::{Observation, Problem};
 
@@ -41,10 +43,22 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub whole: &'a Stage<'a>,
     /// Whether the problem or the table declares the σ of positions.
     pub has_declared_noise: bool,
+    /// Source of the σ of positions.
+    pub noise: Noise,
+    /// Noise variance that the fit took over the declared one.
+    pub noise_factor: f64,
+    /// 1 σ of a coordinate that the fit took \[m\] or \[rad\].
+    pub sigma_taken: f64,
+    /// Covariance of the unknowns of `whole`, 0 where one is held.
+    pub covariance: &'a DMatrix<f64>,
+    /// Rules of `[parameters]` whose σ the data refute.
+    pub refuted_priors: &'a [RefutedPrior],
     /// Number of different poses and what they are too few for.
     pub poses: &'a PoseSufficiency,
     /// Finding about a fit that did not converge.
     pub not_converged: Option<&'a Finding>,
+    /// Bounds that hide the uncertainty of other unknowns.
+    pub hidden: &'a [HiddenByBound],
     /// Prior widths that the fitted deviations contradict.
     pub prior_sizes: &'a [PriorSize],
     /// Scatter of the predictions at each touched point: nominal arm, fitted arm, held out or not.

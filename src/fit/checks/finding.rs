@@ -108,6 +108,15 @@ finding_codes! {
     HeldOutWorse: Error "held-out-worse" ["kind", "before", "after"]
         "The fitted arm misses held-out rows by more than 1.5 times what the nominal arm misses them by.",
         "more poses, fewer free parameters or smaller priors are needed";
+    PriorContradicted: Error "prior-contradicted" ["rule", "factor", "sigma_ratio"]
+        "The data refute the σ of a rule of [parameters]: with a σ 3 and more times as large the residual falls by more than half.",
+        "declare a larger σ, or check the nominal values and their units";
+    NoiseBeyondDeclared: Error "noise-beyond-declared" ["noise_factor", "sigma_taken"]
+        "Residuals and priors speak for a noise variance of more than 1000 times the declared one.",
+        "look for what the model lacks with flexcal loop, or check the unit of the declared σ";
+    OrientationMisfit: Error "orientation-misfit" ["rms", "sigma", "conventions"]
+        "The fitted arm misses the measured orientations by more than 2° and 20 σ.",
+        "check the convention of the orientation columns and their frames";
     PriorsDecide: Warning "priors-decide" ["poses", "coordinates", "parameters"]
         "The poses measure fewer coordinates than parameters are fitted, so that priors decide part of the result.",
         "measure more different poses";
@@ -120,6 +129,15 @@ finding_codes! {
     HeldOutOutliers: Warning "held-out-outliers" ["rows", "of"]
         "Some held-out rows are farther from the prediction than its σ allows.",
         "look at these rows";
+    HeldOutBeyondPrediction: Warning "held-out-beyond-prediction" ["chi2", "coordinates", "p_value"]
+        "The held-out residuals are larger than the σ and the covariance of the fit predict (probability below 0.001).",
+        "look for what the model lacks with flexcal loop, or measure poses like the held-out ones";
+    HeldOutNotBetter: Warning "held-out-not-better" ["kind", "before", "after"]
+        "The fit made the error of held-out rows worse than that of the nominal arm, beyond chance.",
+        "measure more poses, free fewer parameters, or give narrower priors";
+    BoundInUnidentifiedDirection: Warning "bound-in-unidentified-direction" ["parameter", "bound", "deviation", "partners"]
+        "A parameter rests on a bound along a direction that the data hardly see, and others follow it.",
+        "fix one of these parameters, or give them priors";
     InfluentialRows: Warning "influential-rows" ["rows", "reduced_chi2_without"]
         "A few rows cause most of the misfit.",
         "look at these rows; a section [robust] limits their influence";

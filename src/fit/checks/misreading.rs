@@ -22,6 +22,8 @@ const AS_GOOD: f64 = 1.5;
 const MOST_SIZES: f64 = 1e4;
 /// Rows that are looked at.
 const MOST_ROWS: usize = 200;
+/// Maximum number of moving joints of which every set is tried as reversed.
+const MAX_REVERSED: usize = 7;
 /// A length beyond this may be meant in millimetres, of which a link has one at least \[m\].
 const LONG: f64 = 1.0;
 
@@ -39,10 +41,10 @@ pub enum Misreading {
     Millimetres,
     /// Positions in a left-handed frame: two coordinates exchanged, or one of the other sign.
     Mirrored,
-    /// A joint that counts the other way.
+    /// Joints that count the other way.
     Reversed {
-        /// Number of the joint.
-        joint: usize,
+        /// Set of joints; bit k stands for joint k + 1.
+        joints: u64,
     },
     /// The target of `[tool]` in millimetres, declared as metres.
     TargetInMillimetres,
@@ -61,7 +63,17 @@ impl fmt::Display for Misreading {
             Self::Mirrored => {
                 f.write_str("two of x, y and z that are exchanged, or one of the other sign")
             }
-            Self::Reversed { joint } => write!(f, "joint {joint} that counts the other way"),
+            Self::Reversed { joints } => {
+                let numbers: Vec<String> =
+                    numbers_of(*joints).map(|joint| joint.to_string()).collect();
+                match numbers.as_slice() {
+                    [joint] => write!(f, "joint {joint} that counts the other way"),
+                    [first @ .., last] => {
+                        write!(f, "joints {} and {last} that count the other way", first.join(", "))
+                    }
+                    [] => Ok(()),
+                }
+            }
             Self::TargetInMillimetres => {
                 f.write_str("a target of [tool] that is in millimetres, declared in metres")
             }
@@ -72,7 +84,17 @@ impl fmt::Display for Misreading {
     }
 }
 
+/// Numbers of the joints in a set.
+fn numbers_of(joints: u64) -> impl Iterator<Item = usize> {
+    (0..64).filter(move |joint| joints >> joint & 1 == 1).map(|joint| joint + 1)
+}
+
 impl Misreading {
+    /// Creates the misreading that these joints, by number, count the other way.
+    pub fn reversed(joints: &[usize]) -> Self {
+        Self::Reversed { joints: joints.iter().map(|joint| 1 << (joint - 1)).sum() }
+    }
+
     /// All that an arm and the columns of some rows may have.
     fn all(problem: &Problem, rows: &Measurements) -> Vec<Self> {
         let turns = |radians| {
@@ -94,7 +116,9 @@ impl Misreading {
         let moving = (1..)
             .zip(&problem.joints)
             .filter(|(_, joint)| joint.command_kind() != JointKind::Fixed);
-        all.extend(moving.map(|(joint, _)| Self::Reversed { joint }));
+        all.extend(
+            moving.filter(|(joint, _)| *joint <= 64).map(|(joint, _)| Self::reversed(&[joint])),
+        );
         all
     }
 
@@ -123,7 +147,7 @@ impl Misreading {
         let (factor, chosen): (f64, &dyn Fn(usize) -> bool) = match self {
             Self::Degrees => (PI / 180.0, &|joint| turns_in(problem, rows, joint, true)),
             Self::Radians => (180.0 / PI, &|joint| turns_in(problem, rows, joint, false)),
-            Self::Reversed { joint } => (-1.0, &move |own| own + 1 == joint),
+            Self::Reversed { joints } => (-1.0, &move |own| own < 64 && joints >> own & 1 == 1),
             _ => (1.0, &|_| false),
         };
         let chosen: Vec<bool> = (0..problem.joints.len()).map(chosen).collect();
@@ -220,13 +244,43 @@ pub(in crate::fit) fn misreadings(
     let tells = |own: &Misreading| {
         rows.leading().is_position() || matches!(own, Misreading::Reversed { .. })
     };
-    let mut explained: Vec<(Misreading, f64)> = Misreading::all(problem, &rows)
-        .into_iter()
-        .filter(tells)
-        .filter_map(one)
-        .filter(|(_, left)| *left < EXPLAINED * rms)
-        .collect();
+    let explains = |found: &(Misreading, f64)| found.1 < EXPLAINED * rms;
+    let singles: Vec<Misreading> =
+        Misreading::all(problem, &rows).into_iter().filter(tells).collect();
+    let mut explained: Vec<(Misreading, f64)> =
+        singles.iter().copied().filter_map(one).filter(explains).collect();
+    if explained.is_empty() {
+        explained.extend(several_reversed(&singles, one).filter(explains));
+    }
     explained.sort_by(|a, b| a.1.total_cmp(&b.1));
     let best = explained.first().map_or(0.0, |own| own.1);
     explained.into_iter().filter(|(_, left)| *left <= AS_GOOD * best).map(|(own, _)| own).collect()
+}
+
+/// Returns the set of two and more joints which, taken to count the other way, leave the smallest
+/// error, with that error; of sets that do about as well, the smallest.
+fn several_reversed(
+    singles: &[Misreading],
+    error: impl Fn(Misreading) -> Option<(Misreading, f64)>,
+) -> impl Iterator<Item = (Misreading, f64)> {
+    let joints: Vec<u64> = singles
+        .iter()
+        .filter_map(|own| match own {
+            Misreading::Reversed { joints } => Some(*joints),
+            _ => None,
+        })
+        .take(MAX_REVERSED)
+        .collect();
+    let set = |bits: u64| -> u64 {
+        joints.iter().enumerate().filter(|(k, _)| bits >> k & 1 == 1).map(|(_, joint)| joint).sum()
+    };
+    let sets = (1..1_u64 << joints.len()).filter(|bits| bits.count_ones() > 1).map(set);
+    let sets = sets.filter_map(|joints| error(Misreading::Reversed { joints }));
+    let errors: Vec<(Misreading, f64)> = sets.collect();
+    let best = errors.iter().map(|own| own.1).fold(f64::INFINITY, f64::min);
+    let size = |own: &(Misreading, f64)| match own.0 {
+        Misreading::Reversed { joints } => joints.count_ones(),
+        _ => 0,
+    };
+    errors.into_iter().filter(move |own| own.1 <= AS_GOOD * best).min_by_key(size).into_iter()
 }

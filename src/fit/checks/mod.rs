@@ -3,17 +3,21 @@
 //! Each check is a type that implements [`checked_fit::Check`]; [`findings`] runs all of them.
 //! `docs/findings.md` lists the codes of their findings.
 
+pub(super) mod bounds;
 pub(super) mod checked_fit;
+mod convention;
 pub(super) mod far_off;
 pub(super) mod finding;
 pub(super) mod fitted_rows;
 pub(super) mod held_out;
 pub(super) mod misfit;
 pub(super) mod misreading;
+mod orientation;
 pub(super) mod outliers;
 pub(super) mod parameter_limits;
 pub(super) mod point_spread;
 pub(super) mod pose_sufficiency;
+mod prediction;
 pub(super) mod priors;
 pub(super) mod required_columns;
 pub(super) mod row_kind;
@@ -32,8 +36,14 @@ const CHECKS: &[&dyn Check] = &[
     &held_out::NotAllCopied,
     &held_out::HeldOutReached,
     &held_out::BetterThanNominal,
+    &priors::PriorsHold,
+    &priors::NoiseIsDeclared,
+    &orientation::OrientationsFit,
     &priors::DataDecide,
     &far_off::NominalIsNear,
+    &prediction::PredictionHolds,
+    &prediction::NotWorseThanNominal,
+    &bounds::BoundsAreSeen,
     &held_out::NotRepeated,
     &held_out::WithoutOutliers,
     &fitted_rows::SteadyPoints,

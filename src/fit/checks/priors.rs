@@ -1,9 +1,11 @@
-//! Checks of the priors: how much of the result they decide, and whether their widths fit.
+//! Checks of the σ of priors and measurements against what the data say.
 
 use serde_json::json;
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
+use crate::fit::uncertainty::noise::Noise;
+use crate::fit::uncertainty::refuted_priors::RefutedPrior;
 
 /// Checks that the poses measure as many coordinates as parameters are fitted.
 pub(super) struct DataDecide;
@@ -41,5 +43,49 @@ impl Check for PriorWidths {
             Finding::new(FindingCode::PriorWidth, numbers, text)
         };
         fit.prior_sizes.iter().map(finding).collect()
+    }
+}
+
+/// Checks that no rule of `[parameters]` has a σ that the data refute.
+pub(super) struct PriorsHold;
+
+impl Check for PriorsHold {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let finding = |refuted: &RefutedPrior| {
+            let RefutedPrior { rule, factor, sigma_ratio } = refuted;
+            let text = format!(
+                "the data refute the σ of \"{rule}\" in [parameters]: with about {factor:.0} times that the fit would leave {:.1} % of \
+                 its residual",
+                100.0 * sigma_ratio
+            );
+            let numbers = [json!(rule), (*factor).into(), (*sigma_ratio).into()];
+            Finding::new(FindingCode::PriorContradicted, numbers, text)
+        };
+        fit.refuted_priors.iter().map(finding).collect()
+    }
+}
+
+/// Noise variance over the declared one beyond which the residual is no noise: σ 30 times as large.
+const MAX_NOISE_FACTOR: f64 = 1000.0;
+/// Ratios of σ that a σ in metres declared in millimetres brings about.
+const UNIT_RATIOS: std::ops::Range<f64> = 600.0..1600.0;
+
+/// Checks that the σ that the fit took is not far above the declared one.
+pub(super) struct NoiseIsDeclared;
+
+impl Check for NoiseIsDeclared {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        if fit.noise != Noise::Declared || fit.noise_factor <= MAX_NOISE_FACTOR {
+            return Vec::new();
+        }
+        let ratio = fit.noise_factor.sqrt();
+        let text = format!("the residual is {ratio:.0} times as large as the declared σ");
+        let numbers = [fit.noise_factor.into(), fit.sigma_taken.into()];
+        let finding = Finding::new(FindingCode::NoiseBeyondDeclared, numbers, text);
+        vec![if UNIT_RATIOS.contains(&ratio) {
+            finding.with_remedy("the declared σ may be in another unit: check it".to_owned())
+        } else {
+            finding
+        }]
     }
 }

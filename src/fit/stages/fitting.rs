@@ -131,6 +131,16 @@ impl<'a> Fitting<'a> {
         self.placement.oriented_poses(self.measurements, rows, (self.sigma, self.turn_sigma))
     }
 
+    /// Returns the same fits with the declared σ.
+    pub fn with_declared_noise(&self) -> Self {
+        Self {
+            noise_model: NoiseModel::DECLARED,
+            turn_noise_model: NoiseModel::DECLARED,
+            held_out_only: self.held_out_only.clone(),
+            ..*self
+        }
+    }
+
     /// A stage on some rows, with the σ that the fit takes.
     pub fn stage(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
         let mut poses = self.poses(rows);

@@ -12,3 +12,4 @@ pub(super) mod registration;
 pub(super) mod solver_choice;
 pub(super) mod stage;
 pub(super) mod strategy;
+pub(super) mod unmoved;

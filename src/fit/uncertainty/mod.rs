@@ -2,9 +2,11 @@
 
 pub(super) mod active_constraint;
 pub(super) mod covariance;
+pub(super) mod hidden_by_bound;
 pub(super) mod noise;
 pub(super) mod prices;
 pub(super) mod prior_sizes;
+pub(super) mod refuted_priors;
 pub(super) mod residual_lengths;
 pub(super) mod shadow_price;
 pub(super) mod statistics;

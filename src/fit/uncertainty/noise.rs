@@ -159,7 +159,8 @@ fn contradicted(
     let poses: Vec<Pose> = places.iter().map(|&place| stage.poses[place]).collect();
     let several_kinds =
         poses.iter().any(|pose| pose.observation.kind() != poses[0].observation.kind());
-    let count: usize = poses.iter().map(Pose::coordinates).sum();
+    let unmoved = stage.unmoved(&end.x);
+    let count = poses.iter().map(Pose::coordinates).sum::<usize>() - unmoved.count() * poses.len();
     let turned = 3 * poses.iter().filter(|pose| pose.orientation.is_some()).count();
     let all = poses.len() == stage.poses.len();
     let residuals = stage.residuals_of(poses, &end.x);
@@ -172,14 +173,15 @@ fn contradicted(
     let priors: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
     let mut held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
     let closed = confine(&data.triangle, &end.gauge.rows, &stage.held(&end.x)?, &mut held);
-    let rows = (count, 2.0 * data.cost);
+    let whitened = residual_vector(&residuals, &x);
+    let unmoved_squares = unmoved.squares(whitened.as_slice(), stage.coordinates());
+    let rows = (count, (2.0 * data.cost - unmoved_squares).max(0.0));
     let (ratio, gain) = VarianceLikelihood::of(&data, rows, &x, &priors, &held, &closed).maximum();
     if !ratio.is_finite() {
         return Ok(None);
     }
     let first = assumed == AS_DECLARED;
-    let shares =
-        shares(&residual_vector(&residuals, &x), stage.coordinates(), [count - turned, turned]);
+    let shares = shares(&whitened, stage.coordinates(), [count - turned, turned]);
     // Positions and orientations settle each by themselves.
     let settled = shares.iter().all(|share| ((ratio * share).sqrt() - 1.0).abs() < SCALE_SETTLED);
     let chance = by_chance();

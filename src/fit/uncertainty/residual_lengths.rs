@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::fit::stages::stage::Stage;
+use crate::fit::stages::unmoved::Unmoved;
 use crate::least_squares::residual_vector;
 use crate::model::Pose;
 use crate::numeric::median;
@@ -65,17 +66,26 @@ pub(in crate::fit) struct Lengths {
 impl Lengths {
     /// Of a stage at the full parameter vector `at`; `freedom` is the part of its coordinates that
     /// is left to scatter, 0…1, and `declared` the part of the declared σ that the fit took to be
-    /// noise, where any σ was declared.
+    /// noise, where any σ was declared. Parts of residuals along `unmoved` directions do not count.
     ///
     /// A pose is an outlier where P(χ²ₖ > s²) < 0.01 / N, with s = ‖r‖ / scatter, k measured
     /// numbers and N poses \[Bonferroni\]. The scatter is the median of ‖r‖ / √(median of χ²ₖ),
     /// 1.538 of positions, which gross errors hardly move, over √`freedom`; under a declared σ it
     /// is no less than that part of it. So a model that misses some effect everywhere does not turn
     /// every pose into an outlier.
-    pub fn of(stage: &Stage, at: &DVector<f64>, freedom: f64, declared: Option<f64>) -> Self {
+    pub fn of(
+        stage: &Stage,
+        at: &DVector<f64>,
+        unmoved: &Unmoved,
+        freedom: f64,
+        declared: Option<f64>,
+    ) -> Self {
         let residuals = stage.residuals(at);
         let whitened = residual_vector(&residuals, &residuals.reduced(at));
-        let length = |r: &[f64]| r[0].hypot(r[1]).hypot(r[2]);
+        let length = |r: &[f64]| match unmoved.count() {
+            0 => r[0].hypot(r[1]).hypot(r[2]),
+            _ => unmoved.moved_part(Vector3::new(r[0], r[1], r[2])).norm(),
+        };
         let items = || whitened.as_slice().chunks_exact(stage.coordinates());
         let both = |r: &[f64], position: f64| {
             if r.len() > 3 { position.hypot(length(&r[3..])) } else { position }
@@ -93,7 +103,8 @@ impl Lengths {
         let values: Vec<f64> =
             items().zip(stage.poses.iter().zip(&stage.declared)).map(in_declared).collect();
         let least = declared.unwrap_or(0.0);
-        let chances = chances(&stage.poses.iter().map(Pose::coordinates).collect::<Vec<_>>());
+        let moved = |pose: &Pose| pose.coordinates().saturating_sub(unmoved.count()).max(1);
+        let chances = chances(&stage.poses.iter().map(moved).collect::<Vec<_>>());
         let scatter = scatter(&values, &chances) / freedom.clamp(0.01, 1.0).sqrt();
         let limits = chances.into_iter().map(|(_, limit)| limit).collect();
         Self { values, weighed, scatter: scatter.max(least), limits }

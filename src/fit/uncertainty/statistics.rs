@@ -7,6 +7,7 @@ use crate::fit::stages::constraints::{Held, confine};
 use crate::fit::stages::fitting::FitEnd;
 use crate::fit::stages::noise_model::{IMPROBABLE, NoiseModel};
 use crate::fit::stages::stage::{Stage, StageError};
+use crate::fit::uncertainty::hidden_by_bound::{HiddenByBound, hidden_by_bounds};
 use crate::fit::uncertainty::prices::Prices;
 use crate::fit::uncertainty::residual_lengths::Lengths;
 use crate::least_squares::{Blind, Loss, Uncertainty};
@@ -36,6 +37,8 @@ pub(in crate::fit) struct Statistics {
     pub constraints: Vec<Held>,
     /// What bounds and constraints cost.
     pub prices: Prices,
+    /// Bounds that hide the uncertainty of other unknowns.
+    pub hidden: Vec<HiddenByBound>,
     /// Lengths of the residuals.
     pub lengths: Lengths,
 }
@@ -62,40 +65,78 @@ impl Statistics {
         let closed = confine(&triangle, &end.gauge.rows, &constraints, &mut held);
         let of = |factor| Uncertainty::of(&triangle, &priors, &closed, &held, factor);
         let mut uncertainty = of(1.0);
-        let coordinates = stage.count() as f64;
+        let unmoved = stage.unmoved(&end.x);
+        let moved = |pose: &Pose| pose.coordinates().saturating_sub(unmoved.count());
+        let coordinates = stage.poses.iter().map(moved).sum::<usize>() as f64;
         let freedom = coordinates - uncertainty.effective_parameters;
-        let lengths =
-            Lengths::of(stage, &end.x, freedom / coordinates, noise_model.map(|own| own.scale));
+        let lengths = Lengths::of(
+            stage,
+            &end.x,
+            &unmoved,
+            freedom / coordinates,
+            noise_model.map(|own| own.scale),
+        );
         let robust = stage.loss != Loss::Squares;
         let counts = |place: usize| !robust || lengths.outlying(place).is_none();
         let kept = (0..lengths.values.len()).filter(|&place| counts(place));
         let chi2: f64 = kept.map(|place| lengths.values[place].powi(2)).sum();
         let aside = (0..lengths.values.len()).filter(|&place| !counts(place));
-        let left_out = aside.map(|place| stage.poses[place].coordinates() as f64).sum::<f64>();
+        let left_out = aside.map(|place| moved(&stage.poses[place]) as f64).sum::<f64>();
         if robust {
-            let each: Vec<usize> = stage.poses.iter().map(Pose::coordinates).collect();
+            let each: Vec<usize> = stage.poses.iter().map(moved).collect();
             uncertainty = of(stage.loss.variance_factor(&lengths.weighed, &each, freedom));
         }
         let freedom = freedom - left_out;
+        let prices = stage.prices(&end.x, &end.at_bound, &constraints)?;
+        let multipliers: Vec<Option<f64>> =
+            prices.bounds.iter().map(|price| price.map(|price| price.multiplier)).collect();
+        let bounded_errors = uncertainty.standard_errors();
+        let hidden = if stage.memory.is_in_passing() {
+            Vec::new()
+        } else {
+            hidden_by_bounds(
+                stage,
+                &end.x,
+                (&triangle, &closed),
+                (&held, &end.at_bound),
+                &multipliers,
+                &bounded_errors,
+            )
+        };
+        for valley in hidden.iter().filter(|valley| valley.deviation.is_finite()) {
+            let moved = &valley.direction * valley.deviation;
+            uncertainty.covariance += &moved * moved.transpose();
+        }
         let errors = uncertainty.standard_errors();
+        let is_open = |j: usize| {
+            let has = |valley: &HiddenByBound| valley.partners.contains(&j);
+            hidden.iter().any(|valley| has(valley) && valley.deviation.is_infinite())
+        };
         // Nobody asks a fit in passing what data see.
         let visible = if priors.iter().all(Option::is_some) || stage.memory.is_in_passing() {
             vec![1.0; errors.len()]
         } else {
             Blind::in_triangle(&stage.data_triangle(&end.x)).visible
         };
+        // The part of a variance that a bound alone limits is not from the data.
+        let from_data = |j: usize| match errors[j] {
+            error if error > bounded_errors[j] => (bounded_errors[j] / error).powi(2),
+            _ => 1.0,
+        };
         let identified = (0..errors.len())
             .map(|j| match priors[j] {
-                _ if held[j] => 0.0,
+                _ if held[j] || is_open(j) => 0.0,
                 Some(sigma) => (1.0 - (errors[j] / sigma).powi(2)).clamp(0.0, 1.0),
-                None => visible[j],
+                None => visible[j].min(from_data(j)),
             })
             .collect();
         // What was seen at the start may have run out of sight on the way, a rigidity towards
         // infinity for one.
         let seen = stage.gauge(&end.x, &held, &constraints).visible;
         let known = (0..errors.len())
-            .map(|j| !held[j] && seen[j].min(end.gauge.visible[j]) > 1.0 - PARTLY_BLIND)
+            .map(|j| {
+                !held[j] && !is_open(j) && seen[j].min(end.gauge.visible[j]) > 1.0 - PARTLY_BLIND
+            })
             .collect();
         Ok(Self {
             covariance: uncertainty.covariance,
@@ -104,7 +145,8 @@ impl Statistics {
             identified,
             reduced_chi2: (freedom > 0.5).then_some(chi2 / freedom),
             chance: chance(freedom),
-            prices: stage.prices(&end.x, &end.at_bound, &constraints)?,
+            prices,
+            hidden,
             constraints,
             lengths,
         })

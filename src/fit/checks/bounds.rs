@@ -1,0 +1,45 @@
+//! Check of the bounds on which parameters rest.
+
+use serde_json::json;
+
+use super::checked_fit::{Check, CheckedFit};
+use super::finding::{Finding, FindingCode};
+use crate::fit::uncertainty::hidden_by_bound::HiddenByBound;
+use crate::least_squares::solver::AtBound;
+
+/// Number of partners that a text names.
+const MAX_NAMED_PARTNERS: usize = 5;
+
+/// Checks that no bound is met along a direction that the data hardly see.
+pub(super) struct BoundsAreSeen;
+
+impl Check for BoundsAreSeen {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let parameters: Vec<_> = fit.whole.parameters().collect();
+        let finding = |valley: &HiddenByBound| {
+            let HiddenByBound { unknown, side, deviation, direction, partners } = valley;
+            let (parameter, side) = (
+                parameters[*unknown],
+                match side {
+                    AtBound::Lower => "lower",
+                    AtBound::Upper => "upper",
+                },
+            );
+            let name = &parameter.name;
+            let mut names: Vec<&str> = Vec::new();
+            let mut order = partners.clone();
+            order.sort_by(|&a, &b| direction[b].abs().total_cmp(&direction[a].abs()));
+            names.extend(order.iter().map(|&k| parameters[k].name.as_str()));
+            let more = names.len().saturating_sub(MAX_NAMED_PARTNERS);
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            let first = names[..names.len().min(MAX_NAMED_PARTNERS)].join(", ");
+            let text = format!(
+                "{name} rests on its {side} bound along a direction that the data hardly see; {first}{more} would change with it, \
+                 and have standard errors that allow for this"
+            );
+            let numbers = [json!(name), side.into(), (*deviation).into(), json!(names)];
+            Finding::new(FindingCode::BoundInUnidentifiedDirection, numbers, text)
+        };
+        fit.hidden.iter().map(finding).collect()
+    }
+}

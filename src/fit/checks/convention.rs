@@ -1,0 +1,186 @@
+//! Conventions of orientation that would explain why measured orientations do not fit.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
+
+use super::checked_fit::CheckedFit;
+use crate::problem::RotationKind;
+
+/// Part of the error as read that a convention which explains the orientations leaves.
+const EXPLAINED: f64 = 0.2;
+/// Ratio of the errors up to which a convention is named beside the best one.
+const AS_GOOD: f64 = 1.5;
+/// Axes of rotation in the order of the twelve Euler conventions, R = R₁(r₁) R₂(r₂) R₃(r₃); where
+/// all three differ, each angle stands in the column of its axis.
+const ORDERS: [[usize; 3]; 12] = [
+    [0, 1, 2],
+    [0, 2, 1],
+    [1, 0, 2],
+    [1, 2, 0],
+    [2, 0, 1],
+    [2, 1, 0],
+    [0, 1, 0],
+    [0, 2, 0],
+    [1, 0, 1],
+    [1, 2, 1],
+    [2, 0, 2],
+    [2, 1, 2],
+];
+
+/// Orientation of a row as it may have been meant.
+type Reading = Box<dyn Fn(&UnitQuaternion<f64>) -> Vec<UnitQuaternion<f64>>>;
+
+/// Returns the conventions in which the measured orientations fit the predicted ones, best first, in
+/// words; `rms` is the error as read \[rad\]. A constant rotation of the tool is fitted.
+pub(super) fn fitting_conventions(fit: &CheckedFit, rms: f64) -> Vec<String> {
+    let fitting = fit.fitting;
+    let rows: Vec<usize> = fitting
+        .split
+        .identification
+        .iter()
+        .copied()
+        .filter(|&row| fitting.measurements.orientation(row).is_some())
+        .collect();
+    let predicted = fitting.model.orientations(&fitting.poses(&rows), fit.end.x.as_slice());
+    let pairs: Vec<(UnitQuaternion<f64>, UnitQuaternion<f64>)> = rows
+        .iter()
+        .zip(predicted)
+        .filter_map(|(&row, turn)| {
+            let is_known = turn.iter().all(|component| component.is_finite());
+            let measured = *fitting.measurements.orientation(row)?;
+            is_known.then(|| (UnitQuaternion::from_scaled_axis(turn), measured))
+        })
+        .collect();
+    let readings = readings(fit.problem.data.dialect.rotation);
+    let mut errors: Vec<(String, f64)> = readings
+        .into_iter()
+        .map(|(name, reading)| (name, misfit(&pairs, &reading)))
+        .filter(|(_, error)| *error < EXPLAINED * rms)
+        .collect();
+    errors.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let best = errors.first().map_or(0.0, |(_, error)| *error);
+    errors.into_iter().filter(|(_, error)| *error <= AS_GOOD * best).map(|(name, _)| name).collect()
+}
+
+/// Returns every reading of an orientation that was read with convention `kind`, with its name.
+fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
+    let mut readings: Vec<(String, Reading)> = vec![
+        ("the inverse rotation".to_owned(), Box::new(|q| vec![q.inverse()])),
+        (
+            "quaternions with the scalar part first".to_owned(),
+            Box::new(|q| vec![unit(q.i, q.j, q.k, q.w)]),
+        ),
+        (
+            "the inverse of quaternions with the scalar part first".to_owned(),
+            Box::new(|q| vec![unit(q.i, q.j, q.k, q.w).inverse()]),
+        ),
+    ];
+    if kind != RotationKind::Vector {
+        let of_vector: Reading =
+            Box::new(move |q| angles(kind, q).map(UnitQuaternion::from_scaled_axis).to_vec());
+        readings.push(("rotation vectors".to_owned(), of_vector));
+    }
+    for order in ORDERS {
+        let letters: Vec<char> = order.iter().map(|&axis| ['x', 'y', 'z'][axis]).collect();
+        let [a, b, c] = [letters[0], letters[1], letters[2]];
+        let of_order: Reading =
+            Box::new(move |q| angles(kind, q).map(|angles| euler(order, &angles)).to_vec());
+        readings.push((format!("Euler angles with R = R{a} R{b} R{c}"), of_order));
+    }
+    readings
+}
+
+/// Returns the quaternion w + x i + y j + z k, normalised.
+fn unit(w: f64, x: f64, y: f64, z: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
+}
+
+/// Returns the three numbers that may have been read as the orientation `q` \[rad\]. A rotation
+/// vector longer than half a turn is not told from the shorter one of the same rotation.
+fn angles(kind: RotationKind, q: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
+    match kind {
+        RotationKind::Vector => {
+            let vector = q.scaled_axis();
+            let length = vector.norm();
+            let longer = if length > 0.0 { vector * (1.0 - 2.0 * PI / length) } else { vector };
+            [vector, longer]
+        }
+        RotationKind::EulerXyz => {
+            // R = Rx Ry Rz is the inverse of Rz(−z) Ry(−y) Rx(−x).
+            let (x, y, z) = q.inverse().euler_angles();
+            [Vector3::new(-x, -y, -z); 2]
+        }
+        RotationKind::RollPitchYaw => {
+            let (x, y, z) = q.euler_angles();
+            [Vector3::new(x, y, z); 2]
+        }
+    }
+}
+
+/// Returns R₁(r₁) R₂(r₂) R₃(r₃) about the axes of an Euler convention.
+fn euler(order: [usize; 3], angles: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let has_three_axes = order[0] != order[2];
+    let turn = |place: usize| {
+        let angle = angles[if has_three_axes { order[place] } else { place }];
+        UnitQuaternion::from_scaled_axis(Vector3::ith(order[place], angle))
+    };
+    turn(0) * turn(1) * turn(2)
+}
+
+/// Returns the root mean squared angle \[rad\] between predictions and readings, after the constant
+/// rotation of the tool that fits best.
+///
+/// The rotation is the eigenvector of Σ q qᵀ of the differences  [Markley et al. 2007]; of several
+/// readings of a row the nearest counts.
+fn misfit(pairs: &[(UnitQuaternion<f64>, UnitQuaternion<f64>)], reading: &Reading) -> f64 {
+    let differences: Vec<Vec<UnitQuaternion<f64>>> = pairs
+        .iter()
+        .map(|(predicted, measured)| {
+            reading(measured).into_iter().map(|meant| predicted.inverse() * meant).collect()
+        })
+        .collect();
+    let mut sum = Matrix4::zeros();
+    for difference in differences.iter().filter_map(|own| own.first()) {
+        sum += difference.coords * difference.coords.transpose();
+    }
+    let eigen = sum.symmetric_eigen();
+    let mean = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+    let mean = UnitQuaternion::from_quaternion(Quaternion::from(mean));
+    let nearest = |own: &Vec<UnitQuaternion<f64>>| {
+        own.iter().map(|difference| difference.angle_to(&mean)).fold(PI, f64::min).powi(2)
+    };
+    (differences.iter().map(nearest).sum::<f64>() / pairs.len().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{normal, stream};
+
+    #[test]
+    fn the_convention_of_euler_angles_is_found_among_all() {
+        let mut random = stream(4, 0);
+        let tool = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -1.0, 0.4));
+        for meant in ORDERS {
+            let pairs: Vec<_> = (0..40)
+                .map(|_| {
+                    let mut angle = || 0.6 * normal(&mut random);
+                    let angles = Vector3::new(angle(), angle(), angle());
+                    let read = UnitQuaternion::from_scaled_axis(angles);
+                    (euler(meant, &angles) * tool.inverse(), read)
+                })
+                .collect();
+            for (name, reading) in readings(RotationKind::Vector) {
+                let error = misfit(&pairs, &reading);
+                let letters = meant.map(|axis| ['x', 'y', 'z'][axis]);
+                let is_meant = name
+                    == format!(
+                        "Euler angles with R = R{} R{} R{}",
+                        letters[0], letters[1], letters[2]
+                    );
+                assert_eq!(error < 1e-6, is_meant, "{name} {meant:?} {error}");
+            }
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! Check of the orientations: whether they are of the convention that the table declares.
+
+use serde_json::json;
+
+use super::checked_fit::{Check, CheckedFit};
+use super::convention::fitting_conventions;
+use super::finding::{Finding, FindingCode};
+
+/// Root mean squared error of orientation above which orientations are of another convention or of
+/// another frame \[rad\]: 2°.
+const MAX_TURN: f64 = 0.035;
+/// Multiple of the declared σ that such an error also exceeds.
+const MIN_SIGMAS: f64 = 20.0;
+
+/// Checks that the fitted orientations are near the measured ones.
+pub(super) struct OrientationsFit;
+
+impl Check for OrientationsFit {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let Some(sigma) = fit.whole.declared_turn else { return Vec::new() };
+        let fitting = fit.fitting;
+        let rows = &fitting.split.identification;
+        let turns = fitting.model.orientation_residuals(fitting.poses(rows), &fit.end.x);
+        let lengths: Vec<f64> = turns
+            .iter()
+            .map(|turn| turn.norm_squared())
+            .filter(|square| square.is_finite())
+            .collect();
+        let rms = (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).sqrt();
+        if !(rms > MAX_TURN && rms > MIN_SIGMAS * sigma) {
+            return Vec::new();
+        }
+        let conventions = fitting_conventions(fit, rms);
+        let text = format!(
+            "the fitted arm misses the measured orientations by {:.1}° rms, {:.0} times the declared σ",
+            rms.to_degrees(),
+            rms / sigma
+        );
+        let numbers = [rms.into(), sigma.into(), json!(conventions)];
+        let finding = Finding::new(FindingCode::OrientationMisfit, numbers, text);
+        vec![match conventions.first() {
+            Some(convention) => finding.with_remedy(format!(
+                "the columns fit as {convention}: convert them to rotation vectors or quaternions"
+            )),
+            None => finding,
+        }]
+    }
+}

@@ -1,0 +1,148 @@
+//! Checks of the fit against held-out rows, which decide nothing in it but may contradict it.
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
+
+use super::checked_fit::{Check, CheckedFit};
+use super::finding::{Finding, FindingCode};
+use super::row_kind::{rows as noun, size};
+use crate::fit::stages::fitting::Fitting;
+use crate::fit::uncertainty::noise::Noise;
+use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
+
+/// Probability below which the held-out residuals contradict the prediction.
+const IMPROBABLE: f64 = 1e-3;
+/// Number of standard errors from which on a mean difference of held-out errors is no chance.
+const MIN_DIFFERENCE: f64 = 3.0;
+/// Number of held-out rows from which on a mean difference is judged.
+const MIN_ROWS: usize = 8;
+
+/// Checks that the held-out residuals are as large as the fit predicts.
+///
+/// r ∼ N(0, Σ + J C Jᵀ) with the Σ that the fit took and the covariance C of its unknowns:
+/// χ² = rᵀ(Σ + J C Jᵀ)⁻¹ r, over its number of coordinates, follows F where Σ is estimated. Rows
+/// that are reported as outliers are left out.
+pub(super) struct PredictionHolds;
+
+impl Check for PredictionHolds {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let is_outlier = |row: usize| fit.held_out_outliers.iter().any(|own| own.row == row);
+        let held_out = fit.fitting.split.held_out.iter().copied();
+        let rows: Vec<usize> = held_out.filter(|row| !is_outlier(*row)).collect();
+        let Some((chi2, coordinates)) =
+            predictive_chi2(fit.fitting, &rows, &fit.end.x, &fit.whole.unknowns, fit.covariance)
+        else {
+            return Vec::new();
+        };
+        let dof = fit.whole.count() as f64 - fit.whole.unknowns.len() as f64;
+        let is_estimated = fit.noise != Noise::Declared || fit.noise_factor > 1.0 + 1e-9;
+        let Some((p_value, limit)) = upper_tail(chi2, coordinates, is_estimated.then_some(dof))
+        else {
+            return Vec::new();
+        };
+        if p_value >= IMPROBABLE {
+            return Vec::new();
+        }
+        let text = format!(
+            "the held-out rows are {:.2} times as far from the prediction as the fit expects: χ² is {chi2:.0} for {coordinates} \
+             coordinates, expected below {limit:.0} (99.9 %)",
+            (chi2 / coordinates as f64).sqrt()
+        );
+        let numbers = [chi2.into(), coordinates.into(), p_value.into()];
+        vec![Finding::new(FindingCode::HeldOutBeyondPrediction, numbers, text)]
+    }
+}
+
+/// Returns the probability that chance exceeds `chi2`, and the χ² that it exceeds with probability
+/// [`IMPROBABLE`]; `noise_dof` are the degrees of freedom from which the noise was estimated.
+fn upper_tail(chi2: f64, coordinates: usize, noise_dof: Option<f64>) -> Option<(f64, f64)> {
+    let k = coordinates as f64;
+    if !chi2.is_finite() || coordinates == 0 {
+        return None;
+    }
+    match noise_dof {
+        Some(dof) => {
+            let distribution = FisherSnedecor::new(k, dof).ok()?;
+            Some((distribution.sf(chi2 / k), k * distribution.inverse_cdf(1.0 - IMPROBABLE)))
+        }
+        None => {
+            let distribution = ChiSquared::new(k).ok()?;
+            Some((distribution.sf(chi2), distribution.inverse_cdf(1.0 - IMPROBABLE)))
+        }
+    }
+}
+
+/// Returns χ² = rᵀ(I + J C Jᵀ)⁻¹ r of the positions of `rows`, whitened by the σ that the fit took,
+/// and its number of coordinates.
+///
+/// With C = L Lᵀ it is r·r − (LᵀJᵀr)ᵀ (I + LᵀJᵀJ L)⁻¹ LᵀJᵀr  [Woodbury].
+fn predictive_chi2(
+    fitting: &Fitting,
+    rows: &[usize],
+    x: &DVector<f64>,
+    unknowns: &[usize],
+    covariance: &DMatrix<f64>,
+) -> Option<(f64, usize)> {
+    let stage = fitting.stage(rows, unknowns.to_vec());
+    let (residuals, n, per_pose) = (stage.residuals(x), unknowns.len(), stage.coordinates());
+    let at = residuals.reduced(x);
+    let of_chunk = |chunk: usize| {
+        let items = chunk * CHUNK_ITEMS..((chunk + 1) * CHUNK_ITEMS).min(rows.len());
+        let poses = items.len();
+        let mut block = Block::zeros(per_pose * poses, n);
+        residuals.linearise(&at, items, &mut block);
+        let jacobian = DMatrix::from_fn(3 * poses, n + 1, |row, j| {
+            block.column(j)[per_pose * (row / 3) + row % 3]
+        });
+        jacobian.tr_mul(&jacobian)
+    };
+    let chunks: Vec<DMatrix<f64>> =
+        (0..rows.len().div_ceil(CHUNK_ITEMS)).into_par_iter().map(of_chunk).collect();
+    let products = chunks.into_iter().reduce(|a, b| a + b)?;
+    let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(covariance.clone());
+    let root = eigenvectors * DMatrix::from_diagonal(&eigenvalues.map(|v| v.max(0.0).sqrt()));
+    let normal = root.tr_mul(&products.view((0, 0), (n, n)).into_owned()) * &root;
+    let vector = root.tr_mul(&products.view((0, n), (n, 1)).column(0).into_owned());
+    let factor = (DMatrix::identity(n, n) + normal).cholesky()?;
+    let chi2 = products[(n, n)] - vector.dot(&factor.solve(&vector));
+    let coordinates = stage.poses.iter().map(|pose| pose.observation.coordinates()).sum();
+    Some((chi2, coordinates))
+}
+
+/// Checks that the fitted arm meets held-out rows no worse than the registered nominal arm.
+pub(super) struct NotWorseThanNominal;
+
+impl Check for NotWorseThanNominal {
+    fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
+        let fitting = fit.fitting;
+        let kind = fit.fitted.held_out.kind;
+        let of_kind = |row: &usize| fitting.measurements.observation(*row).kind() == kind;
+        let rows: Vec<usize> = fitting.split.held_out.iter().copied().filter(of_kind).collect();
+        let errors = |x| fitting.position_errors(&rows, x);
+        let pairs = errors(fit.registered_x).into_iter().zip(errors(&fit.end.x));
+        let differences: Vec<f64> = pairs
+            .map(|(before, after)| after.norm_squared() - before.norm_squared())
+            .filter(|difference| difference.is_finite())
+            .collect();
+        let count = differences.len() as f64;
+        if differences.len() < MIN_ROWS {
+            return Vec::new();
+        }
+        let mean = differences.iter().sum::<f64>() / count;
+        let squares: f64 = differences.iter().map(|own| (own - mean).powi(2)).sum();
+        let error = (squares / (count - 1.0) / count).sqrt();
+        if mean <= MIN_DIFFERENCE * error {
+            return Vec::new();
+        }
+        let (before, after) = (fit.registered.held_out.rms.norm, fit.fitted.held_out.rms.norm);
+        let text = format!(
+            "the fit made the error of held-out {} worse ({} rms with the nominal arm, {} fitted), beyond chance",
+            noun(kind),
+            size(kind, before, 3),
+            size(kind, after, 3)
+        );
+        let numbers = [kind.into(), before.into(), after.into()];
+        vec![Finding::new(FindingCode::HeldOutNotBetter, numbers, text)]
+    }
+}

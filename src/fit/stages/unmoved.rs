@@ -1,0 +1,89 @@
+//! Directions in which no unknown of a stage moves any pose, such as z of a planar arm.
+
+use nalgebra::{DVector, Matrix3, SymmetricEigen, Vector3};
+
+use super::stage::Stage;
+use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
+use crate::model::Pose;
+
+/// Part of the squares of the derivatives along the strongest direction below which a direction is
+/// not moved: what rounding leaves of eigenvalues.
+const NOT_MOVED: f64 = 1e-15;
+/// Number of poses that are looked at first: most arms move in every direction there.
+const FIRST_POSES: usize = 32;
+
+/// Orthonormal directions of the measuring frame in which no unknown moves any pose. Coordinates
+/// along them tell nothing about the unknowns, and count in no degrees of freedom.
+#[derive(Debug, Clone, Default)]
+pub(in crate::fit) struct Unmoved(Vec<Vector3<f64>>);
+
+impl Unmoved {
+    /// Number of directions.
+    pub fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Returns the squares of whitened residuals along the directions, three numbers first of
+    /// `per_pose` for each pose.
+    pub fn squares(&self, residuals: &[f64], per_pose: usize) -> f64 {
+        let along = |residual: Vector3<f64>| -> f64 {
+            self.0.iter().map(|direction| direction.dot(&residual).powi(2)).sum()
+        };
+        let poses = residuals.chunks_exact(per_pose).filter(|_| self.count() > 0);
+        poses.map(|r| along(Vector3::new(r[0], r[1], r[2]))).sum()
+    }
+
+    /// Returns the part of a residual that the unknowns may move.
+    pub fn moved_part(&self, residual: Vector3<f64>) -> Vector3<f64> {
+        self.0.iter().fold(residual, |left, direction| left - direction * direction.dot(&residual))
+    }
+}
+
+impl Stage<'_> {
+    /// Finds the directions in which no unknown moves any pose at the full parameter vector `at`;
+    /// none where rows measure anything else than positions, or nothing varies.
+    pub fn unmoved(&self, at: &DVector<f64>) -> Unmoved {
+        let is_position =
+            |pose: &Pose| pose.observation.is_position() && pose.orientation.is_none();
+        if self.unknowns.is_empty() || !self.poses.iter().all(is_position) {
+            return Unmoved::default();
+        }
+        let first = self.unmoved_in(at, FIRST_POSES);
+        if first.is_empty() || self.poses.len() <= FIRST_POSES {
+            return Unmoved(first);
+        }
+        Unmoved(self.unmoved_in(at, self.poses.len()))
+    }
+
+    /// Finds the directions in which no unknown moves the first `count` poses.
+    fn unmoved_in(&self, at: &DVector<f64>, count: usize) -> Vec<Vector3<f64>> {
+        let residuals = self.residuals(at);
+        let (x, n) = (residuals.reduced(at), self.unknowns.len());
+        let per_pose = self.coordinates();
+        let count = count.min(self.poses.len());
+        let mut squares: Vec<Matrix3<f64>> = vec![Matrix3::zeros(); n];
+        for start in (0..count).step_by(CHUNK_ITEMS) {
+            let items = start..(start + CHUNK_ITEMS).min(count);
+            let mut block = Block::zeros(per_pose * items.len(), n);
+            residuals.linearise(&x, items, &mut block);
+            for (j, square) in squares.iter_mut().enumerate() {
+                for row in block.column(j).chunks_exact(per_pose) {
+                    let slope = Vector3::new(row[0], row[1], row[2]);
+                    *square += slope * slope.transpose();
+                }
+            }
+        }
+        // Each unknown in units of its own effect: angles and lengths do not compare.
+        let scaled = squares.iter().map(|square| match square.trace() {
+            trace if trace > 0.0 => square / trace,
+            _ => Matrix3::zeros(),
+        });
+        let eigen = SymmetricEigen::new(scaled.sum::<Matrix3<f64>>());
+        let largest = eigen.eigenvalues.max();
+        let is_unmoved = |k: &usize| eigen.eigenvalues[*k] <= NOT_MOVED * largest;
+        if !(largest.is_finite() && largest > 0.0) {
+            return Vec::new();
+        }
+        (0..3).filter(is_unmoved).map(|k| eigen.eigenvectors.column(k).into_owned()).collect()
+    }
+}

@@ -1,0 +1,173 @@
+//! Uncertainty that a bound hides: partners of an unknown that rests on a bound.
+//!
+//! Where the data hardly see a combination of unknowns, a bound on one of them seems to decide the
+//! others: with the unknown held at its bound they have small standard errors. The bound says no
+//! more than on which side the unknown lies. Along the valley of the cost, x + s u, the unknown is
+//! inside its bound by u ≥ 0, and the posterior of u is
+//!
+//! p(u) ∝ exp(−μ u − ½ h u²) on 0 ≤ u ≤ w
+//!
+//! with the multiplier μ of the bound, the curvature h of the cost along the valley, and the width w
+//! after which the valley meets another bound. Its E u² adds E u² s sᵀ to the covariance.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::fit::stages::stage::Stage;
+use crate::least_squares::Triangle;
+use crate::least_squares::solver::AtBound;
+
+/// Ratio of the deviation along the valley to the standard error with the unknown held at its bound,
+/// from which on the bound hides the uncertainty of a partner: nine tenths of its variance and more.
+const MIN_HIDDEN_RATIO: f64 = 3.0;
+/// Weight that turns rows of held combinations into constraints.
+const HARD: f64 = 1e5;
+/// Exponent beyond which the posterior of u counts as zero.
+const MAX_EXPONENT: f64 = 40.0;
+/// Intervals of the quadrature over u; even, for Simpson's rule.
+const INTERVALS: u32 = 400;
+
+/// Valley of the cost that leads from a bound into the interior.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::fit) struct HiddenByBound {
+    /// Index of the unknown that rests on its bound.
+    pub unknown: usize,
+    /// Bound on which it rests.
+    pub side: AtBound,
+    /// √(E u²), the deviation of the unknown from its bound \[unit of x\]; infinite where neither
+    /// data nor bounds limit it.
+    pub deviation: f64,
+    /// Direction s of the valley in all unknowns: 1 for the unknown itself, if its bound is a lower
+    /// one, and −1 otherwise.
+    pub direction: DVector<f64>,
+    /// Indices of the partners whose uncertainty the bound hides.
+    pub partners: Vec<usize>,
+}
+
+/// Finds the bounds of a stage that hide the uncertainty of partners.
+///
+/// `triangle` is the factor R of the weighted data at the full parameter vector `at`, `closed` are
+/// rows of combinations that are held, `held` marks unknowns that are not estimated, `multipliers`
+/// are those of bounds, where an unknown rests on one, and `errors` are the standard errors with all
+/// bounds holding.
+pub(in crate::fit) fn hidden_by_bounds(
+    stage: &Stage,
+    at: &DVector<f64>,
+    (triangle, closed): (&DMatrix<f64>, &DMatrix<f64>),
+    (held, at_bound): (&[bool], &[Option<AtBound>]),
+    multipliers: &[Option<f64>],
+    errors: &[f64],
+) -> Vec<HiddenByBound> {
+    let valley = |j: usize| -> Option<HiddenByBound> {
+        let (side, multiplier) = (at_bound[j]?, multipliers[j]?);
+        let parameters: Vec<_> = stage.parameters().collect();
+        if parameters[j].lower >= parameters[j].upper {
+            return None;
+        }
+        let (mut direction, curvature) = along(stage, (triangle, closed), held, j)?;
+        if side == AtBound::Upper {
+            direction.neg_mut();
+        }
+        let room = |k: usize| {
+            let (x, s) = (at[stage.unknowns[k]], direction[k]);
+            match s.partial_cmp(&0.0) {
+                Some(std::cmp::Ordering::Greater) => (parameters[k].upper - x) / s,
+                Some(std::cmp::Ordering::Less) => (parameters[k].lower - x) / s,
+                _ => f64::INFINITY,
+            }
+        };
+        let width = (0..held.len()).map(room).fold(f64::INFINITY, f64::min).max(0.0);
+        let deviation = deviation(multiplier, curvature, width);
+        let is_hidden = |k: &usize| {
+            let moved = direction[*k].abs() * deviation;
+            !held[*k] && errors[*k] > 0.0 && moved > MIN_HIDDEN_RATIO * errors[*k]
+        };
+        let partners: Vec<usize> = (0..held.len()).filter(is_hidden).collect();
+        (!partners.is_empty()).then_some(HiddenByBound {
+            unknown: j,
+            side,
+            deviation,
+            direction,
+            partners,
+        })
+    };
+    (0..held.len()).filter_map(valley).collect()
+}
+
+/// Returns the direction in which the free unknowns follow the unknown `j`, 1 for `j` itself, and
+/// the curvature of the cost along it \[1 / unit of x²\].
+///
+/// With the columns of the free unknowns first and that of `j` last, \[R r; 0 ρ\] is the factor of
+/// data, priors and held combinations: s = −R⁻¹ r and h = ρ².
+fn along(
+    stage: &Stage,
+    (triangle, closed): (&DMatrix<f64>, &DMatrix<f64>),
+    held: &[bool],
+    j: usize,
+) -> Option<(DVector<f64>, f64)> {
+    let columns: Vec<usize> = (0..held.len()).filter(|&k| !held[k]).chain([j]).collect();
+    let (rows, priors, n) = (triangle.nrows(), stage.priors(), columns.len());
+    let height = rows + priors.nrows() + closed.nrows();
+    let mut stack = DMatrix::zeros(height.max(n), n);
+    for (place, &k) in columns.iter().enumerate() {
+        stack.view_mut((0, place), (rows, 1)).copy_from(&triangle.column(k));
+        stack.view_mut((rows, place), (priors.nrows(), 1)).copy_from(&priors.column(k));
+        let from = rows + priors.nrows();
+        let held_rows = closed.column(k) * HARD;
+        stack.view_mut((from, place), (closed.nrows(), 1)).copy_from(&held_rows);
+    }
+    let factor = Triangle::of(&stack);
+    let last = n - 1;
+    let left = factor.view((0, 0), (last, last));
+    let right = factor.view((0, last), (last, 1)).column(0).into_owned();
+    let response = left.solve_upper_triangular(&right)?;
+    let mut direction = DVector::zeros(held.len());
+    for (place, &k) in columns[..last].iter().enumerate() {
+        direction[k] = -response[place];
+    }
+    direction[j] = 1.0;
+    direction.iter().all(|s| s.is_finite()).then_some((direction, factor[(last, last)].powi(2)))
+}
+
+/// Returns √(E u²) of p(u) ∝ exp(−μ u − ½ h u²) on 0 ≤ u ≤ `width`, by Simpson's rule.
+fn deviation(multiplier: f64, curvature: f64, width: f64) -> f64 {
+    // Where the exponent reaches its limit: μ u + ½ h u² = MAX_EXPONENT.
+    let root = (multiplier * multiplier + 2.0 * curvature * MAX_EXPONENT).sqrt();
+    let reach = 2.0 * MAX_EXPONENT / (multiplier + root);
+    let end = width.min(reach);
+    if !end.is_finite() {
+        return f64::INFINITY;
+    }
+    let step = end / f64::from(INTERVALS);
+    let (mut total, mut squares) = (0.0, 0.0);
+    for k in 0..=INTERVALS {
+        let u = f64::from(k) * step;
+        let weight = match k {
+            0 | INTERVALS => 1.0,
+            k if k % 2 == 1 => 4.0,
+            _ => 2.0,
+        };
+        let density = weight * (-multiplier * u - 0.5 * curvature * u * u).exp();
+        total += density;
+        squares += density * u * u;
+    }
+    (squares / total).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn deviations_from_a_bound_follow_the_posterior() {
+        // Uniform on 0…w, exponential, half normal.
+        for (multiplier, curvature, width, expected) in [
+            (0.0, 0.0, 3.0, 3.0 / 3.0_f64.sqrt()),
+            (2.0, 0.0, f64::INFINITY, 0.5_f64.sqrt()),
+            (0.0, 4.0, f64::INFINITY, 0.5),
+        ] {
+            let found = deviation(multiplier, curvature, width);
+            assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
+        }
+        assert!(deviation(0.0, 0.0, f64::INFINITY).is_infinite());
+    }
+}

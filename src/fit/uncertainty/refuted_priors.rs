@@ -1,0 +1,181 @@
+//! Rules of `[parameters]` whose σ the data refute.
+//!
+//! A prior that is far too narrow keeps its parameters near nominal, and the misfit ends up in the
+//! noise: the fit takes a σ far above the declared one. For each rule a wider σ is weighed by the
+//! evidence, linearised about the fit: with the deviations z, r = R z + c in declared σ, priors
+//! z ∼ N(0, K⁻¹) and noise variance s²,
+//!
+//! −2 ln L(s², K) = m ln s² + ln|A| − ln|K| + (‖r₀‖² − bᵀA⁻¹b / s²) / s²,  A = RᵀR / s² + K
+//!
+//! with b = Rᵀc, ‖r₀‖² the squares at nominal, and m measured coordinates  [Bishop 2006, §3.5].
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::fit::stages::noise_model::by_chance;
+use crate::fit::stages::stage::Stage;
+use crate::least_squares::Loss;
+
+/// Factors by which the σ of a rule is widened.
+const FACTORS: [f64; 8] = [3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4];
+/// Ratio of the noise variances, with the wider σ over as declared, above which the prior is not
+/// the reason for the misfit.
+const MAX_VARIANCE_RATIO: f64 = 0.25;
+/// Multiple of the gain in 2 ln L that chance gives once in 1000, above which a prior is refuted.
+const BEYOND_DOUBT: f64 = 10.0;
+/// Ratio of the noise variance taken to that declared, below which no prior is questioned.
+const MIN_NOISE_FACTOR: f64 = 4.0;
+/// Number of noise variances at which the evidence is compared.
+const VARIANCES: u32 = 24;
+/// Number of unknowns above which priors are not questioned: the work grows with its cube.
+const MAX_UNKNOWNS: usize = 150;
+/// Precision of unknowns without a prior, relative to that of the data.
+const NO_PRIOR: f64 = 1e-12;
+
+/// Rule whose σ the data refute.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::fit) struct RefutedPrior {
+    /// Pattern of the rule.
+    pub rule: String,
+    /// Factor by which its σ is too narrow.
+    pub factor: f64,
+    /// Ratio of the σ of the residual, with wider priors over as declared.
+    pub sigma_ratio: f64,
+}
+
+/// Finds the rules whose σ the data refute, the most improbable first.
+///
+/// `stage` holds all unknowns and identification rows with declared σ, `at` is the full parameter
+/// vector of the fit, `held` marks unknowns that rest on bounds, `rules` names the rule of each
+/// unknown with a prior, and `noise_factor` is the ratio of the noise variance taken to that
+/// declared.
+pub(in crate::fit) fn refuted_priors(
+    stage: &Stage,
+    at: &DVector<f64>,
+    held: &[bool],
+    rules: &[Option<String>],
+    noise_factor: f64,
+) -> Vec<RefutedPrior> {
+    if noise_factor < MIN_NOISE_FACTOR || stage.unknowns.len() > MAX_UNKNOWNS {
+        return Vec::new();
+    }
+    let mut names: Vec<&String> = rules.iter().flatten().collect();
+    names.sort();
+    names.dedup();
+    let evidence = Evidence::of(stage, at, held, 4.0 * noise_factor);
+    let sigmas: Vec<Option<f64>> = stage.parameters().map(|parameter| parameter.sigma).collect();
+    let widened = |factors: &[f64]| -> Vec<Option<f64>> {
+        let factor = |j: usize| {
+            let place = names.iter().position(|name| rules[j].as_ref() == Some(name));
+            place.map_or(1.0, |place| factors[place])
+        };
+        sigmas.iter().enumerate().map(|(j, sigma)| Some(sigma.as_ref()? * factor(j))).collect()
+    };
+    let mut factors = vec![1.0; names.len()];
+    let Some(declared) = evidence.best(&widened(&factors)) else { return Vec::new() };
+    let mut best = declared;
+    let mut order = Vec::new();
+    // The rules that gain most, one after the other.
+    loop {
+        let open = (0..names.len()).filter(|place| factors[*place] == 1.0);
+        let trial = |(place, factor): (usize, f64)| {
+            let mut trial = factors.clone();
+            trial[place] = factor;
+            Some((place, factor, evidence.best(&widened(&trial))?))
+        };
+        let trials = open.flat_map(|place| FACTORS.map(|factor| (place, factor)));
+        let next = trials.filter_map(trial).min_by(|a, b| a.2.deviance.total_cmp(&b.2.deviance));
+        let Some((place, factor, found)) = next else { break };
+        if best.deviance - found.deviance < BEYOND_DOUBT * by_chance() {
+            break;
+        }
+        factors[place] = factor;
+        best = found;
+        order.push(place);
+    }
+    let ratio = best.variance / declared.variance;
+    if ratio > MAX_VARIANCE_RATIO {
+        return Vec::new();
+    }
+    let refuted = |place: usize| RefutedPrior {
+        rule: names[place].clone(),
+        factor: factors[place],
+        sigma_ratio: ratio.sqrt(),
+    };
+    order.into_iter().map(refuted).collect()
+}
+
+/// Most probable noise variance of some priors, and −2 ln L there.
+#[derive(Debug, Clone, Copy)]
+struct Best {
+    variance: f64,
+    deviance: f64,
+}
+
+/// Data of the evidence, linearised about the fit.
+struct Evidence {
+    /// RᵀR of the unknowns that are free.
+    information: DMatrix<f64>,
+    /// Rᵀc.
+    vector: DVector<f64>,
+    /// ‖r₀‖².
+    squares: f64,
+    /// m.
+    coordinates: f64,
+    /// Places of the free unknowns.
+    free: Vec<usize>,
+    /// Largest noise variance that is tried.
+    max_variance: f64,
+}
+
+impl Evidence {
+    fn of(stage: &Stage, at: &DVector<f64>, held: &[bool], max_variance: f64) -> Self {
+        let data = stage.linearised(at, Loss::Squares);
+        let free: Vec<usize> = (0..held.len()).filter(|&j| !held[j]).collect();
+        let mut x = stage.reduced(at);
+        (0..held.len()).filter(|&j| held[j]).for_each(|j| x[j] = 0.0);
+        let columns = data.triangle.select_columns(&free);
+        let at_nominal = &data.projected - &data.triangle * x;
+        let rest = 2.0 * data.cost - data.projected.norm_squared();
+        Self {
+            information: columns.tr_mul(&columns),
+            vector: columns.tr_mul(&at_nominal),
+            squares: rest.max(0.0) + at_nominal.norm_squared(),
+            coordinates: stage.count() as f64,
+            free,
+            max_variance,
+        }
+    }
+
+    /// Returns the noise variance from 1, the declared one, upwards with the largest evidence under
+    /// priors of these σ.
+    fn best(&self, sigmas: &[Option<f64>]) -> Option<Best> {
+        let step = self.max_variance.ln() / f64::from(VARIANCES - 1);
+        let variances = (0..VARIANCES).map(|k| (f64::from(k) * step).exp());
+        let of = |variance| Some(Best { variance, deviance: self.deviance(sigmas, variance)? });
+        variances.filter_map(of).min_by(|a, b| a.deviance.total_cmp(&b.deviance))
+    }
+
+    /// Returns −2 ln L for priors of these σ and a noise variance.
+    fn deviance(&self, sigmas: &[Option<f64>], variance: f64) -> Option<f64> {
+        let n = self.free.len();
+        let precision = |i: usize| match sigmas[self.free[i]] {
+            Some(sigma) => sigma.powi(-2),
+            None => (NO_PRIOR * self.information[(i, i)]).max(f64::MIN_POSITIVE),
+        };
+        let mut matrix = &self.information / variance;
+        (0..n).for_each(|i| matrix[(i, i)] += precision(i));
+        let scale: Vec<f64> = (0..n).map(|i| matrix[(i, i)].sqrt().recip()).collect();
+        let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+        let factor = scaled.cholesky()?;
+        let right = DVector::from_fn(n, |i, _| self.vector[i] * scale[i]);
+        let explained = right.dot(&factor.solve(&right)) / variance;
+        let log_matrix: f64 =
+            (0..n).map(|i| 2.0 * (factor.l_dirty()[(i, i)].ln() - scale[i].ln())).sum();
+        let log_priors: f64 =
+            (0..n).filter_map(|i| sigmas[self.free[i]]).map(|sigma| -2.0 * sigma.ln()).sum();
+        Some(
+            self.coordinates * variance.ln() + log_matrix - log_priors
+                + (self.squares - explained) / variance,
+        )
+    }
+}
