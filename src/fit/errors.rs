@@ -1,4 +1,4 @@
-//! Position errors, summed up.
+//! Summaries of errors over the rows of a table.
 
 use nalgebra::Vector3;
 
@@ -6,44 +6,43 @@ use crate::measurement::Measurements;
 use crate::observation::{Observation, kind_named};
 use crate::quantity::Unit;
 
-/// A value per axis of the measuring frame and for the Euclidean norm \[m\].
+/// Values per axis of the measuring frame and for the Euclidean norm \[m\].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct AxisValues {
-    /// Along x.
+    /// Value along the x axis.
     pub x: f64,
-    /// Along y.
+    /// Value along the y axis.
     pub y: f64,
-    /// Along z.
+    /// Value along the z axis.
     pub z: f64,
-    /// Of the norm.
+    /// Value for the Euclidean norm.
     pub norm: f64,
 }
 
-/// Size of the position errors of some poses \[m\].
+/// Summary of the position errors of some poses \[m\].
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct ErrorSummary {
-    /// What the rows measure ([`Observation::kind`](crate::problem::Observation::kind)); of others
-    /// than positions the errors are the rows' own residuals, along x where that is one number.
+    /// Kind of the rows ([`Observation::kind`](crate::problem::Observation::kind)). Errors of other
+    /// kinds than positions are residuals of the measured quantity; a single number counts along x.
     pub kind: &'static str,
     /// Number of poses.
     pub n: usize,
-    /// How many of them have no equilibrium: their errors, and with them mean, max and rms, are
-    /// NaN.
+    /// Number of poses without an equilibrium; their errors, and so mean, max and rms, are NaN.
     pub unpredicted: usize,
-    /// Mean absolute value per axis, mean norm.
+    /// Mean absolute value per axis, and mean norm.
     pub mean: AxisValues,
-    /// Largest absolute value per axis, largest norm.
+    /// Largest absolute value per axis, and largest norm.
     pub max: AxisValues,
-    /// Root mean square per axis, root of the mean squared norm.
+    /// Root mean square per axis, and root of the mean squared norm.
     pub rms: AxisValues,
 }
 
-/// Errors on both parts of the data.
+/// Errors on identification rows and on held-out rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
-    /// On the poses that are fitted.
+    /// Errors on the identification rows, which are fitted.
     pub identification: ErrorSummary,
-    /// On the poses that decide nothing.
+    /// Errors on the held-out rows, which decide nothing.
     pub held_out: ErrorSummary,
 }
 
@@ -51,15 +50,15 @@ pub struct Errors {
 /// measured, measuring frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OrientationErrors {
-    /// Of the nominal arm, with base and target fitted where they are free.
+    /// Errors of the registered nominal arm.
     pub registered: Errors,
-    /// Of the identified arm.
+    /// Errors of the identified arm.
     pub fitted: Errors,
     /// 1 σ about each axis that the fit took \[rad\].
     pub sigma_taken: f64,
 }
 
-/// The errors of those of some `rows` that measure the same kind of thing.
+/// Summarises the errors of those of `rows` that are of the kind of `observation`.
 pub(super) fn of_kind(
     measurements: &Measurements,
     rows: impl IntoIterator<Item = usize>,
@@ -67,28 +66,28 @@ pub(super) fn of_kind(
     observation: Observation,
 ) -> ErrorSummary {
     let is_of_kind = |row: usize| measurements.observation(row).kind() == observation.kind();
-    let own: Vec<Vector3<f64>> = rows
+    let of_kind: Vec<Vector3<f64>> = rows
         .into_iter()
         .zip(errors)
         .filter(|(row, _)| is_of_kind(*row))
         .map(|(_, error)| *error)
         .collect();
-    ErrorSummary::of_kind(observation, &own)
+    ErrorSummary::of_kind(observation, &of_kind)
 }
 
 impl ErrorSummary {
-    /// Whether the errors are angles \[rad\], as those of tilts are.
+    /// Returns true if the errors are angles \[rad\], as those of tilts are.
     pub fn is_angle(&self) -> bool {
         kind_named(self.kind).unit == Unit::Angle
     }
 
-    /// Of the errors measured − predicted of positions \[m\].
+    /// Summarises errors measured − predicted of positions \[m\].
     pub fn of(errors: &[Vector3<f64>]) -> Self {
         Self::of_kind(Observation::Position, errors)
     }
 
-    /// Of some rows' residuals, measured − predicted: of those of the first kind that the table
-    /// has.
+    /// Summarises the residuals measured − predicted of `rows`: those of the leading kind of the
+    /// table.
     pub fn of_rows(
         table: &Measurements,
         rows: impl IntoIterator<Item = usize>,
@@ -97,7 +96,7 @@ impl ErrorSummary {
         of_kind(table, rows, errors, table.leading())
     }
 
-    /// Of the residuals of rows of one kind \[m\].
+    /// Summarises the residuals of rows of one kind \[m\].
     pub fn of_kind(observation: Observation, errors: &[Vector3<f64>]) -> Self {
         let values: Vec<[f64; 4]> =
             errors.iter().map(|e| [e.x.abs(), e.y.abs(), e.z.abs(), e.norm()]).collect();

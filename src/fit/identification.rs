@@ -1,4 +1,4 @@
-//! From measurements to estimates with their errors.
+//! Identification: from a problem and its data to estimates, their uncertainty, and findings.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
@@ -35,81 +35,81 @@ use crate::model::Model;
 use crate::model::parameter::Parameter;
 use crate::problem::{Effect, ParameterRule, Problem, Robust, RobustLoss, pattern};
 
-/// How to identify: [`Options::default()`] with what the `with_…` methods change.
+/// Options of an identification: [`Options::default()`], changed by the `with_…` methods.
 #[derive(Clone, Default)]
 #[non_exhaustive]
 pub struct Options {
-    /// Which parameters are fitted together.
+    /// Strategy: which parameters are fitted together.
     pub strategy: Strategy,
-    /// By which solver.
+    /// Solver of the fits.
     pub solver: SolverChoice,
-    /// Told of every step.
+    /// Receiver of progress.
     pub progress: Option<ProgressSink>,
-    /// Asks for an early end: of a fit with [`StageError::Interrupted`], of a loop with what it has
-    /// found until then.
+    /// Request to stop early: a fit then returns [`StageError::Interrupted`], a loop returns what it
+    /// has found by then.
     pub stop: Option<Stop>,
-    /// Values \[SI\] by name from which the fit starts; the registered nominal arm gives the
-    /// others.
+    /// Names and values \[SI\] from which the fit starts; other parameters start at the registered
+    /// nominal arm.
     pub start: Vec<(String, f64)>,
-    /// Steps after which a fit is stopped; `None`: those of the solver's own settings.
+    /// Maximum number of steps of a fit; `None` for that of the solver.
     pub max_steps: Option<u64>,
-    /// Effects that trace and loop look for besides those of the catalogue: effects of one's own
-    /// ([`Effect::custom`]). A fit alone does not use them.
+    /// Effects of the caller ([`Effect::custom`]) that trace and loop look for besides those of the
+    /// catalogue. A fit alone does not use them.
     pub candidates: Vec<Effect>,
-    /// What a fit of the same problem with other effects to the same data leaves to this one.
+    /// State of an earlier fit of the same data with other effects, from which this one starts.
     pub(crate) predecessor: Option<Arc<WarmStart>>,
-    /// Whether another fit follows, so that nobody asks of this one what it can be trusted in.
+    /// Whether the fit is provisional: another one follows, and its result is not checked.
     pub(crate) provisional: bool,
-    /// Whether rows are looked for that carry what the fit does not explain, by further fits.
+    /// Whether further fits look for influential rows.
     pub(crate) influential_rows: bool,
 }
 
 impl Options {
-    /// The same with another choice of what is fitted together.
+    /// Sets the strategy.
     #[must_use]
     pub fn with_strategy(self, strategy: Strategy) -> Self {
         Self { strategy, ..self }
     }
 
-    /// The same with another solver.
+    /// Sets the solver.
     #[must_use]
     pub fn with_solver(self, solver: SolverChoice) -> Self {
         Self { solver, ..self }
     }
 
-    /// The same, with a look at whether a few rows carry what the fit does not explain
-    /// ([`Identification::influential_rows`]), by further fits; of a loop at the problem as declared.
+    /// Looks for influential rows ([`Identification::influential_rows`]) by further fits; a loop does
+    /// so for the problem as declared.
     #[must_use]
     pub fn with_influential_rows(self) -> Self {
         Self { influential_rows: true, ..self }
     }
 
-    /// The same, telling `progress` of every step; `None`: nobody.
+    /// Sets the receiver of progress; `None` for none.
     #[must_use]
     pub fn with_progress(self, progress: impl Into<Option<ProgressSink>>) -> Self {
         Self { progress: progress.into(), ..self }
     }
 
-    /// The same, ending early once `stop` asks for it; `None`: never.
+    /// Sets the request that stops the work early; `None` for none.
     #[must_use]
     pub fn with_stop(self, stop: impl Into<Option<Stop>>) -> Self {
         Self { stop: stop.into(), ..self }
     }
 
-    /// Tells of progress, if anybody listens.
+    /// Reports progress, if there is a receiver.
     pub(crate) fn tell(&self, progress: impl FnOnce() -> Progress) {
         if let Some(sink) = &self.progress {
             sink(progress());
         }
     }
 
-    /// The same, starting from these values \[SI\] by name.
+    /// Sets the values \[SI\] by name from which the fit starts.
     #[must_use]
     pub fn with_start(self, start: Vec<(String, f64)>) -> Self {
         Self { start, ..self }
     }
 
-    /// The same, looking for these effects besides those of the catalogue.
+    /// Sets the effects that trace and loop look for besides those of the catalogue.
     #[must_use]
     pub fn with_candidates(self, candidates: Vec<Effect>) -> Self {
         Self { candidates, ..self }
@@ -121,7 +121,7 @@ impl Options {
         Self { max_steps: max_steps.into(), ..self }
     }
 
-    /// Full parameter vector from which the fit begins: `x`, with the values of `start`.
+    /// Returns the full parameter vector from which the fit starts: `x` with the values of `start`.
     fn begin(&self, model: &Model, x: &DVector<f64>) -> DVector<f64> {
         let given =
             |parameter: &Parameter| self.start.iter().find(|(name, _)| *name == parameter.name);
@@ -133,11 +133,11 @@ impl Options {
     }
 }
 
-/// Why an identification could not be made, or not be applied.
+/// Error of an identification that could not be made, or could not be applied.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyError {
-    /// There is no row to identify from.
+    /// The data have no identification row.
     #[error("no pose to identify from")]
     NoPoses,
     /// Problem and data do not fit each other.
@@ -146,37 +146,37 @@ pub enum IdentifyError {
     /// A fit could not be set up.
     #[error(transparent)]
     Stage(#[from] StageError),
-    /// Bounds or constraints were declared for a solver that cannot keep them.
+    /// The problem declares bounds or constraints that the chosen solver cannot keep.
     #[error(
         "{solver} does not keep the bounds of [parameters] and constraints: take the solver bounded, interior-point or auto, or leave out \
          min, max and [[constraint]]"
     )]
     BoundsIgnored {
-        /// The solver that was asked for.
+        /// Name of the solver.
         solver: &'static str,
     },
-    /// A strategy has nothing to vary.
+    /// The strategy has no parameter to vary.
     #[error(
         "strategy {strategy} has nothing to fit: no parameter of its kind is free in [parameters]"
     )]
     NothingToFit {
-        /// The strategy that was asked for.
+        /// Name of the strategy.
         strategy: &'static str,
     },
-    /// A rule of the search for effects has a value that makes no sense.
+    /// A rule of the search for effects has a value outside its range.
     #[error(
         "the rule {rule} of the search for effects has a value that makes no sense; docs/selection.md says what it stands for"
     )]
     Rule {
-        /// Its name.
+        /// Name of the rule.
         rule: &'static str,
     },
-    /// Data have a configuration of another length than the arm.
+    /// The configurations of the data have another number of joints than the arm.
     #[error("configurations of {found} joints for an arm of {joints}")]
     JointCount {
-        /// Of the data.
+        /// Number of joints of the data.
         found: usize,
-        /// Of the problem, fixed ones among them.
+        /// Number of joints of the problem, including fixed ones.
         joints: usize,
     },
     /// The model lacks a parameter that was identified.
@@ -184,34 +184,35 @@ pub enum IdentifyError {
         "{name} was identified, and the problem has no such parameter: it is another than the one identified"
     )]
     NotInModel {
-        /// Its name.
+        /// Name of the parameter.
         name: String,
     },
     /// A parameter is needed that was not identified.
     #[error("{name} was not identified: the sessions, targets or effects are others")]
     NoEstimate {
-        /// Its name.
+        /// Name of the parameter.
         name: String,
     },
 }
 
 impl IdentifyError {
-    /// The work was stopped from outside.
+    /// Creates the error of work that was stopped on request.
     pub(crate) fn interrupted() -> Self {
         Self::Stage(StageError::Interrupted)
     }
 
-    /// Whether the work was stopped from outside.
+    /// Returns true if the work was stopped on request.
     pub fn is_interrupted(&self) -> bool {
         matches!(self, Self::Stage(StageError::Interrupted))
     }
 }
 
-/// Identifies the free parameters of `problem` from the identification rows; held-out rows decide
-/// nothing.
+/// Identifies the free parameters of `problem` from the identification rows of `data`; held-out rows
+/// decide nothing.
 ///
 /// # Errors
-/// Problem, data, strategy and solver do not fit each other.
+/// Returns an error if problem, data, strategy and solver do not fit each other, or if the fit was
+/// stopped.
 pub fn identify(
     problem: &Problem,
     data: &Dataset,
@@ -222,8 +223,8 @@ pub fn identify(
     identify_model(&model, problem, data, options)
 }
 
-/// Data without a row to fit and configurations of another arm are mistakes, and what is declared
-/// and not measured.
+/// Checks that the data have rows to fit, configurations of the arm, and every column that the problem
+/// needs.
 fn check_data(
     problem: &Problem,
     measurements: &Measurements,
@@ -246,11 +247,12 @@ fn check_data(
     if split.identification.is_empty() { Err(IdentifyError::NoPoses) } else { Ok(()) }
 }
 
-/// As [`identify`], with a model of the problem that the caller has changed, as [`Strategy::model`]
-/// does for a strategy.
+/// Identifies as [`identify`] does, with a model of the problem that the caller has changed, as
+/// [`Strategy::model`] does for a strategy.
 ///
 /// # Errors
-/// Problem, data, strategy and solver do not fit each other.
+/// Returns an error if problem, data, strategy and solver do not fit each other, or if the fit was
+/// stopped.
 pub fn identify_model(
     model: &Model,
     problem: &Problem,
@@ -259,9 +261,11 @@ pub fn identify_model(
 ) -> Result<Identification, IdentifyError> {
     let Dataset { measurements, split } = data;
     let mut found = fit_rows(model, problem, (measurements, split), options)?;
-    // A robust loss sets such rows aside by itself.
+    // A robust loss sets such rows aside anyway.
     if options.influential_rows && !options.provisional && problem.robust.is_none() {
-        let start = found.estimates.iter().map(|own| (own.name.clone(), own.estimate)).collect();
+        let values =
+            found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
+        let start = values.collect();
         let predecessor = Some(Arc::new(found.predecessor(true)));
         let passing =
             Options { progress: None, predecessor, provisional: true, start, ..options.clone() };
@@ -282,7 +286,7 @@ pub fn identify_model(
     Ok(found)
 }
 
-/// Fits the identification rows of a split.
+/// Fits the identification rows of a split and checks the result.
 fn fit_rows(
     model: &Model,
     problem: &Problem,
@@ -333,8 +337,8 @@ fn fit_rows(
     let errors = fitting.position_errors(&split.identification, &end.x);
     let outliers = outliers(&statistics.lengths, &split.identification, &errors, measurements);
     let asked = !options.provisional;
-    // Before fits of other rows: the first linearisation of this one is still known.
-    let sight = if asked { fitting.whole().data_triangle(&start) } else { DMatrix::zeros(0, 0) };
+    // Before fits of other rows: the first linearisation of this fit is still remembered.
+    let whitened_triangle = if asked { fitting.whole().data_triangle(&start) } else { DMatrix::zeros(0, 0) };
     let (estimates, covariance, not_converged) = estimated(&fitting, &mut end, &statistics, noise)?;
     let (fitted, whole) = (fitting.errors(&end.x), fitting.whole());
     let (noise_factor, sigma_taken) = taken(&whole, measurements.leading());
@@ -411,7 +415,7 @@ fn fit_rows(
         weak: end.gauge.weak.clone(),
         orientation: fitting.orientation(&start, &end.x),
         coordinates: whole.count(),
-        sight: (sight, OnceLock::new()),
+        whitened_triangle: (whitened_triangle, OnceLock::new()),
         estimates,
         covariance: covariance.finish(),
         prior_sizes,
@@ -432,8 +436,8 @@ fn fit_rows(
     })
 }
 
-/// The full parameter vector of the registered nominal arm and its errors; the fit begins with the
-/// σ that it takes from there, or from its predecessor.
+/// Returns the full parameter vector of the registered nominal arm and its errors, and sets the σ with
+/// which the fit starts: from its predecessor, or an undeclared one from these errors.
 fn prepared(
     fitting: &mut Fitting,
     predecessor: Option<&WarmStart>,
@@ -453,8 +457,10 @@ fn prepared(
     Ok((start, registered))
 }
 
-/// What the strategy varies; a row without equilibrium and a strategy that varies nothing of its
-/// own are mistakes.
+/// Returns the parameters that the strategy varies.
+///
+/// # Errors
+/// Returns an error if a row has no equilibrium, or the strategy varies only bases and targets.
 fn fitted_parameters<'a>(fitting: &Fitting<'a>) -> Result<Vec<&'a Parameter>, IdentifyError> {
     if let Some(row) = fitting.without_equilibrium() {
         return Err(fitting.measurements.location(row).error(InputErrorKind::NoEquilibrium).into());
@@ -468,8 +474,8 @@ fn fitted_parameters<'a>(fitting: &Fitting<'a>) -> Result<Vec<&'a Parameter>, Id
     Ok(unknowns)
 }
 
-/// Estimates of all parameters and their covariance, and what did not converge. Bases and targets
-/// of held-out sessions are fitted to their rows, with the arm as it ended.
+/// Returns the estimates of all parameters, their covariance, and the finding about a fit that did not
+/// converge. Bases and targets of held-out sessions are fitted to their rows with the arm given.
 fn estimated(
     fitting: &Fitting,
     end: &mut FitEnd,
@@ -478,7 +484,7 @@ fn estimated(
 ) -> Result<(Vec<Estimate>, Collected, Option<Finding>), StageError> {
     let (model, time_measured) = (fitting.model, fitting.measurements.time_measured);
     let mut estimates: Vec<Estimate> =
-        model.parameters.iter().map(|own| Estimate::unfitted(own, time_measured)).collect();
+        model.parameters.iter().map(|p| Estimate::unfitted(p, time_measured)).collect();
     let mut covariance = Collected::new(estimates.len());
     enter((&mut estimates, &mut covariance), &fitting.whole(), end, statistics);
     let mut not_converged =
@@ -502,8 +508,8 @@ fn estimated(
         end.x = placed.x;
     }
     if noise == Noise::Unknown {
-        for own in &mut estimates {
-            own.std_error = None;
+        for estimate in &mut estimates {
+            estimate.std_error = None;
         }
     }
     Ok((estimates, covariance, not_converged))
@@ -537,7 +543,7 @@ fn not_converged_finding(reason: Termination) -> Finding {
     })
 }
 
-/// The loss that `[robust]` stands for, on the three coordinates of a position.
+/// Returns the loss that `[robust]` declares, for the three coordinates of a position.
 fn loss(robust: Robust) -> Loss {
     match robust.loss {
         RobustLoss::Huber => {

@@ -1,28 +1,27 @@
-//! Rows that carry what a fit does not explain.
+//! Search for influential rows: few rows whose removal removes most of the misfit.
 
 use crate::fit::checks::outliers::{InfluentialRows, Outlier};
 use crate::fit::outcome::Identification;
 use crate::fit::uncertainty::noise::Noise;
 
-/// Without its influential_rows a fit leaves no more than this part of the variance, or half of it and what
-/// the declared σ explains: then they carry most of it. Rows that an effect touches alone, as two
-/// with a payload, may be such.
+/// Part of the variance left without the rows up to which they are influential in any case. Rows that
+/// one effect alone concerns, such as two with a payload, may be among them.
 const FAR_BETTER: f64 = 0.01;
+/// Part of the variance left without the rows up to which they are influential if the declared σ then
+/// explains the rest.
 const MOST_OF_IT: f64 = 0.5;
-/// More than one row in so many carry nothing: the model misses them all.
+/// Reciprocal of the largest part of the rows that can be influential; beyond it, the model misses all.
 const ONE_IN: usize = 5;
-/// Rows left out in one round: one in so many, at least one. A gross one makes others look far off,
-/// and hides smaller ones.
+/// Reciprocal of the part of the rows that is left out in one round, at least one row: a gross error
+/// makes other rows look far off and hides smaller errors.
 const ONE_A_ROUND_IN: usize = 100;
-/// A round that leaves more than this part of the variance shows that the outliers are no gross
-/// ones.
+/// Part of the variance left after a round above which its rows are no gross errors.
 const NO_GAIN: f64 = 0.95;
 
-/// The rows that carry what `found` does not explain; `without` fits the identification rows but
-/// for some.
+/// Finds the influential rows of the fit `found`; `without` fits the identification rows except some.
 ///
-/// Those farthest off are left out and the rest fitted again, until the declared σ explains it or
-/// nothing more is too far off. A fit that fails tells nothing.
+/// The rows farthest off are left out and the others fitted again, until the declared σ explains the
+/// residual or no row is too far off. The search ends at a fit that does not converge.
 pub(super) fn influential_rows(
     found: &Identification,
     without: impl Fn(&[usize]) -> Option<Identification>,
@@ -36,16 +35,16 @@ pub(super) fn influential_rows(
     let mut rest: Option<Identification> = None;
     loop {
         let last = rest.as_ref().unwrap_or(found);
-        // Known distances stay.
+        // Known distances are never left out.
         let mut far: Vec<&Outlier> =
-            last.outliers.iter().filter(|own| own.kind != "known distance").collect();
+            last.outliers.iter().filter(|row| row.kind != "known distance").collect();
         far.sort_by(|a, b| b.distance.total_cmp(&a.distance));
         far.truncate(a_round);
         let far: Vec<Outlier> = far.into_iter().cloned().collect();
         if explains(last) || far.is_empty() || rows.len() + far.len() > most {
             break;
         }
-        let numbers: Vec<usize> = rows.iter().chain(&far).map(|own| own.row).collect();
+        let numbers: Vec<usize> = rows.iter().chain(&far).map(|outlier| outlier.row).collect();
         let Some(next) = without(&numbers).filter(|fit| fit.termination.converged()) else { break };
         if part(&next, last) > NO_GAIN {
             break;
@@ -54,22 +53,22 @@ pub(super) fn influential_rows(
         rest = Some(next);
     }
     let rest = rest?;
-    rows.sort_by_key(|own| own.row);
+    rows.sort_by_key(|outlier| outlier.row);
     let left = part(&rest, found);
     let is_better = left < FAR_BETTER || (left < MOST_OF_IT && explains(&rest));
     let Identification { reduced_chi2, sigma_taken, .. } = rest;
     is_better.then_some(InfluentialRows { rows, reduced_chi2, sigma_taken })
 }
 
-/// Whether the declared σ explains what a fit leaves.
+/// Returns true if the declared σ explains the residual of a fit.
 fn explains(fit: &Identification) -> bool {
     fit.noise == Noise::Declared && fit.noise_factor <= 1.0 + 1e-9
 }
 
-/// Variance that a fit leaves over that of another.
+/// Returns the variance of the residual of `fit` over that of `other`.
 fn part(fit: &Identification, other: &Identification) -> f64 {
     match (fit.reduced_chi2, other.reduced_chi2) {
-        (Some(own), Some(other)) => own / other,
+        (Some(chi2), Some(other)) => chi2 / other,
         _ => (fit.sigma_taken / other.sigma_taken).powi(2),
     }
 }

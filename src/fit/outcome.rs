@@ -1,4 +1,4 @@
-//! What an identification gives.
+//! Result of an identification.
 
 use std::sync::OnceLock;
 
@@ -20,13 +20,13 @@ use crate::least_squares::{Identifiability, UnidentifiableCombination};
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
 
-/// Correlations beyond this are reported: of sum and difference of the two, one has less than a
-/// nineteenth of the other's variance.
+/// Absolute correlation from which on a pair of parameters is reported: the variances of their sum
+/// and difference, each in units of its σ, then differ by a factor of 19 and more.
 pub const STRONG_CORRELATION: f64 = 0.9;
-/// A parameter of which the data gave no more than this part has no standard error.
+/// Identified part up to which a parameter has no standard error.
 const NOTHING_LEARNED: f64 = 1e-6;
 
-/// A parameter after the fit; SI units.
+/// Free parameter after the fit; SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// Name as in the problem file.
@@ -37,96 +37,97 @@ pub struct Estimate {
     pub nominal: f64,
     /// Estimated value.
     pub estimate: f64,
-    /// 1 σ; `None` where nothing was learned, where the value rests on a bound or is part of a
-    /// combination that neither data nor priors see, or where it was not fitted.
+    /// 1 σ of the value. `None` where it was not fitted, rests on a bound, belongs to a combination
+    /// that neither data nor priors determine, or where the data say nothing about it.
     pub std_error: Option<f64>,
     /// The bound on which the value rests.
     pub at_bound: Option<AtBound>,
-    /// What that costs.
+    /// Price of this bound.
     pub shadow_price: Option<ShadowPrice>,
-    /// Part of the value that the data gave, 0…1; the rest is prior, bound, or choice among
-    /// unidentifiable combinations.
+    /// Part of the value that the data determine, 0…1; the rest is decided by prior, bound, or the
+    /// start of the fit along unidentifiable combinations.
     pub identified: f64,
-    /// Whether the strategy varied it.
+    /// Whether the strategy varied the parameter.
     pub fitted: bool,
 }
 
-/// An identified arm.
+/// Identified arm: estimates with their uncertainty, errors, and the findings of the checks.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Identification {
-    /// Which parameters were fitted together.
+    /// Strategy of the fit.
     pub strategy: Strategy,
-    /// The solver that was used.
+    /// Solver that was used.
     pub solver: SolverChoice,
-    /// Why that one, where `auto` chose it.
+    /// Reason for this solver, where `auto` chose it.
     pub solver_reason: Option<&'static str>,
-    /// Why it stopped.
+    /// Reason for which the last fit stopped.
     pub termination: Termination,
     /// Findings of the checks, errors first; a provisional fit is only checked for convergence.
     pub findings: Vec<Finding>,
-    /// Different poses of the arm that were fitted; several targets in one pose make one.
+    /// Number of different poses of the arm that were fitted; several targets in one pose count once.
     pub poses: usize,
     /// Whether some pose of the arm shows several targets.
     pub several_targets: bool,
-    /// Steps tried, over all stages.
+    /// Number of steps that were tried, over all stages.
     pub iterations: u64,
-    /// Evaluations of the residual, with derivatives or without, over all stages.
+    /// Number of evaluations of the residual, with or without derivatives, over all stages.
     pub evaluations: u64,
-    /// How the stages of a sequential strategy took turns.
+    /// Convergence of the alternating stages of a sequential strategy.
     pub alternation: Option<Alternation>,
-    /// Time taken \[s\].
+    /// Duration of the identification \[s\].
     pub seconds: f64,
-    /// Where the noise comes from.
+    /// Source of the σ of the measurements.
     pub noise: Noise,
-    /// Of the nominal arm, with base and target fitted where they are free.
+    /// Errors of the registered nominal arm: base and target fitted where they are free.
     pub registered: Errors,
-    /// Of the identified arm.
+    /// Errors of the identified arm.
     pub fitted: Errors,
-    /// Of each kind of rows, where there are several: before and after; the first are `registered`
-    /// and `fitted`.
+    /// Errors of each kind of rows before and after the fit, where there are several kinds; the first
+    /// pair is `registered` and `fitted`.
     pub kinds: Vec<(Errors, Errors)>,
-    /// At each point that was touched the spread of the target as the nominal and as the identified
-    /// arm have it, and whether all of its rows were held out.
+    /// Scatter of the predicted target at each touched point: of the registered nominal arm, of the
+    /// identified arm, and whether all of the point's rows are held out.
     pub spreads: Vec<(PointSpread, PointSpread, bool)>,
     /// Errors of orientation, where it is fitted.
     pub orientation: Option<OrientationErrors>,
-    /// χ² of the identification data over its degrees of freedom; `None` without any, or with the
-    /// noise estimated. Where the loss is robust, outliers are left out of it.
+    /// χ² of the identification data over its degrees of freedom; `None` where there are none, or
+    /// where the noise is estimated. A robust loss leaves outliers out.
     pub reduced_chi2: Option<f64>,
-    /// Where chance keeps `reduced_chi2`, with probability 0.999; `None` as there.
+    /// Interval in which `reduced_chi2` lies with probability 0.999 if only noise is left; `None`
+    /// where that is `None`.
     pub chance: Option<(f64, f64)>,
-    /// Variance that the fit took over the declared one: 1 where residual and priors do not
-    /// contradict that.
+    /// Noise variance that the fit took over the declared one; 1 where residuals and priors do not
+    /// contradict the declared σ.
     pub noise_factor: f64,
-    /// 1 σ of a coordinate that the fit took, of the identification rows together that errors are
-    /// told of \[m\]; of tilts \[rad\].
+    /// 1 σ of a coordinate that the fit took \[m\], of tilts \[rad\]: root mean square over the
+    /// identification rows of the kind that `fitted` is about.
     pub sigma_taken: f64,
-    /// By what the declared σ are multiplied because they are too large; 1 where they are not.
+    /// Factor on the declared σ, less than 1 where these are too large.
     pub sigma_scale: f64,
-    /// Combinations of `unknowns` that the data see too weakly to be estimated, held where they
-    /// were: weights in units of the arm's size for lengths, 1 rad for angles and a factor of 100
-    /// for stiffnesses, and the σ by which that moves all data.
+    /// Combinations of `unknowns` that the data determine too weakly, held where they started. Their
+    /// weights are in units of the arm's reach for lengths, 1 rad for angles and a factor of 100 for
+    /// stiffnesses; their singular value is the change of all data along them \[σ\].
     pub weak: Vec<UnidentifiableCombination>,
-    /// Measured coordinates that were fitted.
+    /// Number of measured coordinates that were fitted.
     pub coordinates: usize,
     /// Names of the fitted parameters, in the order of [`Identification::identifiability`].
     pub unknowns: Vec<String>,
-    /// Triangular factor of their whitened Jacobian, data alone, at the registered nominal arm, and
-    /// what it tells once that was asked.
-    pub(super) sight: (DMatrix<f64>, OnceLock<Identifiability>),
-    /// Whether it was fitted in passing: it has neither that factor nor cautions, and nobody judged
-    /// whether it is to be trusted.
+    /// Triangular factor of the whitened Jacobian of the unknowns, without priors, at the registered
+    /// nominal arm, and its analysis once that is asked for.
+    pub(super) whitened_triangle: (DMatrix<f64>, OnceLock<Identifiability>),
+    /// Whether the fit is provisional: another one follows, so it has neither that factor nor the
+    /// findings of the checks.
     pub(crate) provisional: bool,
-    /// What the fit made of the σ of positions, and of orientations.
+    /// Noise models of positions and of orientations that the fit took.
     pub(super) noise_models: (NoiseModel, NoiseModel),
-    /// Every free parameter.
+    /// Estimates of every free parameter, in the order of the model.
     pub estimates: Vec<Estimate>,
     /// Covariance of the estimates.
     pub covariance: Covariance,
-    /// Widths of priors that the deviations found contradict; none of a fit in passing.
+    /// Prior widths that the fitted deviations contradict; none for a provisional fit.
     pub prior_sizes: Vec<PriorSize>,
-    /// Constraints that hold the fitted parameters back, in the order of the file.
+    /// Constraints on whose limits the fit rests, in the order of the file.
     pub active_constraints: Vec<ActiveConstraint>,
     /// Identification rows whose residual is too long to be noise, in the order of the rows.
     pub outliers: Vec<Outlier>,
@@ -136,14 +137,13 @@ pub struct Identification {
     /// Those that carry what the fit does not explain, if a few do; looked for where
     /// [`crate::fit::Options::with_influential_rows`] asks, but not with a robust loss.
     pub influential_rows: Option<InfluentialRows>,
-    /// Full parameter vector of the model.
+    /// Full parameter vector of the identified arm.
     pub x: DVector<f64>,
-    /// The same of the nominal arm with base and target fitted where they are free, whose errors
-    /// are `registered`.
+    /// Full parameter vector of the registered nominal arm, whose errors are `registered`.
     pub registered_x: DVector<f64>,
-    /// Time from which what follows the time counts: that of the first pose \[s\].
+    /// Start time of the time-dependent terms \[s\]: that of the first pose.
     pub first_time: f64,
-    /// 1 σ of a coordinate in rows without one of their own, declared or estimated \[m\].
+    /// 1 σ of a coordinate in rows that state none, declared or estimated \[m\].
     pub sigma: f64,
 }
 
@@ -179,10 +179,10 @@ impl Identification {
             .filter(move |own| own.severity() == Severity::Warning && !has_section(own.code))
     }
 
-    /// What the identification data can tell about the fitted parameters, at the registered nominal
-    /// arm: worked out when it is first asked for.
+    /// Returns the identifiability of the fitted parameters at the registered nominal arm; it is
+    /// computed on the first call.
     pub fn identifiability(&self) -> &Identifiability {
-        let (triangle, found) = &self.sight;
+        let (triangle, found) = &self.whitened_triangle;
         found.get_or_init(|| Identifiability::of(triangle))
     }
 
@@ -191,13 +191,13 @@ impl Identification {
         self.cautions().map(ToString::to_string).collect()
     }
 
-    /// A parameter by its name: `joint2.stiffness`.
+    /// Returns the estimate of a parameter by its name, such as `joint2.stiffness`.
     pub fn estimate(&self, name: &str) -> Option<&Estimate> {
         self.estimates.iter().find(|estimate| estimate.name == name)
     }
 
-    /// Pairs of [`correlations`](Self::correlations) beyond [`STRONG_CORRELATION`], strongest
-    /// first.
+    /// Returns the pairs of [`correlations`](Self::correlations) beyond [`STRONG_CORRELATION`],
+    /// strongest first.
     pub fn strong_correlations(&self) -> Vec<(String, String, f64)> {
         let all = self.correlations();
         all.above(STRONG_CORRELATION)
@@ -206,7 +206,7 @@ impl Identification {
             .collect()
     }
 
-    /// Correlations of the parameters that were fitted together.
+    /// Returns the correlations of the parameters that were fitted together.
     pub fn correlations(&self) -> Correlations {
         let name = |k: usize| &self.estimates[k].name;
         let Covariance { parameters, .. } = &self.covariance;
@@ -221,7 +221,7 @@ impl Identification {
 }
 
 impl Estimate {
-    /// A parameter that no stage has varied.
+    /// Creates the estimate of a parameter that no stage has varied.
     pub(super) fn unfitted(parameter: &Parameter, time_measured: bool) -> Self {
         let unit = match parameter.unit() {
             Unit::Speed if !time_measured => Unit::LengthPerRow,
@@ -241,7 +241,7 @@ impl Estimate {
     }
 }
 
-/// Enters what a stage found into the estimates of its unknowns.
+/// Enters the result of a stage into the estimates of its unknowns and their covariance.
 pub(super) fn enter(
     (estimates, covariance): (&mut [Estimate], &mut Collected),
     stage: &Stage,

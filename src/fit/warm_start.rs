@@ -31,7 +31,7 @@ impl WarmStart {
     /// The full parameter vector of the registered nominal arm in a model of its successor.
     pub(super) fn registered(&self, model: &Model) -> DVector<f64> {
         let deviation = |name: &String| {
-            self.registered.iter().find(|(known, _)| known == name).map_or(0.0, |own| own.1)
+            self.registered.iter().find(|(known, _)| known == name).map_or(0.0, |found| found.1)
         };
         let own = model.parameters.iter().map(|parameter| deviation(&parameter.name));
         DVector::from_iterator(model.parameters.len(), own)

@@ -1,5 +1,4 @@
-//! How accurately positions are predicted in poses that decided nothing, before and after, counted
-//! as ISO 9283 counts positions.
+//! Acceptance: pose accuracy and repeatability in held-out poses, in the terms of ISO 9283.
 
 use std::collections::BTreeMap;
 
@@ -14,70 +13,72 @@ use crate::model::Model;
 use crate::numeric::{Interval, mean_interval};
 use crate::problem::Problem;
 
-/// Resamples of the confidence interval, and how often it covers.
-const DRAWS: usize = 5000;
-const COVERED: f64 = 0.95;
+/// Number of bootstrap resamples of a confidence interval.
+const RESAMPLES: usize = 5000;
+/// Probability with which a confidence interval covers the mean.
+const COVERAGE: f64 = 0.95;
+/// Seed of the resamples.
 const SEED: u64 = 9283;
-/// Positions of a pose from which a spread of distances can be told.
-const LEAST_CYCLES: usize = 3;
+/// Number of measurements of a pose from which on the spread of their distances is defined.
+const MIN_CYCLES: usize = 3;
 
-/// What held-out poses say of an arm.
+/// Pose accuracy of an arm in held-out poses, before and after identification.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Acceptance {
-    /// Each configuration with its base and target once.
+    /// Poses; a configuration with its base and target counts once.
     pub poses: Vec<AcceptancePose>,
-    /// Of the nominal arm, with base and target fitted where they are free.
+    /// Accuracy of the registered nominal arm.
     pub before: Accuracy,
-    /// Of the identified arm.
+    /// Accuracy of the identified arm.
     pub after: Accuracy,
 }
 
-/// A pose, measured once or several times.
+/// Pose that was measured once or several times.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct AcceptancePose {
-    /// Its rows, ascending.
+    /// Rows of the pose, ascending.
     pub rows: Vec<usize>,
-    /// AP of the nominal arm: distance from the predicted position to the barycentre of the
+    /// Accuracy AP of the nominal arm: distance from the predicted position to the barycentre of the
     /// measured ones \[m\].
     pub before: f64,
-    /// AP of the identified arm \[m\].
+    /// Accuracy AP of the identified arm \[m\].
     pub after: f64,
-    /// RP = l̄ + 3 `S_l` of the distances l of the measured positions to their barycentre \[m\];
-    /// `None` of a pose measured less than three times: two positions are equally far from their
-    /// middle.
+    /// Repeatability RP = l̄ + 3 `S_l` of the distances l from the measured positions to their
+    /// barycentre \[m\]; `None` for less than three measurements, since two positions are equally far
+    /// from their centre.
     pub repeatability: Option<f64>,
 }
 
-/// AP over all poses \[m\].
+/// Statistics of the accuracy AP over all poses \[m\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy {
-    /// Its mean, with the interval that covers it in 95 of 100 cases: bootstrap over poses (BCa)
-    /// [Efron 1987].
+    /// Mean with its 95 % confidence interval, by the BCa bootstrap over poses  [Efron 1987].
     pub mean: Interval,
-    /// Root mean square.
+    /// Root mean square of the accuracies.
     pub rms: f64,
-    /// The largest.
+    /// Largest accuracy value.
     pub max: f64,
 }
 
 impl Accuracy {
-    fn of(all: &[f64]) -> Self {
-        let sums: Vec<(f64, f64)> = all.iter().map(|own| (*own, 1.0)).collect();
-        let squares: f64 = all.iter().map(|own| own * own).sum();
+    /// Summarises the accuracies of all poses \[m\].
+    fn of(accuracies: &[f64]) -> Self {
+        let sums: Vec<(f64, f64)> = accuracies.iter().map(|accuracy| (*accuracy, 1.0)).collect();
+        let squares: f64 = accuracies.iter().map(|accuracy| accuracy * accuracy).sum();
         Self {
-            mean: mean_interval(&sums, DRAWS, COVERED, SEED),
-            rms: (squares / all.len().max(1) as f64).sqrt(),
-            max: all.iter().copied().fold(0.0, f64::max),
+            mean: mean_interval(&sums, RESAMPLES, COVERAGE, SEED),
+            rms: (squares / accuracies.len().max(1) as f64).sqrt(),
+            max: accuracies.iter().copied().fold(0.0, f64::max),
         }
     }
 }
 
-/// Held-out rows that measure positions, of which alone a pose accuracy is.
+/// Returns the held-out rows that measure positions, the only ones with a pose accuracy.
 ///
 /// # Errors
-/// There are none.
+/// Returns an error if there are none.
 pub fn held_out_positions(
     problem: &Problem,
     Dataset { measurements, split }: &Dataset,
@@ -90,11 +91,12 @@ pub fn held_out_positions(
     Ok(rows)
 }
 
-/// Of the held-out poses of an identification whose positions were measured; poses without an
-/// equilibrium are left out.
+/// Computes pose accuracy and repeatability of the identified arm in the held-out poses with measured
+/// positions. Poses without an equilibrium are left out.
 ///
 /// # Errors
-/// Problem and data do not fit each other, or no held-out row measures a position.
+/// Returns an error if problem and data do not fit each other, or no held-out row measures a
+/// position.
 pub fn acceptance(
     problem: &Problem,
     data: &Dataset,
@@ -112,32 +114,30 @@ pub fn acceptance(
         if !(before[k].norm().is_finite() && after[k].norm().is_finite()) {
             continue;
         }
-        // Poses that the declared arm does not tell apart may differ in loads and temperature all
-        // the same.
+        // Loads and temperature may differ in poses that are one pose for the declared arm.
         let set = [&measurements.payload, &measurements.hoist, &measurements.temperature];
         #[expect(
             clippy::cast_possible_truncation,
             reason = "steps of 0.1 kg, 0.1 N and 1 K, of which as many as matter have room"
         )]
-        let set = [10.0, 10.0, 1.0]
-            .iter()
-            .zip(set)
-            .map(|(per, own)| own.as_ref().map_or(0, |all| (all[row] * per).round() as i64));
+        let set = [10.0, 10.0, 1.0].iter().zip(set).map(|(per, column)| {
+            column.as_ref().map_or(0, |values| (values[row] * per).round() as i64)
+        });
         let mut key = [0; 3];
-        key.iter_mut().zip(set).for_each(|(own, value)| *own = value);
+        key.iter_mut().zip(set).for_each(|(entry, value)| *entry = value);
         groups.entry((numbers[row], key)).or_default().push(k);
     }
-    let mean = |all: &[Vector3<f64>], own: &[usize]| {
-        own.iter().map(|&k| all[k]).sum::<Vector3<f64>>() / own.len().max(1) as f64
+    let mean = |errors: &[Vector3<f64>], group: &[usize]| {
+        group.iter().map(|&k| errors[k]).sum::<Vector3<f64>>() / group.len().max(1) as f64
     };
-    let pose = |own: Vec<usize>| {
+    let pose = |group: Vec<usize>| {
         let positions: Vec<Vector3<f64>> =
-            own.iter().map(|&k| measurements.positions[held_out[k]]).collect();
+            group.iter().map(|&k| measurements.positions[held_out[k]]).collect();
         AcceptancePose {
-            before: mean(&before, &own).norm(),
-            after: mean(&after, &own).norm(),
+            before: mean(&before, &group).norm(),
+            after: mean(&after, &group).norm(),
             repeatability: repeatability(&positions),
-            rows: own.into_iter().map(|k| held_out[k]).collect(),
+            rows: group.into_iter().map(|k| held_out[k]).collect(),
         }
     };
     let mut poses: Vec<AcceptancePose> = groups.into_values().map(pose).collect();
@@ -150,10 +150,10 @@ pub fn acceptance(
     })
 }
 
-/// RP = l̄ + 3 `S_l`  [ISO 9283, 7.2.2].
+/// Returns the repeatability RP = l̄ + 3 `S_l` of measured positions \[m\]  [ISO 9283, 7.2.2].
 fn repeatability(positions: &[Vector3<f64>]) -> Option<f64> {
     let n = positions.len() as f64;
-    if positions.len() < LEAST_CYCLES {
+    if positions.len() < MIN_CYCLES {
         return None;
     }
     let barycentre = positions.iter().sum::<Vector3<f64>>() / n;

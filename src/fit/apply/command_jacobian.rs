@@ -1,5 +1,4 @@
-//! How the end point moves with the joint commands, for planners and controllers that use the arm
-//! as identified.
+//! Derivatives of the predicted positions by the joint commands, for planners and controllers.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,16 +7,16 @@ use crate::measurement::Measurements;
 use crate::model::Model;
 use crate::problem::Problem;
 
-/// Derivatives of the predicted positions of `rows` by the commands, for each row of shape = (3,
-/// joints), measuring frame \[m/rad\], of joints that slide \[m/m\]; 0 at fixed joints, NaN where
-/// the arm has no equilibrium.
+/// Returns the derivatives of the predicted positions of `rows` by the joint commands, one matrix per
+/// row, shape = (3, joints), measuring frame \[m/rad\], for prismatic joints \[m/m\].
 ///
-/// Of the arm as `identified`, with its sessions and targets, or else of the nominal arm. `problem`
-/// is the one that was identified. The positions in `rows` do not matter.
+/// Columns of fixed joints are 0; rows without an equilibrium are NaN. The arm is the `identified`
+/// one, with its sessions and targets, or else the nominal one. `problem` is the one that was
+/// identified. The positions in `rows` are not used.
 ///
 /// # Errors
-/// A parameter of the problem, or of a session or target of `rows`, that was not identified, or one
-/// that was and that the problem lacks; configurations of another number of joints.
+/// Returns an error if a parameter of the problem, or of a session or target of `rows`, was not
+/// identified, if the problem lacks one that was, or if the number of joints differs.
 pub fn jacobian(
     problem: &Problem,
     identified: Option<&Identification>,

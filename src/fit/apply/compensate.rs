@@ -1,4 +1,4 @@
-//! The purpose of it all: commands that bring the arm as it is to where it should be.
+//! Compensation: joint commands that bring the identified arm to desired poses.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
@@ -13,56 +13,56 @@ use crate::spatial::Frame;
 
 use crate::fit::stages::stage::StageError;
 
-/// 1 σ of the target position against 1 σ = 1 (rad or m) of the way from the seed: the position
-/// decides, the seed breaks ties \[m\].
+/// 1 σ of the target position \[m\], beside 1 σ = 1 rad or 1 m of the distance from the seed: the
+/// position decides, the seed breaks ties.
 const POSITION_WEIGHT: f64 = 1e-6;
-/// 1 σ of the target orientation, likewise \[rad\].
+/// 1 σ of the target orientation \[rad\], beside the same σ of the distance from the seed.
 const ORIENTATION_WEIGHT: f64 = 1e-6;
-/// A command has settled when a pass changes it by less [rad or m].
+/// Change of a command per pass below which it has settled [rad or m].
 const SETTLED: f64 = 1e-10;
-/// Passes after which a command that does not settle is taken as it is: its miss says how good it
-/// is.
+/// Maximum number of passes; a command that has not settled by then is returned with its miss.
 const MAX_PASSES: usize = 20;
-/// A target counts as reached within this distance \[m\].
+/// Distance within which a target counts as reached \[m\].
 const REACHED: f64 = 1e-6;
-/// … and turned by no more than this from it \[rad\].
+/// Angle within which the orientation of a target counts as reached \[rad\].
 const REACHED_TURN: f64 = 1e-6;
-/// Coordinates of a pose: with as many moving joints an arm that is not at the edge of its reach
-/// has a command for it.
+/// Number of coordinates of a pose, and of moving joints from which on an arm can reach any pose
+/// inside its workspace.
 const POSE: usize = 6;
 
-/// A command for one target.
+/// Joint command for one target.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Command {
-    /// Row of the target.
+    /// Row of the target in the table of targets.
     pub row: usize,
     /// Configuration, shape = (joints) \[rad\] or \[m\]; the seed's value at fixed joints.
     pub configuration: Vec<f64>,
     /// Desired − predicted position \[m\].
     pub miss: Vector3<f64>,
-    /// Distance to the target before: with the seed as command \[m\].
+    /// Distance to the target with the seed as command \[m\].
     pub seed_miss: f64,
     /// Rotation vector from the predicted to the desired orientation, measuring frame \[rad\],
     /// where one is desired.
     pub turn: Option<Vector3<f64>>,
-    /// Angle to the desired orientation before \[rad\], likewise.
+    /// Angle to the desired orientation with the seed as command \[rad\], where one is desired.
     pub seed_turn: Option<f64>,
 }
 
 impl Command {
-    /// Whether the arm gets there.
+    /// Returns true if the arm reaches the target.
     pub fn is_reached(&self) -> bool {
         self.miss.norm() <= REACHED && self.turn.is_none_or(|turn| turn.norm() <= REACHED_TURN)
     }
 }
 
-/// Where targets without positions are: where the nominal arm would have been with the commands of
-/// the rows, on the bases and with the tools of the full parameter vector `x`, measuring frame.
-/// With its orientation each to which six moving joints and more lead; with fewer it could not have
-/// both.
+/// Returns `rows` with the targets that the nominal arm would have reached by their commands, on the
+/// bases and with the tools of the full parameter vector `x`, measuring frame.
+///
+/// A target has an orientation if at least six moving joints lead to it; with fewer, position and
+/// orientation cannot both be reached.
 ///
 /// # Errors
-/// The nominal arm has no equilibrium in one of the rows.
+/// Returns an error if the nominal arm has no equilibrium in one of the rows.
 pub fn waypoints(
     problem: &Problem,
     model: &Model,
@@ -76,7 +76,7 @@ pub fn waypoints(
             .parameters
             .iter()
             .zip(x)
-            .map(|(own, x)| if own.site.is_placement() { *x } else { 0.0 }),
+            .map(|(parameter, x)| if parameter.site.is_placement() { *x } else { 0.0 }),
     );
     let all: Vec<usize> = (0..rows.len()).collect();
     let poses = placement.poses(rows, &all, 1.0);
@@ -106,19 +106,19 @@ pub fn waypoints(
     }
 }
 
-/// Targets that are given in the frame of the arm's base, as seen from the measuring frame.
+/// Converts targets from the base frame of the arm to the measuring frame.
 pub fn seen_from_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -> Measurements {
     moved(targets, &model.base_frames(x.as_slice()))
 }
 
-/// The inverse: positions and orientations in the measuring frame, as seen from the arm's base.
+/// Converts positions and orientations from the measuring frame to the base frame of the arm.
 pub fn seen_in_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -> Measurements {
     let bases: Vec<Frame<f64>> =
         model.base_frames(x.as_slice()).iter().map(Frame::inverse).collect();
     moved(targets, &bases)
 }
 
-/// Positions and orientations moved by the frame of each row's base.
+/// Moves positions and orientations by the frame in `bases` of the base of each row.
 fn moved(targets: &Measurements, bases: &[Frame<f64>]) -> Measurements {
     let placement = Placement::of(targets);
     let base = |row: usize| &bases[placement.base_of(row)];
@@ -133,22 +133,19 @@ fn moved(targets: &Measurements, bases: &[Frame<f64>]) -> Measurements {
     moved
 }
 
-/// For each row of `targets`, the configuration nearest to the row's own that brings the arm with
-/// parameters `x` to the row's position, and to its orientation where it has one, within the joint
-/// limits of `problem`.
+/// Computes a command for each row of `targets`: the configuration nearest to that of the row, the
+/// seed, that brings the arm with parameters `x` to the position of the row, and to its orientation
+/// where it has one, within the joint limits of `problem`.
 ///
-/// Joints of other branches than the one that carries the row's target keep to the row's commands.
+/// Joints that do not lead to the target of a row keep its values. Effects on the measurement, such
+/// as an instrument that drifts, are left out: targets are desired places of the arm.
 ///
-/// What effects do to the measurement (an instrument that drifts or has a scale) is left out:
-/// targets are where the arm shall be.
-///
-/// min over q of ‖(desired − predicted(q)) / 1 µm‖² + ‖log(desired predicted(q)ᵀ) / 1 µrad‖² + ‖q −
-/// seed‖²: Newton's method by dual numbers, with redundancy resolved towards the seed. Where
-/// effects follow the command (a transmission ratio, harmonics), they are taken at the command
-/// found so far, until it settles.
+/// Minimises ‖(desired − predicted(q)) / 1 µm‖² + ‖log(desired predicted(q)ᵀ) / 1 µrad‖² + ‖q − seed‖²
+/// over q by Newton's method with dual numbers. Effects that follow the command, such as harmonics,
+/// are evaluated at the command of the pass before, until it settles.
 ///
 /// # Errors
-/// The limits of a joint exclude each other.
+/// Returns an error if the limits of a joint exclude each other.
 pub fn compensate(
     problem: &Problem,
     model: &Model,
@@ -166,17 +163,18 @@ pub fn compensate(
     for (row, mut pose) in placement.oriented_poses(targets, &rows, weights).into_iter().enumerate()
     {
         pose.sigma = POSITION_WEIGHT;
-        // Nobody knows what is measured or done before a target.
+        // The poses before a target are not known.
         pose.setup.past = LazyPast::default();
         let seed = targets.configuration(row);
         let n = moving.len();
         let carrier = model.target_joint(pose.target);
         let leads = |joint: usize| tree.path_contains(joint, carrier);
         let serves = |joint: usize| {
-            let moved = |(own, follows): (usize, Option<Mimic>)| {
-                leads(own) && (own == joint || follows.is_some_and(|own| own.joint == joint))
+            let moved = |(index, mimic): (usize, Option<Mimic>)| {
+                let follows = mimic.is_some_and(|mimic| mimic.joint == joint);
+                leads(index) && (index == joint || follows)
             };
-            problem.joints.iter().map(|own| own.mimic).enumerate().any(moved)
+            problem.joints.iter().map(|other| other.mimic).enumerate().any(moved)
         };
         let at = |configuration: &[f64]| {
             let pose = Pose { setup: PoseView { configuration, ..pose.setup }, ..pose };
@@ -188,8 +186,8 @@ pub fn compensate(
         let mut configuration = seed.to_vec();
         for _ in 0..MAX_PASSES {
             let bound = |pick: fn((f64, f64)) -> f64| {
-                let own = |j: usize| pick(problem.joints[j].limits) - configuration[j];
-                let room = moving.iter().map(|&j| if serves(j) { own(j) } else { 0.0 });
+                let room = |j: usize| pick(problem.joints[j].limits) - configuration[j];
+                let room = moving.iter().map(|&j| if serves(j) { room(j) } else { 0.0 });
                 DVector::from_iterator(n, room)
             };
             let bounds = Bounds::new(bound(|limits| limits.0), bound(|limits| limits.1))?;

@@ -1,34 +1,34 @@
-//! Commands against readings of the joints: which of the two the arm follows.
+//! Comparison of commanded and read joint values: which of the two the arm follows.
 
 use crate::fit::identification::{IdentifyError, Options, identify};
 use crate::fit::outcome::Identification;
 use crate::measurement::Dataset;
 use crate::problem::{JointSource, Problem};
 
-/// What a fit leaves of the identification rows with commands as configurations, and with readings:
-/// root mean squared errors \[m\].
+/// Root mean squared errors on the identification rows \[m\], fitted with commanded and with read
+/// joint values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointSources {
-    /// Which of the two the problem takes.
+    /// Source that the problem uses.
     pub used: JointSource,
-    /// With commands.
+    /// Error with commanded joint values \[m\].
     pub commanded: f64,
-    /// With readings.
+    /// Error with read joint values \[m\].
     pub read: f64,
 }
 
 impl JointSources {
-    /// The one that fits better.
+    /// Returns the source that fits better.
     pub fn better(&self) -> JointSource {
         if self.read < self.commanded { JointSource::Read } else { JointSource::Commanded }
     }
 }
 
-/// Fits once more with the other of commands and readings, where the rows have both and they
-/// differ; `found` is the fit with those that the problem takes. Held-out rows decide nothing.
+/// Compares the fit `found` with one that uses the other source of joint values; `None` where the rows
+/// do not have both, or both are equal. Held-out rows decide nothing.
 ///
 /// # Errors
-/// As for [`identify`].
+/// Returns the errors of [`identify`].
 pub fn joint_sources(
     problem: &Problem,
     data: &Dataset,
@@ -37,9 +37,9 @@ pub fn joint_sources(
 ) -> Result<Option<JointSources>, IdentifyError> {
     let Some(other) = data.measurements.with_other_joint_source() else { return Ok(None) };
     let other = identify(problem, &Dataset::new(other, data.split.clone()), options)?;
-    let [own, other] = [found, &other].map(|found| found.fitted.identification.rms.norm);
+    let [chosen, other] = [found, &other].map(|fit| fit.fitted.identification.rms.norm);
     let used = problem.data.joints;
     let (commanded, read) =
-        if used == JointSource::Commanded { (own, other) } else { (other, own) };
+        if used == JointSource::Commanded { (chosen, other) } else { (other, chosen) };
     Ok(Some(JointSources { used, commanded, read }))
 }

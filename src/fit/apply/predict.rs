@@ -1,4 +1,4 @@
-//! What an identified arm predicts, and what it leaves of measurements.
+//! Predictions of an identified arm, and residuals of measurements.
 
 use std::collections::HashSet;
 
@@ -13,26 +13,26 @@ use crate::observation::FixtureValues;
 use crate::problem::{Observation, Problem};
 use crate::spatial::Frame;
 
-/// A measured pose and what a fit leaves of it.
+/// Residual of a row of a table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Residual {
     /// Row of the measurements, counted from 0.
     pub row: usize,
-    /// Whether the row was held out.
+    /// Whether the row is held out.
     pub held_out: bool,
-    /// What was predicted \[m\]: the position of the target in the measuring frame, also where that
-    /// was at a point; a distance.
+    /// Prediction \[m\]: position of the target in the measuring frame, also for contacts with a point,
+    /// or a distance.
     pub predicted: Vector3<f64>,
     /// Measured − predicted position, measuring frame, or distance \[m\]; NaN where the identified
     /// arm has no equilibrium.
     pub position: Vector3<f64>,
-    /// The same over 1 σ of a coordinate \[1\].
+    /// Residual of the position over 1 σ of a coordinate \[1\].
     pub whitened: Vector3<f64>,
     /// Rotation vector from the predicted to the measured orientation, measuring frame \[rad\],
     /// where orientation is fitted.
     pub orientation: Option<Vector3<f64>>,
-    /// The same over 1 σ about an axis \[1\].
+    /// Residual of the orientation over 1 σ about an axis \[1\].
     pub whitened_orientation: Option<Vector3<f64>>,
     /// Whether the row is too far off to be noise: one of the fit's
     /// [outliers](Identification::outliers) or
@@ -41,23 +41,23 @@ pub struct Residual {
 }
 
 impl Residual {
-    /// Length of everything that is left of the row over 1 σ of each part \[1\].
+    /// Returns the length of the whitened residual of position and orientation \[1\].
     pub fn length(&self) -> f64 {
         self.whitened.norm().hypot(self.whitened_orientation.map_or(0.0, |turn| turn.norm()))
     }
 }
 
 impl Identification {
-    /// Positions of the identified arm in the poses of `rows`, measuring frame \[m\]; NaN where it
-    /// has no equilibrium.
+    /// Predicts the positions of the identified arm in the poses of `rows`, measuring frame \[m\]; NaN
+    /// where the arm has no equilibrium.
     ///
-    /// The positions in `rows` do not matter ([`Dataset::poses`] makes rows without any); their
-    /// sessions and targets have to be among those identified. `problem` is the one that was
+    /// The positions in `rows` are not used ([`Dataset::poses`] makes rows without any). Their
+    /// sessions and targets must be among those identified. `problem` is the one that was
     /// identified.
     ///
     /// # Errors
-    /// A parameter of the problem, or of a session or target of `rows`, that was not identified, or
-    /// one that was and that the problem lacks; configurations of another number of joints.
+    /// Returns an error if a parameter of the problem, or of a session or target of `rows`, was not
+    /// identified, if the problem lacks one that was, or if the number of joints differs.
     pub fn predict(
         &self,
         problem: &Problem,
@@ -68,10 +68,10 @@ impl Identification {
         self.predict_with(&model, rows)
     }
 
-    /// As [`predict`](Self::predict), with a model of the problem that the caller has changed.
+    /// Predicts positions as [`predict`](Self::predict) does, with a model that the caller has changed.
     ///
     /// # Errors
-    /// A parameter of the model that was not identified.
+    /// Returns an error if a parameter of the model was not identified.
     pub fn predict_with(
         &self,
         model: &Model,
@@ -81,10 +81,11 @@ impl Identification {
         Ok(rows.positions.iter().zip(errors).map(|(measured, error)| measured - error).collect())
     }
 
-    /// What the identified arm leaves of every row, in the order of the rows.
+    /// Returns the residuals of every row, in the order of the rows.
     ///
     /// # Errors
-    /// A parameter of the problem, or of a session or target of the data, that was not identified.
+    /// Returns an error if a parameter of the problem, or of a session or target of the data, was not
+    /// identified.
     pub fn residuals(
         &self,
         problem: &Problem,
@@ -111,14 +112,14 @@ impl Identification {
             held_out: split.held_out.binary_search(&row).is_ok(),
             position: in_space(measurements, row, (&fixtures, &bases), &position).1,
             whitened: position / sigma(row),
-            orientation: turns.as_ref().map(|all| all[row]),
-            whitened_orientation: turns.as_ref().map(|all| all[row] / turn_sigma),
+            orientation: turns.as_ref().map(|turns| turns[row]),
+            whitened_orientation: turns.as_ref().map(|turns| turns[row] / turn_sigma),
             outlier: outliers.contains(&row),
         };
         Ok(errors.into_iter().enumerate().map(residual).collect())
     }
 
-    /// Measured − predicted of every row, measuring frame \[m\].
+    /// Returns measured − predicted of every row, measuring frame \[m\].
     fn errors(
         &self,
         model: &Model,
@@ -130,8 +131,8 @@ impl Identification {
         Ok(model.residuals(self.poses(rows, None), &self.vector(model)?))
     }
 
-    /// Rotation vectors from the predicted to the measured orientation of every row, measuring
-    /// frame \[rad\], where it is fitted.
+    /// Returns the rotation vectors from the predicted to the measured orientation of every row,
+    /// measuring frame \[rad\]; `None` where orientation is not fitted.
     fn turns(
         &self,
         problem: &Problem,
@@ -145,8 +146,8 @@ impl Identification {
         Ok(Some(model.orientation_residuals(self.poses(rows, Some(1.0)), &self.vector(model)?)))
     }
 
-    /// Every row as a pose, its orientation with the σ `turn`; time counts from the first pose that
-    /// was identified.
+    /// Returns every row as a pose, its orientation with the σ `turn`; elapsed time starts at the first
+    /// pose of the identification.
     fn poses<'a>(&self, rows: &'a Measurements, turn: Option<f64>) -> Vec<Pose<'a>> {
         let all: Vec<usize> = (0..rows.len()).collect();
         let mut poses = Placement::of(rows).oriented_poses(rows, &all, (1.0, turn));
@@ -156,8 +157,7 @@ impl Identification {
         poses
     }
 
-    /// The full parameter vector of a model with the parameters that were identified, by their
-    /// names.
+    /// Returns the full parameter vector of `model` from the identified parameters of the same names.
     pub(in crate::fit) fn vector(&self, model: &Model) -> Result<DVector<f64>, IdentifyError> {
         let x = model.parameters.iter().map(|parameter| {
             let place = self.estimates.iter().position(|estimate| estimate.name == parameter.name);
@@ -166,11 +166,13 @@ impl Identification {
                 .ok_or_else(|| IdentifyError::NoEstimate { name: parameter.name.clone() })
         });
         let x = x.collect::<Result<Vec<f64>, _>>()?;
-        let own = |name: &str| model.parameters.iter().any(|parameter| parameter.name == name);
-        // Rows of one session need no base of another.
+        let is_in_model = |name: &str| model.parameters.iter().any(|known| known.name == name);
+        // Rows of one session do not need the base of another.
         let placed = |name: &str| name.starts_with("base") || name.starts_with("tool");
-        if let Some(lost) =
-            self.estimates.iter().find(|estimate| !own(&estimate.name) && !placed(&estimate.name))
+        if let Some(lost) = self
+            .estimates
+            .iter()
+            .find(|estimate| !is_in_model(&estimate.name) && !placed(&estimate.name))
         {
             return Err(IdentifyError::NotInModel { name: lost.name.clone() });
         }
@@ -178,8 +180,8 @@ impl Identification {
     }
 }
 
-/// What was predicted of a row, and what is left of it, measuring frame: of a contact with a point
-/// the position of the target.
+/// Returns prediction and residual of a row in the measuring frame; for a contact with a point, of the
+/// position of the target.
 pub(in crate::fit) fn in_space(
     rows: &Measurements,
     row: usize,

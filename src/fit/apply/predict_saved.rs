@@ -1,4 +1,4 @@
-//! An estimate applied to rows of which it knows nothing, without another fit of the arm.
+//! Predictions of a saved estimate for any rows, without another fit of the arm.
 
 use std::sync::Arc;
 
@@ -23,10 +23,10 @@ use crate::model::parameter::ParameterSite;
 use crate::model::{Model, Pose};
 use crate::problem::{Observation, Problem};
 
-/// Part of a parameter in a combination that rows leave open, beyond rounding.
+/// Part of a parameter in an undetermined combination beyond which it is not determined.
 const OPEN: f64 = 1e-6;
 
-/// What an arm makes of some rows.
+/// Predictions of an arm for the rows of a table.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Prediction {
@@ -35,73 +35,73 @@ pub struct Prediction {
     /// Predicted orientation of each row, a rotation vector, measuring frame \[rad\], where
     /// orientation is fitted.
     pub orientations: Option<Vec<Vector3<f64>>>,
-    /// What the rows hold beyond that; `None` where they hold no positions.
+    /// Residuals of the rows; `None` where they hold no measurements.
     pub residuals: Option<Vec<Residual>>,
-    /// Their errors; `None` likewise.
+    /// Summaries of the errors; `None` where the rows hold no measurements.
     pub errors: Option<ErrorsBySession>,
-    /// The spread of the target at each point that the rows touch.
+    /// Scatter of the predicted target at each point that the rows touch.
     pub spreads: Vec<PointSpread>,
-    /// Parameters of bases and tools that the estimate lacks, fitted to their own rows with the arm
-    /// as it is.
+    /// Names of the parameters of bases and tools that the estimate lacks; they are fitted to their rows
+    /// with the arm given.
     pub placed: Vec<String>,
 }
 
-/// Errors of all rows, and of those of each session.
+/// Errors of all rows, and of each session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorsBySession {
-    /// Of all rows of the first kind that there is.
+    /// Errors of all rows of the leading kind.
     pub all: ErrorSummary,
-    /// Of each kind, where there are several.
+    /// Errors of each kind of rows, where there are several.
     pub kinds: Vec<ErrorSummary>,
-    /// Of each session by its name, in the order of the rows, of the first kind that it has; none
+    /// Name and errors of each session, in the order of the rows, for the first kind of its rows; empty
     /// where there are no sessions.
     pub sessions: Vec<(String, ErrorSummary)>,
 }
 
-/// Why an estimate cannot be applied.
+/// Error of an estimate that cannot be applied.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PredictError {
     /// Problem and rows do not fit each other.
     #[error("{0}")]
     Input(#[from] InputError),
-    /// The estimate is not of this problem, or lacks what the rows need.
+    /// The estimate is of another problem, or lacks a parameter that the rows need.
     #[error(transparent)]
     Estimate(#[from] SavedEstimateError),
-    /// Rows of a new session or tool leave open where it is.
+    /// Rows of a new session or tool do not determine where it is.
     #[error(
         "{name} is not in the estimate, and its rows do not determine it; measure more poses there"
     )]
     Open {
-        /// The parameter.
+        /// Name of the parameter.
         name: String,
     },
-    /// Without an estimate the rows leave open where base or tool is.
+    /// There is no estimate, and the rows do not determine where base or tool is.
     #[error(
         "the rows do not determine {name}, and there is no estimate to take it from; measure more poses there"
     )]
     OpenWithoutEstimate {
-        /// The parameter.
+        /// Name of the parameter.
         name: String,
     },
-    /// Bases and tools of new sessions could not be placed.
+    /// Bases and tools of new sessions could not be fitted.
     #[error(transparent)]
     Stage(#[from] StageError),
 }
 
 impl ErrorsBySession {
-    /// Of the errors measured − predicted of every row \[m\].
+    /// Summarises the errors measured − predicted of every row \[m\].
     pub fn of(rows: &Measurements, errors: &[Vector3<f64>]) -> Self {
         let kinds = rows.kinds();
-        let of = |own: &[usize], errors: &[Vector3<f64>]| {
-            let first = own.iter().map(|&row| rows.observation(row)).min().unwrap_or_default();
-            of_kind(rows, own.iter().copied(), errors, first)
+        let of = |chosen: &[usize], errors: &[Vector3<f64>]| {
+            let first = chosen.iter().map(|&row| rows.observation(row)).min().unwrap_or_default();
+            of_kind(rows, chosen.iter().copied(), errors, first)
         };
         let session = |(label, name): (usize, &String)| {
-            let own = (0..rows.len()).filter(|&row| rows.session.of_row[row] == label);
-            let (own, errors): (Vec<usize>, Vec<Vector3<f64>>) =
-                own.map(|row| (row, errors[row])).unzip();
-            (!name.is_empty() && !own.is_empty()).then(|| (name.clone(), of(&own, &errors)))
+            let of_session = (0..rows.len()).filter(|&row| rows.session.of_row[row] == label);
+            let (chosen, errors): (Vec<usize>, Vec<Vector3<f64>>) =
+                of_session.map(|row| (row, errors[row])).unzip();
+            (!name.is_empty() && !chosen.is_empty()).then(|| (name.clone(), of(&chosen, &errors)))
         };
         let sessions = rows.session.names.iter().enumerate().filter_map(session).collect();
         let all: Vec<usize> = (0..rows.len()).collect();
@@ -113,17 +113,15 @@ impl ErrorsBySession {
     }
 }
 
-/// What the arm of `problem` makes of `rows`: as identified in `estimate`, or the nominal arm
+/// Predicts `rows` with the arm of `problem` as identified in `estimate`, or with the nominal arm
 /// without one.
 ///
-/// A base or tool that is free and of which the estimate says nothing (a session that took no part
-/// in it; all of them without an estimate) is fitted to its own rows, with the arm as it is, if
-/// they hold positions and enough of them. `split` says which rows are held out, where that is
-/// known.
+/// A free base or tool that the estimate lacks is fitted to its rows with the arm given, if they
+/// measure enough positions. `split` states which rows are held out, where that is known.
 ///
 /// # Errors
-/// The estimate is not of this problem, or lacks a parameter that the rows need, or the rows lack a
-/// column that an effect needs.
+/// Returns an error if the estimate is of another problem or lacks a parameter that the rows need, or
+/// if the rows lack a column that an effect needs.
 pub fn predict(
     problem: &Problem,
     estimate: Option<&SavedEstimate>,
@@ -156,7 +154,7 @@ pub fn predict(
     if let Some(estimate) = estimate {
         estimate.count_time_in(&mut poses);
     }
-    // A point or surface that no row speaks of is nowhere needed.
+    // A point or surface that no row uses is not needed.
     let is_needed = |k: usize| {
         let fixture = matches!(model.parameters[k].site, ParameterSite::Fixture { .. });
         !fixture || poses.iter().any(|pose| uses(&model, pose, k))
@@ -207,7 +205,7 @@ pub fn predict(
     Ok(Prediction { positions, orientations, residuals, errors, spreads, placed })
 }
 
-/// The error of an estimate that lacks a parameter, or of none.
+/// Creates the error of an estimate that lacks a parameter, or of a missing estimate.
 fn lacking(estimate: Option<&SavedEstimate>, name: &str) -> PredictError {
     let name = name.to_owned();
     match estimate {
@@ -218,7 +216,7 @@ fn lacking(estimate: Option<&SavedEstimate>, name: &str) -> PredictError {
     }
 }
 
-/// The error of rows that leave a parameter open, which the estimate lacks or which none has.
+/// Creates the error of rows that do not determine a parameter which the estimate lacks.
 fn open(estimate: Option<&SavedEstimate>, name: String) -> PredictError {
     match estimate {
         Some(_) => PredictError::Open { name },
@@ -226,7 +224,7 @@ fn open(estimate: Option<&SavedEstimate>, name: String) -> PredictError {
     }
 }
 
-/// Whether a pose uses the base or tool that a parameter belongs to.
+/// Returns true if a pose uses the base, tool or fixture that parameter `k` belongs to.
 fn uses(model: &Model, pose: &Pose, k: usize) -> bool {
     match model.parameters[k].site {
         ParameterSite::Base { base, .. } => pose.base == base,
@@ -238,46 +236,46 @@ fn uses(model: &Model, pose: &Pose, k: usize) -> bool {
     }
 }
 
-/// The first of the parameters `missing` without a prior that poses are too few for.
+/// Returns the first of the `missing` parameters without a prior that the poses are too few for.
 fn too_few(model: &Model, poses: &[Pose], missing: &[usize]) -> Option<usize> {
     let open: Vec<usize> =
         missing.iter().copied().filter(|&k| model.parameters[k].sigma.is_none()).collect();
     open.iter().copied().find(|&k| {
-        let own: Vec<&Pose> = poses.iter().filter(|pose| uses(model, pose, k)).collect();
-        let measured = own.iter().map(|pose| pose.coordinates()).sum::<usize>();
+        let users: Vec<&Pose> = poses.iter().filter(|pose| uses(model, pose, k)).collect();
+        let measured = users.iter().map(|pose| pose.coordinates()).sum::<usize>();
         let unknown =
-            open.iter().filter(|&&other| own.iter().any(|pose| uses(model, pose, other))).count();
-        // Contacts that do no more than place a point would meet it exactly.
+            open.iter().filter(|&&other| users.iter().any(|pose| uses(model, pose, other))).count();
+        // As many contacts as unknowns would meet a point exactly.
         let placed_exactly = matches!(model.parameters[k].site, ParameterSite::Fixture { .. })
             && measured == unknown;
         measured < unknown || placed_exactly
     })
 }
 
-/// The full parameter vector `x` with the bases and tools `missing` from it fitted to the poses
-/// that use them.
+/// Returns the full parameter vector `x` with the `missing` bases and tools fitted to the poses that
+/// use them.
 fn place(
     model: &Model,
     poses: &[Pose],
     missing: &[usize],
     mut x: DVector<f64>,
 ) -> Result<DVector<f64>, PredictError> {
-    let own: Vec<Pose> = poses
+    let users: Vec<Pose> = poses
         .iter()
         .filter(|pose| missing.iter().any(|&k| uses(model, pose, k)))
         .copied()
         .collect();
     let of_base = |k: usize| matches!(model.parameters[k].site, ParameterSite::Base { .. });
     let new_base = |pose: &&Pose| missing.iter().any(|&k| of_base(k) && uses(model, pose, k));
-    let registrable: Vec<Pose> = own.iter().filter(new_base).copied().collect();
+    let registrable: Vec<Pose> = users.iter().filter(new_base).copied().collect();
     register(model, &registrable, &mut x);
-    locate(model, &own, |k| missing.contains(&k), &mut x);
+    locate(model, &users, |k| missing.contains(&k), &mut x);
     let memory = Memory::default();
     let stage = Stage {
         model,
-        declared: own.iter().map(|pose| pose.sigma).collect(),
-        declared_turn: own.iter().find_map(|pose| pose.orientation).map(|own| own.sigma),
-        poses: Arc::new(own),
+        declared: users.iter().map(|pose| pose.sigma).collect(),
+        declared_turn: users.iter().find_map(|pose| pose.orientation).map(|turn| turn.sigma),
+        poses: Arc::new(users),
         unknowns: missing.to_vec(),
         solver: SolverChoice::Auto.decide(model),
         max_steps: Settings::default().max_iterations,
@@ -301,8 +299,8 @@ fn place(
     }
 }
 
-/// Residuals from the errors measured − predicted \[m\] and the σ of each row, NaN where it is not
-/// known, and from those of orientation and their σ \[rad\].
+/// Creates the residuals from the errors measured − predicted \[m\] and the σ of each row, NaN where it
+/// is not known, and from the errors of orientation and their σ \[rad\].
 fn residuals(
     (errors, seen): (&[Vector3<f64>], &[Vector3<f64>]),
     (sigmas, coordinates): (&[Option<f64>], &[usize]),

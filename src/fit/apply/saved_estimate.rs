@@ -1,4 +1,4 @@
-//! An estimate.json that is read again, to apply what was identified without another fit.
+//! Reader of `estimate.json`, to apply an identified arm without another fit.
 
 use std::collections::HashSet;
 use std::io;
@@ -14,25 +14,25 @@ use crate::model::{Model, Pose};
 use crate::problem::Problem;
 use crate::problem::item::MAX_MAGNITUDE;
 
-/// Largest estimate.json that is read [MiB].
+/// Maximum size of an `estimate.json` [MiB].
 const LARGEST_MIB: u64 = 256;
 
-/// Identified part from which on a parameter is known but for rounding.
+/// Identified part from which on a parameter counts as determined.
 const IDENTIFIED: f64 = 0.99;
 
-/// What an estimate.json says of the arm.
+/// Identified arm as saved in an `estimate.json`.
 #[derive(Debug, Clone)]
 pub struct SavedEstimate {
-    /// Where it was read.
+    /// Path of the file.
     pub file: PathBuf,
-    /// Whether the fit was to be trusted.
+    /// Whether the fit was trusted.
     pub trusted: bool,
     /// 1 σ of a coordinate from the scatter, where the problem declares none \[m\].
     pub estimated_sigma: Option<f64>,
-    /// Time from which what follows the time counts \[s\]; older versions did not write it.
+    /// Start time of the time-dependent terms \[s\]; older versions did not write it.
     pub first_time: Option<f64>,
     problem: String,
-    /// Not there in what older versions wrote.
+    /// Digest of the declared arm; older versions did not write it.
     arm_digest: Option<String>,
     strategy: Strategy,
     parameters: Vec<Entry>,
@@ -43,7 +43,7 @@ struct Entry {
     name: String,
     nominal: f64,
     estimate: f64,
-    /// Not there where it has none, or in what older versions wrote.
+    /// Standard error; `None` where there is none, or in files of older versions.
     std_error: Option<f64>,
     identified: Option<f64>,
 }
@@ -59,7 +59,7 @@ struct Document {
     parameters: Vec<Entry>,
 }
 
-/// An estimate that cannot be used.
+/// Error of an `estimate.json` that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]
@@ -89,11 +89,11 @@ pub enum SavedEstimateError {
 }
 
 impl SavedEstimate {
-    /// Reads an estimate.json.
+    /// Reads an `estimate.json`.
     ///
     /// # Errors
-    /// The file cannot be read, is no estimate.json, or has a parameter twice or beyond what can be
-    /// reckoned with.
+    /// Returns an error if the file cannot be read, is no `estimate.json`, or has a parameter twice or
+    /// with a value that is too large.
     pub fn read(file: &Path) -> Result<Self, SavedEstimateError> {
         let named = || file.to_owned();
         let bytes =
@@ -106,10 +106,10 @@ impl SavedEstimate {
         Self::parse(&text, file)
     }
 
-    /// The same from its text; `file` names it in messages.
+    /// Parses the text of an `estimate.json`; `file` names it in messages.
     ///
     /// # Errors
-    /// As [`read`](Self::read).
+    /// Returns the errors of [`read`](Self::read).
     pub fn parse(text: &str, file: &Path) -> Result<Self, SavedEstimateError> {
         let file = file.to_owned();
         let Document {
@@ -125,8 +125,8 @@ impl SavedEstimate {
             Err(source) => return Err(SavedEstimateError::Syntax { file, source }),
         };
         let problem = one_line(&problem);
-        for own in &mut parameters {
-            own.name = one_line(&own.name);
+        for entry in &mut parameters {
+            entry.name = one_line(&entry.name);
         }
         let mut names = HashSet::new();
         for Entry { name, nominal, estimate, .. } in &parameters {
@@ -139,9 +139,9 @@ impl SavedEstimate {
         }
         let estimated_sigma =
             estimated_sigma_mm.map(|sigma: f64| sigma * 1e-3).filter(|sigma| *sigma > 0.0);
-        let known =
-            Strategy::EACH.into_iter().find(|known| strategy.as_deref() == Some(known.as_str()));
-        let strategy = known.unwrap_or_default();
+        let named =
+            Strategy::EACH.into_iter().find(|named| strategy.as_deref() == Some(named.as_str()));
+        let strategy = named.unwrap_or_default();
         Ok(Self {
             file,
             trusted,
@@ -154,13 +154,13 @@ impl SavedEstimate {
         })
     }
 
-    /// The model that was fitted, of the declared one: [`Strategy::model`].
+    /// Returns the model that was fitted, by [`Strategy::model`].
     #[must_use]
     pub fn model(&self, declared: Model) -> Model {
         self.strategy.model(declared)
     }
 
-    /// Lets the time of poses count from where it counted in the identification.
+    /// Sets the elapsed time of `poses` relative to the start time of the identification.
     pub fn count_time_in(&self, poses: &mut [Pose]) {
         if let Some(first) = self.first_time {
             for pose in poses {
@@ -169,11 +169,11 @@ impl SavedEstimate {
         }
     }
 
-    /// Whether it is of `problem`, of which `model` is one: bases and tools of sessions that the
-    /// model lacks are left alone.
+    /// Checks that the estimate is of `problem` with model `model`. Bases and tools of sessions that
+    /// the model lacks are ignored.
     ///
     /// # Errors
-    /// It is of another problem, or of the same one declared otherwise.
+    /// Returns an error if the estimate is of another problem, or of another declaration of it.
     pub fn check(&self, problem: &Problem, model: &Model) -> Result<(), SavedEstimateError> {
         let file = || self.file.clone();
         if self.problem != problem.name {
@@ -182,15 +182,15 @@ impl SavedEstimate {
         }
         for entry in &self.parameters {
             let name = || entry.name.clone();
-            let Some(own) = model.parameters.iter().find(|parameter| parameter.name == entry.name)
+            let Some(parameter) = model.parameters.iter().find(|known| known.name == entry.name)
             else {
                 if entry.name.starts_with("base[") || entry.name.starts_with("tool[") {
                     continue;
                 }
                 return Err(SavedEstimateError::NotFree { file: file(), name: name() });
             };
-            if (own.nominal - entry.nominal).abs() > 1e-9 * own.nominal.abs().max(1.0) {
-                let (found, expected) = (entry.nominal, own.nominal);
+            if (parameter.nominal - entry.nominal).abs() > 1e-9 * parameter.nominal.abs().max(1.0) {
+                let (found, expected) = (entry.nominal, parameter.nominal);
                 return Err(SavedEstimateError::OtherNominal {
                     file: file(),
                     name: name(),
@@ -205,18 +205,19 @@ impl SavedEstimate {
         Ok(())
     }
 
-    /// Whether the rows that were fitted leave open where a base is in its measuring frame, as
-    /// contacts with sockets of unknown places do.
+    /// Returns true if the fitted rows do not determine the pose of a base in its measuring frame, as
+    /// contacts with sockets at unknown places do not.
     pub fn leaves_base_open(&self) -> bool {
-        let is_base = |own: &&Entry| own.name.starts_with("base.") || own.name.starts_with("base[");
-        let is_open = |own: &Entry| {
-            own.std_error.is_none() && own.identified.is_some_and(|part| part < IDENTIFIED)
+        let is_base =
+            |entry: &&Entry| entry.name.starts_with("base.") || entry.name.starts_with("base[");
+        let is_open = |entry: &Entry| {
+            entry.std_error.is_none() && entry.identified.is_some_and(|part| part < IDENTIFIED)
         };
         self.parameters.iter().filter(is_base).any(is_open)
     }
 
-    /// Words in brackets behind `base` or `tool`, in the order of the file; one that is empty where
-    /// there are none.
+    /// Returns the words in brackets behind `base` or `tool`, in the order of the file; one empty word
+    /// where there are none.
     pub fn words(&self, of: &str) -> Vec<String> {
         let mut words: Vec<String> = Vec::new();
         for entry in &self.parameters {
@@ -225,7 +226,7 @@ impl SavedEstimate {
                 .strip_prefix(of)
                 .and_then(|rest| rest.strip_prefix('[')?.split_once(']'));
             if let Some((word, _)) =
-                bracket.filter(|(word, _)| !words.iter().any(|known| known == word))
+                bracket.filter(|(word, _)| !words.iter().any(|earlier| earlier == word))
             {
                 words.push(word.to_owned());
             }
@@ -233,15 +234,16 @@ impl SavedEstimate {
         if words.is_empty() { vec![String::new()] } else { words }
     }
 
-    /// Estimated value of a parameter \[SI\].
+    /// Returns the estimated value of a parameter \[SI\].
     pub fn value(&self, name: &str) -> Option<f64> {
         self.parameters.iter().find(|entry| entry.name == name).map(|entry| entry.estimate)
     }
 
-    /// The full parameter vector of a model of `problem`.
+    /// Returns the full parameter vector of a model of `problem`.
     ///
     /// # Errors
-    /// It is of another problem or arm, or lacks a parameter that the model has.
+    /// Returns an error if the estimate is of another problem or arm, or lacks a parameter of the
+    /// model.
     pub fn vector(
         &self,
         problem: &Problem,

@@ -1,5 +1,4 @@
-//! What held-out poses say of a fit: they decide nothing in it, and are judged by it and it by
-//! them.
+//! Checks of held-out rows against the fit: copies, outliers, and large errors.
 
 use std::collections::HashSet;
 
@@ -22,13 +21,13 @@ const WORSE: f64 = 1.5;
 /// … where the fitted error is also this multiple of the noise.
 const ABOVE_NOISE: f64 = 5.0;
 
-/// Held-out rows whose errors of position are too long for the fit's σ and its own uncertainty
-/// there, in the order of the rows.
+/// Returns the held-out rows that are farther from the prediction than the σ and the covariance of the
+/// fit allow, in the order of the rows.
 ///
-/// A row is one where P(χ²ₖ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², r and J
+/// A row is an outlier where P(χ²ₖ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², r and J
 /// whitened by the σ that the fit took, C the covariance of its `unknowns` at `x`. The scatter is
-/// the median of s / √(median of χ²ₖ), no less than 1: so a model that misses some effect
-/// everywhere does not turn every row into one.
+/// the median of s / √(median of χ²ₖ), at least 1, so that a model which misses an effect everywhere
+/// does not make every row an outlier.
 pub(in crate::fit) fn outliers(
     fitting: &Fitting,
     x: &DVector<f64>,
@@ -53,10 +52,10 @@ pub(in crate::fit) fn outliers(
             let residual = Vector3::from_fn(|i, _| block.column(n)[of_pose * pose + i]);
             let entry =
                 |i: usize, k: usize| spread.row(3 * pose + i).dot(&jacobian.row(3 * pose + k));
-            let own = Matrix3::identity() + Matrix3::from_fn(entry);
+            let variance = Matrix3::identity() + Matrix3::from_fn(entry);
             // Scaled: squares of what is far off overflow.
             let size = residual.amax().max(1.0);
-            let square = own.cholesky().map_or(f64::NAN, |factor| {
+            let square = variance.cholesky().map_or(f64::NAN, |factor| {
                 (residual / size).dot(&factor.solve(&(residual / size)))
             });
             size * square.max(0.0).sqrt()
@@ -78,8 +77,8 @@ pub(in crate::fit) fn outliers(
     (0..rows.len()).filter_map(outlier).collect()
 }
 
-/// Number of held-out rows that are identification rows again: configuration, position and session
-/// are the same to the bit.
+/// Returns the number of held-out rows that are identification rows again: configuration, position and
+/// session are equal to the bit.
 fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usize]) -> usize {
     let key = |row: usize| -> Vec<u64> {
         let values =
@@ -91,8 +90,8 @@ fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usi
             .chain([measurements.session.of_row[row]]);
         values.map(|value| value.to_bits()).chain(words.map(|word| word as u64)).collect()
     };
-    let known: HashSet<Vec<u64>> = identification.iter().map(|&row| key(row)).collect();
-    held_out.iter().filter(|&&row| known.contains(&key(row))).count()
+    let fitted: HashSet<Vec<u64>> = identification.iter().map(|&row| key(row)).collect();
+    held_out.iter().filter(|&&row| fitted.contains(&key(row))).count()
 }
 
 /// Number of held-out rows that a text names.
@@ -173,7 +172,7 @@ impl Check for BetterThanNominal {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let kind = fit.fitted.held_out.kind;
         let (before, after) = (fit.registered.held_out.rms.norm, fit.fitted.held_out.rms.norm);
-        let row_kind = fit.kinds().into_iter().find(|own| own.observation.kind() == kind);
+        let row_kind = fit.kinds().into_iter().find(|row_kind| row_kind.observation.kind() == kind);
         let Some(RowKind { observation, taken_sigma, .. }) = row_kind else { return Vec::new() };
         let noise = observation.root() * taken_sigma;
         if !(after > WORSE * before && after > ABOVE_NOISE * noise) {

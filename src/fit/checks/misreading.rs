@@ -1,10 +1,9 @@
-//! How a table, or a number of the problem, may have been misread where the nominal arm is far from
-//! its measurements.
+//! Misreadings of a table or problem that would explain why the nominal arm is far from its
+//! measurements.
 
 use std::f64::consts::PI;
 use std::fmt;
 
-use nalgebra::Vector3;
 
 use crate::fit::Placement;
 use crate::fit::stages::fitting::Fitting;
@@ -13,43 +12,42 @@ use crate::measurement::{Measurements, Split};
 use crate::model::Model;
 use crate::problem::{Joint, JointKind, Problem};
 
-/// Read otherwise the nominal arm misses the measurements by no more than this part of what it
-/// misses them by as they are.
+/// Part of the error as read that a misreading which explains it leaves.
 const EXPLAINED: f64 = 0.2;
-/// A reading that does nearly as well as the best one is named beside it.
+/// Ratio of the errors up to which a misreading is named beside the best one.
 const AS_GOOD: f64 = 1.5;
-/// Beyond so many sizes of the arm no misreading leads: millimetres are a thousand times metres.
-const MOST_SIZES: f64 = 1e4;
-/// Rows that are looked at.
-const MOST_ROWS: usize = 200;
+/// Error in reaches of the arm beyond which no misreading is tried: millimetres taken for metres give
+/// a factor of 1000.
+const MAX_REACHES: f64 = 1e4;
+/// Maximum number of rows that are looked at.
+const MAX_ROWS: usize = 200;
 /// Maximum number of moving joints of which every set is tried as reversed.
 const MAX_REVERSED: usize = 7;
-/// A length beyond this may be meant in millimetres, of which a link has one at least \[m\].
+/// Length beyond which a number may be in millimetres \[m\].
 const LONG: f64 = 1.0;
 
-/// What may have been taken for something else.
+/// Misreading: a quantity that may have been declared in the wrong unit, sign or order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Misreading {
-    /// Joint angles in degrees, declared as radians.
+    /// Joint angles are in degrees, declared as radians.
     Degrees,
-    /// Joint angles in radians, declared as degrees.
+    /// Joint angles are in radians, declared as degrees.
     Radians,
-    /// Positions in metres, declared as millimetres.
+    /// Positions are in metres, declared as millimetres.
     Metres,
-    /// Positions in millimetres, declared as metres.
+    /// Positions are in millimetres, declared as metres.
     Millimetres,
-    /// Positions in a left-handed frame: two coordinates exchanged, or one of the other sign.
+    /// Positions are in a left-handed frame: two coordinates are exchanged, or one has the wrong sign.
     Mirrored,
     /// Joints that count the other way.
     Reversed {
         /// Set of joints; bit k stands for joint k + 1.
         joints: u64,
     },
-    /// The target of `[tool]` in millimetres, declared as metres.
+    /// The target of `[tool]` is in millimetres, declared as metres.
     TargetInMillimetres,
-    /// Lengths of joints in millimetres, declared as metres, and the target likewise where it is as
-    /// long.
+    /// Lengths of joints are in millimetres, declared as metres, and so is a target as long.
     ArmInMillimetres,
 }
 
@@ -95,7 +93,7 @@ impl Misreading {
         Self::Reversed { joints: joints.iter().map(|joint| 1 << (joint - 1)).sum() }
     }
 
-    /// All that an arm and the columns of some rows may have.
+    /// Returns every misreading that the problem and the columns of its table allow.
     fn all(problem: &Problem, rows: &Measurements) -> Vec<Self> {
         let turns = |radians| {
             (0..problem.joints.len()).any(|joint| turns_in(problem, rows, joint, radians))
@@ -104,7 +102,7 @@ impl Misreading {
         let long = problem
             .joints
             .iter()
-            .any(|joint| lengths_of(&mut joint.clone()).iter().any(|own| own.abs() > LONG));
+            .any(|joint| lengths_of(&mut joint.clone()).iter().any(|length| length.abs() > LONG));
         let mut all = Vec::new();
         all.extend(turns(true).then_some(Self::Degrees));
         all.extend(turns(false).then_some(Self::Radians));
@@ -122,14 +120,17 @@ impl Misreading {
         all
     }
 
-    /// The problem as it should have been written, where the reading is about that.
+    /// Returns the problem as it should have been written, if the misreading concerns the problem.
     fn rewritten(self, problem: &Problem) -> Option<Problem> {
         let mut problem = problem.clone();
         match self {
             Self::TargetInMillimetres => {}
             Self::ArmInMillimetres => {
-                for length in
-                    problem.joints.iter_mut().flat_map(lengths_of).filter(|own| own.abs() > LONG)
+                for length in problem
+                    .joints
+                    .iter_mut()
+                    .flat_map(lengths_of)
+                    .filter(|length| length.abs() > LONG)
                 {
                     *length *= 1e-3;
                 }
@@ -142,12 +143,14 @@ impl Misreading {
         Some(problem)
     }
 
-    /// The rows as they should have been read.
+    /// Changes `rows` to what they should have been read as.
     fn mend(self, rows: &mut Measurements, problem: &Problem) {
         let (factor, chosen): (f64, &dyn Fn(usize) -> bool) = match self {
             Self::Degrees => (PI / 180.0, &|joint| turns_in(problem, rows, joint, true)),
             Self::Radians => (180.0 / PI, &|joint| turns_in(problem, rows, joint, false)),
-            Self::Reversed { joints } => (-1.0, &move |own| own < 64 && joints >> own & 1 == 1),
+            Self::Reversed { joints } => {
+                (-1.0, &move |joint| joint < 64 && joints >> joint & 1 == 1)
+            }
             _ => (1.0, &|_| false),
         };
         let chosen: Vec<bool> = (0..problem.joints.len()).map(chosen).collect();
@@ -157,13 +160,13 @@ impl Misreading {
             Self::Metres => rows.positions.iter_mut().for_each(|position| *position *= 1e3),
             Self::Millimetres => rows.positions.iter_mut().for_each(|position| *position *= 1e-3),
             Self::Mirrored => {
-                rows.positions.iter_mut().for_each(|own| *own = Vector3::new(own.y, own.x, own.z))
+                rows.positions.iter_mut().for_each(|position| position.swap_rows(0, 1))
             }
             _ => {}
         }
     }
 
-    /// Root mean squared error of the registered nominal arm with some rows read this way \[m\].
+    /// Returns the root mean squared error of the registered nominal arm with `rows` read this way \[m\].
     fn rms(
         self,
         fitting: &Fitting,
@@ -201,60 +204,66 @@ impl Misreading {
     }
 }
 
-/// Whether a joint turns and its column is in radians, or else in degrees; either where nobody
-/// knows.
+/// Returns true if a joint is revolute and its column may be in radians, or else in degrees; both may
+/// be where the unit is not known.
 fn turns_in(problem: &Problem, rows: &Measurements, joint: usize, radians: bool) -> bool {
     let turns =
         problem.joints.get(joint).is_some_and(|own| own.command_kind() == JointKind::Revolute);
-    let column = rows.command_columns.iter().find(|own| own.joint == joint);
-    turns && column.is_none_or(|own| (own.unit >= 1.0) == radians)
+    let column = rows.command_columns.iter().find(|column| column.joint == joint);
+    turns && column.is_none_or(|column| (column.unit >= 1.0) == radians)
 }
 
-/// The lengths of a joint \[m\].
+/// Returns the lengths of a joint \[m\].
 fn lengths_of(joint: &mut Joint) -> Vec<&mut f64> {
-    let placement = joint.placement.as_mut().map(|own| own.xyz.iter_mut());
+    let placement = joint.placement.as_mut().map(|placement| placement.xyz.iter_mut());
     [&mut joint.a, &mut joint.d].into_iter().chain(placement.into_iter().flatten()).collect()
 }
 
-/// Whether the target of `[tool]` is so far that it may be in millimetres.
+/// Returns true if the target of `[tool]` is so far away that it may be in millimetres.
 fn is_far(problem: &Problem) -> bool {
     problem.targets.is_empty() && problem.tool.target.norm() > LONG
 }
 
-/// Misreadings any one of which would explain why the registered nominal arm misses the
+/// Returns the misreadings each of which would explain why the registered nominal arm misses the
 /// measurements by `rms` \[m\], the best first.
 pub(in crate::fit) fn misreadings(
     fitting: &Fitting,
     problem: &Problem,
     rms: f64,
 ) -> Vec<Misreading> {
-    if rms.is_nan() || rms > MOST_SIZES * fitting.model.reach() {
+    if rms.is_nan() || rms > MAX_REACHES * fitting.model.reach() {
         return Vec::new();
     }
     let identification = &fitting.split.identification;
     let chosen: Vec<usize> = identification
         .iter()
         .copied()
-        .step_by(identification.len().div_ceil(MOST_ROWS).max(1))
+        .step_by(identification.len().div_ceil(MAX_ROWS).max(1))
         .collect();
     let rows = fitting.measurements.select(&chosen);
     let split = Split { identification: (0..rows.len()).collect(), held_out: Vec::new() };
-    let one = |own: Misreading| Some((own, own.rms(fitting, problem, &rows, &split)?));
+    let error = |misreading: Misreading| {
+        Some((misreading, misreading.rms(fitting, problem, &rows, &split)?))
+    };
     // Contacts with one point agree with every arm that hardly moves.
-    let tells = |own: &Misreading| {
-        rows.leading().is_position() || matches!(own, Misreading::Reversed { .. })
+    let is_tested = |misreading: &Misreading| {
+        rows.leading().is_position() || matches!(misreading, Misreading::Reversed { .. })
     };
     let explains = |found: &(Misreading, f64)| found.1 < EXPLAINED * rms;
     let singles: Vec<Misreading> =
-        Misreading::all(problem, &rows).into_iter().filter(tells).collect();
+        Misreading::all(problem, &rows).into_iter().filter(is_tested).collect();
     let mut explained: Vec<(Misreading, f64)> =
-        singles.iter().copied().filter_map(one).filter(explains).collect();
+        singles.iter().copied().filter_map(error).filter(explains).collect();
     if explained.is_empty() {
-        explained.extend(several_reversed(&singles, one).filter(explains));
+        explained.extend(several_reversed(&singles, error).filter(explains));
     }
     explained.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let best = explained.first().map_or(0.0, |own| own.1);
-    explained.into_iter().filter(|(_, left)| *left <= AS_GOOD * best).map(|(own, _)| own).collect()
+    let best = explained.first().map_or(0.0, |found| found.1);
+    explained
+        .into_iter()
+        .filter(|(_, left)| *left <= AS_GOOD * best)
+        .map(|(found, _)| found)
+        .collect()
 }
 
 /// Returns the set of two and more joints which, taken to count the other way, leave the smallest
@@ -265,7 +274,7 @@ fn several_reversed(
 ) -> impl Iterator<Item = (Misreading, f64)> {
     let joints: Vec<u64> = singles
         .iter()
-        .filter_map(|own| match own {
+        .filter_map(|misreading| match misreading {
             Misreading::Reversed { joints } => Some(*joints),
             _ => None,
         })
@@ -277,10 +286,14 @@ fn several_reversed(
     let sets = (1..1_u64 << joints.len()).filter(|bits| bits.count_ones() > 1).map(set);
     let sets = sets.filter_map(|joints| error(Misreading::Reversed { joints }));
     let errors: Vec<(Misreading, f64)> = sets.collect();
-    let best = errors.iter().map(|own| own.1).fold(f64::INFINITY, f64::min);
-    let size = |own: &(Misreading, f64)| match own.0 {
+    let best = errors.iter().map(|(_, error)| *error).fold(f64::INFINITY, f64::min);
+    let size = |found: &(Misreading, f64)| match found.0 {
         Misreading::Reversed { joints } => joints.count_ones(),
         _ => 0,
     };
-    errors.into_iter().filter(move |own| own.1 <= AS_GOOD * best).min_by_key(size).into_iter()
+    errors
+        .into_iter()
+        .filter(move |(_, error)| *error <= AS_GOOD * best)
+        .min_by_key(size)
+        .into_iter()
 }

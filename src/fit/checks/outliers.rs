@@ -12,14 +12,14 @@ use crate::measurement::Measurements;
 pub struct Outlier {
     /// Row of the measurements, counted from 0 over all files.
     pub row: usize,
-    /// File and line.
+    /// File and line of the row.
     pub location: Location,
-    /// What the row measures ([`Observation::kind`](crate::problem::Observation::kind)).
+    /// Kind of the row ([`Observation::kind`](crate::problem::Observation::kind)).
     pub kind: &'static str,
     /// Length of the whitened residual in units of the scatter \[σ\].
     pub distance: f64,
-    /// Residual measured − predicted, measuring frame \[m\]; of one number along x, of tilts
-    /// \[rad\].
+    /// Residual measured − predicted, measuring frame \[m\], for tilts \[rad\]; a single number is
+    /// along x.
     pub error: Vector3<f64>,
 }
 
@@ -38,11 +38,11 @@ impl Outlier {
 /// Few rows without which the fit would explain the others far better.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InfluentialRows {
-    /// The rows, in their order.
+    /// Influential rows, in the order of the table.
     pub rows: Vec<Outlier>,
-    /// χ² over its degrees of freedom of the fit without them; `None` with the noise estimated.
+    /// χ² over its degrees of freedom of the fit without these rows; `None` if the noise is estimated.
     pub reduced_chi2: Option<f64>,
-    /// 1 σ of a coordinate that the fit without them takes \[m\]; of tilts \[rad\].
+    /// 1 σ of a coordinate that the fit without these rows takes \[m\], for tilts \[rad\].
     pub sigma_taken: f64,
 }
 

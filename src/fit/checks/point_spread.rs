@@ -1,4 +1,4 @@
-//! How far apart the arm puts its target in rows in which it was at one and the same point.
+//! Scatter of the predicted target over the rows in which it touched one point.
 
 use nalgebra::{DVector, Matrix3, SymmetricEigen, Vector3};
 
@@ -8,50 +8,53 @@ use crate::model::{Model, Pose};
 use crate::numeric::median;
 use crate::problem::{Fixture, Observation};
 
-/// A point whose spread is so many times the median of all: points that took no part in a fit may
-/// spread half as much again.
+/// Ratio of the scatter at a point to the median of all points from which on the point is unsteady;
+/// points that were not fitted may scatter half as much again as others.
 const UNSTEADY: f64 = 2.5;
-/// … and whose squares are to this part along one direction, where scatter of equal size in all has
-/// a third there.
+/// Part of the squares along one direction from which on a point is unsteady; isotropic scatter has a
+/// third along each direction.
 const ONE_WAY: f64 = 0.7;
-/// … of so many rows at least, and so many points.
-const LEAST: usize = 8;
-const LEAST_POINTS: usize = 4;
+/// Minimum number of rows of a point that is compared.
+const MIN_ROWS: usize = 8;
+/// Minimum number of points that are compared.
+const MIN_POINTS: usize = 4;
 
-/// What an arm makes of the rows at one point; no place of the point takes part.
+/// Scatter of the predicted target over the rows at one point, whatever the place of the point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointSpread {
-    /// Name of the point.
+    /// Name of the touched point.
     pub point: String,
-    /// Its rows.
+    /// Number of rows at the point.
     pub n: usize,
     /// Mean distance of the predicted target from its mean \[m\].
     pub mean: f64,
-    /// Direction in which it is largest, measuring frame.
+    /// Direction in which the scatter is largest, measuring frame.
     pub along: Vector3<f64>,
-    /// Part of the squares that lies along it.
+    /// Part of the squares along this direction, 0…1.
     pub share: f64,
 }
 
 impl PointSpread {
-    /// Those of some points that spread far more than the others and along one direction alone:
-    /// what they are fixed to may have moved or given way, which no arm explains. Each with its
-    /// spread over the median of all.
-    pub fn unsteady<'a>(all: impl IntoIterator<Item = &'a Self>) -> Vec<(&'a Self, f64)> {
-        let all: Vec<&Self> =
-            all.into_iter().filter(|own| own.n >= LEAST && own.mean.is_finite()).collect();
-        let Some(middle) =
-            median(all.iter().map(|own| own.mean)).filter(|_| all.len() >= LEAST_POINTS)
-        else {
+    /// Returns the points that scatter far more than the others and along one direction, each with its
+    /// scatter over the median of all. They may have moved or given way, which no arm explains.
+    pub fn unsteady<'a>(spreads: impl IntoIterator<Item = &'a Self>) -> Vec<(&'a Self, f64)> {
+        let compared: Vec<&Self> = spreads
+            .into_iter()
+            .filter(|spread| spread.n >= MIN_ROWS && spread.mean.is_finite())
+            .collect();
+        let means = compared.iter().map(|spread| spread.mean);
+        let Some(middle) = median(means).filter(|_| compared.len() >= MIN_POINTS) else {
             return Vec::new();
         };
-        let stands_out = |own: &&Self| own.mean > UNSTEADY * middle && own.share > ONE_WAY;
-        all.into_iter().filter(stands_out).map(|own| (own, own.mean / middle)).collect()
+        let is_unsteady =
+            |spread: &&Self| spread.mean > UNSTEADY * middle && spread.share > ONE_WAY;
+        let unsteady = compared.into_iter().filter(is_unsteady);
+        unsteady.map(|spread| (spread, spread.mean / middle)).collect()
     }
 }
 
-/// The spread at each point that some of `poses` touch, with the arm at the full parameter vector
-/// `x`; NaN where a pose has no equilibrium.
+/// Returns the scatter at each point that some of `poses` touch, with the arm at the full parameter
+/// vector `x`; NaN where a pose has no equilibrium.
 pub(in crate::fit) fn spreads(
     model: &Model,
     fixtures: &[Fixture],
@@ -61,23 +64,23 @@ pub(in crate::fit) fn spreads(
     let bases = model.base_frames(x.as_slice());
     let points = model.predicted_targets_in_base(poses, x.as_slice());
     let of_point = |(index, fixture): (usize, &Fixture)| {
-        let own = poses
+        let touching = poses
             .iter()
             .zip(&points)
             .filter(|(pose, _)| pose.observation == Observation::Point(index));
         let lost = Vector3::from_element(f64::NAN);
-        let own: Vec<Vector3<f64>> = own
+        let touched: Vec<Vector3<f64>> = touching
             .map(|(pose, point)| point.map_or(lost, |point| bases[pose.base].point(&point)))
             .collect();
-        let n = own.len() as f64;
-        let middle = own.iter().sum::<Vector3<f64>>() / n;
-        let mean = own.iter().map(|point| (point - middle).norm()).sum::<f64>() / n;
+        let n = touched.len() as f64;
+        let middle = touched.iter().sum::<Vector3<f64>>() / n;
+        let mean = touched.iter().map(|point| (point - middle).norm()).sum::<f64>() / n;
         let squares: Matrix3<f64> =
-            own.iter().map(|point| (point - middle) * (point - middle).transpose()).sum();
+            touched.iter().map(|point| (point - middle) * (point - middle).transpose()).sum();
         let (along, share) = longest(squares);
-        (!own.is_empty()).then(|| PointSpread {
+        (!touched.is_empty()).then(|| PointSpread {
             point: fixture.name.clone(),
-            n: own.len(),
+            n: touched.len(),
             mean,
             along,
             share,
@@ -87,9 +90,8 @@ pub(in crate::fit) fn spreads(
 }
 
 impl Fitting<'_> {
-    /// The spread of the target at each point that was touched, with the arm at the full parameter
-    /// vectors of the registered nominal arm and of the fitted one, and whether all of the point's
-    /// rows were held out.
+    /// Returns the scatter of the predicted target at each touched point, with the registered nominal
+    /// arm and with the fitted one, and whether all rows of the point are held out.
     pub fn spreads(
         &self,
         fixtures: &[Fixture],
@@ -115,15 +117,15 @@ impl Fitting<'_> {
     }
 }
 
-/// The direction in which squares are largest, its largest component positive, and their part along
-/// it; NaN where they are not known.
+/// Returns the direction in which squares are largest, with its largest component positive, and their
+/// part along it; NaN where the squares are not finite or zero.
 fn longest(squares: Matrix3<f64>) -> (Vector3<f64>, f64) {
     let trace = squares.trace();
     if !(trace.is_finite() && trace > 0.0) {
         return (Vector3::from_element(f64::NAN), f64::NAN);
     }
-    let own = SymmetricEigen::new(squares);
-    let most = own.eigenvalues.imax();
-    let along: Vector3<f64> = own.eigenvectors.column(most).into_owned();
-    (along * along[along.iamax()].signum(), own.eigenvalues[most] / trace)
+    let eigen = SymmetricEigen::new(squares);
+    let most = eigen.eigenvalues.imax();
+    let along: Vector3<f64> = eigen.eigenvectors.column(most).into_owned();
+    (along * along[along.iamax()].signum(), eigen.eigenvalues[most] / trace)
 }

@@ -1,4 +1,4 @@
-//! Whether there are poses enough for what is fitted to them.
+//! Sufficiency of the poses: whether they measure enough coordinates for the fitted parameters.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,24 +12,24 @@ use crate::model::Model;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::problem::{Observation, Problem};
 
-/// Coordinates of a rigid body: what any number of targets in one pose of the arm tell of it.
+/// Number of coordinates of a rigid body; any number of targets in one pose measure no more of it.
 const BODY: usize = 6;
 
-/// What the poses are enough for.
+/// Number of independent coordinates of the identification poses, and what they are too few for.
 pub(in crate::fit) struct PoseSufficiency {
     /// Finding about what the poses are too few for, whatever the priors are.
     pub finding: Option<Finding>,
     /// Measured coordinates that are independent of each other.
     pub coordinates: usize,
-    /// Different poses of the arm among the identification rows, several targets in one pose being
-    /// one.
+    /// Number of different poses of the arm among the identification rows; several targets in one pose
+    /// count once.
     pub poses: usize,
-    /// Whether some pose of the arm shows several of them.
+    /// Whether some pose of the arm shows several targets.
     pub several_targets: bool,
 }
 
 impl PoseSufficiency {
-    /// For the parameters `unknowns` of a fit that begins at the full parameter vector `at`.
+    /// Examines the poses of a fit of `unknowns` that starts at the full parameter vector `at`.
     pub fn of(
         fitting: &Fitting,
         problem: &Problem,
@@ -49,18 +49,18 @@ impl PoseSufficiency {
         let coordinates = coordinates(fitting, (&numbers, &of_arm), &split.identification, &of_row);
         let without_prior = unknowns.iter().filter(|parameter| parameter.sigma.is_none()).count();
         let (rows, later) = (&split.identification, &held_out_only.rows);
-        let (own, theirs) =
-            (|k: usize| !held_out_only.parameters[k], |k: usize| held_out_only.parameters[k]);
+        let is_fitted = |k: usize| !held_out_only.parameters[k];
+        let is_held_out = |k: usize| held_out_only.parameters[k];
         let finding = (coordinates < without_prior)
             .then(|| too_few("the fit".to_owned(), coordinates, without_prior))
             .or_else(|| {
-                underdetermined((model, placement), (&numbers, &of_row), (rows, false), own)
+                underdetermined((model, placement), (&numbers, &of_row), (rows, false), is_fitted)
             })
             .or_else(|| {
-                underdetermined((model, placement), (&numbers, &of_row), (later, true), theirs)
+                underdetermined((model, placement), (&numbers, &of_row), (later, true), is_held_out)
             })
-            .or_else(|| undetermined(fitting, &numbers, rows, at, own))
-            .or_else(|| undetermined(fitting, &numbers, later, at, theirs));
+            .or_else(|| undetermined(fitting, &numbers, rows, at, is_fitted))
+            .or_else(|| undetermined(fitting, &numbers, later, at, is_held_out));
         let several_targets =
             poses < count_distinct(&numbers, split.identification.iter().copied());
         Self { finding, coordinates, poses, several_targets }
@@ -82,9 +82,9 @@ fn too_few(of: String, coordinates: usize, parameters: usize) -> Finding {
     Finding::new(FindingCode::TooFewEquations, numbers, text)
 }
 
-/// Coordinates that tell of the arm and of its targets: as many as each different point has, but no
-/// more than six for a pose of the frame that carries them, with those of contacts and distances
-/// added one by one; the shape of a frame's targets is one measurement more.
+/// Returns the number of independent coordinates: those of each different point, but at most six for a
+/// pose of the frame that carries them, and those of contacts and distances. The shape of the targets
+/// of a frame counts once more.
 fn coordinates(
     fitting: &Fitting,
     (numbers, of_arm): (&[usize], &[usize]),
@@ -94,7 +94,7 @@ fn coordinates(
     let Fitting { model, measurements, placement, .. } = fitting;
     let (positions, others): (Vec<usize>, Vec<usize>) =
         rows.iter().partition(|&&row| measurements.observation(row).is_position());
-    // By the frame that carries them.
+    // Points and targets by the frame that carries them.
     let mut points: BTreeMap<(usize, usize), BTreeMap<usize, usize>> = BTreeMap::new();
     let mut targets: BTreeMap<usize, BTreeMap<usize, usize>> = BTreeMap::new();
     for &row in &positions {
@@ -103,26 +103,27 @@ fn coordinates(
         points.entry((carrier, of_arm[row])).or_default().insert(numbers[row], of_row[row]);
         targets.entry(carrier).or_default().insert(target, of_row[row]);
     }
-    let of_pose = |own: &BTreeMap<usize, usize>| own.values().sum::<usize>();
-    let of_poses: usize = points.values().map(|own| of_pose(own).min(BODY)).sum();
-    let several =
-        |carrier: usize| points.iter().any(|(own, all)| own.0 == carrier && of_pose(all) > BODY);
+    let of_pose = |targets: &BTreeMap<usize, usize>| targets.values().sum::<usize>();
+    let of_poses: usize = points.values().map(|targets| of_pose(targets).min(BODY)).sum();
+    let several = |carrier: usize| {
+        points.iter().any(|(key, targets)| key.0 == carrier && of_pose(targets) > BODY)
+    };
     let contacts: BTreeSet<(usize, Observation)> =
         others.iter().map(|&row| (of_arm[row], measurements.observation(row))).collect();
     let of_contacts: usize =
         contacts.iter().map(|(_, observation)| observation.coordinates()).sum();
     let of_targets = targets.iter().filter(|(carrier, _)| several(**carrier));
-    let of_targets: usize = of_targets.map(|(_, all)| of_pose(all).saturating_sub(BODY)).sum();
+    let of_targets: usize = of_targets.map(|(_, shape)| of_pose(shape).saturating_sub(BODY)).sum();
     of_poses + of_targets + of_contacts
 }
 
-/// `base[A]`, or `base` where there is one without a name.
+/// Returns the label of a base or tool: `base[A]`, or `base` for one without a name.
 fn label(what: &str, word: &str) -> String {
     if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") }
 }
 
-/// The first base whose place the points of `rows` leave open, by the parameters without a prior
-/// that are `varied` there.
+/// Reports the first base whose pose the points of `rows` do not determine, considering its `varied`
+/// parameters without a prior.
 fn undetermined(
     fitting: &Fitting,
     numbers: &[usize],
@@ -132,48 +133,51 @@ fn undetermined(
 ) -> Option<Finding> {
     let Fitting { model, placement, .. } = fitting;
     let open = |b: &usize| {
-        // Contacts may leave the place of a base open, which is then one of the combinations that
-        // they do not see.
-        let own = rows.iter().copied().filter(|&row| placement.base_of(row) == *b);
-        let own: Vec<usize> =
-            own.filter(|&row| fitting.measurements.observation(row).is_position()).collect();
+        // Contacts may leave the pose of a base open, which is then reported as an unidentifiable
+        // combination.
+        let of_base = rows.iter().copied().filter(|&row| placement.base_of(row) == *b);
+        let points: Vec<usize> =
+            of_base.filter(|&row| fitting.measurements.observation(row).is_position()).collect();
         let counts = |k: &usize| {
             let parameter = &model.parameters[*k];
             let of_base = matches!(parameter.site, ParameterSite::Base { base, .. } if base == *b);
             of_base && parameter.sigma.is_none() && varied(*k)
         };
         let unknowns: Vec<usize> = (0..model.parameters.len()).filter(counts).collect();
-        if own.is_empty() || unknowns.is_empty() {
+        if points.is_empty() || unknowns.is_empty() {
             return false;
         }
         let none = vec![false; unknowns.len()];
-        fitting.stage(&own, unknowns).gauge(at, &none, &[]).rows.nrows() > 0
+        fitting.stage(&points, unknowns).gauge(at, &none, &[]).rows.nrows() > 0
     };
     let base = (0..placement.bases.len()).find(open)?;
-    let own = rows.iter().copied().filter(|&row| placement.base_of(row) == base);
-    let (of, poses) = (label("base", &placement.bases[base]), count_distinct(numbers, own));
+    let of_base = rows.iter().copied().filter(|&row| placement.base_of(row) == base);
+    let (of, poses) = (label("base", &placement.bases[base]), count_distinct(numbers, of_base));
     let text = format!(
         "{of}: its points, of {poses} different poses, are too few or lie on a line, which leaves a turn about it open"
     );
     Some(Finding::new(FindingCode::BaseNotDetermined, [of.into(), poses.into()], text))
 }
 
-/// A base, with the targets that no other base of `rows` uses, or a target with fewer coordinates
-/// measured in different poses of `rows` than parameters of its own without a prior; of the
-/// parameters that are `varied` there. `numbers` are those of the poses of all rows. Where
-/// `judged`, the rows have to leave something to judge by as well.
+/// Reports a base, with the targets that no other base of `rows` uses, or a target that has fewer
+/// coordinates in different poses of `rows` than `varied` parameters without a prior.
+///
+/// `numbers` are the pose numbers of all rows, `of_row` their numbers of coordinates. With `judged`,
+/// the rows must leave a degree of freedom for their errors.
 fn underdetermined(
     (model, placement): (&Model, &Placement),
     (numbers, of_row): (&[usize], &[usize]),
     (rows, judged): (&[usize], bool),
     varied: impl Fn(usize) -> bool,
 ) -> Option<Finding> {
-    let check = |of: String, used: &dyn Fn(usize) -> bool, own: &dyn Fn(ParameterSite) -> bool| {
+    let check = |of: String,
+                 used: &dyn Fn(usize) -> bool,
+                 is_part: &dyn Fn(ParameterSite) -> bool| {
         let apart: BTreeMap<usize, usize> =
             rows.iter().filter(|&&row| used(row)).map(|&row| (numbers[row], of_row[row])).collect();
         let coordinates = apart.values().sum::<usize>();
         let counts = |k: usize| {
-            varied(k) && model.parameters[k].sigma.is_none() && own(model.parameters[k].site)
+            varied(k) && model.parameters[k].sigma.is_none() && is_part(model.parameters[k].site)
         };
         let unknowns = (0..model.parameters.len()).filter(|&k| counts(k)).count();
         let enough = if judged { coordinates > unknowns } else { coordinates >= unknowns };
@@ -183,18 +187,18 @@ fn underdetermined(
         let alone = |t: usize| {
             rows.iter().all(|&row| placement.target_of(row) != t || placement.base_of(row) == b)
         };
-        let own = |site| match site {
+        let is_part = |site| match site {
             ParameterSite::Base { base, .. } => base == b,
             ParameterSite::Target { target, .. } => {
                 alone(target) && rows.iter().any(|&row| placement.target_of(row) == target)
             }
             _ => false,
         };
-        check(label("base", &placement.bases[b]), &|row| placement.base_of(row) == b, &own)
+        check(label("base", &placement.bases[b]), &|row| placement.base_of(row) == b, &is_part)
     };
     let target = |t: usize| {
-        let own = |site| matches!(site, ParameterSite::Target { target, .. } if target == t);
-        check(label("tool", &placement.targets[t]), &|row| placement.target_of(row) == t, &own)
+        let is_part = |site| matches!(site, ParameterSite::Target { target, .. } if target == t);
+        check(label("tool", &placement.targets[t]), &|row| placement.target_of(row) == t, &is_part)
     };
     let bases = (0..placement.bases.len()).find_map(base);
     bases.or_else(|| (0..placement.targets.len()).find_map(target))

@@ -1,20 +1,20 @@
-//! Columns without which a declared effect would silently be none.
+//! Columns that declared effects need.
 
 use crate::error::{InputError, InputErrorKind};
 use crate::measurement::Measurements;
 use crate::model::effect::Columns;
 use crate::problem::{EffectDeclaration, Problem};
 
-/// Checks that a table has the columns that the effects of `problem` follow.
+/// Checks that a table has every column that the effects of `problem` need.
 ///
 /// # Errors
-/// One is not there: the effect that follows it, by file and line.
+/// Returns an error at the file and line of the first effect whose column is missing.
 pub fn check_columns(problem: &Problem, rows: &Measurements) -> Result<(), InputError> {
     missing(problem, rows, rows.time_measured).next().map_or(Ok(()), Err)
 }
 
-/// For each effect that follows a column that targets do not have an error that says so, by file
-/// and line. Nothing was before targets: they need no times.
+/// Returns an error for each effect that needs a column which the targets `rows` lack. Targets have no
+/// earlier poses, so they need no times.
 pub fn missing_target_columns(problem: &Problem, rows: &Measurements) -> Vec<InputError> {
     missing(problem, rows, true).collect()
 }

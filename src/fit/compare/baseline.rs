@@ -1,4 +1,4 @@
-//! The paper's own procedure on the problem at hand, as a row to compare with.
+//! Procedure of the paper on the same problem, as a row of the comparison.
 
 use std::time::Instant;
 
@@ -11,36 +11,36 @@ use crate::measurement::{Dataset, Measurements};
 use crate::paper::{self, EndPoint, Form, Mdh, Measured, StiffnessStage};
 use crate::problem::{Joint, Problem};
 
-/// What the paper's closed forms and its iteration make of the data.
+/// Result of the paper's closed forms and iteration for the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Baseline {
-    /// As printed, or without the misprints.
+    /// Form of the equations: as printed, or with the misprints corrected.
     pub form: Form,
-    /// Where the stiffness came from.
+    /// Source of the stiffness.
     pub stage: StiffnessStage,
-    /// Table 2: α, a, θ, d, β of each joint.
+    /// Table 2 of the paper: α, a, θ, d, β of each joint.
     pub geometry: Vec<[TableEntry; 5]>,
-    /// Errors of the identified arm, predicted by the same closed forms.
+    /// Errors of the identified arm, predicted by these closed forms.
     pub errors: Errors,
     /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
     pub held_out: Vec<Vector3<f64>>,
-    /// Steps of the iteration of eq. 45.
+    /// Number of steps of the iteration of eq. 45.
     pub iterations: u64,
-    /// Evaluations of its residual.
+    /// Number of evaluations of the residual.
     pub evaluations: u64,
-    /// Time taken \[s\].
+    /// Duration \[s\].
     pub seconds: f64,
-    /// Why the iteration stopped.
+    /// Reason for which the iteration stopped.
     pub termination: Termination,
 }
 
 impl Baseline {
-    /// Name beside the strategies.
+    /// Returns the name in the list of strategies.
     pub fn name(&self) -> String {
         paper_name(self.form, self.stage)
     }
 
-    /// It in the terms of the paper, with what the rigid one leaves.
+    /// Returns the result in the terms of the paper, with the errors of the `rigid` one.
     pub(in crate::fit) fn procedure(&self, rigid: Option<&Self>) -> Procedure {
         let ignoring = rigid.map(|rigid| rigid.held_out.clone());
         let paper = Some((self.form, self.stage));
@@ -49,14 +49,13 @@ impl Baseline {
     }
 }
 
-/// Every form of the paper's procedure [Chen2021, eq. 1-45] that the identification rows allow: its
-/// closed forms corrected and as printed, the stiffness known, from positions, or from load
-/// differences; and once with elasticity ignored, the first.
+/// Runs every form of the paper's procedure [Chen2021, eq. 1-45] that the identification rows allow:
+/// first with elasticity ignored, then corrected and as printed, with stiffness known, from
+/// positions, or from load differences.
 ///
-/// None where the procedure does not apply: it knows base and target, so that there are no sessions
-/// or targets, it knows one chain, no joints placed by xyz and rpy and none that follow others, and
-/// it needs as many equations as it has geometric parameters. Without elasticity there is the rigid
-/// one alone.
+/// Returns nothing where the procedure does not apply: it needs one session and target, one chain of
+/// joints in DH form without mimic joints, and as many equations as geometric parameters. Without
+/// elasticity it returns the rigid form alone.
 pub(in crate::fit) fn baselines(problem: &Problem, data: &Dataset) -> Vec<Baseline> {
     let Dataset { measurements, .. } = data;
     let beyond = |joint: &Joint| joint.placement.is_some() || joint.mimic.is_some();
@@ -78,7 +77,7 @@ pub(in crate::fit) fn baselines(problem: &Problem, data: &Dataset) -> Vec<Baseli
         .collect()
 }
 
-/// Some rows as the procedure takes them.
+/// Returns `rows` in the form that the procedure takes.
 fn poses<'a>(data: &'a Measurements, rows: &[usize]) -> Vec<Measured<'a>> {
     let first = data.first_time();
     rows.iter()

@@ -1,5 +1,4 @@
-//! Every strategy with every solver, and every part of the elasticity left out in turn, on one
-//! problem.
+//! Comparison of strategies and solvers, and of models without parts of the elasticity.
 
 use nalgebra::{DVector, Vector3};
 
@@ -16,57 +15,55 @@ use crate::paper::StiffnessStage;
 use crate::paper::published::is_published_arm;
 use crate::problem::Problem;
 
-/// Strategies and solvers side by side.
+/// Results of all strategies and solvers for one problem.
 #[derive(Debug, Clone)]
 pub struct Comparison {
-    /// The declared model, everything fitted at once by the solver that `auto` takes.
+    /// Joint fit of the declared model by the solver that `auto` chooses.
     pub joint: Identification,
-    /// The same with elasticity ignored: geometry of a rigid arm.
+    /// Joint fit of the rigid arm, with elasticity ignored.
     pub rigid: Identification,
-    /// One identification per strategy and solver; `None` where the strategy has nothing to vary.
+    /// One identification per strategy and solver, without strategies that have nothing to vary.
     pub strategies: Vec<Identification>,
-    /// The paper's own procedure in every form that the data allow, the rigid one first; none where
-    /// it was not asked for.
+    /// Results of the paper's procedure in every form that the data allow, the rigid one first; empty
+    /// where it was not asked for.
     pub paper: Vec<Baseline>,
-    /// One identification per ablation, everything fitted at once.
+    /// One joint fit per ablation.
     pub ablations: Vec<(Ablation, Identification)>,
-    /// The joint fit and every form of the paper's procedure but the rigid one, in the terms of the
-    /// paper; none where rows measure anything else than positions.
+    /// Results of the joint fit and of every elastic form of the paper's procedure, in the terms of the
+    /// paper; empty where rows measure anything else than positions.
     pub procedures: Vec<Procedure>,
-    /// What the paper calls before: the nominal arm with nothing that gives way, base and tool as
-    /// declared.
+    /// Errors before calibration as the paper counts them: of the rigid nominal arm.
     pub before: Before,
-    /// Whether the problem declares the paper's arm, so that its figures may stand beside.
+    /// Whether the problem declares the arm of the paper, so that published figures apply.
     pub is_papers_arm: bool,
 }
 
-/// Errors of the nominal arm with nothing that gives way.
+/// Errors of the rigid nominal arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Before {
-    /// Measured − predicted of the held-out poses, measuring frame \[m\].
+    /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
     pub errors: Vec<Vector3<f64>>,
-    /// Whether base or tool had to be fitted first, since nobody knows where they are: they are
-    /// free and have no prior.
+    /// Whether base or tool were fitted first, since they are free and have no prior.
     pub registered: bool,
 }
 
-/// What takes part in a comparison.
+/// Options of a comparison.
 #[derive(Clone, Default)]
 pub struct CompareOptions {
-    /// Whether the paper's own procedure does; it does anyway where the problem declares the
-    /// paper's arm.
+    /// Whether to run the paper's procedure; it always runs where the problem declares the arm of the
+    /// paper.
     pub paper: bool,
-    /// Told of every step.
+    /// Receiver of progress.
     pub progress: Option<ProgressSink>,
 }
 
 /// Runs every strategy with every solver, and every ablation, on the identification rows.
 ///
-/// Left out are strategies that have nothing to vary, solvers that cannot keep bounds or
-/// constraints where there are any, and ablations of an arm without elasticity.
+/// It leaves out strategies that have nothing to vary, solvers that cannot keep the declared bounds or
+/// constraints, and ablations of an arm without elasticity.
 ///
 /// # Errors
-/// Problem and data do not fit each other.
+/// Returns an error if problem and data do not fit each other.
 pub fn compare(
     problem: &Problem,
     data: &Dataset,
@@ -80,7 +77,7 @@ pub fn compare(
         identify_model(model, problem, data, &options)
     };
     let elastic = problem.is_elastic();
-    // Without bounds those that keep them all take the same steps; one of them is enough.
+    // Without bounds, all solvers that keep bounds take the same steps: one of them is enough.
     let tells = |solver: &SolverChoice| {
         model.is_bounded() || matches!(solver.within(), None | Some(BoundMethod::ActiveSet))
     };
@@ -110,7 +107,7 @@ pub fn compare(
     let rigid_model = model.ablated(Ablation::Rigid);
     let rigid = run(&rigid_model, Strategy::Joint, SolverChoice::Auto)?;
     let is_papers_arm = is_published_arm(problem);
-    // The paper's procedure and its tables are of positions.
+    // The paper's procedure and its tables concern positions.
     let of_positions = data.measurements.kinds().iter().all(|kind| kind.is_position());
     let paper = if of_positions && (options.paper || is_papers_arm) {
         baselines(problem, data)
@@ -121,10 +118,10 @@ pub fn compare(
         placement.position_errors(model, x, &data.measurements, &data.split.held_out)
     };
     let ignoring = elastic.then(|| held_out(&rigid_model, &rigid.x));
-    let own = Procedure::of_fit(problem, &joint, held_out(&model, &joint.x), ignoring);
-    let papers = paper.iter().filter(|own| !elastic || own.stage != StiffnessStage::Rigid);
-    let papers = papers.map(|own| own.procedure(paper.first().filter(|_| elastic)));
-    let procedures = std::iter::once(own).chain(papers).filter(|_| of_positions).collect();
+    let of_joint_fit = Procedure::of_fit(problem, &joint, held_out(&model, &joint.x), ignoring);
+    let papers = paper.iter().filter(|form| !elastic || form.stage != StiffnessStage::Rigid);
+    let papers = papers.map(|form| form.procedure(paper.first().filter(|_| elastic)));
+    let procedures = std::iter::once(of_joint_fit).chain(papers).filter(|_| of_positions).collect();
     let unknown = |parameter: &crate::model::parameter::Parameter| {
         parameter.site.is_placement() && parameter.sigma.is_none() && !parameter.is_bounded()
     };

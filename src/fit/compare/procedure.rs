@@ -1,4 +1,4 @@
-//! Procedures in the terms of the paper: its tables 2 and 3 and its figure 13.
+//! Results in the terms of the paper: its tables 2 and 3 and its figure 13.
 
 use nalgebra::Vector3;
 
@@ -6,33 +6,33 @@ use crate::fit::{Identification, Strategy};
 use crate::paper::{Form, StiffnessStage};
 use crate::problem::{Joint, Problem};
 
-/// A geometric parameter of table 2 \[m\] or \[rad\].
+/// Geometric parameter of table 2 \[m\] or \[rad\].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TableEntry {
-    /// As declared.
+    /// Declared value.
     pub nominal: f64,
-    /// As identified.
+    /// Identified value.
     pub identified: f64,
-    /// Part of it that the data gave, 0…1; `None` where it was not identified.
+    /// Part of the value that the data determine, 0…1; `None` where it was not identified.
     pub seen: Option<f64>,
 }
 
-/// What one procedure makes of the data, in the shape of the paper's tables 2 and 3 and figure 13.
+/// Result of one procedure, in the form of the paper's tables 2 and 3 and figure 13.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Procedure {
-    /// Which form of the paper's procedure; `None`: everything fitted at once, by the declared
-    /// model.
+    /// Form of the paper's procedure; `None` for the joint fit of the declared model.
     pub paper: Option<(Form, StiffnessStage)>,
-    /// Table 2: number and α, a, θ, d, β of each joint that has these, not a placement of its own.
+    /// Table 2: number and α, a, θ, d, β of each joint in DH form.
     pub geometry: Vec<(usize, [TableEntry; 5])>,
-    /// Errors measured − predicted of the held-out poses after it, measuring frame \[m\].
+    /// Errors measured − predicted of the held-out poses afterwards, measuring frame \[m\].
     pub after: Vec<Vector3<f64>>,
-    /// The same after the procedure with elasticity ignored; `None` where nothing is elastic.
+    /// Errors of the held-out poses with elasticity ignored \[m\]; `None` where nothing is elastic.
     pub ignoring: Option<Vec<Vector3<f64>>>,
 }
 
 impl Procedure {
-    /// Of a fit, with what its fellow leaves that ignores elasticity.
+    /// Creates the result of a fit with its held-out errors and those of the fit that ignores
+    /// elasticity.
     pub(in crate::fit) fn of_fit(
         problem: &Problem,
         found: &Identification,
@@ -62,7 +62,7 @@ impl Procedure {
         Self { paper: None, geometry, after, ignoring }
     }
 
-    /// Name beside the strategies.
+    /// Returns the name in the list of strategies.
     pub fn name(&self) -> String {
         self.paper.map_or_else(
             || Strategy::Joint.as_str().to_owned(),
@@ -71,7 +71,7 @@ impl Procedure {
     }
 }
 
-/// Name of a form of the paper's procedure: `paper-nominal-stiffness-as-printed`.
+/// Returns the name of a form of the paper's procedure, such as `paper-nominal-stiffness-as-printed`.
 pub(in crate::fit) fn paper_name(form: Form, stage: StiffnessStage) -> String {
     let printed = if form == Form::Printed { "-as-printed" } else { "" };
     format!("paper-{}{printed}", stage.as_str())

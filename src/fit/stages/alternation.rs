@@ -1,45 +1,46 @@
-//! Alternating fits: how slowly they converge by themselves, and how to speed them up.
+//! Alternating fits: their rate of convergence, and Anderson acceleration.
 
 use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
 
-/// Earlier sweeps that are used.
+/// Number of earlier sweeps that the acceleration uses.
 const DEPTH: usize = 10;
-/// Differences that the others explain up to this part are rounding.
+/// Relative singular value below which differences of sweeps are rounding.
 const EXPLAINED: f64 = 1e-8;
-/// Sweeps over which the contraction is found, and the change at which it has settled.
+/// Maximum number of power iterations for the contraction.
 const POWERS: usize = 2000;
+/// Relative change of the contraction below which the power iteration has settled.
 const SETTLED: f64 = 1e-6;
 
-/// How an alternating fit went.
+/// Convergence of an alternating fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alternation {
-    /// Sweeps over all stages.
+    /// Number of sweeps over all stages.
     pub sweeps: usize,
-    /// Part of its error that a plain sweep leaves near the optimum, in lengths of the predicted
-    /// change; `None` where data and priors leave a combination open.
+    /// Part of the error that a plain sweep leaves near the optimum, measured by the change of the
+    /// predictions; `None` where data and priors do not determine a combination.
     pub contraction: Option<f64>,
 }
 
-/// Speeds up x ← g(x), a sweep, by what earlier sweeps tell of g's slope             [Anderson
-/// 1965; Walker & Ni 2011]
+/// Anderson acceleration of the fixed-point iteration x ← g(x) of a sweep  [Anderson 1965; Walker &
+/// Ni 2011].
 ///
-/// x + f − (ΔX + ΔF) γ with f = g(x) − x and γ = argmin ‖f − ΔF γ‖ over differences of earlier
-/// sweeps, unknowns scaled by their effect.
+/// The next point is x + f − (ΔX + ΔF) γ with f = g(x) − x and γ = argmin ‖f − ΔF γ‖ over differences
+/// of earlier sweeps; unknowns are scaled by their effect.
 #[derive(Debug, Clone, Default)]
 pub(in crate::fit) struct Anderson {
-    /// g(x) and scaled f of earlier sweeps, the oldest first.
+    /// Pairs of g(x) and scaled f of earlier sweeps, oldest first.
     sweeps: VecDeque<(DVector<f64>, DVector<f64>)>,
 }
 
 impl Anderson {
-    /// Forgets everything.
+    /// Drops all earlier sweeps.
     pub fn restart(&mut self) {
         self.sweeps.clear();
     }
 
-    /// The next x to try after a sweep from `x` to `image`; nothing after the first sweep.
+    /// Returns the next x to try after a sweep from `x` to `image`; `None` after the first sweep.
     pub fn next(
         &mut self,
         x: &DVector<f64>,
@@ -66,23 +67,25 @@ impl Anderson {
     }
 }
 
-/// Part of an error e that a sweep leaves in the end, ‖R e‖ counted: each of `stages` minimises ‖R
-/// e‖ over its unknowns in turn.
+/// Returns the part of ‖R e‖ that a sweep finally leaves of an error e, by power iteration: each of
+/// `stages` minimises ‖R e‖ over its unknowns in turn.
 ///
-/// By power iteration; `triangle` is R, priors among its rows.
+/// `triangle` is the factor R of data and priors.
 pub(in crate::fit) fn contraction(triangle: &DMatrix<f64>, stages: &[Vec<usize>]) -> Option<f64> {
     let hessian = triangle.tr_mul(triangle);
-    let roots: Option<Vec<_>> =
-        stages.iter().map(|own| hessian.select_rows(own).select_columns(own).cholesky()).collect();
+    let roots: Option<Vec<_>> = stages
+        .iter()
+        .map(|stage| hessian.select_rows(stage).select_columns(stage).cholesky())
+        .collect();
     let roots = roots?;
     let n = triangle.ncols();
     let mut error = DVector::from_fn(n, |j, _| (1.0 + j as f64).sin() / hessian[(j, j)].sqrt());
     let mut rate = f64::INFINITY;
     for _ in 0..POWERS {
         error /= (triangle * &error).norm();
-        for (own, root) in stages.iter().zip(&roots) {
-            let step = root.solve(&(&hessian * &error).select_rows(own));
-            own.iter().zip(step.iter()).for_each(|(&j, step)| error[j] -= step);
+        for (stage, root) in stages.iter().zip(&roots) {
+            let step = root.solve(&(&hessian * &error).select_rows(stage));
+            stage.iter().zip(step.iter()).for_each(|(&j, step)| error[j] -= step);
         }
         let next = (triangle * &error).norm();
         if !next.is_finite() || next < f64::EPSILON {

@@ -5,20 +5,23 @@ use nalgebra::{DMatrix, DVector};
 use crate::fit::stages::stage::{Stage, StageError};
 use crate::least_squares::solver::{AtBound, Inequalities, InequalitiesError};
 
-/// A constraint that holds the unknowns of a stage back.
+/// Active constraint on the unknowns of a stage.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct Held {
-    /// Which of the model's constraints.
+    /// Index of the constraint in the model.
     pub constraint: usize,
-    /// The limit that it is on.
+    /// Limit on which the unknowns are.
     pub side: AtBound,
-    /// Its coefficients, one per unknown.
+    /// Coefficients of the constraint, one per unknown.
     pub row: Vec<f64>,
 }
 
 impl Stage<'_> {
-    /// The model's constraints on the unknowns, with the other parameters as in `at`; which they
-    /// are, and their rows.
+    /// Returns the indices and the rows of the model's constraints on the unknowns, with the other
+    /// parameters as in `at`.
+    ///
+    /// # Errors
+    /// Returns an error if a row or limit is not finite.
     pub fn constraints(
         &self,
         at: &DVector<f64>,
@@ -49,10 +52,10 @@ impl Stage<'_> {
         Ok((which, Inequalities::new(matrix, DVector::from_vec(lower), DVector::from_vec(upper))?))
     }
 
-    /// The constraints that hold the unknowns back at the full parameter vector `at`.
+    /// Returns the constraints that are active at the full parameter vector `at`.
     ///
     /// # Errors
-    /// Constraints make no sense.
+    /// Returns an error if a row or limit is not finite.
     pub fn held(&self, at: &DVector<f64>) -> Result<Vec<Held>, StageError> {
         let (which, rows) = self.constraints(at)?;
         let x = DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| at[k]));
@@ -64,9 +67,10 @@ impl Stage<'_> {
     }
 }
 
-/// The rows of `gauge` and of active constraints, all of length one in unknowns scaled by the data.
+/// Stacks the rows of `gauge` and of active constraints, scaled to unit length in unknowns that are
+/// scaled by the data.
 ///
-/// A constraint on a single unknown that nothing else holds is a bound: the unknown is held.
+/// A constraint on a single unknown that is not held acts as a bound: the unknown becomes `held`.
 pub(in crate::fit) fn confine(
     triangle: &DMatrix<f64>,
     gauge: &DMatrix<f64>,

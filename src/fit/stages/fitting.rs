@@ -1,5 +1,4 @@
-//! The fits of an identification: bases and targets first, then the strategy's stages, then
-//! held-out sessions.
+//! Fits of an identification: bases and targets, the stages of the strategy, held-out sessions.
 
 use std::sync::Arc;
 
@@ -22,22 +21,22 @@ use crate::model::parameter::Parameter;
 use crate::model::{LinearModel, Model, Pose};
 use crate::problem::Observation;
 
-/// Sweeps after which a sequential strategy is given up.
+/// Maximum number of sweeps of a sequential strategy.
 const MAX_SWEEPS: usize = 500;
-/// A sequential strategy has settled when a sweep lowers the cost by less than this part.
+/// Relative reduction of the cost per sweep below which a sequential strategy has settled.
 const SWEEP_SETTLED: f64 = 1e-7;
-/// Steps of each stage in a sweep that is repeated: exact answers to a question that the next stage
-/// changes are wasted.
+/// Maximum number of steps of each stage in a sweep that is repeated: the next stage changes the
+/// optimum anyway.
 const SWEEP_STEPS: u64 = 2;
 
-/// Change of ν ln(squares), by which effects are judged, that a step of a fit in passing must be
-/// worth: thousandths of what decides.
-const PASSING: f64 = 0.01;
-/// Part of the cost that a step must be worth where the σ is judged next, which then is known to
-/// half that part.
-const JUDGED: f64 = 1e-3;
+/// Change of ν ln(squares) per step below which a provisional fit has converged: a thousandth of the
+/// change that decides about an effect.
+const PROVISIONAL_CHANGE: f64 = 0.01;
+/// Relative reduction of the cost per step below which a fit stops whose σ is tested next; σ is then
+/// known to half of it.
+const TESTED_NOISE_CHANGE: f64 = 1e-3;
 
-/// What all fits of an identification share.
+/// Input that all fits of an identification share.
 pub(in crate::fit) struct Fitting<'a> {
     pub model: &'a Model,
     pub measurements: &'a Measurements,
@@ -47,46 +46,46 @@ pub(in crate::fit) struct Fitting<'a> {
     pub held_out_only: HeldOutOnly,
     pub strategy: Strategy,
     pub solver: SolverChoice,
-    /// How the residual of a pose counts in the strategy's fits.
+    /// Loss of the residual of a pose in the stages of the strategy.
     pub loss: Loss,
     pub progress: Option<&'a ProgressSink>,
     pub stop: Option<&'a Stop>,
-    /// Steps after which a stage of the strategy is stopped.
+    /// Maximum number of steps of a stage of the strategy.
     pub max_steps: Option<u64>,
-    /// Whether another fit follows.
+    /// Whether the fit is provisional: another one follows.
     pub provisional: bool,
-    /// Whether the σ is judged before the fit goes on.
+    /// Whether the σ is tested before the fit goes on.
     pub to_be_judged: bool,
-    /// 1 σ of a coordinate in rows without one of their own, declared or assumed \[m\].
+    /// 1 σ of a coordinate in rows that state none, declared or assumed \[m\].
     pub sigma: f64,
     /// 1 σ of an orientation about each axis, where orientations are fitted \[rad\].
     pub turn_sigma: Option<f64>,
-    /// What the fit makes of each row's σ.
+    /// Noise model of positions.
     pub noise_model: NoiseModel,
-    /// What it makes of the σ of orientations.
+    /// Noise model of orientations.
     pub turn_noise_model: NoiseModel,
-    /// Linearisations that its fits share.
+    /// Linearisations that the fits share.
     pub memory: &'a Memory,
     /// Derivatives that are known where it may begin.
     pub known: Option<&'a LinearModel>,
 }
 
-/// Where a fit ended.
+/// Result of a fit of the strategy.
 pub(in crate::fit) struct FitEnd {
-    /// Full parameter vector.
+    /// Full parameter vector at the end.
     pub x: DVector<f64>,
     pub termination: Termination,
     pub iterations: u64,
     pub evaluations: u64,
-    /// For each unknown of the fit.
+    /// Bound on which each unknown rests.
     pub at_bound: Vec<Option<AtBound>>,
     pub gauge: Gauge,
-    /// How several stages took turns.
+    /// Convergence of alternating stages.
     pub alternation: Option<Alternation>,
 }
 
 impl FitEnd {
-    /// Of a fit of so many unknowns that has not begun.
+    /// Creates the result of a fit of `unknowns` unknowns that has not begun.
     fn at(start: &DVector<f64>, unknowns: usize) -> Self {
         Self {
             x: start.clone(),
@@ -118,7 +117,8 @@ impl From<StageEnd> for FitEnd {
 }
 
 impl<'a> Fitting<'a> {
-    /// Parameters of a kind, those of bases and targets of held-out rows alone left out.
+    /// Returns the indices of the chosen parameters, without bases and targets that only held-out rows
+    /// use.
     fn choose(&self, choose: impl Fn(&Parameter) -> bool) -> Vec<usize> {
         let all = self.model.parameters.iter().enumerate();
         all.filter(|&(k, parameter)| !self.held_out_only.parameters[k] && choose(parameter))
@@ -126,7 +126,7 @@ impl<'a> Fitting<'a> {
             .collect()
     }
 
-    /// Some rows as poses, with the σ that were declared.
+    /// Returns `rows` as poses with their declared σ.
     pub fn poses(&self, rows: &[usize]) -> Vec<Pose<'a>> {
         self.placement.oriented_poses(self.measurements, rows, (self.sigma, self.turn_sigma))
     }
@@ -141,12 +141,12 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// A stage on some rows, with the σ that the fit takes.
+    /// Creates a stage on `rows` with the σ that the fit takes.
     pub fn stage(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
         let mut poses = self.poses(rows);
         let declared = poses.iter().map(|pose| pose.sigma).collect();
         for pose in &mut poses {
-            // What a drawing or a calibrated bar says is no worse for what the contacts scatter.
+            // Known distances keep their σ, however much the contacts scatter.
             if pose.observation.is_of_arm() {
                 pose.sigma = self.noise_model.of(pose.sigma);
             }
@@ -172,49 +172,50 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// A stage that fits bases and targets, by the solver that `auto` takes whichever was asked
-    /// for.
+    /// Creates a stage that fits bases and targets, always by the solver that `auto` chooses.
     fn placing(&self, rows: &[usize], unknowns: Vec<usize>) -> Stage<'a> {
         let mut stage = self.stage(rows, unknowns);
         stage.solver = SolverChoice::Auto.decide(self.model);
         stage
     }
 
-    /// A stage of the strategy: on the identification rows, with the problem's loss.
+    /// Creates a stage of the strategy: on the identification rows, with the loss of the problem.
     fn strategy_stage(&self, unknowns: Vec<usize>) -> Stage<'a> {
         let stage = self.stage(&self.split.identification, unknowns);
         let max_steps = self.max_steps.unwrap_or(stage.max_steps);
         let passing = if self.provisional {
-            PASSING / stage.count().max(1) as f64
+            PROVISIONAL_CHANGE / stage.count().max(1) as f64
         } else {
             stage.cost_tolerance
         };
-        let cost_tolerance = if self.to_be_judged { passing.max(JUDGED) } else { passing };
+        let cost_tolerance =
+            if self.to_be_judged { passing.max(TESTED_NOISE_CHANGE) } else { passing };
         Stage { loss: self.loss, max_steps, cost_tolerance, ..stage }
     }
 
-    /// Everything that the strategy varies, as one stage on the identification rows.
+    /// Creates the stage of everything that the strategy varies, on the identification rows.
     pub fn whole(&self) -> Stage<'a> {
         let varied =
             |parameter: &Parameter| self.strategy.stages().iter().any(|chosen| chosen(parameter));
         self.strategy_stage(self.choose(varied))
     }
 
-    /// Bases and targets of held-out sessions, as one stage on their rows.
+    /// Creates the stage of bases and targets of held-out sessions, on their rows; `None` without any.
     pub fn held_out_stage(&self) -> Option<Stage<'a>> {
         let HeldOutOnly { parameters, rows } = &self.held_out_only;
         let unknowns: Vec<usize> = (0..parameters.len()).filter(|&k| parameters[k]).collect();
         (!unknowns.is_empty()).then(|| Stage { counts_fixed: true, ..self.placing(rows, unknowns) })
     }
 
-    /// First row whose pose has no equilibrium on the nominal arm.
+    /// Returns the first row whose pose has no equilibrium on the nominal arm.
     pub fn without_equilibrium(&self) -> Option<usize> {
         let rows: Vec<usize> = (0..self.measurements.len()).collect();
         let errors = self.position_errors(&rows, &DVector::zeros(self.model.parameters.len()));
         errors.iter().position(|error| error.x.is_nan())
     }
 
-    /// The nominal arm with bases and targets fitted where they are free.
+    /// Returns the full parameter vector of the registered nominal arm: bases and targets are fitted
+    /// where they are free.
     pub fn registered(&self) -> Result<DVector<f64>, StageError> {
         let mut x = DVector::zeros(self.model.parameters.len());
         let mut poses = self.poses(&self.split.identification);
@@ -243,7 +244,7 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Runs the strategy's stages from `start`; several are repeated until the cost settles.
+    /// Runs the stages of the strategy from `start`; several are repeated until the cost settles.
     pub fn run(&self, start: &DVector<f64>) -> Result<FitEnd, StageError> {
         let whole = self.whole();
         let [first, rest @ ..] = self.strategy.stages() else {
@@ -273,7 +274,7 @@ impl<'a> Fitting<'a> {
         Self::gauged(&whole, end)
     }
 
-    /// Sweeps over the strategy's stages, accelerated, until the cost settles.
+    /// Repeats accelerated sweeps over the stages of the strategy until the cost settles.
     fn alternate(&self, whole: &Stage, start: &DVector<f64>) -> Result<FitEnd, StageError> {
         let mut end = FitEnd::at(start, whole.unknowns.len());
         let scale = whole
@@ -284,8 +285,8 @@ impl<'a> Fitting<'a> {
         let scale = DVector::from_vec(scale);
         let mut anderson = Anderson::default();
         let mut cost = f64::INFINITY;
-        // Short stages may all be turned back where a long one gets on: only a sweep of long ones
-        // can end it.
+        // Stages of few steps may all fail where a longer one succeeds: only a sweep of unlimited
+        // stages ends the search.
         let mut long = false;
         for sweep in 1..=MAX_SWEEPS {
             let begin = whole.reduced(&end.x);
@@ -312,7 +313,8 @@ impl<'a> Fitting<'a> {
         Ok(end)
     }
 
-    /// One sweep over the strategy's stages, each of so many steps at most; why it ended.
+    /// Runs one sweep over the stages of the strategy, each with at most `steps` steps; returns the
+    /// reason for its end.
     fn sweep(
         &self,
         whole: &Stage,
@@ -339,15 +341,15 @@ impl<'a> Fitting<'a> {
         Ok(termination)
     }
 
-    /// With the combinations that nothing decides.
+    /// Adds the combinations that are not determined at the end.
     fn gauged(whole: &Stage, mut end: FitEnd) -> Result<FitEnd, StageError> {
         let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
         end.gauge = whole.gauge(&end.x, &held, &whole.held(&end.x)?);
         Ok(end)
     }
 
-    /// Errors on both parts of the data with the full parameter vector `x`, of the kind of rows
-    /// that errors are told of.
+    /// Returns the errors on both parts of the data at the full parameter vector `x`, for the leading
+    /// kind of rows.
     pub fn errors(&self, x: &DVector<f64>) -> Errors {
         self.errors_of(self.measurements.leading(), x)
     }
@@ -362,8 +364,8 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Errors of every kind of rows at the full parameter vectors of the registered nominal arm and
-    /// of the fitted one, where there are several kinds.
+    /// Returns the errors of every kind of rows at the full parameter vectors of the registered nominal
+    /// arm and of the fitted one; nothing where there is only one kind.
     pub fn errors_by_kind(
         &self,
         registered: &DVector<f64>,
@@ -376,7 +378,7 @@ impl<'a> Fitting<'a> {
         if kinds.len() > 1 { each.collect() } else { Vec::new() }
     }
 
-    /// Errors of orientation on both parts of the data at the full parameter vectors of the
+    /// Returns the errors of orientation on both parts of the data at the full parameter vectors of the
     /// registered nominal arm and of the fitted one; `None` where orientation is not fitted.
     pub fn orientation(
         &self,
@@ -400,7 +402,7 @@ impl<'a> Fitting<'a> {
         })
     }
 
-    /// Residuals measured − predicted of some rows, measuring frame \[m\].
+    /// Returns the residuals measured − predicted of `rows`, measuring frame \[m\].
     pub fn position_errors(&self, rows: &[usize], x: &DVector<f64>) -> Vec<nalgebra::Vector3<f64>> {
         self.placement.position_errors(self.model, x, self.measurements, rows)
     }

@@ -1,5 +1,5 @@
-//! Where points, anchors and surfaces are, in closed form from what the arm predicts, with no guess
-//! to start from.
+//! Locations of points, anchors and surfaces in closed form, from the positions that the arm
+//! predicts.
 
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 
@@ -9,16 +9,17 @@ use crate::problem::FixtureKind;
 use crate::problem::fixture::lean;
 use crate::spatial::plane_normal;
 
-/// Points whose spread across a plane is below this part of that within it are taken to lie in it.
+/// Ratio of the spread across a plane to that within it below which points lie in the plane.
 const IN_A_PLANE: f64 = 1e-3;
-/// Offsets tell the side of a plane where they differ by this \[m\] …
+/// Difference of offsets from which on they determine the side of a plane \[m\] …
 const OFFSETS_DIFFER: f64 = 1e-4;
-/// … and the arm's base does where it is so far from it \[m\].
+/// … and distance of the arm's base from the plane from which on the base does \[m\].
 const BASE_IS_OFF: f64 = 0.05;
 
-/// Sets the free numbers without a prior, of which the problem says nothing, of the fixtures that
-/// `chosen` parameters belong to, in the full parameter vector `x`, from `poses` that measure
-/// against them. What no pose touches stays as it is.
+/// Locates fixtures from the `poses` that measure against them, in the full parameter vector `x`.
+///
+/// It sets the `chosen` parameters of fixtures that are free without prior and bounds and have no
+/// declared value. Fixtures that no pose touches stay as they are.
 pub(crate) fn locate(
     model: &Model,
     poses: &[Pose],
@@ -45,8 +46,8 @@ pub(crate) fn locate(
     let points = model.predicted_targets_in_base(poses, x.as_slice());
     let mut first = 0;
     while let Some(&(fixture, kind, ..)) = free.get(first) {
-        let own: Vec<_> = free.iter().filter(|(of, ..)| *of == fixture).collect();
-        first += own.len();
+        let parameters: Vec<_> = free.iter().filter(|(of, ..)| *of == fixture).collect();
+        first += parameters.len();
         let touches = |(pose, point): (&Pose, &Option<Vector3<f64>>)| {
             (pose.observation.fixture() == Some(fixture))
                 .then(|| Some((bases[pose.base].point(point.as_ref()?), pose.measured.x)))?
@@ -57,18 +58,18 @@ pub(crate) fn locate(
         let base = base.map_or(Vector3::zeros(), |pose| bases[pose.base].origin);
         let Some(mut found) = found(kind, &contacts, &base) else { continue };
         if kind == FixtureKind::Plane && model.is_declared(fixture, 0) {
-            // Its normal is declared.
+            // The normal is declared, so that only the distance is free.
             let [rx, ry, ..] = model.fixtures(x.as_slice())[fixture].numbers;
             found[2] = height(&contacts, &plane_normal(rx, ry));
         }
-        for &&(_, _, axis, k) in &own {
+        for &&(_, _, axis, k) in &parameters {
             x[k] = found[axis] - model.parameters[k].nominal;
         }
     }
 }
 
-/// The numbers of a fixture that fit contacts best: predicted points \[m\] with what is measured
-/// there \[m\].
+/// Returns the parameters of a fixture that fit the contacts best: predicted points with the
+/// measured distances or offsets there \[m\].
 fn found(
     kind: FixtureKind,
     contacts: &[(Vector3<f64>, f64)],
@@ -90,12 +91,13 @@ fn found(
     all.iter().all(|number| number.is_finite()).then_some(all)
 }
 
+/// Returns the centre of the predicted points.
 fn centre(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     contacts.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / contacts.len() as f64
 }
 
-/// Principal directions of points about their centre, widest spread first, with the sums of squares
-/// along them.
+/// Returns the principal directions of points about their centre with the sums of squares along
+/// them, widest spread first.
 fn principal(contacts: &[(Vector3<f64>, f64)], centre: &Vector3<f64>) -> [(Vector3<f64>, f64); 3] {
     let spread: Matrix3<f64> =
         contacts.iter().map(|(point, _)| (point - centre) * (point - centre).transpose()).sum();
@@ -105,7 +107,7 @@ fn principal(contacts: &[(Vector3<f64>, f64)], centre: &Vector3<f64>) -> [(Vecto
     order.map(|k| (eigen.eigenvectors.column(k).into_owned(), eigen.eigenvalues[k]))
 }
 
-/// The least-squares solution of rows (a, b) of a·u = b.
+/// Returns the least-squares solution u of rows (a, b) of a·u = b.
 fn least_squares(rows: &[(Vec<f64>, f64)]) -> Option<DVector<f64>> {
     let n = rows.first()?.0.len();
     let matrix = DMatrix::from_fn(rows.len(), n, |i, j| rows[i].0[j]);
@@ -114,8 +116,10 @@ fn least_squares(rows: &[(Vec<f64>, f64)]) -> Option<DVector<f64>> {
     matrix.svd(true, true).solve(&right, 1e-12 * size).ok()
 }
 
-/// The anchor of some distances: ‖p‖² − ℓ² = 2 p·A − ‖A‖² is linear in A and ‖A‖². Of points in a
-/// plane, its distance from that follows from the lengths, on the side that fits, or the upper one.
+/// Returns the anchor A of distances ℓ to points p: ‖p‖² − ℓ² = 2 p·A − ‖A‖² is linear in A and ‖A‖².
+///
+/// If the points lie in a plane, the distance of the anchor from it follows from the lengths, on the
+/// side that fits better, or else on the upper side.
 fn anchor(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     let centre = centre(contacts);
     let axes = principal(contacts, &centre);
@@ -143,8 +147,8 @@ fn anchor(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     if misfit(&sides[1]) < misfit(&sides[0]) { sides[1] } else { sides[0] }
 }
 
-/// The sphere through some points: ‖p‖² = 2 p·C + (ρ² − ‖C‖²) is linear in C and the bracket;
-/// offsets go out from it.
+/// Returns centre C and radius ρ of the sphere through points p: ‖p‖² = 2 p·C + (ρ² − ‖C‖²) is linear
+/// in C and the bracket. Offsets point outwards.
 fn sphere(contacts: &[(Vector3<f64>, f64)]) -> (Vector3<f64>, f64) {
     let middle = centre(contacts);
     let row = |(point, _): &(Vector3<f64>, f64)| {
@@ -160,8 +164,8 @@ fn sphere(contacts: &[(Vector3<f64>, f64)]) -> (Vector3<f64>, f64) {
     (place, radius / contacts.len() as f64)
 }
 
-/// The plane of least spread, its normal to the side of larger offsets; where these do not differ,
-/// to the arm's base, or else up.
+/// Returns the plane of least spread. Its normal points to the side of larger offsets; where these do
+/// not differ, to the arm's base, or else up.
 fn plane(contacts: &[(Vector3<f64>, f64)], base: &Vector3<f64>) -> [f64; 4] {
     let n = contacts.len() as f64;
     let middle = centre(contacts);
@@ -169,11 +173,11 @@ fn plane(contacts: &[(Vector3<f64>, f64)], base: &Vector3<f64>) -> [f64; 4] {
     let normal = principal(contacts, &middle)[2].0;
     let along: f64 = contacts
         .iter()
-        .map(|(point, own)| normal.dot(&(point - middle)) * (own - offset))
+        .map(|(point, measured)| normal.dot(&(point - middle)) * (measured - offset))
         .sum::<f64>()
         / n;
-    let differ =
-        contacts.iter().map(|(_, own)| (own - offset).abs()).fold(0.0, f64::max) > OFFSETS_DIFFER;
+    let differ = contacts.iter().map(|(_, measured)| (measured - offset).abs()).fold(0.0, f64::max)
+        > OFFSETS_DIFFER;
     let to_base = normal.dot(&(base - middle));
     let side = match differ {
         true => along,
@@ -185,7 +189,7 @@ fn plane(contacts: &[(Vector3<f64>, f64)], base: &Vector3<f64>) -> [f64; 4] {
     [rx, ry, height(contacts, &normal), 0.0]
 }
 
-/// The number d of a plane with this normal \[m\].
+/// Returns the distance d of the plane with this normal from the origin \[m\].
 fn height(contacts: &[(Vector3<f64>, f64)], normal: &Vector3<f64>) -> f64 {
     contacts.iter().map(|(point, offset)| normal.dot(point) - offset).sum::<f64>()
         / contacts.len() as f64
@@ -223,8 +227,8 @@ mod tests {
         let normal = Vector3::new(0.2, -0.3, -0.9).normalize();
         for offset in [0.0, 0.004] {
             let touch = |(k, p): (usize, &Vector3<f64>)| {
-                let own = offset * k as f64;
-                (p - normal * (normal.dot(p) - 0.7 - own), own)
+                let measured = offset * k as f64;
+                (p - normal * (normal.dot(p) - 0.7 - measured), measured)
             };
             let wall: Vec<_> = points().iter().enumerate().map(touch).collect();
             let [rx, ry, d, _] = plane(&wall, &(normal * 3.0));

@@ -1,47 +1,49 @@
-//! What a fit takes for the σ of each row.
+//! Noise model: the σ of each row that a fit takes.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
-/// A σ this improbable is not the one declared.
+/// Probability below which a declared σ counts as contradicted.
 pub(in crate::fit) const IMPROBABLE: f64 = 1e-3;
-/// Least σ that is taken: positions are not predicted more exactly than to rounding \[m\].
+/// Smallest σ that a fit takes \[m\]: predicted positions are exact only to rounding.
 pub(in crate::fit) const LEAST_NOISE: f64 = 1e-9;
 
-/// What a fit makes of the σ of each row: √((scale σ)² + e²).
+/// Noise model √((scale σ)² + e²) of a row with declared σ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::fit) struct NoiseModel {
-    /// 1, or less where the declared σ is too large; more where rows of several kinds scatter more
-    /// than declared.
+    /// Factor on the declared σ: 1, less where it is too large, more where rows of several kinds
+    /// scatter more than declared.
     pub scale: f64,
-    /// 1 σ of the model's own error e, beside the noise \[m\].
+    /// 1 σ of the error e of the model, beside the noise \[m\].
     pub model_error: f64,
 }
 
 impl NoiseModel {
-    /// As declared.
+    /// Model that takes every σ as declared.
     pub const DECLARED: Self = Self { scale: 1.0, model_error: 0.0 };
 
-    /// What it makes of a declared σ \[m\].
+    /// Returns the σ that the model takes for a declared one \[m\].
     pub fn of(self, sigma: f64) -> f64 {
         if self == Self::DECLARED { sigma } else { (self.scale * sigma).hypot(self.model_error) }
     }
 
-    /// The σ scaled together, so that the mean variance becomes larger by `ratio`; as
-    /// [`raised`](Self::raised) otherwise.
+    /// Creates the model that scales all `declared` σ together, so that the mean variance of rows
+    /// weighted by `taken` grows by the factor `ratio`.
     pub fn scaled(declared: &[f64], taken: &[f64], ratio: f64) -> Self {
-        let sum: f64 = declared.iter().zip(taken).map(|(own, taken)| (own / taken).powi(2)).sum();
+        let sum: f64 =
+            declared.iter().zip(taken).map(|(sigma, taken)| (sigma / taken).powi(2)).sum();
         let largest = declared.iter().copied().fold(0.0, f64::max);
         let least = (LEAST_NOISE / largest).min(1.0);
         Self { scale: (declared.len() as f64 * ratio / sum).sqrt().max(least), model_error: 0.0 }
     }
 
-    /// What makes the mean variance of poses that a fit weighted by `taken` larger by `ratio`;
-    /// `declared` are their σ.
+    /// Creates the model with which the mean variance of poses that a fit weighted by `taken` grows by
+    /// the factor `ratio`; `declared` holds their σ.
     ///
-    /// Σ (σ² + e²) / taken² = N ratio for e; where that needs no e, the σ are scaled together.
+    /// Solves Σ (σ² + e²) / taken² = N ratio for e; where no e ≥ 0 does, all σ are scaled together.
     pub fn raised(declared: &[f64], taken: &[f64], ratio: f64) -> Self {
         let n = declared.len() as f64;
-        let sum: f64 = declared.iter().zip(taken).map(|(own, taken)| (own / taken).powi(2)).sum();
+        let sum: f64 =
+            declared.iter().zip(taken).map(|(sigma, taken)| (sigma / taken).powi(2)).sum();
         let weights: f64 = taken.iter().map(|taken| taken.powi(-2)).sum();
         let squared = (n * ratio - sum) / weights;
         if squared > 0.0 {
@@ -53,8 +55,8 @@ impl NoiseModel {
     }
 }
 
-/// Twice the logarithm of the likelihood ratio that chance gives with the probability of what is
-/// improbable.
+/// Returns the value that 2 ln of a likelihood ratio with one degree of freedom exceeds with
+/// probability 0.001.
 pub(in crate::fit) fn by_chance() -> f64 {
     ChiSquared::new(1.0)
         .map_or(f64::INFINITY, |distribution| distribution.inverse_cdf(1.0 - IMPROBABLE))
@@ -69,7 +71,7 @@ mod tests {
         let declared = [1e-5, 2e-5, 4e-5];
         let more = NoiseModel::raised(&declared, &declared, 100.0);
         let ratio: f64 =
-            declared.iter().map(|&own| (more.of(own) / own).powi(2)).sum::<f64>() / 3.0;
+            declared.iter().map(|&sigma| (more.of(sigma) / sigma).powi(2)).sum::<f64>() / 3.0;
         assert!((more.scale - 1.0).abs() < 1e-15 && (ratio - 100.0).abs() < 1e-9, "{more:?}");
         let less = NoiseModel::raised(&declared, &declared, 0.01);
         assert!((less.scale - 0.1).abs() < 1e-12 && less.model_error == 0.0, "{less:?}");

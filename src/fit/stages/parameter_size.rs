@@ -1,19 +1,19 @@
-//! How far parameters may plausibly go.
+//! Plausible and largest deviations of parameters.
 
 use crate::model::Model;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::quantity::Unit;
 
-/// An angle \[rad\] that moves points by their distance from the axis.
+/// Plausible deviation of an angle \[rad\]: it moves points by their distance from the axis.
 const ANGLE: f64 = 1.0;
-/// ln of the factor by which a stiffness or rigidity may differ from nominal.
+/// Plausible deviation of the logarithm of a stiffness or rigidity: ln 100.
 const LN_STIFFNESS: f64 = 4.605_170_185_988_092;
-/// Beyond half a turn every angle is another one within it.
+/// Largest deviation of an angle \[rad\]: beyond half a turn it equals another one within.
 const HALF_TURN: f64 = std::f64::consts::PI;
 
-/// How far a parameter without a prior may plausibly deviate: a length by the arm's own size, an
-/// angle by 1 rad, a stiffness by a factor of 100. `None` for those with a prior, and for what may
-/// be anywhere or has no size of its own.
+/// Returns the plausible deviation of a parameter without a prior: the reach of the arm for a length,
+/// 1 rad for an angle, a factor of 100 for a stiffness. Returns `None` for parameters with a prior,
+/// positions of bases and fixtures, which may be anywhere, and other units.
 pub(in crate::fit) fn plausible(model: &Model, parameter: &Parameter) -> Option<f64> {
     if parameter.sigma.is_some()
         || matches!(
@@ -30,8 +30,9 @@ pub(in crate::fit) fn plausible(model: &Model, parameter: &Parameter) -> Option<
     }
 }
 
-/// What no parameter of the arm exceeds, with a prior or without: as [`plausible`], angles by half
-/// a turn.
+/// Returns the deviation that no parameter of the arm exceeds: the reach of the arm for a length,
+/// half a turn for an angle, a factor of 100 for a stiffness. Returns `None` for bases, fixtures,
+/// orientations of targets, and other units.
 pub(in crate::fit) fn largest(model: &Model, parameter: &Parameter) -> Option<f64> {
     match (parameter.site, parameter.unit()) {
         (

@@ -1,4 +1,4 @@
-//! Which base and which target each row uses, and which of them appear in held-out rows only.
+//! Base and target of each row, and those that only held-out rows use.
 
 use std::collections::BTreeSet;
 
@@ -9,22 +9,22 @@ use crate::model::parameter::ParameterSite;
 use crate::model::{MeasuredOrientation, Model, Pose};
 use crate::problem::Problem;
 
-/// Scale of a coordinate's error where no σ is declared and none estimated yet \[m\].
+/// 1 σ of a coordinate that is assumed where none is declared and none estimated yet \[m\].
 pub(in crate::fit) const UNKNOWN_SIGMA: f64 = 1e-3;
 
-/// Bases and targets of a set of measurements.
+/// Assignment of the rows of a table to bases and targets.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Placement {
-    /// One base per session.
+    /// Names of the bases, one per session.
     pub bases: Vec<String>,
-    /// One target per word of the column `target`, or per session where there is none.
+    /// Names of the targets, one per word of the column `target`, or per session without that column.
     pub targets: Vec<String>,
     base_of_row: Vec<usize>,
     target_of_row: Vec<usize>,
 }
 
 impl Placement {
-    /// As the columns `session` and `target` say.
+    /// Creates the assignment from the columns `session` and `target`.
     pub fn of(measurements: &Measurements) -> Self {
         let session = &measurements.session;
         let target = measurements.target.as_ref().unwrap_or(session);
@@ -36,24 +36,24 @@ impl Placement {
         }
     }
 
-    /// Base of a row.
+    /// Returns the index of the base of a row.
     pub fn base_of(&self, row: usize) -> usize {
         self.base_of_row[row]
     }
 
-    /// Target of a row.
+    /// Returns the index of the target of a row.
     pub fn target_of(&self, row: usize) -> usize {
         self.target_of_row[row]
     }
 
-    /// 1 σ of a coordinate of some rows together, as declared \[m\].
+    /// Returns the root mean square of the declared σ of a coordinate of `rows` \[m\].
     pub fn sigma(&self, measurements: &Measurements, rows: &[usize], problem: &Problem) -> f64 {
         let whole = problem.data.position_sigma.unwrap_or(UNKNOWN_SIGMA);
         let squares = rows.iter().map(|&row| measurements.sigma_of(row).unwrap_or(whole).powi(2));
         if rows.is_empty() { whole } else { (squares.sum::<f64>() / rows.len() as f64).sqrt() }
     }
 
-    /// Rows as poses; `sigma` \[m\] is that of rows without one of their own.
+    /// Returns `rows` as poses; `sigma` \[m\] is that of rows that state none.
     pub fn poses<'a>(
         &self,
         measurements: &'a Measurements,
@@ -74,7 +74,8 @@ impl Placement {
             .collect()
     }
 
-    /// The same with the orientations that were measured, where `turn` \[rad\], their σ, is given.
+    /// Returns `rows` as poses with their measured orientations, where the σ `turn` of these is given
+    /// \[rad\].
     pub fn oriented_poses<'a>(
         &self,
         measurements: &'a Measurements,
@@ -93,8 +94,8 @@ impl Placement {
         poses
     }
 
-    /// Residuals measured − predicted of some rows with the arm at the full parameter vector `x`,
-    /// measuring frame \[m\]; NaN where it has no equilibrium.
+    /// Returns the residuals measured − predicted of `rows` at the full parameter vector `x`, measuring
+    /// frame \[m\]; NaN where the arm has no equilibrium.
     pub fn position_errors(
         &self,
         model: &Model,
@@ -105,10 +106,10 @@ impl Placement {
         model.residuals(self.poses(measurements, rows, 1.0), x)
     }
 
-    /// Which parameters belong to bases, targets or fixtures that held-out rows alone use, and
-    /// which rows use those.
+    /// Finds the parameters of bases, targets and fixtures that only held-out rows use, and those rows.
     ///
-    /// They say nothing about the arm: they are fitted on their held-out rows, alone.
+    /// These parameters say nothing about the arm: they are fitted on their held-out rows, with the
+    /// arm given.
     pub(in crate::fit) fn held_out_only(
         &self,
         model: &Model,
@@ -152,11 +153,11 @@ impl Placement {
     }
 }
 
-/// Bases, targets and fixtures that appear in held-out rows only.
+/// Bases, targets and fixtures that only held-out rows use.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::fit) struct HeldOutOnly {
-    /// Whether each parameter of the model belongs to one.
+    /// Whether each parameter of the model belongs to one of these.
     pub parameters: Vec<bool>,
-    /// The held-out rows that use one.
+    /// Held-out rows that use one of these.
     pub rows: Vec<usize>,
 }

@@ -1,4 +1,4 @@
-//! How far a fit or a loop has come, and the wish that it end early.
+//! Progress of a fit or a loop, and requests to stop early.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,63 +9,63 @@ use argmin::core::{Error, KV, State as _};
 use crate::least_squares::solver::State;
 use crate::problem::Effect;
 
-/// How far a fit or a loop has come.
+/// Progress of a fit or a loop.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Progress {
-    /// A step of a fit was tried.
+    /// Step of a fit that was tried.
     Step {
-        /// Steps tried in the fit at hand.
+        /// Number of steps tried in the current fit.
         iteration: u64,
-        /// Number of unknowns of the fit at hand.
+        /// Number of unknowns of the current fit.
         unknowns: usize,
-        /// Number of poses of the fit at hand.
+        /// Number of poses of the current fit.
         poses: usize,
-        /// ½‖r‖².
+        /// Cost ½‖r‖² after the step.
         cost: f64,
     },
-    /// A round of a loop weighs candidates, or begins another of its fits.
+    /// Round of a loop that evaluates candidates, or starts another of its fits.
     Round {
-        /// Its number, from 1.
+        /// Number of the round, from 1.
         round: usize,
         /// Effects that earlier rounds added.
         effects: Vec<Effect>,
-        /// The fit that begins, from 1; 0 while candidates are weighed.
+        /// Number of the fit that starts, from 1; 0 while candidates are evaluated.
         fit: usize,
-        /// Fits that the round makes, as far as it is known.
+        /// Number of fits of the round, as far as it is known.
         fits: usize,
     },
-    /// A loop adds no more effects and works out what it says of those that it has.
+    /// Loop that adds no more effects and computes the claims about those it has.
     Finishing,
 }
 
-/// Where progress goes; the library itself prints nothing.
+/// Receiver of progress; the library itself prints nothing.
 pub type ProgressSink = Arc<dyn Fn(Progress) + Send + Sync>;
 
-/// The wish, from another thread or a handler of signals, that work end early. Clones share it.
+/// Request from another thread or a signal handler to stop early. Clones share the request.
 ///
-/// A fit looks at it between the steps of its solver.
+/// A fit checks it between the steps of its solver.
 #[derive(Debug, Clone, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Asks for the end; whether it had been asked for before.
+    /// Requests the stop; returns true if it had been requested before.
     pub fn request(&self) -> bool {
         self.0.swap(true, Ordering::Relaxed)
     }
 
-    /// Whether the end was asked for.
+    /// Returns true if the stop was requested.
     pub fn is_requested(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// A fit was stopped.
+/// Error of a solver that was stopped.
 #[derive(Debug, thiserror::Error)]
 #[error("stopped")]
 struct Stopped;
 
-/// Tells of every step of one fit, and stops it.
+/// Observer of a solver: reports every step, and stops it on request.
 pub(in crate::fit) struct Reporter {
     pub sink: Option<ProgressSink>,
     pub stop: Option<Stop>,

@@ -1,4 +1,4 @@
-//! Where the arm stands: a base pose from measured points, with no guess to start from.
+//! Registration: base pose and target orientation from measured poses in closed form.
 
 use nalgebra::{DVector, Matrix3, Matrix4, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
@@ -6,13 +6,15 @@ use crate::model::parameter::{Parameter, ParameterSite};
 use crate::model::{Model, Pose};
 use crate::spatial::{Frame, rotate};
 
-/// Points whose second squared spread is below this part of the first lie on a line.
+/// Ratio of the second to the first squared spread of points below which they lie on a line.
 const ON_A_LINE: f64 = 1e-12;
 
-/// Sets every base that is wholly free and has no prior to the best rigid motion from the arm's own
-/// frame to the measured positions of `poses`, in the full parameter vector `x`, and then every
-/// orientation of a target that is wholly free and has no prior to the best one. What no pose uses
-/// stays as it is.
+/// Registers bases and targets that are free in all components, without priors and bounds, in the
+/// full parameter vector `x`.
+///
+/// A base becomes the best rigid motion from the arm's base frame to the measured positions of
+/// `poses`; then the orientation of a target becomes the best one. Bases and targets that no pose
+/// uses stay as they are.
 ///
 /// min over R, t of Σ ‖y − R p − t‖²: the unit quaternion of R is the eigenvector of a symmetric 4
 /// × 4 matrix  [Horn 1987].
@@ -31,9 +33,9 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
         .map(|rotation| Frame::from_rotation_vector(Vector3::zeros(), rotation))
         .collect();
     let turns = |target: usize| {
-        let own = |parameter: &&Parameter| matches!(parameter.site, ParameterSite::Target { target: own, axis: 3.. } if own == target);
+        let is_of_target = |parameter: &&Parameter| matches!(parameter.site, ParameterSite::Target { target: of, axis: 3.. } if of == target);
         let free = |parameter: &&Parameter| parameter.sigma.is_none() && !parameter.is_bounded();
-        model.parameters.iter().filter(own).filter(free).count() == 3
+        model.parameters.iter().filter(is_of_target).filter(free).count() == 3
     };
     let nominal = model.base_poses(DVector::zeros(x.len()).as_slice());
     for (base, nominal) in nominal.iter().enumerate() {
@@ -43,7 +45,7 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
             .enumerate()
             .filter(|(_, parameter)| parameter.sigma.is_none() && !parameter.is_bounded())
             .filter_map(|(k, parameter)| match parameter.site {
-                ParameterSite::Base { base: own, axis } if own == base => Some((axis, k)),
+                ParameterSite::Base { base: of, axis } if of == base => Some((axis, k)),
                 _ => None,
             })
             .collect();
@@ -69,13 +71,13 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
     turn_targets(model, &oriented, x, turns);
 }
 
-/// The axes of a measured orientation.
+/// Returns the axes of the measured orientation of a pose.
 fn axes(pose: &Pose) -> Option<[Vector3<f64>; 3]> {
     pose.orientation?.axes()
 }
 
-/// Sets the orientations of the targets of which `turns` says so, from poses with the last frames
-/// of the arm in its base frame.
+/// Registers the orientations of the targets for which `turns` is true, from poses with the last
+/// frame of the arm in its base frame.
 fn turn_targets(
     model: &Model,
     poses: &[(&Pose, Frame<f64>)],
@@ -97,8 +99,8 @@ fn turn_targets(
             });
         let Some(rotation) = mean_turn(seen) else { continue };
         for (k, parameter) in model.parameters.iter().enumerate() {
-            if let ParameterSite::Target { target: own, axis: axis @ 3.. } = parameter.site
-                && own == target
+            if let ParameterSite::Target { target: of, axis: axis @ 3.. } = parameter.site
+                && of == target
             {
                 x[k] = rotation[axis - 3] - nominal[axis - 3];
             }
@@ -106,8 +108,8 @@ fn turn_targets(
     }
 }
 
-/// The rotation vector \[rad\] that turns the first of some pairs of axes into the second ones
-/// best; `None` without any.
+/// Returns the rotation vector \[rad\] that best turns the first axes of the pairs into the second
+/// ones; `None` without pairs.
 ///
 /// min over R of Σ ‖R A − B‖²: R = U diag(1, 1, ±1) Vᵀ of Σ B Aᵀ = U Σ Vᵀ  [Arun, Huang & Blostein
 /// 1987].
@@ -127,9 +129,9 @@ fn mean_turn(
     )
 }
 
-/// The rotation vector \[rad\] and translation \[m\] that carry the first points of the pairs to
-/// the second ones best; the `nominal` rotation where the points lie on a line, about which they
-/// leave the turn open.
+/// Returns the rotation vector \[rad\] and translation \[m\] that best move the first points of the
+/// pairs to the second ones. Where the points lie on a line, which leaves the rotation about it
+/// open, the rotation is the `nominal` one.
 fn rigid_motion(
     pairs: &[(Vector3<f64>, Vector3<f64>)],
     nominal: &Vector3<f64>,

@@ -1,9 +1,9 @@
-//! By which solver parameters are fitted.
+//! Choice of the solver.
 
 use crate::least_squares::solver::BoundMethod;
 use crate::model::Model;
 
-/// A solver by name.
+/// Solver of a fit, by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum SolverChoice {
@@ -20,7 +20,7 @@ pub enum SolverChoice {
     /// Levenberg–Marquardt within the bounds of `[parameters]` and every `[[constraint]]`: faces
     /// that hold are guessed and corrected.
     Bounded,
-    /// The same, every step by an interior-point method.
+    /// Levenberg–Marquardt within bounds and constraints, each step by an interior-point method.
     InteriorPoint,
     /// Levenberg–Marquardt within bounds by reflections [Branch, Coleman & Li 1999].
     Reflective,
@@ -29,7 +29,7 @@ pub enum SolverChoice {
 }
 
 impl SolverChoice {
-    /// Every choice: what fits the problem, or a solver.
+    /// Every choice, `auto` first.
     pub const CHOICES: [Self; 8] = [
         Self::Auto,
         Self::LevenbergMarquardt,
@@ -40,7 +40,7 @@ impl SolverChoice {
         Self::Reflective,
         Self::Clamped,
     ];
-    /// Every solver.
+    /// Every solver, without `auto`.
     pub const EACH: [Self; Self::CHOICES.len() - 1] = {
         let mut each = [Self::Auto; Self::CHOICES.len() - 1];
         let mut k = 0;
@@ -51,7 +51,7 @@ impl SolverChoice {
         each
     };
 
-    /// Their names.
+    /// Names of the choices.
     pub const NAMES: [&str; Self::CHOICES.len()] = {
         let mut names = [""; Self::CHOICES.len()];
         let mut k = 0;
@@ -62,7 +62,7 @@ impl SolverChoice {
         names
     };
 
-    /// Name in results, files and arguments, and what it does in a few words.
+    /// Returns the name in results, files and arguments, and a short description.
     const fn words(self) -> (&'static str, &'static str) {
         match self {
             Self::Auto => {
@@ -91,17 +91,17 @@ impl SolverChoice {
         }
     }
 
-    /// Name in results, files and arguments.
+    /// Returns the name in results, files and arguments.
     pub const fn as_str(self) -> &'static str {
         self.words().0
     }
 
-    /// What it does, in a few words.
+    /// Returns a short description.
     pub const fn summary(self) -> &'static str {
         self.words().1
     }
 
-    /// How it keeps bounds, if it does.
+    /// Returns the method by which the solver keeps bounds; `None` where it does not.
     pub fn within(self) -> Option<BoundMethod> {
         match self {
             Self::Bounded => Some(BoundMethod::ActiveSet),
@@ -112,7 +112,7 @@ impl SolverChoice {
         }
     }
 
-    /// Whether it keeps the bounds and constraints of a model.
+    /// Returns true if the solver keeps the bounds and constraints of `model`.
     pub fn keeps(self, model: &Model) -> bool {
         match self.within() {
             None => !model.is_bounded(),
@@ -121,7 +121,7 @@ impl SolverChoice {
         }
     }
 
-    /// The solver that `auto` stands for with this model.
+    /// Returns the solver that is used for `model`: `auto` becomes one of the others.
     #[must_use]
     pub fn decide(self, model: &Model) -> Self {
         match self {
@@ -131,7 +131,7 @@ impl SolverChoice {
         }
     }
 
-    /// Why [`decide`](Self::decide) takes what it takes, where the choice is left to it.
+    /// Returns the reason for the solver of [`decide`](Self::decide), where the choice is `auto`.
     pub fn reason(self, model: &Model) -> Option<&'static str> {
         match self {
             Self::Auto if model.is_bounded() => Some("bounds to keep"),

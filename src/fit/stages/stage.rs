@@ -1,4 +1,4 @@
-//! One least-squares fit of some parameters to some poses.
+//! Stage: one least-squares fit of some parameters to some poses.
 
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::sync::Arc;
@@ -21,55 +21,54 @@ use crate::model::parameter::Parameter;
 use crate::model::{LinearModel, Model, Pose, PoseResiduals};
 use crate::problem::PoseView;
 
-/// Relative reduction of the cost below which a step is not worth it: above the rounding of
-/// predicted positions, which are metres measured in units of their noise, and far below what any
-/// estimate's error would show.
+/// Relative reduction of the cost below which a stage has converged. It is above the rounding of
+/// predicted positions in units of their noise, and far below what changes an estimate noticeably.
 pub const COST_TOLERANCE: f64 = 1e-11;
 
-/// A stage that cannot be set up.
+/// Error of a stage that cannot be set up, or was stopped.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum StageError {
-    /// Bounds leave a parameter no value.
+    /// The bounds of a parameter exclude every value.
     #[error(transparent)]
     Bounds(#[from] BoundsError),
-    /// Constraints make no sense.
+    /// A constraint cannot be satisfied or is not finite.
     #[error(transparent)]
     Inequalities(#[from] InequalitiesError),
-    /// Bounds and constraints contradict each other.
+    /// No parameter vector satisfies all bounds and constraints.
     #[error(
         "no values of the parameters satisfy all bounds of [parameters] and all of [[constraint]]"
     )]
     Infeasible,
-    /// Priors do not fit the unknowns.
+    /// The rows of the priors do not fit the unknowns.
     #[error(transparent)]
     Rows(#[from] RowsError),
-    /// The fit was stopped.
+    /// The fit was interrupted.
     #[error("interrupted before there was a result")]
     Interrupted,
 }
 
-/// What a stage works on.
+/// Input of one least-squares fit.
 pub(in crate::fit) struct Stage<'a> {
     pub model: &'a Model,
-    /// With the σ that the fit takes.
+    /// Poses with the σ that the fit takes.
     pub poses: Arc<Vec<Pose<'a>>>,
-    /// 1 σ of a coordinate of each pose, as declared \[m\].
+    /// Declared 1 σ of a coordinate of each pose \[m\].
     pub declared: Vec<f64>,
-    /// 1 σ of their orientations, as declared, where these are fitted \[rad\].
+    /// Declared 1 σ of the orientations, where these are fitted \[rad\].
     pub declared_turn: Option<f64>,
-    /// Which parameters vary.
+    /// Indices of the parameters that vary.
     pub unknowns: Vec<usize>,
     pub solver: SolverChoice,
-    /// Steps after which the solver is stopped.
+    /// Maximum number of steps of the solver.
     pub max_steps: u64,
-    /// Relative reduction of the cost below which a step is not worth it.
+    /// Relative reduction of the cost below which the solver has converged.
     pub cost_tolerance: f64,
-    /// How the residual of a pose counts.
+    /// Loss of the residual of a pose.
     pub loss: Loss,
-    /// Whether constraints count that also speak of free parameters which do not vary here.
+    /// Whether constraints count that involve free parameters which do not vary here.
     pub counts_fixed: bool,
-    /// Linearisations that fits of the same data share.
+    /// Linearisations shared by fits of the same data.
     pub memory: &'a Memory,
     /// Derivatives that are known at some point of a fit of the identification rows.
     pub known: Option<&'a LinearModel>,
@@ -77,7 +76,7 @@ pub(in crate::fit) struct Stage<'a> {
     pub stop: Option<&'a Stop>,
 }
 
-/// Where a stage ended.
+/// Result of a stage.
 pub(in crate::fit) struct StageEnd {
     /// Full parameter vector.
     pub x: DVector<f64>,
@@ -85,41 +84,41 @@ pub(in crate::fit) struct StageEnd {
     pub gauge: Gauge,
 }
 
-/// The combinations of a stage's unknowns that neither data nor priors see, or too weakly; they are
-/// held where they start.
+/// Combinations of the unknowns of a stage that data and priors determine not at all or too weakly;
+/// they are held where they start.
 #[derive(Debug, Clone, Default)]
 pub(in crate::fit) struct Gauge {
-    /// Rows that span them, on the unknowns.
+    /// Rows that span the combinations, shape = (combinations, unknowns).
     pub rows: DMatrix<f64>,
-    /// Part of each unknown outside of them, 0…1.
+    /// Part of each unknown outside the combinations, 0…1.
     pub visible: Vec<f64>,
-    /// Those that are seen too weakly, each by itself.
+    /// Combinations that are determined too weakly, each by itself.
     pub weak: Vec<UnidentifiableCombination>,
 }
 
 impl<'a> Stage<'a> {
-    /// The parameters that vary.
+    /// Returns the parameters that vary.
     pub fn parameters(&self) -> impl Iterator<Item = &'a Parameter> + '_ {
         self.unknowns.iter().map(|&k| &self.model.parameters[k])
     }
 
-    /// Measured numbers of all poses.
+    /// Returns the number of measured coordinates of all poses.
     pub fn count(&self) -> usize {
         self.poses.iter().map(Pose::coordinates).sum()
     }
 
-    /// Rows of the residual for each pose: three, or six with its orientation; 0 behind what is
-    /// measured.
+    /// Returns the number of residual rows of each pose: three, or six with its orientation; rows
+    /// without a measurement are 0.
     pub fn coordinates(&self) -> usize {
         if self.declared_turn.is_some() { 6 } else { 3 }
     }
 
-    /// Residuals of the stage about the full parameter vector `at`.
+    /// Returns the residuals of the stage; parameters that do not vary are as in `at`.
     pub fn residuals(&self, at: &DVector<f64>) -> PoseResiduals<'a> {
         self.residuals_of(Arc::clone(&self.poses), at)
     }
 
-    /// The same of other poses.
+    /// Returns the residuals of other poses; parameters that do not vary are as in `at`.
     pub fn residuals_of(
         &self,
         poses: impl Into<Arc<Vec<Pose<'a>>>>,
@@ -129,13 +128,13 @@ impl<'a> Stage<'a> {
             .with_linear_model(self.known)
     }
 
-    /// The whitened data linearised at `at`, each pose weighted by `loss`, priors left out.
+    /// Linearises the whitened data at `at`, each pose weighted by `loss`, without priors.
     pub fn linearised(&self, at: &DVector<f64>, loss: Loss) -> Linearisation {
         let residuals = self.residuals(at);
         self.remembered(&residuals, at, loss).linearise(&residuals.reduced(at))
     }
 
-    /// A fit of the poses of this stage that shares its linearisations with others of the same.
+    /// Creates the objective of these poses; it shares linearisations with equal stages.
     fn remembered<'b>(
         &'b self,
         residuals: &'b PoseResiduals<'a>,
@@ -145,13 +144,13 @@ impl<'a> Stage<'a> {
         Fit::new(residuals).with_loss(loss).remembering(self.memory, self.digest(at), self.unit())
     }
 
-    /// 1 σ of the first pose: what residuals are counted in.
+    /// Returns 1 σ of the first pose, the unit in which linearisations are remembered.
     fn unit(&self) -> f64 {
         self.poses.first().map_or(1.0, |pose| pose.sigma)
     }
 
-    /// What tells this stage's data and unknowns, and the parameters that stay as in `at`, from
-    /// those of others, but for the unit that residuals are counted in.
+    /// Returns a digest of the data, the unknowns, and the parameters that stay as in `at`; it does
+    /// not depend on the unit of the residuals.
     fn digest(&self, at: &DVector<f64>) -> u64 {
         let (mut digest, unit) = (DefaultHasher::new(), self.unit());
         let mut others = at.clone();
@@ -176,68 +175,68 @@ impl<'a> Stage<'a> {
                 configuration.iter().chain(approach.iter().copied().flatten()).chain(*covariates);
             columns.chain(pose.measured).copied().for_each(&mut put);
             [*payload, *hoist, *temperature]
-                .map(|own| own.copied().unwrap_or(f64::NAN))
+                .map(|value| value.copied().unwrap_or(f64::NAN))
                 .into_iter()
                 .for_each(&mut put);
             [*time, *elapsed, pose.sigma / unit].into_iter().for_each(&mut put);
-            put(pose.orientation.map_or(0.0, |own| own.sigma / unit));
+            put(pose.orientation.map_or(0.0, |orientation| orientation.sigma / unit));
             put(pose.base as f64);
             put(pose.target as f64);
-            // What was before stands in the table, which is the same in all fits that share a
-            // memory: the row tells it.
+            // Earlier poses are in the table, which all fits with the same memory share: the row
+            // identifies them.
             put(past.place().map_or(f64::NAN, f64::from));
         }
         self.poses.iter().for_each(|pose| pose.observation.hash(&mut digest));
         digest.finish()
     }
 
-    /// Triangular factor R of the whitened data at `at`, priors left out.
+    /// Returns the triangular factor R of the whitened data at `at`, without priors.
     pub fn data_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
         self.linearised(at, Loss::Squares).triangle
     }
 
-    /// How far each unknown may plausibly go, where no prior says so.
+    /// Returns the plausible deviation of each unknown without a prior.
     fn sizes(&self) -> Vec<Option<f64>> {
         self.parameters().map(|parameter| plausible(self.model, parameter)).collect()
     }
 
-    /// The same, each pose weighted as the loss does.
+    /// Returns the factor R of the data at `at` with each pose weighted by the loss.
     pub fn weighted_triangle(&self, at: &DVector<f64>) -> DMatrix<f64> {
         self.linearised(at, self.loss).triangle
     }
 
-    /// The same with the rows of the priors below.
+    /// Returns the factor R of weighted data and priors at `at`.
     pub fn triangle_with_priors(&self, at: &DVector<f64>) -> DMatrix<f64> {
         below(&self.weighted_triangle(at), &self.priors())
     }
 
-    /// The unknowns' entries of the full parameter vector `at`.
+    /// Returns the entries of the unknowns in the full parameter vector `at`.
     pub fn reduced(&self, at: &DVector<f64>) -> DVector<f64> {
         DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| at[k]))
     }
 
-    /// The full parameter vector `at` with other unknowns x.
+    /// Returns the full parameter vector `at` with the unknowns replaced by `x`.
     pub fn full(&self, at: &DVector<f64>, x: &DVector<f64>) -> DVector<f64> {
         let mut full = at.clone();
         self.unknowns.iter().zip(x.iter()).for_each(|(&k, value)| full[k] = *value);
         full
     }
 
-    /// Whether the full parameter vector `at` keeps bounds and constraints.
+    /// Returns true if the full parameter vector `at` satisfies bounds and constraints.
     ///
     /// # Errors
-    /// Constraints make no sense.
+    /// Returns an error if a constraint is not finite.
     pub fn allows(&self, at: &DVector<f64>) -> Result<bool, StageError> {
         let inside = self
             .unknowns
             .iter()
             .zip(self.parameters())
-            .all(|(&k, own)| own.lower <= at[k] && at[k] <= own.upper);
+            .all(|(&k, parameter)| parameter.lower <= at[k] && at[k] <= parameter.upper);
         Ok(inside && self.constraints(at)?.1.contain(&self.reduced(at)))
     }
 
-    /// Combinations of the unknowns that are not `held` which data, priors and `active` constraints
-    /// leave open at `at`.
+    /// Finds the combinations of the unknowns not `held` that data, priors and `active` constraints do
+    /// not determine at `at`.
     pub fn gauge(&self, at: &DVector<f64>, held: &[bool], active: &[Held]) -> Gauge {
         let n = self.unknowns.len();
         if self.parameters().all(|parameter| parameter.sigma.is_some()) {
@@ -249,7 +248,7 @@ impl<'a> Stage<'a> {
         let stacked = DMatrix::from_fn(seen + active.len(), n, |i, j| match i {
             i if i < n => data[(i, j)],
             i if i < seen => priors[(i - n, j)],
-            // Weighted like a measurement of each of its parameters.
+            // A constraint is weighted like a measurement of each of its parameters.
             i => {
                 active[i - seen].row[j].signum()
                     * f64::from(active[i - seen].row[j] != 0.0)
@@ -277,22 +276,23 @@ impl<'a> Stage<'a> {
                 gauge.visible[k] = outside[j].min(weak.visible[j]);
             }
         }
-        let named = |own: UnidentifiableCombination| UnidentifiableCombination {
-            weights: own.weights.into_iter().map(|(j, weight)| (free[j], weight)).collect(),
-            ..own
+        let renumbered = |weak: UnidentifiableCombination| UnidentifiableCombination {
+            weights: weak.weights.into_iter().map(|(j, weight)| (free[j], weight)).collect(),
+            ..weak
         };
-        gauge.weak = weak.into_iter().flat_map(|weak| weak.combinations).map(named).collect();
+        gauge.weak = weak.into_iter().flat_map(|weak| weak.combinations).map(renumbered).collect();
         gauge
     }
 
-    /// Minimises from the full parameter vector `start`.
+    /// Minimises the cost from the full parameter vector `start`.
     ///
-    /// Combinations that are unidentifiable or weak at the start are held there, what becomes weak
-    /// on the way is held where it is then. What is unidentifiable at the start may be seen at the
-    /// end, or decided by a bound or a constraint: then the fit goes on with that set free.
+    /// Combinations that are unidentifiable or weak at the start are held there; one that becomes
+    /// weak on the way is held where it is then. A combination that is unidentifiable at the start
+    /// may be determined at the end, also by a bound or a constraint: the fit then goes on with it
+    /// free.
     ///
     /// # Errors
-    /// Bounds and constraints leave the parameters no values, or the fit was stopped.
+    /// Returns an error if no values satisfy bounds and constraints, or if the fit was interrupted.
     pub fn run(&self, start: &DVector<f64>) -> Result<StageEnd, StageError> {
         let residuals = self.residuals(start);
         let mut begin = residuals.reduced(start);
@@ -332,7 +332,7 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Minimises from the unknowns `begin`, with the combinations in `gauge` held as in `hold`.
+    /// Minimises the cost from the unknowns `begin`, with the combinations of `gauge` as in `hold`.
     fn solve(
         &self,
         residuals: &PoseResiduals<'a>,
@@ -399,7 +399,7 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// ½Σρ of the data and ½‖r‖² of the priors at the full parameter vector `at`.
+    /// Returns the cost at the full parameter vector `at`: ½Σρ of the data and ½‖r‖² of the priors.
     pub fn cost(&self, at: &DVector<f64>) -> f64 {
         let residuals = self.residuals(at);
         let x = residuals.reduced(at);
@@ -407,7 +407,7 @@ impl<'a> Stage<'a> {
             + 0.5 * (self.priors() * x).norm_squared()
     }
 
-    /// One row x / σ for each unknown with a prior.
+    /// Returns the rows x / σ of the priors, shape = (priors, unknowns).
     pub fn priors(&self) -> DMatrix<f64> {
         let sigmas: Vec<(usize, f64)> = self
             .parameters()
@@ -422,7 +422,7 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// Rows stacked on top of each other and brought to a triangle.
+/// Returns the triangular factor of `triangle` with `rows` below it.
 fn below(triangle: &DMatrix<f64>, rows: &DMatrix<f64>) -> DMatrix<f64> {
     let n = triangle.ncols();
     let mut stack =

@@ -1,29 +1,29 @@
-//! Which parameters are fitted together.
+//! Strategies: which parameters are fitted together.
 
 use crate::model::parameter::Parameter;
 use crate::model::{Ablation, Model};
 
-/// Which parameters are fitted together.
+/// Strategy of a fit: which parameters are fitted together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Strategy {
-    /// Everything at once.
+    /// Fits everything at once.
     #[default]
     Joint,
-    /// Stiffness, then geometry [Chen2021, sec. 3.3], repeated until it settles.
+    /// Fits stiffness, then geometry [Chen2021, sec. 3.3], and repeats that until it settles.
     Sequential,
-    /// Stiffness, then geometry, once: the paper's order.
+    /// Fits stiffness, then geometry, once, in the order of the paper.
     OneSweep,
-    /// Geometry; stiffnesses stay at their nominal values.
+    /// Fits geometry; stiffnesses stay at their nominal values.
     GeometryOnly,
-    /// Stiffnesses; geometry stays at its nominal values.
+    /// Fits stiffnesses; geometry stays at its nominal values.
     StiffnessOnly,
-    /// Geometry of an arm in which nothing gives way: what the paper calls ignoring elasticity.
+    /// Fits the geometry of a rigid arm, which the paper calls ignoring elasticity.
     Rigid,
 }
 
 impl Strategy {
-    /// Every strategy.
+    /// Every strategy, the default first.
     pub const EACH: [Self; 6] = [
         Self::Joint,
         Self::Sequential,
@@ -33,7 +33,7 @@ impl Strategy {
         Self::Rigid,
     ];
 
-    /// Their names.
+    /// Names of the strategies.
     pub const NAMES: [&str; Self::EACH.len()] = {
         let mut names = [""; Self::EACH.len()];
         let mut k = 0;
@@ -44,7 +44,7 @@ impl Strategy {
         names
     };
 
-    /// Name in results, files and arguments, and what it does in a few words.
+    /// Returns the name in results, files and arguments, and a short description.
     const fn words(self) -> (&'static str, &'static str) {
         match self {
             Self::Joint => ("joint", "Everything at once"),
@@ -62,25 +62,24 @@ impl Strategy {
         }
     }
 
-    /// Name in results, files and arguments.
+    /// Returns the name in results, files and arguments.
     pub const fn as_str(self) -> &'static str {
         self.words().0
     }
 
-    /// What it does, in a few words.
+    /// Returns a short description.
     pub const fn summary(self) -> &'static str {
         self.words().1
     }
 
-    /// The model that is fitted: as declared, or without its elasticity and the parameters that
-    /// describe it.
+    /// Returns the model that is fitted: as declared, or without elasticity and its parameters.
     #[must_use]
     pub fn model(self, declared: Model) -> Model {
         if self == Self::Rigid { declared.ablated(Ablation::Rigid) } else { declared }
     }
 
-    /// The stages of one sweep, each as a choice of parameters; bases and targets take part in
-    /// every stage.
+    /// Returns the stages of one sweep, each as a predicate of the parameters that vary; bases and
+    /// targets vary in every stage.
     pub fn stages(self) -> &'static [fn(&Parameter) -> bool] {
         const ALL: fn(&Parameter) -> bool = |_| true;
         const STIFFNESS: fn(&Parameter) -> bool = |p| p.site.is_elastic() || p.site.is_placement();

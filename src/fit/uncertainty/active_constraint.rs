@@ -1,4 +1,4 @@
-//! Constraints that hold parameters back, and what they leave to the errors.
+//! Constraints on whose limits a fit rests.
 
 use crate::error::Location;
 use crate::fit::stages::constraints::Held;
@@ -7,25 +7,25 @@ use crate::least_squares::solver::AtBound;
 use crate::model::Model;
 use crate::quantity::Unit;
 
-/// A constraint that holds parameters back.
+/// Active constraint: a `[[constraint]]` on whose limit the fit rests.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActiveConstraint {
-    /// Which of the model's constraints.
+    /// Index of the constraint in the model.
     pub constraint: usize,
-    /// The limit in words: `ln A.EI − ln B.EI ≥ 0`.
+    /// Limit in words, such as `ln A.EI − ln B.EI ≥ 0`.
     pub words: String,
-    /// Which limit.
+    /// Side of the limit.
     pub side: AtBound,
-    /// What it costs, for its limit moved out by one of its unit.
+    /// Shadow price for the limit moved out by one of its unit.
     pub shadow_price: ShadowPrice,
-    /// Unit of its terms; those of stiffnesses and rigidities are logarithms.
+    /// Unit of the terms; stiffnesses and rigidities enter by their logarithms.
     pub unit: Unit,
-    /// Where it stands in the problem file.
+    /// Place in the problem file.
     pub location: Location,
 }
 
 impl ActiveConstraint {
-    /// In words of the problem.
+    /// Describes the `held` constraints of a stage, with their prices, in terms of the problem.
     pub(in crate::fit) fn all(held: &[Held], prices: &[ShadowPrice], model: &Model) -> Vec<Self> {
         let of = |(held, shadow_price): (&Held, &ShadowPrice)| {
             let constraint = &model.constraints[held.constraint];

@@ -4,42 +4,43 @@ use nalgebra::DMatrix;
 
 use crate::model::Model;
 
-/// Covariance of the estimates, as their standard errors have it: priors, active constraints, the
-/// weights of a robust loss and the factor on the noise taken into account.
+/// Covariance of the estimates, consistent with their standard errors: it includes priors, active
+/// constraints, the weights of a robust loss and the noise that the fit took.
 ///
-/// Combinations that neither data nor priors see are held where they were: a parameter that is part
-/// of one has a variance here, but no standard error. Parameters of sessions or targets that only
-/// held-out rows use are fitted with the arm given: their covariance with all others is 0.
+/// Unidentifiable combinations are held where the fit started: their parameters have a variance here,
+/// but no standard error. Parameters of sessions or targets that only held-out rows use are fitted
+/// with the arm given, so their covariance with all others is 0. An unknown that rests on a bound
+/// along a direction that the data hardly see has the variance of its distance from that bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariance {
-    /// Places among the estimates of the parameters it is of, ascending: those that were fitted and
-    /// rest on no bound.
+    /// Indices of the parameters among the estimates, ascending: those that were fitted and have a
+    /// variance.
     pub parameters: Vec<usize>,
-    /// Of the values, SI, shape = (parameters, parameters): entry (i, j) is in the product of both
-    /// units.
+    /// Covariance of the values, shape = (parameters, parameters); entry (i, j) is in the product of
+    /// both SI units.
     pub matrix: DMatrix<f64>,
 }
 
-/// Correlations of the parameters that were fitted together, those left out that rest on a bound.
+/// Correlations of the parameters that were fitted together and have a variance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correlations {
-    /// Names.
+    /// Names of the parameters.
     pub names: Vec<String>,
-    /// −1…1, shape = (names, names).
+    /// Correlations, −1…1, shape = (names, names).
     pub matrix: DMatrix<f64>,
 }
 
-/// Collects the covariance of the values from the stages of an identification.
+/// Covariance of the values of all parameters, collected from the stages of an identification.
 pub(in crate::fit) struct Collected(DMatrix<f64>);
 
 impl Collected {
-    /// Nothing yet, of so many parameters.
+    /// Creates a covariance of zeros for `parameters` parameters.
     pub fn new(parameters: usize) -> Self {
         Self(DMatrix::zeros(parameters, parameters))
     }
 
-    /// Enters the covariance of the unknowns x of one stage, numbers of the model's parameters, at
-    /// the full vector x: of the values, it is S C S with S = diag(∂value/∂x).
+    /// Enters the covariance C of the unknowns of one stage, given by their indices in the model, at
+    /// the full parameter vector `x`. Of the values it is S C S with S = diag(∂value/∂x).
     pub fn enter(
         &mut self,
         model: &Model,
@@ -56,7 +57,7 @@ impl Collected {
         }
     }
 
-    /// The covariance of those that have a variance.
+    /// Returns the covariance of the parameters that have a variance.
     pub fn finish(self) -> Covariance {
         let parameters: Vec<usize> =
             (0..self.0.ncols()).filter(|&k| self.0[(k, k)] > 0.0).collect();
@@ -66,14 +67,14 @@ impl Collected {
 }
 
 impl Covariance {
-    /// Covariance of two parameters by their places among the estimates; `None` where one of them
-    /// was not fitted or rests on a bound.
+    /// Returns the covariance of two parameters by their indices among the estimates; `None` where one
+    /// of them has no variance.
     pub fn of(&self, one: usize, other: usize) -> Option<f64> {
         let place = |k| self.parameters.binary_search(&k).ok();
         Some(self.matrix[(place(one)?, place(other)?)])
     }
 
-    /// The correlation matrix, C_ij / √(C_ii C_jj), shape = (parameters, parameters).
+    /// Returns the correlation matrix C_ij / √(C_ii C_jj), shape = (parameters, parameters).
     pub fn correlation(&self) -> DMatrix<f64> {
         let error = self.matrix.diagonal().map(f64::sqrt);
         let of =
@@ -83,7 +84,7 @@ impl Covariance {
 }
 
 impl Correlations {
-    /// Pairs that are correlated by more than `least` in absolute value, strongest first.
+    /// Returns the pairs whose correlation exceeds `least` in absolute value, strongest first.
     pub fn above(&self, least: f64) -> Vec<(&str, &str, f64)> {
         let n = self.names.len();
         let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));

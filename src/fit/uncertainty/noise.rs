@@ -1,5 +1,5 @@
-//! The σ that a fit takes: as declared, or what residual and priors speak for where that
-//! contradicts it.
+//! Search for the σ that a fit takes: the declared one, or the one of the largest restricted
+//! likelihood where residuals and priors contradict the declared one.
 
 use nalgebra::DVector;
 
@@ -15,40 +15,40 @@ use crate::least_squares::{
 use crate::model::Pose;
 use crate::problem::Observation;
 
-/// An undeclared σ has settled when it changes by less than this part.
+/// Relative change of an undeclared σ below which its search has settled.
 const NOISE_SETTLED: f64 = 1e-3;
-/// A declared σ that is contradicted has settled when it changes by less than this part: standard
-/// errors tell no more.
+/// Relative change of a contradicted σ below which its search has settled; standard errors are not
+/// needed more exactly.
 const SCALE_SETTLED: f64 = 0.01;
-/// Steps after which a declared σ is judged first, where everything is fitted at once: where it is
-/// contradicted, its optimum may be far away, and is not wanted.
+/// Number of steps after which a declared σ is tested first, where everything is fitted at once. If
+/// it is contradicted, the optimum under it is not needed.
 const FIRST_STEPS: u64 = 30;
-/// Fits after which the search for σ stops.
+/// Maximum number of fits in the search for σ.
 const MAX_NOISE_FITS: usize = 20;
-/// Both σ as declared.
+/// Noise models of positions and orientations that take the declared σ.
 const AS_DECLARED: (NoiseModel, NoiseModel) = (NoiseModel::DECLARED, NoiseModel::DECLARED);
-/// What an earlier fit took contradicts a declared σ beyond doubt where twice the logarithm of the
-/// likelihood ratio is so many times what chance gives.
+/// Multiple of the value of [`by_chance`] beyond which 2 ln of the likelihood ratio leaves no doubt
+/// that a declared σ is wrong.
 const BEYOND_DOUBT: f64 = 10.0;
 
-/// Where the assumed noise comes from.
+/// Source of the σ of the measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Noise {
-    /// From `position_sigma` or the column `sigma`.
+    /// Declared by `position_sigma` or the column `sigma`.
     Declared,
-    /// From the scatter about the fit, 1 σ per coordinate \[m\].
+    /// Estimated from the scatter about the fit: 1 σ per coordinate \[m\].
     Estimated(f64),
-    /// Neither declared nor to be seen: the fit has no degrees of freedom.
+    /// Neither declared nor estimated, since the fit has no degrees of freedom.
     Unknown,
 }
 
-/// Runs the strategy until the σ that it takes is the one declared or, where residual and priors
-/// contradict that, the one they speak for; where none is declared, until the scatter about the fit
-/// is the σ assumed. `judged` says whether the poses are enough to contradict a σ.
+/// Runs the strategy until its σ has settled: at the declared one, at the one of the largest
+/// restricted likelihood where residuals and priors contradict that, or, where none is declared, at
+/// the scatter about the fit. `judged` is true if the poses suffice to contradict a σ.
 ///
-/// A fit may begin with what an earlier one took in the place of a declared σ, as long as that
-/// contradicts the declared one beyond doubt.
+/// A fit may start with the σ that an earlier one took, as long as that contradicts the declared one
+/// beyond doubt.
 pub(in crate::fit) fn fitted(
     fitting: &mut Fitting,
     start: &DVector<f64>,
@@ -83,15 +83,15 @@ pub(in crate::fit) fn fitted(
                 Some(next) => {
                     (fitting.noise_model, fitting.turn_noise_model) = next;
                     if judged_early {
-                        // What is still to be gained may decide, and is asked again as of what an
-                        // earlier fit took.
+                        // The fit has not converged: its σ is tested again, as if an earlier fit
+                        // had taken it.
                         taken_over = is_beyond_doubt(&fitting.whole());
                         if !taken_over {
                             (fitting.noise_model, fitting.turn_noise_model) = AS_DECLARED;
                         }
                     }
-                    // What was held stays where it began, and what ran off under a σ too small
-                    // begins anew.
+                    // Held combinations stay where they started, and a fit that diverged under a σ
+                    // too small starts again.
                     let went_well = end.termination.converged()
                         || end.termination == Termination::IterationLimit;
                     begin = if went_well && end.gauge.rows.nrows() == 0 {
@@ -128,8 +128,8 @@ pub(in crate::fit) fn fitted(
     }
 }
 
-/// Whether the variance that a stage took, r times the declared one, contradicts that beyond doubt:
-/// N (r − 1 − ln r) of N numbers less unknowns is twice the logarithm of the likelihood ratio.
+/// Returns true if the noise variance of a stage, r times the declared one, contradicts that beyond
+/// doubt. With ν degrees of freedom, 2 ln of the likelihood ratio is ν (r − 1 − ln r).
 fn is_beyond_doubt(stage: &Stage) -> bool {
     let ratios = stage
         .poses
@@ -141,11 +141,11 @@ fn is_beyond_doubt(stage: &Stage) -> bool {
     freedom * (ratio - 1.0 - ratio.ln()) > BEYOND_DOUBT * by_chance()
 }
 
-/// What to assume instead, if what is assumed is contradicted or has not settled; poses that a
-/// robust loss sets aside as outliers do not count.
+/// Returns the next noise models of positions and orientations, or `None` where the `assumed` ones
+/// are kept. Poses that a robust loss sets aside do not count.
 ///
-/// Contradicted is the declared σ where twice the logarithm of the likelihood ratio exceeds what
-/// chance gives (χ²₁) with probability 0.001.
+/// The declared σ is contradicted where 2 ln of the likelihood ratio exceeds what chance gives (χ²₁)
+/// with probability 0.001.
 fn contradicted(
     stage: &Stage,
     end: &FitEnd,
@@ -154,7 +154,7 @@ fn contradicted(
     let of_fit = || Statistics::of(stage, end, Some(assumed.0));
     let robust = if stage.loss == Loss::Squares { None } else { Some(of_fit()?) };
     let counts =
-        |place: &usize| robust.as_ref().is_none_or(|own| own.lengths.outlying(*place).is_none());
+        |place: &usize| robust.as_ref().is_none_or(|fit| fit.lengths.outlying(*place).is_none());
     let places: Vec<usize> = (0..stage.poses.len()).filter(counts).collect();
     let poses: Vec<Pose> = places.iter().map(|&place| stage.poses[place]).collect();
     let several_kinds =
@@ -182,7 +182,7 @@ fn contradicted(
     }
     let first = assumed == AS_DECLARED;
     let shares = shares(&whitened, stage.coordinates(), [count - turned, turned]);
-    // Positions and orientations settle each by themselves.
+    // Positions and orientations settle separately.
     let settled = shares.iter().all(|share| ((ratio * share).sqrt() - 1.0).abs() < SCALE_SETTLED);
     let chance = by_chance();
     if (first && gain <= chance) || (!first && settled) {
@@ -192,7 +192,7 @@ fn contradicted(
         let of_arm = places.iter().filter(|&&place| stage.poses[place].observation.is_of_arm());
         of_arm.map(|&place| all(place)).collect::<Vec<f64>>()
     };
-    // An error of the model is one length for all only where all measure the same.
+    // A model error is one length for all rows only where all measure the same kind of thing.
     let raised = if several_kinds { NoiseModel::scaled } else { NoiseModel::raised };
     let of_position = raised(
         &of(&|place| stage.declared[place]),
@@ -208,8 +208,8 @@ fn contradicted(
     Ok((next != assumed).then_some(next))
 }
 
-/// Mean square of the whitened residuals of positions, and of orientations, over that of all: 1
-/// where there are positions alone.
+/// Returns the mean squares of the whitened residuals of positions and of orientations, each over
+/// that of all; both are 1 where only positions are fitted.
 fn shares(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f64; 2] {
     if coordinates == 3 {
         return [1.0; 2];
@@ -224,8 +224,8 @@ fn shares(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f
     if all > 0.0 { [position / all, turn / all] } else { [1.0; 2] }
 }
 
-/// The variance that a stage took over the declared one, and 1 σ of the rows of one kind as it took
-/// it; known distances between points keep the σ that they have.
+/// Returns the noise variance that a stage took over the declared one, and 1 σ of the rows of `kind`
+/// that it took. Known distances between points keep their σ and do not count.
 pub(in crate::fit) fn taken(stage: &Stage, kind: Observation) -> (f64, f64) {
     let rows =
         stage.poses.iter().zip(&stage.declared).filter(|(pose, _)| pose.observation.is_of_arm());
@@ -239,7 +239,7 @@ pub(in crate::fit) fn taken(stage: &Stage, kind: Observation) -> (f64, f64) {
     )
 }
 
-/// Root mean square of the σ of some rows.
+/// Returns the root mean square of the σ of some rows.
 pub(in crate::fit) fn together(sigmas: impl ExactSizeIterator<Item = f64>) -> f64 {
     let n = sigmas.len().max(1) as f64;
     (sigmas.map(|sigma| sigma * sigma).sum::<f64>() / n).sqrt()

@@ -1,4 +1,4 @@
-//! What bounds and constraints cost a fit.
+//! Shadow prices of the bounds and constraints of a fit.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,10 +9,11 @@ use crate::least_squares::solver::{AtBound, Factor};
 use crate::least_squares::{Fit, LinearRows, Objective as _};
 use crate::model::parameter::Parameter;
 
-/// Normals are dependent when what is left of one is shorter than this part of it.
+/// Relative length of the independent part of a constraint normal below which it is dependent.
 const DEPENDENT: f64 = 1e-10;
 
-/// Prices of the bound of each unknown, where it rests on one, and of active constraints.
+/// Prices of the bounds of the unknowns, `None` where an unknown rests on none, and of active
+/// constraints.
 #[derive(Debug, Clone, Default)]
 pub(in crate::fit) struct Prices {
     pub bounds: Vec<Option<ShadowPrice>>,
@@ -20,7 +21,7 @@ pub(in crate::fit) struct Prices {
 }
 
 impl Stage<'_> {
-    /// What the limits cost at the full parameter vector `at`.
+    /// Computes the prices of bounds and active constraints at the full parameter vector `at`.
     ///
     /// At a minimum g = Aᵀμ + w, with the gradient g, rows A of active constraints and w of bounds:
     /// μ ≥ 0 at a lower limit, ≤ 0 at an upper one, w likewise.
@@ -57,23 +58,23 @@ impl Stage<'_> {
         } else {
             Factor::new(normals, -force, DEPENDENT).gauss_newton()
         };
-        for (own, force) in active.iter().zip(&forces) {
-            own.row.iter().enumerate().for_each(|(j, coefficient)| left[j] -= coefficient * force);
+        for (held, force) in active.iter().zip(&forces) {
+            held.row.iter().enumerate().for_each(|(j, coefficient)| left[j] -= coefficient * force);
         }
-        // Of the rows that measure what most do: millimetres and degrees have no mean.
+        // Of the rows of the first kind alone: millimetres and degrees have no common mean.
         let leading = self.poses.first().map(|pose| pose.observation.kind());
-        let own = |place: &usize| Some(self.poses[*place].observation.kind()) == leading;
-        let places: Vec<usize> = (0..self.poses.len()).filter(own).collect();
+        let is_leading = |place: &usize| Some(self.poses[*place].observation.kind()) == leading;
+        let places: Vec<usize> = (0..self.poses.len()).filter(is_leading).collect();
         let all = residuals.position_errors(&x);
         let errors: Vec<_> = places.iter().map(|&place| all[place]).collect();
         let count = errors.len().max(1) as f64;
         let rms = (errors.iter().map(nalgebra::Matrix::norm_squared).sum::<f64>() / count).sqrt();
         let variance =
             places.iter().map(|&place| self.poses[place].sigma.powi(2)).sum::<f64>() / count;
-        // Where both limits are one, either may push.
+        // Where both limits coincide, either side may push.
         let parameters: Vec<&Parameter> = self.parameters().collect();
-        let is_equality = |own: &Held| {
-            let limits = &self.model.constraints[own.constraint];
+        let is_equality = |held: &Held| {
+            let limits = &self.model.constraints[held.constraint];
             limits.lower >= limits.upper
         };
         let price = |force: f64, side: AtBound, is_one: bool| {
@@ -96,7 +97,7 @@ impl Stage<'_> {
             constraints: active
                 .iter()
                 .zip(&forces)
-                .map(|(own, force)| price(*force, own.side, is_equality(own)))
+                .map(|(held, force)| price(*force, held.side, is_equality(held)))
                 .collect(),
         })
     }

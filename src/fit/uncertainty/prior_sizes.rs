@@ -1,9 +1,9 @@
-//! How wide the priors of an arm's geometry are, as the deviations that a fit found speak for it.
+//! Prior widths of the geometry, estimated from the deviations that a fit found.
 //!
-//! About the fit the data say of the geometry x as much as a Gaussian with information A and vector
-//! b = A x̂. With priors of σ r, r one factor for all parameters of a kind, the posterior is N(C b,
-//! C), C = (A + Λ/r²)⁻¹, and the logarithm of the evidence is ½ bᵀC b + ½ ln|C| − Σ ln r but for a
-//! constant. Its maximum is where r² is the mean of (E x² over σ²) of the kind.
+//! Linearised about the fit, the likelihood of the geometry x is a Gaussian with information A and
+//! vector b = A x̂. With prior σ multiplied by r, one factor for all parameters of a kind, the
+//! posterior is N(C b, C) with C = (A + Λ/r²)⁻¹. The logarithm of the evidence is
+//! ½ bᵀC b + ½ ln|C| − Σ ln r + constant; it is largest where r² is the mean of E x² / σ² of the kind.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,51 +11,51 @@ use crate::fit::stages::noise_model::by_chance;
 use crate::model::parameter::{JointField, Parameter, ParameterSite, Regressor};
 use crate::quantity::Unit;
 
-/// Fewest parameters of a kind that say how large they are.
-const LEAST_COUNT: usize = 4;
-/// Fewest of a kind that the data decide, counted in parts.
-const LEAST_DECIDED: f64 = 3.0;
-/// A prior is another where its σ is so many times as large, or as small.
-const TIMES: f64 = 2.0;
-/// Steps of the search at most.
-const MOST_STEPS: usize = 500;
-/// It has settled when no ln r changes by more.
+/// Minimum number of parameters of a kind from which its width is estimated.
+const MIN_COUNT: usize = 4;
+/// Minimum number of parameters of a kind that the data determine, counted in parts.
+const MIN_DETERMINED: f64 = 3.0;
+/// Ratio of the estimated to the declared σ, or its inverse, from which on it is reported.
+const MIN_RATIO: f64 = 2.0;
+/// Maximum number of steps of the search.
+const MAX_STEPS: usize = 500;
+/// Change of every ln r below which the search has settled.
 const SETTLED: f64 = 1e-4;
 
-/// The width that the data speak for, of the prior of one kind of geometry at all joints.
+/// Prior width of one kind of geometry at all joints, estimated from the data.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PriorSize {
-    /// A pattern of `[parameters]`: `joint*.alpha`.
+    /// Pattern of the parameters as in `[parameters]`, such as `joint*.alpha`.
     pub pattern: String,
     /// Kind of quantity: angle or length.
     pub unit: Unit,
-    /// How many parameters it is of.
+    /// Number of parameters.
     pub count: usize,
-    /// 1 σ as declared, SI.
+    /// Declared 1 σ \[SI\].
     pub declared: f64,
-    /// 1 σ of the greatest evidence, SI.
+    /// 1 σ of the largest evidence \[SI\].
     pub found: f64,
 }
 
-/// What the data say of the geometry that has priors, in units of its declared σ.
-struct Sight {
+/// Likelihood of the geometry with priors, in units of the declared σ.
+struct GeometryLikelihood {
     information: DMatrix<f64>,
     vector: DVector<f64>,
 }
 
-/// A kind of parameters, and their places among those of a [`Sight`].
+/// Kind of parameters, and their places in the [`GeometryLikelihood`].
 struct Group {
     field: JointField,
     sigma: f64,
     places: Vec<usize>,
 }
 
-/// The widths that the data contradict: those by which the evidence grows beyond what chance gives,
-/// and at least [`TIMES`] off.
+/// Returns the widths that the data contradict: those that raise the evidence beyond what chance
+/// gives, and differ by at least a factor of [`MIN_RATIO`].
 ///
-/// `unknowns` with their values x and their covariance, 0 where one is held; angles and lengths of
-/// joints with one declared σ count, a kind with few of them does not.
+/// `unknowns` have the values `x` and the `covariance`, 0 where one is held. Angles and lengths of
+/// joints with one declared σ count, if there are enough of a kind.
 pub(in crate::fit) fn prior_sizes(
     unknowns: &[&Parameter],
     x: &[f64],
@@ -64,26 +64,26 @@ pub(in crate::fit) fn prior_sizes(
     let seen: Vec<(usize, JointField, f64)> = unknowns
         .iter()
         .enumerate()
-        .filter_map(|(k, own)| match (own.site, own.sigma) {
-            // What a regressor drives is an effect's, not the geometry's.
+        .filter_map(|(k, parameter)| match (parameter.site, parameter.sigma) {
+            // A parameter with a regressor belongs to an effect, not to the geometry.
             (ParameterSite::Joint { field, .. }, Some(sigma))
-                if field.is_geometry() && own.regressor == Regressor::Constant =>
+                if field.is_geometry() && parameter.regressor == Regressor::Constant =>
             {
                 (covariance[(k, k)] > 0.0).then_some((k, field, sigma))
             }
             _ => None,
         })
         .collect();
-    let Some(sight) = Sight::of(&seen, x, covariance) else { return Vec::new() };
+    let Some(likelihood) = GeometryLikelihood::of(&seen, x, covariance) else { return Vec::new() };
     let groups = groups(&seen);
-    let (factors, decided) = sight.widths(&groups, None);
-    let best = sight.evidence(&groups, &factors);
+    let (factors, decided) = likelihood.widths(&groups, None);
+    let best = likelihood.evidence(&groups, &factors);
     let contradicted = |g: &usize| {
-        if factors[*g].max(1.0 / factors[*g]) <= TIMES || decided[*g] < LEAST_DECIDED {
+        if factors[*g].max(1.0 / factors[*g]) <= MIN_RATIO || decided[*g] < MIN_DETERMINED {
             return false;
         }
-        // The other kinds as wide as is best beside this one as declared.
-        let declared = sight.evidence(&groups, &sight.widths(&groups, Some(*g)).0);
+        // The other kinds have the best widths beside this one as declared.
+        let declared = likelihood.evidence(&groups, &likelihood.widths(&groups, Some(*g)).0);
         best.zip(declared).is_some_and(|(best, declared)| 2.0 * (best - declared) > by_chance())
     };
     let size = |g: usize| {
@@ -99,20 +99,21 @@ pub(in crate::fit) fn prior_sizes(
     (0..groups.len()).filter(contradicted).map(size).collect()
 }
 
-/// The kinds of which there are enough, all of one declared σ.
+/// Returns the kinds with enough parameters that all have one declared σ.
 fn groups(seen: &[(usize, JointField, f64)]) -> Vec<Group> {
     let fields = JointField::GEOMETRY.into_iter().chain(JointField::PLACEMENT);
     let group = |field: JointField| {
         let places: Vec<usize> = (0..seen.len()).filter(|&i| seen[i].1 == field).collect();
         let sigma = seen[*places.first()?].2;
         let alike = places.iter().all(|&i| (seen[i].2 / sigma - 1.0).abs() < 1e-9);
-        (alike && places.len() >= LEAST_COUNT).then_some(Group { field, sigma, places })
+        (alike && places.len() >= MIN_COUNT).then_some(Group { field, sigma, places })
     };
     fields.filter_map(group).collect()
 }
 
-impl Sight {
-    /// Of some unknowns with all others integrated out; `None` where their covariance is singular.
+impl GeometryLikelihood {
+    /// Creates the likelihood of some unknowns with all others integrated out; `None` where their
+    /// covariance is singular.
     fn of(seen: &[(usize, JointField, f64)], x: &[f64], covariance: &DMatrix<f64>) -> Option<Self> {
         let n = seen.len();
         let of = |i: usize, j: usize| covariance[(seen[i].0, seen[j].0)] / (seen[i].2 * seen[j].2);
@@ -122,7 +123,7 @@ impl Sight {
         Some(Self { information, vector })
     }
 
-    /// Covariance and mean of the posterior, and half the logarithm of the determinant of its
+    /// Returns covariance and mean of the posterior, and half the logarithm of the determinant of its
     /// covariance.
     fn posterior(
         &self,
@@ -142,22 +143,23 @@ impl Sight {
         Some((covariance, mean, -half))
     }
 
+    /// Returns the logarithm of the evidence, up to a constant.
     fn evidence(&self, groups: &[Group], factors: &[f64]) -> Option<f64> {
         let (_, mean, half) = self.posterior(groups, factors)?;
         let priors: f64 = groups
             .iter()
             .zip(factors)
-            .map(|(own, factor)| own.places.len() as f64 * factor.ln())
+            .map(|(group, factor)| group.places.len() as f64 * factor.ln())
             .sum();
         Some(0.5 * mean.dot(&self.vector) + half - priors)
     }
 
-    /// The factors of the greatest evidence, that of a kind `held` staying 1, and how many
-    /// parameters of each kind the data decide.
+    /// Returns the factors of the largest evidence, where that of the kind `held` stays 1, and the
+    /// number of parameters of each kind that the data determine.
     fn widths(&self, groups: &[Group], held: Option<usize>) -> (Vec<f64>, Vec<f64>) {
         let mut factors = vec![1.0; groups.len()];
         let mut decided = vec![0.0; groups.len()];
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let Some((covariance, mean, _)) = self.posterior(groups, &factors) else { break };
             let mut change: f64 = 0.0;
             for (g, Group { places, .. }) in groups.iter().enumerate() {
@@ -219,13 +221,14 @@ mod tests {
             }
             (vector[k], vector[k + n]) = (100.0 * sum, 100.0 * sum);
         }
-        let sight = Sight { information: precision - DMatrix::identity(2 * n, 2 * n), vector };
+        let likelihood =
+            GeometryLikelihood { information: precision - DMatrix::identity(2 * n, 2 * n), vector };
         let groups = groups(&seen);
-        let best = sight.evidence(&groups, &sight.widths(&groups, None).0).unwrap();
+        let best = likelihood.evidence(&groups, &likelihood.widths(&groups, None).0).unwrap();
         for g in 0..2 {
-            let held = sight.widths(&groups, Some(g)).0;
+            let held = likelihood.widths(&groups, Some(g)).0;
             assert!((held[g] - 1.0).abs() < 1e-12 && held[1 - g] > 2.0, "{held:?}");
-            assert!(2.0 * (best - sight.evidence(&groups, &held).unwrap()) < by_chance());
+            assert!(2.0 * (best - likelihood.evidence(&groups, &held).unwrap()) < by_chance());
         }
     }
 

@@ -1,4 +1,4 @@
-//! Poses whose residual is too long to be noise.
+//! Lengths of whitened residuals, and those that are too long to be noise.
 
 use std::collections::BTreeMap;
 
@@ -11,11 +11,11 @@ use crate::least_squares::residual_vector;
 use crate::model::Pose;
 use crate::numeric::median;
 
-/// Probability that noise alone makes any pose an outlier.
+/// Probability that noise alone makes any of the poses an outlier.
 const BY_CHANCE: f64 = 0.01;
 
-/// The median length of so many `coordinates` of σ 1, √ of the median of χ², and the length beyond
-/// which chance takes any of `count` with probability 0.01 [Bonferroni].
+/// Returns the median length of residuals with `coordinates` of σ 1, √ of the median of χ², and the
+/// length that any of `count` exceeds by chance with probability 0.01  [Bonferroni].
 pub(in crate::fit) fn chance(count: usize, coordinates: usize) -> Option<(f64, f64)> {
     let squares = ChiSquared::new(coordinates as f64).ok()?;
     Some((
@@ -24,49 +24,49 @@ pub(in crate::fit) fn chance(count: usize, coordinates: usize) -> Option<(f64, f
     ))
 }
 
-/// For each of some residuals, which have so many `coordinates`, what [`chance`] says of it.
+/// Returns the result of [`chance`] for each residual, given its number of coordinates.
 pub(in crate::fit) fn chances(coordinates: &[usize]) -> Vec<(f64, f64)> {
-    let mut known: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
-    let of = |&own: &usize| {
-        *known
-            .entry(own)
-            .or_insert_with(|| chance(coordinates.len(), own).unwrap_or((1.0, f64::INFINITY)))
+    let mut by_count: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
+    let of = |&count: &usize| {
+        *by_count
+            .entry(count)
+            .or_insert_with(|| chance(coordinates.len(), count).unwrap_or((1.0, f64::INFINITY)))
     };
     coordinates.iter().map(of).collect()
 }
 
-/// The median of some lengths of whitened residuals, each over the one that chance gives it; those
+/// Returns the median of the lengths of whitened residuals, each over its median by chance. Lengths
 /// that are not finite do not count.
 pub(in crate::fit) fn scatter(lengths: &[f64], chances: &[(f64, f64)]) -> f64 {
     let ratios = lengths.iter().zip(chances).map(|(length, (typical, _))| length / typical);
     median(ratios.filter(|ratio| ratio.is_finite())).unwrap_or(0.0)
 }
 
-/// Which of some lengths of whitened residuals of so many `coordinates` each are too long to be
-/// noise; the scatter is the median one, no less than the σ that they are in units of.
+/// Returns whether each of the lengths of whitened residuals, with these numbers of coordinates, is
+/// too long to be noise. The scatter is their median, but at least 1 σ.
 pub(in crate::fit) fn outlying(lengths: &[f64], coordinates: &[usize]) -> Vec<bool> {
     let chances = chances(coordinates);
     let scatter = scatter(lengths, &chances).max(1.0);
     lengths.iter().zip(&chances).map(|(length, (_, limit))| *length > limit * scatter).collect()
 }
 
-/// Lengths of the whitened residuals of some poses, and what counts as too long.
+/// Lengths of the whitened residuals of some poses, and their limits.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct Lengths {
-    /// ‖r‖ of each pose in units of its declared σ.
+    /// Length ‖r‖ of each pose in units of its declared σ.
     pub values: Vec<f64>,
-    /// The same in units of the σ that the fit took.
+    /// Length ‖r‖ of each pose in units of the σ that the fit took.
     pub weighed: Vec<f64>,
     /// 1 σ of the scatter in units of the assumed one.
     pub scatter: f64,
-    /// Length of each in units of the scatter beyond which it is an outlier.
+    /// Length of each pose in units of the scatter beyond which it is an outlier.
     limits: Vec<f64>,
 }
 
 impl Lengths {
-    /// Of a stage at the full parameter vector `at`; `freedom` is the part of its coordinates that
-    /// is left to scatter, 0…1, and `declared` the part of the declared σ that the fit took to be
-    /// noise, where any σ was declared. Parts of residuals along `unmoved` directions do not count.
+    /// Computes the lengths of a stage at the full parameter vector `at`. `freedom` is the part of its
+    /// coordinates that is left to scatter, 0…1; `declared` is the part of the declared σ that the fit
+    /// took to be noise, where any σ was declared. Parts of residuals along `unmoved` directions do not count.
     ///
     /// A pose is an outlier where P(χ²ₖ > s²) < 0.01 / N, with s = ‖r‖ / scatter, k measured
     /// numbers and N poses \[Bonferroni\]. The scatter is the median of ‖r‖ / √(median of χ²ₖ),
@@ -94,8 +94,8 @@ impl Lengths {
         let in_declared = |(r, (pose, declared)): (&[f64], (&Pose, &f64))| {
             let position = length(r) * (pose.sigma / declared);
             match (pose.orientation, stage.declared_turn) {
-                (Some(orientation), Some(own)) => {
-                    position.hypot(length(&r[3..]) * (orientation.sigma / own))
+                (Some(orientation), Some(sigma)) => {
+                    position.hypot(length(&r[3..]) * (orientation.sigma / sigma))
                 }
                 _ => position,
             }
@@ -110,7 +110,7 @@ impl Lengths {
         Self { values, weighed, scatter: scatter.max(least), limits }
     }
 
-    /// Length of a residual in units of the scatter, if it is an outlier.
+    /// Returns the length of a residual in units of the scatter if it is an outlier.
     pub fn outlying(&self, place: usize) -> Option<f64> {
         let (length, limit) = (self.values[place], self.limits[place]);
         (self.scatter > 0.0 && length > limit * self.scatter).then(|| length / self.scatter)

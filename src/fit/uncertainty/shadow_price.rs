@@ -1,21 +1,21 @@
-//! What a bound or constraint costs.
+//! Shadow price of a bound or constraint.
 
 use crate::quantity::Unit;
 
-/// What a limit costs: by how much the fit would be better if the limit were moved out by one unit.
+/// Shadow price of a limit: improvement of the fit if the limit were moved out by one unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShadowPrice {
-    /// Its Lagrange multiplier −∂(½χ²)/∂limit, priors counted in χ² \[1 / SI unit of the limit; of
-    /// a logarithm: 1\].
+    /// Lagrange multiplier −∂(½χ²)/∂limit, with priors counted in χ² \[1 / SI unit of the limit\];
+    /// limits of logarithms have no unit.
     pub multiplier: f64,
-    /// The same as the fall of the rms of the position residuals that were fitted, as if they bore
-    /// all of it \[m / SI unit\].
+    /// Decrease of the rms of the fitted position residuals, if all of the gain were theirs \[m / SI
+    /// unit\].
     pub rms: f64,
 }
 
 impl ShadowPrice {
-    /// The fall of the rms \[mm\] for a limit moved out by 1 mm, 1°, 1 % (of what enters by its
-    /// logarithm) or one SI unit, and which of these.
+    /// Returns the decrease of the rms \[mm\] for a limit moved out by 1 mm, 1°, 1 % (where the
+    /// logarithm is limited) or one SI unit, and the name of that step.
     pub fn in_mm(self, unit: Unit) -> (f64, &'static str) {
         let (step, name) = match unit {
             Unit::Length => (1e-3, "mm"),

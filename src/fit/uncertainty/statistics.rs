@@ -1,4 +1,4 @@
-//! What the residual of a fit says about its unknowns.
+//! Statistics of a fit: standard errors, identified parts, χ² and outliers.
 
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
@@ -13,38 +13,39 @@ use crate::fit::uncertainty::residual_lengths::Lengths;
 use crate::least_squares::{Blind, Loss, Uncertainty};
 use crate::model::Pose;
 
-/// A part this large in unidentifiable combinations leaves an unknown without an error of its own.
+/// Part in unidentifiable combinations beyond which an unknown has no standard error.
 const PARTLY_BLIND: f64 = 1e-3;
 
-/// Errors and correlations of the unknowns of a fit.
+/// Statistics of the unknowns of a fit.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct Statistics {
     /// Standard error of each unknown.
     pub errors: Vec<f64>,
-    /// Whether data and priors decide each unknown: no bound, and no part in a combination that
-    /// neither of them sees.
+    /// Whether data and priors determine each unknown: it rests on no bound and takes part in no
+    /// unidentifiable combination.
     pub known: Vec<bool>,
-    /// Part of each unknown that the data gave, 0…1; in passing 1 where there is no prior.
+    /// Part of each unknown that the data determine, 0…1; 1 without a prior in a provisional fit.
     pub identified: Vec<f64>,
-    /// Covariance of the unknowns, shape = (unknowns, unknowns); 0 where one is held.
+    /// Covariance of the unknowns, shape = (unknowns, unknowns); 0 for unknowns that are held.
     pub covariance: DMatrix<f64>,
-    /// χ² against the declared σ over its degrees of freedom, outliers left out where the loss is
-    /// robust; `None` without any.
+    /// χ² against the declared σ over its degrees of freedom, `None` where there are none; a robust
+    /// loss leaves outliers out.
     pub reduced_chi2: Option<f64>,
-    /// Where chance keeps it.
+    /// Interval in which chance keeps `reduced_chi2` with probability 0.999.
     pub chance: Option<(f64, f64)>,
-    /// The constraints that hold back.
+    /// Active constraints.
     pub constraints: Vec<Held>,
-    /// What bounds and constraints cost.
+    /// Prices of bounds and constraints.
     pub prices: Prices,
     /// Bounds that hide the uncertainty of other unknowns.
     pub hidden: Vec<HiddenByBound>,
-    /// Lengths of the residuals.
+    /// Lengths of the whitened residuals of the poses.
     pub lengths: Lengths,
 }
 
 impl Statistics {
-    /// Of a stage that ended at `end` and took its σ as `assumed`, if any σ was declared.
+    /// Computes the statistics of a stage that ended at `end`; `noise_model` is what the fit took for
+    /// the declared σ, `None` where none is declared.
     ///
     /// With a robust loss the covariance is that of the weighted Jacobian, times
     /// [`Loss::variance_factor`]. Active constraints confine it to the directions that they leave
@@ -112,7 +113,7 @@ impl Statistics {
             let has = |valley: &HiddenByBound| valley.partners.contains(&j);
             hidden.iter().any(|valley| has(valley) && valley.deviation.is_infinite())
         };
-        // Nobody asks a fit in passing what data see.
+        // Provisional fits report no identified parts.
         let visible = if priors.iter().all(Option::is_some) || stage.memory.is_in_passing() {
             vec![1.0; errors.len()]
         } else {
@@ -130,8 +131,8 @@ impl Statistics {
                 None => visible[j].min(from_data(j)),
             })
             .collect();
-        // What was seen at the start may have run out of sight on the way, a rigidity towards
-        // infinity for one.
+        // A combination that was determined at the start may no longer be, such as a rigidity that
+        // went towards infinity.
         let seen = stage.gauge(&end.x, &held, &constraints).visible;
         let known = (0..errors.len())
             .map(|j| {
@@ -153,7 +154,7 @@ impl Statistics {
     }
 }
 
-/// Where chance keeps χ² / ν.
+/// Returns the interval in which chance keeps χ² / ν with probability 0.999.
 fn chance(freedom: f64) -> Option<(f64, f64)> {
     let distribution = ChiSquared::new(freedom).ok().filter(|_| freedom > 0.5)?;
     let bound = |p: f64| distribution.inverse_cdf(p) / freedom;
