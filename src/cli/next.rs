@@ -30,14 +30,32 @@ pub fn after_fit(
             )
         }
         // Of a fit that says so little neither a cause nor a correction follows.
+        None if found.has(FindingCode::PriorContradicted) => {
+            let rule =
+                found.finding(FindingCode::PriorContradicted).and_then(|own| own.word("rule"));
+            format!(
+                "give \"{}\" in {} a larger σ, or check what it limits",
+                rule.unwrap_or_default(),
+                common.problem_file().display()
+            )
+        }
+        None if found.has(FindingCode::NoiseBeyondDeclared) => {
+            format!("flexcal loop {named} looks for what the model lacks")
+        }
         None if !found.is_trusted() || report::tells_little(found) => {
             format!("flexcal check {named} says what the poses can tell")
         }
         None if found.has(FindingCode::PriorsDecide) => {
             format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
         }
-        None if is_structured || report::lacks_something(found) => {
+        None if is_structured
+            || report::lacks_something(found)
+            || found.has(FindingCode::HeldOutBeyondPrediction) =>
+        {
             format!("flexcal loop {named} looks for what the model lacks")
+        }
+        None if found.has(FindingCode::HeldOutNotBetter) => {
+            format!("flexcal check {named} says what the poses can tell")
         }
         None => {
             let [problem, estimate] = [common.problem(), estimate].map(shell_word);

@@ -16,6 +16,7 @@ use crate::fit::checks::required_columns::check_columns;
 use crate::fit::checks::{findings, held_out};
 use crate::fit::influential_rows::influential_rows;
 use crate::fit::outcome::{Estimate, Identification, enter};
+use crate::fit::stages::custom_solver::CustomSolver;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::fit::stages::noise_model::{LEAST_NOISE, NoiseModel};
 use crate::fit::stages::placement::UNKNOWN_SIGMA;
@@ -43,6 +44,8 @@ pub struct Options {
     pub strategy: Strategy,
     /// Solver of the fits.
     pub solver: SolverChoice,
+    /// Solver of the caller, used where `solver` is [`SolverChoice::Custom`].
+    pub custom_solver: Option<Arc<dyn CustomSolver>>,
     /// Receiver of progress.
     pub progress: Option<ProgressSink>,
     /// Request to stop early: a fit then returns [`StageError::Interrupted`], a loop returns what it
@@ -75,6 +78,13 @@ impl Options {
     #[must_use]
     pub fn with_solver(self, solver: SolverChoice) -> Self {
         Self { solver, ..self }
+    }
+
+    /// Sets a solver of the caller for the stages of the strategy; bases and targets are registered by
+    /// the solver that `auto` chooses.
+    #[must_use]
+    pub fn with_custom_solver(self, solver: Arc<dyn CustomSolver>) -> Self {
+        Self { solver: SolverChoice::Custom, custom_solver: Some(solver), ..self }
     }
 
     /// Looks for influential rows ([`Identification::influential_rows`]) by further fits; a loop does
@@ -155,6 +165,9 @@ pub enum IdentifyError {
         /// Name of the solver.
         solver: &'static str,
     },
+    /// [`SolverChoice::Custom`] was chosen without a solver.
+    #[error("the solver custom needs a solver of the caller: Options::with_custom_solver")]
+    NoCustomSolver,
     /// The strategy has no parameter to vary.
     #[error(
         "strategy {strategy} has nothing to fit: no parameter of its kind is free in [parameters]"
@@ -298,7 +311,14 @@ fn fit_rows(
     check_data(problem, measurements, split)?;
     let placement = Placement::of(measurements);
     let (strategy, solver) = (options.strategy, options.solver.decide(model));
-    if !solver.keeps(model) {
+    let custom_solver = options.custom_solver.as_deref();
+    let custom_keeps =
+        custom_solver.is_some_and(CustomSolver::keeps_bounds) && model.constraints.is_empty();
+    let is_custom = solver == SolverChoice::Custom;
+    if is_custom && custom_solver.is_none() {
+        return Err(IdentifyError::NoCustomSolver);
+    }
+    if !solver.keeps(model) && !(is_custom && custom_keeps) {
         return Err(IdentifyError::BoundsIgnored { solver: solver.as_str() });
     }
     let (declared, has_declared_noise) =
@@ -311,6 +331,7 @@ fn fit_rows(
         held_out_only: placement.held_out_only(model, measurements, split),
         strategy,
         solver,
+        custom_solver,
         loss: problem.robust.map_or(Loss::Squares, loss),
         progress: options.progress.as_ref(),
         stop: options.stop.as_ref(),
@@ -338,7 +359,8 @@ fn fit_rows(
     let outliers = outliers(&statistics.lengths, &split.identification, &errors, measurements);
     let asked = !options.provisional;
     // Before fits of other rows: the first linearisation of this fit is still remembered.
-    let whitened_triangle = if asked { fitting.whole().data_triangle(&start) } else { DMatrix::zeros(0, 0) };
+    let whitened_triangle =
+        if asked { fitting.whole().data_triangle(&start) } else { DMatrix::zeros(0, 0) };
     let (estimates, covariance, not_converged) = estimated(&fitting, &mut end, &statistics, noise)?;
     let (fitted, whole) = (fitting.errors(&end.x), fitting.whole());
     let (noise_factor, sigma_taken) = taken(&whole, measurements.leading());

@@ -17,6 +17,7 @@ pub use apply::compensate::{Command, compensate, seen_from_base, seen_in_base, w
 pub use apply::joint_source::{JointSources, joint_sources};
 pub use apply::predict::Residual;
 pub use apply::predict_saved::{ErrorsBySession, PredictError, Prediction, predict};
+pub use apply::predicted_covariance::PredictedPosition;
 pub use apply::saved_estimate::{SavedEstimate, SavedEstimateError};
 pub use checks::finding::{Finding, FindingCode, FindingEntry, Severity};
 pub use checks::misreading::Misreading;
@@ -31,6 +32,7 @@ pub use errors::{AxisValues, ErrorSummary, Errors, OrientationErrors};
 pub use identification::{IdentifyError, Options, identify, identify_model};
 pub use outcome::{Estimate, Identification, STRONG_CORRELATION};
 pub use stages::alternation::Alternation;
+pub use stages::custom_solver::CustomSolver;
 pub(crate) use stages::fixture_location::locate;
 pub use stages::placement::Placement;
 pub use stages::progress::{Progress, ProgressSink, Stop};

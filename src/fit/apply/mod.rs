@@ -6,4 +6,5 @@ pub(super) mod compensate;
 pub(super) mod joint_source;
 pub(super) mod predict;
 pub(super) mod predict_saved;
+pub(super) mod predicted_covariance;
 pub(super) mod saved_estimate;

@@ -148,7 +148,11 @@ impl Identification {
 
     /// Returns every row as a pose, its orientation with the σ `turn`; elapsed time starts at the first
     /// pose of the identification.
-    fn poses<'a>(&self, rows: &'a Measurements, turn: Option<f64>) -> Vec<Pose<'a>> {
+    pub(in crate::fit) fn poses<'a>(
+        &self,
+        rows: &'a Measurements,
+        turn: Option<f64>,
+    ) -> Vec<Pose<'a>> {
         let all: Vec<usize> = (0..rows.len()).collect();
         let mut poses = Placement::of(rows).oriented_poses(rows, &all, (1.0, turn));
         for pose in &mut poses {

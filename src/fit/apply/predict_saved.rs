@@ -278,6 +278,7 @@ fn place(
         poses: Arc::new(users),
         unknowns: missing.to_vec(),
         solver: SolverChoice::Auto.decide(model),
+        custom_solver: None,
         max_steps: Settings::default().max_iterations,
         cost_tolerance: COST_TOLERANCE,
         loss: Loss::Squares,

@@ -4,7 +4,6 @@
 use std::f64::consts::PI;
 use std::fmt;
 
-
 use crate::fit::Placement;
 use crate::fit::stages::fitting::Fitting;
 use crate::least_squares::Memory;

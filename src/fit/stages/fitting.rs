@@ -6,6 +6,7 @@ use nalgebra::DVector;
 
 use crate::fit::errors::of_kind;
 use crate::fit::stages::alternation::{Alternation, Anderson, contraction};
+use crate::fit::stages::custom_solver::CustomSolver;
 use crate::fit::stages::fixture_location::locate;
 use crate::fit::stages::noise_model::NoiseModel;
 use crate::fit::stages::placement::HeldOutOnly;
@@ -46,6 +47,8 @@ pub(in crate::fit) struct Fitting<'a> {
     pub held_out_only: HeldOutOnly,
     pub strategy: Strategy,
     pub solver: SolverChoice,
+    /// Solver of the caller, which [`SolverChoice::Custom`] stands for.
+    pub custom_solver: Option<&'a dyn CustomSolver>,
     /// Loss of the residual of a pose in the stages of the strategy.
     pub loss: Loss,
     pub progress: Option<&'a ProgressSink>,
@@ -161,6 +164,7 @@ impl<'a> Fitting<'a> {
             declared_turn: self.turn_sigma,
             unknowns,
             solver: self.solver,
+            custom_solver: self.custom_solver,
             max_steps: Settings::default().max_iterations,
             cost_tolerance: COST_TOLERANCE,
             loss: Loss::Squares,

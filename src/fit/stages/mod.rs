@@ -2,6 +2,7 @@
 
 pub(super) mod alternation;
 pub(super) mod constraints;
+pub(super) mod custom_solver;
 pub(super) mod fitting;
 pub(super) mod fixture_location;
 pub(super) mod noise_model;

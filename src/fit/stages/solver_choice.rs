@@ -26,10 +26,13 @@ pub enum SolverChoice {
     Reflective,
     /// Levenberg–Marquardt whose steps are moved to the nearest point within bounds.
     Clamped,
+    /// Solver of the caller, given by
+    /// [`Options::with_custom_solver`](crate::fit::Options::with_custom_solver).
+    Custom,
 }
 
 impl SolverChoice {
-    /// Every choice, `auto` first.
+    /// Every choice by name, `auto` first.
     pub const CHOICES: [Self; 8] = [
         Self::Auto,
         Self::LevenbergMarquardt,
@@ -88,6 +91,7 @@ impl SolverChoice {
             Self::Clamped => {
                 ("clamped", "Levenberg-Marquardt with steps cut at the bounds; no constraints")
             }
+            Self::Custom => ("custom", "A solver of the caller"),
         }
     }
 
@@ -108,7 +112,11 @@ impl SolverChoice {
             Self::InteriorPoint => Some(BoundMethod::InteriorPoint),
             Self::Reflective => Some(BoundMethod::Reflective),
             Self::Clamped => Some(BoundMethod::Clamped),
-            Self::Auto | Self::LevenbergMarquardt | Self::GaussNewton | Self::PseudoInverse => None,
+            Self::Auto
+            | Self::LevenbergMarquardt
+            | Self::GaussNewton
+            | Self::PseudoInverse
+            | Self::Custom => None,
         }
     }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::custom_solver::CustomSolver;
 use crate::fit::SolverChoice;
 use crate::fit::stages::constraints::Held;
 use crate::fit::stages::parameter_size::plausible;
@@ -60,6 +61,8 @@ pub(in crate::fit) struct Stage<'a> {
     /// Indices of the parameters that vary.
     pub unknowns: Vec<usize>,
     pub solver: SolverChoice,
+    /// Solver of the caller, which [`SolverChoice::Custom`] stands for.
+    pub custom_solver: Option<&'a dyn CustomSolver>,
     /// Maximum number of steps of the solver.
     pub max_steps: u64,
     /// Relative reduction of the cost below which the solver has converged.
@@ -300,7 +303,7 @@ impl<'a> Stage<'a> {
         let upper = DVector::from_iterator(begin.len(), self.parameters().map(|p| p.upper));
         let bounds = Bounds::new(lower, upper)?;
         let (_, rows) = self.constraints(start)?;
-        if self.solver.within().is_some() {
+        if self.solver.within().is_some() || self.custom().is_some() {
             begin = solver::nearest(&begin, &bounds, &rows).ok_or(StageError::Infeasible)?;
         }
         let hold = begin.clone();
@@ -357,6 +360,9 @@ impl<'a> Stage<'a> {
             cost_tolerance: self.cost_tolerance,
             ..Settings::default()
         };
+        if let Some(custom) = self.custom() {
+            return Ok(custom.minimise(&fit, begin, bounds, self.max_steps));
+        }
         let watched = self.progress.is_some() || self.stop.is_some();
         let reporter = watched.then(|| Reporter {
             sink: self.progress.map(Arc::clone),
@@ -397,6 +403,11 @@ impl<'a> Stage<'a> {
             (_, Some(reporter)) => solver::minimise_observed(fit, begin, &settings, reporter),
             (_, None) => solver::minimise(fit, begin, &settings),
         })
+    }
+
+    /// Returns the solver of the caller, if it is the chosen one.
+    fn custom(&self) -> Option<&'a dyn CustomSolver> {
+        self.custom_solver.filter(|_| self.solver == SolverChoice::Custom)
     }
 
     /// Returns the cost at the full parameter vector `at`: ½Σρ of the data and ½‖r‖² of the priors.
