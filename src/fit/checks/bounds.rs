@@ -34,8 +34,8 @@ impl Check for BoundsAreSeen {
             let more = if more > 0 { format!(" and {more} more") } else { String::new() };
             let first = names[..names.len().min(MAX_NAMED_PARTNERS)].join(", ");
             let text = format!(
-                "{name} rests on its {side} bound along a direction that the data hardly see; {first}{more} would change with it, \
-                 and have standard errors that allow for this"
+                "{name} rests on its {side} bound along a direction that the data hardly see; {first}{more} follow it, \
+                 and have standard errors that allow for that"
             );
             let numbers = [json!(name), side.into(), (*deviation).into(), json!(names)];
             Finding::new(FindingCode::BoundInUnidentifiedDirection, numbers, text)

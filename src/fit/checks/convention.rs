@@ -65,17 +65,24 @@ pub(super) fn fitting_conventions(fit: &CheckedFit, rms: f64) -> Vec<String> {
 
 /// Returns every reading of an orientation that was read with convention `kind`, with its name.
 fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
-    let mut readings: Vec<(String, Reading)> = vec![
-        ("the inverse rotation".to_owned(), Box::new(|q| vec![q.inverse()])),
-        (
-            "quaternions with the scalar part first".to_owned(),
-            Box::new(|q| vec![unit(q.i, q.j, q.k, q.w)]),
-        ),
-        (
-            "the inverse of quaternions with the scalar part first".to_owned(),
-            Box::new(|q| vec![unit(q.i, q.j, q.k, q.w).inverse()]),
-        ),
-    ];
+    let inverse: Reading = Box::new(|q| vec![q.inverse()]);
+    let mut readings = vec![("the inverse rotation".to_owned(), inverse)];
+    for order in quaternion_orders() {
+        let reordered = move |q: &UnitQuaternion<f64>| {
+            let columns = [q.i, q.j, q.k, q.w];
+            let mut component = [0.0; 4];
+            order.iter().zip(columns).for_each(|(&place, value)| component[place] = value);
+            let [x, y, z, w] = component;
+            UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
+        };
+        let letters: Vec<&str> = order.iter().map(|&place| ["x", "y", "z", "w"][place]).collect();
+        let name = format!("quaternions whose columns hold {}", letters.join(", "));
+        readings.push((
+            format!("the inverse of {name}"),
+            Box::new(move |q| vec![reordered(q).inverse()]),
+        ));
+        readings.push((name, Box::new(move |q| vec![reordered(q)])));
+    }
     if kind != RotationKind::Vector {
         let of_vector: Reading =
             Box::new(move |q| angles(kind, q).map(UnitQuaternion::from_scaled_axis).to_vec());
@@ -91,9 +98,11 @@ fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
     readings
 }
 
-/// Returns the quaternion w + x i + y j + z k, normalised.
-fn unit(w: f64, x: f64, y: f64, z: f64) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
+/// Returns every order of the components x, y, z, w of a quaternion but the declared one.
+fn quaternion_orders() -> impl Iterator<Item = [usize; 4]> {
+    let places = (0..256_usize).map(|k| [k % 4, k / 4 % 4, k / 16 % 4, k / 64]);
+    let is_order = |order: &[usize; 4]| (0..4).all(|place| order.contains(&place));
+    places.filter(move |order| is_order(order) && *order != [0, 1, 2, 3])
 }
 
 /// Returns the three numbers that may have been read as the orientation `q` \[rad\]. A rotation

@@ -14,9 +14,9 @@ use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 /// Probability below which the held-out residuals contradict the prediction.
 const IMPROBABLE: f64 = 1e-3;
 /// Number of standard errors from which on a mean difference of held-out errors is no chance.
-const MIN_DIFFERENCE: f64 = 3.0;
+const MIN_DIFFERENCE: f64 = 2.0;
 /// Number of held-out rows from which on a mean difference is judged.
-const MIN_ROWS: usize = 8;
+const MIN_ROWS: usize = 6;
 
 /// Checks that the held-out residuals are as large as the fit predicts.
 ///

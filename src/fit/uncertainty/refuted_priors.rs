@@ -20,6 +20,8 @@ const FACTORS: [f64; 8] = [3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4];
 /// Ratio of the noise variances, with the wider σ over as declared, above which the prior is not
 /// the reason for the misfit.
 const MAX_VARIANCE_RATIO: f64 = 0.25;
+/// Noise variance over that declared, with wider priors, above which priors explain nothing.
+const MAX_VARIANCE: f64 = 1000.0;
 /// Multiple of the gain in 2 ln L that chance gives once in 1000, above which a prior is refuted.
 const BEYOND_DOUBT: f64 = 10.0;
 /// Ratio of the noise variance taken to that declared, below which no prior is questioned.
@@ -93,7 +95,7 @@ pub(in crate::fit) fn refuted_priors(
         order.push(place);
     }
     let ratio = best.variance / declared.variance;
-    if ratio > MAX_VARIANCE_RATIO {
+    if ratio > MAX_VARIANCE_RATIO || best.variance > MAX_VARIANCE {
         return Vec::new();
     }
     let refuted = |place: usize| RefutedPrior {
@@ -113,13 +115,13 @@ struct Best {
 
 /// Data of the evidence, linearised about the fit.
 struct Evidence {
-    /// RᵀR of the unknowns that are free.
+    /// Information RᵀR of the free unknowns.
     information: DMatrix<f64>,
-    /// Rᵀc.
+    /// Vector Rᵀc of the free unknowns.
     vector: DVector<f64>,
-    /// ‖r₀‖².
+    /// Squares ‖r₀‖² at nominal.
     squares: f64,
-    /// m.
+    /// Number m of measured coordinates.
     coordinates: f64,
     /// Places of the free unknowns.
     free: Vec<usize>,
@@ -128,6 +130,7 @@ struct Evidence {
 }
 
 impl Evidence {
+    /// Linearises the data of a stage about the full parameter vector `at`.
     fn of(stage: &Stage, at: &DVector<f64>, held: &[bool], max_variance: f64) -> Self {
         let data = stage.linearised(at, Loss::Squares);
         let free: Vec<usize> = (0..held.len()).filter(|&j| !held[j]).collect();
