@@ -86,6 +86,7 @@ pub mod problem;
 #[deny(clippy::indexing_slicing)]
 pub mod quantity;
 mod random;
+pub mod remainder;
 pub mod report;
 pub mod residual_tests;
 pub mod results;

@@ -10,6 +10,7 @@ use flexcal::fit::SavedEstimate;
 use flexcal::measurement::Measurements;
 use flexcal::model::Model;
 use flexcal::problem::Problem;
+use flexcal::remainder::{self, Bounds};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{CompensationResult, Document as _};
 
@@ -37,6 +38,9 @@ pub struct Arguments {
     /// The frame in which targets are given
     #[arg(long, value_enum, default_value_t = Frame::Measuring)]
     frame: Frame,
+    /// Probability with which the bound of an error holds
+    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::level)]
+    level: f64,
 }
 
 /// Frame of the targets.
@@ -111,15 +115,30 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             (targets, sought)
         }
     };
-    let commands = fit::compensate(&problem, &model, &x, &sought)?;
-    results.write(&[("commands.csv", &report::commands_csv(&problem, &targets, &commands))])?;
-    common.tell(&CompensationResult::new(&problem, &commands).to_json(), || {
+    let correction = super::remainder::of_estimate(&problem, &estimate)?;
+    let (commands, bounds) = match &correction {
+        Some(correction) => {
+            let fitted = (&estimate, &x);
+            let found = remainder::compensate(&problem, &model, fitted, &sought, correction)?;
+            let (commands, poses) = found.into_iter().unzip();
+            (commands, Some(Bounds::new(correction, poses, arguments.level)))
+        }
+        None => (fit::compensate(&problem, &model, &x, &sought)?, None),
+    };
+    let bounds = bounds.as_ref();
+    let table = report::commands_csv(&problem, &targets, &commands, bounds);
+    results.write(&[("commands.csv", &table)])?;
+    let mut result = CompensationResult::new(&problem, &commands);
+    if let Some(bounds) = bounds {
+        result = result.with_bounds(bounds);
+    }
+    common.tell(&result.to_json(), || {
         let written = results.path("commands.csv");
         let [problem_word, estimate] = [common.problem(), &arguments.estimate].map(shell_word);
         format!(
             "{}\nWritten to {}\n\
              Next: measure with these commands, then flexcal predict {problem_word} --estimate {estimate} --data MEASURED.csv judges them\n",
-            report::commands_text(&problem, &targets, &commands),
+            report::commands_text(&problem, &targets, &commands, bounds),
             written.display()
         )
     })?;

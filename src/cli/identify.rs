@@ -5,8 +5,9 @@ use std::error::Error;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use flexcal::fit::{self, IdentifyError, Options, SolverChoice, Strategy};
+use flexcal::remainder::{self, Correction, Fitted};
 use flexcal::report::{self, PlotData};
-use flexcal::results::{Document as _, IdentificationResult};
+use flexcal::results::{Document as _, IdentificationResult, REMAINDER_FILE};
 
 use super::input::{Common, Input};
 use super::outcome::Outcome;
@@ -29,6 +30,10 @@ pub struct Arguments {
     /// Solver; auto keeps bounds and constraints if there are any
     #[arg(long, default_value = SolverChoice::Auto.as_str(), value_parser = words(SolverChoice::CHOICES, SolverChoice::as_str, SolverChoice::summary))]
     solver: SolverChoice,
+    /// Correct predictions by what no law explains, if poses left out gain by it; writes
+    /// remainder.json
+    #[arg(long)]
+    remainder: bool,
     /// Print every table: parameters, outliers, what the poses can tell
     #[arg(short, long, conflicts_with_all = ["quiet", "json"])]
     verbose: bool,
@@ -52,8 +57,12 @@ fn words<T: Copy + Send + Sync + 'static, const N: usize>(
 /// what it came to.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
-    let Input { problem, data, results } =
-        common.read("identify", &["estimate.json", "residuals.csv", REPORT[0], REPORT[1]])?;
+    let mut names = vec!["estimate.json", "residuals.csv", REPORT[0], REPORT[1]];
+    if arguments.remainder {
+        names.push(REMAINDER_FILE);
+    }
+    let Input { problem, data, results } = common.read("identify", &names)?;
+    let declared = super::remainder::declared(&problem)?.filter(|_| !arguments.remainder);
     common.say_if_nothing_is_free(&problem);
     let stop = interrupt::stop();
     let options = Options::default()
@@ -72,15 +81,40 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
                 sources => Ok((sources?, found)),
             }
         })?;
-    let json = IdentificationResult::new(&problem, &identification).to_json();
+    let fitted = if arguments.remainder {
+        remainder::fit(&identification, &problem, &data)?
+    } else {
+        remainder::uncertainty(&identification, &problem, &data)?
+    };
+    let fitted = match (fitted, declared) {
+        (Some(fitted), Some(declared)) => {
+            Some(fitted.with_declared(declared, (&identification, &problem), &data)?)
+        }
+        (fitted, _) => fitted,
+    };
+    let mut result = IdentificationResult::new(&problem, &identification);
+    if let Some(fitted) = &fitted {
+        result = result.with_predictions(&identification, fitted);
+    }
+    let json = result.to_json();
+    let is_told = |own: &&Fitted| arguments.remainder || own.remainder.is_some();
+    let words = fitted
+        .as_ref()
+        .filter(is_told)
+        .map(|own| format!("\n{}\n", report::remainder_text(&identification, own)))
+        .unwrap_or_default();
     let shown = PlotData::of_identification(&problem, &data, &identification)?;
     let told = report::identification_report(&problem, &identification, &shown);
-    let residuals = report::residuals_csv(
-        &problem,
-        &data.measurements,
-        &identification.residuals(&problem, &data)?,
-    );
-    results.write_report(&[("estimate.json", &json), ("residuals.csv", &residuals)], &told)?;
+    let residuals = match fitted.as_ref().and_then(|own| own.residuals.as_ref()) {
+        Some(corrected) => corrected.rows.clone(),
+        None => identification.residuals(&problem, &data)?,
+    };
+    let residuals = report::residuals_csv(&problem, &data.measurements, &residuals);
+    let kept = fitted.as_ref().and_then(|own| own.remainder.as_ref());
+    let file = kept.filter(|_| arguments.remainder).map(Correction::to_json);
+    let mut texts = vec![("estimate.json", json.as_str()), ("residuals.csv", residuals.as_str())];
+    texts.extend(file.as_ref().map(|text| (REMAINDER_FILE, text.as_str())));
+    results.write_report(&texts, &told)?;
     let sources = sources.as_ref().map(report::joint_sources_text);
     common.tell(&json, || {
         let told = if arguments.verbose {
@@ -92,7 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let is_structured = shown.findings.is_structured();
         let estimate = results.path("estimate.json");
         let next = next::after_fit(common, &identification, is_structured, &estimate);
-        format!("{told}{sources}{}Next: {next}\n", results.written())
+        format!("{told}{words}{sources}{}Next: {next}\n", results.written())
     })?;
     if let (Some(words), true, false) = (&sources, common.json, common.quiet) {
         diagnostic::warn(words);

@@ -6,10 +6,12 @@ use std::{fs, io};
 
 use clap::Args;
 use flexcal::fit::Options;
+use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
+use flexcal::remainder::{self, Correction, Fitted};
 use flexcal::report::{self, PlotData};
-use flexcal::results::{Document as _, LoopResult};
-use flexcal::select;
+use flexcal::results::{Document as _, LoopResult, REMAINDER_FILE};
+use flexcal::select::{self, ClosedLoop};
 
 use super::input::Common;
 use super::outcome::Outcome;
@@ -40,7 +42,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let (problem, text) = Problem::read_with_text(common.problem())?;
     common.files(&problem).iter().try_for_each(|file| nameable(file))?;
-    let names = ["loop.json", "problem.closed.toml", "residuals.csv", REPORT[0], REPORT[1]];
+    let texts = ["loop.json", "problem.closed.toml", "residuals.csv", REMAINDER_FILE];
+    let names = [&texts[..], &REPORT].concat();
     let results = common.results("loop", &problem, &[], &names)?;
     let mut data = common.measurements(&problem)?;
     common.say_if_nothing_is_free(&problem);
@@ -49,8 +52,6 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let options = Options::default().with_influential_rows().with_stop(stop.clone());
     let close = |sink| select::close(&problem, &data, &options.with_progress(sink));
     let closure = Line::during(common.talks(), stop, close)?;
-    let result = LoopResult::new(&problem, &closure);
-    let json = result.to_json();
     fs::create_dir_all(&results.folder)
         .map_err(|source| WriteError::Io { path: results.folder.clone(), source })?;
     let relative = |files: &[PathBuf]| -> io::Result<Vec<PathBuf>> {
@@ -60,21 +61,30 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let joint_files =
         relative(problem.data.joint_log.as_ref().map_or(&[], |log| log.files.as_slice()))?;
     let shown = PlotData::of_loop(&problem, &data, &closure)?;
-    let texts = [
+    let closed = report::closed_problem(&text, &problem, &closure, [&files, &joint_files])?;
+    let fitted = fitted(&problem, &closed, &closure, &data)?;
+    let kept = fitted.as_ref().and_then(|own| own.remainder.as_ref());
+    let closed = report::with_remainder(&closed, kept.map(|_| REMAINDER_FILE))?;
+    let mut result = LoopResult::new(&problem, &closure);
+    if let Some(fitted) = &fitted {
+        result = result.with_remainder(&closure, fitted);
+    }
+    let json = result.to_json();
+    let residuals = match fitted.as_ref().and_then(|own| own.residuals.as_ref()) {
+        Some(corrected) => corrected.rows.clone(),
+        None => closure.after.residuals(&closure.closed, &data)?,
+    };
+    let residuals = report::residuals_csv(&closure.closed, &data.measurements, &residuals);
+    let file = kept.map(Correction::to_json);
+    let mut texts = vec![
         ("loop.json", json.as_str()),
-        (
-            "problem.closed.toml",
-            &report::closed_problem(&text, &problem, &closure, [&files, &joint_files])?,
-        ),
-        (
-            "residuals.csv",
-            &report::residuals_csv(
-                &closure.closed,
-                &data.measurements,
-                &closure.after.residuals(&closure.closed, &data)?,
-            ),
-        ),
+        ("problem.closed.toml", closed.as_str()),
+        ("residuals.csv", residuals.as_str()),
     ];
+    texts.extend(file.as_ref().map(|text| (REMAINDER_FILE, text.as_str())));
+    let words = kept.and(fitted.as_ref()).map_or_else(String::new, |own| {
+        format!("\n{}\n", report::remainder_text(&closure.after, own))
+    });
     let told = report::loop_report(&problem, &closure, &shown);
     results.write_report(&texts, &told)?;
     common.tell(&json, || {
@@ -85,13 +95,28 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             report::loop_brief(&problem, &closure, output::columns(), &all)
         };
         let next = next::after_loop(common, &problem, &closure.before.fit, &result, &results);
-        format!("{told}{}Next: {next}\n", results.written())
+        format!("{told}{words}{}Next: {next}\n", results.written())
     })?;
     let outcome = diagnostic::judged(&closure.after, common.quiet);
     if closure.interrupted {
         diagnostic::warn(&report::interrupted(closure.rounds.len()));
     }
     Ok(if closure.interrupted { Outcome::Interrupted } else { outcome })
+}
+
+/// Remainder beside the effects of the closed problem, whose text is `closed`; `None` where the
+/// text declares another arm than was fitted, as without an effect that data contradict.
+fn fitted(
+    problem: &Problem,
+    closed: &str,
+    closure: &ClosedLoop,
+    data: &Dataset,
+) -> Result<Option<Fitted>, Box<dyn Error>> {
+    let declared = Problem::parse(closed, &problem.data.location.file)?;
+    if declared.digest() != closure.closed.digest() || closure.interrupted {
+        return Ok(None);
+    }
+    Ok(remainder::fit(&closure.after, &closure.closed, data)?)
 }
 
 /// Data file that a closed problem cannot name.

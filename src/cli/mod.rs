@@ -24,6 +24,7 @@ mod plan;
 mod poses;
 mod predict;
 mod progress;
+mod remainder;
 mod simulate;
 mod study;
 mod trace;

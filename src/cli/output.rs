@@ -74,7 +74,10 @@ impl Results {
 
     /// States where the results are.
     pub fn written(&self) -> String {
-        format!("\nWritten to {}: {}\n", self.folder.display(), self.names.join(", "))
+        // Some names are claimed for files that are not always written.
+        let is_there = |name: &&String| self.path(name).exists();
+        let names: Vec<&str> = self.names.iter().filter(is_there).map(String::as_str).collect();
+        format!("\nWritten to {}: {}\n", self.folder.display(), names.join(", "))
     }
 
     /// Returns the path of a result.

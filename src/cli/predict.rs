@@ -7,6 +7,7 @@ use clap::Args;
 use flexcal::fit::{self, SavedEstimate};
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::{HeldOut, Problem};
+use flexcal::remainder::{self, Bounds, CorrectedPrediction};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, PredictionErrors};
 
@@ -33,6 +34,9 @@ pub struct Arguments {
     /// predicted
     #[arg(long, value_name = "ESTIMATE.json")]
     estimate: Option<PathBuf>,
+    /// Probability with which the bound of an error holds
+    #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::level)]
+    level: f64,
 }
 
 /// Names of the files that the command may write.
@@ -54,26 +58,42 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     // Rows without a split are predicted too. A random split applies only to the fitted rows.
     let by_chance = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }));
     let split = Split::new(&problem, &rows).ok().filter(|_| !by_chance || common.data().is_empty());
-    let prediction = fit::predict(&problem, estimate.as_ref(), &rows, split.as_ref())?;
-    let mut texts =
-        vec![("predictions.csv", report::predictions_csv(&problem, &rows, &prediction))];
+    let correction = match &estimate {
+        Some(estimate) => super::remainder::of_estimate(&problem, estimate)?,
+        None => None,
+    };
+    let (prediction, bounds) = match (&estimate, &correction) {
+        (Some(estimate), Some(correction)) => {
+            let CorrectedPrediction { prediction, poses } =
+                remainder::predict(&problem, estimate, correction, &rows, split.as_ref())?;
+            (prediction, Some(Bounds::new(correction, poses, arguments.level)))
+        }
+        _ => (fit::predict(&problem, estimate.as_ref(), &rows, split.as_ref())?, None),
+    };
+    let bounds = bounds.as_ref();
+    let table = report::predictions_csv(&problem, &rows, &prediction, bounds);
+    let mut texts = vec![("predictions.csv", table)];
     texts.extend(
         prediction
             .residuals
             .as_ref()
             .map(|all| ("residuals.csv", report::residuals_csv(&problem, &rows, all))),
     );
-    let errors = prediction
-        .errors
-        .as_ref()
-        .map(|own| PredictionErrors::new(own, &prediction.spreads).to_json());
+    let residuals = prediction.residuals.as_deref().unwrap_or_default();
+    let errors = prediction.errors.as_ref().map(|own| {
+        let errors = PredictionErrors::new(own, &prediction.spreads);
+        match bounds {
+            Some(bounds) => errors.with_bounds(residuals, bounds).to_json(),
+            None => errors.to_json(),
+        }
+    });
     texts.extend(errors.clone().map(|json| ("errors.json", json)));
     let borrowed: Vec<(&str, &str)> =
         texts.iter().map(|(name, text)| (*name, text.as_str())).collect();
     results.write(&borrowed)?;
     common.tell(errors.as_deref().unwrap_or(&PredictionErrors::default().to_json()), || {
         let arm = if estimate.is_some() { "the identified arm" } else { "the nominal arm" };
-        let text = report::prediction_text(&problem, arm, &prediction);
+        let text = report::prediction_text(&problem, arm, &prediction, bounds);
         let names: Vec<&str> = texts.iter().map(|(name, _)| *name).collect();
         let problem = shell_word(common.problem());
         let next = match &arguments.estimate {

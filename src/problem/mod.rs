@@ -22,6 +22,7 @@ pub(crate) mod pattern;
 mod plausible;
 pub(crate) mod quoted;
 pub(crate) mod read;
+mod remainder;
 mod robust;
 pub(crate) mod section;
 mod standard;
@@ -47,6 +48,7 @@ pub use parameters::{Freedom, ParameterRule, Quantities};
 pub(crate) use past::PoseTable;
 pub(crate) use past::ThermalLag;
 pub use past::{LazyPast, Past};
+pub use remainder::RemainderDeclaration;
 pub use robust::{Robust, RobustLoss};
 pub use target::{Target, Tool};
 pub use tree::Tree;
@@ -88,6 +90,8 @@ pub struct Problem {
     pub robust: Option<Robust>,
     /// Warnings about implausible values of the arm.
     pub warnings: Vec<Warning>,
+    /// Correction of what no law explains, if one is declared.
+    pub remainder: Option<RemainderDeclaration>,
 }
 
 impl Problem {

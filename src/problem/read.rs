@@ -10,7 +10,7 @@ use super::section::Section;
 use super::target::CarrierJoints;
 use super::{
     BasePose, Effect, EffectDeclaration, Equilibrium, Placement, Problem, Statics, UrdfEnds, arm,
-    constraints, data, effects, fixture, parameters, robust, target,
+    constraints, data, effects, fixture, parameters, remainder, robust, target,
 };
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
@@ -102,6 +102,7 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let constraints = constraints::read(&mut root)?;
     let data = data::read(&mut root)?;
     let robust = robust::read(&mut root)?;
+    let remainder = remainder::read(&mut root)?;
     root.finish()?;
     effects::check(&effects, statics, &joints, &data)?;
     Ok(Problem {
@@ -122,6 +123,7 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
         data,
         robust,
         warnings,
+        remainder,
     })
 }
 

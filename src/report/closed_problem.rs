@@ -48,6 +48,26 @@ pub fn closed_problem(
     }
 }
 
+/// The `text` of a closed problem that declares the remainder in `file`, beside it; without a file
+/// it declares none.
+///
+/// # Errors
+/// The text is not TOML.
+pub fn with_remainder(text: &str, file: Option<&str>) -> Result<String, TomlError> {
+    let mut document: DocumentMut = text.parse()?;
+    document.remove("remainder");
+    if let Some(file) = file {
+        let mut table = Table::new();
+        table.insert("file", Item::Value(Value::from(file)));
+        table.decor_mut().set_prefix(
+            "\n# Found by flexcal loop: what no law explains, applied to predictions and commands;\n\
+             # use = false switches it off.\n",
+        );
+        document.insert("remainder", Item::Table(table));
+    }
+    Ok(document.to_string())
+}
+
 /// Adds the prior of the harmonics of all joints to the end of `[parameters]`.
 fn with_rules(text: &str, prior: &HarmonicPrior) -> Result<String, TomlError> {
     let mut document: DocumentMut = text.parse()?;

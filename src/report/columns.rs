@@ -30,7 +30,7 @@ pub enum Column {
 
 impl Column {
     /// Returns the cell of a row as text.
-    fn cell(&self, row: usize) -> String {
+    pub(super) fn cell(&self, row: usize) -> String {
         match self {
             Self::Words(labels) => table::word(labels, row),
             Self::Counts(values) => values[row].to_string(),

@@ -4,16 +4,23 @@ use std::fmt::Write as _;
 
 use super::document::Block;
 use super::quantity::{fixed, mm, number};
+use super::remainder::{bounded, uncertainty};
 use super::render::text;
 use super::table;
 use crate::files::csv;
 use crate::fit::Command;
 use crate::measurement::Measurements;
 use crate::problem::Problem;
+use crate::remainder::Bounds;
 use crate::results::CompensationResult;
 
 /// Returns the outcome as text, with file and line of the targets that cannot be reached.
-pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Command]) -> String {
+pub fn commands_text(
+    problem: &Problem,
+    targets: &Measurements,
+    commands: &[Command],
+    bounds: Option<&Bounds>,
+) -> String {
     let result = CompensationResult::new(problem, commands);
     let mut words = format!(
         "{}\n{} of {} targets can be reached",
@@ -35,6 +42,9 @@ pub fn commands_text(problem: &Problem, targets: &Measurements, commands: &[Comm
             number(after, 4),
             number(before, 4)
         );
+    }
+    if let Some(bounds) = bounds {
+        let _ = write!(words, ".\n{}", bounded(bounds, None));
     }
     let point = |command: &Command| {
         let (place, miss) = (targets.location(command.row), command.miss.norm());
@@ -72,7 +82,12 @@ fn degrees(angle: Option<f64>) -> String {
 
 /// Returns commands as CSV: q of every moving joint (empty if the target is out of reach) with the
 /// names and units of the table of targets, desired pose and conditions, and predicted distances.
-pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Command]) -> String {
+pub fn commands_csv(
+    problem: &Problem,
+    targets: &Measurements,
+    commands: &[Command],
+    bounds: Option<&Bounds>,
+) -> String {
     let (mut header, mut lines) = (Vec::new(), vec![Vec::new(); commands.len()]);
     let mut add = |name: &str, cell: &dyn Fn(&Command) -> String| {
         header.push(name.to_owned());
@@ -113,5 +128,11 @@ pub fn commands_csv(problem: &Problem, targets: &Measurements, commands: &[Comma
         add("turn_before_deg", &|command| degrees(command.seed_turn));
     }
     add("reached", &|command| command.is_reached().to_string());
+    for (name, column) in bounds.into_iter().flat_map(uncertainty) {
+        header.push(name);
+        for (row, line) in lines.iter_mut().enumerate() {
+            line.push(column.cell(row));
+        }
+    }
     csv(header, lines)
 }

@@ -7,14 +7,21 @@ use super::columns::{self, Column};
 use super::document::{Block, Table};
 use super::errors::{measure, sizes};
 use super::quantity::counted;
+use super::remainder::{bounded, uncertainty};
 use super::render::text;
 use super::table;
 use crate::fit::{ErrorSummary, Prediction};
 use crate::measurement::Measurements;
 use crate::problem::Problem;
+use crate::remainder::Bounds;
 
 /// Returns predictions as CSV: columns that name the row, commands, and the predicted pose.
-pub fn predictions_csv(problem: &Problem, rows: &Measurements, prediction: &Prediction) -> String {
+pub fn predictions_csv(
+    problem: &Problem,
+    rows: &Measurements,
+    prediction: &Prediction,
+    bounds: Option<&Bounds>,
+) -> String {
     let all: Vec<usize> = (0..prediction.positions.len()).collect();
     let mut columns = columns::names(problem, rows, &all);
     let mut add = |name: String, decimals, of: &dyn Fn(usize) -> f64| {
@@ -34,11 +41,17 @@ pub fn predictions_csv(problem: &Problem, rows: &Measurements, prediction: &Pred
             add(format!("predicted_{axis}_deg"), 7, &|row| turns[row][k].to_degrees());
         }
     }
+    columns.extend(bounds.into_iter().flat_map(uncertainty));
     columns::to_csv(&columns, all.len())
 }
 
 /// Returns the prediction for an arm as text.
-pub fn prediction_text(problem: &Problem, arm: &str, prediction: &Prediction) -> String {
+pub fn prediction_text(
+    problem: &Problem,
+    arm: &str,
+    prediction: &Prediction,
+    bounds: Option<&Bounds>,
+) -> String {
     let mut words = format!(
         "{}\n{} predicted for {arm}",
         problem.title,
@@ -80,6 +93,8 @@ pub fn prediction_text(problem: &Problem, arm: &str, prediction: &Prediction) ->
             &[0],
         )));
     }
+    let residuals = prediction.residuals.as_deref();
+    blocks.extend(bounds.map(|own| Block::lines(bounded(own, residuals))));
     let unsteady = unsteady(&prediction.spreads);
     if !unsteady.is_empty() {
         blocks.push(Block::list(unsteady));

@@ -9,9 +9,11 @@ use serde::Serialize;
 
 use super::document::Document;
 use super::identification::Spread;
+use super::remainder::BoundSummary;
 use super::summary::Summary;
-use crate::fit::{Command, ErrorsBySession, PointSpread};
+use crate::fit::{Command, ErrorsBySession, PointSpread, Residual};
 use crate::problem::Problem;
+use crate::remainder::Bounds;
 use crate::urdf::{Chain, Description};
 
 /// Errors of predictions against measurements.
@@ -27,6 +29,11 @@ pub struct PredictionErrors {
     /// Spread of the target at each touched point.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub spread: BTreeMap<String, SpreadAtPoint>,
+    /// Share of the rows whose error lies within its bound.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coverage: Option<f64>,
+    #[serde(flatten)]
+    pub bounds: Option<BoundSummary>,
 }
 
 impl Document for PredictionErrors {
@@ -53,7 +60,17 @@ impl PredictionErrors {
             kinds: errors.kinds.iter().map(Summary::of).collect(),
             sessions: sessions.map(|(name, own)| (name.clone(), Summary::of(own))).collect(),
             spread: spreads.iter().map(spread).collect(),
+            coverage: None,
+            bounds: None,
         }
+    }
+
+    /// Returns the errors with their bounds, and the share of `residuals` within them.
+    #[must_use]
+    pub fn with_bounds(self, residuals: &[Residual], bounds: &Bounds) -> Self {
+        let lengths = residuals.iter().map(|own| own.position.norm());
+        let coverage = Some(bounds.coverage(lengths));
+        Self { coverage, bounds: Some(BoundSummary::new(bounds)), ..self }
     }
 }
 
@@ -71,6 +88,8 @@ pub struct CompensationResult {
     pub mean_turn_deg: Option<f64>,
     /// Rows of the targets that cannot be reached, from 1.
     pub unreached: Vec<usize>,
+    #[serde(flatten)]
+    pub bounds: Option<BoundSummary>,
 }
 
 impl Document for CompensationResult {
@@ -146,7 +165,14 @@ impl CompensationResult {
             mean_turn_before_deg: mean(|command| command.seed_turn, f64::to_degrees),
             mean_turn_deg: mean(|command| Some(command.turn?.norm()), f64::to_degrees),
             unreached: missed.iter().map(|command| command.row + 1).collect(),
+            bounds: None,
         }
+    }
+
+    /// Returns the result with the expected error at the targets and its bounds.
+    #[must_use]
+    pub fn with_bounds(self, bounds: &Bounds) -> Self {
+        Self { bounds: Some(BoundSummary::new(bounds)), ..self }
     }
 }
 

@@ -7,11 +7,13 @@ use super::claims::{Claims, law_name};
 use super::document::Document;
 use super::effect::{EffectKeys, NamedEffect};
 use super::identification::{FindingKeys, InfluentialRowSet};
+use super::remainder::Remainder;
 use super::residual_test::ResidualTest;
 use super::summary::{Errors, KindErrors, Summary, by_unit, in_unit};
 use crate::fit::{Estimate, Finding, Identification};
 use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
+use crate::remainder::Fitted;
 use crate::residual_tests::Covariate;
 use crate::select::{self, ClosedLoop, HypothesisKind, ReferenceVerdict, Status, Trace, Verdict};
 
@@ -43,6 +45,8 @@ pub struct LoopResult {
     pub held_out_gain_deg: Option<Gain>,
     /// Effects of the extended problem that were not declared.
     pub effects: Vec<FoundEffect>,
+    /// Remainder beside the effects; `after` is with it.
+    pub remainder: Option<Remainder>,
     /// Strongest structure whose law is unknown.
     pub unexplained: Option<Structure>,
     /// Rows with gross errors, which took no part in the choice of effects.
@@ -209,6 +213,7 @@ impl LoopResult {
             held_out_gain_mm: (!is_angle).then_some(gain),
             held_out_gain_deg: is_angle.then_some(gain),
             effects: closure.effects.iter().map(|found| FoundEffect::new(found, before)).collect(),
+            remainder: None,
             unexplained: structures.next(),
             further: structures.collect(),
             set_aside: closure.set_aside.iter().map(Row::new).collect(),
@@ -218,6 +223,16 @@ impl LoopResult {
             checks_after: ResidualTest::all(&closure.findings),
             findings: closure.after.findings.clone(),
         }
+    }
+
+    /// Returns the result with the remainder that was kept beside the effects, if one was.
+    #[must_use]
+    pub fn with_remainder(mut self, closure: &ClosedLoop, fitted: &Fitted) -> Self {
+        if let Some(corrected) = &fitted.residuals {
+            self.after.errors = Errors::of(&corrected.errors);
+        }
+        self.remainder = Remainder::new(&closure.after, fitted);
+        self
     }
 
     /// Iterates over the effects with a status.

@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::value::{RawValue, to_raw_value};
 
 use super::document::Document;
+use super::remainder::{self, Remainder};
 use super::summary::{Errors, KindErrors, by_unit};
 use crate::fit::{
     self, ActiveConstraint, Estimate, Finding, Identification, InfluentialRows, Noise,
@@ -16,6 +17,7 @@ use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination};
 use crate::problem::Problem;
 use crate::quantity::Unit;
+use crate::remainder::Fitted;
 
 /// Identified arm. Values are in SI units unless the key names another unit.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -62,8 +64,8 @@ pub struct IdentificationResult {
     pub unidentified: Vec<Combination>,
     /// Combinations that the data determine too weakly to be estimated.
     pub weak: Vec<Combination>,
-    /// Covariance of the estimates in the order of `parameters`; null where one of the two has no
-    /// standard error.
+    /// Posterior covariance of all free parameters in the order of `parameters`. Without the
+    /// uncertainty of predictions: null where one of the two has no standard error.
     #[schemars(with = "Vec<Vec<Option<f64>>>")]
     pub covariance: Vec<Box<RawValue>>,
     pub correlations: Vec<Correlation>,
@@ -74,6 +76,12 @@ pub struct IdentificationResult {
     /// Findings of the checks of the fit.
     #[schemars(with = "Vec<FindingKeys>")]
     pub findings: Vec<Finding>,
+    /// Remainder that corrects predictions; errors of the identified arm are with it.
+    pub remainder: Option<Remainder>,
+    /// Uncertainty of predictions without a remainder, in the form of remainder.json.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<serde_json::Value>")]
+    pub prediction: Option<Box<RawValue>>,
 }
 
 /// Finding of a check of the fit.
@@ -302,6 +310,22 @@ impl IdentificationResult {
             misfit_carried_by: found.influential_rows.as_ref().map(InfluentialRowSet::new),
             cautions: found.reasons_to_ask(),
             findings: found.findings.clone(),
+            remainder: None,
+            prediction: None,
+        }
+    }
+
+    /// Returns the result with what predictions need: the posterior covariance, the uncertainty of
+    /// predictions, and the remainder if one is kept.
+    #[must_use]
+    pub fn with_predictions(self, found: &Identification, fitted: &Fitted) -> Self {
+        let corrected = fitted.residuals.as_ref();
+        Self {
+            fitted: corrected.map_or(self.fitted, |own| Errors::of(&own.errors)),
+            covariance: remainder::covariance(found, fitted),
+            remainder: Remainder::new(found, fitted),
+            prediction: remainder::prediction(fitted),
+            ..self
         }
     }
 }

@@ -17,6 +17,7 @@ mod design;
 mod document;
 mod effect;
 mod identification;
+mod remainder;
 mod residual_test;
 mod study;
 mod summary;
@@ -47,6 +48,7 @@ pub use identification::{
     Alternation, Combination, Conditioning, Constraint, Correlation, IdentificationResult,
     InfluentialRowSet, Orientation, OutlierRow, Parameter, Price, Spread, SpreadChange,
 };
+pub use remainder::{BoundSummary, REMAINDER_FILE, Remainder};
 pub use residual_test::ResidualTest;
 pub use study::{
     Cell, HeldOut, LargestBias, MisprintResult, MisprintSize, Reading, Rival, Specimen,

@@ -52,6 +52,8 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     // The paper is a check of the model, so it shares no mechanics with it.
     ("paper", &[&["spatial", "error", "problem", "least_squares"]]),
     ("fit", &[GROUND, BELOW_FIT, &["files"]]),
+    // Corrections of an identified arm know fits, and no search for effects.
+    ("remainder", &[GROUND, BELOW_FIT, &["fit", "files"]]),
     // Statistical tests of a residual are independent of arms and fits.
     ("residual_tests", &[&["error", "problem", "model", "numeric"]]),
     ("select", &[GROUND, BELOW_FIT, &["fit", "residual_tests"]]),
@@ -64,14 +66,28 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     // Results as data, which reports turn into text and figures.
     (
         "results",
-        &[GROUND, BELOW_FIT, &["fit", "residual_tests", "select", "design", "study", "urdf"]],
+        &[
+            GROUND,
+            BELOW_FIT,
+            &["fit", "remainder", "residual_tests", "select", "design", "study", "urdf"],
+        ],
     ),
     (
         "report",
         &[
             GROUND,
             BELOW_FIT,
-            &["fit", "residual_tests", "select", "design", "study", "files", "urdf", "results"],
+            &[
+                "fit",
+                "remainder",
+                "residual_tests",
+                "select",
+                "design",
+                "study",
+                "files",
+                "urdf",
+                "results",
+            ],
         ],
     ),
     (
@@ -81,6 +97,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
             BELOW_FIT,
             &[
                 "fit",
+                "remainder",
                 "residual_tests",
                 "select",
                 "design",

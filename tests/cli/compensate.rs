@@ -273,7 +273,9 @@ fn a_joint_that_follows_moves_with_its_leader() {
         assert!(off.fold(0.0, f64::max) < 1e-8, "{command:?}");
     }
     let commands = compensate(&problem, &arm, &x, &targets).unwrap();
-    assert!(commands_csv(&problem, &targets, &commands).starts_with("q1_deg,q2_deg,q3_deg,x_mm"));
+    assert!(
+        commands_csv(&problem, &targets, &commands, None).starts_with("q1_deg,q2_deg,q3_deg,x_mm")
+    );
 }
 
 #[test]
@@ -285,7 +287,7 @@ fn words_with_a_comma_stay_one_cell() {
     let arm = model(&problem, &targets);
     let x = nalgebra::DVector::zeros(arm.parameters.len());
     let commands = compensate(&problem, &arm, &x, &targets).unwrap();
-    for text in [commands_csv(&problem, &targets, &commands), poses_csv(&problem, &targets)] {
+    for text in [commands_csv(&problem, &targets, &commands, None), poses_csv(&problem, &targets)] {
         let mut table = csv::Reader::from_reader(text.as_bytes());
         let place = table.headers().unwrap().iter().position(|name| name == "session").unwrap();
         let words: Vec<String> =

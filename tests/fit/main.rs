@@ -16,6 +16,7 @@ mod identified;
 mod judged;
 mod orientation;
 mod recovery;
+mod remainder;
 mod robust;
 mod runaway;
 mod sigma;

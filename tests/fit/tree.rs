@@ -138,7 +138,7 @@ fn waypoints_keep_the_orientation_of_the_targets_that_can_have_one() {
     let wanted = waypoints(&problem, &model, &x, &rows).unwrap();
     let shown = seen_in_base(&model, &x, &wanted);
     let commands = compensate(&problem, &model, &x, &wanted).unwrap();
-    let csv = commands_csv(&problem, &shown, &commands);
+    let csv = commands_csv(&problem, &shown, &commands, None);
     let mut cells = csv::Reader::from_reader(csv.as_bytes());
     for (command, cells) in
         commands.iter().zip(cells.deserialize::<std::collections::BTreeMap<String, String>>())

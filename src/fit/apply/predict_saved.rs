@@ -44,6 +44,8 @@ pub struct Prediction {
     /// Names of the parameters of bases and tools that the estimate lacks; they are fitted to their rows
     /// with the arm given.
     pub placed: Vec<String>,
+    /// Full parameter vector of the model of these rows.
+    pub x: DVector<f64>,
 }
 
 /// Errors of all rows, and of each session.
@@ -202,7 +204,7 @@ pub fn predict(
     let errors = rows.position_measured.then(|| ErrorsBySession::of(rows, &errors));
     let placed = if rows.position_measured { missing } else { Vec::new() };
     let placed = placed.into_iter().map(|k| model.parameters[k].name.clone()).collect();
-    Ok(Prediction { positions, orientations, residuals, errors, spreads, placed })
+    Ok(Prediction { positions, orientations, residuals, errors, spreads, placed, x })
 }
 
 /// Creates the error of an estimate that lacks a parameter, or of a missing estimate.

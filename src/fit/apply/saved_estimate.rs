@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::DVector;
 use serde::Deserialize;
+use serde_json::value::RawValue;
 
 use crate::error::one_line;
 use crate::files::read_limited;
@@ -31,6 +32,10 @@ pub struct SavedEstimate {
     pub estimated_sigma: Option<f64>,
     /// Start time of the time-dependent terms \[s\]; older versions did not write it.
     pub first_time: Option<f64>,
+    /// Name of the remainder.json beside it, if one was kept.
+    pub remainder: Option<String>,
+    /// Uncertainty of predictions as JSON text; older versions did not write it.
+    pub prediction: Option<String>,
     problem: String,
     /// Digest of the declared arm; older versions did not write it.
     arm_digest: Option<String>,
@@ -57,6 +62,13 @@ struct Document {
     estimated_sigma_mm: Option<f64>,
     first_time_s: Option<f64>,
     parameters: Vec<Entry>,
+    remainder: Option<RemainderEntry>,
+    prediction: Option<Box<RawValue>>,
+}
+
+#[derive(Debug, Deserialize)]
+struct RemainderEntry {
+    file: Option<String>,
 }
 
 /// Error of an `estimate.json` that cannot be used.
@@ -120,6 +132,8 @@ impl SavedEstimate {
             estimated_sigma_mm,
             first_time_s,
             mut parameters,
+            remainder,
+            prediction,
         } = match serde_json::from_str(text) {
             Ok(document) => document,
             Err(source) => return Err(SavedEstimateError::Syntax { file, source }),
@@ -147,6 +161,8 @@ impl SavedEstimate {
             trusted,
             estimated_sigma,
             first_time: first_time_s,
+            remainder: remainder.and_then(|own| own.file),
+            prediction: prediction.map(|own| own.get().to_owned()),
             problem,
             arm_digest,
             strategy,

@@ -1,0 +1,42 @@
+//! Which correction predictions of a problem take.
+
+use std::path::Path;
+
+use flexcal::fit::SavedEstimate;
+use flexcal::problem::Problem;
+use flexcal::remainder::{Correction, SavedRemainderError};
+
+/// Reads the remainder that a problem declares and uses.
+pub fn declared(problem: &Problem) -> Result<Option<Correction>, SavedRemainderError> {
+    let used = problem.remainder.as_ref().filter(|own| own.is_used);
+    used.map(|own| read(problem, &own.file)).transpose()
+}
+
+/// Reads what predictions with `estimate` are corrected by: the remainder of the problem, or else
+/// of the estimate, or else no more than their uncertainty; nothing where the estimate does not
+/// hold that.
+pub fn of_estimate(
+    problem: &Problem,
+    estimate: &SavedEstimate,
+) -> Result<Option<Correction>, SavedRemainderError> {
+    if let Some(declared) = declared(problem)? {
+        return Ok(Some(declared));
+    }
+    if let Some(name) = estimate.remainder.as_ref().filter(|_| problem.remainder.is_none()) {
+        return read(problem, &estimate.file.with_file_name(name)).map(Some);
+    }
+    let parse = |text: &str| Correction::parse(text, &estimate.file);
+    estimate.prediction.as_deref().map(parse).transpose()
+}
+
+fn read(problem: &Problem, file: &Path) -> Result<Correction, SavedRemainderError> {
+    let correction = Correction::read(file)?;
+    correction.check(problem, file)?;
+    Ok(correction)
+}
+
+/// A probability of bounds, between 0 and 1.
+pub fn level(text: &str) -> Result<f64, String> {
+    let level = text.parse::<f64>().ok().filter(|level| 0.0 < *level && *level < 1.0);
+    level.ok_or_else(|| "a probability between 0 and 1 is needed, such as 0.95".to_owned())
+}

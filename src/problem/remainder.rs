@@ -1,0 +1,29 @@
+//! `[remainder]`: a correction that was fitted beside the parameters.
+
+use std::path::{Path, PathBuf};
+
+use super::section::Section;
+use crate::error::{InputError, Location};
+
+/// `[remainder]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RemainderDeclaration {
+    /// The remainder.json, already resolved against the problem's folder.
+    pub file: PathBuf,
+    /// False where the file says `use = false`: predictions are left uncorrected.
+    pub is_used: bool,
+    /// Place of the file's name, for errors.
+    pub location: Location,
+}
+
+/// Reads the section, if it is there.
+pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Option<RemainderDeclaration>, InputError> {
+    let problem = root.location().file;
+    let Some(mut section) = root.section("remainder")? else { return Ok(None) };
+    let item = section.require("file", "file = \"remainder.json\"")?;
+    let file = problem.parent().unwrap_or(Path::new("")).join(item.text()?);
+    let location = item.location();
+    let is_used = section.get("use").map_or(Ok(true), |item| item.boolean())?;
+    section.finish()?;
+    Ok(Some(RemainderDeclaration { file, is_used, location }))
+}

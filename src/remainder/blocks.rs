@@ -1,0 +1,64 @@
+//! Blocks of neighbouring configurations, to be left out together.
+
+use rand::seq::SliceRandom as _;
+
+use super::rows::{Inputs, Rows};
+use crate::random::stream;
+
+/// Seed of the first centres of blocks.
+const SEED: u64 = 0x0062_6c6f_636b;
+/// Passes of Lloyd's method.
+const MAX_PASSES: usize = 30;
+
+/// Number of the block of each row: at most `count` clusters of (sin q, cos q), and of standardised
+/// values of other inputs, by k-means.                                             [Lloyd 1982]
+pub(super) fn blocks(rows: &Rows, inputs: &Inputs, count: usize) -> Vec<usize> {
+    let points: Vec<Vec<f64>> =
+        (0..rows.len()).map(|row| point(rows.inputs_of(row), inputs)).collect();
+    let mut first: Vec<usize> = rows.configurations().iter().map(|group| group[0]).collect();
+    first.shuffle(&mut stream(SEED, 0));
+    first.truncate(count.max(1));
+    let mut centres: Vec<Vec<f64>> = first.into_iter().map(|row| points[row].clone()).collect();
+    let mut block = vec![0; rows.len()];
+    for _ in 0..MAX_PASSES {
+        let next: Vec<usize> = points.iter().map(|point| nearest(point, &centres)).collect();
+        if next == block {
+            break;
+        }
+        block = next;
+        for (number, centre) in centres.iter_mut().enumerate() {
+            let members: Vec<&Vec<f64>> = points
+                .iter()
+                .zip(&block)
+                .filter(|(_, own)| **own == number)
+                .map(|(p, _)| p)
+                .collect();
+            if members.is_empty() {
+                continue;
+            }
+            for (k, value) in centre.iter_mut().enumerate() {
+                *value = members.iter().map(|point| point[k]).sum::<f64>() / members.len() as f64;
+            }
+        }
+    }
+    block
+}
+
+fn point(inputs: &[f64], kinds: &Inputs) -> Vec<f64> {
+    let each = inputs.iter().zip(&kinds.angles);
+    each.flat_map(
+        |(&value, &is_angle)| {
+            if is_angle { vec![value.sin(), value.cos()] } else { vec![value] }
+        },
+    )
+    .collect()
+}
+
+/// Place of the centre nearest to a point.
+fn nearest(point: &[f64], centres: &[Vec<f64>]) -> usize {
+    let distance = |centre: &Vec<f64>| -> f64 {
+        centre.iter().zip(point).map(|(a, b)| (a - b) * (a - b)).sum()
+    };
+    let each = centres.iter().map(distance).enumerate();
+    each.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(place, _)| place)
+}

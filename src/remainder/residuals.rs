@@ -1,0 +1,136 @@
+//! What a corrected arm leaves of the rows that it was identified from, and of held-out rows.
+
+use std::collections::HashSet;
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::correction::Correction;
+use super::linearise::{Linearisation, timed_poses};
+use super::rows::AXES;
+use crate::fit::{ErrorSummary, Errors, Identification, IdentifyError, Placement, Residual};
+use crate::measurement::{Dataset, Measurements};
+use crate::model::Model;
+use crate::problem::Problem;
+use crate::spatial::Frame;
+
+/// Singular values below this share of the largest are no direction of a base or tool.
+const RANK_TOLERANCE: f64 = 1e-9;
+
+/// Residuals of a corrected arm.
+#[derive(Debug, Clone)]
+pub struct CorrectedResiduals {
+    /// Residual of each row, in the order of the rows.
+    pub rows: Vec<Residual>,
+    /// Errors of both parts of the data, of the kind of rows that errors are told of.
+    pub errors: Errors,
+}
+
+/// What `found`, corrected, leaves of every row of `data`.
+///
+/// Bases, tools and points that only held-out rows use are fitted to these rows again, to first
+/// order.
+///
+/// # Errors
+/// Problem and data are not those identified.
+pub fn residuals(
+    found: &Identification,
+    problem: &Problem,
+    data: &Dataset,
+    correction: &Correction,
+) -> Result<CorrectedResiduals, IdentifyError> {
+    let table = &data.measurements;
+    let placement = Placement::of(table);
+    let model = found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
+    let mut rows = found.residuals(problem, data)?;
+    if correction.has_remainder() {
+        let all: Vec<usize> = (0..table.len()).collect();
+        let poses = timed_poses(table, &all, (found.sigma, found.first_time));
+        let mut shifts: Vec<Vector3<f64>> =
+            correction.at(problem, &model, &found.x, &poses).iter().map(|own| own.shift).collect();
+        let placed = placed(found, &model, correction);
+        if !placed.is_empty() {
+            let linearisation = Linearisation {
+                problem,
+                model: &model,
+                x: &found.x,
+                unknowns: placed,
+                sigma: found.sigma,
+            };
+            let poses_again = poses.clone();
+            let jacobian = linearisation.rows(&correction.layout, poses).jacobian;
+            let left = model.residuals(poses_again, &found.x);
+            refit(&mut shifts, &left, &jacobian);
+        }
+        in_measuring_frame(table, &model.base_frames(found.x.as_slice()), &mut shifts);
+        for (row, shift) in rows.iter_mut().zip(&shifts) {
+            let unit = row.position.norm() / row.whitened.norm();
+            row.predicted += shift;
+            row.position -= shift;
+            let sigma = if unit.is_finite() { unit } else { found.sigma };
+            row.whitened = row.position / sigma;
+        }
+    }
+    let of = |part: &[usize]| {
+        let errors: Vec<Vector3<f64>> = part.iter().map(|&row| rows[row].position).collect();
+        ErrorSummary::of_rows(table, part.iter().copied(), &errors)
+    };
+    let errors = Errors {
+        identification: of(&data.split.identification),
+        held_out: of(&data.split.held_out),
+    };
+    Ok(CorrectedResiduals { rows, errors })
+}
+
+/// Turns the corrections of contacts with points, which are along the axes of the arm's base, into
+/// the measuring frame.
+pub(super) fn in_measuring_frame(
+    table: &Measurements,
+    bases: &[Frame<f64>],
+    shifts: &mut [Vector3<f64>],
+) {
+    for (row, shift) in shifts.iter_mut().enumerate() {
+        if table.observation(row).is_point() {
+            *shift = bases[table.session.of_row[row]].vector(shift);
+        }
+    }
+}
+
+/// Fitted bases and tools that are no parameters of the correction.
+fn placed(found: &Identification, model: &Model, correction: &Correction) -> Vec<usize> {
+    let known: HashSet<&str> = correction.parameters.iter().map(|own| own.name.as_str()).collect();
+    let estimates = found.estimates.iter().enumerate();
+    estimates
+        .filter(|(k, own)| {
+            own.fitted
+                && model.parameters[*k].site.is_placement()
+                && !known.contains(own.name.as_str())
+        })
+        .map(|(k, _)| k)
+        .collect()
+}
+
+/// Adds to the shifts what bases and tools with this Jacobian make up for, in the least-squares
+/// sense, of what is left of these residuals.
+fn refit(shifts: &mut [Vector3<f64>], residuals: &[Vector3<f64>], jacobian: &DMatrix<f64>) {
+    let is_used = |row: &usize| jacobian.rows(AXES * row, AXES).amax() > 0.0;
+    let used: Vec<usize> = (0..residuals.len()).filter(is_used).collect();
+    let coordinates: Vec<usize> =
+        used.iter().flat_map(|&row| (0..AXES).map(move |axis| AXES * row + axis)).collect();
+    let mut columns = jacobian.select_rows(&coordinates);
+    for mut column in columns.column_iter_mut() {
+        let length = column.norm();
+        if length > 0.0 {
+            column /= length;
+        }
+    }
+    let left = DVector::from_iterator(
+        coordinates.len(),
+        coordinates.iter().map(|&k| (residuals[k / AXES] - shifts[k / AXES])[k % AXES]),
+    );
+    let gram = columns.tr_mul(&columns);
+    let Ok(inverse) = gram.pseudo_inverse(RANK_TOLERANCE) else { return };
+    let taken = &columns * (inverse * columns.tr_mul(&left));
+    for (k, &row) in used.iter().enumerate() {
+        shifts[row] += Vector3::from_fn(|axis, _| taken[AXES * k + axis]);
+    }
+}

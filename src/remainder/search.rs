@@ -1,0 +1,115 @@
+//! Minimisation within a box by BFGS, for functions whose value and gradient come together.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Change of the value below which a step is the last one.
+const SETTLED: f64 = 1e-3;
+/// Longest step of a variable: hyperparameters are logarithms.
+const MAX_STEP: f64 = 2.0;
+/// Part of the expected decrease that a step has to reach                      [Armijo 1966]
+const SUFFICIENT: f64 = 1e-4;
+/// Halvings of a step before the search gives up.
+const MAX_HALVINGS: usize = 12;
+
+/// Where a search ended.
+#[derive(Debug, Clone)]
+pub(super) struct Minimum {
+    /// Variables.
+    pub at: DVector<f64>,
+    /// Value of the function.
+    pub value: f64,
+}
+
+/// Minimises `function` from `start` within `bounds`, with at most `max_steps` steps; `None` where
+/// the function has no value at the start.
+///
+/// Variables at a bound towards which the function falls are held there for the step. Each step
+/// evaluates value and gradient at once, because both need one factorisation.
+pub(super) fn minimise(
+    function: impl Fn(&DVector<f64>) -> Option<(f64, DVector<f64>)>,
+    start: DVector<f64>,
+    bounds: &[(f64, f64)],
+    max_steps: usize,
+) -> Option<Minimum> {
+    let within =
+        |x: DVector<f64>| DVector::from_fn(x.len(), |k, _| x[k].clamp(bounds[k].0, bounds[k].1));
+    let mut at = within(start);
+    let (mut value, mut gradient) = function(&at)?;
+    let n = at.len();
+    let mut inverse = DMatrix::identity(n, n);
+    let mut is_scaled = false;
+    for _ in 0..max_steps {
+        let held: Vec<bool> = (0..n)
+            .map(|k| {
+                (at[k] <= bounds[k].0 && gradient[k] > 0.0)
+                    || (at[k] >= bounds[k].1 && gradient[k] < 0.0)
+            })
+            .collect();
+        let free = DVector::from_fn(n, |k, _| if held[k] { 0.0 } else { gradient[k] });
+        let mut step = -(&inverse * &free);
+        (0..n).filter(|&k| held[k]).for_each(|k| step[k] = 0.0);
+        if step.dot(&free) >= 0.0 {
+            step = -&free;
+            inverse = DMatrix::identity(n, n);
+            is_scaled = false;
+        }
+        let longest = step.amax();
+        if !is_scaled {
+            step *= (0.5 / longest.max(f64::MIN_POSITIVE)).min(1.0);
+        } else if longest > MAX_STEP {
+            step *= MAX_STEP / longest;
+        }
+        let mut next = None;
+        for _ in 0..MAX_HALVINGS {
+            let tried = within(&at + &step);
+            let expected = gradient.dot(&(&tried - &at));
+            match function(&tried) {
+                Some((reached, slope)) if reached <= value + SUFFICIENT * expected => {
+                    next = Some((tried, reached, slope));
+                    break;
+                }
+                _ => step *= 0.5,
+            }
+        }
+        let Some((tried, reached, slope)) = next else { break };
+        let (moved, turned) = (&tried - &at, &slope - &gradient);
+        let curvature = moved.dot(&turned);
+        if curvature > 1e-10 * moved.norm() * turned.norm() {
+            if !is_scaled {
+                inverse *= curvature / turned.norm_squared();
+                is_scaled = true;
+            }
+            // (I − ρ s yᵀ) H (I − ρ y sᵀ) + ρ s sᵀ.                 [Nocedal & Wright 2006, eq. 6.17]
+            let along = &inverse * &turned;
+            let factor = (1.0 + turned.dot(&along) / curvature) / curvature;
+            inverse += &moved * moved.transpose() * factor
+                - (&along * moved.transpose() + &moved * along.transpose()) / curvature;
+        }
+        let gain = value - reached;
+        (at, value, gradient) = (tried, reached, slope);
+        if gain < SETTLED {
+            break;
+        }
+    }
+    Some(Minimum { at, value })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_valley_is_followed_into_a_corner() {
+        // Rosenbrock's valley with its minimum at (1, 1), and the same cut off at x = 0.5.
+        let function = |x: &DVector<f64>| {
+            let (a, b) = (1.0 - x[0], x[1] - x[0] * x[0]);
+            let gradient = vec![-2.0 * a - 400.0 * x[0] * b, 200.0 * b];
+            Some((a * a + 100.0 * b * b, DVector::from_vec(gradient)))
+        };
+        let start = DVector::from_vec(vec![-1.2, 1.0]);
+        let free = minimise(function, start.clone(), &[(-5.0, 5.0); 2], 500).unwrap();
+        assert!((free.at - DVector::from_vec(vec![1.0, 1.0])).amax() < 0.1, "{}", free.value);
+        let cut = minimise(function, start, &[(-5.0, 0.5), (-5.0, 5.0)], 500).unwrap();
+        assert!((cut.at - DVector::from_vec(vec![0.5, 0.25])).amax() < 0.05, "{}", cut.value);
+    }
+}

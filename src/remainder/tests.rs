@@ -1,0 +1,158 @@
+//! Tests of the processes on synthetic rows: a covariance is positive, a gradient is a slope,
+//! leaving out in closed form is fitting again.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::kernel::{Hyperparameters, covariance, variance};
+use super::likelihood::MarginalLikelihood;
+use super::posterior::Training;
+use super::prior::ParameterPrior;
+use super::rows::{AXES, Inputs, Rows};
+
+/// Number of configurations, of which the first is measured twice.
+const CONFIGURATIONS: usize = 14;
+
+/// A number in −1…1 that looks random.
+fn noise(k: usize) -> f64 {
+    ((12.9898 * k as f64).sin() * 43758.5453).rem_euclid(2.0) - 1.0
+}
+
+fn inputs() -> Inputs {
+    Inputs {
+        joints: vec![0, 1, 2],
+        angles: vec![true, true, false],
+        site_of: vec![Some(0), Some(1), None],
+        standard: vec![(0.0, 1.0); 3],
+        ranges: vec![(-1.0, 1.0); 3],
+    }
+}
+
+/// Rows of two sites, three inputs and two parameters.
+fn rows() -> Rows {
+    let count = CONFIGURATIONS + 1;
+    let configuration: Vec<usize> = (0..count).map(|row| row.saturating_sub(1)).collect();
+    let of = |row: usize, k: usize| noise(100 * configuration[row] + k);
+    Rows {
+        residual: DVector::from_fn(AXES * count, |k, _| 1e-4 * noise(1000 + k)),
+        jacobian: DMatrix::from_fn(AXES * count, 2, |k, j| of(k / AXES, 10 + 2 * (k % AXES) + j)),
+        sites: DMatrix::from_fn(2, AXES * count, |s, k| of(k / AXES, 20 + 2 * (k % AXES) + s)),
+        inputs: DMatrix::from_fn(3, count, |k, row| 2.0 * of(row, k)),
+        relative_sigma: (0..count).map(|row| 1.0 + 0.1 * noise(row)).collect(),
+        configuration,
+    }
+}
+
+fn prior() -> ParameterPrior {
+    ParameterPrior {
+        mean: DVector::from_vec(vec![1e-5, -2e-5]),
+        spread: DVector::from_vec(vec![3e-4, 1e-1]),
+    }
+}
+
+fn hyper() -> Hyperparameters {
+    Hyperparameters {
+        single: vec![6e-5, 3e-5],
+        joint: vec![4e-5, 9e-5],
+        lengths: [0.3, 1.2],
+        noise: 2e-5,
+        shared_noise: 1.5e-5,
+    }
+}
+
+fn all(rows: &Rows) -> Vec<usize> {
+    (0..rows.len()).collect()
+}
+
+#[test]
+fn the_covariance_is_positive_and_its_diagonal_the_variance() {
+    let (rows, hyper) = (rows(), hyper());
+    let matrix = covariance(&hyper, &inputs(), &rows, &rows);
+    assert!((&matrix - matrix.transpose()).amax() <= 1e-20);
+    let least = matrix.clone().symmetric_eigenvalues().min();
+    assert!(least > -1e-12 * matrix.amax(), "{least}");
+    for row in 0..rows.len() {
+        let block = matrix.view((AXES * row, AXES * row), (AXES, AXES));
+        assert!((block - variance(&hyper, &rows, row)).amax() < 1e-18);
+    }
+}
+
+#[test]
+fn the_gradient_of_the_likelihood_is_its_slope() {
+    let (rows, inputs, prior) = (rows(), inputs(), prior());
+    let likelihood = MarginalLikelihood::new((&rows, &inputs), &prior, (2, true), 1e-4);
+    let at = likelihood.start(0.4).map_with_location(|k, _, value| value + 0.2 * noise(k));
+    let (value, gradient) = likelihood.value_and_gradient(&at).unwrap();
+    assert!(value.is_finite() && gradient.len() == likelihood.len());
+    for k in 0..at.len() {
+        let beside = |step: f64| {
+            let mut moved = at.clone();
+            moved[k] += step;
+            likelihood.value_and_gradient(&moved).unwrap().0
+        };
+        let slope = (beside(1e-5) - beside(-1e-5)) / 2e-5;
+        assert!(
+            (slope - gradient[k]).abs() < 1e-5 * (1.0 + slope.abs()),
+            "{k}: {slope} {gradient}"
+        );
+    }
+}
+
+#[test]
+fn leaving_out_in_closed_form_is_fitting_again() {
+    let (rows, inputs, prior, hyper) = (rows(), inputs(), prior(), hyper());
+    let training = Training::of((&rows, &inputs), &prior, &hyper, &all(&rows)).unwrap();
+    let single = training.without_each_configuration();
+    let block: Vec<usize> = rows.configuration.iter().map(|own| own % 4).collect();
+    let blocks = training.without_each_block(&block).unwrap();
+    let check = |found: &super::posterior::LeftOut,
+                 left_out: &dyn Fn(usize) -> bool,
+                 row: usize| {
+        let kept: Vec<usize> = all(&rows).into_iter().filter(|&row| !left_out(row)).collect();
+        let others = rows.select(&kept);
+        let again = Training::of((&others, &inputs), &prior, &hyper, &all(&others)).unwrap();
+        let own = again.posterior.at(&rows.select(&[row]))[0];
+        let measured = Vector3::from_fn(|axis, _| rows.residual[AXES * row + axis]);
+        assert!((measured - own.mean - found.error).norm() < 1e-9, "{row}");
+        let noise = (hyper.noise * rows.relative_sigma[row]).powi(2) + hyper.shared_noise.powi(2);
+        let expected = own.covariance.trace() + AXES as f64 * noise;
+        assert!(
+            (found.variance / expected - 1.0).abs() < 1e-4,
+            "{row}: {} {expected}",
+            found.variance
+        );
+    };
+    for row in all(&rows) {
+        let configuration = rows.configuration[row];
+        check(&single[row], &|other| rows.configuration[other] == configuration, row);
+        check(&blocks[row], &|other| block[other] == block[row], row);
+    }
+}
+
+#[test]
+fn far_from_all_rows_only_the_parameters_are_corrected() {
+    let (rows, inputs, prior) = (rows(), inputs(), prior());
+    let hyper = Hyperparameters { lengths: [0.05, 0.05], ..hyper() };
+    let posterior = Training::of((&rows, &inputs), &prior, &hyper, &all(&rows)).unwrap().posterior;
+    let mut far = rows.select(&[3]);
+    far.inputs.fill(2.9);
+    let own = posterior.at(&far)[0];
+    assert!((own.covariance.trace() - own.prior) > -1e-6 * own.prior, "the prior is back");
+    let parameters = &far.jacobian * posterior.parameters();
+    assert!((own.mean - Vector3::from_column_slice(parameters.as_slice())).norm() < 1e-9);
+    assert_eq!(super::scores::fade(own.covariance.trace(), own.prior), 0.0);
+}
+
+#[test]
+fn weights_of_the_centres_restore_a_posterior() {
+    let (rows, inputs, prior, hyper) = (rows(), inputs(), prior(), hyper());
+    let own = Training::of((&rows, &inputs), &prior, &hyper, &[0, 2, 5, 9, 11]).unwrap().posterior;
+    let again = super::posterior::Posterior::restored(
+        (hyper.clone(), inputs.clone()),
+        (own.centres.clone(), prior.clone()),
+        (own.factor.clone(), own.kernel_weights(), own.parameters()),
+    )
+    .unwrap();
+    for (a, b) in own.at(&rows).iter().zip(again.at(&rows)) {
+        assert!((a.mean - b.mean).norm() < 1e-12 && (a.covariance - b.covariance).amax() < 1e-16);
+    }
+}

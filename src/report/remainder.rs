@@ -1,0 +1,81 @@
+//! What is said of a remainder and of bounds.
+
+use std::fmt::Write as _;
+
+use super::columns::{Column, Columns};
+use super::quantity::{counted, number};
+use crate::fit::{Identification, Residual};
+use crate::remainder::{Bounds, Fitted};
+
+/// Returns one sentence on the search for a remainder; `found` has the errors without it.
+pub fn remainder_text(found: &Identification, fitted: &Fitted) -> String {
+    let Some(gain) = fitted.gain.filter(|_| !fitted.is_declared) else {
+        return match &fitted.residuals {
+            Some(corrected) => {
+                let before = number(found.fitted.held_out.mean.norm * 1e3, 4);
+                let after = number(corrected.errors.held_out.mean.norm * 1e3, 4);
+                format!(
+                    "Corrected by the remainder that the problem declares: mean error of held-out \
+                     poses {before} mm without it, {after} mm with it."
+                )
+            }
+            None => "No remainder: too few configurations to fit one.".to_owned(),
+        };
+    };
+    let [without, with] = [gain.without, gain.with].map(|error| number(error * 1e3, 4));
+    match &fitted.residuals {
+        Some(corrected) => {
+            let before = number(found.fitted.held_out.mean.norm * 1e3, 4);
+            let after = number(corrected.errors.held_out.mean.norm * 1e3, 4);
+            let joints = fitted.remainder.as_ref().map_or(0, |own| own.joints().len());
+            format!(
+                "Remainder at {}, kept: mean error of configurations left out {without} mm \
+                 without it, {with} mm with it; of held-out poses {before} mm and {after} mm.",
+                counted(joints, "joint"),
+            )
+        }
+        None => format!(
+            "No remainder is kept: mean error of configurations left out {without} mm without it, \
+             {with} mm with it, a gain of {} standard errors (more than 3 are needed).",
+            number(gain.ratio(), 2),
+        ),
+    }
+}
+
+/// Returns the columns of the uncertainty of predictions: 1 σ along each axis, the bound of the
+/// error, and whether the pose lies outside of what was measured.
+pub(super) fn uncertainty(bounds: &Bounds) -> Columns {
+    let numbers = |of: &dyn Fn(usize) -> f64| {
+        Column::Numbers((0..bounds.poses.len()).map(|pose| of(pose) * 1e3).collect(), Some(4))
+    };
+    let mut columns: Columns = ["x", "y", "z"]
+        .into_iter()
+        .enumerate()
+        .map(|(k, axis)| (format!("sigma_{axis}_mm"), numbers(&|pose| bounds.poses[pose].sigma[k])))
+        .collect();
+    columns.push((bounds.column(), numbers(&|pose| bounds.bound(pose))));
+    let flags = bounds.poses.iter().map(|own| own.is_extrapolated).collect();
+    columns.push(("extrapolated".to_owned(), Column::Flags(flags)));
+    columns
+}
+
+/// Returns the expected error and its bound in words, and the share of measured rows within their
+/// bounds.
+pub(super) fn bounded(bounds: &Bounds, residuals: Option<&[Residual]>) -> String {
+    let mut words = format!(
+        "Expected error {} mm rms; the {} % bound is {} mm on average",
+        number(bounds.expected() * 1e3, 3),
+        number(bounds.level * 100.0, 3),
+        number(bounds.mean() * 1e3, 3),
+    );
+    if let Some(residuals) = residuals {
+        let share = bounds.coverage(residuals.iter().map(|own| own.position.norm()));
+        let _ = write!(words, "; {} % of these rows lie within theirs", number(share * 100.0, 3));
+    }
+    let beyond = bounds.poses.iter().filter(|own| own.is_extrapolated).count();
+    if beyond > 0 {
+        let poses = counted(beyond, "pose");
+        let _ = write!(words, "; {poses} outside of what was measured, with wider bounds");
+    }
+    words
+}

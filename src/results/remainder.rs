@@ -1,0 +1,99 @@
+//! Remainders and uncertainty of predictions in the results of other commands.
+
+use nalgebra::DMatrix;
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::value::{RawValue, to_raw_value};
+
+use super::summary::Summary;
+use crate::fit::Identification;
+use crate::remainder::{Bounds, Fitted};
+
+/// Name of the file that holds a remainder.
+pub const REMAINDER_FILE: &str = "remainder.json";
+
+/// Remainder that corrects predictions.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Remainder {
+    /// File beside this one; null if the problem declares the remainder.
+    pub file: Option<&'static str>,
+    /// Joints whose errors the remainder describes.
+    pub sites: Vec<String>,
+    /// Quantities on which these errors depend.
+    pub inputs: Vec<String>,
+    /// Mean error of configurations left out, without the remainder.
+    pub left_out_without_mm: Option<f64>,
+    /// Mean error of configurations left out, with the remainder.
+    pub left_out_mm: Option<f64>,
+    /// Mean gain of the configurations left out over its standard error.
+    pub gain_over_std_error: Option<f64>,
+    pub identification_without: Summary,
+    pub held_out_without: Summary,
+}
+
+impl Remainder {
+    /// Summarises the remainder that was kept; `found` has the errors without it.
+    pub(super) fn new(found: &Identification, fitted: &Fitted) -> Option<Self> {
+        let remainder = fitted.remainder.as_ref()?;
+        let joints = remainder.joints().iter();
+        Some(Self {
+            file: (!fitted.is_declared).then_some(REMAINDER_FILE),
+            sites: joints.map(|joint| format!("joint {}", joint + 1)).collect(),
+            inputs: remainder.inputs(),
+            left_out_without_mm: fitted.gain.map(|gain| gain.without * 1e3),
+            left_out_mm: fitted.gain.map(|gain| gain.with * 1e3),
+            gain_over_std_error: fitted.gain.map(|gain| gain.ratio()),
+            identification_without: Summary::of(&found.fitted.identification),
+            held_out_without: Summary::of(&found.fitted.held_out),
+        })
+    }
+}
+
+/// Bounds of the errors of predictions.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+pub struct BoundSummary {
+    /// Expected root mean square error, with the noise of a measurement.
+    pub expected_error_mm: f64,
+    /// Probability with which a bound holds.
+    pub level: f64,
+    pub mean_bound_mm: f64,
+}
+
+impl BoundSummary {
+    /// Summarises bounds.
+    pub(super) fn new(bounds: &Bounds) -> Self {
+        Self {
+            expected_error_mm: bounds.expected() * 1e3,
+            level: bounds.level,
+            mean_bound_mm: bounds.mean() * 1e3,
+        }
+    }
+}
+
+/// Returns the uncertainty of predictions without a remainder as JSON text.
+pub(super) fn prediction(fitted: &Fitted) -> Option<Box<RawValue>> {
+    RawValue::from_string(fitted.alone.to_json().trim_end().to_owned()).ok()
+}
+
+/// Returns the rows of the posterior covariance of all free parameters in the order of the
+/// estimates, SI, each as JSON text on a line of its own; 0 where a parameter was held.
+pub(super) fn covariance(found: &Identification, fitted: &Fitted) -> Vec<Box<RawValue>> {
+    let n = found.estimates.len();
+    let (names, posterior) = fitted.alone.parameter_covariance();
+    let place = |name: &&str| found.estimates.iter().position(|own| own.name == **name);
+    let places: Vec<Option<usize>> = names.iter().map(|name| place(name)).collect();
+    let slope = |k: usize| {
+        let estimate = &found.estimates[k];
+        if estimate.unit.is_relative() { estimate.estimate } else { 1.0 }
+    };
+    let mut covariance = DMatrix::zeros(n, n);
+    for (i, k) in places.iter().enumerate() {
+        for (j, l) in places.iter().enumerate() {
+            if let (Some(k), Some(l)) = (*k, *l) {
+                covariance[(k, l)] = slope(k) * posterior[(i, j)] * slope(l);
+            }
+        }
+    }
+    let rows = (0..n).map(|k| covariance.row(k).iter().copied().collect::<Vec<f64>>());
+    rows.filter_map(|row| to_raw_value(&row).ok()).collect()
+}

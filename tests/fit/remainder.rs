@@ -1,0 +1,172 @@
+//! What no law explains is corrected where poses left out gain, and predictions have bounds.
+
+use std::f64::consts::TAU;
+use std::path::Path;
+
+use assert_cmd::Command;
+use flexcal::fit::{Identification, Options, Placement, SavedEstimate, identify};
+use flexcal::measurement::{Dataset, Measurements};
+use flexcal::problem::Problem;
+use flexcal::remainder::{self, Bounds, Correction, Fitted};
+use flexcal::results::{Document as _, IdentificationResult};
+use nalgebra::DVector;
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+use serde_json::Value;
+
+use crate::common::arms::path;
+use crate::common::made::{at_random, csv, divided, measure, model_of};
+
+/// 1 σ of a coordinate [m].
+const SIGMA: f64 = 2e-5;
+/// Rows that are fitted; as many more are held out.
+const FITTED: usize = 90;
+
+fn panda() -> Problem {
+    Problem::read(&path("problems/panda")).unwrap()
+}
+
+/// Rows of an arm whose second and fourth joints err by `size` sin(5 q) [rad].
+fn measured(problem: &Problem, size: f64, seed: u64) -> Dataset {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut rows = at_random(problem, 2 * FITTED, 1.0, &mut rng);
+    let mut moved = rows.clone();
+    let n = moved.joints;
+    for configuration in moved.configurations.chunks_mut(n) {
+        for joint in [1, 3] {
+            configuration[joint] += size * (5.0 * configuration[joint]).sin();
+        }
+    }
+    let x = DVector::zeros(model_of(problem, &rows).parameters.len());
+    measure(problem, &mut moved, &x, SIGMA, &mut rng);
+    rows.positions = moved.positions;
+    divided(FITTED, &rows)
+}
+
+fn fitted(problem: &Problem, data: &Dataset) -> (Identification, Fitted) {
+    let found = identify(problem, data, &Options::default()).unwrap();
+    let fitted = remainder::fit(&found, problem, data).unwrap().unwrap();
+    (found, fitted)
+}
+
+#[test]
+fn smooth_errors_of_joints_are_corrected_and_bounded() {
+    let problem = panda();
+    let data = measured(&problem, 3e-4, 1);
+    let (found, fitted) = fitted(&problem, &data);
+    let corrected = fitted.residuals.as_ref().unwrap();
+    let (before, after) = (&found.fitted.held_out, &corrected.errors.held_out);
+    assert!(after.mean.norm < 0.6 * before.mean.norm, "{before:?} {after:?}");
+    let gain = fitted.gain.unwrap();
+    assert!(gain.with < gain.without && gain.ratio() > 3.0, "{gain:?}");
+    // The file holds everything: what is predicted from it are the residuals of the fit.
+    let remainder = fitted.remainder.as_ref().unwrap();
+    let file = Path::new("remainder.json");
+    let read = Correction::parse(&remainder.to_json(), file).unwrap();
+    read.check(&problem, file).unwrap();
+    let json =
+        IdentificationResult::new(&problem, &found).with_predictions(&found, &fitted).to_json();
+    let saved = SavedEstimate::parse(&json, Path::new("estimate.json")).unwrap();
+    assert_eq!(saved.remainder.as_deref(), Some("remainder.json"));
+    let rows = &data.measurements;
+    let own = remainder::predict(&problem, &saved, &read, rows, None).unwrap();
+    for (predicted, fitted) in own.prediction.residuals.unwrap().iter().zip(&corrected.rows) {
+        assert!((predicted.position - fitted.position).norm() < 1e-9);
+        assert!((predicted.predicted - fitted.predicted).norm() < 1e-9);
+    }
+    // A bound of 95 % holds for about as many of the poses held out.
+    let bounds = Bounds::new(&read, own.poses, 0.95);
+    let held_out = &data.split.held_out;
+    let within = held_out
+        .iter()
+        .filter(|&&row| corrected.rows[row].position.norm() <= bounds.bound(row))
+        .count();
+    assert!((within as f64) > 0.85 * held_out.len() as f64, "{within} of {}", held_out.len());
+    // Far from all poses nothing is corrected, and that is said.
+    let mut far = rows.select(&[0]);
+    far.configurations.iter_mut().for_each(|q| *q += 0.5 * TAU);
+    let far = remainder::predict(&problem, &saved, &read, &far, None).unwrap().poses[0];
+    assert!(
+        far.is_extrapolated && far.shift.norm() < 1e-5 && far.size > 2.0 * bounds.poses[0].size
+    );
+}
+
+#[test]
+fn commands_bring_the_corrected_arm_to_its_targets() {
+    let problem = panda();
+    let data = measured(&problem, 3e-4, 2);
+    let (found, fitted) = fitted(&problem, &data);
+    let json =
+        IdentificationResult::new(&problem, &found).with_predictions(&found, &fitted).to_json();
+    let saved = SavedEstimate::parse(&json, Path::new("estimate.json")).unwrap();
+    let remainder = fitted.remainder.as_ref().unwrap();
+    let targets: Measurements = data.measurements.select(&[3, 70, 120]);
+    let placement = Placement::of(&targets);
+    let model = model_of(&problem, &targets);
+    let x = saved.vector(&problem, &model).unwrap();
+    assert_eq!(placement.bases.len(), 1);
+    let commands =
+        remainder::compensate(&problem, &model, (&saved, &x), &targets, remainder).unwrap();
+    let mut reached = targets.clone();
+    reached.configurations =
+        commands.iter().flat_map(|(command, _)| command.configuration.clone()).collect();
+    let predicted = remainder::predict(&problem, &saved, remainder, &reached, None).unwrap();
+    for (residual, (command, _)) in predicted.prediction.residuals.unwrap().iter().zip(&commands) {
+        assert!(command.is_reached() && command.miss.norm() < 1e-8, "{:?}", command.miss);
+        assert!(residual.position.norm() < 1e-8, "{residual:?}");
+    }
+}
+
+#[test]
+fn nothing_is_kept_where_only_noise_is_left() {
+    let problem = panda();
+    let kept = (10..16)
+        .filter(|&seed| fitted(&problem, &measured(&problem, 0.0, seed)).1.remainder.is_some());
+    assert_eq!(kept.count(), 0);
+    // Rows of the rig, which shares no physics with the model.
+    let problem = Problem::read(&path("tests/cases/problem.toml")).unwrap();
+    let (data, _) = Dataset::read_files(&[path("tests/cases/h-none-large.csv")], &problem).unwrap();
+    let (_, fitted) = fitted(&problem, &data);
+    assert!(fitted.remainder.is_none(), "{:?}", fitted.gain);
+}
+
+#[test]
+fn files_name_the_remainder_and_switch_it_off() {
+    let folder = tempfile::tempdir().unwrap();
+    let problem = panda();
+    let text = std::fs::read_to_string(path("problems/panda/problem.toml")).unwrap();
+    let data = measured(&problem, 3e-4, 3);
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("problem.toml", &text);
+    write("rows.csv", &csv(&problem, &data));
+    let run = |words: &str| {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
+        command.args(words.split_whitespace()).current_dir(folder.path()).output().unwrap()
+    };
+    let mean = |json: &[u8]| -> f64 {
+        let json: Value = serde_json::from_slice(json).unwrap();
+        json["all"]["mean_mm"]["norm"].as_f64().unwrap()
+    };
+    let json = run("identify . --data rows.csv --remainder --json --out out").stdout;
+    let estimate: Value = serde_json::from_slice(&json).unwrap();
+    let norm = |of: &Value| of["mean_mm"]["norm"].as_f64().unwrap();
+    let remainder = &estimate["remainder"];
+    assert!(norm(&estimate["held_out"]) < norm(&remainder["held_out_without"]));
+    assert_eq!(remainder["file"], "remainder.json");
+    let predict = "predict . --estimate out/estimate.json --data rows.csv --json --out predicted";
+    let with = run(predict).stdout;
+    let table = std::fs::read_to_string(folder.path().join("predicted/predictions.csv")).unwrap();
+    let header = table.lines().next().unwrap();
+    assert!(
+        header.ends_with("sigma_x_mm,sigma_y_mm,sigma_z_mm,bound95_mm,extrapolated"),
+        "{header}"
+    );
+    let errors: Value = serde_json::from_slice(&with).unwrap();
+    assert!(errors["coverage"].as_f64().unwrap() > 0.9, "{errors}");
+    write("problem.toml", &(text.clone() + "\n[remainder]\nfile = \"out/remainder.json\"\n"));
+    let declared = run(predict).stdout;
+    assert_eq!(declared, with, "{}", String::from_utf8_lossy(&run(predict).stderr));
+    write("problem.toml", &(text + "\n[remainder]\nfile = \"out/remainder.json\"\nuse = false\n"));
+    let without = run(predict).stdout;
+    assert!(mean(&without) > mean(&with));
+}
