@@ -73,6 +73,12 @@ impl Correction {
         posterior: Posterior,
         scores: Scores,
     ) -> Self {
+        let mut layout = layout.clone();
+        if posterior.hyper.sites() == 0 {
+            layout.joints.clear();
+            layout.levers.clear();
+            layout.inputs.site_of.iter_mut().for_each(|site| *site = None);
+        }
         let parameter = |&k: &usize| Linearised {
             name: found.estimates[k].name.clone(),
             deviation: found.x[k],
@@ -82,7 +88,7 @@ impl Correction {
             problem: problem.name.clone(),
             arm_digest: problem.digest(),
             sigma: found.sigma,
-            layout: layout.clone(),
+            layout,
             parameters: unknowns.iter().map(parameter).collect(),
             posterior,
             scores,
