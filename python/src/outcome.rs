@@ -141,7 +141,9 @@ impl ClosedLoop {
 
     /// problem.closed.toml: the problem with what was found declared, its data where they were.
     fn closed_problem(&self) -> PyResult<String> {
-        let files = &self.problem.data.files;
+        let data = &self.problem.data;
+        let joint_files = data.joint_log.as_ref().map_or(&[][..], |log| log.files.as_slice());
+        let files = [data.files.as_slice(), joint_files];
         report::closed_problem(&self.text, &self.problem, &self.closure, files)
             .map_err(|error| PyValueError::new_err(error.to_string()))
     }

@@ -38,7 +38,8 @@ fn replicas_repeat_and_tell_readings_and_stages_apart() {
     };
     let found = on(1);
     let json = |found| MisprintResult::new(&study, found).to_json();
-    assert_eq!(json(&found), json(&on(3)));
+    let again = on(3);
+    assert_eq!(json(&found), json(&again));
     super::schema::assert_valid(&MisprintResult::schema(), &json(&found));
     for replica in &found.replicas {
         assert!((replica.rigid.unwrap().mean.norm / study.rigid_leaves - 1.0).abs() < 1e-3);
