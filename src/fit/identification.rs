@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::error::{InputError, InputErrorKind};
+use crate::error::InputErrorKind;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::finding::{Finding, FindingCode};
 use crate::fit::checks::fitted_rows::influential_finding;
@@ -28,197 +28,13 @@ use crate::fit::uncertainty::prior_sizes::prior_sizes;
 use crate::fit::uncertainty::refuted_priors::refuted_priors;
 use crate::fit::uncertainty::statistics::Statistics;
 use crate::fit::warm_start::WarmStart;
-use crate::fit::{Errors, Placement, Progress, ProgressSink, SolverChoice, Stop, Strategy};
+use crate::fit::{Errors, IdentifyError, Options, Placement, SolverChoice, Strategy};
 use crate::least_squares::solver::Termination;
 use crate::least_squares::{Loss, Memory};
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::Model;
 use crate::model::parameter::Parameter;
-use crate::problem::{Effect, ParameterRule, Problem, Robust, RobustLoss, pattern};
-
-/// Options of an identification: [`Options::default()`], changed by the `with_…` methods.
-#[derive(Clone, Default)]
-#[non_exhaustive]
-pub struct Options {
-    /// Strategy: which parameters are fitted together.
-    pub strategy: Strategy,
-    /// Solver of the fits.
-    pub solver: SolverChoice,
-    /// Solver of the caller, used where `solver` is [`SolverChoice::Custom`].
-    pub custom_solver: Option<Arc<dyn CustomSolver>>,
-    /// Receiver of progress.
-    pub progress: Option<ProgressSink>,
-    /// Request to stop early: a fit then returns [`StageError::Interrupted`], a loop returns what it
-    /// has found by then.
-    pub stop: Option<Stop>,
-    /// Names and values \[SI\] from which the fit starts; other parameters start at the registered
-    /// nominal arm.
-    pub start: Vec<(String, f64)>,
-    /// Maximum number of steps of a fit; `None` for that of the solver.
-    pub max_steps: Option<u64>,
-    /// Effects of the caller ([`Effect::custom`]) that trace and loop look for besides those of the
-    /// catalogue. A fit alone does not use them.
-    pub candidates: Vec<Effect>,
-    /// State of an earlier fit of the same data with other effects, from which this one starts.
-    pub(crate) predecessor: Option<Arc<WarmStart>>,
-    /// Whether the fit is provisional: another one follows, and its result is not checked.
-    pub(crate) provisional: bool,
-    /// Whether further fits look for influential rows.
-    pub(crate) influential_rows: bool,
-}
-
-impl Options {
-    /// Sets the strategy.
-    #[must_use]
-    pub fn with_strategy(self, strategy: Strategy) -> Self {
-        Self { strategy, ..self }
-    }
-
-    /// Sets the solver.
-    #[must_use]
-    pub fn with_solver(self, solver: SolverChoice) -> Self {
-        Self { solver, ..self }
-    }
-
-    /// Sets a solver of the caller for the stages of the strategy; bases and targets are registered by
-    /// the solver that `auto` chooses.
-    #[must_use]
-    pub fn with_custom_solver(self, solver: Arc<dyn CustomSolver>) -> Self {
-        Self { solver: SolverChoice::Custom, custom_solver: Some(solver), ..self }
-    }
-
-    /// Looks for influential rows ([`Identification::influential_rows`]) by further fits; a loop does
-    /// so for the problem as declared.
-    #[must_use]
-    pub fn with_influential_rows(self) -> Self {
-        Self { influential_rows: true, ..self }
-    }
-
-    /// Sets the receiver of progress; `None` for none.
-    #[must_use]
-    pub fn with_progress(self, progress: impl Into<Option<ProgressSink>>) -> Self {
-        Self { progress: progress.into(), ..self }
-    }
-
-    /// Sets the request that stops the work early; `None` for none.
-    #[must_use]
-    pub fn with_stop(self, stop: impl Into<Option<Stop>>) -> Self {
-        Self { stop: stop.into(), ..self }
-    }
-
-    /// Reports progress, if there is a receiver.
-    pub(crate) fn tell(&self, progress: impl FnOnce() -> Progress) {
-        if let Some(sink) = &self.progress {
-            sink(progress());
-        }
-    }
-
-    /// Sets the values \[SI\] by name from which the fit starts.
-    #[must_use]
-    pub fn with_start(self, start: Vec<(String, f64)>) -> Self {
-        Self { start, ..self }
-    }
-
-    /// Sets the effects that trace and loop look for besides those of the catalogue.
-    #[must_use]
-    pub fn with_candidates(self, candidates: Vec<Effect>) -> Self {
-        Self { candidates, ..self }
-    }
-
-    /// The same, stopped after so many steps.
-    #[must_use]
-    pub fn with_max_steps(self, max_steps: impl Into<Option<u64>>) -> Self {
-        Self { max_steps: max_steps.into(), ..self }
-    }
-
-    /// Returns the full parameter vector from which the fit starts: `x` with the values of `start`.
-    fn begin(&self, model: &Model, x: &DVector<f64>) -> DVector<f64> {
-        let given =
-            |parameter: &Parameter| self.start.iter().find(|(name, _)| *name == parameter.name);
-        let own = model.parameters.iter().zip(x);
-        let value = |(parameter, x): (&Parameter, &f64)| {
-            given(parameter).map_or(*x, |(_, value)| parameter.deviation(*value))
-        };
-        DVector::from_iterator(x.len(), own.map(value))
-    }
-}
-
-/// Error of an identification that could not be made, or could not be applied.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum IdentifyError {
-    /// The data have no identification row.
-    #[error("no pose to identify from")]
-    NoPoses,
-    /// Problem and data do not fit each other.
-    #[error("{0}")]
-    Input(#[from] InputError),
-    /// A fit could not be set up.
-    #[error(transparent)]
-    Stage(#[from] StageError),
-    /// The problem declares bounds or constraints that the chosen solver cannot keep.
-    #[error(
-        "{solver} does not keep the bounds of [parameters] and constraints: take the solver bounded, interior-point or auto, or leave out \
-         min, max and [[constraint]]"
-    )]
-    BoundsIgnored {
-        /// Name of the solver.
-        solver: &'static str,
-    },
-    /// [`SolverChoice::Custom`] was chosen without a solver.
-    #[error("the solver custom needs a solver of the caller: Options::with_custom_solver")]
-    NoCustomSolver,
-    /// The strategy has no parameter to vary.
-    #[error(
-        "strategy {strategy} has nothing to fit: no parameter of its kind is free in [parameters]"
-    )]
-    NothingToFit {
-        /// Name of the strategy.
-        strategy: &'static str,
-    },
-    /// A rule of the search for effects has a value outside its range.
-    #[error(
-        "the rule {rule} of the search for effects has a value that makes no sense; docs/selection.md says what it stands for"
-    )]
-    Rule {
-        /// Name of the rule.
-        rule: &'static str,
-    },
-    /// The configurations of the data have another number of joints than the arm.
-    #[error("configurations of {found} joints for an arm of {joints}")]
-    JointCount {
-        /// Number of joints of the data.
-        found: usize,
-        /// Number of joints of the problem, including fixed ones.
-        joints: usize,
-    },
-    /// The model lacks a parameter that was identified.
-    #[error(
-        "{name} was identified, and the problem has no such parameter: it is another than the one identified"
-    )]
-    NotInModel {
-        /// Name of the parameter.
-        name: String,
-    },
-    /// A parameter is needed that was not identified.
-    #[error("{name} was not identified: the sessions, targets or effects are others")]
-    NoEstimate {
-        /// Name of the parameter.
-        name: String,
-    },
-}
-
-impl IdentifyError {
-    /// Creates the error of work that was stopped on request.
-    pub(crate) fn interrupted() -> Self {
-        Self::Stage(StageError::Interrupted)
-    }
-
-    /// Returns true if the work was stopped on request.
-    pub fn is_interrupted(&self) -> bool {
-        matches!(self, Self::Stage(StageError::Interrupted))
-    }
-}
+use crate::problem::{ParameterRule, Problem, Robust, RobustLoss, pattern};
 
 /// Identifies the free parameters of `problem` from the identification rows of `data`; held-out rows
 /// decide nothing.

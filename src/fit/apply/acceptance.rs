@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use crate::error::InputErrorKind;
-use crate::fit::identification::IdentifyError;
+use crate::fit::IdentifyError;
 use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
 use crate::measurement::Dataset;

@@ -1,7 +1,8 @@
 //! Comparison of commanded and read joint values: which of the two the arm follows.
 
-use crate::fit::identification::{IdentifyError, Options, identify};
+use crate::fit::identification::identify;
 use crate::fit::outcome::Identification;
+use crate::fit::{IdentifyError, Options};
 use crate::measurement::Dataset;
 use crate::problem::{JointSource, Problem};
 

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use nalgebra::{DVector, Vector3};
 
-use crate::fit::identification::IdentifyError;
+use crate::fit::IdentifyError;
 use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
 use crate::measurement::{Dataset, Measurements};

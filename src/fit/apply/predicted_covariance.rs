@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use crate::fit::identification::IdentifyError;
+use crate::fit::IdentifyError;
 use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
 use crate::least_squares::{Block, LeastSquares as _};

@@ -1,5 +1,6 @@
 //! Least-squares fits of an identification: strategies, solvers, registration, staged fits.
 
+pub(super) mod active_limits;
 pub(super) mod alternation;
 pub(super) mod constraints;
 pub(super) mod custom_solver;

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::custom_solver::CustomSolver;
 use crate::fit::SolverChoice;
-use crate::fit::stages::constraints::Held;
+use crate::fit::stages::active_limits::Held;
 use crate::fit::stages::parameter_size::plausible;
 use crate::fit::stages::progress::{ProgressSink, Reporter, Stop};
 use crate::least_squares::solver::{

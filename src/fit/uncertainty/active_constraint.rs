@@ -1,7 +1,7 @@
 //! Constraints on whose limits a fit rests.
 
 use crate::error::Location;
-use crate::fit::stages::constraints::Held;
+use crate::fit::stages::active_limits::Held;
 use crate::fit::uncertainty::shadow_price::ShadowPrice;
 use crate::least_squares::solver::AtBound;
 use crate::model::Model;

@@ -3,7 +3,7 @@
 
 use nalgebra::DVector;
 
-use crate::fit::stages::constraints::confine;
+use crate::fit::stages::active_limits::confine;
 use crate::fit::stages::fitting::{FitEnd, Fitting};
 use crate::fit::stages::noise_model::{LEAST_NOISE, NoiseModel, by_chance};
 use crate::fit::stages::stage::{Stage, StageError};

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::fit::stages::constraints::Held;
+use crate::fit::stages::active_limits::Held;
 use crate::fit::stages::stage::{Stage, StageError};
 use crate::fit::uncertainty::shadow_price::ShadowPrice;
 use crate::least_squares::solver::{AtBound, Factor};

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
-use crate::fit::stages::constraints::{Held, confine};
+use crate::fit::stages::active_limits::{Held, confine};
 use crate::fit::stages::fitting::FitEnd;
 use crate::fit::stages::noise_model::{IMPROBABLE, NoiseModel};
 use crate::fit::stages::stage::{Stage, StageError};

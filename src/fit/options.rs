@@ -1,0 +1,118 @@
+//! Options of an identification.
+
+use std::sync::Arc;
+
+use nalgebra::DVector;
+
+use super::warm_start::WarmStart;
+use super::{CustomSolver, Progress, ProgressSink, SolverChoice, Stop, Strategy};
+use crate::model::Model;
+use crate::model::parameter::Parameter;
+use crate::problem::Effect;
+
+/// Options of an identification: [`Options::default()`], changed by the `with_…` methods.
+#[derive(Clone, Default)]
+#[non_exhaustive]
+pub struct Options {
+    /// Strategy: which parameters are fitted together.
+    pub strategy: Strategy,
+    /// Solver of the fits.
+    pub solver: SolverChoice,
+    /// Solver of the caller, used where `solver` is [`SolverChoice::Custom`].
+    pub custom_solver: Option<Arc<dyn CustomSolver>>,
+    /// Receiver of progress.
+    pub progress: Option<ProgressSink>,
+    /// Request to stop early: a fit then returns [`StageError::Interrupted`](super::StageError::Interrupted), a loop returns what it
+    /// has found by then.
+    pub stop: Option<Stop>,
+    /// Names and values \[SI\] from which the fit starts; other parameters start at the registered
+    /// nominal arm.
+    pub start: Vec<(String, f64)>,
+    /// Maximum number of steps of a fit; `None` for that of the solver.
+    pub max_steps: Option<u64>,
+    /// Effects of the caller ([`Effect::custom`]) that trace and loop look for besides those of the
+    /// catalogue. A fit alone does not use them.
+    pub candidates: Vec<Effect>,
+    /// State of an earlier fit of the same data with other effects, from which this one starts.
+    pub(crate) predecessor: Option<Arc<WarmStart>>,
+    /// Whether the fit is provisional: another one follows, and its result is not checked.
+    pub(crate) provisional: bool,
+    /// Whether further fits look for influential rows.
+    pub(crate) influential_rows: bool,
+}
+
+impl Options {
+    /// Sets the strategy.
+    #[must_use]
+    pub fn with_strategy(self, strategy: Strategy) -> Self {
+        Self { strategy, ..self }
+    }
+
+    /// Sets the solver.
+    #[must_use]
+    pub fn with_solver(self, solver: SolverChoice) -> Self {
+        Self { solver, ..self }
+    }
+
+    /// Sets a solver of the caller for the stages of the strategy; bases and targets are registered by
+    /// the solver that `auto` chooses.
+    #[must_use]
+    pub fn with_custom_solver(self, solver: Arc<dyn CustomSolver>) -> Self {
+        Self { solver: SolverChoice::Custom, custom_solver: Some(solver), ..self }
+    }
+
+    /// Looks for influential rows ([`Identification::influential_rows`]) by further fits; a loop does
+    /// so for the problem as declared.
+    #[must_use]
+    pub fn with_influential_rows(self) -> Self {
+        Self { influential_rows: true, ..self }
+    }
+
+    /// Sets the receiver of progress; `None` for none.
+    #[must_use]
+    pub fn with_progress(self, progress: impl Into<Option<ProgressSink>>) -> Self {
+        Self { progress: progress.into(), ..self }
+    }
+
+    /// Sets the request that stops the work early; `None` for none.
+    #[must_use]
+    pub fn with_stop(self, stop: impl Into<Option<Stop>>) -> Self {
+        Self { stop: stop.into(), ..self }
+    }
+
+    /// Reports progress, if there is a receiver.
+    pub(crate) fn tell(&self, progress: impl FnOnce() -> Progress) {
+        if let Some(sink) = &self.progress {
+            sink(progress());
+        }
+    }
+
+    /// Sets the values \[SI\] by name from which the fit starts.
+    #[must_use]
+    pub fn with_start(self, start: Vec<(String, f64)>) -> Self {
+        Self { start, ..self }
+    }
+
+    /// Sets the effects that trace and loop look for besides those of the catalogue.
+    #[must_use]
+    pub fn with_candidates(self, candidates: Vec<Effect>) -> Self {
+        Self { candidates, ..self }
+    }
+
+    /// The same, stopped after so many steps.
+    #[must_use]
+    pub fn with_max_steps(self, max_steps: impl Into<Option<u64>>) -> Self {
+        Self { max_steps: max_steps.into(), ..self }
+    }
+
+    /// Returns the full parameter vector from which the fit starts: `x` with the values of `start`.
+    pub(super) fn begin(&self, model: &Model, x: &DVector<f64>) -> DVector<f64> {
+        let given =
+            |parameter: &Parameter| self.start.iter().find(|(name, _)| *name == parameter.name);
+        let own = model.parameters.iter().zip(x);
+        let value = |(parameter, x): (&Parameter, &f64)| {
+            given(parameter).map_or(*x, |(_, value)| parameter.deviation(*value))
+        };
+        DVector::from_iterator(x.len(), own.map(value))
+    }
+}
