@@ -35,9 +35,9 @@ pub struct Options {
     pub candidates: Vec<Effect>,
     /// State of an earlier fit of the same data with other effects, from which this one starts.
     pub(crate) predecessor: Option<Arc<WarmStart>>,
-    /// Whether the fit is provisional: another one follows, and its result is not checked.
+    /// True if the fit is provisional: another one follows, and its result is not checked.
     pub(crate) provisional: bool,
-    /// Whether further fits look for influential rows.
+    /// True if further fits look for influential rows.
     pub(crate) influential_rows: bool,
 }
 

@@ -47,7 +47,7 @@ pub struct Estimate {
     /// Part of the value that the data determine, 0…1; the rest is decided by prior, bound, or the
     /// start of the fit along unidentifiable combinations.
     pub identified: f64,
-    /// Whether the strategy varied the parameter.
+    /// True if the strategy varied the parameter.
     pub fitted: bool,
 }
 
@@ -67,7 +67,7 @@ pub struct Identification {
     pub findings: Vec<Finding>,
     /// Number of different poses of the arm that were fitted; several targets in one pose count once.
     pub poses: usize,
-    /// Whether some pose of the arm shows several targets.
+    /// True if some pose of the arm shows several targets.
     pub several_targets: bool,
     /// Number of steps that were tried, over all stages.
     pub iterations: u64,
@@ -116,7 +116,7 @@ pub struct Identification {
     /// Triangular factor of the whitened Jacobian of the unknowns, without priors, at the registered
     /// nominal arm, and its analysis once that is asked for.
     pub(super) whitened_triangle: (DMatrix<f64>, OnceLock<Identifiability>),
-    /// Whether the fit is provisional: another one follows, so it has neither that factor nor the
+    /// True if the fit is provisional: another one follows, so it has neither that factor nor the
     /// findings of the checks.
     pub(crate) provisional: bool,
     /// Noise models of positions and of orientations that the fit took.
@@ -134,8 +134,9 @@ pub struct Identification {
     /// Held-out rows that are farther from the prediction than its σ allows, in the order of the
     /// rows.
     pub held_out_outliers: Vec<Outlier>,
-    /// Those that carry what the fit does not explain, if a few do; looked for where
-    /// [`crate::fit::Options::with_influential_rows`] asks, but not with a robust loss.
+    /// Rows whose removal removes most of the misfit, if a few do. They are looked for where
+    /// [`Options::with_influential_rows`](crate::fit::Options::with_influential_rows) asks for it,
+    /// but not with a robust loss.
     pub influential_rows: Option<InfluentialRows>,
     /// Full parameter vector of the identified arm.
     pub x: DVector<f64>,

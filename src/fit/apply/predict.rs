@@ -19,7 +19,7 @@ use crate::spatial::Frame;
 pub struct Residual {
     /// Row of the measurements, counted from 0.
     pub row: usize,
-    /// Whether the row is held out.
+    /// True if the row is held out.
     pub held_out: bool,
     /// Prediction \[m\]: position of the target in the measuring frame, also for contacts with a point,
     /// or a distance.
@@ -34,7 +34,7 @@ pub struct Residual {
     pub orientation: Option<Vector3<f64>>,
     /// Residual of the orientation over 1 σ about an axis \[1\].
     pub whitened_orientation: Option<Vector3<f64>>,
-    /// Whether the row is too far off to be noise: one of the fit's
+    /// True if the row is too far off to be noise: one of the fit's
     /// [outliers](Identification::outliers) or
     /// [held-out outliers](Identification::held_out_outliers).
     pub outlier: bool,

@@ -26,7 +26,7 @@ const IDENTIFIED: f64 = 0.99;
 pub struct SavedEstimate {
     /// Path of the file.
     pub file: PathBuf,
-    /// Whether the fit was trusted.
+    /// True if the fit was trusted.
     pub trusted: bool,
     /// 1 σ of a coordinate from the scatter, where the problem declares none \[m\].
     pub estimated_sigma: Option<f64>,

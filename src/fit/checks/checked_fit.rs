@@ -41,7 +41,7 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub held_out_outliers: &'a [Outlier],
     /// Fit of all unknowns to the identification rows, with the declared σ and those that it took.
     pub whole: &'a Stage<'a>,
-    /// Whether the problem or the table declares the σ of positions.
+    /// True if the problem or the table declares the σ of positions.
     pub has_declared_noise: bool,
     /// Source of the σ of positions.
     pub noise: Noise,

@@ -24,7 +24,7 @@ pub(in crate::fit) struct PoseSufficiency {
     /// Number of different poses of the arm among the identification rows; several targets in one pose
     /// count once.
     pub poses: usize,
-    /// Whether some pose of the arm shows several targets.
+    /// True if some pose of the arm shows several targets.
     pub several_targets: bool,
 }
 

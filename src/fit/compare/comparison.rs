@@ -34,7 +34,7 @@ pub struct Comparison {
     pub procedures: Vec<Procedure>,
     /// Errors before calibration as the paper counts them: of the rigid nominal arm.
     pub before: Before,
-    /// Whether the problem declares the arm of the paper, so that published figures apply.
+    /// True if the problem declares the arm of the paper, so that published figures apply.
     pub is_papers_arm: bool,
 }
 
@@ -43,14 +43,14 @@ pub struct Comparison {
 pub struct Before {
     /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
     pub errors: Vec<Vector3<f64>>,
-    /// Whether base or tool were fitted first, since they are free and have no prior.
+    /// True if base or tool were fitted first, since they are free and have no prior.
     pub registered: bool,
 }
 
 /// Options of a comparison.
 #[derive(Clone, Default)]
 pub struct CompareOptions {
-    /// Whether to run the paper's procedure; it always runs where the problem declares the arm of the
+    /// True to run the paper's procedure; it always runs where the problem declares the arm of the
     /// paper.
     pub paper: bool,
     /// Receiver of progress.

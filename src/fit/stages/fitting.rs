@@ -55,9 +55,9 @@ pub(in crate::fit) struct Fitting<'a> {
     pub stop: Option<&'a Stop>,
     /// Maximum number of steps of a stage of the strategy.
     pub max_steps: Option<u64>,
-    /// Whether the fit is provisional: another one follows.
+    /// True if the fit is provisional: another one follows.
     pub provisional: bool,
-    /// Whether the σ is tested before the fit goes on.
+    /// True if the σ is tested before the fit goes on.
     pub to_be_judged: bool,
     /// 1 σ of a coordinate in rows that state none, declared or assumed \[m\].
     pub sigma: f64,

@@ -156,7 +156,7 @@ impl Placement {
 /// Bases, targets and fixtures that only held-out rows use.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::fit) struct HeldOutOnly {
-    /// Whether each parameter of the model belongs to one of these.
+    /// True if each parameter of the model belongs to one of these.
     pub parameters: Vec<bool>,
     /// Held-out rows that use one of these.
     pub rows: Vec<usize>,

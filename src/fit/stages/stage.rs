@@ -69,7 +69,7 @@ pub(in crate::fit) struct Stage<'a> {
     pub cost_tolerance: f64,
     /// Loss of the residual of a pose.
     pub loss: Loss,
-    /// Whether constraints count that involve free parameters which do not vary here.
+    /// True if constraints count that involve free parameters which do not vary here.
     pub counts_fixed: bool,
     /// Linearisations shared by fits of the same data.
     pub memory: &'a Memory,

@@ -21,7 +21,7 @@ const PARTLY_BLIND: f64 = 1e-3;
 pub(in crate::fit) struct Statistics {
     /// Standard error of each unknown.
     pub errors: Vec<f64>,
-    /// Whether data and priors determine each unknown: it rests on no bound and takes part in no
+    /// True if data and priors determine each unknown: it rests on no bound and takes part in no
     /// unidentifiable combination.
     pub known: Vec<bool>,
     /// Part of each unknown that the data determine, 0…1; 1 without a prior in a provisional fit.
