@@ -109,10 +109,10 @@ impl Options {
     pub(super) fn begin(&self, model: &Model, x: &DVector<f64>) -> DVector<f64> {
         let given =
             |parameter: &Parameter| self.start.iter().find(|(name, _)| *name == parameter.name);
-        let own = model.parameters.iter().zip(x);
+        let parameters = model.parameters.iter().zip(x);
         let value = |(parameter, x): (&Parameter, &f64)| {
             given(parameter).map_or(*x, |(_, value)| parameter.deviation(*value))
         };
-        DVector::from_iterator(x.len(), own.map(value))
+        DVector::from_iterator(x.len(), parameters.map(value))
     }
 }

@@ -177,7 +177,7 @@ impl Identification {
             |code| matches!(code, FindingCode::InfluentialRows | FindingCode::UnsteadyPoint);
         self.findings
             .iter()
-            .filter(move |own| own.severity() == Severity::Warning && !has_section(own.code))
+            .filter(move |it| it.severity() == Severity::Warning && !has_section(it.code))
     }
 
     /// Returns the identifiability of the fitted parameters at the registered nominal arm; it is

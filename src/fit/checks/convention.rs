@@ -150,14 +150,14 @@ fn misfit(pairs: &[(UnitQuaternion<f64>, UnitQuaternion<f64>)], reading: &Readin
         })
         .collect();
     let mut sum = Matrix4::zeros();
-    for difference in differences.iter().filter_map(|own| own.first()) {
+    for difference in differences.iter().filter_map(|readings| readings.first()) {
         sum += difference.coords * difference.coords.transpose();
     }
     let eigen = sum.symmetric_eigen();
     let mean = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
     let mean = UnitQuaternion::from_quaternion(Quaternion::from(mean));
-    let nearest = |own: &Vec<UnitQuaternion<f64>>| {
-        own.iter().map(|difference| difference.angle_to(&mean)).fold(PI, f64::min).powi(2)
+    let nearest = |readings: &Vec<UnitQuaternion<f64>>| {
+        readings.iter().map(|difference| difference.angle_to(&mean)).fold(PI, f64::min).powi(2)
     };
     (differences.iter().map(nearest).sum::<f64>() / pairs.len().max(1) as f64).sqrt()
 }

@@ -207,7 +207,7 @@ impl Misreading {
 /// be where the unit is not known.
 fn turns_in(problem: &Problem, rows: &Measurements, joint: usize, radians: bool) -> bool {
     let turns =
-        problem.joints.get(joint).is_some_and(|own| own.command_kind() == JointKind::Revolute);
+        problem.joints.get(joint).is_some_and(|joint| joint.command_kind() == JointKind::Revolute);
     let column = rows.command_columns.iter().find(|column| column.joint == joint);
     turns && column.is_none_or(|column| (column.unit >= 1.0) == radians)
 }

@@ -27,7 +27,8 @@ pub(super) struct PredictionHolds;
 
 impl Check for PredictionHolds {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
-        let is_outlier = |row: usize| fit.held_out_outliers.iter().any(|own| own.row == row);
+        let is_outlier =
+            |row: usize| fit.held_out_outliers.iter().any(|outlier| outlier.row == row);
         let held_out = fit.fitting.split.held_out.iter().copied();
         let rows: Vec<usize> = held_out.filter(|row| !is_outlier(*row)).collect();
         let Some((chi2, coordinates)) =
@@ -130,7 +131,7 @@ impl Check for NotWorseThanNominal {
             return Vec::new();
         }
         let mean = differences.iter().sum::<f64>() / count;
-        let squares: f64 = differences.iter().map(|own| (own - mean).powi(2)).sum();
+        let squares: f64 = differences.iter().map(|difference| (difference - mean).powi(2)).sum();
         let error = (squares / (count - 1.0) / count).sqrt();
         if mean <= MIN_DIFFERENCE * error {
             return Vec::new();

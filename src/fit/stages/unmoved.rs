@@ -73,7 +73,7 @@ impl Stage<'_> {
                 }
             }
         }
-        // Each unknown in units of its own effect: angles and lengths do not compare.
+        // Each unknown in units of its effect: angles and lengths do not compare.
         let scaled = squares.iter().map(|square| match square.trace() {
             trace if trace > 0.0 => square / trace,
             _ => Matrix3::zeros(),

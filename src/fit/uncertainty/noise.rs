@@ -199,7 +199,8 @@ fn contradicted(
         &of(&|place| stage.poses[place].sigma),
         ratio * shares[0],
     );
-    let taken = |place: usize| stage.poses[place].orientation.map_or(1.0, |own| own.sigma);
+    let taken =
+        |place: usize| stage.poses[place].orientation.map_or(1.0, |orientation| orientation.sigma);
     let of_turn = match stage.declared_turn {
         Some(sigma) => NoiseModel::raised(&of(&|_| sigma), &of(&taken), ratio * shares[1]),
         None => NoiseModel::DECLARED,
@@ -231,11 +232,11 @@ pub(in crate::fit) fn taken(stage: &Stage, kind: Observation) -> (f64, f64) {
         stage.poses.iter().zip(&stage.declared).filter(|(pose, _)| pose.observation.is_of_arm());
     let (poses, declared): (Vec<&Pose>, Vec<f64>) = rows.unzip();
     let all = together(poses.iter().map(|pose| pose.sigma));
-    let own =
+    let of_kind =
         poses.iter().filter(|pose| pose.observation.kind() == kind.kind()).map(|pose| pose.sigma);
     (
         (all / together(declared.into_iter())).powi(2),
-        together(own.collect::<Vec<f64>>().into_iter()),
+        together(of_kind.collect::<Vec<f64>>().into_iter()),
     )
 }
 

@@ -75,7 +75,7 @@ impl Statistics {
             &end.x,
             &unmoved,
             freedom / coordinates,
-            noise_model.map(|own| own.scale),
+            noise_model.map(|model| model.scale),
         );
         let robust = stage.loss != Loss::Squares;
         let counts = |place: usize| !robust || lengths.outlying(place).is_none();
