@@ -36,8 +36,8 @@ use crate::model::Model;
 use crate::model::parameter::Parameter;
 use crate::problem::{ParameterRule, Problem, Robust, RobustLoss, pattern};
 
-/// Identifies the free parameters of `problem` from the identification rows of `data`; held-out rows
-/// decide nothing.
+/// Identifies the free parameters of `problem` from the identification rows of `data`; held-out
+/// rows decide nothing.
 ///
 /// # Errors
 /// Returns an error if problem, data, strategy and solver do not fit each other, or if the fit was
@@ -52,8 +52,8 @@ pub fn identify(
     identify_model(&model, problem, data, options)
 }
 
-/// Checks that the data have rows to fit, configurations of the arm, and every column that the problem
-/// needs.
+/// Checks that the data have rows to fit, configurations of the arm, and every column that the
+/// problem needs.
 fn check_data(
     problem: &Problem,
     measurements: &Measurements,
@@ -274,8 +274,8 @@ fn fit_rows(
     })
 }
 
-/// Returns the full parameter vector of the registered nominal arm and its errors, and sets the σ with
-/// which the fit starts: from its predecessor, or an undeclared one from these errors.
+/// Returns the full parameter vector of the registered nominal arm and its errors, and sets the σ
+/// with which the fit starts: from its predecessor, or an undeclared one from these errors.
 fn prepared(
     fitting: &mut Fitting,
     predecessor: Option<&WarmStart>,
@@ -312,8 +312,9 @@ fn fitted_parameters<'a>(fitting: &Fitting<'a>) -> Result<Vec<&'a Parameter>, Id
     Ok(unknowns)
 }
 
-/// Returns the estimates of all parameters, their covariance, and the finding about a fit that did not
-/// converge. Bases and targets of held-out sessions are fitted to their rows with the arm given.
+/// Returns the estimates of all parameters, their covariance, and the finding about a fit that did
+/// not converge. Bases and targets of held-out sessions are fitted to their rows with the arm
+/// given.
 fn estimated(
     fitting: &Fitting,
     end: &mut FitEnd,

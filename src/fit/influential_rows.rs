@@ -4,24 +4,26 @@ use crate::fit::checks::outliers::{InfluentialRows, Outlier};
 use crate::fit::outcome::Identification;
 use crate::fit::uncertainty::noise::Noise;
 
-/// Part of the variance left without the rows up to which they are influential in any case. Rows that
-/// one effect alone concerns, such as two with a payload, may be among them.
+/// Part of the variance left without the rows up to which they are influential in any case. Rows
+/// that one effect alone concerns, such as two with a payload, may be among them.
 const FAR_BETTER: f64 = 0.01;
-/// Part of the variance left without the rows up to which they are influential if the declared σ then
-/// explains the rest.
+/// Part of the variance left without the rows up to which they are influential if the declared σ
+/// then explains the rest.
 const MOST_OF_IT: f64 = 0.5;
-/// Reciprocal of the largest part of the rows that can be influential; beyond it, the model misses all.
+/// Reciprocal of the largest part of the rows that can be influential; beyond it, the model misses
+/// all.
 const ONE_IN: usize = 5;
-/// Reciprocal of the part of the rows that is left out in one round, at least one row: a gross error
-/// makes other rows look far off and hides smaller errors.
+/// Reciprocal of the part of the rows that is left out in one round, at least one row: a gross
+/// error makes other rows look far off and hides smaller errors.
 const ONE_A_ROUND_IN: usize = 100;
 /// Part of the variance left after a round above which its rows are no gross errors.
 const NO_GAIN: f64 = 0.95;
 
-/// Finds the influential rows of the fit `found`; `without` fits the identification rows except some.
+/// Finds the influential rows of the fit `found`; `without` fits the identification rows except
+/// some.
 ///
-/// The rows farthest off are left out and the others fitted again, until the declared σ explains the
-/// residual or no row is too far off. The search ends at a fit that does not converge.
+/// The rows farthest off are left out and the others fitted again, until the declared σ explains
+/// the residual or no row is too far off. The search ends at a fit that does not converge.
 pub(super) fn influential_rows(
     found: &Identification,
     without: impl Fn(&[usize]) -> Option<Identification>,

@@ -1,4 +1,5 @@
-//! Identification of an arm: fits, their uncertainty, checks of their results, and their application.
+//! Identification of an arm: fits, their uncertainty, checks of their results, and their
+//! application.
 
 mod apply;
 mod checks;

@@ -22,8 +22,9 @@ pub struct Options {
     pub custom_solver: Option<Arc<dyn CustomSolver>>,
     /// Receiver of progress.
     pub progress: Option<ProgressSink>,
-    /// Request to stop early: a fit then returns [`StageError::Interrupted`](super::StageError::Interrupted), a loop returns what it
-    /// has found by then.
+    /// Request to stop early: a fit then returns
+    /// [`StageError::Interrupted`](super::StageError::Interrupted), a loop returns what it has
+    /// found by then.
     pub stop: Option<Stop>,
     /// Names and values \[SI\] from which the fit starts; other parameters start at the registered
     /// nominal arm.
@@ -54,15 +55,15 @@ impl Options {
         Self { solver, ..self }
     }
 
-    /// Sets a solver of the caller for the stages of the strategy; bases and targets are registered by
-    /// the solver that `auto` chooses.
+    /// Sets a solver of the caller for the stages of the strategy; bases and targets are registered
+    /// by the solver that `auto` chooses.
     #[must_use]
     pub fn with_custom_solver(self, solver: Arc<dyn CustomSolver>) -> Self {
         Self { solver: SolverChoice::Custom, custom_solver: Some(solver), ..self }
     }
 
-    /// Looks for influential rows ([`Identification::influential_rows`]) by further fits; a loop does
-    /// so for the problem as declared.
+    /// Looks for influential rows ([`Identification::influential_rows`]) by further fits; a loop
+    /// does so for the problem as declared.
     #[must_use]
     pub fn with_influential_rows(self) -> Self {
         Self { influential_rows: true, ..self }

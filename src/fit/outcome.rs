@@ -65,7 +65,8 @@ pub struct Identification {
     pub termination: Termination,
     /// Findings of the checks, errors first; a provisional fit is only checked for convergence.
     pub findings: Vec<Finding>,
-    /// Number of different poses of the arm that were fitted; several targets in one pose count once.
+    /// Number of different poses of the arm that were fitted; several targets in one pose count
+    /// once.
     pub poses: usize,
     /// True if some pose of the arm shows several targets.
     pub several_targets: bool,
@@ -83,8 +84,8 @@ pub struct Identification {
     pub registered: Errors,
     /// Errors of the identified arm.
     pub fitted: Errors,
-    /// Errors of each kind of rows before and after the fit, where there are several kinds; the first
-    /// pair is `registered` and `fitted`.
+    /// Errors of each kind of rows before and after the fit, where there are several kinds; the
+    /// first pair is `registered` and `fitted`.
     pub kinds: Vec<(Errors, Errors)>,
     /// Scatter of the predicted target at each touched point: of the registered nominal arm, of the
     /// identified arm, and whether all of the point's rows are held out.
@@ -105,16 +106,16 @@ pub struct Identification {
     pub sigma_taken: f64,
     /// Factor on the declared σ, less than 1 where these are too large.
     pub sigma_scale: f64,
-    /// Combinations of `unknowns` that the data determine too weakly, held where they started. Their
-    /// weights are in units of the arm's reach for lengths, 1 rad for angles and a factor of 100 for
-    /// stiffnesses; their singular value is the change of all data along them \[σ\].
+    /// Combinations of `unknowns` that the data determine too weakly, held where they started.
+    /// Their weights are in units of the arm's reach for lengths, 1 rad for angles and a factor of
+    /// 100 for stiffnesses; their singular value is the change of all data along them \[σ\].
     pub weak: Vec<UnidentifiableCombination>,
     /// Number of measured coordinates that were fitted.
     pub coordinates: usize,
     /// Names of the fitted parameters, in the order of [`Identification::identifiability`].
     pub unknowns: Vec<String>,
-    /// Triangular factor of the whitened Jacobian of the unknowns, without priors, at the registered
-    /// nominal arm, and its analysis once that is asked for.
+    /// Triangular factor of the whitened Jacobian of the unknowns, without priors, at the
+    /// registered nominal arm, and its analysis once that is asked for.
     pub(super) whitened_triangle: (DMatrix<f64>, OnceLock<Identifiability>),
     /// True if the fit is provisional: another one follows, so it has neither that factor nor the
     /// findings of the checks.

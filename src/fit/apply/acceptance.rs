@@ -40,14 +40,14 @@ pub struct Acceptance {
 pub struct AcceptancePose {
     /// Rows of the pose, ascending.
     pub rows: Vec<usize>,
-    /// Accuracy AP of the nominal arm: distance from the predicted position to the barycentre of the
-    /// measured ones \[m\].
+    /// Accuracy AP of the nominal arm: distance from the predicted position to the barycentre of
+    /// the measured ones \[m\].
     pub before: f64,
     /// Accuracy AP of the identified arm \[m\].
     pub after: f64,
     /// Repeatability RP = l̄ + 3 `S_l` of the distances l from the measured positions to their
-    /// barycentre \[m\]; `None` for less than three measurements, since two positions are equally far
-    /// from their centre.
+    /// barycentre \[m\]; `None` for less than three measurements, since two positions are equally
+    /// far from their centre.
     pub repeatability: Option<f64>,
 }
 
@@ -91,8 +91,8 @@ pub fn held_out_positions(
     Ok(rows)
 }
 
-/// Computes pose accuracy and repeatability of the identified arm in the held-out poses with measured
-/// positions. Poses without an equilibrium are left out.
+/// Computes pose accuracy and repeatability of the identified arm in the held-out poses with
+/// measured positions. Poses without an equilibrium are left out.
 ///
 /// # Errors
 /// Returns an error if problem and data do not fit each other, or no held-out row measures a

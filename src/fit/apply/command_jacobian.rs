@@ -7,8 +7,8 @@ use crate::measurement::Measurements;
 use crate::model::Model;
 use crate::problem::Problem;
 
-/// Returns the derivatives of the predicted positions of `rows` by the joint commands, one matrix per
-/// row, shape = (3, joints), measuring frame \[m/rad\], for prismatic joints \[m/m\].
+/// Returns the derivatives of the predicted positions of `rows` by the joint commands, one matrix
+/// per row, shape = (3, joints), measuring frame \[m/rad\], for prismatic joints \[m/m\].
 ///
 /// Columns of fixed joints are 0; rows without an equilibrium are NaN. The arm is the `identified`
 /// one, with its sessions and targets, or else the nominal one. `problem` is the one that was

@@ -55,8 +55,8 @@ impl Command {
     }
 }
 
-/// Returns `rows` with the targets that the nominal arm would have reached by their commands, on the
-/// bases and with the tools of the full parameter vector `x`, measuring frame.
+/// Returns `rows` with the targets that the nominal arm would have reached by their commands, on
+/// the bases and with the tools of the full parameter vector `x`, measuring frame.
 ///
 /// A target has an orientation if at least six moving joints lead to it; with fewer, position and
 /// orientation cannot both be reached.
@@ -140,9 +140,9 @@ fn moved(targets: &Measurements, bases: &[Frame<f64>]) -> Measurements {
 /// Joints that do not lead to the target of a row keep its values. Effects on the measurement, such
 /// as an instrument that drifts, are left out: targets are desired places of the arm.
 ///
-/// Minimises ‖(desired − predicted(q)) / 1 µm‖² + ‖log(desired predicted(q)ᵀ) / 1 µrad‖² + ‖q − seed‖²
-/// over q by Newton's method with dual numbers. Effects that follow the command, such as harmonics,
-/// are evaluated at the command of the pass before, until it settles.
+/// Minimises ‖(desired − predicted(q)) / 1 µm‖² + ‖log(desired predicted(q)ᵀ) / 1 µrad‖² + ‖q −
+/// seed‖² over q by Newton's method with dual numbers. Effects that follow the command, such as
+/// harmonics, are evaluated at the command of the pass before, until it settles.
 ///
 /// # Errors
 /// Returns an error if the limits of a joint exclude each other.

@@ -25,8 +25,8 @@ impl JointSources {
     }
 }
 
-/// Compares the fit `found` with one that uses the other source of joint values; `None` where the rows
-/// do not have both, or both are equal. Held-out rows decide nothing.
+/// Compares the fit `found` with one that uses the other source of joint values; `None` where the
+/// rows do not have both, or both are equal. Held-out rows decide nothing.
 ///
 /// # Errors
 /// Returns the errors of [`identify`].

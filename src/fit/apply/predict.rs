@@ -21,8 +21,8 @@ pub struct Residual {
     pub row: usize,
     /// True if the row is held out.
     pub held_out: bool,
-    /// Prediction \[m\]: position of the target in the measuring frame, also for contacts with a point,
-    /// or a distance.
+    /// Prediction \[m\]: position of the target in the measuring frame, also for contacts with a
+    /// point, or a distance.
     pub predicted: Vector3<f64>,
     /// Measured − predicted position, measuring frame, or distance \[m\]; NaN where the identified
     /// arm has no equilibrium.
@@ -48,8 +48,8 @@ impl Residual {
 }
 
 impl Identification {
-    /// Predicts the positions of the identified arm in the poses of `rows`, measuring frame \[m\]; NaN
-    /// where the arm has no equilibrium.
+    /// Predicts the positions of the identified arm in the poses of `rows`, measuring frame \[m\];
+    /// NaN where the arm has no equilibrium.
     ///
     /// The positions in `rows` are not used ([`Dataset::poses`] makes rows without any). Their
     /// sessions and targets must be among those identified. `problem` is the one that was
@@ -68,7 +68,8 @@ impl Identification {
         self.predict_with(&model, rows)
     }
 
-    /// Predicts positions as [`predict`](Self::predict) does, with a model that the caller has changed.
+    /// Predicts positions as [`predict`](Self::predict) does, with a model that the caller has
+    /// changed.
     ///
     /// # Errors
     /// Returns an error if a parameter of the model was not identified.
@@ -84,8 +85,8 @@ impl Identification {
     /// Returns the residuals of every row, in the order of the rows.
     ///
     /// # Errors
-    /// Returns an error if a parameter of the problem, or of a session or target of the data, was not
-    /// identified.
+    /// Returns an error if a parameter of the problem, or of a session or target of the data, was
+    /// not identified.
     pub fn residuals(
         &self,
         problem: &Problem,
@@ -146,8 +147,8 @@ impl Identification {
         Ok(Some(model.orientation_residuals(self.poses(rows, Some(1.0)), &self.vector(model)?)))
     }
 
-    /// Returns every row as a pose, its orientation with the σ `turn`; elapsed time starts at the first
-    /// pose of the identification.
+    /// Returns every row as a pose, its orientation with the σ `turn`; elapsed time starts at the
+    /// first pose of the identification.
     pub(in crate::fit) fn poses<'a>(
         &self,
         rows: &'a Measurements,
@@ -161,7 +162,8 @@ impl Identification {
         poses
     }
 
-    /// Returns the full parameter vector of `model` from the identified parameters of the same names.
+    /// Returns the full parameter vector of `model` from the identified parameters of the same
+    /// names.
     pub(in crate::fit) fn vector(&self, model: &Model) -> Result<DVector<f64>, IdentifyError> {
         let x = model.parameters.iter().map(|parameter| {
             let place = self.estimates.iter().position(|estimate| estimate.name == parameter.name);
@@ -184,8 +186,8 @@ impl Identification {
     }
 }
 
-/// Returns prediction and residual of a row in the measuring frame; for a contact with a point, of the
-/// position of the target.
+/// Returns prediction and residual of a row in the measuring frame; for a contact with a point, of
+/// the position of the target.
 pub(in crate::fit) fn in_space(
     rows: &Measurements,
     row: usize,

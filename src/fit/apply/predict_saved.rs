@@ -41,8 +41,8 @@ pub struct Prediction {
     pub errors: Option<ErrorsBySession>,
     /// Scatter of the predicted target at each point that the rows touch.
     pub spreads: Vec<PointSpread>,
-    /// Names of the parameters of bases and tools that the estimate lacks; they are fitted to their rows
-    /// with the arm given.
+    /// Names of the parameters of bases and tools that the estimate lacks; they are fitted to their
+    /// rows with the arm given.
     pub placed: Vec<String>,
     /// Full parameter vector of the model of these rows.
     pub x: DVector<f64>,
@@ -55,8 +55,8 @@ pub struct ErrorsBySession {
     pub all: ErrorSummary,
     /// Errors of each kind of rows, where there are several.
     pub kinds: Vec<ErrorSummary>,
-    /// Name and errors of each session, in the order of the rows, for the first kind of its rows; empty
-    /// where there are no sessions.
+    /// Name and errors of each session, in the order of the rows, for the first kind of its rows;
+    /// empty where there are no sessions.
     pub sessions: Vec<(String, ErrorSummary)>,
 }
 
@@ -122,8 +122,8 @@ impl ErrorsBySession {
 /// measure enough positions. `split` states which rows are held out, where that is known.
 ///
 /// # Errors
-/// Returns an error if the estimate is of another problem or lacks a parameter that the rows need, or
-/// if the rows lack a column that an effect needs.
+/// Returns an error if the estimate is of another problem or lacks a parameter that the rows need,
+/// or if the rows lack a column that an effect needs.
 pub fn predict(
     problem: &Problem,
     estimate: Option<&SavedEstimate>,
@@ -254,8 +254,8 @@ fn too_few(model: &Model, poses: &[Pose], missing: &[usize]) -> Option<usize> {
     })
 }
 
-/// Returns the full parameter vector `x` with the `missing` bases and tools fitted to the poses that
-/// use them.
+/// Returns the full parameter vector `x` with the `missing` bases and tools fitted to the poses
+/// that use them.
 fn place(
     model: &Model,
     poses: &[Pose],
@@ -302,8 +302,8 @@ fn place(
     }
 }
 
-/// Creates the residuals from the errors measured − predicted \[m\] and the σ of each row, NaN where it
-/// is not known, and from the errors of orientation and their σ \[rad\].
+/// Creates the residuals from the errors measured − predicted \[m\] and the σ of each row, NaN
+/// where it is not known, and from the errors of orientation and their σ \[rad\].
 fn residuals(
     (errors, seen): (&[Vector3<f64>], &[Vector3<f64>]),
     (sigmas, coordinates): (&[Option<f64>], &[usize]),

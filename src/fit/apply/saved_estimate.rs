@@ -104,8 +104,8 @@ impl SavedEstimate {
     /// Reads an `estimate.json`.
     ///
     /// # Errors
-    /// Returns an error if the file cannot be read, is no `estimate.json`, or has a parameter twice or
-    /// with a value that is too large.
+    /// Returns an error if the file cannot be read, is no `estimate.json`, or has a parameter twice
+    /// or with a value that is too large.
     pub fn read(file: &Path) -> Result<Self, SavedEstimateError> {
         let named = || file.to_owned();
         let bytes =
@@ -185,8 +185,8 @@ impl SavedEstimate {
         }
     }
 
-    /// Checks that the estimate is of `problem` with model `model`. Bases and tools of sessions that
-    /// the model lacks are ignored.
+    /// Checks that the estimate is of `problem` with model `model`. Bases and tools of sessions
+    /// that the model lacks are ignored.
     ///
     /// # Errors
     /// Returns an error if the estimate is of another problem, or of another declaration of it.
@@ -221,8 +221,8 @@ impl SavedEstimate {
         Ok(())
     }
 
-    /// Returns true if the fitted rows do not determine the pose of a base in its measuring frame, as
-    /// contacts with sockets at unknown places do not.
+    /// Returns true if the fitted rows do not determine the pose of a base in its measuring frame,
+    /// as contacts with sockets at unknown places do not.
     pub fn leaves_base_open(&self) -> bool {
         let is_base =
             |entry: &&Entry| entry.name.starts_with("base.") || entry.name.starts_with("base[");
@@ -232,8 +232,8 @@ impl SavedEstimate {
         self.parameters.iter().filter(is_base).any(is_open)
     }
 
-    /// Returns the words in brackets behind `base` or `tool`, in the order of the file; one empty word
-    /// where there are none.
+    /// Returns the words in brackets behind `base` or `tool`, in the order of the file; one empty
+    /// word where there are none.
     pub fn words(&self, of: &str) -> Vec<String> {
         let mut words: Vec<String> = Vec::new();
         for entry in &self.parameters {

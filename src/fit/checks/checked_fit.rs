@@ -121,7 +121,8 @@ impl CheckedFit<'_> {
     }
 }
 
-/// Checks that there are as many equations as unknowns without a prior, and that bases are determined.
+/// Checks that there are as many equations as unknowns without a prior, and that bases are
+/// determined.
 pub(super) struct EnoughEquations;
 
 impl Check for EnoughEquations {

@@ -31,8 +31,8 @@ const ORDERS: [[usize; 3]; 12] = [
 /// Orientation of a row as it may have been meant.
 type Reading = Box<dyn Fn(&UnitQuaternion<f64>) -> Vec<UnitQuaternion<f64>>>;
 
-/// Returns the conventions in which the measured orientations fit the predicted ones, best first, in
-/// words; `rms` is the error as read \[rad\]. A constant rotation of the tool is fitted.
+/// Returns the conventions in which the measured orientations fit the predicted ones, best first,
+/// in words; `rms` is the error as read \[rad\]. A constant rotation of the tool is fitted.
 pub(super) fn fitting_conventions(fit: &CheckedFit, rms: f64) -> Vec<String> {
     let fitting = fit.fitting;
     let rows: Vec<usize> = fitting

@@ -31,8 +31,8 @@ impl Check for NominalIsNear {
     }
 }
 
-/// Reports an error `rms` of the nominal arm beside the `spread` of rows of a kind \[m\] or \[rad\],
-/// with what would explain it, each by itself, the best first.
+/// Reports an error `rms` of the nominal arm beside the `spread` of rows of a kind \[m\] or
+/// \[rad\], with what would explain it, each by itself, the best first.
 fn far_off(kind: &str, rms: f64, spread: f64, explanations: &[Misreading]) -> Finding {
     let words: Vec<String> = explanations.iter().map(Misreading::to_string).collect();
     let numbers = [kind.into(), rms.into(), spread.into(), json!(words)];

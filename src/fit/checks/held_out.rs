@@ -16,18 +16,19 @@ use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 use crate::measurement::Measurements;
 use crate::numeric::median;
 
-/// Ratio of the errors on held-out rows, fitted over nominal, from which on a fit is worse than none …
+/// Ratio of the errors on held-out rows, fitted over nominal, from which on a fit is worse than
+/// none …
 const WORSE: f64 = 1.5;
 /// … where the fitted error is also this multiple of the noise.
 const ABOVE_NOISE: f64 = 5.0;
 
-/// Returns the held-out rows that are farther from the prediction than the σ and the covariance of the
-/// fit allow, in the order of the rows.
+/// Returns the held-out rows that are farther from the prediction than the σ and the covariance of
+/// the fit allow, in the order of the rows.
 ///
-/// A row is an outlier where P(χ²ₖ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², r and J
-/// whitened by the σ that the fit took, C the covariance of its `unknowns` at `x`. The scatter is
-/// the median of s / √(median of χ²ₖ), at least 1, so that a model which misses an effect everywhere
-/// does not make every row an outlier.
+/// A row is an outlier where P(χ²ₖ > s²) < 0.01 / N with s² = rᵀ (I + J C Jᵀ)⁻¹ r / scatter², r and
+/// J whitened by the σ that the fit took, C the covariance of its `unknowns` at `x`. The scatter is
+/// the median of s / √(median of χ²ₖ), at least 1, so that a model which misses an effect
+/// everywhere does not make every row an outlier.
 pub(in crate::fit) fn outliers(
     fitting: &Fitting,
     x: &DVector<f64>,
@@ -77,8 +78,8 @@ pub(in crate::fit) fn outliers(
     (0..rows.len()).filter_map(outlier).collect()
 }
 
-/// Returns the number of held-out rows that are identification rows again: configuration, position and
-/// session are equal to the bit.
+/// Returns the number of held-out rows that are identification rows again: configuration, position
+/// and session are equal to the bit.
 fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usize]) -> usize {
     let key = |row: usize| -> Vec<u64> {
         let values =

@@ -15,8 +15,8 @@ use crate::problem::{Joint, JointKind, Problem};
 const EXPLAINED: f64 = 0.2;
 /// Ratio of the errors up to which a misreading is named beside the best one.
 const AS_GOOD: f64 = 1.5;
-/// Error in reaches of the arm beyond which no misreading is tried: millimetres taken for metres give
-/// a factor of 1000.
+/// Error in reaches of the arm beyond which no misreading is tried: millimetres taken for metres
+/// give a factor of 1000.
 const MAX_REACHES: f64 = 1e4;
 /// Maximum number of rows that are looked at.
 const MAX_ROWS: usize = 200;
@@ -37,7 +37,8 @@ pub enum Misreading {
     Metres,
     /// Positions are in millimetres, declared as metres.
     Millimetres,
-    /// Positions are in a left-handed frame: two coordinates are exchanged, or one has the wrong sign.
+    /// Positions are in a left-handed frame: two coordinates are exchanged, or one has the wrong
+    /// sign.
     Mirrored,
     /// Joints that count the other way.
     Reversed {
@@ -165,7 +166,8 @@ impl Misreading {
         }
     }
 
-    /// Returns the root mean squared error of the registered nominal arm with `rows` read this way \[m\].
+    /// Returns the root mean squared error of the registered nominal arm with `rows` read this way
+    /// \[m\].
     fn rms(
         self,
         fitting: &Fitting,
@@ -203,8 +205,8 @@ impl Misreading {
     }
 }
 
-/// Returns true if a joint is revolute and its column may be in radians, or else in degrees; both may
-/// be where the unit is not known.
+/// Returns true if a joint is revolute and its column may be in radians, or else in degrees; both
+/// may be where the unit is not known.
 fn turns_in(problem: &Problem, rows: &Measurements, joint: usize, radians: bool) -> bool {
     let turns =
         problem.joints.get(joint).is_some_and(|joint| joint.command_kind() == JointKind::Revolute);

@@ -40,7 +40,8 @@ impl Outlier {
 pub struct InfluentialRows {
     /// Influential rows, in the order of the table.
     pub rows: Vec<Outlier>,
-    /// χ² over its degrees of freedom of the fit without these rows; `None` if the noise is estimated.
+    /// χ² over its degrees of freedom of the fit without these rows; `None` if the noise is
+    /// estimated.
     pub reduced_chi2: Option<f64>,
     /// 1 σ of a coordinate that the fit without these rows takes \[m\], for tilts \[rad\].
     pub sigma_taken: f64,
@@ -61,7 +62,8 @@ pub(in crate::fit) fn outliers(
     rows.iter().enumerate().zip(errors).filter_map(outlier).collect()
 }
 
-/// Returns the places of rows in their files as numbers of a finding: file, line and \[σ\] distance.
+/// Returns the places of rows in their files as numbers of a finding: file, line and \[σ\]
+/// distance.
 pub(super) fn places(rows: &[Outlier]) -> Value {
     let place = |row: &Outlier| {
         let Location { file, line, .. } = &row.location;

@@ -11,8 +11,8 @@ use crate::problem::{Fixture, Observation};
 /// Ratio of the scatter at a point to the median of all points from which on the point is unsteady;
 /// points that were not fitted may scatter half as much again as others.
 const UNSTEADY: f64 = 2.5;
-/// Part of the squares along one direction from which on a point is unsteady; isotropic scatter has a
-/// third along each direction.
+/// Part of the squares along one direction from which on a point is unsteady; isotropic scatter has
+/// a third along each direction.
 const ONE_WAY: f64 = 0.7;
 /// Minimum number of rows of a point that is compared.
 const MIN_ROWS: usize = 8;
@@ -35,8 +35,8 @@ pub struct PointSpread {
 }
 
 impl PointSpread {
-    /// Returns the points that scatter far more than the others and along one direction, each with its
-    /// scatter over the median of all. They may have moved or given way, which no arm explains.
+    /// Returns the points that scatter far more than the others and along one direction, each with
+    /// its scatter over the median of all. They may have moved or given way, which no arm explains.
     pub fn unsteady<'a>(spreads: impl IntoIterator<Item = &'a Self>) -> Vec<(&'a Self, f64)> {
         let compared: Vec<&Self> = spreads
             .into_iter()
@@ -90,8 +90,8 @@ pub(in crate::fit) fn spreads(
 }
 
 impl Fitting<'_> {
-    /// Returns the scatter of the predicted target at each touched point, with the registered nominal
-    /// arm and with the fitted one, and whether all rows of the point are held out.
+    /// Returns the scatter of the predicted target at each touched point, with the registered
+    /// nominal arm and with the fitted one, and whether all rows of the point are held out.
     pub fn spreads(
         &self,
         fixtures: &[Fixture],
@@ -117,8 +117,8 @@ impl Fitting<'_> {
     }
 }
 
-/// Returns the direction in which squares are largest, with its largest component positive, and their
-/// part along it; NaN where the squares are not finite or zero.
+/// Returns the direction in which squares are largest, with its largest component positive, and
+/// their part along it; NaN where the squares are not finite or zero.
 fn longest(squares: Matrix3<f64>) -> (Vector3<f64>, f64) {
     let trace = squares.trace();
     if !(trace.is_finite() && trace > 0.0) {

@@ -21,8 +21,8 @@ pub(in crate::fit) struct PoseSufficiency {
     pub finding: Option<Finding>,
     /// Measured coordinates that are independent of each other.
     pub coordinates: usize,
-    /// Number of different poses of the arm among the identification rows; several targets in one pose
-    /// count once.
+    /// Number of different poses of the arm among the identification rows; several targets in one
+    /// pose count once.
     pub poses: usize,
     /// True if some pose of the arm shows several targets.
     pub several_targets: bool,
@@ -82,9 +82,9 @@ fn too_few(of: String, coordinates: usize, parameters: usize) -> Finding {
     Finding::new(FindingCode::TooFewEquations, numbers, text)
 }
 
-/// Returns the number of independent coordinates: those of each different point, but at most six for a
-/// pose of the frame that carries them, and those of contacts and distances. The shape of the targets
-/// of a frame counts once more.
+/// Returns the number of independent coordinates: those of each different point, but at most six
+/// for a pose of the frame that carries them, and those of contacts and distances. The shape of the
+/// targets of a frame counts once more.
 fn coordinates(
     fitting: &Fitting,
     (numbers, of_arm): (&[usize], &[usize]),
@@ -122,8 +122,8 @@ fn label(what: &str, word: &str) -> String {
     if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") }
 }
 
-/// Reports the first base whose pose the points of `rows` do not determine, considering its `varied`
-/// parameters without a prior.
+/// Reports the first base whose pose the points of `rows` do not determine, considering its
+/// `varied` parameters without a prior.
 fn undetermined(
     fitting: &Fitting,
     numbers: &[usize],
@@ -162,8 +162,8 @@ fn undetermined(
 /// Reports a base, with the targets that no other base of `rows` uses, or a target that has fewer
 /// coordinates in different poses of `rows` than `varied` parameters without a prior.
 ///
-/// `numbers` are the pose numbers of all rows, `of_row` their numbers of coordinates. With `judged`,
-/// the rows must leave a degree of freedom for their errors.
+/// `numbers` are the pose numbers of all rows, `of_row` their numbers of coordinates. With
+/// `judged`, the rows must leave a degree of freedom for their errors.
 fn underdetermined(
     (model, placement): (&Model, &Placement),
     (numbers, of_row): (&[usize], &[usize]),

@@ -13,8 +13,8 @@ pub fn check_columns(problem: &Problem, rows: &Measurements) -> Result<(), Input
     missing(problem, rows, rows.time_measured).next().map_or(Ok(()), Err)
 }
 
-/// Returns an error for each effect that needs a column which the targets `rows` lack. Targets have no
-/// earlier poses, so they need no times.
+/// Returns an error for each effect that needs a column which the targets `rows` lack. Targets have
+/// no earlier poses, so they need no times.
 pub fn missing_target_columns(problem: &Problem, rows: &Measurements) -> Vec<InputError> {
     missing(problem, rows, true).collect()
 }

@@ -49,13 +49,13 @@ impl Baseline {
     }
 }
 
-/// Runs every form of the paper's procedure [Chen2021, eq. 1-45] that the identification rows allow:
-/// first with elasticity ignored, then corrected and as printed, with stiffness known, from
+/// Runs every form of the paper's procedure [Chen2021, eq. 1-45] that the identification rows
+/// allow: first with elasticity ignored, then corrected and as printed, with stiffness known, from
 /// positions, or from load differences.
 ///
-/// Returns nothing where the procedure does not apply: it needs one session and target, one chain of
-/// joints in DH form without mimic joints, and as many equations as geometric parameters. Without
-/// elasticity it returns the rigid form alone.
+/// Returns nothing where the procedure does not apply: it needs one session and target, one chain
+/// of joints in DH form without mimic joints, and as many equations as geometric parameters.
+/// Without elasticity it returns the rigid form alone.
 pub(in crate::fit) fn baselines(problem: &Problem, data: &Dataset) -> Vec<Baseline> {
     let Dataset { measurements, .. } = data;
     let beyond = |joint: &Joint| joint.placement.is_some() || joint.mimic.is_some();

@@ -24,13 +24,13 @@ pub struct Comparison {
     pub rigid: Identification,
     /// One identification per strategy and solver, without strategies that have nothing to vary.
     pub strategies: Vec<Identification>,
-    /// Results of the paper's procedure in every form that the data allow, the rigid one first; empty
-    /// where it was not asked for.
+    /// Results of the paper's procedure in every form that the data allow, the rigid one first;
+    /// empty where it was not asked for.
     pub paper: Vec<Baseline>,
     /// One joint fit per ablation.
     pub ablations: Vec<(Ablation, Identification)>,
-    /// Results of the joint fit and of every elastic form of the paper's procedure, in the terms of the
-    /// paper; empty where rows measure anything else than positions.
+    /// Results of the joint fit and of every elastic form of the paper's procedure, in the terms of
+    /// the paper; empty where rows measure anything else than positions.
     pub procedures: Vec<Procedure>,
     /// Errors before calibration as the paper counts them: of the rigid nominal arm.
     pub before: Before,
@@ -59,8 +59,8 @@ pub struct CompareOptions {
 
 /// Runs every strategy with every solver, and every ablation, on the identification rows.
 ///
-/// It leaves out strategies that have nothing to vary, solvers that cannot keep the declared bounds or
-/// constraints, and ablations of an arm without elasticity.
+/// It leaves out strategies that have nothing to vary, solvers that cannot keep the declared bounds
+/// or constraints, and ablations of an arm without elasticity.
 ///
 /// # Errors
 /// Returns an error if problem and data do not fit each other.

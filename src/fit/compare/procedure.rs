@@ -71,7 +71,8 @@ impl Procedure {
     }
 }
 
-/// Returns the name of a form of the paper's procedure, such as `paper-nominal-stiffness-as-printed`.
+/// Returns the name of a form of the paper's procedure, such as
+/// `paper-nominal-stiffness-as-printed`.
 pub(in crate::fit) fn paper_name(form: Form, stage: StiffnessStage) -> String {
     let printed = if form == Form::Printed { "-as-printed" } else { "" };
     format!("paper-{}{printed}", stage.as_str())

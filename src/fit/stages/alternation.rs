@@ -26,8 +26,8 @@ pub struct Alternation {
 /// Anderson acceleration of the fixed-point iteration x ← g(x) of a sweep  [Anderson 1965; Walker &
 /// Ni 2011].
 ///
-/// The next point is x + f − (ΔX + ΔF) γ with f = g(x) − x and γ = argmin ‖f − ΔF γ‖ over differences
-/// of earlier sweeps; unknowns are scaled by their effect.
+/// The next point is x + f − (ΔX + ΔF) γ with f = g(x) − x and γ = argmin ‖f − ΔF γ‖ over
+/// differences of earlier sweeps; unknowns are scaled by their effect.
 #[derive(Debug, Clone, Default)]
 pub(in crate::fit) struct Anderson {
     /// Pairs of g(x) and scaled f of earlier sweeps, oldest first.

@@ -8,16 +8,16 @@ use crate::least_squares::solver::{Bounds, Solution};
 /// Solver that a caller gives to the fits of an identification, see
 /// [`Options::with_custom_solver`](crate::fit::Options::with_custom_solver).
 pub trait CustomSolver: Send + Sync {
-    /// Returns true if solutions satisfy the bounds; problems with bounds are refused otherwise, and
-    /// those with a `[[constraint]]` always.
+    /// Returns true if solutions satisfy the bounds; problems with bounds are refused otherwise,
+    /// and those with a `[[constraint]]` always.
     fn keeps_bounds(&self) -> bool {
         false
     }
 
     /// Minimises `objective` from the unknowns `start` in at most `max_steps` steps.
     ///
-    /// Lengths are in m, angles in rad, and stiffnesses enter by their logarithms. The solution marks
-    /// unknowns that rest on a bound.
+    /// Lengths are in m, angles in rad, and stiffnesses enter by their logarithms. The solution
+    /// marks unknowns that rest on a bound.
     fn minimise(
         &self,
         objective: &dyn Objective,

@@ -30,11 +30,11 @@ const SWEEP_SETTLED: f64 = 1e-7;
 /// optimum anyway.
 const SWEEP_STEPS: u64 = 2;
 
-/// Change of ν ln(squares) per step below which a provisional fit has converged: a thousandth of the
-/// change that decides about an effect.
+/// Change of ν ln(squares) per step below which a provisional fit has converged: a thousandth of
+/// the change that decides about an effect.
 const PROVISIONAL_CHANGE: f64 = 0.01;
-/// Relative reduction of the cost per step below which a fit stops whose σ is tested next; σ is then
-/// known to half of it.
+/// Relative reduction of the cost per step below which a fit stops whose σ is tested next; σ is
+/// then known to half of it.
 const TESTED_NOISE_CHANGE: f64 = 1e-3;
 
 /// Input that all fits of an identification share.
@@ -120,8 +120,8 @@ impl From<StageEnd> for FitEnd {
 }
 
 impl<'a> Fitting<'a> {
-    /// Returns the indices of the chosen parameters, without bases and targets that only held-out rows
-    /// use.
+    /// Returns the indices of the chosen parameters, without bases and targets that only held-out
+    /// rows use.
     fn choose(&self, choose: impl Fn(&Parameter) -> bool) -> Vec<usize> {
         let all = self.model.parameters.iter().enumerate();
         all.filter(|&(k, parameter)| !self.held_out_only.parameters[k] && choose(parameter))
@@ -204,7 +204,8 @@ impl<'a> Fitting<'a> {
         self.strategy_stage(self.choose(varied))
     }
 
-    /// Creates the stage of bases and targets of held-out sessions, on their rows; `None` without any.
+    /// Creates the stage of bases and targets of held-out sessions, on their rows; `None` without
+    /// any.
     pub fn held_out_stage(&self) -> Option<Stage<'a>> {
         let HeldOutOnly { parameters, rows } = &self.held_out_only;
         let unknowns: Vec<usize> = (0..parameters.len()).filter(|&k| parameters[k]).collect();
@@ -218,8 +219,8 @@ impl<'a> Fitting<'a> {
         errors.iter().position(|error| error.x.is_nan())
     }
 
-    /// Returns the full parameter vector of the registered nominal arm: bases and targets are fitted
-    /// where they are free.
+    /// Returns the full parameter vector of the registered nominal arm: bases and targets are
+    /// fitted where they are free.
     pub fn registered(&self) -> Result<DVector<f64>, StageError> {
         let mut x = DVector::zeros(self.model.parameters.len());
         let mut poses = self.poses(&self.split.identification);
@@ -352,8 +353,8 @@ impl<'a> Fitting<'a> {
         Ok(end)
     }
 
-    /// Returns the errors on both parts of the data at the full parameter vector `x`, for the leading
-    /// kind of rows.
+    /// Returns the errors on both parts of the data at the full parameter vector `x`, for the
+    /// leading kind of rows.
     pub fn errors(&self, x: &DVector<f64>) -> Errors {
         self.errors_of(self.measurements.leading(), x)
     }
@@ -368,8 +369,8 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Returns the errors of every kind of rows at the full parameter vectors of the registered nominal
-    /// arm and of the fitted one; nothing where there is only one kind.
+    /// Returns the errors of every kind of rows at the full parameter vectors of the registered
+    /// nominal arm and of the fitted one; nothing where there is only one kind.
     pub fn errors_by_kind(
         &self,
         registered: &DVector<f64>,
@@ -382,8 +383,8 @@ impl<'a> Fitting<'a> {
         if kinds.len() > 1 { each.collect() } else { Vec::new() }
     }
 
-    /// Returns the errors of orientation on both parts of the data at the full parameter vectors of the
-    /// registered nominal arm and of the fitted one; `None` where orientation is not fitted.
+    /// Returns the errors of orientation on both parts of the data at the full parameter vectors of
+    /// the registered nominal arm and of the fitted one; `None` where orientation is not fitted.
     pub fn orientation(
         &self,
         registered: &DVector<f64>,

@@ -116,10 +116,11 @@ fn least_squares(rows: &[(Vec<f64>, f64)]) -> Option<DVector<f64>> {
     matrix.svd(true, true).solve(&right, 1e-12 * size).ok()
 }
 
-/// Returns the anchor A of distances ℓ to points p: ‖p‖² − ℓ² = 2 p·A − ‖A‖² is linear in A and ‖A‖².
+/// Returns the anchor A of distances ℓ to points p: ‖p‖² − ℓ² = 2 p·A − ‖A‖² is linear in A and
+/// ‖A‖².
 ///
-/// If the points lie in a plane, the distance of the anchor from it follows from the lengths, on the
-/// side that fits better, or else on the upper side.
+/// If the points lie in a plane, the distance of the anchor from it follows from the lengths, on
+/// the side that fits better, or else on the upper side.
 fn anchor(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     let centre = centre(contacts);
     let axes = principal(contacts, &centre);
@@ -147,8 +148,8 @@ fn anchor(contacts: &[(Vector3<f64>, f64)]) -> Vector3<f64> {
     if misfit(&sides[1]) < misfit(&sides[0]) { sides[1] } else { sides[0] }
 }
 
-/// Returns centre C and radius ρ of the sphere through points p: ‖p‖² = 2 p·C + (ρ² − ‖C‖²) is linear
-/// in C and the bracket. Offsets point outwards.
+/// Returns centre C and radius ρ of the sphere through points p: ‖p‖² = 2 p·C + (ρ² − ‖C‖²) is
+/// linear in C and the bracket. Offsets point outwards.
 fn sphere(contacts: &[(Vector3<f64>, f64)]) -> (Vector3<f64>, f64) {
     let middle = centre(contacts);
     let row = |(point, _): &(Vector3<f64>, f64)| {
@@ -164,8 +165,8 @@ fn sphere(contacts: &[(Vector3<f64>, f64)]) -> (Vector3<f64>, f64) {
     (place, radius / contacts.len() as f64)
 }
 
-/// Returns the plane of least spread. Its normal points to the side of larger offsets; where these do
-/// not differ, to the arm's base, or else up.
+/// Returns the plane of least spread. Its normal points to the side of larger offsets; where these
+/// do not differ, to the arm's base, or else up.
 fn plane(contacts: &[(Vector3<f64>, f64)], base: &Vector3<f64>) -> [f64; 4] {
     let n = contacts.len() as f64;
     let middle = centre(contacts);

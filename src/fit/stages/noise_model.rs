@@ -36,8 +36,8 @@ impl NoiseModel {
         Self { scale: (declared.len() as f64 * ratio / sum).sqrt().max(least), model_error: 0.0 }
     }
 
-    /// Creates the model with which the mean variance of poses that a fit weighted by `taken` grows by
-    /// the factor `ratio`; `declared` holds their σ.
+    /// Creates the model with which the mean variance of poses that a fit weighted by `taken` grows
+    /// by the factor `ratio`; `declared` holds their σ.
     ///
     /// Solves Σ (σ² + e²) / taken² = N ratio for e; where no e ≥ 0 does, all σ are scaled together.
     pub fn raised(declared: &[f64], taken: &[f64], ratio: f64) -> Self {

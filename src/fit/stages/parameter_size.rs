@@ -11,9 +11,9 @@ const LN_STIFFNESS: f64 = 4.605_170_185_988_092;
 /// Largest deviation of an angle \[rad\]: beyond half a turn it equals another one within.
 const HALF_TURN: f64 = std::f64::consts::PI;
 
-/// Returns the plausible deviation of a parameter without a prior: the reach of the arm for a length,
-/// 1 rad for an angle, a factor of 100 for a stiffness. Returns `None` for parameters with a prior,
-/// positions of bases and fixtures, which may be anywhere, and other units.
+/// Returns the plausible deviation of a parameter without a prior: the reach of the arm for a
+/// length, 1 rad for an angle, a factor of 100 for a stiffness. Returns `None` for parameters with
+/// a prior, positions of bases and fixtures, which may be anywhere, and other units.
 pub(in crate::fit) fn plausible(model: &Model, parameter: &Parameter) -> Option<f64> {
     if parameter.sigma.is_some()
         || matches!(

@@ -17,7 +17,8 @@ pub(in crate::fit) const UNKNOWN_SIGMA: f64 = 1e-3;
 pub struct Placement {
     /// Names of the bases, one per session.
     pub bases: Vec<String>,
-    /// Names of the targets, one per word of the column `target`, or per session without that column.
+    /// Names of the targets, one per word of the column `target`, or per session without that
+    /// column.
     pub targets: Vec<String>,
     base_of_row: Vec<usize>,
     target_of_row: Vec<usize>,
@@ -74,8 +75,8 @@ impl Placement {
             .collect()
     }
 
-    /// Returns `rows` as poses with their measured orientations, where the σ `turn` of these is given
-    /// \[rad\].
+    /// Returns `rows` as poses with their measured orientations, where the σ `turn` of these is
+    /// given \[rad\].
     pub fn oriented_poses<'a>(
         &self,
         measurements: &'a Measurements,
@@ -94,8 +95,8 @@ impl Placement {
         poses
     }
 
-    /// Returns the residuals measured − predicted of `rows` at the full parameter vector `x`, measuring
-    /// frame \[m\]; NaN where the arm has no equilibrium.
+    /// Returns the residuals measured − predicted of `rows` at the full parameter vector `x`,
+    /// measuring frame \[m\]; NaN where the arm has no equilibrium.
     pub fn position_errors(
         &self,
         model: &Model,
@@ -106,7 +107,8 @@ impl Placement {
         model.residuals(self.poses(measurements, rows, 1.0), x)
     }
 
-    /// Finds the parameters of bases, targets and fixtures that only held-out rows use, and those rows.
+    /// Finds the parameters of bases, targets and fixtures that only held-out rows use, and those
+    /// rows.
     ///
     /// These parameters say nothing about the arm: they are fitted on their held-out rows, with the
     /// arm given.

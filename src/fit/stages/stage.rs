@@ -238,8 +238,8 @@ impl<'a> Stage<'a> {
         Ok(inside && self.constraints(at)?.1.contain(&self.reduced(at)))
     }
 
-    /// Finds the combinations of the unknowns not `held` that data, priors and `active` constraints do
-    /// not determine at `at`.
+    /// Finds the combinations of the unknowns not `held` that data, priors and `active` constraints
+    /// do not determine at `at`.
     pub fn gauge(&self, at: &DVector<f64>, held: &[bool], active: &[Held]) -> Gauge {
         let n = self.unknowns.len();
         if self.parameters().all(|parameter| parameter.sigma.is_some()) {

@@ -7,17 +7,18 @@ use crate::model::Model;
 /// Covariance of the estimates, consistent with their standard errors: it includes priors, active
 /// constraints, the weights of a robust loss and the noise that the fit took.
 ///
-/// Unidentifiable combinations are held where the fit started: their parameters have a variance here,
-/// but no standard error. Parameters of sessions or targets that only held-out rows use are fitted
-/// with the arm given, so their covariance with all others is 0. An unknown that rests on a bound
-/// along a direction that the data hardly see has the variance of its distance from that bound.
+/// Unidentifiable combinations are held where the fit started: their parameters have a variance
+/// here, but no standard error. Parameters of sessions or targets that only held-out rows use are
+/// fitted with the arm given, so their covariance with all others is 0. An unknown that rests on a
+/// bound along a direction that the data hardly see has the variance of its distance from that
+/// bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariance {
     /// Indices of the parameters among the estimates, ascending: those that were fitted and have a
     /// variance.
     pub parameters: Vec<usize>,
-    /// Covariance of the values, shape = (parameters, parameters); entry (i, j) is in the product of
-    /// both SI units.
+    /// Covariance of the values, shape = (parameters, parameters); entry (i, j) is in the product
+    /// of both SI units.
     pub matrix: DMatrix<f64>,
 }
 
@@ -39,8 +40,8 @@ impl Collected {
         Self(DMatrix::zeros(parameters, parameters))
     }
 
-    /// Enters the covariance C of the unknowns of one stage, given by their indices in the model, at
-    /// the full parameter vector `x`. Of the values it is S C S with S = diag(∂value/∂x).
+    /// Enters the covariance C of the unknowns of one stage, given by their indices in the model,
+    /// at the full parameter vector `x`. Of the values it is S C S with S = diag(∂value/∂x).
     pub fn enter(
         &mut self,
         model: &Model,
@@ -67,8 +68,8 @@ impl Collected {
 }
 
 impl Covariance {
-    /// Returns the covariance of two parameters by their indices among the estimates; `None` where one
-    /// of them has no variance.
+    /// Returns the covariance of two parameters by their indices among the estimates; `None` where
+    /// one of them has no variance.
     pub fn of(&self, one: usize, other: usize) -> Option<f64> {
         let place = |k| self.parameters.binary_search(&k).ok();
         Some(self.matrix[(place(one)?, place(other)?)])

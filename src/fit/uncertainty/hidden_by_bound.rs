@@ -7,8 +7,8 @@
 //!
 //! p(u) ∝ exp(−μ u − ½ h u²) on 0 ≤ u ≤ w
 //!
-//! with the multiplier μ of the bound, the curvature h of the cost along the valley, and the width w
-//! after which the valley meets another bound. Its E u² adds E u² s sᵀ to the covariance.
+//! with the multiplier μ of the bound, the curvature h of the cost along the valley, and the width
+//! w after which the valley meets another bound. Its E u² adds E u² s sᵀ to the covariance.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,8 +16,9 @@ use crate::fit::stages::stage::Stage;
 use crate::least_squares::Triangle;
 use crate::least_squares::solver::AtBound;
 
-/// Ratio of the deviation along the valley to the standard error with the unknown held at its bound,
-/// from which on the bound hides the uncertainty of a partner: nine tenths of its variance and more.
+/// Ratio of the deviation along the valley to the standard error with the unknown held at its
+/// bound, from which on the bound hides the uncertainty of a partner: nine tenths of its variance
+/// and more.
 const MIN_HIDDEN_RATIO: f64 = 3.0;
 /// Weight that turns rows of held combinations into constraints.
 const HARD: f64 = 1e5;
@@ -47,8 +48,8 @@ pub(in crate::fit) struct HiddenByBound {
 ///
 /// `triangle` is the factor R of the weighted data at the full parameter vector `at`, `closed` are
 /// rows of combinations that are held, `held` marks unknowns that are not estimated, `multipliers`
-/// are those of bounds, where an unknown rests on one, and `errors` are the standard errors with all
-/// bounds holding.
+/// are those of bounds, where an unknown rests on one, and `errors` are the standard errors with
+/// all bounds holding.
 pub(in crate::fit) fn hidden_by_bounds(
     stage: &Stage,
     at: &DVector<f64>,

@@ -47,8 +47,8 @@ pub enum Noise {
 /// restricted likelihood where residuals and priors contradict that, or, where none is declared, at
 /// the scatter about the fit. `judged` is true if the poses suffice to contradict a σ.
 ///
-/// A fit may start with the σ that an earlier one took, as long as that contradicts the declared one
-/// beyond doubt.
+/// A fit may start with the σ that an earlier one took, as long as that contradicts the declared
+/// one beyond doubt.
 pub(in crate::fit) fn fitted(
     fitting: &mut Fitting,
     start: &DVector<f64>,
@@ -144,8 +144,8 @@ fn is_beyond_doubt(stage: &Stage) -> bool {
 /// Returns the next noise models of positions and orientations, or `None` where the `assumed` ones
 /// are kept. Poses that a robust loss sets aside do not count.
 ///
-/// The declared σ is contradicted where 2 ln of the likelihood ratio exceeds what chance gives (χ²₁)
-/// with probability 0.001.
+/// The declared σ is contradicted where 2 ln of the likelihood ratio exceeds what chance gives
+/// (χ²₁) with probability 0.001.
 fn contradicted(
     stage: &Stage,
     end: &FitEnd,
@@ -225,8 +225,8 @@ fn shares(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f
     if all > 0.0 { [position / all, turn / all] } else { [1.0; 2] }
 }
 
-/// Returns the noise variance that a stage took over the declared one, and 1 σ of the rows of `kind`
-/// that it took. Known distances between points keep their σ and do not count.
+/// Returns the noise variance that a stage took over the declared one, and 1 σ of the rows of
+/// `kind` that it took. Known distances between points keep their σ and do not count.
 pub(in crate::fit) fn taken(stage: &Stage, kind: Observation) -> (f64, f64) {
     let rows =
         stage.poses.iter().zip(&stage.declared).filter(|(pose, _)| pose.observation.is_of_arm());

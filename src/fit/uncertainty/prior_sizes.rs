@@ -2,8 +2,8 @@
 //!
 //! Linearised about the fit, the likelihood of the geometry x is a Gaussian with information A and
 //! vector b = A x̂. With prior σ multiplied by r, one factor for all parameters of a kind, the
-//! posterior is N(C b, C) with C = (A + Λ/r²)⁻¹. The logarithm of the evidence is
-//! ½ bᵀC b + ½ ln|C| − Σ ln r + constant; it is largest where r² is the mean of E x² / σ² of the kind.
+//! posterior is N(C b, C) with C = (A + Λ/r²)⁻¹. The logarithm of the evidence is ½ bᵀC b + ½ ln|C|
+//! − Σ ln r + constant; it is largest where r² is the mean of E x² / σ² of the kind.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -123,8 +123,8 @@ impl GeometryLikelihood {
         Some(Self { information, vector })
     }
 
-    /// Returns covariance and mean of the posterior, and half the logarithm of the determinant of its
-    /// covariance.
+    /// Returns covariance and mean of the posterior, and half the logarithm of the determinant of
+    /// its covariance.
     fn posterior(
         &self,
         groups: &[Group],

@@ -64,9 +64,10 @@ pub(in crate::fit) struct Lengths {
 }
 
 impl Lengths {
-    /// Computes the lengths of a stage at the full parameter vector `at`. `freedom` is the part of its
-    /// coordinates that is left to scatter, 0…1; `declared` is the part of the declared σ that the fit
-    /// took to be noise, where any σ was declared. Parts of residuals along `unmoved` directions do not count.
+    /// Computes the lengths of a stage at the full parameter vector `at`. `freedom` is the part of
+    /// its coordinates that is left to scatter, 0…1; `declared` is the part of the declared σ that
+    /// the fit took to be noise, where any σ was declared. Parts of residuals along `unmoved`
+    /// directions do not count.
     ///
     /// A pose is an outlier where P(χ²ₖ > s²) < 0.01 / N, with s = ‖r‖ / scatter, k measured
     /// numbers and N poses \[Bonferroni\]. The scatter is the median of ‖r‖ / √(median of χ²ₖ),

@@ -8,8 +8,8 @@ pub struct ShadowPrice {
     /// Lagrange multiplier −∂(½χ²)/∂limit, with priors counted in χ² \[1 / SI unit of the limit\];
     /// limits of logarithms have no unit.
     pub multiplier: f64,
-    /// Decrease of the rms of the fitted position residuals, if all of the gain were theirs \[m / SI
-    /// unit\].
+    /// Decrease of the rms of the fitted position residuals, if all of the gain were theirs \[m /
+    /// SI unit\].
     pub rms: f64,
 }
 

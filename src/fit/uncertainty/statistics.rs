@@ -44,8 +44,8 @@ pub(in crate::fit) struct Statistics {
 }
 
 impl Statistics {
-    /// Computes the statistics of a stage that ended at `end`; `noise_model` is what the fit took for
-    /// the declared σ, `None` where none is declared.
+    /// Computes the statistics of a stage that ended at `end`; `noise_model` is what the fit took
+    /// for the declared σ, `None` where none is declared.
     ///
     /// With a robust loss the covariance is that of the weighted Jacobian, times
     /// [`Loss::variance_factor`]. Active constraints confine it to the directions that they leave
