@@ -30,7 +30,7 @@ use crate::fit::uncertainty::statistics::Statistics;
 use crate::fit::warm_start::WarmStart;
 use crate::fit::{Errors, IdentifyError, Options, Placement, SolverChoice, Strategy};
 use crate::least_squares::solver::Termination;
-use crate::least_squares::{Loss, Memory};
+use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Dataset, Measurements, Split};
 use crate::model::Model;
 use crate::model::parameter::Parameter;
@@ -95,9 +95,9 @@ pub fn identify_model(
         let values =
             found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
         let start = values.collect();
-        let predecessor = Some(Arc::new(found.predecessor(true)));
-        let passing =
-            Options { progress: None, predecessor, provisional: true, start, ..options.clone() };
+        let warm_start = Some(Arc::new(found.warm_start(true)));
+        let provisional =
+            Options { progress: None, warm_start, provisional: true, start, ..options.clone() };
         let without = |rows: &[usize]| {
             let left_out: BTreeSet<usize> = rows.iter().copied().collect();
             let kept = split
@@ -107,7 +107,7 @@ pub fn identify_model(
                 .filter(|row| !left_out.contains(row))
                 .collect();
             let split = Split { identification: kept, held_out: split.held_out.clone() };
-            fit_rows(model, problem, (measurements, &split), &passing).ok()
+            fit_rows(model, problem, (measurements, &split), &provisional).ok()
         };
         found.influential_rows = influential_rows(&found, without);
         found.findings.extend(found.influential_rows.as_ref().map(influential_finding));
@@ -123,7 +123,11 @@ fn fit_rows(
     options: &Options,
 ) -> Result<Identification, IdentifyError> {
     let clock = Instant::now();
-    let memory = if options.provisional { Memory::provisional() } else { Memory::default() };
+    let cache = if options.provisional {
+        LinearisationCache::provisional()
+    } else {
+        LinearisationCache::default()
+    };
     check_data(problem, measurements, split)?;
     let placement = Placement::of(measurements);
     let (strategy, solver) = (options.strategy, options.solver.decide(model));
@@ -152,21 +156,20 @@ fn fit_rows(
         progress: options.progress.as_ref(),
         stop: options.stop.as_ref(),
         max_steps: options.max_steps,
-        provisional: options.provisional,
         to_be_judged: false,
         sigma: declared.unwrap_or(UNKNOWN_SIGMA),
         turn_sigma: problem.data.orientation_sigma.filter(|_| problem.data.fits_orientation),
         noise_model: NoiseModel::DECLARED,
         turn_noise_model: NoiseModel::DECLARED,
-        memory: &memory,
-        known: options
-            .predecessor
+        cache: &cache,
+        linear_model: options
+            .warm_start
             .as_ref()
-            .and_then(|predecessor| predecessor.derivatives.as_ref()),
+            .and_then(|warm_start| warm_start.linear_model.as_ref()),
     };
     let unknowns = fitted_parameters(&fitting)?;
     let (start, registered) =
-        prepared(&mut fitting, options.predecessor.as_deref(), has_declared_noise)?;
+        prepared(&mut fitting, options.warm_start.as_deref(), has_declared_noise)?;
     let begin = options.begin(model, &start);
     let enough = PoseSufficiency::of(&fitting, problem, &unknowns, &start);
     let judged = enough.judges_noise(unknowns.len());
@@ -275,21 +278,21 @@ fn fit_rows(
 }
 
 /// Returns the full parameter vector of the registered nominal arm and its errors, and sets the σ
-/// with which the fit starts: from its predecessor, or an undeclared one from these errors.
+/// with which the fit starts: from its warm_start, or an undeclared one from these errors.
 fn prepared(
     fitting: &mut Fitting,
-    predecessor: Option<&WarmStart>,
+    warm_start: Option<&WarmStart>,
     has_declared_noise: bool,
 ) -> Result<(DVector<f64>, Errors), StageError> {
-    let (start, registered) = match predecessor {
-        Some(known) => (known.registered(fitting.model), known.errors),
+    let (start, registered) = match warm_start {
+        Some(warm_start) => (warm_start.registered(fitting.model), warm_start.errors),
         None => fitting.registered().map(|start| (start.clone(), fitting.errors(&start)))?,
     };
     if !has_declared_noise {
         let scatter = registered.identification.rms.norm / fitting.measurements.leading().root();
         fitting.sigma = scatter.max(LEAST_NOISE);
     }
-    if let Some(noise) = predecessor.and_then(|known| known.noise) {
+    if let Some(noise) = warm_start.and_then(|warm_start| warm_start.noise) {
         (fitting.noise_model, fitting.turn_noise_model) = noise;
     }
     Ok((start, registered))

@@ -35,7 +35,7 @@ pub struct Options {
     /// catalogue. A fit alone does not use them.
     pub candidates: Vec<Effect>,
     /// State of an earlier fit of the same data with other effects, from which this one starts.
-    pub(crate) predecessor: Option<Arc<WarmStart>>,
+    pub(crate) warm_start: Option<Arc<WarmStart>>,
     /// True if the fit is provisional: another one follows, and its result is not checked.
     pub(crate) provisional: bool,
     /// True if further fits look for influential rows.

@@ -1,5 +1,4 @@
-//! What a fit leaves to the next one, of the same problem with other effects to the same data, or
-//! to most of their rows.
+//! Warm start: state that a fit passes on to the next fit of a similar problem.
 
 use nalgebra::DVector;
 
@@ -7,50 +6,49 @@ use crate::fit::stages::noise_model::NoiseModel;
 use crate::fit::{Errors, Identification};
 use crate::model::{LinearModel, Model};
 
-/// What the next fit need not find anew.
+/// State reused to start the next fit of the same data, or of most of their rows, with other
+/// effects: registered parameters, noise model, and the linear model at the optimum.
 #[derive(Debug, Clone)]
 pub(crate) struct WarmStart {
-    /// Deviations from nominal of the registered nominal arm, by name: what is not among them has
-    /// none there.
+    /// Deviations of the registered nominal arm by parameter name; parameters without an entry have
+    /// none.
     registered: Vec<(String, f64)>,
-    /// The errors of that arm.
+    /// Errors of the registered nominal arm.
     pub(super) errors: Errors,
-    /// What the fit made of the σ of positions, and of orientations; `None` where the next one
-    /// begins with them as declared.
+    /// Noise models of positions and orientations; `None` if the next fit starts with the declared
+    /// σ.
     pub(super) noise: Option<(NoiseModel, NoiseModel)>,
-    /// Derivatives where it ended, if somebody took them.
-    pub(super) derivatives: Option<LinearModel>,
+    /// Jacobian at the optimum, if it was computed.
+    pub(super) linear_model: Option<LinearModel>,
 }
 
 impl WarmStart {
-    /// The same with derivatives where it ended.
-    pub(crate) fn with_derivatives(self, derivatives: Option<LinearModel>) -> Self {
-        Self { derivatives, ..self }
+    /// Adds the Jacobian at the optimum.
+    pub(crate) fn with_linear_model(self, linear_model: Option<LinearModel>) -> Self {
+        Self { linear_model, ..self }
     }
 
-    /// The full parameter vector of the registered nominal arm in a model of its successor.
+    /// Returns the full parameter vector of the registered nominal arm in the model of the next
+    /// fit.
     pub(super) fn registered(&self, model: &Model) -> DVector<f64> {
         let deviation = |name: &String| {
-            self.registered.iter().find(|(known, _)| known == name).map_or(0.0, |found| found.1)
+            self.registered.iter().find(|(other, _)| other == name).map_or(0.0, |entry| entry.1)
         };
-        let own = model.parameters.iter().map(|parameter| deviation(&parameter.name));
-        DVector::from_iterator(model.parameters.len(), own)
+        let deviations = model.parameters.iter().map(|parameter| deviation(&parameter.name));
+        DVector::from_iterator(model.parameters.len(), deviations)
     }
 }
 
 impl Identification {
-    /// What it leaves to the next fit, of a problem with other effects to the same data: what it
-    /// made of the σ only if that is `alike`.
-    pub(crate) fn predecessor(&self, alike: bool) -> WarmStart {
+    /// Returns the state that the next fit starts from, with the noise model only if `keep_noise`.
+    pub(crate) fn warm_start(&self, keep_noise: bool) -> WarmStart {
         let names = self.estimates.iter().map(|estimate| estimate.name.clone());
-        let placed =
-            names.zip(self.registered_x.iter().copied()).filter(|(_, deviation)| *deviation != 0.0);
-        let noise = alike.then_some(self.noise_models);
+        let deviations = names.zip(self.registered_x.iter().copied());
         WarmStart {
-            registered: placed.collect(),
+            registered: deviations.filter(|(_, deviation)| *deviation != 0.0).collect(),
             errors: self.registered,
-            noise,
-            derivatives: None,
+            noise: keep_noise.then_some(self.noise_models),
+            linear_model: None,
         }
     }
 }

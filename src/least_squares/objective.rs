@@ -9,10 +9,10 @@ use rayon::prelude::*;
 use super::chord::{Base, Chunk};
 use super::curvature::by_differences;
 use super::kernel::{dot, sum_of_squares};
-use super::memory::Key;
+use super::linearisation_cache::Key;
 use super::{
-    Block, LeastSquares, LinearRows, Linearisation, Loss, MANY_UNKNOWNS, Memory, Objective,
-    RowsError, Triangle, slopes,
+    Block, LeastSquares, LinearRows, Linearisation, LinearisationCache, Loss, MANY_UNKNOWNS,
+    Objective, RowsError, Triangle, slopes,
 };
 
 /// Number of items reduced together. Larger problems keep only n × n factors, never the m × n
@@ -43,13 +43,13 @@ pub struct Fit<'a, P> {
     problem: &'a P,
     rows: Vec<LinearRows>,
     loss: Loss,
-    memory: Option<(&'a Memory, u64, f64)>,
+    cache: Option<(&'a LinearisationCache, u64, f64)>,
 }
 
 impl<'a, P: LeastSquares> Fit<'a, P> {
     /// Creates the objective of the data alone, with squared loss.
     pub fn new(problem: &'a P) -> Self {
-        Self { problem, rows: Vec::new(), loss: Loss::Squares, memory: None }
+        Self { problem, rows: Vec::new(), loss: Loss::Squares, cache: None }
     }
 
     /// Replaces the loss of the items; linear rows keep their squares.
@@ -59,11 +59,11 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         self
     }
 
-    /// Stores linearisations in `memory` and reuses those stored there. `data` identifies the data
+    /// Stores linearisations in `cache` and reuses those stored there. `data` identifies the data
     /// of the problem, apart from the `unit` of its residuals.
     #[must_use]
-    pub fn remembering(mut self, memory: &'a Memory, data: u64, unit: f64) -> Self {
-        self.memory = Some((memory, data, unit));
+    pub fn with_cache(mut self, cache: &'a LinearisationCache, data: u64, unit: f64) -> Self {
+        self.cache = Some((cache, data, unit));
         self
     }
 
@@ -192,17 +192,17 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
     /// Returns the triangular factor of all data at x. A provisional fit takes it from the
     /// derivatives of an earlier point where these are accurate enough.
     fn triangle_at(&self, x: &DVector<f64>) -> Triangle {
-        let Some((memory, data, unit)) = self.memory else { return self.reduce(x) };
-        memory.recall(&Key { data, loss: self.loss, x: x.clone() }, unit, || {
-            if !(memory.is_in_passing() && self.keeps_derivatives()) {
+        let Some((cache, data, unit)) = self.cache else { return self.reduce(x) };
+        cache.get_or_reduce(&Key { data, loss: self.loss, x: x.clone() }, unit, || {
+            if !(cache.is_provisional() && self.keeps_derivatives()) {
                 return self.reduce(x);
             }
-            let earlier = memory.base(data).and_then(|base| base.at(self.problem, x, unit));
+            let earlier = cache.base(data).and_then(|base| base.at(self.problem, x, unit));
             earlier.unwrap_or_else(|| {
                 let base = self.base(x, (data, unit));
                 let triangle = base.triangle();
                 if triangle.sum_of_squares().is_finite() {
-                    memory.keep(Arc::new(base));
+                    cache.set_base(Arc::new(base));
                 }
                 triangle
             })
@@ -299,14 +299,14 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
         linearisation
     }
 
-    /// Differences gradients at exact linearisations, without the memory of earlier points.
+    /// Differences gradients at exact linearisations, without the cache of earlier points.
     fn curvature(
         &self,
         x: &DVector<f64>,
         within: &dyn Fn(&DVector<f64>) -> bool,
     ) -> Option<DMatrix<f64>> {
         let plain =
-            Fit { problem: self.problem, rows: self.rows.clone(), loss: self.loss, memory: None };
+            Fit { problem: self.problem, rows: self.rows.clone(), loss: self.loss, cache: None };
         by_differences(|x| slopes(plain.linearise(x)), x, within)
     }
 
@@ -325,8 +325,7 @@ impl<P: LeastSquares> Objective for Fit<'_, P> {
 
     fn acceleration_gradient(&self, x: &DVector<f64>, step: &DVector<f64>) -> Option<DVector<f64>> {
         // In a provisional fit one more step costs less than an acceleration.
-        if self.memory.is_some_and(|(memory, ..)| memory.is_in_passing())
-            && self.keeps_derivatives()
+        if self.cache.is_some_and(|(cache, ..)| cache.is_provisional()) && self.keeps_derivatives()
         {
             return None;
         }
@@ -397,7 +396,7 @@ mod tests {
     #[test]
     fn what_is_remembered_is_not_asked_for_again() {
         let line = Line { points: 500, largest: AtomicUsize::new(0) };
-        let memory = Memory::default();
+        let cache = LinearisationCache::default();
         let (x, shifted) = (DVector::from_vec(vec![0.5, 1e-3]), DVector::from_vec(vec![0.5, 2e-3]));
         let robust = Loss::Huber { threshold: 1.0 };
         let asked = |x: &DVector<f64>, loss: Loss, data: u64| {
@@ -405,11 +404,8 @@ mod tests {
             let plain = fit.linearise(x);
             assert!((fit.cost(x) / plain.cost - 1.0).abs() < 1e-12);
             line.largest.store(0, Ordering::Relaxed);
-            let remembered = fit.remembering(&memory, data, 1.0).linearise(x);
-            assert_eq!(
-                (plain.triangle, plain.projected),
-                (remembered.triangle, remembered.projected)
-            );
+            let cached = fit.with_cache(&cache, data, 1.0).linearise(x);
+            assert_eq!((plain.triangle, plain.projected), (cached.triangle, cached.projected));
             line.largest.load(Ordering::Relaxed) > 0
         };
         // The last two points and the first one of the same data are kept; anything else is reduced

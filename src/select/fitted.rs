@@ -99,7 +99,7 @@ impl Fitted {
         Ok(fitted)
     }
 
-    /// Fits on until it converges, if it was stopped before that or fitted in passing.
+    /// Fits on until it converges, if it was stopped before that or fitted provisionally.
     pub fn settled(self, data: &Data, options: &Options) -> Result<Self, IdentifyError> {
         if self.found.termination.converged() && !self.found.provisional {
             return Ok(self);
@@ -124,9 +124,10 @@ impl Fitted {
     pub fn succeeding(&self, options: &Options, alike: bool) -> Options {
         let derivatives = self.derivatives.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let at = (self.model.parameters.as_slice(), &self.found.x);
-        let known = derivatives.map(|derivatives| derivatives.known(at, &self.unknowns));
-        let predecessor = self.found.predecessor(alike).with_derivatives(known);
-        Options { predecessor: Some(Arc::new(predecessor)), ..self.onwards(options) }
+        let linear_model =
+            derivatives.map(|derivatives| derivatives.linear_model(at, &self.unknowns));
+        let warm_start = self.found.warm_start(alike).with_linear_model(linear_model);
+        Options { warm_start: Some(Arc::new(warm_start)), ..self.onwards(options) }
     }
 
     /// The same problem with other effects declared.

@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
-use flexcal::least_squares::{Block, Fit, LeastSquares, Linearisation, Memory, Objective as _};
+use flexcal::least_squares::{
+    Block, Fit, LeastSquares, Linearisation, LinearisationCache, Objective as _,
+};
 use nalgebra::DVector;
 
 /// Number of amplitudes, large enough for derivatives to be kept.
@@ -49,7 +51,7 @@ impl LeastSquares for Waves {
 
 #[test]
 fn in_passing_derivatives_of_the_start_serve_in_any_unit() {
-    let memory = Memory::provisional();
+    let cache = LinearisationCache::provisional();
     let gradient = |found: &Linearisation| found.triangle.tr_mul(&found.projected);
     let at = |height: f64| {
         let mut x = DVector::from_element(MANY + 2, 0.01);
@@ -60,7 +62,7 @@ fn in_passing_derivatives_of_the_start_serve_in_any_unit() {
     for (x, unit) in [(&start, 0.1), (&near, 0.1), (&near, 0.3), (&start, 0.3)] {
         let waves = Waves { unit };
         let (fit, plain) =
-            (Fit::new(&waves).remembering(&memory, 1, unit), Fit::new(&waves).linearise(x));
+            (Fit::new(&waves).with_cache(&cache, 1, unit), Fit::new(&waves).linearise(x));
         let found = fit.linearise(x);
         assert!((found.cost / plain.cost - 1.0).abs() < 1e-9, "{unit}");
         assert!(
@@ -75,11 +77,11 @@ fn in_passing_derivatives_of_the_start_serve_in_any_unit() {
 
 #[test]
 fn in_passing_what_had_no_effect_is_looked_at_again() {
-    let memory = Memory::provisional();
+    let cache = LinearisationCache::provisional();
     let mut x = DVector::from_element(MANY + 2, 0.01);
     x[MANY] = 0.0;
     let waves = Waves { unit: 0.1 };
-    let fit = Fit::new(&waves).remembering(&memory, 1, 0.1);
+    let fit = Fit::new(&waves).with_cache(&cache, 1, 0.1);
     assert!(fit.linearise(&x).triangle.column(MANY + 1).iter().all(|value| *value == 0.0));
     x[MANY] = 1e-3;
     assert!(fit.linearise(&x).triangle.column(MANY + 1).amax() > 0.0);

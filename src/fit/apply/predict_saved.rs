@@ -17,7 +17,7 @@ use crate::fit::stages::stage::{COST_TOLERANCE, Stage, StageError};
 use crate::fit::uncertainty::residual_lengths::outlying;
 use crate::fit::{ErrorSummary, Placement, SolverChoice};
 use crate::least_squares::solver::Settings;
-use crate::least_squares::{Loss, Memory};
+use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::ParameterSite;
 use crate::model::{Model, Pose};
@@ -272,7 +272,7 @@ fn place(
     let registrable: Vec<Pose> = users.iter().filter(new_base).copied().collect();
     register(model, &registrable, &mut x);
     locate(model, &users, |k| missing.contains(&k), &mut x);
-    let memory = Memory::default();
+    let cache = LinearisationCache::default();
     let stage = Stage {
         model,
         declared: users.iter().map(|pose| pose.sigma).collect(),
@@ -285,8 +285,8 @@ fn place(
         cost_tolerance: COST_TOLERANCE,
         loss: Loss::Squares,
         counts_fixed: true,
-        memory: &memory,
-        known: None,
+        cache: &cache,
+        linear_model: None,
         progress: None,
         stop: None,
     };

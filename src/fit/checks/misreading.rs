@@ -6,7 +6,7 @@ use std::fmt;
 
 use crate::fit::Placement;
 use crate::fit::stages::fitting::Fitting;
-use crate::least_squares::Memory;
+use crate::least_squares::LinearisationCache;
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
 use crate::problem::{Joint, JointKind, Problem};
@@ -188,7 +188,7 @@ impl Misreading {
         let placement = &Placement::of(rows);
         let held_out_only = placement.held_out_only(model, rows, split);
         // Linearisations of another model are not those of this one.
-        let memory = &Memory::default();
+        let cache = &LinearisationCache::default();
         let fitting = Fitting {
             model,
             measurements: &mended,
@@ -196,8 +196,8 @@ impl Misreading {
             placement,
             held_out_only,
             turn_sigma: None,
-            memory,
-            known: None,
+            cache,
+            linear_model: None,
             ..*fitting
         };
         let registered = fitting.registered().ok()?;

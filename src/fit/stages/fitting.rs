@@ -16,7 +16,7 @@ use crate::fit::{
     ErrorSummary, Errors, OrientationErrors, Placement, ProgressSink, SolverChoice, Stop, Strategy,
 };
 use crate::least_squares::solver::{AtBound, Settings, Termination};
-use crate::least_squares::{Loss, Memory};
+use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Parameter;
 use crate::model::{LinearModel, Model, Pose};
@@ -55,8 +55,6 @@ pub(in crate::fit) struct Fitting<'a> {
     pub stop: Option<&'a Stop>,
     /// Maximum number of steps of a stage of the strategy.
     pub max_steps: Option<u64>,
-    /// True if the fit is provisional: another one follows.
-    pub provisional: bool,
     /// True if the σ is tested before the fit goes on.
     pub to_be_judged: bool,
     /// 1 σ of a coordinate in rows that state none, declared or assumed \[m\].
@@ -68,9 +66,9 @@ pub(in crate::fit) struct Fitting<'a> {
     /// Noise model of orientations.
     pub turn_noise_model: NoiseModel,
     /// Linearisations that the fits share.
-    pub memory: &'a Memory,
+    pub cache: &'a LinearisationCache,
     /// Derivatives that are known where it may begin.
-    pub known: Option<&'a LinearModel>,
+    pub linear_model: Option<&'a LinearModel>,
 }
 
 /// Result of a fit of the strategy.
@@ -169,8 +167,8 @@ impl<'a> Fitting<'a> {
             cost_tolerance: COST_TOLERANCE,
             loss: Loss::Squares,
             counts_fixed: false,
-            memory: self.memory,
-            known: self.known,
+            cache: self.cache,
+            linear_model: self.linear_model,
             progress: self.progress,
             stop: self.stop,
         }
@@ -187,13 +185,13 @@ impl<'a> Fitting<'a> {
     fn strategy_stage(&self, unknowns: Vec<usize>) -> Stage<'a> {
         let stage = self.stage(&self.split.identification, unknowns);
         let max_steps = self.max_steps.unwrap_or(stage.max_steps);
-        let passing = if self.provisional {
+        let tolerance = if self.cache.is_provisional() {
             PROVISIONAL_CHANGE / stage.count().max(1) as f64
         } else {
             stage.cost_tolerance
         };
         let cost_tolerance =
-            if self.to_be_judged { passing.max(TESTED_NOISE_CHANGE) } else { passing };
+            if self.to_be_judged { tolerance.max(TESTED_NOISE_CHANGE) } else { tolerance };
         Stage { loss: self.loss, max_steps, cost_tolerance, ..stage }
     }
 

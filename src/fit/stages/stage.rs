@@ -15,7 +15,7 @@ use crate::least_squares::solver::{
     PseudoInverseSettings, Settings, Solution, Termination,
 };
 use crate::least_squares::{
-    Blind, Fit, LinearRows, Linearisation, Loss, Memory, Objective as _, RowsError,
+    Blind, Fit, LinearRows, Linearisation, LinearisationCache, Loss, Objective as _, RowsError,
     StabilisedObjective, Triangle, UnidentifiableCombination, Weak,
 };
 use crate::model::parameter::Parameter;
@@ -72,9 +72,9 @@ pub(in crate::fit) struct Stage<'a> {
     /// True if constraints count that involve free parameters which do not vary here.
     pub counts_fixed: bool,
     /// Linearisations shared by fits of the same data.
-    pub memory: &'a Memory,
+    pub cache: &'a LinearisationCache,
     /// Derivatives that are known at some point of a fit of the identification rows.
-    pub known: Option<&'a LinearModel>,
+    pub linear_model: Option<&'a LinearModel>,
     pub progress: Option<&'a ProgressSink>,
     pub stop: Option<&'a Stop>,
 }
@@ -128,23 +128,23 @@ impl<'a> Stage<'a> {
         at: &DVector<f64>,
     ) -> PoseResiduals<'a> {
         PoseResiduals::new(self.model, poses, self.unknowns.clone(), at.clone())
-            .with_linear_model(self.known)
+            .with_linear_model(self.linear_model)
     }
 
     /// Linearises the whitened data at `at`, each pose weighted by `loss`, without priors.
     pub fn linearised(&self, at: &DVector<f64>, loss: Loss) -> Linearisation {
         let residuals = self.residuals(at);
-        self.remembered(&residuals, at, loss).linearise(&residuals.reduced(at))
+        self.cached(&residuals, at, loss).linearise(&residuals.reduced(at))
     }
 
     /// Creates the objective of these poses; it shares linearisations with equal stages.
-    fn remembered<'b>(
+    fn cached<'b>(
         &'b self,
         residuals: &'b PoseResiduals<'a>,
         at: &DVector<f64>,
         loss: Loss,
     ) -> Fit<'b, PoseResiduals<'a>> {
-        Fit::new(residuals).with_loss(loss).remembering(self.memory, self.digest(at), self.unit())
+        Fit::new(residuals).with_loss(loss).with_cache(self.cache, self.digest(at), self.unit())
     }
 
     /// Returns 1 σ of the first pose, the unit in which linearisations are remembered.
@@ -347,7 +347,7 @@ impl<'a> Stage<'a> {
         let priors = self.priors();
         let none = DVector::zeros(priors.nrows());
         let fit = self
-            .remembered(residuals, &residuals.full(&begin), self.loss)
+            .cached(residuals, &residuals.full(&begin), self.loss)
             .with_rows(LinearRows { matrix: priors, constant: none })?
             .with_rows(LinearRows {
                 matrix: gauge.rows.clone(),

@@ -92,7 +92,7 @@ impl Statistics {
         let multipliers: Vec<Option<f64>> =
             prices.bounds.iter().map(|price| price.map(|price| price.multiplier)).collect();
         let bounded_errors = uncertainty.standard_errors();
-        let hidden = if stage.memory.is_in_passing() {
+        let hidden = if stage.cache.is_provisional() {
             Vec::new()
         } else {
             hidden_by_bounds(
@@ -114,7 +114,7 @@ impl Statistics {
             hidden.iter().any(|valley| has(valley) && valley.deviation.is_infinite())
         };
         // Provisional fits report no identified parts.
-        let visible = if priors.iter().all(Option::is_some) || stage.memory.is_in_passing() {
+        let visible = if priors.iter().all(Option::is_some) || stage.cache.is_provisional() {
             vec![1.0; errors.len()]
         } else {
             Blind::in_triangle(&stage.data_triangle(&end.x)).visible

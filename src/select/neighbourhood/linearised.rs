@@ -43,7 +43,11 @@ pub(in crate::select) struct Derivatives {
 impl Derivatives {
     /// Those of the fitted parameters, as a fit that begins at the full parameter vector `x` takes
     /// them.
-    pub fn known(&self, at: (&[Parameter], &DVector<f64>), unknowns: &[usize]) -> LinearModel {
+    pub fn linear_model(
+        &self,
+        at: (&[Parameter], &DVector<f64>),
+        unknowns: &[usize],
+    ) -> LinearModel {
         LinearModel::new(
             at,
             unknowns,

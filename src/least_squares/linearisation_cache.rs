@@ -1,0 +1,91 @@
+//! Cache of linearisations that several stages of a fit need at the same point.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use nalgebra::DVector;
+
+use super::chord::Base;
+use super::{Loss, Triangle};
+
+/// Largest number of cached linearisations: at the last point, at the one before, and at the first
+/// point of the same data, which is needed again at the end.
+const MAX_CACHED: usize = 3;
+
+/// Most recent linearisations of some data. Reducing many rows takes far longer than any use of the
+/// triangular factor.
+#[derive(Debug, Default)]
+pub struct LinearisationCache {
+    cached: Mutex<VecDeque<(Key, f64, Triangle)>>,
+    /// Derivatives reused at later points; only for provisional fits.
+    base: Option<Mutex<Option<Arc<Base>>>>,
+}
+
+/// Identifier of a linearisation.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Key {
+    /// Identifier of the data set, without the unit of its residuals.
+    pub data: u64,
+    pub loss: Loss,
+    pub x: DVector<f64>,
+}
+
+impl LinearisationCache {
+    /// Creates the cache of a provisional fit, which another fit follows or of which little is
+    /// needed. Its steps reuse the derivatives at the start point as long as these predict the
+    /// residuals.
+    #[must_use]
+    pub fn provisional() -> Self {
+        Self { base: Some(Mutex::default()), ..Self::default() }
+    }
+
+    /// Returns true for the cache of a provisional fit.
+    pub(crate) fn is_provisional(&self) -> bool {
+        self.base.is_some()
+    }
+
+    /// Returns the linearisation cached under `key`, or calls `reduce` and caches its result, for
+    /// residuals in this `unit`. With squared loss, a change of unit only scales the factor.
+    pub(super) fn get_or_reduce(
+        &self,
+        key: &Key,
+        unit: f64,
+        reduce: impl FnOnce() -> Triangle,
+    ) -> Triangle {
+        let fits = |(other, other_unit, _): &&(Key, f64, Triangle)| {
+            let same_unit = other_unit.to_bits() == unit.to_bits();
+            other == key && (key.loss == Loss::Squares || same_unit)
+        };
+        let cached = locked(&self.cached)
+            .iter()
+            .find(fits)
+            .map(|(_, other_unit, triangle)| triangle.clone().scaled(other_unit / unit));
+        cached.unwrap_or_else(|| {
+            let triangle = reduce();
+            let mut cached = locked(&self.cached);
+            if cached.len() == MAX_CACHED {
+                let of_other_data = cached.iter().rposition(|(other, ..)| other.data != key.data);
+                cached.remove(of_other_data.unwrap_or(MAX_CACHED - 2));
+            }
+            cached.push_front((key.clone(), unit, triangle.clone()));
+            triangle
+        })
+    }
+
+    /// Returns the derivatives of a data set that are reused at later points.
+    pub(super) fn base(&self, data: u64) -> Option<Arc<Base>> {
+        let base = self.base.as_ref()?;
+        locked(base).as_ref().filter(|base| base.data == data).map(Arc::clone)
+    }
+
+    /// Stores derivatives for later points.
+    pub(super) fn set_base(&self, new: Arc<Base>) {
+        if let Some(base) = &self.base {
+            *locked(base) = Some(new);
+        }
+    }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
