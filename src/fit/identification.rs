@@ -278,7 +278,7 @@ fn fit_rows(
 }
 
 /// Returns the full parameter vector of the registered nominal arm and its errors, and sets the σ
-/// with which the fit starts: from its warm_start, or an undeclared one from these errors.
+/// with which the fit starts: from the warm start, or an undeclared one from these errors.
 fn prepared(
     fitting: &mut Fitting,
     warm_start: Option<&WarmStart>,

@@ -35,7 +35,7 @@ impl Flexibility<f64> {
 /// Force and moment at one point, in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wrench<S> {
-    /// Force vector \[N\].
+    /// Force at the point \[N\].
     pub force: Vector3<S>,
     /// Moment about the point [N·m].
     pub moment: Vector3<S>,

@@ -19,7 +19,7 @@ pub struct Compensator<S> {
     pub free_length: f64,
     /// Spring rate k [N/m].
     pub rate: S,
-    /// Preload F₀ \[N\].
+    /// Preload F₀ at length l₀ \[N\].
     pub preload: S,
 }
 

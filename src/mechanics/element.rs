@@ -25,7 +25,7 @@ pub(super) struct LinkLoad<S> {
 pub(super) struct Element<'a, S> {
     /// Number of the element along the beam.
     pub number: usize,
-    /// Signed length \[m\].
+    /// Signed length of the element \[m\].
     pub length: S,
     /// Start of the element along the beam \[m\].
     pub start: S,

@@ -56,7 +56,7 @@ fn tanh<S: Scalar>(x: S) -> S {
 /// Strain of a beam without load, for example of a warm beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strain<S> {
-    /// Elongation per length.
+    /// Elongation per unit of length.
     pub axial: S,
     /// Curvatures about y and z along +x [1/m].
     pub curvature: [S; 2],

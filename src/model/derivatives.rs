@@ -13,7 +13,7 @@ use crate::spatial::{Frame, rotation_axes};
 /// Base frame with the derivatives of its six coordinates, and the columns of these.
 #[derive(Clone)]
 pub(super) struct Base {
-    /// Frame, measuring frame.
+    /// Frame of the base, measuring frame.
     pub frame: Frame<f64>,
     /// Directions in which its translation's coordinates move it, measuring frame.
     pub directions: [Vector3<f64>; 3],
@@ -42,9 +42,9 @@ pub(super) struct Target {
 
 /// Method that differentiates the arm with respect to its parameters.
 pub(super) enum ArmDerivatives {
-    /// Motion by motion.
+    /// Derivatives of a rigid arm, motion by motion.
     Rigid(Rigid),
-    /// Through the statics.
+    /// Derivatives of an elastic arm, through the statics.
     Elastic(Box<Elastic>),
 }
 

@@ -7,7 +7,7 @@ use crate::problem::{Observation, PoseView};
 /// Measured row with its conditions.
 #[derive(Debug, Clone, Copy)]
 pub struct Pose<'a> {
-    /// Configuration and conditions.
+    /// Configuration and conditions of the row.
     pub setup: PoseView<'a>,
     /// Index of the base.
     pub base: usize,

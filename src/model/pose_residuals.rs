@@ -80,7 +80,7 @@ impl<'a> PoseResiduals<'a> {
         DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| full[k]))
     }
 
-    /// Returns the rows.
+    /// Returns the measured rows.
     pub fn poses(&self) -> &[Pose<'a>] {
         &self.poses
     }

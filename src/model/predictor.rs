@@ -15,7 +15,7 @@ use crate::spatial::{Frame, rotation_axes, rotation_between};
 /// Arm with its set-up at one parameter vector, ready to predict one row after another.
 pub(super) struct Predictor<'m> {
     model: &'m Model,
-    /// Full parameter vector.
+    /// Full parameter vector of the predictions.
     x: Vec<f64>,
     /// Returns true if nothing deflects and no effect acts on the arm.
     is_rigid: bool,
@@ -32,7 +32,7 @@ pub(super) struct Predictor<'m> {
     workspace: Workspace<f64>,
 }
 
-/// Predicted row.
+/// Predicted numbers and orientation of a row.
 pub(super) struct Prediction {
     /// Predicted numbers \[m\] or \[rad\], followed by zeros.
     pub numbers: Vector3<f64>,
@@ -113,34 +113,30 @@ impl<'m> Predictor<'m> {
 
     fn try_predict(&mut self, pose: &Pose) -> Option<Prediction> {
         let observation = pose.observation;
-        let mut scene = Scene {
-            fixtures: fixtures_of(observation, |fixture| self.fixtures[fixture]),
-            ..Scene::default()
-        };
         let mut turn = None;
-        match observation.description().needs {
-            Needs::Fixtures => {}
+        let scene = match observation.description().needs {
+            Needs::Fixtures => Scene::default(),
             Needs::Frame => {
-                (scene.frame, scene.gravity) = (self.frame_axes(pose)?, self.arm.gravity);
+                let frame = self.frame_axes(pose)?;
+                Scene { frame, gravity: self.arm.gravity, ..Scene::default() }
             }
             Needs::Target => {
                 let frame = self.target_frame(pose)?;
                 let base = self.base(pose);
-                let position = base.point(&frame.point(&self.target(pose)));
+                let mut target = base.point(&frame.point(&self.target(pose)));
+                if observation.is_position() {
+                    target = self.instrument.reading(&target, &pose.setup);
+                }
                 turn = pose.orientation.map(|orientation| {
                     orientation.axes().map_or(Vector3::zeros(), |measured| {
                         rotation_between(&self.axes(pose, &base, &frame), &measured)
                     })
                 });
-                scene.base = base.axes;
-                scene.target = if observation.is_position() {
-                    self.instrument.reading(&position, &pose.setup)
-                } else {
-                    position
-                };
+                Scene { target, base: base.axes, ..Scene::default() }
             }
-        }
-        Some(Prediction { numbers: observation.predict(&scene), turn })
+        };
+        let fixtures = fixtures_of(observation, |fixture| self.fixtures[fixture]);
+        Some(Prediction { numbers: observation.predict(&Scene { fixtures, ..scene }), turn })
     }
 
     /// Returns the axes of the frame whose tilt is measured, arm base frame.

@@ -79,7 +79,8 @@ pub(super) fn rigid_frame_axes(
     setup: &PoseView,
     frame: usize,
 ) -> [Vector3<f64>; 3] {
-    arm.rigid_frame(setup, frame.min(arm.last())).axes
+    let Some(joint) = frame.checked_sub(1) else { return Scene::default().frame };
+    arm.rigid_frame(setup, joint.min(arm.last())).axes
 }
 
 fn axes(

@@ -185,7 +185,7 @@ impl<'a> Stage<'a> {
             put(pose.orientation.map_or(0.0, |orientation| orientation.sigma / unit));
             put(pose.base as f64);
             put(pose.target as f64);
-            // Earlier poses are in the table, which all fits with the same memory share: the row
+            // Earlier poses are in the table, which all fits with the same cache share: the row
             // identifies them.
             put(past.place().map_or(f64::NAN, f64::from));
         }
