@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::document::code;
 use super::quantity::{number, p_value};
 use super::trace::{EVEN, percent};
+use crate::fit::Noise;
 use crate::model::effect::NO_REFERENCE;
 use crate::model::parameter::holds_all;
 use crate::problem::{Effect, JointKind, Problem};
@@ -25,7 +26,7 @@ fn untried(problem: &Problem, (effect, reason): &(Effect, &'static str)) -> &'st
 }
 
 /// Lists what the problem should declare before the causes are read: a reference temperature,
-/// masses, or a limit moved out.
+/// masses, σ, or a limit moved out.
 pub(super) fn to_declare(
     problem: &Problem,
     closure: &ClosedLoop,
@@ -47,6 +48,12 @@ pub(super) fn to_declare(
             "Declare {} in [data], the temperature at which the arm is as declared. Without it no law of the measured temperatures was \
              tried.",
             code("reference_temperature_C")
+        ));
+    }
+    if closure.before.fit.noise != Noise::Declared {
+        declarations.push(format!(
+            "Declare {} in [data], 1 σ of a measured coordinate. Without it the size of the residual cannot be judged.",
+            code("position_sigma_mm")
         ));
     }
     declarations.extend(wrong_limits(result).map(|(limit, probability)| {
