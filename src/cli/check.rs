@@ -60,7 +60,10 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let written = results.path("check.json");
     common.tell(&json, || {
         let problem_word = shell_word(common.problem());
-        let next = if check.suffices() {
+        let is_measured = arguments.poses.is_none() && arguments.source.candidates.is_empty();
+        let next = if check.suffices() && is_measured {
+            format!("flexcal identify {} fits these measurements", common.named())
+        } else if check.suffices() {
             format!("measure such poses, then flexcal identify {problem_word} --data MEASURED.csv")
         } else {
             format!("flexcal plan {problem_word} --poses N chooses poses that tell more")

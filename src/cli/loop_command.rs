@@ -91,8 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let told = if arguments.verbose {
             report::loop_text(&problem, &closure)
         } else {
-            let all = format!("flexcal loop {} -v", common.named());
-            report::loop_brief(&problem, &closure, output::columns(), &all)
+            report::loop_brief(&problem, &closure, output::columns())
         };
         let next = next::after_loop(common, &problem, &closure.before.fit, &result, &results);
         format!("{told}{words}{}Next: {next}\n", results.written())

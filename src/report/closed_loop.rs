@@ -33,9 +33,8 @@ const SCREEN_LINES: usize = 22;
 /// Arm with the effects of the extended problem.
 const EXTENDED: &str = "with what was found";
 
-/// Returns the outcome on one screen of this many columns, ending in a line break; `all` names the
-/// command that prints the rest.
-pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize, all: &str) -> String {
+/// Returns the outcome on one screen of this many columns, ending in a line break.
+pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> String {
     let result = &LoopResult::new(problem, closure);
     let text = |blocks: &[Block]| text_within(blocks, columns);
     let mut blocks = head(problem, closure, result);
@@ -46,7 +45,7 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize, all: 
     table.rows.iter_mut().for_each(|row| _ = row.pop());
     blocks.push(Block::Table(table));
     blocks.extend(gained(closure, result));
-    let end = remains(closure, result, all)
+    let end = remains(closure, result)
         .map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
     let points: Vec<Point> = causes(result).map(cause).collect();
     if points.is_empty() {
@@ -67,21 +66,34 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize, all: 
     let more = if hidden == 0 {
         String::new()
     } else {
-        format!("     and {hidden} more: {all} lists them, loop.json holds them\n")
+        format!("     and {hidden} more: -v lists them, loop.json holds them\n")
     };
     text(&blocks) + &more + &end
 }
 
 /// Returns the cause with its size ± 1 σ, its probability and what it is not told from.
 fn cause(found: &FoundEffect) -> Point {
-    let mut facts = effect::values(&found.effect.effect, &found.parameters);
+    let values = effect::values(&found.effect.effect, &found.parameters);
+    let mut facts: Vec<String> = values.iter().map(|value| without_effect(value)).collect();
     let law = found.claims.as_ref().map(|claims| claims.law.probability);
     facts.extend(law.map(|law| format!("probability of the law {}", percent(law))));
-    let alternatives = found.alternatives.iter().map(|other| other.description.clone());
-    let others = named(alternatives, 1, "");
-    let others = if others.is_empty() { others } else { format!("; not told from: {others}") };
+    let others = match found.alternatives.as_slice() {
+        [] => String::new(),
+        [first] => format!("; not told from: {}", first.description),
+        [first, others @ ..] => {
+            let count = others.len();
+            format!("; not told from: {} ({count} more in loop.json)", first.description)
+        }
+    };
     let details = if facts.is_empty() { Vec::new() } else { vec![facts.join("; ")] };
     Point { text: title(found) + &others, details, mark: None }
+}
+
+/// Removes the name of the effect from "effect[1].parameter = value".
+fn without_effect(value: &str) -> String {
+    let name = value.split(" = ").next().unwrap_or_default();
+    let parameter = name.rsplit('.').next().unwrap_or_default();
+    value.replacen(name, parameter, 1)
 }
 
 /// Returns title, rows, verdict, and what to know before the causes are read.
@@ -335,16 +347,15 @@ fn gained<'a>(closure: &ClosedLoop, result: &LoopResult) -> Option<Block<'a>> {
 }
 
 /// States what is left, and where it is shown.
-fn remains(closure: &ClosedLoop, result: &LoopResult, all: &str) -> Option<String> {
+fn remains(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
     let failed = findings::failed(&closure.findings).len();
     let places = if result.size_alone().is_none() { places(result) } else { Vec::new() };
     let structure = (!places.is_empty())
         .then(|| format!("structure without a known law ({})", places.join(", ")));
     let tests = (failed > 0).then(|| format!("{} failed", counted(failed, "residual test")));
     let parts: Vec<String> = structure.into_iter().chain(tests).collect();
-    (!parts.is_empty()).then(|| {
-        format!("What remains: {}. {all} lists it, report.html shows it.", parts.join(", "))
-    })
+    (!parts.is_empty())
+        .then(|| format!("What remains: {}; -v lists it, report.html shows it.", parts.join(", ")))
 }
 
 /// States the gain and how the figures are to be read.

@@ -210,7 +210,7 @@ fn tested(
     f: &mut fmt::Formatter<'_>,
 ) -> fmt::Result {
     let Outcome { statistic, bounds: (from, to), failed, .. } = outcome;
-    let chance = format!("chance gives up to {to:.2}");
+    let expected = format!("expected up to {to:.2} if only noise is left");
     match test {
         Test::ReducedChiSquared => {
             let size = match (failed, statistic < from) {
@@ -218,44 +218,44 @@ fn tested(
                 (false, true) => "residuals are smaller than σ, which is overstated",
                 (false, false) => "residuals are as large as σ",
             };
-            write!(f, "{size} (χ²/ν {statistic:.2}, chance gives {from:.2} to {to:.2})")
+            write!(
+                f,
+                "{size} (χ²/ν {statistic:.2}, expected {from:.2} to {to:.2} if only noise is left)"
+            )
         }
         Test::LackOfFit => {
             let size = if *failed { "larger than" } else { "as large as" };
             write!(
                 f,
-                "residuals are {size} repeats of a setup scatter (F {statistic:.2}, {chance})"
+                "residuals are {size} the scatter of repeated poses (F {statistic:.2}, {expected})"
             )
         }
         Test::Runs { sequence } => {
             let sign =
-                if *failed { "keep their sign" } else { "do not keep their sign beyond chance" };
+                if *failed { "keep their sign" } else { "do not keep their sign significantly" };
             let percent = (100.0 * statistic, 100.0 * to);
             write!(
                 f,
-                "residuals {sign} {} (at {:.0} % of the steps, chance gives up to {:.0} %)",
+                "residuals {sign} {} (at {:.0} % of the steps, expected up to {:.0} %)",
                 order(*sequence),
                 percent.0,
                 percent.1
             )
         }
         Test::LjungBox { sequence } => {
-            let follow = if *failed {
-                "follow one another"
-            } else {
-                "do not follow one another beyond chance"
-            };
+            let follow =
+                if *failed { "are autocorrelated" } else { "are not significantly autocorrelated" };
             write!(
                 f,
-                "residuals {follow} {} (Ljung–Box {statistic:.1}, chance gives up to {to:.1})",
+                "residuals {follow} {} (Ljung–Box {statistic:.1}, expected up to {to:.1})",
                 order(*sequence)
             )
         }
         Test::Dependence { covariate } => {
-            let depend = if *failed { "depend" } else { "do not depend beyond chance" };
+            let depend = if *failed { "depend" } else { "do not depend significantly" };
             write!(
                 f,
-                "residuals {depend} on {covariate} (distance correlation {statistic:.2}, {chance})"
+                "residuals {depend} on {covariate} (distance correlation {statistic:.2}, {expected})"
             )
         }
         Test::Outliers { worst } => {
@@ -264,18 +264,15 @@ fn tested(
                 (None, Some(pose)) => format!("pose {} ", pose + 1),
                 (None, None) => String::new(),
             };
-            let far = if *failed {
-                "is too far off to be noise"
-            } else {
-                "is farthest off, not beyond chance"
-            };
-            write!(f, "{pose}{far} ({statistic:.1} times the scatter, chance gives up to {to:.1})")
+            let far =
+                if *failed { "has a gross error" } else { "is farthest off, not significantly" };
+            write!(f, "{pose}{far} ({statistic:.1} × the scatter, expected up to {to:.1})")
         }
         Test::Normality => {
-            let normal = if *failed { "are not" } else { "may well be" };
+            let normal = if *failed { "are not" } else { "may be" };
             write!(
                 f,
-                "residuals {normal} normally distributed (Anderson–Darling {statistic:.2}, {chance})"
+                "residuals {normal} normally distributed (Anderson–Darling {statistic:.2}, {expected})"
             )
         }
     }

@@ -76,7 +76,7 @@ fn a_row_that_carries_the_misfit_is_named_and_to_be_looked_at() {
 fn a_test_of_outliers_names_the_row_of_the_file() {
     let bench = Bench::new();
     let (_, out, _) = run(&bench, "trace . --out out");
-    let (before, _) = out.split_once(" is farthest off, not beyond chance").unwrap();
+    let (before, _) = out.split_once(" is farthest off, not significantly").unwrap();
     let line = before.rsplit_once("passed: ./a-none.csv:").unwrap().1.parse::<usize>().unwrap();
     let table = fs::read_to_string(bench.path("a-none.csv")).unwrap();
     assert!(table.lines().nth(line - 1).unwrap().contains(",identification,"), "{out}");
