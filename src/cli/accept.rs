@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use flexcal::files::digest;
+use flexcal::files::{self, digest};
 use flexcal::fit::{self, Options, SolverChoice, Strategy};
 use flexcal::report::{self, AcceptanceRecord};
 use flexcal::results::Document as _;
@@ -69,7 +69,7 @@ fn commit(file: &Path) -> Option<String> {
     let whole = file.canonicalize().ok()?;
     let git =
         whole.ancestors().skip(1).map(|folder| folder.join(".git")).find(|git| git.exists())?;
-    let read = |path: PathBuf| Some(fs::read_to_string(path).ok()?.trim().to_owned());
+    let read = |path: PathBuf| Some(files::read_text(&path).ok()?.trim().to_owned());
     // In a worktree .git is a file that names its folder, which names the folder of the references.
     let folder = match read(git.clone()) {
         Some(text) => git.parent()?.join(text.strip_prefix("gitdir: ")?),

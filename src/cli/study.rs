@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use flexcal::files::StagedFile;
+use flexcal::files::{self, StagedFile};
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, MisprintResult, StudyResult};
 use flexcal::study::{self, CellResult, MisprintStudy, Request, Shard, Store, Study};
@@ -79,7 +79,7 @@ impl<'a> Sentinel<'a> {
     fn claim(path: &'a Path) -> Result<Self, WriteError> {
         let io = |source| WriteError::Io { path: path.to_owned(), source };
         if path.symlink_metadata().is_ok() {
-            if fs::read(path).map_err(io)? != Self::TEXT.as_bytes() {
+            if files::read_text(path).map_err(io)? != Self::TEXT {
                 return Err(WriteError::InTheWay {
                     path: path.to_owned(),
                     why: "a file that --done did not write is there",

@@ -8,6 +8,7 @@ use thiserror::Error;
 use super::NoRows;
 use super::near::{instead, meant, question};
 use super::phrases::{difference, in_quotes, list, near, plural};
+use super::study::StudyErrorKind;
 use super::urdf::UrdfErrorKind;
 
 /// Kind of an input error.
@@ -22,20 +23,14 @@ pub enum InputErrorKind {
     #[error("no such file; give a problem.toml or the folder that holds one")]
     ProblemMissing,
     #[error(
-        "no such file; give the TRUTH.toml that describes the simulation, or the folder that holds one"
+        "no such file; give the TRUTH.toml that describes the simulation, or the folder that \
+         holds one"
     )]
     TruthMissing,
     #[error(
-        "no such file; give a STUDY.toml or the folder that holds one; docs/study.md says how to write one"
+        "no such file: {}; paths in `files` are relative to the problem's folder",
+        path.display()
     )]
-    StudyMissing,
-    #[error("no such file: {}; paths are relative to the study's folder", path.display())]
-    StudyFileMissing { path: PathBuf },
-    #[error(
-        "a study draws and fits positions; this problem measures points, distances or surfaces: `simulate` and `identify` do"
-    )]
-    StudyOfContacts,
-    #[error("no such file: {}; paths in `files` are relative to the problem's folder", path.display())]
     DataFileMissing { path: PathBuf },
     #[error("no such file; paths on the command line are relative to the current folder")]
     GivenFileMissing,
@@ -78,7 +73,8 @@ pub enum InputErrorKind {
     #[error("{value} is larger than 1e150, the largest number that flexcal accepts")]
     MagnitudeTooLarge { value: String },
     #[error(
-        "contains an invisible character (U+{code:04X}: a control character, or a direction mark); remove it"
+        "contains an invisible character (U+{code:04X}: a control character, or a direction \
+         mark); remove it"
     )]
     Hidden { code: u32 },
     #[error("{value} is not a whole number of at least {least}")]
@@ -104,7 +100,8 @@ pub enum InputErrorKind {
 
     // Errors of the arm.
     #[error(
-        "\"{name}\" cannot name a folder; leave out / \\ : * ? \" < > | and spaces or dots at either end"
+        "\"{name}\" cannot name a folder; leave out / \\ : * ? \" < > | and spaces or dots at \
+         either end"
     )]
     NotAFolderName { name: String },
     #[error("an arm has at least one joint; add a section [[joint]]")]
@@ -112,17 +109,20 @@ pub enum InputErrorKind {
     #[error("a beam lies along its joint's a, which is 0 here; give a_m or a_mm")]
     BeamWithoutLength,
     #[error(
-        "a beam lies along a before its joint; write the table in the modified form (without dh = \"standard\")"
+        "a beam lies along a before its joint; write the table in the modified form (without dh \
+         = \"standard\")"
     )]
     BeamInStandardForm,
     #[error(
-        "a standard table describes one chain with one tool after its last row; write the table in the modified form (without dh = \"standard\")"
+        "a standard table describes one chain with one tool after its last row; write the table \
+         in the modified form (without dh = \"standard\")"
     )]
     NotInStandardForm,
     #[error("{what} needs a single chain of joints, and this arm is a tree")]
     NotAChain { what: &'static str },
     #[error(
-        "{what} needs one tool on the last joint, and this arm has a [[target]], or its tool on another joint"
+        "{what} needs one tool on the last joint, and this arm has a [[target]], or its tool on \
+         another joint"
     )]
     NotOneTool { what: &'static str },
     #[error(
@@ -130,7 +130,8 @@ pub enum InputErrorKind {
     )]
     ParentListedLater { joint: usize, parent: u64 },
     #[error(
-        "the branch of joint {parent} has ended; list everything that a joint carries directly after it"
+        "the branch of joint {parent} has ended; list everything that a joint carries directly \
+         after it"
     )]
     BranchEnded { parent: u64 },
     #[error("a fixed joint cannot follow another one; leave mimic out, or write another kind")]
@@ -140,7 +141,8 @@ pub enum InputErrorKind {
     )]
     LeaderNotCommanded { joint: u64 },
     #[error(
-        "\"{name}\" cannot name a beam, because its parameters contain the name; leave out . * [ ] and spaces"
+        "\"{name}\" cannot name a beam, because its parameters contain the name; leave out . * \
+         [ ] and spaces"
     )]
     NotABeamName { name: String },
     #[error("\"{name}\" is the name of other parameters; choose another name")]
@@ -150,10 +152,14 @@ pub enum InputErrorKind {
 
     // Errors of points, anchors, surfaces and targets.
     #[error(
-        "\"{name}\" cannot name {what}, because parameter names contain it; leave out . * [ ] and spaces"
+        "\"{name}\" cannot name {what}, because parameter names contain it; leave out . * [ ] \
+         and spaces"
     )]
     NotAFixtureName { what: &'static str, name: String },
-    #[error("the rows name no target; each of them measures one of {}: add a column target", targets.join(", "))]
+    #[error(
+        "the rows name no target; each of them measures one of {}: add a column target",
+        targets.join(", ")
+    )]
     TargetsUnnamed { targets: Vec<String> },
     #[error("another {what} is called \"{name}\" (line {line}); choose another name")]
     RepeatedFixture { what: &'static str, name: String, line: usize },
@@ -164,7 +170,8 @@ pub enum InputErrorKind {
     )]
     UnknownFixture { what: &'static str, name: String, known: Vec<String> },
     #[error(
-        "the place of {parameter} is not declared, so it can neither be fixed nor have a prior; write {write}"
+        "the place of {parameter} is not declared, so it can neither be fixed nor have a prior; \
+         write {write}"
     )]
     UnknownPlaceHeld { parameter: String, write: &'static str },
     #[error(
@@ -174,7 +181,8 @@ pub enum InputErrorKind {
     #[error("a distance needs two different points, found {found}")]
     NotTwoPoints { found: usize },
     #[error(
-        "the {what} \"{name}\" is measured by {rows} row{} only, which do not determine its {numbers} unknown coordinates; \
+        "the {what} \"{name}\" is measured by {rows} row{} only, which do not determine its \
+         {numbers} unknown coordinates; \
          measure it again in other configurations, or declare where it is", plural(*rows)
     )]
     TooFewContacts { what: &'static str, name: String, rows: usize, numbers: usize },
@@ -203,7 +211,8 @@ pub enum InputErrorKind {
     )]
     CoupledToItself { joint: usize },
     #[error(
-        "\"{name}\" cannot name a covariate: it is a column name of flexcal, or contains one of [ ] , * ?"
+        "\"{name}\" cannot name a covariate: it is a column name of flexcal, or contains one of \
+         [ ] , * ?"
     )]
     NoCovariateName { name: String },
     #[error(
@@ -212,7 +221,8 @@ pub enum InputErrorKind {
     )]
     UnknownCovariate { name: String, known: Vec<String> },
     #[error(
-        "every row measures a fixed point (column nest) and none the arm; add rows of the arm with an empty cell"
+        "every row measures a fixed point (column nest) and none the arm; add rows of the arm \
+         with an empty cell"
     )]
     NestsAlone,
     #[error("the row has no target position; contacts, distances and tilts cannot be commanded")]
@@ -222,7 +232,8 @@ pub enum InputErrorKind {
     #[error("no order; write at least one, as in [1]")]
     NoOrders,
     #[error(
-        "{order} is not a valid order; write a number of cycles per revolution above 0 and up to {highest}"
+        "{order} is not a valid order; write a number of cycles per revolution above 0 and up \
+         to {highest}"
     )]
     NotAnOrder { order: f64, highest: f64 },
     #[error("order {order} is listed twice; keep one")]
@@ -232,7 +243,8 @@ pub enum InputErrorKind {
     #[error("order {order} of this joint is declared already on line {line}")]
     RepeatedHarmonic { order: u32, line: usize },
     #[error(
-        "joint {joint} is fixed and takes no command; leave the effect out, or free the joint's geometric parameters"
+        "joint {joint} is fixed and takes no command; leave the effect out, or free the joint's \
+         geometric parameters"
     )]
     NoCommand { joint: usize },
     #[error("joint {joint} has no link that can bend, because its a is 0")]
@@ -242,7 +254,8 @@ pub enum InputErrorKind {
     #[error("joint {joint} does not rotate, because it is not revolute")]
     NotRevolute { joint: usize },
     #[error(
-        "the end of a spring lies on the joint's axis, where its force has no moment; move the point"
+        "the end of a spring lies on the joint's axis, where its force has no moment; move the \
+         point"
     )]
     OnTheAxis,
     #[error(
@@ -255,13 +268,15 @@ pub enum InputErrorKind {
     #[error("no beam has a hoist; add a section [joint.beam.hoist]")]
     NoHoist,
     #[error(
-        "the loads already act on the deflected arm; with this effect write equilibrium = \"undeflected\" in [statics]"
+        "the loads already act on the deflected arm; with this effect write equilibrium = \
+         \"undeflected\" in [statics]"
     )]
     InEquilibriumAlready,
     #[error("{name} acts at the place of another parameter; choose another place")]
     SiteOccupied { name: String },
     #[error(
-        "{name} depends on a quantity of the pose, which is allowed only at the coordinate of a moving joint and for a shift of the measurement"
+        "{name} depends on a quantity of the pose, which is allowed only at the coordinate of a \
+         moving joint and for a shift of the measurement"
     )]
     RegressorNotAllowed { name: String },
     #[error("{name} acts at a place that this arm does not have")]
@@ -286,7 +301,8 @@ pub enum InputErrorKind {
     )]
     MatchesNothing { pattern: String, known: Vec<String> },
     #[error(
-        "the pattern matches no parameter of this arm; parameters of {effects} exist if an [[effect]] declares it, \
+        "the pattern matches no parameter of this arm; parameters of {effects} exist if an \
+         [[effect]] declares it, \
          as in {write}"
     )]
     EffectNotDeclared { effects: String, write: String },
@@ -299,7 +315,8 @@ pub enum InputErrorKind {
     #[error("a constraint may contain only angles, lengths, stiffnesses and rigidities")]
     NotConstrainable,
     #[error(
-        "no terms; write the parameters and their coefficients, as in {{ \"A.EI\" = 1.0, \"B.EI\" = -1.0 }}"
+        "no terms; write the parameters and their coefficients, as in {{ \"A.EI\" = 1.0, \
+         \"B.EI\" = -1.0 }}"
     )]
     NoTerms,
     #[error("a coefficient of 0 has no effect; leave the parameter out")]
@@ -313,7 +330,8 @@ pub enum InputErrorKind {
     )]
     UnknownParameter { name: String, known: Vec<String> },
     #[error(
-        "cannot be added to {other}; write separate constraints for angles, for lengths and for logarithms of stiffnesses"
+        "cannot be added to {other}; write separate constraints for angles, for lengths and for \
+         logarithms of stiffnesses"
     )]
     MixedKinds { other: String },
     #[error("{parameter} takes {write}")]
@@ -344,30 +362,13 @@ pub enum InputErrorKind {
     #[error("needs temperatures; write {write}")]
     NeedsTemperature { write: &'static str },
     #[error(
-        "the problem holds out session \"{session}\", and a simulation has no sessions; use column or fraction"
+        "the problem holds out session \"{session}\", and a simulation has no sessions; use \
+         column or fraction"
     )]
     NoSessions { session: String },
 
-    // Errors of studies.
-    #[error("is already in the list; remove it")]
-    Repeated,
-    #[error("the list is empty; write at least one value")]
-    EmptyList,
-    #[error("a study of misprints runs in one piece; leave out --shard and merge")]
-    NotOfFits,
-    #[error("the study sets the number of poses; leave this out")]
-    PosesOfStudy,
-    #[error(
-        "the model cannot simulate effects that the problem does not declare; write data = \"rig\""
-    )]
-    NeedsRig,
-    #[error(
-        "{solver} does not keep the bounds and constraints of the problem; write bounded, interior-point or auto"
-    )]
-    SolverIgnoresBounds { solver: &'static str },
-    #[error("no parameter that {strategy} varies is free in the problem; leave the strategy out")]
-    NothingToVary { strategy: &'static str },
-
+    #[error(transparent)]
+    Study(#[from] StudyErrorKind),
     #[error(transparent)]
     Urdf(#[from] UrdfErrorKind),
 
@@ -375,7 +376,8 @@ pub enum InputErrorKind {
     #[error("give one of column, fraction (with seed) or session")]
     NotOneHeldOut,
     #[error(
-        "no held-out rows are declared; write held_out = {{ fraction = 0.3, seed = 1 }} in [data], or add a column split"
+        "no held-out rows are declared; write held_out = {{ fraction = 0.3, seed = 1 }} in \
+         [data], or add a column split"
     )]
     NoHeldOut,
     #[error("no rows are left to fit: {cause}")]
@@ -383,7 +385,8 @@ pub enum InputErrorKind {
     #[error("no rows are held out: {cause}")]
     NoHeldOutRows { cause: NoRows },
     #[error(
-        "no held-out row measures a position, and pose accuracy is of positions: hold out rows with x_mm, y_mm and z_mm, measured by \
+        "no held-out row measures a position, and pose accuracy is of positions: hold out rows \
+         with x_mm, y_mm and z_mm, measured by \
          whatever is to judge the arm; identify tells the errors of contacts, distances and tilts"
     )]
     NoPositionsHeldOut,
@@ -409,7 +412,8 @@ pub enum InputErrorKind {
     )]
     RepeatedPose { name: String, line: usize },
     #[error(
-        "no row of the measurements has a partner in the joint table; check the column of the join (pose or time) and \
+        "no row of the measurements has a partner in the joint table; check the column of the \
+         join (pose or time) and \
          tolerance_s"
     )]
     NothingJoined,
@@ -425,7 +429,10 @@ pub enum InputErrorKind {
     DecimalDelimiter,
     #[error("{} has no such column{}; {}", file.display(), meant(name, known), in_quotes(known))]
     NoSuchColumn { file: PathBuf, name: String, known: Vec<String> },
-    #[error("{} has several columns with this name; select one by its place, as in \"#{place}\"", file.display())]
+    #[error(
+        "{} has several columns with this name; select one by its place, as in \"#{place}\"",
+        file.display()
+    )]
     AmbiguousColumn { file: PathBuf, place: usize },
     #[error("the table has another column {name} and lacks {write}; is {write} meant here?")]
     MappedNameTaken { name: String, write: String },
@@ -436,25 +443,30 @@ pub enum InputErrorKind {
     )]
     AllMissing,
     #[error(
-        "qx, qy, qz, qw are not a rotation, because their squares do not add up to 1; check the columns"
+        "qx, qy, qz, qw are not a rotation, because their squares do not add up to 1; check the \
+         columns"
     )]
     NotAQuaternion,
     #[error(
-        "orientations are to be fitted, and the measurements contain none; add rx_deg, ry_deg, rz_deg or qx, qy, qz, qw"
+        "orientations are to be fitted, and the measurements contain none; add rx_deg, ry_deg, \
+         rz_deg or qx, qy, qz, qw"
     )]
     NoOrientation,
     #[error(
-        "fitting orientations needs the standard deviation of positions; write position_sigma_mm too, or a column sigma_mm"
+        "fitting orientations needs the standard deviation of positions; write \
+         position_sigma_mm too, or a column sigma_mm"
     )]
     NoPositionSigma,
     #[error("\"{value}\" is neither a number nor a time such as 2024-05-31T14:03:20.5")]
     NotATime { value: String },
     #[error(
-        "\"{value}\" is not a number; if numbers have a decimal comma, write decimal = \",\" in [data.format]"
+        "\"{value}\" is not a number; if numbers have a decimal comma, write decimal = \",\" in \
+         [data.format]"
     )]
     DecimalComma { value: String },
     #[error(
-        "\"{value}\" has a decimal point, and [data.format] says decimal = \",\"; write the number with a comma and without \
+        "\"{value}\" has a decimal point, and [data.format] says decimal = \",\"; write the \
+         number with a comma and without \
          thousands separators, or correct decimal"
     )]
     DecimalPoint { value: String },

@@ -6,6 +6,7 @@ mod near;
 mod no_rows;
 mod phrases;
 mod plain;
+mod study;
 mod urdf;
 mod warning;
 
@@ -19,6 +20,7 @@ pub use kind::InputErrorKind;
 pub(crate) use near::{nearest, one_typo};
 pub use no_rows::NoRows;
 pub use plain::{escape_hidden, is_hidden, mask_hidden, one_line};
+pub use study::StudyErrorKind;
 pub use urdf::UrdfErrorKind;
 pub use warning::WarningKind;
 
@@ -86,8 +88,8 @@ impl Location {
     }
 
     /// Returns an error at this place.
-    pub fn error(self, kind: InputErrorKind) -> InputError {
-        InputError { location: Box::new(self), kind: Box::new(kind) }
+    pub fn error(self, kind: impl Into<InputErrorKind>) -> InputError {
+        InputError { location: Box::new(self), kind: Box::new(kind.into()) }
     }
 }
 
@@ -112,7 +114,7 @@ impl fmt::Display for Location {
 pub struct InputError {
     /// Place of the error.
     pub location: Box<Location>,
-    /// Cause and remedy.
+    /// Kind of the message, with cause and remedy.
     pub kind: Box<InputErrorKind>,
 }
 
@@ -133,7 +135,7 @@ impl std::error::Error for InputError {
 pub struct Warning {
     /// Place of the warning.
     pub location: Location,
-    /// Cause and remedy.
+    /// Kind of the message, with cause and remedy.
     pub kind: WarningKind,
 }
 

@@ -12,7 +12,8 @@ pub enum NoRows {
     #[error("every row is of session \"{session}\"")]
     Session { session: String },
     #[error(
-        "the {rows} rows have {configurations} joint configurations, too few for fraction {fraction}"
+        "the {rows} rows have {configurations} joint configurations, too few for fraction \
+         {fraction}"
     )]
     Fraction { rows: usize, configurations: usize, fraction: String },
 }

@@ -14,7 +14,8 @@ pub enum UrdfErrorKind {
     #[error("not valid XML: {message}")]
     Syntax { message: String },
     #[error(
-        "contains a document type declaration, which is refused because it may expand without limit; remove it"
+        "contains a document type declaration, which is refused because it may expand without \
+         limit; remove it"
     )]
     DocumentType,
     #[error("not a URDF: its outermost element is <{found}>, not <robot>")]
@@ -36,7 +37,8 @@ pub enum UrdfErrorKind {
     #[error("the axis has no direction")]
     NoAxis,
     #[error(
-        "a joint of type \"{kind}\" is not supported; supported types: revolute, continuous, prismatic, fixed"
+        "a joint of type \"{kind}\" is not supported; supported types: revolute, continuous, \
+         prismatic, fixed"
     )]
     Kind { kind: String },
     #[error("no link is called \"{name}\"{}; the links are {}", meant(name, known), listed(known))]
@@ -57,22 +59,33 @@ pub enum UrdfErrorKind {
     NoLinks,
     #[error("several links have no parent: {}; choose one with --base", roots.join(", "))]
     Roots { roots: Vec<String> },
-    #[error("several links end the tree below \"{base}\": {}; choose one with --tip", leaves.join(", "))]
+    #[error(
+        "several links end the tree below \"{base}\": {}; choose one with --tip",
+        leaves.join(", ")
+    )]
     Leaves { base: String, leaves: Vec<String> },
-    #[error("link \"{tip}\" is not below link \"{base}\"; {}", if above.is_empty() { "it is the root".to_owned() } else { format!("above it are {}", above.join(", ")) })]
+    #[error(
+        "link \"{tip}\" is not below link \"{base}\"; {}",
+        if above.is_empty() { "it is the root".to_owned() } else { format!("above it are {}", above.join(", ")) }
+    )]
     NotBelow { base: String, tip: String, above: Vec<String> },
     #[error("no joint moves between \"{base}\" and \"{tip}\"")]
     NothingMoves { base: String, tip: String },
     #[error("the chain has {found} joints; at most {most}")]
     TooManyJoints { found: usize, most: usize },
-    #[error("the URDF moves joints {} between \"{base}\" and \"{tip}\", the problem {}", found.join(", "), expected.join(", "))]
+    #[error(
+        "the URDF moves joints {} between \"{base}\" and \"{tip}\", the problem {}",
+        found.join(", "), expected.join(", ")
+    )]
     OtherJoints { base: String, tip: String, found: Vec<String>, expected: Vec<String> },
     #[error(
-        "the nominal arm of the problem is not that of the URDF at joint \"{joint}\": {off}; was the problem made from this file?"
+        "the nominal arm of the problem is not that of the URDF at joint \"{joint}\": {off}; \
+         was the problem made from this file?"
     )]
     OtherArm { joint: String, off: String },
     #[error(
-        "no joint after \"{joint}\" has an origin that can hold the identified transform after it ({off}); choose a --tip behind a fixed joint"
+        "no joint after \"{joint}\" has an origin that can hold the identified transform after \
+         it ({off}); choose a --tip behind a fixed joint"
     )]
     NoRoom { joint: String, off: String },
     #[error("not an arm with the joint layout of Universal Robots: {why}")]

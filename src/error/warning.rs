@@ -14,18 +14,25 @@ use super::phrases::plural;
 pub enum WarningKind {
     #[error("unknown column{}; ignored{}", question(meant.as_deref()), covariate(meant.as_deref()))]
     ColumnIgnored { meant: Option<String> },
-    #[error("no column of {} has a name of [data.columns]; the table is read by flexcal's names", file.display())]
+    #[error(
+        "no column of {} has a name of [data.columns]; the table is read by flexcal's names",
+        file.display()
+    )]
     MapUnused { file: PathBuf },
     #[error("columns that [data.columns] does not name are ignored: {}", names.join(", "))]
     Unmapped { names: Vec<String> },
-    #[error("{rows} row{} without a partner in the other table, the first here{}; left out", plural(*rows), listed(*rows, others))]
+    #[error(
+        "{rows} row{} without a partner in the other table, the first here{}; left out",
+        plural(*rows), listed(*rows, others)
+    )]
     WithoutPartner { rows: usize, others: Vec<String> },
     #[error("{rows} row{} without a measurement, the first here; left out", plural(*rows))]
     RowsMissing { rows: usize },
     #[error("the search for effects uses positions only, not orientations")]
     OrientationLeftOut,
     #[error(
-        "rows are marked in the column split, but held_out selects others; held_out = {{ column = \"split\" }} follows the marks"
+        "rows are marked in the column split, but held_out selects others; held_out = {{ column \
+         = \"split\" }} follows the marks"
     )]
     SplitUnused,
     #[error("joint {joint} has no coordinate q; ignored")]
@@ -33,28 +40,40 @@ pub enum WarningKind {
     #[error("unknown column; ignored (write {write})")]
     UnitIgnored { write: String },
     #[error(
-        "{value:?} is not a date and time such as 2024-05-31T14:03:20.5; ignored, and rows count in their order instead (write {write} for \
+        "{value:?} is not a date and time such as 2024-05-31T14:03:20.5; ignored, and rows \
+         count in their order instead (write {write} for \
          seconds)"
     )]
     NotADate { value: String, write: String },
-    #[error("equal to {first} in all digits{}; measurements do not repeat so exactly, and a copied row counts twice", repeated_rows(*rows, others))]
+    #[error(
+        "equal to {first} in all digits{}; measurements do not repeat so exactly, and a copied \
+         row counts twice",
+        repeated_rows(*rows, others)
+    )]
     RowsRepeated { rows: usize, first: String, others: Vec<String> },
-    #[error("the time is {back} s earlier than in the previous row{}; rows are used in the order of their times", additional_rows(*rows))]
+    #[error(
+        "the time is {back} s earlier than in the previous row{}; rows are used in the order of \
+         their times",
+        additional_rows(*rows)
+    )]
     TimeGoesBack { rows: usize, back: String },
     #[error(
         "commanded beyond its limits ({limits}) in {rows} row{}, furthest here: {worst}; used all the same", plural(*rows)
     )]
     BeyondLimits { rows: usize, worst: String, limits: String },
     #[error(
-        "{value} looks like radians of {degrees}°, and the key means degrees; write {radians} = {value}, or {degrees} here"
+        "{value} looks like radians of {degrees}°, and the key means degrees; write {radians} = \
+         {value}, or {degrees} here"
     )]
     LooksLikeRadians { value: String, degrees: String, radians: String },
     #[error(
-        "{value} m is long for a part of an arm; if these are millimetres, write {millimetres} = {value}"
+        "{value} m is long for a part of an arm; if these are millimetres, write {millimetres} \
+         = {value}"
     )]
     LooksLikeMillimetres { value: String, millimetres: String },
     #[error(
-        "the table has the zeros of standard DH (α of the first row is set, α and a of the last are 0) and is read as \
+        "the table has the zeros of standard DH (α of the first row is set, α and a of the last \
+         are 0) and is read as \
          modified DH; write dh = \"standard\" or dh = \"modified\" before the first [[joint]]"
     )]
     LooksLikeStandardForm,
@@ -63,7 +82,8 @@ pub enum WarningKind {
     #[error("all temperatures are {least} °C or more; if these are kelvins, subtract 273.15")]
     Kelvins { least: String },
     #[error(
-        "{distance} m from the last frame, while all links together are {links} m long; if these are millimetres, write target_mm"
+        "{distance} m from the last frame, while all links together are {links} m long; if \
+         these are millimetres, write target_mm"
     )]
     FarTarget { distance: String, links: String },
 }

@@ -38,6 +38,14 @@ pub fn open(path: &Path) -> io::Result<File> {
     }
 }
 
+/// Reads a text file of any size; see [`open`] for the files that are refused.
+///
+/// # Errors
+/// The file cannot be opened or read, or is not UTF-8.
+pub fn read_text(path: &Path) -> io::Result<String> {
+    io::read_to_string(open(path)?)
+}
+
 /// Returns true if two paths lead to the same existing file, also through links.
 pub fn same_file(first: &Path, second: &Path) -> bool {
     #[cfg(unix)]

@@ -26,9 +26,9 @@ pub enum DatasetError {
     Length {
         /// Name of the column.
         column: &'static str,
-        /// Number of rows.
+        /// Number of rows of the configurations.
         expected: usize,
-        /// Number of values.
+        /// Number of values in the column.
         found: usize,
     },
     /// A value is infinite or not a number.
@@ -54,7 +54,7 @@ pub enum DatasetError {
     NoSuchRow {
         /// Row, counted from 0.
         row: usize,
-        /// Number of rows.
+        /// Number of rows of the configurations.
         rows: usize,
     },
 }

@@ -12,7 +12,7 @@ use crate::quantity::Unit;
 pub(super) enum Meaning {
     Read(Role, fn(f64) -> f64),
     Ignored(WarningKind),
-    /// No meaning.
+    /// The name has no meaning here.
     Unknown,
 }
 

@@ -156,7 +156,7 @@ pub struct CommandColumn {
 /// Words of rows, stored as indices into the distinct words in order of appearance.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Labels {
-    /// Distinct words.
+    /// Distinct words in order of appearance.
     pub names: Vec<String>,
     /// Index of the word of each row.
     pub of_row: Vec<usize>,

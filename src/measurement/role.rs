@@ -24,7 +24,7 @@ pub(super) enum Role {
     Pose,
     /// Fixed point measured by a row without the arm.
     Nest,
-    /// Declared covariate.
+    /// Covariate declared in `[data.covariates]`.
     Covariate(usize),
     /// Point that the target touches.
     Point,

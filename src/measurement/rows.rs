@@ -15,7 +15,7 @@ use super::{CommandColumn, Labels, Measurements, NestReading, RowOrder};
 use crate::error::{InputError, InputErrorKind};
 use crate::problem::{JointSource, Problem, RotationKind};
 
-/// Measurements under construction.
+/// Measurements to which rows are appended.
 pub(super) struct RowsBuilder {
     measurements: Measurements,
     session: LabelsBuilder,

@@ -26,7 +26,7 @@ const WORKBOOK_SIGNATURE: &[u8] = b"PK\x03\x04";
 /// Text whose beginning has already been read.
 type TextFromStart = Chain<Cursor<Vec<u8>>, Box<dyn Read>>;
 
-/// Open CSV file.
+/// Open CSV file with its current row.
 pub(super) struct Table {
     pub file: PathBuf,
     /// Names in the header line without surrounding white space.

@@ -1,4 +1,4 @@
-//! Dates and times.
+//! Parsers of dates and times.
 
 /// Parses a date and time of ISO 8601 or day first (`31.05.2024 14:03:20`) and returns the seconds
 /// since 1970-01-01T00:00 UTC.

@@ -79,7 +79,7 @@ pub enum JointSource {
 impl JointSource {
     /// Words of the sources in the file, in the order of [`ALL`](Self::ALL).
     pub(super) const WORDS: &'static [&'static str] = &["commanded", "read"];
-    /// All sources.
+    /// All sources of configurations.
     pub(super) const ALL: [Self; 2] = [Self::Commanded, Self::Read];
 
     /// Returns the word used in the file.

@@ -69,12 +69,12 @@ pub enum ColumnSelector {
     File,
 }
 
-/// Separator between columns.
+/// Separator between the columns of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Delimiter {
-    /// One character.
+    /// Separates columns by one character.
     Byte(u8),
-    /// Any run of spaces and tabs.
+    /// Separates columns by any run of spaces and tabs.
     Spaces,
 }
 

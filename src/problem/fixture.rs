@@ -36,7 +36,7 @@ pub struct Fixture {
 pub struct KnownDistance {
     /// Indices of the two points in [`Problem::fixtures`](super::Problem::fixtures).
     pub between: [usize; 2],
-    /// Distance \[m\].
+    /// Known distance between the points \[m\].
     pub length: f64,
     /// Standard deviation of the distance \[m\].
     pub sigma: f64,

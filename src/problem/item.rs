@@ -91,7 +91,7 @@ impl<'a, 'i> Item<'a, 'i> {
     }
 
     /// Returns an error at this value.
-    pub fn error(&self, kind: InputErrorKind) -> InputError {
+    pub fn error(&self, kind: impl Into<InputErrorKind>) -> InputError {
         self.location().error(kind)
     }
 
@@ -194,7 +194,7 @@ impl<'a, 'i> Item<'a, 'i> {
         }
     }
 
-    /// Returns a boolean.
+    /// Returns a value `true` or `false`.
     pub fn boolean(&self) -> Result<bool, InputError> {
         self.value.as_bool().ok_or_else(|| self.wrong_type("true or false"))
     }

@@ -63,7 +63,7 @@ impl Joint {
 /// Rx(roll).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
-    /// Origin \[m\].
+    /// Origin in the parent's frame \[m\].
     pub xyz: Vector3<f64>,
     /// Roll, pitch and yaw \[rad\].
     pub rpy: Vector3<f64>,
@@ -99,10 +99,10 @@ pub struct Beam {
     pub hoist: Option<Hoist>,
 }
 
-/// Point mass.
+/// Point mass carried by a frame or beam.
 #[derive(Debug, Clone)]
 pub struct Body {
-    /// Display name.
+    /// Name of the mass for display.
     pub name: String,
     /// Mass \[kg\], not negative.
     pub mass: f64,

@@ -1,4 +1,4 @@
-//! TOML strings.
+//! Quoted strings of TOML.
 
 /// Returns a name in quotes with escaped quotes and backslashes; names contain no other character
 /// that needs an escape.

@@ -39,7 +39,7 @@ impl<'a, 'i> Section<'a, 'i> {
     }
 
     /// Returns an error about the whole section.
-    pub fn error(&self, kind: InputErrorKind) -> InputError {
+    pub fn error(&self, kind: impl Into<InputErrorKind>) -> InputError {
         self.location().error(kind)
     }
 

@@ -1,4 +1,4 @@
-//! Tree of joints.
+//! Parent relations of the joints of an arm.
 
 use super::Joint;
 use super::item::Item;

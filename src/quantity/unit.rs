@@ -105,7 +105,7 @@ enum Shown {
     Prefixed,
 }
 
-/// Degrees per radian.
+/// Number of degrees per radian.
 const DEGREES: f64 = 180.0 / PI;
 
 const fn si(name: &'static str) -> Suffix {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::{InputError, InputErrorKind};
+use crate::error::{InputError, InputErrorKind, StudyErrorKind};
 use crate::problem::Problem;
 use crate::problem::item::{Document, Item};
 
@@ -21,7 +21,7 @@ pub(super) fn problem_of(
     let document = Document::read(&file, InputErrorKind::ProblemMissing)?;
     let problem = Problem::parse(&document.text, &file)?;
     if !problem.fixtures.is_empty() {
-        return Err(item.error(InputErrorKind::StudyOfContacts));
+        return Err(item.error(StudyErrorKind::PositionsOnly));
     }
     Ok((problem, document.text.to_string(), file))
 }
@@ -29,11 +29,7 @@ pub(super) fn problem_of(
 /// Returns the path of a file that the study names, relative to its folder.
 pub(super) fn beside(item: &Item<'_, '_>, folder: &Path) -> Result<PathBuf, InputError> {
     let path = folder.join(item.text()?);
-    if path.exists() {
-        Ok(path)
-    } else {
-        Err(item.error(InputErrorKind::StudyFileMissing { path }))
-    }
+    if path.exists() { Ok(path) } else { Err(item.error(StudyErrorKind::FileMissing { path })) }
 }
 
 /// Reads a count, at least one and at most [`MAX_COUNT`].
@@ -53,9 +49,9 @@ pub(super) fn distinct<'a, 'i, T: PartialEq>(
     for item in &items {
         let value = read(item)?;
         if values.contains(&value) {
-            return Err(item.error(InputErrorKind::Repeated));
+            return Err(item.error(StudyErrorKind::Repeated));
         }
         values.push(value);
     }
-    if values.is_empty() { Err(item.error(InputErrorKind::EmptyList)) } else { Ok(values) }
+    if values.is_empty() { Err(item.error(StudyErrorKind::EmptyList)) } else { Ok(values) }
 }

@@ -6,7 +6,7 @@ use super::effects;
 use super::input::{beside, count, distinct, problem_of};
 use super::replica::MisprintStudy;
 use super::study::{Cell, Source, Study};
-use crate::error::{InputError, InputErrorKind, Location};
+use crate::error::{InputError, InputErrorKind, Location, StudyErrorKind};
 use crate::fit::{SolverChoice, Strategy};
 use crate::model::Model;
 use crate::problem::item::{Document, Item};
@@ -36,7 +36,7 @@ impl Request {
     /// files.
     pub fn read(path: &Path) -> Result<Self, InputError> {
         let file = if path.is_dir() { path.join("STUDY.toml") } else { path.to_owned() };
-        let document = Document::read(&file, InputErrorKind::StudyMissing)?;
+        let document = Document::read(&file, StudyErrorKind::Missing.into())?;
         let table = document.table()?;
         let mut root = Section::new(&document, String::new(), 0..0, table.get_ref());
         if root.word("kind", &["fits", "misprints"], &[false, true])?.unwrap_or(false) {
@@ -57,7 +57,7 @@ impl Study {
             Request::Fits(study) => Ok(*study),
             Request::Misprints(study) => {
                 let file = study.files.first().map_or(path, PathBuf::as_path);
-                Err(Location::file(file).error(InputErrorKind::NotOfFits))
+                Err(Location::file(file).error(StudyErrorKind::StudyNotDivisible))
             }
         }
     }
@@ -95,8 +95,8 @@ fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
     effects::check(&problem, &truth, source, || {
         let place = root.peek("truth").or_else(|| root.peek("effect"));
         place.map_or_else(
-            || root.error(InputErrorKind::NeedsRig),
-            |item| item.error(InputErrorKind::NeedsRig),
+            || root.error(StudyErrorKind::NeedsRig),
+            |item| item.error(StudyErrorKind::NeedsRig),
         )
     })?;
     let mut cells = Vec::new();
@@ -151,7 +151,7 @@ fn truth(
             if let Some(item) =
                 ["identification", "held_out"].iter().find_map(|key| poses.peek(key))
             {
-                return Err(item.error(InputErrorKind::PosesOfStudy));
+                return Err(item.error(StudyErrorKind::PosesOfStudy));
             }
         }
         let mut truth = Truth::of_sections(root, problem)?;
@@ -199,14 +199,14 @@ fn strategy(item: &Item<'_, '_>, model: &Model) -> Result<Strategy, InputError> 
     if strategy == Strategy::Joint || strategy.stages().iter().any(varies) {
         Ok(strategy)
     } else {
-        Err(item.error(InputErrorKind::NothingToVary { strategy: strategy.as_str() }))
+        Err(item.error(StudyErrorKind::NothingToVary { strategy: strategy.as_str() }))
     }
 }
 
 fn solver(item: &Item<'_, '_>, model: &Model) -> Result<SolverChoice, InputError> {
     let solver = word(item, &SolverChoice::NAMES, &SolverChoice::CHOICES)?.decide(model);
     if !solver.keeps(model) {
-        return Err(item.error(InputErrorKind::SolverIgnoresBounds { solver: solver.as_str() }));
+        return Err(item.error(StudyErrorKind::SolverIgnoresBounds { solver: solver.as_str() }));
     }
     Ok(solver)
 }

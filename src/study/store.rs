@@ -1,6 +1,5 @@
 //! Finished parts on disk, one small file each, written atomically.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -9,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::key::key;
 use super::study::{Cell, Part, Study};
 use super::tally::Tally;
-use crate::files::StagedFile;
+use crate::files::{StagedFile, read_text};
 
 /// Number of digits of the key that form the file name of a part.
 const NAME_DIGITS: usize = 16;
@@ -106,7 +105,7 @@ impl Store {
     ) -> Result<Option<FinishedPart>, StoreError> {
         let key = key(study, part, study.cell(part)?);
         let path = self.path(&key);
-        let text = match fs::read_to_string(&path) {
+        let text = match read_text(&path) {
             Ok(text) => text,
             Err(source) if source.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(source) => return Err(StoreError::Unreadable { path, source }),

@@ -114,7 +114,7 @@ impl<'a> Chain<'a> {
                 continue;
             }
             if let Some((location, kind)) = &joint.broken_mimic {
-                return Err(location.clone().error(kind.clone().into()));
+                return Err(location.clone().error(kind.clone()));
             }
             let axis = axis_frame(&joint.axis);
             let (leader, addend) = self.leader(index)?;

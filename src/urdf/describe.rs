@@ -127,7 +127,8 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
         });
         if let Some((lower, upper)) = joint.reversed_limits {
             notes.push(format!(
-                "{}: the limits {lower} to {upper} exclude each other (the lower one is above the upper one) and are taken as none",
+                "{}: the limits {lower} to {upper} exclude each other (the lower one is above \
+                 the upper one) and are taken as none",
                 joint.name
             ));
         }
@@ -285,7 +286,8 @@ fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
         }
     }
     text.push_str(
-        "\n[tool]\ntarget_m = [0, 0, 0]                             # fill in: the measured point, in the frame of the tip\n",
+        "\n[tool]\ntarget_m = [0, 0, 0]                             # fill in: the measured \
+         point, in the frame of the tip\n",
     );
     text
 }

@@ -34,7 +34,8 @@ pub(super) fn of_chain(chain: &Chain) -> Vec<String> {
 fn degrees(joint: &Joint) -> Option<String> {
     let angle = joint.origin.written.iter().find(|angle| angle.abs() > MAX_PLAUSIBLE_ANGLE)?;
     Some(format!(
-        "{}: rpy holds {angle} rad, which is more than one turn; if the URDF has degrees there, convert them to radians \
+        "{}: rpy holds {angle} rad, which is more than one turn; if the URDF has degrees there, \
+         convert them to radians \
          and run init again",
         joint.name
     ))
@@ -44,7 +45,8 @@ fn degrees(joint: &Joint) -> Option<String> {
 fn millimetres(joint: &Joint) -> Option<String> {
     let length = joint.origin.xyz.iter().find(|length| length.abs() > MAX_PLAUSIBLE_LENGTH)?;
     Some(format!(
-        "{}: xyz holds {length} m; if the URDF has millimetres there, convert them to metres and run init again",
+        "{}: xyz holds {length} m; if the URDF has millimetres there, convert them to metres \
+         and run init again",
         joint.name
     ))
 }

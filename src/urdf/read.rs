@@ -108,8 +108,8 @@ impl Robot {
         let xml = Xml::parse(&text).map_err(|error| {
             let location = Location::file(&source.file).at_line(error.pos().row as usize);
             location.error(match error {
-                roxmltree::Error::DtdDetected => UrdfErrorKind::DocumentType.into(),
-                _ => UrdfErrorKind::Syntax { message: error.to_string() }.into(),
+                roxmltree::Error::DtdDetected => UrdfErrorKind::DocumentType,
+                _ => UrdfErrorKind::Syntax { message: error.to_string() },
             })
         })?;
         let robot = Reader { source: &source }.robot(xml.root_element())?;
@@ -117,18 +117,16 @@ impl Robot {
     }
 
     /// Returns an error at a joint.
-    pub(super) fn error_at(&self, joint: usize, mistake: UrdfErrorKind) -> InputError {
+    pub(super) fn error_at(&self, joint: usize, kind: UrdfErrorKind) -> InputError {
         match self.joints.get(joint) {
-            Some(joint) => {
-                self.source.locate(joint.span.start..joint.span.start + 1).error(mistake.into())
-            }
-            None => self.error(mistake),
+            Some(joint) => self.source.locate(joint.span.start..joint.span.start + 1).error(kind),
+            None => self.error(kind),
         }
     }
 
     /// Returns an error about the whole file.
-    pub(super) fn error(&self, mistake: UrdfErrorKind) -> InputError {
-        Location::file(&self.source.file).error(mistake.into())
+    pub(super) fn error(&self, kind: UrdfErrorKind) -> InputError {
+        Location::file(&self.source.file).error(kind)
     }
 
     /// Returns the error for a URDF whose numbers make an invalid problem.
@@ -157,19 +155,19 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn fail<T>(&self, node: Node<'_, '_>, mistake: UrdfErrorKind) -> Result<T, InputError> {
-        self.fail_at(node.range(), mistake)
+    fn fail<T>(&self, node: Node<'_, '_>, kind: UrdfErrorKind) -> Result<T, InputError> {
+        self.fail_at(node.range(), kind)
     }
 
     /// Returns an error at the first line of a part of the text.
-    fn fail_at<T>(&self, span: Range<usize>, mistake: UrdfErrorKind) -> Result<T, InputError> {
+    fn fail_at<T>(&self, span: Range<usize>, kind: UrdfErrorKind) -> Result<T, InputError> {
         let line = self
             .source
             .text
             .get(span.clone())
             .and_then(|part| part.lines().next())
             .unwrap_or_default();
-        Err(self.source.locate(span.start..span.start + line.len()).error(mistake.into()))
+        Err(self.source.locate(span.start..span.start + line.len()).error(kind))
     }
 
     fn robot(&self, root: Node<'_, '_>) -> Result<Robot, InputError> {

@@ -11,7 +11,7 @@ pub(super) struct Weight {
     /// Stage after which the link follows.
     pub stage: usize,
     pub name: String,
-    /// Mass \[kg\].
+    /// Mass of the link \[kg\].
     pub mass: f64,
     /// Centre of mass with all joints at zero, frame of the chain's base \[m\].
     pub at: Vector3<f64>,

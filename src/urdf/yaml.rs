@@ -25,7 +25,7 @@ pub enum YamlFormat {
 pub struct JointOrigin {
     /// Name of the joint, or of the link after it.
     pub name: String,
-    /// Origin \[m\].
+    /// Origin in the previous frame \[m\].
     pub xyz: Vector3<f64>,
     /// Roll, pitch and yaw \[rad\].
     pub rpy: Vector3<f64>,
@@ -55,7 +55,7 @@ pub fn joint_origins(
         let nominal = Steps::new(&Arm::nominal(problem));
         let found = universal_robots::origins(&nominal, &steps);
         let wrong_form = |why: String| {
-            Location::file(&problem.data.location.file).error(UrdfErrorKind::NotUr { why }.into())
+            Location::file(&problem.data.location.file).error(UrdfErrorKind::NotUr { why })
         };
         let frames = found.map_err(wrong_form)?;
         return Ok(universal_robots::LINKS
