@@ -155,6 +155,14 @@ impl Identification {
         self.first_error().is_none()
     }
 
+    /// Returns true if the fit describes the measured arm well enough to look for effects: no finding
+    /// is an error, unless it is about a residual beyond the declared noise.
+    pub fn describes_arm(&self) -> bool {
+        let is_noise = |finding: &Finding| finding.code == FindingCode::NoiseBeyondDeclared;
+        let mut findings = self.findings.iter();
+        findings.all(|finding| finding.severity() != Severity::Error || is_noise(finding))
+    }
+
     /// Returns the first error among the findings: the reason for which the fit is not to be
     /// trusted.
     pub fn first_error(&self) -> Option<&Finding> {

@@ -110,7 +110,7 @@ pub(super) fn without_law(
     let first = all.iter().position(|(hypothesis, _)| {
         !matches!(hypothesis.kind, HypothesisKind::PerPose | HypothesisKind::Limit(_))
     });
-    if let Some(first) = first.filter(|_| fitted.found.is_trusted()) {
+    if let Some(first) = first.filter(|_| fitted.found.describes_arm()) {
         let hypothesis = all[first].0.clone();
         all[first].1.correction = correction(fitted, data, best, &hypothesis);
     }

@@ -143,17 +143,17 @@ pub fn close_by(
     };
     // What was missing at first may have driven a parameter to where no step leads back from: such
     // a fit begins anew.
-    let anew = if fitted.found.is_trusted() {
+    let anew = if fitted.found.describes_arm() {
         None
     } else {
         Some(Fitted::new(fitted.problem.clone(), &data, &unhurried)?)
     };
-    let anew = anew.filter(|anew| anew.found.is_trusted());
+    let anew = anew.filter(|anew| anew.found.describes_arm());
     let evidence = evidence.filter(|_| anew.is_none());
     let fitted = anew.unwrap_or(fitted);
     // Beside a fit that is not to be trusted nothing is found: its residual may be that of a
     // mistake in the data.
-    let trusted = fitted.found.is_trusted();
+    let trusted = fitted.found.describes_arm();
     let (fitted, harmonic_prior, evidence) =
         if trusted { (fitted, harmonic_prior, evidence) } else { (declared, None, None) };
     let findings = check_fit(&fitted, &data);
