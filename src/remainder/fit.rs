@@ -37,8 +37,9 @@ const HYPER_ROWS: [usize; 2] = [150, 400];
 const MAX_CENTRES: usize = 500;
 /// Most rows × centres²: the time grows with this product.
 const MAX_CENTRE_WORK: usize = 500_000_000;
-/// Lengths ℓ from which hyperparameters are searched: from 1 alone short ones are missed.
-const STARTS: [f64; 2] = [1.0, 0.15];
+/// Lengths ℓᵤ and ℓᵥ from which hyperparameters are searched: each start reaches another optimum on
+/// some of the arms measured.
+const STARTS: [[f64; 2]; 3] = [[1.0, 1.0], [0.15, 0.15], [0.1, 3.0]];
 /// Most steps of the search from each start, and of the refinement.
 const MAX_STEPS: [usize; 2] = [60, 20];
 /// Gain of the left-out error over its standard error above which a remainder is kept.
@@ -292,8 +293,16 @@ impl Setting {
         Hyperparameters::without_remainder(within.sqrt(), (whole - within).sqrt())
     }
 
-    /// Hyperparameters of largest marginal likelihood: searched on few of the rows from both
-    /// starts, refined on more of them.
+    /// Mean error of rows predicted without their configuration [m].
+    fn left_out_error(&self, rows: &Rows, hyper: &Hyperparameters) -> Option<f64> {
+        let centres: Vec<usize> = (0..rows.len()).collect();
+        let training = Training::of((rows, &self.layout.inputs), &self.prior, hyper, &centres)?;
+        let left_out = training.without_each_configuration();
+        Some(left_out.iter().map(|own| own.error.norm()).sum::<f64>() / rows.len() as f64)
+    }
+
+    /// Hyperparameters of a local maximum of the marginal likelihood: searched on few of the rows
+    /// from every start, taken where rows left out are predicted best, refined on more rows.
     fn hyperparameters(&self) -> Option<Hyperparameters> {
         let [few, more] = HYPER_ROWS.map(|count| self.rows.select(&self.some_rows(count, 0)));
         let function = |rows| {
@@ -302,11 +311,14 @@ impl Setting {
         };
         let searched = function(&few);
         let bounds = searched.bounds();
-        let minima = STARTS.iter().filter_map(|&length| {
+        let minima = STARTS.iter().filter_map(|&lengths| {
             let value = |x: &DVector<f64>| searched.value_and_gradient(x);
-            minimise(value, searched.start(length), &bounds, MAX_STEPS[0])
+            let minimum = minimise(value, searched.start(lengths), &bounds, MAX_STEPS[0])?;
+            // Optima of nearly the same likelihood predict differently.
+            let error = self.left_out_error(&few, &searched.hyperparameters(&minimum.at))?;
+            Some((minimum, error))
         });
-        let mut best = minima.min_by(|a, b| a.value.total_cmp(&b.value))?;
+        let (mut best, _) = minima.min_by(|a, b| a.1.total_cmp(&b.1))?;
         if few.len() < more.len() {
             let refined = function(&more);
             let value = |x: &DVector<f64>| refined.value_and_gradient(x);

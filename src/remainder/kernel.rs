@@ -77,6 +77,7 @@ impl<'a> SiteCovariance<'a> {
     #[inline]
     pub fn write(&self, first: &[f64], second: &[f64], out: &mut [f64]) {
         let mut sum = 0.0;
+        out.fill(0.0);
         let [single, joint] = self.inverse_squares;
         let squares = first.iter().zip(second).zip(&self.inputs.angles);
         for (input, ((first, second), &is_angle)) in squares.enumerate() {

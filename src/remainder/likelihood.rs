@@ -57,13 +57,13 @@ impl<'a> MarginalLikelihood<'a> {
         kernel + 1 + usize::from(self.shares_noise)
     }
 
-    /// Logarithms of hyperparameters to start from, with both lengths at `length`.
-    pub fn start(&self, length: f64) -> DVector<f64> {
+    /// Logarithms of hyperparameters to start from, with these lengths ℓᵤ and ℓᵥ.
+    pub fn start(&self, lengths: [f64; 2]) -> DVector<f64> {
         let amplitudes = 2 * self.sites;
         let amplitude = self.size - 0.5 * (amplitudes.max(1) as f64).ln();
         DVector::from_fn(self.len(), |k, _| match k {
             k if k < amplitudes => amplitude,
-            k if self.sites > 0 && k < amplitudes + 2 => length.ln(),
+            k if self.sites > 0 && k < amplitudes + 2 => lengths[k - amplitudes].ln(),
             k if k + 1 == self.len() && self.shares_noise => self.size + 0.3_f64.ln(),
             _ => self.size + 0.7_f64.ln(),
         })

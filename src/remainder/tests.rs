@@ -80,7 +80,7 @@ fn the_covariance_is_positive_and_its_diagonal_the_variance() {
 fn the_gradient_of_the_likelihood_is_its_slope() {
     let (rows, inputs, prior) = (rows(), inputs(), prior());
     let likelihood = MarginalLikelihood::new((&rows, &inputs), &prior, (2, true), 1e-4);
-    let at = likelihood.start(0.4).map_with_location(|k, _, value| value + 0.2 * noise(k));
+    let at = likelihood.start([0.4, 0.4]).map_with_location(|k, _, value| value + 0.2 * noise(k));
     let (value, gradient) = likelihood.value_and_gradient(&at).unwrap();
     assert!(value.is_finite() && gradient.len() == likelihood.len());
     for k in 0..at.len() {
