@@ -48,7 +48,7 @@ pub fn predict(
     if !correction.has_remainder() {
         return Ok(CorrectedPrediction { prediction, poses: corrected });
     }
-    let mut shifts: Vec<Vector3<f64>> = corrected.iter().map(|own| own.shift).collect();
+    let mut shifts: Vec<Vector3<f64>> = corrected.iter().map(|pose| pose.shift).collect();
     let mut prediction = fit::predict(problem, Some(estimate), &shifted(rows, &shifts), split)?;
     in_measuring_frame(rows, &model.base_frames(prediction.x.as_slice()), &mut shifts);
     for (position, shift) in prediction.positions.iter_mut().zip(&shifts) {
@@ -65,7 +65,9 @@ fn shifted(rows: &Measurements, shifts: &[Vector3<f64>]) -> Measurements {
     let mut rows = rows.clone();
     let of_rows = rows.positions.iter_mut().zip(shifts);
     // Where the arm has no equilibrium nothing is corrected.
-    for (position, shift) in of_rows.filter(|(_, shift)| shift.iter().all(|own| own.is_finite())) {
+    for (position, shift) in
+        of_rows.filter(|(_, shift)| shift.iter().all(|value| value.is_finite()))
+    {
         *position -= shift;
     }
     rows
@@ -93,7 +95,7 @@ pub fn compensate(
         estimate.count_time_in(&mut poses);
         correction.at(problem, model, x, &poses)
     };
-    let mut shifts: Vec<Vector3<f64>> = corrected(targets).iter().map(|own| own.shift).collect();
+    let mut shifts: Vec<Vector3<f64>> = corrected(targets).iter().map(|pose| pose.shift).collect();
     let mut first: Option<Vec<Command>> = None;
     let mut pass = 0;
     loop {
@@ -104,11 +106,11 @@ pub fn compensate(
             commands.iter().flat_map(|command| command.configuration.iter().copied()).collect();
         let poses = corrected(&reached);
         let mut change = 0.0_f64;
-        for ((command, own), shift) in commands.iter_mut().zip(&poses).zip(&mut shifts) {
-            let turn = own.shift - *shift;
+        for ((command, pose), shift) in commands.iter_mut().zip(&poses).zip(&mut shifts) {
+            let turn = pose.shift - *shift;
             command.miss -= turn;
             change = change.max(turn.norm());
-            *shift = own.shift;
+            *shift = pose.shift;
         }
         let before = first.get_or_insert_with(|| commands.clone());
         for (command, before) in commands.iter_mut().zip(before.iter()) {

@@ -32,14 +32,17 @@ impl Bounds {
 
     /// Expected root mean square length of measured − predicted \[m\].
     pub fn expected(&self) -> f64 {
-        let squares = self.poses.iter().map(|own| own.size * own.size);
+        let squares = self.poses.iter().map(|pose| pose.size * pose.size);
         (squares.sum::<f64>() / self.poses.len() as f64).sqrt()
     }
 
     /// Share of errors of these lengths \[m\] that lie within their bounds.
     pub fn coverage(&self, lengths: impl IntoIterator<Item = f64>) -> f64 {
-        let within: Vec<bool> =
-            lengths.into_iter().enumerate().map(|(pose, own)| own <= self.bound(pose)).collect();
+        let within: Vec<bool> = lengths
+            .into_iter()
+            .enumerate()
+            .map(|(pose, length)| length <= self.bound(pose))
+            .collect();
         within.iter().filter(|within| **within).count() as f64 / within.len() as f64
     }
 

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::linearise::Linearisation;
-use super::posterior::Posterior;
+use super::posterior::{Posterior, RowPosterior};
 use super::rows::{AXES, Layout, Rows};
 use super::scores::{Scores, expected_size, fade};
 use crate::fit::Identification;
@@ -30,7 +30,7 @@ pub struct Correction {
     /// Name of the problem and digest of the declared arm.
     pub(super) problem: String,
     pub(super) arm_digest: String,
-    /// 1 σ of rows without one of their own \[m\].
+    /// 1 σ of rows for which the table has none \[m\].
     pub(super) sigma: f64,
     pub(super) layout: Layout,
     /// Free parameters, in the order of the posterior's columns.
@@ -113,7 +113,7 @@ impl Correction {
     /// Names of the free parameters and the posterior covariance of their deviations from nominal,
     /// shape = (parameters, parameters).
     pub fn parameter_covariance(&self) -> (Vec<&str>, DMatrix<f64>) {
-        let names = self.parameters.iter().map(|own| own.name.as_str()).collect();
+        let names = self.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
         (names, self.posterior.parameter_covariance())
     }
 
@@ -132,12 +132,12 @@ impl Correction {
             .enumerate()
             .map(|(k, parameter)| (parameter.name.as_str(), k))
             .collect();
-        let place = |own: &Linearised| places.get(own.name.as_str()).copied();
+        let place = |parameter: &Linearised| places.get(parameter.name.as_str()).copied();
         let known: Vec<(usize, usize)> = self
             .parameters
             .iter()
             .enumerate()
-            .filter_map(|(column, own)| Some((column, place(own)?)))
+            .filter_map(|(column, parameter)| Some((column, place(parameter)?)))
             .collect();
         let mut moved = DVector::zeros(self.parameters.len());
         for &(column, k) in &known {
@@ -162,15 +162,15 @@ impl Correction {
     fn corrected(&self, rows: &Rows, moved: &DVector<f64>, poses: &[Pose]) -> Vec<CorrectedPose> {
         let change = &rows.jacobian * moved;
         let hyper = &self.posterior.hyper;
-        let one = |(row, own): (usize, super::posterior::RowPosterior)| {
+        let one = |(row, posterior): (usize, RowPosterior)| {
             let lost = rows.residual[AXES * row].is_nan();
-            let share = fade(own.covariance.trace(), own.prior);
-            let mean = own.mean - Vector3::from_fn(|axis, _| change[AXES * row + axis]);
+            let share = fade(posterior.covariance.trace(), posterior.prior);
+            let mean = posterior.mean - Vector3::from_fn(|axis, _| change[AXES * row + axis]);
             let has_remainder = self.has_remainder();
             let missed = if has_remainder { (1.0 - share) * mean.norm() } else { 0.0 };
             let noise = hyper.noise_variance() * rows.relative_sigma[row].powi(2);
-            let variance = own.covariance.diagonal().map(|own| own.max(0.0) + noise);
-            let sigma = variance.map(|own| (own + missed * missed / AXES as f64).sqrt());
+            let variance = posterior.covariance.diagonal().map(|value| value.max(0.0) + noise);
+            let sigma = variance.map(|value| (value + missed * missed / AXES as f64).sqrt());
             let blank = if lost { f64::NAN } else { 0.0 };
             CorrectedPose {
                 shift: (if has_remainder { mean * share } else { Vector3::zeros() })

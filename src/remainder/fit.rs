@@ -125,7 +125,7 @@ fn fitted(
     let Some(setting) = Setting::new(found, problem, &model, data) else { return Ok(None) };
     let fitted = setting.fitted((found, problem), is_remainder_wanted);
     let Some(mut fitted) = fitted else { return Ok(None) };
-    let corrected = fitted.remainder.as_ref().map(|own| residuals(found, problem, data, own));
+    let corrected = fitted.remainder.as_ref().map(|kept| residuals(found, problem, data, kept));
     fitted.residuals = corrected.transpose()?;
     Ok(Some(fitted))
 }
@@ -298,7 +298,7 @@ impl Setting {
         let centres: Vec<usize> = (0..rows.len()).collect();
         let training = Training::of((rows, &self.layout.inputs), &self.prior, hyper, &centres)?;
         let left_out = training.without_each_configuration();
-        Some(left_out.iter().map(|own| own.error.norm()).sum::<f64>() / rows.len() as f64)
+        Some(left_out.iter().map(|row| row.error.norm()).sum::<f64>() / rows.len() as f64)
     }
 
     /// Hyperparameters of a local maximum of the marginal likelihood: searched on few of the rows
@@ -315,16 +315,16 @@ impl Setting {
             let value = |x: &DVector<f64>| searched.value_and_gradient(x);
             let minimum = minimise(value, searched.start(lengths), &bounds, MAX_STEPS[0])?;
             // Optima of nearly the same likelihood predict differently.
-            let error = self.left_out_error(&few, &searched.hyperparameters(&minimum.at))?;
+            let error = self.left_out_error(&few, &searched.hyperparameters(&minimum))?;
             Some((minimum, error))
         });
         let (mut best, _) = minima.min_by(|a, b| a.1.total_cmp(&b.1))?;
         if few.len() < more.len() {
             let refined = function(&more);
             let value = |x: &DVector<f64>| refined.value_and_gradient(x);
-            best = minimise(value, best.at, &bounds, MAX_STEPS[1])?;
+            best = minimise(value, best, &bounds, MAX_STEPS[1])?;
         }
-        Some(searched.hyperparameters(&best.at))
+        Some(searched.hyperparameters(&best))
     }
 }
 

@@ -198,20 +198,20 @@ impl<'a> MarginalLikelihood<'a> {
                 carried.fill(0.0);
                 for b in 0..AXES {
                     for a in 0..AXES {
-                        let own = weight[(AXES * first + a, AXES * second + b)];
+                        let entry = weight[(AXES * first + a, AXES * second + b)];
                         let pair = self.rows.sites_of(AXES * first + a).iter();
                         let pair = pair.zip(self.rows.sites_of(AXES * second + b));
                         for (out, (left, right)) in carried.iter_mut().zip(pair) {
-                            *out += own * left * right;
+                            *out += entry * left * right;
                         }
                     }
                 }
                 for site in 0..sites {
-                    let (of, own) = (factor * carried[site], correlations[site]);
-                    out[site] += 2.0 * of_single[site] * of * own.0;
-                    out[sites + site] += 2.0 * of_joint[site] * of * all;
-                    out[2 * sites] += of_single[site] * of * own.1;
-                    out[2 * sites + 1] += of_joint[site] * of * slope;
+                    let (scale, single) = (factor * carried[site], correlations[site]);
+                    out[site] += 2.0 * of_single[site] * scale * single.0;
+                    out[sites + site] += 2.0 * of_joint[site] * scale * all;
+                    out[2 * sites] += of_single[site] * scale * single.1;
+                    out[2 * sites + 1] += of_joint[site] * scale * slope;
                 }
             }
             out

@@ -27,7 +27,7 @@ pub(super) struct Linearisation<'a> {
     pub x: &'a DVector<f64>,
     /// Parameters that have a column in the Jacobian.
     pub unknowns: Vec<usize>,
-    /// 1 σ of rows without one of their own \[m\]: the unit of [`Rows::relative_sigma`].
+    /// 1 σ of rows for which the table has none \[m\]: the unit of [`Rows::relative_sigma`].
     pub sigma: f64,
 }
 
@@ -70,7 +70,7 @@ fn configurations(poses: &[Pose]) -> Vec<usize> {
         .collect()
 }
 
-/// Joints with a command of their own.
+/// Joints that take a command.
 fn commanded(problem: &Problem) -> Vec<usize> {
     let joints = problem.joints.iter().map(Joint::command_kind).enumerate();
     joints.filter(|(_, kind)| *kind != JointKind::Fixed).map(|(joint, _)| joint).collect()
@@ -142,7 +142,7 @@ pub(super) fn prior(
     }
 }
 
-/// Rows of a table as poses; `sigma` \[m\] is that of rows without one of their own, and time counts
+/// Rows of a table as poses; `sigma` \[m\] is that of rows for which the table has none, and time counts
 /// from `first_time` \[s\].
 pub(super) fn timed_poses<'a>(
     table: &'a Measurements,

@@ -102,14 +102,14 @@ impl Posterior {
     /// Change of each parameter beside the remainder: m + S½ ŵ.
     pub fn parameters(&self) -> DVector<f64> {
         let first = self.weights.len() - self.prior.mean.len();
-        let own = self.weights.rows_range(first..).component_mul(&self.prior.spread);
-        &self.prior.mean + own
+        let change = self.weights.rows_range(first..).component_mul(&self.prior.spread);
+        &self.prior.mean + change
     }
 
     /// Posterior covariance of the parameters.
     pub fn parameter_covariance(&self) -> DMatrix<f64> {
-        let (all, own) = (self.factor.nrows(), self.prior.mean.len());
-        let columns = self.inverse_factor.columns(all - own, own);
+        let (weights, parameters) = (self.factor.nrows(), self.prior.mean.len());
+        let columns = self.inverse_factor.columns(weights - parameters, parameters);
         let scaled = self.prior.scale(&columns.into_owned());
         gram(&scaled)
     }
@@ -186,12 +186,12 @@ impl Training {
         for (group, factor) in &groups {
             let places = coordinates(group);
             let mut block = whitened.select_rows(&places);
-            let mut own = target.select_rows(&places);
+            let mut left = target.select_rows(&places);
             factor.solve_lower_triangular_mut(&mut block);
-            factor.solve_lower_triangular_mut(&mut own);
+            factor.solve_lower_triangular_mut(&mut left);
             for (k, &place) in places.iter().enumerate() {
                 whitened.row_mut(place).copy_from(&block.row(k));
-                target[place] = own[k];
+                target[place] = left[k];
             }
         }
         let n = whitened.ncols();
@@ -222,9 +222,9 @@ impl Training {
         let mut out = vec![LeftOut { error: Vector3::zeros(), variance: 0.0 }; left.len() / AXES];
         for (group, noise) in &self.groups {
             let places = coordinates(group);
-            let own = spread.select_rows(&places);
+            let of_group = spread.select_rows(&places);
             let n = places.len();
-            let precision = DMatrix::identity(n, n) - &own * own.transpose();
+            let precision = DMatrix::identity(n, n) - &of_group * of_group.transpose();
             let Some(precision) = precision.cholesky() else { continue };
             let error = noise * precision.solve(&left.select_rows(&places));
             let variance = noise * precision.solve(&noise.transpose());
@@ -257,8 +257,8 @@ impl Training {
             let mut first = 0;
             for (group, noise) in groups {
                 let n = AXES * group.len();
-                let own = spread.rows(first, n);
-                let covariance = DMatrix::identity(n, n) + own * own.transpose();
+                let of_group = spread.rows(first, n);
+                let covariance = DMatrix::identity(n, n) + of_group * of_group.transpose();
                 let variance = noise * covariance * noise.transpose();
                 out.push((group, noise * left.rows(first, n), variance));
                 first += n;
@@ -315,10 +315,10 @@ fn noise(
         }
     }
     if kernel > 0 {
-        let own = rows.select(group);
+        let members = rows.select(group);
         let seen = features.select_rows(&coordinates(group));
         let seen = seen.columns(0, kernel);
-        noise += covariance(hyper, inputs, &own, &own) - seen * seen.transpose();
+        noise += covariance(hyper, inputs, &members, &members) - seen * seen.transpose();
     }
     noise
 }

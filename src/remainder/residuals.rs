@@ -45,8 +45,11 @@ pub fn residuals(
     if correction.has_remainder() {
         let all: Vec<usize> = (0..table.len()).collect();
         let poses = timed_poses(table, &all, (found.sigma, found.first_time));
-        let mut shifts: Vec<Vector3<f64>> =
-            correction.at(problem, &model, &found.x, &poses).iter().map(|own| own.shift).collect();
+        let mut shifts: Vec<Vector3<f64>> = correction
+            .at(problem, &model, &found.x, &poses)
+            .iter()
+            .map(|pose| pose.shift)
+            .collect();
         let placed = placed(found, &model, correction);
         if !placed.is_empty() {
             let linearisation = Linearisation {
@@ -97,13 +100,14 @@ pub(super) fn in_measuring_frame(
 
 /// Fitted bases and tools that are no parameters of the correction.
 fn placed(found: &Identification, model: &Model, correction: &Correction) -> Vec<usize> {
-    let known: HashSet<&str> = correction.parameters.iter().map(|own| own.name.as_str()).collect();
+    let known: HashSet<&str> =
+        correction.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
     let estimates = found.estimates.iter().enumerate();
     estimates
-        .filter(|(k, own)| {
-            own.fitted
+        .filter(|(k, estimate)| {
+            estimate.fitted
                 && model.parameters[*k].site.is_placement()
-                && !known.contains(own.name.as_str())
+                && !known.contains(estimate.name.as_str())
         })
         .map(|(k, _)| k)
         .collect()

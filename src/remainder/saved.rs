@@ -54,10 +54,10 @@ struct Site {
     joint: usize,
     /// Root mean square of ‖∂p/∂q‖ [m/rad] or [1].
     lever: f64,
-    /// 1 σ of the error that follows the joint's own command, as motion of the target.
-    own_amplitude_m: f64,
+    /// 1 σ of the error that follows the joint's command, as motion of the target.
+    single_amplitude_m: f64,
     /// The same of the error that follows all inputs.
-    all_amplitude_m: f64,
+    joint_amplitude_m: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -73,8 +73,8 @@ struct Input {
 
 #[derive(Serialize, Deserialize)]
 struct Lengths {
-    own: f64,
-    all: f64,
+    single: f64,
+    joint: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -143,8 +143,8 @@ impl Correction {
         let site = |(k, (&joint, &lever)): (usize, (&usize, &f64))| Site {
             joint: joint + 1,
             lever,
-            own_amplitude_m: hyper.single[k],
-            all_amplitude_m: hyper.joint[k],
+            single_amplitude_m: hyper.single[k],
+            joint_amplitude_m: hyper.joint[k],
         };
         let inputs = &self.layout.inputs;
         let input = |(k, &joint): (usize, &usize)| Input {
@@ -156,10 +156,10 @@ impl Correction {
             min: inputs.ranges[k].0,
             max: inputs.ranges[k].1,
         };
-        let parameter = |(k, own): (usize, &Linearised)| Parameter {
-            name: own.name.clone(),
-            estimate: own.estimate,
-            deviation: own.deviation,
+        let parameter = |(k, parameter): (usize, &Linearised)| Parameter {
+            name: parameter.name.clone(),
+            estimate: parameter.estimate,
+            deviation: parameter.deviation,
             change: change[k],
             prior_mean: prior.mean[k],
             prior_sigma: prior.spread[k],
@@ -181,7 +181,7 @@ impl Correction {
                 .map(site)
                 .collect(),
             inputs: inputs.joints.iter().enumerate().map(input).collect(),
-            lengths: Lengths { own: hyper.lengths[0], all: hyper.lengths[1] },
+            lengths: Lengths { single: hyper.lengths[0], joint: hyper.lengths[1] },
             noise_m: hyper.noise,
             configuration_noise_m: hyper.shared_noise,
             sigma_m: self.sigma,
@@ -253,32 +253,32 @@ impl Correction {
             return Err(wrong("centres, columns, weights and covariance_factor differ in size"));
         }
         let hyper = Hyperparameters {
-            single: document.sites.iter().map(|own| own.own_amplitude_m).collect(),
-            joint: document.sites.iter().map(|own| own.all_amplitude_m).collect(),
-            lengths: [document.lengths.own, document.lengths.all],
+            single: document.sites.iter().map(|site| site.single_amplitude_m).collect(),
+            joint: document.sites.iter().map(|site| site.joint_amplitude_m).collect(),
+            lengths: [document.lengths.single, document.lengths.joint],
             noise: document.noise_m,
             shared_noise: document.configuration_noise_m,
         };
         let joints: Vec<usize> =
-            document.sites.iter().map(|own| own.joint.wrapping_sub(1)).collect();
-        let of_input = |own: &Input| own.joint.wrapping_sub(1);
+            document.sites.iter().map(|site| site.joint.wrapping_sub(1)).collect();
+        let of_input = |input: &Input| input.joint.wrapping_sub(1);
         let inputs = Inputs {
             joints: document.inputs.iter().map(of_input).collect(),
-            angles: document.inputs.iter().map(|own| own.is_angle).collect(),
+            angles: document.inputs.iter().map(|input| input.is_angle).collect(),
             site_of: document
                 .inputs
                 .iter()
-                .map(|own| joints.iter().position(|&joint| joint == of_input(own)))
+                .map(|input| joints.iter().position(|&joint| joint == of_input(input)))
                 .collect(),
-            standard: document.inputs.iter().map(|own| (own.offset, own.unit)).collect(),
-            ranges: document.inputs.iter().map(|own| (own.min, own.max)).collect(),
+            standard: document.inputs.iter().map(|input| (input.offset, input.unit)).collect(),
+            ranges: document.inputs.iter().map(|input| (input.min, input.max)).collect(),
         };
         let of_parameters = |of: fn(&Parameter) -> f64| {
             DVector::from_iterator(parameters, document.parameters.iter().map(of))
         };
         let prior = ParameterPrior {
-            mean: of_parameters(|own| own.prior_mean),
-            spread: of_parameters(|own| own.prior_sigma),
+            mean: of_parameters(|parameter| parameter.prior_mean),
+            spread: of_parameters(|parameter| parameter.prior_sigma),
         };
         let centres = Rows {
             residual: DVector::zeros(AXES * count),
@@ -289,18 +289,18 @@ impl Correction {
             relative_sigma: vec![1.0; count],
         };
         let factor = DMatrix::from_fn(size, size, |i, j| if j <= i { lower[i][j] } else { 0.0 });
-        let change = of_parameters(|own| own.change);
+        let change = of_parameters(|parameter| parameter.change);
         let posterior = Posterior::restored(
             (hyper, inputs.clone()),
             (centres, prior),
             (factor, DVector::from_vec(weights.concat()), change),
         )
         .ok_or_else(|| wrong("the covariance of the centres is not positive definite"))?;
-        let levers = document.sites.iter().map(|own| own.lever).collect();
-        let linearised = |own: Parameter| Linearised {
-            name: own.name,
-            deviation: own.deviation,
-            estimate: own.estimate,
+        let levers = document.sites.iter().map(|site| site.lever).collect();
+        let linearised = |parameter: Parameter| Linearised {
+            name: parameter.name,
+            deviation: parameter.deviation,
+            estimate: parameter.estimate,
         };
         let ScoreLists { configurations, single, blocks } = document.scores;
         Ok(Self {

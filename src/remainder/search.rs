@@ -11,17 +11,8 @@ const SUFFICIENT: f64 = 1e-4;
 /// Halvings of a step before the search gives up.
 const MAX_HALVINGS: usize = 12;
 
-/// Where a search ended.
-#[derive(Debug, Clone)]
-pub(super) struct Minimum {
-    /// Variables.
-    pub at: DVector<f64>,
-    /// Value of the function.
-    pub value: f64,
-}
-
-/// Minimises `function` from `start` within `bounds`, with at most `max_steps` steps; `None` where
-/// the function has no value at the start.
+/// Returns the minimum of `function` that a descent from `start` within `bounds` reaches in at most
+/// `max_steps` steps; `None` where the function has no value at the start.
 ///
 /// Variables at a bound towards which the function falls are held there for the step. Each step
 /// evaluates value and gradient at once, because both need one factorisation.
@@ -30,7 +21,7 @@ pub(super) fn minimise(
     start: DVector<f64>,
     bounds: &[(f64, f64)],
     max_steps: usize,
-) -> Option<Minimum> {
+) -> Option<DVector<f64>> {
     let within =
         |x: DVector<f64>| DVector::from_fn(x.len(), |k, _| x[k].clamp(bounds[k].0, bounds[k].1));
     let mut at = within(start);
@@ -91,7 +82,7 @@ pub(super) fn minimise(
             break;
         }
     }
-    Some(Minimum { at, value })
+    Some(at)
 }
 
 #[cfg(test)]
@@ -108,8 +99,8 @@ mod tests {
         };
         let start = DVector::from_vec(vec![-1.2, 1.0]);
         let free = minimise(function, start.clone(), &[(-5.0, 5.0); 2], 500).unwrap();
-        assert!((free.at - DVector::from_vec(vec![1.0, 1.0])).amax() < 0.1, "{}", free.value);
+        assert!((&free - DVector::from_vec(vec![1.0, 1.0])).amax() < 0.1, "{free}");
         let cut = minimise(function, start, &[(-5.0, 0.5), (-5.0, 5.0)], 500).unwrap();
-        assert!((cut.at - DVector::from_vec(vec![0.5, 0.25])).amax() < 0.05, "{}", cut.value);
+        assert!((&cut - DVector::from_vec(vec![0.5, 0.25])).amax() < 0.05, "{cut}");
     }
 }
