@@ -38,7 +38,7 @@ pub enum IdentifyError {
     },
     /// A rule of the search for effects has a value outside its range.
     #[error(
-        "the rule {rule} of the search for effects has a value that makes no sense; docs/selection.md says what it stands for"
+        "the rule {rule} of the search for effects has a value outside its range; docs/selection.md explains it"
     )]
     Rule {
         /// Name of the rule.
@@ -53,15 +53,13 @@ pub enum IdentifyError {
         joints: usize,
     },
     /// The model lacks a parameter that was identified.
-    #[error(
-        "{name} was identified, and the problem has no such parameter: it is another than the one identified"
-    )]
+    #[error("{name} was identified, but the problem has no such parameter: identify this problem")]
     NotInModel {
         /// Name of the parameter.
         name: String,
     },
     /// A parameter is needed that was not identified.
-    #[error("{name} was not identified: the sessions, targets or effects are others")]
+    #[error("{name} was not identified: the sessions, targets or effects differ")]
     NoEstimate {
         /// Name of the parameter.
         name: String,

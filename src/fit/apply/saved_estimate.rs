@@ -92,7 +92,7 @@ pub enum SavedEstimateError {
     NotFree { file: PathBuf, name: String },
     #[error("{}: {name} stands there twice; keep one of the two", file.display())]
     Twice { file: PathBuf, name: String },
-    #[error("{}: {name} has a value larger than 1e150, the largest number that can be reckoned with", file.display())]
+    #[error("{}: {name} has a value larger than 1e150, the largest number that is accepted", file.display())]
     MagnitudeTooLarge { file: PathBuf, name: String },
     #[error("{}: larger than {LARGEST_MIB} MiB; is it the right file?", file.display())]
     TooLarge { file: PathBuf },
