@@ -1,35 +1,14 @@
-//! An arm, data from arrays, a fit, a prediction, and an effect of one's own that the residual is
-//! traced to, in thirty lines: `cargo run --example thirty_lines`.
+//! An arm, data from arrays, a fit, a prediction, and a law that the residual is traced to, in thirty lines: `cargo run --example thirty_lines`.
 
 #![expect(clippy::print_stdout, reason = "an example shows what it found")]
 
-use flexcal::model::{
-    effect::CustomEffect, effect::Term, parameter::ParameterSite, parameter::Regressor,
-};
-use flexcal::{fit, measurement::Dataset, problem::Effect, problem::Problem, select};
+use flexcal::{fit, measurement::Dataset, problem::Problem, select};
 
 const ARM: &str = "name = 'planar'\n[[joint]]\n[[joint]]\na_m = 0.5\n[tool]\ntarget_m = [0.4, 0, 0]
 [parameters]\n'joint2.a' = { sigma_mm = 5 }\n'joint2.theta' = { sigma_deg = 1 }\n[data]\nposition_sigma_mm = 0.05";
 
 // An eccentric of joint 1 pulls at joint 2: Δθ₂ = pull · sin q₁; 1 σ of the prior is 10 mrad.
-#[derive(Debug)]
-struct Cam;
-impl CustomEffect for Cam {
-    fn name(&self) -> &'static str {
-        "eccentric"
-    }
-    fn terms(&self, problem: &Problem) -> Vec<Term> {
-        vec![Term::driven(
-            "pull",
-            ParameterSite::coordinate(problem, 2),
-            Regressor::Sine(0, 1),
-            0.01,
-        )]
-    }
-    fn describe(&self) -> String {
-        "joint 1 pulls at joint 2".to_owned()
-    }
-}
+const CAM: &str = "law = { name = 'cam', at = 'joint2', terms = ['sin(q1)'], sigma_rad = 0.01 }";
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arm = Problem::parse(ARM, "planar.toml".as_ref())?;
@@ -44,15 +23,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         q.iter().map(|[a, b]| at(0.502, *a) + at(0.4, a + b + 3e-3 * a.sin())),
     )
     .build()?;
-    let trace = select::trace(
-        &arm,
-        &data,
-        &fit::Options::default().with_candidates(vec![Effect::custom(Cam)]),
-    )?;
-    let arm = arm.with_effect(Effect::custom(Cam));
+    let cam = arm.effect(CAM, "cam".as_ref())?.effect;
+    let options = fit::Options::default().with_candidates(vec![cam.clone()]);
+    let trace = select::trace(&arm, &data, &options)?;
+    let arm = arm.with_effect(cam);
     let found = fit::identify(&arm, &data, &fit::Options::default())?;
     let tip = found.predict(&arm, &data.measurements)?[0];
-    let pull = found.estimate("eccentric.pull").map_or(0.0, |pull| pull.estimate * 1e3);
+    let pull = found.estimate("law[cam].1").map_or(0.0, |pull| pull.estimate * 1e3);
     println!(
         "{}: {pull:.2} mrad; the tip is at {tip:.3?} m",
         trace.describe(&trace.ranking[0].effect)

@@ -74,6 +74,7 @@ pub mod error;
 #[deny(clippy::indexing_slicing)]
 pub mod files;
 pub mod fit;
+pub mod laws;
 pub mod least_squares;
 pub mod measurement;
 pub mod mechanics;

@@ -12,6 +12,10 @@ mod catalogue;
 mod commands;
 #[path = "effects/derivatives.rs"]
 mod derivatives;
+#[path = "effects/formulas.rs"]
+mod formulas;
+#[path = "effects/laws.rs"]
+mod laws;
 #[path = "effects/recovery.rs"]
 mod recovery;
 #[path = "effects/rig.rs"]

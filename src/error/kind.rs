@@ -272,15 +272,26 @@ pub enum InputErrorKind {
          \"undeflected\" in [statics]"
     )]
     InEquilibriumAlready,
-    #[error("{name} acts at the place of another parameter; choose another place")]
-    SiteOccupied { name: String },
+    #[error("column {column} of the formula: {mistake}")]
+    Formula { column: usize, mistake: String },
     #[error(
-        "{name} depends on a quantity of the pose, which is allowed only at the coordinate of a \
-         moving joint and for a shift of the measurement"
+        "{formula} has no finite value in row {row}; keep log, sqrt and divisions off their edges"
     )]
-    RegressorNotAllowed { name: String },
-    #[error("{name} acts at a place that this arm does not have")]
-    SiteAbsent { name: String },
+    FormulaNotFinite { formula: String, row: usize },
+    #[error("{reason}")]
+    LawSite { reason: String },
+    #[error("\"{name}\" cannot name {noun}; write a word of letters, digits and _")]
+    NotAWord { name: String, noun: &'static str },
+    #[error("no formula of this law uses {name}; leave it out, or write it into a term")]
+    UnusedParameter { name: String },
+    #[error("no formula; write at least one, as in [\"sin(q2)\"]")]
+    NoTermsOfLaw,
+    #[error("the start {start} lies outside of its bounds")]
+    StartOutOfBounds { start: f64 },
+    #[error(
+        "the shape of a link follows temperature, time and loads in this model; {quantity} is a command of a joint"
+    )]
+    LinkFollowsCommand { quantity: String },
     #[error("the measurements contain no information about this effect; they need {write}")]
     NeedsColumn { write: &'static str },
 

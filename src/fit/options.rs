@@ -31,7 +31,7 @@ pub struct Options {
     pub start: Vec<(String, f64)>,
     /// Maximum number of steps of a fit; `None` for that of the solver.
     pub max_steps: Option<u64>,
-    /// Effects of the caller ([`Effect::custom`]) that trace and loop look for besides those of the
+    /// Effects of the caller (from [`Problem::effect`](crate::problem::Problem::effect)) that trace and loop look for besides those of the
     /// catalogue. A fit alone does not use them.
     pub candidates: Vec<Effect>,
     /// State of an earlier fit of the same data with other effects, from which this one starts.

@@ -229,7 +229,7 @@ impl Columns {
                 problem
                     .effects
                     .iter()
-                    .any(|declared| declared.effect.covariate() == Some(covariate.name.as_str()))
+                    .any(|declared| declared.effect.covariate().as_ref() == Some(&covariate.name))
             };
             if !self.has(Role::Covariate(k)) && (measured || used()) {
                 let write =

@@ -1,6 +1,8 @@
 //! Terms that add to the joints' commands and to the strains of beams.
 
-use crate::model::parameter::{BeamField, JointField, Parameter, ParameterSite, Regressor};
+use crate::model::parameter::{
+    BeamField, JointField, Parameter, ParameterSite, Regressor, value_regressor,
+};
 use crate::problem::{Mimic, Problem};
 
 /// Quantity that a term adds to.
@@ -18,7 +20,7 @@ pub(super) enum TermSite {
 }
 
 /// Term with a known coefficient: value × regressor.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct CommandTerm {
     pub site: TermSite,
     pub regressor: Regressor,
@@ -43,25 +45,27 @@ impl CommandTerm {
 
     /// Returns the fixed terms and those of the free parameters at the full parameter vector `x`.
     pub fn all(fixed: &[Self], parameters: &[Parameter], x: &[f64]) -> Vec<Self> {
-        let free = parameters.iter().zip(x);
-        let free =
-            free.filter_map(|(parameter, &x)| Self::of(parameter.site, parameter.regressor, x));
-        fixed.iter().copied().chain(free).collect()
+        let free = (0..parameters.len()).filter_map(|k| {
+            let site = TermSite::of(parameters[k].site)?;
+            let regressor = value_regressor(parameters, x, k)?;
+            (!regressor.is_constant()).then(|| Self { site, regressor, value: x[k] })
+        });
+        fixed.iter().cloned().chain(free).collect()
     }
+}
 
-    /// Returns the term of a parameter at `x`, if it has a regressor and adds to a joint's
-    /// coordinate or a beam's strain.
-    fn of(site: ParameterSite, regressor: Regressor, x: f64) -> Option<Self> {
-        let site = match site {
+impl TermSite {
+    /// Returns the coordinate of a joint or the strain of a beam at a parameter's site.
+    fn of(site: ParameterSite) -> Option<Self> {
+        match site {
             ParameterSite::Joint { joint, field: JointField::Theta | JointField::D } => {
-                TermSite::Joint(joint)
+                Some(Self::Joint(joint))
             }
-            ParameterSite::Beam { joint, field } => TermSite::Strain {
-                joint,
-                which: BeamField::STRAINS.iter().position(|strain| *strain == field)?,
-            },
-            _ => return None,
-        };
-        (!regressor.is_constant()).then_some(Self { site, regressor, value: x })
+            ParameterSite::Beam { joint, field } => {
+                let which = BeamField::STRAINS.iter().position(|strain| *strain == field)?;
+                Some(Self::Strain { joint, which })
+            }
+            _ => None,
+        }
     }
 }

@@ -37,7 +37,7 @@ impl CommandTerms {
         let others = self
             .others
             .iter()
-            .map(|term| (term.site, term.value * waves.value(term.regressor, setup)));
+            .map(|term| (term.site, term.value * waves.value(&term.regressor, setup)));
         let series = self.series.iter().map(|sum| (sum.site, sum.value(setup.configuration)));
         for (site, added) in others.chain(series) {
             match site {
@@ -60,9 +60,13 @@ impl CommandTerms {
 mod tests {
     use super::*;
     use crate::model::parameter::Regressor;
+    use crate::problem::Problem;
 
     #[test]
     fn waves_other_drivers_and_strains_add_up() {
+        let text = "name = 'arm'\njoint = [{}, {}]\n[data]\nreference_temperature_C = 20\n";
+        let problem = Problem::parse(text, "problem.toml".as_ref()).unwrap();
+        let formula = |text: &str| Regressor::parse(text, &problem).unwrap();
         let strain = TermSite::Strain { joint: 1, which: 2 };
         let waves = (1..=20).flat_map(|order| {
             let value = 1e-3 / f64::from(order);
@@ -72,9 +76,9 @@ mod tests {
             ]
         });
         let others = [
-            (TermSite::Joint(0), Regressor::Warming { reference: 20.0 }, 1e-4),
-            (TermSite::Joint(1), Regressor::Command(0), 0.5),
-            (TermSite::Strain { joint: 0, which: 0 }, Regressor::Elapsed, 1e-6),
+            (TermSite::Joint(0), formula("T"), 1e-4),
+            (TermSite::Joint(1), formula("q1"), 0.5),
+            (TermSite::Strain { joint: 0, which: 0 }, formula("t"), 1e-6),
         ];
         let terms: Vec<CommandTerm> = waves
             .chain(others)

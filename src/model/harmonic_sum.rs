@@ -28,7 +28,8 @@ impl HarmonicSum {
     /// many and dense, and returns their sums.
     pub fn take(terms: &mut Vec<CommandTerm>) -> Vec<Self> {
         let mut found: Vec<(Self, usize)> = Vec::new();
-        for &CommandTerm { site, regressor, value } in &*terms {
+        for CommandTerm { site, regressor, value } in &*terms {
+            let (site, value) = (*site, *value);
             let Some((joint, order, of)) = wave(regressor) else { continue };
             let is_it = |(sum, _): &(Self, usize)| (sum.site, sum.joint) == (site, joint);
             let number = found.iter().position(is_it).unwrap_or(found.len());
@@ -48,7 +49,7 @@ impl HarmonicSum {
         });
         let taken: Vec<Self> = found.into_iter().map(|(series, _)| series).collect();
         terms.retain(|term| {
-            wave(term.regressor).is_none_or(|(joint, ..)| {
+            wave(&term.regressor).is_none_or(|(joint, ..)| {
                 !taken.iter().any(|series| (series.site, series.joint) == (term.site, joint))
             })
         });
@@ -63,8 +64,8 @@ impl HarmonicSum {
 
 /// Returns joint, order less one, and 0 for a sine or 1 for a cosine; `None` if the regressor is no
 /// harmonic of integer order.
-fn wave(regressor: Regressor) -> Option<(usize, usize, usize)> {
-    match regressor {
+fn wave(regressor: &Regressor) -> Option<(usize, usize, usize)> {
+    match *regressor {
         Regressor::Sine(joint, order) if (1..=MAX_ORDER).contains(&order) => {
             Some((joint, order as usize - 1, 0))
         }
@@ -121,8 +122,8 @@ mod tests {
             regressor: Regressor::Sine(joint, order),
             value: 1.0,
         });
-        let mut left: Vec<CommandTerm> = all.iter().chain(&few).copied().collect();
-        left.push(CommandTerm { site, regressor: Regressor::Elapsed, value: 1.0 });
+        let mut left: Vec<CommandTerm> = all.iter().chain(&few).cloned().collect();
+        left.push(CommandTerm { site, regressor: Regressor::Unit, value: 1.0 });
         let series = HarmonicSum::take(&mut left);
         assert!(series.len() == 1 && left.len() == 4 && left[..3] == few);
         for k in -30..30 {

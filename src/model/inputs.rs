@@ -2,7 +2,7 @@
 //! site.
 
 use super::Model;
-use crate::model::parameter::{ParameterSite, Regressor};
+use crate::model::parameter::{ParameterSite, Regressor, slope_regressor};
 
 /// Scalar of the arm with the columns of the parameters that act on it.
 #[derive(Debug, Clone)]
@@ -17,9 +17,9 @@ pub(super) struct Input {
     pub regressors: Vec<(usize, Regressor)>,
 }
 
-/// Returns the inputs of the arm for some unknowns; the column of an unknown is its place in the
-/// list.
-pub(super) fn inputs(model: &Model, unknowns: &[usize]) -> Vec<Input> {
+/// Returns the inputs of the arm at the full parameter vector `x` for some unknowns, whose column
+/// is their place in the list.
+pub(super) fn inputs(model: &Model, x: &[f64], unknowns: &[usize]) -> Vec<Input> {
     let mut inputs: Vec<Input> = Vec::new();
     for (column, &k) in unknowns.iter().enumerate() {
         let parameter = &model.parameters[k];
@@ -43,7 +43,7 @@ pub(super) fn inputs(model: &Model, unknowns: &[usize]) -> Vec<Input> {
         if parameter.regressor.is_constant() {
             (input.parameter, input.column) = (Some(k), Some(column));
         } else {
-            input.regressors.push((column, parameter.regressor));
+            input.regressors.push((column, slope_regressor(&model.parameters, x, k)));
         }
     }
     inputs

@@ -2,7 +2,8 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::model::parameter::{Parameter, ParameterSite, Regressor};
+use crate::laws::Quantity;
+use crate::model::parameter::{Parameter, ParameterSite, Regressor, value_regressor};
 use crate::problem::PoseView;
 use crate::spatial::Frame;
 
@@ -26,17 +27,19 @@ impl Instrument {
     /// Returns the instrument with the free parameters at the full parameter vector `x`.
     pub fn with(&self, parameters: &[Parameter], x: &[f64]) -> Self {
         let mut instrument = self.clone();
-        for (parameter, &x) in parameters.iter().zip(x) {
+        for (k, (parameter, &value)) in parameters.iter().zip(x).enumerate() {
+            let regressor = || value_regressor(parameters, x, k);
             match parameter.site {
-                ParameterSite::Scale => instrument.scale += x,
+                ParameterSite::Scale => instrument.scale += value,
                 ParameterSite::Strain { entry } => {
-                    *instrument.strain.get_or_insert_with(Matrix3::zeros) += unit_strain(entry) * x;
+                    *instrument.strain.get_or_insert_with(Matrix3::zeros) +=
+                        unit_strain(entry) * value;
                 }
                 ParameterSite::Shift { axis } => {
-                    instrument.shifts.push((axis, parameter.regressor, x))
+                    instrument.shifts.extend(regressor().map(|own| (axis, own, value)));
                 }
                 ParameterSite::Turn { axis } => {
-                    instrument.rotations.push((axis, parameter.regressor, x))
+                    instrument.rotations.extend(regressor().map(|own| (axis, own, value)));
                 }
                 _ => {}
             }
@@ -48,8 +51,10 @@ impl Instrument {
     /// instrument are left out.
     pub fn without_errors(&self) -> Self {
         let follow_covariates = |terms: &[(usize, Regressor, f64)]| {
-            let terms = terms.iter().copied();
-            terms.filter(|(_, regressor, _)| matches!(regressor, Regressor::Covariate(_))).collect()
+            let follows = |(_, regressor, _): &&(usize, Regressor, f64)| {
+                matches!(regressor.as_quantity(), Some(Quantity::Covariate(_)))
+            };
+            terms.iter().filter(follows).cloned().collect()
         };
         Self {
             scale: 0.0,
@@ -66,8 +71,8 @@ impl Instrument {
         if let Some(strain) = self.strain {
             reading += strain * position;
         }
-        for &(axis, regressor, size) in &self.shifts {
-            reading[axis] += size * regressor.value(setup);
+        for (axis, regressor, size) in &self.shifts {
+            reading[*axis] += size * regressor.value(setup);
         }
         reading
     }
@@ -77,7 +82,7 @@ impl Instrument {
     pub fn slope(
         site: ParameterSite,
         position: &Vector3<f64>,
-        regressor: Regressor,
+        regressor: &Regressor,
         setup: &PoseView,
     ) -> Vector3<f64> {
         match site {
@@ -122,10 +127,10 @@ impl Instrument {
 }
 
 /// Returns Σ size × value of the regressor, by axis.
-fn sum(terms: &[(usize, Regressor, f64)], value: impl Fn(Regressor) -> f64) -> Vector3<f64> {
+fn sum(terms: &[(usize, Regressor, f64)], value: impl Fn(&Regressor) -> f64) -> Vector3<f64> {
     let mut sum = Vector3::zeros();
-    for &(axis, regressor, size) in terms {
-        sum[axis] += size * value(regressor);
+    for (axis, regressor, size) in terms {
+        sum[*axis] += size * value(regressor);
     }
     sum
 }

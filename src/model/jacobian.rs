@@ -19,7 +19,7 @@ use super::rigid::Rigid;
 use super::rows::{Rows, clear};
 use super::tilt::TiltDerivatives;
 use crate::least_squares::Block;
-use crate::model::parameter::{ParameterSite, Regressor};
+use crate::model::parameter::{ParameterSite, Regressor, slope_regressor};
 use crate::observation::{FixtureValues, Needs, Scene};
 use crate::spatial::Frame;
 
@@ -62,6 +62,7 @@ impl JacobianWriter {
         let fixtures = model.fixtures(x);
         let mut fixture_columns = vec![[None; 4]; fixtures.len()];
         let (mut instrument_columns, mut base_rotations) = (Vec::new(), Vec::new());
+        let regressor = |k| slope_regressor(&model.parameters, x, k);
         for (column, &k) in unknowns.iter().enumerate() {
             let parameter = &model.parameters[k];
             match parameter.site {
@@ -72,20 +73,18 @@ impl JacobianWriter {
                 ParameterSite::Fixture { fixture, axis, .. } => {
                     fixture_columns[fixture][axis] = Some(column)
                 }
-                ParameterSite::Turn { axis } => {
-                    base_rotations.push((axis, parameter.regressor, column))
-                }
+                ParameterSite::Turn { axis } => base_rotations.push((axis, regressor(k), column)),
                 ParameterSite::Scale
                 | ParameterSite::Strain { .. }
                 | ParameterSite::Shift { .. } => {
-                    instrument_columns.push((parameter.site, parameter.regressor, column))
+                    instrument_columns.push((parameter.site, regressor(k), column))
                 }
                 ParameterSite::Joint { .. }
                 | ParameterSite::Beam { .. }
                 | ParameterSite::Arm(_) => {}
             }
         }
-        let inputs = inputs(model, unknowns);
+        let inputs = inputs(model, x, unknowns);
         let tilts = tilted.then(|| TiltDerivatives::new(model, x, arm.clone(), inputs.clone()));
         let arm = if arm.is_elastic() {
             ArmDerivatives::Elastic(Box::new(Elastic::new(model, x, arm, inputs)))
@@ -185,7 +184,7 @@ impl JacobianWriter {
             let columns = self
                 .base_rotations
                 .iter()
-                .map(|&(axis, regressor, column)| (axis, column, regressor.value(&pose.setup)));
+                .map(|(axis, regressor, column)| (*axis, *column, regressor.value(&pose.setup)));
             base.rotated(&self.instrument.base_rotation(&pose.setup), columns)
         })
     }
@@ -209,8 +208,9 @@ impl JacobianWriter {
             rows.multiply(&strain);
         }
         rows.scale = per_sigma;
-        for &(site, regressor, column) in &self.instrument_columns {
-            rows.put(column, &Instrument::slope(site, &predicted, regressor, &pose.setup));
+        for (site, regressor, column) in &self.instrument_columns {
+            let slope = Instrument::slope(*site, &predicted, regressor, &pose.setup);
+            rows.put(*column, &slope);
         }
         let reading = self.instrument.reading(&predicted, &pose.setup);
         rows.put(last_column, &(reading - pose.measured));

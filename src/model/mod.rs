@@ -6,7 +6,6 @@ mod command_jacobian;
 mod command_residuals;
 mod command_term;
 mod command_terms;
-mod custom_effects;
 mod derivatives;
 pub mod effect;
 mod elastic;
@@ -77,14 +76,13 @@ impl Model {
     /// target per name in `targets`.
     ///
     /// # Errors
-    /// A rule of `[parameters]` or a constraint fits no parameter, a custom effect has no site in
-    /// the model, or the problem declares targets but not all of these.
+    /// A rule of `[parameters]` or a constraint fits no parameter, or the problem declares targets
+    /// but not all of these.
     pub fn new(
         problem: &Problem,
         bases: &[String],
         targets: &[String],
     ) -> Result<Self, InputError> {
-        custom_effects::check_custom_effects(problem, bases.len(), targets.len())?;
         let effects = &effect::parameters(problem);
         let declared =
             targets.iter().map(|word| problem.target(word)).collect::<Result<Vec<_>, _>>()?;

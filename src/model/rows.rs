@@ -53,8 +53,8 @@ impl Rows<'_> {
     pub fn put_input(&mut self, input: &Input, commanded: &PoseView, derivative: &Vector3<f64>) {
         self.put_if(input.column, || *derivative);
         let mut waves = Waves::default();
-        for &(column, regressor) in &input.regressors {
-            self.put(column, &(derivative * waves.value(regressor, commanded)));
+        for (column, regressor) in &input.regressors {
+            self.put(*column, &(derivative * waves.value(regressor, commanded)));
         }
     }
 }

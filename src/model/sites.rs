@@ -4,7 +4,7 @@ use crate::mechanics::{
     AddedMass, Angle, Arm, Beam, Compensator, Flexibility, HoistError, Nonlinear, Strain,
 };
 use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
-use crate::problem::Effect;
+use crate::problem::{Argument, Effect};
 use crate::scalar::Scalar;
 use crate::spatial::rotate;
 use nalgebra::Vector3;
@@ -67,12 +67,14 @@ pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64
 
 /// Adds the spring of an effect, without force, unless the joint has a spring.
 pub(super) fn add_spring(arm: &mut Arm<f64>, effect: &Effect) {
-    if let Effect::GravityCompensator { joint, anchor, lever, free_length } = effect
+    let argument = |key| effect.argument(key);
+    if let Some(joint) = effect.compensated()
         && let Some(joint) = arm.joints.get_mut(joint.wrapping_sub(1))
+        && let (Some(Argument::Point(anchor)), Some(Argument::Point(lever))) =
+            (argument("anchor_m"), argument("lever_m"))
+        && let Some(Argument::Length(free_length)) = argument("free_length_m")
     {
-        let free_length = free_length.0;
-        let spring =
-            Compensator { anchor: *anchor, lever: *lever, free_length, rate: 0.0, preload: 0.0 };
+        let spring = Compensator { anchor, lever, free_length, rate: 0.0, preload: 0.0 };
         joint.compensator.get_or_insert(spring);
     }
 }

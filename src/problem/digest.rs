@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use nalgebra::Vector3;
 use sha2::{Digest as _, Sha256};
 
-use super::quoted::quoted;
+use super::quoted;
 use super::{
     BasePose, Beam, Body, Effect, Equilibrium, Hoist, Joint, JointKind, Mimic, Placement, Problem,
     Statics, Target, Tool,

@@ -5,16 +5,19 @@ use std::path::Path;
 use toml::de::DeTable;
 
 use super::argument::Reader;
-use super::effect::{NAMES, example};
+use super::effect::example;
 use super::item::{Document, Item};
+use super::law;
 use super::section::Section;
 use super::{Data, Effect, EffectDeclaration, Joint, Problem, Statics};
 use crate::error::{InputError, InputErrorKind, Location};
+use crate::laws::{Argument, FAMILIES, LAW, NAMES};
 
 /// Every `[[effect]]`.
 pub(super) fn read(
     root: &mut Section<'_, '_>,
     joints: &[Joint],
+    data: &Data,
 ) -> Result<Vec<EffectDeclaration>, InputError> {
     let mut effects: Vec<EffectDeclaration> = Vec::new();
     for section in root.sections("effect")? {
@@ -22,8 +25,9 @@ pub(super) fn read(
         let [(name, item)] = entries.as_slice() else {
             return Err(section.error(InputErrorKind::NotOneEffect { found: section.len() }));
         };
-        let effect = effect(name, item, joints)?;
-        if let Some(first) = effects.iter().find(|known| known.effect == effect) {
+        let effect = declared(name, item, joints, data)?;
+        let is_same = |known: &&EffectDeclaration| known.effect.is_same_as(&effect);
+        if let Some(first) = effects.iter().find(is_same) {
             let line = first.location.line.unwrap_or(0);
             return Err(item.error(InputErrorKind::RepeatedEffect { line }));
         }
@@ -87,7 +91,7 @@ pub(crate) fn gives_way<'e>(
     mut effects: impl Iterator<Item = &'e Effect>,
 ) -> bool {
     let stiff = joints.get(joint.wrapping_sub(1)).is_some_and(|own| own.stiffness.is_some());
-    stiff || effects.any(|effect| *effect == Effect::JointCompliance { joint })
+    stiff || effects.any(|effect| effect.gives_way(joint))
 }
 
 /// One effect written as in a problem file, its `[[effect]]` left out: `gear-ratio = { joint = 3
@@ -121,7 +125,7 @@ fn written(text: String, named: &Path, problem: &Problem) -> Result<EffectDeclar
         return Err(section.error(InputErrorKind::NotOneEffect { found: section.len() }));
     };
     let declared = EffectDeclaration {
-        effect: effect(name, item, &problem.joints)?,
+        effect: self::declared(name, item, &problem.joints, &problem.data)?,
         location: item.location(),
     };
     check_alone(&declared, problem.statics, &problem.joints, &problem.data)?;
@@ -130,7 +134,17 @@ fn written(text: String, named: &Path, problem: &Problem) -> Result<EffectDeclar
     Ok(declared)
 }
 
-/// One effect; `true` stands for no arguments.
+/// Reads an effect of the catalogue, or a law of the user's own.
+fn declared(
+    name: &str,
+    item: &Item<'_, '_>,
+    joints: &[Joint],
+    data: &Data,
+) -> Result<Effect, InputError> {
+    if name == LAW { law::read(item.section()?, joints, data) } else { effect(name, item, joints) }
+}
+
+/// Reads an effect of the catalogue; `true` stands for no arguments.
 pub(crate) fn effect(
     name: &str,
     item: &Item<'_, '_>,
@@ -143,11 +157,14 @@ pub(crate) fn effect(
         Err(_) => item.section()?,
     };
     let mut arguments = Reader::new(section, joints);
-    let Some(effect) = Effect::read(name, &mut arguments)? else {
-        return Err(
-            item.error(InputErrorKind::UnknownEffect { name: name.to_owned(), known: NAMES })
-        );
-    };
+    let unknown =
+        || item.error(InputErrorKind::UnknownEffect { name: name.to_owned(), known: NAMES });
+    let family = FAMILIES.iter().find(|family| family.name == name).ok_or_else(unknown)?;
+    let mut found: Vec<(&str, Argument)> = Vec::new();
+    for (key, kind) in family.arguments {
+        found.push((key, arguments.read(key, *kind)?));
+    }
     arguments.section.finish()?;
-    Ok(effect)
+    let argument = |key: &str| found.iter().find(|(own, _)| *own == key).map(|own| own.1.clone());
+    Effect::build(name, argument).ok_or_else(unknown)
 }

@@ -96,11 +96,11 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let targets = target::targets(&mut root, &tool, &carriers)?;
     let base = base(root.section("base")?)?;
     let urdf = root.section("urdf")?.map(urdf).transpose()?;
-    let effects = effects::read(&mut root, &joints)?;
     let (fixtures, distances) = fixture::read(&mut root)?;
     let parameters = parameters::read(&mut root)?;
     let constraints = constraints::read(&mut root)?;
     let data = data::read(&mut root)?;
+    let effects = effects::read(&mut root, &joints, &data)?;
     let robust = robust::read(&mut root)?;
     let remainder = remainder::read(&mut root)?;
     root.finish()?;

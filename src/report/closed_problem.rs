@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 
 use toml_edit::{
-    Array, ArrayOfTables, DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError,
-    Value,
+    ArrayOfTables, DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError, Value,
 };
 
 use super::effect::values;
@@ -107,31 +106,14 @@ fn edited(
             name_files(joints, files[1]);
         }
     }
-    let (customs, written): (Vec<_>, Vec<_>) =
-        closed.iter().partition(|(effect, _)| effect.is_custom());
-    let declared: Vec<&Effect> = declared.iter().filter(|effect| !effect.is_custom()).collect();
-    for (k, (effect, comments)) in written.into_iter().enumerate() {
+    for (k, (effect, comments)) in closed.iter().enumerate() {
         match declared.get(k) {
-            Some(known) if *known == effect => {}
+            Some(known) if known == effect => {}
             Some(_) => replace(&mut document, k, effect),
             None => add(&mut document, effect, comments),
         }
     }
-    for (effect, comments) in customs {
-        say(&mut document, effect, comments);
-    }
     Ok(document.to_string())
-}
-
-/// Appends a comment that no file can declare a custom effect.
-fn say(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
-    let rest = document.trailing().as_str().unwrap_or_default();
-    let lines: String = comments.iter().flat_map(|line| ["# ", line, "\n"]).collect();
-    let name = one_line(&effect.name_and_place());
-    let more = format!(
-        "# {name} is a custom effect: no file declares it, only the program that defines it.\n"
-    );
-    document.set_trailing(format!("{rest}\n{lines}{more}"));
 }
 
 /// Replaces the names of the data files.
@@ -208,21 +190,11 @@ fn arguments(effect: &Effect) -> Value {
     if arguments.is_empty() {
         return Value::from(true);
     }
-    let whole = |number: usize| Value::from(i64::try_from(number).unwrap_or(i64::MAX));
-    let value = |(key, argument): (&'static str, Argument)| {
-        let value = match argument {
-            Argument::Joint(joint) => whole(joint),
-            Argument::Orders(orders) => {
-                Value::Array(orders.into_iter().map(i64::from).collect::<Array>())
-            }
-            Argument::Name(name) => Value::from(name),
-            Argument::Number(number) | Argument::Length(number) => Value::from(number),
-            Argument::Point(point) => Value::Array(point.into_iter().collect::<Array>()),
-            Argument::Base(there) => Value::from(there),
-        };
-        (key, value)
+    // Every argument writes itself as a value of TOML.
+    let value = |(key, argument): (&str, Argument)| {
+        Some((key.to_owned(), argument.toml().parse::<Value>().ok()?))
     };
-    Value::InlineTable(arguments.into_iter().map(value).collect())
+    Value::InlineTable(arguments.into_iter().filter_map(value).collect())
 }
 
 /// Returns comments on an effect that was found: p-value, status and values.
@@ -271,31 +243,16 @@ mod tests {
     }
 
     #[test]
-    fn what_no_file_can_declare_is_a_comment() {
-        #[derive(Debug)]
-        struct Creep;
-        impl crate::model::effect::CustomEffect for Creep {
-            fn name(&self) -> &'static str {
-                "joint-creep"
-            }
-            fn place(&self) -> String {
-                "3".to_owned()
-            }
-            fn terms(&self, _: &Problem) -> Vec<crate::model::effect::Term> {
-                Vec::new()
-            }
-            fn describe(&self) -> String {
-                String::new()
-            }
-        }
-        let custom = || Effect::custom(Creep);
-        let text =
-            "[[effect]]\njoint-harmonic = { joint = 1, orders = [1] }\n\n[data]\nfiles = []\n";
-        let harmonic = |orders: &[u32]| Effect::JointHarmonic { joint: 1, orders: orders.to_vec() };
-        let expected = "[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 2] }\n\n[data]\nfiles = [\"../data.csv\"]\n\n\
-                        # found\n[[effect]]\ngear-ratio = { joint = 3 }\n\n# found\n\
-                        # joint-creep 3 is a custom effect: no file declares it, only the program that defines it.\n";
-        assert_eq!(edit(text, &[harmonic(&[1])], &[harmonic(&[1, 2]), custom(), gear()]), expected);
+    fn a_law_is_written_as_it_is_read() {
+        let text = "name = 'arm'\njoint = [{}, {}, {}]\n";
+        let problem = Problem::parse(text, "problem.toml".as_ref()).unwrap();
+        let law = "law = { name = \"creep\", at = \"joint3\", terms = [\"t*exp(-k*t)\"], \
+                   sigma_deg = 0.05, k = { start = 0.5, min = 0.0 } }";
+        let creep = problem.effect(law, "law".as_ref()).unwrap().effect;
+        assert_eq!(creep.declaration(), law);
+        let edited = edit("[data]\nfiles = []\n", &[], &[creep.clone()]);
+        let read = Problem::parse(&format!("{text}{edited}"), "problem.toml".as_ref());
+        assert_eq!(read.unwrap().effects[0].effect, creep, "{edited}");
     }
 
     #[test]

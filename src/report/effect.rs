@@ -2,6 +2,7 @@
 
 use super::document::{Point, code};
 use super::quantity::{decimals, number};
+use crate::laws::ArgumentKind;
 use crate::problem::Effect;
 use crate::results::{ParameterValue, joined};
 
@@ -16,7 +17,7 @@ pub(super) const SHOWN_WAVES: usize = 4;
 /// largest.
 pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<String> {
     let line = |name: &str, parameter: &ParameterValue| format!("{name} = {}", value(parameter));
-    let orders = orders(effect).unwrap_or_default();
+    let orders = effect.harmonic_orders().unwrap_or_default();
     if parameters.len() <= MOST_LISTED || parameters.len() != 2 * orders.len() {
         return parameters.iter().map(|parameter| line(&parameter.name, parameter)).collect();
     }
@@ -80,7 +81,7 @@ fn grouped<R: Copy + PartialEq>(
         let alike = |(members, why): &&mut (Vec<Effect>, R)| {
             *why == reason
                 && members[0].name() == effect.name()
-                && orders(&members[0]) == orders(&effect)
+                && members[0].harmonic_orders() == effect.harmonic_orders()
         };
         match groups.iter_mut().find(alike) {
             Some((members, _)) => members.push(effect),
@@ -88,10 +89,6 @@ fn grouped<R: Copy + PartialEq>(
         }
     }
     groups.into_iter().map(|(members, reason)| (group(&members), reason)).collect()
-}
-
-fn orders(effect: &Effect) -> Option<&[u32]> {
-    if let Effect::JointHarmonic { orders, .. } = effect { Some(orders) } else { None }
 }
 
 /// Names effects with many time constants or distances by their places alone.
@@ -119,24 +116,24 @@ fn of_places(members: &[Effect]) -> String {
 
 fn group(members: &[Effect]) -> String {
     let name = members[0].name();
-    match (&members[0], members.len()) {
-        (Effect::StationShift { .. } | Effect::StationMove { .. }, 2..) => {
+    match (members[0].searched_value(), members.len()) {
+        (Some((ArgumentKind::Time, _)), 2..) => {
             return format!("{} at {} times", code(name), members.len());
         }
-        (Effect::TrackerSettling { .. }, 2..) => {
+        (_, 2..) if members[0].has_memory() => return of_places(members),
+        (Some((ArgumentKind::Duration, _)), 2..) => {
             return format!("{} of {} time constants", code(name), members.len());
         }
-        (effect, 2..) if effect.has_memory() => return of_places(members),
         _ => {}
     }
-    let place = |effect: &Effect| match effect {
-        Effect::JointCoupling { joint, from } => format!("{joint} by {from}"),
-        Effect::JointWave { joint, order } => format!("{joint} (order {order})"),
-        Effect::StationShift { at_time } | Effect::StationMove { at_time } => {
-            format!("{at_time} s")
-        }
-        Effect::TrackerSettling { time_constant } => format!("{time_constant} s"),
-        other => other.place(),
+    let place = |effect: &Effect| match (effect.searched_value(), effect.joint()) {
+        (Some((ArgumentKind::Order, order)), Some(joint)) => format!("{joint} (order {order})"),
+        (Some((_, seconds)), None) if effect.link().is_none() => format!("{seconds} s"),
+        (_, Some(joint)) => match effect.other_joint() {
+            Some(from) => format!("{joint} by {from}"),
+            None => effect.place(),
+        },
+        _ => effect.place(),
     };
     let places = members.iter().map(place).collect::<Vec<_>>().join(", ");
     let of = match members[0].arguments().first() {
@@ -147,7 +144,7 @@ fn group(members: &[Effect]) -> String {
         Some(_) => "at ",
         None => return code(name),
     };
-    let orders = match orders(&members[0]) {
+    let orders = match members[0].harmonic_orders().as_deref() {
         Some([one]) => format!(", order {one}"),
         Some(all @ [first, .., last]) if (last - first) as usize + 1 == all.len() => {
             format!(", orders {first} to {last}")

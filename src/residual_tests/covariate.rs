@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use crate::model::parameter::Quantity;
+use crate::laws::Quantity;
 use crate::problem::Problem;
 
 /// What is known of every pose and a residual may depend on; joints are counted from 0. Its
@@ -34,17 +34,29 @@ pub enum Covariate {
 }
 
 impl Covariate {
-    /// Of a quantity; without measured times the order of the rows stands for them.
-    pub fn of(quantity: Quantity, problem: &Problem, time_measured: bool) -> Self {
+    /// Returns the covariates that a quantity follows; without measured times the order of the rows
+    /// stands for them, and without directions of approach the commands do.
+    pub fn of(quantity: Quantity, problem: &Problem, known: (bool, bool)) -> Vec<Self> {
+        let (approach_known, time_measured) = known;
         match quantity {
-            Quantity::Command(joint) => Self::Command(joint),
-            Quantity::Temperature => Self::Temperature,
-            Quantity::Payload => Self::Payload,
-            Quantity::Hoist => Self::Hoist,
-            Quantity::Elapsed if time_measured => Self::Time,
-            Quantity::Elapsed => Self::Row,
-            Quantity::Covariate(which) => Self::own(which, problem),
+            Quantity::Warming => vec![Self::Temperature],
+            Quantity::Lagging { .. } => vec![Self::Temperature, Self::time(time_measured)],
+            Quantity::Friction { joint, .. } if approach_known => {
+                vec![Self::Command(joint), Self::Approach(joint)]
+            }
+            Quantity::Command(joint) | Quantity::Friction { joint, .. } => {
+                vec![Self::Command(joint)]
+            }
+            Quantity::Payload => vec![Self::Payload],
+            Quantity::Hoist => vec![Self::Hoist],
+            Quantity::Elapsed | Quantity::Time => vec![Self::time(time_measured)],
+            Quantity::Approach(joint) => vec![Self::Approach(joint)],
+            Quantity::Covariate(index) => vec![Self::own(index, problem)],
         }
+    }
+
+    fn time(measured: bool) -> Self {
+        if measured { Self::Time } else { Self::Row }
     }
 
     /// The problem's own covariate of that number, from 0.

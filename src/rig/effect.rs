@@ -167,7 +167,7 @@ pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
             named(&[turns, ["x", "y", "z"].map(|name| (name, Unit::LengthPerUnit))].concat())
         }
         // The rig implements the laws of the catalogue only.
-        Effect::Custom(_) => Vec::new(),
+        Effect::Law(_) => Vec::new(),
     }
 }
 

@@ -14,9 +14,6 @@ pub const REFUSED: &str = "a rule of [parameters] speaks of it in another unit";
 /// Why an effect is not judged whose derivative is not a number in these poses.
 pub const NOT_FINITE: &str = "its derivative is not a finite number in these poses";
 
-/// Why a custom effect is not looked for that the model cannot take.
-pub const NO_ROOM: &str = "the model has no room for it";
-
 /// Candidates that are not declared, divided into those that the data can show and the others.
 pub(super) struct Candidates {
     pub testable: Vec<Effect>,
@@ -28,11 +25,7 @@ impl Candidates {
         let conditions = data.conditions(problem);
         let more = data.candidates.iter().map(|effect| Candidate {
             effect: effect.clone(),
-            untestable: effect
-                .check_room(problem)
-                .err()
-                .map(|_| NO_ROOM)
-                .or_else(|| effect.untestable(problem, &conditions)),
+            untestable: effect.untestable(problem, &conditions),
         });
         let all = effect::candidates(problem, &conditions).into_iter().chain(more);
         let mut found = Self { testable: Vec::new(), untestable: Vec::new() };

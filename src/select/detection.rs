@@ -171,7 +171,7 @@ pub(super) fn sizes(
     for (k, parameter) in
         parameters.iter().enumerate().filter(|(_, parameter)| parameter.nominal == 0.0)
     {
-        let own = unit(parameter.site, parameter.regressor);
+        let own = unit(parameter.site, &parameter.regressor);
         match groups.iter_mut().find(|(unit, _)| *unit == own) {
             Some((_, members)) => members.push(k),
             None => groups.push((own, vec![k])),

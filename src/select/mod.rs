@@ -25,7 +25,7 @@ mod separation;
 mod telling_pose;
 mod unexplained;
 
-pub use candidates::{HELD_FIXED, NO_ROOM, NOT_FINITE, REFUSED};
+pub use candidates::{HELD_FIXED, NOT_FINITE, REFUSED};
 pub use detection::{Detectable, Detection, Size, detectable};
 pub use evidence::{Claims, Evidence, Hypothesis, HypothesisKind, HypothesisSet, Site};
 pub use reference_check::{ReferenceCheck, ReferenceVerdict};

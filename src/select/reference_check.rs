@@ -20,8 +20,10 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::data::Data;
 use super::fitted::Fitted;
+use crate::laws::Quantity;
 use crate::measurement::NestReading;
-use crate::problem::Effect;
+use crate::model::parameter::{ParameterSite, Regressor};
+use crate::problem::{Effect, PoseView, Problem};
 
 /// Twice the logarithm of the odds at which readings decide: 100 to 1.
 const DECIDED: f64 = 9.21;
@@ -102,6 +104,22 @@ fn odds(
     Some(2.0 * found.dot(told) - found.dot(&known) + left.dot(&inner.solve(&left)) - ln_determinant)
 }
 
+/// Returns the function of time by which an effect moves and turns the instrument; `None` for other
+/// effects.
+fn course(effect: &Effect, problem: &Problem) -> Option<Regressor> {
+    let mut terms = effect.terms(problem).into_iter();
+    let first = terms.next()?;
+    let is_of_instrument = |site: ParameterSite| {
+        matches!(site, ParameterSite::Shift { .. } | ParameterSite::Turn { .. })
+    };
+    let quantities = first.regressor.quantities();
+    let follows_time =
+        quantities.iter().all(|own| matches!(own, Quantity::Elapsed | Quantity::Time));
+    let is_one = is_of_instrument(first.site)
+        && terms.all(|term| is_of_instrument(term.site) && term.regressor == first.regressor);
+    (is_one && follows_time && !quantities.is_empty()).then_some(first.regressor)
+}
+
 /// What readings of fixed points say of an effect of the instrument; `None` for other effects, and
 /// where they do not decide.
 pub(super) fn reference_check(
@@ -110,6 +128,7 @@ pub(super) fn reference_check(
     effect: &Effect,
 ) -> Option<ReferenceCheck> {
     let measurements = data.measurements;
+    let course = course(effect, &fitted.problem)?;
     let first = measurements.time.iter().copied().fold(f64::INFINITY, f64::min);
     let moves = |reading: &NestReading| -> Option<f64> {
         // Where rows are the time, a reading lies between those before and behind it.
@@ -118,16 +137,8 @@ pub(super) fn reference_check(
         } else {
             measurements.time.first()? + reading.after as f64 - 0.5
         };
-        match effect {
-            Effect::StationShift { at_time } | Effect::StationMove { at_time } => {
-                Some(f64::from(time >= *at_time))
-            }
-            Effect::TrackerDrift => Some(time - first),
-            Effect::TrackerSettling { time_constant } => {
-                Some(1.0 - ((first - time) / time_constant).exp())
-            }
-            _ => None,
-        }
+        let pose = PoseView::from_configuration(&[]);
+        Some(course.value(&PoseView { time, elapsed: time - first, ..pose }))
     };
     let places = fitted.parameters_of(effect);
     let count = places.len();

@@ -2,6 +2,7 @@
 
 use super::study::{Source, Study};
 use crate::error::{InputError, InputErrorKind};
+use crate::laws::At;
 use crate::model::effect::Columns;
 use crate::model::parameter::{ArmField, EffectParameter, Parameter, ParameterSite};
 use crate::problem::{Effect, PoseRanges, Problem};
@@ -50,7 +51,7 @@ impl Strengths {
         let effect = |effect: &Effect| {
             let cause = Cause::Catalogued(effect.clone());
             let names = names(effect, &study.problem);
-            if *effect == Effect::DeflectedEquilibrium
+            if effect.acts_at(At::Arm(ArmField::Mixing))
                 || names.iter().all(|name| is_in(&given, name))
             {
                 return None;

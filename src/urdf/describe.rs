@@ -14,7 +14,7 @@ use super::read::Kind;
 use super::weights::weights;
 use crate::error::InputError;
 use crate::problem::Problem;
-use crate::problem::quoted::quoted;
+use crate::problem::quoted;
 use crate::problem::read::FORBIDDEN_IN_FOLDER_NAMES;
 use crate::spatial::Frame;
 

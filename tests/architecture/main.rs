@@ -14,7 +14,7 @@ const LONGEST: usize = 660;
 
 /// Modules of input data and their parts.
 const GROUND: &[&str] =
-    &["scalar", "spatial", "quantity", "error", "observation", "problem", "measurement"];
+    &["scalar", "spatial", "quantity", "error", "observation", "laws", "problem", "measurement"];
 
 /// Top-level modules from the bottom up, each with the modules that it may use.
 const STOREYS: &[(&str, &[&[&str]])] = &[
@@ -29,7 +29,9 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     // Small numerical methods: medians, bisection, random numbers.
     ("numeric", &[]),
     ("random", &[]),
-    ("problem", &[&["quantity", "error", "spatial", "observation", "files"]]),
+    // Laws are data: formulas and the catalogue of effects.
+    ("laws", &[&["scalar", "error"]]),
+    ("problem", &[&["quantity", "error", "spatial", "observation", "files", "laws"]]),
     ("measurement", &[&["quantity", "error", "problem", "files"]]),
     // Least squares is independent of robots.
     ("least_squares", &[&["scalar", "error", "numeric"]]),
@@ -44,6 +46,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
             "quantity",
             "error",
             "observation",
+            "laws",
             "problem",
             "mechanics",
             "least_squares",
@@ -55,7 +58,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     // Corrections of an identified arm know fits, and no search for effects.
     ("remainder", &[GROUND, BELOW_FIT, &["fit", "files"]]),
     // Statistical tests of a residual are independent of arms and fits.
-    ("residual_tests", &[&["error", "problem", "model", "numeric"]]),
+    ("residual_tests", &[&["error", "laws", "problem", "model", "numeric"]]),
     ("select", &[GROUND, BELOW_FIT, &["fit", "residual_tests"]]),
     // Import and export of URDF.
     ("urdf", &[&["spatial", "error", "problem", "mechanics", "model", "least_squares", "random"]]),
@@ -115,8 +118,16 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
 const BELOW_FIT: &[&str] = &["mechanics", "model", "paper", "least_squares", "numeric", "random"];
 
 /// Modules that read no files.
-const WITHOUT_FILES: &[&str] =
-    &["scalar", "spatial", "quantity", "observation", "least_squares", "mechanics", "model"];
+const WITHOUT_FILES: &[&str] = &[
+    "scalar",
+    "spatial",
+    "quantity",
+    "observation",
+    "laws",
+    "least_squares",
+    "mechanics",
+    "model",
+];
 const FILES: &[&str] = &["std::fs", "std::path", "std::io", "csv::", "toml::", "serde_json::"];
 
 /// Modules that print.

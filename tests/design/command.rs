@@ -261,7 +261,7 @@ fn examples_of_arguments_are_effects_of_the_arm() {
     problem.joints[3].kind = JointKind::Prismatic;
     let read = |text: &str| problem.effect(text, Path::new("--separate"));
     let mut written = 0;
-    for family in flexcal::model::effect::FAMILIES {
+    for family in flexcal::laws::FAMILIES {
         let Err(error) = read(family.name) else { continue };
         let error = error.to_string();
         let Some((_, example)) = error.split_once("write '") else { continue };

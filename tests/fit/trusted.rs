@@ -46,7 +46,7 @@ fn a_bound_along_an_unidentifiable_direction_gives_its_partner_no_certainty() {
     assert!(error < 3.0 * sigma && sigma > 3e-4, "{error} {sigma}");
     assert!(partner.identified < 0.5, "{}", partner.identified);
     // The sum is as certain as before.
-    let rows = Dataset::poses(vec![vec![0.3; 5]]).unwrap();
+    let rows = Dataset::poses([[0.3; 5]]).build().unwrap().measurements;
     let predicted = found.predict_with_covariance(&problem, &rows).unwrap();
     assert!(predicted[0].covariance.trace().sqrt() < SIGMA, "{}", predicted[0].covariance);
 }

@@ -5,29 +5,12 @@ use std::path::Path;
 
 use flexcal::fit::Options;
 use flexcal::measurement::{Dataset, Measurements};
-use flexcal::model::effect::{CustomEffect, Term};
-use flexcal::model::parameter::{ParameterSite, Regressor};
 use flexcal::problem::{Effect, Problem};
 use flexcal::select::{NOT_FINITE, trace};
 
-/// Drift with the temperature relative to a reference that is not a number.
-#[derive(Debug)]
-struct Endless;
-
-impl CustomEffect for Endless {
-    fn name(&self) -> &'static str {
-        "endless-drift"
-    }
-
-    fn terms(&self, problem: &Problem) -> Vec<Term> {
-        let regressor = Regressor::Warming { reference: f64::NEG_INFINITY };
-        vec![Term::driven("rate", ParameterSite::coordinate(problem, 2), regressor, 1e-3)]
-    }
-
-    fn describe(&self) -> String {
-        "joint 2 drifts without end".to_owned()
-    }
-}
+/// A law whose value is not finite at any pose.
+const ENDLESS: &str =
+    "law = { name = 'endless', at = 'joint2', terms = ['log(q2 - 1000)'], sigma_deg = 0.05 }";
 
 #[test]
 fn a_derivative_that_is_not_finite_spoils_no_other_candidate() {
@@ -37,11 +20,11 @@ fn a_derivative_that_is_not_finite_spoils_no_other_candidate() {
     let data = Dataset::from_measurements(&problem, measurements).unwrap();
     let mut options = Options::default();
     let plain = trace(&problem, &data, &options).unwrap();
-    options.candidates = vec![Effect::custom(Endless)];
+    options.candidates = vec![problem.effect(ENDLESS, Path::new("endless")).unwrap().effect];
     let endless = trace(&problem, &data, &options).unwrap();
     assert!(plain.untestable.iter().all(|(_, why)| *why != NOT_FINITE));
     let refused =
-        |(effect, why): &&(Effect, &str)| effect.name() == "endless-drift" && *why == NOT_FINITE;
+        |(effect, why): &&(Effect, &str)| effect.place() == "endless" && *why == NOT_FINITE;
     assert_eq!(endless.untestable.iter().filter(refused).count(), 1);
     assert_eq!(endless.tried, plain.tried);
     let names = |effects: &[flexcal::select::Ranked]| -> Vec<(Effect, f64)> {

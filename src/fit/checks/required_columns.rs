@@ -3,14 +3,30 @@
 use crate::error::{InputError, InputErrorKind};
 use crate::measurement::Measurements;
 use crate::model::effect::Columns;
-use crate::problem::{EffectDeclaration, Problem};
+use crate::problem::{Effect, EffectDeclaration, Problem};
 
 /// Checks that a table has every column that the effects of `problem` need.
 ///
 /// # Errors
 /// Returns an error at the file and line of the first effect whose column is missing.
 pub fn check_columns(problem: &Problem, rows: &Measurements) -> Result<(), InputError> {
-    missing(problem, rows, rows.time_measured).next().map_or(Ok(()), Err)
+    missing(problem, rows, rows.time_measured).next().map_or(Ok(()), Err)?;
+    not_finite(problem, rows).map_or(Ok(()), Err)
+}
+
+/// Returns the error of the first declared law with a formula that has no finite value in a row,
+/// counted from 1.
+fn not_finite(problem: &Problem, rows: &Measurements) -> Option<InputError> {
+    let first = rows.time.iter().copied().fold(f64::INFINITY, f64::min);
+    problem.effects.iter().find_map(|EffectDeclaration { effect, location }| {
+        let Effect::Law(_) = effect else { return None };
+        effect.terms(problem).into_iter().find_map(|term| {
+            let is_lost = |row: &usize| !term.regressor.value(&rows.setup(*row, first)).is_finite();
+            let row = (0..rows.len()).find(is_lost)? + 1;
+            let kind = InputErrorKind::FormulaNotFinite { formula: term.regressor.text(), row };
+            Some(location.clone().error(kind))
+        })
+    })
 }
 
 /// Returns an error for each effect that needs a column which the targets `rows` lack. Targets have

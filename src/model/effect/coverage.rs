@@ -2,8 +2,6 @@
 
 use nalgebra::Vector3;
 
-use crate::problem::{Effect, Problem};
-
 /// Which regressors of effects the poses at hand have, and vary.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DataCoverage {
@@ -74,13 +72,4 @@ pub struct Columns {
     pub time: bool,
     /// The problem's own covariates.
     pub covariates: bool,
-}
-
-/// The column that an effect of the temperature needs, where it is not there.
-pub(super) fn without_temperature(
-    _: &Effect,
-    _: &Problem,
-    columns: Columns,
-) -> Option<&'static str> {
-    (!columns.temperature).then_some("a column temperature_C")
 }

@@ -1,9 +1,9 @@
-//! Places of an arm that effects are about; joints are counted from 1, as in files.
+//! Places of an arm at which effects act; joints are counted from 1, as in files.
 
-use crate::model::parameter::{JointField, ParameterSite, Regressor};
+use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{Body, Joint, JointKind, Problem};
 
-/// Whether a joint, counted from 1, slides.
+/// Returns true if a joint, counted from 1, slides.
 pub(super) fn slides(problem: &Problem, joint: usize) -> bool {
     joint
         .checked_sub(1)
@@ -12,8 +12,7 @@ pub(super) fn slides(problem: &Problem, joint: usize) -> bool {
 }
 
 impl ParameterSite {
-    /// What an error of a joint adds to: d where it slides, else θ. The joint is numbered from 1,
-    /// as in files.
+    /// Returns the coordinate of a joint, numbered from 1 as in files: d where it slides, else θ.
     pub fn coordinate(problem: &Problem, joint: usize) -> Self {
         Self::of_joint(
             joint,
@@ -22,26 +21,11 @@ impl ParameterSite {
     }
 }
 
-impl Regressor {
-    /// What a joint is told: q \[rad\] or \[m\]. The joint is numbered from 1, as in files.
-    pub fn command(problem: &Problem, joint: usize) -> Self {
-        let index = joint.wrapping_sub(1);
-        if slides(problem, joint) { Self::Travel(index) } else { Self::Command(index) }
-    }
-}
-
-/// Numbers, from 1, of the joints that take a command.
-pub(super) fn commanded(problem: &Problem) -> impl Iterator<Item = usize> + '_ {
-    let takes =
-        |&(_, joint): &(usize, &crate::problem::Joint)| joint.command_kind() != JointKind::Fixed;
-    problem.joints.iter().enumerate().filter(takes).map(|(index, _)| index + 1)
-}
-
-/// Moment below which arms are not told apart [N·m].
+/// Least moment that sizes of priors are derived from [N·m].
 pub(super) const LEAST_MOMENT: f64 = 10.0;
 
-/// The weight of everything that is declared beyond a joint, counted from 1, at the length of the
-/// arm beyond it, that of the longest branch [N·m].
+/// Returns the weight of everything declared beyond a joint, counted from 1, times the length of
+/// the longest branch beyond it [N·m].
 pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
     let all = |bodies: &[Body]| bodies.iter().map(|body| body.mass).sum::<f64>();
     let beam =
@@ -76,29 +60,6 @@ pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
     };
     let tips = beyond().map(|(k, _)| k).chain([joint - 1]);
     problem.gravity.norm() * (mass + payload) * tips.map(reach).fold(0.0, f64::max)
-}
-
-/// Index of the joint whose beam has that name.
-pub(super) fn carrier(problem: &Problem, link: &str) -> Option<usize> {
-    problem
-        .joints
-        .iter()
-        .position(|joint| joint.beam.as_ref().is_some_and(|beam| beam.name == link))
-}
-
-/// T − T₀.
-pub(super) fn warming(problem: &Problem) -> Regressor {
-    Regressor::Warming { reference: problem.data.reference_temperature.unwrap_or(0.0) }
-}
-
-/// Names of all beams.
-pub(super) fn links(problem: &Problem) -> impl Iterator<Item = String> + '_ {
-    problem.joints.iter().filter_map(|joint| joint.beam.as_ref()).map(|beam| beam.name.clone())
-}
-
-/// Whether some rope hoists the arm.
-pub(super) fn is_hoisted(problem: &Problem) -> bool {
-    problem.joints.iter().any(|joint| joint.beam.as_ref().is_some_and(|beam| beam.hoist.is_some()))
 }
 
 #[cfg(test)]

@@ -5,17 +5,22 @@
 //! and a stiffness stays positive.
 
 mod constraint;
-mod name;
+mod inner;
 mod regressor;
 mod resolve;
+mod site;
 
+pub use crate::laws::{ArmField, BeamField, JointField};
 pub use constraint::{LinearConstraint, constrain};
-pub use name::{ArmField, BeamField, JointField, ParameterSite};
+pub use inner::Slope;
+pub(crate) use inner::{slope_regressor, value_regressor};
 pub(crate) use regressor::Waves;
-pub use regressor::{Quantity, Regressor};
+pub use regressor::{Formula, Regressor};
 pub use resolve::{EffectParameter, resolve};
 pub(crate) use resolve::{holds_all, refuses, rule_of};
+pub use site::ParameterSite;
 
+use crate::laws::expression::Per;
 use crate::quantity::Unit;
 
 /// Free parameter of the model.
@@ -40,7 +45,7 @@ pub struct Parameter {
 impl Parameter {
     /// Returns the unit of its value.
     pub fn unit(&self) -> Unit {
-        unit(self.site, self.regressor)
+        unit(self.site, &self.regressor)
     }
 
     /// Returns the value at x, in SI units.
@@ -65,22 +70,23 @@ impl Parameter {
 }
 
 /// Returns the unit of a parameter that is multiplied by `regressor` at `site`.
-pub(crate) fn unit(site: ParameterSite, regressor: Regressor) -> Unit {
-    match (regressor, site.unit()) {
-        (Regressor::Warming { .. } | Regressor::Lagging { .. }, of) => match of {
-            Unit::Angle => Unit::AnglePerDegree,
-            Unit::PerLength => Unit::CurvaturePerDegree,
-            Unit::Ratio => Unit::PerDegree,
-            _ => Unit::LengthPerDegree,
-        },
-        (Regressor::LoadedSide { .. }, Unit::Angle) => Unit::AnglePerMass,
-        (Regressor::LoadedSide { .. }, _) => Unit::LengthPerMass,
-        (Regressor::Elapsed, _) => Unit::Speed,
-        (Regressor::Covariate(_), Unit::Angle) => Unit::AnglePerUnit,
-        (Regressor::Covariate(_), _) => Unit::LengthPerUnit,
-        (Regressor::Command(_), Unit::Length) => Unit::LengthPerAngle,
-        (Regressor::Travel(_), Unit::Angle) => Unit::AnglePerLength,
-        (Regressor::Command(_) | Regressor::Travel(_), _) => Unit::Ratio,
+pub(crate) fn unit(site: ParameterSite, regressor: &Regressor) -> Unit {
+    if *regressor == Regressor::Inner {
+        return Unit::Number;
+    }
+    match (regressor.per(), site.unit()) {
+        (Per::Kelvin, Unit::Angle) => Unit::AnglePerDegree,
+        (Per::Kelvin, Unit::PerLength) => Unit::CurvaturePerDegree,
+        (Per::Kelvin, Unit::Ratio) => Unit::PerDegree,
+        (Per::Kelvin, _) => Unit::LengthPerDegree,
+        (Per::Mass, Unit::Angle) => Unit::AnglePerMass,
+        (Per::Mass, _) => Unit::LengthPerMass,
+        (Per::Second, _) => Unit::Speed,
+        (Per::Covariate, Unit::Angle) => Unit::AnglePerUnit,
+        (Per::Covariate, _) => Unit::LengthPerUnit,
+        (Per::Angle, Unit::Length) => Unit::LengthPerAngle,
+        (Per::Length, Unit::Angle) => Unit::AnglePerLength,
+        (Per::Angle | Per::Length, _) => Unit::Ratio,
         (_, unit) => unit,
     }
 }

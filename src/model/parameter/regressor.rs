@@ -1,226 +1,92 @@
-//! What a parameter is multiplied by, pose by pose.
+//! Regressors: functions of a pose that multiply parameters.
 
-use crate::problem::{PoseView, ThermalLag};
+use std::sync::Arc;
 
-/// The known quantity of a pose that scales a parameter's part in a joint's coordinate or in the
-/// observation.
+use num_dual::Dual64;
+
+use super::inner::Slope;
+use crate::laws::Quantity;
+use crate::laws::expression::{Expression, FormulaError, Names, Parsed, Per, Vocabulary, parse};
+use crate::problem::{PoseView, Problem, ThermalLag};
+
+/// Function of a pose that multiplies a parameter at its site.
 ///
-/// Joints are counted from 0, [`Regressor::command`] takes the numbers of files; configurations are
-/// those commanded.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Joints are counted from 0. Waves of whole orders stand apart from other formulas because sums of
+/// many of them are taken in one pass.
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Regressor {
-    /// 1: the parameter acts the same in every pose.
+    /// 1: the parameter is itself the quantity of its site, the same in every pose.
     Constant,
-    /// 1, for what is added to a parameter that acts at the same place.
+    /// 1, for a parameter that adds to the quantity of its site.
     Unit,
-    /// q of a joint that turns \[rad\].
-    Command(usize),
-    /// q of a joint that slides \[m\].
-    Travel(usize),
-    /// sin kq.
+    /// sin kq of a joint and an order k.
     Sine(usize, u32),
-    /// cos kq.
+    /// cos kq of a joint and an order k.
     Cosine(usize, u32),
-    /// sin(kq + φ) of an order k that need be no whole number.
-    Wave {
-        /// The joint.
-        joint: usize,
-        /// k, cycles a revolution.
-        order: f64,
-        /// φ \[rad\].
-        phase: f64,
-    },
-    /// Temperature above the reference \[K\].
-    Warming {
-        /// T₀ [°C].
-        reference: f64,
-    },
-    /// The same of what follows the temperature with a time constant.
-    Lagging {
-        /// T₀ [°C].
-        reference: f64,
-        /// τ \[s\].
-        time_constant: f64,
-    },
-    /// Which part of its friction pulls a joint back the way on which it came, −1 to 1
-    /// ([`dragged`](crate::problem::Past::friction_state)).
-    Dragged {
-        /// The joint.
-        joint: usize,
-        /// The way on which that turns over, s \[rad\] or \[m\].
-        distance: f64,
-    },
-    /// Time since the first pose \[s\].
-    Elapsed,
-    /// 1 from a time on \[s\], 0 before.
-    Since(f64),
-    /// 1 − exp(−t/τ), t since the first pose, of a time constant τ \[s\].
-    Settling(f64),
-    /// Half the payload, with the sign of the direction from which a joint came \[kg\]; 0 where
-    /// that is not known.
-    LoadedSide {
-        /// The joint.
-        joint: usize,
-        /// Payload that the problem declares \[kg\]: that of poses of which none is known.
-        declared: f64,
-    },
-    /// One of the problem's own covariates, counted from 0, in its unit.
-    Covariate(usize),
-    /// A cubic B-spline of one quantity of the pose, nought outside of its four intervals.
-    Spline {
-        /// The quantity.
-        of: Quantity,
-        /// Where it begins, in the quantity's unit.
-        begin: f64,
-        /// Length of an interval.
-        step: f64,
-    },
-    /// exp(−u²/2) with u = (quantity − centre) / width.
-    Bump {
-        /// The quantity.
-        of: Quantity,
-        /// Where it is highest, in the quantity's unit.
-        centre: f64,
-        /// Its width, in the quantity's unit.
-        width: f64,
-    },
-    /// tanh u with u = (quantity − centre) / width.
-    Step {
-        /// The quantity.
-        of: Quantity,
-        /// Where it is steepest, in the quantity's unit.
-        centre: f64,
-        /// Its width, in the quantity's unit.
-        width: f64,
-    },
+    /// Any other formula.
+    Formula(Arc<Formula>),
+    /// 0: the parameter multiplies nothing, it stands inside of formulas at its site.
+    Inner,
+    /// Derivative of formulas by a parameter inside of them.
+    Slope(Arc<Slope>),
 }
 
-/// A quantity that is known of every pose; joints are counted from 0.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub enum Quantity {
-    /// q of a joint \[rad\] or \[m\], joints counted from 0.
-    Command(usize),
-    /// Temperature [°C].
-    Temperature,
-    /// Time since the first pose \[s\].
-    Elapsed,
-    /// Payload \[kg\].
-    Payload,
-    /// Hoist force \[N\].
-    Hoist,
-    /// One of the problem's own covariates, counted from 0, in its unit.
-    Covariate(usize),
+/// Formula over quantities of a pose, with the values that poses may leave open.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Formula {
+    expression: Expression,
+    per: Per,
+    /// Names of the covariates, for printing.
+    covariates: Vec<String>,
+    /// Reference temperature T₀ [°C].
+    reference: f64,
+    /// Payload of poses that name none \[kg\].
+    payload: f64,
+    /// Hoist force of poses that name none \[N\].
+    hoist: f64,
+    /// Full names and values of the parameters inside of the formula.
+    parameters: Vec<(String, f64)>,
 }
 
-impl Quantity {
-    /// Its value in a pose; 0 where nobody knows.
-    pub fn value(self, setup: &PoseView) -> f64 {
-        match self {
-            Self::Command(joint) => setup.configuration[joint],
-            Self::Temperature => setup.temperature.copied().unwrap_or(0.0),
-            Self::Elapsed => setup.elapsed,
-            Self::Payload => setup.payload.copied().unwrap_or(0.0),
-            Self::Hoist => setup.hoist.copied().unwrap_or(0.0),
-            Self::Covariate(which) => setup.covariates.get(which).copied().unwrap_or(0.0),
-        }
+impl Formula {
+    /// Returns the expression.
+    pub fn expression(&self) -> &Expression {
+        &self.expression
     }
-}
 
-impl Regressor {
-    /// Its values in some poses, the faster the more of them follow one another.
-    pub(crate) fn values<'p>(self, poses: impl Iterator<Item = &'p PoseView<'p>>) -> Vec<f64> {
-        let Self::Lagging { reference, time_constant } = self else {
-            return poses.map(|own| self.value(own)).collect();
+    /// Returns the value of a quantity in a pose.
+    fn quantity(&self, quantity: Quantity, setup: &PoseView) -> f64 {
+        let side = |joint: usize| {
+            setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0)
         };
-        let mut lag = ThermalLag::new(time_constant);
-        let felt = |own: &PoseView| {
-            own.temperature.map(|&now| lag.advance(&own.past.read(), (own.time, now)) - reference)
-        };
-        poses.map(felt).map(|warming| warming.unwrap_or(0.0)).collect()
-    }
-
-    /// Its value in a pose.
-    pub fn value(self, setup: &PoseView) -> f64 {
-        match self {
-            Self::Constant | Self::Unit => 1.0,
-            Self::Command(joint) | Self::Travel(joint) => setup.configuration[joint],
-            Self::Sine(joint, order) => (f64::from(order) * setup.configuration[joint]).sin(),
-            Self::Cosine(joint, order) => (f64::from(order) * setup.configuration[joint]).cos(),
-            Self::Wave { joint, order, phase } => {
-                (order * setup.configuration[joint] + phase).sin()
+        match quantity {
+            Quantity::Command(joint) => setup.configuration[joint],
+            Quantity::Warming => {
+                setup.temperature.map_or(0.0, |temperature| temperature - self.reference)
             }
-            Self::Warming { reference } => {
-                setup.temperature.map_or(0.0, |temperature| temperature - reference)
+            Quantity::Lagging { time_constant } => setup.temperature.map_or(0.0, |&temperature| {
+                setup.past.read().lagged_temperature((setup.time, temperature), time_constant)
+                    - self.reference
+            }),
+            Quantity::Friction { joint, distance } => {
+                let now = (setup.configuration[joint], side(joint));
+                setup.past.read().friction_state(joint, now, distance)
             }
-            Self::Lagging { reference, time_constant } => {
-                setup.temperature.map_or(0.0, |&temperature| {
-                    setup.past.read().lagged_temperature((setup.time, temperature), time_constant)
-                        - reference
-                })
-            }
-            Self::Dragged { joint, distance } => {
-                let side =
-                    setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0);
-                setup.past.read().friction_state(
-                    joint,
-                    (setup.configuration[joint], side),
-                    distance,
-                )
-            }
-            Self::Elapsed => setup.elapsed,
-            Self::Since(time) => f64::from(setup.time >= time),
-            Self::Settling(time_constant) => -(-setup.elapsed / time_constant).exp_m1(),
-            Self::LoadedSide { joint, declared } => {
-                let side =
-                    setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0);
-                0.5 * setup.payload.copied().unwrap_or(declared) * side
-            }
-            Self::Covariate(which) => Quantity::Covariate(which).value(setup),
-            Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => {
-                self.at(of.value(setup))
-            }
+            Quantity::Elapsed => setup.elapsed,
+            Quantity::Time => setup.time,
+            Quantity::Payload => setup.payload.copied().unwrap_or(self.payload),
+            Quantity::Hoist => setup.hoist.copied().unwrap_or(self.hoist),
+            Quantity::Approach(joint) => side(joint),
+            Quantity::Covariate(index) => setup.covariates.get(index).copied().unwrap_or(0.0),
         }
     }
 
-    /// The value of a function of one quantity at a value of that quantity; 0 for other regressors.
-    pub fn at(self, quantity: f64) -> f64 {
-        match self {
-            Self::Spline { begin, step, .. } => cubic((quantity - begin) / step),
-            Self::Bump { centre, width, .. } => {
-                (-0.5 * ((quantity - centre) / width).powi(2)).exp()
-            }
-            Self::Step { centre, width, .. } => ((quantity - centre) / width).tanh(),
-            _ => 0.0,
-        }
-    }
-
-    /// Derivative of its value by the command of a joint, counted from 0.
-    pub fn slope(self, setup: &PoseView, joint: usize) -> f64 {
-        let order = |order: u32| f64::from(order);
-        match self {
-            Self::Command(own) | Self::Travel(own) if own == joint => 1.0,
-            Self::Sine(own, k) if own == joint => {
-                order(k) * (order(k) * setup.configuration[joint]).cos()
-            }
-            Self::Cosine(own, k) if own == joint => {
-                -order(k) * (order(k) * setup.configuration[joint]).sin()
-            }
-            Self::Wave { joint: own, order, phase } if own == joint => {
-                order * (order * setup.configuration[joint] + phase).cos()
-            }
-            Self::Spline { of: Quantity::Command(own), begin, step } if own == joint => {
-                cubic_slope((setup.configuration[joint] - begin) / step) / step
-            }
-            Self::Bump { of: Quantity::Command(own), centre, width } if own == joint => {
-                let u = (setup.configuration[joint] - centre) / width;
-                -u / width * (-0.5 * u * u).exp()
-            }
-            Self::Step { of: Quantity::Command(own), centre, width } if own == joint => {
-                (1.0 - ((setup.configuration[joint] - centre) / width).tanh().powi(2)) / width
-            }
-            Self::Dragged { joint: own, distance } if own == joint => {
+    /// Returns the derivative of a quantity by the command of a joint.
+    fn quantity_slope(&self, quantity: Quantity, setup: &PoseView, joint: usize) -> f64 {
+        match quantity {
+            Quantity::Command(commanded) if commanded == joint => 1.0,
+            Quantity::Friction { joint: held, distance } if held == joint => {
                 let side =
                     setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0);
                 setup.past.read().friction_state_slope(
@@ -233,41 +99,202 @@ impl Regressor {
         }
     }
 
-    /// Whether it depends on what the joints are told.
-    pub fn follows_commands(self) -> bool {
-        match self {
-            Self::Command(_)
-            | Self::Travel(_)
-            | Self::Sine(..)
-            | Self::Cosine(..)
-            | Self::Wave { .. }
-            | Self::Dragged { .. } => true,
-            Self::Spline { of, .. } | Self::Bump { of, .. } | Self::Step { of, .. } => {
-                matches!(of, Quantity::Command(_))
+    /// Returns full names and values of the parameters inside of the formula.
+    pub(super) fn parameters(&self) -> &[(String, f64)] {
+        &self.parameters
+    }
+
+    /// The same with other parameters.
+    pub(super) fn with_parameters(&self, parameters: Vec<(String, f64)>) -> Self {
+        Self { parameters, ..self.clone() }
+    }
+
+    fn value(&self, setup: &PoseView) -> f64 {
+        let at = |quantity| self.quantity(quantity, setup);
+        match self.expression {
+            // The commonest formulas are one quantity.
+            Expression::Quantity(quantity) => at(quantity),
+            _ if self.parameters.is_empty() => self.expression.evaluate(&at, &[]),
+            _ => {
+                let values: Vec<f64> = self.parameters.iter().map(|own| own.1).collect();
+                self.expression.evaluate(&at, &values)
             }
-            Self::Constant
-            | Self::Unit
-            | Self::Warming { .. }
-            | Self::Lagging { .. }
-            | Self::Elapsed
-            | Self::Since(_)
-            | Self::Settling(_)
-            | Self::LoadedSide { .. }
-            | Self::Covariate(_) => false,
         }
     }
 
-    /// Whether the parameter acts the same in every pose.
-    pub fn is_constant(self) -> bool {
-        self == Self::Constant
+    /// Returns the derivative of the value in a pose by a parameter inside, by its index.
+    pub(super) fn parameter_slope(&self, setup: &PoseView, parameter: usize) -> f64 {
+        let seeded = |(k, (_, value)): (usize, &(String, f64))| {
+            Dual64::new(*value, f64::from(u8::from(k == parameter)))
+        };
+        let values: Vec<Dual64> = self.parameters.iter().enumerate().map(seeded).collect();
+        let at = |quantity| Dual64::from(self.quantity(quantity, setup));
+        self.expression.evaluate(&at, &values).eps
+    }
+}
+
+impl Regressor {
+    /// Regressor of a formula on the arm of `problem`, with full names and starts of the parameters
+    /// inside.
+    pub(crate) fn new(formula: &Parsed, parameters: Vec<(String, f64)>, problem: &Problem) -> Self {
+        match formula.expression.wave() {
+            Some((joint, order, false)) => return Self::Sine(joint, order),
+            Some((joint, order, true)) => return Self::Cosine(joint, order),
+            None => {}
+        }
+        let hoists = problem.joints.iter().filter_map(|joint| joint.beam.as_ref()?.hoist.as_ref());
+        Self::Formula(Arc::new(Formula {
+            per: formula.dimension.per(),
+            expression: formula.expression.clone(),
+            covariates: problem.covariate_names(),
+            reference: problem.data.reference_temperature.unwrap_or(0.0),
+            payload: problem.tool.payload_mass,
+            hoist: hoists.map(|hoist| hoist.force).sum(),
+            parameters,
+        }))
+    }
+
+    /// Regressor of a formula as files write it: `sin(2*q3)*T`.
+    ///
+    /// # Errors
+    /// The text is no formula of this arm; with the column.
+    pub fn parse(text: &str, problem: &Problem) -> Result<Self, FormulaError> {
+        let (slides, covariates) = (problem.slides(), problem.covariate_names());
+        let vocabulary =
+            Vocabulary { slides: &slides, covariates: &covariates, ..Vocabulary::default() };
+        Ok(Self::new(&parse(text, &vocabulary)?, Vec::new(), problem))
+    }
+
+    /// Regressor of the command of a joint, numbered from 1 as in files: q \[rad\] or \[m\].
+    pub fn command(problem: &Problem, joint: usize) -> Self {
+        Self::parse(&format!("q{joint}"), problem).unwrap_or(Self::Constant)
+    }
+
+    /// Returns the formula's expression, waves among them.
+    pub fn expression(&self) -> Expression {
+        let wave = |function, joint: usize, order: u32| {
+            use crate::laws::expression::{Function, Operator};
+            let command = Expression::Quantity(Quantity::Command(joint));
+            let order = Expression::Number(f64::from(order));
+            let argument = Expression::binary(Operator::Multiply, order, command);
+            let function = if function { Function::Sin } else { Function::Cos };
+            Expression::Call(function, Box::new(argument))
+        };
+        match self {
+            Self::Constant | Self::Unit => Expression::Number(1.0),
+            Self::Inner | Self::Slope(_) => Expression::Number(0.0),
+            Self::Sine(joint, order) => wave(true, *joint, *order),
+            Self::Cosine(joint, order) => wave(false, *joint, *order),
+            Self::Formula(formula) => formula.expression.clone(),
+        }
+    }
+
+    /// Returns the formula as files write it.
+    pub fn text(&self) -> String {
+        let (covariates, parameters) = match self {
+            Self::Formula(formula) => {
+                let names = formula.parameters.iter().map(|own| own.0.clone()).collect();
+                (formula.covariates.as_slice(), names)
+            }
+            _ => (&[][..], Vec::new()),
+        };
+        self.expression().display(Names { covariates, parameters: &parameters }).to_string()
+    }
+
+    /// Returns the quantities that it depends on.
+    pub fn quantities(&self) -> Vec<Quantity> {
+        match self {
+            Self::Constant | Self::Unit | Self::Inner | Self::Slope(_) => Vec::new(),
+            Self::Sine(joint, _) | Self::Cosine(joint, _) => vec![Quantity::Command(*joint)],
+            Self::Formula(formula) => formula.expression.quantities(),
+        }
+    }
+
+    /// Returns the one quantity that it is, where it is one.
+    pub fn as_quantity(&self) -> Option<Quantity> {
+        match self {
+            Self::Formula(formula) => match formula.expression {
+                Expression::Quantity(quantity) => Some(quantity),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    /// Returns the unit that divides the one of the site in the unit of the coefficient.
+    pub(crate) fn per(&self) -> Per {
+        match self {
+            Self::Formula(formula) => formula.per,
+            _ => Per::Number,
+        }
+    }
+
+    /// Returns its values in some poses, faster the more of them follow one another.
+    pub(crate) fn values<'p>(&self, poses: impl Iterator<Item = &'p PoseView<'p>>) -> Vec<f64> {
+        let (Self::Formula(formula), Some(Quantity::Lagging { time_constant })) =
+            (self, self.as_quantity())
+        else {
+            return poses.map(|pose| self.value(pose)).collect();
+        };
+        let mut lag = ThermalLag::new(time_constant);
+        let felt = |pose: &PoseView| {
+            let now = (pose.time, *pose.temperature?);
+            Some(lag.advance(&pose.past.read(), now) - formula.reference)
+        };
+        poses.map(felt).map(|warming| warming.unwrap_or(0.0)).collect()
+    }
+
+    /// Returns its value in a pose.
+    pub fn value(&self, setup: &PoseView) -> f64 {
+        match self {
+            Self::Constant | Self::Unit => 1.0,
+            Self::Sine(joint, order) => (f64::from(*order) * setup.configuration[*joint]).sin(),
+            Self::Cosine(joint, order) => (f64::from(*order) * setup.configuration[*joint]).cos(),
+            Self::Formula(formula) => formula.value(setup),
+            Self::Inner => 0.0,
+            Self::Slope(slope) => slope.value(setup),
+        }
+    }
+
+    /// Returns the derivative of its value by the command of a joint, counted from 0.
+    pub fn slope(&self, setup: &PoseView, joint: usize) -> f64 {
+        let order = |order: u32| f64::from(order);
+        match self {
+            Self::Sine(own, k) if *own == joint => {
+                order(*k) * (order(*k) * setup.configuration[joint]).cos()
+            }
+            Self::Cosine(own, k) if *own == joint => {
+                -order(*k) * (order(*k) * setup.configuration[joint]).sin()
+            }
+            Self::Formula(formula) => {
+                let seeded = |quantity: Quantity| {
+                    let slope = formula.quantity_slope(quantity, setup, joint);
+                    Dual64::new(formula.quantity(quantity, setup), slope)
+                };
+                let values: Vec<Dual64> =
+                    formula.parameters.iter().map(|own| Dual64::from(own.1)).collect();
+                formula.expression.evaluate(&seeded, &values).eps
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Returns true if it depends on the commands of joints.
+    pub fn follows_commands(&self) -> bool {
+        self.quantities().iter().any(|quantity| quantity.commanded_joint().is_some())
+    }
+
+    /// Returns true if the parameter is itself the quantity of its site.
+    pub fn is_constant(&self) -> bool {
+        *self == Self::Constant
     }
 }
 
 /// Orders that a wave may be above the one before it to be had from it by steps: a sine and a
 /// cosine cost more than so many.
-const NEAR: u32 = 4;
+const MAX_ORDER_STEPS: u32 = 4;
 
-/// The values of many regressors in one pose: a wave takes its sine and cosine from the one before it
+/// Values of many regressors in one pose: a wave takes its sine and cosine from the one before it
 /// where their orders are near.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Waves {
@@ -278,22 +305,24 @@ pub(crate) struct Waves {
 }
 
 impl Waves {
-    /// The value of a regressor in the pose that all others were of.
+    /// Returns the value of a regressor in the pose that all others were evaluated in.
     #[inline]
-    pub fn value(&mut self, regressor: Regressor, setup: &PoseView) -> f64 {
+    pub fn value(&mut self, regressor: &Regressor, setup: &PoseView) -> f64 {
         match regressor {
-            Regressor::Sine(joint, order) => self.wave(joint, order, setup).0,
-            Regressor::Cosine(joint, order) => self.wave(joint, order, setup).1,
+            Regressor::Sine(joint, order) => self.wave(*joint, *order, setup).0,
+            Regressor::Cosine(joint, order) => self.wave(*joint, *order, setup).1,
             other => other.value(setup),
         }
     }
 
-    /// sin kq and cos kq.
+    /// Returns sin kq and cos kq.
     fn wave(&mut self, joint: usize, order: u32, setup: &PoseView) -> (f64, f64) {
         let q = setup.configuration[joint];
         let wave = match self.last {
             Some((own, last, wave)) if own == joint && last == order => return wave,
-            Some((own, last, mut wave)) if own == joint && last < order && order - last <= NEAR => {
+            Some((own, last, mut wave))
+                if own == joint && last < order && order - last <= MAX_ORDER_STEPS =>
+            {
                 let (by_sin, by_cos) = *self.first.get_or_insert_with(|| q.sin_cos());
                 for _ in last..order {
                     let (sin, cos) = wave;
@@ -311,41 +340,20 @@ impl Waves {
         wave
     }
 }
-
-/// The uniform cubic B-spline over the intervals 0…4; its shifts by whole numbers add up to 1.
-fn cubic(u: f64) -> f64 {
-    let v = 2.0 - (u - 2.0).abs();
-    match v {
-        v if v <= 0.0 => 0.0,
-        v if v <= 1.0 => v * v * v / 6.0,
-        v => {
-            let w = 2.0 - v;
-            (4.0 - 6.0 * w * w + 3.0 * w * w * w) / 6.0
-        }
-    }
-}
-
-/// The derivative of [`cubic`].
-fn cubic_slope(u: f64) -> f64 {
-    let v = 2.0 - (u - 2.0).abs();
-    let slope = match v {
-        v if v <= 0.0 => 0.0,
-        v if v <= 1.0 => v * v / 2.0,
-        v => {
-            let w = 2.0 - v;
-            2.0 * w - 1.5 * w * w
-        }
-    };
-    if u > 2.0 { -slope } else { slope }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const ARM: &str = "name = 'arm'\njoint = [{}, {}]\n[tool]\npayload_kg = 3\n";
+
+    fn regressor(formula: &str) -> Regressor {
+        let problem = Problem::parse(ARM, "problem.toml".as_ref()).unwrap();
+        Regressor::parse(formula, &problem).unwrap()
+    }
+
     #[test]
     fn a_pose_of_unknown_payload_carries_the_declared_one() {
-        let regressor = Regressor::LoadedSide { joint: 1, declared: 3.0 };
+        let regressor = regressor("0.5*payload*approach2");
         let sides = [1.0, -1.0];
         let pose = PoseView { approach: Some(&sides), ..PoseView::from_configuration(&[0.0, 0.0]) };
         assert!((regressor.value(&pose) + 1.5).abs() < 1e-15);
@@ -354,20 +362,21 @@ mod tests {
 
     #[test]
     fn slopes_are_those_of_the_values() {
-        let of = Quantity::Command(1);
-        let regressors = [
-            Regressor::Command(1),
-            Regressor::Travel(0),
-            Regressor::Sine(1, 3),
-            Regressor::Cosine(1, 2),
-            Regressor::Wave { joint: 1, order: 2.43, phase: 0.7 },
-            Regressor::Elapsed,
-            Regressor::Spline { of, begin: -1.0, step: 0.7 },
-            Regressor::Spline { of: Quantity::Payload, begin: -1.0, step: 0.7 },
-            Regressor::Bump { of, centre: 0.4, width: 0.3 },
-            Regressor::Step { of, centre: 0.4, width: 0.3 },
+        let formulas = [
+            "q2",
+            "q1",
+            "sin(3*q2)",
+            "cos(2*q2)",
+            "sin(2.43*q2 + 0.7)",
+            "t",
+            "spline((q2 + 1)/0.7)",
+            "spline((payload + 1)/0.7)",
+            "exp(-((q2 - 0.4)/0.3)^2/2)",
+            "tanh((q2 - 0.4)/0.3)",
+            "q1*sin(q2)^3*max(q2, 0.111)",
         ];
-        for regressor in regressors {
+        for formula in formulas {
+            let regressor = regressor(formula);
             for k in -20..20 {
                 let at = |q: f64| regressor.value(&PoseView::from_configuration(&[0.2, q]));
                 let (q, step) = (0.093 * f64::from(k), 1e-5);
@@ -386,14 +395,13 @@ mod tests {
         let setup = PoseView::from_configuration(&[0.7, -2.3]);
         let mut waves = Waves::default();
         let orders = (1..=60).chain([3, 4, 4, 6, 9, 13, 18]);
+        let command = regressor("q2");
         for (order, joint) in
             orders.flat_map(|order| [(order, 1), (order, 1), (order, order as usize % 2)])
         {
-            for regressor in [
-                Regressor::Sine(joint, order),
-                Regressor::Cosine(joint, order),
-                Regressor::Command(joint),
-            ] {
+            for regressor in
+                [&Regressor::Sine(joint, order), &Regressor::Cosine(joint, order), &command]
+            {
                 let (found, expected) = (waves.value(regressor, &setup), regressor.value(&setup));
                 assert!((found - expected).abs() < 1e-13, "{regressor:?}: {found}, not {expected}");
             }
@@ -402,16 +410,16 @@ mod tests {
         for regressor in
             (1..=60).flat_map(|order| [Regressor::Sine(0, order), Regressor::Cosine(0, order)])
         {
-            assert!((waves.value(regressor, &setup) - regressor.value(&setup)).abs() < 1e-13);
+            assert!((waves.value(&regressor, &setup) - regressor.value(&setup)).abs() < 1e-13);
         }
     }
 
     #[test]
-    fn splines_add_up_to_one() {
-        for k in 0..40 {
-            let u = 0.025 * f64::from(k);
-            let sum: f64 = (0..4).map(|shift| cubic(u + f64::from(shift))).sum();
-            assert!((sum - 1.0).abs() < 1e-14, "{u}: {sum}");
+    fn waves_of_whole_orders_stand_apart_and_print_as_they_are_read() {
+        assert_eq!(regressor("sin(3*q2)"), Regressor::Sine(1, 3));
+        assert_eq!(regressor("cos(q1)"), Regressor::Cosine(0, 1));
+        for formula in ["sin(3*q2)", "lag(T, 300)*q1", "friction(q1, 0.8)", "-expm1(-t/40)"] {
+            assert_eq!(regressor(formula).text(), formula);
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{BeamField, JointField, Parameter, ParameterSite, Regressor, unit};
 use crate::error::{InputError, InputErrorKind};
+use crate::laws::NAMES;
 use crate::problem::effect;
 use crate::problem::pattern::matches;
 use crate::problem::{Fixture, Freedom, ParameterRule, Placement, Problem, Quantities};
@@ -17,13 +18,15 @@ pub(super) struct Candidate {
     pub(super) nominal: f64,
     /// Default prior of a parameter of an effect, which is free unless a rule holds it.
     effect_sigma: Option<f64>,
+    /// Bounds of a parameter of an effect, SI.
+    limits: (f64, f64),
     /// True for an undeclared number, which is free unless a rule holds it.
     unknown: bool,
 }
 
 impl Candidate {
     pub(super) fn unit(&self) -> Unit {
-        unit(self.site, self.regressor)
+        unit(self.site, &self.regressor)
     }
 
     fn matches(&self, rule: &ParameterRule) -> bool {
@@ -46,12 +49,16 @@ pub struct EffectParameter {
     pub nominal: f64,
     /// 1 σ of a prior that allows every realistic size.
     pub sigma: f64,
+    /// Smallest value that it may have, SI.
+    pub lower: f64,
+    /// Greatest value that it may have, SI.
+    pub upper: f64,
 }
 
 impl EffectParameter {
     /// Returns the unit of its value.
     pub fn unit(&self) -> Unit {
-        unit(self.site, self.regressor)
+        unit(self.site, &self.regressor)
     }
 
     fn is_named(&self, rule: &ParameterRule) -> bool {
@@ -137,8 +144,8 @@ pub fn resolve(
             regressor: candidate.regressor,
             nominal: candidate.nominal,
             sigma,
-            lower: bound(min).unwrap_or(f64::NEG_INFINITY),
-            upper: bound(max).unwrap_or(f64::INFINITY),
+            lower: bound(min).unwrap_or(candidate.limits.0 - candidate.nominal),
+            upper: bound(max).unwrap_or(candidate.limits.1 - candidate.nominal),
         });
     }
     Ok(parameters)
@@ -161,8 +168,7 @@ fn undeclared(problem: &Problem, pattern: &str, known: &[String]) -> Option<Inpu
     if known.iter().any(|name| matches(&wanted, &head(name))) {
         return None;
     }
-    let effects: Vec<&str> =
-        effect::NAMES.iter().copied().filter(|name| matches(&wanted, name)).collect();
+    let effects: Vec<&str> = NAMES.iter().copied().filter(|name| matches(&wanted, name)).collect();
     let write = effect::example(effects.first()?, problem);
     Some(InputErrorKind::EffectNotDeclared { effects: effects.join(", "), write })
 }
@@ -204,6 +210,7 @@ pub(super) fn candidates(
         regressor: Regressor::Constant,
         nominal,
         effect_sigma: None,
+        limits: (f64::NEG_INFINITY, f64::INFINITY),
         unknown: false,
     };
     for (joint, declared_joint) in problem.joints.iter().enumerate() {
@@ -299,6 +306,7 @@ pub(super) fn candidates(
         regressor: effect.regressor,
         nominal: effect.nominal,
         effect_sigma: Some(effect.sigma),
+        limits: (effect.lower, effect.upper),
         unknown: false,
     }));
     out

@@ -9,9 +9,12 @@ use nalgebra::Vector3;
 
 use super::arm::{Arm, MIN_LEVER, Poses};
 use super::prelude::*;
+use crate::laws::Quantity as Known;
 use crate::measurement::Split;
-use crate::model::parameter::{EffectParameter, JointField, ParameterSite, Regressor};
-use crate::problem::{Effect, JointKind, Mount, PoseView, Problem};
+use crate::model::parameter::{
+    ArmField, BeamField, EffectParameter, JointField, ParameterSite, Regressor, value_regressor,
+};
+use crate::problem::{Effect, JointKind, PoseView, Problem};
 use crate::quantity::Unit;
 use crate::residual_tests::Covariate;
 use crate::select::{PartialResidual, Unexplained};
@@ -150,8 +153,10 @@ struct Rows<'a> {
     poses: Vec<PoseView<'a>>,
     /// Displacement by the effect in each row \[m\].
     displacements: Vec<Vector3<f64>>,
-    parameters: &'a [EffectParameter],
-    values: &'a [f64],
+    /// Regressor and value of each term.
+    terms: Vec<(Regressor, f64)>,
+    /// Site of each term.
+    sites: Vec<ParameterSite>,
 }
 
 /// Computes the figure data of an effect from the fit of `problem`, which declares it.
@@ -172,15 +177,19 @@ pub fn of(
     }
     let partial = poses.errors(&without, &poses.rows());
     let all_poses = poses.all(1.0);
-    let values: Vec<f64> = indices.iter().map(|&k| arm.x[k]).collect();
+    let term = |&k: &usize| {
+        let regressor = value_regressor(&arm.model.parameters, arm.x.as_slice(), k)?;
+        Some(((regressor, arm.x[k]), arm.model.parameters[k].site))
+    };
+    let (terms, sites) = indices.iter().filter_map(term).unzip();
     let displacements = partial.iter().zip(residuals).map(|(partial, residual)| partial - residual);
     let rows = Rows {
         poses: all_poses.iter().map(|pose| pose.setup).collect(),
         displacements: displacements.collect(),
-        parameters: &parameters,
-        values: &values,
+        terms,
+        sites,
     };
-    let view = at_joint(effect, problem, &rows, levers, poses)
+    let view = at_joint(problem, &rows, levers, poses)
         .unwrap_or_else(|| beyond_joints(effect, problem, &rows));
     let longest = view.levers.iter().map(Vector3::norm).fold(0.0, f64::max);
     let point = |k: usize| Point {
@@ -211,223 +220,268 @@ fn largest(points: &[Point], curve: &[(f64, f64)]) -> f64 {
     heights.filter(|height| height.is_finite()).map(f64::abs).fold(0.0, f64::max)
 }
 
-/// Returns the view of an effect on a joint coordinate; `None` for other effects.
+/// Returns the view of an effect that changes the coordinate of a joint; `None` for other effects.
 fn at_joint<'a>(
-    effect: &Effect,
     problem: &'a Problem,
     rows: &'a Rows,
     levers: &[Vec<Vector3<f64>>],
     poses: &Poses,
 ) -> Option<View<'a>> {
-    let first = rows.values.first().copied().unwrap_or_default();
-    let each =
-        |value: &dyn Fn(&PoseView) -> f64| -> Vec<f64> { rows.poses.iter().map(value).collect() };
-    let command = |joint: usize| each(&|pose| pose.configuration[joint - 1]);
-    let lever = |joint: usize| &levers[joint - 1];
-    let moment = |joint: usize| Quantity::new(format!("moment about joint {joint} [N·m]"), 1.0);
-    // Δθ = c M or c₃ M³: the moment follows from the displacement and the law.
-    let moments = |joint: usize, of: fn(f64) -> f64| -> Vec<f64> {
-        lever(joint)
-            .iter()
-            .zip(&rows.displacements)
-            .map(|(lever, displacement)| of(along(lever, displacement) / first))
-            .collect()
+    let ParameterSite::Joint { joint, field } = rows.site()? else { return None };
+    let (number, levers) = (joint + 1, levers.get(joint)?);
+    let first = rows.terms.first()?.1;
+    let unit = if slides(problem, number) { Unit::Length } else { Unit::Angle };
+    // Δθ = c M, c₃ M³: the moment follows from the law itself.
+    let moments = |of: fn(f64) -> f64| -> (Quantity, Vec<f64>) {
+        let moment = |(lever, own): (&Vector3<f64>, &Vector3<f64>)| of(along(lever, own) / first);
+        let across = Quantity::new(format!("moment about joint {number} [N·m]"), 1.0);
+        (across, levers.iter().zip(&rows.displacements).map(moment).collect())
     };
-    let proportional: Law = Box::new(move |x| first * x);
-    let of_command: Law = Box::new(|q: f64| {
-        let configuration = vec![q; rows.poses[0].configuration.len()];
-        rows.law_value(&PoseView::from_configuration(&configuration))
-    });
-    let (joint, across, x, law): (_, _, _, Law) = match *effect {
-        Effect::JointHarmonic { joint, .. }
-        | Effect::JointWave { joint, .. }
-        | Effect::GearRatio { joint } => {
-            (joint, Quantity::command(problem, joint), command(joint), of_command)
+    let (across, x, law): (_, _, Law) = match field {
+        JointField::Theta | JointField::D if rows.is_driven() => {
+            match (rows.quantities().as_slice(), rows.terms.as_slice()) {
+                (&[quantity], _) if rows.over_quantity(quantity, problem).is_some() => {
+                    rows.over_quantity(quantity, problem)?
+                }
+                (_, [(regressor, value)]) => {
+                    let across = Quantity::new(rows.label(regressor), 1.0);
+                    let each = rows.poses.iter().map(|pose| regressor.value(pose)).collect();
+                    (across, each, Box::new(move |x| value * x))
+                }
+                _ => {
+                    let across = Quantity::error(&format!("joint {number} by the law"), unit);
+                    let each = rows.poses.iter().map(|pose| rows.driven(pose)).collect();
+                    (across, each, Box::new(|x| x))
+                }
+            }
         }
-        Effect::JointCoupling { joint, from } => {
-            (joint, Quantity::command(problem, from), command(from), of_command)
+        JointField::Play | JointField::SlidingPlay if poses.measurements.approach.is_some() => {
+            let label = format!("side from which joint {number} came [−1 … +1]");
+            let side = |pose: &PoseView| pose.approach.map_or(0.0, |all| all[joint]);
+            let sides = rows.poses.iter().map(side).collect();
+            (Quantity::new(label, 1.0), sides, Box::new(move |side| 0.5 * first * side))
         }
-        Effect::JointThermalDrift { joint } => {
-            let law = Box::new(|t| {
-                rows.law_value(&PoseView {
-                    temperature: Some(&t),
-                    ..PoseView::from_configuration(&[])
-                })
-            });
-            (joint, Quantity::temperature(), rows.temperatures(), law)
+        JointField::Compliance => {
+            let (across, x) = moments(|moment| moment);
+            (across, x, Box::new(move |moment| first * moment))
         }
-        Effect::Covariate { joint: Mount::Joint(joint), ref of } => {
-            let which = problem.data.covariates.iter().position(|declared| declared.name == *of)?;
-            let values = each(&|pose| pose.covariates.get(which).copied().unwrap_or_default());
-            (joint, Quantity::new(of, 1.0), values, proportional)
+        JointField::Cubic => {
+            let (across, x) = moments(f64::cbrt);
+            (across, x, Box::new(move |moment| first * moment.powi(3)))
         }
-        Effect::Backlash { joint } if poses.measurements.approach.is_some() => {
-            let label = format!("approach side of joint {joint} [−1 … +1]");
-            let sides = each(&|pose| pose.approach.map_or(0.0, |sides| sides[joint - 1]));
-            let across = Quantity::new(label, 1.0);
-            (joint, across, sides, Box::new(move |side| 0.5 * first * side))
-        }
-        Effect::PayloadBacklash { joint } => {
-            let label = format!("half the payload × approach side of joint {joint} [kg]");
-            let across = Quantity::new(label, 1.0);
-            let regressor =
-                Regressor::LoadedSide { joint: joint - 1, declared: problem.tool.payload_mass };
-            (joint, across, each(&|pose| regressor.value(pose)), proportional)
-        }
-        Effect::JointHysteresis { joint, distance } => {
-            let label = format!("friction state of joint {joint} [−1 … +1]");
-            let across = Quantity::new(label, 1.0);
-            let regressor = Regressor::Dragged { joint: joint - 1, distance };
-            (joint, across, each(&|pose| regressor.value(pose)), proportional)
-        }
-        Effect::JointThermalDriftLag { joint, time_constant } => {
-            let reference = problem.data.reference_temperature.unwrap_or_default();
-            let lagged = rows.lagged_temperatures(reference, time_constant);
-            (
-                joint,
-                Quantity::lagging(time_constant),
-                lagged,
-                Box::new(move |lagged| first * (lagged - reference)),
-            )
-        }
-        Effect::JointCompliance { joint } => {
-            (joint, moment(joint), moments(joint, |moment| moment), proportional)
-        }
-        Effect::JointNonlinearStiffness { joint } => (
-            joint,
-            moment(joint),
-            moments(joint, f64::cbrt),
-            Box::new(move |moment| first * moment.powi(3)),
-        ),
         _ => return None,
     };
-    let unit = if slides(problem, joint) { Unit::Length } else { Unit::Angle };
-    let up = Box::new(move |_| Quantity::error(&format!("joint {joint}"), unit));
-    Some(View { across, up, x, levers: lever(joint).clone(), law, reading: COORDINATE })
+    let up = Box::new(move |_| Quantity::error(&format!("joint {number}"), unit));
+    Some(View { across, up, x, levers: levers.clone(), law, reading: COORDINATE })
 }
 
 type Law<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
 
 impl Rows<'_> {
-    /// Returns the value of the law at a pose, Σ value · regressor.
-    fn law_value(&self, pose: &PoseView) -> f64 {
-        self.parameters
-            .iter()
-            .zip(self.values)
-            .map(|(parameter, value)| value * parameter.regressor.value(pose))
-            .sum()
+    /// Returns the site of all terms, where it is one.
+    fn site(&self) -> Option<ParameterSite> {
+        let (first, others) = self.sites.split_first()?;
+        others.iter().all(|site| site == first).then_some(*first)
     }
 
-    /// Returns the lagged temperature of each row [°C].
-    fn lagged_temperatures(&self, reference: f64, time_constant: f64) -> Vec<f64> {
-        let regressor = Regressor::Lagging { reference, time_constant };
-        self.poses.iter().map(|pose| regressor.value(pose) + reference).collect()
+    /// Returns true if every term is multiplied by a formula.
+    fn is_driven(&self) -> bool {
+        self.terms.iter().all(|(regressor, _)| !regressor.is_constant())
     }
 
-    fn temperatures(&self) -> Vec<f64> {
-        self.poses.iter().map(|pose| pose.temperature.copied().unwrap_or_default()).collect()
+    /// Returns the quantities that the terms follow, each once.
+    fn quantities(&self) -> Vec<Known> {
+        let mut found = Vec::new();
+        for quantity in self.terms.iter().flat_map(|(regressor, _)| regressor.quantities()) {
+            if !found.contains(&quantity) {
+                found.push(quantity);
+            }
+        }
+        found
     }
 
-    /// Returns the displacement of each row divided by the size of the effect; zero if the size is
-    /// zero.
-    fn per_size(&self, sizes: impl Iterator<Item = f64>) -> Vec<Vector3<f64>> {
-        let lever = |(displacement, size): (&Vector3<f64>, f64)| {
-            if size == 0.0 { Vector3::zeros() } else { displacement / size }
+    /// Returns Σ value · regressor.
+    fn driven(&self, pose: &PoseView) -> f64 {
+        self.terms.iter().map(|(regressor, value)| value * regressor.value(pose)).sum()
+    }
+
+    /// Returns the axis of a formula with its unit.
+    fn label(&self, regressor: &Regressor) -> String {
+        match regressor.as_quantity() {
+            Some(Known::Friction { joint, .. }) => {
+                format!("friction that holds joint {} back [−1 … +1]", joint + 1)
+            }
+            _ => format!("{} [SI]", regressor.text()),
+        }
+    }
+
+    /// Returns the axis of one quantity, its values, and Σ value · regressor over it; `None` where no
+    /// pose can be made of a value of the quantity alone.
+    fn over_quantity<'r>(
+        &'r self,
+        quantity: Known,
+        problem: &Problem,
+    ) -> Option<(Quantity, Vec<f64>, Law<'r>)> {
+        let each =
+            |value: &dyn Fn(&PoseView) -> f64| self.poses.iter().map(value).collect::<Vec<f64>>();
+        let reference = problem.data.reference_temperature.unwrap_or_default();
+        Some(match quantity {
+            Known::Command(joint) => {
+                let count = self.poses.first()?.configuration.len();
+                let law = move |q: f64| self.driven(&PoseView::from_configuration(&vec![q; count]));
+                let across = Quantity::command(problem, joint + 1);
+                (across, each(&|pose| pose.configuration[joint]), Box::new(law))
+            }
+            Known::Warming => {
+                let law = move |t: f64| {
+                    let pose = PoseView::from_configuration(&[]);
+                    self.driven(&PoseView { temperature: Some(&t), ..pose })
+                };
+                let value = |pose: &PoseView| pose.temperature.copied().unwrap_or_default();
+                (Quantity::temperature(), each(&value), Box::new(law))
+            }
+            // The lagged temperature itself multiplies every term.
+            Known::Lagging { time_constant } if self.is_each(quantity) => {
+                let sum: f64 = self.terms.iter().map(|term| term.1).sum();
+                let regressor = &self.terms.first()?.0;
+                let values = each(&|pose| regressor.value(pose) + reference);
+                let law = move |lagged: f64| sum * (lagged - reference);
+                (Quantity::lagging(time_constant), values, Box::new(law))
+            }
+            Known::Covariate(index) => {
+                let name = &problem.data.covariates.get(index)?.name;
+                let law = move |value: f64| {
+                    let mut covariates = vec![0.0; index];
+                    covariates.push(value);
+                    let pose = PoseView::from_configuration(&[]);
+                    self.driven(&PoseView { covariates: &covariates, ..pose })
+                };
+                let value =
+                    |pose: &PoseView| pose.covariates.get(index).copied().unwrap_or_default();
+                (Quantity::new(name, 1.0), each(&value), Box::new(law))
+            }
+            Known::Elapsed | Known::Time => {
+                let elapsed = each(&|pose| pose.elapsed);
+                let last = elapsed.iter().copied().fold(0.0, f64::max);
+                let first = self.poses.first().map_or(0.0, |pose| pose.time - pose.elapsed);
+                let law = move |elapsed: f64| {
+                    let pose = PoseView::from_configuration(&[]);
+                    self.driven(&PoseView { elapsed, time: first + elapsed, ..pose })
+                };
+                (Quantity::elapsed(last), elapsed, Box::new(law))
+            }
+            _ => return None,
+        })
+    }
+
+    /// Returns true if every term is multiplied by a quantity itself.
+    fn is_each(&self, quantity: Known) -> bool {
+        self.terms.iter().all(|(regressor, _)| regressor.as_quantity() == Some(quantity))
+    }
+
+    /// Returns the effect's displacement over its size in each row; none where that is 0.
+    fn over(&self, sizes: impl Iterator<Item = f64>) -> Vec<Vector3<f64>> {
+        let lever = |(own, size): (&Vector3<f64>, f64)| {
+            if size == 0.0 { Vector3::zeros() } else { own / size }
         };
         self.displacements.iter().zip(sizes).map(lever).collect()
     }
 }
 
-/// Returns the view of an effect that is no error of a joint coordinate.
-fn beyond_joints<'a>(effect: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> {
-    let sum: f64 = rows.values.iter().sum();
-    let norm = rows.values.iter().map(|value| value * value).sum::<f64>().sqrt();
-    let elapsed: Vec<f64> = rows.poses.iter().map(|pose| pose.elapsed).collect();
-    let last = elapsed.iter().copied().fold(0.0, f64::max);
-    let longest = rows
-        .displacements
-        .iter()
-        .fold(Vector3::zeros(), |a: Vector3<f64>, b| if b.norm() > a.norm() { *b } else { a });
-    let measured = |_| Quantity::new("displacement, measured [mm]", 1e3);
-    // An effect on the measuring frame displaces every pose in one direction.
-    let of_time = |law: Law<'a>| View {
-        across: Quantity::elapsed(last),
-        up: Box::new(measured),
-        x: elapsed.clone(),
-        levers: vec![longest.try_normalize(0.0).unwrap_or_default(); rows.displacements.len()],
-        law,
-        reading: ALONG,
-    };
-    match effect {
-        Effect::LinkThermalBending { link }
-        | Effect::LinkThermalExpansion { link }
-        | Effect::LinkThermalBendingLag { link, .. }
-        | Effect::LinkThermalExpansionLag { link, .. } => {
-            let reference = problem.data.reference_temperature.unwrap_or_default();
-            let (across, temperatures) = match effect {
-                Effect::LinkThermalBendingLag { time_constant, .. }
-                | Effect::LinkThermalExpansionLag { time_constant, .. } => (
-                    Quantity::lagging(*time_constant),
-                    rows.lagged_temperatures(reference, *time_constant),
-                ),
-                _ => (Quantity::temperature(), rows.temperatures()),
-            };
-            let bends = matches!(
-                effect,
-                Effect::LinkThermalBending { .. } | Effect::LinkThermalBendingLag { .. }
-            );
-            let link = link.clone();
-            // An expansion has one signed coefficient; the two of a bending have one norm.
-            let size = if bends { norm } else { sum };
-            View {
-                across,
-                up: if bends {
-                    Box::new(move |largest| {
-                        Quantity::small(&format!("curvature of link {link}"), "rad/m", largest)
-                    })
-                } else {
-                    Box::new(move |_| Quantity::new(format!("strain of link {link} [10⁻⁶]"), 1e6))
-                },
-                levers: rows.per_size(temperatures.iter().map(|t| size * (t - reference))),
-                x: temperatures,
-                law: Box::new(move |t| size * (t - reference)),
-                reading: SIZE,
-            }
-        }
-        Effect::PayloadMass => View {
-            across: Quantity::new("payload [kg]", 1.0),
-            up: Box::new(|_| Quantity::new("missing mass [kg]", 1.0)),
-            x: rows.poses.iter().map(|pose| pose.payload.copied().unwrap_or_default()).collect(),
-            levers: rows.per_size(std::iter::repeat(sum)),
-            law: Box::new(move |_| sum),
-            reading: SIZE,
-        },
-        Effect::TrackerDrift => {
-            let speed = if last > 0.0 { longest.norm() / last } else { 0.0 };
-            of_time(Box::new(move |t| speed * t))
-        }
-        Effect::TrackerSettling { time_constant } => {
-            let (time_constant, size) = (*time_constant, norm);
-            of_time(Box::new(move |t| size * (1.0 - (-t / time_constant).exp())))
-        }
-        Effect::StationShift { at_time } => {
-            let first = rows.poses.first().map_or(0.0, |pose| pose.time - pose.elapsed);
-            let (at, step) = (at_time - first, longest.norm());
-            of_time(Box::new(move |t| if t >= at { step } else { 0.0 }))
-        }
-        _ => View {
-            across: Quantity::new("displacement predicted by the law [mm]", 1e3),
-            up: Box::new(measured),
+/// Returns the view of an effect that is no error of a joint's coordinate.
+fn beyond_joints<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> {
+    at_link(found, problem, rows)
+        .or_else(|| of_time(problem, rows))
+        .or_else(|| of_payload(rows))
+        .unwrap_or_else(|| View {
+            across: Quantity::new("displacement by the law [mm]", 1e3),
+            up: Box::new(|_| Quantity::new("displacement, measured [mm]", 1e3)),
             x: rows.displacements.iter().map(Vector3::norm).collect(),
             levers: rows
                 .displacements
                 .iter()
-                .map(|displacement| displacement.try_normalize(0.0).unwrap_or_default())
+                .map(|own| own.try_normalize(0.0).unwrap_or_default())
                 .collect(),
             law: Box::new(|displacement| displacement),
             reading: ALONG,
-        },
+        })
+}
+
+/// Returns the view of a strain of a link that follows one temperature.
+fn at_link<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
+    let is_strain = |site: &ParameterSite| matches!(site, ParameterSite::Beam { field, .. } if field.is_strain());
+    let &[quantity] = rows.quantities().as_slice() else { return None };
+    if !(quantity.is_thermal() && rows.sites.iter().all(is_strain) && rows.is_each(quantity)) {
+        return None;
     }
+    let (across, values, _) = rows.over_quantity(quantity, problem)?;
+    let reference = problem.data.reference_temperature.unwrap_or_default();
+    let link = found.link()?;
+    let stretches =
+        matches!(rows.sites.first(), Some(ParameterSite::Beam { field: BeamField::Stretch, .. }));
+    // An expansion has one coefficient with a sign; a bending's two make one size.
+    let sizes = || rows.terms.iter().map(|term| term.1);
+    let size = if stretches { sizes().sum() } else { sizes().map(|c| c * c).sum::<f64>().sqrt() };
+    let up: Box<dyn Fn(f64) -> Quantity> = if stretches {
+        Box::new(move |_| Quantity::new(format!("strain of link {link} [10⁻⁶]"), 1e6))
+    } else {
+        Box::new(move |most| Quantity::small(&format!("curvature of link {link}"), "rad/m", most))
+    };
+    Some(View {
+        across,
+        up,
+        levers: rows.over(values.iter().map(|value| size * (value - reference))),
+        x: values,
+        law: Box::new(move |value| size * (value - reference)),
+        reading: SIZE,
+    })
+}
+
+/// Returns the view of a displacement of the measuring frame by a function of time: every pose moves
+/// in one direction.
+fn of_time<'a>(problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
+    let is_shift = |site: &ParameterSite| matches!(site, ParameterSite::Shift { .. });
+    let &[quantity @ (Known::Elapsed | Known::Time)] = rows.quantities().as_slice() else {
+        return None;
+    };
+    let (regressor, _) = rows.terms.first()?;
+    let is_one = rows.terms.iter().all(|(other, _)| other == regressor);
+    if !is_one || !rows.sites.iter().all(is_shift) {
+        return None;
+    }
+    let (across, x, _) = rows.over_quantity(quantity, problem)?;
+    let norm = rows.terms.iter().map(|term| term.1 * term.1).sum::<f64>().sqrt();
+    let first = rows.poses.first().map_or(0.0, |pose| pose.time - pose.elapsed);
+    let longest = |a: Vector3<f64>, b: &Vector3<f64>| if b.norm() > a.norm() { *b } else { a };
+    let most = rows.displacements.iter().fold(Vector3::zeros(), longest);
+    let law = move |elapsed: f64| {
+        let pose = PoseView::from_configuration(&[]);
+        norm * regressor.value(&PoseView { elapsed, time: first + elapsed, ..pose })
+    };
+    Some(View {
+        across,
+        up: Box::new(|_| Quantity::new("displacement, measured [mm]", 1e3)),
+        x,
+        levers: vec![most.try_normalize(0.0).unwrap_or_default(); rows.displacements.len()],
+        law: Box::new(law),
+        reading: ALONG,
+    })
+}
+
+/// Returns the view of a mass that is added to payloads.
+fn of_payload<'a>(rows: &'a Rows) -> Option<View<'a>> {
+    if rows.site()? != ParameterSite::Arm(ArmField::Payload) {
+        return None;
+    }
+    let sum: f64 = rows.terms.iter().map(|term| term.1).sum();
+    Some(View {
+        across: Quantity::new("payload [kg]", 1.0),
+        up: Box::new(|_| Quantity::new("missing mass [kg]", 1.0)),
+        x: rows.poses.iter().map(|pose| pose.payload.copied().unwrap_or_default()).collect(),
+        levers: rows.over(std::iter::repeat(sum)),
+        law: Box::new(move |_| sum),
+        reading: SIZE,
+    })
 }
 
 /// Returns the empirical correction of unexplained structure, less its mean; `None` if it does not

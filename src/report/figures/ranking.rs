@@ -1,6 +1,7 @@
 //! Ranking of candidate effects by their evidence.
 
 use super::prelude::*;
+use crate::laws::ArgumentKind;
 use crate::problem::Effect;
 use crate::select::{Ranked, Trace};
 
@@ -13,30 +14,23 @@ const NAMES: i32 = 200;
 /// Smallest p value that is distinguished from zero.
 const MIN_P: f64 = 1e-300;
 
-/// Returns the name of an effect with its site, as in a problem file.
-fn named(effect: &Effect, trace: &Trace) -> String {
-    let place = effect.place();
-    let orders = match effect {
-        Effect::JointHarmonic { orders, .. } => {
-            format!(" ×{}", orders.iter().map(u32::to_string).collect::<Vec<_>>().join(","))
+/// Returns the name of an effect with its place, as in a problem file.
+fn named(found: &Effect, trace: &Trace) -> String {
+    let name = found.name();
+    match (found.searched_value(), found.joint()) {
+        (Some((ArgumentKind::Time, time)), _) if trace.time_measured => {
+            format!("{name} {time:.0} s")
         }
-        _ => String::new(),
-    };
-    let name = effect.name();
-    match effect {
-        Effect::StationShift { at_time } | Effect::StationMove { at_time }
-            if trace.time_measured =>
-        {
-            format!("{name} {at_time:.0} s")
+        (Some((ArgumentKind::Time, time)), _) => format!("{name} row {}", time.ceil()),
+        (Some((ArgumentKind::Order, order)), Some(joint)) => format!("{name} {joint} ×{order}"),
+        _ if found.has_memory() => found.name_and_place(),
+        (Some((ArgumentKind::Duration, time_constant)), _) => format!("{name} {time_constant} s"),
+        _ => {
+            let orders = found.harmonic_orders().map_or_else(String::new, |orders| {
+                format!(" ×{}", orders.iter().map(u32::to_string).collect::<Vec<_>>().join(","))
+            });
+            format!("{name} {}{orders}", found.place()).trim_end().to_owned()
         }
-        Effect::StationShift { at_time } | Effect::StationMove { at_time } => {
-            format!("{name} row {}", at_time.ceil())
-        }
-        Effect::JointWave { joint, order } => format!("{name} {joint} ×{order}"),
-        Effect::TrackerSettling { time_constant } => format!("{name} {time_constant} s"),
-        effect if effect.has_memory() => effect.name_and_place(),
-        _ if place.is_empty() => name.to_owned(),
-        _ => format!("{name} {place}{orders}"),
     }
 }
 

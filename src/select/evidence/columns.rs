@@ -7,6 +7,7 @@ use super::candidate::{Candidate, even};
 use super::functions::{Known, basis, goes_with, growing, merge, products_of, rough_basis, times};
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::marginal::Coefficients;
+use crate::laws::Quantity;
 use crate::model::Pose;
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, JointField, ParameterSite, Regressor};
@@ -343,8 +344,8 @@ impl<'a, 'l> Columns<'a, 'l> {
     fn has_law(&self, site: ParameterSite, of: &Known) -> bool {
         let is_line = |term: &Term| {
             let is_linear = matches!(
-                term.regressor,
-                Regressor::Warming { .. } | Regressor::Elapsed | Regressor::Covariate(_)
+                term.regressor.as_quantity(),
+                Some(Quantity::Warming | Quantity::Elapsed | Quantity::Covariate(_))
             );
             term.site == site && (is_linear || of.levels < 3)
         };

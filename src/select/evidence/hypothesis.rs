@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::model::parameter::{JointField, ParameterSite, Quantity, Regressor};
+use crate::model::parameter::{ArmField, JointField, ParameterSite, Regressor};
 use crate::problem::{Effect, Problem};
 use crate::residual_tests::Covariate;
 
@@ -133,7 +133,7 @@ impl Hypothesis {
         let mut depends_on: Vec<Covariate> = terms
             .iter()
             .flat_map(|term| {
-                covariates(term.site, term.regressor, problem, (approach_known, time_measured))
+                covariates(term.site, &term.regressor, problem, (approach_known, time_measured))
             })
             .collect();
         depends_on.sort();
@@ -170,55 +170,27 @@ impl Hypothesis {
     }
 }
 
-/// The same of a parameter that two covariates drive, too.
+/// Returns the covariates that a parameter depends on, by its regressor or by the physics of its
+/// site.
 fn covariates(
     site: ParameterSite,
-    regressor: Regressor,
+    regressor: &Regressor,
     problem: &Problem,
     known: (bool, bool),
 ) -> Vec<Covariate> {
-    match regressor {
-        Regressor::LoadedSide { joint, .. } => vec![Covariate::Approach(joint), Covariate::Payload],
-        Regressor::Lagging { .. } => {
-            vec![Covariate::Temperature, Covariate::of(Quantity::Elapsed, problem, known.1)]
-        }
-        Regressor::Dragged { joint, .. } if known.0 => {
-            vec![Covariate::Command(joint), Covariate::Approach(joint)]
-        }
-        _ => vec![covariate(site, regressor, problem, known)],
+    let quantities = regressor.quantities();
+    if !quantities.is_empty() {
+        let of = |quantity| Covariate::of(quantity, problem, known);
+        return quantities.into_iter().flat_map(of).collect();
     }
-}
-
-/// What a parameter depends on by what drives it, or by the physics of where it enters.
-fn covariate(
-    site: ParameterSite,
-    regressor: Regressor,
-    problem: &Problem,
-    (approach_known, time_measured): (bool, bool),
-) -> Covariate {
-    let time = Covariate::of(Quantity::Elapsed, problem, time_measured);
-    match regressor {
-        Regressor::Command(joint)
-        | Regressor::Travel(joint)
-        | Regressor::Sine(joint, _)
-        | Regressor::Cosine(joint, _)
-        | Regressor::Wave { joint, .. }
-        | Regressor::Dragged { joint, .. } => Covariate::Command(joint),
-        Regressor::Warming { .. } => Covariate::Temperature,
-        Regressor::Elapsed | Regressor::Since(_) | Regressor::Settling(_) => time,
-        Regressor::Covariate(which) => Covariate::own(which, problem),
-        Regressor::Spline { of, .. } | Regressor::Bump { of, .. } | Regressor::Step { of, .. } => {
-            Covariate::of(of, problem, time_measured)
+    vec![match site {
+        ParameterSite::Joint { joint, field: JointField::Play | JointField::SlidingPlay }
+            if known.0 =>
+        {
+            Covariate::Approach(joint)
         }
-        _ => match site {
-            ParameterSite::Joint { joint, field: JointField::Play | JointField::SlidingPlay }
-                if approach_known =>
-            {
-                Covariate::Approach(joint)
-            }
-            ParameterSite::Arm(crate::model::parameter::ArmField::Payload) => Covariate::Payload,
-            ParameterSite::Scale | ParameterSite::Strain { .. } => Covariate::Position,
-            _ => Covariate::Load,
-        },
-    }
+        ParameterSite::Arm(ArmField::Payload) => Covariate::Payload,
+        ParameterSite::Scale | ParameterSite::Strain { .. } => Covariate::Position,
+        _ => Covariate::Load,
+    }]
 }

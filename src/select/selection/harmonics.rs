@@ -111,8 +111,8 @@ pub(super) fn filled(
 }
 
 /// Order of a harmonic.
-fn order(regressor: Regressor) -> Option<u32> {
-    match regressor {
+fn order(regressor: &Regressor) -> Option<u32> {
+    match *regressor {
         Regressor::Sine(_, order) | Regressor::Cosine(_, order) => Some(order),
         _ => None,
     }
@@ -120,13 +120,13 @@ fn order(regressor: Regressor) -> Option<u32> {
 
 /// Places of the coefficients of harmonics among the unknowns, and their orders.
 fn coefficients(fitted: &Fitted) -> Vec<(usize, u32)> {
-    let order = |j: usize| order(fitted.model.parameters[fitted.unknowns[j]].regressor);
+    let order = |j: usize| order(&fitted.model.parameters[fitted.unknowns[j]].regressor);
     (0..fitted.unknowns.len()).filter_map(|j| Some((j, order(j)?))).collect()
 }
 
 /// Orders of all harmonics of a problem.
 fn orders(problem: &Problem) -> BTreeSet<u32> {
-    effect::parameters(problem).iter().filter_map(|own| order(own.regressor)).collect()
+    effect::parameters(problem).iter().filter_map(|own| order(&own.regressor)).collect()
 }
 
 /// Whether one prior in angles can hold all harmonics of a problem: none is of a joint that slides,
@@ -134,7 +134,7 @@ fn orders(problem: &Problem) -> BTreeSet<u32> {
 fn takes_prior(problem: &Problem) -> bool {
     let takes =
         |own: &EffectParameter| own.unit() == Unit::Angle && rule_of(problem, own).is_none();
-    effect::parameters(problem).iter().filter(|own| order(own.regressor).is_some()).all(takes)
+    effect::parameters(problem).iter().filter(|own| order(&own.regressor).is_some()).all(takes)
 }
 
 /// Several orders of a joint that were found become all of them up to the highest but those

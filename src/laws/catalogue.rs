@@ -1,0 +1,434 @@
+//! The catalogue of effects: one entry a family, from which everything else follows.
+//!
+//! An entry reads `Variant "name-in-files" { field: Type = Kind as "key" } => Family { … }`. Formulas
+//! are those of [`expression`](super::expression); `{joint}` stands for the argument `joint`. θ is
+//! the joint's command, M the moment that the outboard loads exert at the place, T the temperature
+//! above the reference. At zero every effect does nothing.
+
+use super::argument::{Argument, ArgumentKind, Field, FreeLength, Mount};
+use super::family::{At, Chance, Family, Need, Only, Prior, Search, TermEntry};
+use super::law::{LAW, Law};
+use super::site::{ArmField, BeamField, JointField};
+
+/// Returns the key of an argument: the name of its field, or the one behind `as`.
+macro_rules! key {
+    ($field:ident) => {
+        stringify!($field)
+    };
+    ($field:ident $key:literal) => {
+        $key
+    };
+}
+
+/// Makes [`Effect`] and [`FAMILIES`] from the entries of the catalogue.
+macro_rules! catalogue {
+    ($(
+        $(#[$doc:meta])*
+        $variant:ident $name:literal $({ $($field:ident: $type:ty = $kind:ident $(as $key:literal)?),+ })?
+        => $family:expr;
+    )+) => {
+        /// Effect with its arguments; joints are numbered from 1 as in files, links go by the name
+        /// of their beam.
+        #[derive(Debug, Clone, PartialEq)]
+        #[non_exhaustive]
+        #[expect(missing_docs, reason = "arguments carry the names of the file format")]
+        pub enum Effect {
+            $($(#[$doc])* $variant $({ $($field: $type),+ })?,)+
+            /// A law of the user's own, or one that the search for effects wrote down.
+            Law(Law),
+        }
+
+        /// Families of the catalogue, in the order of the file format.
+        pub static FAMILIES: &[Family] = &[$(Family {
+            name: $name,
+            arguments: &[$($((key!($field $($key)?), ArgumentKind::$kind)),+)?],
+            ..$family
+        }),+];
+
+        /// Names of effects in files: the families, and laws of the user's own.
+        pub(crate) const NAMES: &[&str] = &[$($name,)+ LAW];
+
+        /// Place of each family in [`FAMILIES`].
+        #[derive(Clone, Copy)]
+        enum Index {
+            $($variant),+
+        }
+
+        impl Effect {
+            /// Returns the family; `None` for a law of the user's own.
+            pub fn family(&self) -> Option<&'static Family> {
+                let index = match self {
+                    $(Self::$variant $({ $($field: _),+ })? => Index::$variant,)+
+                    Self::Law(_) => return None,
+                };
+                FAMILIES.get(index as usize)
+            }
+
+            /// Returns the arguments with their keys, in the order of files.
+            pub fn arguments(&self) -> Vec<(&str, Argument)> {
+                match self {
+                    $(Self::$variant $({ $($field),+ })? => {
+                        vec![$($($field.argument(key!($field $($key)?))),+)?]
+                    })+
+                    Self::Law(law) => law.arguments(),
+                }
+            }
+
+            /// Returns the effect of a family with these arguments, by their keys; `None` where one
+            /// is missing or of another kind.
+            pub(crate) fn build(name: &str, argument: impl Fn(&str) -> Option<Argument>) -> Option<Self> {
+                match name {
+                    $($name => Some(Self::$variant $({
+                        $($field: <$type>::of(&argument(key!($field $($key)?))?)?),+
+                    })?),)+
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+/// Prior of an angle or length that repeats or drifts [rad, m].
+const SMALL: f64 = 1e-3;
+/// Prior of a relative error.
+const PERCENT: f64 = 0.01;
+/// Prior of a displacement of the instrument \[m\].
+const SHIFTED: f64 = 5e-3;
+/// Prior of a displacement \[m\] and turn \[rad\] of an instrument that was knocked or set down again.
+const MOVED: f64 = 1e-2;
+/// Prior of a flexibility 1/EI [1/(N·m²)].
+const FLEXIBLE: f64 = 1e-2;
+/// Angle that no joint exceeds under the greatest conceivable moment \[rad\].
+const MAX_TURN: f64 = 0.1;
+
+catalogue! {
+    /// A joint declared rigid turns by Δθ = c `M_z`.
+    JointCompliance "joint-compliance" { joint: usize = AnyJoint } => Family {
+        terms: &[TermEntry::at(At::Joint(JointField::Compliance), "compliance", 1e-3).never_negative()],
+        says: "joint {joint} gives way about its axis",
+        only: &[Only::RigidJoint],
+        needs: &[Need::Loads],
+        ..Family::PLAIN
+    };
+    /// Δθ = Σₖ aₖ sin kθ + bₖ cos kθ.
+    JointHarmonic "joint-harmonic" { joint: usize = MovingJoint, orders: Vec<u32> = Orders } => Family {
+        terms: &[
+            TermEntry::driven(At::Coordinate, "sin{orders}", "sin({orders}*q{joint})", SMALL),
+            TermEntry::driven(At::Coordinate, "cos{orders}", "cos({orders}*q{joint})", SMALL),
+        ],
+        says: "angle of joint {joint} errs with {orders:cycles} a revolution",
+        only: &[Only::Turning],
+        needs: &[Need::Moves("joint")],
+        search: Search::Orders,
+        chance: Chance::Orders,
+        ..Family::PLAIN
+    };
+    /// Δθ = a sin kθ + b cos kθ of an order k that need be no whole number: a stage of a gear.
+    JointWave "joint-wave" { joint: usize = MovingJoint, order: f64 = Order } => Family {
+        terms: &[
+            TermEntry::driven(At::Coordinate, "sin", "sin({order}*q{joint})", SMALL),
+            TermEntry::driven(At::Coordinate, "cos", "cos({order}*q{joint})", SMALL),
+        ],
+        says: "joint {joint} errs in waves of order {order} (every {order:degrees}°, or {order:millimetres} mm of a slide)",
+        search: Search::Declared,
+        chance: Chance::Waves,
+        ..Family::PLAIN
+    };
+    /// Δθ = ε θ.
+    GearRatio "gear-ratio" { joint: usize = MovingJoint } => Family {
+        terms: &[TermEntry::driven(At::Coordinate, "error", "q{joint}", PERCENT)],
+        says: "transmission ratio of joint {joint} is off",
+        needs: &[Need::Moves("joint")],
+        ..Family::PLAIN
+    };
+    /// Δθ = (b/2)·approach; without directions of approach the moment decides.
+    Backlash "backlash" { joint: usize = MovingJoint } => Family {
+        terms: &[TermEntry::at(At::JointOrSlide(JointField::Play, JointField::SlidingPlay), "width", 0.01)],
+        says: "play in joint {joint}",
+        needs: &[Need::Play],
+        ..Family::PLAIN
+    };
+    /// Play that opens with the payload m: Δθ = (w m / 2)·approach.
+    PayloadBacklash "payload-backlash" { joint: usize = MovingJoint } => Family {
+        terms: &[TermEntry::driven(At::Coordinate, "width", "0.5*payload*approach{joint}", 0.01)],
+        says: "play in joint {joint} that opens with the payload",
+        needs: &[Need::PayloadFromBothSides],
+        ..Family::PLAIN
+    };
+    /// Friction holds the joint back on the path it came, Δθ = h z with dz/dθ = (g − z)/s, g = ±1
+    /// the side from which it comes \[Dahl 1968\].
+    JointHysteresis "joint-hysteresis" { joint: usize = TurningJoint, distance: f64 = Distance as "distance_rad" } => Family {
+        terms: &[TermEntry::driven(At::Coordinate, "amplitude", "friction(q{joint}, {distance_rad})", SMALL)],
+        says: "friction pulls joint {joint} back the way on which it came",
+        needs: &[Need::Moves("joint"), Need::Clock],
+        search: Search::Distances,
+        ..Family::PLAIN
+    };
+    /// Δθ = c₃ `M_z`³ beyond the linear torsion.
+    JointNonlinearStiffness "joint-nonlinear-stiffness" { joint: usize = AnyJoint } => Family {
+        terms: &[TermEntry::at(At::Joint(JointField::Cubic), "cubic", 0.0).prior(Prior::OfCubedMoment(MAX_TURN))],
+        says: "stiffness of joint {joint} changes with its load",
+        needs: &[Need::Loads],
+        ..Family::PLAIN
+    };
+    /// Bearings tilt by (`c_x` `M_x`, `c_y` `M_y`, 0) before the joint turns.
+    JointLateralCompliance "joint-lateral-compliance" { joint: usize = AnyJoint } => Family {
+        terms: &[
+            TermEntry::at(At::Joint(JointField::LateralX), "about_x", 1e-3).never_negative(),
+            TermEntry::at(At::Joint(JointField::LateralY), "about_y", 1e-3).never_negative(),
+        ],
+        says: "joint {joint} tilts across its axis",
+        only: &[Only::Commanded],
+        needs: &[Need::Loads],
+        ..Family::PLAIN
+    };
+    /// A spring from an anchor before the joint to a lever on the link behind it pulls the two
+    /// together: with a moment about the axis.
+    GravityCompensator "gravity-compensator" {
+        joint: usize = RelievedJoint,
+        anchor: [f64; 2] = Point as "anchor_m",
+        lever: [f64; 2] = Point as "lever_m",
+        free_length: FreeLength = FreeLength as "free_length_m"
+    } => Family {
+        terms: &[
+            TermEntry::at(At::Joint(JointField::SpringRate), "rate", 0.0).prior(Prior::SpringRate).never_negative(),
+            TermEntry::at(At::Joint(JointField::SpringPreload), "preload", 0.0).prior(Prior::SpringPreload),
+        ],
+        says: "a gravity compensator takes load off joint {joint}",
+        search: Search::Declared,
+        ..Family::PLAIN
+    };
+    /// Δθ = k (T − T₀).
+    JointThermalDrift "joint-thermal-drift" { joint: usize = MovingJoint } => Family {
+        terms: &[TermEntry::driven(At::Coordinate, "rate", "T", SMALL)],
+        says: "zero of joint {joint} drifts with temperature",
+        needs: &[Need::Temperature],
+        ..Family::PLAIN
+    };
+    /// Δθ = k (T̃ − T₀) with a temperature that lags, dT̃/dt = (T − T̃)/τ.
+    JointThermalDriftLag "joint-thermal-drift-lag" { joint: usize = MovingJoint, time_constant: f64 = Duration as "time_constant_s" } => Family {
+        terms: &[TermEntry::driven(At::Coordinate, "rate", "lag(T, {time_constant_s})", SMALL)],
+        says: "zero of joint {joint} drifts with a temperature that lags by {time_constant_s} s",
+        needs: &[Need::Clock, Need::Temperature],
+        search: Search::TimeConstants,
+        ..Family::PLAIN
+    };
+    /// Δθ of one joint = k q of another.
+    JointCoupling "joint-coupling" { joint: usize = MovingJoint, from: usize = OtherJoint } => Family {
+        terms: &[TermEntry::driven(At::Coordinate, "factor", "q{from}", PERCENT)],
+        says: "joint {from} moves joint {joint} along",
+        needs: &[Need::Moves("from")],
+        ..Family::PLAIN
+    };
+    /// Flexibility 1/EI of a link declared rigid.
+    LinkBending "link-bending" { joint: usize = LinkedJoint } => Family {
+        terms: &[TermEntry::at(At::Beam(BeamField::Flexibility), "flexibility", FLEXIBLE).never_negative()],
+        says: "the link before joint {joint} bends",
+        only: &[Only::Link, Only::RigidLink],
+        needs: &[Need::Loads],
+        ..Family::PLAIN
+    };
+    /// Flexibility 1/EI of the slide of a prismatic joint, a cantilever as long as it is out.
+    SlideBending "slide-bending" { joint: usize = SlidingJoint } => Family {
+        terms: &[TermEntry::at(At::Joint(JointField::SlideFlexibility), "flexibility", FLEXIBLE).never_negative()],
+        says: "the slide of joint {joint} bends",
+        needs: &[Need::Moves("joint"), Need::Loads],
+        ..Family::PLAIN
+    };
+    /// Torsional moments bend a beam by (`k_y`, `k_z`), and bending moments twist it by as much.
+    TwistBending "twist-bending" { link: String = Beam } => Family {
+        terms: &[
+            TermEntry::at(At::Beam(BeamField::CouplingY), "about_y", 0.0).prior(Prior::TwistCoupling { about_z: false }),
+            TermEntry::at(At::Beam(BeamField::CouplingZ), "about_z", 0.0).prior(Prior::TwistCoupling { about_z: true }),
+        ],
+        says: "link {link} twists as it bends, and bends as it twists",
+        needs: &[Need::Loads],
+        ..Family::PLAIN
+    };
+    /// Curvature (`k_y`, `k_z`)·(T − T₀) along a beam.
+    LinkThermalBending "link-thermal-bending" { link: String = Beam } => Family {
+        terms: &[
+            TermEntry::driven(At::Beam(BeamField::BowY), "about_y", "T", SMALL),
+            TermEntry::driven(At::Beam(BeamField::BowZ), "about_z", "T", SMALL),
+        ],
+        says: "link {link} bows with temperature",
+        needs: &[Need::Temperature],
+        ..Family::PLAIN
+    };
+    /// Strain α (T − T₀) of a beam.
+    LinkThermalExpansion "link-thermal-expansion" { link: String = Beam } => Family {
+        terms: &[TermEntry::driven(At::Beam(BeamField::Stretch), "strain", "T", SMALL)],
+        says: "link {link} grows with temperature",
+        needs: &[Need::Temperature],
+        ..Family::PLAIN
+    };
+    /// Curvature (`k_y`, `k_z`)·(T̃ − T₀) along a beam whose temperature lags.
+    LinkThermalBendingLag "link-thermal-bending-lag" { link: String = Beam, time_constant: f64 = Duration as "time_constant_s" } => Family {
+        terms: &[
+            TermEntry::driven(At::Beam(BeamField::BowY), "about_y", "lag(T, {time_constant_s})", SMALL),
+            TermEntry::driven(At::Beam(BeamField::BowZ), "about_z", "lag(T, {time_constant_s})", SMALL),
+        ],
+        says: "link {link} bows with a temperature that lags by {time_constant_s} s",
+        needs: &[Need::Clock, Need::Temperature],
+        search: Search::TimeConstants,
+        ..Family::PLAIN
+    };
+    /// Strain α (T̃ − T₀) of a beam whose temperature lags.
+    LinkThermalExpansionLag "link-thermal-expansion-lag" { link: String = Beam, time_constant: f64 = Duration as "time_constant_s" } => Family {
+        terms: &[TermEntry::driven(At::Beam(BeamField::Stretch), "strain", "lag(T, {time_constant_s})", SMALL)],
+        says: "link {link} grows with a temperature that lags by {time_constant_s} s",
+        needs: &[Need::Clock, Need::Temperature],
+        search: Search::TimeConstants,
+        ..Family::PLAIN
+    };
+    /// A mass m at s along a beam.
+    UnmodelledMass "unmodelled-mass" { link: String = Beam } => Family {
+        terms: &[
+            TermEntry::at(At::Beam(BeamField::AddedMass), "mass", 5.0).never_negative(),
+            TermEntry::at(At::Beam(BeamField::AddedAt), "at", 0.0).prior(Prior::HalfLength).nominal(Prior::HalfLength),
+        ],
+        says: "link {link} carries a mass that is not declared",
+        needs: &[Need::Loads],
+        ..Family::PLAIN
+    };
+    /// The payload is heavier by m whenever one is carried.
+    PayloadMass "payload-mass" => Family {
+        terms: &[TermEntry::at(At::Arm(ArmField::Payload), "mass", 2.0)],
+        says: "payloads are heavier than declared",
+        needs: &[Need::Payload],
+        ..Family::PLAIN
+    };
+    /// The rope pulls with F (1 + k).
+    HoistForce "hoist-force" => Family {
+        terms: &[TermEntry::at(At::Arm(ArmField::HoistForce), "error", 0.3)],
+        says: "the hoist pulls with another force",
+        only: &[Only::Hoisted],
+        ..Family::PLAIN
+    };
+    /// The rope leans: direction ∝ that declared + (`t_x` + k x, `t_y` + k y, 0), hook at x, y.
+    HoistDirection "hoist-direction" => Family {
+        terms: &[
+            TermEntry::at(At::Arm(ArmField::HoistLeanX), "lean_x", 0.1),
+            TermEntry::at(At::Arm(ArmField::HoistLeanY), "lean_y", 0.1),
+            TermEntry::at(At::Arm(ArmField::HoistTrolley), "trolley", 0.1),
+        ],
+        says: "the rope of the hoist leans",
+        only: &[Only::Hoisted],
+        ..Family::PLAIN
+    };
+    /// The base turns by (`C_x` `M_x`, `C_y` `M_y`, 0) under the moments at the base.
+    BaseCompliance "base-compliance" => Family {
+        terms: &[
+            TermEntry::at(At::Arm(ArmField::MountingX), "about_x", 1e-4).never_negative(),
+            TermEntry::at(At::Arm(ArmField::MountingY), "about_y", 1e-4).never_negative(),
+        ],
+        says: "the base tilts under the load",
+        needs: &[Need::Loads],
+        ..Family::PLAIN
+    };
+    /// Gravity is turned by (`r_x`, `r_y`, 0).
+    GravityDirection "gravity-direction" => Family {
+        terms: &[
+            TermEntry::at(At::Arm(ArmField::GravityX), "about_x", 0.1),
+            TermEntry::at(At::Arm(ArmField::GravityY), "about_y", 0.1),
+        ],
+        says: "the base does not stand level",
+        needs: &[Need::Loads],
+        ..Family::PLAIN
+    };
+    /// λ from 0, loads on the rigid arm, to 1, loads on the bent arm.
+    DeflectedEquilibrium "deflected-equilibrium" => Family {
+        terms: &[TermEntry::at(At::Arm(ArmField::Mixing), "lambda", 1.0).never_negative()],
+        says: "the loads act on the bent arm",
+        only: &[Only::Undeflected],
+        needs: &[Need::Loads],
+        ..Family::PLAIN
+    };
+    /// Measured positions are scaled by 1 + s.
+    TrackerScale "tracker-scale" => Family {
+        terms: &[TermEntry::at(At::Scale, "error", PERCENT)],
+        says: "the scale of the measurement is off",
+        ..Family::PLAIN
+    };
+    /// Positions are measured as p + E p, E upper triangular: scales and squareness of the axes, as
+    /// usual for coordinate measuring machines; a rotation more is the base's.
+    FrameStrain "frame-strain" => Family {
+        terms: &[
+            TermEntry::at(At::Strain(0), "xx", PERCENT),
+            TermEntry::at(At::Strain(1), "yy", PERCENT),
+            TermEntry::at(At::Strain(2), "zz", PERCENT),
+            TermEntry::at(At::Strain(3), "xy", PERCENT),
+            TermEntry::at(At::Strain(4), "xz", PERCENT),
+            TermEntry::at(At::Strain(5), "yz", PERCENT),
+        ],
+        says: "axes of the measuring frame are off in scale or not square",
+        ..Family::PLAIN
+    };
+    /// Measured positions move by v (t − `t_first`).
+    TrackerDrift "tracker-drift" => Family {
+        terms: &[
+            TermEntry::driven(At::Shift(0), "x", "t", 1e-5),
+            TermEntry::driven(At::Shift(1), "y", "t", 1e-5),
+            TermEntry::driven(At::Shift(2), "z", "t", 1e-5),
+        ],
+        says: "the measuring station drifts",
+        needs: &[Need::Times],
+        ..Family::PLAIN
+    };
+    /// Measured positions are moved by d from a time on.
+    StationShift "station-shift" { at_time: f64 = Time as "at_time_s" } => Family {
+        terms: &[
+            TermEntry::driven(At::Shift(0), "x", "step(time - {at_time_s})", SHIFTED),
+            TermEntry::driven(At::Shift(1), "y", "step(time - {at_time_s})", SHIFTED),
+            TermEntry::driven(At::Shift(2), "z", "step(time - {at_time_s})", SHIFTED),
+        ],
+        says: "the measuring station moved at {at_time_s} s",
+        says_by_row: "the measuring station moved after row {at_time_s:row}",
+        search: Search::Times,
+        ..Family::PLAIN
+    };
+    /// Measured positions are turned by (`r_x`, `r_y`, `r_z`) about the measuring frame's origin and
+    /// moved by d from a time on.
+    StationMove "station-move" { at_time: f64 = Time as "at_time_s" } => Family {
+        terms: &[
+            TermEntry::driven(At::Shift(0), "x", "step(time - {at_time_s})", MOVED),
+            TermEntry::driven(At::Shift(1), "y", "step(time - {at_time_s})", MOVED),
+            TermEntry::driven(At::Shift(2), "z", "step(time - {at_time_s})", MOVED),
+            TermEntry::driven(At::Turn(0), "rx", "step(time - {at_time_s})", MOVED),
+            TermEntry::driven(At::Turn(1), "ry", "step(time - {at_time_s})", MOVED),
+            TermEntry::driven(At::Turn(2), "rz", "step(time - {at_time_s})", MOVED),
+        ],
+        says: "the measuring station moved and turned at {at_time_s} s",
+        says_by_row: "the measuring station moved and turned after row {at_time_s:row}",
+        search: Search::Declared,
+        ..Family::PLAIN
+    };
+    /// Measured positions move by d (1 − exp(−(t − `t_first`)/τ)).
+    TrackerSettling "tracker-settling" { time_constant: f64 = Duration as "time_constant_s" } => Family {
+        terms: &[
+            TermEntry::driven(At::Shift(0), "x", "-expm1(-t/{time_constant_s})", SHIFTED),
+            TermEntry::driven(At::Shift(1), "y", "-expm1(-t/{time_constant_s})", SHIFTED),
+            TermEntry::driven(At::Shift(2), "z", "-expm1(-t/{time_constant_s})", SHIFTED),
+        ],
+        says: "the measuring station settles with a time constant of {time_constant_s} s",
+        says_by_row: "the measuring station settles with a constant of {time_constant_s} rows",
+        search: Search::SettlingTimes,
+        ..Family::PLAIN
+    };
+    /// Δθ of a joint, or a small motion of the base, in proportion to a covariate of the problem.
+    Covariate "covariate" { joint: Mount = Mount, of: String = Covariate } => Family {
+        terms: &[
+            TermEntry::driven(At::Coordinate, "rate", "{of:formula}", f64::INFINITY),
+            TermEntry::driven(At::BaseTurn(0), "rx", "{of:formula}", f64::INFINITY),
+            TermEntry::driven(At::BaseTurn(1), "ry", "{of:formula}", f64::INFINITY),
+            TermEntry::driven(At::BaseTurn(2), "rz", "{of:formula}", f64::INFINITY),
+            TermEntry::driven(At::BaseShift(0), "x", "{of:formula}", f64::INFINITY),
+            TermEntry::driven(At::BaseShift(1), "y", "{of:formula}", f64::INFINITY),
+            TermEntry::driven(At::BaseShift(2), "z", "{of:formula}", f64::INFINITY),
+        ],
+        says: "zero of joint {joint} moves with {of}",
+        says_of_base: "the base moves with {of}",
+        needs: &[Need::Covariate],
+        ..Family::PLAIN
+    };
+}

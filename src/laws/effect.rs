@@ -1,0 +1,420 @@
+//! Properties of effects, as they follow from the data of their laws.
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+
+use super::argument::{Argument, ArgumentKind};
+use super::catalogue::Effect;
+use super::expression::{Expression, Vocabulary, parse};
+use super::family::{At, Family, TermEntry};
+use super::law::LAW;
+use super::quantity::Quantity;
+use super::site::JointField;
+use super::term::EffectTerm;
+use super::text::filled;
+
+impl Effect {
+    /// Returns the name in files.
+    pub fn name(&self) -> &'static str {
+        self.family().map_or(LAW, |family| family.name)
+    }
+
+    /// Returns true if both are the same effect, or laws of the same name.
+    pub(crate) fn is_same_as(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Law(law), Self::Law(other)) => law.name() == other.name(),
+            _ => self == other,
+        }
+    }
+
+    /// Returns the place, which parameters carry in brackets: a joint's number, a link, a time, the
+    /// name of a law; empty for the whole.
+    pub fn place(&self) -> String {
+        if let Self::Law(law) = self {
+            return law.name().to_owned();
+        }
+        let places = self.arguments().into_iter().filter_map(|(_, argument)| argument.place());
+        places.collect::<Vec<_>>().join(",")
+    }
+
+    /// Returns the declaration as a problem file has it: `gear-ratio = { joint = 3 }`.
+    pub fn declaration(&self) -> String {
+        let arguments: Vec<_> =
+            self.arguments().iter().map(|(key, argument)| (*key, argument.toml())).collect();
+        declaration(self.name(), &arguments)
+    }
+
+    /// Returns the value of an argument by its key.
+    pub fn argument(&self, key: &str) -> Option<Argument> {
+        self.arguments().into_iter().find(|(own, _)| *own == key).map(|(_, argument)| argument)
+    }
+
+    /// Returns the number, from 1, of the joint at which the effect acts.
+    pub fn joint(&self) -> Option<usize> {
+        if let Self::Law(law) = self {
+            return law.joint();
+        }
+        self.arguments().into_iter().find_map(|(_, argument)| match argument {
+            Argument::Joint(joint) => Some(joint),
+            _ => None,
+        })
+    }
+
+    /// Returns the name of the link on which the effect acts.
+    pub fn link(&self) -> Option<String> {
+        match self {
+            Self::Law(law) => law.link().map(str::to_owned),
+            _ => self.argument("link").and_then(|argument| match argument {
+                Argument::Name(link) => Some(link),
+                _ => None,
+            }),
+        }
+    }
+
+    /// Returns the name of the covariate that the effect follows.
+    pub fn covariate(&self) -> Option<String> {
+        let (key, _) = self.key_of(|kind| kind == ArgumentKind::Covariate)?;
+        match self.argument(key)? {
+            Argument::Name(name) => Some(name),
+            _ => None,
+        }
+    }
+
+    /// Returns key and kind of the first argument of some kind.
+    fn key_of(&self, is_it: impl Fn(ArgumentKind) -> bool) -> Option<(&'static str, ArgumentKind)> {
+        self.family()?.arguments.iter().find(|(_, kind)| is_it(*kind)).copied()
+    }
+
+    /// Returns the parameters with formulas in the words of `vocabulary`; none whose formula uses
+    /// another word.
+    pub(crate) fn entries(&self, vocabulary: &Vocabulary) -> Vec<EffectTerm> {
+        let family = match self {
+            Self::Law(law) => return law.entries(),
+            _ => self.family().unwrap_or(&Family::PLAIN),
+        };
+        let arguments = self.arguments();
+        let acts = |entry: &&TermEntry| match entry.at {
+            At::Coordinate => self.joint().is_some(),
+            At::BaseShift(_) | At::BaseTurn(_) => self.joint().is_none(),
+            _ => true,
+        };
+        let one = |entry: &TermEntry, arguments: &[(&str, Argument)]| {
+            let formula = match entry.formula {
+                "" => None,
+                formula => Some(parse(&filled(formula, arguments), vocabulary).ok()?),
+            };
+            Some(EffectTerm {
+                name: filled(entry.name, arguments),
+                at: entry.at,
+                formula,
+                prior: entry.prior,
+                nominal: entry.nominal,
+                never_negative: entry.never_negative,
+                inner: None,
+            })
+        };
+        let entries = || family.terms.iter().filter(acts);
+        match arguments.iter().find(|(_, argument)| matches!(argument, Argument::Orders(_))) {
+            Some((key, Argument::Orders(orders))) => orders
+                .iter()
+                .flat_map(|&order| {
+                    let single = |(own, argument): &(_, Argument)| {
+                        let order = Argument::Orders(vec![order]);
+                        (*own, if own == key { order } else { argument.clone() })
+                    };
+                    let arguments: Vec<(&str, Argument)> = arguments.iter().map(single).collect();
+                    entries().filter_map(|entry| one(entry, &arguments)).collect::<Vec<_>>()
+                })
+                .collect(),
+            _ => entries().filter_map(|entry| one(entry, &arguments)).collect(),
+        }
+    }
+
+    /// Returns the parameters on an arm of any joints and covariates.
+    fn loose_entries(&self) -> Vec<EffectTerm> {
+        let covariates: Vec<String> = self.covariate().into_iter().collect();
+        let slides = [false; MAX_JOINTS];
+        self.entries(&Vocabulary {
+            slides: &slides,
+            covariates: &covariates,
+            ..Vocabulary::default()
+        })
+    }
+
+    /// Returns the quantities that multiply its parameters, each once.
+    pub fn quantities(&self) -> Vec<Quantity> {
+        let mut found = Vec::new();
+        for formula in self.loose_entries().into_iter().filter_map(|entry| entry.formula) {
+            for quantity in formula.expression.quantities() {
+                if !found.contains(&quantity) {
+                    found.push(quantity);
+                }
+            }
+        }
+        found
+    }
+
+    fn follows(&self, is_it: fn(Quantity) -> bool) -> bool {
+        self.quantities().into_iter().any(is_it)
+    }
+
+    /// Returns true if it acts at a site.
+    pub fn acts_at(&self, at: At) -> bool {
+        match self {
+            Self::Law(law) => law.at() == at,
+            _ => self.family().is_some_and(|own| own.terms.iter().any(|entry| entry.at == at)),
+        }
+    }
+
+    /// Returns true if it follows the temperature.
+    pub fn is_thermal(&self) -> bool {
+        self.follows(Quantity::is_thermal)
+    }
+
+    /// Returns true if it depends on the side from which joints come.
+    pub fn has_sides(&self) -> bool {
+        self.acts_at(At::JointOrSlide(JointField::Play, JointField::SlidingPlay))
+            || self.follows(Quantity::has_sides)
+    }
+
+    /// Returns true if it follows time, or the order of the poses, rather than quantities for which
+    /// poses can be chosen.
+    pub fn follows_time(&self) -> bool {
+        self.follows(Quantity::follows_time)
+    }
+
+    /// Returns true if it depends on the poses measured before.
+    pub fn has_memory(&self) -> bool {
+        self.follows(Quantity::has_memory)
+    }
+
+    /// Returns the joint, from 1, whose load a spring takes off.
+    pub(crate) fn compensated(&self) -> Option<usize> {
+        self.acts_at(At::Joint(JointField::SpringRate)).then(|| self.joint()).flatten()
+    }
+
+    /// Returns the joint at which the effect is a function of one command alone, and the joint
+    /// commanded, both from 1.
+    pub fn function_of(&self) -> Option<(usize, usize)> {
+        let joint = self.joint()?;
+        let entries = self.loose_entries();
+        if entries.is_empty() || entries.iter().any(|entry| entry.at != At::Coordinate) {
+            return None;
+        }
+        match self.quantities().as_slice() {
+            [Quantity::Command(from)] => Some((joint, from + 1)),
+            _ => None,
+        }
+    }
+
+    /// Returns order and joint, from 1, of each wave sin kq or cos kq that adds to the coordinate of
+    /// that joint itself.
+    pub fn waves(&self) -> Vec<(usize, f64)> {
+        let Some((joint, from)) = self.function_of() else { return Vec::new() };
+        let wave = |entry: EffectTerm| entry.formula.and_then(|own| own.expression.wave_order());
+        let waves = self.loose_entries().into_iter().filter_map(wave);
+        let mut orders: Vec<f64> = waves.filter(|_| joint == from).collect();
+        orders.dedup();
+        orders.into_iter().map(|order| (joint, order)).collect()
+    }
+
+    /// Returns a whole order that this and another effect give the same joint.
+    pub(crate) fn shared_order(&self, other: &Self) -> Option<u32> {
+        let waves = other.waves();
+        let shared = self.waves().into_iter().find(|wave| waves.contains(wave))?.1;
+        (shared.fract() == 0.0).then_some(shared as u32)
+    }
+
+    /// Returns the effect in words for people.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Law(law) => law.describe(),
+            _ => {
+                let family = self.family().unwrap_or(&Family::PLAIN);
+                let of_base = self.argument("base").is_some();
+                let says = if of_base { family.says_of_base } else { family.says };
+                filled(says, &self.arguments())
+            }
+        }
+    }
+
+    /// Returns the same where times may not have been measured: the order of the rows stands for
+    /// them then, counted from 1.
+    pub fn describe_in(&self, time_measured: bool) -> String {
+        match self.family() {
+            Some(family) if !time_measured && !family.says_by_row.is_empty() => {
+                filled(family.says_by_row, &self.arguments())
+            }
+            _ => self.describe(),
+        }
+    }
+
+    /// Returns name and place for people, without an argument that is searched.
+    pub fn name_and_place(&self) -> String {
+        if let Self::Law(law) = self {
+            return format!("law {}", law.name());
+        }
+        let searched = self.searched();
+        let known = self.arguments().into_iter().filter(|(key, _)| Some(*key) != searched);
+        let place =
+            known.filter_map(|(_, argument)| argument.place()).collect::<Vec<_>>().join(",");
+        if place.is_empty() { self.name().to_owned() } else { format!("{} {place}", self.name()) }
+    }
+
+    /// Returns the key of the argument that is searched.
+    fn searched(&self) -> Option<&'static str> {
+        self.key_of(ArgumentKind::is_searched).map(|(key, _)| key)
+    }
+
+    /// Returns kind and value of the argument that is searched: a time, an order, a path.
+    pub fn searched_value(&self) -> Option<(ArgumentKind, f64)> {
+        let (key, kind) = self.key_of(ArgumentKind::is_searched)?;
+        match self.argument(key)? {
+            Argument::Number(value) => Some((kind, value)),
+            _ => None,
+        }
+    }
+
+    /// Returns the other joint, from 1, that moves the joint at which the effect acts.
+    pub fn other_joint(&self) -> Option<usize> {
+        let (key, _) = self.key_of(|kind| kind == ArgumentKind::OtherJoint)?;
+        match self.argument(key)? {
+            Argument::Joint(joint) => Some(joint),
+            _ => None,
+        }
+    }
+
+    /// Returns true if an argument is searched, as a time: effects that [`Self::name_and_place`]
+    /// calls the same are one effect.
+    pub fn is_searched(&self) -> bool {
+        self.searched().is_some()
+    }
+
+    /// Returns true if it is the same effect, whatever the value of the argument that is searched.
+    pub(crate) fn is_but_for_search(&self, other: &Self) -> bool {
+        let is_alike = || {
+            std::mem::discriminant(self) == std::mem::discriminant(other)
+                && self.name_and_place() == other.name_and_place()
+        };
+        self == other || (self.is_searched() && is_alike())
+    }
+
+    /// Returns true if it depends on the poses before as another effect of its family at the same
+    /// place does for another time or path.
+    pub(crate) fn remembers_like(&self, other: &Self) -> bool {
+        self.name_and_place() == other.name_and_place() && self.has_memory()
+    }
+
+    /// Returns the same with its searched argument multiplied, to three digits; `None` where values
+    /// between those of the candidates cannot be told apart.
+    pub(crate) fn scaled(&self, factor: f64) -> Option<Self> {
+        let (key, _) = self.key_of(ArgumentKind::is_scalable)?;
+        let Some(Argument::Number(number)) = self.argument(key) else { return None };
+        self.with(key, Argument::Number(to_three_digits(factor * number)?))
+    }
+
+    /// Returns the same with another value of an argument.
+    fn with(&self, key: &str, value: Argument) -> Option<Self> {
+        let arguments = self.arguments();
+        Self::build(self.name(), |wanted| {
+            let own = || arguments.iter().find(|(own, _)| *own == wanted);
+            if wanted == key { Some(value.clone()) } else { own().map(|own| own.1.clone()) }
+        })
+    }
+
+    /// Returns the orders of a harmonic.
+    pub fn harmonic_orders(&self) -> Option<Vec<u32>> {
+        self.orders().map(|(_, orders)| orders)
+    }
+
+    /// Returns the orders of a harmonic, and their key.
+    fn orders(&self) -> Option<(&'static str, Vec<u32>)> {
+        let (key, _) = self.key_of(|kind| kind == ArgumentKind::Orders)?;
+        match self.argument(key)? {
+            Argument::Orders(orders) => Some((key, orders)),
+            _ => None,
+        }
+    }
+
+    /// Returns the parts that are tested one by one: a harmonic order by order.
+    pub fn parts(&self) -> Vec<Self> {
+        let Some((key, orders)) = self.orders() else { return vec![self.clone()] };
+        let one = |order: u32| self.with(key, Argument::Orders(vec![order]));
+        orders.into_iter().filter_map(one).collect()
+    }
+
+    /// Returns the orders of both where they differ in nothing else.
+    fn alike(&self, other: &Self) -> Option<(&'static str, Vec<u32>, Vec<u32>)> {
+        let ((key, orders), (_, more)) = (self.orders()?, other.orders()?);
+        let same = self.with(key, Argument::Orders(more.clone()))? == *other;
+        same.then_some((key, orders, more))
+    }
+
+    /// Returns the one effect that is this and another: harmonics of one joint; `None` where they
+    /// are two.
+    pub fn joined(&self, other: &Self) -> Option<Self> {
+        let (key, mut orders, more) = self.alike(other)?;
+        let added: Vec<u32> = more.into_iter().filter(|order| !orders.contains(order)).collect();
+        orders.extend(added);
+        orders.sort_unstable();
+        self.with(key, Argument::Orders(orders))
+    }
+
+    /// Returns true if it holds all of another: a harmonic of more orders.
+    pub fn covers(&self, other: &Self) -> bool {
+        match self.alike(other) {
+            Some((_, orders, wanted)) => wanted.iter().all(|order| orders.contains(order)),
+            None => self == other,
+        }
+    }
+}
+
+/// Greatest number of joints that properties of effects are derived for.
+const MAX_JOINTS: usize = 1000;
+
+/// Returns `name = { key = value }`; without arguments `name = true`.
+pub(crate) fn declaration(name: &str, arguments: &[(&str, String)]) -> String {
+    let all: Vec<String> =
+        arguments.iter().map(|(key, value)| format!("{key} = {value}")).collect();
+    match all.join(", ") {
+        none if none.is_empty() => format!("{name} = true"),
+        all => format!("{name} = {{ {all} }}"),
+    }
+}
+
+/// Returns a searched number to three digits; `None` where nothing is left.
+pub(crate) fn to_three_digits(number: f64) -> Option<f64> {
+    let step = 10_f64.powf(number.log10().floor() - 2.0);
+    let rounded = (number / step).round() * step;
+    // As written with three digits, not as the product has it.
+    let written = if step < 1.0 { format!("{rounded:.6}").parse().ok()? } else { rounded.round() };
+    (written > 0.0).then_some(written)
+}
+
+impl Expression {
+    /// Returns the order k of sin kq or cos kq.
+    fn wave_order(&self) -> Option<f64> {
+        use super::expression::{Function, Operator};
+        let Self::Call(Function::Sin | Function::Cos, argument) = self else { return None };
+        match &**argument {
+            Self::Quantity(Quantity::Command(_)) => Some(1.0),
+            Self::Binary(Operator::Multiply, operands) => match &**operands {
+                [Self::Number(order), Self::Quantity(Quantity::Command(_))] => Some(*order),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+}
+
+/// `{"effect": "gear-ratio", "joint": 3}`.
+impl Serialize for Effect {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let arguments = self.arguments();
+        let mut map = serializer.serialize_map(Some(1 + arguments.len()))?;
+        map.serialize_entry("effect", self.name())?;
+        for (key, argument) in &arguments {
+            map.serialize_entry(key, argument)?;
+        }
+        map.end()
+    }
+}

@@ -1,0 +1,139 @@
+//! Units of expressions, as powers of base units.
+
+use super::tree::Operator;
+
+/// Number of base units: rad, m, K, kg, s, N, and the unit of a covariate.
+const BASES: usize = 7;
+/// Symbols of the base units.
+const SYMBOLS: [&str; BASES] = ["rad", "m", "K", "kg", "s", "N", "units of the covariate"];
+
+/// Unit of an expression as powers of base units.
+///
+/// Literal numbers and named parameters may stand for quantities with a unit, so that a product with
+/// one of them is `flexible`: it may have any unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Dimension {
+    powers: [i32; BASES],
+    flexible: bool,
+}
+
+/// Unit of a formula, by which the coefficient of a term divides that of its site.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
+pub enum Per {
+    /// No unit, or one that no table names.
+    #[default]
+    Number,
+    /// \[rad\]
+    Angle,
+    /// \[m\]
+    Length,
+    /// \[K\]
+    Kelvin,
+    /// \[kg\]
+    Mass,
+    /// \[s\]
+    Second,
+    /// The unit of a covariate.
+    Covariate,
+}
+
+impl Dimension {
+    /// A number without unit.
+    pub(super) const PLAIN: Self = Self { powers: [0; BASES], flexible: false };
+    /// A literal or a parameter.
+    pub(super) const FLEXIBLE: Self = Self { powers: [0; BASES], flexible: true };
+    pub(super) const ANGLE: Self = Self::base(0);
+    pub(super) const LENGTH: Self = Self::base(1);
+    pub(super) const KELVIN: Self = Self::base(2);
+    pub(super) const MASS: Self = Self::base(3);
+    pub(super) const SECOND: Self = Self::base(4);
+    pub(super) const FORCE: Self = Self::base(5);
+    pub(super) const COVARIATE: Self = Self { flexible: true, ..Self::base(6) };
+
+    const fn base(index: usize) -> Self {
+        let mut powers = [0; BASES];
+        powers[index] = 1;
+        Self { powers, flexible: false }
+    }
+
+    /// Returns the base unit that a coefficient is given per.
+    pub fn per(self) -> Per {
+        let is = |of: Self| self.powers == of.powers;
+        let known = [
+            (Self::ANGLE, Per::Angle),
+            (Self::LENGTH, Per::Length),
+            (Self::KELVIN, Per::Kelvin),
+            (Self::MASS, Per::Mass),
+            (Self::SECOND, Per::Second),
+            (Self::COVARIATE, Per::Covariate),
+        ];
+        known.into_iter().find(|(of, _)| is(*of)).map_or(Per::Number, |(_, per)| per)
+    }
+
+    /// Returns true if it has no unit but an angle, or may have none.
+    pub(super) fn is_plain(self) -> bool {
+        self.flexible || self.powers[1..].iter().all(|power| *power == 0)
+    }
+
+    /// Returns the unit of a product or quotient.
+    pub(super) fn product(self, other: Self, sign: i32) -> Self {
+        let powers = std::array::from_fn(|k| {
+            self.powers[k].saturating_add(sign.saturating_mul(other.powers[k]))
+        });
+        Self { powers, flexible: self.flexible || other.flexible }
+    }
+
+    /// Returns the unit of a power.
+    pub(super) fn power(self, exponent: Option<f64>) -> Self {
+        match exponent {
+            Some(exponent) if exponent.fract() == 0.0 && exponent.abs() <= 64.0 => Self {
+                powers: self.powers.map(|power| power.saturating_mul(exponent as i32)),
+                ..self
+            },
+            _ => Self { flexible: self.flexible || !self.is_plain(), ..Self::PLAIN },
+        }
+    }
+
+    /// Returns the unit of a sum, or nothing where the operands have different ones.
+    pub(super) fn sum(self, other: Self) -> Option<Self> {
+        match (self.flexible, other.flexible) {
+            (false, false) => (self.powers[1..] == other.powers[1..]).then_some(self),
+            (true, false) => Some(other),
+            (false, true) => Some(self),
+            (true, true) if self.powers == other.powers => Some(self),
+            (true, true) if self.powers == [0; BASES] => Some(other),
+            (true, true) if other.powers == [0; BASES] => Some(self),
+            (true, true) => Some(Self::FLEXIBLE),
+        }
+    }
+
+    /// Returns the unit in words.
+    pub(super) fn symbol(self) -> String {
+        let part = |(power, symbol): (&i32, &&str)| match power {
+            0 => None,
+            1 => Some((*symbol).to_owned()),
+            power => Some(format!("{symbol}^{power}")),
+        };
+        let parts: Vec<String> = self.powers.iter().zip(&SYMBOLS).filter_map(part).collect();
+        if parts.is_empty() { "a number".to_owned() } else { parts.join("·") }
+    }
+
+    /// Returns the unit of two operands under an operator, or nothing where they do not fit.
+    pub(super) fn under(
+        operator: Operator,
+        left: Self,
+        right: Self,
+        exponent: Option<f64>,
+    ) -> Option<Self> {
+        match operator {
+            Operator::Add | Operator::Subtract | Operator::Minimum | Operator::Maximum => {
+                left.sum(right)
+            }
+            Operator::Atan2 => left.sum(right).map(|_| Self::PLAIN),
+            Operator::Multiply => Some(left.product(right, 1)),
+            Operator::Divide => Some(left.product(right, -1)),
+            Operator::Power => Some(left.power(exponent)),
+        }
+    }
+}

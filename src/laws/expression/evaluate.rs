@@ -1,0 +1,111 @@
+//! Values of expressions, generic over the scalar.
+
+use super::tree::{Expression, Function, Operator};
+use crate::laws::quantity::Quantity;
+use crate::scalar::Scalar;
+
+impl Expression {
+    /// Returns the value for quantities `at` and named `parameters`.
+    ///
+    /// Dual numbers carry derivatives through. Where a derivative has two sides, at 0 of `abs`,
+    /// `sign` and `step`, or is infinite, at 0 of `sqrt` and of a power below 1, it counts as 0; of
+    /// equal operands of `min` and `max` the first one's counts. A value outside of the domain of a
+    /// function is NaN or infinite.
+    pub fn evaluate<S: Scalar>(&self, at: &impl Fn(Quantity) -> S, parameters: &[S]) -> S {
+        match self {
+            Self::Number(number) => S::from(*number),
+            Self::Quantity(quantity) => at(*quantity),
+            Self::Parameter(index) => {
+                parameters.get(*index).copied().unwrap_or_else(|| S::from(f64::NAN))
+            }
+            Self::Negative(inner) => -inner.evaluate(at, parameters),
+            Self::Call(function, argument) => function.apply(argument.evaluate(at, parameters)),
+            Self::Binary(operator, operands) => {
+                let [left, right] = &**operands;
+                if let (Operator::Power, Self::Number(exponent)) = (operator, right) {
+                    return power(left.evaluate(at, parameters), *exponent);
+                }
+                operator.apply(left.evaluate(at, parameters), right.evaluate(at, parameters))
+            }
+        }
+    }
+}
+
+impl Function {
+    fn apply<S: Scalar>(self, x: S) -> S {
+        match self {
+            Self::Sin => x.sin(),
+            Self::Cos => x.cos(),
+            Self::Tan => x.tan(),
+            Self::Exp => x.exp(),
+            Self::Expm1 => x.exp_m1(),
+            Self::Log => x.ln(),
+            Self::Sqrt if x.re() == 0.0 => S::from(0.0),
+            Self::Sqrt => x.sqrt(),
+            Self::Abs if x.re() == 0.0 => S::from(0.0),
+            Self::Abs if x.re() < 0.0 => -x,
+            Self::Abs => x,
+            Self::Sign => S::from(sign(x.re())),
+            Self::Tanh => tanh(x),
+            Self::Step => S::from(f64::from(x.re() >= 0.0)),
+            Self::Spline => cubic(x),
+        }
+    }
+}
+
+impl Operator {
+    fn apply<S: Scalar>(self, a: S, b: S) -> S {
+        match self {
+            Self::Add => a + b,
+            Self::Subtract => a - b,
+            Self::Multiply => a * b,
+            Self::Divide => a / b,
+            // a^b = exp(b ln a) has a derivative by b for positive a alone.
+            Self::Power if a.re() > 0.0 => (b * a.ln()).exp(),
+            Self::Power => S::from(a.re().powf(b.re())),
+            Self::Atan2 if a.re() == 0.0 && b.re() == 0.0 => S::from(0.0),
+            Self::Atan2 => a.atan2(b),
+            Self::Minimum if b.re() < a.re() || b.re().is_nan() => b,
+            Self::Maximum if b.re() > a.re() || b.re().is_nan() => b,
+            Self::Minimum | Self::Maximum => a,
+        }
+    }
+}
+
+/// Highest whole exponent that is taken by products.
+const MAX_WHOLE_EXPONENT: f64 = 64.0;
+
+/// Returns x to a power that is a literal number.
+fn power<S: Scalar>(x: S, exponent: f64) -> S {
+    if exponent.fract() == 0.0 && exponent.abs() <= MAX_WHOLE_EXPONENT {
+        return x.powi(exponent as i32);
+    }
+    if x.re() == 0.0 { S::from(x.re().powf(exponent)) } else { x.powf(exponent) }
+}
+
+/// Returns −1, 0 or 1, NaN for NaN.
+fn sign(x: f64) -> f64 {
+    if x == 0.0 { 0.0 } else { x.signum() }
+}
+
+/// Returns tanh x, with a derivative of 0 where x is so great that its exponential overflows.
+fn tanh<S: Scalar>(x: S) -> S {
+    /// tanh differs from ±1 by less than rounding beyond it.
+    const SATURATED: f64 = 20.0;
+    if x.re().abs() > SATURATED { S::from(sign(x.re())) } else { x.tanh() }
+}
+
+/// Returns the uniform cubic B-spline over the intervals 0…4.
+fn cubic<S: Scalar>(u: S) -> S {
+    let above = u.re() > 2.0;
+    let v = if above { -u + 4.0 } else { u };
+    match v.re() {
+        re if re <= 0.0 => S::from(0.0),
+        re if re <= 1.0 => v * v * v / 6.0,
+        _ => {
+            let w = -v + 2.0;
+            let square = w * w;
+            (square * w * 3.0 - square * 6.0 + 4.0) / 6.0
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! Expressions: formulas over quantities of a pose and named parameters.
+//!
+//! An expression is read from text ([`parse`]), written back ([`std::fmt::Display`]), and evaluated
+//! generically over the scalar, so that dual numbers differentiate it. Joints print as `q1`, `q2`, …
+//! and covariates as `covariate1`, …, unless names are given ([`Names`]).
+
+mod dimension;
+mod evaluate;
+mod mistake;
+mod parse;
+mod print;
+mod tree;
+mod vocabulary;
+
+pub use dimension::{Dimension, Per};
+pub use mistake::{FormulaError, Mistake};
+pub use parse::{Parsed, parse};
+pub use print::Names;
+pub use tree::{Expression, Function, Operator};
+pub use vocabulary::Vocabulary;

@@ -1,0 +1,428 @@
+//! Formulas read from text.
+
+use std::ops::Range;
+
+use super::dimension::Dimension;
+use super::mistake::{FormulaError, Mistake};
+use super::tree::{Expression, Function, Operator};
+use super::vocabulary::Vocabulary;
+use crate::error::nearest;
+use crate::laws::quantity::Quantity;
+
+/// Longest formula [characters].
+const MAX_LENGTH: usize = 2000;
+/// Deepest nesting of parentheses, signs and powers.
+const MAX_DEPTH: usize = 60;
+
+/// Expression with its unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parsed {
+    /// The expression.
+    pub expression: Expression,
+    /// Its unit.
+    pub dimension: Dimension,
+}
+
+/// Part of an expression that has been read, with its place in the text.
+struct Part {
+    expression: Expression,
+    dimension: Dimension,
+    span: Range<usize>,
+}
+
+/// Reads a formula: sums, products, powers and functions of the words of `vocabulary`.
+///
+/// # Errors
+/// The text is no formula, uses an unknown word, or mixes units; with the column.
+pub fn parse(text: &str, vocabulary: &Vocabulary) -> Result<Parsed, FormulaError> {
+    let mut parser = Parser { text, at: 0, depth: 0, vocabulary };
+    if text.chars().count() > MAX_LENGTH {
+        return Err(
+            parser.error(0..text.len(), Mistake::TooLarge { most: MAX_LENGTH, of: "characters" })
+        );
+    }
+    let part = parser.sum()?;
+    match parser.peek() {
+        None => Ok(Parsed { expression: part.expression, dimension: part.dimension }),
+        Some(_) => Err(parser.unexpected("an operator or the end of the formula")),
+    }
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    /// Next byte.
+    at: usize,
+    depth: usize,
+    vocabulary: &'a Vocabulary<'a>,
+}
+
+impl<'a> Parser<'a> {
+    fn error(&self, span: Range<usize>, mistake: Mistake) -> FormulaError {
+        let before = self.text.get(..span.start).unwrap_or(self.text);
+        FormulaError { column: before.chars().count() + 1, span, mistake }
+    }
+
+    fn rest(&self) -> &'a str {
+        self.text.get(self.at..).unwrap_or_default()
+    }
+
+    /// Returns the next character that is no space.
+    fn peek(&mut self) -> Option<char> {
+        let rest = self.rest();
+        self.at += rest.len() - rest.trim_start().len();
+        self.rest().chars().next()
+    }
+
+    fn take(&mut self, sign: char) -> bool {
+        let is_next = self.peek() == Some(sign);
+        if is_next {
+            self.at += sign.len_utf8();
+        }
+        is_next
+    }
+
+    fn unexpected(&mut self, expected: &'static str) -> FormulaError {
+        let next = self.peek();
+        let end = self.at + next.map_or(0, char::len_utf8);
+        let found = next.map_or_else(|| "the end of the formula".to_owned(), String::from);
+        self.error(self.at..end, Mistake::Unexpected { expected, found })
+    }
+
+    fn deeper(
+        &mut self,
+        read: impl FnOnce(&mut Self) -> Result<Part, FormulaError>,
+    ) -> Result<Part, FormulaError> {
+        self.depth += 1;
+        if self.depth > MAX_DEPTH {
+            let mistake = Mistake::TooLarge { most: MAX_DEPTH, of: "levels of nesting" };
+            return Err(self.error(self.at..self.at, mistake));
+        }
+        let part = read(self);
+        self.depth -= 1;
+        part
+    }
+
+    fn sum(&mut self) -> Result<Part, FormulaError> {
+        let mut left = self.product()?;
+        // A chain of operators nests to the left: it counts as depth of the tree.
+        let mut chained = 0;
+        loop {
+            let operator = match self.peek() {
+                Some('+') => Operator::Add,
+                Some('-' | '−') => Operator::Subtract,
+                _ => return Ok(left),
+            };
+            self.chain(&mut chained)?;
+            let right = self.product()?;
+            left = self.join(operator, left, right)?;
+        }
+    }
+
+    fn product(&mut self) -> Result<Part, FormulaError> {
+        let mut left = self.signed()?;
+        let mut chained = 0;
+        loop {
+            let operator = match self.peek() {
+                Some('*' | '·') => Operator::Multiply,
+                Some('/') => Operator::Divide,
+                _ => return Ok(left),
+            };
+            self.chain(&mut chained)?;
+            let right = self.signed()?;
+            left = self.join(operator, left, right)?;
+        }
+    }
+
+    /// Moves past an operator of a chain.
+    fn chain(&mut self, chained: &mut usize) -> Result<(), FormulaError> {
+        *chained += 1;
+        if *chained > MAX_DEPTH {
+            let mistake = Mistake::TooLarge { most: MAX_DEPTH, of: "operands in a row" };
+            return Err(self.error(self.at..self.at, mistake));
+        }
+        self.at += self.peek().map_or(0, char::len_utf8);
+        Ok(())
+    }
+
+    fn signed(&mut self) -> Result<Part, FormulaError> {
+        let start = {
+            self.peek();
+            self.at
+        };
+        if self.take('+') {
+            return self.deeper(Self::signed);
+        }
+        if !(self.take('-') || self.take('−')) {
+            return self.power();
+        }
+        let inner = self.deeper(Self::signed)?;
+        let expression = match inner.expression {
+            Expression::Number(number) if number.is_sign_positive() => Expression::Number(-number),
+            other => Expression::Negative(Box::new(other)),
+        };
+        Ok(Part { expression, dimension: inner.dimension, span: start..inner.span.end })
+    }
+
+    fn power(&mut self) -> Result<Part, FormulaError> {
+        let base = self.atom()?;
+        if !self.take('^') {
+            return Ok(base);
+        }
+        let exponent = self.deeper(Self::signed)?;
+        if !exponent.dimension.is_plain() {
+            let unit = exponent.dimension.symbol();
+            return Err(self.error(exponent.span, Mistake::HasUnit { function: "^", unit }));
+        }
+        self.join(Operator::Power, base, exponent)
+    }
+
+    fn join(&self, operator: Operator, left: Part, right: Part) -> Result<Part, FormulaError> {
+        let span = left.span.start..right.span.end;
+        let exponent = match right.expression {
+            Expression::Number(number) => Some(number),
+            _ => None,
+        };
+        let Some(dimension) = Dimension::under(operator, left.dimension, right.dimension, exponent)
+        else {
+            let (left, right) = (left.dimension.symbol(), right.dimension.symbol());
+            return Err(self.error(span, Mistake::DifferentUnits { left, right }));
+        };
+        let expression = Expression::binary(operator, left.expression, right.expression);
+        Ok(Part { expression, dimension, span })
+    }
+
+    fn atom(&mut self) -> Result<Part, FormulaError> {
+        match self.peek() {
+            Some('(') => {
+                let start = self.at;
+                self.at += 1;
+                let inner = self.deeper(Self::sum)?;
+                if !self.take(')') {
+                    return Err(self.unexpected("an operator or )"));
+                }
+                Ok(Part { span: start..self.at, ..inner })
+            }
+            Some('0'..='9' | '.') => self.number(),
+            Some('`') => self.quoted(),
+            Some(c) if c.is_alphabetic() || c == '_' => self.word(),
+            _ => Err(self.unexpected("a number, a quantity, a function or (")),
+        }
+    }
+
+    fn number(&mut self) -> Result<Part, FormulaError> {
+        let rest = self.rest();
+        let digits = |from: usize| {
+            let part = rest.get(from..).unwrap_or_default();
+            from + part.len() - part.trim_start_matches(|c: char| c.is_ascii_digit()).len()
+        };
+        let mut end = digits(0);
+        if rest.get(end..).is_some_and(|rest| rest.starts_with('.')) {
+            end = digits(end + 1);
+        }
+        let after = rest.get(end..).unwrap_or_default();
+        if let Some(exponent) = after.strip_prefix(['e', 'E']) {
+            let sign = usize::from(exponent.starts_with(['+', '-']));
+            let last = digits(end + 1 + sign);
+            if last > end + 1 + sign {
+                end = last;
+            }
+        }
+        let written = rest.get(..end).unwrap_or_default();
+        let span = self.at..self.at + end;
+        self.at += end;
+        match written.parse::<f64>() {
+            Ok(number) if number.is_finite() => {
+                let expression = Expression::Number(number);
+                Ok(Part { expression, dimension: Dimension::FLEXIBLE, span })
+            }
+            _ => Err(self.error(span, Mistake::NotFinite { number: written.to_owned() })),
+        }
+    }
+
+    /// Reads the name of a covariate in backquotes.
+    fn quoted(&mut self) -> Result<Part, FormulaError> {
+        let start = self.at;
+        let inner = self.rest().get(1..).unwrap_or_default();
+        let Some(length) = inner.find('`') else {
+            return Err(self.error(
+                start..self.text.len(),
+                Mistake::Unexpected {
+                    expected: "a name between backquotes",
+                    found: "one that does not end".to_owned(),
+                },
+            ));
+        };
+        self.at += length + 2;
+        let name = inner.get(..length).unwrap_or_default();
+        match self.vocabulary.covariates.iter().position(|known| known == name) {
+            Some(index) => Ok(covariate(index, start..self.at)),
+            None => {
+                let near = nearest(name, self.vocabulary.covariates).cloned();
+                let mistake = Mistake::UnknownWord { word: name.to_owned(), near };
+                Err(self.error(start..self.at, mistake))
+            }
+        }
+    }
+
+    fn word(&mut self) -> Result<Part, FormulaError> {
+        let start = self.at;
+        let rest = self.rest();
+        let length = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
+        let word = rest.get(..length).unwrap_or_default();
+        self.at += length;
+        let span = start..self.at;
+        if self.peek() == Some('(') {
+            return self.call(word, span);
+        }
+        let of = |expression, dimension| Ok(Part { expression, dimension, span: span.clone() });
+        let quantity = |quantity, dimension| of(Expression::Quantity(quantity), dimension);
+        // Words of the problem go before built-in ones of the same spelling.
+        if let Some(index) = self.vocabulary.parameters.iter().position(|known| known == word) {
+            return of(Expression::Parameter(index), Dimension::FLEXIBLE);
+        }
+        if let Some(index) = self.vocabulary.covariates.iter().position(|known| known == word) {
+            return Ok(covariate(index, span));
+        }
+        if let Some((_, joint)) = self.vocabulary.joints.iter().find(|(name, _)| name == word) {
+            return quantity(Quantity::Command(*joint), self.command(*joint));
+        }
+        match word {
+            "pi" => return of(Expression::Number(std::f64::consts::PI), Dimension::FLEXIBLE),
+            "T" => return quantity(Quantity::Warming, Dimension::KELVIN),
+            "t" => return quantity(Quantity::Elapsed, Dimension::SECOND),
+            "time" => return quantity(Quantity::Time, Dimension::SECOND),
+            "payload" => return quantity(Quantity::Payload, Dimension::MASS),
+            "hoist" => return quantity(Quantity::Hoist, Dimension::FORCE),
+            _ => {}
+        }
+        for (prefix, of) in [("approach", None), ("q", Some(())), ("M", None)] {
+            let Some(number) = numbered(word, prefix) else { continue };
+            let joints = self.vocabulary.slides.len();
+            if number == 0 || number > joints {
+                let mistake = Mistake::NoJoint { word: word.to_owned(), joints };
+                return Err(self.error(span, mistake));
+            }
+            let joint = number - 1;
+            return match (prefix, of) {
+                ("M", _) => {
+                    let reason = "moments under the loads are no quantity of formulas yet; \
+                                  joint-compliance and joint-nonlinear-stiffness follow them";
+                    let mistake = Mistake::Unsupported { word: word.to_owned(), reason };
+                    Err(self.error(span, mistake))
+                }
+                (_, Some(())) => quantity(Quantity::Command(joint), self.command(joint)),
+                _ => quantity(Quantity::Approach(joint), Dimension::PLAIN),
+            };
+        }
+        Err(self.error(span, self.unknown(word)))
+    }
+
+    fn unknown(&self, word: &str) -> Mistake {
+        let Vocabulary { slides, joints, covariates, parameters } = self.vocabulary;
+        let commands = (1..=slides.len()).map(|number| format!("q{number}"));
+        let sides = (1..=slides.len()).map(|number| format!("approach{number}"));
+        let known = Vocabulary::QUANTITIES.map(str::to_owned).into_iter();
+        let functions = Function::ALL.iter().map(|(_, name)| (*name).to_owned());
+        let names = joints.iter().map(|(name, _)| name.clone());
+        let words = parameters.iter().chain(*covariates).cloned();
+        let all = words.chain(names).chain(commands).chain(sides).chain(known).chain(functions);
+        Mistake::UnknownWord { word: word.to_owned(), near: nearest(word, all) }
+    }
+
+    fn command(&self, joint: usize) -> Dimension {
+        let slides = self.vocabulary.slides.get(joint).copied().unwrap_or(false);
+        if slides { Dimension::LENGTH } else { Dimension::ANGLE }
+    }
+
+    /// Reads the arguments of a function behind its name.
+    fn call(&mut self, name: &str, span: Range<usize>) -> Result<Part, FormulaError> {
+        self.take('(');
+        let mut arguments = Vec::new();
+        loop {
+            arguments.push(self.deeper(Self::sum)?);
+            if self.take(')') {
+                break;
+            }
+            if !self.take(',') {
+                return Err(self.unexpected("an operator, a comma or )"));
+            }
+        }
+        let whole = span.start..self.at;
+        let found = arguments.len();
+        let wrong = |function, takes| Mistake::Arguments { function, takes, found };
+        if let Some((function, known)) = Function::ALL.iter().find(|(_, known)| *known == name) {
+            let Ok([argument]) = <[Part; 1]>::try_from(arguments) else {
+                return Err(self.error(span, wrong(known, 1)));
+            };
+            return self.apply(*function, argument, whole);
+        }
+        if let Some((operator, known)) = Operator::CALLS.iter().find(|(_, known)| *known == name) {
+            let Ok([left, right]) = <[Part; 2]>::try_from(arguments) else {
+                return Err(self.error(span, wrong(known, 2)));
+            };
+            let part = self.join(*operator, left, right)?;
+            return Ok(Part { span: whole, ..part });
+        }
+        let numbers = arguments.iter().map(|part| &part.expression).collect::<Vec<_>>();
+        let (quantity, dimension) = match (name, numbers.as_slice()) {
+            (
+                "lag",
+                &[Expression::Quantity(Quantity::Warming), &Expression::Number(time_constant)],
+            ) if time_constant > 0.0 => (Quantity::Lagging { time_constant }, Dimension::KELVIN),
+            (
+                "friction",
+                &[&Expression::Quantity(Quantity::Command(joint)), &Expression::Number(distance)],
+            ) if distance > 0.0 => (Quantity::Friction { joint, distance }, Dimension::PLAIN),
+            ("lag", _) => {
+                let write = "lag(T, seconds) with a time constant above 0";
+                return Err(self.error(whole, Mistake::Form { write }));
+            }
+            ("friction", _) => {
+                let write = "friction(q1, distance) with a joint's command and a distance above 0";
+                return Err(self.error(whole, Mistake::Form { write }));
+            }
+            _ => return Err(self.error(span, self.unknown_function(name))),
+        };
+        Ok(Part { expression: Expression::Quantity(quantity), dimension, span: whole })
+    }
+
+    fn unknown_function(&self, name: &str) -> Mistake {
+        let known = Function::ALL.iter().map(|(_, name)| *name);
+        let known = known.chain(Operator::CALLS.iter().map(|(_, name)| *name));
+        let near = nearest(name, known.chain(["lag", "friction"])).map(str::to_owned);
+        Mistake::UnknownFunction { word: name.to_owned(), near }
+    }
+
+    fn apply(
+        &self,
+        function: Function,
+        argument: Part,
+        span: Range<usize>,
+    ) -> Result<Part, FormulaError> {
+        let Part { expression, dimension, span: inner } = argument;
+        let dimension = match function {
+            Function::Abs => dimension,
+            Function::Sqrt => dimension.power(Some(0.5)),
+            Function::Sign | Function::Step => Dimension::PLAIN,
+            _ if dimension.is_plain() => Dimension::PLAIN,
+            _ => {
+                let (function, unit) = (function.name(), dimension.symbol());
+                return Err(self.error(inner, Mistake::HasUnit { function, unit }));
+            }
+        };
+        let expression = Expression::Call(function, Box::new(expression));
+        Ok(Part { expression, dimension, span })
+    }
+}
+
+fn covariate(index: usize, span: Range<usize>) -> Part {
+    let expression = Expression::Quantity(Quantity::Covariate(index));
+    Part { expression, dimension: Dimension::COVARIATE, span }
+}
+
+/// Returns the number behind a prefix, if the word is the prefix and a number.
+fn numbered(word: &str, prefix: &str) -> Option<usize> {
+    let digits = word.strip_prefix(prefix)?;
+    let is_number = !digits.is_empty() && digits.chars().all(|c| c.is_ascii_digit());
+    is_number.then(|| digits.parse().unwrap_or(usize::MAX))
+}

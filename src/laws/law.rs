@@ -1,0 +1,277 @@
+//! Laws of the user's own: terms with formulas at one site, declared in a problem or found.
+
+use super::argument::Argument;
+use super::expression::{FormulaError, Names, Parsed, Vocabulary, parse};
+use super::family::{At, Prior};
+use super::parameter::LawParameter;
+use super::site::BeamField;
+use super::term::EffectTerm;
+
+/// Name of laws of the user's own in files.
+pub(crate) const LAW: &str = "law";
+
+/// Law that the user declares or that a search writes down: Δ = Σ cₖ fₖ at one site.
+///
+/// Each term is a coefficient times a formula; formulas may share named parameters, which are fitted
+/// beside the coefficients.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Law {
+    name: String,
+    place: LawPlace,
+    at: At,
+    prior: Option<LawPrior>,
+    terms: Vec<Parsed>,
+    parameters: Vec<LawParameter>,
+    covariates: Vec<String>,
+}
+
+/// Place of a law on the arm.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum LawPlace {
+    /// A joint, from 1.
+    Joint(usize),
+    /// A link, by the name of its beam.
+    Link(String),
+    /// The base or the measurement.
+    Whole,
+}
+
+/// Gaussian prior of the coefficients of a law about 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LawPrior {
+    /// 1 σ \[SI\].
+    pub sigma: f64,
+    /// Key in files, `sigma_deg` for instance.
+    pub key: String,
+    /// 1 σ in the unit of that key.
+    pub written: f64,
+}
+
+/// Site of a law: a place with the quantity of it that the law adds to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LawSite {
+    /// The place.
+    pub place: LawPlace,
+    /// The quantity.
+    pub at: At,
+}
+
+impl LawSite {
+    /// Returns the number, from 1, of the joint.
+    pub fn joint(&self) -> Option<usize> {
+        if let LawPlace::Joint(joint) = self.place { Some(joint) } else { None }
+    }
+
+    /// Coordinate of a joint, from 1, before it acts.
+    pub fn of_joint(number: usize) -> Self {
+        Self { place: LawPlace::Joint(number), at: At::Coordinate }
+    }
+
+    /// Site written in a file: `joint3`, `A.curvature_y`, `base.rx`, `measurement.x`; joints may
+    /// also go by a name.
+    ///
+    /// # Errors
+    /// The reason why a law cannot act there.
+    pub fn parse(
+        text: &str,
+        joints: usize,
+        names: &[(String, usize)],
+        links: &[String],
+    ) -> Result<Self, String> {
+        const AXES: [&str; 3] = ["x", "y", "z"];
+        const TURNS: [&str; 3] = ["rx", "ry", "rz"];
+        let (head, field) = text.split_once('.').unwrap_or((text, ""));
+        let axis = |words: [&str; 3]| words.iter().position(|word| *word == field);
+        let whole = |at: Option<At>, write: &str| match at {
+            Some(at) => Ok(Self { place: LawPlace::Whole, at }),
+            None => Err(format!("{text} is no site; write {write}")),
+        };
+        match head {
+            "measurement" if field == "range" => {
+                return Err(
+                    "measurement.range is no site yet; write measurement.x, .y or .z".into()
+                );
+            }
+            "measurement" => {
+                return whole(axis(AXES).map(At::Shift), "measurement.x, .y or .z");
+            }
+            "base" => {
+                let at = axis(AXES).map(At::BaseShift).or(axis(TURNS).map(At::BaseTurn));
+                return whole(at, "base.x, .y, .z, .rx, .ry or .rz");
+            }
+            _ => {}
+        }
+        if let Some(link) = links.iter().find(|link| *link == head) {
+            let at = match field {
+                "curvature_y" => BeamField::BowY,
+                "curvature_z" => BeamField::BowZ,
+                "strain" => BeamField::Stretch,
+                _ => {
+                    return Err(format!(
+                        "{text} is no site; write {link}.curvature_y, .curvature_z or .strain"
+                    ));
+                }
+            };
+            return Ok(Self { place: LawPlace::Link(link.clone()), at: At::Beam(at) });
+        }
+        let number = head.strip_prefix("joint").and_then(|number| number.parse::<usize>().ok());
+        let named = || names.iter().find(|(name, _)| name == head).map(|(_, joint)| joint + 1);
+        match number.or_else(named) {
+            Some(joint) if (1..=joints).contains(&joint) && field.is_empty() => {
+                Ok(Self::of_joint(joint))
+            }
+            Some(joint) if (1..=joints).contains(&joint) => Err(format!(
+                "{text} is no site yet: a law adds to the coordinate of a joint; write joint{joint}"
+            )),
+            Some(joint) => Err(format!("no joint {joint}; the arm has {joints}, counted from 1")),
+            None => Err(format!(
+                "{text} is no site; write joint1, measurement.x, base.rx{}",
+                links.first().map_or_else(String::new, |link| format!(" or {link}.curvature_y"))
+            )),
+        }
+    }
+}
+
+impl Law {
+    /// Law called `name` at a site, with formulas in the words of `vocabulary`, parameters in them,
+    /// and the prior of the coefficients.
+    ///
+    /// # Errors
+    /// The number of the first formula with a mistake, from 0, and the mistake.
+    pub fn new(
+        name: &str,
+        site: LawSite,
+        terms: &[impl AsRef<str>],
+        prior: Option<LawPrior>,
+        parameters: Vec<LawParameter>,
+        vocabulary: &Vocabulary,
+    ) -> Result<Self, (usize, FormulaError)> {
+        let words: Vec<String> = parameters.iter().map(|own| own.name.clone()).collect();
+        let vocabulary = Vocabulary { parameters: &words, ..*vocabulary };
+        let read = |(k, term): (usize, &_)| {
+            let term: &str = AsRef::as_ref(term);
+            parse(term, &vocabulary).map_err(|error| (k, error))
+        };
+        Ok(Self {
+            name: name.to_owned(),
+            place: site.place,
+            at: site.at,
+            prior,
+            terms: terms
+                .iter()
+                .enumerate()
+                .map(|(k, term)| read((k, term)))
+                .collect::<Result<_, _>>()?,
+            parameters,
+            covariates: vocabulary.covariates.to_vec(),
+        })
+    }
+
+    /// Returns the name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Returns the quantity that the law adds to.
+    pub fn at(&self) -> At {
+        self.at
+    }
+
+    /// Returns the number, from 1, of the joint.
+    pub fn joint(&self) -> Option<usize> {
+        if let LawPlace::Joint(joint) = self.place { Some(joint) } else { None }
+    }
+
+    /// Returns the name of the link.
+    pub fn link(&self) -> Option<&str> {
+        if let LawPlace::Link(link) = &self.place { Some(link) } else { None }
+    }
+
+    /// Returns the named parameters inside of the formulas.
+    pub fn parameters(&self) -> &[LawParameter] {
+        &self.parameters
+    }
+
+    /// Returns true if a formula uses a named parameter.
+    pub fn uses(&self, parameter: &str) -> bool {
+        let index = self.parameters.iter().position(|own| own.name == parameter);
+        let uses = |term: &Parsed| index.is_some_and(|index| term.expression.uses(index));
+        self.terms.iter().any(uses)
+    }
+
+    /// Returns the formulas with their names.
+    pub fn formulas(&self) -> Vec<String> {
+        let parameters: Vec<String> = self.parameters.iter().map(|own| own.name.clone()).collect();
+        let names = Names { covariates: &self.covariates, parameters: &parameters };
+        self.terms.iter().map(|term| term.expression.display(names).to_string()).collect()
+    }
+
+    /// Returns the site as files write it.
+    pub fn site(&self) -> String {
+        const AXES: [&str; 3] = ["x", "y", "z"];
+        let field = match self.at {
+            At::Shift(axis) => return format!("measurement.{}", AXES[axis.min(2)]),
+            At::BaseShift(axis) => return format!("base.{}", AXES[axis.min(2)]),
+            At::BaseTurn(axis) => return format!("base.r{}", AXES[axis.min(2)]),
+            At::Beam(BeamField::BowY) => ".curvature_y",
+            At::Beam(BeamField::BowZ) => ".curvature_z",
+            At::Beam(_) => ".strain",
+            _ => "",
+        };
+        match &self.place {
+            LawPlace::Joint(joint) => format!("joint{joint}{field}"),
+            LawPlace::Link(link) => format!("{link}{field}"),
+            LawPlace::Whole => String::new(),
+        }
+    }
+
+    /// Returns the law in words for people.
+    pub(super) fn describe(&self) -> String {
+        format!("{} at {}: {}", self.name, self.site(), self.formulas().join(", "))
+    }
+
+    /// Returns the arguments with their keys, in the order of files.
+    pub(super) fn arguments(&self) -> Vec<(&str, Argument)> {
+        let mut arguments = vec![
+            ("name", Argument::Text(self.name.clone())),
+            ("at", Argument::Text(self.site())),
+            ("terms", Argument::Texts(self.formulas())),
+        ];
+        if let Some(LawPrior { key, written, .. }) = &self.prior {
+            arguments.push((key, Argument::Length(*written)));
+        }
+        for LawParameter { name, start, min, max, sigma } in &self.parameters {
+            let limits = [("min", *min), ("max", *max), ("sigma", *sigma)];
+            let limits = limits.into_iter().filter_map(|(key, value)| Some((key, value?)));
+            let numbers = [("start", *start)].into_iter().chain(limits).collect();
+            arguments.push((name, Argument::Numbers(numbers)));
+        }
+        arguments
+    }
+
+    /// Returns the coefficients, named from 1, and the parameters inside of the formulas.
+    pub(super) fn entries(&self) -> Vec<EffectTerm> {
+        let plain = |name, prior| EffectTerm {
+            name,
+            at: self.at,
+            formula: None,
+            prior: Prior::Size(prior),
+            nominal: None,
+            never_negative: false,
+            inner: None,
+        };
+        let size = self.prior.as_ref().map_or(f64::INFINITY, |prior| prior.sigma);
+        let term = |(k, formula): (usize, &Parsed)| EffectTerm {
+            formula: Some(formula.clone()),
+            ..plain((k + 1).to_string(), size)
+        };
+        let inner = |parameter: &LawParameter| EffectTerm {
+            nominal: Some(Prior::Size(parameter.start)),
+            inner: Some(parameter.clone()),
+            ..plain(parameter.name.clone(), parameter.sigma.unwrap_or(f64::INFINITY))
+        };
+        let terms = self.terms.iter().enumerate().map(term);
+        terms.chain(self.parameters.iter().map(inner)).collect()
+    }
+}

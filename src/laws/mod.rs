@@ -1,0 +1,32 @@
+//! Laws as data: sites, formulas, families of effects, and the catalogue of families.
+//!
+//! A law multiplies parameters by formulas of what is known of a pose, and adds the products to a
+//! quantity of the arm, its base, or the measurement. [`catalogue`] has one entry a family; a
+//! [`Law`] is declared in a problem file. Everything that the program knows of an effect follows
+//! from these data: its parameters and their units, the columns it needs, the candidates of a
+//! search, words, and file syntax.
+
+mod argument;
+mod catalogue;
+mod effect;
+pub mod expression;
+mod family;
+mod law;
+mod parameter;
+mod quantity;
+mod site;
+mod term;
+mod text;
+
+pub(crate) use argument::quoted;
+pub use argument::{Argument, ArgumentKind, FreeLength, Mount};
+pub(crate) use catalogue::NAMES;
+pub use catalogue::{Effect, FAMILIES};
+pub(crate) use effect::{declaration, to_three_digits};
+pub use family::{At, Chance, Family, Need, Only, Prior, Search, TermEntry};
+pub(crate) use law::LAW;
+pub use law::{Law, LawPlace, LawPrior, LawSite};
+pub use parameter::LawParameter;
+pub use quantity::Quantity;
+pub use site::{ArmField, BeamField, JointField};
+pub use term::EffectTerm;

@@ -1,0 +1,196 @@
+//! Fields of the arm that laws act on.
+
+/// Field of a joint that may be free: first the letters of [Chen2021, eq. 1], then the fields of
+/// effects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[expect(missing_docs, reason = "letters need no words")]
+#[non_exhaustive]
+pub enum JointField {
+    Alpha,
+    A,
+    Theta,
+    D,
+    Beta,
+    Stiffness,
+    /// Addition to the compliance 1/k [rad/(N·m)].
+    Compliance,
+    /// Angle per cube of the moment [rad/(N·m)³].
+    Cubic,
+    /// Play \[rad\]: half of it to each side, by the direction of approach, or by the moment if
+    /// that is unknown.
+    Play,
+    /// Play of a prismatic joint \[m\], taken up by the direction of approach only.
+    SlidingPlay,
+    /// Flexibility about x before the joint's rotation [rad/(N·m)].
+    LateralX,
+    /// Flexibility about y before the joint's rotation [rad/(N·m)].
+    LateralY,
+    /// Flexibility 1/EI of the slide [1/(N·m²)].
+    SlideFlexibility,
+    /// Spring rate of a gravity compensator [N/m].
+    SpringRate,
+    /// Preload of a gravity compensator \[N\].
+    SpringPreload,
+    /// Coordinates of a fixed joint's placement \[m\].
+    X,
+    Y,
+    Z,
+    /// Angles of a fixed joint's placement \[rad\].
+    Roll,
+    Pitch,
+    Yaw,
+}
+
+/// Field of a beam that may be free: rigidities, then the fields of effects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum BeamField {
+    /// Axial rigidity EA \[N\].
+    Axial,
+    /// Bending rigidity EI about y and z, equal in nominal [N·m²].
+    Bending,
+    /// Bending rigidity `EI_y` [N·m²].
+    BendingY,
+    /// Bending rigidity `EI_z` [N·m²].
+    BendingZ,
+    /// Torsional rigidity GJ [N·m²].
+    Twist,
+    /// Logarithm of the ratio of EI about z to the EI common to y and z.
+    Anisotropy,
+    /// Addition to 1/EI about y and z [1/(N·m²)].
+    Flexibility,
+    /// Coupling of twist with bending about y [1/(N·m²)].
+    CouplingY,
+    /// Coupling of twist with bending about z [1/(N·m²)].
+    CouplingZ,
+    /// Curvature about y without load [1/m].
+    BowY,
+    /// Curvature about z without load [1/m].
+    BowZ,
+    /// Elongation per length without load.
+    Stretch,
+    /// Point mass on the beam's axis \[kg\].
+    AddedMass,
+    /// Position of that mass, from the root \[m\].
+    AddedAt,
+}
+
+/// Quantity of the arm as a whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ArmField {
+    /// Addition to the mass of every payload \[kg\].
+    Payload,
+    /// Relative error of the hoist's force.
+    HoistForce,
+    /// Lean of the hoist's direction along x.
+    HoistLeanX,
+    /// Lean of the hoist's direction along y.
+    HoistLeanY,
+    /// Derivative of that lean with respect to the hook's position [1/m].
+    HoistTrolley,
+    /// Flexibility of the base about x [rad/(N·m)].
+    MountingX,
+    /// Flexibility of the base about y [rad/(N·m)].
+    MountingY,
+    /// Rotation of gravity about x \[rad\].
+    GravityX,
+    /// Rotation of gravity about y \[rad\].
+    GravityY,
+    /// Mixing factor λ from loads on the undeflected arm (0) to loads on the deflected arm (1).
+    Mixing,
+}
+
+impl ArmField {
+    /// Returns true for a coordinate of the rotation vector of gravity.
+    pub fn turns_gravity(self) -> bool {
+        matches!(self, Self::GravityX | Self::GravityY)
+    }
+}
+
+impl JointField {
+    /// Geometric fields, in the order of the transform.
+    pub const GEOMETRY: [Self; 5] = [Self::Alpha, Self::A, Self::Theta, Self::D, Self::Beta];
+
+    /// Fields of a placement by xyz and rpy, in the order of files.
+    pub const PLACEMENT: [Self; 6] =
+        [Self::X, Self::Y, Self::Z, Self::Roll, Self::Pitch, Self::Yaw];
+
+    /// Returns the index in a placement: x, y, z, roll, pitch, yaw.
+    pub fn placement(self) -> Option<usize> {
+        Self::PLACEMENT.iter().position(|&field| field == self)
+    }
+
+    /// Returns true for geometry that a problem declares.
+    pub fn is_geometry(self) -> bool {
+        Self::GEOMETRY.contains(&self) || self.placement().is_some()
+    }
+
+    /// Returns the part of the parameter's name after the dot.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Alpha => "alpha",
+            Self::A => "a",
+            Self::Theta => "theta",
+            Self::D => "d",
+            Self::Beta => "beta",
+            Self::Stiffness => "stiffness",
+            Self::Compliance => "compliance",
+            Self::Cubic => "cubic",
+            Self::Play => "play",
+            Self::SlidingPlay => "sliding_play",
+            Self::LateralX => "lateral_x",
+            Self::LateralY => "lateral_y",
+            Self::SlideFlexibility => "slide_flexibility",
+            Self::SpringRate => "spring_rate",
+            Self::SpringPreload => "spring_preload",
+            Self::X => "x",
+            Self::Y => "y",
+            Self::Z => "z",
+            Self::Roll => "roll",
+            Self::Pitch => "pitch",
+            Self::Yaw => "yaw",
+        }
+    }
+}
+
+impl BeamField {
+    /// Strains without load, in the order of `PoseView::strains`.
+    pub const STRAINS: [Self; 3] = [Self::Stretch, Self::BowY, Self::BowZ];
+
+    /// Returns true for a strain without load.
+    pub fn is_strain(self) -> bool {
+        Self::STRAINS.contains(&self)
+    }
+
+    /// Returns true for a field that describes the beam's deflection under loads.
+    pub fn is_rigidity(self) -> bool {
+        let of_effects = matches!(self, Self::Flexibility | Self::CouplingY | Self::CouplingZ);
+        of_effects || self.is_declared()
+    }
+
+    /// Returns true for a rigidity that a problem declares.
+    pub fn is_declared(self) -> bool {
+        matches!(self, Self::Axial | Self::Bending | Self::BendingY | Self::BendingZ | Self::Twist)
+    }
+
+    /// Returns the part of the parameter's name after the dot.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Axial => "EA",
+            Self::Bending => "EI",
+            Self::BendingY => "EIy",
+            Self::BendingZ => "EIz",
+            Self::Twist => "GJ",
+            Self::Anisotropy => "anisotropy",
+            Self::Flexibility => "flexibility",
+            Self::CouplingY => "coupling_y",
+            Self::CouplingZ => "coupling_z",
+            Self::BowY => "bow_y",
+            Self::BowZ => "bow_z",
+            Self::Stretch => "stretch",
+            Self::AddedMass => "added_mass",
+            Self::AddedAt => "added_at",
+        }
+    }
+}

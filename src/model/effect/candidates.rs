@@ -1,0 +1,251 @@
+//! Candidates of a search: every effect of the catalogue that is conceivable on an arm.
+
+use super::coverage::{DataCoverage, NO_LOADS, NO_TIMES, STANDS_STILL};
+use super::place::slides;
+use crate::laws::{
+    Argument, ArgumentKind, Effect, FAMILIES, Family, Need, Only, Quantity, Search, to_three_digits,
+};
+use crate::problem::{Equilibrium, Joint, JointKind, Problem};
+
+/// Highest order of a harmonic that is a candidate by itself.
+pub(crate) const HIGHEST_ORDER: u32 = 60;
+
+/// Longest time constant among the candidates, as part of the time measured; a longer one is a
+/// drift.
+const LONGEST_LAG: f64 = 0.6;
+/// Shortest time constant of a lag in times from one pose to the next: between poses nothing lags.
+const SHORTEST_LAG: f64 = 2.0;
+/// Shortest time constant of a settling as part of the time measured: shorter ones act on few poses.
+const SHORTEST_SETTLING: f64 = 0.03;
+/// Each time constant over the one before.
+const LAG_STEP: f64 = 1.25;
+/// Paths of friction as parts of the range of a joint: over shorter ones it is play, over longer
+/// ones a ratio.
+const PATHS: (f64, f64) = (0.1, 1.6);
+/// Each path over the one before.
+const PATH_STEP: f64 = 1.4;
+
+/// Effect that may be at work.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// The effect.
+    pub effect: Effect,
+    /// Reason why these data cannot show it, if they cannot.
+    pub untestable: Option<&'static str>,
+}
+
+/// Returns every effect of the catalogue that is conceivable on an arm, with the reason why these
+/// data cannot show it.
+pub fn candidates(problem: &Problem, data: &DataCoverage) -> Vec<Candidate> {
+    let of_family = |family: &'static Family| {
+        let found = places(family, problem).into_iter();
+        let found = found.flat_map(move |place| searched(family, place, data));
+        found.filter_map(move |arguments| {
+            let argument = |key: &str| {
+                arguments.iter().find(|(own, _)| *own == key).map(|(_, value)| value.clone())
+            };
+            let effect = Effect::build(family.name, argument)?;
+            let conceivable = family.only.iter().all(|only| effect.meets(*only, problem));
+            conceivable.then(|| {
+                let untestable =
+                    family.needs.iter().find_map(|need| effect.unmet_need(*need, problem, data));
+                Candidate { effect, untestable }
+            })
+        })
+    };
+    let families = FAMILIES.iter().filter(|family| family.search != Search::Declared);
+    families.flat_map(of_family).collect()
+}
+
+type Arguments = Vec<(&'static str, Argument)>;
+
+/// Returns the places of a family on an arm: its arguments without those that are searched.
+fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
+    let mut all: Vec<Arguments> = vec![Vec::new()];
+    for &(key, kind) in family.arguments {
+        let joints = |is_it: &dyn Fn(&Joint) -> bool| -> Vec<Argument> {
+            let found = (1..).zip(&problem.joints).filter(|(_, joint)| is_it(joint));
+            found.map(|(number, _)| Argument::Joint(number)).collect()
+        };
+        let takes = |joint: &Joint| joint.command_kind() != JointKind::Fixed;
+        let values = match kind {
+            ArgumentKind::AnyJoint | ArgumentKind::LinkedJoint => joints(&|_| true),
+            ArgumentKind::MovingJoint | ArgumentKind::OtherJoint => joints(&takes),
+            ArgumentKind::TurningJoint | ArgumentKind::RelievedJoint => {
+                joints(&|joint| joint.command_kind() == JointKind::Revolute)
+            }
+            ArgumentKind::SlidingJoint => {
+                joints(&|joint| takes(joint) && joint.kind == JointKind::Prismatic)
+            }
+            ArgumentKind::Mount => {
+                joints(&takes).into_iter().chain([Argument::Base(true)]).collect()
+            }
+            ArgumentKind::Beam => {
+                let beams = problem.joints.iter().filter_map(|joint| joint.beam.as_ref());
+                beams.map(|beam| Argument::Name(beam.name.clone())).collect()
+            }
+            ArgumentKind::Covariate => {
+                let covariates = problem.covariate_names();
+                // Covariate by covariate, each at every place.
+                all = covariates
+                    .into_iter()
+                    .flat_map(|name| {
+                        let with = |place: &Arguments| {
+                            let mut place = place.clone();
+                            place.push((key, Argument::Name(name.clone())));
+                            place
+                        };
+                        all.iter().map(with).collect::<Vec<_>>()
+                    })
+                    .collect();
+                continue;
+            }
+            _ => continue,
+        };
+        all = all
+            .iter()
+            .flat_map(|place| {
+                let others = values.iter().filter(|value| {
+                    kind != ArgumentKind::OtherJoint || place.iter().all(|(_, own)| own != *value)
+                });
+                others.map(|value| [place.as_slice(), &[(key, value.clone())]].concat())
+            })
+            .collect();
+    }
+    all
+}
+
+/// Returns the arguments of a place with each value of the one that is searched or listed.
+fn searched(family: &Family, place: Arguments, data: &DataCoverage) -> Vec<Arguments> {
+    let is_open = |kind: ArgumentKind| kind.is_searched() || kind == ArgumentKind::Orders;
+    let Some((key, _)) = family.arguments.iter().find(|(_, kind)| is_open(*kind)) else {
+        return vec![place];
+    };
+    let grid = |from: f64, to: f64, step: f64, unit: f64| -> Vec<Argument> {
+        let parts = std::iter::successors(Some(from), |part| Some(part * step));
+        let parts = parts.take_while(|part| *part > 0.0 && *part <= to);
+        parts.filter_map(|part| to_three_digits(part * unit)).map(Argument::Number).collect()
+    };
+    let values: Vec<Argument> = match family.search {
+        Search::Places | Search::Declared => Vec::new(),
+        Search::Orders => (1..=HIGHEST_ORDER).map(|order| Argument::Orders(vec![order])).collect(),
+        Search::Times => data.times.iter().map(|&time| Argument::Number(time)).collect(),
+        Search::TimeConstants => match data.clock {
+            None => vec![Argument::Number(1.0)],
+            Some((between, span)) => {
+                grid(SHORTEST_LAG * between, LONGEST_LAG * span, LAG_STEP, 1.0)
+            }
+        },
+        Search::SettlingTimes => match (data.times.first(), data.times.last()) {
+            (Some(first), Some(last)) => {
+                grid(SHORTEST_SETTLING, LONGEST_LAG, LAG_STEP, last - first)
+            }
+            _ => Vec::new(),
+        },
+        Search::Distances => {
+            let joint = place.iter().find_map(|(_, argument)| match argument {
+                Argument::Joint(joint) => joint.checked_sub(1),
+                _ => None,
+            });
+            let range = joint.and_then(|joint| data.ranges.get(joint));
+            let (from, to) = PATHS;
+            grid(from, to, PATH_STEP, range.map_or(0.0, |(low, high)| high - low))
+        }
+    };
+    values.into_iter().map(|value| [place.as_slice(), &[(*key, value)]].concat()).collect()
+}
+
+impl Effect {
+    /// Returns the reason why these data cannot show a law of the user's own, if they cannot;
+    /// candidates of the catalogue come with their reason.
+    pub fn untestable(&self, problem: &Problem, data: &DataCoverage) -> Option<&'static str> {
+        if !matches!(self, Self::Law(_)) {
+            return None;
+        }
+        self.quantities()
+            .into_iter()
+            .find_map(|quantity| match quantity {
+                Quantity::Command(joint) => (!data.moves(joint)).then_some(STANDS_STILL),
+                Quantity::Warming => data.no_temperature,
+                Quantity::Lagging { .. } => {
+                    data.no_temperature.or(data.clock.is_none().then_some(NO_TIMES))
+                }
+                Quantity::Friction { .. } => data.clock.is_none().then_some(NO_TIMES),
+                Quantity::Payload => (!data.carries()).then_some("no payload is carried"),
+                Quantity::Approach(joint) => {
+                    let both = data.both_sides.get(joint).copied().unwrap_or(false);
+                    (!both).then_some("the joint was not approached from both sides")
+                }
+                Quantity::Covariate(index) => {
+                    let varies = data.covariates.get(index).copied().unwrap_or(false);
+                    (!varies).then_some("the covariate does not change in these poses")
+                }
+                _ => None,
+            })
+            .or_else(|| self.terms(problem).is_empty().then_some("the arm does not have the site"))
+    }
+
+    /// Returns true if the arm is one on which the effect is a candidate.
+    fn meets(&self, only: Only, problem: &Problem) -> bool {
+        let joint = || problem.joints.get(self.joint()?.checked_sub(1)?);
+        let is = |is_it: fn(&Joint) -> bool| joint().is_some_and(is_it);
+        match only {
+            Only::Turning => is(|joint| joint.command_kind() == JointKind::Revolute),
+            Only::Commanded => is(|joint| joint.command_kind() != JointKind::Fixed),
+            Only::RigidJoint => is(|joint| joint.stiffness.is_none()),
+            Only::Link => is(|joint| joint.a != 0.0),
+            Only::RigidLink => is(|joint| {
+                let bends = joint.beam.as_ref();
+                !bends.is_some_and(|beam| beam.ei_y.is_some() || beam.ei_z.is_some())
+            }),
+            Only::Undeflected => problem.statics.equilibrium == Equilibrium::Undeflected,
+            Only::Hoisted => {
+                let hoisted =
+                    |joint: &Joint| joint.beam.as_ref().is_some_and(|beam| beam.hoist.is_some());
+                problem.joints.iter().any(hoisted)
+            }
+        }
+    }
+
+    /// Returns the reason of a need that the data do not meet.
+    fn unmet_need(
+        &self,
+        need: Need,
+        problem: &Problem,
+        data: &DataCoverage,
+    ) -> Option<&'static str> {
+        let unless = |met: bool, reason| (!met).then_some(reason);
+        let joint = self.joint().and_then(|joint| joint.checked_sub(1));
+        let both_sides =
+            joint.and_then(|joint| data.both_sides.get(joint)).copied().unwrap_or(false);
+        match need {
+            Need::Loads => unless(data.weighs(), NO_LOADS),
+            Need::Moves(key) => match self.argument(key) {
+                Some(Argument::Joint(joint)) => unless(data.moves(joint - 1), STANDS_STILL),
+                _ => None,
+            },
+            Need::Temperature => data.no_temperature,
+            Need::Clock => unless(data.clock.is_some(), NO_TIMES),
+            Need::Times => unless(!data.times.is_empty(), "too few poses before or after any time"),
+            Need::Payload => unless(data.carries() && data.weighs(), "no payload is carried"),
+            Need::PayloadFromBothSides => unless(
+                both_sides && data.changes_payload(),
+                "no payload that changes, or no approach from both sides",
+            ),
+            Need::Play if data.approach => {
+                unless(both_sides, "the joint was not approached from both sides")
+            }
+            Need::Play if self.joint().is_some_and(|joint| slides(problem, joint)) => {
+                Some("no directions of approach, and moments move nothing along a slide")
+            }
+            Need::Play => unless(data.weighs(), NO_LOADS),
+            Need::Covariate => {
+                let name = self.covariate();
+                let mut known = problem.data.covariates.iter();
+                let index = known.position(|known| Some(&known.name) == name.as_ref());
+                let varies = index.and_then(|index| data.covariates.get(index)).copied();
+                unless(varies.unwrap_or(false), "the covariate does not change in these poses")
+            }
+        }
+    }
+}

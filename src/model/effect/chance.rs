@@ -1,0 +1,49 @@
+//! Share of the chance of a family that falls to one of its members.
+
+use std::collections::BTreeSet;
+use std::f64::consts::PI;
+
+use super::place::slides;
+use crate::laws::{Chance, Effect};
+use crate::problem::{Joint, JointKind, Problem};
+
+/// Chance of all orders between a whole number and the next, over that of a harmonic of that order:
+/// gears have whole numbers of teeth, so that most errors repeat a whole number of times a
+/// revolution; a stage of a gear need not.
+const FRACTIONAL_SHARE: f64 = 0.2;
+/// ln of the longest over the shortest lead of a screw or pitch of a rack: each factor is as
+/// probable as any other.
+const LOG_LEAD_RANGE: f64 = 7.0;
+
+impl Effect {
+    /// Returns how often chance has a try at it: one over its share of its family's chance, whose
+    /// `members` are the candidates.
+    pub fn tries(&self, members: &[&Self], problem: &Problem) -> f64 {
+        match self.family().map_or(Chance::Equal, |family| family.chance) {
+            Chance::Equal => members.len().max(1) as f64,
+            Chance::Orders => {
+                // Order k of each of n joints: n π²/6 k². Low orders have causes, high ones are
+                // found by trying.
+                let joints: BTreeSet<usize> =
+                    members.iter().filter_map(|member| member.joint()).collect();
+                let order = self.waves().iter().map(|wave| wave.1).fold(1.0, f64::max);
+                joints.len().max(1) as f64 * PI.powi(2) / 6.0 * order * order
+            }
+            Chance::Waves => {
+                let of_kind = |kind| {
+                    let is_it = |joint: &&Joint| joint.command_kind() == kind;
+                    problem.joints.iter().filter(is_it).count().max(1) as f64
+                };
+                let (joint, order) = self.waves().first().copied().unwrap_or((1, 1.0));
+                let order = order.max(1.0);
+                // The chance of a lead in a factor e of leads, over the orders in it.
+                if slides(problem, joint) {
+                    return of_kind(JointKind::Prismatic) * LOG_LEAD_RANGE * order;
+                }
+                // All orders in a unit together: those of a harmonic of that order of each joint
+                // that turns, over the share.
+                of_kind(JointKind::Revolute) * PI.powi(2) / 6.0 * order.powi(2) / FRACTIONAL_SHARE
+            }
+        }
+    }
+}

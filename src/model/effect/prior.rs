@@ -1,0 +1,38 @@
+//! Sizes of parameters on an arm.
+
+use super::place::{LEAST_MOMENT, greatest_moment};
+use crate::laws::{Argument, Effect, Prior};
+use crate::problem::Problem;
+
+/// Coupling of twist and bending where a beam is declared rigid in both [1/(N·m²)].
+const RIGID_COUPLING: f64 = 1e-2;
+
+impl Effect {
+    /// Returns a prior size on the arm of `problem`, SI; `None` where the arm does not have the
+    /// place.
+    pub(super) fn size(&self, prior: Prior, problem: &Problem) -> Option<f64> {
+        let moment = || Some(greatest_moment(problem, self.joint()?).max(LEAST_MOMENT));
+        let length = |key: &str| match self.argument(key) {
+            Some(Argument::Point([x, y])) => Some(x.hypot(y)),
+            _ => None,
+        };
+        Some(match prior {
+            Prior::Size(size) => size,
+            Prior::OfCubedMoment(angle) => angle / moment()?.powi(3),
+            // l h is at most |A| |B|, and the distance h of the line of pull from the axis at most
+            // the shorter of the two.
+            Prior::SpringRate => moment()? / (length("anchor_m")? * length("lever_m")?),
+            Prior::SpringPreload => moment()? / length("anchor_m")?.min(length("lever_m")?),
+            Prior::TwistCoupling { about_z } => {
+                let beam = problem.joints.get(self.beam(problem)?)?.beam.as_ref()?;
+                // 1/√(EI GJ); one that is declared rigid counts as the other.
+                match (if about_z { beam.ei_z } else { beam.ei_y }, beam.gj) {
+                    (Some(ei), Some(gj)) => (ei * gj).sqrt().recip(),
+                    (Some(rigidity), None) | (None, Some(rigidity)) => rigidity.recip(),
+                    (None, None) => RIGID_COUPLING,
+                }
+            }
+            Prior::HalfLength => problem.joints.get(self.beam(problem)?)?.a.abs() / 2.0,
+        })
+    }
+}

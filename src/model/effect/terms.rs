@@ -1,0 +1,167 @@
+//! Parameters of effects on an arm.
+
+use super::coverage::Columns;
+use crate::laws::expression::Vocabulary;
+use crate::laws::{At, Effect, EffectTerm, JointField, LAW, LawParameter, Quantity};
+use crate::model::parameter::{EffectParameter, ParameterSite, Regressor};
+use crate::problem::{JointKind, Problem};
+
+/// Parameter of an effect on an arm.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// Name after the dot.
+    pub name: String,
+    /// Site where it enters.
+    pub site: ParameterSite,
+    /// Function of the pose by which it is multiplied there.
+    pub regressor: Regressor,
+    /// Value where the effect has no size, SI.
+    pub nominal: f64,
+    /// Size that no realistic effect exceeds by much, SI: 1 σ of its prior.
+    pub size: f64,
+    /// True if nature knows no negative values: an effect that needs one is no explanation.
+    pub never_negative: bool,
+    /// Smallest value that it may have, SI.
+    pub lower: f64,
+    /// Greatest value that it may have, SI.
+    pub upper: f64,
+}
+
+/// Returns the parameters of every effect that `problem` declares, in order.
+pub fn parameters(problem: &Problem) -> Vec<EffectParameter> {
+    problem.effects.iter().flat_map(|declared| declared.effect.parameters(problem)).collect()
+}
+
+impl Effect {
+    /// Returns its parameters with where and how each enters the model of `problem`; those of a
+    /// place that the arm does not have are left out.
+    pub fn terms(&self, problem: &Problem) -> Vec<Term> {
+        let (slides, covariates) = (problem.slides(), problem.covariate_names());
+        let vocabulary =
+            Vocabulary { slides: &slides, covariates: &covariates, ..Vocabulary::default() };
+        self.entries(&vocabulary)
+            .into_iter()
+            .filter_map(|entry| self.placed(&entry, problem))
+            .collect()
+    }
+
+    fn placed(&self, entry: &EffectTerm, problem: &Problem) -> Option<Term> {
+        let of_arm =
+            |quantity: &Quantity| quantity.joint().is_none_or(|joint| joint < problem.joints.len());
+        let quantities = entry.formula.as_ref().map(|formula| formula.expression.quantities());
+        if !quantities.iter().flatten().all(of_arm) {
+            return None;
+        }
+        let regressor = match &entry.formula {
+            None if entry.inner.is_some() => Regressor::Inner,
+            None => Regressor::Constant,
+            Some(formula) => Regressor::new(formula, self.inner_parameters(), problem),
+        };
+        let bounds = entry.inner.as_ref().map_or((None, None), |inner| (inner.min, inner.max));
+        let size = self.size(entry.prior, problem)?;
+        let nominal = match entry.nominal {
+            Some(nominal) => self.size(nominal, problem)?,
+            None => 0.0,
+        };
+        Some(Term {
+            name: entry.name.clone(),
+            site: self.site(entry.at, problem)?,
+            regressor,
+            nominal,
+            size,
+            never_negative: entry.never_negative,
+            lower: bounds.0.unwrap_or(f64::NEG_INFINITY),
+            upper: bounds.1.unwrap_or(f64::INFINITY),
+        })
+    }
+
+    /// Returns the site of a parameter on this arm.
+    fn site(&self, at: At, problem: &Problem) -> Option<ParameterSite> {
+        let of_joint = |turning, sliding| {
+            let joint = self.joint()?.checked_sub(1)?;
+            let slides = problem.joints.get(joint)?.kind == JointKind::Prismatic;
+            Some(ParameterSite::Joint { joint, field: if slides { sliding } else { turning } })
+        };
+        Some(match at {
+            At::Coordinate => of_joint(JointField::Theta, JointField::D)?,
+            At::Joint(field) => of_joint(field, field)?,
+            At::JointOrSlide(turning, sliding) => of_joint(turning, sliding)?,
+            At::Beam(field) => ParameterSite::Beam { joint: self.beam(problem)?, field },
+            At::Arm(field) => ParameterSite::Arm(field),
+            At::Shift(axis) => ParameterSite::Shift { axis },
+            At::Turn(axis) => ParameterSite::Turn { axis },
+            At::BaseShift(axis) => ParameterSite::Shift { axis },
+            At::BaseTurn(axis) => ParameterSite::Turn { axis },
+            At::Scale => ParameterSite::Scale,
+            At::Strain(entry) => ParameterSite::Strain { entry },
+        })
+    }
+
+    /// Returns the index of the joint that carries the link on which the effect acts.
+    pub(super) fn beam(&self, problem: &Problem) -> Option<usize> {
+        let Some(link) = self.link() else { return self.joint()?.checked_sub(1) };
+        problem
+            .joints
+            .iter()
+            .position(|joint| joint.beam.as_ref().is_some_and(|beam| beam.name == link))
+    }
+
+    /// Returns full names and starts of the parameters inside of its formulas.
+    fn inner_parameters(&self) -> Vec<(String, f64)> {
+        let Self::Law(law) = self else { return Vec::new() };
+        let named = |own: &LawParameter| (format!("{LAW}[{}].{}", law.name(), own.name), own.start);
+        law.parameters().iter().map(named).collect()
+    }
+
+    /// Returns its parameters with their full names: `gear-ratio[3].error`.
+    pub fn parameters(&self, problem: &Problem) -> Vec<EffectParameter> {
+        let place = self.place();
+        let bracket = if place.is_empty() { String::new() } else { format!("[{place}]") };
+        let name = self.name();
+        let parameter = |term: Term| EffectParameter {
+            name: format!("{name}{bracket}.{}", term.name),
+            plain: format!("{name}.{}", term.name),
+            site: term.site,
+            regressor: term.regressor,
+            nominal: term.nominal,
+            sigma: term.size,
+            lower: term.lower,
+            upper: term.upper,
+        };
+        self.terms(problem).into_iter().map(parameter).collect()
+    }
+
+    /// Returns the columns without which it cannot be fitted, if measurements with these columns
+    /// lack them, as a message names them.
+    pub fn missing_column(&self, problem: &Problem, columns: Columns) -> Option<&'static str> {
+        let sliding_play = |term: &Term| {
+            matches!(term.site, ParameterSite::Joint { field: JointField::SlidingPlay, .. })
+        };
+        let quantities = self.quantities();
+        let follows = |is_it: fn(&Quantity) -> bool| quantities.iter().any(is_it);
+        let approach = follows(|own| matches!(own, Quantity::Approach(_)))
+            || self.terms(problem).iter().any(sliding_play);
+        let needed = [
+            (follows(|own| own.is_thermal()), columns.temperature, "a column temperature_C"),
+            (
+                follows(|own| matches!(own, Quantity::Lagging { .. })),
+                columns.time,
+                "a column time_s",
+            ),
+            (approach, columns.approach, "columns approach1, …"),
+            (
+                follows(|own| matches!(own, Quantity::Covariate(_))),
+                columns.covariates,
+                "the columns of [data.covariates]",
+            ),
+        ];
+        needed.into_iter().find(|(needs, has, _)| *needs && !has).map(|(.., write)| write)
+    }
+}
+
+impl Problem {
+    /// Returns the names of the covariates, in their order.
+    pub(crate) fn covariate_names(&self) -> Vec<String> {
+        self.data.covariates.iter().map(|covariate| covariate.name.clone()).collect()
+    }
+}

@@ -1,0 +1,59 @@
+//! Parameters inside of formulas: how regressors depend on the parameter vector.
+
+use std::sync::Arc;
+
+use super::Parameter;
+use super::regressor::{Formula, Regressor};
+
+/// Derivative of a sum of terms c f(pose; p) by one parameter p inside of the formulas.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slope {
+    /// Coefficient, formula with the values of its parameters, and the index of p among these.
+    terms: Vec<(f64, Arc<Formula>, usize)>,
+}
+
+impl Slope {
+    /// Returns the value in a pose.
+    pub(super) fn value(&self, setup: &crate::problem::PoseView) -> f64 {
+        self.terms.iter().map(|(c, formula, p)| c * formula.parameter_slope(setup, *p)).sum()
+    }
+}
+
+/// Returns the regressor that multiplies parameter k in the prediction at the full parameter vector
+/// `x`: formulas take the values of the parameters inside of them. `None` for such a parameter
+/// itself, which multiplies nothing.
+pub(crate) fn value_regressor(parameters: &[Parameter], x: &[f64], k: usize) -> Option<Regressor> {
+    match &parameters[k].regressor {
+        Regressor::Inner => None,
+        Regressor::Formula(formula) if !formula.parameters().is_empty() => {
+            Some(Regressor::Formula(Arc::new(bound(formula, parameters, x))))
+        }
+        regressor => Some(regressor.clone()),
+    }
+}
+
+/// Returns the regressor of the derivative of the prediction by parameter k at the full parameter
+/// vector `x`: for a parameter inside of formulas the derivative of all terms that use it.
+pub(crate) fn slope_regressor(parameters: &[Parameter], x: &[f64], k: usize) -> Regressor {
+    value_regressor(parameters, x, k).unwrap_or_else(|| {
+        let name = &parameters[k].name;
+        let term = |(parameter, c): (&Parameter, &f64)| {
+            let Regressor::Formula(formula) = &parameter.regressor else { return None };
+            let index = formula.parameters().iter().position(|(inner, _)| inner == name)?;
+            Some((*c, Arc::new(bound(formula, parameters, x)), index))
+        };
+        let terms = parameters.iter().zip(x).filter_map(term).collect();
+        Regressor::Slope(Arc::new(Slope { terms }))
+    })
+}
+
+/// Returns a formula with the values that its parameters have at `x`; those that are not free keep
+/// their start.
+fn bound(formula: &Formula, parameters: &[Parameter], x: &[f64]) -> Formula {
+    let value = |(name, start): &(String, f64)| {
+        let place = parameters.iter().position(|parameter| parameter.name == *name);
+        let value = place.map_or(*start, |k| parameters[k].value(x[k]));
+        (name.clone(), value)
+    };
+    formula.with_parameters(formula.parameters().iter().map(value).collect())
+}

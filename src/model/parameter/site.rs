@@ -1,0 +1,162 @@
+//! Sites of parameters in the model.
+
+use crate::laws::{ArmField, BeamField, JointField};
+use crate::problem::FixtureKind;
+use crate::quantity::Unit;
+
+/// Site of a parameter in the model. Joints are counted from 0; [`ParameterSite::of_joint`] takes
+/// the numbers of files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ParameterSite {
+    /// Field of a joint.
+    Joint {
+        /// Index of the joint.
+        joint: usize,
+        /// Field of that joint.
+        field: JointField,
+    },
+    /// Field of the beam before a joint.
+    Beam {
+        /// Index of the joint that carries the beam.
+        joint: usize,
+        /// Field of that beam.
+        field: BeamField,
+    },
+    /// Quantity of the arm as a whole.
+    Arm(ArmField),
+    /// Coordinate of a base pose: translation x, y, z, then rotation vector x, y, z.
+    Base {
+        /// Index of the base.
+        base: usize,
+        /// Coordinate 0 to 5.
+        axis: usize,
+    },
+    /// Coordinate of a target in the frame that carries it: position x, y, z, then rotation vector
+    /// x, y, z.
+    Target {
+        /// Index of the target.
+        target: usize,
+        /// Coordinate 0 to 5.
+        axis: usize,
+    },
+    /// Number of a fixture, in the order of [`FixtureKind::fields`].
+    Fixture {
+        /// Index of the fixture.
+        fixture: usize,
+        /// Kind of the fixture.
+        kind: FixtureKind,
+        /// Index of the number.
+        axis: usize,
+    },
+    /// Displacement of every measured position, measuring frame.
+    Shift {
+        /// Axis 0, 1 or 2.
+        axis: usize,
+    },
+    /// Rotation of every base about an axis through the measuring frame's origin; always with a
+    /// regressor.
+    Turn {
+        /// Axis 0, 1 or 2.
+        axis: usize,
+    },
+    /// Relative error of every measured coordinate.
+    Scale,
+    /// Entry of the strain E of the measuring frame: p reads as p + E p. E is triangular, in the
+    /// order xx, yy, zz, xy, xz, yz.
+    Strain {
+        /// Entry 0 to 5.
+        entry: usize,
+    },
+}
+
+impl ParameterSite {
+    /// Creates the site of a field of a joint that is numbered from 1, as in files.
+    pub fn of_joint(number: usize, field: JointField) -> Self {
+        Self::Joint { joint: number.wrapping_sub(1), field }
+    }
+
+    /// Returns the unit of a parameter without regressor.
+    pub fn unit(self) -> Unit {
+        match self {
+            Self::Joint { field, .. } => match field {
+                JointField::Alpha
+                | JointField::Theta
+                | JointField::Beta
+                | JointField::Play
+                | JointField::Roll
+                | JointField::Pitch
+                | JointField::Yaw => Unit::Angle,
+                JointField::A
+                | JointField::D
+                | JointField::SlidingPlay
+                | JointField::X
+                | JointField::Y
+                | JointField::Z => Unit::Length,
+                JointField::Stiffness => Unit::TorsionalStiffness,
+                JointField::Compliance | JointField::LateralX | JointField::LateralY => {
+                    Unit::Compliance
+                }
+                JointField::Cubic => Unit::CubicCompliance,
+                JointField::SlideFlexibility => Unit::Flexibility,
+                JointField::SpringRate => Unit::ForcePerLength,
+                JointField::SpringPreload => Unit::Force,
+            },
+            Self::Beam { field, .. } => match field {
+                BeamField::Axial => Unit::AxialRigidity,
+                BeamField::Bending
+                | BeamField::BendingY
+                | BeamField::BendingZ
+                | BeamField::Twist => Unit::FlexuralRigidity,
+                BeamField::Anisotropy | BeamField::Stretch => Unit::Ratio,
+                BeamField::Flexibility | BeamField::CouplingY | BeamField::CouplingZ => {
+                    Unit::Flexibility
+                }
+                BeamField::BowY | BeamField::BowZ => Unit::PerLength,
+                BeamField::AddedMass => Unit::Mass,
+                BeamField::AddedAt => Unit::Length,
+            },
+            Self::Arm(field) => match field {
+                ArmField::Payload => Unit::Mass,
+                ArmField::HoistForce | ArmField::HoistLeanX | ArmField::HoistLeanY => Unit::Ratio,
+                ArmField::Mixing => Unit::Number,
+                ArmField::HoistTrolley => Unit::PerLength,
+                ArmField::MountingX | ArmField::MountingY => Unit::Compliance,
+                ArmField::GravityX | ArmField::GravityY => Unit::Angle,
+            },
+            Self::Base { axis, .. } | Self::Target { axis, .. } if axis >= 3 => Unit::Angle,
+            Self::Turn { .. } => Unit::Angle,
+            Self::Base { .. } | Self::Target { .. } | Self::Shift { .. } => Unit::Length,
+            Self::Fixture { kind, axis, .. } => kind.unit(axis),
+            Self::Scale | Self::Strain { .. } => Unit::Ratio,
+        }
+    }
+
+    /// Returns true for elasticity and loads, false for geometry.
+    pub fn is_elastic(self) -> bool {
+        match self {
+            Self::Joint { field, .. } => {
+                !field.is_geometry() && !matches!(field, JointField::Play | JointField::SlidingPlay)
+            }
+            Self::Beam { field, .. } => !field.is_strain(),
+            Self::Arm(_) => true,
+            Self::Base { .. }
+            | Self::Target { .. }
+            | Self::Fixture { .. }
+            | Self::Shift { .. }
+            | Self::Turn { .. }
+            | Self::Scale
+            | Self::Strain { .. } => false,
+        }
+    }
+
+    /// Returns true for the orientation of a target, which positions do not depend on.
+    pub fn turns_target(self) -> bool {
+        matches!(self, Self::Target { axis: 3.., .. })
+    }
+
+    /// Returns true for the set-up (base, target, fixture), false for the arm.
+    pub fn is_placement(self) -> bool {
+        matches!(self, Self::Base { .. } | Self::Target { .. } | Self::Fixture { .. })
+    }
+}

@@ -1,0 +1,183 @@
+//! Laws of the user's own: `law = { name, at, terms, sigma_…, parameters }`.
+
+use super::item::Item;
+use super::section::Section;
+use super::{Data, Joint, JointKind};
+use crate::error::{InputError, InputErrorKind};
+use crate::laws::expression::{FormulaError, Vocabulary};
+use crate::laws::{At, BeamField, Effect, Law, LawParameter, LawPrior, LawSite, Quantity};
+use crate::quantity::Unit;
+
+/// Most terms of one law.
+const MAX_TERMS: usize = 50;
+/// Most parameters inside of the formulas of one law.
+const MAX_PARAMETERS: usize = 20;
+/// Keys of a law that are no parameters; the prior has the suffix of its unit besides.
+const KEYS: [&str; 3] = ["name", "at", "terms"];
+
+/// Reads a law that acts on an arm with these joints, where the data have these covariates.
+pub(super) fn read(
+    mut section: Section<'_, '_>,
+    joints: &[Joint],
+    data: &Data,
+) -> Result<Effect, InputError> {
+    let name = section.require("name", "name = \"…\", a word for its parameters")?;
+    let at = section.require("at", "at = \"joint1\", the site that the law adds to")?;
+    let terms = section.require("terms", "terms = [\"sin(q1)\"], formulas")?;
+    let named = word(&name, name.text()?, "a law")?;
+    let names: Vec<(String, usize)> =
+        joints.iter().enumerate().map(|(k, joint)| (joint.name.clone(), k)).collect();
+    let links: Vec<String> =
+        joints.iter().filter_map(|joint| Some(joint.beam.as_ref()?.name.clone())).collect();
+    let site = LawSite::parse(at.text()?, joints.len(), &names, &links)
+        .map_err(|reason| at.error(InputErrorKind::LawSite { reason }))?;
+    let prior = prior(&mut section, unit(&site, joints))?;
+    let parameters = parameters(&mut section)?;
+    let formulas = formulas(&terms)?;
+    let slides: Vec<bool> = joints.iter().map(|own| own.kind == JointKind::Prismatic).collect();
+    let covariates: Vec<String> = data.covariates.iter().map(|own| own.name.clone()).collect();
+    let vocabulary =
+        Vocabulary { slides: &slides, joints: &names, covariates: &covariates, parameters: &[] };
+    let texts: Vec<&str> = formulas.iter().map(|(_, text)| *text).collect();
+    let law =
+        Law::new(&named, site, &texts, prior, parameters, &vocabulary).map_err(|(k, error)| {
+            match formulas.get(k) {
+                Some((item, text)) => mistake(item, text, error),
+                None => section.error(InputErrorKind::NoTermsOfLaw),
+            }
+        })?;
+    check(&law, &at, joints)?;
+    for (key, item) in section.entries() {
+        let is_parameter = law.parameters().iter().any(|parameter| parameter.name == key);
+        if is_parameter && !law.uses(key) {
+            return Err(item.error(InputErrorKind::UnusedParameter { name: key.to_owned() }));
+        }
+    }
+    section.finish()?;
+    Ok(Effect::Law(law))
+}
+
+/// Refuses a site at which the model has no room for the formulas.
+fn check(law: &Law, at: &Item, joints: &[Joint]) -> Result<(), InputError> {
+    let joint = law.joint();
+    let declared = joint.and_then(|joint| joints.get(joint.wrapping_sub(1)));
+    match (joint, declared.map(Joint::command_kind)) {
+        (Some(joint), Some(JointKind::Fixed)) => {
+            return Err(at.error(InputErrorKind::NoCommand { joint }));
+        }
+        _ if matches!(law.at(), At::Beam(_)) => {}
+        _ => return Ok(()),
+    }
+    let commands = Effect::Law(law.clone()).quantities();
+    match commands.into_iter().find_map(Quantity::commanded_joint) {
+        Some(joint) => {
+            let quantity = format!("q{}", joint + 1);
+            Err(at.error(InputErrorKind::LinkFollowsCommand { quantity }))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Returns a name that is a word, which no pattern or bracket can be mistaken for.
+fn word(item: &Item, text: &str, noun: &'static str) -> Result<String, InputError> {
+    let is_word = text.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
+    if is_word {
+        Ok(text.to_owned())
+    } else {
+        Err(item.error(InputErrorKind::NotAWord { name: text.to_owned(), noun }))
+    }
+}
+
+/// Returns the unit of the quantity that a law adds to.
+fn unit(site: &LawSite, joints: &[Joint]) -> Unit {
+    let slides = |number: usize| {
+        joints.get(number.wrapping_sub(1)).is_some_and(|own| own.kind == JointKind::Prismatic)
+    };
+    match site.at {
+        At::Coordinate if site.joint().is_some_and(slides) => Unit::Length,
+        At::Coordinate | At::BaseTurn(_) => Unit::Angle,
+        At::Beam(BeamField::Stretch) => Unit::Ratio,
+        At::Beam(_) => Unit::PerLength,
+        _ => Unit::Length,
+    }
+}
+
+fn prior(section: &mut Section<'_, '_>, unit: Unit) -> Result<Option<LawPrior>, InputError> {
+    let Some((item, suffix)) = section.quantity("sigma", unit)? else { return Ok(None) };
+    let written = item.number()?;
+    let sigma = (suffix.to_si)(written);
+    if sigma > 0.0 {
+        Ok(Some(LawPrior { sigma, key: format!("sigma_{}", suffix.name), written }))
+    } else {
+        Err(item.error(InputErrorKind::NotPositive { value: written }))
+    }
+}
+
+/// Reads the parameters inside of the formulas: every table `k = { start, min, max, sigma }`.
+fn parameters(section: &mut Section<'_, '_>) -> Result<Vec<LawParameter>, InputError> {
+    let mut parameters = Vec::new();
+    for (key, item) in section.entries() {
+        if KEYS.contains(&key) || !item.holds_tables() {
+            continue;
+        }
+        section.get(key);
+        let starts_as_word = key.starts_with(|c: char| c.is_alphabetic() || c == '_');
+        let is_free = !Vocabulary::is_reserved(key);
+        if !starts_as_word || !is_free || key.contains('-') {
+            let (name, noun) = (key.to_owned(), "a parameter of a formula");
+            return Err(item.error(InputErrorKind::NotAWord { name, noun }));
+        }
+        let name = word(&item, key, "a parameter of a formula")?;
+        let mut own = item.section()?;
+        let start = own.require("start", "start = …, the value at which the fit begins")?;
+        let mut number = |key: &str| own.get(key).map(|item| item.number()).transpose();
+        let (min, max, sigma) = (number("min")?, number("max")?, number("sigma")?);
+        let parameter = LawParameter { name, start: start.number()?, min, max, sigma };
+        if sigma.is_some_and(|sigma| sigma <= 0.0) {
+            let value = sigma.unwrap_or_default();
+            return Err(item.error(InputErrorKind::NotPositive { value }));
+        }
+        let is_within = min.is_none_or(|min| min <= parameter.start)
+            && max.is_none_or(|max| parameter.start <= max);
+        if !is_within {
+            let start_value = parameter.start;
+            return Err(start.error(InputErrorKind::StartOutOfBounds { start: start_value }));
+        }
+        own.finish()?;
+        parameters.push(parameter);
+    }
+    if let Some(extra) = parameters.get(MAX_PARAMETERS)
+        && let Some(item) = section.peek(&extra.name)
+    {
+        item.check_count("parameters of a law", parameters.len(), MAX_PARAMETERS)?;
+    }
+    Ok(parameters)
+}
+
+/// Reads the formulas, each with its place.
+fn formulas<'a, 'i>(terms: &Item<'a, 'i>) -> Result<Vec<(Item<'a, 'i>, &'a str)>, InputError> {
+    let elements = terms.list("a list of formulas in quotes")?;
+    terms.check_count("terms", elements.len(), MAX_TERMS)?;
+    if elements.is_empty() {
+        return Err(terms.error(InputErrorKind::NoTermsOfLaw));
+    }
+    let read = |item: Item<'a, 'i>| {
+        let text = item.text()?;
+        Ok((item, text))
+    };
+    elements.into_iter().map(read).collect()
+}
+
+/// Returns the error of a formula at the place of the word that is meant.
+fn mistake(item: &Item, text: &str, error: FormulaError) -> InputError {
+    let FormulaError { column, span, mistake } = error;
+    let kind = InputErrorKind::Formula { column, mistake: mistake.to_string() };
+    let start = item.span.start + 1;
+    // A text with escapes stands in the file in another spelling.
+    let is_verbatim = item.document.text.get(start..start + text.len()) == Some(text);
+    if is_verbatim && !span.is_empty() {
+        let span = start + span.start..start + span.end;
+        return item.document.locate(span).with_key(item.key.as_str()).error(kind);
+    }
+    item.error(kind)
+}
