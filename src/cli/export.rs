@@ -97,13 +97,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         .unwrap_or(Path::new("."))
         .to_owned();
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let own = if arguments.problem.is_dir() {
+    let file = if arguments.problem.is_dir() {
         arguments.problem.join("problem.toml")
     } else {
         arguments.problem.clone()
     };
     let files = if arguments.data.is_empty() { &problem.data.files } else { &arguments.data };
-    let inputs = [&[own, arguments.estimate.clone()], arguments.urdf.as_slice(), files].concat();
+    let inputs = [&[file, arguments.estimate.clone()], arguments.urdf.as_slice(), files].concat();
     let results = Results::claim("export", folder, inputs, &[&name], (flags.force, flags.quiet))?;
     // Measurements that the problem names may have been removed.
     let at_hand =

@@ -31,8 +31,9 @@ pub fn after_fit(
         }
         // Of a fit that says so little neither a cause nor a correction follows.
         None if found.has(FindingCode::PriorContradicted) => {
-            let rule =
-                found.finding(FindingCode::PriorContradicted).and_then(|own| own.word("rule"));
+            let rule = found
+                .finding(FindingCode::PriorContradicted)
+                .and_then(|finding| finding.word("rule"));
             format!(
                 "give \"{}\" in {} a larger σ, or check what it limits",
                 rule.unwrap_or_default(),
@@ -113,7 +114,8 @@ pub fn after_loop(
 
 /// Names the command after a trace.
 pub fn after_trace(common: &Common, result: &TraceResult) -> String {
-    let is_pointed = result.ranking.first().is_some_and(|own| own.p_value < result.level);
+    let is_pointed =
+        result.ranking.first().is_some_and(|candidate| candidate.p_value < result.level);
     match is_pointed || result.structured {
         true => format!("flexcal loop {} adds what is missing and fits again", common.named()),
         false => format!("flexcal identify {} writes the estimate to apply", common.named()),

@@ -84,13 +84,15 @@ fn poses_of(
     arguments.flags.warn(&warnings);
     let target = rows.target.as_ref().filter(|_| !problem.targets.is_empty());
     let word = |row: usize| {
-        target.and_then(|own| own.names.get(*own.of_row.get(row)?).cloned()).unwrap_or_default()
+        target
+            .and_then(|labels| labels.names.get(*labels.of_row.get(row)?).cloned())
+            .unwrap_or_default()
     };
     Ok(rows
         .conditions_without_past()
         .into_iter()
         .enumerate()
-        .map(|(row, own)| (own, word(row)))
+        .map(|(row, conditions)| (conditions, word(row)))
         .collect())
 }
 

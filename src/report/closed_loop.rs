@@ -271,7 +271,7 @@ fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Hea
 /// stand.
 fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let (before, after) = (&closure.before.fit, &closure.after);
-    let untrusted = (!result.trusted).then(|| format!("Beware: {}.", why_not_trusted(after)));
+    let untrusted = (!result.trusted).then(|| format!("Warning: {}.", why_not_trusted(after)));
     let bounds = before
         .estimates
         .iter()

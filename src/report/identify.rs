@@ -104,7 +104,7 @@ pub(super) fn counts(found: &Identification) -> String {
     let beware = if found.is_trusted() {
         String::new()
     } else {
-        format!(" Beware: {}.", why_not_trusted(found))
+        format!(" Warning: {}.", why_not_trusted(found))
     };
     format!(
         "{} from {}; {} held out. Strategy {}, solver {}: {}.{beware}",

@@ -51,14 +51,14 @@ pub struct SpreadAtPoint {
 impl PredictionErrors {
     /// Collects errors and spreads.
     pub fn new(errors: &ErrorsBySession, spreads: &[PointSpread]) -> Self {
-        let spread = |own: &PointSpread| {
-            (own.point.clone(), SpreadAtPoint { n: own.n, spread: Spread::new(own) })
+        let spread = |spread: &PointSpread| {
+            (spread.point.clone(), SpreadAtPoint { n: spread.n, spread: Spread::new(spread) })
         };
         let sessions = errors.sessions.iter();
         Self {
             all: Some(Summary::of(&errors.all)),
             kinds: errors.kinds.iter().map(Summary::of).collect(),
-            sessions: sessions.map(|(name, own)| (name.clone(), Summary::of(own))).collect(),
+            sessions: sessions.map(|(name, errors)| (name.clone(), Summary::of(errors))).collect(),
             spread: spreads.iter().map(spread).collect(),
             coverage: None,
             bounds: None,
@@ -68,7 +68,7 @@ impl PredictionErrors {
     /// Returns the errors with their bounds, and the share of `residuals` within them.
     #[must_use]
     pub fn with_bounds(self, residuals: &[Residual], bounds: &Bounds) -> Self {
-        let lengths = residuals.iter().map(|own| own.position.norm());
+        let lengths = residuals.iter().map(|residual| residual.position.norm());
         let coverage = Some(bounds.coverage(lengths));
         Self { coverage, bounds: Some(BoundSummary::new(bounds)), ..self }
     }

@@ -258,7 +258,8 @@ impl LoopResult {
         let failed = self.checks_after.iter().filter(|test| test.structure && test.failed);
         let is_alone = failed.count() == 1 && size.failed && chi2 > 1.0;
         let mut structures = self.structures().peekable();
-        let is_nowhere = structures.peek().is_some() && structures.all(|own| own.place == NOWHERE);
+        let is_nowhere =
+            structures.peek().is_some() && structures.all(|structure| structure.place == NOWHERE);
         (is_alone && is_nowhere).then(|| chi2.sqrt())
     }
 
@@ -347,7 +348,8 @@ impl Structure {
             }),
             claims: left.claims.as_ref().map(|claims| Claims::new(claims, trace)),
             p_value: left.p_value,
-            held_out_with_empirical_correction: correction.map(|own| Summary::of(&own.held_out)),
+            held_out_with_empirical_correction: correction
+                .map(|correction| Summary::of(&correction.held_out)),
             correction: correction.map(Correction::new),
         }
     }

@@ -116,13 +116,13 @@ impl ComparisonResult {
             parameters: found.unknowns.len(),
             fit: found.into(),
         };
-        let procedure = |own: &fit::Procedure| Procedure::new(&comparison.before, own);
+        let result = |procedure: &fit::Procedure| Procedure::new(&comparison.before, procedure);
         Self {
             problem: problem.name.clone(),
             registered: Errors::of(&comparison.joint.registered),
             rows: comparison.strategies.iter().map(ComparedFit::from).chain(paper).collect(),
             ablations: comparison.ablations.iter().map(ablation).collect(),
-            procedures: comparison.procedures.iter().map(procedure).collect(),
+            procedures: comparison.procedures.iter().map(result).collect(),
         }
     }
 }
@@ -162,7 +162,7 @@ impl From<&Baseline> for ComparedFit {
 }
 
 impl Procedure {
-    fn new(before: &fit::Before, own: &fit::Procedure) -> Self {
+    fn new(before: &fit::Before, procedure: &fit::Procedure) -> Self {
         let value = |entry: &TableEntry, to: fn(f64) -> f64| GeometryValue {
             nominal: to(entry.nominal),
             identified: to(entry.identified),
@@ -184,18 +184,18 @@ impl Procedure {
             errors.iter().map(|error| (error * 1e3).into()).collect()
         };
         Self {
-            procedure: own.name(),
-            table_2: own.geometry.iter().map(joint).collect(),
+            procedure: procedure.name(),
+            table_2: procedure.geometry.iter().map(joint).collect(),
             table_3: HeldOutErrors {
                 before_registered: before.registered,
                 before: summary(&before.errors),
-                after: summary(&own.after),
-                ignoring_elasticity: own.ignoring.as_deref().map(summary),
+                after: summary(&procedure.after),
+                ignoring_elasticity: procedure.ignoring.as_deref().map(summary),
             },
             figure_13: PoseErrors {
                 before_mm: by_pose(&before.errors),
-                after_mm: by_pose(&own.after),
-                ignoring_elasticity_mm: own.ignoring.as_deref().map(by_pose),
+                after_mm: by_pose(&procedure.after),
+                ignoring_elasticity_mm: procedure.ignoring.as_deref().map(by_pose),
             },
         }
     }

@@ -305,9 +305,9 @@ impl Detectable {
             found_from: size.worst,
             found_from_at_best: size.best,
         };
-        let effect = |own: &select::Detectable| DetectableEffect {
-            effect: own.effect.clone(),
-            sizes: own.sizes.iter().map(size).collect(),
+        let effect = |detectable: &select::Detectable| DetectableEffect {
+            effect: detectable.effect.clone(),
+            sizes: detectable.sizes.iter().map(size).collect(),
         };
         let untestable = |(effect, reason): &(Effect, &'static str)| Untestable {
             effect: effect.clone(),
@@ -326,7 +326,7 @@ impl Detectable {
 impl SeparationResult {
     /// Collects how well a plan separates two effects.
     pub fn new(separated: &PairSeparation) -> Self {
-        let angle = |own: &Separation| own.angle;
+        let angle = |separation: &Separation| separation.angle;
         let random = Some(separated.random(angle)).filter(|angle| angle.is_finite());
         Self {
             angle_deg: separated.planned.angle.map(f64::to_degrees),
@@ -340,7 +340,8 @@ impl SeparatedEffect {
     fn new(separated: &PairSeparation, side: usize) -> Self {
         let planned = &separated.planned.sides[side];
         let median = |of: fn(&Side) -> Option<f64>| {
-            Some(separated.random(|own| of(&own.sides[side]))).filter(|value| value.is_finite())
+            Some(separated.random(|separation| of(&separation.sides[side])))
+                .filter(|value| value.is_finite())
         };
         let random_found_from = median(|side| side.found.worst);
         let prior = planned.found.prior;
@@ -356,7 +357,8 @@ impl SeparatedEffect {
             random_told_from: median(|side| side.told.worst),
             size,
             p_value: planned.expected_p(size),
-            random_p_value: separated.random(|own| Some(own.sides[side].expected_p(size))),
+            random_p_value: separated
+                .random(|separation| Some(separation.sides[side].expected_p(size))),
         }
     }
 }

@@ -168,9 +168,9 @@ impl Combination {
         combinations: &[UnidentifiableCombination],
         name: impl Fn(usize) -> String,
     ) -> Vec<Self> {
-        let entry = |own: &UnidentifiableCombination| Self {
-            combination: own.weights.iter().map(|&(k, weight)| (name(k), weight)).collect(),
-            singular_value: own.singular_value,
+        let entry = |combination: &UnidentifiableCombination| Self {
+            combination: combination.weights.iter().map(|&(k, weight)| (name(k), weight)).collect(),
+            singular_value: combination.singular_value,
         };
         combinations.iter().map(entry).collect()
     }
@@ -321,7 +321,7 @@ impl IdentificationResult {
     pub fn with_predictions(self, found: &Identification, fitted: &Fitted) -> Self {
         let corrected = fitted.residuals.as_ref();
         Self {
-            fitted: corrected.map_or(self.fitted, |own| Errors::of(&own.errors)),
+            fitted: corrected.map_or(self.fitted, |corrected| Errors::of(&corrected.errors)),
             covariance: remainder::covariance(found, fitted),
             remainder: Remainder::new(found, fitted),
             prediction: remainder::prediction(fitted),

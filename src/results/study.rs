@@ -175,16 +175,16 @@ impl Cell {
         let CellResult { cell, tally, .. } = result;
         let in_mm = |length: Option<f64>| length.map(|length| length * 1e3);
         let rms = &tally.held_out_rms;
-        let parameter = |own: study::ParameterResult| StudiedParameter {
-            name: own.parameter.name.clone(),
-            unit: own.unit(),
-            fits: own.fits,
-            bias: own.bias,
-            spread: own.spread,
-            rms_error: own.rms_error,
-            with_std_error: own.with_std_error,
-            std_error: own.std_error,
-            coverage: own.coverage,
+        let parameter = |result: study::ParameterResult| StudiedParameter {
+            name: result.parameter.name.clone(),
+            unit: result.unit(),
+            fits: result.fits,
+            bias: result.bias,
+            spread: result.spread,
+            rms_error: result.rms_error,
+            with_std_error: result.with_std_error,
+            std_error: result.std_error,
+            coverage: result.coverage,
         };
         let bias = result.largest_bias(study);
         Self {
@@ -205,8 +205,10 @@ impl Cell {
             },
             reduced_chi2: tally.reduced_chi2.mean(),
             coverage: result.coverage(),
-            largest_bias: bias
-                .map(|(own, bias_sd)| LargestBias { parameter: own.name.clone(), bias_sd }),
+            largest_bias: bias.map(|(parameter, bias_sd)| LargestBias {
+                parameter: parameter.name.clone(),
+                bias_sd,
+            }),
             iterations_mean: tally.iterations.mean(),
             iterations_max: tally.iterations.largest(),
             parameters: result.parameters(study).map(parameter).collect(),
@@ -226,7 +228,7 @@ impl MisprintResult {
             links_over_joints: case.links_over_joints,
             payload_kg: case.load.and_then(|load| load.payload),
             hoist: case.load.and_then(|load| load.hoist),
-            specimens: found.of_case(case).map(|own| Specimen::new(own, found)).collect(),
+            specimens: found.of_case(case).map(|replica| Specimen::new(replica, found)).collect(),
         };
         Self {
             study: study.name.clone(),
@@ -244,7 +246,7 @@ impl MisprintResult {
 }
 
 impl Specimen {
-    fn new(own: &Replica, found: &ReplicaResults) -> Self {
+    fn new(replica: &Replica, found: &ReplicaResults) -> Self {
         let left = |left: &HeldOutError| left.as_ref().map(Summary::of);
         let reading = |(named, [known, declared, positions, differences]): (
             &study::NamedReading,
@@ -256,17 +258,17 @@ impl Specimen {
             from_positions: left(positions),
             from_load_differences: left(differences),
         };
-        let rivals = AlternativeModel::EACH.into_iter().zip(&own.by_alternative);
+        let rivals = AlternativeModel::EACH.into_iter().zip(&replica.by_alternative);
         Self {
-            scale: own.scale,
-            before: Summary::of(&own.before),
-            rigid: left(&own.rigid),
-            geometry_only: Summary::of(&own.geometry_only),
-            joint: Summary::of(&own.joint),
-            joint_both_loads: Summary::of(&own.joint_twice),
-            readings: found.readings.iter().zip(&own.by_reading).map(reading).collect(),
+            scale: replica.scale,
+            before: Summary::of(&replica.before),
+            rigid: left(&replica.rigid),
+            geometry_only: Summary::of(&replica.geometry_only),
+            joint: Summary::of(&replica.joint),
+            joint_both_loads: Summary::of(&replica.joint_twice),
+            readings: found.readings.iter().zip(&replica.by_reading).map(reading).collect(),
             rivals: rivals
-                .map(|(rival, own)| Rival { rival: rival.words().0, held_out: left(own) })
+                .map(|(rival, error)| Rival { rival: rival.words().0, held_out: left(error) })
                 .collect(),
         }
     }

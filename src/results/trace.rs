@@ -119,7 +119,11 @@ impl TraceResult {
         let sets = evidence.map_or(&[][..], |evidence| &evidence.sets);
         let set = |set: &select::HypothesisSet| HypothesisSet {
             probability: set.probability,
-            hypotheses: set.hypotheses.iter().map(|own| Hypothesis::new(own, trace)).collect(),
+            hypotheses: set
+                .hypotheses
+                .iter()
+                .map(|hypothesis| Hypothesis::new(hypothesis, trace))
+                .collect(),
         };
         let absorbed = joined(trace.absorbed.iter().cloned().map(|effect| (effect, ())));
         Self {
@@ -131,14 +135,18 @@ impl TraceResult {
             checks: ResidualTest::all(&trace.findings),
             tried: trace.tried,
             level: trace.level,
-            ranking: trace.ranking.iter().map(|own| Candidate::new(own, trace, errors)).collect(),
+            ranking: trace
+                .ranking
+                .iter()
+                .map(|ranked| Candidate::new(ranked, trace, errors))
+                .collect(),
             explanations: sets
                 .iter()
                 .filter(|set| set.probability > LEAST_PROBABILITY)
                 .map(set)
                 .collect(),
             claims: evidence.map_or_else(Vec::new, |evidence| {
-                let claims = |own| Claims::new(&evidence.claims(own), trace);
+                let claims = |hypothesis| Claims::new(&evidence.claims(hypothesis), trace);
                 evidence.best().iter().map(claims).collect()
             }),
             untestable: Untestable::all(&trace.untestable),
