@@ -66,7 +66,7 @@ fn every_command_writes_what_its_schema_says() {
         ),
         ("flexcal-export", vec!["export", &lunar, "--estimate", estimate, "--format", "ros-yaml"]),
         ("flexcal-acceptance", vec!["accept", &lunar]),
-        ("flexcal-init", vec!["init", &urdf]),
+        ("flexcal-init", vec!["init", &urdf, "--tip", "tool"]),
     ];
     let schemas = schemas();
     for (format, arguments) in commands {

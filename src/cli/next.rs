@@ -85,6 +85,11 @@ pub fn after_loop(
     if !result.trusted {
         return format!("flexcal identify {named} -v, once the input is corrected");
     }
+    if result.structures().any(|left| left.limit.is_some()) {
+        return format!(
+            "flexcal identify {named} -v shows the cost of each limit; then move it out"
+        );
+    }
     // A plan separates effects within known ranges, unless they depend on time.
     let doubted = result.effects.iter().filter(|found| found.is_doubted());
     let mut pairs = doubted.filter_map(|found| {
