@@ -75,7 +75,14 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
             format!("Unexplained: structure is left in the residual. {found}.")
         }
         (_, false) => format!("{found}; structure in the residual could not be tested."),
-        (Verdict::Unexplained, true) => format!("Unexplained: {}.", lower(&found)),
+        (Verdict::Unexplained, true) => {
+            let noise = if result.with_status(Status::Contradicted).next().is_some() {
+                ""
+            } else {
+                " With what is in the model, the residual looks like noise."
+            };
+            format!("Unexplained: {}.{noise}", lower(&found))
+        }
         (Verdict::Explained, true) => {
             format!("Explained: {}, and what is left looks like noise.", lower(&found))
         }
