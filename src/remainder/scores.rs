@@ -56,11 +56,17 @@ pub struct Gain {
     pub with: f64,
     /// Standard error of the mean difference over the configurations \[m\].
     pub std_error: f64,
+    /// Gain in the logarithm of the marginal likelihood, priors of the hyperparameters included.
+    pub evidence: f64,
 }
 
 impl Gain {
     /// Gain of each configuration's mean error, averaged over `configurations`.
-    pub(super) fn of(configurations: &[Vec<usize>], without: &[f64], with: &[f64]) -> Self {
+    pub(super) fn of(
+        configurations: &[Vec<usize>],
+        (without, with): (&[f64], &[f64]),
+        evidence: f64,
+    ) -> Self {
         let mean = |rows: &[usize], of: &[f64]| {
             rows.iter().map(|&row| of[row]).sum::<f64>() / rows.len() as f64
         };
@@ -70,7 +76,7 @@ impl Gain {
         let (without, with) = (before.iter().sum::<f64>() / n, after.iter().sum::<f64>() / n);
         let squares = before.iter().zip(&after).map(|(a, b)| (a - b - (without - with)).powi(2));
         let std_error = (squares.sum::<f64>() / (n - 1.0) / n).sqrt();
-        Self { without, with, std_error }
+        Self { without, with, std_error, evidence }
     }
 
     /// Mean gain over its standard error.

@@ -36,8 +36,10 @@ pub fn remainder_text(found: &Identification, fitted: &Fitted) -> String {
         }
         None => format!(
             "No remainder is kept: mean error of configurations left out {without} mm without it, \
-             {with} mm with it, a gain of {} standard errors (more than 3 are needed).",
+             {with} mm with it, a gain of {} standard errors and of {} in the logarithm of the \
+             likelihood (more than 3 and 6 are needed).",
             number(gain.ratio(), 2),
+            number(gain.evidence, 2),
         ),
     }
 }
