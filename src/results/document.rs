@@ -32,6 +32,7 @@ pub trait Document: Serialize + JsonSchema + Sized {
         let settings = SchemaSettings::draft2020_12().for_serialize();
         let mut schema = settings.into_generator().into_root_schema_for::<File<Self>>();
         RecursiveTransform(adapted).transform(&mut schema);
+        schema.remove("description");
         schema.insert("title".to_owned(), Self::FORMAT.into());
         if let Some(format) = schema.pointer_mut("/$defs/Format/properties") {
             *format = json!({ "name": { "const": Self::FORMAT }, "version": { "const": FORMAT_VERSION } });
