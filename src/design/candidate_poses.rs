@@ -157,8 +157,8 @@ struct Draft {
 impl Draft {
     /// Recovers the draft of a row that was drawn from these ranges.
     fn of(ranges: &PoseRanges, poses: &Measurements, row: usize) -> Self {
-        let at = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
-        let index = at(&poses.payload).and_then(|mass| {
+        let in_row = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
+        let index = in_row(&poses.payload).and_then(|mass| {
             ranges.payloads.iter().position(|&payload| payload.to_bits() == mass.to_bits())
         });
         let n = poses.joints;
@@ -169,8 +169,8 @@ impl Draft {
         Self {
             joints: poses.configuration(row).to_vec(),
             choice: (index.unwrap_or(0) as f64 + 0.5) / ranges.payloads.len().max(1) as f64,
-            hoist: at(&poses.hoist),
-            temperature: at(&poses.temperature),
+            hoist: in_row(&poses.hoist),
+            temperature: in_row(&poses.temperature),
             covariates: poses.covariates_of(row).to_vec(),
             sides,
             target: poses.target.as_ref().map_or(0, |target| target.of_row[row]),

@@ -21,6 +21,6 @@ pub(super) fn coordinates(
 
 /// Returns the first row of each pose number.
 pub(super) fn first_rows(numbers: &[usize]) -> Vec<usize> {
-    let mut found = HashSet::new();
-    (0..numbers.len()).filter(|&row| found.insert(numbers[row])).collect()
+    let mut numbers_so_far = HashSet::new();
+    (0..numbers.len()).filter(|&row| numbers_so_far.insert(numbers[row])).collect()
 }

@@ -139,11 +139,11 @@ impl Forecast {
             .collect();
         squares.sort_by(f64::total_cmp);
         let count = squares.len().max(1);
-        let at =
+        let percentile =
             |share: usize| squares.get((count - 1) * share / 100).copied().unwrap_or(0.0).sqrt();
         Prediction {
-            median: at(50),
-            quantile_95: at(95),
+            median: percentile(50),
+            quantile_95: percentile(95),
             rms: (squares.iter().sum::<f64>() / count as f64).sqrt(),
         }
     }

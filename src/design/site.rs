@@ -97,8 +97,8 @@ impl<'a> Site<'a> {
         let parameters = self.model.parameters.iter().zip(&self.nominal);
         let values = parameters
             .map(|(parameter, value)| if is_mass(parameter.site) { PROBE_MASS } else { *value });
-        let at = DVector::from_iterator(self.model.parameters.len(), values);
-        self.sensitivity_at(table, unit, &at)
+        let values = DVector::from_iterator(self.model.parameters.len(), values);
+        self.sensitivity_at(table, unit, &values)
     }
 
     /// Returns the sensitivities at `count` arms drawn from the priors. Parameters without a prior

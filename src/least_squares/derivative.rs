@@ -85,9 +85,9 @@ fn extrapolate<P: LeastSquares>(
     let rows = problem.items() * problem.rows_per_item();
     let mut best = (DVector::from_element(rows, f64::NAN), f64::INFINITY);
     for first in FIRST_STEPS {
-        let found = ridders(|h| central_difference(problem, x, j, h), first * size);
-        if found.1 < best.1 {
-            best = found;
+        let estimate = ridders(|h| central_difference(problem, x, j, h), first * size);
+        if estimate.1 < best.1 {
+            best = estimate;
         }
     }
     best
@@ -99,14 +99,14 @@ fn central_difference<P: LeastSquares>(
     j: usize,
     h: f64,
 ) -> DVector<f64> {
-    let at = |value: f64| {
+    let residual_at = |value: f64| {
         let mut moved = x.clone();
         moved[j] = value;
         residual_vector(problem, &moved)
     };
     // Divide by the step as it was rounded.
     let (above, below) = (x[j] + h, x[j] - h);
-    (at(above) - at(below)) / (above - below)
+    (residual_at(above) - residual_at(below)) / (above - below)
 }
 
 /// Extrapolates differences to step zero by Ridders' tableau; stops once higher orders no longer

@@ -164,8 +164,9 @@ fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let triangle = qr.r();
     let largest = triangle.get((0, 0))?.abs();
     let rank = (0..n).take_while(|&k| triangle[(k, k)].abs() > CERTAIN_NULL * largest).count();
-    let rest = triangle.view((rank, rank), (n - rank, n - rank)).norm();
-    if rank == 0 || rank == n || rest.is_nan() || rest > CERTAIN_NULL * n as f64 * largest {
+    let remainder = triangle.view((rank, rank), (n - rank, n - rank)).norm();
+    if rank == 0 || rank == n || remainder.is_nan() || remainder > CERTAIN_NULL * n as f64 * largest
+    {
         return None;
     }
     let first = triangle.view((0, 0), (rank, rank)).into_owned();
@@ -183,15 +184,15 @@ fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 /// must be orthonormal.
 pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
     let (n, r) = basis.shape();
-    let mut rest = DMatrix::identity(n, n) - basis * basis.transpose();
+    let mut projector = DMatrix::identity(n, n) - basis * basis.transpose();
     let mut rows = DMatrix::zeros(n - r, n);
     for mut row in rows.row_iter_mut() {
         let longest = (0..n)
-            .max_by(|&i, &j| rest.column(i).norm().total_cmp(&rest.column(j).norm()))
+            .max_by(|&i, &j| projector.column(i).norm().total_cmp(&projector.column(j).norm()))
             .unwrap_or(0);
-        let direction = rest.column(longest).normalize();
-        let along = direction.transpose() * &rest;
-        rest -= &direction * along;
+        let direction = projector.column(longest).normalize();
+        let along = direction.transpose() * &projector;
+        projector -= &direction * along;
         row.copy_from(&direction.transpose());
     }
     rows

@@ -71,16 +71,16 @@ pub(super) fn dots(vectors: &[&[f64]; PANEL], b: &[f64]) -> [f64; PANEL] {
 pub(crate) fn products(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     let rows = a.nrows();
     let column = |i: usize| &a.as_slice()[i.min(a.ncols() - 1) * rows..][..rows];
-    let mut all = DMatrix::zeros(a.ncols(), b.ncols());
+    let mut product = DMatrix::zeros(a.ncols(), b.ncols());
     for first in (0..a.ncols()).step_by(PANEL) {
         let panel: [&[f64]; PANEL] = std::array::from_fn(|i| column(first + i));
         for (j, right) in b.as_slice().chunks_exact(rows.max(1)).enumerate() {
             let sums = dots(&panel, right);
             let count = PANEL.min(a.ncols() - first);
-            all.column_mut(j).rows_mut(first, count).copy_from_slice(&sums[..count]);
+            product.column_mut(j).rows_mut(first, count).copy_from_slice(&sums[..count]);
         }
     }
-    all
+    product
 }
 
 /// Subtracts Σ sᵢ vᵢ from b in one pass over b.

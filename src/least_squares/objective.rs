@@ -399,7 +399,7 @@ mod tests {
         let cache = LinearisationCache::default();
         let (x, shifted) = (DVector::from_vec(vec![0.5, 1e-3]), DVector::from_vec(vec![0.5, 2e-3]));
         let robust = Loss::Huber { threshold: 1.0 };
-        let asked = |x: &DVector<f64>, loss: Loss, data: u64| {
+        let is_evaluated_anew = |x: &DVector<f64>, loss: Loss, data: u64| {
             let fit = Fit::new(&line).with_loss(loss);
             let plain = fit.linearise(x);
             assert!((fit.cost(x) / plain.cost - 1.0).abs() < 1e-12);
@@ -410,16 +410,18 @@ mod tests {
         };
         // The last two points and the first one of the same data are kept; anything else is reduced
         // again.
-        assert!(asked(&x, Loss::Squares, 1));
+        assert!(is_evaluated_anew(&x, Loss::Squares, 1));
         assert!(
-            !asked(&x, Loss::Squares, 1) && asked(&x, robust, 1) && !asked(&x, Loss::Squares, 1)
+            !is_evaluated_anew(&x, Loss::Squares, 1)
+                && is_evaluated_anew(&x, robust, 1)
+                && !is_evaluated_anew(&x, Loss::Squares, 1)
         );
         assert!(
-            asked(&x, Loss::Squares, 2)
-                && asked(&shifted, Loss::Squares, 1)
-                && !asked(&x, Loss::Squares, 1)
+            is_evaluated_anew(&x, Loss::Squares, 2)
+                && is_evaluated_anew(&shifted, Loss::Squares, 1)
+                && !is_evaluated_anew(&x, Loss::Squares, 1)
         );
-        assert!(asked(&x, Loss::Squares, 2));
+        assert!(is_evaluated_anew(&x, Loss::Squares, 2));
     }
 
     /// Curve through many points with two exchangeable unknowns and residuals in some unit.
@@ -467,16 +469,16 @@ mod tests {
         for (unit, step) in [(0.1, 0.0), (0.1, 0.02), (0.5, 0.02)] {
             let curve = Curve { unit };
             let x = &start + DVector::from_vec(vec![step, -2.0 * step, step, 0.5 * step]);
-            let there = base.at(&curve, &x, unit).unwrap().into_linearisation();
+            let predicted = base.at(&curve, &x, unit).unwrap().into_linearisation();
             let residual = residual_vector(&curve, &x);
             let gradient = columns.tr_mul(&residual) * (0.1 / unit);
             assert!(
-                (there.triangle.tr_mul(&there.projected) - &gradient).norm()
+                (predicted.triangle.tr_mul(&predicted.projected) - &gradient).norm()
                     < 1e-6 * gradient.norm()
             );
-            assert!((2.0 * there.cost / residual.norm_squared() - 1.0).abs() < 1e-12);
+            assert!((2.0 * predicted.cost / residual.norm_squared() - 1.0).abs() < 1e-12);
             // The two exchangeable unknowns do not diverge against each other.
-            assert!(there.projected.norm_squared() < residual.norm_squared());
+            assert!(predicted.projected.norm_squared() < residual.norm_squared());
         }
         assert!(base.at(&curve, &(&start * 3.0), 0.1).is_none());
     }

@@ -232,10 +232,10 @@ impl Triangle {
                 let column = &mut column[..used];
                 let mut s = dots(&vectors, column);
                 for i in 0..width {
-                    let at = (first + i) * (n + 1) + first + width + j;
+                    let index = (first + i) * (n + 1) + first + width + j;
                     let earlier: f64 = (0..i).map(|l| coupling[i][l] * s[l]).sum();
-                    s[i] = panel_factors[i] * (self.rows[at] + s[i] - earlier);
-                    self.rows[at] -= s[i];
+                    s[i] = panel_factors[i] * (self.rows[index] + s[i] - earlier);
+                    self.rows[index] -= s[i];
                 }
                 s[width..].fill(0.0);
                 subtract(column, &s, &vectors);
@@ -305,9 +305,9 @@ impl Triangle {
             factors[i] = factor;
             for (l, column) in tail.chunks_exact_mut(m).enumerate() {
                 let column = &mut column[..used];
-                let at = row + i + 1 + l;
-                let s = factor * (self.rows[at] + dot(vector, column));
-                self.rows[at] -= s;
+                let index = row + i + 1 + l;
+                let s = factor * (self.rows[index] + dot(vector, column));
+                self.rows[index] -= s;
                 column.iter_mut().zip(&*vector).for_each(|(c, v)| *c -= s * v);
             }
         }

@@ -50,7 +50,7 @@ pub(crate) fn mean_interval(
     let moment = |k: i32| jackknife.iter().map(|mean| (center - mean).powi(k)).sum::<f64>();
     let scale = moment(2).powf(1.5);
     let acceleration = if scale > 0.0 { moment(3) / (6.0 * scale) } else { 0.0 };
-    let at = |level: f64| {
+    let quantile_of_means = |level: f64| {
         let z = z0 + quantile(level);
         let shifted = z0 + z / (1.0 - acceleration * z).max(0.1);
         let corrected = 0.5 * erfc(-shifted / std::f64::consts::SQRT_2);
@@ -63,7 +63,7 @@ pub(crate) fn mean_interval(
         means[index.min(draws - 1)]
     };
     let tail = (1.0 - covered) / 2.0;
-    Interval { value, low: at(tail), high: at(1.0 - tail) }
+    Interval { value, low: quantile_of_means(tail), high: quantile_of_means(1.0 - tail) }
 }
 
 /// Returns z with Φ(z) = `probability`, limited to four standard deviations.

@@ -141,8 +141,8 @@ fn friction(conditions: &PoseConditions, joint: usize, distance: f64) -> f64 {
                     0.0 => -1.0,
                     side => side,
                 };
-                let kept = 1.0 / (step.abs() / distance).exp();
-                (q, direction * (1.0 - kept) + z * kept)
+                let memory = 1.0 / (step.abs() / distance).exp();
+                (q, direction * (1.0 - memory) + z * memory)
             }
         });
     }

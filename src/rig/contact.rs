@@ -32,13 +32,15 @@ impl Rig {
     fn fixture_offset(&self, fixture: usize, target: &Vector3<f64>) -> Vector3<f64> {
         let Some(fixture) = self.arm.fixtures.get(fixture) else { return Vector3::zeros() };
         let number = |k: usize| fixture.known.get(k).copied().flatten().unwrap_or(0.0);
-        let place = Vector3::new(number(0), number(1), number(2));
+        let position = Vector3::new(number(0), number(1), number(2));
         let scalar = |x: f64| Vector3::new(x, 0.0, 0.0);
         match fixture.kind {
-            FixtureKind::Point => target - place,
-            FixtureKind::Anchor => scalar((target - place).norm()),
-            FixtureKind::Sphere => scalar((target - place).norm() - number(3)),
-            FixtureKind::Plane => scalar(plane_normal(place.x, place.y).dot(target) - place.z),
+            FixtureKind::Point => target - position,
+            FixtureKind::Anchor => scalar((target - position).norm()),
+            FixtureKind::Sphere => scalar((target - position).norm() - number(3)),
+            FixtureKind::Plane => {
+                scalar(plane_normal(position.x, position.y).dot(target) - position.z)
+            }
         }
     }
 
@@ -137,11 +139,11 @@ impl Rig {
                     let q = &mut conditions.configuration[joint];
                     *q = rounded_command(kinds[joint], *q);
                 }
-                let within = |&joint: &usize| {
+                let is_within_range = |&joint: &usize| {
                     let (from, to) = truth.poses.joints[joint];
                     (from..=to).contains(&conditions.configuration[joint])
                 };
-                return Ok(moving.iter().all(within));
+                return Ok(moving.iter().all(is_within_range));
             }
             let mut jacobian = DMatrix::zeros(now.len(), moving.len());
             for (column, &joint) in moving.iter().enumerate() {

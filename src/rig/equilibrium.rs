@@ -32,7 +32,7 @@ impl Equilibrium {
     /// part.
     pub fn find(chain: &Chain) -> Option<Self> {
         let count = chain.pieces.len();
-        let mut rest = Self {
+        let mut equilibrium = Self {
             hinges: Vec::with_capacity(count),
             pieces: Vec::with_capacity(count),
             motions: vec![Motion::default(); count],
@@ -41,26 +41,27 @@ impl Equilibrium {
         // Loads of one piece need not be adjacent.
         let mut loads = chain.loads.clone();
         loads.sort_by_key(|load| load.piece);
-        let mut from = rest.motions.clone();
-        let mut missing = rest.motions.clone();
-        let mut next_missing = rest.motions.clone();
+        let mut from = equilibrium.motions.clone();
+        let mut missing = equilibrium.motions.clone();
+        let mut next_missing = equilibrium.motions.clone();
         let (mut step, mut least) = (1.0, f64::INFINITY);
         for _ in 0..MAX_PASSES {
-            rest.place(chain);
-            let change = rest.load(chain, &loads, &mut next_missing);
+            equilibrium.place(chain);
+            let change = equilibrium.load(chain, &loads, &mut next_missing);
             if change <= TOLERANCE {
-                return Some(rest);
+                return Some(equilibrium);
             }
             if step > MIN_STEP && (change > least || !change.is_finite()) {
                 step /= 2.0;
             } else if change.is_finite() {
                 least = change;
-                from.copy_from_slice(&rest.motions);
+                from.copy_from_slice(&equilibrium.motions);
                 missing.copy_from_slice(&next_missing);
             } else {
                 return None;
             }
-            for ((motion, from), missing) in rest.motions.iter_mut().zip(&from).zip(&missing) {
+            for ((motion, from), missing) in equilibrium.motions.iter_mut().zip(&from).zip(&missing)
+            {
                 motion.rotation = from.rotation + missing.rotation * step;
                 motion.stretch = from.stretch + missing.stretch * step;
             }

@@ -114,14 +114,14 @@ impl Rig {
         let equilibrium = Equilibrium::find(&chain).ok_or(NoEquilibrium)?;
         let tool = &self.arm.tool;
         let named = self.arm.targets.iter().find(|declared| declared.name == target);
-        let (joint, at, rotation) = match named {
+        let (joint, offset, rotation) = match named {
             Some(target) => (target.joint, target.at, target.rotation),
             None => (tool.joint, tool.target, tool.rotation),
         };
         let carrier = equilibrium.frame(frames.get(joint).ok_or(NoEquilibrium)?);
         let base = Frame::from_rotation_vector(self.arm.base.translation, &self.arm.base.rotation);
         let base = self.mounted(conditions).compose(&base);
-        let position = base.point(&carrier.point(&at));
+        let position = base.point(&carrier.point(&offset));
         let axes = base.compose(&carrier).axes;
         let last = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&axes));
         let orientation = UnitQuaternion::from(last) * UnitQuaternion::from_scaled_axis(rotation);

@@ -63,16 +63,16 @@ fn located_effect(
     check_temperature(&cause, &item, problem, poses)?;
     let keys = keys(&cause, &problem.joints);
     let mut values = Vec::with_capacity(keys.len());
-    let mut given = false;
+    let mut has_value = false;
     for (key, unit) in &keys {
         let value = section.number(key, *unit)?;
-        given |= value.is_some();
+        has_value |= value.is_some();
         values.push(value.unwrap_or(0.0));
     }
     section.finish()?;
     let write =
         || keys.iter().map(|(key, unit)| unit.alternatives(key)).collect::<Vec<_>>().join(", ");
-    if !given {
+    if !has_value {
         return Err(item.error(InputErrorKind::NoStrength { write: write() }));
     }
     match (&cause, values.as_slice()) {
@@ -113,12 +113,12 @@ fn declaration<'a, 'i>(section: &Section<'a, 'i>) -> Result<(&'a str, Item<'a, '
 /// Reads `outside = { joint = 2, shape = "bump" }`.
 fn outside(item: &Item<'_, '_>, problem: &Problem) -> Result<Cause, InputError> {
     let mut section = item.section()?;
-    let place = section.require("joint", "joint = …, a joint's number")?;
-    let joint = place.whole(0)?;
+    let item = section.require("joint", "joint = …, a joint's number")?;
+    let joint = item.whole(0)?;
     let joints = problem.joints.len();
     let number = usize::try_from(joint).ok().filter(|number| (1..=joints).contains(number));
     let number =
-        number.ok_or_else(|| place.error(InputErrorKind::UnknownJoint { joint, joints }))?;
+        number.ok_or_else(|| item.error(InputErrorKind::UnknownJoint { joint, joints }))?;
     let shape = section
         .word("shape", &["bump", "step"], &[Shape::Bump, Shape::Step])?
         .unwrap_or(Shape::Bump);

@@ -86,12 +86,12 @@ impl Truth {
     /// Returns the kind of measurement of each row: positions first, then fixtures and tilted
     /// frames in turn; positions only if there are none of these.
     pub(super) fn observations(&self, fixtures: &[Fixture], rows: usize) -> Vec<Observation> {
-        let of = |(index, kind): (usize, FixtureKind)| match kind {
+        let observation = |(index, kind): (usize, FixtureKind)| match kind {
             FixtureKind::Point => Observation::Point(index),
             FixtureKind::Anchor => Observation::Distance(index),
             FixtureKind::Plane | FixtureKind::Sphere => Observation::Surface(index),
         };
-        let fixtures = fixtures.iter().map(|fixture| fixture.kind).enumerate().map(of);
+        let fixtures = fixtures.iter().map(|fixture| fixture.kind).enumerate().map(observation);
         let kinds: Vec<Observation> =
             fixtures.chain(self.tilts.iter().map(|&frame| Observation::Tilt(frame))).collect();
         let of_row = |row: usize| match row.checked_sub(self.positions) {

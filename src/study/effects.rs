@@ -21,10 +21,10 @@ impl Strengths {
             .iter()
             .flat_map(|declared| declared.effect.parameters(&study.problem))
             .collect();
-        let given = given(&study.truth, &study.problem);
+        let values = given(&study.truth, &study.problem);
         let value = |(parameter, normal): (EffectParameter, f64)| {
             let stated =
-                given.iter().find(|(name, _)| *name == parameter.name).map(|(_, value)| *value);
+                values.iter().find(|(name, _)| *name == parameter.name).map(|(_, value)| *value);
             // The rig is always in equilibrium.
             let at_rest = (study.source == Source::Rig
                 && parameter.site == ParameterSite::Arm(ArmField::Mixing))

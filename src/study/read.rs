@@ -93,8 +93,8 @@ fn study(mut root: Section<'_, '_>, file: &Path) -> Result<Study, InputError> {
     }
     root.finish()?;
     effects::check(&problem, &truth, source, || {
-        let place = root.peek("truth").or_else(|| root.peek("effect"));
-        place.map_or_else(
+        let item = root.peek("truth").or_else(|| root.peek("effect"));
+        item.map_or_else(
             || root.error(StudyErrorKind::NeedsRig),
             |item| item.error(StudyErrorKind::NeedsRig),
         )

@@ -125,7 +125,8 @@ fn by_rig(
 
 /// Returns the rows of the virtual test rig as a table of measurements.
 pub fn table(rows: &[Row]) -> Measurements {
-    let of = |value: fn(&Row) -> Option<f64>| rows.iter().map(value).collect::<Option<Vec<f64>>>();
+    let column =
+        |value: fn(&Row) -> Option<f64>| rows.iter().map(value).collect::<Option<Vec<f64>>>();
     let approach: Vec<f64> =
         rows.iter().flat_map(|row| row.conditions.approach.iter().flatten().copied()).collect();
     Measurements {
@@ -138,9 +139,9 @@ pub fn table(rows: &[Row]) -> Measurements {
             .collect(),
         positions: rows.iter().map(|row| row.position).collect(),
         position_measured: true,
-        payload: of(|row| row.conditions.payload),
-        hoist: of(|row| row.conditions.hoist),
-        temperature: of(|row| row.conditions.temperature),
+        payload: column(|row| row.conditions.payload),
+        hoist: column(|row| row.conditions.hoist),
+        temperature: column(|row| row.conditions.temperature),
         time: rows.iter().map(|row| row.conditions.time).collect(),
         time_measured: true,
         approach: (!approach.is_empty()).then_some(approach),

@@ -172,15 +172,15 @@ mod tests {
     #[test]
     fn parts_add_up_to_the_whole() {
         let values = [3.0, -1.0, 4.0, 1.5, -5.0, 9.25];
-        let of = |values: &[f64]| {
+        let moments_of = |values: &[f64]| {
             let mut moments = Moments::default();
             for &value in values {
                 moments.push(value);
             }
             moments
         };
-        let (mut joined, whole) = (of(&values[..2]), of(&values));
-        joined.merge(&of(&values[2..]));
+        let (mut joined, whole) = (moments_of(&values[..2]), moments_of(&values));
+        joined.merge(&moments_of(&values[2..]));
         let mean = values.iter().sum::<f64>() / 6.0;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 5.0;
         let rms = (values.iter().map(|v| v * v).sum::<f64>() / 6.0).sqrt();

@@ -44,26 +44,26 @@ pub(super) fn interior_point(
 
     // Rows: y − B S⁻¹ z = c, then −g S⁻¹ z ≤ −h.
     let (mut row_indices, mut column_indices, mut values) = (Vec::new(), Vec::new(), Vec::new());
-    let mut put = |i: usize, j: usize, value: f64| {
+    let mut push_entry = |i: usize, j: usize, value: f64| {
         row_indices.push(i);
         column_indices.push(j);
         values.push(value);
     };
     let mut right = Vec::with_capacity(rows + spaces.len());
     for i in 0..rows {
-        put(i, n + i, 1.0);
-        (0..n).for_each(|j| put(i, j, -matrix[(i, j)] / sizes[j]));
+        push_entry(i, n + i, 1.0);
+        (0..n).for_each(|j| push_entry(i, j, -matrix[(i, j)] / sizes[j]));
         right.push(factor.constant()[i] / scale);
     }
     for space in spaces {
         let length = space.normal.iter().map(|&(j, g)| (g / sizes[j]).powi(2)).sum::<f64>().sqrt();
-        space.normal.iter().for_each(|&(j, g)| put(right.len(), j, -g / sizes[j] / length));
+        space.normal.iter().for_each(|&(j, g)| push_entry(right.len(), j, -g / sizes[j] / length));
         right.push(-space.offset / scale / length);
     }
     if let Some(radius) = radius {
         right.push(radius / scale);
         for (j, size) in sizes.iter().enumerate() {
-            put(right.len(), j, -size.recip());
+            push_entry(right.len(), j, -size.recip());
             right.push(0.0);
         }
     }

@@ -56,10 +56,10 @@ impl<'a> PolyhedronProblem<'a> {
             let interior =
                 interior_point(self.factor, lambda, &self.polyhedron.half_spaces(), None)
                     .map(|(q, _)| q);
-            let near = |q: &DVector<f64>| self.polyhedron.faces_near(q, FACE_DISTANCE);
-            let refined = interior
-                .as_ref()
-                .and_then(|q| self.active_set(near(q), lambda, (MAX_INTERIOR_CORRECTIONS, 0)));
+            let faces_near = |q: &DVector<f64>| self.polyhedron.faces_near(q, FACE_DISTANCE);
+            let refined = interior.as_ref().and_then(|q| {
+                self.active_set(faces_near(q), lambda, (MAX_INTERIOR_CORRECTIONS, 0))
+            });
             refined.unwrap_or_else(|| {
                 let q = interior.unwrap_or_else(|| DVector::zeros(self.gradient.len()));
                 self.polyhedron.pulled_inside(q, 0.0)

@@ -438,9 +438,9 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
                     x.len(),
                 );
             if forms {
-                let within = |x: &DVector<f64>| self.subproblem.is_feasible(x);
+                let is_feasible = |x: &DVector<f64>| self.subproblem.is_feasible(x);
                 let matrix =
-                    problem.problem("curvature_count", |o| Ok(o.curvature(&x, &within)))?;
+                    problem.problem("curvature_count", |o| Ok(o.curvature(&x, &is_feasible)))?;
                 self.second_order.set_matrix(matrix);
             }
             if is_accepted || forms || retired {

@@ -201,9 +201,12 @@ pub fn of(
     let informative = (0..partial.len()).filter(|&k| view.levers[k].norm() > MIN_LEVER * longest);
     let points: Vec<Point> = informative.map(point).collect();
     let (low, high) = range(points.iter().map(|point| point.x));
-    let at = |step: u32| low + (high - low) * f64::from(step) / f64::from(CURVE_STEPS);
-    let curve: Vec<(f64, f64)> =
-        (0..=CURVE_STEPS).filter(|_| low <= high).map(at).map(|x| (x, (view.law)(x))).collect();
+    let abscissa = |step: u32| low + (high - low) * f64::from(step) / f64::from(CURVE_STEPS);
+    let curve: Vec<(f64, f64)> = (0..=CURVE_STEPS)
+        .filter(|_| low <= high)
+        .map(abscissa)
+        .map(|x| (x, (view.law)(x)))
+        .collect();
     let up = (view.up)(largest(&points, &curve));
     let title = effect.describe_in(poses.measurements.time_measured);
     Some(Cause { title, across: view.across, up, points, curve, reading: view.reading })
@@ -487,9 +490,9 @@ fn of_payload<'a>(rows: &'a Rows) -> Option<View<'a>> {
 /// Returns the empirical correction of unexplained structure, less its mean; `None` if it does not
 /// depend on a single covariate or the order of the rows.
 pub fn unexplained(structure: &Unexplained, problem: &Problem, split: &Split) -> Option<Cause> {
-    let of = structure.correction.as_ref()?.curve.as_ref()?;
+    let correction = structure.correction.as_ref()?.curve.as_ref()?;
     let mut curve: Vec<(f64, f64)> =
-        of.points.iter().map(|point| (point.covariate, point.correction)).collect();
+        correction.points.iter().map(|point| (point.covariate, point.correction)).collect();
     curve.sort_by(|a, b| a.0.total_cmp(&b.0));
     let trapezoid = |pair: &[(f64, f64)]| (pair[1].0 - pair[0].0) * 0.5 * (pair[0].1 + pair[1].1);
     let width = curve.last()?.0 - curve.first()?.0;
@@ -498,7 +501,7 @@ pub fn unexplained(structure: &Unexplained, problem: &Problem, split: &Split) ->
     for (_, y) in &mut curve {
         *y -= mean;
     }
-    let across = match of.covariate {
+    let across = match correction.covariate {
         Covariate::Temperature => Quantity::temperature(),
         Covariate::Time => Quantity::elapsed(range(curve.iter().map(|at| at.0)).1),
         Covariate::Payload => Quantity::new("payload [kg]", 1.0),
@@ -507,9 +510,9 @@ pub fn unexplained(structure: &Unexplained, problem: &Problem, split: &Split) ->
         Covariate::Own(ref name) => Quantity::new(&**name, 1.0),
         _ => return None,
     };
-    let longest = of.points.iter().map(|point| point.lever).fold(0.0, f64::max);
+    let longest = correction.points.iter().map(|point| point.lever).fold(0.0, f64::max);
     let informative =
-        of.points.iter().enumerate().filter(|(_, point)| point.lever > MIN_LEVER * longest);
+        correction.points.iter().enumerate().filter(|(_, point)| point.lever > MIN_LEVER * longest);
     let point = |(k, point): (usize, &PartialResidual)| Point {
         x: point.covariate,
         y: point.value - mean,
@@ -518,7 +521,7 @@ pub fn unexplained(structure: &Unexplained, problem: &Problem, split: &Split) ->
     };
     let points: Vec<Point> = informative.map(point).collect();
     let site = structure.site?;
-    let up = Quantity::error(&site.to_string(), of.unit);
+    let up = Quantity::error(&site.to_string(), correction.unit);
     let title = format!("{site}: structure without a known cause");
     Some(Cause { title, across, up, points, curve, reading: COORDINATE })
 }

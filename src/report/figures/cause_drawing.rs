@@ -42,16 +42,16 @@ impl Cause {
     fn draw(&self, shown: &[usize], name: &str, law: &str, lead: &str) -> Drawing {
         let is_finite = |point: &&Point| point.x.is_finite() && point.y.is_finite();
         let finite: Vec<&Point> = self.points.iter().filter(is_finite).collect();
-        let at = |x: f64, y: f64| (x * self.across.factor, y * self.up.factor);
+        let scaled = |x: f64, y: f64| (x * self.across.factor, y * self.up.factor);
         let is_shown =
             |k: &usize| finite[*k].row.is_none_or(|row| shown.binary_search(&row).is_ok());
         let candidates: Vec<usize> = (0..finite.len()).filter(is_shown).collect();
         let deviation = |k: usize| finite[k].y - law_at(&self.curve, finite[k].x);
         let sampled = sample(&candidates, MAX_POSES, deviation);
         let points: Vec<((f64, f64), &Point)> =
-            sampled.iter().map(|&k| (at(finite[k].x, finite[k].y), finite[k])).collect();
-        let curve: Vec<(f64, f64)> = self.curve.iter().map(|&(x, y)| at(x, y)).collect();
-        let every_point = || points.iter().map(|(at, _)| *at).chain(curve.iter().copied());
+            sampled.iter().map(|&k| (scaled(finite[k].x, finite[k].y), finite[k])).collect();
+        let curve: Vec<(f64, f64)> = self.curve.iter().map(|&(x, y)| scaled(x, y)).collect();
+        let every_point = || points.iter().map(|(scaled, _)| *scaled).chain(curve.iter().copied());
         let x = with_margin(range(every_point().map(|at| at.0)), 0.04);
         let deviation = |&(x, y): &(f64, f64)| y - law_at(&curve, x);
         let limit = axis_limit(points.iter().map(|(at, _)| deviation(at)));

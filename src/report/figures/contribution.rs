@@ -39,7 +39,7 @@ pub fn of(
     (identification, rows): (&Identification, &[usize]),
 ) -> Vec<Contribution> {
     let rows = sample(rows, MAX_POSES, |_| 0.0);
-    let with = poses.errors(arm, &rows);
+    let errors = poses.errors(arm, &rows);
     let moved = |indices: &[usize]| {
         let mut without = arm.clone();
         for &k in indices {
@@ -48,8 +48,8 @@ pub fn of(
         let changes = poses
             .errors(&without, &rows)
             .into_iter()
-            .zip(&with)
-            .map(|(without, with)| without - with);
+            .zip(&errors)
+            .map(|(without, errors)| without - errors);
         let squares: Vec<f64> = changes
             .map(|change| change.norm_squared())
             .filter(|square| square.is_finite())

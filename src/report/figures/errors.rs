@@ -104,9 +104,9 @@ fn draw_stages(
     norms.sort_by(f64::total_cmp);
     let typical = norms.get(norms.len() / 2).copied().unwrap_or(1e-3).max(1e-9);
     let floor = (FLOOR * typical * 1e3).log10();
-    let most =
+    let largest =
         range(stages.iter().flat_map(|stage| &stage.errors).map(|error| error.norm() * 1e3)).1;
-    let extent = (floor, most.log10() + 0.1);
+    let extent = (floor, largest.log10() + 0.1);
     let mark = |index: usize| if index > 0 { Mark::Dot } else { Mark::Ring };
     let entries: Vec<(&str, RGBColor, Mark)> = stages
         .iter()
@@ -155,10 +155,10 @@ fn draw_axis(
         let colour = colour(index, stages.len());
         let value = |error: &Vector3<f64>| if axis == 3 { error.norm() } else { error[axis].abs() };
         let finite = shown.iter().copied().filter(|&k| stage.errors[k].norm().is_finite());
-        let at = |k: usize| {
+        let position = |k: usize| {
             (k as f64 + 1.0, (value(&stage.errors[k]) * 1e3).log10().clamp(y.range.0, y.range.1))
         };
-        let points: Vec<(usize, (f64, f64))> = finite.map(|k| (k, at(k))).collect();
+        let points: Vec<(usize, (f64, f64))> = finite.map(|k| (k, position(k))).collect();
         chart.draw_series(LineSeries::new(
             points.iter().map(|(_, at)| *at),
             colour.mix(0.45).stroke_width(3),

@@ -23,15 +23,15 @@ struct JointRange {
 
 /// Returns the ranges of a joint in ascending order.
 fn joint_ranges(data: &PlotData, joint: usize) -> Vec<JointRange> {
-    let of =
+    let positions =
         || data.residuals.iter().filter(|pose| pose.has_place() && pose.error.norm().is_finite());
-    let (low, high) = range(of().map(|pose| pose.configuration[joint]));
+    let (low, high) = range(positions().map(|pose| pose.configuration[joint]));
     if high - low <= 0.0 || !(high - low).is_finite() {
         return Vec::new();
     }
     let width = (high - low) / RANGES as f64;
     let mut sums = vec![(0.0, 0_usize); RANGES];
-    for pose in of() {
+    for pose in positions() {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,

@@ -14,22 +14,22 @@ const NAMES: i32 = 200;
 /// Smallest p value that is distinguished from zero.
 const MIN_P: f64 = 1e-300;
 
-/// Returns the name of an effect with its place, as in a problem file.
-fn named(found: &Effect, trace: &Trace) -> String {
-    let name = found.name();
-    match (found.searched_value(), found.joint()) {
+/// Returns the name of an effect with its site, as in a problem file.
+fn named(effect: &Effect, trace: &Trace) -> String {
+    let name = effect.name();
+    match (effect.searched_value(), effect.joint()) {
         (Some((ArgumentKind::Time, time)), _) if trace.time_measured => {
             format!("{name} {time:.0} s")
         }
         (Some((ArgumentKind::Time, time)), _) => format!("{name} row {}", time.ceil()),
         (Some((ArgumentKind::Order, order)), Some(joint)) => format!("{name} {joint} ×{order}"),
-        _ if found.has_memory() => found.name_and_place(),
+        _ if effect.has_memory() => effect.name_and_place(),
         (Some((ArgumentKind::Duration, time_constant)), _) => format!("{name} {time_constant} s"),
         _ => {
-            let orders = found.harmonic_orders().map_or_else(String::new, |orders| {
+            let orders = effect.harmonic_orders().map_or_else(String::new, |orders| {
                 format!(" ×{}", orders.iter().map(u32::to_string).collect::<Vec<_>>().join(","))
             });
-            format!("{name} {}{orders}", found.place()).trim_end().to_owned()
+            format!("{name} {}{orders}", effect.place()).trim_end().to_owned()
         }
     }
 }
@@ -39,7 +39,7 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
     let shown: Vec<&Ranked> = trace.ranking.iter().take(MAX_CANDIDATES).collect();
     let first = shown.first()?;
     let evidence = |ranked: &Ranked| -ranked.p_value.max(MIN_P).log10();
-    let most = shown
+    let highest = shown
         .iter()
         .map(|ranked| evidence(ranked))
         .fold(1.0, f64::max)
@@ -47,9 +47,9 @@ pub fn ranking(trace: &Trace) -> Option<Drawing> {
     let alike = |ranked: &Ranked| first.alike.iter().any(|(other, _)| *other == ranked.effect);
     let count = i32::try_from(shown.len()).unwrap_or_default();
     let (top, bottom) = (10, 10 + ROW * count);
-    let position = |value: f64| px(NAMES) + pixels(value / most * f64::from(WIDTH - NAMES - 96));
+    let position = |value: f64| px(NAMES) + pixels(value / highest * f64::from(WIDTH - NAMES - 96));
     let svg = figure((WIDTH, bottom + BELOW), "Candidate effects by evidence", |area| {
-        for (value, number) in round_numbers((0.0, most), 5) {
+        for (value, number) in round_numbers((0.0, highest), 5) {
             let at = position(value);
             vertical_line(area, at, (top, bottom), GRID)?;
             write(area, &number, (at / px(1), bottom + 10), MUTED, HPos::Center)?;

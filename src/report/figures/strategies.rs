@@ -123,16 +123,16 @@ fn sheet(entries: &[Entry]) -> Sheet {
 }
 
 fn rows(entries: &[Entry], label: &str) -> String {
-    let of = |entry: &Entry| {
+    let log_means = |entry: &Entry| {
         [entry.errors.identification.mean.norm, entry.errors.held_out.mean.norm]
             .map(|e| (e * 1e3).max(1e-9).log10())
     };
-    let (low, high) = range(entries.iter().flat_map(of));
+    let (low, high) = range(entries.iter().flat_map(log_means));
     let (low, high) = if low < high { ((low - 0.1), (high + 0.1)) } else { (low - 0.5, low + 0.5) };
     let bottom = TOP + ROW * i32::try_from(entries.len()).unwrap_or_default();
     let room = f64::from(WIDTH - NAMES - NUMBERS);
     let position = |value: f64| px(NAMES) + pixels((value - low) / (high - low) * room);
-    let best = entries.iter().map(|entry| of(entry)[1]).fold(f64::INFINITY, f64::min);
+    let best = entries.iter().map(|entry| log_means(entry)[1]).fold(f64::INFINITY, f64::min);
     figure((WIDTH, bottom + BELOW), label, |area| {
         let marks = [("fitted poses", FAINT), ("held-out poses", INK), ("best", ACCENT)];
         legend(area, TOP, &marks.map(|(name, colour)| (name, colour, Mark::Dot)))?;
@@ -152,7 +152,7 @@ fn rows(entries: &[Entry], label: &str) -> String {
         }
         for (k, entry) in (0..).zip(entries) {
             let y = TOP + ROW * k + ROW / 2;
-            let [fitted, held_out] = of(entry);
+            let [fitted, held_out] = log_means(entry);
             let colour = if held_out <= best + 1e-4 { ACCENT } else { INK };
             write(area, &entry.name, (NAMES - 10, y), INK, HPos::Right)?;
             if !(fitted.is_finite() && held_out.is_finite()) {

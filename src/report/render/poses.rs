@@ -63,8 +63,8 @@ fn millimetres(length: &Vector3<f64>, decimals: i32) -> [f64; 3] {
 /// Returns the points of the rigid arm \[mm\].
 fn rigid(arm: &CentreLine) -> Vec<i64> {
     #[expect(clippy::cast_possible_truncation, reason = "millimetres of an arm")]
-    let whole = |x: f64| (x * 1e3).round() as i64;
-    arm.rigid.iter().flat_map(|at| [at.x, at.y, at.z]).map(whole).collect()
+    let rounded = |x: f64| (x * 1e3).round() as i64;
+    arm.rigid.iter().flat_map(|at| [at.x, at.y, at.z]).map(rounded).collect()
 }
 
 /// Returns the deflections of these points \[mm\].

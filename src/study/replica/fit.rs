@@ -54,16 +54,16 @@ pub(super) fn dataset(
     held_out: &[MeasuredPose],
 ) -> Result<Dataset, DatasetError> {
     let rows = || poses.iter().chain(held_out);
-    let of =
+    let column =
         |value: fn(&MeasuredPose) -> Option<f64>| rows().map(value).collect::<Option<Vec<f64>>>();
     let configurations = rows().map(|pose| pose.conditions.configuration.clone());
     let mut builder =
         Dataset::builder(configurations, rows().map(|pose| pose.position).collect::<Vec<_>>())
             .held_out(poses.len()..poses.len() + held_out.len());
-    if let Some(payload) = of(|pose| pose.conditions.payload) {
+    if let Some(payload) = column(|pose| pose.conditions.payload) {
         builder = builder.payload(payload);
     }
-    if let Some(hoist) = of(|pose| pose.conditions.hoist) {
+    if let Some(hoist) = column(|pose| pose.conditions.hoist) {
         builder = builder.hoist(hoist);
     }
     builder.build()

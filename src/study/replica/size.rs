@@ -32,17 +32,17 @@ pub fn sizes(study: &MisprintStudy) -> Vec<f64> {
     let size = |misprint: Misprint| {
         let of_row = |row: &crate::rig::Row| {
             let view = row.conditions.view();
-            let at = |parameters: &Parameters, reading: Reading| {
+            let end_point = |parameters: &Parameters, reading: Reading| {
                 EndPoint::new(problem, parameters, &view, &reading)
             };
             let (corrected, printed) = (Reading::default(), Reading::from(misprint));
             if misprint == Misprint::BetaLeftOut {
-                return (at(&nominal, corrected).jacobian() * &beta).norm();
+                return (end_point(&nominal, corrected).jacobian() * &beta).norm();
             }
-            let elastic = at(&true_geometry, printed).deflection(&true_geometry)
-                - at(&true_geometry, corrected).deflection(&true_geometry);
-            let geometric =
-                at(&nominal, printed).jacobian() * &e - at(&nominal, corrected).jacobian() * &e;
+            let elastic = end_point(&true_geometry, printed).deflection(&true_geometry)
+                - end_point(&true_geometry, corrected).deflection(&true_geometry);
+            let geometric = end_point(&nominal, printed).jacobian() * &e
+                - end_point(&nominal, corrected).jacobian() * &e;
             elastic.norm().max(geometric.norm())
         };
         rows.iter().map(of_row).fold(0.0, f64::max)
