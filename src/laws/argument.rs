@@ -157,16 +157,16 @@ pub(super) trait Field: Sized {
 
 /// Implements [`Field`] for a type that is one variant of [`Argument`].
 macro_rules! field {
-    ($type:ty, $variant:ident, $own:ident => $to:expr, $from:expr) => {
+    ($type:ty, $variant:ident, $value:ident => $to:expr, $from:expr) => {
         impl Field for $type {
             fn argument(&self, key: &'static str) -> (&'static str, Argument) {
-                let $own = self;
+                let $value = self;
                 (key, Argument::$variant($to))
             }
 
             fn of(argument: &Argument) -> Option<Self> {
                 match argument {
-                    Argument::$variant($own) => Some($from),
+                    Argument::$variant($value) => Some($from),
                     _ => None,
                 }
             }

@@ -34,7 +34,7 @@ macro_rules! catalogue {
         #[expect(missing_docs, reason = "arguments carry the names of the file format")]
         pub enum Effect {
             $($(#[$doc])* $variant $({ $($field: $type),+ })?,)+
-            /// A law of the user's own, or one that the search for effects wrote down.
+            /// Declared law, or one that the search for effects wrote down.
             Law(Law),
         }
 
@@ -45,7 +45,7 @@ macro_rules! catalogue {
             ..$family
         }),+];
 
-        /// Names of effects in files: the families, and laws of the user's own.
+        /// Names of effects in files: the families, and declared laws.
         pub(crate) const NAMES: &[&str] = &[$($name,)+ LAW];
 
         /// Place of each family in [`FAMILIES`].
@@ -55,7 +55,7 @@ macro_rules! catalogue {
         }
 
         impl Effect {
-            /// Returns the family; `None` for a law of the user's own.
+            /// Returns the family; `None` for a declared law.
             pub fn family(&self) -> Option<&'static Family> {
                 let index = match self {
                     $(Self::$variant $({ $($field: _),+ })? => Index::$variant,)+

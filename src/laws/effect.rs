@@ -45,7 +45,7 @@ impl Effect {
 
     /// Returns the value of an argument by its key.
     pub fn argument(&self, key: &str) -> Option<Argument> {
-        self.arguments().into_iter().find(|(own, _)| *own == key).map(|(_, argument)| argument)
+        self.arguments().into_iter().find(|(known, _)| *known == key).map(|(_, argument)| argument)
     }
 
     /// Returns the number, from 1, of the joint at which the effect acts.
@@ -117,9 +117,9 @@ impl Effect {
             Some((key, Argument::Orders(orders))) => orders
                 .iter()
                 .flat_map(|&order| {
-                    let single = |(own, argument): &(_, Argument)| {
+                    let single = |(known, argument): &(_, Argument)| {
                         let order = Argument::Orders(vec![order]);
-                        (*own, if own == key { order } else { argument.clone() })
+                        (*known, if known == key { order } else { argument.clone() })
                     };
                     let arguments: Vec<(&str, Argument)> = arguments.iter().map(single).collect();
                     entries().filter_map(|entry| one(entry, &arguments)).collect::<Vec<_>>()
@@ -161,7 +161,9 @@ impl Effect {
     pub fn acts_at(&self, at: At) -> bool {
         match self {
             Self::Law(law) => law.at() == at,
-            _ => self.family().is_some_and(|own| own.terms.iter().any(|entry| entry.at == at)),
+            _ => {
+                self.family().is_some_and(|family| family.terms.iter().any(|entry| entry.at == at))
+            }
         }
     }
 
@@ -210,7 +212,8 @@ impl Effect {
     /// that joint itself.
     pub fn waves(&self) -> Vec<(usize, f64)> {
         let Some((joint, from)) = self.function_of() else { return Vec::new() };
-        let wave = |entry: EffectTerm| entry.formula.and_then(|own| own.expression.wave_order());
+        let wave =
+            |entry: EffectTerm| entry.formula.and_then(|formula| formula.expression.wave_order());
         let waves = self.loose_entries().into_iter().filter_map(wave);
         let mut orders: Vec<f64> = waves.filter(|_| joint == from).collect();
         orders.dedup();
@@ -316,8 +319,12 @@ impl Effect {
     fn with(&self, key: &str, value: Argument) -> Option<Self> {
         let arguments = self.arguments();
         Self::build(self.name(), |wanted| {
-            let own = || arguments.iter().find(|(own, _)| *own == wanted);
-            if wanted == key { Some(value.clone()) } else { own().map(|own| own.1.clone()) }
+            let present = || arguments.iter().find(|(known, _)| *known == wanted);
+            if wanted == key {
+                Some(value.clone())
+            } else {
+                present().map(|(_, value)| value.clone())
+            }
         })
     }
 

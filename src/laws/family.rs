@@ -197,7 +197,7 @@ pub enum Need {
 pub enum Search {
     /// One candidate at each place; nothing else is open.
     Places,
-    /// No candidate: declared effects alone, or a search of its own.
+    /// No candidate: declared effects alone, or a separate search.
     Declared,
     /// Each whole order up to 60.
     Orders,

@@ -1,4 +1,4 @@
-//! Laws of the user's own: terms with formulas at one site, declared in a problem or found.
+//! Declared laws: terms with formulas at one site, declared in a problem or found.
 
 use super::argument::Argument;
 use super::expression::{FormulaError, Names, Parsed, Vocabulary, parse};
@@ -7,7 +7,7 @@ use super::parameter::LawParameter;
 use super::site::BeamField;
 use super::term::EffectTerm;
 
-/// Name of laws of the user's own in files.
+/// Name of declared laws in files.
 pub(crate) const LAW: &str = "law";
 
 /// Law that the user declares or that a search writes down: Δ = Σ cₖ fₖ at one site.
@@ -147,7 +147,8 @@ impl Law {
         parameters: Vec<LawParameter>,
         vocabulary: &Vocabulary,
     ) -> Result<Self, (usize, FormulaError)> {
-        let words: Vec<String> = parameters.iter().map(|own| own.name.clone()).collect();
+        let words: Vec<String> =
+            parameters.iter().map(|parameter| parameter.name.clone()).collect();
         let vocabulary = Vocabulary { parameters: &words, ..*vocabulary };
         let read = |(k, term): (usize, &_)| {
             let term: &str = AsRef::as_ref(term);
@@ -195,14 +196,15 @@ impl Law {
 
     /// Returns true if a formula uses a named parameter.
     pub fn uses(&self, parameter: &str) -> bool {
-        let index = self.parameters.iter().position(|own| own.name == parameter);
+        let index = self.parameters.iter().position(|known| known.name == parameter);
         let uses = |term: &Parsed| index.is_some_and(|index| term.expression.uses(index));
         self.terms.iter().any(uses)
     }
 
     /// Returns the formulas with their names.
     pub fn formulas(&self) -> Vec<String> {
-        let parameters: Vec<String> = self.parameters.iter().map(|own| own.name.clone()).collect();
+        let parameters: Vec<String> =
+            self.parameters.iter().map(|parameter| parameter.name.clone()).collect();
         let names = Names { covariates: &self.covariates, parameters: &parameters };
         self.terms.iter().map(|term| term.expression.display(names).to_string()).collect()
     }

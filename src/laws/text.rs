@@ -16,7 +16,7 @@ pub(super) fn filled(text: &str, arguments: &[(&str, Argument)]) -> String {
         out.push_str(before);
         let Some((inner, behind)) = after.split_once('}') else { break };
         let (key, form) = inner.split_once(':').unwrap_or((inner, ""));
-        if let Some((_, argument)) = arguments.iter().find(|(own, _)| *own == key) {
+        if let Some((_, argument)) = arguments.iter().find(|(known, _)| *known == key) {
             out.push_str(&shown(argument, form));
         }
         rest = behind;

@@ -2,7 +2,6 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::laws::Quantity;
 use crate::model::parameter::{Parameter, ParameterSite, Regressor, value_regressor};
 use crate::problem::PoseView;
 use crate::spatial::Frame;
@@ -47,20 +46,17 @@ impl Instrument {
         instrument
     }
 
-    /// Returns the part that moves the arm itself: bases that follow covariates. Errors of the
-    /// instrument are left out.
+    /// Returns the part that moves the arm itself: motions of the bases. Errors of the instrument
+    /// are left out.
     pub fn without_errors(&self) -> Self {
-        let follow_covariates = |terms: &[(usize, Regressor, f64)]| {
-            let follows = |(_, regressor, _): &&(usize, Regressor, f64)| {
-                matches!(regressor.as_quantity(), Some(Quantity::Covariate(_)))
-            };
-            terms.iter().filter(follows).cloned().collect()
+        let of_bases = |terms: &[(usize, Regressor, f64)]| {
+            terms.iter().filter(|(_, regressor, _)| regressor.moves_base()).cloned().collect()
         };
         Self {
             scale: 0.0,
             strain: None,
-            shifts: follow_covariates(&self.shifts),
-            rotations: follow_covariates(&self.rotations),
+            shifts: of_bases(&self.shifts),
+            rotations: of_bases(&self.rotations),
         }
     }
 

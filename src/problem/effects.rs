@@ -76,7 +76,7 @@ fn check_compensators(effects: &[EffectDeclaration], joints: &[Joint]) -> Result
                 .clone()
                 .error(InputErrorKind::RepeatedCompensator { joint, line }));
         }
-        if !gives_way(joint, joints, effects.iter().map(|own| &own.effect)) {
+        if !gives_way(joint, joints, effects.iter().map(|declared| &declared.effect)) {
             return Err(location.clone().error(InputErrorKind::NothingToRelieve { joint }));
         }
     }
@@ -90,7 +90,7 @@ pub(crate) fn gives_way<'e>(
     joints: &[Joint],
     mut effects: impl Iterator<Item = &'e Effect>,
 ) -> bool {
-    let stiff = joints.get(joint.wrapping_sub(1)).is_some_and(|own| own.stiffness.is_some());
+    let stiff = joints.get(joint.wrapping_sub(1)).is_some_and(|joint| joint.stiffness.is_some());
     stiff || effects.any(|effect| effect.gives_way(joint))
 }
 
@@ -134,7 +134,7 @@ fn written(text: String, named: &Path, problem: &Problem) -> Result<EffectDeclar
     Ok(declared)
 }
 
-/// Reads an effect of the catalogue, or a law of the user's own.
+/// Reads an effect of the catalogue, or a declared law.
 fn declared(
     name: &str,
     item: &Item<'_, '_>,
@@ -165,6 +165,7 @@ pub(crate) fn effect(
         found.push((key, arguments.read(key, *kind)?));
     }
     arguments.section.finish()?;
-    let argument = |key: &str| found.iter().find(|(own, _)| *own == key).map(|own| own.1.clone());
+    let argument =
+        |key: &str| found.iter().find(|(known, _)| *known == key).map(|(_, value)| value.clone());
     Effect::build(name, argument).ok_or_else(unknown)
 }

@@ -1,4 +1,4 @@
-//! Laws of the user's own: `law = { name, at, terms, sigma_…, parameters }`.
+//! Declared laws: `law = { name, at, terms, sigma_…, parameters }`.
 
 use super::item::Item;
 use super::section::Section;
@@ -34,8 +34,9 @@ pub(super) fn read(
     let prior = prior(&mut section, unit(&site, joints))?;
     let parameters = parameters(&mut section)?;
     let formulas = formulas(&terms)?;
-    let slides: Vec<bool> = joints.iter().map(|own| own.kind == JointKind::Prismatic).collect();
-    let covariates: Vec<String> = data.covariates.iter().map(|own| own.name.clone()).collect();
+    let slides: Vec<bool> = joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect();
+    let covariates: Vec<String> =
+        data.covariates.iter().map(|covariate| covariate.name.clone()).collect();
     let vocabulary =
         Vocabulary { slides: &slides, joints: &names, covariates: &covariates, parameters: &[] };
     let texts: Vec<&str> = formulas.iter().map(|(_, text)| *text).collect();
@@ -91,7 +92,7 @@ fn word(item: &Item, text: &str, noun: &'static str) -> Result<String, InputErro
 /// Returns the unit of the quantity that a law adds to.
 fn unit(site: &LawSite, joints: &[Joint]) -> Unit {
     let slides = |number: usize| {
-        joints.get(number.wrapping_sub(1)).is_some_and(|own| own.kind == JointKind::Prismatic)
+        joints.get(number.wrapping_sub(1)).is_some_and(|joint| joint.kind == JointKind::Prismatic)
     };
     match site.at {
         At::Coordinate if site.joint().is_some_and(slides) => Unit::Length,
@@ -128,9 +129,9 @@ fn parameters(section: &mut Section<'_, '_>) -> Result<Vec<LawParameter>, InputE
             return Err(item.error(InputErrorKind::NotAWord { name, noun }));
         }
         let name = word(&item, key, "a parameter of a formula")?;
-        let mut own = item.section()?;
-        let start = own.require("start", "start = …, the value at which the fit begins")?;
-        let mut number = |key: &str| own.get(key).map(|item| item.number()).transpose();
+        let mut section = item.section()?;
+        let start = section.require("start", "start = …, the value at which the fit begins")?;
+        let mut number = |key: &str| section.get(key).map(|item| item.number()).transpose();
         let (min, max, sigma) = (number("min")?, number("max")?, number("sigma")?);
         let parameter = LawParameter { name, start: start.number()?, min, max, sigma };
         if sigma.is_some_and(|sigma| sigma <= 0.0) {
@@ -143,7 +144,7 @@ fn parameters(section: &mut Section<'_, '_>) -> Result<Vec<LawParameter>, InputE
             let start_value = parameter.start;
             return Err(start.error(InputErrorKind::StartOutOfBounds { start: start_value }));
         }
-        own.finish()?;
+        section.finish()?;
         parameters.push(parameter);
     }
     if let Some(extra) = parameters.get(MAX_PARAMETERS)

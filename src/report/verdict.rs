@@ -174,10 +174,8 @@ fn doubted((place, at): (&str, f64), law: f64, words: &str, rival: Option<&str>)
 
 /// Describes an effect, followed by its declaration unless that lists many orders.
 pub(super) fn declared(effect: &NamedEffect) -> String {
-    match &effect.effect {
-        Effect::JointHarmonic { orders, .. } if orders.len() > MOST_LISTED => {
-            effect.description.clone()
-        }
+    match effect.effect.harmonic_orders() {
+        Some(orders) if orders.len() > MOST_LISTED => effect.description.clone(),
         _ => format!("{}: {}", effect.description, code(&effect.declaration)),
     }
 }

@@ -172,7 +172,7 @@ fn mistakes_are_located() {
         (
             "at = 'joint2', terms = ['k*q1']",
             "terms[1]",
-            "unknown word k; a parameter of your own takes k = { start = … }",
+            "unknown word k; a parameter of the formula takes k = { start = … }",
         ),
         ("at = 'joint2', terms = ['q1'], k = { start = 1 }", "k", "no formula of this law uses k"),
         (

@@ -29,7 +29,7 @@ pub enum Mistake {
         found: String,
     },
     /// A word that is neither quantity, function nor parameter.
-    #[error("unknown word {word}{}; a parameter of your own takes {word} = {{ start = … }}", meant(.near.as_deref()))]
+    #[error("unknown word {word}{}; a parameter of the formula takes {word} = {{ start = … }}", meant(.near.as_deref()))]
     UnknownWord {
         /// The word.
         word: String,

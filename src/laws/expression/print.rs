@@ -73,7 +73,8 @@ impl fmt::Display for Named<'_> {
                     Operator::Power => ("^", (5, 3)),
                     Operator::Atan2 | Operator::Minimum | Operator::Maximum => {
                         let mut calls = Operator::CALLS.iter();
-                        let name = calls.find(|(own, _)| own == operator).map_or("", |own| own.1);
+                        let name =
+                            calls.find(|(known, _)| known == operator).map_or("", |call| call.1);
                         return write!(f, "{name}({}, {})", named(left), named(right));
                     }
                 };

@@ -42,7 +42,7 @@ pub fn candidates(problem: &Problem, data: &DataCoverage) -> Vec<Candidate> {
         let found = found.flat_map(move |place| searched(family, place, data));
         found.filter_map(move |arguments| {
             let argument = |key: &str| {
-                arguments.iter().find(|(own, _)| *own == key).map(|(_, value)| value.clone())
+                arguments.iter().find(|(known, _)| *known == key).map(|(_, value)| value.clone())
             };
             let effect = Effect::build(family.name, argument)?;
             let conceivable = family.only.iter().all(|only| effect.meets(*only, problem));
@@ -106,7 +106,8 @@ fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
             .iter()
             .flat_map(|place| {
                 let others = values.iter().filter(|value| {
-                    kind != ArgumentKind::OtherJoint || place.iter().all(|(_, own)| own != *value)
+                    kind != ArgumentKind::OtherJoint
+                        || place.iter().all(|(_, known)| known != *value)
                 });
                 others.map(|value| [place.as_slice(), &[(key, value.clone())]].concat())
             })
@@ -156,7 +157,7 @@ fn searched(family: &Family, place: Arguments, data: &DataCoverage) -> Vec<Argum
 }
 
 impl Effect {
-    /// Returns the reason why these data cannot show a law of the user's own, if they cannot;
+    /// Returns the reason why these data cannot show a declared law, if they cannot;
     /// candidates of the catalogue come with their reason.
     pub fn untestable(&self, problem: &Problem, data: &DataCoverage) -> Option<&'static str> {
         if !matches!(self, Self::Law(_)) {

@@ -21,7 +21,7 @@ pub struct DataCoverage {
     /// Usual time between two poses of a session, and that of the longest session from end to end
     /// \[s\]; `None` where times were not measured: what was before a pose is not known.
     pub clock: Option<(f64, f64)>,
-    /// For each of the problem's own covariates, whether it is known and changes.
+    /// For each covariate of the problem, whether it is known and changes.
     pub covariates: Vec<bool>,
     /// Gravity, arm base frame [m/s²].
     pub gravity: Vector3<f64>,
@@ -70,6 +70,6 @@ pub struct Columns {
     pub approach: bool,
     /// Times.
     pub time: bool,
-    /// The problem's own covariates.
+    /// Covariates of the problem.
     pub covariates: bool,
 }

@@ -1,7 +1,7 @@
 //! Effects of the catalogue on an arm: their parameters, and the candidates of a search.
 //!
 //! Entries of the [catalogue](crate::laws) are data; here they meet a problem. To add a family, add
-//! an entry to `src/laws/catalogue.rs`; docs/effects.md walks through it. A law of the user's own
+//! an entry to `src/laws/catalogue.rs`; docs/effects.md walks through it. A declared law
 //! needs no entry: a problem declares it.
 
 mod candidates;

@@ -8,7 +8,7 @@ pub(super) fn slides(problem: &Problem, joint: usize) -> bool {
     joint
         .checked_sub(1)
         .and_then(|index| problem.joints.get(index))
-        .is_some_and(|own| own.kind == JointKind::Prismatic)
+        .is_some_and(|joint| joint.kind == JointKind::Prismatic)
 }
 
 impl ParameterSite {
@@ -31,7 +31,7 @@ pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
     let beam =
         |joint: &Joint| joint.beam.as_ref().map_or(0.0, |beam| beam.mass + all(&beam.masses));
     let tree = problem.tree();
-    let own = &problem.joints[joint - 1];
+    let first = &problem.joints[joint - 1];
     let beyond = || {
         problem
             .joints
@@ -40,15 +40,15 @@ pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
             .skip(joint)
             .filter(|(k, _)| tree.path_contains(joint - 1, *k))
     };
-    let mass =
-        all(&own.bodies) + beyond().map(|(_, joint)| all(&joint.bodies) + beam(joint)).sum::<f64>();
+    let mass = all(&first.bodies)
+        + beyond().map(|(_, joint)| all(&joint.bodies) + beam(joint)).sum::<f64>();
     let payload = if tree.path_contains(joint - 1, problem.tool.joint) {
         problem.tool.payload_mass
     } else {
         0.0
     };
     let carried = |joint: usize| {
-        let targets = problem.targets.iter().map(|own| (own.joint, own.at));
+        let targets = problem.targets.iter().map(|target| (target.joint, target.at));
         let all = targets
             .chain([(problem.tool.joint, problem.tool.target)])
             .filter(|(carrier, _)| *carrier == joint);

@@ -55,7 +55,10 @@ impl Effect {
         let regressor = match &entry.formula {
             None if entry.inner.is_some() => Regressor::Inner,
             None => Regressor::Constant,
-            Some(formula) => Regressor::new(formula, self.inner_parameters(), problem),
+            Some(formula) => {
+                let moves_base = matches!(entry.at, At::BaseShift(_) | At::BaseTurn(_));
+                Regressor::new(formula, self.inner_parameters(), problem, moves_base)
+            }
         };
         let bounds = entry.inner.as_ref().map_or((None, None), |inner| (inner.min, inner.max));
         let size = self.size(entry.prior, problem)?;
@@ -109,7 +112,8 @@ impl Effect {
     /// Returns full names and starts of the parameters inside of its formulas.
     fn inner_parameters(&self) -> Vec<(String, f64)> {
         let Self::Law(law) = self else { return Vec::new() };
-        let named = |own: &LawParameter| (format!("{LAW}[{}].{}", law.name(), own.name), own.start);
+        let named =
+            |inner: &LawParameter| (format!("{LAW}[{}].{}", law.name(), inner.name), inner.start);
         law.parameters().iter().map(named).collect()
     }
 
@@ -139,18 +143,22 @@ impl Effect {
         };
         let quantities = self.quantities();
         let follows = |is_it: fn(&Quantity) -> bool| quantities.iter().any(is_it);
-        let approach = follows(|own| matches!(own, Quantity::Approach(_)))
+        let approach = follows(|quantity| matches!(quantity, Quantity::Approach(_)))
             || self.terms(problem).iter().any(sliding_play);
         let needed = [
-            (follows(|own| own.is_thermal()), columns.temperature, "a column temperature_C"),
             (
-                follows(|own| matches!(own, Quantity::Lagging { .. })),
+                follows(|quantity| quantity.is_thermal()),
+                columns.temperature,
+                "a column temperature_C",
+            ),
+            (
+                follows(|quantity| matches!(quantity, Quantity::Lagging { .. })),
                 columns.time,
                 "a column time_s",
             ),
             (approach, columns.approach, "columns approach1, …"),
             (
-                follows(|own| matches!(own, Quantity::Covariate(_))),
+                follows(|quantity| matches!(quantity, Quantity::Covariate(_))),
                 columns.covariates,
                 "the columns of [data.covariates]",
             ),

@@ -47,6 +47,8 @@ pub struct Formula {
     hoist: f64,
     /// Full names and values of the parameters inside of the formula.
     parameters: Vec<(String, f64)>,
+    /// True if it moves the base itself, and not the readings of the instrument.
+    moves_base: bool,
 }
 
 impl Formula {
@@ -116,7 +118,8 @@ impl Formula {
             Expression::Quantity(quantity) => at(quantity),
             _ if self.parameters.is_empty() => self.expression.evaluate(&at, &[]),
             _ => {
-                let values: Vec<f64> = self.parameters.iter().map(|own| own.1).collect();
+                let values: Vec<f64> =
+                    self.parameters.iter().map(|parameter| parameter.1).collect();
                 self.expression.evaluate(&at, &values)
             }
         }
@@ -135,9 +138,14 @@ impl Formula {
 
 impl Regressor {
     /// Regressor of a formula on the arm of `problem`, with full names and starts of the parameters
-    /// inside.
-    pub(crate) fn new(formula: &Parsed, parameters: Vec<(String, f64)>, problem: &Problem) -> Self {
-        match formula.expression.wave() {
+    /// inside, and whether it moves the base itself.
+    pub(crate) fn new(
+        formula: &Parsed,
+        parameters: Vec<(String, f64)>,
+        problem: &Problem,
+        moves_base: bool,
+    ) -> Self {
+        match formula.expression.wave().filter(|_| !moves_base) {
             Some((joint, order, false)) => return Self::Sine(joint, order),
             Some((joint, order, true)) => return Self::Cosine(joint, order),
             None => {}
@@ -151,6 +159,7 @@ impl Regressor {
             payload: problem.tool.payload_mass,
             hoist: hoists.map(|hoist| hoist.force).sum(),
             parameters,
+            moves_base,
         }))
     }
 
@@ -162,7 +171,7 @@ impl Regressor {
         let (slides, covariates) = (problem.slides(), problem.covariate_names());
         let vocabulary =
             Vocabulary { slides: &slides, covariates: &covariates, ..Vocabulary::default() };
-        Ok(Self::new(&parse(text, &vocabulary)?, Vec::new(), problem))
+        Ok(Self::new(&parse(text, &vocabulary)?, Vec::new(), problem, false))
     }
 
     /// Regressor of the command of a joint, numbered from 1 as in files: q \[rad\] or \[m\].
@@ -193,7 +202,8 @@ impl Regressor {
     pub fn text(&self) -> String {
         let (covariates, parameters) = match self {
             Self::Formula(formula) => {
-                let names = formula.parameters.iter().map(|own| own.0.clone()).collect();
+                let names =
+                    formula.parameters.iter().map(|parameter| parameter.0.clone()).collect();
                 (formula.covariates.as_slice(), names)
             }
             _ => (&[][..], Vec::new()),
@@ -208,6 +218,11 @@ impl Regressor {
             Self::Sine(joint, _) | Self::Cosine(joint, _) => vec![Quantity::Command(*joint)],
             Self::Formula(formula) => formula.expression.quantities(),
         }
+    }
+
+    /// Returns true if it moves the base itself, and not the readings of the instrument.
+    pub(crate) fn moves_base(&self) -> bool {
+        matches!(self, Self::Formula(formula) if formula.moves_base)
     }
 
     /// Returns the one quantity that it is, where it is one.
@@ -260,10 +275,10 @@ impl Regressor {
     pub fn slope(&self, setup: &PoseView, joint: usize) -> f64 {
         let order = |order: u32| f64::from(order);
         match self {
-            Self::Sine(own, k) if *own == joint => {
+            Self::Sine(of, k) if *of == joint => {
                 order(*k) * (order(*k) * setup.configuration[joint]).cos()
             }
-            Self::Cosine(own, k) if *own == joint => {
+            Self::Cosine(of, k) if *of == joint => {
                 -order(*k) * (order(*k) * setup.configuration[joint]).sin()
             }
             Self::Formula(formula) => {
@@ -272,7 +287,7 @@ impl Regressor {
                     Dual64::new(formula.quantity(quantity, setup), slope)
                 };
                 let values: Vec<Dual64> =
-                    formula.parameters.iter().map(|own| Dual64::from(own.1)).collect();
+                    formula.parameters.iter().map(|parameter| Dual64::from(parameter.1)).collect();
                 formula.expression.evaluate(&seeded, &values).eps
             }
             _ => 0.0,
@@ -319,9 +334,9 @@ impl Waves {
     fn wave(&mut self, joint: usize, order: u32, setup: &PoseView) -> (f64, f64) {
         let q = setup.configuration[joint];
         let wave = match self.last {
-            Some((own, last, wave)) if own == joint && last == order => return wave,
-            Some((own, last, mut wave))
-                if own == joint && last < order && order - last <= MAX_ORDER_STEPS =>
+            Some((of, last, wave)) if of == joint && last == order => return wave,
+            Some((of, last, mut wave))
+                if of == joint && last < order && order - last <= MAX_ORDER_STEPS =>
             {
                 let (by_sin, by_cos) = *self.first.get_or_insert_with(|| q.sin_cos());
                 for _ in last..order {
