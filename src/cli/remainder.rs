@@ -26,7 +26,9 @@ pub fn of_estimate(
         return read(problem, &estimate.file.with_file_name(name)).map(Some);
     }
     let parse = |text: &str| Correction::parse(text, &estimate.file);
-    estimate.prediction.as_deref().map(parse).transpose()
+    let correction = estimate.prediction.as_deref().map(parse).transpose()?;
+    // An estimate of another arm is refused with a message of its own.
+    Ok(correction.filter(|own| own.check(problem, &estimate.file).is_ok()))
 }
 
 fn read(problem: &Problem, file: &Path) -> Result<Correction, SavedRemainderError> {

@@ -116,7 +116,9 @@ impl Scores {
     }
 }
 
+/// Sorts finite scores and keeps at most [`MAX_SCORES`] evenly spaced ones.
 fn thinned(mut scores: Vec<f64>) -> Vec<f64> {
+    scores.retain(|score| score.is_finite());
     scores.sort_by(f64::total_cmp);
     let last = scores.len().saturating_sub(1);
     if scores.len() <= MAX_SCORES {
