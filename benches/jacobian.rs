@@ -52,7 +52,7 @@ fn evaluate(bencher: Bencher, problem: &impl LeastSquares, x: &DVector<f64>) {
     let poses = problem.items();
     let mut out = vec![0.0; problem.rows_per_item() * poses];
     bencher.counter(ItemsCount::new(poses)).bench_local(|| {
-        problem.residuals(divan::black_box(x), 0..poses, divan::black_box(&mut out))
+        problem.residuals(divan::black_box(x), 0..poses, divan::black_box(&mut out));
     });
 }
 
@@ -82,7 +82,7 @@ mod rigid {
         let x = Ur10::some_point(&residuals);
         let mut out = DMatrix::zeros(3 * POSES, x.len());
         bencher.counter(ItemsCount::new(POSES)).bench_local(|| {
-            common::central_differences(&residuals, divan::black_box(&x), &mut out)
+            common::central_differences(&residuals, divan::black_box(&x), &mut out);
         });
     }
 
@@ -111,7 +111,7 @@ mod elastic {
         let x = DVector::zeros(lunar.parameters());
         let mut out = DMatrix::zeros(3 * lunar.poses(), x.len());
         bencher.counter(ItemsCount::new(lunar.poses())).bench_local(|| {
-            common::central_differences(&lunar.residuals(), divan::black_box(&x), &mut out)
+            common::central_differences(&lunar.residuals(), divan::black_box(&x), &mut out);
         });
     }
 

@@ -20,14 +20,14 @@ pub fn table<'py>(
     for (name, column) in py.detach(|| residual_columns(problem, &data.measurements, residuals)) {
         match column {
             Column::Words(labels) => {
-                columns.set_item(name, (integers(py, labels.of_row.into_iter()), labels.names))?
+                columns.set_item(name, (integers(py, labels.of_row.into_iter()), labels.names))?;
             }
             Column::Counts(values) => columns.set_item(name, integers(py, values.into_iter()))?,
             Column::Flags(values) => {
-                columns.set_item(name, integers(py, values.into_iter().map(usize::from)))?
+                columns.set_item(name, integers(py, values.into_iter().map(usize::from)))?;
             }
             Column::Numbers(values, _) => {
-                columns.set_item(name, numbers(py, values.into_iter()))?
+                columns.set_item(name, numbers(py, values.into_iter()))?;
             }
             _ => {}
         }

@@ -121,8 +121,9 @@ pub fn after_loop(
 pub fn after_trace(common: &Common, result: &TraceResult) -> String {
     let is_pointed =
         result.ranking.first().is_some_and(|candidate| candidate.p_value < result.level);
-    match is_pointed || result.structured {
-        true => format!("flexcal loop {} adds what is missing and fits again", common.named()),
-        false => format!("flexcal identify {} writes the estimate to apply", common.named()),
+    if is_pointed || result.structured {
+        format!("flexcal loop {} adds what is missing and fits again", common.named())
+    } else {
+        format!("flexcal identify {} writes the estimate to apply", common.named())
     }
 }

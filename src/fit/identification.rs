@@ -138,7 +138,7 @@ fn fit_rows(
     if is_custom && custom_solver.is_none() {
         return Err(IdentifyError::NoCustomSolver);
     }
-    if !solver.keeps(model) && !(is_custom && custom_keeps) {
+    if !(solver.keeps(model) || is_custom && custom_keeps) {
         return Err(IdentifyError::BoundsIgnored { solver: solver.as_str() });
     }
     let (declared, has_declared_noise) =

@@ -229,14 +229,13 @@ impl Effect {
 
     /// Returns the effect in words for people.
     pub fn describe(&self) -> String {
-        match self {
-            Self::Law(law) => law.describe(),
-            _ => {
-                let family = self.family().unwrap_or(&Family::PLAIN);
-                let of_base = self.argument("base").is_some();
-                let says = if of_base { family.says_of_base } else { family.says };
-                filled(says, &self.arguments())
-            }
+        if let Self::Law(law) = self {
+            law.describe()
+        } else {
+            let family = self.family().unwrap_or(&Family::PLAIN);
+            let of_base = self.argument("base").is_some();
+            let says = if of_base { family.says_of_base } else { family.says };
+            filled(says, &self.arguments())
         }
     }
 

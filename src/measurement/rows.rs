@@ -258,7 +258,7 @@ impl RowsBuilder {
         }
         match columns.file {
             Some(Role::Session) => {
-                self.session.push(self.stems.get(file).map_or("", String::as_str))
+                self.session.push(self.stems.get(file).map_or("", String::as_str));
             }
             Some(Role::Target) => self.target.push(self.stems.get(file).map_or("", String::as_str)),
             _ => {}

@@ -110,7 +110,7 @@ impl Table {
         for cell in &table.record {
             match std::str::from_utf8(cell.trim_ascii()) {
                 Ok(name) if !name.contains('\0') => {
-                    table.header.push(unescape_cell(name).to_owned())
+                    table.header.push(unescape_cell(name).to_owned());
                 }
                 // A header that is not text cannot be shown.
                 _ => return Err(header_error(InputErrorKind::HeaderNotUtf8)),

@@ -84,7 +84,7 @@ impl LinearisedArm {
         let mut weights = [Vector3::zeros(); 3];
         let mut forks = Vec::new();
         let weigh = |load: &mut Load, weights: &PerCoordinate| {
-            load.virtual_force = weights.each_ref().map(|w| load.force.cross(w))
+            load.virtual_force = weights.each_ref().map(|w| load.force.cross(w));
         };
         for step in steps {
             match step {

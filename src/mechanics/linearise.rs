@@ -54,13 +54,13 @@ impl LinearisedArm {
                     root = cut.real();
                 }
                 Event::Tip { .. } => {
-                    self.push_section(root.origin, &Frame::identity().axes, MomentAxes::Fixed)
+                    self.push_section(root.origin, &Frame::identity().axes, MomentAxes::Fixed);
                 }
                 Event::Axis { .. } => {
-                    self.push_section(root.origin, &root.axes[2..], MomentAxes::Moving)
+                    self.push_section(root.origin, &root.axes[2..], MomentAxes::Moving);
                 }
                 Event::Tilt { .. } => {
-                    self.push_section(root.origin, &root.axes[..2], MomentAxes::Moving)
+                    self.push_section(root.origin, &root.axes[..2], MomentAxes::Moving);
                 }
                 Event::Fork { branches } => {
                     forks.extend((0..*branches).map(|_| root));

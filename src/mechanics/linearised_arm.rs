@@ -211,7 +211,7 @@ impl LinearisedArm {
             match step {
                 Step::Load(load) => sums.add(&self.loads[*load]),
                 Step::Segment(segment) => {
-                    self.loads[segment.loads.clone()].iter().for_each(|load| sums.add(load))
+                    self.loads[segment.loads.clone()].iter().for_each(|load| sums.add(load));
                 }
                 Step::Section(section) => {
                     section.force = sums.force;

@@ -67,7 +67,7 @@ pub(super) struct Cut<S> {
 pub(super) fn moment_directions<S: Scalar>(arm: &Arm<S>) -> Vec<usize> {
     let mut directions = Vec::new();
     let mut add = |segment: Segment, count: usize| {
-        directions.extend((0..count).map(|k| segment.moment_direction(count) + k))
+        directions.extend((0..count).map(|k| segment.moment_direction(count) + k));
     };
     if arm.mounting.is_some() {
         add(Segment::Mounting, 2);

@@ -98,7 +98,7 @@ mod tests {
                 match *site {
                     TermSite::Joint(joint) => joints[joint] += value * regressor.value(&pose),
                     TermSite::Strain { joint, which } => {
-                        strains[joint][which] += value * regressor.value(&pose)
+                        strains[joint][which] += value * regressor.value(&pose);
                     }
                 }
             }

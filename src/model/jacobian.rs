@@ -68,16 +68,16 @@ impl JacobianWriter {
             match parameter.site {
                 ParameterSite::Base { base, axis } => bases[base].columns[axis] = Some(column),
                 ParameterSite::Target { target, axis } => {
-                    targets[target].columns[axis] = Some(column)
+                    targets[target].columns[axis] = Some(column);
                 }
                 ParameterSite::Fixture { fixture, axis, .. } => {
-                    fixture_columns[fixture][axis] = Some(column)
+                    fixture_columns[fixture][axis] = Some(column);
                 }
                 ParameterSite::Turn { axis } => base_rotations.push((axis, regressor(k), column)),
                 ParameterSite::Scale
                 | ParameterSite::Strain { .. }
                 | ParameterSite::Shift { .. } => {
-                    instrument_columns.push((parameter.site, regressor(k), column))
+                    instrument_columns.push((parameter.site, regressor(k), column));
                 }
                 ParameterSite::Joint { .. }
                 | ParameterSite::Beam { .. }

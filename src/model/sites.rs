@@ -20,7 +20,7 @@ pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64
                     joint.nonlinear.get_or_insert(Nonlinear { cubic: 0.0, play: 0.0 });
                 }
                 JointField::LateralX | JointField::LateralY => {
-                    _ = joint.lateral.get_or_insert([0.0; 2])
+                    _ = joint.lateral.get_or_insert([0.0; 2]);
                 }
                 JointField::SlideFlexibility => _ = joint.slide.get_or_insert(0.0),
                 _ => {}
@@ -125,22 +125,22 @@ pub(super) fn set_site<S: Scalar>(
                 (JointField::Beta, ..) => joint.beta = Angle::new(x + nominal),
                 (JointField::Stiffness, ..) => joint.flexibility = Some((-x).exp() / nominal),
                 (JointField::Compliance, ..) => {
-                    joint.flexibility = Some(joint.flexibility.map_or(x, |c| c + x))
+                    joint.flexibility = Some(joint.flexibility.map_or(x, |c| c + x));
                 }
                 (JointField::Cubic, Some(nonlinear), _) => nonlinear.cubic += x,
                 (JointField::Play | JointField::SlidingPlay, Some(nonlinear), _) => {
-                    nonlinear.play += x
+                    nonlinear.play += x;
                 }
                 (JointField::LateralX, _, Some(lateral)) => lateral[0] += x,
                 (JointField::LateralY, _, Some(lateral)) => lateral[1] += x,
                 (JointField::SpringRate, ..) => {
-                    joint.compensator.iter_mut().for_each(|spring| spring.rate += x)
+                    joint.compensator.iter_mut().for_each(|spring| spring.rate += x);
                 }
                 (JointField::SpringPreload, ..) => {
-                    joint.compensator.iter_mut().for_each(|spring| spring.preload += x)
+                    joint.compensator.iter_mut().for_each(|spring| spring.preload += x);
                 }
                 (JointField::SlideFlexibility, ..) => {
-                    joint.slide = Some(joint.slide.map_or(x, |declared| declared + x))
+                    joint.slide = Some(joint.slide.map_or(x, |declared| declared + x));
                 }
                 _ => {}
             }
@@ -167,7 +167,7 @@ fn set_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: S)
     match (field, &mut beam.strain, &mut beam.added) {
         (BeamField::Axial, ..) => flexibilities.axial = flexibility,
         (BeamField::Bending, ..) => {
-            (flexibilities.about_y, flexibilities.about_z) = (flexibility, flexibility)
+            (flexibilities.about_y, flexibilities.about_z) = (flexibility, flexibility);
         }
         (BeamField::BendingY, ..) => flexibilities.about_y = flexibility,
         (BeamField::BendingZ, ..) => flexibilities.about_z = flexibility,
@@ -178,10 +178,10 @@ fn set_beam<S: Scalar>(beam: &mut Beam<S>, field: BeamField, nominal: f64, x: S)
             flexibilities.about_z += x;
         }
         (BeamField::CouplingY, ..) => {
-            flexibilities.coupling = flexibilities.coupling.map(|[y, z]| [y + x, z])
+            flexibilities.coupling = flexibilities.coupling.map(|[y, z]| [y + x, z]);
         }
         (BeamField::CouplingZ, ..) => {
-            flexibilities.coupling = flexibilities.coupling.map(|[y, z]| [y, z + x])
+            flexibilities.coupling = flexibilities.coupling.map(|[y, z]| [y, z + x]);
         }
         (BeamField::BowY, Some(strain), _) => strain.curvature[0] += x,
         (BeamField::BowZ, Some(strain), _) => strain.curvature[1] += x,

@@ -107,7 +107,7 @@ impl Parameters {
             Flexibility::Joint(k) => self.joints[k] = value,
             Flexibility::Axial(k) => self.links[k].axial = value,
             Flexibility::Bending(k) => {
-                (self.links[k].about_y, self.links[k].about_z) = (value, value)
+                (self.links[k].about_y, self.links[k].about_z) = (value, value);
             }
             Flexibility::BendingY(k) => self.links[k].about_y = value,
             Flexibility::BendingZ(k) => self.links[k].about_z = value,

@@ -5,7 +5,6 @@ use super::document::code;
 use super::effect::MOST_LISTED;
 use super::quantity::{counted, number};
 use super::trace::{EVEN, percent};
-use crate::problem::Effect;
 use crate::results::{FoundEffect, LoopResult, NamedEffect};
 use crate::select::{Status, Verdict};
 
@@ -86,16 +85,17 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
         (Verdict::Explained, true) => {
             format!("Explained: {}, and what is left looks like noise.", lower(&found))
         }
-        (Verdict::NothingFound, true) => match result.overstated_sigma() {
-            Some(ratio) => nothing_below(ratio, takes_less),
-            None => {
+        (Verdict::NothingFound, true) => {
+            if let Some(ratio) = result.overstated_sigma() {
+                nothing_below(ratio, takes_less)
+            } else {
                 let apart = match result.set_aside.len() {
                     0 => String::new(),
                     rows => format!("apart from {} with gross errors, ", counted(rows, "pose")),
                 };
                 format!("Nothing found: {apart}what the declared problem leaves looks like noise.")
             }
-        },
+        }
     }
 }
 

@@ -81,7 +81,7 @@ pub(super) fn covariance(found: &Identification, fitted: &Fitted) -> Vec<Box<Raw
     let n = found.estimates.len();
     let (names, posterior) = fitted.alone.parameter_covariance();
     let place = |name: &&str| found.estimates.iter().position(|own| own.name == **name);
-    let places: Vec<Option<usize>> = names.iter().map(|name| place(name)).collect();
+    let places: Vec<Option<usize>> = names.iter().map(place).collect();
     let slope = |k: usize| {
         let estimate = &found.estimates[k];
         if estimate.unit.is_relative() { estimate.estimate } else { 1.0 }

@@ -105,7 +105,7 @@ impl Rig {
                     about_axis.compliance.z += extra;
                 }
                 (Effect::JointNonlinearStiffness { joint }, [cubic]) if *joint == number => {
-                    about_axis.cubic += cubic
+                    about_axis.cubic += cubic;
                 }
                 (Effect::JointLateralCompliance { joint }, [x, y]) if *joint == number => {
                     lateral.compliance += Vector3::new(*x, *y, 0.0);

@@ -35,7 +35,7 @@ impl Candidates {
                 _ if problem.effects.iter().any(|declared| declared.effect.covers(&effect)) => {}
                 Some(reason) => found.untestable.push((effect, reason)),
                 None if holds_all(problem, &parameters()) => {
-                    found.untestable.push((effect, HELD_FIXED))
+                    found.untestable.push((effect, HELD_FIXED));
                 }
                 None if refuses(problem, &parameters()) => found.untestable.push((effect, REFUSED)),
                 None => found.testable.push(effect),

@@ -172,7 +172,7 @@ impl Reader<'_> {
         while let Some(token) = words.next() {
             match token {
                 TokenTree::Ident(ident) if ident == "as" => {
-                    name = words.next().map(ToString::to_string)
+                    name = words.next().map(ToString::to_string);
                 }
                 TokenTree::Ident(ident) if ident == "self" && !path.is_empty() => {}
                 TokenTree::Ident(ident) => path.push(ident.to_string()),

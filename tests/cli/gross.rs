@@ -97,7 +97,7 @@ fn copies_are_named_whatever_their_number_and_time_and_repeats_are_not() {
         names.iter().zip(row.split(',')).map(change).collect::<Vec<_>>().join(",")
     };
     let with = |rows: &[String]| {
-        fs::write(bench.path("a-none.csv"), table.clone() + &rows.join("\n") + "\n").unwrap()
+        fs::write(bench.path("a-none.csv"), table.clone() + &rows.join("\n") + "\n").unwrap();
     };
     let last = table.lines().count();
     with(&[line(6, &[("time_s", "90000"), ("pose", "201")]), line(9, &[])]);

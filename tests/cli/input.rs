@@ -168,7 +168,7 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
             "no joints",
             |b| {
                 fs::write(b.path(PROBLEM), "name = \"none\"\n[data]\nfiles = [\"a-none.csv\"]\n")
-                    .unwrap()
+                    .unwrap();
             },
             &[PROBLEM, "joint"],
         ),
@@ -185,7 +185,7 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
                     PROBLEM,
                     "\"tool.*\" = { sigma_mm = 5.0 }",
                     "\"tool.*\" = { min_mm = 2, max_mm = -2 }",
-                )
+                );
             },
             &["problem.toml:78", "min"],
         ),
@@ -196,7 +196,7 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
                     PROBLEM,
                     "\"tool.*\" = { sigma_mm = 5.0 }",
                     "\"tool.*\" = { sigma_deg = 5.0 }",
-                )
+                );
             },
             &["problem.toml:78", "tool.x", "_mm"],
         ),

@@ -198,7 +198,7 @@ fn what_may_have_been_misread_is_said() {
     };
     let sized = |factor: f64| {
         move |_: &mut Problem, data: &mut Dataset| {
-            data.measurements.positions.iter_mut().for_each(|position| *position *= factor)
+            data.measurements.positions.iter_mut().for_each(|position| *position *= factor);
         }
     };
     let degree = std::f64::consts::PI / 180.0;
@@ -207,11 +207,11 @@ fn what_may_have_been_misread_is_said() {
     assert_eq!(with(&sized(1e3)), [Misreading::Millimetres.to_string()]);
     assert_eq!(with(&sized(1e-3)), [Misreading::Metres.to_string()]);
     let mirrored = with(&|_, data| {
-        data.measurements.positions.iter_mut().for_each(|position| position.swap_rows(0, 2))
+        data.measurements.positions.iter_mut().for_each(|position| position.swap_rows(0, 2));
     });
     assert_eq!(mirrored, [Misreading::Mirrored.to_string()]);
     let reversed = with(&|_, data| {
-        data.measurements.configurations.iter_mut().skip(2).step_by(5).for_each(|q| *q = -*q)
+        data.measurements.configurations.iter_mut().skip(2).step_by(5).for_each(|q| *q = -*q);
     });
     assert_eq!(reversed, [Misreading::reversed(&[3]).to_string()]);
     // A free tool moves to its true position, far beyond its prior.

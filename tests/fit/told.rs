@@ -143,7 +143,7 @@ fn spoiled_ones() -> Vec<Case> {
     let based = &format!("{priors}\n'base.*' = {{ free = true }}");
     let scaled = |factor: f64| {
         move |data: &mut Dataset| {
-            positions(data).iter_mut().for_each(|position| *position *= factor)
+            positions(data).iter_mut().for_each(|position| *position *= factor);
         }
     };
     let off = |by: f64| move |data: &mut Dataset| positions(data)[77].y += by;
@@ -164,7 +164,7 @@ fn spoiled_ones() -> Vec<Case> {
     vec![
         spoiled("nothing wrong", priors, 0, "explains the data", |_| ()),
         spoiled("held-out rows shifted", priors, 1, "held-out", |data| {
-            positions(data)[60..].rotate_left(1)
+            positions(data)[60..].rotate_left(1);
         }),
         spoiled("one wrong held-out row", priors, 0, "rows.csv:79", off(0.3)),
         spoiled("a held-out cell of 1e150", priors, 0, "rows.csv:79", off(1e149)),

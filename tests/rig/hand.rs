@@ -184,7 +184,7 @@ fn the_tracker_scales_drifts_and_shifts() {
         position(&arm, vec![effect(&arm, cause, values)], conditions) - Vector3::new(2.0, 0.0, 0.0)
     };
     let is = |found: Vector3<f64>, expected: [f64; 3]| {
-        assert!((found - Vector3::from(expected)).norm() < 1e-14)
+        assert!((found - Vector3::from(expected)).norm() < 1e-14);
     };
     is(shift(Effect::TrackerScale, &[1e-4], &late), [2e-4, 0.0, 0.0]);
     is(shift(Effect::TrackerDrift, &[1e-6, 0.0, 2e-6], &late), [4e-4, 0.0, 8e-4]);

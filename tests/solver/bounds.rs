@@ -161,10 +161,10 @@ fn optimality_conditions_on_many_boxes() {
             match solution.at_bound[j] {
                 None => assert!(cosine.abs() < 1e-6, "case {case}, unknown {j}: {cosine}"),
                 Some(AtBound::Lower) => {
-                    assert!(cosine > -1e-6, "case {case}, unknown {j}: {cosine}")
+                    assert!(cosine > -1e-6, "case {case}, unknown {j}: {cosine}");
                 }
                 Some(AtBound::Upper) => {
-                    assert!(cosine < 1e-6, "case {case}, unknown {j}: {cosine}")
+                    assert!(cosine < 1e-6, "case {case}, unknown {j}: {cosine}");
                 }
             }
         }

@@ -30,7 +30,7 @@ impl Lacking {
         match &self.effect {
             Effect::DeflectedEquilibrium => problem.statics.equilibrium = Equilibrium::Undeflected,
             Effect::JointCompliance { joint } if self.values.is_empty() => {
-                problem.joints[joint - 1].stiffness = None
+                problem.joints[joint - 1].stiffness = None;
             }
             Effect::LinkBending { joint } if self.values.is_empty() => {
                 if let Some(beam) = &mut problem.joints[joint - 1].beam {

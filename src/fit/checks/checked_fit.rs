@@ -90,9 +90,12 @@ impl CheckedFit<'_> {
             let poses = self.fitting.poses(&rows);
             self.fitting.model.predicted_targets(&poses, self.registered_x.as_slice())
         };
-        let point = |place: usize| match is_measured_directly {
-            true => measurements.positions[rows[place]],
-            false => target_places[place],
+        let point = |place: usize| {
+            if is_measured_directly {
+                measurements.positions[rows[place]]
+            } else {
+                target_places[place]
+            }
         };
         let declared = together(places.iter().map(|&place| self.whole.declared[place]));
         let taken = together(places.iter().map(|&place| self.whole.poses[place].sigma));

@@ -160,7 +160,7 @@ impl Misreading {
             Self::Metres => rows.positions.iter_mut().for_each(|position| *position *= 1e3),
             Self::Millimetres => rows.positions.iter_mut().for_each(|position| *position *= 1e-3),
             Self::Mirrored => {
-                rows.positions.iter_mut().for_each(|position| position.swap_rows(0, 1))
+                rows.positions.iter_mut().for_each(|position| position.swap_rows(0, 1));
             }
             _ => {}
         }

@@ -23,7 +23,7 @@ impl Check for OrientationsFit {
         let turns = fitting.model.orientation_residuals(fitting.poses(rows), &fit.end.x);
         let lengths: Vec<f64> = turns
             .iter()
-            .map(|turn| turn.norm_squared())
+            .map(nalgebra::Matrix::norm_squared)
             .filter(|square| square.is_finite())
             .collect();
         let rms = (lengths.iter().sum::<f64>() / lengths.len().max(1) as f64).sqrt();

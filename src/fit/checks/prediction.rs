@@ -62,15 +62,12 @@ fn upper_tail(chi2: f64, coordinates: usize, noise_dof: Option<f64>) -> Option<(
     if !chi2.is_finite() || coordinates == 0 {
         return None;
     }
-    match noise_dof {
-        Some(dof) => {
-            let distribution = FisherSnedecor::new(k, dof).ok()?;
-            Some((distribution.sf(chi2 / k), k * distribution.inverse_cdf(1.0 - IMPROBABLE)))
-        }
-        None => {
-            let distribution = ChiSquared::new(k).ok()?;
-            Some((distribution.sf(chi2), distribution.inverse_cdf(1.0 - IMPROBABLE)))
-        }
+    if let Some(dof) = noise_dof {
+        let distribution = FisherSnedecor::new(k, dof).ok()?;
+        Some((distribution.sf(chi2 / k), k * distribution.inverse_cdf(1.0 - IMPROBABLE)))
+    } else {
+        let distribution = ChiSquared::new(k).ok()?;
+        Some((distribution.sf(chi2), distribution.inverse_cdf(1.0 - IMPROBABLE)))
     }
 }
 

@@ -104,7 +104,7 @@ pub(in crate::fit) fn fitted(
                     begin = if end.gauge.rows.nrows() == 0 { end.x } else { start.clone() }
                 }
                 None if first && end.iterations >= FIRST_STEPS && !end.termination.converged() => {
-                    begin = end.x
+                    begin = end.x;
                 }
                 None => {
                     let statistics = Statistics::of(&whole, &end, Some(fitting.noise_model))?;

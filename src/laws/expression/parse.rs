@@ -254,13 +254,12 @@ impl<'a> Parser<'a> {
         };
         self.at += length + 2;
         let name = inner.get(..length).unwrap_or_default();
-        match self.vocabulary.covariates.iter().position(|known| known == name) {
-            Some(index) => Ok(covariate(index, start..self.at)),
-            None => {
-                let near = nearest(name, self.vocabulary.covariates).cloned();
-                let mistake = Mistake::UnknownWord { word: name.to_owned(), near };
-                Err(self.error(start..self.at, mistake))
-            }
+        if let Some(index) = self.vocabulary.covariates.iter().position(|known| known == name) {
+            Ok(covariate(index, start..self.at))
+        } else {
+            let near = nearest(name, self.vocabulary.covariates).cloned();
+            let mistake = Mistake::UnknownWord { word: name.to_owned(), near };
+            Err(self.error(start..self.at, mistake))
         }
     }
 

@@ -123,7 +123,7 @@ fn draw_stages(
                     .numbers(if last { 8 } else { 0 });
             let left = Axis::logarithmic(extent, label).numbers(4);
             draw_axis(panel, (&bottom, &left), stages, (axis, &shown), |k| {
-                tags.pose(rows.get(k).copied())
+                tags.pose(rows.get(k).copied());
             })?;
         }
         Ok(())

@@ -107,7 +107,7 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
                 ));
                 match rms(part) {
                     Some(rms) => {
-                        area.draw(&Rectangle::new(corners, WARM.mix(shade(rms)).filled()))?
+                        area.draw(&Rectangle::new(corners, WARM.mix(shade(rms)).filled()))?;
                     }
                     None => area.draw(&Rectangle::new(corners, line(FAINT, 0.5)))?,
                 }

@@ -26,14 +26,14 @@ pub(in crate::report) fn text_within(blocks: &[Block], columns: usize) -> String
         match block {
             Block::Heading(words) => text.push_str(&wrapped(words, ("", ""), width)),
             Block::Text(words) | Block::Note(words) => {
-                text.push_str(&wrapped(words, (indent, indent), width))
+                text.push_str(&wrapped(words, (indent, indent), width));
             }
             Block::Lines(words, points) => {
                 text.extend(words.lines().map(|line| wrapped(line, ("", ""), width)));
                 text.extend(points.iter().map(|point| wrapped(point, ("  ", "    "), width)));
             }
             Block::List(points) => {
-                points.iter().for_each(|item| point(&mut text, "- ", item, width))
+                points.iter().for_each(|item| point(&mut text, "- ", item, width));
             }
             Block::Ranking(points) => {
                 points

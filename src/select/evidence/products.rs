@@ -498,7 +498,7 @@ mod tests {
         let products = Products::new((&blocks, &target), &SelectionRules::DEFAULT);
         let of = |block: usize, others: &[usize]| products.ln_prior(&blocks[block], others);
         let is = |value: f64, expected: f64| {
-            assert!((value - expected).abs() < 1e-12, "{value} {expected}")
+            assert!((value - expected).abs() < 1e-12, "{value} {expected}");
         };
         is(of(1, &[]), -3.0);
         is(of(1, &[2, 3]), -3.0);
