@@ -76,7 +76,7 @@ fn derivatives_are_those_of_extrapolated_differences() {
         "min(q2, 0.0123)",
         "max(q2^2, 0.0123)",
         "q2^3",
-        "q2^-2",
+        "(q2 + 4)^-2",
         "abs(q2)^1.7",
         "(q2 + 4)^q2",
         "2^q2",
