@@ -14,10 +14,12 @@
 //!    arms.
 //! 5. [`fit`]: what to fit in which order, identifiability, standard errors, comparison,
 //!    compensation.
-//! 6. [`residual_tests`]: statistical tests of what a fit leaves, whether structure is left at all.
-//! 7. [`select`]: which effects the residual points to ([`select::trace`]), and the loop that adds
+//! 6. [`remainder`]: what no law explains as smooth errors of the joints, and the uncertainty of
+//!    predictions and commands.
+//! 7. [`residual_tests`]: statistical tests of what a fit leaves, whether structure is left at all.
+//! 8. [`select`]: which effects the residual points to ([`select::trace`]), and the loop that adds
 //!    them ([`select::close`]).
-//! 8. [`report`]: text, JSON, Markdown, HTML and figures.
+//! 9. [`report`]: text, JSON, Markdown, HTML and figures.
 //!
 //! Beside this way stand [`design`] (which poses to measure, and what they will tell),
 //! [`study`] (many fits where the truth is known), [`urdf`] (arms from URDF, and identified
