@@ -67,12 +67,12 @@ pub(super) fn bounded(bounds: &Bounds, residuals: Option<&[Residual]>) -> String
     let mut words = format!(
         "Expected error {} mm rms; the {} % bound is {} mm on average",
         number(bounds.expected() * 1e3, 3),
-        number(bounds.level * 100.0, 3),
+        (bounds.level * 1e6).round() / 1e4,
         number(bounds.mean() * 1e3, 3),
     );
     if let Some(residuals) = residuals {
         let share = bounds.coverage(residuals.iter().map(|own| own.position.norm()));
-        let _ = write!(words, "; {} % of these rows lie within theirs", number(share * 100.0, 3));
+        let _ = write!(words, "; {} % of these rows lie within theirs", number(share * 100.0, 1));
     }
     let beyond = bounds.poses.iter().filter(|own| own.is_extrapolated).count();
     if beyond > 0 {
