@@ -116,6 +116,7 @@ pub fn identify_model(
 }
 
 /// Fits the identification rows of a split and checks the result.
+#[expect(clippy::too_many_lines, reason = "one result, listed field by field")]
 fn fit_rows(
     model: &Model,
     problem: &Problem,

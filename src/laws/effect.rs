@@ -224,6 +224,11 @@ impl Effect {
     pub(crate) fn shared_order(&self, other: &Self) -> Option<u32> {
         let waves = other.waves();
         let shared = self.waves().into_iter().find(|wave| waves.contains(wave))?.1;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "orders are above 0, and whole here"
+        )]
         (shared.fract() == 0.0).then_some(shared as u32)
     }
 
@@ -311,11 +316,11 @@ impl Effect {
     pub(crate) fn scaled(&self, factor: f64) -> Option<Self> {
         let (key, _) = self.key_of(ArgumentKind::is_scalable)?;
         let Some(Argument::Number(number)) = self.argument(key) else { return None };
-        self.with(key, Argument::Number(to_three_digits(factor * number)?))
+        self.with(key, &Argument::Number(to_three_digits(factor * number)?))
     }
 
     /// Returns the same with another value of an argument.
-    fn with(&self, key: &str, value: Argument) -> Option<Self> {
+    fn with(&self, key: &str, value: &Argument) -> Option<Self> {
         let arguments = self.arguments();
         Self::build(self.name(), |wanted| {
             let present = || arguments.iter().find(|(known, _)| *known == wanted);
@@ -344,14 +349,14 @@ impl Effect {
     /// Returns the parts that are tested one by one: a harmonic order by order.
     pub fn parts(&self) -> Vec<Self> {
         let Some((key, orders)) = self.orders() else { return vec![self.clone()] };
-        let one = |order: u32| self.with(key, Argument::Orders(vec![order]));
+        let one = |order: u32| self.with(key, &Argument::Orders(vec![order]));
         orders.into_iter().filter_map(one).collect()
     }
 
     /// Returns the orders of both where they differ in nothing else.
     fn alike(&self, other: &Self) -> Option<(&'static str, Vec<u32>, Vec<u32>)> {
         let ((key, orders), (_, more)) = (self.orders()?, other.orders()?);
-        let same = self.with(key, Argument::Orders(more.clone()))? == *other;
+        let same = self.with(key, &Argument::Orders(more.clone()))? == *other;
         same.then_some((key, orders, more))
     }
 
@@ -362,7 +367,7 @@ impl Effect {
         let added: Vec<u32> = more.into_iter().filter(|order| !orders.contains(order)).collect();
         orders.extend(added);
         orders.sort_unstable();
-        self.with(key, Argument::Orders(orders))
+        self.with(key, &Argument::Orders(orders))
     }
 
     /// Returns true if it holds all of another: a harmonic of more orders.

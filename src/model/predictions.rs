@@ -48,6 +48,10 @@ impl Model {
     /// Returns the frames that carry the targets at the full parameter vector `x`, arm base frame;
     /// `None` without equilibrium.
     pub fn frames(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Frame<f64>>> {
+        #[expect(
+            clippy::redundant_closure_for_method_calls,
+            reason = "a path is not general enough over lifetimes"
+        )]
         self.map(poses, x, |predictor, pose| predictor.target_frame(pose))
     }
 

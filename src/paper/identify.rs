@@ -81,9 +81,9 @@ pub enum IdentifyError {
 /// Identifies stiffness, then geometry, from measured positions, each once.
 ///
 /// 1. Stiffness by the [`StiffnessStage`] (§3.3 puts it first; the paper does not print its
-/// equations).
-/// 2. With fixed stiffness, e_{j+1} = `J_g(E_j)`⁺ [`PE_meas` − `PE_nom(E_j)` − `D_f(E_j)`], E_{j+1}
-/// = E_j + e_{j+1}, until e is negligible [Chen2021, eq. 45].
+///    equations).
+/// 2. With fixed stiffness, e_{j+1} = `J_g(E_j)`⁺ [`PE_meas` − `PE_nom(E_j)` − `D_f(E_j)`],
+///    E_{j+1} = E_j + e_{j+1}, until e is negligible [Chen2021, eq. 45].
 ///
 /// Geometric errors that resemble deflections bias stage 1 if it uses positions: it explains them
 /// by flexibilities many times the true ones, or negative, and stage 2 cannot correct that. Load

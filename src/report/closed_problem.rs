@@ -250,7 +250,7 @@ mod tests {
                    sigma_deg = 0.05, k = { start = 0.5, min = 0.0 } }";
         let creep = problem.effect(law, "law".as_ref()).unwrap().effect;
         assert_eq!(creep.declaration(), law);
-        let edited = edit("[data]\nfiles = []\n", &[], &[creep.clone()]);
+        let edited = edit("[data]\nfiles = []\n", &[], std::slice::from_ref(&creep));
         let read = Problem::parse(&format!("{text}{edited}"), "problem.toml".as_ref());
         assert_eq!(read.unwrap().effects[0].effect, creep, "{edited}");
     }

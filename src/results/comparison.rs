@@ -169,7 +169,8 @@ impl Procedure {
             change: to(entry.identified - entry.nominal),
             seen: entry.seen,
         };
-        let (deg, mm): (fn(f64) -> f64, fn(f64) -> f64) = (f64::to_degrees, |length| length * 1e3);
+        let deg: fn(f64) -> f64 = f64::to_degrees;
+        let mm: fn(f64) -> f64 = |length| length * 1e3;
         let joint =
             |(joint, [alpha, a, theta, d, beta]): &(usize, [TableEntry; 5])| JointGeometry {
                 joint: *joint,

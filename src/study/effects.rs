@@ -1,6 +1,6 @@
 //! True values of the effects that the problem of a study declares.
 
-use super::study::{Source, Study};
+use super::definition::{Source, Study};
 use crate::error::{InputError, InputErrorKind};
 use crate::laws::At;
 use crate::model::effect::Columns;

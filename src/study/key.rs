@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::study::{Cell, Part, Study};
+use super::definition::{Cell, Part, Study};
 use crate::problem::PoseRanges;
 use crate::problem::digest::hexadecimal;
 use crate::rig::{Cause, HeldOutRows, Shape, Truth};

@@ -10,6 +10,7 @@
 //!
 //! A [`MisprintStudy`] repeats the experiment of [Chen2021] with simulated arms instead.
 
+mod definition;
 mod effects;
 mod input;
 mod key;
@@ -19,9 +20,9 @@ mod replica;
 mod results;
 mod run;
 mod store;
-mod study;
 mod tally;
 
+pub use definition::{Cell, Part, Shard, ShardError, Source, Study};
 pub use read::Request;
 pub use repetition::table;
 pub use replica::{
@@ -31,5 +32,4 @@ pub use replica::{
 pub use results::{CellResult, ParameterResult, Results, Timing};
 pub use run::{RunError, collect, pending, run};
 pub use store::{Store, StoreError};
-pub use study::{Cell, Part, Shard, ShardError, Source, Study};
 pub use tally::{Moments, ParameterTally, Tally};

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use super::definition::{Cell, Source, Study};
 use super::effects;
 use super::input::{beside, count, distinct, problem_of};
 use super::replica::MisprintStudy;
-use super::study::{Cell, Source, Study};
 use crate::error::{InputError, InputErrorKind, Location, StudyErrorKind};
 use crate::fit::{SolverChoice, Strategy};
 use crate::model::Model;

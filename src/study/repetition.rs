@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use nalgebra::{DVector, Vector3};
 use rand::Rng as _;
 
+use super::definition::{Cell, Source, Study};
 use super::effects::Strengths;
-use super::study::{Cell, Source, Study};
 use super::tally::{Fitted, ParameterScore, Score};
 use crate::fit::{
     Estimate, FindingCode, Identification, IdentifyError, Options, Placement, identify,

@@ -1,6 +1,6 @@
 //! Results of a study by cell and by parameter.
 
-use super::study::{Cell, Study};
+use super::definition::{Cell, Study};
 use super::tally::{ParameterTally, Tally};
 use crate::model::parameter::Parameter;
 use crate::numeric::median;

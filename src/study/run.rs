@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use rayon::prelude::*;
 
+use super::definition::{Part, Shard, Study};
 use super::repetition::{fit, problem_of};
 use super::results::{CellResult, Results};
 use super::store::{FinishedPart, Store, StoreError};
-use super::study::{Part, Shard, Study};
 use super::tally::Tally;
 
 /// Error that prevents the results of a study.

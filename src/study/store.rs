@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::definition::{Cell, Part, Study};
 use super::key::key;
-use super::study::{Cell, Part, Study};
 use super::tally::Tally;
 use crate::files::{StagedFile, read_text};
 

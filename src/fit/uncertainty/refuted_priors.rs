@@ -78,7 +78,7 @@ pub(in crate::fit) fn refuted_priors(
     let mut order = Vec::new();
     // The rules that gain most, one after the other.
     loop {
-        let open = (0..names.len()).filter(|place| factors[*place] == 1.0);
+        let open = (0..names.len()).filter(|place| factors[*place] <= 1.0);
         let trial = |(place, factor): (usize, f64)| {
             let mut trial = factors.clone();
             trial[place] = factor;

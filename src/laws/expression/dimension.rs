@@ -85,6 +85,7 @@ impl Dimension {
     }
 
     /// Returns the unit of a power.
+    #[expect(clippy::cast_possible_truncation, reason = "a whole number up to 64")]
     pub(super) fn power(self, exponent: Option<f64>) -> Self {
         match exponent {
             Some(exponent) if exponent.fract() == 0.0 && exponent.abs() <= 64.0 => Self {

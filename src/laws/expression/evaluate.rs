@@ -40,9 +40,8 @@ impl Function {
             Self::Exp => x.exp(),
             Self::Expm1 => x.exp_m1(),
             Self::Log => x.ln(),
-            Self::Sqrt if x.re() == 0.0 => S::from(0.0),
+            Self::Sqrt | Self::Abs if x.re() == 0.0 => S::from(0.0),
             Self::Sqrt => x.sqrt(),
-            Self::Abs if x.re() == 0.0 => S::from(0.0),
             Self::Abs if x.re() < 0.0 => -x,
             Self::Abs => x,
             Self::Sign => S::from(sign(x.re())),
@@ -76,6 +75,7 @@ impl Operator {
 const MAX_WHOLE_EXPONENT: f64 = 64.0;
 
 /// Returns x to a power that is a literal number.
+#[expect(clippy::cast_possible_truncation, reason = "a whole number up to 64")]
 fn power<S: Scalar>(x: S, exponent: f64) -> S {
     if exponent.fract() == 0.0 && exponent.abs() <= MAX_WHOLE_EXPONENT {
         return x.powi(exponent as i32);

@@ -380,12 +380,12 @@ impl<'a> Parser<'a> {
                 let write = "friction(q1, distance) with a joint's command and a distance above 0";
                 return Err(self.error(whole, Mistake::Form { write }));
             }
-            _ => return Err(self.error(span, self.unknown_function(name))),
+            _ => return Err(self.error(span, Self::unknown_function(name))),
         };
         Ok(Part { expression: Expression::Quantity(quantity), dimension, span: whole })
     }
 
-    fn unknown_function(&self, name: &str) -> Mistake {
+    fn unknown_function(name: &str) -> Mistake {
         let known = Function::ALL.iter().map(|(_, name)| *name);
         let known = known.chain(Operator::CALLS.iter().map(|(_, name)| *name));
         let near = nearest(name, known.chain(["lag", "friction"])).map(str::to_owned);

@@ -159,5 +159,10 @@ impl Expression {
 /// Returns a number as a whole one from 1 on, if it is one.
 fn whole(number: f64) -> Option<u32> {
     let is_whole = number.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&number);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a whole number within the range of u32"
+    )]
     is_whole.then_some(number as u32)
 }

@@ -102,7 +102,7 @@ pub struct Constrained {
     /// Undamped constrained step from x, once computed.
     undamped: Option<PolyhedronSolution>,
     /// True if constraints changed the last step.
-    was_constrained: bool,
+    is_limited: bool,
 }
 
 impl Constrained {
@@ -152,7 +152,7 @@ impl Constrained {
                 model: None,
                 guess: None,
                 undamped: None,
-                was_constrained: false,
+                is_limited: false,
             },
             settings,
         )
@@ -210,7 +210,7 @@ impl Subproblem for Constrained {
     }
 
     fn is_step_constrained(&self) -> bool {
-        self.was_constrained && self.method != StepMethod::Clamped
+        self.is_limited && self.method != StepMethod::Clamped
     }
 
     fn active_normals(
@@ -249,7 +249,7 @@ impl Subproblem for Constrained {
     }
 
     fn step(&mut self, x: &DVector<f64>, radius: f64) -> Step {
-        if self.was_constrained && self.method == StepMethod::ActiveSet {
+        if self.is_limited && self.method == StepMethod::ActiveSet {
             // Constraints that changed the last step usually change this one, too.
             if let Some(step) = self.undamped_step(x, radius) {
                 return step;
@@ -258,7 +258,7 @@ impl Subproblem for Constrained {
         let Some(model) = &mut self.model else { return Step::none(x) };
         let step = model.unbounded_step(x, radius);
         let is_feasible = self.bounds.contain(&step.point) && self.rows.contain(&step.point);
-        self.was_constrained = !is_feasible;
+        self.is_limited = !is_feasible;
         if is_feasible && self.method != StepMethod::InteriorPoint {
             return step;
         }

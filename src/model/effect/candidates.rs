@@ -220,11 +220,10 @@ impl Effect {
         let both_sides =
             joint.and_then(|joint| data.both_sides.get(joint)).copied().unwrap_or(false);
         match need {
-            Need::Loads => unless(data.weighs(), NO_LOADS),
-            Need::Moves(key) => match self.argument(key) {
-                Some(Argument::Joint(joint)) => unless(data.moves(joint - 1), STANDS_STILL),
-                _ => None,
-            },
+            Need::Moves(key) => {
+                let Some(Argument::Joint(joint)) = self.argument(key) else { return None };
+                unless(data.moves(joint - 1), STANDS_STILL)
+            }
             Need::Temperature => data.no_temperature,
             Need::Clock => unless(data.clock.is_some(), NO_TIMES),
             Need::Times => unless(!data.times.is_empty(), "too few poses before or after any time"),
@@ -239,7 +238,7 @@ impl Effect {
             Need::Play if self.joint().is_some_and(|joint| slides(problem, joint)) => {
                 Some("no directions of approach, and moments move nothing along a slide")
             }
-            Need::Play => unless(data.weighs(), NO_LOADS),
+            Need::Loads | Need::Play => unless(data.weighs(), NO_LOADS),
             Need::Covariate => {
                 let name = self.covariate();
                 let mut known = problem.data.covariates.iter();

@@ -91,10 +91,8 @@ impl Effect {
             At::JointOrSlide(turning, sliding) => of_joint(turning, sliding)?,
             At::Beam(field) => ParameterSite::Beam { joint: self.beam(problem)?, field },
             At::Arm(field) => ParameterSite::Arm(field),
-            At::Shift(axis) => ParameterSite::Shift { axis },
-            At::Turn(axis) => ParameterSite::Turn { axis },
-            At::BaseShift(axis) => ParameterSite::Shift { axis },
-            At::BaseTurn(axis) => ParameterSite::Turn { axis },
+            At::Shift(axis) | At::BaseShift(axis) => ParameterSite::Shift { axis },
+            At::Turn(axis) | At::BaseTurn(axis) => ParameterSite::Turn { axis },
             At::Scale => ParameterSite::Scale,
             At::Strain(entry) => ParameterSite::Strain { entry },
         })

@@ -85,7 +85,7 @@ impl Formula {
     }
 
     /// Returns the derivative of a quantity by the command of a joint.
-    fn quantity_slope(&self, quantity: Quantity, setup: &PoseView, joint: usize) -> f64 {
+    fn quantity_slope(quantity: Quantity, setup: &PoseView, joint: usize) -> f64 {
         match quantity {
             Quantity::Command(commanded) if commanded == joint => 1.0,
             Quantity::Friction { joint: held, distance } if held == joint => {
@@ -283,7 +283,7 @@ impl Regressor {
             }
             Self::Formula(formula) => {
                 let seeded = |quantity: Quantity| {
-                    let slope = formula.quantity_slope(quantity, setup, joint);
+                    let slope = Formula::quantity_slope(quantity, setup, joint);
                     Dual64::new(formula.quantity(quantity, setup), slope)
                 };
                 let values: Vec<Dual64> =

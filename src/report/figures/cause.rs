@@ -247,7 +247,7 @@ fn at_joint<'a>(
                     rows.over_quantity(quantity, problem)?
                 }
                 (_, [(regressor, value)]) => {
-                    let across = Quantity::new(rows.label(regressor), 1.0);
+                    let across = Quantity::new(Rows::label(regressor), 1.0);
                     let each = rows.poses.iter().map(|pose| regressor.value(pose)).collect();
                     (across, each, Box::new(move |x| value * x))
                 }
@@ -309,7 +309,7 @@ impl Rows<'_> {
     }
 
     /// Returns the axis of a formula with its unit.
-    fn label(&self, regressor: &Regressor) -> String {
+    fn label(regressor: &Regressor) -> String {
         match regressor.as_quantity() {
             Some(Known::Friction { joint, .. }) => {
                 format!("friction that holds joint {} back [−1 … +1]", joint + 1)

@@ -33,13 +33,14 @@ pub(in crate::report) fn text_within(blocks: &[Block], columns: usize) -> String
                 text.extend(points.iter().map(|point| wrapped(point, ("  ", "    "), width)));
             }
             Block::List(points) => {
-                points.iter().for_each(|item| point(&mut text, "- ", item, width));
+                for item in points {
+                    point(&mut text, "- ", item, width);
+                }
             }
             Block::Ranking(points) => {
-                points
-                    .iter()
-                    .enumerate()
-                    .for_each(|(k, item)| point(&mut text, &format!("{}. ", k + 1), item, width));
+                for (k, item) in points.iter().enumerate() {
+                    point(&mut text, &format!("{}. ", k + 1), item, width);
+                }
             }
             Block::Table(content) => {
                 text.push_str(&table(content));
