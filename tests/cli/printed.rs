@@ -222,7 +222,7 @@ fn the_readme_shows_what_is_printed() {
     if refills {
         fs::write(root.join("README.md"), &*readme.borrow()).unwrap();
     }
-    assert!(readme.borrow().lines().count() < 120, "one page");
+    assert!(readme.borrow().lines().count() < 130, "one page");
 }
 
 /// Returns the output of a command in the package folder, with line breaks as spaces.
