@@ -1,5 +1,7 @@
 //! Warnings about values of the arm that are probably in another unit or convention.
 
+use std::f64::consts::TAU;
+
 use super::section::Section;
 use super::{Joint, JointKind, Problem};
 use crate::error::{Location, Warning, WarningKind};
@@ -16,7 +18,10 @@ pub(super) fn joint(section: &Section<'_, '_>) -> Vec<Warning> {
     let mut warnings = Vec::new();
     for key in ["alpha_deg", "theta_deg", "beta_deg"] {
         let Some(item) = section.peek(key) else { continue };
-        let angle = item.written_number().and_then(|text| Some((text, rounded_right_angle(text)?)));
+        let angle = item
+            .written_number()
+            .and_then(|text| Some((text, rounded_right_angle(text)?)))
+            .filter(|(_, angle)| angle.abs() <= TAU);
         if let Some((text, angle)) = angle {
             let kind = WarningKind::LooksLikeRadians {
                 value: text.to_owned(),

@@ -101,6 +101,7 @@ fn values_in_another_unit_and_tables_in_another_form_are_asked_about() {
     assert!(radians.contains(":5: joint[2].alpha_deg: 1.5708 looks like radians of 90°"));
     let millimetres = said(&format!("{ARM}d_m = 399.1\n"));
     assert!(millimetres.contains("write d_mm = 399.1"), "{millimetres}");
+    assert_eq!(said(&format!("{ARM}alpha_deg = 45.55\n")), "");
     assert_eq!(said(&format!("{ARM}alpha_deg = 90.5\nd_m = 0.3991\n")), "");
     let wrong = "name = 'arm'\n[[joints]]\na_m = 1\n";
     let error = Problem::parse(wrong, Path::new("problem.toml")).unwrap_err().to_string();
@@ -146,7 +147,7 @@ fn a_joint_log_is_joined_by_name_order_or_time() {
     // A mistake in the log is named where it stands.
     let wrong = joined("by = 'name'", tracker, &log.replace("11,", "x,")).unwrap_err().to_string();
     assert!(wrong.contains("controller.csv:2: column A1: \"x\" is not a number"), "{wrong}");
-    let none = joined("by = 'name'", &tracker.replace('P', "Q"), log).unwrap_err().to_string();
+    let none = joined("by = 'name'", &tracker.replace("\nP", "\nQ"), log).unwrap_err().to_string();
     assert!(none.contains("no row of the measurements has a partner"), "{none}");
     let twice = joined("by = 'name'", tracker, &log.replace("P2", "P1")).unwrap_err().to_string();
     assert!(twice.contains("controller.csv:3: column Point: the pose P1 is already on line 2"));

@@ -63,7 +63,7 @@ fn mistakes_are_named_with_their_place() {
             ":3: a mass of -1 kg is negative",
         ),
         ("mimic", revolute("<mimic joint=\"k\"/>"), ":5: no joint is called \"k\""),
-        ("mimic itself", revolute("<mimic joint=\"j\"/>"), "follow each other in a circle"),
+        ("mimic itself", revolute("<mimic joint=\"j\"/>"), "follow each other in a cycle"),
         (
             "two parents",
             with(

@@ -91,7 +91,12 @@ fn a_chain_with_everything_is_as_another_program_has_it() {
         (problem.joints[2].limits.1 - 2.5).abs() < 1e-8
             && (problem.joints[1].limits.0 + 0.4).abs() < 1e-12
     );
-    assert_eq!(problem.joints[3].limits, (f64::NEG_INFINITY, f64::INFINITY), "continuous");
+    let turn = std::f64::consts::PI;
+    assert_eq!(
+        problem.joints[3].limits,
+        (-turn, turn),
+        "a continuous joint is planned within a turn"
+    );
     let all = |[rail, shoulder, elbow, wrist]: [f64; 4]| {
         vec![0.0, rail, shoulder, elbow, 0.0, wrist, 0.0]
     };
@@ -187,11 +192,39 @@ fn limits_that_exclude_each_other_are_said_to_be_none() {
             .iter()
             .any(|note| note.starts_with("j: the limits 1 to -1 exclude each other"));
         assert_eq!(
-            (said, described.text.contains("min_deg")),
+            (said, !described.text.contains("min_deg = -180")),
             (is_said, limits.contains("\"-1\" upper")),
             "{limits}"
         );
     }
+}
+
+#[test]
+fn other_units_and_broken_followers_are_noted() {
+    let arm = |origin: &str, beside: &str| {
+        format!(
+            "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><link name=\"c\"/><link name=\"f\"/>\
+             <joint name=\"j1\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/></joint>\
+             <joint name=\"j2\" type=\"revolute\"><parent link=\"b\"/><child link=\"c\"/><origin {origin}/>\
+             <limit lower=\"-1\" upper=\"1\"/></joint>\
+             <joint name=\"g\" type=\"prismatic\"><parent link=\"a\"/><child link=\"f\"/>{beside}</joint></robot>"
+        )
+    };
+    let notes = |origin: &str, beside: &str| {
+        let robot = Robot::parse(&arm(origin, beside), Path::new("r.urdf")).unwrap();
+        describe(&Chain::new(&robot, None, Some("c")).unwrap()).unwrap().notes.join("\n")
+    };
+    assert_eq!(notes("xyz=\"0.2 0 0\" rpy=\"3.1 0 0.2\"", ""), "");
+    let said = notes("xyz=\"0.2 0 0\" rpy=\"90 0 0\"", "");
+    assert!(said.contains("j2: rpy holds 90 rad") && said.contains("degrees"), "{said}");
+    let said = notes("xyz=\"200 0 0\"", "");
+    assert!(said.contains("j2: xyz holds 200 m") && said.contains("millimetres"), "{said}");
+    let mimic = "<mimic joint=\"finger\"/>";
+    let said = notes("xyz=\"0.2 0 0\"", mimic);
+    assert!(said.contains("g: <mimic>: no joint is called \"finger\""), "{said}");
+    let robot = Robot::parse(&arm("xyz=\"0.2 0 0\"", mimic), Path::new("r.urdf")).unwrap();
+    let error = Chain::new(&robot, None, Some("f")).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("no joint is called \"finger\""), "needed by the chain: {error}");
 }
 
 /// Two joints of the chain follow each other, the first a joint outside the chain; the names of
