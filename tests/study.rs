@@ -502,7 +502,7 @@ fn bad_studies_are_named_and_leave_nothing_behind() {
         (
             "q3_deg = [-120, -10]",
             "q3_deg = [-120, -10]\nidentification = 8",
-            &["poses.identification", "the study says"],
+            &["poses.identification", "the study sets"],
         ),
         ("[poses]", "truth = \"TRUTH.toml\"\n[poses]", &["STUDY.toml:11", "TRUTH.toml"]),
     ];

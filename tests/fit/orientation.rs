@@ -215,7 +215,7 @@ fn base_and_tool_are_found_from_poses_without_a_guess() {
     data.measurements.orientations = None;
     let error = identify(&problem, &data, &Options::default()).unwrap_err().to_string();
     assert!(
-        error.contains("orientation is to be fitted, and the measurements hold none"),
+        error.contains("orientations are to be fitted, and the measurements contain none"),
         "{error}"
     );
 }

@@ -28,10 +28,7 @@ fn sections() {
         ("[[anchor]]\nname = \"a\"\nat = [1, 2, 3]\n", "needs a unit"),
         ("[[surface]]\nname = \"a\"\n", "surface[1].kind: missing"),
         ("[[surface]]\nname = \"a\"\nkind = \"cone\"\n", "none of plane, sphere"),
-        (
-            "[[surface]]\nname = \"a\"\nkind = \"plane\"\nnormal = [0, 0, 0]\n",
-            "a direction has a length",
-        ),
+        ("[[surface]]\nname = \"a\"\nkind = \"plane\"\nnormal = [0, 0, 0]\n", "has no direction"),
         ("[[surface]]\nname = \"a\"\nkind = \"sphere\"\nradius_mm = 0\n", "not above zero"),
         (
             "[[point]]\nname = \"a\"\n[[distance]]\nbetween = [\"a\", \"b\"]\nmm = 50\n",

@@ -333,7 +333,7 @@ fn fixed_points_are_read_like_shots_of_the_arm() {
     let alone = read(&plain, &[("nests.csv", "q1_deg,q2_deg,x_m,y_m,z_m,nest\n,,1,2,3,N1\n")])
         .map(|_| ())
         .unwrap_err();
-    assert!(alone.to_string().contains("nests.csv: every row names a fixed point"), "{alone}");
+    assert!(alone.to_string().contains("nests.csv: every row measures a fixed point"), "{alone}");
 }
 
 #[test]

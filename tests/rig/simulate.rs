@@ -261,7 +261,7 @@ fn every_mistake_says_where_it_is() {
             "[parameters]\n\"joint9.a\" = { mm = 1 }",
             &["parameters.\"joint9.a\": no such parameter (did you mean joint1.a?)", "joint4.a"],
         ),
-        ("[parameters]\ntool.x = { mm = 1 }", &["stands in quotes"]),
+        ("[parameters]\ntool.x = { mm = 1 }", &["needs quotes"]),
         (
             "[parameters]\n\"tool.x\" = { deg = 1 }",
             &["parameters.\"tool.x\".deg: unknown key", "mm"],
@@ -293,7 +293,7 @@ fn every_mistake_says_where_it_is() {
         ("[[effect]]\ngear-ratio = { joint = 1 }\npayload-mass = {}", &["found 2"]),
         (
             "[[effect]]\ndeflected-equilibrium = {}\nlambda_relative = 0.5",
-            &["always in equilibrium; write 1"],
+            &["always computes the equilibrium; write 1"],
         ),
         ("[[effect]]\noutside = { joint = 2 }\nheight_deg = 1", &["a width above 0"]),
         ("[[effect]]\noutside = { joint = 0 }\nheight_deg = 1", &["no joint 0"]),

@@ -132,7 +132,7 @@ fn universal_robots_get_their_six_links() {
     let error =
         joint_origins(&tree, &Arm::nominal(&tree), YamlFormat::Ros).unwrap_err().to_string();
     assert!(
-        error.contains(":53: joint[7].parent: export to YAML takes one chain of joints"),
+        error.contains(":53: joint[7].parent: export to YAML needs a single chain of joints"),
         "{error}"
     );
 }

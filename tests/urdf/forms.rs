@@ -89,10 +89,10 @@ fn placements_and_followers_are_the_same_in_model_and_rig() {
     for (wrong, says) in [
         ("kind = 'fixed'\nxyz_m = [0, 0, 1]\nalpha_deg = 3", "unknown key"),
         ("xyz_m = [0, 0, 1]", "unknown key"),
-        ("mimic = { joint = 2 }", "joint 2 takes no command of its own"),
+        ("mimic = { joint = 2 }", "joint 2 takes no command that another joint could follow"),
         ("mimic = { joint = 7 }", "no joint 7"),
         ("mimic = { joint = 1 }\nmin_deg = 3", "unknown key"),
-        ("kind = 'fixed'\nmimic = { joint = 1 }", "a fixed joint follows no other"),
+        ("kind = 'fixed'\nmimic = { joint = 1 }", "a fixed joint cannot follow another one"),
     ] {
         let text = format!("name = 'w'\n[[joint]]\nd_m = 1\n[[joint]]\n{wrong}\n");
         let error = Problem::parse(&text, Path::new("problem.toml")).unwrap_err().to_string();

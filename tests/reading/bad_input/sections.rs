@@ -95,7 +95,7 @@ fn trees_and_targets() {
         (
             &ended,
             &[
-                ":7: joint[4].parent: the branch of joint 2 has ended; list everything that stands on a joint right",
+                ":7: joint[4].parent: the branch of joint 2 has ended; list everything that a joint carries directly",
             ],
         ),
         ("[tool]\njoint = 2", &[":4: tool.joint: no joint 2; the arm has 1"]),
@@ -112,7 +112,11 @@ fn trees_and_targets() {
         [("[[joint]]\nparent = 0", "joint[2].parent"), ("[tool]\njoint = 1", "tool.joint")]
     {
         let error = problem(&format!("dh = 'standard'\n{ARM}{text}\n")).expect_err(text);
-        check(&error, text, &[&format!(":5: {key}: a standard table has one chain and one tool")]);
+        check(
+            &error,
+            text,
+            &[&format!(":5: {key}: a standard table describes one chain with one tool")],
+        );
     }
     let named = format!("{ARM}[[target]]\nname = 'left'\n[[target]]\nname = 'right'\n");
     for (text, words) in [
