@@ -1,6 +1,6 @@
 //! Checks of the fit against held-out rows, which decide nothing in it but may contradict it.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor};
 
@@ -13,6 +13,8 @@ use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 
 /// Probability below which the held-out residuals contradict the prediction.
 const IMPROBABLE: f64 = 1e-3;
+/// Maximum number of held-out rows that are tested together: more would only cost time.
+const MAX_TESTED_ROWS: usize = 2048;
 /// Number of standard errors from which on a mean difference of held-out errors is no chance.
 const MIN_DIFFERENCE: f64 = 2.0;
 /// Number of held-out rows from which on a mean difference is judged.
@@ -31,6 +33,8 @@ impl Check for PredictionHolds {
             |row: usize| fit.held_out_outliers.iter().any(|outlier| outlier.row == row);
         let held_out = fit.fitting.split.held_out.iter().copied();
         let rows: Vec<usize> = held_out.filter(|row| !is_outlier(*row)).collect();
+        let step = rows.len().div_ceil(MAX_TESTED_ROWS).max(1);
+        let rows: Vec<usize> = rows.into_iter().step_by(step).collect();
         let Some((chi2, coordinates)) =
             predictive_chi2(fit.fitting, &rows, &fit.end.x, &fit.whole.unknowns, fit.covariance)
         else {
@@ -74,7 +78,8 @@ fn upper_tail(chi2: f64, coordinates: usize, noise_dof: Option<f64>) -> Option<(
 /// Returns χ² = rᵀ(I + J C Jᵀ)⁻¹ r of the positions of `rows`, whitened by the σ that the fit took,
 /// and its number of coordinates.
 ///
-/// With C = L Lᵀ it is r·r − (LᵀJᵀr)ᵀ (I + LᵀJᵀJ L)⁻¹ LᵀJᵀr  [Woodbury].
+/// With N = JᵀJ and v = Jᵀr it is r·r − vᵀ C (I + N C)⁻¹ v  [Woodbury], with the unknowns in units
+/// of their standard errors.
 fn predictive_chi2(
     fitting: &Fitting,
     rows: &[usize],
@@ -85,27 +90,30 @@ fn predictive_chi2(
     let stage = fitting.stage(rows, unknowns.to_vec());
     let (residuals, n, per_pose) = (stage.residuals(x), unknowns.len(), stage.coordinates());
     let at = residuals.reduced(x);
+    let scale = covariance.diagonal().map(|variance| variance.max(0.0).sqrt());
     let of_chunk = |chunk: usize| {
         let items = chunk * CHUNK_ITEMS..((chunk + 1) * CHUNK_ITEMS).min(rows.len());
         let poses = items.len();
         let mut block = Block::zeros(per_pose * poses, n);
         residuals.linearise(&at, items, &mut block);
-        let jacobian = DMatrix::from_fn(3 * poses, n + 1, |row, j| {
-            block.column(j)[per_pose * (row / 3) + row % 3]
+        let scaled = DMatrix::from_fn(3 * poses, n + 1, |row, j| {
+            let unit = if j < n { scale[j] } else { 1.0 };
+            block.column(j)[per_pose * (row / 3) + row % 3] * unit
         });
-        jacobian.tr_mul(&jacobian)
+        scaled.tr_mul(&scaled)
     };
     let chunks: Vec<DMatrix<f64>> =
         (0..rows.len().div_ceil(CHUNK_ITEMS)).into_par_iter().map(of_chunk).collect();
     let products = chunks.into_iter().reduce(|a, b| a + b)?;
-    let SymmetricEigen { eigenvalues, eigenvectors } = SymmetricEigen::new(covariance.clone());
-    let root = eigenvectors * DMatrix::from_diagonal(&eigenvalues.map(|v| v.max(0.0).sqrt()));
-    let normal = root.tr_mul(&products.view((0, 0), (n, n)).into_owned()) * &root;
-    let vector = root.tr_mul(&products.view((0, n), (n, 1)).column(0).into_owned());
-    let factor = (DMatrix::identity(n, n) + normal).cholesky()?;
-    let chi2 = products[(n, n)] - vector.dot(&factor.solve(&vector));
+    let correlation = DMatrix::from_fn(n, n, |i, j| match scale[i] * scale[j] {
+        unit if unit > 0.0 => covariance[(i, j)] / unit,
+        _ => 0.0,
+    });
+    let vector = products.view((0, n), (n, 1)).column(0).into_owned();
+    let matrix = DMatrix::identity(n, n) + products.view((0, 0), (n, n)) * &correlation;
+    let explained = vector.dot(&(correlation * matrix.lu().solve(&vector)?));
     let coordinates = stage.poses.iter().map(|pose| pose.observation.coordinates()).sum();
-    Some((chi2, coordinates))
+    Some((products[(n, n)] - explained, coordinates))
 }
 
 /// Checks that the fitted arm meets held-out rows no worse than the registered nominal arm.

@@ -74,6 +74,11 @@ pub(in crate::fit) fn refuted_priors(
     };
     let mut factors = vec![1.0; names.len()];
     let Some(declared) = evidence.best(&widened(&factors)) else { return Vec::new() };
+    // No choice of rules leaves less than all of them widened together.
+    let widest = evidence.best(&widened(&vec![FACTORS[FACTORS.len() - 1]; names.len()]));
+    if widest.is_none_or(|best| best.variance > MAX_VARIANCE_RATIO * declared.variance) {
+        return Vec::new();
+    }
     let mut best = declared;
     let mut order = Vec::new();
     // The rules that gain most, one after the other.
