@@ -53,7 +53,7 @@ impl Role {
     /// Returns true if the column has a meaning in this problem.
     pub fn is_known_to(self, problem: &Problem) -> bool {
         if matches!(self, Self::Frame | Self::Tilt(_)) {
-            return problem.data.tilt_sigma.is_some();
+            return problem.data.kind_sigmas.contains_key("tilt");
         }
         self.declared_by()
             .is_none_or(|word| problem.fixtures.iter().any(|fixture| fixture.kind.word() == word))

@@ -39,7 +39,7 @@ impl RowsBuilder {
     pub fn new(files: &[PathBuf], table: &Table, columns: &Columns, problem: &Problem) -> Self {
         let list = |role| columns.has(role).then(Vec::new);
         let names_targets = !problem.targets.is_empty();
-        let mixed = !problem.fixtures.is_empty() || problem.data.tilt_sigma.is_some();
+        let mixed = !problem.fixtures.is_empty() || problem.data.kind_sigmas.contains_key("tilt");
         let approach = columns.read.iter().any(|column| matches!(column.role, Role::Approach(_)));
         let measurements = Measurements {
             files: files.to_vec(),

@@ -18,9 +18,9 @@ use crate::spatial::Frame;
 /// Elastic arm, differentiated segment by segment for parameters of one segment, and as a whole for
 /// the others.
 pub(super) struct Elastic {
-    parts: Option<Parts>,
+    segments: Option<SegmentInputs>,
     adjoint: AdjointSolver,
-    whole: Vec<Whole>,
+    whole: Vec<WholeArmInput>,
     arm: Arm<f64>,
     state: StaticState,
     /// Memory for forward passes.
@@ -29,13 +29,13 @@ pub(super) struct Elastic {
 }
 
 /// Parameters of single segments, with the direction of each in its segment.
-struct Parts {
+struct SegmentInputs {
     sensitivity: Sensitivity,
     inputs: Vec<(Input, Segment, usize)>,
 }
 
 /// Input of the whole arm, with the arm in which it is seeded.
-struct Whole {
+struct WholeArmInput {
     arm: Arm<Dual64>,
     input: Input,
 }
@@ -43,31 +43,36 @@ struct Whole {
 impl Elastic {
     /// Creates the derivatives of `arm`, which is that of the model at `x`.
     pub fn new(model: &Model, x: &[f64], arm: Arm<f64>, inputs: Vec<Input>) -> Self {
-        let (mut apart, mut whole) = (Vec::new(), Vec::new());
+        let (mut by_segment, mut whole) = (Vec::new(), Vec::new());
         for input in inputs {
-            match part_of(&arm, input.site).filter(|_| Sensitivity::applies_to(&arm)) {
-                Some(part) => {
-                    let before = apart.iter().filter(|(_, of, _)| *of == part).count();
-                    apart.push((input, part, part.first_parameter_direction() + before));
+            match segment_of(&arm, input.site).filter(|_| Sensitivity::applies_to(&arm)) {
+                Some(segment) => {
+                    let before =
+                        by_segment.iter().filter(|(_, other, _)| *other == segment).count();
+                    by_segment.push((input, segment, segment.first_parameter_direction() + before));
                 }
-                None => whole.push(Whole { arm: seed_arm(model, x, &[&input]), input }),
+                None => whole.push(WholeArmInput { arm: seed_arm(model, x, &[&input]), input }),
             }
         }
-        let parts = (!apart.is_empty()).then(|| {
-            let count = |part| apart.iter().filter(|(_, of, _)| *of == part).count();
+        let segments = (!by_segment.is_empty()).then(|| {
+            let count =
+                |segment| by_segment.iter().filter(|(_, other, _)| *other == segment).count();
             let seeded = |direction| {
-                let of_direction: Vec<&Input> = apart
+                let of_direction: Vec<&Input> = by_segment
                     .iter()
                     .filter(|(_, _, its_direction)| *its_direction == direction)
                     .map(|(input, _, _)| input)
                     .collect();
                 seed_arm(model, x, &of_direction)
             };
-            Parts { sensitivity: Sensitivity::new(&arm, count, seeded), inputs: apart.clone() }
+            SegmentInputs {
+                sensitivity: Sensitivity::new(&arm, count, seeded),
+                inputs: by_segment.clone(),
+            }
         });
         let (adjoint, state) = (AdjointSolver::new(&arm), StaticState::default());
         Self {
-            parts,
+            segments,
             adjoint,
             whole,
             arm,
@@ -86,23 +91,23 @@ impl Elastic {
         (tip, target): (usize, &Vector3<f64>),
         rows: &mut Rows,
     ) -> Option<Frame<f64>> {
-        let Self { parts, adjoint, whole, arm, state, real, ws } = self;
+        let Self { segments, adjoint, whole, arm, state, real, ws } = self;
         arm.equilibrate_at(setup, tip, real, state).ok()?;
-        match parts {
-            Some(Parts { sensitivity, inputs }) => {
+        match segments {
+            Some(SegmentInputs { sensitivity, inputs }) => {
                 sensitivity.differentiate(setup, target, state).ok()?;
-                for (input, part, direction) in inputs {
+                for (input, segment, direction) in inputs {
                     rows.put_input(
                         input,
                         commanded,
-                        &base.vector(&sensitivity.derivative(*part, *direction)),
+                        &base.vector(&sensitivity.derivative(*segment, *direction)),
                     );
                 }
             }
             None if !whole.is_empty() => adjoint.adjoint(setup, target, state).ok()?,
             None => {}
         }
-        for Whole { arm, input } in whole {
+        for WholeArmInput { arm, input } in whole {
             let position = arm.target_position(setup, target, state, ws);
             rows.put_input(
                 input,
@@ -115,7 +120,7 @@ impl Elastic {
 }
 
 /// Returns the segment that alone contains an input; `None` if the input changes loads.
-fn part_of(arm: &Arm<f64>, site: ParameterSite) -> Option<Segment> {
+fn segment_of(arm: &Arm<f64>, site: ParameterSite) -> Option<Segment> {
     match site {
         ParameterSite::Joint { joint, field: JointField::A }
             if arm.joints[joint].beam.is_some() =>

@@ -100,12 +100,17 @@ fn pair(indices: &[usize]) -> [Option<usize>; 2] {
 
 /// Returns the kind of rows called `name`; positions if no kind has this name.
 pub(crate) fn kind_named(name: &str) -> &'static Kind {
-    KINDS.iter().find(|kind| kind.name == name).copied().unwrap_or(&position::KIND)
+    kinds().find(|kind| kind.name == name).unwrap_or(&position::KIND)
+}
+
+/// Returns every kind of rows, in the order of [`Observation`].
+pub(crate) fn kinds() -> impl Iterator<Item = &'static Kind> {
+    KINDS.iter().copied()
 }
 
 /// Returns the columns that name the fixtures and frames measured against.
 pub(crate) fn references() -> impl Iterator<Item = &'static str> {
-    KINDS.iter().map(|kind| kind.reference).filter(|reference| !reference.is_empty())
+    kinds().map(|kind| kind.reference).filter(|reference| !reference.is_empty())
 }
 
 impl Observation {

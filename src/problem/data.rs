@@ -1,5 +1,6 @@
 //! Reader of `[data]`: measurement files and their use.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::dialect::{self, Dialect};
@@ -7,7 +8,7 @@ use super::item::Item;
 use super::joint_log::{self, JointLog};
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
-use crate::observation::Observation;
+use crate::observation::{Needs, Observation, kinds};
 use crate::quantity::Unit;
 
 /// Maximum number of measurement files.
@@ -22,14 +23,9 @@ pub struct Data {
     pub files: Vec<PathBuf>,
     /// Standard deviation of a measured coordinate \[m\]; `None` if unknown.
     pub position_sigma: Option<f64>,
-    /// Standard deviation of the distance between a target and the point it touches \[m\].
-    pub point_sigma: Option<f64>,
-    /// Standard deviation of a measured distance to an anchor \[m\].
-    pub distance_sigma: Option<f64>,
-    /// Standard deviation of a measured distance from a surface \[m\].
-    pub surface_sigma: Option<f64>,
-    /// Standard deviation of a measured tilt \[rad\]; `None` if tilts are not read.
-    pub tilt_sigma: Option<f64>,
+    /// Standard deviations of other kinds of rows by their name \[m\] or \[rad\]. Tilts are not
+    /// read without one.
+    pub kind_sigmas: BTreeMap<&'static str, f64>,
     /// Rows that take no part in fitting or choosing effects; `None` if the file does not say.
     pub held_out: Option<HeldOut>,
     /// Reference temperature T₀ [°C].
@@ -111,14 +107,10 @@ pub enum HeldOut {
 impl Data {
     /// Returns the declared standard deviation of an observation \[m\] or \[rad\].
     pub fn sigma_of(&self, observation: Observation) -> Option<f64> {
-        match observation {
-            Observation::Position => self.position_sigma,
-            Observation::Point(_) => self.point_sigma,
-            Observation::Distance(_) => self.distance_sigma,
-            Observation::Surface(_) => self.surface_sigma,
-            Observation::Tilt(_) => self.tilt_sigma,
-            Observation::Between(..) => None,
+        if observation.is_position() {
+            return self.position_sigma;
         }
+        self.kind_sigmas.get(observation.kind()).copied()
     }
 }
 
@@ -130,10 +122,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         return Ok(Data {
             files: Vec::new(),
             position_sigma: None,
-            point_sigma: None,
-            distance_sigma: None,
-            surface_sigma: None,
-            tilt_sigma: None,
+            kind_sigmas: BTreeMap::new(),
             held_out: None,
             reference_temperature: None,
             joints: JointSource::Commanded,
@@ -159,12 +148,14 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         }
         files_location = item.location();
     }
-    let mut sigma =
-        |base| section.positive(base, Unit::Length, |value| InputErrorKind::NotPositive { value });
-    let (position_sigma, point_sigma) = (sigma("position_sigma")?, sigma("point_sigma")?);
-    let (distance_sigma, surface_sigma) = (sigma("distance_sigma")?, sigma("surface_sigma")?);
-    let tilt_sigma = section
-        .positive("tilt_sigma", Unit::Angle, |value| InputErrorKind::NotPositive { value })?;
+    let mut kind_sigmas = BTreeMap::new();
+    // The σ of a known distance stands beside the distance.
+    for kind in kinds().filter(|kind| kind.needs != Needs::Fixtures) {
+        let not_positive = |value| InputErrorKind::NotPositive { value };
+        let sigma = section.positive(&format!("{}_sigma", kind.name), kind.unit, not_positive)?;
+        kind_sigmas.extend(sigma.map(|sigma| (kind.name, sigma)));
+    }
+    let position_sigma = kind_sigmas.remove(Observation::Position.kind());
     let mut held_out = None;
     let mut held_out_location = location.clone();
     if let Some(item) = section.get("held_out") {
@@ -191,10 +182,7 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
     Ok(Data {
         files,
         position_sigma,
-        point_sigma,
-        distance_sigma,
-        surface_sigma,
-        tilt_sigma,
+        kind_sigmas,
         held_out,
         reference_temperature,
         joints,

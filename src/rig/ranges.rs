@@ -154,7 +154,7 @@ fn time_step(section: &mut Section<'_, '_>) -> Result<(f64, f64), InputError> {
 /// Reads the frames whose tilts are measured; the problem must declare tilts.
 fn tilts(section: &mut Section<'_, '_>, problem: &Problem) -> Result<Vec<usize>, InputError> {
     let Some(item) = section.get("tilts") else { return Ok(Vec::new()) };
-    if problem.data.tilt_sigma.is_none() {
+    if !problem.data.kind_sigmas.contains_key("tilt") {
         return Err(problem.data.location.clone().with_key("tilt_sigma_deg".to_owned()).error(
             InputErrorKind::MissingKey {
                 write: "tilt_sigma_deg = …, because tilts are measured".to_owned(),

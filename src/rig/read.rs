@@ -71,7 +71,7 @@ fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
         return Err(location.error(InputErrorKind::NoSessions { session: session.clone() }));
     }
     let orientation_sigma = problem.data.orientation_sigma.map(|declared| turn.unwrap_or(declared));
-    let tilt_sigma = tilt.or(problem.data.tilt_sigma).unwrap_or(0.0);
+    let tilt_sigma = tilt.or(problem.data.kind_sigmas.get("tilt").copied()).unwrap_or(0.0);
     Ok(Truth { noise_sigma, contact_sigmas, tilt_sigma, orientation_sigma, ..truth })
 }
 
