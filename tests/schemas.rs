@@ -2,7 +2,7 @@
 //!
 //! `FLEXCAL_REFILL=1 cargo test --test schemas` writes the schemas of the types to docs/schema/.
 
-#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use csv::ByteRecord;
 
+use super::cell_style::CellStyle;
 use super::mapped::Names;
 use super::table::Table;
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
@@ -34,13 +35,6 @@ pub(super) struct JoinedLog {
     requested: usize,
     unpaired: Vec<Location>,
     paired: usize,
-}
-
-/// Format of the cells of a table.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct CellStyle {
-    pub delimiter: char,
-    pub decimal_comma: bool,
 }
 
 /// Column that pairs rows, and its conversion to seconds if it holds times.

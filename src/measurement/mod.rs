@@ -2,6 +2,7 @@
 
 mod builder;
 #[deny(clippy::indexing_slicing)]
+mod cell_style;
 mod cells;
 #[deny(clippy::indexing_slicing)]
 mod column_table;

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use csv::{ByteRecord, Reader, ReaderBuilder};
 
+use super::cell_style::CellStyle;
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
-use super::joined::CellStyle;
 use super::lines::{Lines, MAX_RECORD_KIB};
 use super::time::date_time;
 use crate::error::{

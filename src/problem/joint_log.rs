@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::data::JointSource;
 use super::item::Item;
+use super::joint_source::JointSource;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 

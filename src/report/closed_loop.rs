@@ -10,9 +10,9 @@ use super::identify::{
 };
 use super::noise::{carried, expected, short, size};
 use super::parameters::{lower_waves, parameters};
+use super::probability::percent;
 use super::quantity::{counted, decimals, number, or_dash, p_value};
 use super::render::{Report, report, text, text_within};
-use super::trace::percent;
 use super::unexplained::{correction, places, to_declare, unexplained};
 use super::verdict::{causes, counts, stand_in, title, verdict};
 use super::{effect, findings, trace};

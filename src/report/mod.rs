@@ -29,6 +29,7 @@ mod parameters;
 mod plan;
 mod poses;
 mod predict;
+mod probability;
 mod quantity;
 mod remainder;
 mod render;

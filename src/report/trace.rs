@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::document::{Block, Point, named};
 use super::errors::{held_out_rows, rows_of, without_equilibrium};
 use super::noise::short;
+use super::probability::percent;
 use super::quantity::{counted, number, p_value};
 use super::render::text;
 use super::table::{Command, commands};
@@ -24,9 +25,6 @@ const SHOWN_CANDIDATES: usize = 6;
 const SHOWN_SETS: usize = 4;
 /// Confounded effects that are named of a candidate.
 const SHOWN_CONFOUNDED: usize = 3;
-
-/// Probability from which on a law, or a cause at a place, is more probable than not.
-pub(super) const EVEN: f64 = 0.5;
 
 /// Returns the trace as text, ending in a line break.
 pub fn trace_text(problem: &Problem, trace: &Trace) -> String {
@@ -109,15 +107,6 @@ pub(super) fn claimed(claims: &Claims) -> String {
         format!("; acts there and depends on {inputs} {}", percent(depends_on.probability))
     };
     format!("acts at {} {}{inputs}; {words}", place.value, percent(place.probability))
-}
-
-/// Returns a probability in percent.
-pub(super) fn percent(probability: f64) -> String {
-    match probability {
-        p if p > 0.995 => "over 99 %".to_owned(),
-        p if p < 0.005 => "under 1 %".to_owned(),
-        p => format!("{:.0} %", 100.0 * p),
-    }
 }
 
 /// Lists at most `most` significant candidates and how to read them; `where_all` says where all of

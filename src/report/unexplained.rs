@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::document::code;
+use super::probability::{EVEN, percent};
 use super::quantity::{number, p_value};
-use super::trace::{EVEN, percent};
 use crate::fit::Noise;
 use crate::model::effect::NO_REFERENCE;
 use crate::model::parameter::holds_all;

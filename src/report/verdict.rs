@@ -3,8 +3,8 @@
 
 use super::document::code;
 use super::effect::MOST_LISTED;
+use super::probability::{EVEN, percent};
 use super::quantity::{counted, number};
-use super::trace::{EVEN, percent};
 use crate::results::{FoundEffect, LoopResult, NamedEffect};
 use crate::select::{Status, Verdict};
 

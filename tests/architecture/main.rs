@@ -61,7 +61,19 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ("residual_tests", &[&["error", "laws", "problem", "model", "numeric"]]),
     ("select", &[GROUND, BELOW_FIT, &["fit", "residual_tests"]]),
     // Import and export of URDF.
-    ("urdf", &[&["spatial", "error", "problem", "mechanics", "model", "least_squares", "random"]]),
+    (
+        "urdf",
+        &[&[
+            "quantity",
+            "spatial",
+            "error",
+            "problem",
+            "mechanics",
+            "model",
+            "least_squares",
+            "random",
+        ]],
+    ),
     // Choice of poses, and forecasts of their measurement.
     ("design", &[GROUND, BELOW_FIT, &["fit", "select"]]),
     // Monte Carlo studies with data from the model or the rig.

@@ -23,6 +23,7 @@ mod second_order;
 mod settings;
 mod solution;
 mod spectrum;
+mod step;
 mod termination;
 mod trial;
 mod trust_region;
@@ -48,5 +49,6 @@ pub use run::{
 };
 pub use settings::Settings;
 pub use solution::Solution;
+pub use step::Step;
 pub use termination::Termination;
-pub use trust_region::{State, Step, Subproblem, TrustRegion};
+pub use trust_region::{State, Subproblem, TrustRegion};

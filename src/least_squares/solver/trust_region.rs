@@ -8,6 +8,7 @@ use argmin::kv;
 use nalgebra::{DMatrix, DVector};
 
 use super::second_order::{ConvexModel, SecondOrder};
+use super::step::Step;
 use super::trial::{GOOD_RATIO, Trial};
 use super::{Settings, Termination};
 use crate::least_squares::{Linearisation, Objective};
@@ -23,28 +24,6 @@ const MAX_ACCELERATION: f64 = 0.75;
 const MAX_ACCELERATION_TRIES: usize = 6;
 /// Relative change of the cost that counts as rounding.
 const ROUNDING: f64 = 1e3 * f64::EPSILON;
-
-/// Step within the radius, with its predictions by the linearised problem.
-#[derive(Debug, Clone)]
-pub struct Step {
-    /// Point x + p that the step reaches.
-    pub point: DVector<f64>,
-    /// Scaled length ‖D p‖.
-    pub length: f64,
-    /// First-order reduction −gᵀp of ½‖r‖².
-    pub slope: f64,
-    /// Predicted reduction ½‖r‖² − ½‖J p + r‖².
-    pub predicted: f64,
-    /// Damping λ, zero if the radius did not limit the step.
-    pub damping: f64,
-}
-
-impl Step {
-    /// Creates a step of length zero, which stops the solver.
-    pub(super) fn none(x: &DVector<f64>) -> Self {
-        Self { point: x.clone(), length: 0.0, slope: 0.0, predicted: 0.0, damping: 0.0 }
-    }
-}
 
 /// Method by which a solver chooses its step from a linearisation.
 pub trait Subproblem {

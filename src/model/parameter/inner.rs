@@ -3,21 +3,7 @@
 use std::sync::Arc;
 
 use super::Parameter;
-use super::regressor::{Formula, Regressor};
-
-/// Derivative of a sum of terms c f(pose; p) by one parameter p inside of the formulas.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Slope {
-    /// Coefficient, formula with the values of its parameters, and the index of p among these.
-    terms: Vec<(f64, Arc<Formula>, usize)>,
-}
-
-impl Slope {
-    /// Returns the value in a pose.
-    pub(super) fn value(&self, setup: &crate::problem::PoseView) -> f64 {
-        self.terms.iter().map(|(c, formula, p)| c * formula.parameter_slope(setup, *p)).sum()
-    }
-}
+use super::regressor::{Formula, Regressor, Slope};
 
 /// Returns the regressor that multiplies parameter k in the prediction at the full parameter vector
 /// `x`: formulas take the values of the parameters inside of them. `None` for such a parameter
@@ -43,7 +29,7 @@ pub(crate) fn slope_regressor(parameters: &[Parameter], x: &[f64], k: usize) -> 
             Some((*c, Arc::new(bound(formula, parameters, x)), index))
         };
         let terms = parameters.iter().zip(x).filter_map(term).collect();
-        Regressor::Slope(Arc::new(Slope { terms }))
+        Regressor::Slope(Arc::new(Slope::new(terms)))
     })
 }
 

@@ -12,10 +12,10 @@ mod site;
 
 pub use crate::laws::{ArmField, BeamField, JointField};
 pub use constraint::{LinearConstraint, constrain};
-pub use inner::Slope;
+
 pub(crate) use inner::{slope_regressor, value_regressor};
 pub(crate) use regressor::Waves;
-pub use regressor::{Formula, Regressor};
+pub use regressor::{Formula, Regressor, Slope};
 pub use resolve::{EffectParameter, resolve};
 pub(crate) use resolve::{holds_all, refuses, rule_of};
 pub use site::ParameterSite;

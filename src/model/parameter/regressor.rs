@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use num_dual::Dual64;
 
-use super::inner::Slope;
 use crate::laws::Quantity;
 use crate::laws::expression::{Expression, FormulaError, Names, Parsed, Per, Vocabulary, parse};
 use crate::problem::{PoseView, Problem, ThermalLag};
@@ -30,6 +29,25 @@ pub enum Regressor {
     Inner,
     /// Derivative of formulas by a parameter inside of them.
     Slope(Arc<Slope>),
+}
+
+/// Derivative of a sum of terms c f(pose; p) by one parameter p inside of the formulas.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slope {
+    /// Coefficient, formula with the values of its parameters, and the index of p among these.
+    terms: Vec<(f64, Arc<Formula>, usize)>,
+}
+
+impl Slope {
+    /// Creates the derivative from the coefficient, the formula and the parameter index of each term.
+    pub(super) fn new(terms: Vec<(f64, Arc<Formula>, usize)>) -> Self {
+        Self { terms }
+    }
+
+    /// Returns the value in a pose.
+    pub(super) fn value(&self, setup: &PoseView) -> f64 {
+        self.terms.iter().map(|(c, formula, p)| c * formula.parameter_slope(setup, *p)).sum()
+    }
 }
 
 /// Formula over quantities of a pose, with the values that poses may leave open.
