@@ -196,7 +196,7 @@ fn other_sections() {
 #[test]
 fn rules_of_parameters() {
     let rules: [(&str, &[&str]); 14] = [
-        ("'tool.x' = {}", &[":4: parameters.\"tool.x\": says nothing"]),
+        ("'tool.x' = {}", &[":4: parameters.\"tool.x\": the rule is empty"]),
         ("'tool.x' = true", &[":4: parameters.\"tool.x\": expected a table"]),
         ("tool.x = { free = true }", &[":4: parameters.tool: ", "in quotes: \"tool.x\""]),
         ("a = { sigma = 1 }", &[":4: parameters.a.sigma: ", "needs a unit", "sigma_mm"]),
