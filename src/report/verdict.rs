@@ -33,7 +33,7 @@ pub(super) fn verdict(result: &LoopResult, takes_less: bool) -> String {
         return end
             + "The residual was not examined to the end: no cause is named, and none is ruled out.";
     }
-    let first = if result.before.misfit_carried_by.is_some() && result.trusted {
+    let first = if result.before.misfit_carried_by.is_some() {
         "Check the influential rows first: wrong rows hide causes, and a cause that acts in them alone looks like wrong rows. "
     } else {
         ""

@@ -139,7 +139,7 @@ fn rows_that_an_effect_touches_alone_are_no_gross_ones() {
     fs::copy(cases.join("e-payload-mass.csv"), bench.path("a-none.csv")).unwrap();
     let (_, out, _) = run(&bench, "identify . --out out");
     assert!(
-        !out.contains("gross errors")
+        !out.contains("most of the residual")
             && out.contains("\nNext: flexcal loop . looks for what the model lacks"),
         "{out}"
     );
