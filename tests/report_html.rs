@@ -200,7 +200,7 @@ fn the_picture_holds_the_errors_that_the_tables_sum_up() {
         );
     }
     let told = report::identification_report(&problem, &found, &shown).markdown;
-    assert!(told.contains("- passed: ") && told.contains("## What the poses can tell"), "{told}");
+    assert!(told.contains("- passed: ") && told.contains("## Identifiability"), "{told}");
     assert!(found.estimates.iter().all(|estimate| told.contains(&estimate.name)));
     assert!(shown.correlations.names.iter().all(|name| page.html.contains(name.as_str())));
     // Markup in a title has no effect.

@@ -101,7 +101,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let words = fitted
         .as_ref()
         .filter(is_told)
-        .map(|own| format!("\n{}\n", report::remainder_text(&identification, own)))
+        .map(|own| {
+            format!(
+                "\n{}\n",
+                textwrap::fill(
+                    &report::remainder_text(&identification, own),
+                    output::columns().min(110)
+                )
+            )
+        })
         .unwrap_or_default();
     let shown = PlotData::of_identification(&problem, &data, &identification)?;
     let told = report::identification_report(&problem, &identification, &shown);

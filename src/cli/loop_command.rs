@@ -83,7 +83,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     ];
     texts.extend(file.as_ref().map(|text| (REMAINDER_FILE, text.as_str())));
     let words = kept.and(fitted.as_ref()).map_or_else(String::new, |own| {
-        format!("\n{}\n", report::remainder_text(&closure.after, own))
+        format!(
+            "\n{}\n",
+            textwrap::fill(
+                &report::remainder_text(&closure.after, own),
+                output::columns().min(110)
+            )
+        )
     });
     let told = report::loop_report(&problem, &closure, &shown);
     results.write_report(&texts, &told)?;

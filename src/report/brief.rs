@@ -70,7 +70,7 @@ fn worth_a_look(found: &Identification) -> Vec<String> {
     points.extend(farthest.map(|outlier| {
         let n = counted(found.outliers.len(), noun(found));
         format!(
-            "{n} with gross errors, the largest at {}: {}",
+            "{n} too far off to be noise, the largest at {}: {}",
             outlier.location,
             size_of_kind(outlier.kind, outlier.error.norm(), 3)
         )

@@ -97,7 +97,7 @@ fn where_nothing_is_free_every_command_that_fits_says_so() {
         let assert = run.current_dir(bench.folder.path()).arg(command).assert();
         let said = text(&assert.get_output().stderr);
         assert!(
-            said.contains("nothing is free: the nominal arm is judged as it is"),
+            said.contains("no parameter is free, so the nominal arm is judged"),
             "{command}: {said}"
         );
     }

@@ -143,9 +143,9 @@ fn a_check_names_what_would_be_found() {
     let bench = Bench::new();
     let (out, _) = bench.run(0, "check tests/cases", &[]);
     for expected in [
-        "How large an effect must be",
+        "Size from which on an effect is found",
         "gear-ratio = { joint = 4 }",
-        "Not with these poses",
+        "Not visible with these poses",
         "tracker-scale",
     ] {
         assert!(out.contains(expected), "{expected} missing in:\n{out}");
@@ -236,7 +236,7 @@ fn a_plan_tells_two_effects_apart() {
             "--separate: gear-ratio: needs arguments; write 'gear-ratio = { joint = 1 }'",
         ),
         (["gear-ratio = { joint = 9 }", "hoist-force"], "no joint 9"),
-        (["tracker-drift", "hoist-force"], "an effect of time"),
+        (["tracker-drift", "hoist-force"], "depends on the time of measurement"),
     ] {
         let more = ["--separate", pair[0], pair[1], "--candidates", &table];
         let (_, err) = bench.run(2, "plan tests/cases --poses 20", &more);
@@ -437,8 +437,9 @@ fn a_plan_of_too_few_poses_says_how_many_it_takes() {
         rank == 15 && attainable > 25 && json["least_poses"] == attainable.div_ceil(3),
         "{json}"
     );
-    let words =
-        format!("Too few poses: they see 15 of the {attainable} combinations of the 31 parameters");
+    let words = format!(
+        "Too few poses: they determine 15 of the {attainable} combinations of the 31 parameters"
+    );
     assert!(
         few.contains(&words)
             && few.contains(&format!("it takes {} poses at least", attainable.div_ceil(3))),

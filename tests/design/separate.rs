@@ -173,7 +173,9 @@ fn a_pair_must_be_two_effects_that_poses_show() {
     let (problem, _) = lunar();
     let refused = |names| pair(&problem, names).unwrap_err().to_string();
     assert!(refused(["hoist-force", "hoist-force = true"]).contains("the same"));
-    assert!(refused(["hoist-force", "tracker-drift"]).contains("effect of time"));
+    assert!(
+        refused(["hoist-force", "tracker-drift"]).contains("depends on the time of measurement")
+    );
     let springs = [0.2, 0.3].map(|free| {
         format!("gravity-compensator = {{ joint = 2, anchor_m = [0.1, -0.25], lever_m = [0.3, 0.15], free_length_m = {free} }}")
     });

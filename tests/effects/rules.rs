@@ -139,7 +139,7 @@ fn rules_that_do_not_fit_are_mistakes() {
     for (rule, words) in [
         (
             "\"gear-ratio.*\" = { sigma_mm = 1 }",
-            "gear-ratio[3].error takes free = true or fixed = true",
+            "gear-ratio[3].error needs free = true or fixed = true",
         ),
         ("\"backlash[5].width\" = { sigma_mm = 1 }", "backlash[5].width takes _deg or _rad"),
         ("\"backlash[4].width\" = { sigma_deg = 1 }", "backlash[4].width takes _mm or _m"),

@@ -228,7 +228,7 @@ fn an_estimate_applies_to_another_session_without_a_refit() {
         run("predict problem.toml --estimate fit/estimate.json --out there --data A.csv B.csv")
             .success();
     let told = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
-    assert!(told.contains("Fitted to these rows, with the arm as it is: base[B].x"), "{told}");
+    assert!(told.contains("Fitted to these rows, with the arm held: base[B].x"), "{told}");
     let errors: Value = serde_json::from_str(&read("there/errors.json")).unwrap();
     assert_eq!(
         (errors["all"]["n"].as_u64(), errors["sessions"]["B"]["n"].as_u64()),

@@ -136,7 +136,8 @@ fn a_check_does_not_trust_what_a_fit_would_not() {
     let check = |bench: &Bench| bench.command("check", &["--candidates", "m.csv"]);
     let (status, _, err) = check(&one);
     assert!(
-        status == 1 && err.contains("leave 3 combinations of parameters without a prior undecided"),
+        status == 1
+            && err.contains("do not determine 3 combinations of parameters without a prior"),
         "{err}"
     );
     assert_eq!(one.json("check.json")["sufficient"], false);

@@ -68,11 +68,11 @@ fn rows() {
         ("offset_mm", "800", ":1: column surface: missing"),
         ("point", "", ":2: nothing is measured in this row"),
         ("point,x_mm,y_mm,z_mm", ",1,2,", ":2: column z_mm: the cell is empty"),
-        ("point", "left", ":2: column point: the point \"left\" is measured by 1 row alone"),
+        ("point", "left", ":2: column point: the point \"left\" is measured by 1 row only"),
         (
             "anchor,distance_mm",
             "A,800",
-            ":2: column anchor: the anchor \"A\" is measured by 1 row alone",
+            ":2: column anchor: the anchor \"A\" is measured by 1 row only",
         ),
     ] {
         let text = format!("q1_rad,q2_rad,q3_rad,q4_rad,q5_rad,q6_rad,{columns}\n{q},{cells}\n");

@@ -194,8 +194,8 @@ fn bad_references_end_with_status_2_and_write_nothing() {
         (",D,800,,,,", "rows.csv:42: column anchor: no anchor is called \"D\""),
         (",,,wall,,,", "rows.csv:42: column surface: no surface is called \"wall\""),
         (",,,,wrist,1,1", "rows.csv:42: column frame: no frame is called \"wrist\""),
-        ("top,,,,,,", "rows.csv:42: column point: the point \"top\" is measured by 1 row alone"),
-        (",C,800,,,,", "rows.csv:42: column anchor: the anchor \"C\" is measured by 1 row alone"),
+        ("top,,,,,,", "rows.csv:42: column point: the point \"top\" is measured by 1 row only"),
+        (",C,800,,,,", "rows.csv:42: column anchor: the anchor \"C\" is measured by 1 row only"),
     ] {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("problem.toml"), format!("{ARM}{around}")).unwrap();

@@ -15,9 +15,7 @@ const TRACKER: (&str, &str) = (
     "'Collection::Group::Target' = 'pose'\n'X' = 'x_mm'\n'Y' = 'y_mm'\n'Z' = 'z_mm'\n'A1' = 'q1_deg'\n'A2' = 'q2_deg'\n'Timestamp' = 'time'\n\
      [data.format]\ncomment = '//'\ndecimal = ','\nmissing = '0,0,0'\n",
     "// Exported; units: mm, \"degrees\nCollection::Group::Target;X;Y;Z;A1;A2;Timestamp;RMS\nM::P::1;1500,25;-2,5;3;10,5;-20;2024-05-31T14:03:20Z;0,01\n\
-     // lost the
-     // beam\nM::P::2;0,0;0;0;11;-21;2024-05-31T14:03:25Z;\nM::P::3;1,5e3;2;3;12;-22;2024-05-31
-     // 14:03:30.5;0,02\n",
+     // lost the beam\nM::P::2;0,0;0;0;11;-21;2024-05-31T14:03:25Z;\nM::P::3;1,5e3;2;3;12;-22;2024-05-31 14:03:30.5;0,02\n",
 );
 
 /// Export of a motion capture system: lines above the header, repeated names, empty cells for a
@@ -106,7 +104,7 @@ fn sizes_that_no_arm_has_are_said() {
     assert_eq!(said(&arm(""), &table("deg")), "");
     let words = said(&arm("target_m = [220, 0, -90]"), &table("deg"));
     assert!(
-        words.contains("problem.toml: tool.target: 237.697 m away")
+        words.contains("problem.toml: tool.target: 237.697 m from the last frame")
             && words.contains("0.500 m long"),
         "{words}"
     );
@@ -276,11 +274,11 @@ fn wrong_covariates_are_named() {
         ),
         (
             "[[effect]]\ncovariate = { joint = 2, base = true, of = 'oil' }\n",
-            "write joint = … or base = true",
+            "write either joint = … or base = true",
         ),
         (
             "[[effect]]\ncovariate = { base = false, of = 'oil' }\n",
-            "write joint = … or base = true",
+            "write either joint = … or base = true",
         ),
         ("[[effect]]\ncovariate = { of = 'oil' }\n", "effect[1].covariate.joint: missing"),
         ("[[effect]]\ncovariate = { joint = 2 }\n", "effect[1].covariate.of: missing"),

@@ -283,10 +283,10 @@ fn columns_nobody_knows_are_passed_over_with_a_warning() {
     let warnings: Vec<_> = warnings.iter().map(ToString::to_string).collect();
     let words = [
         ["q1_deg", "joint 1"],
-        ["operator", "known; ignored"],
+        ["operator", "unknown column; ignored"],
         ["payloud_kgs", "(did you mean payload_kg?); ignored"],
         // A suggested column that already exists is not meant.
-        ["yy_m", "known; ignored"],
+        ["yy_m", "unknown column; ignored"],
         ["time", "time_s"],
     ];
     assert_eq!(warnings.len(), words.len());

@@ -241,9 +241,9 @@ fn every_mistake_says_where_it_is() {
     };
     fails("", &["poses: missing"]);
     fails("[poses]\nq1_deg = [0, 1]", &["poses.q2: missing", "q2_deg or q2_rad"]);
-    fails("[poses]\nq1_deg = [0, 1, 2]", &[":2: poses.q1_deg: a range is two numbers", "found 3"]);
+    fails("[poses]\nq1_deg = [0, 1, 2]", &[":2: poses.q1_deg: a range has two numbers", "found 3"]);
     fails("[poses]\nq1_m = [0, 1]", &["poses.q1_m: an angle is not given in m"]);
-    fails("[poses]\nq1_deg = 3", &["poses.q1_deg: a range is two numbers", "write [3, 3]"]);
+    fails("[poses]\nq1_deg = 3", &["poses.q1_deg: a range has two numbers", "write [3, 3]"]);
     fails("[poses]\nq1_deg = '3'", &["poses.q1_deg: expected a list"]);
     for (line, words) in [
         ("held_out = 1.5", &["poses.held_out: 1.5 is not between 0 and 1"][..]),

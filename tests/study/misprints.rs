@@ -88,7 +88,7 @@ fn mistakes_in_a_study_of_misprints_are_named() {
         let mut flexcal = Command::new(assert_cmd::cargo::cargo_bin!("flexcal"));
         let assert =
             flexcal.current_dir(root()).args(arguments).args(["--out", &out]).assert().code(2);
-        assert!(String::from_utf8_lossy(&assert.get_output().stderr).contains("done at once"));
+        assert!(String::from_utf8_lossy(&assert.get_output().stderr).contains("runs in one piece"));
     }
 }
 

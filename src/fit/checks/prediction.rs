@@ -109,10 +109,13 @@ fn predictive_chi2(
         unit if unit > 0.0 => covariance[(i, j)] / unit,
         _ => 0.0,
     });
+    let coordinates = stage.poses.iter().map(|pose| pose.observation.coordinates()).sum();
+    if n == 0 {
+        return Some((products[(0, 0)], coordinates));
+    }
     let vector = products.view((0, n), (n, 1)).column(0).into_owned();
     let matrix = DMatrix::identity(n, n) + products.view((0, 0), (n, n)) * &correlation;
     let explained = vector.dot(&(correlation * matrix.lu().solve(&vector)?));
-    let coordinates = stage.poses.iter().map(|pose| pose.observation.coordinates()).sum();
     Some((products[(n, n)] - explained, coordinates))
 }
 

@@ -97,7 +97,7 @@ fn files_that_differ() {
     check(
         &read(",hoist_N", "").unwrap_err(),
         "fewer",
-        &["2.csv:1: column hoist_N: ", "1.csv has it"],
+        &["2.csv:1: column hoist_N: ", "1.csv has this column, this file does not"],
     );
     assert!(read("", "").is_ok() && read(",pose", "").is_ok() && read(",note", "").is_ok());
     let twice = [files[0].clone(), files[0].clone()];

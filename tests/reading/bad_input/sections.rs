@@ -198,7 +198,7 @@ fn rules_of_parameters() {
     let rules: [(&str, &[&str]); 14] = [
         ("'tool.x' = {}", &[":4: parameters.\"tool.x\": the rule is empty"]),
         ("'tool.x' = true", &[":4: parameters.\"tool.x\": expected a table"]),
-        ("tool.x = { free = true }", &[":4: parameters.tool: ", "in quotes: \"tool.x\""]),
+        ("tool.x = { free = true }", &[":4: parameters.tool: ", "needs quotes: \"tool.x\""]),
         ("a = { sigma = 1 }", &[":4: parameters.a.sigma: ", "needs a unit", "sigma_mm"]),
         ("a = { sigma_mm = 0 }", &[":4: parameters.a.sigma_mm: 0 is not above zero"]),
         ("a = { sigma_kg = 1 }", &[":4: parameters.a.sigma_kg: unknown key", "sigma_relative"]),
@@ -245,7 +245,7 @@ fn constraints() {
         ("", &[":3: constraint[1].terms: missing"]),
         ("terms = {}", &[":4: constraint[1].terms: no terms"]),
         ("terms = 1", &[":4: constraint[1].terms: expected a table"]),
-        ("terms = { A.EI = 1 }", &[":4: constraint[1].terms.A: ", "in quotes: \"A.EI\""]),
+        ("terms = { A.EI = 1 }", &[":4: constraint[1].terms.A: ", "needs quotes: \"A.EI\""]),
         ("terms = { a = 0 }\nat_least = 0", &[":4: constraint[1].terms.a: a coefficient of 0"]),
         ("terms = { a = 'x' }", &[":4: constraint[1].terms.a: expected a number"]),
         ("terms = { a = 1 }", &[":3: constraint[1]: no limit; write at_least or at_most"]),
@@ -304,11 +304,11 @@ fn effects() {
         ),
         (
             "joint-wave = { joint = 1, order = 0 }",
-            &[":4: effect[1].joint-wave.order: 0 is no order"],
+            &[":4: effect[1].joint-wave.order: 0 is not a valid order"],
         ),
         (
             "joint-wave = { joint = 1, order = 1e9 }",
-            &[":4: effect[1].joint-wave.order: 1000000000 is no order"],
+            &[":4: effect[1].joint-wave.order: 1000000000 is not a valid order"],
         ),
         ("joint-wave = { joint = 1 }", &[":4: effect[1].joint-wave.order: missing"]),
         (
@@ -406,7 +406,7 @@ fn compensators() {
         ),
         (
             "gravity-compensator = { joint = 2, anchor_m = [0, 1], lever_m = [1, 0], free_length_m = 0 }\n[[joint]]\nkind = 'prismatic'",
-            &[":4: effect[1].gravity-compensator.joint: joint 2 does not turn"],
+            &[":4: effect[1].gravity-compensator.joint: joint 2 does not rotate"],
         ),
         (
             "gravity-compensator = { joint = 2, anchor_m = [0, 1], lever_m = [1, 0], free_length_m = 0 }\n[[joint]]\nkind = 'fixed'",

@@ -158,7 +158,7 @@ fn splits() {
             rows("note", ["", ""]),
             &[place, "2 rows have 1 joint configurations"],
         ),
-        (ARM, rows("note", ["", ""]), &["problem.toml: data: no row is said to be held out"]),
+        (ARM, rows("note", ["", ""]), &["problem.toml: data: no held-out rows are declared"]),
         (ARM, rows("split", ["validation"; 2]), &["problem.toml: data: no rows are left to fit"]),
     ];
     for (problem, rows, words) in cases {
