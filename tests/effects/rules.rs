@@ -141,8 +141,8 @@ fn rules_that_do_not_fit_are_mistakes() {
             "\"gear-ratio.*\" = { sigma_mm = 1 }",
             "gear-ratio[3].error needs free = true or fixed = true",
         ),
-        ("\"backlash[5].width\" = { sigma_mm = 1 }", "backlash[5].width takes _deg or _rad"),
-        ("\"backlash[4].width\" = { sigma_deg = 1 }", "backlash[4].width takes _mm or _m"),
+        ("\"backlash[5].width\" = { sigma_mm = 1 }", "backlash[5].width needs _deg or _rad"),
+        ("\"backlash[4].width\" = { sigma_deg = 1 }", "backlash[4].width needs _mm or _m"),
         ("\"gear-ratio[2].error\" = { free = true }", "matches no parameter"),
         (
             "\"joint*.alfa\" = { free = true }",
@@ -154,7 +154,7 @@ fn rules_that_do_not_fit_are_mistakes() {
         ),
         (
             "\"link-th*\" = { free = true }",
-            "those of link-thermal-bending, link-thermal-expansion, link-thermal-bending-lag, link-thermal-expansion-lag are there",
+            "parameters of link-thermal-bending, link-thermal-expansion, link-thermal-bending-lag, link-thermal-expansion-lag exist if",
         ),
         (
             "\"joint-com*[2].*\" = { free = true }",

@@ -166,7 +166,7 @@ fn a_check_does_not_trust_what_a_fit_would_not() {
     };
     let still = Bench::new(free, still);
     let (status, _, err) = check(&still);
-    assert!(status == 1 && err.contains("leave 1 combination of parameters"), "{err}");
+    assert!(status == 1 && err.contains("do not determine 1 combination of parameters"), "{err}");
     fs::copy(still.path("rig/measurements.csv"), still.path("m.csv")).unwrap();
     assert_eq!(check(&still).0, 0);
 }

@@ -28,7 +28,7 @@ fn read(map: &str, text: &str, measured: bool) -> Result<(Measurements, Vec<Warn
 }
 
 fn words(warnings: &[Warning]) -> String {
-    warnings.iter().map(|warning| format!("{warning}\n")).collect()
+    warnings.iter().flat_map(|warning| [warning.to_string(), "\n".to_owned()]).collect()
 }
 
 #[test]
@@ -80,7 +80,8 @@ fn pipes_with_a_name_are_refused_at_once() {
     let pipe = folder.path().join("rows.csv");
     let status = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
     assert!(status.success());
-    let error = Measurements::read(&[pipe.clone()], &problem(ARM)).unwrap_err().to_string();
+    let error =
+        Measurements::read(std::slice::from_ref(&pipe), &problem(ARM)).unwrap_err().to_string();
     assert!(error.contains("a FIFO, socket or device; give a regular file"), "{error}");
     assert!(Problem::read(&pipe).unwrap_err().to_string().contains("FIFO"));
     fs::rename(&pipe, folder.path().join(".flexcal")).unwrap();

@@ -7,54 +7,16 @@ use super::candidate::{Candidate, even};
 use super::functions::{Known, basis, goes_with, growing, merge, products_of, rough_basis, times};
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::marginal::Coefficients;
+use super::sites::{acts_along_axes, geometry_sites};
 use crate::laws::Quantity;
 use crate::model::Pose;
 use crate::model::effect::Term;
-use crate::model::parameter::{BeamField, JointField, ParameterSite, Regressor};
+use crate::model::parameter::{BeamField, JointField, ParameterSite};
 use crate::problem::{Effect, JointKind, Observation, Problem};
 use crate::residual_tests::Covariate;
 use crate::select::data::{bits, number};
 use crate::select::neighbourhood::{Linearised, tries};
 use crate::select::rules::SelectionRules;
-
-/// Slots whose columns the hypotheses need beside those of effects.
-pub(super) fn slots(problem: &Problem) -> Vec<ParameterSite> {
-    let mut slots: Vec<ParameterSite> = places(problem).collect();
-    slots.extend(
-        (0..3).flat_map(|axis| [ParameterSite::Shift { axis }, ParameterSite::Turn { axis }]),
-    );
-    for joint in 0..problem.joints.len() {
-        slots.extend(
-            [JointField::Compliance, JointField::LateralX]
-                .map(|field| ParameterSite::Joint { joint, field }),
-        );
-        if problem.joints[joint].beam.is_some() && problem.data.reference_temperature.is_some() {
-            slots.extend(BeamField::STRAINS.map(|field| ParameterSite::Beam { joint, field }));
-        }
-    }
-    slots
-}
-
-/// Every coordinate of a joint or link that may be off.
-fn places(problem: &Problem) -> impl Iterator<Item = ParameterSite> + '_ {
-    (0..problem.joints.len()).flat_map(|joint| {
-        JointField::GEOMETRY.into_iter().map(move |field| ParameterSite::Joint { joint, field })
-    })
-}
-
-/// Whether the parameters of an effect stand for axes of the arm, as compliances about two of them,
-/// of which one alone may give way; a shift of what measures and the phase of a harmonic have no
-/// such axes.
-fn acts_along_axes(terms: &[Term]) -> bool {
-    let is_axis = |term: &Term| {
-        term.regressor == Regressor::Constant
-            && term.nominal == 0.0
-            && Site::of(term.site) != Site::Measurement
-    };
-    let distinct =
-        |(k, term): (usize, &Term)| terms[..k].iter().all(|other| other.site != term.site);
-    terms.len() > 1 && terms.iter().all(is_axis) && terms.iter().enumerate().all(distinct)
-}
 
 /// Commands in contact that differ by what moves the target by no more than this, in σ, may differ
 /// by noise alone.
@@ -197,7 +159,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         let (known, loads) = (self.known(), self.loads());
         // The shortest only of the coordinates that joints move: it takes many poses.
         let lengths = self.rules.smooth_lengths;
-        for site in places(self.problem) {
+        for site in geometry_sites(self.problem) {
             let Some(at) = self.linearised.place(site) else { continue };
             let moving = self.moving(site);
             let (family, own) =

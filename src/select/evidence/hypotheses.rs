@@ -4,12 +4,13 @@ use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::candidate::{Candidate, even, order_of};
-use super::columns::{Columns, slots};
+use super::columns::Columns;
 use super::functions::{Known, Shape};
 use super::hypothesis::Hypothesis;
 use super::hypothesis_set::HypothesisSet;
 use super::limits::limits;
 use super::marginal::Coefficients;
+use super::sites::hypothesis_sites;
 use crate::model::parameter::ParameterSite;
 use crate::problem::{Effect, Problem};
 use crate::residual_tests::Covariate;
@@ -49,7 +50,8 @@ impl<'a> Hypotheses<'a> {
         let added: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
         let own: Vec<Vec<usize>> = added.iter().map(|part| fitted.unknowns_of(part)).collect();
         let unknowns = own.concat();
-        let linearised = fitted.linearised_with(data, rows, &candidates, &slots(&fitted.problem));
+        let linearised =
+            fitted.linearised_with(data, rows, &candidates, &hypothesis_sites(&fitted.problem));
         let fit = linearised.fitted();
         let known =
             added.iter().zip(&own).map(|(part, own)| (part.clone(), fit.select_columns(own)));
@@ -109,7 +111,8 @@ impl<'a> Hypotheses<'a> {
         weighed: usize,
         of: &Hypothesis,
     ) -> Self {
-        let linearised = fitted.linearised_with(data, rows, &[], &slots(&fitted.problem));
+        let linearised =
+            fitted.linearised_with(data, rows, &[], &hypothesis_sites(&fitted.problem));
         let how = (data.measurements.time_measured, data.rules, weighed);
         let (all, covariates, ln_family) =
             Columns::all(&fitted.problem, &linearised, how, &[], Some(of));

@@ -26,6 +26,7 @@ mod posterior;
 mod products;
 mod sag;
 mod search;
+mod sites;
 mod waves;
 
 use std::collections::BTreeMap;

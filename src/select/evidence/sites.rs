@@ -1,0 +1,44 @@
+//! Parameter sites of the hypotheses.
+
+use super::hypothesis::Site;
+use crate::model::effect::Term;
+use crate::model::parameter::{BeamField, JointField, ParameterSite, Regressor};
+use crate::problem::Problem;
+
+/// Returns the parameter sites whose columns the hypotheses need besides those of the effects.
+pub(super) fn hypothesis_sites(problem: &Problem) -> Vec<ParameterSite> {
+    let mut sites: Vec<ParameterSite> = geometry_sites(problem).collect();
+    sites.extend(
+        (0..3).flat_map(|axis| [ParameterSite::Shift { axis }, ParameterSite::Turn { axis }]),
+    );
+    for joint in 0..problem.joints.len() {
+        sites.extend(
+            [JointField::Compliance, JointField::LateralX]
+                .map(|field| ParameterSite::Joint { joint, field }),
+        );
+        if problem.joints[joint].beam.is_some() && problem.data.reference_temperature.is_some() {
+            sites.extend(BeamField::STRAINS.map(|field| ParameterSite::Beam { joint, field }));
+        }
+    }
+    sites
+}
+
+/// Returns the sites of the geometric parameters of every joint.
+pub(super) fn geometry_sites(problem: &Problem) -> impl Iterator<Item = ParameterSite> + '_ {
+    (0..problem.joints.len()).flat_map(|joint| {
+        JointField::GEOMETRY.into_iter().map(move |field| ParameterSite::Joint { joint, field })
+    })
+}
+
+/// Returns true if each parameter of an effect acts about an axis of the arm, so that one of them
+/// alone may be at work: two compliances do, a shift of the measurement or a harmonic does not.
+pub(super) fn acts_along_axes(terms: &[Term]) -> bool {
+    let is_axis = |term: &Term| {
+        term.regressor == Regressor::Constant
+            && term.nominal == 0.0
+            && Site::of(term.site) != Site::Measurement
+    };
+    let distinct =
+        |(k, term): (usize, &Term)| terms[..k].iter().all(|other| other.site != term.site);
+    terms.len() > 1 && terms.iter().all(is_axis) && terms.iter().enumerate().all(distinct)
+}
