@@ -25,7 +25,7 @@ pub enum IdentifyError {
         /// Name of the solver.
         solver: &'static str,
     },
-    /// [`SolverChoice::Custom`] was chosen without a solver.
+    /// `SolverChoice::Custom` was chosen without a solver.
     #[error("the solver custom needs a solver of the caller: Options::with_custom_solver")]
     NoCustomSolver,
     /// The strategy has no parameter to vary.

@@ -62,7 +62,7 @@ impl Options {
         Self { solver: SolverChoice::Custom, custom_solver: Some(solver), ..self }
     }
 
-    /// Looks for influential rows ([`Identification::influential_rows`]) by further fits; a loop
+    /// Looks for influential rows ([`Identification::influential_rows`](super::Identification::influential_rows)) by further fits; a loop
     /// does so for the problem as declared.
     #[must_use]
     pub fn with_influential_rows(self) -> Self {

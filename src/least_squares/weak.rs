@@ -24,7 +24,7 @@ pub struct Weak {
     /// [1 / unit of x].
     pub rows: DMatrix<f64>,
     /// Each combination with its weights in units of the plausible sizes, and the data change it
-    /// causes [σ].
+    /// causes \[σ\].
     pub combinations: Vec<UnidentifiableCombination>,
     /// Fraction of each unknown that lies outside the weak combinations, 0…1.
     pub visible: Vec<f64>,
@@ -36,7 +36,7 @@ impl Weak {
     ///
     /// `sizes` holds the plausible size of each unknown. Unknowns without a size are not tested but
     /// follow the others: with R = [R₁ R₂; 0 R₃], those unknowns first, the data change by ‖R₃ S w‖
-    /// [σ] along S w, S = diag(sizes). Returns `None` if no combination is weak.
+    /// \[σ\] along S w, S = diag(sizes). Returns `None` if no combination is weak.
     pub fn of(triangle: &DMatrix<f64>, sizes: &[Option<f64>]) -> Option<Self> {
         let n = triangle.ncols();
         let sized: Vec<(usize, f64)> =

@@ -1,4 +1,4 @@
-//! Closed forms of [Chen2021], equation by equation: a baseline and a check of the model.
+//! Closed forms of \[Chen2021\], equation by equation: a baseline and a check of the model.
 //!
 //! \[Chen2021\] Chen Gang, Sun Fenglei, Li Tong, Shao Wen: "Accuracy Compensation for a Lunar
 //! Sampling Manipulator with Elastic Deformation", J. Nanjing Univ. of Aeronautics & Astronautics

@@ -182,7 +182,7 @@ pub struct Statics {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Equilibrium {
-    /// Loads act on the rigid arm: first order in the deflection [Chen2021].
+    /// Loads act on the rigid arm: first order in the deflection \[Chen2021\].
     Undeflected,
     /// Loads act on the deflected arm in equilibrium.
     Deflected,

@@ -33,6 +33,7 @@ macro_rules! problem {
 }
 
 /// Returns every problem.
+#[allow(clippy::too_many_lines, reason = "a table of problems")]
 pub fn problems() -> Vec<Problem> {
     let ramp = |n: usize, g: fn(f64) -> f64| {
         (1..=n).map(|j| g(j as f64 / (n as f64 + 1.0))).collect::<Vec<_>>()

@@ -425,7 +425,7 @@ fn the_trace_ranks_and_says_why_not() {
     assert!(told.contains("None of 486 candidates is significant"), "{told}");
     let told = Bench::new(TWO).told(&["trace", "arm"]);
     assert!(
-        told.contains("more that stand out are left out here; trace.json holds them all."),
+        told.contains("more significant ones are left out here; trace.json holds\nthem all."),
         "{told}"
     );
 }

@@ -109,7 +109,7 @@ finding_codes! {
         "The fitted arm misses held-out rows by more than 1.5 times what the nominal arm misses them by.",
         "more poses, fewer free parameters or smaller priors are needed";
     PriorContradicted: Error "prior-contradicted" ["rule", "factor", "sigma_ratio"]
-        "The data refute the σ of a rule of [parameters]: with a σ 3 and more times as large the residual falls by more than half.",
+        "The data refute the σ of a rule of `[parameters]`: with a σ 3 and more times as large the residual falls by more than half.",
         "declare a larger σ, or check the nominal values and their units";
     NoiseBeyondDeclared: Error "noise-beyond-declared" ["noise_factor", "sigma_taken"]
         "Residuals and priors speak for a noise variance of more than 1000 times the declared one.",

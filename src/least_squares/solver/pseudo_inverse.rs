@@ -38,7 +38,7 @@ impl Default for PseudoInverseSettings {
     }
 }
 
-/// Pseudo-inverse iteration of [Chen2021].
+/// Pseudo-inverse iteration of \[Chen2021\].
 ///
 /// xₖ₊₁ = xₖ − J(xₖ)⁺ r(xₖ),  J⁺r = R⁺Qᵀr = Σ vᵢ (uᵢᵀQᵀr)/σᵢ over σᵢ > `tolerance`·σ₁ [Chen2021,
 /// eq. 45]

@@ -31,7 +31,7 @@ const MAX_POSES: usize = 600;
 pub enum Stage {
     /// Nominal arm, with base and target fitted if these are free.
     Registered,
-    /// Nominal rigid arm in the measured frames, which [Chen2021] calls before.
+    /// Nominal rigid arm in the measured frames, which \[Chen2021\] calls before.
     Before,
     /// Arm with identified geometry and a rigid model.
     Ignoring,
