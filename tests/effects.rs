@@ -1,7 +1,7 @@
 //! Effects of the catalogue in the model: against the virtual rig, at zero, derivatives, and
 //! recovery from data.
 
-#![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test that fails may panic")]
 #![expect(clippy::print_stdout, reason = "figures for those who ask with --nocapture")]
 
 mod common;

@@ -274,7 +274,7 @@ fn an_own_arm_goes_the_way_of_the_readme_to_its_end() {
     ] {
         assert!(init.contains(words), "{words:?} missing in:\n{init}");
     }
-    for words in ["58 poses", "target_m = [0, 0, 0]"] {
+    for words in ["measure 58", "target_m = [0, 0, 0]"] {
         assert!(check.contains(words), "{words:?} missing in:\n{check}");
     }
     assert!(

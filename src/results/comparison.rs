@@ -22,7 +22,7 @@ pub struct ComparisonResult {
     pub rows: Vec<ComparedFit>,
     /// Fits of the joint strategy with parts of the elasticity left out.
     pub ablations: Vec<AblatedFit>,
-    /// Results in the terms of [Chen2021].
+    /// Results in the terms of Chen et al. (2021).
     pub procedures: Vec<Procedure>,
 }
 
@@ -58,7 +58,7 @@ pub struct AblatedFit {
     pub fit: ComparedFit,
 }
 
-/// Tables 2 and 3 and figure 13 of [Chen2021] for one procedure.
+/// Tables 2 and 3 and figure 13 of Chen et al. (2021) for one procedure.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Procedure {
     pub procedure: String,

@@ -87,7 +87,7 @@ pub struct StudiedParameter {
     pub coverage: Option<f64>,
 }
 
-/// Study of the misprints of [Chen2021].
+/// Study of the misprints of Chen et al. (2021).
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct MisprintResult {
     pub study: String,

@@ -8,7 +8,7 @@
 //! [`Part`]s; a finished part is kept in a [`Store`], and results are made from finished parts
 //! only.
 //!
-//! A [`MisprintStudy`] repeats the experiment of [Chen2021] with simulated arms instead.
+//! A [`MisprintStudy`] repeats the experiment of Chen et al. (2021) with simulated arms instead.
 
 mod definition;
 mod effects;

@@ -24,7 +24,7 @@ const DEFAULT_HELD_OUT: usize = 50;
 pub enum Request {
     /// Fits by several strategies and solvers; `kind = "fits"`, or no kind.
     Fits(Box<Study>),
-    /// Replicas of the experiment of [Chen2021]; `kind = "misprints"`.
+    /// Replicas of the experiment of Chen et al. (2021); `kind = "misprints"`.
     Misprints(Box<MisprintStudy>),
 }
 

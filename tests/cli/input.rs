@@ -104,6 +104,7 @@ fn where_nothing_is_free_every_command_that_fits_says_so() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table of mistakes")]
 fn bad_input_is_named_and_leaves_nothing_behind() {
     let mistakes: &[Mistake] = &[
         ("empty file", |b| fs::write(b.path(DATA), "").unwrap(), &[DATA, "empty"]),
