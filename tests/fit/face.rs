@@ -72,10 +72,10 @@ fn predictions_scatter_as_their_covariance_says() {
         let data = measured(&problem, 100 + seed);
         let found = identify(&problem, &data, &Options::default()).unwrap();
         let predicted = found.predict_with_covariance(&problem, &data.measurements).unwrap();
-        for row in 60..90 {
-            let error = data.measurements.positions[row] - predicted[row].position;
+        for (measured, predicted) in data.measurements.positions.iter().zip(&predicted).skip(60) {
+            let error = measured - predicted.position;
             let noise = nalgebra::Matrix3::identity() * SIGMA.powi(2);
-            let whitened = (predicted[row].covariance + noise).cholesky().unwrap();
+            let whitened = (predicted.covariance + noise).cholesky().unwrap();
             squares += error.dot(&whitened.solve(&error)) / 90.0;
         }
     }

@@ -143,7 +143,9 @@ fn spoiled_ones() -> Vec<Case> {
     let based = &format!("{priors}\n'base.*' = {{ free = true }}");
     let scaled = |factor: f64| {
         move |data: &mut Dataset| {
-            positions(data).iter_mut().for_each(|position| *position *= factor);
+            for position in positions(data).iter_mut() {
+                *position *= factor;
+            }
         }
     };
     let off = |by: f64| move |data: &mut Dataset| positions(data)[77].y += by;
