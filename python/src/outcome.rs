@@ -48,9 +48,17 @@ pub struct Trace {
 
 #[pymethods]
 impl Identification {
-    /// estimate.json.
-    fn json(&self, py: Python<'_>) -> String {
-        py.detach(|| IdentificationResult::new(&self.problem, &self.found).to_json())
+    /// Returns estimate.json, with the uncertainty of predictions.
+    fn json(&self, py: Python<'_>) -> PyResult<String> {
+        py.detach(|| {
+            let mut result = IdentificationResult::new(&self.problem, &self.found);
+            let fitted = flexcal::remainder::uncertainty(&self.found, &self.problem, &self.data)?;
+            if let Some(fitted) = fitted {
+                result = result.with_predictions(&self.found, &fitted);
+            }
+            Ok(result.to_json())
+        })
+        .map_err(|error: fit::IdentifyError| raised(&error))
     }
 
     /// What the command line prints.

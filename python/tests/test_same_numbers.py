@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import flexcal
@@ -14,7 +15,10 @@ from conftest import assert_written, Command, exact, LUNAR, ROOT, timeless, UR10
 @pytest.mark.parametrize("strategy", ["joint", "geometry-only", "rigid"])
 def test_identify(lunar: flexcal.Problem, command: Command, strategy: str) -> None:
     run, out = command("identify", LUNAR, "--strategy", strategy, "--verbose")
-    result = lunar.identify(strategy=strategy)  # type: ignore[arg-type]
+    # Without elasticity the residual is far above the declared σ.
+    untrusted = pytest.warns(flexcal.FlexcalWarning, match="not to be trusted")
+    with untrusted if strategy == "rigid" else contextlib.nullcontext():
+        result = lunar.identify(strategy=strategy)  # type: ignore[arg-type]
     assert result.trusted == (run.returncode == 0)
     assert timeless(result.to_json()) == timeless((out / "estimate.json").read_text())
     assert result.summary().splitlines()[4:] == run.stdout.splitlines()[4 : len(result.summary().splitlines())]
