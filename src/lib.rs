@@ -74,15 +74,20 @@ pub mod design;
 #[deny(clippy::indexing_slicing)]
 pub mod error;
 #[deny(clippy::indexing_slicing)]
+#[doc(hidden)]
 pub mod files;
 pub mod fit;
+#[doc(hidden)]
 pub mod laws;
 pub mod least_squares;
 pub mod measurement;
+#[doc(hidden)]
 pub mod mechanics;
 pub mod model;
 mod numeric;
+#[doc(hidden)]
 pub mod observation;
+#[doc(hidden)]
 pub mod paper;
 #[deny(clippy::indexing_slicing)]
 pub mod problem;
@@ -91,13 +96,17 @@ pub mod quantity;
 mod random;
 pub mod remainder;
 pub mod report;
+#[doc(hidden)]
 pub mod residual_tests;
 pub mod results;
 pub mod rig;
+#[doc(hidden)]
 pub mod scalar;
 pub mod select;
+#[doc(hidden)]
 pub mod spatial;
 #[deny(clippy::indexing_slicing)]
+#[doc(hidden)]
 pub mod study;
 #[deny(clippy::indexing_slicing)]
 pub mod urdf;

@@ -19,15 +19,24 @@ mod separate;
 mod site;
 mod workspace;
 
-pub use candidate_poses::Extremes;
-pub use check::{Check, CheckedPoses, PredictionPoses, check, predictable_rows, random_rows};
+pub(crate) use check::PredictionPoses;
+pub use check::{Check, CheckedPoses, check};
 pub use criterion::Criterion;
 pub use error::DesignError;
-pub use exchange::{Exchange, ExchangeResult};
-pub use forecast::{ExpectedParameter, Forecast, Prediction};
-pub use growth::{Growth, GrowthStep};
-pub use plan::{Candidates, Plan, PlanOptions, PlanProgress, plan};
-pub use sensitivity::Sensitivity;
-pub use separate::{EffectPair, PairSeparation, separate};
-pub use site::Site;
-pub use workspace::Workspace;
+pub(crate) use exchange::ExchangeResult;
+pub(crate) use forecast::Prediction;
+pub use forecast::{ExpectedParameter, Forecast};
+pub(crate) use growth::{Growth, GrowthStep};
+pub use plan::{Candidates, Plan, PlanOptions, plan};
+// Public for the tests, the benches and the Python module only.
+#[doc(hidden)]
+pub use self::{
+    candidate_poses::Extremes,
+    check::{predictable_rows, random_rows},
+    exchange::Exchange,
+    plan::PlanProgress,
+    sensitivity::Sensitivity,
+    separate::{EffectPair, PairSeparation, separate},
+    site::Site,
+    workspace::Workspace,
+};

@@ -15,14 +15,19 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub use causes::{message_with_causes, mistake};
 pub use kind::InputErrorKind;
 pub(crate) use near::{nearest, one_typo};
-pub use no_rows::NoRows;
-pub use plain::{escape_hidden, is_hidden, mask_hidden, one_line};
-pub use study::StudyErrorKind;
-pub use urdf::UrdfErrorKind;
+pub(crate) use no_rows::NoRows;
+pub(crate) use plain::{escape_hidden, mask_hidden, one_line};
+pub(crate) use study::StudyErrorKind;
+pub(crate) use urdf::UrdfErrorKind;
 pub use warning::WarningKind;
+// Public for the tests, the benches and the Python module only.
+#[doc(hidden)]
+pub use self::{
+    causes::{message_with_causes, mistake},
+    plain::is_hidden,
+};
 
 /// Byte-order mark of UTF-8 text.
 pub(crate) const BYTE_ORDER_MARK_UTF8: &[u8] = b"\xef\xbb\xbf";

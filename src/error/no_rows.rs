@@ -4,7 +4,6 @@ use thiserror::Error;
 
 /// Reason why one part of the split is empty.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 #[non_exhaustive]
 pub enum NoRows {
     #[error("column {column} says {word} in every row")]

@@ -7,7 +7,6 @@ use thiserror::Error;
 /// Kind of error in a study; [`Location`](super::Location) holds the place.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
-#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum StudyErrorKind {
     #[error(
         "no such file; give a STUDY.toml or the folder that holds one; docs/study.md says how \

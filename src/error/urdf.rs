@@ -7,7 +7,6 @@ use super::near::meant;
 /// Kind of error in a URDF; [`Location`](super::Location) holds the place.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
-#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 pub enum UrdfErrorKind {
     #[error("no such file; give a URDF")]
     Missing,

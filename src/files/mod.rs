@@ -9,7 +9,7 @@ use std::io::{self, Read as _};
 use std::path::Path;
 
 pub use record::{FolderRecord, digest};
-pub use staged::StagedFile;
+pub(crate) use staged::StagedFile;
 
 /// Reads a file of at most `max_bytes` bytes.
 ///

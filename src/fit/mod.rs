@@ -14,38 +14,50 @@ mod stages;
 mod uncertainty;
 mod warm_start;
 
-pub use apply::acceptance::{Acceptance, AcceptancePose, Accuracy, acceptance, held_out_positions};
+pub(crate) use apply::acceptance::{
+    Acceptance, AcceptancePose, Accuracy, acceptance, held_out_positions,
+};
 pub use apply::command_jacobian::jacobian;
-pub use apply::compensate::{Command, compensate, seen_from_base, seen_in_base, waypoints};
-pub use apply::joint_source::{JointSources, joint_sources};
+pub use apply::compensate::{Command, compensate};
+pub(crate) use apply::joint_source::{JointSources, joint_sources};
 pub use apply::predict::Residual;
-pub use apply::predict_saved::{ErrorsBySession, PredictError, Prediction, predict};
+pub(crate) use apply::predict_saved::ErrorsBySession;
+pub use apply::predict_saved::{PredictError, Prediction, predict};
 pub use apply::predicted_covariance::PredictedPosition;
 pub use apply::saved_estimate::{SavedEstimate, SavedEstimateError};
-pub use checks::finding::{Finding, FindingCode, FindingEntry, Severity};
-pub use checks::misreading::Misreading;
+pub use checks::finding::{Finding, FindingCode, Severity};
 pub use checks::outliers::{InfluentialRows, Outlier};
 pub use checks::point_spread::PointSpread;
-pub use checks::required_columns::{check_columns, missing_target_columns};
+pub(crate) use checks::required_columns::{check_columns, missing_target_columns};
 pub(crate) use checks::row_kind::{rows as rows_of_kind, size as size_of_kind};
-pub use compare::baseline::Baseline;
-pub use compare::comparison::{Before, CompareOptions, Comparison, compare};
-pub use compare::procedure::{Procedure, TableEntry};
+pub(crate) use compare::baseline::Baseline;
+pub(crate) use compare::comparison::{Before, CompareOptions, Comparison};
+pub(crate) use compare::procedure::{Procedure, TableEntry};
 pub use errors::{AxisValues, ErrorSummary, Errors, OrientationErrors};
-pub use identification::{identify, identify_model};
+pub use identification::identify;
 pub use identify_error::IdentifyError;
 pub use options::Options;
-pub use outcome::{Estimate, Identification, STRONG_CORRELATION};
+pub use outcome::{Estimate, Identification};
 pub use stages::alternation::Alternation;
 pub use stages::custom_solver::CustomSolver;
 pub(crate) use stages::fixture_location::locate;
-pub use stages::placement::Placement;
 pub use stages::progress::{Progress, ProgressSink, Stop};
 pub use stages::solver_choice::SolverChoice;
-pub use stages::stage::{COST_TOLERANCE, StageError};
+pub(crate) use stages::stage::COST_TOLERANCE;
+pub use stages::stage::StageError;
 pub use stages::strategy::Strategy;
 pub use uncertainty::active_constraint::ActiveConstraint;
 pub use uncertainty::covariance::{Correlations, Covariance};
 pub use uncertainty::noise::Noise;
 pub use uncertainty::prior_sizes::PriorSize;
 pub use uncertainty::shadow_price::ShadowPrice;
+// Public for the tests, the benches and the Python module only.
+#[doc(hidden)]
+pub use self::{
+    apply::compensate::{seen_from_base, seen_in_base, waypoints},
+    checks::finding::FindingEntry,
+    checks::misreading::Misreading,
+    compare::comparison::compare,
+    identification::identify_model,
+    stages::placement::Placement,
+};

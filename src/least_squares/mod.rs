@@ -27,18 +27,23 @@ use std::ops::Range;
 use curvature::{Slopes, by_differences};
 use nalgebra::{DMatrix, DVector};
 
-pub use derivative::{ColumnCheck, JacobianCheck, check_jacobian};
 pub(crate) use identifiability::Blind;
 pub use identifiability::{Identifiability, UnidentifiableCombination};
-pub use linear_rows::{LinearRows, RowsError};
-pub use linearisation_cache::LinearisationCache;
-pub use loss::Loss;
-pub use objective::{CHUNK_ITEMS, Fit};
-pub use triangle::Triangle;
-pub use uncertainty::Uncertainty;
-pub use variance::VarianceLikelihood;
-pub use weak::{StabilisedObjective, WEAK_THRESHOLD, Weak};
-pub use whole::{jacobian, jacobian_and_residual, residual_vector};
+pub(crate) use uncertainty::Uncertainty;
+pub(crate) use variance::VarianceLikelihood;
+pub(crate) use weak::{StabilisedObjective, WEAK_THRESHOLD, Weak};
+pub(crate) use whole::jacobian_and_residual;
+// Public for the tests, the benches and the Python module only.
+#[doc(hidden)]
+pub use self::{
+    derivative::check_jacobian,
+    linear_rows::{LinearRows, RowsError},
+    linearisation_cache::LinearisationCache,
+    loss::Loss,
+    objective::{CHUNK_ITEMS, Fit},
+    triangle::Triangle,
+    whole::{jacobian, residual_vector},
+};
 
 /// Number of unknowns from which forming and reducing derivatives takes nearly all the time of a
 /// fit.

@@ -54,7 +54,7 @@ use crate::problem::{LazyPast, Observation, PoseConditions, PoseView, Problem};
 pub use builder::{DatasetBuilder, DatasetError};
 pub use column_table::{ColumnTable, ColumnValues};
 pub use dataset::Dataset;
-pub use order::RowOrder;
+pub(crate) use order::RowOrder;
 pub(crate) use repeats::count_distinct;
 pub use split::Split;
 

@@ -7,6 +7,7 @@ mod command_residuals;
 mod command_term;
 mod command_terms;
 mod derivatives;
+#[doc(hidden)]
 pub mod effect;
 mod elastic;
 mod free_commands;
@@ -16,6 +17,7 @@ mod instrument;
 mod jacobian;
 mod linear_model;
 mod orientation;
+#[doc(hidden)]
 pub mod parameter;
 mod pose;
 mod pose_residuals;
@@ -26,12 +28,10 @@ mod rows;
 mod sites;
 mod tilt;
 
-pub use crate::mechanics::CentreLine;
-pub use ablation::Ablation;
-pub use command_residuals::CommandResiduals;
+pub(crate) use crate::mechanics::CentreLine;
+pub(crate) use command_residuals::CommandResiduals;
 pub(crate) use linear_model::LinearModel;
-pub use pose::{MeasuredOrientation, Pose};
-pub use pose_residuals::PoseResiduals;
+pub(crate) use pose::MeasuredOrientation;
 
 use nalgebra::Vector3;
 
@@ -47,6 +47,9 @@ use crate::spatial::Frame;
 use command_term::CommandTerm;
 use command_terms::CommandTerms;
 use instrument::Instrument;
+// Public for the tests, the benches and the Python module only.
+#[doc(hidden)]
+pub use self::{ablation::Ablation, pose::Pose, pose_residuals::PoseResiduals};
 
 /// Prediction of measured rows as a function of the free parameters.
 #[derive(Debug, Clone)]

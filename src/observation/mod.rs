@@ -15,9 +15,10 @@ mod scene;
 mod surface;
 mod tilt;
 
-pub use fixture::{FixtureKind, FixtureValues};
-pub use kind::{Kind, Needs};
-pub use scene::Scene;
+pub(crate) use fixture::{FixtureKind, FixtureValues};
+pub use kind::Kind;
+pub(crate) use kind::Needs;
+pub(crate) use scene::Scene;
 
 use nalgebra::{Matrix3, Matrix3x4, SVector, Vector3};
 

@@ -33,28 +33,41 @@ mod tree;
 use nalgebra::Vector3;
 
 use crate::error::{InputError, InputErrorKind, Location, Warning};
+pub(crate) use crate::laws::Argument;
+pub use crate::laws::Effect;
 pub(crate) use crate::laws::quoted;
-pub use crate::laws::{Argument, Effect, FreeLength, Mount};
 
-pub use crate::observation::{FixtureKind, Observation};
+pub(crate) use crate::observation::FixtureKind;
 pub(crate) use argument::HIGHEST_ORDER;
-pub use conditions::{PoseConditions, PoseRanges, PoseView};
-pub use constraints::{Constraint, ConstraintTerm, Limit, LimitKind};
-pub use data::{Data, DeclaredCovariate, HeldOut};
-pub use dialect::{ColumnRule, ColumnSelector, Delimiter, Dialect, Missing, RotationKind};
-pub use effect::EffectDeclaration;
-pub use fixture::{Fixture, KnownDistance};
-pub use joint::{Beam, Body, Hoist, Joint, JointKind, Mimic, Placement};
-pub use joint_log::{JoinRule, JointLog};
-pub use joint_source::JointSource;
-pub use parameters::{Freedom, ParameterRule, Quantities};
+pub use conditions::PoseRanges;
+pub(crate) use constraints::{Constraint, Limit, LimitKind};
+pub(crate) use dialect::{ColumnRule, ColumnSelector, Delimiter, Dialect, Missing, RotationKind};
+pub(crate) use fixture::{Fixture, KnownDistance};
+pub(crate) use joint::Body;
+pub(crate) use joint_log::{JoinRule, JointLog};
+pub(crate) use joint_source::JointSource;
+pub(crate) use parameters::ParameterRule;
 pub(crate) use past::PoseTable;
 pub(crate) use past::ThermalLag;
-pub use past::{LazyPast, Past};
-pub use remainder::RemainderDeclaration;
-pub use robust::{Robust, RobustLoss};
-pub use target::{Target, Tool};
-pub use tree::Tree;
+pub(crate) use past::{LazyPast, Past};
+pub(crate) use remainder::RemainderDeclaration;
+pub(crate) use target::Tool;
+// Public for the tests, the benches and the Python module only.
+#[doc(hidden)]
+pub use self::{
+    conditions::{PoseConditions, PoseView},
+    data::{Data, DeclaredCovariate, HeldOut},
+    effect::EffectDeclaration,
+    joint::{Beam, Hoist, Joint, JointKind, Mimic, Placement},
+    parameters::{Freedom, Quantities},
+    robust::{Robust, RobustLoss},
+    target::Target,
+    tree::Tree,
+};
+#[doc(hidden)]
+pub use crate::laws::{FreeLength, Mount};
+#[doc(hidden)]
+pub use crate::observation::Observation;
 
 /// Problem as declared in `problem.toml`.
 #[derive(Debug, Clone)]

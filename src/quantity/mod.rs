@@ -5,5 +5,6 @@ mod right_angle;
 mod unit;
 
 pub(crate) use right_angle::rounded_right_angle;
+pub(crate) use unit::Display;
 pub(crate) use unit::Suffix;
-pub use unit::{Display, Unit};
+pub use unit::Unit;

@@ -23,10 +23,10 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-pub use apply::{CorrectedPrediction, compensate, predict};
-pub use bounds::Bounds;
-pub use correction::{CorrectedPose, Correction};
-pub use fit::{Fitted, fit, uncertainty};
-pub use residuals::{CorrectedResiduals, residuals};
-pub use saved::SavedRemainderError;
-pub use scores::{Gain, Scores};
+pub use apply::{CorrectedPrediction, predict};
+pub use correction::Correction;
+pub use fit::{Fitted, fit};
+pub(crate) use saved::SavedRemainderError;
+// Public for the tests, the benches and the Python module only.
+#[doc(hidden)]
+pub use self::{apply::compensate, bounds::Bounds, fit::uncertainty};

@@ -42,30 +42,41 @@ mod trace;
 mod unexplained;
 mod verdict;
 
-pub use acceptance::{AcceptanceRecord, acceptance_page, acceptance_result, acceptance_text};
-pub use brief::{estimate_brief, tells_little};
-pub use check::{check_text, why_not_sufficient};
-pub use closed_loop::{loop_brief, loop_report, loop_text};
-pub use closed_problem::{closed_problem, with_remainder};
-pub use columns::{Column, Columns, residual_columns, residuals_csv};
-pub use compare::{compare_text, comparison_report};
-pub use compensate::{commands_csv, commands_text};
-pub use export::{ExportErrors, Exported, export_text};
-pub use figures::{
-    Cause, Contribution, Coverage, PlotData, Point, PoseError, Quantity, Stage, StageErrors,
-    is_figure,
+pub(crate) use acceptance::{
+    AcceptanceRecord, acceptance_page, acceptance_result, acceptance_text,
 };
-pub use identify::{estimate_text, identification_report, joint_sources_text, why_not_trusted};
-pub use init::init_text;
-pub use noise::{lacks_something, show_influential_rows};
-pub use plan::plan_text;
-pub use poses::poses_csv;
-pub use predict::{prediction_text, predictions_csv};
-pub use remainder::remainder_text;
+pub(crate) use brief::{estimate_brief, tells_little};
+pub use closed_loop::{loop_report, loop_text};
+pub(crate) use closed_problem::with_remainder;
+pub(crate) use columns::residuals_csv;
+pub(crate) use compare::{compare_text, comparison_report};
+pub(crate) use compensate::commands_text;
+pub use figures::PlotData;
+pub(crate) use identify::joint_sources_text;
+pub use identify::{estimate_text, identification_report};
+pub(crate) use init::init_text;
+pub(crate) use noise::{lacks_something, show_influential_rows};
+pub(crate) use predict::{prediction_text, predictions_csv};
+pub(crate) use remainder::remainder_text;
 pub use render::Report;
-pub use replica::{replica_report, replica_text};
-pub use shell::shell_word;
-pub use study::{study_csv, study_parameters_csv, study_text, study_timing_csv};
-pub use table::Command;
-pub use trace::trace_text;
-pub use verdict::interrupted;
+pub(crate) use replica::{replica_report, replica_text};
+pub(crate) use shell::shell_word;
+pub(crate) use study::{study_text, study_timing_csv};
+pub(crate) use verdict::interrupted;
+// Public for the tests, the benches and the Python module only.
+#[doc(hidden)]
+pub use self::{
+    check::{check_text, why_not_sufficient},
+    closed_loop::loop_brief,
+    closed_problem::closed_problem,
+    columns::{Column, residual_columns},
+    compensate::commands_csv,
+    export::{ExportErrors, Exported, export_text},
+    figures::{Cause, Quantity, is_figure},
+    identify::why_not_trusted,
+    plan::plan_text,
+    poses::poses_csv,
+    study::{study_csv, study_parameters_csv},
+    table::Command,
+    trace::trace_text,
+};

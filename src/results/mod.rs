@@ -23,41 +23,38 @@ mod study;
 mod summary;
 mod trace;
 
-pub use acceptance::{AcceptanceResult, Condition, Input, PoseAccuracy};
-pub use application::{
+pub(crate) use acceptance::{AcceptanceResult, Condition, Input};
+pub(crate) use application::{
     CompensationResult, ExportResult, ExportedErrors, InitResult, Origin, PredictionErrors,
-    SpreadAtPoint,
 };
-pub use claims::{Claim, Claims, Hypothesis};
-pub use closed_loop::{
-    Correction, Fit, FoundEffect, Gain, LoopResult, OrderPrior, ParameterValue, Row, Step,
-    Structure, Witness,
-};
-pub use comparison::{
-    AblatedFit, ComparedFit, ComparisonResult, GeometryValue, HeldOutErrors, JointGeometry,
-    PoseErrors, Procedure,
-};
-pub use design::{
-    CheckResult, Detectable, DetectableEffect, DetectableSize, ExpectedParameter, GrowthStep,
-    JudgedPrediction, PlanResult, PlannedParameter, PredictionError, SeparatedEffect,
-    SeparationResult,
-};
-pub use document::{Document, FORMAT_VERSION, PROGRAM};
-pub use effect::{NamedEffect, Untestable};
-pub use identification::{
-    Alternation, Combination, Conditioning, Constraint, Correlation, IdentificationResult,
-    InfluentialRowSet, Orientation, OutlierRow, Parameter, Price, Spread, SpreadChange,
-};
-pub use remainder::{BoundSummary, REMAINDER_FILE, Remainder};
-pub use residual_test::ResidualTest;
-pub use study::{
-    Cell, HeldOut, LargestBias, MisprintResult, MisprintSize, Reading, Rival, Specimen,
-    StudiedCase, StudiedParameter, StudyResult,
-};
-pub use summary::{Axes, Errors, KindErrors, Sizes, Summary};
-pub use trace::{Candidate, Confounded, HypothesisSet, ToldApart, TraceResult};
+pub(crate) use claims::Claims;
+pub use closed_loop::LoopResult;
+pub(crate) use closed_loop::{FoundEffect, Gain, ParameterValue, Step, Structure, Witness};
+pub(crate) use comparison::{ComparedFit, ComparisonResult};
+pub(crate) use design::SeparationResult;
+pub use document::Document;
+pub(crate) use effect::NamedEffect;
+pub use identification::IdentificationResult;
+pub(crate) use remainder::REMAINDER_FILE;
+pub(crate) use study::{Cell, StudiedParameter};
+pub(crate) use summary::Summary;
+pub use trace::TraceResult;
+pub(crate) use trace::{Candidate, Confounded, HypothesisSet, ToldApart};
 
 pub(crate) use effect::joined;
+// Public for the tests, the benches and the Python module only.
+#[doc(hidden)]
+pub use self::{
+    claims::Hypothesis,
+    closed_loop::{Correction, Fit, Row},
+    design::{CheckResult, ExpectedParameter, PlanResult},
+    document::{FORMAT_VERSION, PROGRAM},
+    effect::Untestable,
+    identification::{Parameter, Spread},
+    residual_test::ResidualTest,
+    study::{HeldOut, MisprintResult, Reading, StudyResult},
+    summary::Errors,
+};
 
 /// Name of every format with its JSON Schema.
 pub fn schemas() -> Vec<(&'static str, String)> {

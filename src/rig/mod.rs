@@ -34,11 +34,19 @@ use crate::problem::{Effect, Mount, PoseConditions, Problem};
 use crate::spatial::Frame;
 use equilibrium::Equilibrium;
 
+pub(crate) use draw::Draw;
 pub(crate) use draw::standard_normals;
-pub use draw::{Draw, Row, Simulation, SimulationError, draw, simulate, simulate_poses};
-pub use effect::{Cause, Shape, TrueEffect, ValueCount};
-pub use parameters::TrueParameter;
-pub use truth::{Deviation, HeldOutRows, RandomRule, Truth};
+pub use draw::{Simulation, SimulationError, simulate};
+pub(crate) use parameters::TrueParameter;
+pub(crate) use truth::RandomRule;
+pub use truth::Truth;
+// Public for the tests, the benches and the Python module only.
+#[doc(hidden)]
+pub use self::{
+    draw::{Row, draw, simulate_poses},
+    effect::{Cause, Shape, TrueEffect},
+    truth::HeldOutRows,
+};
 
 /// Default number of segments per beam.
 pub const SEGMENTS: usize = 16;

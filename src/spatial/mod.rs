@@ -6,8 +6,9 @@ mod plane;
 mod rotation;
 
 pub use frame::Frame;
-pub use plane::{MAX_NORMAL_TILT, plane_normal};
-pub use rotation::{
+pub(crate) use plane::MAX_NORMAL_TILT;
+pub use plane::plane_normal;
+pub(crate) use rotation::{
     inverse_right_jacobian, rotate, rotated_about_x, rotated_about_y, rotated_about_z,
     rotation_axes, rotation_between,
 };

@@ -22,14 +22,12 @@ mod run;
 mod store;
 mod tally;
 
-pub use definition::{Cell, Part, Shard, ShardError, Source, Study};
+pub use definition::{Part, Shard, Source, Study};
 pub use read::Request;
 pub use repetition::table;
-pub use replica::{
-    AlternativeModel, Case, HeldOutError, Load, MisprintStudy, NamedReading, Replica, ReplicaError,
-    ReplicaResults, Spread, readings, replicate,
-};
-pub use results::{CellResult, ParameterResult, Results, Timing};
-pub use run::{RunError, collect, pending, run};
-pub use store::{Store, StoreError};
-pub use tally::{Moments, ParameterTally, Tally};
+pub(crate) use replica::{AlternativeModel, HeldOutError, NamedReading, Replica};
+pub use replica::{Case, MisprintStudy, ReplicaResults, Spread, replicate};
+pub use results::Results;
+pub(crate) use results::{CellResult, ParameterResult};
+pub use run::{collect, pending, run};
+pub use store::Store;

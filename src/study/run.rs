@@ -12,7 +12,6 @@ use super::tally::Tally;
 
 /// Error that prevents the results of a study.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 #[non_exhaustive]
 pub enum RunError {
     #[error(transparent)]

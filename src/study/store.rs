@@ -21,7 +21,6 @@ pub struct Store {
 
 /// Error while writing or reading a finished part.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 #[non_exhaustive]
 pub enum StoreError {
     #[error("cannot write {}: {source}", path.display())]

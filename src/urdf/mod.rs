@@ -18,7 +18,14 @@ mod weights;
 mod yaml;
 
 pub use chain::Chain;
-pub use describe::{Description, HELD_OUT, SIGMA_MM, describe};
-pub use export::{Export, MovedOrigin, export};
+pub(crate) use describe::SIGMA_MM;
+pub use describe::{Description, describe};
+pub(crate) use export::MovedOrigin;
+pub use export::{Export, export};
 pub use read::Robot;
-pub use yaml::{JointOrigin, YamlFormat, joint_origins, yaml};
+// Public for the tests, the benches and the Python module only.
+#[doc(hidden)]
+pub use self::{
+    describe::HELD_OUT,
+    yaml::{YamlFormat, joint_origins, yaml},
+};

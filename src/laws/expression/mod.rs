@@ -12,9 +12,11 @@ mod print;
 mod tree;
 mod vocabulary;
 
-pub use dimension::{Dimension, Per};
+pub(crate) use dimension::Per;
 pub use mistake::{FormulaError, Mistake};
-pub use parse::{Parsed, parse};
+pub(crate) use parse::Parsed;
+pub use parse::parse;
 pub use print::Names;
-pub use tree::{Expression, Function, Operator};
+pub use tree::Expression;
+pub(crate) use tree::{Function, Operator};
 pub use vocabulary::Vocabulary;

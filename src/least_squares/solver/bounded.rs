@@ -13,14 +13,6 @@ use crate::least_squares::Linearisation;
 /// Maximum number of damping values tried for one step when both the radius and bounds limit it.
 const MAX_DAMPING_TRIES: usize = 25;
 
-/// Returns a Levenberg–Marquardt solver within bounds lo ≤ x ≤ hi.
-///
-/// It is [`constrained_levenberg_marquardt`] without inequalities.
-pub fn bounded_levenberg_marquardt(bounds: Bounds, settings: Settings) -> TrustRegion<Constrained> {
-    let rows = Inequalities::none(bounds.lower().len());
-    constrained_levenberg_marquardt(bounds, rows, settings)
-}
-
 /// Returns a Levenberg–Marquardt solver within bounds lo ≤ x ≤ hi and inequalities lo ≤ A x ≤ hi.
 ///
 /// min ½‖J p + r‖² + ½λ‖D p‖² subject to the bounds and inequalities on x + p

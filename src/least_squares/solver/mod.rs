@@ -28,27 +28,30 @@ mod termination;
 mod trial;
 mod trust_region;
 
-pub use bounded::{
-    Constrained, bounded_levenberg_marquardt, clamped_levenberg_marquardt,
-    constrained_levenberg_marquardt, interior_point_levenberg_marquardt, nearest,
+pub(crate) use bounded::{
+    clamped_levenberg_marquardt, constrained_levenberg_marquardt,
+    interior_point_levenberg_marquardt,
 };
 pub use bounds::{AtBound, Bounds, BoundsError};
-pub use divergence::Divergence;
-pub use factor::Factor;
-pub use gauss_newton::{GaussNewtonSettings, minimise_gauss_newton};
-pub use inequalities::{Inequalities, InequalitiesError};
-pub use levenberg_marquardt::{Unconstrained, levenberg_marquardt};
-pub use pseudo_inverse::{
-    PseudoInverse, PseudoInverseSettings, minimise_pseudo_inverse,
-    minimise_pseudo_inverse_observed, minimum_norm_step,
-};
-pub use reflective::{Reflective, reflective_levenberg_marquardt};
-pub use run::{
-    BoundMethod, minimise, minimise_bounded, minimise_constrained, minimise_constrained_by,
-    minimise_observed,
-};
+pub(crate) use inequalities::InequalitiesError;
+pub(crate) use levenberg_marquardt::levenberg_marquardt;
+pub(crate) use pseudo_inverse::{minimise_pseudo_inverse_observed, minimum_norm_step};
+pub(crate) use reflective::reflective_levenberg_marquardt;
+pub use run::{minimise, minimise_bounded};
 pub use settings::Settings;
 pub use solution::Solution;
-pub use step::Step;
+pub(crate) use step::Step;
 pub use termination::Termination;
-pub use trust_region::{State, Subproblem, TrustRegion};
+pub(crate) use trust_region::{Subproblem, TrustRegion};
+// Public for the tests, the benches and the Python module only.
+#[doc(hidden)]
+pub use self::{
+    bounded::nearest,
+    divergence::Divergence,
+    factor::Factor,
+    gauss_newton::{GaussNewtonSettings, minimise_gauss_newton},
+    inequalities::Inequalities,
+    pseudo_inverse::{PseudoInverseSettings, minimise_pseudo_inverse},
+    run::{BoundMethod, minimise_constrained, minimise_constrained_by, minimise_observed},
+    trust_region::State,
+};

@@ -64,11 +64,6 @@ impl PseudoInverse {
         }
     }
 
-    /// Returns the reason of termination, or `None` while the iteration runs.
-    pub fn termination(&self) -> Option<Termination> {
-        self.termination
-    }
-
     fn stop(&mut self, state: State, termination: Termination) -> State {
         self.termination = Some(termination);
         stopped(state, termination)

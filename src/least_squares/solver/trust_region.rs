@@ -148,11 +148,6 @@ impl<S: Subproblem> TrustRegion<S> {
         self.termination
     }
 
-    /// Returns the method that chooses the step.
-    pub fn subproblem(&self) -> &S {
-        &self.subproblem
-    }
-
     fn stop(&mut self, state: State, termination: Termination) -> State {
         self.termination = Some(termination);
         stopped(state, termination)

@@ -11,7 +11,8 @@ mod place;
 mod prior;
 mod terms;
 
+pub(crate) use candidates::Candidate;
 pub(crate) use candidates::HIGHEST_ORDER;
-pub use candidates::{Candidate, candidates};
-pub use coverage::{Columns, DataCoverage, NO_REFERENCE, NO_TEMPERATURE};
-pub use terms::{Term, parameters};
+pub use candidates::candidates;
+pub(crate) use coverage::{Columns, DataCoverage, NO_REFERENCE, NO_TEMPERATURE};
+pub(crate) use terms::{Term, parameters};

@@ -10,13 +10,15 @@ mod regressor;
 mod resolve;
 mod site;
 
-pub use crate::laws::{ArmField, BeamField, JointField};
-pub use constraint::{LinearConstraint, constrain};
+pub(crate) use crate::laws::ArmField;
+pub use crate::laws::{BeamField, JointField};
+pub use constraint::LinearConstraint;
+pub(crate) use constraint::constrain;
 
 pub(crate) use inner::{slope_regressor, value_regressor};
+pub(crate) use regressor::Regressor;
 pub(crate) use regressor::Waves;
-pub use regressor::{Formula, Regressor, Slope};
-pub use resolve::{EffectParameter, resolve};
+pub(crate) use resolve::{EffectParameter, resolve};
 pub(crate) use resolve::{holds_all, refuses, rule_of};
 pub use site::ParameterSite;
 

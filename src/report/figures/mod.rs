@@ -37,11 +37,8 @@ pub(super) use strategies::{ablations, rounds, strategies};
 pub(super) use vectors::vectors;
 
 pub use cause::{Cause, Point, Quantity};
-pub use contribution::Contribution;
-pub use coverage::Coverage;
-pub use data::{PlotData, Stage, StageErrors};
+pub use data::PlotData;
 pub use frame::{ACCENT, Drawing, FAINT, GRID, INK, MUTED, WARM};
-pub use pose::PoseError;
 
 /// File names of all figures, except those of effects (numbered) and procedures (named).
 const NAMES: [&str; 14] = [

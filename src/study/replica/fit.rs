@@ -8,7 +8,6 @@ use crate::problem::Problem;
 
 /// Error that prevents the replicas of an experiment.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the message of each variant says what it stands for")]
 #[non_exhaustive]
 pub enum ReplicaError {
     #[error(

@@ -19,8 +19,7 @@ mod size;
 mod study;
 
 pub use alternative::AlternativeModel;
-pub use fit::ReplicaError;
-pub use reading::{NamedReading, readings};
+pub use reading::NamedReading;
 pub use results::{HeldOutError, Replica, ReplicaResults, Spread};
 pub use run::replicate;
-pub use study::{Case, Load, MisprintStudy};
+pub use study::{Case, MisprintStudy};
