@@ -51,6 +51,7 @@ impl PoseRanges {
 
     /// Draws `count` poses. A larger count leaves the first poses unchanged. Quantities are
     /// independent, targets alternate, and positions are zero.
+    #[doc(hidden)]
     pub fn draw(
         &self,
         problem: &Problem,

@@ -67,7 +67,7 @@ pub struct Check {
     /// Expected error of positions that the identified arm predicts.
     pub prediction: Prediction,
     /// Poses at which the prediction is evaluated.
-    pub predicted_at: PredictionPoses,
+    pub(crate) predicted_at: PredictionPoses,
     /// Root mean square length of the error of one measured position \[m\]; `None` if only tilts
     /// are measured.
     pub noise: Option<f64>,
@@ -75,9 +75,9 @@ pub struct Check {
     /// ([`Observation::kind`]).
     pub noise_of: &'static str,
     /// Forecasts for the first n poses of a series of such poses.
-    pub growth: Growth,
+    pub(crate) growth: Growth,
     /// Effects of the catalogue that the poses would show, with their smallest detectable sizes.
-    pub detection: Detection,
+    pub(crate) detection: Detection,
     /// Number of measured coordinates.
     pub coordinates: usize,
     /// Number of measured coordinates over poses that differ from each other.

@@ -57,6 +57,7 @@ pub(super) enum Measure {
 
 impl Criterion {
     /// Returns the name on the command line and in results.
+    #[doc(hidden)]
     pub fn as_str(&self) -> &'static str {
         match self {
             Self::D => "D",

@@ -63,9 +63,10 @@ pub struct Prediction {
 
 impl Forecast {
     /// Share from the data at which a parameter counts as well identified.
-    pub const WELL_IDENTIFIED: f64 = 0.9;
+    pub(crate) const WELL_IDENTIFIED: f64 = 0.9;
 
     /// Forecasts measurements with the given `sensitivity` and the priors of `parameters`.
+    #[doc(hidden)]
     pub fn new(parameters: &[Parameter], sensitivity: &Sensitivity) -> Self {
         let triangle = sensitivity.triangle();
         let identifiability = Identifiability::of(&triangle);
@@ -108,7 +109,7 @@ impl Forecast {
     /// with other parameters at other arms. Errors are then larger than the linearisation at the
     /// nominal arm says.
     #[must_use]
-    pub fn over(mut self, parameters: &[Parameter], arms: &[Sensitivity]) -> Self {
+    pub(crate) fn over(mut self, parameters: &[Parameter], arms: &[Sensitivity]) -> Self {
         if arms.is_empty() {
             return self;
         }
@@ -130,7 +131,7 @@ impl Forecast {
     /// sensitivity is in metres (σ = 1 m).
     ///
     /// The error of a prediction J x has the covariance J C Jᵀ. Measurement noise is not included.
-    pub fn prediction(&self, poses: &Sensitivity) -> Prediction {
+    pub(crate) fn prediction(&self, poses: &Sensitivity) -> Prediction {
         let mut squares: Vec<f64> = (0..poses.len())
             .map(|k| {
                 let rows = poses.pose(k);
@@ -149,7 +150,7 @@ impl Forecast {
     }
 
     /// Returns the number of parameters of the arm that will be identified to 90 % or more.
-    pub fn well_identified(&self) -> usize {
+    pub(crate) fn well_identified(&self) -> usize {
         self.expected
             .iter()
             .filter(|expected| !expected.is_placement && expected.is_well_identified())
@@ -168,7 +169,7 @@ impl ExpectedParameter {
     }
 
     /// Returns true if the data will determine 90 % of the value or more.
-    pub fn is_well_identified(&self) -> bool {
+    pub(crate) fn is_well_identified(&self) -> bool {
         self.identified >= Forecast::WELL_IDENTIFIED && self.std_error.is_some()
     }
 }

@@ -59,8 +59,10 @@ pub struct PlanOptions<'a> {
     /// Seed of all random numbers.
     pub seed: u64,
     /// Region for the target; `None` is unlimited.
+    #[doc(hidden)]
     pub workspace: Option<&'a Workspace>,
     /// Callback after every sweep, called from several threads.
+    #[doc(hidden)]
     pub progress: Option<&'a (dyn Fn(PlanProgress) + Sync)>,
 }
 
@@ -362,13 +364,14 @@ impl Selection {
 impl Plan {
     /// Returns the median standard error of parameter k over the random sets, SI; `None` if most of
     /// them do not inform on it.
-    pub fn random_error(&self, k: usize) -> Option<f64> {
+    pub(crate) fn random_error(&self, k: usize) -> Option<f64> {
         let errors = self.random.iter().map(|forecast| forecast.expected[k].std_error);
         median(errors.map(|error| error.unwrap_or(f64::INFINITY))).filter(|error| error.is_finite())
     }
 
     /// Returns the indices of the arm parameters that random poses identify to 90 % or more (median
     /// over the sets).
+    #[doc(hidden)]
     pub fn meaningful(&self) -> Vec<usize> {
         let share =
             |k: usize| median(self.random.iter().map(|forecast| forecast.expected[k].identified));

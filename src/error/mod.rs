@@ -44,10 +44,12 @@ pub struct Location {
     /// Key (`joint[2].alpha`) or column (`column x_mm`).
     pub key: Option<String>,
     /// Text around the place, for display with the message.
+    #[doc(hidden)]
     pub excerpt: Option<Excerpt>,
 }
 
 /// Part of an input file with a marked span.
+#[doc(hidden)]
 #[derive(Clone, PartialEq, Eq)]
 pub struct Excerpt {
     /// Text: a whole problem file or one line of measurements.
@@ -67,12 +69,13 @@ impl fmt::Debug for Excerpt {
 
 impl Location {
     /// Returns a place that means a whole file.
+    #[doc(hidden)]
     pub fn file(file: impl Into<PathBuf>) -> Self {
         Self { file: file.into(), line: None, key: None, excerpt: None }
     }
 
     /// Returns the place of a span of a text file that is held in memory.
-    pub fn in_text(file: &Path, text: &Arc<str>, span: Range<usize>) -> Self {
+    pub(crate) fn in_text(file: &Path, text: &Arc<str>, span: Range<usize>) -> Self {
         let line = lines(text.as_bytes().get(..span.start).unwrap_or(text.as_bytes()));
         let excerpt = Excerpt { text: Arc::clone(text), first_line: 1, span };
         Self { file: file.to_owned(), line: Some(line), key: None, excerpt: Some(excerpt) }
@@ -80,20 +83,20 @@ impl Location {
 
     /// Returns this place with a line number.
     #[must_use]
-    pub fn at_line(mut self, line: usize) -> Self {
+    pub(crate) fn at_line(mut self, line: usize) -> Self {
         self.line = Some(line);
         self
     }
 
     /// Returns this place with a key or column.
     #[must_use]
-    pub fn with_key(mut self, key: impl Into<String>) -> Self {
+    pub(crate) fn with_key(mut self, key: impl Into<String>) -> Self {
         self.key = Some(key.into());
         self
     }
 
     /// Returns an error at this place.
-    pub fn error(self, kind: impl Into<InputErrorKind>) -> InputError {
+    pub(crate) fn error(self, kind: impl Into<InputErrorKind>) -> InputError {
         InputError { location: Box::new(self), kind: Box::new(kind.into()) }
     }
 }

@@ -77,18 +77,19 @@ pub(super) fn of_kind(
 
 impl ErrorSummary {
     /// Returns true if the errors are angles \[rad\], as those of tilts are.
-    pub fn is_angle(&self) -> bool {
+    pub(crate) fn is_angle(&self) -> bool {
         kind_named(self.kind).unit == Unit::Angle
     }
 
     /// Summarises errors measured − predicted of positions \[m\].
+    #[doc(hidden)]
     pub fn of(errors: &[Vector3<f64>]) -> Self {
         Self::of_kind(Observation::Position, errors)
     }
 
     /// Summarises the residuals measured − predicted of `rows`: those of the leading kind of the
     /// table.
-    pub fn of_rows(
+    pub(crate) fn of_rows(
         table: &Measurements,
         rows: impl IntoIterator<Item = usize>,
         errors: &[Vector3<f64>],
@@ -97,7 +98,7 @@ impl ErrorSummary {
     }
 
     /// Summarises the residuals of rows of one kind \[m\].
-    pub fn of_kind(observation: Observation, errors: &[Vector3<f64>]) -> Self {
+    pub(crate) fn of_kind(observation: Observation, errors: &[Vector3<f64>]) -> Self {
         let values: Vec<[f64; 4]> =
             errors.iter().map(|e| [e.x.abs(), e.y.abs(), e.z.abs(), e.norm()]).collect();
         let n = values.len().max(1) as f64;

@@ -73,7 +73,7 @@ impl IdentifyError {
     }
 
     /// Returns true if the work was stopped on request.
-    pub fn is_interrupted(&self) -> bool {
+    pub(crate) fn is_interrupted(&self) -> bool {
         matches!(self, Self::Stage(StageError::Interrupted))
     }
 }

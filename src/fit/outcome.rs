@@ -157,7 +157,7 @@ impl Identification {
 
     /// Returns true if the fit describes the measured arm well enough to look for effects: no finding
     /// is an error, unless it is about a residual beyond the declared noise.
-    pub fn describes_arm(&self) -> bool {
+    pub(crate) fn describes_arm(&self) -> bool {
         let is_noise = |finding: &Finding| finding.code == FindingCode::NoiseBeyondDeclared;
         let mut findings = self.findings.iter();
         findings.all(|finding| finding.severity() != Severity::Error || is_noise(finding))
@@ -165,6 +165,7 @@ impl Identification {
 
     /// Returns the first error among the findings: the reason for which the fit is not to be
     /// trusted.
+    #[doc(hidden)]
     pub fn first_error(&self) -> Option<&Finding> {
         self.findings.iter().find(|finding| finding.severity() == Severity::Error)
     }
@@ -197,6 +198,7 @@ impl Identification {
     }
 
     /// Returns the sentences of [`cautions`](Self::cautions).
+    #[doc(hidden)]
     pub fn reasons_to_ask(&self) -> Vec<String> {
         self.cautions().map(ToString::to_string).collect()
     }
@@ -208,6 +210,7 @@ impl Identification {
 
     /// Returns the pairs of [`correlations`](Self::correlations) beyond [`STRONG_CORRELATION`],
     /// strongest first.
+    #[doc(hidden)]
     pub fn strong_correlations(&self) -> Vec<(String, String, f64)> {
         let all = self.correlations();
         all.above(STRONG_CORRELATION)

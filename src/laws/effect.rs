@@ -28,6 +28,7 @@ impl Effect {
 
     /// Returns the place, which parameters carry in brackets: a joint's number, a link, a time, the
     /// name of a law; empty for the whole.
+    #[doc(hidden)]
     pub fn place(&self) -> String {
         if let Self::Law(law) = self {
             return law.name().to_owned();
@@ -37,6 +38,7 @@ impl Effect {
     }
 
     /// Returns the declaration as a problem file has it: `gear-ratio = { joint = 3 }`.
+    #[doc(hidden)]
     pub fn declaration(&self) -> String {
         let arguments: Vec<_> =
             self.arguments().iter().map(|(key, argument)| (*key, argument.toml())).collect();
@@ -44,12 +46,12 @@ impl Effect {
     }
 
     /// Returns the value of an argument by its key.
-    pub fn argument(&self, key: &str) -> Option<Argument> {
+    pub(crate) fn argument(&self, key: &str) -> Option<Argument> {
         self.arguments().into_iter().find(|(known, _)| *known == key).map(|(_, argument)| argument)
     }
 
     /// Returns the number, from 1, of the joint at which the effect acts.
-    pub fn joint(&self) -> Option<usize> {
+    pub(crate) fn joint(&self) -> Option<usize> {
         if let Self::Law(law) = self {
             return law.joint();
         }
@@ -60,7 +62,7 @@ impl Effect {
     }
 
     /// Returns the name of the link on which the effect acts.
-    pub fn link(&self) -> Option<String> {
+    pub(crate) fn link(&self) -> Option<String> {
         match self {
             Self::Law(law) => law.link().map(str::to_owned),
             _ => self.argument("link").and_then(|argument| match argument {
@@ -71,7 +73,7 @@ impl Effect {
     }
 
     /// Returns the name of the covariate that the effect follows.
-    pub fn covariate(&self) -> Option<String> {
+    pub(crate) fn covariate(&self) -> Option<String> {
         let (key, _) = self.key_of(|kind| kind == ArgumentKind::Covariate)?;
         match self.argument(key)? {
             Argument::Name(name) => Some(name),
@@ -141,7 +143,7 @@ impl Effect {
     }
 
     /// Returns the quantities that multiply its parameters, each once.
-    pub fn quantities(&self) -> Vec<Quantity> {
+    pub(crate) fn quantities(&self) -> Vec<Quantity> {
         let mut found = Vec::new();
         for formula in self.loose_entries().into_iter().filter_map(|entry| entry.formula) {
             for quantity in formula.expression.quantities() {
@@ -158,7 +160,7 @@ impl Effect {
     }
 
     /// Returns true if it acts at a site.
-    pub fn acts_at(&self, at: At) -> bool {
+    pub(crate) fn acts_at(&self, at: At) -> bool {
         match self {
             Self::Law(law) => law.at() == at,
             _ => {
@@ -168,24 +170,24 @@ impl Effect {
     }
 
     /// Returns true if it follows the temperature.
-    pub fn is_thermal(&self) -> bool {
+    pub(crate) fn is_thermal(&self) -> bool {
         self.follows(Quantity::is_thermal)
     }
 
     /// Returns true if it depends on the side from which joints come.
-    pub fn has_sides(&self) -> bool {
+    pub(crate) fn has_sides(&self) -> bool {
         self.acts_at(At::JointOrSlide(JointField::Play, JointField::SlidingPlay))
             || self.follows(Quantity::has_sides)
     }
 
     /// Returns true if it follows time, or the order of the poses, rather than quantities for which
     /// poses can be chosen.
-    pub fn follows_time(&self) -> bool {
+    pub(crate) fn follows_time(&self) -> bool {
         self.follows(Quantity::follows_time)
     }
 
     /// Returns true if it depends on the poses measured before.
-    pub fn has_memory(&self) -> bool {
+    pub(crate) fn has_memory(&self) -> bool {
         self.follows(Quantity::has_memory)
     }
 
@@ -196,7 +198,7 @@ impl Effect {
 
     /// Returns the joint at which the effect is a function of one command alone, and the joint
     /// commanded, both from 1.
-    pub fn function_of(&self) -> Option<(usize, usize)> {
+    pub(crate) fn function_of(&self) -> Option<(usize, usize)> {
         let joint = self.joint()?;
         let entries = self.loose_entries();
         if entries.is_empty() || entries.iter().any(|entry| entry.at != At::Coordinate) {
@@ -210,7 +212,7 @@ impl Effect {
 
     /// Returns order and joint, from 1, of each wave sin kq or cos kq that adds to the coordinate of
     /// that joint itself.
-    pub fn waves(&self) -> Vec<(usize, f64)> {
+    pub(crate) fn waves(&self) -> Vec<(usize, f64)> {
         let Some((joint, from)) = self.function_of() else { return Vec::new() };
         let wave =
             |entry: EffectTerm| entry.formula.and_then(|formula| formula.expression.wave_order());
@@ -246,7 +248,7 @@ impl Effect {
 
     /// Returns the same where times may not have been measured: the order of the rows stands for
     /// them then, counted from 1.
-    pub fn describe_in(&self, time_measured: bool) -> String {
+    pub(crate) fn describe_in(&self, time_measured: bool) -> String {
         match self.family() {
             Some(family) if !time_measured && !family.says_by_row.is_empty() => {
                 filled(family.says_by_row, &self.arguments())
@@ -256,6 +258,7 @@ impl Effect {
     }
 
     /// Returns name and place for people, without an argument that is searched.
+    #[doc(hidden)]
     pub fn name_and_place(&self) -> String {
         if let Self::Law(law) = self {
             return format!("law {}", law.name());
@@ -273,7 +276,7 @@ impl Effect {
     }
 
     /// Returns kind and value of the argument that is searched: a time, an order, a path.
-    pub fn searched_value(&self) -> Option<(ArgumentKind, f64)> {
+    pub(crate) fn searched_value(&self) -> Option<(ArgumentKind, f64)> {
         let (key, kind) = self.key_of(ArgumentKind::is_searched)?;
         match self.argument(key)? {
             Argument::Number(value) => Some((kind, value)),
@@ -282,7 +285,7 @@ impl Effect {
     }
 
     /// Returns the other joint, from 1, that moves the joint at which the effect acts.
-    pub fn other_joint(&self) -> Option<usize> {
+    pub(crate) fn other_joint(&self) -> Option<usize> {
         let (key, _) = self.key_of(|kind| kind == ArgumentKind::OtherJoint)?;
         match self.argument(key)? {
             Argument::Joint(joint) => Some(joint),
@@ -292,7 +295,7 @@ impl Effect {
 
     /// Returns true if an argument is searched, as a time: effects that [`Self::name_and_place`]
     /// calls the same are one effect.
-    pub fn is_searched(&self) -> bool {
+    pub(crate) fn is_searched(&self) -> bool {
         self.searched().is_some()
     }
 
@@ -333,7 +336,7 @@ impl Effect {
     }
 
     /// Returns the orders of a harmonic.
-    pub fn harmonic_orders(&self) -> Option<Vec<u32>> {
+    pub(crate) fn harmonic_orders(&self) -> Option<Vec<u32>> {
         self.orders().map(|(_, orders)| orders)
     }
 
@@ -347,7 +350,7 @@ impl Effect {
     }
 
     /// Returns the parts that are tested one by one: a harmonic order by order.
-    pub fn parts(&self) -> Vec<Self> {
+    pub(crate) fn parts(&self) -> Vec<Self> {
         let Some((key, orders)) = self.orders() else { return vec![self.clone()] };
         let one = |order: u32| self.with(key, &Argument::Orders(vec![order]));
         orders.into_iter().filter_map(one).collect()
@@ -362,7 +365,7 @@ impl Effect {
 
     /// Returns the one effect that is this and another: harmonics of one joint; `None` where they
     /// are two.
-    pub fn joined(&self, other: &Self) -> Option<Self> {
+    pub(crate) fn joined(&self, other: &Self) -> Option<Self> {
         let (key, mut orders, more) = self.alike(other)?;
         let added: Vec<u32> = more.into_iter().filter(|order| !orders.contains(order)).collect();
         orders.extend(added);
@@ -371,6 +374,7 @@ impl Effect {
     }
 
     /// Returns true if it holds all of another: a harmonic of more orders.
+    #[doc(hidden)]
     pub fn covers(&self, other: &Self) -> bool {
         match self.alike(other) {
             Some((_, orders, wanted)) => wanted.iter().all(|order| orders.contains(order)),

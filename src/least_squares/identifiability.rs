@@ -53,6 +53,7 @@ pub struct UnidentifiableCombination {
 
 impl Identifiability {
     /// Analyses the least-squares problem with triangular factor `triangle` (n × n).
+    #[doc(hidden)]
     pub fn of(triangle: &DMatrix<f64>) -> Self {
         let Scaled { matrix: scaled, scale } = Scaled::of(triangle);
         let SingularValues { values: singular_values, right } = SingularValues::of(&scaled);
@@ -64,7 +65,7 @@ impl Identifiability {
     }
 
     /// Returns the ratio of the largest singular value to the smallest nonzero one.
-    pub fn condition_number(&self) -> f64 {
+    pub(crate) fn condition_number(&self) -> f64 {
         match self.singular_values[..self.rank] {
             [largest, .., smallest] => largest / smallest,
             [] | [_] => 1.0,
@@ -76,7 +77,7 @@ impl Identifiability {
     ///
     /// O1 = (Π σ)^(1/r) / √m, O2 = `σ_r` / `σ_1`, O3 = `σ_r`, O4 = `σ_r`² / `σ_1`,
     /// O5 = 1 / Σ 1/σ [Sun & Hollerbach 2008].
-    pub fn observability(&self, measurements: usize) -> [f64; 5] {
+    pub(crate) fn observability(&self, measurements: usize) -> [f64; 5] {
         let used = &self.singular_values[..self.rank];
         let (Some(&largest), Some(&smallest)) = (used.first(), used.last()) else {
             return [0.0; 5];

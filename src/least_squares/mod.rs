@@ -50,6 +50,7 @@ pub use self::{
 pub(crate) const MANY_UNKNOWNS: usize = 100;
 
 /// Least-squares problem given by the residuals of many small items and their derivatives.
+#[doc(hidden)]
 pub trait LeastSquares: Sync {
     /// Returns the number of unknowns n.
     fn parameters(&self) -> usize;
@@ -71,6 +72,7 @@ pub trait LeastSquares: Sync {
 }
 
 /// Block of rows [∂r/∂x  r], stored column after column.
+#[doc(hidden)]
 #[derive(Debug, Clone)]
 pub struct Block {
     rows: usize,
@@ -205,7 +207,7 @@ pub struct Linearisation {
 impl Linearisation {
     /// Adds rows W p = 0 for the step p, shape of `rows` = (k, n); the cost stays unchanged.
     #[must_use]
-    pub fn with_rows(self, rows: &DMatrix<f64>) -> Self {
+    pub(crate) fn with_rows(self, rows: &DMatrix<f64>) -> Self {
         let n = self.projected.len();
         let mut block = Block::zeros(n + rows.nrows(), n);
         for j in 0..n {

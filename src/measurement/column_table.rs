@@ -69,7 +69,7 @@ impl ColumnTable {
     }
 
     /// Returns the name used in messages.
-    pub fn name(&self) -> &Path {
+    pub(crate) fn name(&self) -> &Path {
         &self.name
     }
 

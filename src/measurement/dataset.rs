@@ -29,6 +29,7 @@ pub struct Dataset {
 impl Dataset {
     /// Creates a data set from measurements and a split; `split` holds row numbers in ascending
     /// order.
+    #[doc(hidden)]
     pub fn new(measurements: Measurements, split: Split) -> Self {
         Self { measurements, split }
     }

@@ -23,7 +23,7 @@ impl Measurements {
     /// `sigma` is the declared standard deviation of a coordinate \[m\]. If the resolution is much
     /// coarser than σ, whole positions repeat by chance; then rows count as copies only if their
     /// times agree as well.
-    pub fn repeated_rows(&self, sigma: Option<f64>) -> Option<Warning> {
+    pub(crate) fn repeated_rows(&self, sigma: Option<f64>) -> Option<Warning> {
         let fine = sigma.map_or(FINE_RESOLUTION_WITHOUT_SIGMA, |sigma| FINE_RESOLUTION * sigma);
         let by_time = self.time_measured && self.step().is_some_and(|step| step > fine);
         let mut first_rows: HashMap<Vec<u64>, usize> = HashMap::with_capacity(self.len());

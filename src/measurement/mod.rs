@@ -72,8 +72,10 @@ pub struct Measurements {
     /// Configurations from the other joint source (commands or readings), if the table has both.
     pub other_configurations: Option<Vec<f64>>,
     /// Measurements of fixed points between the poses; they take no part in fits.
+    #[doc(hidden)]
     pub nests: Vec<NestReading>,
     /// Observation of each row; empty if all rows measure positions.
+    #[doc(hidden)]
     pub observations: Vec<Observation>,
     /// Measured numbers of each row, padded with zeros \[m\] or \[rad\]: positions in the measuring
     /// frame, distances or tilts; 0 for a contact.
@@ -108,23 +110,29 @@ pub struct Measurements {
     /// Pose numbers from the column `pose`, if every row has a number there.
     pub pose: Option<Vec<f64>>,
     /// Pose names from the column `pose`, if every row has one and not all are numbers.
+    #[doc(hidden)]
     pub pose_names: Option<Labels>,
     /// Session of each row; one unnamed label without a column.
+    #[doc(hidden)]
     pub session: Labels,
     /// Target of each row; `None` without a column.
+    #[doc(hidden)]
     pub target: Option<Labels>,
     /// True for rows marked `validation` in the column that the problem names, or else in `split`.
     pub marked_held_out: Option<Vec<bool>>,
     /// Columns of the commands in the first file, one per joint; empty without a file.
+    #[doc(hidden)]
     pub command_columns: Vec<CommandColumn>,
     /// Warnings about the files, for reports.
     pub warnings: Vec<Warning>,
     /// Order in which the rows were measured. It is computed at first use, so rows may change only
     /// before that or in a copy.
+    #[doc(hidden)]
     pub order: RowOrder,
 }
 
 /// Repeated measurement of a fixed point, which shows whether the instrument has moved.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct NestReading {
     /// File index and line, for messages.
@@ -144,6 +152,7 @@ pub struct NestReading {
 }
 
 /// Column of a joint's commands as written in a table.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommandColumn {
     /// Joint, counted from 0.
@@ -155,6 +164,7 @@ pub struct CommandColumn {
 }
 
 /// Words of rows, stored as indices into the distinct words in order of appearance.
+#[doc(hidden)]
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Labels {
     /// Distinct words in order of appearance.
@@ -192,12 +202,13 @@ impl Measurements {
     }
 
     /// Returns the quantity that a row measures.
+    #[doc(hidden)]
     pub fn observation(&self, row: usize) -> Observation {
         self.observations.get(row).copied().unwrap_or_default()
     }
 
     /// Returns one observation of each kind in the table, positions first.
-    pub fn kinds(&self) -> Vec<Observation> {
+    pub(crate) fn kinds(&self) -> Vec<Observation> {
         let mut kinds: Vec<Observation> =
             (0..self.len()).map(|row| self.observation(row)).collect();
         kinds.sort_unstable();
@@ -206,11 +217,12 @@ impl Measurements {
     }
 
     /// Returns the first of [`kinds`](Self::kinds), on which error summaries are based.
-    pub fn leading(&self) -> Observation {
+    pub(crate) fn leading(&self) -> Observation {
         self.kinds().first().copied().unwrap_or_default()
     }
 
     /// Returns the orientation of a row in the measuring frame, if it was measured.
+    #[doc(hidden)]
     pub fn orientation(&self, row: usize) -> Option<&UnitQuaternion<f64>> {
         self.orientations
             .as_ref()
@@ -219,34 +231,36 @@ impl Measurements {
     }
 
     /// Returns the standard deviation stated for a row \[m\], if there is one.
-    pub fn sigma_of(&self, row: usize) -> Option<f64> {
+    pub(crate) fn sigma_of(&self, row: usize) -> Option<f64> {
         self.sigma.as_ref().map(|column| column[row]).filter(|sigma| !sigma.is_nan())
     }
 
     /// Returns true if every row states its standard deviation.
-    pub fn has_sigma_in_every_row(&self) -> bool {
+    pub(crate) fn has_sigma_in_every_row(&self) -> bool {
         self.sigma.as_ref().is_some_and(|column| column.iter().all(|sigma| !sigma.is_nan()))
     }
 
     /// Returns true if the standard deviation of every row is known from columns or from `[data]`.
-    pub fn has_declared_noise(&self, problem: &Problem) -> bool {
+    pub(crate) fn has_declared_noise(&self, problem: &Problem) -> bool {
         self.has_sigma_in_every_row()
             || (self.observations.is_empty() && problem.data.position_sigma.is_some())
     }
 
     /// Returns file and line of a row, for messages.
+    #[doc(hidden)]
     pub fn location(&self, row: usize) -> Location {
         let (file, line) = self.origin[row];
         Location::file(&self.files[file as usize]).at_line(line as usize)
     }
 
     /// Returns a copy of the conditions of a row; times count from the first pose.
+    #[doc(hidden)]
     pub fn conditions(&self, row: usize) -> PoseConditions {
         self.setup(row, self.first_time()).to_owned()
     }
 
     /// Returns the conditions of all rows without their past, which the other rows contain.
-    pub fn conditions_without_past(&self) -> Vec<PoseConditions> {
+    pub(crate) fn conditions_without_past(&self) -> Vec<PoseConditions> {
         let first = self.first_time();
         let alone =
             |row| PoseView { past: LazyPast::default(), ..self.setup(row, first) }.to_owned();
@@ -279,6 +293,7 @@ impl Measurements {
     }
 
     /// Returns the declared covariates of a row in their order and units; empty if there are none.
+    #[doc(hidden)]
     pub fn covariates_of(&self, row: usize) -> &[f64] {
         let n = self.covariates.len() / self.len().max(1);
         &self.covariates[row * n..(row + 1) * n]
@@ -291,6 +306,7 @@ impl Measurements {
 
     /// Returns these rows with configurations from the other joint source (commands or readings),
     /// if the table has both and they differ.
+    #[doc(hidden)]
     pub fn with_other_joint_source(&self) -> Option<Self> {
         let other =
             self.other_configurations.as_ref().filter(|other| **other != self.configurations)?;

@@ -312,7 +312,7 @@ impl Measurements {
 
     /// Returns the rows in which the arm takes part, without known distances between points.
     #[must_use]
-    pub fn arm_rows(self) -> Self {
+    pub(crate) fn arm_rows(self) -> Self {
         let rows: Vec<usize> =
             (0..self.len()).filter(|&row| self.observation(row).is_of_arm()).collect();
         if rows.len() == self.len() { self } else { self.select(&rows) }

@@ -68,7 +68,7 @@ impl Measurements {
     /// Returns the median time between consecutive configurations and the duration of the longest
     /// session \[s\]. Repeated readings of one configuration are not counted. Returns `None` if
     /// times were not measured or no configuration changes.
-    pub fn clock(&self) -> Option<(f64, f64)> {
+    pub(crate) fn clock(&self) -> Option<(f64, f64)> {
         let chronology = self.chronology();
         let sorted = chronology.sorted.as_ref();
         let times = sorted.map_or(self.time.as_slice(), |sorted| &sorted.times);
@@ -90,7 +90,7 @@ impl Measurements {
     }
 
     /// Returns a warning if a row is earlier than the row above it in the same file and session.
-    pub fn time_going_back(&self) -> Option<Warning> {
+    pub(crate) fn time_going_back(&self) -> Option<Warning> {
         if !self.time_measured {
             return None;
         }

@@ -19,6 +19,7 @@ impl Measurements {
     ///
     /// # Errors
     /// The first error in the files, or a file cannot be read.
+    #[doc(hidden)]
     pub fn read(files: &[PathBuf], problem: &Problem) -> Result<(Self, Vec<Warning>), InputError> {
         Self::read_table(files, problem, true)
     }
@@ -38,7 +39,7 @@ impl Measurements {
     ///
     /// # Errors
     /// The first error in the table.
-    pub fn read_columns(
+    pub(crate) fn read_columns(
         table: ColumnTable,
         problem: &Problem,
     ) -> Result<(Self, Vec<Warning>), InputError> {
@@ -49,6 +50,7 @@ impl Measurements {
     ///
     /// # Errors
     /// The first error in the table.
+    #[doc(hidden)]
     pub fn read_pose_columns(
         table: ColumnTable,
         problem: &Problem,

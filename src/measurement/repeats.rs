@@ -49,13 +49,14 @@ impl Measurements {
     /// They agree in configuration, session and target. They also agree in payload and hoist if the
     /// arm is elastic or an effect is declared, and in temperature and approach if a declared
     /// effect depends on them.
+    #[doc(hidden)]
     pub fn pose_numbers(&self, problem: &Problem) -> Vec<usize> {
         self.numbers(problem, true)
     }
 
     /// Returns the number of each row's pose regardless of the target: rows of several targets can
     /// show one pose of the arm.
-    pub fn arm_pose_numbers(&self, problem: &Problem) -> Vec<usize> {
+    pub(crate) fn arm_pose_numbers(&self, problem: &Problem) -> Vec<usize> {
         self.numbers(problem, false)
     }
 

@@ -68,6 +68,7 @@ impl Model {
     /// Returns the model with a part of its elasticity left out, together with the parameters of
     /// that part.
     #[must_use]
+    #[doc(hidden)]
     pub fn ablated(&self, ablation: Ablation) -> Self {
         let mut model = self.clone();
         let kept: Vec<usize> = (0..model.parameters.len())

@@ -16,7 +16,7 @@ impl Model {
     /// A command moves its joint, joints with terms that depend on it, and the displacements s of
     /// the instrument: ∂p/∂q = ∂p/∂θ (1 + ∂Δθ/∂q) + ∂s/∂q. Directions of approach are kept
     /// constant.
-    pub fn command_jacobian(
+    pub(crate) fn command_jacobian(
         &self,
         problem: &Problem,
         poses: Vec<Pose>,

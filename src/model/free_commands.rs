@@ -15,7 +15,7 @@ impl Model {
     /// The correction adds to θ of a revolute joint and to d of a prismatic joint. Bases and
     /// targets keep their values at `x`.
     #[must_use]
-    pub fn with_free_commands(&self, problem: &Problem, x: &DVector<f64>) -> Self {
+    pub(crate) fn with_free_commands(&self, problem: &Problem, x: &DVector<f64>) -> Self {
         let arm = self.arm(|k| x[k]);
         let parameters = commands(problem, &arm, Joint::command_kind);
         Self {
@@ -36,13 +36,13 @@ impl Model {
     /// Returns the model without errors of the instrument: it predicts the position of the target,
     /// not the reading.
     #[must_use]
-    pub fn without_instrument_errors(self) -> Self {
+    pub(crate) fn without_instrument_errors(self) -> Self {
         Self { instrument: self.instrument.without_errors(), ..self }
     }
 
     /// Adds corrections to the mimic joints as free parameters to a model with free commands.
     #[must_use]
-    pub fn with_mimic_joints(mut self, problem: &Problem) -> Self {
+    pub(crate) fn with_mimic_joints(mut self, problem: &Problem) -> Self {
         let kind =
             |joint: &Joint| if joint.mimic.is_some() { joint.kind } else { JointKind::Fixed };
         self.parameters.extend(commands(problem, &self.nominal, kind));
@@ -53,6 +53,7 @@ impl Model {
     ///
     /// # Errors
     /// A free parameter has no value; its name is returned.
+    #[doc(hidden)]
     pub fn parameter_vector(
         &self,
         value: impl Fn(&str) -> Option<f64>,
@@ -65,12 +66,12 @@ impl Model {
     }
 
     /// Returns true if a term that is not free depends on the joints' commands.
-    pub fn follows_commands(&self) -> bool {
+    pub(crate) fn follows_commands(&self) -> bool {
         self.fixed_terms.iter().any(|term| term.regressor.follows_commands())
     }
 
     /// Returns the joints that the parameters of a model with free commands move, in their order.
-    pub fn moving_joints(&self) -> Vec<usize> {
+    pub(crate) fn moving_joints(&self) -> Vec<usize> {
         let joint = |parameter: &Parameter| match parameter.site {
             ParameterSite::Joint { joint, .. } => Some(joint),
             _ => None,

@@ -69,8 +69,10 @@ pub struct Model {
     /// Declared numbers of each fixture.
     declared: Vec<Vec<Option<f64>>>,
     /// Free parameters, in the order of every full parameter vector.
+    #[doc(hidden)]
     pub parameters: Vec<Parameter>,
     /// Linear inequalities between the free parameters.
+    #[doc(hidden)]
     pub constraints: Vec<LinearConstraint>,
 }
 
@@ -122,7 +124,7 @@ impl Model {
     /// Each site comes with its value without deviations. A declared value of the arm takes
     /// precedence.
     #[must_use]
-    pub fn with_probes(&self, sites: &[(ParameterSite, f64)]) -> Self {
+    pub(crate) fn with_probes(&self, sites: &[(ParameterSite, f64)]) -> Self {
         let mut model = self.clone();
         for &(site, nominal) in sites {
             sites::prepare_site(&mut model.nominal, site, nominal);
@@ -155,12 +157,13 @@ impl Model {
     }
 
     /// Returns the number of joints, fixed ones included.
-    pub fn joints(&self) -> usize {
+    pub(crate) fn joints(&self) -> usize {
         self.nominal.joints.len()
     }
 
     /// Returns the largest distance that the undeflected arm can reach \[m\]: Σ √(a² + d²), or
     /// ‖xyz‖, over the joints that carry a target, plus the target's offset; 1 m if that is zero.
+    #[doc(hidden)]
     pub fn reach(&self) -> f64 {
         let length = |joint: &Joint<f64>| {
             joint.a.hypot(joint.d)
@@ -178,11 +181,13 @@ impl Model {
     }
 
     /// Returns true if bounds or constraints limit the parameters.
+    #[doc(hidden)]
     pub fn is_bounded(&self) -> bool {
         !self.constraints.is_empty() || self.parameters.iter().any(Parameter::is_bounded)
     }
 
     /// Returns the arm with parameter k at deviation `x(k)`; other values are as declared.
+    #[doc(hidden)]
     pub fn arm<S: Scalar>(&self, x: impl Fn(usize) -> S) -> Arm<S> {
         let mut arm = self.nominal.lift();
         let mut tilt = [S::from(0.0); 2];
@@ -213,7 +218,7 @@ impl Model {
 
     /// Returns the base poses at `x`, measuring frame: translation \[m\] and rotation vector
     /// \[rad\].
-    pub fn base_poses(&self, x: &[f64]) -> Vec<BasePose> {
+    pub(crate) fn base_poses(&self, x: &[f64]) -> Vec<BasePose> {
         let mut bases = self.bases.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
             if let ParameterSite::Base { base, axis } = parameter.site {
@@ -228,6 +233,7 @@ impl Model {
     }
 
     /// Returns the base frames at `x`, measuring frame.
+    #[doc(hidden)]
     pub fn base_frames(&self, x: &[f64]) -> Vec<Frame<f64>> {
         self.base_poses(x)
             .iter()
@@ -241,6 +247,7 @@ impl Model {
     }
 
     /// Returns the positions of the targets at `x` in the frames that carry them \[m\].
+    #[doc(hidden)]
     pub fn target_positions(&self, x: &[f64]) -> Vec<Vector3<f64>> {
         let mut targets = self.targets.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
@@ -272,7 +279,7 @@ impl Model {
 
     /// Returns the orientations of the targets at `x` in the frames that carry them, as rotation
     /// vectors \[rad\].
-    pub fn target_rotations(&self, x: &[f64]) -> Vec<Vector3<f64>> {
+    pub(crate) fn target_rotations(&self, x: &[f64]) -> Vec<Vector3<f64>> {
         let mut rotations = self.target_rotations.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {
             if let ParameterSite::Target { target, axis: axis @ 3.. } = parameter.site {

@@ -15,12 +15,14 @@ use crate::spatial::{Frame, rotation_between};
 impl Model {
     /// Returns measured − predicted of each row at the full parameter vector `x` \[m\] or \[rad\];
     /// NaN without equilibrium.
+    #[doc(hidden)]
     pub fn residuals(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
         PoseResiduals::new(self, poses, Vec::new(), x.clone()).position_errors(&DVector::zeros(0))
     }
 
     /// Returns the predicted numbers of each row at the full parameter vector `x` \[m\] or
     /// \[rad\]; NaN without equilibrium.
+    #[doc(hidden)]
     pub fn predict(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
         let measured: Vec<Vector3<f64>> = poses.iter().map(|pose| *pose.measured).collect();
         let residuals = self.residuals(poses, x);
@@ -33,21 +35,25 @@ impl Model {
 
     /// Returns the rotation vectors from the predicted to the measured orientations, measuring
     /// frame \[rad\], as [`PoseResiduals::orientation_errors`].
-    pub fn orientation_residuals(&self, poses: Vec<Pose>, x: &DVector<f64>) -> Vec<Vector3<f64>> {
+    pub(crate) fn orientation_residuals(
+        &self,
+        poses: Vec<Pose>,
+        x: &DVector<f64>,
+    ) -> Vec<Vector3<f64>> {
         PoseResiduals::new(self, poses, Vec::new(), x.clone())
             .orientation_errors(&DVector::zeros(0))
     }
 
     /// Returns measured − predicted of each row by the geometry alone at the full parameter vector
     /// `x` \[m\] or \[rad\]: nothing deflects, and no effect acts on the arm.
-    pub fn geometric_residuals(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
+    pub(crate) fn geometric_residuals(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let mut predictor = Predictor::rigid(self, x);
         poses.iter().map(|pose| pose.measured - predictor.predict(pose).numbers).collect()
     }
 
     /// Returns the frames that carry the targets at the full parameter vector `x`, arm base frame;
     /// `None` without equilibrium.
-    pub fn frames(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Frame<f64>>> {
+    pub(crate) fn frames(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Frame<f64>>> {
         #[expect(
             clippy::redundant_closure_for_method_calls,
             reason = "a path is not general enough over lifetimes"
@@ -57,6 +63,7 @@ impl Model {
 
     /// Returns the predicted orientations of the targets at the full parameter vector `x`, rotation
     /// vectors, measuring frame \[rad\]; NaN without equilibrium.
+    #[doc(hidden)]
     pub fn orientations(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let reference = [Vector3::x(), Vector3::y(), Vector3::z()];
         self.map(poses, x, |predictor, pose| {
@@ -80,7 +87,7 @@ impl Model {
 
     /// Returns the position of the target in each pose at the full parameter vector `x`, arm base
     /// frame \[m\]; `None` without equilibrium.
-    pub fn predicted_targets_in_base(
+    pub(crate) fn predicted_targets_in_base(
         &self,
         poses: &[Pose],
         x: &[f64],
@@ -93,7 +100,7 @@ impl Model {
     /// Returns the positions by the geometry alone at the full parameter vector `x`, as the
     /// instrument reads them, measuring frame \[m\]: nothing deflects, and no effect acts on the
     /// arm.
-    pub fn geometric_positions(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
+    pub(crate) fn geometric_positions(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let mut predictor = Predictor::rigid(self, x);
         let position = |pose: &Pose| {
             predictor.predict(&Pose { observation: Observation::Position, ..*pose }).numbers
@@ -103,7 +110,7 @@ impl Model {
 
     /// Returns the arm as a line from its base to the target in each pose at the full parameter
     /// vector `x`, measuring frame \[m\]; `None` without equilibrium.
-    pub fn centre_lines(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<CentreLine>> {
+    pub(crate) fn centre_lines(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<CentreLine>> {
         let (arm, bases) = (self.arm(|k| x[k]), self.base_frames(x));
         self.map(poses, x, |predictor, pose| {
             let (joint, target) = (self.target_joint(pose.target), predictor.target(pose));

@@ -9,10 +9,10 @@
 //! | 1-2 frames | [`Mdh`], [`Chain`] |
 //! | 3-7 deflection of links | [`Loads`], [`LinkTerms`] |
 //! | 8-11 torsion of joints | [`joint`] |
-//! | 12-27 transfer to the end point | [`transfer`], [`joint_transfer`], [`link_transfer`], [`Elastic`] |
+//! | 12-27 transfer to the end point | [`transfer`](fn@transfer), [`joint_transfer`], [`link_transfer`], [`Elastic`] |
 //! | 28-38 geometric errors | [`geometric`] |
 //! | 39-41 end-point error | [`EndPoint`] |
-//! | 42-45 least squares, iteration | [`least_squares`], [`stiffness`], [`identify`], [`crate::least_squares::solver::PseudoInverse`] |
+//! | 42-45 least squares, iteration | [`least_squares`], [`stiffness`], [`identify`](fn@identify), `PseudoInverse` |
 //! | tables 1-3 | [`published`] |
 //!
 //! The module shares no physics with the model: forces are resolved in the frames of the rigid arm,

@@ -129,6 +129,7 @@ impl PoseRanges {
     /// Returns these ranges without the temperatures, approach directions and covariates on which
     /// no declared effect depends, because they need not be set.
     #[must_use]
+    #[doc(hidden)]
     pub fn relevant_to(self, problem: &Problem) -> Self {
         let declared = |matters: fn(&Effect) -> bool| {
             problem.effects.iter().any(|declared| matters(&declared.effect))

@@ -34,6 +34,7 @@ impl Problem {
     /// - T₀ if an effect depends on the temperature.
     ///
     /// Display names, joint limits, `[parameters]`, constraints, data and noise do not enter.
+    #[doc(hidden)]
     pub fn digest(&self) -> String {
         let Self { gravity, statics, joints, tool, targets, base, effects, data, .. } = self;
         let Statics { equilibrium, beam_elements } = statics;

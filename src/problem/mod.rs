@@ -79,41 +79,55 @@ pub struct Problem {
     /// Gravity in the arm's base frame [m/s²].
     pub gravity: Vector3<f64>,
     /// Settings of the static loads.
+    #[doc(hidden)]
     pub statics: Statics,
     /// Joints from the base outwards, branch by branch. Joint `i` of the file is element `i − 1`.
+    #[doc(hidden)]
     pub joints: Vec<Joint>,
     /// Measured point and payload.
+    #[doc(hidden)]
     pub tool: Tool,
     /// Declared measured points, named by the rows; empty if the tool's point is the only one.
+    #[doc(hidden)]
     pub targets: Vec<Target>,
     /// Pose of the arm's base in the measuring frame.
+    #[doc(hidden)]
     pub base: BasePose,
     /// Links at both ends of the arm, if the problem was made from a URDF.
+    #[doc(hidden)]
     pub urdf: Option<UrdfEnds>,
     /// Effects declared by the model.
+    #[doc(hidden)]
     pub effects: Vec<EffectDeclaration>,
     /// Points, anchors and surfaces that rows are measured against.
+    #[doc(hidden)]
     pub fixtures: Vec<Fixture>,
     /// Known distances between points.
+    #[doc(hidden)]
     pub distances: Vec<KnownDistance>,
     /// Rules for free parameters in the order of the file; a later rule overrides an earlier one.
+    #[doc(hidden)]
     pub parameters: Vec<ParameterRule>,
     /// Linear inequalities between parameters.
+    #[doc(hidden)]
     pub constraints: Vec<Constraint>,
     /// Measurement files and their use.
+    #[doc(hidden)]
     pub data: Data,
     /// Robust loss; `None` for least squares.
+    #[doc(hidden)]
     pub robust: Option<Robust>,
     /// Warnings about implausible values of the arm.
     pub warnings: Vec<Warning>,
     /// Correction of what no law explains, if one is declared.
+    #[doc(hidden)]
     pub remainder: Option<RemainderDeclaration>,
 }
 
 impl Problem {
     /// Returns true if the declared arm is elastic: a joint has a stiffness or a beam has a
     /// rigidity.
-    pub fn is_elastic(&self) -> bool {
+    pub(crate) fn is_elastic(&self) -> bool {
         let bends =
             |beam: &Beam| [beam.ea, beam.ei_y, beam.ei_z, beam.gj].iter().any(Option::is_some);
         self.joints
@@ -122,11 +136,12 @@ impl Problem {
     }
 
     /// Returns the parent relations of the joints.
-    pub fn tree(&self) -> Tree {
+    pub(crate) fn tree(&self) -> Tree {
         Tree::from_joints(&self.joints)
     }
 
     /// Returns true if the joints form one chain with the tool and all targets on its last joint.
+    #[doc(hidden)]
     pub fn is_chain(&self) -> bool {
         let last = self.joints.len().saturating_sub(1);
         let mut carrier_joints =
@@ -138,7 +153,7 @@ impl Problem {
     ///
     /// # Errors
     /// The parent of a joint is not the joint before it.
-    pub fn require_chain(&self, what: &'static str) -> Result<(), InputError> {
+    pub(crate) fn require_chain(&self, what: &'static str) -> Result<(), InputError> {
         let mut joints = self.joints.iter().enumerate();
         match joints.find(|(index, joint)| joint.parent != index.checked_sub(1)) {
             Some((index, joint)) => {
@@ -154,7 +169,7 @@ impl Problem {
     ///
     /// # Errors
     /// Targets are declared and none has that name.
-    pub fn target(&self, word: &str) -> Result<Target, InputError> {
+    pub(crate) fn target(&self, word: &str) -> Result<Target, InputError> {
         let location = Location { line: None, excerpt: None, ..self.data.location.clone() };
         if self.targets.is_empty() {
             return Ok(Target::of_tool(&self.tool, location.with_key("tool")));
@@ -165,6 +180,7 @@ impl Problem {
 
     /// Returns the words by which rows may name their target; one empty word if no target is
     /// declared.
+    #[doc(hidden)]
     pub fn target_words(&self) -> Vec<String> {
         if self.targets.is_empty() {
             return vec![String::new()];
@@ -183,6 +199,7 @@ impl Problem {
 }
 
 /// Section `[statics]`: settings of the static loads.
+#[doc(hidden)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Statics {
     /// Arm shape in which the loads act.
@@ -192,6 +209,7 @@ pub struct Statics {
 }
 
 /// Arm shape in which the loads act.
+#[doc(hidden)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Equilibrium {
@@ -202,6 +220,7 @@ pub enum Equilibrium {
 }
 
 /// Section `[urdf]`: links of a URDF at both ends of the arm.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UrdfEnds {
     /// Link whose frame is the arm's base frame.
@@ -211,6 +230,7 @@ pub struct UrdfEnds {
 }
 
 /// Section `[base]`: pose of the arm's base in the measuring frame.
+#[doc(hidden)]
 #[derive(Debug, Clone)]
 pub struct BasePose {
     /// Origin of the base frame \[m\].

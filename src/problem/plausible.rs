@@ -59,6 +59,7 @@ pub(super) fn form(joints: &[Joint]) -> Option<Warning> {
 
 impl Problem {
     /// Returns warnings about values of the arm that are probably in another unit or convention.
+    #[doc(hidden)]
     pub fn plausibility_warnings(&self) -> Vec<Warning> {
         self.warnings.iter().cloned().chain(self.far_target()).collect()
     }

@@ -33,6 +33,7 @@ impl Problem {
     ///
     /// # Errors
     /// The first error in the file, or the file cannot be read.
+    #[doc(hidden)]
     pub fn read_with_text(path: &Path) -> Result<(Self, Arc<str>), InputError> {
         let file = if path.is_dir() { path.join("problem.toml") } else { path.to_owned() };
         let document = Document::read(&file, InputErrorKind::ProblemMissing)?;
@@ -63,6 +64,7 @@ impl Problem {
     /// Returns this problem without fitted orientations, and so without orientation parameters of
     /// the tools.
     #[must_use]
+    #[doc(hidden)]
     pub fn positions_alone(&self) -> Self {
         let mut problem = self.clone();
         problem.data.fits_orientation = false;

@@ -228,13 +228,14 @@ impl Unit {
 
     /// Returns true if parameters of this unit deviate by ln(value / nominal): stiffnesses and
     /// rigidities.
+    #[doc(hidden)]
     pub fn is_relative(self) -> bool {
         matches!(self, Self::TorsionalStiffness | Self::AxialRigidity | Self::FlexuralRigidity)
     }
 
     /// Returns the unit for display: degrees, millimetres, and stiffnesses with the prefix that
     /// suits `magnitude` \[SI\].
-    pub fn display(self, magnitude: f64) -> Display {
+    pub(crate) fn display(self, magnitude: f64) -> Display {
         let Row { symbol, shown, .. } = self.row();
         match shown {
             Shown::As(factor, symbol) => Display { factor, symbol: symbol.to_owned() },

@@ -37,7 +37,7 @@ pub struct Correction {
     pub(super) parameters: Vec<Linearised>,
     pub(super) posterior: Posterior,
     /// Scores of the rows fitted, left out.
-    pub scores: Scores,
+    pub(crate) scores: Scores,
 }
 
 /// A free parameter that a correction was linearised about.
@@ -96,30 +96,30 @@ impl Correction {
     }
 
     /// True if joints are corrected: if a remainder is applied.
-    pub fn has_remainder(&self) -> bool {
+    pub(crate) fn has_remainder(&self) -> bool {
         self.posterior.hyper.sites() > 0
     }
 
     /// Joints whose errors the remainder describes, counted from 0.
-    pub fn joints(&self) -> &[usize] {
+    pub(crate) fn joints(&self) -> &[usize] {
         if self.has_remainder() { &self.layout.joints } else { &[] }
     }
 
     /// Names of the quantities on which the joints' errors depend: `q1`, ….
-    pub fn inputs(&self) -> Vec<String> {
+    pub(crate) fn inputs(&self) -> Vec<String> {
         self.layout.inputs.joints.iter().map(|joint| format!("q{}", joint + 1)).collect()
     }
 
     /// Names of the free parameters and the posterior covariance of their deviations from nominal,
     /// shape = (parameters, parameters).
-    pub fn parameter_covariance(&self) -> (Vec<&str>, DMatrix<f64>) {
+    pub(crate) fn parameter_covariance(&self) -> (Vec<&str>, DMatrix<f64>) {
         let names = self.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
         (names, self.posterior.parameter_covariance())
     }
 
     /// Corrections of `poses`, with the arm at the full parameter vector `x` of `model`; NaN where
     /// a pose has no equilibrium.
-    pub fn at(
+    pub(crate) fn at(
         &self,
         problem: &Problem,
         model: &Model,

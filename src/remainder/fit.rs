@@ -63,24 +63,21 @@ pub struct Fitted {
     /// The arm corrected by a remainder, if that is kept.
     pub remainder: Option<Correction>,
     /// What a remainder gains on configurations left out, whether it is kept or not.
+    #[doc(hidden)]
     pub gain: Option<Gain>,
     /// What the corrected arm leaves of all rows, where a remainder is kept.
+    #[doc(hidden)]
     pub residuals: Option<CorrectedResiduals>,
     /// True if the remainder was read from a file that the problem declares.
     pub is_declared: bool,
 }
 
 impl Fitted {
-    /// The correction that predicts best: with the remainder if it is kept.
-    pub fn best(&self) -> &Correction {
-        self.remainder.as_ref().unwrap_or(&self.alone)
-    }
-
     /// The same predictions with a remainder that the problem declares.
     ///
     /// # Errors
     /// Problem and data are not those identified.
-    pub fn with_declared(
+    pub(crate) fn with_declared(
         self,
         remainder: Correction,
         (found, problem): (&Identification, &Problem),

@@ -24,7 +24,7 @@ mod search;
 mod tests;
 
 pub use apply::{CorrectedPrediction, predict};
-pub use correction::Correction;
+pub use correction::{CorrectedPose, Correction};
 pub use fit::{Fitted, fit};
 pub(crate) use saved::SavedRemainderError;
 // Public for the tests, the benches and the Python module only.

@@ -135,6 +135,7 @@ fn shortened(number: f64) -> f64 {
 
 impl Correction {
     /// The correction as JSON text, ending in a line break.
+    #[doc(hidden)]
     pub fn to_json(&self) -> String {
         let Posterior { hyper, prior, centres, factor, .. } = &self.posterior;
         let change = self.posterior.parameters();
@@ -220,6 +221,7 @@ impl Correction {
     ///
     /// # Errors
     /// As [`read`](Self::read).
+    #[doc(hidden)]
     pub fn parse(text: &str, file: &Path) -> Result<Self, SavedRemainderError> {
         let syntax = |source| SavedRemainderError::Syntax { file: file.to_owned(), source };
         let wrong = |what| SavedRemainderError::Format { file: file.to_owned(), what };
@@ -317,6 +319,7 @@ impl Correction {
     ///
     /// # Errors
     /// It was fitted to another problem, or to the same one declared otherwise.
+    #[doc(hidden)]
     pub fn check(&self, problem: &Problem, file: &Path) -> Result<(), SavedRemainderError> {
         let file = || file.to_owned();
         if self.problem != problem.name {

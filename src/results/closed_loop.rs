@@ -227,7 +227,7 @@ impl LoopResult {
 
     /// Returns the result with the remainder that was kept beside the effects, if one was.
     #[must_use]
-    pub fn with_remainder(mut self, closure: &ClosedLoop, fitted: &Fitted) -> Self {
+    pub(crate) fn with_remainder(mut self, closure: &ClosedLoop, fitted: &Fitted) -> Self {
         if let Some(corrected) = &fitted.residuals {
             self.after.errors = Errors::of(&corrected.errors);
         }
@@ -236,12 +236,12 @@ impl LoopResult {
     }
 
     /// Iterates over the effects with a status.
-    pub fn with_status(&self, status: Status) -> impl Iterator<Item = &FoundEffect> {
+    pub(crate) fn with_status(&self, status: Status) -> impl Iterator<Item = &FoundEffect> {
         self.effects.iter().filter(move |found| found.status == status)
     }
 
     /// Iterates over structure whose law is unknown, most probable first.
-    pub fn structures(&self) -> impl Iterator<Item = &Structure> {
+    pub(crate) fn structures(&self) -> impl Iterator<Item = &Structure> {
         self.unexplained.iter().chain(&self.further)
     }
 
@@ -253,7 +253,7 @@ impl LoopResult {
 
     /// Returns the size of the residual over the declared σ, if its size alone is significant and
     /// no structure is seen in it.
-    pub fn size_alone(&self) -> Option<f64> {
+    pub(crate) fn size_alone(&self) -> Option<f64> {
         let (size, chi2) = self.size_test()?;
         let failed = self.checks_after.iter().filter(|test| test.structure && test.failed);
         let is_alone = failed.count() == 1 && size.failed && chi2 > 1.0;
@@ -264,14 +264,14 @@ impl LoopResult {
     }
 
     /// Returns the size of the residual over the declared σ, if it is significantly smaller.
-    pub fn overstated_sigma(&self) -> Option<f64> {
+    pub(crate) fn overstated_sigma(&self) -> Option<f64> {
         let (size, chi2) = self.size_test()?;
         let (low, _) = size.bounds?;
         (chi2 < low).then(|| chi2.max(0.0).sqrt())
     }
 
     /// Returns the decrease of the mean held-out error, in mm or ° as its key says.
-    pub fn gain(&self) -> Option<Gain> {
+    pub(crate) fn gain(&self) -> Option<Gain> {
         self.held_out_gain_mm.or(self.held_out_gain_deg)
     }
 }

@@ -318,6 +318,7 @@ impl IdentificationResult {
     /// Returns the result with what predictions need: the posterior covariance, the uncertainty of
     /// predictions, and the remainder if one is kept.
     #[must_use]
+    #[doc(hidden)]
     pub fn with_predictions(self, found: &Identification, fitted: &Fitted) -> Self {
         let corrected = fitted.residuals.as_ref();
         Self {

@@ -57,6 +57,7 @@ pub use self::{
 };
 
 /// Name of every format with its JSON Schema.
+#[doc(hidden)]
 pub fn schemas() -> Vec<(&'static str, String)> {
     macro_rules! schemas {
         ($($document:ty),+ $(,)?) => { vec![$((<$document>::FORMAT, <$document>::schema())),+] };

@@ -54,18 +54,21 @@ pub struct Simulation {
     /// Name of the problem.
     pub problem: String,
     /// Joints that the problem declares.
-    pub joints: Vec<Joint>,
+    pub(crate) joints: Vec<Joint>,
     /// Fixtures that the rows measure against.
-    pub fixtures: Vec<Fixture>,
+    pub(crate) fixtures: Vec<Fixture>,
     /// Seed of all random numbers.
     pub seed: u64,
     /// Truth from which the arm was drawn.
     pub truth: Truth,
     /// All parameters with their true values.
+    #[doc(hidden)]
     pub parameters: Vec<TrueParameter>,
     /// Rig with the true arm.
+    #[doc(hidden)]
     pub rig: Rig,
     /// Measurements in order of time.
+    #[doc(hidden)]
     pub rows: Vec<Row>,
     /// Name of the column that marks held-out rows.
     pub split_column: String,

@@ -49,9 +49,11 @@ pub use self::{
 };
 
 /// Default number of segments per beam.
+#[doc(hidden)]
 pub const SEGMENTS: usize = 16;
 
 /// True arm on a simulated test bench.
+#[doc(hidden)]
 #[derive(Debug, Clone)]
 pub struct Rig {
     arm: Problem,
@@ -60,6 +62,7 @@ pub struct Rig {
 }
 
 /// Error of a pose without static equilibrium.
+#[doc(hidden)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("no static equilibrium: the arm is too flexible for its loads")]
 pub struct NoEquilibrium;

@@ -165,7 +165,7 @@ impl Simulation {
     }
 
     /// Returns the text of `truth.json`.
-    pub fn truth_json(&self) -> String {
+    pub(crate) fn truth_json(&self) -> String {
         let document = Document {
             format: serde_json::json!({ "name": "flexcal-truth", "version": 2 }),
             program: concat!("flexcal ", env!("CARGO_PKG_VERSION")),
@@ -188,7 +188,7 @@ impl Simulation {
     }
 
     /// Returns the names of the true effects.
-    pub fn effect_names(&self) -> Vec<String> {
+    pub(crate) fn effect_names(&self) -> Vec<String> {
         let name = |effect| {
             described(effect, &self.joints)
                 .get("effect")
@@ -200,7 +200,7 @@ impl Simulation {
     }
 
     /// Returns the number of held-out rows.
-    pub fn held_out(&self) -> usize {
+    pub(crate) fn held_out(&self) -> usize {
         self.rows.iter().filter(|row| row.held_out).count()
     }
 }

@@ -9,11 +9,14 @@ use crate::quantity::Unit;
 #[derive(Debug, Clone)]
 pub struct Truth {
     /// Given true values, `[parameters]`.
+    #[doc(hidden)]
     pub parameters: Vec<Deviation>,
     /// Rules for random true values, `[random]`; a given value precedes them, and a later rule an
     /// earlier one.
+    #[doc(hidden)]
     pub random: Vec<RandomRule>,
     /// Effects on the true arm, `[[effect]]`.
+    #[doc(hidden)]
     pub effects: Vec<TrueEffect>,
     /// Standard deviation of a measured coordinate \[m\].
     pub noise_sigma: f64,
@@ -36,6 +39,7 @@ pub struct Truth {
     /// Range of the time between poses \[s\], `[poses]`.
     pub time_step: (f64, f64),
     /// Selection of held-out rows, `[poses]`.
+    #[doc(hidden)]
     pub held_out: HeldOutRows,
     /// Number of segments per beam.
     pub segments: usize,

@@ -157,7 +157,7 @@ impl<'a> Chain<'a> {
     }
 
     /// Returns the names of the moving joints.
-    pub fn joint_names(&self) -> Vec<String> {
+    pub(crate) fn joint_names(&self) -> Vec<String> {
         self.stages
             .iter()
             .filter_map(|stage| Some(self.robot.joints.get(stage.joint)?.name.clone()))
@@ -165,7 +165,7 @@ impl<'a> Chain<'a> {
     }
 
     /// Returns the names of the first and the last link.
-    pub fn ends(&self) -> (&str, &str) {
+    pub(crate) fn ends(&self) -> (&str, &str) {
         let name = |link: usize| self.robot.links.get(link).map_or("", |link| link.name.as_str());
         (name(self.base), name(self.tip))
     }

@@ -25,6 +25,7 @@ pub struct Export {
     /// Text of the whole file.
     pub text: String,
     /// Moved origins from base to tip.
+    #[doc(hidden)]
     pub moved: Vec<MovedOrigin>,
 }
 

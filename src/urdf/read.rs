@@ -136,7 +136,7 @@ impl Robot {
     }
 
     /// Returns the path of the file.
-    pub fn file(&self) -> &Path {
+    pub(crate) fn file(&self) -> &Path {
         &self.source.file
     }
 

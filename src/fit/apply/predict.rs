@@ -42,7 +42,7 @@ pub struct Residual {
 
 impl Residual {
     /// Returns the length of the whitened residual of position and orientation \[1\].
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         self.whitened.norm().hypot(self.whitened_orientation.map_or(0.0, |turn| turn.norm()))
     }
 }
@@ -73,7 +73,7 @@ impl Identification {
     ///
     /// # Errors
     /// Returns an error if a parameter of the model was not identified.
-    pub fn predict_with(
+    pub(crate) fn predict_with(
         &self,
         model: &Model,
         rows: &Measurements,

@@ -38,6 +38,7 @@ pub struct Prediction {
     /// Residuals of the rows; `None` where they hold no measurements.
     pub residuals: Option<Vec<Residual>>,
     /// Summaries of the errors; `None` where the rows hold no measurements.
+    #[doc(hidden)]
     pub errors: Option<ErrorsBySession>,
     /// Scatter of the predicted target at each point that the rows touch.
     pub spreads: Vec<PointSpread>,

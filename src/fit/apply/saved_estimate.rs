@@ -122,6 +122,7 @@ impl SavedEstimate {
     ///
     /// # Errors
     /// Returns the errors of [`read`](Self::read).
+    #[doc(hidden)]
     pub fn parse(text: &str, file: &Path) -> Result<Self, SavedEstimateError> {
         let file = file.to_owned();
         let Document {
@@ -172,12 +173,12 @@ impl SavedEstimate {
 
     /// Returns the model that was fitted, by [`Strategy::model`].
     #[must_use]
-    pub fn model(&self, declared: Model) -> Model {
+    pub(crate) fn model(&self, declared: Model) -> Model {
         self.strategy.model(declared)
     }
 
     /// Sets the elapsed time of `poses` relative to the start time of the identification.
-    pub fn count_time_in(&self, poses: &mut [Pose]) {
+    pub(crate) fn count_time_in(&self, poses: &mut [Pose]) {
         if let Some(first) = self.first_time {
             for pose in poses {
                 pose.setup.elapsed = pose.setup.time - first;
@@ -190,7 +191,7 @@ impl SavedEstimate {
     ///
     /// # Errors
     /// Returns an error if the estimate is of another problem, or of another declaration of it.
-    pub fn check(&self, problem: &Problem, model: &Model) -> Result<(), SavedEstimateError> {
+    pub(crate) fn check(&self, problem: &Problem, model: &Model) -> Result<(), SavedEstimateError> {
         let file = || self.file.clone();
         if self.problem != problem.name {
             let (found, expected) = (self.problem.clone(), problem.name.clone());
@@ -223,7 +224,7 @@ impl SavedEstimate {
 
     /// Returns true if the fitted rows do not determine the pose of a base in its measuring frame,
     /// as contacts with sockets at unknown places do not.
-    pub fn leaves_base_open(&self) -> bool {
+    pub(crate) fn leaves_base_open(&self) -> bool {
         let is_base =
             |entry: &&Entry| entry.name.starts_with("base.") || entry.name.starts_with("base[");
         let is_open = |entry: &Entry| {
@@ -234,7 +235,7 @@ impl SavedEstimate {
 
     /// Returns the words in brackets behind `base` or `tool`, in the order of the file; one empty
     /// word where there are none.
-    pub fn words(&self, of: &str) -> Vec<String> {
+    pub(crate) fn words(&self, of: &str) -> Vec<String> {
         let mut words: Vec<String> = Vec::new();
         for entry in &self.parameters {
             let bracket = entry
@@ -251,7 +252,7 @@ impl SavedEstimate {
     }
 
     /// Returns the estimated value of a parameter \[SI\].
-    pub fn value(&self, name: &str) -> Option<f64> {
+    pub(crate) fn value(&self, name: &str) -> Option<f64> {
         self.parameters.iter().find(|entry| entry.name == name).map(|entry| entry.estimate)
     }
 
@@ -260,6 +261,7 @@ impl SavedEstimate {
     /// # Errors
     /// Returns an error if the estimate is of another problem or arm, or lacks a parameter of the
     /// model.
+    #[doc(hidden)]
     pub fn vector(
         &self,
         problem: &Problem,

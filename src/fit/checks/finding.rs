@@ -189,6 +189,7 @@ impl Finding {
     }
 
     /// Returns the number or name that is called `name`.
+    #[doc(hidden)]
     pub fn value(&self, name: &str) -> Option<&Value> {
         self.numbers.iter().find(|(known, _)| *known == name).map(|(_, value)| value)
     }

@@ -37,6 +37,7 @@ pub struct PointSpread {
 impl PointSpread {
     /// Returns the points that scatter far more than the others and along one direction, each with
     /// its scatter over the median of all. They may have moved or given way, which no arm explains.
+    #[doc(hidden)]
     pub fn unsteady<'a>(spreads: impl IntoIterator<Item = &'a Self>) -> Vec<(&'a Self, f64)> {
         let compared: Vec<&Self> = spreads
             .into_iter()

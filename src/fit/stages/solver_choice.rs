@@ -33,6 +33,7 @@ pub enum SolverChoice {
 
 impl SolverChoice {
     /// Every choice by name, `auto` first.
+    #[doc(hidden)]
     pub const CHOICES: [Self; 8] = [
         Self::Auto,
         Self::LevenbergMarquardt,
@@ -44,6 +45,7 @@ impl SolverChoice {
         Self::Clamped,
     ];
     /// Every solver, without `auto`.
+    #[doc(hidden)]
     pub const EACH: [Self; Self::CHOICES.len() - 1] = {
         let mut each = [Self::Auto; Self::CHOICES.len() - 1];
         let mut k = 0;
@@ -55,7 +57,7 @@ impl SolverChoice {
     };
 
     /// Names of the choices.
-    pub const NAMES: [&str; Self::CHOICES.len()] = {
+    pub(crate) const NAMES: [&str; Self::CHOICES.len()] = {
         let mut names = [""; Self::CHOICES.len()];
         let mut k = 0;
         while k < names.len() {
@@ -101,11 +103,12 @@ impl SolverChoice {
     }
 
     /// Returns a short description.
-    pub const fn summary(self) -> &'static str {
+    pub(crate) const fn summary(self) -> &'static str {
         self.words().1
     }
 
     /// Returns the method by which the solver keeps bounds; `None` where it does not.
+    #[doc(hidden)]
     pub fn within(self) -> Option<BoundMethod> {
         match self {
             Self::Bounded => Some(BoundMethod::ActiveSet),
@@ -121,6 +124,7 @@ impl SolverChoice {
     }
 
     /// Returns true if the solver keeps the bounds and constraints of `model`.
+    #[doc(hidden)]
     pub fn keeps(self, model: &Model) -> bool {
         match self.within() {
             None => !model.is_bounded(),
@@ -131,6 +135,7 @@ impl SolverChoice {
 
     /// Returns the solver that is used for `model`: `auto` becomes one of the others.
     #[must_use]
+    #[doc(hidden)]
     pub fn decide(self, model: &Model) -> Self {
         match self {
             Self::Auto if model.is_bounded() => Self::Bounded,
@@ -140,6 +145,7 @@ impl SolverChoice {
     }
 
     /// Returns the reason for the solver of [`decide`](Self::decide), where the choice is `auto`.
+    #[doc(hidden)]
     pub fn reason(self, model: &Model) -> Option<&'static str> {
         match self {
             Self::Auto if model.is_bounded() => Some("bounds to keep"),

@@ -24,6 +24,7 @@ pub enum Strategy {
 
 impl Strategy {
     /// Every strategy, the default first.
+    #[doc(hidden)]
     pub const EACH: [Self; 6] = [
         Self::Joint,
         Self::Sequential,
@@ -34,7 +35,7 @@ impl Strategy {
     ];
 
     /// Names of the strategies.
-    pub const NAMES: [&str; Self::EACH.len()] = {
+    pub(crate) const NAMES: [&str; Self::EACH.len()] = {
         let mut names = [""; Self::EACH.len()];
         let mut k = 0;
         while k < names.len() {
@@ -68,19 +69,20 @@ impl Strategy {
     }
 
     /// Returns a short description.
-    pub const fn summary(self) -> &'static str {
+    pub(crate) const fn summary(self) -> &'static str {
         self.words().1
     }
 
     /// Returns the model that is fitted: as declared, or without elasticity and its parameters.
     #[must_use]
+    #[doc(hidden)]
     pub fn model(self, declared: Model) -> Model {
         if self == Self::Rigid { declared.ablated(Ablation::Rigid) } else { declared }
     }
 
     /// Returns the stages of one sweep, each as a predicate of the parameters that vary; bases and
     /// targets vary in every stage.
-    pub fn stages(self) -> &'static [fn(&Parameter) -> bool] {
+    pub(crate) fn stages(self) -> &'static [fn(&Parameter) -> bool] {
         const ALL: fn(&Parameter) -> bool = |_| true;
         const STIFFNESS: fn(&Parameter) -> bool = |p| p.site.is_elastic() || p.site.is_placement();
         const GEOMETRY: fn(&Parameter) -> bool = |p| !p.site.is_elastic();

@@ -76,6 +76,7 @@ impl Covariance {
     }
 
     /// Returns the correlation matrix C_ij / √(C_ii C_jj), shape = (parameters, parameters).
+    #[doc(hidden)]
     pub fn correlation(&self) -> DMatrix<f64> {
         let error = self.matrix.diagonal().map(f64::sqrt);
         let of =

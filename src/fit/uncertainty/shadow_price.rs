@@ -16,6 +16,7 @@ pub struct ShadowPrice {
 impl ShadowPrice {
     /// Returns the decrease of the rms \[mm\] for a limit moved out by 1 mm, 1°, 1 % (where the
     /// logarithm is limited) or one SI unit, and the name of that step.
+    #[doc(hidden)]
     pub fn in_mm(self, unit: Unit) -> (f64, &'static str) {
         let (step, name) = match unit {
             Unit::Length => (1e-3, "mm"),

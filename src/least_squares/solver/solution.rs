@@ -41,6 +41,7 @@ impl Solution {
     }
 
     /// Returns the number of evaluations of the residual, with derivatives or without.
+    #[doc(hidden)]
     pub fn evaluations(&self) -> u64 {
         self.cost_evaluations + self.linearisations
     }

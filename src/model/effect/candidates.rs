@@ -159,7 +159,11 @@ fn searched(family: &Family, place: Arguments, data: &DataCoverage) -> Vec<Argum
 impl Effect {
     /// Returns the reason why these data cannot show a declared law, if they cannot;
     /// candidates of the catalogue come with their reason.
-    pub fn untestable(&self, problem: &Problem, data: &DataCoverage) -> Option<&'static str> {
+    pub(crate) fn untestable(
+        &self,
+        problem: &Problem,
+        data: &DataCoverage,
+    ) -> Option<&'static str> {
         if !matches!(self, Self::Law(_)) {
             return None;
         }

@@ -18,7 +18,7 @@ const LOG_LEAD_RANGE: f64 = 7.0;
 impl Effect {
     /// Returns how often chance has a try at it: one over its share of its family's chance, whose
     /// `members` are the candidates.
-    pub fn tries(&self, members: &[&Self], problem: &Problem) -> f64 {
+    pub(crate) fn tries(&self, members: &[&Self], problem: &Problem) -> f64 {
         match self.family().map_or(Chance::Equal, |family| family.chance) {
             Chance::Equal => members.len().max(1) as f64,
             Chance::Orders => {

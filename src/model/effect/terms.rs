@@ -35,6 +35,7 @@ pub fn parameters(problem: &Problem) -> Vec<EffectParameter> {
 impl Effect {
     /// Returns its parameters with where and how each enters the model of `problem`; those of a
     /// place that the arm does not have are left out.
+    #[doc(hidden)]
     pub fn terms(&self, problem: &Problem) -> Vec<Term> {
         let (slides, covariates) = (problem.slides(), problem.covariate_names());
         let vocabulary =
@@ -116,6 +117,7 @@ impl Effect {
     }
 
     /// Returns its parameters with their full names: `gear-ratio[3].error`.
+    #[doc(hidden)]
     pub fn parameters(&self, problem: &Problem) -> Vec<EffectParameter> {
         let place = self.place();
         let bracket = if place.is_empty() { String::new() } else { format!("[{place}]") };
@@ -135,7 +137,11 @@ impl Effect {
 
     /// Returns the columns without which it cannot be fitted, if measurements with these columns
     /// lack them, as a message names them.
-    pub fn missing_column(&self, problem: &Problem, columns: Columns) -> Option<&'static str> {
+    pub(crate) fn missing_column(
+        &self,
+        problem: &Problem,
+        columns: Columns,
+    ) -> Option<&'static str> {
         let sliding_play = |term: &Term| {
             matches!(term.site, ParameterSite::Joint { field: JointField::SlidingPlay, .. })
         };

@@ -56,8 +56,10 @@ pub struct StageErrors {
 #[derive(Debug, Clone)]
 pub struct PlotData {
     /// Errors at each stage, from nominal to best.
+    #[doc(hidden)]
     pub stages: Vec<StageErrors>,
     /// Residual of the best arm in each row.
+    #[doc(hidden)]
     pub residuals: Vec<PoseError>,
     /// Rows that figures may draw, in ascending order: all rows whose target has a position, or a
     /// sample of them with the largest residuals.
@@ -67,23 +69,27 @@ pub struct PlotData {
     /// Joints that take a command.
     pub commands: Vec<Command>,
     /// Contribution of each parameter and effect to the predicted positions, in descending order.
+    #[doc(hidden)]
     pub contributions: Vec<Contribution>,
     /// Coverage of the workspace by fitted poses.
-    pub coverage: Coverage,
+    pub(crate) coverage: Coverage,
     /// Centre line of the best arm in the poses of `shown`; `None` for a pose without equilibrium.
+    #[doc(hidden)]
     pub arms: Vec<Option<CentreLine>>,
     /// True if the `time` of the residuals was measured.
     pub time_measured: bool,
     /// Tests of the residual at the fitted poses.
+    #[doc(hidden)]
     pub findings: Findings,
     /// Warnings on ignored contents of the measurement files.
     pub warnings: Vec<Warning>,
     /// Correlations of the parameters, as in estimate.json.
     pub correlations: Correlations,
     /// Partial residuals of each effect found, in the order of discovery.
+    #[doc(hidden)]
     pub causes: Vec<Cause>,
     /// Partial residuals of structure without a known cause.
-    pub trend: Option<Cause>,
+    pub(crate) trend: Option<Cause>,
 }
 
 impl PlotData {
@@ -111,7 +117,7 @@ impl PlotData {
     ///
     /// # Errors
     /// Returns an error if problem and data do not match.
-    pub fn of_comparison(
+    pub(crate) fn of_comparison(
         problem: &Problem,
         data: &Dataset,
         comparison: &Comparison,
@@ -253,27 +259,27 @@ impl PlotData {
     }
 
     /// Returns the number of rows that figures could draw.
-    pub fn placed(&self) -> usize {
+    pub(crate) fn placed(&self) -> usize {
         self.residuals.iter().filter(|residual| residual.has_place()).count()
     }
 
     /// Returns true if a row measures a position, along the axes of the measuring frame.
-    pub fn is_position(&self, row: usize) -> bool {
+    pub(crate) fn is_position(&self, row: usize) -> bool {
         self.residuals[row].observation.is_position()
     }
 
     /// Returns true if any row measures a position.
-    pub fn has_positions(&self) -> bool {
+    pub(crate) fn has_positions(&self) -> bool {
         self.residuals.iter().any(|residual| residual.observation.is_position())
     }
 
     /// Returns the held-out rows, in the order of the errors of `stages`.
-    pub fn held_out(&self) -> Vec<usize> {
+    pub(crate) fn held_out(&self) -> Vec<usize> {
         (0..self.residuals.len()).filter(|&row| self.residuals[row].held_out).collect()
     }
 
     /// Returns the length of the residual of the best arm in a row \[m\].
-    pub fn size(&self, row: usize) -> f64 {
+    pub(crate) fn size(&self, row: usize) -> f64 {
         self.residuals[row].error.norm()
     }
 }
