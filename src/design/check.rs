@@ -144,7 +144,7 @@ pub fn check(problem: &Problem, checked: &CheckedPoses, seed: u64) -> Result<Che
     // Predictions are of positions, whatever is measured.
     let prediction_table = Measurements { observations: Vec::new(), ..prediction_table };
     let workspace = finite(&site.sensitivity(&prediction_table, Some(1.0)));
-    let lengths = series.kinds().into_iter().find(|kind| kind.is_of_arm() && !kind.is_angle());
+    let lengths = series.kinds().into_iter().find(|kind| kind.measures_length());
     let noise = lengths.map(|kind| noise(problem, &series, kind));
     let forecast = Forecast::new(parameters, &sensitivity.select(&(0..count).collect::<Vec<_>>()));
     let arms = site.arms(&poses, (ARM_POSES / count).clamp(ARMS.0, ARMS.1), (seed, ARM));

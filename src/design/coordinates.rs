@@ -3,7 +3,6 @@
 use std::collections::HashSet;
 
 use crate::measurement::Measurements;
-use crate::problem::Observation;
 
 /// Returns the number of coordinates that some rows of a table measure; a position has
 /// `of_position`.
@@ -12,9 +11,9 @@ pub(super) fn coordinates(
     of_position: usize,
     rows: impl IntoIterator<Item = usize>,
 ) -> usize {
-    let of_row = |row: usize| match table.observation(row) {
-        Observation::Position => of_position,
-        observation => observation.coordinates(),
+    let of_row = |row: usize| {
+        let observation = table.observation(row);
+        if observation.is_position() { of_position } else { observation.coordinates() }
     };
     rows.into_iter().map(of_row).sum()
 }

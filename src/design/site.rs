@@ -18,6 +18,13 @@ use crate::random;
 /// \[kg\].
 const PROBE_MASS: f64 = 1.0;
 
+/// Returns true if a row of a table locates its fixture. Planned rows do so only if the arm touches
+/// the fixture, so that no number must be measured.
+fn locates(observation: Observation, table: &Measurements) -> bool {
+    let mut fields = observation.description().measured_fields();
+    table.position_measured || observation.is_position() || fields.all(|field| !field.required)
+}
+
 /// Model with a base for every session and a target for every target name of some tables of poses.
 #[derive(Debug, Clone)]
 pub struct Site<'a> {
@@ -64,15 +71,12 @@ impl<'a> Site<'a> {
             let mut poses = site.poses(table, &Placement::of(table));
             for pose in &poses {
                 // Before any measurement, contacts locate a fixture, but distances do not.
-                let planned = matches!(pose.observation, Observation::Distance(_))
-                    && !table.position_measured;
+                let planned = !locates(pose.observation, table);
                 if let Some(fixture) = pose.observation.fixture() {
                     if planned { &mut planned_only } else { &mut located }.insert(fixture);
                 }
             }
-            poses.retain(|pose| {
-                table.position_measured || !matches!(pose.observation, Observation::Distance(_))
-            });
+            poses.retain(|pose| locates(pose.observation, table));
             let mut nominal = std::mem::take(&mut site.nominal);
             locate(&site.model, &poses, |_| true, &mut nominal);
             site.nominal = nominal;

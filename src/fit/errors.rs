@@ -76,9 +76,14 @@ pub(super) fn of_kind(
 }
 
 impl ErrorSummary {
-    /// Returns true if the errors are angles \[rad\], as those of tilts are.
-    pub(crate) fn is_angle(&self) -> bool {
-        kind_named(self.kind).unit == Unit::Angle
+    /// Returns the unit of the errors: lengths, or angles for tilts.
+    pub(crate) fn unit(&self) -> Unit {
+        kind_named(self.kind).unit
+    }
+
+    /// Converts an error to the unit in which errors of this kind are shown: mm or °.
+    pub(crate) fn in_unit(&self, value: f64) -> f64 {
+        value * self.unit().in_tables().factor
     }
 
     /// Summarises errors measured − predicted of positions \[m\].

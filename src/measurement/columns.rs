@@ -5,9 +5,10 @@ use std::convert::identity;
 
 use super::mapped::{Names, no_such};
 use super::meaning::{Meaning, Numbering, affects_results, split_unit, unit_of, word_of_row};
-use super::role::Role;
+use super::role::{POINT, POSITION, Role, is_declared};
 use super::table::Table;
 use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind, nearest, one_typo};
+use crate::observation::{Field, Kind, kinds};
 use crate::problem::{ColumnRule, HeldOut, JointSource, Problem};
 use crate::quantity::Unit;
 
@@ -239,22 +240,29 @@ impl Columns {
                     .error(InputErrorKind::MissingColumn { write, near: near(&covariate.name) }));
             }
         }
-        for (has, lacks, write) in [
-            (Role::Distance, Role::Anchor, "anchor"),
-            (Role::Offset, Role::Surface, "surface"),
-            (Role::Anchor, Role::Distance, "distance_mm"),
-            (Role::Tilt(0), Role::Tilt(1), "tilt_y_deg"),
-            (Role::Tilt(1), Role::Tilt(0), "tilt_x_deg"),
-        ] {
-            if self.has(has) && !self.has(lacks) && (measured || has != Role::Anchor) {
-                let write = write.to_owned();
+        let has_field = |field: &&Field| self.has(Role::Field(field.name));
+        let declared = kinds().filter(|kind| is_declared(kind, problem));
+        for kind in declared.filter(|kind| !kind.declared_by.is_empty()) {
+            let has_number = kind.measured_fields().any(|field| has_field(&field));
+            let is_named = kind.references().any(|field| field.required && has_field(&field));
+            let lacks = |field: &&Field| {
+                let is_needed = field.unit().is_none() || has_number || (measured && is_named);
+                field.required && is_needed && !has_field(field)
+            };
+            if !has_number && !is_named {
+                continue;
+            }
+            if let Some(field) = kind.fields.iter().find(lacks) {
+                let write = field.unit().map_or(field.name.to_owned(), |unit| {
+                    format!("{}_{}", field.name, unit.in_tables().suffix)
+                });
                 return Err(table
                     .column(&write)
                     .error(InputErrorKind::MissingColumn { near: near(&write), write }));
             }
         }
         // A single coordinate is no position.
-        let has_position = (0..3).any(|axis| self.has(Role::Position(axis)));
+        let has_position = POSITION.iter().any(|role| self.has(*role));
         if !has_position && (!measured || self.observes()) {
             return self.require_marked(table, problem, measured, near);
         }
@@ -265,8 +273,8 @@ impl Columns {
             let name = self.names.get(place).map_or("", String::as_str);
             return Err(table.column(name).error(InputErrorKind::NotDeclared { write }));
         }
-        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-            if !self.has(Role::Position(axis)) {
+        for (role, name) in POSITION.into_iter().zip(["x", "y", "z"]) {
+            if !self.has(role) {
                 return missing(&[name], Unit::Length);
             }
         }
@@ -299,9 +307,8 @@ impl Columns {
 
     /// Returns true if rows may measure something other than positions.
     pub fn observes(&self) -> bool {
-        [Role::Point, Role::Anchor, Role::Distance, Role::Surface, Role::Tilt(0), Role::Frame]
-            .into_iter()
-            .any(|role| self.has(role))
+        let is_other = |role: &Role| matches!(role, Role::Field(_)) && !POSITION.contains(role);
+        self.read.iter().map(|column| &column.role).chain(&self.file).any(is_other)
     }
 
     /// Returns the first of the `chosen` columns that lacks a declaration in the problem, and that
@@ -318,19 +325,16 @@ impl Columns {
 
     /// Returns true if the current row measures something other than a position.
     pub fn observes_at(&self, table: &Table) -> bool {
-        let filled = |role: Role| {
-            self.place(role)
-                .is_some_and(|place| table.text(place).is_ok_and(|cell| !cell.is_empty()))
+        let others = || kinds().filter(|kind| !kind.declared_by.is_empty());
+        let first_measured = |kind: &Kind| {
+            let required = kind.fields.iter().filter(|field| field.required);
+            required.max_by_key(|field| field.unit().is_some()).map(|field| field.name)
         };
-        let roles = [Role::Point, Role::Distance, Role::Surface, Role::Tilt(0)];
-        self.file == Some(Role::Point) || roles.into_iter().any(filled)
-    }
-
-    /// Returns the number in the column of a role in the current row \[SI\]; 0 without such a
-    /// column.
-    pub fn length(&self, table: &Table, role: Role) -> Result<f64, InputError> {
-        let column = self.read.iter().find(|column| column.role == role);
-        column.map_or(Ok(0.0), |column| table.number(column.place).map(column.to_si))
+        let is_filled = |name: &'static str| {
+            let column = self.read.iter().find(|column| column.role == Role::Field(name));
+            column.is_some_and(|column| is_filled(table, column.place))
+        };
+        self.file == Some(POINT) || others().filter_map(first_measured).any(is_filled)
     }
 
     /// Returns the index of the column of a role.
@@ -366,6 +370,11 @@ impl Columns {
         self.file == Some(role)
             || self.read.binary_search_by_key(&role, |column| column.role).is_ok()
     }
+}
+
+/// Returns true if a cell of the current row is not empty.
+pub(super) fn is_filled(table: &Table, place: usize) -> bool {
+    table.text(place).is_ok_and(|cell| !cell.is_empty())
 }
 
 /// Returns flexcal's name of a column, followed by the table's name if that differs.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::convert::identity;
 
-use super::role::{COLUMNS_WITH_UNIT, COLUMNS_WITHOUT_UNIT, Role};
+use super::role::{POINT, Role, columns_with_unit, columns_without_unit};
 use crate::error::{InputErrorKind, WarningKind, nearest};
 use crate::problem::{Joint, JointKind, Problem};
 use crate::quantity::Unit;
@@ -59,13 +59,12 @@ impl Numbering {
         };
         let joints = moving().map(|(index, _, unit)| (self.number(index), unit));
         let named = moving().map(|(_, joint, unit)| (joint.name.clone(), unit));
-        let plain = COLUMNS_WITHOUT_UNIT
-            .iter()
+        let plain = columns_without_unit()
             .filter(|(_, role)| role.is_known_to(problem))
-            .map(|(name, _)| (*name).to_owned());
+            .map(|(name, _)| name.to_owned());
         let approach = joints.clone().map(|(number, _)| format!("approach{number}"));
-        let measured = COLUMNS_WITH_UNIT.iter().filter(|(_, role, ..)| role.is_known_to(problem));
-        let measured = measured.map(|&(base, _, unit, _)| (base.to_owned(), unit));
+        let measured = columns_with_unit().filter(|(_, role, ..)| role.is_known_to(problem));
+        let measured = measured.map(|(base, _, unit, _)| (base.to_owned(), unit));
         let measured = measured.chain(joints.map(|(number, unit)| (format!("q{number}"), unit)));
         let measured = measured
             .chain(named)
@@ -80,11 +79,10 @@ impl Numbering {
             return meaning;
         }
         let plain = |role| Ok(Meaning::Read(role, identity));
-        if let Some((_, role)) = COLUMNS_WITHOUT_UNIT
-            .iter()
-            .find(|(known, role)| *known == name && role.is_known_to(problem))
+        if let Some((_, role)) =
+            columns_without_unit().find(|(known, role)| *known == name && role.is_known_to(problem))
         {
-            return plain(*role);
+            return plain(role);
         }
         if let Some(number) = numbered(name, "approach") {
             let moves = |&joint: &usize| {
@@ -98,28 +96,25 @@ impl Numbering {
                 None => Ok(Meaning::Ignored(WarningKind::JointIgnored { joint: number })),
             };
         }
-        if let Some((tilt, suffix)) = [("tilt_x", 0), ("tilt_y", 1)]
-            .into_iter()
-            .filter(|&(_, axis)| Role::Tilt(axis).is_known_to(problem))
-            .find_map(|(base, axis)| Some((Role::Tilt(axis), (base, name.strip_prefix(base)?))))
+        let underscored = columns_with_unit().filter(|(known, ..)| known.contains('_'));
+        if let Some((base, role, unit, _)) = underscored
+            .filter(|(known, role, ..)| name.starts_with(known) && role.is_known_to(problem))
+            .last()
         {
-            let (base, suffix) = suffix;
-            let unit = suffix.strip_prefix('_').and_then(|suffix| Unit::Angle.suffix(suffix));
-            let needed = || InputErrorKind::NeedsUnit {
-                noun: Unit::Angle.noun(),
-                write: Unit::Angle.alternatives(base),
-            };
-            return unit.map(|unit| Meaning::Read(tilt, unit.to_si)).ok_or_else(needed);
+            let suffix = name.strip_prefix(base).and_then(|suffix| suffix.strip_prefix('_'));
+            let needed =
+                || InputErrorKind::NeedsUnit { noun: unit.noun(), write: unit.alternatives(base) };
+            let suffix = suffix.and_then(|suffix| unit.suffix(suffix)).ok_or_else(needed)?;
+            return Ok(Meaning::Read(role, suffix.to_si));
         }
         let (base, suffix) = split_unit(name);
         let reading = suffix
             .and_then(|suffix| suffix.strip_prefix("read_"))
             .filter(|_| numbered(base, "q").is_some());
         let suffix = reading.or(suffix);
-        let measured = COLUMNS_WITH_UNIT
-            .iter()
+        let measured = columns_with_unit()
             .find(|(known, role, ..)| *known == base && role.is_known_to(problem));
-        let (role, unit, strict) = if let Some(&(_, role, unit, strict)) = measured {
+        let (role, unit, strict) = if let Some((_, role, unit, strict)) = measured {
             (role, unit, strict)
         } else {
             let Some(number) = numbered(base, "q") else { return Ok(Meaning::Unknown) };
@@ -160,7 +155,7 @@ impl Numbering {
 /// Checks that the file's name can have this role, which must be a word.
 pub(super) fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
     match role {
-        Role::Session | Role::Target | Role::Point => Ok(role),
+        Role::Session | Role::Target | POINT => Ok(role),
         _ => Err(InputErrorKind::UnknownMeaning { meant: Some("session".to_owned()) }),
     }
 }
@@ -172,9 +167,9 @@ pub(super) const DATE_CONVERSION: fn(f64) -> f64 = |_| f64::NAN;
 /// names, and those that equal other columns, are not considered.
 fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputErrorKind>> {
     let base = split_unit(name).0;
-    let other = COLUMNS_WITHOUT_UNIT.iter().any(|(known, _)| *known == name)
-        || numbered(base, "q").is_some();
-    let measured = COLUMNS_WITH_UNIT.iter().find(|(known, ..)| *known == base);
+    let other =
+        columns_without_unit().any(|(known, _)| known == name) || numbered(base, "q").is_some();
+    let measured = columns_with_unit().find(|(known, ..)| *known == base);
     if other
         || measured
             .is_some_and(|(known, _, unit, _)| unit.spellings(known).any(|spelled| spelled == name))
@@ -209,9 +204,7 @@ fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputE
 pub(super) fn affects_results(meant: &str) -> bool {
     let base = split_unit(meant).0;
     base != "pose"
-        && !COLUMNS_WITH_UNIT
-            .iter()
-            .any(|(known, role, ..)| *known == base && matches!(role, Role::Orientation(_)))
+        && !columns_with_unit().any(|(known, role, ..)| known == base && role.is_orientation())
 }
 
 /// Returns the unit of a joint's coordinate, or `None` for a fixed joint.

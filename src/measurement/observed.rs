@@ -1,135 +1,113 @@
-//! Observations other than positions: contacts with points and surfaces, distances to anchors,
-//! tilts, known distances between points.
+//! Observations other than positions, from the columns of their kinds;
+//! known distances between points.
 
 use std::path::Path;
 
 use nalgebra::Vector3;
 
 use super::Measurements;
-use super::columns::Columns;
-use super::role::Role;
+use super::columns::{self, Columns};
+use super::role::{POINT, POSITION, Role};
 use super::table::Table;
 use crate::error::{InputError, InputErrorKind};
+use crate::observation::{Content, Field, Kind, Needs, kinds};
 use crate::problem::fixture::{frame, unknown};
 use crate::problem::{Fixture, KnownDistance, Observation, Problem};
 
-/// Observation of a row with its measured numbers \[m\] or \[rad\]; those of a position are in
-/// separate columns.
+/// Quantity that a row measures.
 pub(super) struct Observed {
     pub observation: Observation,
-    pub numbers: Vector3<f64>,
-    /// True if the numbers have been measured.
+    /// True if its numbers have been measured.
     pub measured: bool,
 }
 
-impl Observed {
-    fn position(measured: bool) -> Self {
-        Self { observation: Observation::Position, numbers: Vector3::zeros(), measured }
-    }
-}
-
-/// Returns all observations of the current row in the order position, point, distance, surface,
-/// tilt. A table of positions has one position per row. `in_point` is the point that the whole file
-/// measures. A position that is `missing` gives no observation.
+/// Returns what the current row measures, in the order of [`Observation`]. A table of positions has
+/// one position per row. `in_point` is the point that the whole file measures. A position that is
+/// `missing` gives no observation.
 pub(super) fn of_row(
     table: &Table,
     columns: &Columns,
     (problem, measured, missing): (&Problem, bool, bool),
     in_point: Option<&str>,
 ) -> Result<Vec<Observed>, InputError> {
-    let has_position = columns.has(Role::Position(0));
+    let position = |measured| Observed { observation: Observation::Position, measured };
     if !columns.observes() {
-        return Ok(vec![Observed::position(has_position)]);
+        return Ok(vec![position(columns.has(POSITION[0]))]);
     }
-    let filled = |role: Role| {
-        let place = columns.place(role);
-        place.filter(|&place| table.text(place).is_ok_and(|cell| !cell.is_empty()))
-    };
-    let of_point =
-        |name: &str, place: Option<usize>| fixture(table, place, ("point", name), problem);
+    let filled = |role: Role| columns.place(role).filter(|&place| columns::is_filled(table, place));
     let mut found = Vec::new();
-    if !missing && (0..3).any(|axis| filled(Role::Position(axis)).is_some()) {
-        found.push(Observed::position(true));
+    if !missing && POSITION.iter().any(|role| filled(*role).is_some()) {
+        found.push(position(true));
     }
-    let in_point = match filled(Role::Point) {
-        Some(place) => Some((table.name(place)?, Some(place))),
-        None => in_point.map(|name| (name, None)),
+    let cell = |field: &'static Field| {
+        let role = Role::Field(field.name);
+        let of_file = in_point.filter(|_| role == POINT);
+        match filled(role) {
+            Some(place) => Some(Cell { field, place: Some(place), stem: "" }),
+            None => of_file.map(|stem| Cell { field, place: None, stem }),
+        }
     };
-    if let Some((name, place)) = in_point {
-        let observation = Observation::Point(of_point(name, place)?);
-        found.push(Observed { observation, numbers: Vector3::zeros(), measured: true });
+    for kind in kinds().filter(|kind| !kind.declared_by.is_empty()) {
+        let cells: Vec<Cell> = kind.fields.iter().filter_map(cell).collect();
+        found.extend(of_kind(table, kind, &cells, (problem, measured))?);
     }
-    let incomplete = |place: usize, has, lacks| {
-        Err(table.cell_error(place, InputErrorKind::IncompleteObservation { has, lacks }))
-    };
-    match (filled(Role::Anchor), filled(Role::Distance)) {
-        (Some(place), None) if measured => return incomplete(place, "an anchor", "a distance"),
-        (None, Some(place)) => return incomplete(place, "a distance", "an anchor"),
-        (Some(place), distance) => {
-            let observation = Observation::Distance(fixture(
-                table,
-                Some(place),
-                ("anchor", table.name(place)?),
-                problem,
-            )?);
-            let number =
-                distance.map(|_| columns.length(table, Role::Distance)).transpose()?.unwrap_or(0.0);
-            if let Some(place) = distance.filter(|_| number <= 0.0) {
-                return Err(table.cell_error(place, InputErrorKind::NotPositive { value: number }));
-            }
-            found.push(Observed {
-                observation,
-                numbers: number * Vector3::x(),
-                measured: distance.is_some(),
-            });
-        }
-        (None, None) => {}
-    }
-    match (filled(Role::Surface), filled(Role::Offset)) {
-        (None, Some(place)) => return incomplete(place, "an offset", "a surface"),
-        (Some(place), offset) => {
-            let observation = Observation::Surface(fixture(
-                table,
-                Some(place),
-                ("surface", table.name(place)?),
-                problem,
-            )?);
-            let number =
-                offset.map(|_| columns.length(table, Role::Offset)).transpose()?.unwrap_or(0.0);
-            found.push(Observed { observation, numbers: number * Vector3::x(), measured: true });
-        }
-        (None, None) => {}
-    }
-    match (filled(Role::Tilt(0)), filled(Role::Tilt(1)), filled(Role::Frame)) {
-        (Some(_), Some(_), frame) => {
-            let numbers =
-                [columns.length(table, Role::Tilt(0))?, columns.length(table, Role::Tilt(1))?];
-            let observation = Observation::Tilt(frame_of(table, frame, problem)?);
-            found.push(Observed {
-                observation,
-                numbers: Vector3::new(numbers[0], numbers[1], 0.0),
-                measured: true,
-            });
-        }
-        (None, None, Some(frame)) if !measured => {
-            let observation = Observation::Tilt(frame_of(table, Some(frame), problem)?);
-            found.push(Observed { observation, numbers: Vector3::zeros(), measured: false });
-        }
-        (Some(place), None, _) | (None, Some(place), _) => {
-            return incomplete(place, "a tilt", "that of the other axis");
-        }
-        (None, None, Some(place)) => return incomplete(place, "a frame", "its tilts"),
-        (None, None, None) => {}
-    }
-    let filled = |place: usize| table.text(place).is_ok_and(|cell| !cell.is_empty());
+    let filled = |place: usize| columns::is_filled(table, place);
     if let (true, Some((place, write))) = (found.is_empty(), columns.undeclared(problem, filled)) {
         return Err(table.cell_error(place, InputErrorKind::NotDeclared { write }));
     }
     match found.is_empty() {
         true if measured => Err(table.error(InputErrorKind::NothingMeasured)),
-        true => Ok(vec![Observed::position(false)]),
+        true => Ok(vec![position(false)]),
         false => Ok(found),
     }
+}
+
+/// Filled cell of the current row.
+struct Cell<'a> {
+    field: &'static Field,
+    /// Index of its column; `None` if the name of the file is its value.
+    place: Option<usize>,
+    /// Name of the file.
+    stem: &'a str,
+}
+
+/// Returns the observation of a kind from the filled cells of its columns; `None` without one.
+/// Numbers may be missing in rows that are not yet `measured`.
+fn of_kind(
+    table: &Table,
+    kind: &Kind,
+    cells: &[Cell],
+    (problem, measured): (&Problem, bool),
+) -> Result<Option<Observed>, InputError> {
+    let Some(last) = cells.last() else { return Ok(None) };
+    let is_filled = |field: &Field| cells.iter().any(|cell| cell.field.name == field.name);
+    let mut lacking = kind.fields.iter().filter(|field| field.required && !is_filled(field));
+    let has_number = kind.measured_fields().any(is_filled);
+    let lacks = match lacking.next().map(|field| (field, field.unit())) {
+        Some((field, None)) => Some(field.noun),
+        Some((_, Some(_))) if has_number => Some("that of the other axis"),
+        Some((_, Some(_))) if measured => Some(kind.lacking),
+        _ => None,
+    };
+    if let (Some(lacks), Some(place)) = (lacks, last.place) {
+        let kind = InputErrorKind::IncompleteObservation { has: last.field.noun, lacks };
+        return Err(table.cell_error(place, kind));
+    }
+    let mut indices = Vec::new();
+    for field in kind.references() {
+        let cell = cells.iter().find(|cell| cell.field.name == field.name);
+        indices.push(match (field.content, cell) {
+            (Content::Frame, _) => frame_of(table, cell.and_then(|cell| cell.place), problem)?,
+            (_, Some(cell)) => {
+                let name = cell.place.map_or(Ok(cell.stem), |place| table.name(place))?;
+                fixture(table, cell.place, (field.name, name), problem)?
+            }
+            (_, None) => return Ok(None),
+        });
+    }
+    let is_measured = kind.measured_fields().all(|field| !field.required || is_filled(field));
+    Ok(Observation::new(kind, &indices)
+        .map(|observation| Observed { observation, measured: is_measured }))
 }
 
 /// Returns the frame that a cell names: `base`, a joint by its name, or `joint3`; without a column
@@ -174,7 +152,7 @@ pub(super) fn check_target_column(
 }
 
 /// Returns an error if the current row names an undeclared target. A row without a target is
-/// allowed only if it measures tilts alone. `stem` is the name of the file.
+/// allowed only if nothing that it measures needs one. `stem` is the name of the file.
 pub(super) fn check_target(
     table: &Table,
     columns: &Columns,
@@ -184,9 +162,11 @@ pub(super) fn check_target(
     if problem.targets.is_empty() {
         return Ok(());
     }
+    let needs_no_target =
+        |observed: &Observed| observed.observation.description().needs != Needs::Target;
     let place = columns.place(Role::Target);
     let is_blank = place.map_or(Ok(true), |place| table.text(place).map(str::is_empty))?;
-    if is_blank && observed.iter().all(|observed| observed.observation.is_angle()) {
+    if is_blank && observed.iter().all(needs_no_target) {
         return Ok(());
     }
     let of_file = if columns.file == Some(Role::Target) { stem } else { "" };
@@ -250,8 +230,8 @@ pub(super) fn add_known_distances(
     }
     match without {
         Some(observation) if kinds.len() > 1 => {
-            let unit = if observation.is_angle() { "deg" } else { "mm" };
-            let write = format!("{}_sigma_{unit}", observation.kind());
+            let Kind { name, unit, .. } = observation.description();
+            let write = format!("{name}_sigma_{}", unit.in_tables().suffix);
             Err(problem.data.location.clone().error(InputErrorKind::NoSigmaOfKind { write }))
         }
         _ => Ok(()),

@@ -6,7 +6,7 @@ use super::columns::{Column, Columns};
 use super::joined::JoinedLog;
 use super::limits::Commands;
 use super::observed;
-use super::role::Role;
+use super::role::{POINT, POSITION, Role};
 use super::rows::RowsBuilder;
 use super::table::Table;
 use super::{ColumnTable, Measurements};
@@ -155,7 +155,7 @@ impl<'a> Tables<'a> {
             } else if let Some(name) = columns.nest(&table) {
                 rows.push_nest(index, name, &table, &columns)?;
             } else {
-                let in_point = (columns.file == Some(Role::Point)).then(|| rows.stem(index));
+                let in_point = (columns.file == Some(POINT)).then(|| rows.stem(index));
                 let observations = observed::of_row(
                     &table,
                     &columns,
@@ -240,9 +240,9 @@ impl LeftOut {
 
 /// Returns true if the position of the current row is the marker for a missing measurement.
 fn is_missing(missing: &Missing, table: &Table, columns: &Columns) -> bool {
-    let axis = |column: &&Column| match column.role {
-        Role::Position(axis) => Some((axis, column.place)),
-        _ => None,
+    let axis = |column: &&Column| {
+        let axis = POSITION.iter().position(|role| *role == column.role)?;
+        Some((axis, column.place))
     };
     let mut cells = columns.read.iter().filter_map(|column| axis(&column)).peekable();
     match missing {

@@ -1,5 +1,6 @@
 //! Roles of columns and their names.
 
+use crate::observation::{Content, Kind, fields, kinds};
 use crate::problem::Problem;
 use crate::quantity::Unit;
 
@@ -9,7 +10,8 @@ pub(super) enum Role {
     Joint(usize),
     /// Encoder reading of a joint.
     Reading(usize),
-    Position(usize),
+    /// Column of this name of a kind of rows.
+    Field(&'static str),
     Sigma,
     Payload,
     Hoist,
@@ -26,64 +28,57 @@ pub(super) enum Role {
     Nest,
     /// Covariate declared in `[data.covariates]`.
     Covariate(usize),
-    /// Point that the target touches.
-    Point,
-    /// Anchor and measured distance to it.
-    Anchor,
-    Distance,
-    /// Surface and measured distance from it.
-    Surface,
-    Offset,
-    /// Frame and measured tilts of its x and y axes.
-    Frame,
-    Tilt(usize),
+}
+
+/// Roles of the coordinates of a measured position.
+pub(super) const POSITION: [Role; 3] = [Role::Field("x"), Role::Field("y"), Role::Field("z")];
+/// Role of the column that names a point, which the name of a file may replace.
+pub(super) const POINT: Role = Role::Field("point");
+
+/// Returns true if the problem declares what rows of a kind are measured against; a kind without
+/// fixtures needs its standard deviation.
+pub(super) fn is_declared(kind: &Kind, problem: &Problem) -> bool {
+    let is_fixture = |word: &str| problem.fixtures.iter().any(|known| known.kind.word() == word);
+    let mut fixtures =
+        kind.references().filter(|field| field.content == Content::Fixture).peekable();
+    match fixtures.peek() {
+        _ if kind.declared_by.is_empty() => true,
+        Some(_) => fixtures.all(|field| is_fixture(field.name)),
+        None => problem.data.kind_sigmas.contains_key(kind.name),
+    }
 }
 
 impl Role {
-    /// Returns the table of `problem.toml` that must declare the fixtures of this column.
-    fn declared_by(self) -> Option<&'static str> {
-        match self {
-            Self::Point => Some("point"),
-            Self::Anchor | Self::Distance => Some("anchor"),
-            Self::Surface | Self::Offset => Some("surface"),
-            _ => None,
-        }
-    }
-
     /// Returns true if the column has a meaning in this problem.
     pub fn is_known_to(self, problem: &Problem) -> bool {
-        if matches!(self, Self::Frame | Self::Tilt(_)) {
-            return problem.data.kind_sigmas.contains_key("tilt");
-        }
-        self.declared_by()
-            .is_none_or(|word| problem.fixtures.iter().any(|fixture| fixture.kind.word() == word))
+        let Self::Field(name) = self else { return true };
+        kinds().any(|kind| kind.field(name).is_some() && is_declared(kind, problem))
     }
 
     /// Returns the missing declaration if a column of this name has no meaning in this problem.
+    /// Columns of fixtures announce a kind of rows; so do the numbers of a kind without fixtures.
     pub fn undeclared(name: &str, problem: &Problem) -> Option<&'static str> {
-        let tilts = name.strip_prefix("tilt_").is_some_and(|rest| rest.starts_with(['x', 'y']));
-        let (role, write) = match name {
-            "point" => (Self::Point, "[[point]]"),
-            "anchor" => (Self::Anchor, "[[anchor]]"),
-            "surface" => (Self::Surface, "[[surface]]"),
-            _ if tilts => (Self::Tilt(0), "tilt_sigma_deg in [data]"),
-            _ => return None,
+        let announces = |kind: &&Kind| {
+            let has_fixture = kind.fields.iter().any(|field| field.content == Content::Fixture);
+            kind.fields.iter().any(|field| match field.content {
+                Content::Fixture => field.name == name,
+                _ => !has_fixture && field.unit().is_some() && name.starts_with(field.name),
+            })
         };
-        (!role.is_known_to(problem)).then_some(write)
+        let mut kinds = kinds().filter(|kind| !kind.declared_by.is_empty());
+        let kind = kinds.find(announces)?;
+        (!is_declared(kind, problem)).then_some(kind.declared_by)
     }
 
     /// Returns true if the column holds measured values or what they refer to, false for
     /// configurations and conditions.
     pub fn is_observed(self) -> bool {
-        self.declared_by().is_some()
-            || matches!(
-                self,
-                Self::Frame
-                    | Self::Tilt(_)
-                    | Self::Position(_)
-                    | Self::Orientation(_)
-                    | Self::Quaternion(_)
-            )
+        matches!(self, Self::Field(_)) || self.is_orientation()
+    }
+
+    /// Returns true for a coordinate of an orientation.
+    pub fn is_orientation(self) -> bool {
+        matches!(self, Self::Orientation(_) | Self::Quaternion(_))
     }
 
     /// Returns true for encoder readings.
@@ -92,37 +87,35 @@ impl Role {
     }
 }
 
-/// Names of columns without a unit.
-pub(super) const COLUMNS_WITHOUT_UNIT: [(&str, Role); 13] = [
-    ("nest", Role::Nest),
-    ("split", Role::Split),
-    ("session", Role::Session),
-    ("target", Role::Target),
-    ("pose", Role::Pose),
-    ("point", Role::Point),
-    ("anchor", Role::Anchor),
-    ("surface", Role::Surface),
-    ("frame", Role::Frame),
-    ("qx", Role::Quaternion(0)),
-    ("qy", Role::Quaternion(1)),
-    ("qz", Role::Quaternion(2)),
-    ("qw", Role::Quaternion(3)),
-];
+/// Returns the names of columns without a unit.
+pub(super) fn columns_without_unit() -> impl Iterator<Item = (&'static str, Role)> {
+    let references = fields().filter(|field| field.unit().is_none());
+    references.map(|field| (field.name, Role::Field(field.name))).chain([
+        ("nest", Role::Nest),
+        ("split", Role::Split),
+        ("session", Role::Session),
+        ("target", Role::Target),
+        ("pose", Role::Pose),
+        ("qx", Role::Quaternion(0)),
+        ("qy", Role::Quaternion(1)),
+        ("qz", Role::Quaternion(2)),
+        ("qw", Role::Quaternion(3)),
+    ])
+}
 
-/// Names of columns with a unit. The flag is true if a missing unit is an error; other names, such
-/// as `time`, may mean something else.
-pub(super) const COLUMNS_WITH_UNIT: [(&str, Role, Unit, bool); 13] = [
-    ("x", Role::Position(0), Unit::Length, true),
-    ("y", Role::Position(1), Unit::Length, true),
-    ("z", Role::Position(2), Unit::Length, true),
-    ("sigma", Role::Sigma, Unit::Length, true),
-    ("rx", Role::Orientation(0), Unit::Angle, true),
-    ("ry", Role::Orientation(1), Unit::Angle, true),
-    ("rz", Role::Orientation(2), Unit::Angle, true),
-    ("distance", Role::Distance, Unit::Length, true),
-    ("offset", Role::Offset, Unit::Length, true),
-    ("payload", Role::Payload, Unit::Mass, false),
-    ("hoist", Role::Hoist, Unit::Force, false),
-    ("temperature", Role::Temperature, Unit::Temperature, false),
-    ("time", Role::Time, Unit::Time, false),
-];
+/// Returns the names of columns with a unit. The flag is true if a missing unit is an error; other
+/// names, such as `time`, may mean something else.
+pub(super) fn columns_with_unit() -> impl Iterator<Item = (&'static str, Role, Unit, bool)> {
+    let measured = fields()
+        .filter_map(|field| Some((field.name, Role::Field(field.name), field.unit()?, true)));
+    measured.chain([
+        ("sigma", Role::Sigma, Unit::Length, true),
+        ("rx", Role::Orientation(0), Unit::Angle, true),
+        ("ry", Role::Orientation(1), Unit::Angle, true),
+        ("rz", Role::Orientation(2), Unit::Angle, true),
+        ("payload", Role::Payload, Unit::Mass, false),
+        ("hoist", Role::Hoist, Unit::Force, false),
+        ("temperature", Role::Temperature, Unit::Temperature, false),
+        ("time", Role::Time, Unit::Time, false),
+    ])
+}

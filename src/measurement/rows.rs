@@ -5,15 +5,17 @@ use std::path::PathBuf;
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::cells::{above_zero, direction, is_validation, not_negative};
-use super::columns::{Column, Columns};
+use super::columns::{Column, Columns, is_filled};
 use super::labels::{LabelsBuilder, PoseNames, stems};
 use super::observed::Observed;
 use super::orientation::Cells;
-use super::role::Role;
+use super::role::{POSITION, Role, is_declared};
 use super::table::Table;
 use super::{CommandColumn, Labels, Measurements, NestReading, RowOrder};
 use crate::error::{InputError, InputErrorKind};
+use crate::observation::{Content, Needs, kinds};
 use crate::problem::{JointSource, Problem, RotationKind};
+use crate::quantity::Unit;
 
 /// Measurements to which rows are appended.
 pub(super) struct RowsBuilder {
@@ -39,7 +41,8 @@ impl RowsBuilder {
     pub fn new(files: &[PathBuf], table: &Table, columns: &Columns, problem: &Problem) -> Self {
         let list = |role| columns.has(role).then(Vec::new);
         let names_targets = !problem.targets.is_empty();
-        let mixed = !problem.fixtures.is_empty() || problem.data.kind_sigmas.contains_key("tilt");
+        let mut others = kinds().filter(|kind| !kind.declared_by.is_empty());
+        let mixed = others.any(|kind| is_declared(kind, problem));
         let approach = columns.read.iter().any(|column| matches!(column.role, Role::Approach(_)));
         let measurements = Measurements {
             files: files.to_vec(),
@@ -54,7 +57,7 @@ impl RowsBuilder {
             position_unit: columns
                 .read
                 .iter()
-                .find(|column| column.role == Role::Position(0))
+                .find(|column| column.role == POSITION[0])
                 .map(|column| (column.to_si)(1.0)),
             orientations: (columns.orientations() != (false, false)).then(Vec::new),
             sigma: if mixed { Some(Vec::new()) } else { list(Role::Sigma) },
@@ -160,14 +163,11 @@ impl RowsBuilder {
             sigma: None,
         };
         for column in &columns.read {
+            if let Some(axis) = POSITION.iter().position(|role| *role == column.role) {
+                let value = (column.to_si)(table.number(column.place)?);
+                set(reading.position.as_mut_slice(), axis, value);
+            }
             match column.role {
-                Role::Position(axis) => {
-                    set(
-                        reading.position.as_mut_slice(),
-                        axis,
-                        (column.to_si)(table.number(column.place)?),
-                    );
-                }
                 Role::Time => reading.time = Some(table.time(column.place, column.to_si)?),
                 Role::Session => table.text(column.place)?.clone_into(&mut reading.session),
                 Role::Sigma => reading.sigma = Some(above_zero(table, column)?),
@@ -186,7 +186,8 @@ impl RowsBuilder {
         columns: &Columns,
         observed: &Observed,
     ) -> Result<(), InputError> {
-        let Observed { observation, numbers, measured } = *observed;
+        let Observed { observation, measured } = *observed;
+        let (kind, mut numbers) = (observation.description(), Vector3::zeros());
         let measurements = &mut self.measurements;
         let joints = measurements.joints;
         let row = measurements.len();
@@ -202,11 +203,11 @@ impl RowsBuilder {
         if !measurements.time_measured {
             measurements.time.push(row as f64);
         }
-        let (mut position, mut pose, mut turned) = (numbers, None, Cells::default());
+        let (mut pose, mut turned) = (None, Cells::default());
         for column in columns
             .read
             .iter()
-            .filter(|column| observation.is_position() || !column.role.is_observed())
+            .filter(|column| observation.is_position() || !column.role.is_orientation())
         {
             let number = || table.number(column.place).map(column.to_si);
             match column.role {
@@ -218,10 +219,23 @@ impl RowsBuilder {
                         set(other, row * joints + joint, value);
                     }
                 }
-                Role::Position(axis) => set(position.as_mut_slice(), axis, number()?),
+                Role::Field(name) => {
+                    let mut fields = kind.measured_fields().enumerate();
+                    let field = fields.find(|(_, field)| field.name == name);
+                    if let Some((axis, field)) = field.filter(|(_, field)| {
+                        (field.required && measured) || is_filled(table, column.place)
+                    }) {
+                        let value = number()?;
+                        if matches!(field.content, Content::Positive(_)) && value <= 0.0 {
+                            let kind = InputErrorKind::NotPositive { value };
+                            return Err(table.cell_error(column.place, kind));
+                        }
+                        set(numbers.as_mut_slice(), axis, value);
+                    }
+                }
                 Role::Sigma
                     if self.mixed
-                        && (observation.is_angle() || table.text(column.place)?.is_empty()) => {}
+                        && (kind.unit != Unit::Length || !is_filled(table, column.place)) => {}
                 Role::Sigma => push(&mut measurements.sigma, above_zero(table, column)?),
                 Role::Payload => push(&mut measurements.payload, not_negative(table, column)?),
                 Role::Hoist => push(&mut measurements.hoist, number()?),
@@ -239,20 +253,12 @@ impl RowsBuilder {
                 Role::Covariate(_) => measurements.covariates.push(number()?),
                 Role::Split => _ = is_validation(table, column.place)?,
                 Role::Session => self.session.push(table.name(column.place)?),
-                // Tilts need no target; a named one has been checked.
-                Role::Target if self.names_targets && observation.is_angle() => {
+                // Rows without a target may leave it out; a named one has been checked.
+                Role::Target if self.names_targets && kind.needs != Needs::Target => {
                     self.target.push(table.text(column.place)?);
                 }
                 Role::Target => self.target.push(table.name(column.place)?),
-                // These columns are empty or have been read by [`observed::of_row`].
-                Role::Nest
-                | Role::Point
-                | Role::Anchor
-                | Role::Distance
-                | Role::Surface
-                | Role::Offset
-                | Role::Frame
-                | Role::Tilt(_) => {}
+                Role::Nest => {}
                 Role::Pose => pose = Some(table.text(column.place)?),
             }
         }
@@ -269,7 +275,7 @@ impl RowsBuilder {
         if let (Some(marked), Some(place)) = (&mut measurements.marked_held_out, columns.marked) {
             marked.push(is_validation(table, place)?);
         }
-        measurements.positions.push(position);
+        measurements.positions.push(numbers);
         measurements.position_measured &= measured;
         if self.mixed {
             measurements.observations.push(observation);

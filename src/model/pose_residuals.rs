@@ -12,6 +12,7 @@ use super::linear_model::LinearModel;
 use super::pose::Pose;
 use super::predictor::{Prediction, Predictor};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
+use crate::observation::Needs;
 
 /// Residuals of a row without and with an orientation.
 const POSITION: usize = 3;
@@ -48,7 +49,8 @@ impl<'a> PoseResiduals<'a> {
         let poses = poses.into();
         let oriented = poses.iter().any(|pose| pose.orientation.is_some());
         let residuals_per_row = if oriented { POSE } else { POSITION };
-        let measures_tilts = poses.iter().any(|pose| pose.observation.is_angle());
+        let measures_tilts =
+            poses.iter().any(|pose| pose.observation.description().needs == Needs::Frame);
         Self {
             model,
             poses,

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::scene::{length, single};
-use super::{Kind, Needs, Scene};
+use super::{Content, Field, Kind, Needs, Scene};
 use crate::quantity::Unit;
 use crate::scalar::Scalar;
 
@@ -12,7 +12,12 @@ pub(super) const KIND: Kind = Kind {
     numbers: 1,
     unit: Unit::Length,
     needs: Needs::Target,
-    reference: "anchor",
+    fields: &[
+        Field::new("anchor", "an anchor", Content::Fixture),
+        Field::new("distance", "a distance", Content::Positive(Unit::Length)),
+    ],
+    declared_by: "[[anchor]]",
+    lacking: "a distance",
     residuals: ("distance", &["distance"]),
     error_label: "distance, mm",
     row: ("distance", "distances"),

@@ -9,12 +9,16 @@ pub struct Kind {
     pub name: &'static str,
     /// Count of numbers that a row measures, at most three.
     pub numbers: usize,
-    /// Unit of these numbers: a length or an angle.
+    /// Unit of these numbers.
     pub unit: Unit,
     /// Parts of the scene that predict a row.
     pub needs: Needs,
-    /// Column that names the fixture or frame measured against; empty if there is none.
-    pub reference: &'static str,
+    /// Columns of a row: first those that name what it is measured against, then its numbers.
+    pub fields: &'static [Field],
+    /// Declaration in `problem.toml` that gives the columns their meaning; empty if none is needed.
+    pub declared_by: &'static str,
+    /// Noun for the numbers that a row lacks, in messages.
+    pub lacking: &'static str,
     /// Group and columns of the residuals in tables of results.
     pub residuals: (&'static str, &'static [&'static str]),
     /// Label and unit of the errors, in tables and plots.
@@ -27,6 +31,32 @@ pub struct Kind {
     pub suspects: &'static str,
 }
 
+/// Column of a kind of rows.
+#[derive(Debug)]
+pub struct Field {
+    /// Name of the column, without the suffix of its unit.
+    pub name: &'static str,
+    /// Noun with its article, for messages.
+    pub noun: &'static str,
+    /// Type of the cells.
+    pub content: Content,
+    /// True if every row of the kind fills the cell; planned rows may leave out their numbers.
+    pub required: bool,
+}
+
+/// Type of the cells of a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Content {
+    /// Name of a fixture, declared in the table of the column's name.
+    Fixture,
+    /// Name of a frame of the arm; the tool's frame if the cell is empty.
+    Frame,
+    /// Measured number; 0 if the cell is empty.
+    Number(Unit),
+    /// Measured number above 0.
+    Positive(Unit),
+}
+
 /// Parts of a [`Scene`](super::Scene) that predict a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Needs {
@@ -36,4 +66,41 @@ pub enum Needs {
     Target,
     /// Frame of the arm and gravity.
     Frame,
+}
+
+impl Kind {
+    /// Returns the column called `name`, if this kind of rows has it.
+    pub fn field(&self, name: &str) -> Option<&'static Field> {
+        self.fields.iter().find(|field| field.name == name)
+    }
+
+    /// Returns the columns that name what a row is measured against.
+    pub fn references(&self) -> impl Iterator<Item = &'static Field> + use<> {
+        self.fields.iter().filter(|field| field.unit().is_none())
+    }
+
+    /// Returns the columns of the measured numbers.
+    pub fn measured_fields(&self) -> impl Iterator<Item = &'static Field> + use<> {
+        self.fields.iter().filter(|field| field.unit().is_some())
+    }
+}
+
+impl Field {
+    /// Creates a column that every row fills.
+    pub(super) const fn new(name: &'static str, noun: &'static str, content: Content) -> Self {
+        Self { name, noun, content, required: true }
+    }
+
+    /// Makes the cells optional.
+    pub(super) const fn optional(self) -> Self {
+        Self { required: false, ..self }
+    }
+
+    /// Returns the unit of a measured number; `None` for other columns.
+    pub fn unit(&self) -> Option<Unit> {
+        match self.content {
+            Content::Number(unit) | Content::Positive(unit) => Some(unit),
+            Content::Fixture | Content::Frame => None,
+        }
+    }
 }

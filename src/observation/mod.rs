@@ -17,7 +17,7 @@ mod tilt;
 
 pub(crate) use fixture::{FixtureKind, FixtureValues};
 pub use kind::Kind;
-pub(crate) use kind::Needs;
+pub(crate) use kind::{Content, Field, Needs};
 pub(crate) use scene::Scene;
 
 use nalgebra::{Matrix3, Matrix3x4, SVector, Vector3};
@@ -67,6 +67,16 @@ macro_rules! observations {
                 match self { $(Self::$variant { .. } => $kind::predict(scene),)+ }
             }
 
+            /// Creates the observation of a kind from its indices, in the order of the kind's
+            /// references; `None` if an index is missing or too large.
+            pub(crate) fn new(kind: &Kind, indices: &[usize]) -> Option<Self> {
+                let mut indices = indices.iter();
+                $(if kind.name == $kind::KIND.name {
+                    return Some(Self::$variant $(($(<$type>::try_from(*indices.next()?).ok()?),+))?);
+                })+
+                None
+            }
+
             /// Returns the indices that the variant carries.
             fn indices(self) -> [Option<usize>; 2] {
                 match self {
@@ -109,12 +119,18 @@ pub(crate) fn kinds() -> impl Iterator<Item = &'static Kind> {
     KINDS.iter().copied()
 }
 
-/// Returns the columns that name the fixtures and frames measured against.
-pub(crate) fn references() -> impl Iterator<Item = &'static str> {
-    kinds().map(|kind| kind.reference).filter(|reference| !reference.is_empty())
+/// Returns the columns of all kinds of rows, in the order of [`Observation`].
+pub(crate) fn fields() -> impl Iterator<Item = &'static Field> {
+    kinds().flat_map(|kind| kind.fields)
 }
 
 impl Observation {
+    /// Returns the columns that name what the row is measured against, with the index of each.
+    pub(crate) fn references(self) -> impl Iterator<Item = (&'static Field, usize)> {
+        let fields = self.description().references();
+        fields.zip(self.indices()).filter_map(|(field, index)| Some((field, index?)))
+    }
+
     /// Returns the count of numbers that a row measures, without an orientation.
     pub fn coordinates(self) -> usize {
         self.description().numbers
@@ -142,15 +158,20 @@ impl Observation {
 
     /// Returns numbers that differ for any two observations that differ.
     pub(crate) fn key(self) -> [usize; 3] {
-        let [first, second] =
-            self.fixtures().map(|fixture| fixture.map_or(0, |fixture| fixture + 1));
-        let frame = if self.is_angle() { self.frame() + 1 } else { 0 };
-        [first, second, 4 * frame + self.coordinates()]
+        let kind = kinds().take_while(|kind| kind.name != self.kind()).count();
+        let [first, second] = self.indices().map(|index| index.map_or(0, |index| index + 1));
+        [kind, first, second]
     }
 
-    /// Returns true if the numbers are angles \[rad\], false if they are lengths \[m\].
-    pub fn is_angle(self) -> bool {
-        self.description().unit == Unit::Angle
+    /// Returns true if the row measures a length on the arm.
+    pub(crate) fn measures_length(self) -> bool {
+        self.is_of_arm() && self.description().unit == Unit::Length
+    }
+
+    /// Returns true if the spread of the measured numbers shows how much the arm moves: distances
+    /// to fixtures do not, positions and tilts do.
+    pub(crate) fn is_measured_directly(self) -> bool {
+        self.is_position() || self.description().needs != Needs::Target
     }
 
     /// Returns true if the row measures a position in the measuring frame.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Kind, Needs, Scene};
+use super::{Content, Field, Kind, Needs, Scene};
 use crate::quantity::Unit;
 use crate::scalar::Scalar;
 
@@ -11,7 +11,9 @@ pub(super) const KIND: Kind = Kind {
     numbers: 3,
     unit: Unit::Length,
     needs: Needs::Target,
-    reference: "point",
+    fields: &[Field::new("point", "a point", Content::Fixture)],
+    declared_by: "[[point]]",
+    lacking: "",
     residuals: ("position", &["x", "y", "z"]),
     error_label: "missed point, mm",
     row: ("contact with a point", "contacts with points"),

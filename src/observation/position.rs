@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Kind, Needs, Scene};
+use super::{Content, Field, Kind, Needs, Scene};
 use crate::quantity::Unit;
 use crate::scalar::Scalar;
 
@@ -11,7 +11,13 @@ pub(super) const KIND: Kind = Kind {
     numbers: 3,
     unit: Unit::Length,
     needs: Needs::Target,
-    reference: "",
+    fields: &[
+        Field::new("x", "a position", Content::Number(Unit::Length)),
+        Field::new("y", "a position", Content::Number(Unit::Length)),
+        Field::new("z", "a position", Content::Number(Unit::Length)),
+    ],
+    declared_by: "",
+    lacking: "a position",
     residuals: ("position", &["x", "y", "z"]),
     error_label: "error, mm",
     row: ("pose", "poses"),

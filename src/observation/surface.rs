@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::scene::{length, single};
-use super::{FixtureKind, Kind, Needs, Scene};
+use super::{Content, Field, FixtureKind, Kind, Needs, Scene};
 use crate::quantity::Unit;
 use crate::scalar::Scalar;
 use crate::spatial::plane_normal;
@@ -13,7 +13,12 @@ pub(super) const KIND: Kind = Kind {
     numbers: 1,
     unit: Unit::Length,
     needs: Needs::Target,
-    reference: "surface",
+    fields: &[
+        Field::new("surface", "a surface", Content::Fixture),
+        Field::new("offset", "an offset", Content::Number(Unit::Length)).optional(),
+    ],
+    declared_by: "[[surface]]",
+    lacking: "",
     residuals: ("offset", &["offset"]),
     error_label: "distance from the surface, mm",
     row: ("contact with a surface", "contacts with surfaces"),

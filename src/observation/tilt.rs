@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Kind, Needs, Scene};
+use super::{Content, Field, Kind, Needs, Scene};
 use crate::quantity::Unit;
 use crate::scalar::Scalar;
 
@@ -11,7 +11,13 @@ pub(super) const KIND: Kind = Kind {
     numbers: 2,
     unit: Unit::Angle,
     needs: Needs::Frame,
-    reference: "frame",
+    fields: &[
+        Field::new("frame", "a frame", Content::Frame).optional(),
+        Field::new("tilt_x", "a tilt", Content::Number(Unit::Angle)),
+        Field::new("tilt_y", "a tilt", Content::Number(Unit::Angle)),
+    ],
+    declared_by: "tilt_sigma_deg in [data]",
+    lacking: "its tilts",
     residuals: ("tilt", &["tilt_x", "tilt_y"]),
     error_label: "tilt, °",
     row: ("row of tilts", "rows of tilts"),

@@ -7,11 +7,12 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
+use super::Problem;
 use super::item::Item;
 use super::joint::Joint;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
-use crate::observation::FixtureKind;
+use crate::observation::{Content, Field, FixtureKind, Observation};
 use crate::quantity::Unit;
 use crate::spatial::MAX_NORMAL_TILT;
 
@@ -69,6 +70,20 @@ pub(crate) fn frame(word: &str, joints: &[Joint], tool: usize) -> Result<usize, 
             InputErrorKind::UnknownFixture { what: "frame", name: word.to_owned(), known }
         }),
     }
+}
+
+/// Returns the columns that name what a row is measured against, each with its cell.
+pub(crate) fn reference_cells(
+    problem: &Problem,
+    observation: Observation,
+) -> impl Iterator<Item = (&'static Field, String)> + '_ {
+    observation.references().map(|(field, index)| {
+        let word = match field.content {
+            Content::Frame => frame_word(index, &problem.joints, problem.tool.joint),
+            _ => problem.fixtures.get(index).map_or(String::new(), |known| known.name.clone()),
+        };
+        (field, word)
+    })
 }
 
 /// Returns a word that names a frame: the joint's name if it is unambiguous, otherwise `joint3`.

@@ -5,6 +5,5 @@ mod right_angle;
 mod unit;
 
 pub(crate) use right_angle::rounded_right_angle;
-pub(crate) use unit::Display;
-pub(crate) use unit::Suffix;
 pub use unit::Unit;
+pub(crate) use unit::{Display, Suffix, TableUnit};

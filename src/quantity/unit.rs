@@ -84,6 +84,17 @@ pub struct Display {
     pub symbol: String,
 }
 
+/// Unit of measured numbers in tables and messages.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TableUnit {
+    /// Factor that converts an SI value to this unit.
+    pub factor: f64,
+    /// Suffix in names of columns and keys: `mm`, `deg`.
+    pub suffix: &'static str,
+    /// Symbol in text: `mm`, `°`.
+    pub symbol: &'static str,
+}
+
 /// Properties of one unit: a row of the table.
 struct Row {
     /// Name of the quantity with its article, for messages.
@@ -286,6 +297,15 @@ impl Unit {
     /// Returns the accepted spellings in words: `alpha_deg or alpha_rad`.
     pub(crate) fn alternatives(self, base: &str) -> String {
         self.spellings(base).collect::<Vec<_>>().join(" or ")
+    }
+
+    /// Returns the unit in which tables and messages give measured numbers of this unit.
+    pub(crate) fn in_tables(self) -> TableUnit {
+        match self {
+            Self::Length => TableUnit { factor: 1e3, suffix: "mm", symbol: "mm" },
+            Self::Angle => TableUnit { factor: DEGREES, suffix: "deg", symbol: "°" },
+            other => TableUnit { factor: 1.0, suffix: other.si_suffix(), symbol: other.symbol() },
+        }
     }
 
     /// Returns every suffix that can occur in arms and measurements.

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::document::{Block, Headline, Point, Table, code, named, some_of};
-use super::errors::{NOMINAL, both_parts, held_out_rows, measure, rows_of, unpredicted};
+use super::errors::{NOMINAL, both_parts, header, held_out_rows, measure, rows_of, unpredicted};
 use super::figures::{self, PlotData};
 use super::identify::{
     BEFORE, all_told, beware, fitted_parameters, mean, poses, spread, why_not_trusted,
@@ -456,8 +456,8 @@ fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
         let errors = [fitted_rms, mean, rms].map(|error| number(error, 4));
         [vec![(k + 1).to_string(), effects], errors.to_vec()].concat()
     };
-    let is_angle = closure.after.fitted.held_out.is_angle();
-    let rms = if is_angle { "identification rms, °" } else { "identification rms, mm" };
+    let rms = ["identification rms, mm", "identification rms, °"];
+    let rms = header(&closure.after.fitted.held_out, rms);
     let header = ["round", "effects in the model", rms, "held out mean", "held out rms"];
     let rows = result.steps.iter().enumerate().map(row).collect();
     vec![

@@ -9,9 +9,10 @@ use super::table;
 use crate::files::csv;
 use crate::fit::Residual;
 use crate::measurement::{Labels, Measurements};
-use crate::observation::{Kind, Observation};
+use crate::observation::{Content, Kind, Observation};
 use crate::problem::Problem;
-use crate::quantity::Unit;
+use crate::problem::fixture::reference_cells;
+use crate::quantity::TableUnit;
 
 /// Cells of a column.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,21 +79,22 @@ pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) ->
             add(name, labels(all));
         }
     }
-    // Fixtures of contacts, a column for each kind.
-    let fixture = |row: usize| problem.fixtures.get(rows.observation(row).fixture()?);
-    let mut known = Vec::new();
-    for word in (0..rows.len()).filter_map(fixture).map(|fixture| fixture.kind.word()) {
-        if !known.contains(&word) {
-            known.push(word);
+    // Columns of what rows are measured against, in the order of the rows.
+    let mut columns_of_rows = Vec::new();
+    for observation in (0..rows.len()).map(|row| rows.observation(row)) {
+        let references = observation.references().map(|(field, _)| field);
+        for field in references.filter(|field| field.content != Content::Frame) {
+            if !columns_of_rows.contains(&field.name) {
+                columns_of_rows.push(field.name);
+            }
         }
     }
-    for word in known {
-        let named = |row: usize| {
-            fixture(row)
-                .filter(|fixture| fixture.kind.word() == word)
-                .map_or("", |fixture| fixture.name.as_str())
+    for name in columns_of_rows {
+        let cell = |row: usize| {
+            let mut cells = reference_cells(problem, rows.observation(row));
+            cells.find(|(field, _)| field.name == name).map(|(_, cell)| cell).unwrap_or_default()
         };
-        add(word, Column::Words(picked.iter().map(|&row| named(row)).collect()));
+        add(name, Column::Words(picked.iter().map(|&row| cell(row)).collect()));
     }
     columns
 }
@@ -123,9 +125,7 @@ pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Res
     for (word, value, turn) in both {
         for kind in &kinds {
             let (group, axes) = kind.residuals;
-            let is_angle = kind.unit == Unit::Angle;
-            let (unit, factor) =
-                if is_angle { ("deg", 180.0 / std::f64::consts::PI) } else { ("mm", 1e3) };
+            let TableUnit { factor, suffix, .. } = kind.unit.in_tables();
             for (k, axis) in axes.iter().enumerate() {
                 let is_of_kind = |residual: &Residual| {
                     rows.observation(residual.row).description().residuals.0 == group
@@ -133,7 +133,7 @@ pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Res
                 let cell = |residual: &Residual| {
                     if is_of_kind(residual) { value(residual)[k] * factor } else { f64::NAN }
                 };
-                add(format!("{word}_{axis}_{unit}"), 6, &cell);
+                add(format!("{word}_{axis}_{suffix}"), 6, &cell);
             }
         }
         for (k, axis) in ["rx", "ry", "rz"].into_iter().enumerate().filter(|_| turned) {

@@ -1,7 +1,7 @@
 //! Texts of `compare`: every strategy, solver and ablation, and the paper's tables 2 and 3.
 
 use super::document::{Block, Headline, Table, code};
-use super::errors::{both_parts, held_out_rows, noun, shown, unit};
+use super::errors::{both_parts, header, held_out_rows, noun, shown, unit};
 use super::figures::{self, PlotData};
 use super::identify::{
     BEFORE, beware, counts, errors, fitted_parameters, mean, no_errors, poses, remainder,
@@ -183,9 +183,9 @@ fn parts(comparison: &Comparison) -> Table {
 }
 
 fn side_by_side(comparison: &Comparison, first: &'static str, rows: Vec<Vec<String>>) -> Table {
-    let is_angle = comparison.joint.fitted.held_out.is_angle();
-    let rest = ROWS.map(|name| if is_angle && name == "rms, mm" { "rms, °" } else { name });
-    let header: Vec<&str> = std::iter::once(first).chain(rest).collect();
+    let rms = header(&comparison.joint.fitted.held_out, ["rms, mm", "rms, °"]);
+    let columns = ROWS.map(|name| if name == "rms, mm" { rms } else { name });
+    let header: Vec<&str> = std::iter::once(first).chain(columns).collect();
     Table { minor: vec![1, 4, 5, 6, 7, 8], ..Table::new(&header, rows, &[0, 1, 9]) }
 }
 

@@ -3,6 +3,7 @@
 use super::quantity::{about_three_digits, counted, number};
 use crate::fit::{ErrorSummary, Errors, Identification};
 use crate::observation::kind_named;
+use crate::quantity::Unit;
 
 /// Name of the arm before identification.
 pub(super) const NOMINAL: &str = "nominal arm, base and tool fitted";
@@ -12,14 +13,9 @@ pub(super) fn measure(of: &ErrorSummary) -> &'static str {
     kind_named(of.kind).error_label
 }
 
-/// Converts an error [m] or \[rad\] to the unit in which errors of this kind are shown, mm or °.
-pub(super) fn in_unit(of: &ErrorSummary, value: f64) -> f64 {
-    if of.is_angle() { value.to_degrees() } else { value * 1e3 }
-}
-
 /// Formats an error with four decimals, in mm or °.
 pub(super) fn shown(of: &ErrorSummary, value: f64) -> String {
-    number(in_unit(of, value), 4)
+    number(of.in_unit(value), 4)
 }
 
 /// Returns the number of axes along which errors of a kind of rows are listed.
@@ -34,12 +30,17 @@ pub(super) fn with_unit(of: &ErrorSummary, value: f64) -> String {
 
 /// Formats an error with about three significant digits, in mm or °.
 pub(super) fn brief(of: &ErrorSummary, value: f64) -> String {
-    about_three_digits(in_unit(of, value))
+    about_three_digits(of.in_unit(value))
 }
 
 /// Returns the unit in which errors of a kind of rows are shown.
 pub(super) fn unit(of: &ErrorSummary) -> &'static str {
-    if of.is_angle() { "°" } else { "mm" }
+    of.unit().in_tables().symbol
+}
+
+/// Returns the header for errors in the unit of their kind: the one in mm or the one in °.
+pub(super) fn header(of: &ErrorSummary, [mm, degrees]: [&'static str; 2]) -> &'static str {
+    if of.unit() == Unit::Angle { degrees } else { mm }
 }
 
 /// Returns the cells of a table of errors: poses, arm, mean, rms and largest error.

@@ -4,9 +4,10 @@ use super::quantity::fixed;
 use super::table::{Command, commands, sessions, word};
 use crate::files::csv;
 use crate::measurement::Measurements;
-use crate::observation::references;
-use crate::problem::fixture::frame_word;
+use crate::observation::fields;
+use crate::problem::fixture::reference_cells;
 use crate::problem::{HeldOut, Problem};
+use crate::quantity::Unit;
 
 /// Returns poses as CSV with the columns of measurements, except the positions.
 ///
@@ -66,10 +67,11 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     csv(columns.iter().map(|(name, _)| name.clone()).collect(), lines)
 }
 
-/// Returns the declared 1 σ of each row \[mm\]; empty for tilts.
+/// Returns the declared 1 σ of each row \[mm\]; empty for rows that measure no length.
 fn sigmas(poses: &Measurements) -> Option<Vec<String>> {
     let cell = |(row, sigma): (usize, &f64)| {
-        if poses.observation(row).is_angle() { String::new() } else { plain(sigma * 1e3) }
+        let is_length = poses.observation(row).description().unit == Unit::Length;
+        if is_length { plain(sigma * 1e3) } else { String::new() }
     };
     poses.sigma.as_ref().map(|sigmas| sigmas.iter().enumerate().map(cell).collect())
 }
@@ -77,24 +79,22 @@ fn sigmas(poses: &Measurements) -> Option<Vec<String>> {
 /// Returns the columns that name the fixture or frame of each row: `point`, `anchor`, `surface`,
 /// `frame`.
 fn surroundings(problem: &Problem, poses: &Measurements) -> Vec<(String, Vec<String>)> {
-    let word = |row: usize| match poses.observation(row) {
-        tilt if tilt.is_angle() => {
-            Some(("frame", frame_word(tilt.frame(), &problem.joints, problem.tool.joint)))
-        }
-        fixture => fixture
-            .fixture()
-            .and_then(|fixture| problem.fixtures.get(fixture))
-            .map(|fixture| (fixture.kind.word(), fixture.name.clone())),
-    };
-    let words: Vec<_> = (0..poses.len()).map(word).collect();
-    let column = |kind: &str| -> Vec<String> {
-        let cell = |word: &Option<(&str, String)>| {
-            word.clone().filter(|(word, _)| *word == kind).unwrap_or_default().1
+    let column = |name: &str| -> Vec<String> {
+        let cell = |row| {
+            let mut cells = reference_cells(problem, poses.observation(row));
+            cells.find(|(field, _)| field.name == name).map(|(_, cell)| cell).unwrap_or_default()
         };
-        words.iter().map(cell).collect()
+        (0..poses.len()).map(cell).collect()
     };
-    let all = references().map(|kind| (kind.to_owned(), column(kind)));
-    all.filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty())).collect()
+    let mut columns: Vec<(String, Vec<String>)> = Vec::new();
+    for field in fields().filter(|field| field.unit().is_none()) {
+        let cells = column(field.name);
+        let is_new = columns.iter().all(|(name, _)| name != field.name);
+        if is_new && cells.iter().any(|cell| !cell.is_empty()) {
+            columns.push((field.name.to_owned(), cells));
+        }
+    }
+    columns
 }
 
 /// Formats a value with six decimals, without trailing zeros.

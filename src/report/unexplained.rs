@@ -187,7 +187,7 @@ fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -
     let ([mean, rms, _], unit) = Summary::of(held_out).norms();
     let ([mean_before, rms_before, _], _) = Summary::of(&closure.after.fitted.held_out).norms();
     let improves = if rms < rms_before { "improves" } else { "does not improve" };
-    let [without, with] = [*without, *with].map(|error| super::errors::in_unit(held_out, error));
+    let [without, with] = [*without, *with].map(|error| held_out.in_unit(error));
     let show = |value: f64| number(value, 4);
     let mut sentences = vec![format!(
         "A smooth correction there {improves} the prediction of held-out poses: mean {} to {} {unit}, rms {} to {} {unit}. For \

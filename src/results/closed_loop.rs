@@ -9,7 +9,7 @@ use super::effect::{EffectKeys, NamedEffect};
 use super::identification::{FindingKeys, InfluentialRowSet};
 use super::remainder::Remainder;
 use super::residual_test::ResidualTest;
-use super::summary::{Errors, KindErrors, Summary, by_unit, in_unit};
+use super::summary::{Errors, KindErrors, Summary, by_unit};
 use crate::fit::{Estimate, Finding, Identification};
 use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
@@ -190,11 +190,11 @@ impl LoopResult {
     pub fn new(problem: &Problem, closure: &ClosedLoop) -> Self {
         let (before, held_out) = (&closure.before, &closure.after.fitted.held_out);
         let gain = {
-            let in_unit = |value: f64| in_unit(held_out, value);
+            let in_unit = |value: f64| held_out.in_unit(value);
             let select::Interval { value, low, high } = closure.gain;
             Gain { mean: in_unit(value), interval_95: [in_unit(low), in_unit(high)] }
         };
-        let is_angle = held_out.is_angle();
+        let is_angle = held_out.unit() == Unit::Angle;
         let mut structures = closure.unexplained.iter().map(|left| Structure::new(left, before));
         let prior = closure.harmonic_prior.as_ref().map(|prior| {
             let order = |&(order, sigma_rad): &(u32, f64)| OrderPrior { order, sigma_rad };
@@ -358,9 +358,9 @@ impl Structure {
 impl Correction {
     fn new(correction: &select::Correction) -> Self {
         let (without, with) = correction.cross_validated;
-        let is_angle = correction.held_out.is_angle();
+        let unit = correction.held_out.unit();
         let [(without_mm, without_deg), (with_mm, with_deg)] =
-            [without, with].map(|value| by_unit(is_angle, value));
+            [without, with].map(|value| by_unit(unit, value));
         let range = |(input, range): &(Covariate, (f64, f64))| (input.to_string(), *range);
         Self {
             ranges: correction.ranges.iter().map(range).collect(),

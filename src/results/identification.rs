@@ -15,6 +15,7 @@ use crate::fit::{
 };
 use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination};
+use crate::observation::kind_named;
 use crate::problem::Problem;
 use crate::quantity::Unit;
 use crate::remainder::Fitted;
@@ -255,8 +256,8 @@ impl IdentificationResult {
     /// Collects the result of a fit.
     pub fn new(problem: &Problem, found: &Identification) -> Self {
         let identifiability = found.identifiability();
-        let is_angle = found.fitted.identification.is_angle();
-        let (sigma_taken_mm, sigma_taken_deg) = by_unit(is_angle, found.sigma_taken);
+        let unit = found.fitted.identification.unit();
+        let (sigma_taken_mm, sigma_taken_deg) = by_unit(unit, found.sigma_taken);
         let name = |k: usize| found.unknowns[k].clone();
         let spread = |(before, after, held_out): &(PointSpread, PointSpread, bool)| {
             let change = SpreadChange {
@@ -367,7 +368,7 @@ impl Constraint {
 
 impl OutlierRow {
     fn new(outlier: &Outlier) -> Self {
-        let (error_mm, error_deg) = by_unit(outlier.kind == "tilt", outlier.error.norm());
+        let (error_mm, error_deg) = by_unit(kind_named(outlier.kind).unit, outlier.error.norm());
         Self {
             file: outlier.location.file.display().to_string(),
             line: outlier.location.line,

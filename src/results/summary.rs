@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::fit::{self, AxisValues, ErrorSummary};
+use crate::quantity::Unit;
 
 /// Values along the axes of the measuring frame, and of the Euclidean norm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
@@ -39,7 +40,7 @@ impl Summary {
     /// Creates the summary of rows, in ° if their errors are angles.
     pub fn of(errors: &ErrorSummary) -> Self {
         let kind = Some(errors.kind).filter(|kind| !matches!(*kind, "" | "position"));
-        Self { kind, n: errors.n, sizes: Sizes::of(errors, errors.is_angle()) }
+        Self { kind, n: errors.n, sizes: Sizes::of(errors, errors.unit()) }
     }
 
     /// Returns mean, root mean square and largest value of the norm, and their unit.
@@ -53,18 +54,18 @@ impl Summary {
 }
 
 impl Sizes {
-    /// Converts sizes [m] to mm, or \[rad\] to °.
-    fn of(errors: &ErrorSummary, is_angle: bool) -> Self {
+    /// Converts sizes in `unit` [m] or \[rad\] to mm or °.
+    fn of(errors: &ErrorSummary, unit: Unit) -> Self {
+        let factor = unit.in_tables().factor;
         let axes = |values: &AxisValues| {
-            let in_unit = |value: f64| if is_angle { value.to_degrees() } else { value * 1e3 };
-            let [x, y, z, norm] = [values.x, values.y, values.z, values.norm].map(in_unit);
+            let [x, y, z, norm] =
+                [values.x, values.y, values.z, values.norm].map(|value| value * factor);
             Axes { x, y, z, norm }
         };
         let [mean, max, rms] = [&errors.mean, &errors.max, &errors.rms].map(axes);
-        if is_angle {
-            Self::Angles { mean_deg: mean, max_deg: max, rms_deg: rms }
-        } else {
-            Self::Lengths { mean_mm: mean, max_mm: max, rms_mm: rms }
+        match unit {
+            Unit::Angle => Self::Angles { mean_deg: mean, max_deg: max, rms_deg: rms },
+            _ => Self::Lengths { mean_mm: mean, max_mm: max, rms_mm: rms },
         }
     }
 }
@@ -90,7 +91,7 @@ impl Errors {
         let of = |errors: &ErrorSummary| Summary {
             kind: None,
             n: errors.n,
-            sizes: Sizes::of(errors, true),
+            sizes: Sizes::of(errors, Unit::Angle),
         };
         Self { identification: of(&errors.identification), held_out: of(&errors.held_out) }
     }
@@ -116,11 +117,8 @@ impl KindErrors {
 }
 
 /// Splits a value \[m\] or \[rad\] between the keys `…_mm` and `…_deg`, converted to their unit.
-pub(super) fn by_unit(is_angle: bool, value: f64) -> (Option<f64>, Option<f64>) {
-    ((!is_angle).then_some(value * 1e3), is_angle.then_some(value.to_degrees()))
-}
-
-/// Converts a value to the unit in which errors of this kind of rows are given: mm, or ° of tilts.
-pub(super) fn in_unit(errors: &ErrorSummary, value: f64) -> f64 {
-    if errors.is_angle() { value.to_degrees() } else { value * 1e3 }
+pub(super) fn by_unit(unit: Unit, value: f64) -> (Option<f64>, Option<f64>) {
+    let value = value * unit.in_tables().factor;
+    let only = |wanted: Unit| (unit == wanted).then_some(value);
+    (only(Unit::Length), only(Unit::Angle))
 }

@@ -158,7 +158,7 @@ impl TraceResult {
 
 impl Candidate {
     fn new(ranked: &select::Ranked, trace: &Trace, errors: &ErrorSummary) -> Self {
-        let by_unit = |value: f64| by_unit(errors.is_angle(), value);
+        let by_unit = |value: f64| by_unit(errors.unit(), value);
         let (expected_gain_mm, expected_gain_deg) = by_unit(ranked.gain);
         let (cross_validated_gain_mm, cross_validated_gain_deg) =
             ranked.cross_validated.map_or((None, None), by_unit);

@@ -10,9 +10,7 @@ use super::parameters::{self, TrueParameter};
 use super::truth::Truth;
 use super::{NoEquilibrium, Rig};
 use crate::problem::pattern::matches;
-use crate::problem::{
-    Fixture, HeldOut, Joint, JointKind, Observation, Past, PoseConditions, Problem,
-};
+use crate::problem::{HeldOut, Joint, JointKind, Observation, Past, PoseConditions, Problem};
 use crate::random::{normal, stream};
 
 /// Stream of the parameter deviations. Each quantity has a separate stream, so that more numbers of
@@ -55,8 +53,6 @@ pub struct Simulation {
     pub problem: String,
     /// Joints that the problem declares.
     pub(crate) joints: Vec<Joint>,
-    /// Fixtures that the rows measure against.
-    pub(crate) fixtures: Vec<Fixture>,
     /// Seed of all random numbers.
     pub seed: u64,
     /// Truth from which the arm was drawn.
@@ -225,7 +221,6 @@ fn measure(
     Ok(Simulation {
         problem: problem.name.clone(),
         joints: problem.joints.clone(),
-        fixtures: problem.fixtures.clone(),
         seed,
         truth: truth.clone(),
         parameters,

@@ -7,8 +7,10 @@ use super::draw::{Row, Simulation};
 use super::effect::{Cause, Shape, TrueEffect, keys};
 use super::parameters::TrueParameter;
 use crate::files::csv;
-use crate::problem::fixture::frame_word;
-use crate::problem::{Joint, JointKind, Observation};
+use crate::observation::{Field, Kind, kinds};
+use crate::problem::fixture::reference_cells;
+use crate::problem::{Joint, JointKind};
+use crate::quantity::Unit;
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -58,18 +60,7 @@ impl Simulation {
         let mut names = vec!["pose".to_owned(), self.split_column.clone()];
         let unit = |turns| if turns { "deg" } else { "m" };
         names.extend(self.moving().map(|(index, turns)| format!("q{}_{}", index + 1, unit(turns))));
-        let has = |word| self.rows.iter().any(|row| self.word(row) == word);
         let columns = [
-            (has(""), "x_mm"),
-            (has(""), "y_mm"),
-            (has(""), "z_mm"),
-            (has("point"), "point"),
-            (has("anchor"), "anchor"),
-            (has("anchor"), "distance_mm"),
-            (has("surface"), "surface"),
-            (has("frame"), "frame"),
-            (has("frame"), "tilt_x_deg"),
-            (has("frame"), "tilt_y_deg"),
             (self.truth.orientation_sigma.is_some(), "rx_deg"),
             (self.truth.orientation_sigma.is_some(), "ry_deg"),
             (self.truth.orientation_sigma.is_some(), "rz_deg"),
@@ -79,6 +70,11 @@ impl Simulation {
             (true, "time_s"),
         ];
         names.extend(self.names_targets().then(|| "target".to_owned()));
+        for kind in self.kinds() {
+            names.extend(kind.references().map(|field| field.name.to_owned()));
+            let suffix = kind.unit.in_tables().suffix;
+            names.extend(measured(kind).map(|field| format!("{}_{suffix}", field.name)));
+        }
         names.extend(
             columns.into_iter().filter(|(exists, _)| *exists).map(|(_, name)| name.to_owned()),
         );
@@ -121,46 +117,25 @@ impl Simulation {
         cells
     }
 
-    /// Returns the word of the fixture that a row measures against; empty for a position.
-    fn word(&self, row: &Row) -> &'static str {
-        if row.observation.is_angle() {
-            return "frame";
-        }
-        row.observation
-            .fixture()
-            .and_then(|fixture| self.fixtures.get(fixture))
-            .map_or("", |fixture| fixture.kind.word())
+    /// Returns the kinds of rows in the table.
+    fn kinds(&self) -> impl Iterator<Item = &'static Kind> {
+        kinds().filter(|kind| self.rows.iter().any(|row| row.observation.kind() == kind.name))
     }
 
     /// Adds the measured values, in the columns of all kinds of measurement in the table.
     fn observed(&self, row: &Row, cells: &mut Vec<String>) {
-        let has = |word| self.rows.iter().any(|row| self.word(row) == word);
-        let name = row
-            .observation
-            .fixture()
-            .and_then(|fixture| self.fixtures.get(fixture))
-            .map_or("", |fixture| fixture.name.as_str());
-        let row_word = self.word(row);
-        let cell = |word: &str, text: String| if row_word == word { text } else { String::new() };
-        if has("") {
-            cells.extend(row.position.iter().map(|x| cell("", format!("{:.6}", x * 1e3))));
-        }
-        for word in ["point", "anchor", "surface"].into_iter().filter(|word| has(word)) {
-            cells.push(cell(word, name.to_owned()));
-            if word == "anchor" {
-                cells.push(cell(word, format!("{:.6}", row.position.x * 1e3)));
+        for kind in self.kinds() {
+            let is_of_kind = row.observation.kind() == kind.name;
+            let cell = |text: String| if is_of_kind { text } else { String::new() };
+            for field in kind.references() {
+                let mut words = reference_cells(&self.rig.arm, row.observation);
+                let word = words.find(|(known, _)| known.name == field.name);
+                cells.push(cell(word.map(|(_, word)| word).unwrap_or_default()));
             }
-        }
-        if has("frame") {
-            let tool = self.rig.arm.tool.joint;
-            let word = |frame| frame_word(frame, &self.joints, tool);
-            cells.push(if let Observation::Tilt(frame) = row.observation {
-                word(frame)
-            } else {
-                String::new()
-            });
-            let angle = |angle: f64| cell("frame", format!("{:.7}", angle.to_degrees()));
-            cells.extend([angle(row.position.x), angle(row.position.y)]);
+            let decimals = if kind.unit == Unit::Length { 6 } else { 7 };
+            for (_, value) in measured(kind).zip(&row.position) {
+                cells.push(cell(format!("{:.*}", decimals, value * kind.unit.in_tables().factor)));
+            }
         }
     }
 
@@ -235,4 +210,9 @@ fn described(effect: &TrueEffect, joints: &[Joint]) -> Value {
         entry.insert("values".to_owned(), Value::Object(values));
     }
     entry
+}
+
+/// Returns the columns of the numbers that every row of a kind measures.
+fn measured(kind: &Kind) -> impl Iterator<Item = &'static Field> {
+    kind.measured_fields().filter(|field| field.required)
 }

@@ -1,5 +1,6 @@
 //! Reader of the truth file `TRUTH.toml`.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -9,10 +10,11 @@ use super::ranges::{self, Poses};
 use super::strengths;
 use super::truth::{Deviation, RandomRule, Truth};
 use crate::error::{InputError, InputErrorKind};
+use crate::observation::{Kind, Needs, kinds};
 use crate::problem::item::{Document, Item, join};
 use crate::problem::pattern::matches;
 use crate::problem::section::Section;
-use crate::problem::{HeldOut, Joint, JointKind, Observation, Problem};
+use crate::problem::{HeldOut, Joint, JointKind, Problem};
 use crate::quantity::Unit;
 
 impl Truth {
@@ -51,28 +53,31 @@ fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
     let noise = root.section("noise")?.map_or(Ok(Noise::default()), noise)?;
     let truth = sections(&mut root, problem)?;
     root.finish()?;
-    let Noise { position, contacts, turn, tilt, missing } = noise;
+    let Noise { given, turn, missing } = noise;
     let count = truth.positions + problem.fixtures.len() + truth.tilts.len();
     let observations = truth.observations(&problem.fixtures, count.max(1));
-    let is_needed = observations.into_iter().any(|observation| match observation {
-        Observation::Point(_) => contacts[0].is_none(),
-        Observation::Distance(_) => contacts[1].is_none(),
-        Observation::Surface(_) => contacts[2].is_none(),
-        Observation::Tilt(_) => false,
-        _ => true,
-    });
+    let is_needed = observations
+        .iter()
+        .map(|observation| observation.description())
+        .any(|kind| kind.unit == Unit::Length && !given.contains_key(kind.name));
     if let Some(error) = missing.filter(|_| is_needed) {
         return Err(error);
     }
-    let noise_sigma = position.unwrap_or(0.0);
-    let contact_sigmas = contacts.map(|sigma| sigma.unwrap_or(noise_sigma));
+    let noise_sigma = given.get(POSITION).copied().unwrap_or(0.0);
+    let sigma = |kind: &'static Kind| {
+        let declared = match kind.unit {
+            Unit::Length => Some(noise_sigma),
+            _ => problem.data.kind_sigmas.get(kind.name).copied(),
+        };
+        (kind.name, given.get(kind.name).copied().or(declared).unwrap_or(0.0))
+    };
+    let kind_sigmas = kinds().map(sigma).collect();
     if let Some(HeldOut::Session(session)) = &problem.data.held_out {
         let location = problem.data.held_out_location.clone();
         return Err(location.error(InputErrorKind::NoSessions { session: session.clone() }));
     }
     let orientation_sigma = problem.data.orientation_sigma.map(|declared| turn.unwrap_or(declared));
-    let tilt_sigma = tilt.or(problem.data.kind_sigmas.get("tilt").copied()).unwrap_or(0.0);
-    Ok(Truth { noise_sigma, contact_sigmas, tilt_sigma, orientation_sigma, ..truth })
+    Ok(Truth { noise_sigma, kind_sigmas, orientation_sigma, ..truth })
 }
 
 /// Reads the sections of a truth without noise.
@@ -104,10 +109,9 @@ fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, Inpu
         random,
         effects,
         noise_sigma: 0.0,
-        contact_sigmas: [0.0; 3],
+        kind_sigmas: BTreeMap::new(),
         positions,
         tilts,
-        tilt_sigma: 0.0,
         orientation_sigma: None,
         poses,
         time_step,
@@ -149,37 +153,33 @@ fn example(joints: &[Joint]) -> String {
     format!("[poses] with the range of each joint: {}", ranges.join(", "))
 }
 
+/// Name of the kind of rows that measure positions.
+const POSITION: &str = "position";
+
 /// Contents of the section `[noise]`.
 #[derive(Default)]
 struct Noise {
-    /// Standard deviation of a position \[m\], if given.
-    position: Option<f64>,
-    /// Standard deviations of a point contact, a distance and a surface contact \[m\], if given.
-    contacts: [Option<f64>; 3],
+    /// Given standard deviations by the name of the kind of rows \[m\] or \[rad\].
+    given: BTreeMap<&'static str, f64>,
     /// Standard deviation of an orientation \[rad\], if given.
     turn: Option<f64>,
-    /// Standard deviation of a tilt \[rad\], if given.
-    tilt: Option<f64>,
     /// Error to report if positions, or contacts without a given σ, are measured.
     missing: Option<InputError>,
 }
 
 /// Reads the section; contacts have the σ of positions by default.
 fn noise(mut section: Section<'_, '_>) -> Result<Noise, InputError> {
-    let position = section.not_negative("position_sigma", Unit::Length)?;
-    let contact = |section: &mut Section<'_, '_>, base| section.not_negative(base, Unit::Length);
-    let contacts = [
-        contact(&mut section, "point_sigma")?,
-        contact(&mut section, "distance_sigma")?,
-        contact(&mut section, "surface_sigma")?,
-    ];
+    let mut given = BTreeMap::new();
+    for kind in kinds().filter(|kind| kind.needs != Needs::Fixtures) {
+        let sigma = section.not_negative(&format!("{}_sigma", kind.name), kind.unit)?;
+        given.extend(sigma.map(|sigma| (kind.name, sigma)));
+    }
     let turn = section.not_negative("orientation_sigma", Unit::Angle)?;
-    let tilt = section.not_negative("tilt_sigma", Unit::Angle)?;
     section.finish()?;
     let missing =
         || section.missing("position_sigma_mm", Unit::Length.alternatives("position_sigma"));
-    let missing = position.is_none().then(missing);
-    Ok(Noise { position, contacts, turn, tilt, missing })
+    let missing = (!given.contains_key(POSITION)).then(missing);
+    Ok(Noise { given, turn, missing })
 }
 
 fn segments(mut section: Section<'_, '_>) -> Result<usize, InputError> {

@@ -1,7 +1,10 @@
 //! Truth of a simulation, as plain data in SI units.
 
+use std::collections::BTreeMap;
+
 use super::effect::TrueEffect;
-use crate::problem::{Fixture, FixtureKind, Observation, PoseRanges};
+use crate::observation::{Observation, kinds};
+use crate::problem::{Fixture, PoseRanges};
 use crate::quantity::Unit;
 
 /// Difference of the true arm from the declared one, and the poses in which it is measured
@@ -20,16 +23,14 @@ pub struct Truth {
     pub effects: Vec<TrueEffect>,
     /// Standard deviation of a measured coordinate \[m\].
     pub noise_sigma: f64,
-    /// Standard deviations of a point contact, a measured distance and a surface contact \[m\].
-    pub contact_sigmas: [f64; 3],
+    /// Standard deviations of rows of other kinds by the name of the kind \[m\] or \[rad\].
+    pub kind_sigmas: BTreeMap<&'static str, f64>,
     /// Number of rows that measure positions before the other kinds, if there are fixtures to
     /// measure against.
     pub positions: usize,
     /// Frames whose tilts are measured in turn after the fixtures: 0 is the base of the arm, i that
     /// of joint i.
     pub tilts: Vec<usize>,
-    /// Standard deviation of a measured tilt \[rad\].
-    pub tilt_sigma: f64,
     /// Standard deviation of a measured orientation about each axis \[rad\], if orientations are
     /// measured.
     pub orientation_sigma: Option<f64>,
@@ -90,12 +91,12 @@ impl Truth {
     /// Returns the kind of measurement of each row: positions first, then fixtures and tilted
     /// frames in turn; positions only if there are none of these.
     pub(super) fn observations(&self, fixtures: &[Fixture], rows: usize) -> Vec<Observation> {
-        let observation = |(index, kind): (usize, FixtureKind)| match kind {
-            FixtureKind::Point => Observation::Point(index),
-            FixtureKind::Anchor => Observation::Distance(index),
-            FixtureKind::Plane | FixtureKind::Sphere => Observation::Surface(index),
+        let observation = |(index, fixture): (usize, &Fixture)| {
+            let mut kinds = kinds().filter(|kind| kind.references().count() == 1);
+            let kind = kinds.find(|kind| kind.field(fixture.kind.word()).is_some())?;
+            Observation::new(kind, &[index])
         };
-        let fixtures = fixtures.iter().map(|fixture| fixture.kind).enumerate().map(observation);
+        let fixtures = fixtures.iter().enumerate().filter_map(observation);
         let kinds: Vec<Observation> =
             fixtures.chain(self.tilts.iter().map(|&frame| Observation::Tilt(frame))).collect();
         let of_row = |row: usize| match row.checked_sub(self.positions) {
@@ -113,14 +114,17 @@ impl Truth {
 
     /// Returns the standard deviation of a measurement \[m\], or of a tilt \[rad\].
     pub(super) fn sigma_of(&self, observation: Observation) -> f64 {
-        let [point, distance, surface] = self.contact_sigmas;
-        match observation {
-            Observation::Point(_) => point,
-            Observation::Distance(_) => distance,
-            Observation::Surface(_) => surface,
-            Observation::Tilt(_) => self.tilt_sigma,
-            _ => self.noise_sigma,
+        self.kind_sigmas.get(observation.kind()).copied().unwrap_or(self.noise_sigma)
+    }
+
+    /// Returns the truth with another standard deviation of positions, contacts and distances
+    /// \[m\].
+    pub(crate) fn with_noise(&self, sigma: f64) -> Self {
+        let mut truth = Self { noise_sigma: sigma, ..self.clone() };
+        for kind in kinds().filter(|kind| kind.unit == Unit::Length) {
+            truth.kind_sigmas.insert(kind.name, sigma);
         }
+        truth
     }
 }
 

@@ -48,10 +48,9 @@ fn canonical(truth: &Truth) -> String {
         time_step,
         held_out,
         segments,
-        contact_sigmas: _,
+        kind_sigmas: _,
         positions: _,
         tilts: _,
-        tilt_sigma: _,
     } = truth;
     let optional =
         |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |value| format!("{value:e}"));

@@ -15,7 +15,7 @@ use crate::measurement::{Dataset, Labels, Measurements, Split};
 use crate::model::Model;
 use crate::problem::Problem;
 use crate::random::stream;
-use crate::rig::{self, Draw, Rig, Row, TrueEffect, TrueParameter, Truth};
+use crate::rig::{self, Draw, Rig, Row, TrueEffect, TrueParameter};
 
 /// Simulated measurements with their truth.
 struct Data {
@@ -58,8 +58,7 @@ pub(super) fn fit(
 /// Held-out poses come first, so that they are the same for every number of identification poses.
 /// Noise of another σ is the same noise, scaled.
 fn data(study: &Study, cell: &Cell, repetition: usize) -> Option<Data> {
-    let truth =
-        Truth { noise_sigma: cell.sigma, contact_sigmas: [cell.sigma; 3], ..study.truth.clone() };
+    let truth = study.truth.with_noise(cell.sigma);
     let seed = repetition_seed(study, repetition);
     let Draw { arm, parameters, mut rows } =
         rig::draw(&study.problem, &truth, study.held_out + cell.poses, seed);

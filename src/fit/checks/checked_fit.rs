@@ -83,7 +83,7 @@ impl CheckedFit<'_> {
             .enumerate()
             .filter(|&(_, row)| is_of_kind(row))
             .unzip();
-        let is_measured_directly = observation.is_position() || observation.is_angle();
+        let is_measured_directly = observation.is_measured_directly();
         let target_places = if is_measured_directly {
             Vec::new()
         } else {

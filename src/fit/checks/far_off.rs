@@ -20,7 +20,7 @@ impl Check for NominalIsNear {
     fn check(&self, fit: &CheckedFit) -> Vec<Finding> {
         let rms = fit.registered.identification.rms.norm;
         let RowKind { observation, spread, .. } = fit.kind(fit.fitting.measurements.leading());
-        let is_measured_directly = observation.is_position() || observation.is_angle();
+        let is_measured_directly = observation.is_measured_directly();
         let least = if is_measured_directly { 0.0 } else { ONE_PLACE * fit.fitting.model.reach() };
         if !(spread > least && rms > MAX_NOMINAL_MISS * spread) {
             return Vec::new();

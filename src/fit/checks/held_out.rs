@@ -15,6 +15,7 @@ use crate::fit::uncertainty::residual_lengths::{chances, scatter};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 use crate::measurement::Measurements;
 use crate::numeric::median;
+use crate::observation::kind_named;
 
 /// Ratio of the errors on held-out rows, fitted over nominal, from which on a fit is worse than
 /// none …
@@ -200,7 +201,7 @@ impl Check for WithoutOutliers {
             return Vec::new();
         }
         let name = |row: &Outlier| {
-            let is_vector = matches!(row.kind, "position" | "point");
+            let is_vector = kind_named(row.kind).numbers == 3;
             let axis = if is_vector { " along an axis" } else { "" };
             format!("{} (off by {}{axis})", row.location, size(row.kind, row.error.amax(), 3))
         };

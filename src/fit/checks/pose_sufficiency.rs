@@ -41,9 +41,9 @@ impl PoseSufficiency {
         let of_arm = measurements.arm_pose_numbers(problem);
         let poses = count_distinct(&of_arm, split.identification.iter().copied());
         let turned = if fitting.turn_sigma.is_some() { 3 } else { 0 };
-        let of_row = |row: usize| match measurements.observation(row) {
-            Observation::Position => 3 + turned,
-            other => other.coordinates(),
+        let of_row = |row: usize| {
+            let observation = measurements.observation(row);
+            observation.coordinates() + if observation.is_position() { turned } else { 0 }
         };
         let of_row: Vec<usize> = (0..measurements.len()).map(of_row).collect();
         let coordinates = coordinates(fitting, (&numbers, &of_arm), &split.identification, &of_row);

@@ -32,7 +32,7 @@ pub struct PoseError {
 impl PoseError {
     /// Returns true if the residual is a length at a position of the target.
     pub fn has_place(&self) -> bool {
-        self.observation.is_of_arm() && !self.observation.is_angle()
+        self.observation.measures_length()
     }
 }
 

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::model::CentreLine;
+use crate::observation::Needs;
 use crate::report::figures::{PlotData, Point};
 use crate::report::quantity::{mm, number};
 use crate::report::table::Command;
@@ -156,7 +157,11 @@ fn without_positions(data: &PlotData) -> String {
     } else {
         "are omitted: no row measures a position"
     };
-    let tilts = if data.residuals.iter().any(|residual| residual.observation.is_angle()) {
+    let tilts = if data
+        .residuals
+        .iter()
+        .any(|residual| residual.observation.description().needs == Needs::Frame)
+    {
         "; tilts have no position"
     } else {
         ""
