@@ -1,32 +1,33 @@
 //! Identifies the geometric and elastic parameters of robot arms from measured end-point positions.
 //!
-//! # A walk through the house
+//! A problem declares an arm, what is free in it, and measured poses. A fit estimates the free
+//! parameters with their uncertainty; a search names the effects that the model lacks.
 //!
-//! From input to result, each room uses only those before it:
+//! # Entry points
 //!
-//! 1. [`problem`] and [`measurement`]: the arm as declared and the poses as measured, in SI units.
-//!    A mistake in a file is an [`error`] that says where.
-//! 2. [`spatial`], [`scalar`], [`mechanics`]: frames, and the arm's physics written once for real
-//!    and dual numbers.
-//! 3. [`model`]: what is free ([`model::parameter`]), the catalogue of what an arm may do besides
-//!    ([`model::effect`]), and positions with their derivatives as a function of both.
-//! 4. [`least_squares`]: residuals of many small items and the solvers for them, which know no
-//!    arms.
-//! 5. [`fit`]: what to fit in which order, identifiability, standard errors, comparison,
-//!    compensation.
-//! 6. [`remainder`]: what no law explains as smooth errors of the joints, and the uncertainty of
-//!    predictions and commands.
-//! 7. [`residual_tests`]: statistical tests of what a fit leaves, whether structure is left at all.
-//! 8. [`select`]: which effects the residual points to ([`select::trace`]), and the loop that adds
-//!    them ([`select::close`]).
-//! 9. [`report`]: text, JSON, Markdown, HTML and figures.
+//! | task | call | result |
+//! |---|---|---|
+//! | declare an arm, from a file or from text | [`problem::Problem::read`], [`problem::Problem::parse`] | [`problem::Problem`] |
+//! | read poses, or take them from arrays | [`measurement::Dataset::read`], [`measurement::Dataset::builder`] | [`measurement::Dataset`] |
+//! | fit the free parameters | [`fit::identify`] | [`fit::Identification`] |
+//! | rank effects that the residual points to | [`select::trace`] | [`select::Trace`] |
+//! | find effects and add them to the model | [`select::close`] | [`select::ClosedLoop`] |
+//! | predict positions, with covariance | [`fit::Identification::predict_with_covariance`] | [`fit::PredictedPosition`] |
+//! | correct commands | [`fit::compensate`] | [`fit::Command`] |
+//! | fit smooth errors that no law explains | [`remainder::fit`] | [`remainder::Correction`] |
+//! | choose poses to measure, judge given ones | [`design::plan`], [`design::check`] | [`design::Plan`], [`design::Check`] |
+//! | simulate measurements with known truth | [`rig::simulate`] | [`rig::Simulation`] |
+//! | read and write URDF | [`urdf::describe`], [`urdf::export`] | [`urdf::Description`], [`urdf::Export`] |
+//! | write results as JSON | [`results::Document::to_json`] | documented in `docs/results.md` |
+//! | write text and HTML reports with figures | [`report`] | [`report::Report`] |
 //!
-//! Beside this way stand [`design`] (which poses to measure, and what they will tell),
-//! [`study`] (many fits where the truth is known), [`urdf`] (arms from URDF, and identified
-//! ones back into it), [`paper`] (the closed forms of \[Chen2021\], a baseline), and [`rig`],
-//! a rig that shares no physics with the model.
+//! The caller may supply a law ([`problem::Problem::effect`]) and a solver ([`fit::CustomSolver`]).
+//! `examples/custom.rs` does both in 40 lines. Quantities are in SI units: m, rad, kg, N, s.
 //!
-//! # The same walk in code
+//! Modules that this page does not list are public for the tests, the benches and the Python module
+//! of this repository. They may change in every release.
+//!
+//! # Example
 //!
 //! ```
 //! use std::path::Path;
@@ -54,15 +55,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! `examples/` has an arm of one's own from text to estimate, an effect of one's own, and a report;
-//! `docs/` explains files, effects, plans and results.
+//! # Errors and panics
 //!
-//! # Indices
-//!
-//! What reads input indexes nothing (`clippy::indexing_slicing` is denied there: [`error`],
-//! [`files`], [`problem`], [`quantity`], [`study`], [`urdf`], the readers of [`measurement`]
-//! and [`rig`], the command line). What reckons does: its indices are those of arrays that one
-//! constructor made of one length from what was read.
+//! A mistake in a file is an [`error::InputError`] with file, line and column. Modules that read
+//! input do not index (`clippy::indexing_slicing` is denied there). Numerical code indexes arrays
+//! whose lengths one constructor has made from checked input.
 
 // The command line names this library as any other program does.
 extern crate self as flexcal;

@@ -79,7 +79,7 @@ impl Bounds {
     }
 
     /// Returns the bound that `x[j]` equals or exceeds, if any.
-    pub(crate) fn at(&self, x: &DVector<f64>, j: usize) -> Option<AtBound> {
+    pub(super) fn at(&self, x: &DVector<f64>, j: usize) -> Option<AtBound> {
         if x[j] <= self.lower[j] {
             Some(AtBound::Lower)
         } else if x[j] >= self.upper[j] {
@@ -90,7 +90,7 @@ impl Bounds {
     }
 
     /// Moves x to the nearest point within the bounds.
-    pub(crate) fn clamp(&self, x: &mut DVector<f64>) {
+    pub fn clamp(&self, x: &mut DVector<f64>) {
         for (j, x) in x.iter_mut().enumerate() {
             *x = x.clamp(self.lower[j], self.upper[j]);
         }

@@ -2,7 +2,8 @@
 
 use nalgebra::DVector;
 
-use super::{AtBound, Termination};
+use super::{AtBound, Bounds, Termination};
+use crate::least_squares::Objective;
 
 /// Solution with the reason of termination and the number of evaluations.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,6 +27,18 @@ pub struct Solution {
 }
 
 impl Solution {
+    /// Creates the solution of a caller's solver at `x`, with the cost there, the bounds that `x`
+    /// rests on, and all counts zero.
+    pub fn new(
+        objective: &dyn Objective,
+        x: DVector<f64>,
+        termination: Termination,
+        bounds: &Bounds,
+    ) -> Self {
+        let at_bound = (0..x.len()).map(|j| bounds.at(&x, j)).collect();
+        Self { cost: objective.cost(&x), termination, at_bound, ..Self::at(x) }
+    }
+
     /// Creates the solution of a run from `start` that has not begun.
     pub(super) fn at(start: DVector<f64>) -> Self {
         Self {
