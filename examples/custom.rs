@@ -40,8 +40,8 @@ impl CustomSolver for Projected {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arm = Problem::parse(ARM, "planar.toml".as_ref())?;
     let arm = arm.with_effect(arm.effect(CAM, "cam".as_ref())?.effect);
-    // The true arm is 1 mm longer, and its eccentric turns 3 mrad.
-    let at = |length: f64, angle: f64| Vector3::new(angle.cos(), angle.sin(), 0.0) * length;
+    // The true arm is 1 mm longer, and its eccentric turns 3 mrad; the readings are to 0.1 mm.
+    let at = |l: f64, a: f64| (Vector3::new(a.cos(), a.sin(), 0.0) * l * 1e4).map(f64::round) / 1e4;
     let tip = |[a, b]: &[f64; 2]| at(0.501, *a) + at(0.4, a + b + 3e-3 * a.sin());
     let q = [[-2.7, 0.4], [-1.9, 1.0], [-0.8, -1.2], [0.1, 0.9], [0.8, -0.5], [1.5, 1.3]];
     let data = Dataset::builder(&q, q.iter().map(tip)).build()?;
@@ -50,6 +50,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let cam = found.estimate("law[cam].1").map_or(0.0, |cam| cam.estimate * 1e3);
     let predicted = &found.predict_with_covariance(&arm, &data.measurements)?[0];
     let sigma = predicted.covariance.trace().sqrt() * 1e6;
-    println!("cam: {cam:.2} mrad; tip at {:.3?} m ± {sigma:.0} µm", predicted.position);
+    println!("cam: {cam:.2} mrad; tip at {:.3?} m ± {sigma:.0} µm", predicted.position.as_slice());
     Ok(())
 }

@@ -84,11 +84,6 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         Ok(self)
     }
 
-    /// Returns the data problem.
-    pub fn problem(&self) -> &'a P {
-        self.problem
-    }
-
     fn chunks(&self) -> usize {
         self.problem.items().div_ceil(CHUNK_ITEMS)
     }

@@ -62,11 +62,6 @@ impl Triangle {
         triangle.into_linearisation().triangle
     }
 
-    /// Returns the number of unknowns n.
-    pub fn parameters(&self) -> usize {
-        self.parameters
-    }
-
     /// Returns ‖r‖² of all rows absorbed so far.
     pub fn sum_of_squares(&self) -> f64 {
         self.squares

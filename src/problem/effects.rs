@@ -21,11 +21,8 @@ pub(super) fn read(
 ) -> Result<Vec<EffectDeclaration>, InputError> {
     let mut effects: Vec<EffectDeclaration> = Vec::new();
     for section in root.sections("effect")? {
-        let entries = section.entries();
-        let [(name, item)] = entries.as_slice() else {
-            return Err(section.error(InputErrorKind::NotOneEffect { found: section.len() }));
-        };
-        let effect = declared(name, item, joints, data)?;
+        let (name, item) = only_entry(&section)?;
+        let effect = declared(name, &item, joints, data)?;
         let is_same = |known: &&EffectDeclaration| known.effect.is_same_as(&effect);
         if let Some(first) = effects.iter().find(is_same) {
             let line = first.location.line.unwrap_or(0);
@@ -120,18 +117,23 @@ fn written(text: String, named: &Path, problem: &Problem) -> Result<EffectDeclar
     let document = Document { file: named.to_owned(), text: text.into() };
     let table = document.table()?;
     let section = Section::new(&document, String::new(), 0..0, table.get_ref());
-    let entries = section.entries();
-    let [(name, item)] = entries.as_slice() else {
-        return Err(section.error(InputErrorKind::NotOneEffect { found: section.len() }));
-    };
+    let (name, item) = only_entry(&section)?;
     let declared = EffectDeclaration {
-        effect: self::declared(name, item, &problem.joints, &problem.data)?,
+        effect: self::declared(name, &item, &problem.joints, &problem.data)?,
         location: item.location(),
     };
     check_alone(&declared, problem.statics, &problem.joints, &problem.data)?;
     let all = [problem.effects.as_slice(), std::slice::from_ref(&declared)].concat();
     check_compensators(&all, &problem.joints)?;
     Ok(declared)
+}
+
+/// Returns the only entry of an `[[effect]]`, with its key.
+fn only_entry<'a, 'i>(section: &Section<'a, 'i>) -> Result<(&'a str, Item<'a, 'i>), InputError> {
+    match <[_; 1]>::try_from(section.entries()) {
+        Ok([entry]) => Ok(entry),
+        Err(_) => Err(section.error(InputErrorKind::NotOneEffect { found: section.len() })),
+    }
 }
 
 /// Reads an effect of the catalogue, or a declared law.

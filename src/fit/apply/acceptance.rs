@@ -9,7 +9,6 @@ use crate::fit::IdentifyError;
 use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
 use crate::measurement::Dataset;
-use crate::model::Model;
 use crate::numeric::{Interval, mean_interval};
 use crate::problem::Problem;
 
@@ -105,7 +104,7 @@ pub fn acceptance(
     let measurements = &data.measurements;
     let held_out = held_out_positions(problem, data)?;
     let placement = Placement::of(measurements);
-    let model = found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
+    let model = found.model(problem, &placement)?;
     let errors = |x| placement.position_errors(&model, x, measurements, &held_out);
     let (before, after) = (errors(&found.registered_x), errors(&found.x));
     let numbers = measurements.pose_numbers(problem);

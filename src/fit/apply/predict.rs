@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use nalgebra::{DVector, Vector3};
 
+use crate::error::InputError;
 use crate::fit::IdentifyError;
 use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
@@ -48,6 +49,16 @@ impl Residual {
 }
 
 impl Identification {
+    /// Returns the model of the strategy with the bases and targets of a placement.
+    pub(crate) fn model(
+        &self,
+        problem: &Problem,
+        placement: &Placement,
+    ) -> Result<Model, InputError> {
+        let declared = Model::new(problem, &placement.bases, &placement.targets)?;
+        Ok(self.strategy.model(declared))
+    }
+
     /// Predicts the positions of the identified arm in the poses of `rows`, measuring frame \[m\];
     /// NaN where the arm has no equilibrium.
     ///
@@ -63,9 +74,7 @@ impl Identification {
         problem: &Problem,
         rows: &Measurements,
     ) -> Result<Vec<Vector3<f64>>, IdentifyError> {
-        let placement = Placement::of(rows);
-        let model = self.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
-        self.predict_with(&model, rows)
+        self.predict_with(&self.model(problem, &Placement::of(rows))?, rows)
     }
 
     /// Predicts positions as [`predict`](Self::predict) does, with a model that the caller has
@@ -93,8 +102,7 @@ impl Identification {
         data: &Dataset,
     ) -> Result<Vec<Residual>, IdentifyError> {
         let Dataset { measurements, split } = data;
-        let placement = Placement::of(measurements);
-        let model = self.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
+        let model = self.model(problem, &Placement::of(measurements))?;
         let errors = self.errors(&model, measurements)?;
         let turns = self.turns(problem, &model, measurements)?;
         let turn_sigma = problem.data.orientation_sigma.unwrap_or(f64::NAN);

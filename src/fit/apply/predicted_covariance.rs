@@ -7,7 +7,7 @@ use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
 use crate::least_squares::{Block, LeastSquares as _};
 use crate::measurement::Measurements;
-use crate::model::{Model, PoseResiduals};
+use crate::model::PoseResiduals;
 use crate::problem::Problem;
 
 /// Predicted position of a row with its uncertainty.
@@ -34,8 +34,7 @@ impl Identification {
         problem: &Problem,
         rows: &Measurements,
     ) -> Result<Vec<PredictedPosition>, IdentifyError> {
-        let placement = Placement::of(rows);
-        let model = self.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
+        let model = self.model(problem, &Placement::of(rows))?;
         let positions = self.predict_with(&model, rows)?;
         let x = self.vector(&model)?;
         // Estimates of other sessions have no part in these rows.

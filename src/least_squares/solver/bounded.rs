@@ -7,49 +7,34 @@ use super::levenberg_marquardt::Model;
 use super::polyhedron::{Faces, Polyhedron};
 use super::polyhedron_step::{FACE_DISTANCE, PolyhedronProblem, PolyhedronSolution};
 use super::settings::RADIUS_SLACK;
-use super::{Bounds, Factor, Inequalities, Settings, Step, Subproblem, TrustRegion};
+use super::{Bounds, Factor, Inequalities, Settings, Step, Subproblem};
 use crate::least_squares::Linearisation;
 
 /// Maximum number of damping values tried for one step when both the radius and bounds limit it.
 const MAX_DAMPING_TRIES: usize = 25;
 
-/// Returns a Levenberg–Marquardt solver within bounds lo ≤ x ≤ hi and inequalities lo ≤ A x ≤ hi.
-///
-/// min ½‖J p + r‖² + ½λ‖D p‖² subject to the bounds and inequalities on x + p
-///
-/// The solver first tries the unconstrained step, then the step in the polyhedron. Each is tried
-/// without damping if that respects the radius. An active-set method guesses the active faces and
-/// corrects them until the optimality conditions hold. After a constrained step, the step in the
-/// polyhedron is tried first. The problem is never evaluated outside the bounds, or outside the
-/// inequalities beyond rounding. A start outside is moved to the [`nearest`] feasible point. The
-/// solver has converged when the gradient vanishes along all feasible directions.
-pub fn constrained_levenberg_marquardt(
-    bounds: Bounds,
-    rows: Inequalities,
-    settings: Settings,
-) -> TrustRegion<Constrained> {
-    Constrained::solver(StepMethod::ActiveSet, bounds, rows, settings)
-}
-
-/// Returns a solver like [`constrained_levenberg_marquardt`] whose constrained steps come from
-/// Clarabel's interior-point method.
-///
-/// The radius ‖D p‖ ≤ Δ is a second-order cone of the same problem.
-pub fn interior_point_levenberg_marquardt(
-    bounds: Bounds,
-    rows: Inequalities,
-    settings: Settings,
-) -> TrustRegion<Constrained> {
-    Constrained::solver(StepMethod::InteriorPoint, bounds, rows, settings)
-}
-
-/// Returns a Levenberg–Marquardt solver that clamps unconstrained steps to the bounds; a baseline
-/// for comparisons.
-///
-/// It may stop at a bound above the minimum, since a clamped step need not lead downhill.
-pub fn clamped_levenberg_marquardt(bounds: Bounds, settings: Settings) -> TrustRegion<Constrained> {
-    let rows = Inequalities::none(bounds.lower().len());
-    Constrained::solver(StepMethod::Clamped, bounds, rows, settings)
+/// Method that finds a step within the constraints.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StepMethod {
+    /// Damped step in the polyhedron of the constraints.
+    ///
+    /// min ½‖J p + r‖² + ½λ‖D p‖² subject to lo ≤ x + p ≤ hi and lo ≤ A (x + p) ≤ hi
+    ///
+    /// The solver first tries the unconstrained step, then the step in the polyhedron. Each is
+    /// tried without damping if that respects the radius. An active-set method guesses the active
+    /// faces and corrects them until the optimality conditions hold. After a constrained step, the
+    /// step in the polyhedron is tried first. The problem is never evaluated outside the bounds, or
+    /// outside the inequalities beyond rounding. A start outside is moved to the [`nearest`]
+    /// feasible point. The solver has converged when the gradient vanishes along all feasible
+    /// directions.
+    ActiveSet,
+    /// The same step by Clarabel's interior-point method, with the radius ‖D p‖ ≤ Δ as a
+    /// second-order cone.
+    InteriorPoint,
+    /// Unconstrained step clamped to the bounds; a baseline for comparisons.
+    ///
+    /// It may stop at a bound above the minimum, since a clamped step need not lead downhill.
+    Clamped,
 }
 
 /// Returns the point nearest to `x` that satisfies bounds and inequalities, or `None` if there is
@@ -72,14 +57,6 @@ pub fn nearest(x: &DVector<f64>, bounds: &Bounds, rows: &Inequalities) -> Option
     bounds.hold(&mut point, &solution.faces.bounds);
     let is_satisfied = |i| rows.at(&point, i).is_some() || rows.holds(&point, i);
     (0..rows.len()).all(is_satisfied).then_some(point)
-}
-
-/// Method that finds a step within the constraints.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum StepMethod {
-    ActiveSet,
-    InteriorPoint,
-    Clamped,
 }
 
 /// Subproblem of a step within a sphere ‖D p‖ ≤ Δ, bounds and inequalities.
@@ -129,25 +106,9 @@ impl Constrained {
         Step { point, length: q.norm(), slope, predicted, damping }
     }
 
-    /// Creates the trust-region solver around this subproblem.
-    fn solver(
-        method: StepMethod,
-        bounds: Bounds,
-        rows: Inequalities,
-        settings: Settings,
-    ) -> TrustRegion<Self> {
-        TrustRegion::new(
-            Self {
-                method,
-                bounds,
-                rows,
-                model: None,
-                guess: None,
-                undamped: None,
-                is_limited: false,
-            },
-            settings,
-        )
+    /// Creates the subproblem of a method within bounds and inequalities.
+    pub fn new(method: StepMethod, bounds: Bounds, rows: Inequalities) -> Self {
+        Self { method, bounds, rows, model: None, guess: None, undamped: None, is_limited: false }
     }
 }
 

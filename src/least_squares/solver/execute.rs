@@ -4,7 +4,7 @@ use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{Executor, Solver, State as _, TerminationReason, TerminationStatus};
 use nalgebra::DVector;
 
-use super::{Solution, State, Subproblem, Termination, TrustRegion};
+use super::{Solution, State, Termination};
 use crate::least_squares::Objective;
 
 /// Observer that ignores every iteration.
@@ -16,12 +16,6 @@ impl Observe<State> for NoObserver {}
 pub(super) trait ReportsTermination {
     /// Returns the reason of termination, or `None` while the solver runs.
     fn termination(&self) -> Option<Termination>;
-}
-
-impl<S: Subproblem> ReportsTermination for TrustRegion<S> {
-    fn termination(&self) -> Option<Termination> {
-        TrustRegion::termination(self)
-    }
 }
 
 /// Runs a solver from `start`. If it does not converge, the solution is the best point it

@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{Factor, Settings, Step, Subproblem, TrustRegion};
+use super::{Factor, Settings, Step, Subproblem};
 use crate::least_squares::{Linearisation, MANY_UNKNOWNS};
 
-/// Returns a Levenberg–Marquardt solver in trust-region form, without bounds.
+/// Subproblem of a step within a sphere ‖D p‖ ≤ Δ: Levenberg–Marquardt in trust-region form.
 ///
 /// min ‖J p + r‖ subject to ‖D p‖ ≤ Δ, that is `(JᵀJ + λD²) p = −Jᵀr` with λ ≥ 0          [Moré
 /// 1978]
@@ -13,11 +13,6 @@ use crate::least_squares::{Linearisation, MANY_UNKNOWNS};
 /// It works with the n × n factor of J alone. Redundant unknowns are allowed: combinations that the
 /// data do not determine stay unchanged. With many unknowns, steps whose gain differs from the
 /// prediction get a geodesic acceleration [Transtrum & Sethna 2012].
-pub fn levenberg_marquardt(settings: Settings) -> TrustRegion<Unconstrained> {
-    TrustRegion::new(Unconstrained::default(), settings)
-}
-
-/// Subproblem of a step within a sphere ‖D p‖ ≤ Δ.
 #[derive(Debug, Clone, Default)]
 pub struct Unconstrained {
     model: Option<Model>,

@@ -28,15 +28,9 @@ mod termination;
 mod trial;
 mod trust_region;
 
-pub(crate) use bounded::{
-    clamped_levenberg_marquardt, constrained_levenberg_marquardt,
-    interior_point_levenberg_marquardt,
-};
 pub use bounds::{AtBound, Bounds, BoundsError};
 pub(crate) use inequalities::InequalitiesError;
-pub(crate) use levenberg_marquardt::levenberg_marquardt;
 pub(crate) use pseudo_inverse::{minimise_pseudo_inverse_observed, minimum_norm_step};
-pub(crate) use reflective::reflective_levenberg_marquardt;
 pub use run::{minimise, minimise_bounded};
 pub use settings::Settings;
 pub use solution::Solution;

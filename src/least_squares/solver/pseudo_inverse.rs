@@ -8,7 +8,7 @@ use nalgebra::DVector;
 use super::divergence::DivergenceMonitor;
 use super::execute::{NoObserver, ReportsTermination, run};
 use super::spectrum::Spectrum;
-use super::trust_region::{stopped, take_point};
+use super::trust_region::{ended, take_point};
 use super::{Divergence, Solution, State, Termination};
 use crate::least_squares::{Linearisation, Objective};
 
@@ -64,11 +64,6 @@ impl PseudoInverse {
         }
     }
 
-    fn stop(&mut self, state: State, termination: Termination) -> State {
-        self.termination = Some(termination);
-        stopped(state, termination)
-    }
-
     /// Stores the linearisation at a new point and returns the reason to stop there, if any.
     fn accept_linearisation(&mut self, linearisation: Linearisation) -> Option<Termination> {
         let Linearisation { cost, triangle, projected } = &linearisation;
@@ -113,19 +108,16 @@ impl<O: Objective> Solver<O, State> for PseudoInverse {
     ) -> Result<(State, Option<KV>), Error> {
         let x = take_point(&mut state)?;
         if problem.problem.as_ref().map(Objective::parameters) != Some(x.len()) {
-            return Ok((
-                self.stop(state.param(x).cost(f64::INFINITY), Termination::SizeMismatch),
-                None,
-            ));
+            self.termination = Some(Termination::SizeMismatch);
+            return Ok((ended(state, x, f64::INFINITY, self.termination), None));
         }
         let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&x)))?;
         let cost = linearisation.cost;
-        let termination = match self.accept_linearisation(linearisation) {
+        self.termination = match self.accept_linearisation(linearisation) {
             Some(Termination::Diverged) => Some(Termination::OutsideDomainAtStart),
             termination => termination,
         };
-        let state = state.param(x).cost(cost);
-        Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), None))
+        Ok((ended(state, x, cost, self.termination), None))
     }
 
     fn next_iter(
@@ -145,10 +137,10 @@ impl<O: Objective> Solver<O, State> for PseudoInverse {
         let size = point.norm() + self.settings.step_tolerance;
         let small_step =
             (length <= self.settings.step_tolerance * size).then_some(Termination::Step);
-        let termination = self.accept_linearisation(linearisation).or(small_step);
-        let state = state.param(point).cost(if cost.is_nan() { f64::INFINITY } else { cost });
+        self.termination = self.accept_linearisation(linearisation).or(small_step);
+        let cost = if cost.is_nan() { f64::INFINITY } else { cost };
         let log = kv!("length" => length;);
-        Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), Some(log)))
+        Ok((ended(state, point, cost, self.termination), Some(log)))
     }
 }
 

@@ -3,7 +3,7 @@
 
 use nalgebra::DVector;
 
-use super::{Bounds, Factor, Settings, Step, Subproblem, TrustRegion};
+use super::{Bounds, Factor, Settings, Step, Subproblem};
 use crate::least_squares::Linearisation;
 
 /// Fraction of the distance to a bound that a step may take.
@@ -11,8 +11,8 @@ const BOUND_FRACTION: f64 = 0.995;
 /// Distance that a start keeps from its bounds, relative to their magnitude (1 at least).
 const START_MARGIN: f64 = 1e-10;
 
-/// Returns an interior reflective Levenberg–Marquardt solver within bounds lo < x < hi [Branch,
-/// Coleman & Li 1999].
+/// Subproblem of the interior reflective step within bounds lo < x < hi [Branch, Coleman & Li
+/// 1999].
 ///
 /// Let v be the distance to the bound in the direction of −g (1 if there is none), and V = diag(v).
 /// The optimality conditions are V g = 0, and min ½‖J p + r‖² + ½ pᵀ V⁻¹|g| p is solved within a
@@ -20,14 +20,6 @@ const START_MARGIN: f64 = 1e-10;
 /// SciPy's `trf`: the step to the bound, its reflection there, and the steepest descent. Unknowns
 /// that end next to a bound are moved onto it by
 /// [`minimise_constrained_by`](super::minimise_constrained_by).
-pub fn reflective_levenberg_marquardt(
-    bounds: Bounds,
-    settings: Settings,
-) -> TrustRegion<Reflective> {
-    TrustRegion::new(Reflective { bounds, model: None }, settings)
-}
-
-/// Subproblem of the interior reflective step.
 #[derive(Debug, Clone)]
 pub struct Reflective {
     bounds: Bounds,
@@ -75,6 +67,11 @@ impl ScaledModel {
 }
 
 impl Reflective {
+    /// Creates the subproblem within `bounds`.
+    pub fn new(bounds: Bounds) -> Self {
+        Self { bounds, model: None }
+    }
+
     /// Returns the distance of `x[j]` to the bound in the direction of −gradient, or `None` if
     /// there is none.
     fn distance(&self, x: &DVector<f64>, j: usize, gradient: f64) -> Option<f64> {

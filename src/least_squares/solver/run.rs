@@ -3,12 +3,12 @@
 use argmin::core::observers::Observe;
 use nalgebra::DVector;
 
+use super::bounded::{Constrained, StepMethod, nearest};
 use super::execute::{NoObserver, run};
-use super::{Bounds, Inequalities, Settings, Solution, State, Termination};
+use super::levenberg_marquardt::Unconstrained;
+use super::reflective::Reflective;
 use super::{
-    clamped_levenberg_marquardt, constrained_levenberg_marquardt,
-    interior_point_levenberg_marquardt, levenberg_marquardt, nearest,
-    reflective_levenberg_marquardt,
+    Bounds, Inequalities, Settings, Solution, State, Subproblem, Termination, TrustRegion,
 };
 use crate::least_squares::Objective;
 
@@ -57,13 +57,7 @@ const COST_ROUNDING: f64 = 1e-12;
 /// assert!((solution.x[1] - 2.0_f64.ln()).abs() < 1e-9);
 /// ```
 pub fn minimise<O: Objective>(objective: O, start: DVector<f64>, settings: &Settings) -> Solution {
-    run(
-        objective,
-        start,
-        levenberg_marquardt(*settings),
-        settings.max_iterations,
-        None::<NoObserver>,
-    )
+    solve(objective, start, Unconstrained::default(), settings, None::<NoObserver>)
 }
 
 /// Minimises like [`minimise`] and calls `observer` after every iteration.
@@ -73,21 +67,33 @@ pub fn minimise_observed<O: Objective>(
     settings: &Settings,
     observer: impl Observe<State> + 'static,
 ) -> Solution {
-    run(objective, start, levenberg_marquardt(*settings), settings.max_iterations, Some(observer))
+    solve(objective, start, Unconstrained::default(), settings, Some(observer))
+}
+
+/// Runs the trust-region loop around a subproblem.
+fn solve<O: Objective>(
+    objective: O,
+    start: DVector<f64>,
+    subproblem: impl Subproblem,
+    settings: &Settings,
+    observer: Option<impl Observe<State> + 'static>,
+) -> Solution {
+    let solver = TrustRegion::new(subproblem, *settings);
+    run(objective, start, solver, settings.max_iterations, observer)
 }
 
 /// Method that keeps the unknowns within bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum BoundMethod {
-    /// Steps of the active-set method, see [`constrained_levenberg_marquardt`].
+    /// Damped steps in the polyhedron of the constraints by an active-set method.
     #[default]
     ActiveSet,
-    /// Steps of the interior-point method, see [`interior_point_levenberg_marquardt`].
+    /// The same steps by Clarabel's interior-point method.
     InteriorPoint,
-    /// Interior reflective steps, [`reflective_levenberg_marquardt`]; ignores inequalities.
+    /// Interior reflective steps [Branch, Coleman & Li 1999]; ignores inequalities.
     Reflective,
-    /// Clamped steps, [`clamped_levenberg_marquardt`]; ignores inequalities.
+    /// Unconstrained steps clamped to the bounds, a baseline; ignores inequalities.
     Clamped,
 }
 
@@ -126,30 +132,18 @@ pub fn minimise_constrained_by<O: Objective>(
 ) -> Solution {
     let sizes_match = start.len() == bounds.lower().len() && start.len() == rows.matrix().ncols();
     let is_infeasible = sizes_match && nearest(&start, bounds, rows).is_none();
-    let (solver_bounds, limit) = (bounds.clone(), settings.max_iterations);
-    let mut solution = match method {
-        BoundMethod::ActiveSet => {
-            let solver = constrained_levenberg_marquardt(solver_bounds, rows.clone(), *settings);
-            run(&objective, start, solver, limit, observer)
+    let constrained = |method, rows| Constrained::new(method, bounds.clone(), rows);
+    let subproblem = match method {
+        BoundMethod::ActiveSet => Some(constrained(StepMethod::ActiveSet, rows.clone())),
+        BoundMethod::InteriorPoint => Some(constrained(StepMethod::InteriorPoint, rows.clone())),
+        BoundMethod::Clamped => {
+            Some(constrained(StepMethod::Clamped, Inequalities::none(bounds.lower().len())))
         }
-        BoundMethod::InteriorPoint => {
-            let solver = interior_point_levenberg_marquardt(solver_bounds, rows.clone(), *settings);
-            run(&objective, start, solver, limit, observer)
-        }
-        BoundMethod::Reflective => run(
-            &objective,
-            start,
-            reflective_levenberg_marquardt(solver_bounds, *settings),
-            limit,
-            observer,
-        ),
-        BoundMethod::Clamped => run(
-            &objective,
-            start,
-            clamped_levenberg_marquardt(solver_bounds, *settings),
-            limit,
-            observer,
-        ),
+        BoundMethod::Reflective => None,
+    };
+    let mut solution = match subproblem {
+        Some(subproblem) => solve(&objective, start, subproblem, settings, observer),
+        None => solve(&objective, start, Reflective::new(bounds.clone()), settings, observer),
     };
     if is_infeasible {
         solution.termination = Termination::Infeasible;

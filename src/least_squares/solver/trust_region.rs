@@ -7,6 +7,7 @@ use argmin::core::{
 use argmin::kv;
 use nalgebra::{DMatrix, DVector};
 
+use super::execute::ReportsTermination;
 use super::second_order::{ConvexModel, SecondOrder};
 use super::step::Step;
 use super::trial::{GOOD_RATIO, Trial};
@@ -141,16 +142,6 @@ impl<S: Subproblem> TrustRegion<S> {
             convex: None,
             termination: None,
         }
-    }
-
-    /// Returns the reason of termination, or `None` while the solver runs.
-    pub fn termination(&self) -> Option<Termination> {
-        self.termination
-    }
-
-    fn stop(&mut self, state: State, termination: Termination) -> State {
-        self.termination = Some(termination);
-        stopped(state, termination)
     }
 
     /// Updates the scaling, tests the gradient and stores the linearisation; returns the reason to
@@ -311,13 +302,29 @@ impl<S: Subproblem> TrustRegion<S> {
     }
 }
 
-/// Returns the state of a solver that stops for the given reason.
-pub(super) fn stopped(state: State, termination: Termination) -> State {
-    state.terminate_with(if termination.converged() {
-        TerminationReason::SolverConverged
-    } else {
-        TerminationReason::SolverExit(termination.to_string())
-    })
+impl<S: Subproblem> ReportsTermination for TrustRegion<S> {
+    fn termination(&self) -> Option<Termination> {
+        self.termination
+    }
+}
+
+/// Returns the state after an iteration that ends at x, and stops there if a reason is given.
+pub(super) fn ended(
+    state: State,
+    x: DVector<f64>,
+    cost: f64,
+    termination: Option<Termination>,
+) -> State {
+    let state = state.param(x).cost(cost);
+    match termination {
+        None => state,
+        Some(termination) if termination.converged() => {
+            state.terminate_with(TerminationReason::SolverConverged)
+        }
+        Some(termination) => {
+            state.terminate_with(TerminationReason::SolverExit(termination.to_string()))
+        }
+    }
 }
 
 /// Takes x out of argmin's state.
@@ -339,23 +346,20 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
         let mut x = take_point(&mut state)?;
         let parameters = problem.problem.as_ref().map(Objective::parameters);
         if parameters != Some(x.len()) || !self.subproblem.admit_start(&mut x) {
-            return Ok((
-                self.stop(state.param(x).cost(f64::INFINITY), Termination::SizeMismatch),
-                None,
-            ));
+            self.termination = Some(Termination::SizeMismatch);
+            return Ok((ended(state, x, f64::INFINITY, self.termination), None));
         }
         let linearisation = problem.problem("linearise_count", |o| Ok(o.linearise(&x)))?;
         let cost = linearisation.cost;
-        let termination = if cost.is_finite() {
+        self.termination = if cost.is_finite() {
             self.accept_linearisation(&x, linearisation)
         } else {
             Some(Termination::OutsideDomainAtStart)
         };
-        if termination.is_none() {
+        if self.termination.is_none() {
             self.prepare(&x);
         }
-        let state = state.param(x).cost(cost);
-        Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), None))
+        Ok((ended(state, x, cost, self.termination), None))
     }
 
     fn next_iter(
@@ -421,7 +425,7 @@ impl<O: Objective, S: Subproblem> Solver<O, State> for TrustRegion<S> {
                 self.prepare(&x);
             }
         }
-        let state = state.param(x).cost(cost);
-        Ok((termination.into_iter().fold(state, |state, t| self.stop(state, t)), Some(log)))
+        self.termination = termination;
+        Ok((ended(state, x, cost, termination), Some(log)))
     }
 }

@@ -70,11 +70,6 @@ pub struct Formula {
 }
 
 impl Formula {
-    /// Returns the expression.
-    pub fn expression(&self) -> &Expression {
-        &self.expression
-    }
-
     /// Returns the value of a quantity in a pose.
     fn quantity(&self, quantity: Quantity, setup: &PoseView) -> f64 {
         let side = |joint: usize| {
