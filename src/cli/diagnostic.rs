@@ -6,8 +6,8 @@ use std::io::Write as _;
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use flexcal::design::DesignError;
 use flexcal::error::{
-    InputError, InputErrorKind, Location, Warning, mask_hidden, message_with_causes, mistake,
-    one_line,
+    InputError, InputErrorKind, Location, TableErrorKind, Warning, mask_hidden,
+    message_with_causes, mistake, one_line,
 };
 use flexcal::fit::{Finding, FindingCode, Identification};
 use flexcal::report;
@@ -30,7 +30,8 @@ pub fn print(error: &(dyn Error + 'static)) {
 
 /// Adds the argument that avoids a mistake in the input.
 fn with_argument(error: &InputError) -> Option<String> {
-    matches!(*error.kind, InputErrorKind::NoDataFiles).then(|| format!("{error} or with --data"))
+    matches!(*error.kind, InputErrorKind::Table(TableErrorKind::NoDataFiles))
+        .then(|| format!("{error} or with --data"))
 }
 
 /// Describes an error of a design by the arguments that cause it.

@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use super::NoRows;
-use super::near::{instead, meant, question};
-use super::phrases::{difference, in_quotes, list, near, plural};
+use super::near::{instead, meant};
+use super::phrases::{list, near, plural};
 use super::study::StudyErrorKind;
+use super::table::TableErrorKind;
 use super::urdf::UrdfErrorKind;
 
 /// Kind of an input error.
@@ -379,6 +380,8 @@ pub enum InputErrorKind {
     NoSessions { session: String },
 
     #[error(transparent)]
+    Table(#[from] TableErrorKind),
+    #[error(transparent)]
     Study(#[from] StudyErrorKind),
     #[error(transparent)]
     Urdf(#[from] UrdfErrorKind),
@@ -406,101 +409,4 @@ pub enum InputErrorKind {
         list("is", sessions, "is no column session")
     )]
     UnknownSession { session: String, sessions: Vec<String> },
-
-    // Errors of measurement tables.
-    #[error("no measurements; name them in `files`")]
-    NoDataFiles,
-    #[error("{} is named twice; its rows would count twice", path.display())]
-    RepeatedFile { path: PathBuf },
-    #[error("several joints are called \"{name}\"; write {}", write.join(" and "))]
-    SharedJointName { name: String, write: Vec<String> },
-    #[error("named twice on the command line; its rows would count twice")]
-    GivenFileRepeated,
-    #[error("the file is empty; it begins with a header line such as q1_deg,x_mm,y_mm,z_mm")]
-    EmptyTable,
-    #[error(
-        "the pose {name} is already on line {line}; give each pose of the joint table its own name"
-    )]
-    RepeatedPose { name: String, line: usize },
-    #[error(
-        "no row of the measurements has a partner in the joint table; check the column of the \
-         join (pose or time) and \
-         tolerance_s"
-    )]
-    NothingJoined,
-    #[error("no rows below the header")]
-    NoRowsBelowHeader,
-    #[error("an Excel workbook; save its sheet as CSV")]
-    Workbook,
-    #[error(
-        "the columns are separated by {found:?}; write delimiter = \"{found}\" in [data.format]"
-    )]
-    OtherDelimiter { found: char },
-    #[error("a decimal comma needs another delimiter than the comma; write delimiter = \";\"")]
-    DecimalDelimiter,
-    #[error("{} has no such column{}; {}", file.display(), meant(name, known), in_quotes(known))]
-    NoSuchColumn { file: PathBuf, name: String, known: Vec<String> },
-    #[error(
-        "{} has several columns with this name; select one by its place, as in \"#{place}\"",
-        file.display()
-    )]
-    AmbiguousColumn { file: PathBuf, place: usize },
-    #[error("the table has another column {name} and lacks {write}; is {write} meant here?")]
-    MappedNameTaken { name: String, write: String },
-    #[error("not a column of flexcal{}", question(meant.as_deref()))]
-    UnknownMeaning { meant: Option<String> },
-    #[error(
-        "every row has the position that marks missing measurements; check missing in [data.format]"
-    )]
-    AllMissing,
-    #[error(
-        "qx, qy, qz, qw are not a rotation, because their squares do not add up to 1; check the \
-         columns"
-    )]
-    NotAQuaternion,
-    #[error(
-        "orientations are to be fitted, and the measurements contain none; add rx_deg, ry_deg, \
-         rz_deg or qx, qy, qz, qw"
-    )]
-    NoOrientation,
-    #[error(
-        "fitting orientations needs the standard deviation of positions; write \
-         position_sigma_mm too, or a column sigma_mm"
-    )]
-    NoPositionSigma,
-    #[error("\"{value}\" is neither a number nor a time such as 2024-05-31T14:03:20.5")]
-    NotATime { value: String },
-    #[error(
-        "\"{value}\" is not a number; if numbers have a decimal comma, write decimal = \",\" in \
-         [data.format]"
-    )]
-    DecimalComma { value: String },
-    #[error(
-        "\"{value}\" has a decimal point, and [data.format] says decimal = \",\"; write the \
-         number with a comma and without \
-         thousands separators, or correct decimal"
-    )]
-    DecimalPoint { value: String },
-    #[error("missing; add {write}{}", instead("column ", near.as_deref()))]
-    MissingColumn { write: String, near: Option<String> },
-    #[error("unknown column, one letter away from {meant}; write {meant}, or a less similar name")]
-    MistypedColumn { meant: String },
-    #[error("given already as column {first}; keep one of the two")]
-    RepeatedColumn { first: String },
-    #[error("{}; give every file the same columns", difference(other, *has))]
-    ColumnsDiffer { other: PathBuf, has: bool },
-    #[error("{found} values for {expected} rows")]
-    ColumnLength { expected: usize, found: usize },
-    #[error("the row has {found} fields, the header {expected}")]
-    RowLength { expected: usize, found: usize },
-    #[error("a quote is opened and not closed")]
-    OpenQuote,
-    #[error("the cell is empty")]
-    EmptyCell,
-    #[error("\"{value}\" is not a number")]
-    NotANumber { value: String },
-    #[error("{value} is not a direction; write -1, 0 or 1")]
-    NotADirection { value: f64 },
-    #[error("\"{word}\" is neither identification nor validation")]
-    UnknownSplit { word: String },
 }

@@ -7,6 +7,7 @@ mod no_rows;
 mod phrases;
 mod plain;
 mod study;
+mod table;
 mod urdf;
 mod warning;
 
@@ -20,6 +21,7 @@ pub(crate) use near::{nearest, one_typo};
 pub(crate) use no_rows::NoRows;
 pub(crate) use plain::{escape_hidden, mask_hidden, one_line};
 pub(crate) use study::StudyErrorKind;
+pub(crate) use table::TableErrorKind;
 pub(crate) use urdf::UrdfErrorKind;
 pub use warning::WarningKind;
 // Public for the tests, the benches and the Python module only.

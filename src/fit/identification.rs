@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::error::InputErrorKind;
+use crate::error::{InputErrorKind, TableErrorKind};
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::finding::{Finding, FindingCode};
 use crate::fit::checks::fitted_rows::influential_finding;
@@ -66,10 +66,10 @@ fn check_data(
     if problem.data.fits_orientation {
         let error = |kind| IdentifyError::from(problem.data.location.clone().error(kind));
         if measurements.orientations.is_none() {
-            return Err(error(InputErrorKind::NoOrientation));
+            return Err(error(TableErrorKind::NoOrientation));
         }
         if problem.data.position_sigma.is_none() && !measurements.has_sigma_in_every_row() {
-            return Err(error(InputErrorKind::NoPositionSigma));
+            return Err(error(TableErrorKind::NoPositionSigma));
         }
     }
     check_columns(problem, measurements)?;

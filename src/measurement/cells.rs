@@ -2,7 +2,7 @@
 
 use super::columns::Column;
 use super::table::{Table, shortened};
-use crate::error::{InputError, InputErrorKind};
+use crate::error::{InputError, InputErrorKind, TableErrorKind};
 
 /// Returns a number above zero \[SI\].
 pub(super) fn above_zero(table: &Table, column: &Column) -> Result<f64, InputError> {
@@ -32,7 +32,7 @@ pub(super) fn direction(table: &Table, column: &Column) -> Result<f64, InputErro
     if [-1.0, 0.0, 1.0].contains(&value) {
         Ok(value)
     } else {
-        Err(table.cell_error(column.place, InputErrorKind::NotADirection { value }))
+        Err(table.cell_error(column.place, TableErrorKind::NotADirection { value }))
     }
 }
 
@@ -42,7 +42,7 @@ pub(super) fn is_validation(table: &Table, place: usize) -> Result<bool, InputEr
         "validation" => Ok(true),
         "identification" => Ok(false),
         word => {
-            Err(table.cell_error(place, InputErrorKind::UnknownSplit { word: shortened(word) }))
+            Err(table.cell_error(place, TableErrorKind::UnknownSplit { word: shortened(word) }))
         }
     }
 }

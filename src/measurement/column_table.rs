@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use super::Labels;
-use crate::error::{InputError, InputErrorKind, Location};
+use crate::error::{InputError, Location, TableErrorKind};
 
 /// Size of the text that is generated at a time [bytes].
 const CHUNK_BYTES: usize = 1 << 15;
@@ -61,7 +61,7 @@ impl ColumnTable {
         let rows = columns.first().map_or(0, |(_, values)| values.len());
         for (column, values) in &columns {
             if values.len() != rows {
-                let kind = InputErrorKind::ColumnLength { expected: rows, found: values.len() };
+                let kind = TableErrorKind::ColumnLength { expected: rows, found: values.len() };
                 return Err(Location::file(name).with_key(format!("column {column}")).error(kind));
             }
         }

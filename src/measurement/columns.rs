@@ -7,7 +7,7 @@ use super::mapped::{Names, no_such};
 use super::meaning::{Meaning, Numbering, affects_results, split_unit, unit_of, word_of_row};
 use super::role::{POINT, POSITION, Role, is_declared};
 use super::table::Table;
-use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind, nearest, one_typo};
+use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind, nearest, one_typo};
 use crate::observation::{Field, Kind, kinds};
 use crate::problem::{ColumnRule, HeldOut, JointSource, Problem};
 use crate::quantity::Unit;
@@ -62,13 +62,13 @@ impl Columns {
         let (mut shifted, mut hidden) = (None, None);
         for (place, name, rule) in named.mapped_first() {
             let location = || rule.map_or_else(|| table.column(name), |rule| rule.location.clone());
-            let error = |kind| location().error(kind);
+            let error = |kind: InputErrorKind| location().error(kind);
             let covariate = problem.data.covariates.iter().position(|known| known.name == name);
             let foreign = named.mapped && rule.is_none() && covariate.is_none();
             let called = display_name(name, table.header.get(place));
             let first = names.insert(name, called.clone()).filter(|_| !name.is_empty() && !foreign);
             if let Some(first) = first {
-                return Err(error(InputErrorKind::RepeatedColumn { first }));
+                return Err(error(TableErrorKind::RepeatedColumn { first }.into()));
             }
             let is_marked = marked_name == Some(name);
             if is_marked {
@@ -96,7 +96,7 @@ impl Columns {
                 }
                 Meaning::Read(role, to_si) => {
                     if let Some((first, _)) = found.insert(role, (called, rule)) {
-                        return Err(error(InputErrorKind::RepeatedColumn { first }));
+                        return Err(error(TableErrorKind::RepeatedColumn { first }.into()));
                     }
                     columns.read.push(Column { role, place, to_si });
                 }
@@ -104,15 +104,17 @@ impl Columns {
                 // If another name is misspelt, numbers count the joints differently.
                 Meaning::Ignored(WarningKind::JointIgnored { .. }) if rule.is_some() => {
                     let meant = numbering.meant(name, &present, problem);
-                    shifted =
-                        shifted.or_else(|| Some(error(InputErrorKind::UnknownMeaning { meant })));
+                    shifted = shifted
+                        .or_else(|| Some(error(TableErrorKind::UnknownMeaning { meant }.into())));
                 }
                 Meaning::Ignored(WarningKind::UnitIgnored { write }) if rule.is_some() => {
-                    return Err(error(InputErrorKind::UnknownMeaning { meant: Some(write) }));
+                    return Err(error(
+                        TableErrorKind::UnknownMeaning { meant: Some(write) }.into(),
+                    ));
                 }
                 Meaning::Ignored(_) | Meaning::Unknown if rule.is_some() => {
                     let meant = numbering.meant(name, &present, problem);
-                    return Err(error(InputErrorKind::UnknownMeaning { meant }));
+                    return Err(error(TableErrorKind::UnknownMeaning { meant }.into()));
                 }
                 Meaning::Ignored(kind) => warnings.push(Warning { location: location(), kind }),
                 Meaning::Unknown if foreign => {
@@ -129,7 +131,9 @@ impl Columns {
                         .filter(|meant| affects_results(meant) && one_typo(name, meant))
                     {
                         mistyped = mistyped.or_else(|| {
-                            Some(error(InputErrorKind::MistypedColumn { meant: meant.clone() }))
+                            Some(error(
+                                TableErrorKind::MistypedColumn { meant: meant.clone() }.into(),
+                            ))
                         });
                     }
                     let kind = WarningKind::ColumnIgnored { meant };
@@ -158,7 +162,12 @@ impl Columns {
         let required = columns.require(table, problem, measured, &numbering, &unknown);
         required.map_err(|error| match (hidden, named.unused) {
             (Some(hidden), _) => blame_rule(error, hidden),
-            (None, Some(rule)) if matches!(*error.kind, InputErrorKind::MissingColumn { .. }) => {
+            (None, Some(rule))
+                if matches!(
+                    *error.kind,
+                    InputErrorKind::Table(TableErrorKind::MissingColumn { .. })
+                ) =>
+            {
                 no_such(rule, table)
             }
             _ => error,
@@ -193,7 +202,7 @@ impl Columns {
             let near =
                 bases.iter().flat_map(|base| unit.spellings(base)).find_map(|name| near(&name));
             let first = bases.first().copied().unwrap_or_default();
-            Err(table.column(first).error(InputErrorKind::MissingColumn { write, near }))
+            Err(table.column(first).error(TableErrorKind::MissingColumn { write, near }))
         };
         let (source, suffix): (fn(usize) -> Role, _) = match problem.data.joints {
             JointSource::Commanded => (Role::Joint, ""),
@@ -218,7 +227,7 @@ impl Columns {
                     let (name, write) = (joint.name.clone(), write.collect());
                     return Err(table
                         .column(column)
-                        .error(InputErrorKind::SharedJointName { name, write }));
+                        .error(TableErrorKind::SharedJointName { name, write }));
                 }
                 let usable = |name: &&str| suffix.is_empty() && !name.contains(' ') && !is_shared;
                 let named = Some(joint.name.as_str()).filter(usable);
@@ -237,7 +246,7 @@ impl Columns {
                     format!("it, or take it out of [data.covariates] in {}", covariate.location);
                 return Err(table
                     .column(&covariate.name)
-                    .error(InputErrorKind::MissingColumn { write, near: near(&covariate.name) }));
+                    .error(TableErrorKind::MissingColumn { write, near: near(&covariate.name) }));
             }
         }
         let has_field = |field: &&Field| self.has(Role::Field(field.name));
@@ -258,7 +267,7 @@ impl Columns {
                 });
                 return Err(table
                     .column(&write)
-                    .error(InputErrorKind::MissingColumn { near: near(&write), write }));
+                    .error(TableErrorKind::MissingColumn { near: near(&write), write }));
             }
         }
         // A single coordinate is no position.
@@ -281,7 +290,7 @@ impl Columns {
         if let (true, true) = self.orientations() {
             return Err(table
                 .column("qx")
-                .error(InputErrorKind::RepeatedColumn { first: "rx".to_owned() }));
+                .error(TableErrorKind::RepeatedColumn { first: "rx".to_owned() }));
         }
         self.require_marked(table, problem, measured, near)
     }
@@ -300,7 +309,7 @@ impl Columns {
             let write = format!("it, or change held_out in {}", problem.data.held_out_location);
             return Err(table
                 .column(name)
-                .error(InputErrorKind::MissingColumn { write, near: near(name) }));
+                .error(TableErrorKind::MissingColumn { write, near: near(name) }));
         }
         Ok(())
     }
@@ -387,10 +396,10 @@ fn display_name(name: &str, theirs: Option<&String>) -> String {
 /// the rule is the cause.
 fn blame_rule(error: InputError, (rule, name): (&ColumnRule, &str)) -> InputError {
     match *error.kind {
-        InputErrorKind::MissingColumn { write, .. } => rule
+        InputErrorKind::Table(TableErrorKind::MissingColumn { write, .. }) => rule
             .location
             .clone()
-            .error(InputErrorKind::MappedNameTaken { name: name.to_owned(), write }),
+            .error(TableErrorKind::MappedNameTaken { name: name.to_owned(), write }),
         kind => error.location.error(kind),
     }
 }

@@ -8,7 +8,7 @@ use csv::ByteRecord;
 use super::cell_style::CellStyle;
 use super::mapped::Names;
 use super::table::Table;
-use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
+use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
 use crate::problem::{Dialect, JoinRule, JointLog, Problem};
 use crate::quantity::Unit;
 
@@ -85,7 +85,7 @@ impl JoinedLog {
         by_time.sort_by(|a, b| time(a).total_cmp(&time(b)));
         joined.by_time = by_time;
         if joined.rows.is_empty() {
-            return Err(log.location.clone().error(InputErrorKind::NoDataFiles));
+            return Err(log.location.clone().error(TableErrorKind::NoDataFiles));
         }
         Ok(joined)
     }
@@ -100,7 +100,7 @@ impl JoinedLog {
             let first = self.rows.first().map(|row| row.file.clone()).unwrap_or_default();
             let different = |name: &&String| !self.header.contains(*name);
             let name = table.header.iter().find(different);
-            let kind = InputErrorKind::ColumnsDiffer { other: first, has: false };
+            let kind = TableErrorKind::ColumnsDiffer { other: first, has: false };
             return Err(table.column(name.map_or("", String::as_str)).error(kind));
         }
         let key = self.find_key(&table, &self.names)?;
@@ -112,7 +112,7 @@ impl JoinedLog {
                     let name = table.name(key.place)?.to_owned();
                     if let Some(&first) = self.of_name.get(&name) {
                         let line = self.rows.get(first).map_or(0, |row| row.line);
-                        let kind = InputErrorKind::RepeatedPose { name, line };
+                        let kind = TableErrorKind::RepeatedPose { name, line };
                         return Err(table.cell_error(key.place, kind));
                     }
                     self.of_name.insert(name, self.rows.len());
@@ -143,7 +143,7 @@ impl JoinedLog {
                 (with_unit.or_else(date), "time_s or time")
             }
         };
-        let kind = InputErrorKind::MissingColumn { write: write.to_owned(), near: None };
+        let kind = TableErrorKind::MissingColumn { write: write.to_owned(), near: None };
         key.map(Some).ok_or_else(|| table.column(write).error(kind))
     }
 
@@ -217,7 +217,7 @@ impl JoinedLog {
     /// No row has a partner.
     pub fn warnings(&self) -> Result<Vec<Warning>, InputError> {
         if self.paired == 0 && self.requested > 0 {
-            return Err(self.location.clone().error(InputErrorKind::NothingJoined));
+            return Err(self.location.clone().error(TableErrorKind::NothingJoined));
         }
         let unused = self.rows.iter().filter(|row| !row.is_used);
         let unused: Vec<Location> = match self.rule {

@@ -1,7 +1,7 @@
 //! Names of a table's columns after the map of `[data.columns]`.
 
 use super::table::Table;
-use crate::error::{InputError, InputErrorKind};
+use crate::error::{InputError, TableErrorKind};
 use crate::problem::{ColumnRule, ColumnSelector, Dialect};
 
 /// Names of a table's columns.
@@ -59,7 +59,7 @@ impl<'a> Names<'a> {
             };
             if let Some(first) = entry.1 {
                 let first = first.ours.clone();
-                return Err(rule.location.clone().error(InputErrorKind::RepeatedColumn { first }));
+                return Err(rule.location.clone().error(TableErrorKind::RepeatedColumn { first }));
             }
             *entry = (rule.ours.as_str(), Some(rule));
         }
@@ -102,7 +102,7 @@ fn only_place(rule: &ColumnRule, name: &str, table: &Table) -> Result<Option<usi
         Some(other) => Err(rule
             .location
             .clone()
-            .error(InputErrorKind::AmbiguousColumn { file: table.file.clone(), place: other + 1 })),
+            .error(TableErrorKind::AmbiguousColumn { file: table.file.clone(), place: other + 1 })),
         None => Ok(first),
     }
 }
@@ -114,7 +114,7 @@ pub(super) fn no_such(rule: &ColumnRule, table: &Table) -> InputError {
         ColumnSelector::Place(place) => format!("#{place}"),
         ColumnSelector::File => "#file".to_owned(),
     };
-    rule.location.clone().error(InputErrorKind::NoSuchColumn {
+    rule.location.clone().error(TableErrorKind::NoSuchColumn {
         file: table.file.clone(),
         name,
         known: table.header.clone(),

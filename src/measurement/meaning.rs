@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::convert::identity;
 
 use super::role::{POINT, Role, columns_with_unit, columns_without_unit};
-use crate::error::{InputErrorKind, WarningKind, nearest};
+use crate::error::{InputErrorKind, TableErrorKind, WarningKind, nearest};
 use crate::problem::{Joint, JointKind, Problem};
 use crate::quantity::Unit;
 
@@ -156,7 +156,7 @@ impl Numbering {
 pub(super) fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
     match role {
         Role::Session | Role::Target | POINT => Ok(role),
-        _ => Err(InputErrorKind::UnknownMeaning { meant: Some("session".to_owned()) }),
+        _ => Err(TableErrorKind::UnknownMeaning { meant: Some("session".to_owned()) }.into()),
     }
 }
 

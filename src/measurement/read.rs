@@ -10,7 +10,7 @@ use super::role::{POINT, POSITION, Role};
 use super::rows::RowsBuilder;
 use super::table::Table;
 use super::{ColumnTable, Measurements};
-use crate::error::{InputError, InputErrorKind, Location, Warning, WarningKind};
+use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind};
 use crate::files::same_file;
 use crate::problem::{Missing, Problem};
 
@@ -66,11 +66,11 @@ impl Measurements {
         let mut tables = Tables::new(files, problem, measured);
         for (index, file) in files.iter().enumerate() {
             if files.iter().take(index).any(|other| other == file || same_file(other, file)) {
-                let again = InputErrorKind::RepeatedFile { path: file.clone() };
+                let again = TableErrorKind::RepeatedFile { path: file.clone() };
                 return Err(file_error(
                     (file, files),
                     problem,
-                    [again, InputErrorKind::GivenFileRepeated],
+                    [again, TableErrorKind::GivenFileRepeated],
                 ));
             }
             let missing = || {
@@ -130,7 +130,7 @@ impl<'a> Tables<'a> {
             let line = table.line();
             return Err(Location::file(&table.file)
                 .at_line(line)
-                .error(InputErrorKind::NoRowsBelowHeader));
+                .error(TableErrorKind::NoRowsBelowHeader));
         }
         columns.settle_time(&table, &mut self.warnings)?;
         let rows = self
@@ -183,7 +183,7 @@ impl<'a> Tables<'a> {
         }
         self.log = log;
         if rows.row_count() == before {
-            return Err(Location::file(&table.file).error(InputErrorKind::AllMissing));
+            return Err(Location::file(&table.file).error(TableErrorKind::AllMissing));
         }
         self.warnings.extend(left_out.warning());
         Ok(())
@@ -214,7 +214,7 @@ impl<'a> Tables<'a> {
                 measurements.warnings.clone_from(&warnings);
                 Ok((measurements, warnings))
             }
-            None => Err(problem.data.files_location.clone().error(InputErrorKind::NoDataFiles)),
+            None => Err(problem.data.files_location.clone().error(TableErrorKind::NoDataFiles)),
         }
     }
 }
@@ -276,7 +276,7 @@ fn commands(columns: &[(Column, String)]) -> Vec<Commands<'_>> {
 fn file_error(
     (file, files): (&Path, &[PathBuf]),
     problem: &Problem,
-    [named, given]: [InputErrorKind; 2],
+    [named, given]: [impl Into<InputErrorKind>; 2],
 ) -> InputError {
     if problem.data.files == files {
         problem.data.files_location.clone().error(named)

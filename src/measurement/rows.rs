@@ -12,7 +12,7 @@ use super::orientation::Cells;
 use super::role::{POSITION, Role, is_declared};
 use super::table::Table;
 use super::{CommandColumn, Labels, Measurements, NestReading, RowOrder};
-use crate::error::{InputError, InputErrorKind};
+use crate::error::{InputError, TableErrorKind};
 use crate::observation::{Content, Needs, kinds};
 use crate::problem::{JointSource, Problem, RotationKind};
 use crate::quantity::Unit;
@@ -117,7 +117,7 @@ impl RowsBuilder {
     pub fn same_columns(&self, table: &Table, columns: &Columns) -> Result<(), InputError> {
         let differ = |name: &str, has| {
             let other = self.measurements.files.first().cloned().unwrap_or_default();
-            Err(table.column(name).error(InputErrorKind::ColumnsDiffer { other, has }))
+            Err(table.column(name).error(TableErrorKind::ColumnsDiffer { other, has }))
         };
         let of_observed = |role: Role| {
             role.is_observed()
@@ -287,7 +287,7 @@ impl RowsBuilder {
                 (true, _) => turned.of_angles(self.rotation),
                 _ => turned
                     .of_quaternion()
-                    .ok_or_else(|| table.error(InputErrorKind::NotAQuaternion))?,
+                    .ok_or_else(|| table.error(TableErrorKind::NotAQuaternion))?,
             });
         }
         self.poses.push(pose);

@@ -3,7 +3,7 @@
 use super::columns::{Column, Columns};
 use super::role::Role;
 use super::table::{Table, shortened};
-use crate::error::{InputError, InputErrorKind, Warning, WarningKind};
+use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
 use crate::quantity::Unit;
 
 impl Columns {
@@ -30,7 +30,7 @@ impl Columns {
                 return Err(table
                     .column(theirs)
                     .at_line(table.line())
-                    .error(InputErrorKind::NotATime { value }));
+                    .error(TableErrorKind::NotATime { value }));
             }
             let write = Unit::Time.alternatives("time");
             let kind = if is_number {

@@ -11,7 +11,8 @@ use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
 use super::lines::{Lines, MAX_RECORD_KIB};
 use super::time::date_time;
 use crate::error::{
-    BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, is_hidden, lines,
+    BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, TableErrorKind, is_hidden,
+    lines,
 };
 use crate::files::{open, unescape_cell};
 use crate::problem::Dialect;
@@ -67,7 +68,7 @@ impl Table {
         let mut beginning = Vec::new();
         input.by_ref().take(HEADER_SEARCH_BYTES).read_to_end(&mut beginning).map_err(unreadable)?;
         if beginning.starts_with(WORKBOOK_SIGNATURE) {
-            return Err(Location::file(file).error(InputErrorKind::Workbook));
+            return Err(Location::file(file).error(TableErrorKind::Workbook));
         }
         let layout = Layout::detect(&beginning, dialect);
         let lines =
@@ -92,7 +93,7 @@ impl Table {
             partner: None,
         };
         if !table.advance()? {
-            return Err(Location::file(file).at_line(1).error(InputErrorKind::EmptyTable));
+            return Err(Location::file(file).at_line(1).error(TableErrorKind::EmptyTable));
         }
         table.header_line = table.line;
         let header_error = |kind| Location::file(file).at_line(table.line).error(kind);
@@ -119,7 +120,7 @@ impl Table {
         if let [only] = table.header.as_slice()
             && let Some(found) = only.chars().find(|c| ";\t|".contains(*c))
         {
-            return Err(table.error(InputErrorKind::OtherDelimiter { found }));
+            return Err(table.error(TableErrorKind::OtherDelimiter { found }));
         }
         Ok(table)
     }
@@ -132,7 +133,7 @@ impl Table {
         let expected = self.appended.map_or(self.header.len(), |(_, own_cells)| own_cells);
         if self.record.len() != expected {
             let found = self.record.len();
-            return Err(self.error(InputErrorKind::RowLength { expected, found }));
+            return Err(self.error(TableErrorKind::RowLength { expected, found }));
         }
         if !self.record.as_slice().is_ascii() {
             for place in 0..self.record.len() {
@@ -161,7 +162,7 @@ impl Table {
                 self.line = first;
                 return Err(Location::file(&self.file)
                     .at_line(first)
-                    .error(InputErrorKind::OpenQuote));
+                    .error(TableErrorKind::OpenQuote));
             }
         }
         Ok(found)
@@ -224,7 +225,7 @@ impl Table {
     pub fn word(&self, place: usize) -> Result<&str, InputError> {
         let word = self.text(place)?;
         if word.is_empty() {
-            Err(self.cell_error(place, InputErrorKind::EmptyCell))
+            Err(self.cell_error(place, TableErrorKind::EmptyCell))
         } else {
             Ok(word)
         }
@@ -247,7 +248,7 @@ impl Table {
         let value = || shortened(word);
         let CellStyle { delimiter, decimal_comma } = self.style_of(place);
         if decimal_comma && delimiter != ',' && word.contains('.') {
-            return Err(self.cell_error(place, InputErrorKind::DecimalPoint { value: value() }));
+            return Err(self.cell_error(place, TableErrorKind::DecimalPoint { value: value() }));
         }
         let with_point = (decimal_comma && word.contains(',')).then(|| word.replace(',', "."));
         match with_point.as_deref().unwrap_or(word).parse::<f64>() {
@@ -257,9 +258,9 @@ impl Table {
             }
             Ok(_) => Err(self.cell_error(place, InputErrorKind::NotFinite { value: value() })),
             Err(_) if word.contains(',') && !decimal_comma => {
-                Err(self.cell_error(place, InputErrorKind::DecimalComma { value: value() }))
+                Err(self.cell_error(place, TableErrorKind::DecimalComma { value: value() }))
             }
-            Err(_) => Err(self.cell_error(place, InputErrorKind::NotANumber { value: value() })),
+            Err(_) => Err(self.cell_error(place, TableErrorKind::NotANumber { value: value() })),
         }
     }
 
@@ -270,11 +271,11 @@ impl Table {
         match date_time(word) {
             Some(seconds) => Ok(seconds),
             None if word.bytes().filter(|byte| b"-:T".contains(byte)).count() > 1 => {
-                Err(self.cell_error(place, InputErrorKind::NotATime { value: shortened(word) }))
+                Err(self.cell_error(place, TableErrorKind::NotATime { value: shortened(word) }))
             }
             None => match self.number(place).map(to_si) {
                 Ok(seconds) if !seconds.is_finite() => {
-                    Err(self.cell_error(place, InputErrorKind::NotATime { value: shortened(word) }))
+                    Err(self.cell_error(place, TableErrorKind::NotATime { value: shortened(word) }))
                 }
                 other => other,
             },
@@ -292,7 +293,7 @@ impl Table {
     }
 
     /// Returns an error in a cell of the row.
-    pub fn cell_error(&self, place: usize, kind: InputErrorKind) -> InputError {
+    pub fn cell_error(&self, place: usize, kind: impl Into<InputErrorKind>) -> InputError {
         let name = self.name_of(place);
         self.location(Some(place)).with_key(format!("column {}", shortened(name))).error(kind)
     }
@@ -305,7 +306,7 @@ impl Table {
     }
 
     /// Returns an error about the whole row.
-    pub fn error(&self, kind: InputErrorKind) -> InputError {
+    pub fn error(&self, kind: impl Into<InputErrorKind>) -> InputError {
         self.location(None).error(kind)
     }
 

@@ -1,7 +1,7 @@
 //! Reader of `[data.columns]` and `[data.format]`: tables in the format of other programs.
 
 use super::section::Section;
-use crate::error::{InputError, InputErrorKind, Location};
+use crate::error::{InputError, InputErrorKind, Location, TableErrorKind};
 
 /// Maximum number of columns in a map.
 const MAX_MAPPED_COLUMNS: usize = 10_000;
@@ -113,7 +113,7 @@ pub(super) fn read(data: &mut Section<'_, '_>) -> Result<Dialect, InputError> {
             .peek("decimal")
             .filter(|_| comma && dialect.delimiter == Some(Delimiter::Byte(b',')))
         {
-            return Err(item.error(InputErrorKind::DecimalDelimiter));
+            return Err(item.error(TableErrorKind::DecimalDelimiter));
         }
     }
     let kinds = [RotationKind::Vector, RotationKind::EulerXyz, RotationKind::RollPitchYaw];
