@@ -8,7 +8,8 @@ use std::{env, fs};
 use flexcal::fit::Options;
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
-use flexcal::report::{self, PlotData};
+use flexcal::report;
+use flexcal::results::PlotData;
 use flexcal::select::close;
 
 fn main() -> Result<(), Box<dyn Error>> {

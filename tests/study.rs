@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use assert_cmd::Command;
 use flexcal::report;
-use flexcal::results::{Document as _, StudyResult};
+use flexcal::results::{Document as _, StudyResult, study_csv, study_parameters_csv};
 use flexcal::study::{Results, Shard, Store, Study, collect, pending, run};
 use serde_json::Value;
 
@@ -118,9 +118,9 @@ fn run_on(threads: usize, study: &Study, store: &Store, shard: Shard) {
 
 fn texts(study: &Study, results: &Results) -> [String; 3] {
     [
-        report::study_csv(study, results),
+        study_csv(study, results),
         StudyResult::new(study, results).to_json(),
-        report::study_parameters_csv(study, results),
+        study_parameters_csv(study, results),
     ]
 }
 

@@ -10,7 +10,7 @@ use flexcal::fit::Progress;
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::problem::{PoseRanges, Problem as Declared};
 use flexcal::report;
-use flexcal::results::{CheckResult, Document as _, PlanResult};
+use flexcal::results::{CheckResult, Document as _, PlanResult, poses_csv};
 use flexcal::rig::Truth;
 use pyo3::prelude::*;
 
@@ -70,7 +70,7 @@ impl Plan {
 
     /// plan.csv.
     fn csv(&self) -> String {
-        report::poses_csv(&self.problem, &self.found.poses)
+        poses_csv(&self.problem, &self.found.poses)
     }
 
     /// Whether the poses decide what poses can decide.

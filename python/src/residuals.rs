@@ -3,7 +3,7 @@
 use flexcal::fit::Residual;
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
-use flexcal::report::{Column, residual_columns};
+use flexcal::results::{Column, residual_columns};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

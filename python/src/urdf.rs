@@ -7,8 +7,8 @@ use flexcal::fit::{Identification, Placement};
 use flexcal::measurement::Dataset;
 use flexcal::model::Model;
 use flexcal::problem::Problem;
-use flexcal::report::{self, ExportErrors, Exported};
-use flexcal::results::Document as _;
+use flexcal::report;
+use flexcal::results::{Document as _, ExportResult, ExportedErrors};
 use flexcal::urdf::{Chain, Robot, export};
 use pyo3::prelude::*;
 
@@ -50,10 +50,9 @@ impl Export {
             found.strategy.model(Model::new(problem, &placement.bases, &placement.targets)?);
         let arm = model.arm(|k| found.x.get(k).copied().unwrap_or(0.0));
         let moved = export(&chain, problem, &arm)?;
-        let errors = Some(ExportErrors::of(&model, &found.x, data, None));
-        let exported =
-            Exported { problem, model: &model, file: None, moved: Some(&moved.moved), errors };
-        let (json, summary) = (exported.result().to_json(), report::export_text(&exported));
+        let errors = Some(ExportedErrors::of(&model, &found.x, data, None));
+        let result = ExportResult::new(problem, &model, None, Some(&moved.moved), errors);
+        let (json, summary) = (result.to_json(), report::export_text(&result));
         Ok(Self { text: moved.text, json, summary })
     }
 }

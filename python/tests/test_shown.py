@@ -55,6 +55,16 @@ def test_pages(lunar: flexcal.Problem, identified: flexcal.Identification, close
         assert shown.summary() == str(shown) and "lunar-sampler" in repr(shown)
 
 
+def test_verdict_and_statuses(closed: flexcal.ClosedLoop) -> None:
+    text, page = " ".join(closed.summary().split()), Tags(closed._repr_html_()).text
+    verdicts = {"explained": "Explained: ", "unexplained": "Unexplained: ", "nothing-found": "Nothing found: "}
+    assert [verdict for verdict, words in verdicts.items() if words in text] == [closed.verdict]
+    assert closed.verdict in page
+    for status, description in zip(closed.effects["status"], closed.effects["description"], strict=True):
+        assert f"{status}: {description}" in text
+        assert status in page and description in page
+
+
 def test_designs(lunar: flexcal.Problem) -> None:
     check = lunar.check()
     assert check.suffices and len(check.parameters) == 32

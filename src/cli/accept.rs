@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use flexcal::files::{self, digest};
 use flexcal::fit::{self, Options, SolverChoice, Strategy};
-use flexcal::report::{self, AcceptanceRecord};
-use flexcal::results::Document as _;
+use flexcal::report;
+use flexcal::results::{AcceptanceRecord, AcceptanceResult, Document as _};
 
 use super::diagnostic;
 use super::input::{Common, Input};
@@ -47,12 +47,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         commit: commit(&file),
         instrument: arguments.instrument.clone(),
     };
-    let json =
-        report::acceptance_result(&problem, &data.measurements, &found, &judged, &record).to_json();
-    let page = report::acceptance_page(&problem, &data.measurements, &found, &judged, &record);
+    let result = AcceptanceResult::new(&problem, &data.measurements, &found, &judged, &record);
+    let (json, page) = (result.to_json(), report::acceptance_page(&problem, &result));
     results.write(&[("acceptance.json", &json), ("acceptance.html", &page)])?;
     common.tell(&json, || {
-        let text = report::acceptance_text(&problem, &judged);
+        let text = report::acceptance_text(&problem, &result);
         let page = results.path("acceptance.html");
         format!("{text}{}Next: print {} and sign it\n", results.written(), page.display())
     })?;

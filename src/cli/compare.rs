@@ -4,8 +4,8 @@ use std::error::Error;
 
 use clap::Args;
 use flexcal::fit::{self, CompareOptions};
-use flexcal::report::{self, PlotData};
-use flexcal::results::{ComparisonResult, Document as _};
+use flexcal::report;
+use flexcal::results::{ComparisonResult, Document as _, PlotData, exceeds_noise};
 
 use super::diagnostic;
 use super::input::{Common, Input};
@@ -41,7 +41,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     results.write_report(&[("compare.json", &json)], &told)?;
     common.tell(&json, || {
         let text = report::compare_text(&problem, &comparison);
-        let lacks = report::lacks_something(&comparison.joint);
+        let lacks = exceeds_noise(&comparison.joint);
         let (command, what) = if lacks {
             ("loop", "looks for what the model lacks")
         } else {

@@ -12,7 +12,7 @@ use flexcal::model::Model;
 use flexcal::problem::Problem;
 use flexcal::remainder::{self, Bounds};
 use flexcal::report::{self, shell_word};
-use flexcal::results::{CompensationResult, Document as _};
+use flexcal::results::{CompensationResult, Document as _, commands_csv};
 
 use super::diagnostic;
 use super::input::Common;
@@ -126,7 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         None => (fit::compensate(&problem, &model, &x, &sought)?, None),
     };
     let bounds = bounds.as_ref();
-    let table = report::commands_csv(&problem, &targets, &commands, bounds);
+    let table = commands_csv(&problem, &targets, &commands, bounds);
     results.write(&[("commands.csv", &table)])?;
     let mut result = CompensationResult::new(&problem, &commands);
     if let Some(bounds) = bounds {

@@ -8,8 +8,8 @@ use flexcal::fit::{Placement, SavedEstimate, check_columns};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
 use flexcal::problem::Problem;
-use flexcal::report::{self, ExportErrors, Exported, shell_word};
-use flexcal::results::Document as _;
+use flexcal::report::{self, shell_word};
+use flexcal::results::{Document as _, ExportResult, ExportedErrors};
 use flexcal::urdf::{Chain, Robot, YamlFormat, export, joint_origins, yaml};
 
 use super::diagnostic;
@@ -115,18 +115,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let errors = if at_hand { Some(errors(&problem, files, &estimates, flags)?) } else { None };
     results.write(&[(&name, &text)])?;
-    let exported = Exported {
-        problem: &problem,
-        model: &model,
-        file: Some(&path),
-        moved: moved.as_deref(),
-        errors,
-    };
-    flags.tell(&exported.result().to_json(), || {
+    let result = ExportResult::new(&problem, &model, Some(&path), moved.as_deref(), errors);
+    flags.tell(&result.to_json(), || {
         let [problem, estimate] = [&arguments.problem, &arguments.estimate].map(|path| shell_word(path));
         format!(
             "{}\nNext: flexcal predict {problem} --estimate {estimate} --data MEASURED.csv judges new measurements\n",
-            report::export_text(&exported)
+            report::export_text(&result)
         )
     })?;
     if !estimates.trusted {
@@ -141,7 +135,7 @@ fn errors(
     files: &[PathBuf],
     estimates: &SavedEstimate,
     flags: &Flags,
-) -> Result<ExportErrors, Box<dyn Error>> {
+) -> Result<ExportedErrors, Box<dyn Error>> {
     let (rows, warnings) = Measurements::read(files, problem)?;
     flags.warn(&warnings);
     check_columns(problem, &rows)?;
@@ -149,5 +143,5 @@ fn errors(
     let placement = Placement::of(&data.measurements);
     let model = estimates.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let x = estimates.vector(problem, &model)?;
-    Ok(ExportErrors::of(&model, &x, &data, Some(estimates)))
+    Ok(ExportedErrors::of(&model, &x, &data, Some(estimates)))
 }

@@ -6,8 +6,10 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use flexcal::fit::{self, IdentifyError, Options, SolverChoice, Strategy};
 use flexcal::remainder::{self, Correction, Fitted};
-use flexcal::report::{self, PlotData};
-use flexcal::results::{Document as _, IdentificationResult, REMAINDER_FILE};
+use flexcal::report;
+use flexcal::results::{
+    Document as _, IdentificationResult, PlotData, REMAINDER_FILE, residuals_csv,
+};
 
 use super::input::{Common, Input};
 use super::outcome::Outcome;
@@ -117,7 +119,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         Some(corrected) => corrected.rows.clone(),
         None => identification.residuals(&problem, &data)?,
     };
-    let residuals = report::residuals_csv(&problem, &data.measurements, &residuals);
+    let residuals = residuals_csv(&problem, &data.measurements, &residuals);
     let kept = fitted.as_ref().and_then(|own| own.remainder.as_ref());
     let file = kept.filter(|_| arguments.remainder).map(Correction::to_json);
     let mut texts = vec![("estimate.json", json.as_str()), ("residuals.csv", residuals.as_str())];

@@ -7,10 +7,10 @@ use std::{fs, io};
 use clap::Args;
 use flexcal::fit::Options;
 use flexcal::measurement::Dataset;
-use flexcal::problem::Problem;
+use flexcal::problem::{self, Problem};
 use flexcal::remainder::{self, Correction, Fitted};
-use flexcal::report::{self, PlotData};
-use flexcal::results::{Document as _, LoopResult, REMAINDER_FILE};
+use flexcal::report;
+use flexcal::results::{Document as _, LoopResult, PlotData, REMAINDER_FILE, residuals_csv};
 use flexcal::select::{self, ClosedLoop};
 
 use super::input::Common;
@@ -64,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let closed = report::closed_problem(&text, &problem, &closure, [&files, &joint_files])?;
     let fitted = fitted(&problem, &closed, &closure, &data)?;
     let kept = fitted.as_ref().and_then(|own| own.remainder.as_ref());
-    let closed = report::with_remainder(&closed, kept.map(|_| REMAINDER_FILE))?;
+    let closed = problem::with_remainder(&closed, kept.map(|_| REMAINDER_FILE))?;
     let mut result = LoopResult::new(&problem, &closure);
     if let Some(fitted) = &fitted {
         result = result.with_remainder(&closure, fitted);
@@ -74,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         Some(corrected) => corrected.rows.clone(),
         None => closure.after.residuals(&closure.closed, &data)?,
     };
-    let residuals = report::residuals_csv(&closure.closed, &data.measurements, &residuals);
+    let residuals = residuals_csv(&closure.closed, &data.measurements, &residuals);
     let file = kept.map(Correction::to_json);
     let mut texts = vec![
         ("loop.json", json.as_str()),

@@ -5,7 +5,7 @@ use std::path::Path;
 use flexcal::fit::{FindingCode, Identification};
 use flexcal::problem::{PoseRanges, Problem};
 use flexcal::report::{self, shell_word};
-use flexcal::results::{LoopResult, TraceResult};
+use flexcal::results::{LoopResult, TraceResult, exceeds_noise};
 use flexcal::select::Verdict;
 
 use super::input::Common;
@@ -50,7 +50,7 @@ pub fn after_fit(
             format!("flexcal plan {named} --poses N chooses poses to measure that tell more")
         }
         None if is_structured
-            || report::lacks_something(found)
+            || exceeds_noise(found)
             || found.has(FindingCode::HeldOutBeyondPrediction) =>
         {
             format!("flexcal loop {named} looks for what the model lacks")

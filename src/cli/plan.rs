@@ -11,7 +11,7 @@ use flexcal::measurement::Measurements;
 use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
 use flexcal::report::{self, shell_word};
-use flexcal::results::{Document as _, PlanResult};
+use flexcal::results::{Document as _, PlanResult, poses_csv};
 
 use super::diagnostic;
 use super::input::Common;
@@ -175,7 +175,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let criterion = separated.as_ref().map_or(&criterion, |separated| &separated.criterion);
     let json =
         PlanResult::new(&problem, criterion, source.seed, &plan, separated.as_ref()).to_json();
-    let table = report::poses_csv(&problem, &plan.poses);
+    let table = poses_csv(&problem, &plan.poses);
     results.write(&[("plan.csv", &table), ("plan.json", &json)])?;
     common.tell(&json, || {
         let text = report::plan_text(&problem, criterion, &plan, separated.as_ref());

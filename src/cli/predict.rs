@@ -9,7 +9,7 @@ use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::{HeldOut, Problem};
 use flexcal::remainder::{self, Bounds, CorrectedPrediction};
 use flexcal::report::{self, shell_word};
-use flexcal::results::{Document as _, PredictionErrors};
+use flexcal::results::{Document as _, PredictionErrors, predictions_csv, residuals_csv};
 
 use super::diagnostic;
 use super::input::Common;
@@ -71,13 +71,13 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         _ => (fit::predict(&problem, estimate.as_ref(), &rows, split.as_ref())?, None),
     };
     let bounds = bounds.as_ref();
-    let table = report::predictions_csv(&problem, &rows, &prediction, bounds);
+    let table = predictions_csv(&problem, &rows, &prediction, bounds);
     let mut texts = vec![("predictions.csv", table)];
     texts.extend(
         prediction
             .residuals
             .as_ref()
-            .map(|all| ("residuals.csv", report::residuals_csv(&problem, &rows, all))),
+            .map(|all| ("residuals.csv", residuals_csv(&problem, &rows, all))),
     );
     let residuals = prediction.residuals.as_deref().unwrap_or_default();
     let errors = prediction.errors.as_ref().map(|own| {

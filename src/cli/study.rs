@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use flexcal::files::{self, StagedFile};
 use flexcal::report::{self, shell_word};
-use flexcal::results::{Document as _, MisprintResult, StudyResult};
+use flexcal::results::{
+    Document as _, MisprintResult, StudyResult, study_csv, study_parameters_csv, study_timing_csv,
+};
 use flexcal::study::{self, CellResult, MisprintStudy, Request, Shard, Store, Study};
 
 use super::diagnostic;
@@ -205,9 +207,9 @@ fn finish(
     let json = StudyResult::new(study, &found).to_json();
     let texts = [
         (NAMES[0], json.as_str()),
-        (NAMES[1], &report::study_parameters_csv(study, &found)),
-        (NAMES[2], &report::study_timing_csv(study, &found)),
-        (NAMES[3], &report::study_csv(study, &found)),
+        (NAMES[1], &study_parameters_csv(study, &found)),
+        (NAMES[2], &study_timing_csv(study, &found)),
+        (NAMES[3], &study_csv(study, &found)),
     ];
     results.write(&texts)?;
     common.flags.tell(&json, || {

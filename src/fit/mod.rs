@@ -14,9 +14,7 @@ mod stages;
 mod uncertainty;
 mod warm_start;
 
-pub(crate) use apply::acceptance::{
-    Acceptance, AcceptancePose, Accuracy, acceptance, held_out_positions,
-};
+pub(crate) use apply::acceptance::{Acceptance, Accuracy, acceptance, held_out_positions};
 pub use apply::command_jacobian::jacobian;
 pub use apply::compensate::{Command, compensate};
 pub(crate) use apply::joint_source::{JointSources, joint_sources};

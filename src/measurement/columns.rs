@@ -7,7 +7,9 @@ use super::mapped::{Names, no_such};
 use super::meaning::{Meaning, Numbering, affects_results, split_unit, unit_of, word_of_row};
 use super::role::{POINT, POSITION, Role, is_declared};
 use super::table::Table;
-use crate::error::{InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind, nearest, one_typo};
+use crate::error::{
+    InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind, nearest, one_typo,
+};
 use crate::observation::{Field, Kind, kinds};
 use crate::problem::{ColumnRule, HeldOut, JointSource, Problem};
 use crate::quantity::Unit;

@@ -12,7 +12,7 @@ use super::orientation::Cells;
 use super::role::{POSITION, Role, is_declared};
 use super::table::Table;
 use super::{CommandColumn, Labels, Measurements, NestReading, RowOrder};
-use crate::error::{InputError, TableErrorKind};
+use crate::error::{InputError, InputErrorKind, TableErrorKind};
 use crate::observation::{Content, Needs, kinds};
 use crate::problem::{JointSource, Problem, RotationKind};
 use crate::quantity::Unit;

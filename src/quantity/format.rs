@@ -7,7 +7,7 @@ const HUGE: f64 = 1e12;
 const LEAST_P: f64 = 1e-16;
 
 /// Returns the decimals that show `error` with two significant digits, at most `most`.
-pub(super) fn decimals(error: f64, most: usize) -> usize {
+pub(crate) fn decimals(error: f64, most: usize) -> usize {
     if error <= 0.0 || !error.is_finite() {
         return most;
     }
@@ -22,18 +22,18 @@ pub(super) fn decimals(error: f64, most: usize) -> usize {
 }
 
 /// Formats `value` with two significant digits and at most `most` decimals.
-pub(super) fn two_digits(value: f64, most: usize) -> String {
+pub(crate) fn two_digits(value: f64, most: usize) -> String {
     number(value, decimals(value, most))
 }
 
 /// Formats `value` with about three significant digits and at most four decimals.
-pub(super) fn about_three_digits(value: f64) -> String {
+pub(crate) fn about_three_digits(value: f64) -> String {
     number(value, (decimals(value, 4) + 1).min(4))
 }
 
 /// Formats `value` with `decimals`, never as "-0"; huge values as `1.234e300`, and values that are
 /// not finite as "–".
-pub(super) fn number(value: f64, decimals: usize) -> String {
+pub(crate) fn number(value: f64, decimals: usize) -> String {
     match value.abs() {
         size if size < HUGE => fixed(value, decimals),
         size if size.is_finite() => format!("{value:.3e}"),
@@ -43,7 +43,7 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
 
 /// Formats `value` with `decimals` for tables that programs read, never as "-0"; empty if it is not
 /// finite.
-pub(super) fn fixed(value: f64, decimals: usize) -> String {
+pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return String::new();
     }
@@ -55,22 +55,22 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
 }
 
 /// Formats a count with its noun: "1 pose", "3 poses".
-pub(super) fn counted(n: usize, noun: &str) -> String {
+pub(crate) fn counted(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
 /// Formats a length \[m\] in mm with `decimals`.
-pub(super) fn mm(length: f64, decimals: usize) -> String {
+pub(crate) fn mm(length: f64, decimals: usize) -> String {
     number(length * 1e3, decimals)
 }
 
 /// Formats a value by `words`, or returns "–" if there is none.
-pub(super) fn or_dash<T>(value: Option<T>, words: impl FnOnce(T) -> String) -> String {
+pub(crate) fn or_dash<T>(value: Option<T>, words: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| "–".to_owned(), words)
 }
 
 /// Formats a p-value: `0.003`, `2e-9`, `below 1e-16`.
-pub(super) fn p_value(p: f64) -> String {
+pub(crate) fn p_value(p: f64) -> String {
     match p {
         p if p < LEAST_P => "below 1e-16".to_owned(),
         p if p < 1e-3 => format!("{p:.0e}"),

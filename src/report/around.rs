@@ -2,8 +2,8 @@
 
 use super::document::{Block, Table};
 use super::errors::{measure, shown};
-use super::quantity::{mm, number};
 use crate::fit::{ErrorSummary, Identification, PointSpread};
+use crate::quantity::format::{mm, number};
 
 /// Returns tables of errors by kind of rows, if there are several, and of the spread at points.
 pub(super) fn around<'a>(found: &Identification) -> Vec<Block<'a>> {

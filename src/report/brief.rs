@@ -6,10 +6,11 @@ use super::errors::noun;
 use super::identify::{errors_by_axis, headline};
 use super::noise::{carried, noise};
 use super::parameters::correlated;
-use super::quantity::{counted, number};
 use super::render::text_within;
 use crate::fit::{Estimate, Identification, size_of_kind};
 use crate::problem::Problem;
+use crate::quantity::format::{counted, number};
+use crate::results::Knowledge;
 
 /// Returns a fit on one screen of this many columns, ending in a line break: errors, size of the
 /// residual, parameters and remarks.
@@ -24,34 +25,27 @@ pub fn estimate_brief(problem: &Problem, found: &Identification, columns: usize)
     text_within(&blocks, columns)
 }
 
-/// Returns true if the data determine a parameter, rather than its prior.
-fn is_identified(estimate: &Estimate) -> bool {
-    estimate.at_bound.is_none() && estimate.fitted && estimate.identified > 0.9
-}
-
 /// Returns true if the data determine no parameter.
 pub fn tells_little(found: &Identification) -> bool {
-    !found.estimates.iter().any(is_identified)
+    !found.estimates.iter().any(|estimate| Knowledge::of(estimate).is_identified())
 }
 
 /// Counts the parameters by how well they are identified.
 fn parameters(estimates: &[Estimate]) -> String {
-    let count =
-        |is: fn(&Estimate) -> bool| estimates.iter().filter(|estimate| is(estimate)).count();
-    let held = count(|estimate| estimate.at_bound.is_some() || !estimate.fitted);
-    let well = count(is_identified);
-    let in_part = count(|estimate| {
-        estimate.at_bound.is_none() && estimate.fitted && estimate.identified > 0.1
-    }) - well;
-    let parts =
-        [(in_part, "in part"), (estimates.len() - held - well - in_part, "hardly"), (held, "held")];
-    let others: Vec<String> =
-        parts.iter().filter(|part| part.0 > 0).map(|(n, how)| format!(", {n} {how}")).collect();
-    let others = others.concat();
+    let count = |is: fn(Knowledge) -> bool| {
+        estimates.iter().filter(|estimate| is(Knowledge::of(estimate))).count()
+    };
+    let well = count(Knowledge::is_identified);
+    let others = [
+        (count(|knowledge| knowledge == Knowledge::InPart), "in part"),
+        (count(|knowledge| matches!(knowledge, Knowledge::Hardly | Knowledge::NotAtAll)), "hardly"),
+        (count(Knowledge::is_held), "held"),
+    ];
+    let others = others.iter().filter(|part| part.0 > 0).map(|(n, how)| format!(", {n} {how}"));
     format!(
-        "{} of {} identified well{others}; -v lists them.",
-        well,
-        counted(estimates.len(), "parameter")
+        "{well} of {} identified well{}; -v lists them.",
+        counted(estimates.len(), "parameter"),
+        others.collect::<String>()
     )
 }
 

@@ -4,11 +4,11 @@ use super::detection;
 use super::document::{Block, Table};
 use super::forecast::{assumptions, cells};
 use super::parameters::{conditioning, unidentifiable};
-use super::quantity::{counted, mm};
 use super::render::text;
 use crate::design::{Check, ExpectedParameter, Forecast, Prediction, PredictionPoses};
 use crate::fit::rows_of_kind;
 use crate::problem::Problem;
+use crate::quantity::format::{counted, mm};
 
 /// Returns the check as text, ending in a line break.
 pub fn check_text(problem: &Problem, check: &Check) -> String {

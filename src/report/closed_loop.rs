@@ -4,19 +4,20 @@ use std::fmt::Write as _;
 
 use super::document::{Block, Headline, Point, Table, code, named, some_of};
 use super::errors::{NOMINAL, both_parts, header, held_out_rows, measure, rows_of, unpredicted};
-use super::figures::{self, PlotData};
+use super::figures;
 use super::identify::{
     BEFORE, all_told, beware, fitted_parameters, mean, poses, spread, why_not_trusted,
 };
 use super::noise::{carried, expected, short, size};
-use super::parameters::{lower_waves, parameters};
+use super::parameters::parameters;
 use super::probability::percent;
-use super::quantity::{counted, decimals, number, or_dash, p_value};
 use super::render::{Report, report, text, text_within};
 use super::unexplained::{correction, places, to_declare, unexplained};
 use super::verdict::{causes, counts, stand_in, title, verdict};
 use super::{effect, findings, trace};
 use crate::problem::Problem;
+use crate::quantity::format::{counted, decimals, number, or_dash, p_value};
+use crate::results::PlotData;
 use crate::results::{FoundEffect, Gain, LoopResult, Step, Summary, TraceResult, Witness};
 use crate::select::ClosedLoop;
 
@@ -206,7 +207,7 @@ fn blocks<'a>(
     blocks.push(Block::Page(found(result, 2 * SHOWN_ALTERNATIVES)));
     let causes = plots.causes.iter().zip(1..);
     blocks.push(Block::figures(
-        causes.map(|(cause, number)| Some(cause.draw_effect(number, &plots.shown))),
+        causes.map(|(cause, number)| Some(figures::effect(cause, number, &plots.shown))),
     ));
     blocks.push(Block::heading("What remains"));
     let unexplained = unexplained(problem, closure, result).into_iter().map(Point::from);
@@ -215,7 +216,7 @@ fn blocks<'a>(
         Block::Words(vec![Block::List(unexplained.clone().chain(tests).collect())]),
         Block::Page(vec![Block::List(unexplained.chain(page).collect())]),
         Block::figures([
-            plots.trend.as_ref().map(|trend| trend.draw_unexplained(&plots.shown)),
+            plots.trend.as_ref().map(|trend| figures::unexplained(trend, &plots.shown)),
             figures::histogram(plots),
             figures::order(plots),
             figures::joint_map(plots),
@@ -223,7 +224,6 @@ fn blocks<'a>(
         Block::heading("Parameters of the final fit"),
     ]);
     blocks.extend(parameters(&closure.closed, after, &file));
-    blocks.extend(lower_waves(&closure.closed, after, &file));
     blocks.push(Block::figures([figures::contributions(&plots.contributions)]));
     blocks.push(Block::Page(all_told(after, plots, &file)));
     blocks

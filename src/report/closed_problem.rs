@@ -2,16 +2,14 @@
 
 use std::path::PathBuf;
 
-use toml_edit::{
-    ArrayOfTables, DocumentMut, InlineTable, Item, RawString, Table, TableLike, TomlError, Value,
-};
+use toml_edit::TomlError;
 
 use super::effect::values;
-use super::quantity::p_value;
 use crate::error::one_line;
-use crate::problem::{Argument, Effect, Problem};
+use crate::problem::{Effect, Problem, edit};
+use crate::quantity::format::p_value;
 use crate::results::ParameterValue;
-use crate::select::{ClosedLoop, Found, HarmonicPrior, Status};
+use crate::select::{ClosedLoop, Found, Status};
 
 /// Adds the found effects to the `text` of `problem`, and names its data `files` (measurements,
 /// then the joint table) as seen from the folder of the new text. All else stays as written, comments included.
@@ -40,161 +38,14 @@ pub fn closed_problem(
                 found.map(|found| comments(found, closure)).unwrap_or_default(),
             )
         });
-    let edited = edited(text, &declared, &closed.collect::<Vec<_>>(), files)?;
+    let edited = edit::with_effects(text, &declared, &closed.collect::<Vec<_>>(), files)?;
     match &closure.harmonic_prior {
-        Some(prior) => with_rules(&edited, prior),
+        Some(prior) => {
+            let comment = "Found by flexcal loop: this prior predicts left-out poses best.";
+            edit::with_rules(&edited, &prior.rules().collect::<Vec<_>>(), comment)
+        }
         None => Ok(edited),
     }
-}
-
-/// The `text` of a closed problem that declares the remainder in `file`, beside it; without a file
-/// it declares none.
-///
-/// # Errors
-/// The text is not TOML.
-pub fn with_remainder(text: &str, file: Option<&str>) -> Result<String, TomlError> {
-    let mut document: DocumentMut = text.parse()?;
-    document.remove("remainder");
-    if let Some(file) = file {
-        let mut table = Table::new();
-        table.insert("file", Item::Value(Value::from(file)));
-        table.decor_mut().set_prefix(
-            "\n# Found by flexcal loop: what no law explains, applied to predictions and commands;\n\
-             # use = false switches it off.\n",
-        );
-        document.insert("remainder", Item::Table(table));
-    }
-    Ok(document.to_string())
-}
-
-/// Adds the prior of the harmonics of all joints to the end of `[parameters]`.
-fn with_rules(text: &str, prior: &HarmonicPrior) -> Result<String, TomlError> {
-    let mut document: DocumentMut = text.parse()?;
-    let parameters = document.entry("parameters").or_insert_with(|| Item::Table(Table::new()));
-    if let Some(parameters) = parameters.as_table_like_mut() {
-        for (pattern, sigma) in prior.rules() {
-            let sigma = InlineTable::from_iter([("sigma_rad", Value::from(sigma))]);
-            parameters.insert(&pattern, Item::Value(Value::InlineTable(sigma)));
-        }
-    }
-    // An inline table cannot hold a comment.
-    if let Some((first, _)) = prior.rules().next()
-        && let Some(mut key) = document
-            .get_mut("parameters")
-            .and_then(Item::as_table_mut)
-            .and_then(|all| all.key_mut(&first))
-    {
-        key.leaf_decor_mut()
-            .set_prefix("# Found by flexcal loop: this prior predicts left-out poses best.\n");
-    }
-    Ok(document.to_string())
-}
-
-/// Replaces the `declared` effects of the text by the `closed` ones, each with comments.
-///
-/// The loop keeps the order of the declared effects, adds harmonics to them at most, and appends.
-fn edited(
-    text: &str,
-    declared: &[Effect],
-    closed: &[(Effect, Vec<String>)],
-    files: [&[PathBuf]; 2],
-) -> Result<String, TomlError> {
-    let mut document: DocumentMut = text.parse()?;
-    if let Some(data) = document.get_mut("data").and_then(Item::as_table_like_mut) {
-        name_files(data, files[0]);
-        if let Some(joints) = data.get_mut("joints").and_then(Item::as_table_like_mut) {
-            name_files(joints, files[1]);
-        }
-    }
-    for (k, (effect, comments)) in closed.iter().enumerate() {
-        match declared.get(k) {
-            Some(known) if known == effect => {}
-            Some(_) => replace(&mut document, k, effect),
-            None => add(&mut document, effect, comments),
-        }
-    }
-    Ok(document.to_string())
-}
-
-/// Replaces the names of the data files.
-fn name_files(data: &mut dyn TableLike, files: &[PathBuf]) {
-    let slashes = |file: &PathBuf| file.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
-    let mut names = Value::Array(files.iter().map(slashes).collect());
-    match data.get_mut("files") {
-        Some(Item::Value(current)) => {
-            *names.decor_mut() = current.decor().clone();
-            *current = names;
-        }
-        _ => _ = data.insert("files", Item::Value(names)),
-    }
-}
-
-/// Appends an effect below its comments.
-fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
-    let lines: String = comments.iter().flat_map(|line| ["# ", line, "\n"]).collect();
-    if let Some(Item::Value(Value::Array(known))) = document.get_mut("effect") {
-        let mut value =
-            Value::InlineTable(InlineTable::from_iter([(effect.name(), arguments(effect))]));
-        value.decor_mut().set_prefix(format!("\n{lines}"));
-        known.push_formatted(value);
-        return;
-    }
-    // Text at the end of the file stays before the added effects.
-    let rest = document.trailing().as_str().unwrap_or_default().to_owned();
-    document.set_trailing(RawString::default());
-    let mut table = Table::new();
-    table.insert(effect.name(), Item::Value(arguments(effect)));
-    table.decor_mut().set_prefix(format!("{rest}\n{lines}"));
-    let last = document.iter().map(|(_, item)| last_position(item)).max().unwrap_or(0);
-    table.set_position(Some(last + 1));
-    let known =
-        document.entry("effect").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()));
-    if let Some(known) = known.as_array_of_tables_mut() {
-        known.push(table);
-    }
-}
-
-/// Returns the last position in the file of the tables of an item.
-fn last_position(item: &Item) -> isize {
-    let of_table = |table: &Table| {
-        let below = table.iter().map(|(_, item)| last_position(item)).max();
-        table.position().unwrap_or(0).max(below.unwrap_or(0))
-    };
-    match item {
-        Item::Table(table) => of_table(table),
-        Item::ArrayOfTables(tables) => tables.iter().map(of_table).max().unwrap_or(0),
-        Item::None | Item::Value(_) => 0,
-    }
-}
-
-/// Replaces the arguments of the effect that was declared as number `k`.
-fn replace(document: &mut DocumentMut, k: usize, effect: &Effect) {
-    let declared: Option<&mut dyn TableLike> = match document.get_mut("effect") {
-        Some(Item::ArrayOfTables(tables)) => {
-            tables.get_mut(k).map(|table| table as &mut dyn TableLike)
-        }
-        Some(Item::Value(Value::Array(values))) => values
-            .get_mut(k)
-            .and_then(Value::as_inline_table_mut)
-            .map(|table| table as &mut dyn TableLike),
-        _ => None,
-    };
-    if let Some(declared) = declared {
-        declared.insert(effect.name(), Item::Value(arguments(effect)));
-    }
-}
-
-/// Returns the arguments of an effect, `true` if it has none.
-fn arguments(effect: &Effect) -> Value {
-    let arguments = effect.arguments();
-    if arguments.is_empty() {
-        return Value::from(true);
-    }
-    // Every argument writes itself as a value of TOML.
-    let value = |(key, argument): (&str, Argument)| {
-        Some((key.to_owned(), argument.toml().parse::<Value>().ok()?))
-    };
-    Value::InlineTable(arguments.into_iter().filter_map(value).collect())
 }
 
 /// Returns comments on an effect that was found: p-value, status and values.
@@ -215,85 +66,4 @@ fn comments(found: &Found, closure: &ClosedLoop) -> Vec<String> {
         .chain(values(&found.effect, &parameters))
         .map(|line| one_line(&line.replace('\n', " ")))
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const FILES: [&str; 1] = ["../data.csv"];
-
-    fn edit(text: &str, declared: &[Effect], closed: &[Effect]) -> String {
-        let closed: Vec<_> =
-            closed.iter().map(|effect| (effect.clone(), vec!["found".to_owned()])).collect();
-        edited(text, declared, &closed, [&FILES.map(PathBuf::from), &[]]).unwrap()
-    }
-
-    fn gear() -> Effect {
-        Effect::GearRatio { joint: 3 }
-    }
-
-    #[test]
-    fn what_was_written_stays() {
-        let text = "name = \"x\" # a name\n\n[data]\nfiles = [\"data.csv\"] # measured in May\nsigma = 1\n\n# the end\n";
-        let expected = "name = \"x\" # a name\n\n[data]\nfiles = [\"../data.csv\"] # measured in May\nsigma = 1\n\n# the end\n\n\
-                        # found\n[[effect]]\ngear-ratio = { joint = 3 }\n\n# found\n[[effect]]\nhoist-force = true\n";
-        assert_eq!(edit(text, &[], &[gear(), Effect::HoistForce]), expected);
-        assert_eq!(edit(text, &[], &[]), text.replace("data.csv", "../data.csv"));
-    }
-
-    #[test]
-    fn a_law_is_written_as_it_is_read() {
-        let text = "name = 'arm'\njoint = [{}, {}, {}]\n";
-        let problem = Problem::parse(text, "problem.toml".as_ref()).unwrap();
-        let law = "law = { name = \"creep\", at = \"joint3\", terms = [\"t*exp(-k*t)\"], \
-                   sigma_deg = 0.05, k = { start = 0.5, min = 0.0 } }";
-        let creep = problem.effect(law, "law".as_ref()).unwrap().effect;
-        assert_eq!(creep.declaration(), law);
-        let edited = edit("[data]\nfiles = []\n", &[], std::slice::from_ref(&creep));
-        let read = Problem::parse(&format!("{text}{edited}"), "problem.toml".as_ref());
-        assert_eq!(read.unwrap().effects[0].effect, creep, "{edited}");
-    }
-
-    #[test]
-    fn effects_follow_those_declared() {
-        let harmonic = |orders: &[u32]| Effect::JointHarmonic { joint: 1, orders: orders.to_vec() };
-        let declared = [harmonic(&[1]), Effect::PayloadMass];
-        let closed = [harmonic(&[1, 2]), Effect::PayloadMass, gear()];
-        let text = "[[effect]]\njoint-harmonic = { joint = 1, orders = [1] }\n\n[[effect]]\npayload-mass = true\n\n[data]\nfiles = []\n";
-        let expected = "[[effect]]\njoint-harmonic = { joint = 1, orders = [1, 2] }\n\n[[effect]]\npayload-mass = true\n\n[data]\n\
-                        files = [\"../data.csv\"]\n\n# found\n[[effect]]\ngear-ratio = { joint = 3 }\n";
-        assert_eq!(edit(text, &declared, &closed), expected);
-        let text = "effect = [{ joint-harmonic = { joint = 1, orders = [1] } }, { payload-mass = true }]\ndata.files = []\n";
-        let edited = edit(text, &declared, &closed);
-        let read: toml::Table = edited.parse().unwrap();
-        assert_eq!(read["effect"].as_array().unwrap().len(), 3, "{edited}");
-        assert_eq!(read["effect"][0]["joint-harmonic"]["orders"].as_array().unwrap().len(), 2);
-        assert_eq!(read["effect"][2]["gear-ratio"]["joint"].as_integer(), Some(3));
-        assert_eq!(read["data"]["files"][0].as_str(), Some("../data.csv"));
-    }
-
-    #[test]
-    fn a_prior_of_harmonics_is_rules() {
-        for text in [
-            "[parameters]\n\"base.*\" = { free = true }\n\n[data]\nfiles = []\n",
-            "parameters = {}\n",
-            "name = \"x\"\n",
-        ] {
-            let prior = HarmonicPrior { by_order: vec![(1, 2.5e-5), (17, 4.1e-5)] };
-            let ruled = with_rules(text, &prior).unwrap();
-            let read: toml::Table = ruled.parse().unwrap();
-            let sigma = |name: &str| read["parameters"][name]["sigma_rad"].as_float();
-            assert_eq!(sigma("joint-harmonic.sin1"), Some(2.5e-5), "{ruled}");
-            assert_eq!(sigma("joint-harmonic.cos17"), Some(4.1e-5), "{ruled}");
-        }
-    }
-
-    #[test]
-    fn other_ends_of_lines_do_no_harm() {
-        let text = "name = \"x\"\r\n[data]\r\nfiles = [\"data.csv\"]\r\n";
-        let read: toml::Table = edit(text, &[], &[gear()]).parse().unwrap();
-        assert_eq!(read["effect"][0]["gear-ratio"]["joint"].as_integer(), Some(3));
-        assert!(edited("name = ", &[], &[], [&[], &[]]).is_err());
-    }
 }

@@ -2,18 +2,19 @@
 
 use super::document::{Block, Headline, Table, code};
 use super::errors::{both_parts, header, held_out_rows, noun, shown, unit};
-use super::figures::{self, PlotData};
+use super::figures;
 use super::identify::{
     BEFORE, beware, counts, errors, fitted_parameters, mean, no_errors, poses, remainder,
 };
 use super::noise::size;
 use super::paper_tables::{table_2, table_3, title};
-use super::quantity::{counted, number, or_dash};
 use super::render::{Report, report, text};
 use crate::fit::{Comparison, Errors, Identification};
 use crate::model::Ablation;
 use crate::problem::Problem;
+use crate::quantity::format::{counted, number, or_dash};
 use crate::results::ComparedFit;
+use crate::results::PlotData;
 
 /// Columns of a comparison after the first; only the time differs from run to run.
 const ROWS: [&str; 9] = [

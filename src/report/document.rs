@@ -3,7 +3,8 @@
 //! Texts mark [`code`]. Only the page shows figures and folds; [`Block::Page`] and [`Block::Words`]
 //! hold blocks for one kind of output alone.
 
-use super::figures::{Drawing, PlotData};
+use super::figures::Drawing;
+use crate::results::PlotData;
 
 /// Marks around code in texts: control characters, which titles do not contain and terminals drop.
 pub(super) const CODE: (char, char) = ('\u{2}', '\u{3}');

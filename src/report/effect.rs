@@ -1,46 +1,34 @@
 //! Effects in words: values of their parameters, and many effects in few lines.
 
 use super::document::{Point, code};
-use super::quantity::{decimals, number};
 use crate::laws::ArgumentKind;
 use crate::problem::Effect;
-use crate::results::{ParameterValue, joined};
+use crate::quantity::format::{decimals, number};
+use crate::results::{MAX_COEFFICIENTS, ParameterValue, SHOWN_HARMONICS, joined};
 
 /// Most decimals of a value.
 const MOST: usize = 6;
-/// Most parameters of one effect that are listed one by one.
-pub(super) const MOST_LISTED: usize = 8;
-/// Harmonics of a joint that are shown if there are more.
-pub(super) const SHOWN_WAVES: usize = 4;
 
 /// Lists the parameters of an effect with their values; of many harmonics the amplitudes of the
 /// largest.
 pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<String> {
     let line = |name: &str, parameter: &ParameterValue| format!("{name} = {}", value(parameter));
     let orders = effect.harmonic_orders().unwrap_or_default();
-    if parameters.len() <= MOST_LISTED || parameters.len() != 2 * orders.len() {
+    if parameters.len() <= MAX_COEFFICIENTS || parameters.len() != 2 * orders.len() {
         return parameters.iter().map(|parameter| line(&parameter.name, parameter)).collect();
     }
-    let mut waves: Vec<(u32, ParameterValue)> =
-        orders.iter().copied().zip(parameters.chunks_exact(2).map(amplitude)).collect();
+    let mut waves: Vec<(u32, ParameterValue)> = orders
+        .iter()
+        .copied()
+        .zip(parameters.chunks_exact(2).map(ParameterValue::amplitude))
+        .collect();
     waves.sort_by(|(_, a), (_, b)| b.estimate.total_cmp(&a.estimate));
     let highest = waves
         .iter()
-        .take(SHOWN_WAVES)
+        .take(SHOWN_HARMONICS)
         .map(|(order, wave)| line(&format!("amplitude of order {order}"), wave));
-    let lower = waves.len().saturating_sub(SHOWN_WAVES);
+    let lower = waves.len().saturating_sub(SHOWN_HARMONICS);
     highest.chain((lower > 0).then(|| format!("{lower} smaller ones in loop.json"))).collect()
-}
-
-/// Returns the amplitude of a sine and a cosine of one order, taken as uncorrelated.
-fn amplitude(pair: &[ParameterValue]) -> ParameterValue {
-    let (sine, cosine) = (&pair[0], &pair[1]);
-    let amplitude = sine.estimate.hypot(cosine.estimate);
-    let std_error = sine.std_error.zip(cosine.std_error).map(|(of_sine, of_cosine)| {
-        (sine.estimate * of_sine).hypot(cosine.estimate * of_cosine)
-            / amplitude.max(f64::MIN_POSITIVE)
-    });
-    ParameterValue { estimate: amplitude, std_error, ..sine.clone() }
 }
 
 /// Returns a value with its standard error in a readable unit: `4.12 ± 0.05 µrad/(m·K)`.

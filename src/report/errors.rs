@@ -1,9 +1,10 @@
 //! Errors in words: kinds of rows, their units and counts, and poses without an equilibrium.
 
-use super::quantity::{about_three_digits, counted, number};
 use crate::fit::{ErrorSummary, Errors, Identification};
 use crate::observation::kind_named;
 use crate::quantity::Unit;
+use crate::quantity::format::{about_three_digits, counted, number};
+use crate::results::measured_kinds;
 
 /// Name of the arm before identification.
 pub(super) const NOMINAL: &str = "nominal arm, base and tool fitted";
@@ -53,11 +54,6 @@ pub(super) fn sizes(of: &ErrorSummary) -> [String; 3] {
     [of.mean.norm, of.rms.norm, of.max.norm].map(|value| shown(of, value))
 }
 
-/// States mean and rms: "mean 0.1 mm, rms 0.2 mm".
-pub(super) fn mean_and_rms(of: &ErrorSummary) -> String {
-    format!("mean {}, rms {}", with_unit(of, of.mean.norm), with_unit(of, of.rms.norm))
-}
-
 /// Counts the rows of each kind in one part of the data: "50 poses", "71 contacts with points, 47
 /// distances". Known distances between points do not count.
 pub(super) fn rows_of(found: &Identification, part: fn(&Errors) -> ErrorSummary) -> String {
@@ -98,25 +94,6 @@ fn counted_rows(found: &Identification, of: &ErrorSummary, adjective: &str) -> S
 pub(super) fn noun(found: &Identification) -> &'static str {
     let positions = found.kinds.is_empty() && found.fitted.identification.kind == "position";
     if positions { "pose" } else { "row" }
-}
-
-/// Returns the number of rows of all kinds in one part of the data.
-pub(super) fn rows_in(found: &Identification, part: fn(&Errors) -> ErrorSummary) -> usize {
-    measured_kinds(found, part).map(|of| of.n).sum()
-}
-
-/// Iterates over the kinds of rows in one part of the data, without known distances.
-fn measured_kinds(
-    found: &Identification,
-    part: fn(&Errors) -> ErrorSummary,
-) -> impl Iterator<Item = ErrorSummary> + use<'_> {
-    let alone = found.kinds.is_empty().then(|| part(&found.fitted));
-    let each = found
-        .kinds
-        .iter()
-        .map(move |(_, fitted)| part(fitted))
-        .filter(|of| of.kind != "known distance");
-    alone.into_iter().chain(each)
 }
 
 /// Names for each arm the poses without an equilibrium, over which no mean exists; `None` if all

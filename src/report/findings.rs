@@ -1,7 +1,7 @@
 //! Tests of the residual of a fit, in words.
 
 use super::document::{Block, Mark, Point};
-use super::quantity::number;
+use crate::quantity::format::number;
 use crate::residual_tests::{Findings, ResidualTest, Test};
 
 /// Describes the tests that failed.

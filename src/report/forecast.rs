@@ -1,10 +1,10 @@
 //! Expected standard errors in words, and their assumptions.
 
 use super::document::Block;
-use super::quantity::{counted, decimals, number, or_dash, two_digits};
 use crate::design::ExpectedParameter;
 use crate::problem::{HeldOut, Problem};
 use crate::quantity::Display;
+use crate::quantity::format::{counted, decimals, number, or_dash, two_digits};
 
 /// Most decimals of a value.
 const MAX_DECIMALS: usize = 6;

@@ -3,21 +3,23 @@
 use super::around::around;
 use super::document::{Block, Headline, Table};
 use super::errors::{
-    NOMINAL, axes, brief, held_out_rows, measure, row, rows_in, rows_of, shown, unit, unpredicted,
+    NOMINAL, axes, brief, held_out_rows, measure, row, rows_of, shown, unit, unpredicted,
 };
-use super::figures::{self, PlotData};
+use super::figures;
 use super::findings;
 use super::limits::{alternation, shadow_prices};
 use super::noise::{carried, noise, outliers, size};
 use super::parameters::{
-    conditioning, correlations, lower_waves, more_unidentifiable, parameters, unidentifiable, weak,
+    conditioning, correlations, more_unidentifiable, parameters, unidentifiable, weak,
 };
-use super::quantity::{counted, mm, number};
 use super::render::{Report, report, text};
 use crate::fit::{
     ActiveConstraint, ErrorSummary, Errors, Identification, JointSources, OrientationErrors,
 };
 use crate::problem::Problem;
+use crate::quantity::format::{counted, mm, number};
+use crate::results::PlotData;
+use crate::results::rows_in;
 
 /// File that holds the whole result.
 const FILE: &str = "estimate.json";
@@ -227,7 +229,6 @@ pub(super) fn remainder<'a>(
     blocks.extend(findings::another_size(&plots.findings, found.reduced_chi2).map(Block::Text));
     blocks.push(Block::heading("Parameters"));
     blocks.extend(parameters(problem, found, file));
-    blocks.extend(lower_waves(problem, found, file));
     blocks.push(Block::figures([figures::contributions(&plots.contributions)]));
     blocks.push(Block::Page(limits(found)));
     blocks.extend(all_told(found, plots, file));

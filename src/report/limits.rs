@@ -1,10 +1,10 @@
 //! Sentences of `identify` on active limits and on alternating stages.
 
 use super::document::Block;
-use super::quantity::{decimals, number, two_digits};
 use crate::fit::{ActiveConstraint, Alternation, Estimate, Identification, ShadowPrice};
 use crate::least_squares::solver::AtBound;
 use crate::quantity::Unit;
+use crate::quantity::format::{decimals, number, two_digits};
 
 /// Lists the costs of active bounds and constraints, if there are any.
 pub(super) fn shadow_prices<'a>(found: &Identification) -> Option<Block<'a>> {

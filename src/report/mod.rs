@@ -9,7 +9,6 @@ mod brief;
 mod check;
 mod closed_loop;
 mod closed_problem;
-mod columns;
 mod compare;
 mod compensate;
 mod detection;
@@ -27,41 +26,33 @@ mod noise;
 mod paper_tables;
 mod parameters;
 mod plan;
-mod poses;
 mod predict;
 mod probability;
-mod quantity;
 mod remainder;
 mod render;
 mod replica;
 mod separation;
 mod shell;
 mod study;
-mod table;
 mod trace;
 mod unexplained;
 mod verdict;
 
-pub(crate) use acceptance::{
-    AcceptanceRecord, acceptance_page, acceptance_result, acceptance_text,
-};
+pub(crate) use acceptance::{acceptance_page, acceptance_text};
 pub(crate) use brief::{estimate_brief, tells_little};
 pub use closed_loop::{loop_report, loop_text};
-pub(crate) use closed_problem::with_remainder;
-pub(crate) use columns::residuals_csv;
 pub(crate) use compare::{compare_text, comparison_report};
 pub(crate) use compensate::commands_text;
-pub use figures::PlotData;
 pub(crate) use identify::joint_sources_text;
 pub use identify::{estimate_text, identification_report};
 pub(crate) use init::init_text;
-pub(crate) use noise::{lacks_something, show_influential_rows};
-pub(crate) use predict::{prediction_text, predictions_csv};
+pub(crate) use noise::show_influential_rows;
+pub(crate) use predict::prediction_text;
 pub(crate) use remainder::remainder_text;
 pub use render::Report;
 pub(crate) use replica::{replica_report, replica_text};
 pub(crate) use shell::shell_word;
-pub(crate) use study::{study_text, study_timing_csv};
+pub(crate) use study::study_text;
 pub(crate) use verdict::interrupted;
 // Public for the tests, the benches and the Python module only.
 #[doc(hidden)]
@@ -69,14 +60,9 @@ pub use self::{
     check::{check_text, why_not_sufficient},
     closed_loop::loop_brief,
     closed_problem::closed_problem,
-    columns::{Column, residual_columns},
-    compensate::commands_csv,
-    export::{ExportErrors, Exported, export_text},
-    figures::{Cause, Quantity, is_figure},
+    export::export_text,
+    figures::is_figure,
     identify::why_not_trusted,
     plan::plan_text,
-    poses::poses_csv,
-    study::{study_csv, study_parameters_csv},
-    table::Command,
     trace::trace_text,
 };

@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use super::document::{Block, first_of, named};
-use super::errors::{brief, noun, rows_in, unit, with_unit};
-use super::quantity::{counted, decimals, mm, number};
-use crate::fit::{FindingCode, Identification, Noise, Outlier, size_of_kind};
+use super::errors::{brief, noun, unit, with_unit};
+use crate::fit::{Identification, Noise, Outlier, size_of_kind};
 use crate::problem::Problem;
+use crate::quantity::format::{counted, decimals, mm, number};
+use crate::results::{ResidualSize, rows_in};
 
 /// Outliers on one screen.
 const SHOWN_OUTLIERS: usize = 20;
@@ -17,51 +18,43 @@ const FILE: &str = "estimate.json";
 
 /// States the size of the residual against the declared noise.
 pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
-    let errors = &found.fitted.identification;
-    let has_too_few_rows =
-        found.has(FindingCode::PriorsDecide) || found.has(FindingCode::TooFewEquations);
-    let chi2 = match (found.noise, found.reduced_chi2) {
-        (Noise::Estimated(sigma), _) => {
-            return format!(
-                "No σ is declared; the scatter of the residual is {} per coordinate, model errors included.",
-                with_unit(errors, sigma)
-            );
+    match ResidualSize::of(found) {
+        ResidualSize::Undeclared(sigma) => format!(
+            "No σ is declared; the scatter of the residual is {} per coordinate, model errors \
+             included.",
+            with_unit(&found.fitted.identification, sigma)
+        ),
+        ResidualSize::Unknown => "No σ is declared, and the fit leaves no degree of freedom to \
+                                  estimate it: there are no standard errors."
+            .to_owned(),
+        ResidualSize::TooFewPoses => {
+            "There are too few different poses to judge the declared σ, or the model.".to_owned()
         }
-        (Noise::Unknown, _) => {
-            return "No σ is declared, and the fit leaves no degree of freedom to estimate it: there are no standard errors."
-                .to_owned();
+        ResidualSize::TooFewRows => {
+            "There are too few measurements to judge the declared σ.".to_owned()
         }
-        (Noise::Declared, Some(_)) if has_too_few_rows => {
-            return "There are too few different poses to judge the declared σ, or the model."
-                .to_owned();
-        }
-        (Noise::Declared, None) => {
-            return "There are too few measurements to judge the declared σ.".to_owned();
-        }
-        (Noise::Declared, Some(chi2)) => chi2,
-    };
-    let is_expected = found.chance.is_none_or(|(low, high)| (low..=high).contains(&chi2));
-    if contradicted(found) {
-        return format!(
+        ResidualSize::Contradicted(chi2) => format!(
             "Reduced χ² is {}; {}.\n{}",
             short(chi2),
             expected(found),
             other_sigma(problem, found)
-        );
-    }
-    if is_expected {
-        return format!(
+        ),
+        ResidualSize::Expected(chi2) => format!(
             "Reduced χ² is {}: the model explains the data to the declared σ.",
             number(chi2, 2)
-        );
+        ),
+        ResidualSize::Unclear(chi2) => {
+            let (size, what) =
+                if chi2 > 1.0 { ("larger", "explains") } else { ("smaller", "predicts") };
+            format!(
+                "Reduced χ² is {}; {}: the residual is {size} than the declared σ {what}.\n\
+                 Fit and standard errors keep the declared σ: residuals and priors together give \
+                 no clear evidence for another one.",
+                short(chi2),
+                expected(found),
+            )
+        }
     }
-    let (size, what) = if chi2 > 1.0 { ("larger", "explains") } else { ("smaller", "predicts") };
-    format!(
-        "Reduced χ² is {}; {}: the residual is {size} than the declared σ {what}.\n\
-         Fit and standard errors keep the declared σ: residuals and priors together give no clear evidence for another one.",
-        short(chi2),
-        expected(found),
-    )
 }
 
 /// States the interval of χ²/ν for noise alone.
@@ -103,19 +96,6 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
         "The scatter is {size} × the declared σ{declared}, {cause}. Fit and standard errors take {taken}, estimated from residuals and \
          priors."
     )
-}
-
-/// Returns true if residuals and priors contradict the declared σ.
-fn contradicted(found: &Identification) -> bool {
-    found.noise == Noise::Declared && (found.noise_factor - 1.0).abs() > 1e-9
-}
-
-/// Returns true if a fit leaves more than the declared noise explains.
-pub fn lacks_something(found: &Identification) -> bool {
-    let by_chi2 =
-        || found.reduced_chi2.zip(found.chance).is_some_and(|(chi2, (_, high))| chi2 > high);
-    found.noise == Noise::Declared
-        && if contradicted(found) { found.noise_factor > 1.0 } else { by_chi2() }
 }
 
 /// Formats χ²/ν with two decimals, or with two significant digits if it is small.

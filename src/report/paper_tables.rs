@@ -1,10 +1,10 @@
 //! Tables 2 and 3 of [Chen2021] from any procedure.
 
 use super::document::Table;
-use super::quantity::{mm, number, or_dash};
 use crate::fit::{AxisValues, Comparison, ErrorSummary, Procedure, TableEntry};
 use crate::paper::published::{BEFORE, Published, WITH_ELASTICITY, WITHOUT_ELASTICITY};
 use crate::paper::{Form, StiffnessStage};
+use crate::quantity::format::{mm, number, or_dash};
 
 /// Share of information from the data below which a parameter is marked.
 const MARKED_BELOW: f64 = 0.9;

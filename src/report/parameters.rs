@@ -1,17 +1,12 @@
 //! Parameters in words: their table, unidentifiable and weak combinations, correlations.
 
-use std::collections::BTreeMap;
-
 use super::document::{Bar, Block, Table, first_of};
-use super::effect::{MOST_LISTED, SHOWN_WAVES};
-use super::quantity::{decimals, number, or_dash, two_digits};
 use crate::fit::{Estimate, Identification, PriorSize};
 use crate::least_squares::solver::AtBound;
 use crate::least_squares::{Identifiability, UnidentifiableCombination, WEAK_THRESHOLD};
-use crate::model::effect;
-use crate::model::parameter::Regressor;
 use crate::problem::Problem;
-use crate::quantity::Unit;
+use crate::quantity::format::{decimals, number, or_dash, two_digits};
+use crate::results::{Knowledge, ManyHarmonics, MissingReference};
 
 /// Decimals of a value without a standard error.
 const DEFAULT_DECIMALS: usize = 4;
@@ -30,43 +25,6 @@ const HEADER: [&str; 7] =
 /// Row of the table of parameters with its bar.
 type Line = (Vec<String>, Bar);
 
-/// Returns the joint (from 1) and the order of every coefficient of a declared harmonic, by the
-/// name of the parameter.
-fn harmonics(problem: &Problem) -> BTreeMap<String, (usize, u32)> {
-    let of = |regressor: &Regressor| match *regressor {
-        Regressor::Sine(joint, order) | Regressor::Cosine(joint, order) => Some((joint + 1, order)),
-        _ => None,
-    };
-    effect::parameters(problem)
-        .into_iter()
-        .filter_map(|parameter| Some((parameter.name, of(&parameter.regressor)?)))
-        .collect()
-}
-
-/// Selects the harmonics of joints with more coefficients than are listed one by one. Returns for
-/// each of these joints the orders of the largest amplitudes, and the number of smaller ones.
-fn highest(
-    estimates: &[Estimate],
-    harmonics: &BTreeMap<String, (usize, u32)>,
-) -> BTreeMap<usize, (Vec<u32>, usize)> {
-    let mut joints: BTreeMap<usize, (usize, BTreeMap<u32, f64>)> = BTreeMap::new();
-    for estimate in estimates {
-        if let Some((joint, order)) = harmonics.get(&estimate.name) {
-            let (count, heights) = joints.entry(*joint).or_default();
-            *count += 1;
-            *heights.entry(*order).or_default() += estimate.estimate * estimate.estimate;
-        }
-    }
-    joints.retain(|_, (count, _)| *count > MOST_LISTED);
-    let shown = |(joint, (_, heights)): (usize, (usize, BTreeMap<u32, f64>))| {
-        let mut orders: Vec<u32> = heights.keys().copied().collect();
-        orders.sort_by(|a, b| heights[b].total_cmp(&heights[a]));
-        orders.truncate(SHOWN_WAVES);
-        (joint, (orders, heights.len().saturating_sub(SHOWN_WAVES)))
-    };
-    joints.into_iter().map(shown).collect()
-}
-
 /// Returns the table of all free parameters. Of many harmonics of a joint it shows the largest; the
 /// others are in `file`, and folded on the page.
 pub(super) fn parameters<'a>(
@@ -74,27 +32,18 @@ pub(super) fn parameters<'a>(
     found: &Identification,
     file: &str,
 ) -> Vec<Block<'a>> {
-    let harmonics = harmonics(problem);
-    let high = highest(&found.estimates, &harmonics);
+    let harmonics = ManyHarmonics::of(problem, &found.estimates);
     let (mut shown, mut lower): (Vec<Line>, Vec<Line>) = Default::default();
     for (k, estimate) in found.estimates.iter().enumerate() {
-        let wave = harmonics
-            .get(&estimate.name)
-            .and_then(|(joint, order)| Some((joint, order, high.get(joint)?)));
         let line = (row(estimate), bar(estimate));
-        match wave {
-            Some((_, order, (orders, _))) if !orders.contains(order) => lower.push(line),
-            _ => shown.push(line),
-        }
-        let Some((joint, _, (_, more))) = wave else { continue };
-        let later = &found.estimates[k + 1..];
-        if *more > 0
-            && !later
-                .iter()
-                .any(|other| harmonics.get(&other.name).is_some_and(|(of, _)| of == joint))
-        {
+        if harmonics.is_smaller(&estimate.name) { &mut lower } else { &mut shown }.push(line);
+        let of_joint = harmonics.joint_of(&estimate.name);
+        let is_last = found.estimates[k + 1..]
+            .iter()
+            .all(|other| harmonics.joint_of(&other.name) != of_joint);
+        if let Some((joint, smaller)) = of_joint.filter(|_| is_last) {
             let mut cells = vec![String::new(); HEADER.len()];
-            cells[0] = format!("and {more} smaller harmonics of joint {joint}");
+            cells[0] = format!("and {smaller} smaller harmonics of joint {joint}");
             shown.push((cells, Bar::default()));
         }
     }
@@ -126,11 +75,8 @@ pub(super) fn parameters<'a>(
     if count > 0 {
         let on_paper = format!("The smaller harmonics are left out on paper: they are in {file}.");
         let folded = vec![Block::Table(table(lower))];
-        blocks.push(Block::Folded(
-            format!("The smaller harmonics: {count} coefficients"),
-            folded,
-            on_paper,
-        ));
+        let title = format!("The smaller harmonics: {count} coefficients");
+        blocks.push(Block::Folded(title, folded, on_paper));
     }
     blocks
 }
@@ -151,16 +97,6 @@ fn sizes(sizes: &[PriorSize]) -> Option<String> {
             rules.join(", ")
         )
     })
-}
-
-/// Returns the note of Markdown below the table if harmonics are left out.
-pub(super) fn lower_waves<'a>(
-    problem: &Problem,
-    found: &Identification,
-    file: &str,
-) -> Option<Block<'a>> {
-    let some = highest(&found.estimates, &harmonics(problem)).values().any(|(_, more)| *more > 0);
-    some.then(|| Block::Words(vec![Block::Text(format!("Smaller harmonics: in {file}."))]))
 }
 
 fn row(estimate: &Estimate) -> Vec<String> {
@@ -191,32 +127,16 @@ fn bar(estimate: &Estimate) -> Bar {
 /// Returns the share of information from the data, with a word for it.
 fn identified(estimate: &Estimate) -> String {
     let share = format!("{:3.0} %", estimate.identified * 100.0);
-    match (estimate.at_bound, estimate.fitted) {
-        (Some(AtBound::Lower), _) => "at its lower bound".to_owned(),
-        (Some(AtBound::Upper), _) => "at its upper bound".to_owned(),
-        (None, false) => "not fitted".to_owned(),
-        (None, true) => match estimate.identified {
-            part if part > 0.9 && is_vague(estimate) => format!("{share}  but vaguely"),
-            part if part > 0.9 => format!("{share}  well"),
-            part if part > 0.1 => format!("{share}  in part"),
-            part if part > 1e-6 => format!("{share}  hardly"),
-            _ => format!("{share}  not at all"),
-        },
+    match Knowledge::of(estimate) {
+        Knowledge::AtBound(AtBound::Lower) => "at its lower bound".to_owned(),
+        Knowledge::AtBound(AtBound::Upper) => "at its upper bound".to_owned(),
+        Knowledge::NotFitted => "not fitted".to_owned(),
+        Knowledge::Vaguely => format!("{share}  but vaguely"),
+        Knowledge::Well => format!("{share}  well"),
+        Knowledge::InPart => format!("{share}  in part"),
+        Knowledge::Hardly => format!("{share}  hardly"),
+        Knowledge::NotAtAll => format!("{share}  not at all"),
     }
-}
-
-/// Returns true if the standard error exceeds what a calibration can accept: 1°, 10 mm, or half the
-/// value of a stiffness.
-fn is_vague(estimate: &Estimate) -> bool {
-    let limit = match estimate.unit {
-        Unit::Angle => 1.0_f64.to_radians(),
-        Unit::Length => 0.01,
-        Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => {
-            0.5 * estimate.estimate
-        }
-        _ => f64::INFINITY,
-    };
-    estimate.std_error.is_none_or(|error| error > limit)
 }
 
 /// Lists the combinations of parameters that no measurement determines; `file` holds them all.
@@ -243,52 +163,22 @@ pub(super) fn unidentifiable<'a>(
         MAX_LISTED,
         file,
     );
-    points.extend(without_tracker(unidentifiable, unknowns).into_iter().map(str::to_owned));
+    points.extend(MissingReference::all(unidentifiable, unknowns).into_iter().map(remedy));
     Block::Lines(words, points)
 }
 
-/// Names what contacts and distances leave open because a reference is missing.
-fn without_tracker(
-    unidentifiable: &[UnidentifiableCombination],
-    unknowns: &[String],
-) -> Vec<&'static str> {
-    let of = |name: &str, words: &[&str]| words.iter().any(|word| name.starts_with(word));
-    let is_around = |name: &str| of(name, &["point", "anchor", "surface"]);
-    let field = |name: &'_ str| name.rsplit('.').next().unwrap_or_default().to_owned();
-    let is_length = |name: &str| {
-        let geometry = name.starts_with("joint") && ["a", "d"].contains(&&*field(name));
-        geometry
-            || of(name, &["tool"])
-            || (is_around(name) && !["rx", "ry"].contains(&&*field(name)))
-    };
-    let any = |combination: &UnidentifiableCombination, is: &dyn Fn(&str) -> bool| {
-        combination.weights.iter().any(|&(k, _)| is(&unknowns[k]))
-    };
-    let all = |combination: &UnidentifiableCombination, is: &dyn Fn(&str) -> bool| {
-        combination.weights.iter().all(|&(k, _)| is(&unknowns[k]))
-    };
-    let place = |combination: &UnidentifiableCombination| {
-        any(combination, &|name| name.starts_with("base"))
-            && all(combination, &|name| name.starts_with("base") || is_around(name))
-    };
-    // A translation moves the points along one axis, a scale along all three.
-    let size = |combination: &UnidentifiableCombination| {
-        let along = |axis: &str| any(combination, &|name| is_around(name) && field(name) == axis);
-        all(combination, &is_length)
-            && ["x", "y", "z"].into_iter().all(along)
-            && any(combination, &|name| name.starts_with("joint"))
-    };
-    let mut words = Vec::new();
-    if unidentifiable.iter().any(place) {
-        words.push(
-            "the pose of the base: no row refers to a known place in the measuring frame; fix base.* (fixed = true), or declare the place \
-             of a point or an anchor (at_m)",
-        );
+/// States how to supply a missing reference.
+fn remedy(missing: MissingReference) -> String {
+    match missing {
+        MissingReference::Place => {
+            "the pose of the base: no row refers to a known place in the measuring frame; fix \
+             base.* (fixed = true), or declare the place of a point or an anchor (at_m)"
+        }
+        MissingReference::Length => {
+            "the scale: no length is known; declare a [[distance]], or measure one"
+        }
     }
-    if unidentifiable.iter().any(size) {
-        words.push("the scale: no length is known; declare a [[distance]], or measure one");
-    }
-    words
+    .to_owned()
 }
 
 /// Lists the combinations that the data determine too weakly, if there are any.
@@ -385,39 +275,4 @@ pub(super) fn conditioning<'a>(
         found.rank,
         found.condition_number(),
     ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn estimate(name: &str, value: f64) -> Estimate {
-        Estimate {
-            name: name.to_owned(),
-            unit: Unit::Angle,
-            nominal: 0.0,
-            estimate: value,
-            std_error: None,
-            identified: 1.0,
-            at_bound: None,
-            shadow_price: None,
-            fitted: true,
-        }
-    }
-
-    #[test]
-    fn the_highest_of_many_waves_are_shown() {
-        let waves = [(1, 4_u32), (2, 10)].into_iter().flat_map(|(joint, orders)| {
-            (1..=orders).flat_map(move |order| {
-                ["sin", "cos"].map(|part| (format!("{joint}.{part}{order}"), (joint, order)))
-            })
-        });
-        let harmonics: BTreeMap<String, (usize, u32)> = waves.collect();
-        let mut estimates = vec![estimate("tool.x", 1.0)];
-        estimates
-            .extend(harmonics.iter().map(|(name, (_, order))| estimate(name, f64::from(*order))));
-        // Of joint 1 all are shown.
-        let expected = BTreeMap::from([(2, (vec![10, 9, 8, 7], 6))]);
-        assert_eq!(highest(&estimates, &harmonics), expected);
-    }
 }

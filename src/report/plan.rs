@@ -3,11 +3,11 @@
 use super::document::{Block, Table};
 use super::forecast::{assumptions, cells};
 use super::parameters::{conditioning, unidentifiable};
-use super::quantity::{counted, number, or_dash};
 use super::render::text;
 use super::separation;
 use crate::design::{Criterion, PairSeparation, Plan};
 use crate::problem::Problem;
+use crate::quantity::format::{counted, number, or_dash};
 
 /// States that the poses are too few to determine all that such poses can, if they are.
 fn too_few<'a>(plan: &Plan) -> Option<Block<'a>> {

@@ -3,47 +3,14 @@
 use std::fmt::Write as _;
 
 use super::around::unsteady;
-use super::columns::{self, Column};
 use super::document::{Block, Table};
 use super::errors::{measure, sizes};
-use super::quantity::counted;
-use super::remainder::{bounded, uncertainty};
+use super::remainder::bounded;
 use super::render::text;
-use super::table;
 use crate::fit::{ErrorSummary, Prediction};
-use crate::measurement::Measurements;
 use crate::problem::Problem;
+use crate::quantity::format::counted;
 use crate::remainder::Bounds;
-
-/// Returns predictions as CSV: columns that name the row, commands, and the predicted pose.
-pub fn predictions_csv(
-    problem: &Problem,
-    rows: &Measurements,
-    prediction: &Prediction,
-    bounds: Option<&Bounds>,
-) -> String {
-    let all: Vec<usize> = (0..prediction.positions.len()).collect();
-    let mut columns = columns::names(problem, rows, &all);
-    let mut add = |name: String, decimals, of: &dyn Fn(usize) -> f64| {
-        columns.push((
-            name,
-            Column::Numbers(all.iter().map(|&row| of(row)).collect(), Some(decimals)),
-        ));
-    };
-    for joint in table::commands(problem) {
-        add(joint.column(), 7, &|row| rows.configuration(row)[joint.joint] * joint.factor());
-    }
-    for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
-        add(format!("predicted_{axis}_mm"), 6, &|row| prediction.positions[row][k] * 1e3);
-    }
-    if let Some(turns) = &prediction.orientations {
-        for (k, axis) in ["rx", "ry", "rz"].into_iter().enumerate() {
-            add(format!("predicted_{axis}_deg"), 7, &|row| turns[row][k].to_degrees());
-        }
-    }
-    columns.extend(bounds.into_iter().flat_map(uncertainty));
-    columns::to_csv(&columns, all.len())
-}
 
 /// Returns the prediction for an arm as text.
 pub fn prediction_text(

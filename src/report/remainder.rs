@@ -2,9 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::columns::{Column, Columns};
-use super::quantity::{counted, number};
 use crate::fit::{Identification, Residual};
+use crate::quantity::format::{counted, number};
 use crate::remainder::{Bounds, Fitted};
 
 /// Returns one sentence on the search for a remainder; `found` has the errors without it.
@@ -42,23 +41,6 @@ pub fn remainder_text(found: &Identification, fitted: &Fitted) -> String {
             number(gain.evidence, 2),
         ),
     }
-}
-
-/// Returns the columns of the uncertainty of predictions: 1 σ along each axis, the bound of the
-/// error, and whether the pose lies outside of what was measured.
-pub(super) fn uncertainty(bounds: &Bounds) -> Columns {
-    let numbers = |of: &dyn Fn(usize) -> f64| {
-        Column::Numbers((0..bounds.poses.len()).map(|pose| of(pose) * 1e3).collect(), Some(4))
-    };
-    let mut columns: Columns = ["x", "y", "z"]
-        .into_iter()
-        .enumerate()
-        .map(|(k, axis)| (format!("sigma_{axis}_mm"), numbers(&|pose| bounds.poses[pose].sigma[k])))
-        .collect();
-    columns.push((bounds.column(), numbers(&|pose| bounds.bound(pose))));
-    let flags = bounds.poses.iter().map(|own| own.is_extrapolated).collect();
-    columns.push(("extrapolated".to_owned(), Column::Flags(flags)));
-    columns
 }
 
 /// Returns the expected error and its bound in words, and the share of measured rows within their

@@ -2,11 +2,11 @@
 
 use super::document::{Block, Headline, Table};
 use super::figures;
-use super::quantity::{mm, number, or_dash};
 use super::render::{Report, report, text};
 use crate::fit::ErrorSummary;
 use crate::paper::Misprint;
 use crate::paper::published::{BEFORE, Published, WITH_ELASTICITY, WITHOUT_ELASTICITY};
+use crate::quantity::format::{mm, number, or_dash};
 use crate::study::{
     AlternativeModel, Case, HeldOutError, MisprintStudy, Replica, ReplicaResults, Spread,
 };

@@ -2,8 +2,8 @@
 
 use super::document::{Block, Table};
 use super::forecast::size as shown;
-use super::quantity::{number, or_dash, p_value};
 use crate::design::PairSeparation;
+use crate::quantity::format::{number, or_dash, p_value};
 use crate::results::SeparationResult;
 
 /// Returns the table of the two effects, random poses beside planned ones.

@@ -1,14 +1,10 @@
 //! Text of `study`, and its tables for other programs.
 
 use super::document::{Block, Table};
-use super::quantity::{number, or_dash};
 use super::render::text;
-use crate::files;
+use crate::quantity::format::{number, or_dash};
 use crate::results::{Cell, StudyResult};
 use crate::study::{CellResult, Results, Source, Study};
-
-/// Header of the first columns of every table.
-const CELL: &str = "cell,position_sigma_mm,identification_poses,strategy,solver";
 
 /// Returns the study as text, ending in a line break.
 pub fn study_text(study: &Study, results: &Results) -> String {
@@ -54,91 +50,4 @@ fn line(cell: &Cell, timed: &CellResult) -> Vec<String> {
         shown(cell.iterations_mean, 1),
         number(timed.timing().median * 1e3, 1),
     ]
-}
-
-/// Returns `study.csv` with a line for each cell.
-pub fn study_csv(study: &Study, results: &Results) -> String {
-    let header = "fits,failed,failure_rate,held_out_mean_mm,held_out_rms_mm,held_out_rms_sd_mm,held_out_rms_max_mm,\
-                  reduced_chi2,coverage,largest_bias_sd,largest_bias_of,iterations_mean,iterations_max";
-    let line = |cell: &Cell| {
-        let (held_out, bias) = (&cell.held_out_mm, cell.largest_bias.as_ref());
-        vec![vec![
-            cell.fits.to_string(),
-            cell.failed.to_string(),
-            cell.failure_rate.to_string(),
-            plain(held_out.mean),
-            plain(held_out.rms),
-            plain(held_out.rms_sd),
-            plain(held_out.rms_max),
-            plain(cell.reduced_chi2),
-            plain(cell.coverage),
-            plain(bias.map(|bias| bias.bias_sd)),
-            bias.map(|bias| bias.parameter.clone()).unwrap_or_default(),
-            plain(cell.iterations_mean),
-            plain(cell.iterations_max),
-        ]]
-    };
-    csv(study, results, header, |cell, _| line(cell))
-}
-
-/// Returns `parameters.csv` with a line for each parameter of each cell; the unit `relative` stands
-/// for ln(value).
-pub fn study_parameters_csv(study: &Study, results: &Results) -> String {
-    let header = "parameter,unit,fits,bias,spread,rms_error,with_std_error,std_error,coverage";
-    csv(study, results, header, |cell, _| {
-        let line = |parameter: &crate::results::StudiedParameter| {
-            vec![
-                parameter.name.clone(),
-                parameter.unit.to_owned(),
-                parameter.fits.to_string(),
-                plain(parameter.bias),
-                plain(parameter.spread),
-                plain(parameter.rms_error),
-                parameter.with_std_error.to_string(),
-                plain(parameter.std_error),
-                plain(parameter.coverage),
-            ]
-        };
-        cell.parameters.iter().map(line).collect()
-    })
-}
-
-/// Returns `timing.csv` with a line for each cell, the only result that differs from run to run.
-pub fn study_timing_csv(study: &Study, results: &Results) -> String {
-    csv(study, results, "fits,median_ms,slowest_ms,total_s", |_, timed| {
-        let timing = timed.timing();
-        let [median, slowest] =
-            [timing.median, timing.slowest].map(|seconds| format!("{:.3}", seconds * 1e3));
-        let total = format!("{:.3}", timing.total);
-        vec![vec![timed.seconds.len().to_string(), median, slowest, total]]
-    })
-}
-
-/// Formats a number by the shortest text that is read back as the same; empty for `None`.
-fn plain(value: Option<f64>) -> String {
-    value.map(|value| value.to_string()).unwrap_or_default()
-}
-
-/// Returns a table with the columns of `header` behind those that name the cell, numbered from 1.
-fn csv(
-    study: &Study,
-    results: &Results,
-    header: &str,
-    lines: impl Fn(&Cell, &CellResult) -> Vec<Vec<String>>,
-) -> String {
-    let cells = StudyResult::new(study, results).cells;
-    let named = |(index, (cell, timed)): (usize, (&Cell, &CellResult))| {
-        let first = vec![
-            (index + 1).to_string(),
-            cell.position_sigma_mm.to_string(),
-            cell.identification_poses.to_string(),
-            cell.strategy.to_owned(),
-            cell.solver.to_owned(),
-        ];
-        let join = |line| [first.clone(), line].concat();
-        lines(cell, timed).into_iter().map(join).collect::<Vec<_>>()
-    };
-    let rows: Vec<Vec<String>> =
-        cells.iter().zip(&results.cells).enumerate().flat_map(named).collect();
-    files::csv(CELL.split(',').chain(header.split(',')).map(str::to_owned).collect(), rows)
 }

@@ -6,17 +6,17 @@ use super::document::{Block, Point, named};
 use super::errors::{held_out_rows, rows_of, without_equilibrium};
 use super::noise::short;
 use super::probability::percent;
-use super::quantity::{counted, number, p_value};
 use super::render::text;
-use super::table::{Command, commands};
 use super::verdict::declared;
 use super::{effect, findings};
 use crate::fit::Identification;
 use crate::problem::Problem;
 use crate::quantity::Unit;
+use crate::quantity::format::{counted, number, p_value};
 use crate::results::{
     Candidate, Claims, Confounded, Hypothesis, HypothesisSet, Summary, ToldApart, TraceResult,
 };
+use crate::results::{CommandedJoint, commanded_joints};
 use crate::select::Trace;
 
 /// Candidates on one screen.
@@ -201,11 +201,11 @@ fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
 
 /// Describes a pose: joints, target, payload, hoist, temperature.
 fn pose_words(problem: &Problem, pose: &ToldApart) -> String {
-    let value = |joint: Command| {
+    let value = |joint: CommandedJoint| {
         let unit = if joint.unit == Unit::Angle { "°" } else { " mm" };
         format!("{} {}{unit}", joint.name(), number(pose.q[joint.joint] * joint.factor(), 1))
     };
-    let mut words: Vec<String> = commands(problem).into_iter().map(value).collect();
+    let mut words: Vec<String> = commanded_joints(problem).into_iter().map(value).collect();
     words.extend(pose.target.as_ref().map(|target| format!("target {target}")));
     words.extend(pose.payload_kg.map(|mass| format!("payload {} kg", number(mass, 2))));
     words.extend(pose.hoist.map(|force| format!("hoist {} N", number(force, 1))));

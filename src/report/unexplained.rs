@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 
 use super::document::code;
 use super::probability::{EVEN, percent};
-use super::quantity::{number, p_value};
 use crate::fit::Noise;
 use crate::model::effect::NO_REFERENCE;
 use crate::model::parameter::holds_all;
 use crate::problem::{Effect, JointKind, Problem};
+use crate::quantity::format::{number, p_value};
 use crate::residual_tests::Covariate;
 use crate::results::{LoopResult, Structure, Summary};
 use crate::select::{ClosedLoop, Correction, HELD_FIXED, REFUSED};

@@ -2,10 +2,9 @@
 //! more than the status of a cause allows.
 
 use super::document::code;
-use super::effect::MOST_LISTED;
 use super::probability::{EVEN, percent};
-use super::quantity::{counted, number};
-use crate::results::{FoundEffect, LoopResult, NamedEffect};
+use crate::quantity::format::{counted, number};
+use crate::results::{FoundEffect, LoopResult, MAX_COEFFICIENTS, NamedEffect};
 use crate::select::{Status, Verdict};
 
 /// Probability of a law below which it is not named even as a candidate.
@@ -175,36 +174,39 @@ fn doubted((place, at): (&str, f64), law: f64, words: &str, rival: Option<&str>)
 /// Describes an effect, followed by its declaration unless that lists many orders.
 pub(super) fn declared(effect: &NamedEffect) -> String {
     match effect.effect.harmonic_orders() {
-        Some(orders) if orders.len() > MOST_LISTED => effect.description.clone(),
+        Some(orders) if orders.len() > MAX_COEFFICIENTS => effect.description.clone(),
         _ => format!("{}: {}", effect.description, code(&effect.declaration)),
     }
 }
 
-/// Returns the title of a cause: what its status allows to claim, and the line that declares it.
+/// Returns the title of a cause: its status, what the status allows to claim, and the line that
+/// declares it.
 pub(super) fn title(found: &FoundEffect) -> String {
     let words = declared(&found.effect);
-    match (found.status, &found.claims) {
-        (Status::Contradicted, _) => format!("contradicted: {words}"),
-        _ if found.is_only_with_others() => {
-            format!("only together with the others, not significant by itself: {words}")
+    let claim = match (found.status, &found.claims) {
+        (Status::Probable, Some(claims)) => {
+            format!("{words} ({})", percent(claims.law.probability))
         }
-        (Status::Probable | Status::Located, Some(claims)) => {
+        (Status::Located, Some(claims)) => {
             let place = (claims.place.value.as_str(), claims.place.probability);
-            doubted_title(place, claims.law.probability, &words)
+            located(place, claims.law.probability, &words)
+        }
+        (Status::Located, None) => {
+            format!("only together with the others, not significant by itself; {words}")
         }
         _ => words,
-    }
+    };
+    format!("{}: {claim}", found.status.as_str())
 }
 
-fn doubted_title((place, at): (&str, f64), law: f64, words: &str) -> String {
+/// Returns what may be claimed of a cause whose law is not known.
+fn located((place, at): (&str, f64), law: f64, words: &str) -> String {
+    let place = if at >= EVEN { place } else { "place" };
+    let law_not_known = if at >= EVEN { "law not known" } else { "and law not known" };
+    let separator = if at >= EVEN { ", " } else { " " };
     match law {
-        EVEN.. => format!("{place}: most probably {words} ({})", percent(law)),
-        LEAST_CANDIDATE.. if at >= EVEN => {
-            format!("{place}: law not known, one candidate: {words}")
-        }
-        LEAST_CANDIDATE.. => format!("place and law not known, one candidate: {words}"),
-        _ if at >= EVEN => format!("{place}: law not known"),
-        _ => "place and law not known".to_owned(),
+        LEAST_CANDIDATE.. => format!("{place}{separator}{law_not_known}; one candidate: {words}"),
+        _ => format!("{place}{separator}{law_not_known}"),
     }
 }
 
@@ -227,16 +229,15 @@ mod tests {
     #[test]
     fn sentences_claim_no_more_than_the_probabilities_allow() {
         let words = |at: f64, law: f64| doubted(("joint 2", at), law, "a wave", Some("a drift"));
-        let title = |at: f64, law: f64| doubted_title(("joint 2", at), law, "a wave");
+        let title = |at: f64, law: f64| located(("joint 2", at), law, "a wave");
         assert_eq!(words(0.99, 0.78), (true, "a wave (78 %), or else a drift".to_owned()));
-        assert_eq!(title(0.99, 0.78), "joint 2: most probably a wave (78 %)");
         let candidate = "one candidate law: a wave (39 %), or else a drift";
         let there = "an error at joint 2 (80 %) whose law is not known";
         assert_eq!(words(0.8, 0.39), (true, format!("{there}; {candidate}")));
-        assert_eq!(title(0.8, 0.39), "joint 2: law not known, one candidate: a wave");
+        assert_eq!(title(0.8, 0.39), "joint 2, law not known; one candidate: a wave");
         assert_eq!(words(0.45, 0.39), (false, candidate.to_owned()));
-        assert_eq!(title(0.45, 0.39), "place and law not known, one candidate: a wave");
-        assert_eq!(title(0.999, 0.0), "joint 2: law not known");
+        assert_eq!(title(0.45, 0.39), "place and law not known; one candidate: a wave");
+        assert_eq!(title(0.999, 0.0), "joint 2, law not known");
         assert!(!words(0.2, 0.001).1.contains("wave") && !title(0.2, 0.001).contains("wave"));
     }
 

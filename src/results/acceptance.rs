@@ -1,10 +1,29 @@
 //! Result of `accept`: acceptance.json.
 
+use std::path::PathBuf;
+
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::document::Document;
-use crate::fit::Accuracy;
+use super::summary::rows_in;
+use super::tables::commanded_joints;
+use crate::fit::{Acceptance, Accuracy, Identification};
+use crate::measurement::Measurements;
+use crate::numeric::range;
+use crate::problem::{HeldOut, Problem};
+use crate::quantity::format::number;
+
+/// Inputs of a record, and facts that no file holds.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct AcceptanceRecord {
+    /// Each input file with its SHA-256, `None` if it cannot be read again.
+    pub inputs: Vec<(PathBuf, Option<String>)>,
+    /// Commit of the repository that holds the problem.
+    pub commit: Option<String>,
+    /// Description of the instrument.
+    pub instrument: Option<String>,
+}
 
 /// Accuracy of the held-out poses, counted after ISO 9283, with the conditions of the measurement.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -79,4 +98,87 @@ impl From<&Accuracy> for PoseAccuracy {
             max_mm: max * 1e3,
         }
     }
+}
+
+impl AcceptanceResult {
+    /// Collects the record of an acceptance.
+    pub fn new(
+        problem: &Problem,
+        rows: &Measurements,
+        found: &Identification,
+        judged: &Acceptance,
+        record: &AcceptanceRecord,
+    ) -> Self {
+        let input = |(file, sha256): &(PathBuf, Option<String>)| Input {
+            file: file.display().to_string(),
+            sha256: sha256.clone(),
+        };
+        let repeatabilities = || judged.poses.iter().filter_map(|pose| pose.repeatability);
+        Self {
+            problem: problem.name.clone(),
+            flexcal: env!("CARGO_PKG_VERSION"),
+            commit: record.commit.clone(),
+            arm_digest: problem.digest(),
+            inputs: record.inputs.iter().map(input).collect(),
+            instrument: record.instrument.clone(),
+            position_sigma_mm: problem.data.position_sigma.map(|sigma| sigma * 1e3),
+            protocol: protocol(problem),
+            strategy: found.strategy.as_str(),
+            solver: found.solver.as_str(),
+            trusted: found.is_trusted(),
+            conditions: conditions(problem, rows, judged),
+            identification_rows: rows_in(found, |errors| errors.identification),
+            held_out_rows: found.fitted.held_out.n,
+            poses: judged.poses.len(),
+            before: (&judged.before).into(),
+            after: (&judged.after).into(),
+            repeated_poses: repeatabilities().count(),
+            repeatability_max_mm: repeatabilities().max_by(f64::total_cmp).map(|most| most * 1e3),
+        }
+    }
+}
+
+/// Describes how the held-out poses were chosen.
+fn protocol(problem: &Problem) -> String {
+    let chosen = match &problem.data.held_out {
+        Some(HeldOut::Fraction { fraction, seed }) => {
+            format!(
+                "a random part of {} % of the configurations (seed {seed})",
+                number(100.0 * fraction, 1)
+            )
+        }
+        Some(HeldOut::Session(name)) => {
+            format!("every row of session {name}, to which its base and tool alone were fitted")
+        }
+        Some(HeldOut::Column(name)) => format!("rows that the column {name} marks as validation"),
+        _ => "rows that the column split marks as validation".to_owned(),
+    };
+    format!("held out: {chosen}; they took part in no fit of the arm and in no choice")
+}
+
+/// Returns the range of each quantity over the held-out poses.
+fn conditions(problem: &Problem, rows: &Measurements, judged: &Acceptance) -> Vec<Condition> {
+    let rows_judged = || judged.poses.iter().flat_map(|pose| pose.rows.iter().copied());
+    let condition = |of: &str, unit: &str, value: &dyn Fn(usize) -> f64| Condition {
+        of: of.to_owned(),
+        unit: unit.to_owned(),
+        range: range(rows_judged().map(value)),
+    };
+    let joints = commanded_joints(problem).into_iter().map(|joint| {
+        condition(&joint.name(), &joint.symbol(), &|row| {
+            rows.configuration(row)[joint.joint] * joint.factor()
+        })
+    });
+    let places = ["x", "y", "z"].into_iter().enumerate();
+    let places =
+        places.map(|(axis, name)| condition(name, "mm", &|row| rows.positions[row][axis] * 1e3));
+    let columns = [
+        ("temperature", "°C", &rows.temperature),
+        ("payload", "kg", &rows.payload),
+        ("hoist", "N", &rows.hoist),
+    ];
+    let measured = columns.into_iter().filter_map(|(name, unit, values)| {
+        values.as_ref().map(|values| condition(name, unit, &|row| values[row]))
+    });
+    joints.chain(places).chain(measured).collect()
 }

@@ -96,39 +96,6 @@ impl Document for CompensationResult {
     const FORMAT: &'static str = "flexcal-compensate";
 }
 
-/// File with the identified geometry.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct ExportResult {
-    pub problem: String,
-    pub file: Option<String>,
-    /// Origins that moved in a URDF.
-    pub origins: Option<Vec<Origin>>,
-    pub held_out: Option<ExportedErrors>,
-    /// Parts of the model that the file cannot hold.
-    pub not_held: Vec<String>,
-}
-
-impl Document for ExportResult {
-    const FORMAT: &'static str = "flexcal-export";
-}
-
-/// Origin of a joint in a URDF.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct Origin {
-    pub joint: String,
-    pub xyz_m: [f64; 3],
-    pub rpy_rad: [f64; 3],
-    pub moved_mm: f64,
-    pub turned_deg: f64,
-}
-
-/// Errors on held-out rows of the whole model and of its rigid geometry.
-#[derive(Debug, Serialize, JsonSchema)]
-pub struct ExportedErrors {
-    pub whole: Summary,
-    pub rigid: Summary,
-}
-
 /// Problem made from a URDF.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct InitResult {

@@ -332,6 +332,17 @@ impl ParameterValue {
             std_error: estimate.std_error,
         }
     }
+
+    /// Returns the amplitude of a sine and a cosine of one order, taken as uncorrelated.
+    pub(crate) fn amplitude(pair: &[Self]) -> Self {
+        let (sine, cosine) = (&pair[0], &pair[1]);
+        let amplitude = sine.estimate.hypot(cosine.estimate);
+        let std_error = sine.std_error.zip(cosine.std_error).map(|(of_sine, of_cosine)| {
+            (sine.estimate * of_sine).hypot(cosine.estimate * of_cosine)
+                / amplitude.max(f64::MIN_POSITIVE)
+        });
+        Self { estimate: amplitude, std_error, ..sine.clone() }
+    }
 }
 
 impl Structure {

@@ -16,28 +16,43 @@ mod comparison;
 mod design;
 mod document;
 mod effect;
+mod export;
 mod identification;
+mod knowledge;
+pub(crate) mod plots;
 mod remainder;
+mod residual_size;
 mod residual_test;
 mod study;
 mod summary;
+pub(crate) mod tables;
 mod trace;
 
-pub(crate) use acceptance::{AcceptanceResult, Condition, Input};
-pub(crate) use application::{
-    CompensationResult, ExportResult, ExportedErrors, InitResult, Origin, PredictionErrors,
-};
+pub(crate) use acceptance::{AcceptanceRecord, AcceptanceResult, PoseAccuracy};
+pub(crate) use application::{CompensationResult, InitResult, PredictionErrors};
 pub(crate) use claims::Claims;
 pub use closed_loop::LoopResult;
-pub(crate) use closed_loop::{FoundEffect, Gain, ParameterValue, Step, Structure, Witness};
+pub(crate) use closed_loop::{Gain, ParameterValue, Step, Structure, Witness};
 pub(crate) use comparison::{ComparedFit, ComparisonResult};
 pub(crate) use design::SeparationResult;
 pub use document::Document;
 pub(crate) use effect::NamedEffect;
+pub(crate) use export::Origin;
 pub use identification::IdentificationResult;
+pub(crate) use knowledge::{
+    Knowledge, MAX_COEFFICIENTS, ManyHarmonics, MissingReference, SHOWN_HARMONICS,
+};
+pub use plots::PlotData;
+pub(crate) use plots::{
+    Contribution, Point, PoseError, Stage, StageErrors, procedure_stages, sample,
+};
 pub(crate) use remainder::REMAINDER_FILE;
+pub(crate) use residual_size::{ResidualSize, exceeds_noise};
 pub(crate) use study::{Cell, StudiedParameter};
-pub(crate) use summary::Summary;
+pub(crate) use summary::{Summary, measured_kinds, rows_in};
+pub(crate) use tables::{
+    CommandedJoint, commanded_joints, predictions_csv, residuals_csv, study_timing_csv,
+};
 pub use trace::TraceResult;
 pub(crate) use trace::{Candidate, Confounded, HypothesisSet, ToldApart};
 
@@ -46,14 +61,17 @@ pub(crate) use effect::joined;
 #[doc(hidden)]
 pub use self::{
     claims::Hypothesis,
-    closed_loop::{Correction, Fit, Row},
+    closed_loop::{Correction, Fit, FoundEffect, Row},
     design::{CheckResult, ExpectedParameter, PlanResult},
     document::{FORMAT_VERSION, PROGRAM},
     effect::Untestable,
+    export::{ExportResult, ExportedErrors},
     identification::{Parameter, Spread},
+    plots::{Cause, Quantity},
     residual_test::ResidualTest,
     study::{HeldOut, MisprintResult, Reading, StudyResult},
     summary::Errors,
+    tables::{Column, commands_csv, poses_csv, residual_columns, study_csv, study_parameters_csv},
 };
 
 /// Name of every format with its JSON Schema.

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::fit::{self, AxisValues, ErrorSummary};
+use crate::fit::{self, AxisValues, ErrorSummary, Identification};
 use crate::quantity::Unit;
 
 /// Values along the axes of the measuring frame, and of the Euclidean norm.
@@ -121,4 +121,23 @@ pub(super) fn by_unit(unit: Unit, value: f64) -> (Option<f64>, Option<f64>) {
     let value = value * unit.in_tables().factor;
     let only = |wanted: Unit| (unit == wanted).then_some(value);
     (only(Unit::Length), only(Unit::Angle))
+}
+
+/// Returns the number of rows of all kinds in one part of the data.
+pub(crate) fn rows_in(found: &Identification, part: fn(&fit::Errors) -> ErrorSummary) -> usize {
+    measured_kinds(found, part).map(|of| of.n).sum()
+}
+
+/// Iterates over the kinds of rows in one part of the data, without known distances.
+pub(crate) fn measured_kinds(
+    found: &Identification,
+    part: fn(&fit::Errors) -> ErrorSummary,
+) -> impl Iterator<Item = ErrorSummary> + use<'_> {
+    let alone = found.kinds.is_empty().then(|| part(&found.fitted));
+    let each = found
+        .kinds
+        .iter()
+        .map(move |(_, fitted)| part(fitted))
+        .filter(|of| of.kind != "known distance");
+    alone.into_iter().chain(each)
 }

@@ -84,7 +84,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
         &[
             GROUND,
             BELOW_FIT,
-            &["fit", "remainder", "residual_tests", "select", "design", "study", "urdf"],
+            &["fit", "remainder", "residual_tests", "select", "design", "study", "files", "urdf"],
         ],
     ),
     (

@@ -9,7 +9,7 @@ use flexcal::measurement::{Dataset, Measurements};
 use flexcal::mechanics::{Arm, StaticState, Workspace};
 use flexcal::model::Model;
 use flexcal::problem::{PoseView, Problem};
-use flexcal::report::{commands_csv, poses_csv};
+use flexcal::results::{commands_csv, poses_csv};
 use flexcal::rig::{Truth, simulate};
 use nalgebra::Vector3;
 

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use flexcal::problem::{DeclaredCovariate, JointKind};
+use flexcal::results::poses_csv;
 use serde_json::Value;
 
 /// Temporary folder for results, with flexcal run in the package folder.
@@ -111,7 +112,7 @@ fn drawn(count: usize) -> String {
         super::bench::ranges(&truth).draw(&problem, count, flexcal::design::Extremes::Often, 2, 0);
     let mut plain = problem.clone();
     plain.data.held_out = None;
-    let text = flexcal::report::poses_csv(&plain, &poses);
+    let text = poses_csv(&plain, &poses);
     text.lines().map(|line| line.split_once(',').unwrap().1.to_owned() + "\n").collect()
 }
 

@@ -4,7 +4,8 @@ use flexcal::fit::{Options, Placement, compensate, identify, seen_in_base, waypo
 use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::model::Model;
 use flexcal::problem::{Observation, Problem};
-use flexcal::report::commands_csv;
+use flexcal::results::commands_csv;
+use flexcal::results::commands_csv;
 use flexcal::rig::{Simulation, Truth, simulate};
 use flexcal::select::{Verdict, close};
 use flexcal::study::table;

@@ -5,8 +5,8 @@ use std::path::Path;
 use flexcal::fit::Options;
 use flexcal::measurement::Dataset;
 use flexcal::problem::Problem;
-use flexcal::report::{PlotData, loop_brief, loop_report, loop_text};
-use flexcal::results::{Document as _, LoopResult};
+use flexcal::report::{loop_brief, loop_report, loop_text};
+use flexcal::results::{Document as _, LoopResult, PlotData};
 use flexcal::select::{Status, Verdict, close};
 use serde_json::Value;
 

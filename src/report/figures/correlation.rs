@@ -8,83 +8,75 @@ use crate::fit::Correlations;
 /// Maximum number of parameters in the matrix.
 const MAX_PARAMETERS: usize = 20;
 /// Minimum and maximum width for names in pixels.
-const NAME_WIDTH: (i32, i32) = (118, 230);
+const NAME_WIDTH: (f64, f64) = (118.0, 230.0);
 /// Ratio of the width of a letter to its height.
 const LETTER_WIDTH: f64 = 0.62;
 /// Smallest absolute correlation that is coloured.
 const MIN_CORRELATION: f64 = 0.05;
 
+/// Returns the paint of a correlation; `None` for a small or undefined one, which stays blank.
+fn shade(value: f64) -> Option<Paint> {
+    let colour = if value < 0.0 { WARM } else { ACCENT };
+    // Few distinct colours keep the file small.
+    let depth = (value.abs() * 10.0).ceil() / 10.0;
+    (value.abs() >= MIN_CORRELATION).then(|| Paint::fill(colour).faded(depth))
+}
+
 /// Draws the correlation matrix in colours; with many parameters only the most correlated ones.
 pub fn correlation(correlations: &Correlations) -> Option<Drawing> {
-    let matrix = &correlations.matrix;
-    let total = correlations.names.len();
+    let (matrix, total) = (&correlations.matrix, correlations.names.len());
     if total < 2 {
         return None;
     }
     let shown = clustered_order(matrix);
-    let count = i32::try_from(shown.len()).unwrap_or(1);
-    let longest =
-        shown.iter().map(|&i| correlations.names[i].chars().count()).max().unwrap_or_default();
-    let letters_of = |cell: i32| (0.85 * f64::from(cell)).min(TEXT);
-    let cell_of = |names: i32| ((WIDTH - names - 4) / count).clamp(8, 26);
-    #[expect(clippy::cast_possible_truncation, reason = "a position on the drawing")]
-    let width = |cell: i32| (LETTER_WIDTH * letters_of(cell) * longest as f64).ceil() as i32 + 12;
-    let names = width(cell_of(NAME_WIDTH.0)).clamp(NAME_WIDTH.0, NAME_WIDTH.1);
-    let cell = cell_of(names);
-    let height = 8 + cell * count + 40;
-    let letters = letters_of(cell);
-    let svg = figure((WIDTH, height), "Correlations of the parameters", |area| {
-        for (row, &i) in (0..).zip(&shown) {
-            let top = 8 + cell * row;
-            let position = (names - 6, top + cell / 2);
-            write_sized(area, &correlations.names[i], position, (MUTED, letters), HPos::Right)?;
-            for (column, &j) in (0..).zip(&shown) {
-                let left = names + cell * column;
-                let value = matrix[(i, j)];
-                let corners = [(px(left), px(top)), (px(left + cell) - 3, px(top + cell) - 3)];
-                let style = match value {
-                    _ if i == j => GRID.filled(),
-                    // Small or undefined correlations stay blank.
-                    v if v.abs() < MIN_CORRELATION || v.is_nan() => continue,
-                    // Few distinct colours keep the file small.
-                    v if v < 0.0 => WARM.mix((-v * 10.0).ceil() / 10.0).filled(),
-                    v => ACCENT.mix((v * 10.0).ceil() / 10.0).filled(),
-                };
-                area.draw(&Rectangle::new(corners, style))?;
-            }
-        }
-        let y = 8 + cell * count + 20;
-        for k in 0..=10 {
-            let value = f64::from(k) / 5.0 - 1.0;
-            let colour = if value < 0.0 { WARM.mix(-value) } else { ACCENT.mix(value) };
-            let left = names + 14 * k;
-            area.draw(&Rectangle::new(
-                [(px(left), px(y - 6)), (px(left + 14), px(y + 6))],
-                colour.filled(),
-            ))?;
-        }
-        write(area, "−1", (names - 6, y), MUTED, HPos::Right)?;
-        write(area, "+1   correlation", (names + 14 * 11 + 6, y), MUTED, HPos::Left)
+    let count = shown.len() as f64;
+    let names: Vec<&str> = shown.iter().map(|&i| correlations.names[i].as_str()).collect();
+    let longest = names.iter().map(|name| name.chars().count()).max().unwrap_or_default() as f64;
+    let cell_beside = |names: f64| ((WIDTH - names - 4.0) / count).clamp(8.0, 26.0).floor();
+    let text_of = |cell: f64| (0.85 * cell).min(TEXT);
+    let wanted = LETTER_WIDTH * text_of(cell_beside(NAME_WIDTH.0)) * longest + 12.0;
+    let left = wanted.clamp(NAME_WIDTH.0, NAME_WIDTH.1);
+    let cell = cell_beside(left);
+    let (shown_rows, x) = (&shown, Axis::bare((-0.5, count - 0.5)));
+    let boxes = shown.iter().enumerate().flat_map(|(row, &i)| {
+        shown_rows.iter().enumerate().filter_map(move |(column, &j)| {
+            let paint = if i == j { Some(Paint::fill(GRID)) } else { shade(matrix[(i, j)]) };
+            let (x, y) = (column as f64, row as f64);
+            Some(Shape::area((x - 0.48, y - 0.48), (x + 0.48, y + 0.48), paint?))
+        })
     });
-    let omitted = total - shown.len();
-    let note = if omitted > 0 {
+    let sides = (left, WIDTH - left - cell * count);
+    let rows = names.iter().map(|name| ((*name).to_owned(), MUTED));
+    let matrix_panel =
+        Panel { text: text_of(cell), ..Panel::of_rows(cell, sides, x, rows) }.with(boxes);
+    let steps = (0..=10).filter_map(|k| {
+        let paint = shade(f64::from(k) / 5.0 - 1.0)?;
+        Some(Shape::area((f64::from(k) - 0.5, -0.5), (f64::from(k) + 0.5, 0.5), paint))
+    });
+    let (low, high) = (("−1".to_owned(), MUTED), "+1   correlation");
+    let x = Axis::bare((-0.5, 10.5));
+    let scale = Panel::of_rows(12.0, (left, WIDTH - left - 14.0 * 11.0), x, [low])
+        .with(steps)
+        .with([Shape::text((10.5, 0.0), 6.0, high, MUTED)]);
+    let note = if total > shown.len() {
         format!(" Shown are the {MAX_PARAMETERS} most correlated of {total} parameters.")
     } else {
         String::new()
     };
     let caption = format!(
-        "Correlation of every pair of estimates, columns in the order of the rows, correlated parameters side \
-             by side. Deep colours off the diagonal: only the \
-             sum (orange) or the difference (blue) of two parameters is well determined, so neither value is reliable alone.{note}"
+        "Correlation of every pair of estimates, columns in the order of the rows, correlated \
+         parameters side by side. Deep colours off the diagonal: only the sum (orange) or the \
+         difference (blue) of two parameters is well determined, so neither value is reliable \
+         alone.{note}"
     );
-    let names = || shown.iter().map(|&i| correlations.names[i].as_str());
-    let header: Vec<&str> = std::iter::once("parameter").chain(names()).collect();
-    let row = |(name, &i): (&str, &usize)| {
+    let header = std::iter::once("parameter").chain(names.iter().copied());
+    let rows = names.iter().zip(&shown).map(|(name, &i)| {
         let values = shown.iter().map(|&j| fixed(matrix[(i, j)], 4));
-        std::iter::once(name.to_owned()).chain(values).collect()
-    };
-    let sheet = Sheet::new(&header, names().zip(&shown).map(row).collect());
-    Some(Drawing::new("correlations", "Correlations of the estimates", caption, svg).with(sheet))
+        std::iter::once((*name).to_owned()).chain(values).collect()
+    });
+    let svg = chart("Correlations of the parameters", &[], &[matrix_panel, scale]);
+    let titles = ("correlations", "Correlations of the estimates");
+    Some(Drawing::new(titles, caption, svg, sheet(header, rows)))
 }
 
 /// Returns the most correlated parameters, at most [`MAX_PARAMETERS`], with correlated ones side by

@@ -6,16 +6,10 @@ use crate::study::{
     AlternativeModel, Case, HeldOutError, MisprintStudy, Replica, ReplicaResults, Spread,
 };
 
-/// Height of a row in pixels.
-const ROW: i32 = 19;
-/// Width for names in pixels.
-const NAMES: i32 = 178;
-/// Height above the rows in pixels.
-const TOP: i32 = 26;
 /// Ends of the logarithmic axis.
 const RANGE: (f64, f64) = (0.02, 5.0);
 /// Colours of the cases.
-const COLOURS: [RGBColor; 4] = [INK, ACCENT, FAINT, MUTED];
+const COLOURS: [Colour; 4] = [INK, ACCENT, FAINT, MUTED];
 
 /// Name of a row with mean and spread of each case.
 type Row = (String, Vec<Option<Spread>>);
@@ -30,74 +24,53 @@ pub fn misprints(study: &MisprintStudy, results: &ReplicaResults) -> Drawing {
         study.cases.iter().map(ratio).collect()
     };
     let named = results.readings.iter().enumerate();
-    let mut rows: Vec<Row> = named
-        .map(|(index, named)| {
-            (named.name.clone(), spreads(&|replica| replica.reading_error(index, 0)))
-        })
-        .collect();
-    rows.extend(AlternativeModel::EACH.map(|model| {
+    let readings = named.map(|(index, named)| {
+        (named.name.clone(), spreads(&|replica| replica.reading_error(index, 0)))
+    });
+    let models = AlternativeModel::EACH.into_iter().map(|model| {
         (model.words().0.to_owned(), spreads(&|replica| replica.alternative_error(model)))
-    }));
-    let caption = "Mean error at the held-out poses relative to that of the rigid fit, mean and standard deviation over specimens, with \
-                   known stiffness: each misprint alone, combinations of misprints, and below them alternative models. Colours: how \
-                   links and joints share the flexibility, and a single load instead of several. The line is the ratio in the paper, \
-                   2.136/3.967; a misprint can explain it if its marks meet the line.";
-    let title = "Cost of each misprint";
-    Drawing::new("misprints", title, caption, draw(study, &rows))
-}
-
-fn draw(study: &MisprintStudy, rows: &[Row]) -> String {
-    let bottom = TOP + ROW * i32::try_from(rows.len()).unwrap_or_default();
-    let paper = WITH_ELASTICITY.mean[3] / WITHOUT_ELASTICITY.mean[3];
-    let colour = |k: usize| COLOURS[k % COLOURS.len()];
-    let words: Vec<String> = study.cases.iter().map(Case::name).collect();
-    figure((WIDTH, bottom + BELOW), "Error of every reading over that of the rigid fit", |area| {
-        let mut marks: Vec<(&str, RGBColor, Mark)> = words
-            .iter()
-            .enumerate()
-            .map(|(k, word)| (word.as_str(), colour(k), Mark::Dot))
-            .collect();
-        marks.push(("the paper", WARM, Mark::Line));
-        legend(area, TOP, &marks)?;
-        for value in [0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0] {
-            vertical_line(area, position(value), (TOP, bottom), GRID)?;
-            let number = number(value, if value < 1.0 { 2 } else { 0 });
-            write(area, &number, (position(value) / px(1), bottom + 10), MUTED, HPos::Center)?;
-        }
-        vertical_line(area, position(paper), (TOP, bottom), WARM)?;
-        for (k, (name, spreads)) in (0..).zip(rows) {
-            let y = TOP + ROW * k + ROW / 2;
-            write(area, name, (NAMES - 10, y), INK, HPos::Right)?;
-            if spreads.iter().all(Option::is_none) {
-                write(area, "diverges", (NAMES + 8, y), MUTED, HPos::Left)?;
-            }
-            for (j, spread) in spreads.iter().enumerate() {
-                let Some(Spread { mean, deviation, .. }) = *spread else { continue };
-                let shift = px(4)
-                    * (2 * i32::try_from(j).unwrap_or_default()
-                        - i32::try_from(spreads.len()).unwrap_or_default()
-                        + 1)
-                    / 2;
-                let at = px(y) + shift;
-                let ends = vec![(position(mean - deviation), at), (position(mean + deviation), at)];
-                area.draw(&PathElement::new(ends, line(colour(j), 1.2)))?;
-                area.draw(&Circle::new((position(mean), at), pixels(2.4), colour(j).filled()))?;
-            }
-        }
-        let middle = NAMES + (WIDTH - NAMES) / 2;
-        write(
-            area,
-            "held-out mean over that of the rigid fit",
-            (middle, bottom + 28),
-            INK,
-            HPos::Center,
-        )
-    })
-}
-
-/// Returns the horizontal position of a ratio in drawn pixels.
-fn position(value: f64) -> i32 {
+    });
+    let rows: Vec<Row> = readings.chain(models).collect();
+    let cases: Vec<String> = study.cases.iter().map(Case::name).collect();
+    let mut legend: Vec<_> = cases
+        .iter()
+        .zip(COLOURS.into_iter().cycle())
+        .map(|(case, colour)| (case.as_str(), colour, Mark::Dot))
+        .collect();
+    legend.push(("the paper", WARM, Mark::Line));
     let (low, high) = (RANGE.0.log10(), RANGE.1.log10());
-    let fraction = (value.max(RANGE.0).log10().clamp(low, high) - low) / (high - low);
-    px(NAMES) + pixels(fraction * f64::from(WIDTH - NAMES - 16))
+    let at = |value: f64| value.max(RANGE.0).log10().clamp(low, high);
+    let marks = rows.iter().enumerate().flat_map(|(k, (_, spreads))| {
+        let row = k as f64;
+        let mark = |(j, spread): (usize, &Option<Spread>)| {
+            let Spread { mean, deviation, .. } = (*spread)?;
+            let y = row + 0.21 * (j as f64 - 0.5 * (spreads.len() as f64 - 1.0));
+            let colour = COLOURS[j % COLOURS.len()];
+            let ends = [mean - deviation, mean + deviation].map(|value| (at(value), y));
+            let line = Shape::line(ends, Paint::line(colour, 1.2));
+            Some([line, Shape::dot((at(mean), y), 2.4, Paint::fill(colour), None)])
+        };
+        let diverges = spreads.iter().all(Option::is_none);
+        let note = diverges.then(|| Shape::text((low, row), 8.0, "diverges", MUTED));
+        spreads.iter().enumerate().filter_map(mark).flatten().chain(note).collect::<Vec<_>>()
+    });
+    let names = rows.iter().map(|(name, _)| (name.clone(), INK));
+    let x = Axis::logarithmic((low, high), "held-out mean over that of the rigid fit", 6);
+    let paper = WITH_ELASTICITY.mean[3] / WITHOUT_ELASTICITY.mean[3];
+    let panel = Panel::of_rows(19.0, (178.0, 16.0), x, names)
+        .with_reference(paper.log10(), WARM)
+        .with(marks);
+    let caption = "Mean error at the held-out poses relative to that of the rigid fit, mean and \
+                   standard deviation over specimens, with known stiffness: each misprint alone, \
+                   combinations of misprints, and below them alternative models. Colours: how \
+                   links and joints share the flexibility, and a single load instead of several. \
+                   The line is the ratio in the paper, 2.136/3.967; a misprint can explain it if \
+                   its marks meet the line.";
+    let svg = chart("Error of every reading over that of the rigid fit", &legend, &[panel]);
+    let cell = |spread: &Option<Spread>| spread.map_or_else(String::new, |s| fixed(s.mean, 6));
+    let header = std::iter::once("reading").chain(cases.iter().map(String::as_str));
+    let cells = rows.iter().map(|(name, spreads)| {
+        std::iter::once(name.clone()).chain(spreads.iter().map(cell)).collect()
+    });
+    Drawing::new(("misprints", "Cost of each misprint"), caption, svg, sheet(header, cells))
 }

@@ -1,32 +1,28 @@
 //! Figures of the reports, one per file: data in, SVG with title and caption out.
 
-mod arm;
-mod axis_limit;
-mod cause;
-mod cause_drawing;
+mod axis;
+mod chart;
 mod contribution;
 mod correlation;
-mod coverage;
-mod data;
+mod drawing;
+mod effect;
 mod errors;
-mod frame;
 mod histogram;
 mod joint_map;
 mod misprints;
 mod order;
-mod pose;
 mod prelude;
 mod ranking;
-mod sheet;
 mod spectrum;
 mod strategies;
-mod tags;
+mod svg;
 mod vectors;
 
 pub(super) use contribution::contributions;
 pub(super) use correlation::correlation;
+pub(super) use drawing::Drawing;
+pub(super) use effect::{effect, unexplained};
 pub(super) use errors::{errors, of_procedure};
-pub(super) use frame::range;
 pub(super) use histogram::histogram;
 pub(super) use joint_map::joint_map;
 pub(super) use misprints::misprints;
@@ -34,11 +30,8 @@ pub(super) use order::order;
 pub(super) use ranking::ranking;
 pub(super) use spectrum::spectrum;
 pub(super) use strategies::{ablations, rounds, strategies};
+pub(super) use svg::{ACCENT, Colour, FAINT, GRID, INK, MUTED, WARM};
 pub(super) use vectors::vectors;
-
-pub use cause::{Cause, Point, Quantity};
-pub use data::PlotData;
-pub use frame::{ACCENT, Drawing, FAINT, GRID, INK, MUTED, WARM};
 
 /// File names of all figures, except those of effects (numbered) and procedures (named).
 const NAMES: [&str; 14] = [

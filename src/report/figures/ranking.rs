@@ -7,10 +7,6 @@ use crate::select::{Ranked, Trace};
 
 /// Maximum number of candidates in the figure.
 const MAX_CANDIDATES: usize = 12;
-/// Height of a row in pixels.
-const ROW: i32 = 22;
-/// Width for names in pixels.
-const NAMES: i32 = 200;
 /// Smallest p value that is distinguished from zero.
 const MIN_P: f64 = 1e-300;
 
@@ -38,66 +34,43 @@ fn named(effect: &Effect, trace: &Trace) -> String {
 pub fn ranking(trace: &Trace) -> Option<Drawing> {
     let shown: Vec<&Ranked> = trace.ranking.iter().take(MAX_CANDIDATES).collect();
     let first = shown.first()?;
+    let level = -trace.level.log10();
     let evidence = |ranked: &Ranked| -ranked.p_value.max(MIN_P).log10();
-    let highest = shown
-        .iter()
-        .map(|ranked| evidence(ranked))
-        .fold(1.0, f64::max)
-        .max(-2.0 * trace.level.log10());
-    let alike = |ranked: &Ranked| first.alike.iter().any(|(other, _)| *other == ranked.effect);
-    let count = i32::try_from(shown.len()).unwrap_or_default();
-    let (top, bottom) = (10, 10 + ROW * count);
-    let position = |value: f64| px(NAMES) + pixels(value / highest * f64::from(WIDTH - NAMES - 96));
-    let svg = figure((WIDTH, bottom + BELOW), "Candidate effects by evidence", |area| {
-        for (value, number) in round_numbers((0.0, highest), 5) {
-            let at = position(value);
-            vertical_line(area, at, (top, bottom), GRID)?;
-            write(area, &number, (at / px(1), bottom + 10), MUTED, HPos::Center)?;
-        }
-        for (k, ranked) in (0..).zip(&shown) {
-            let y = top + ROW * k + ROW / 2;
-            let is_significant = ranked.p_value < trace.level;
-            let colour = if is_significant { INK } else { MUTED };
-            write(area, &named(&ranked.effect, trace), (NAMES - 8, y), colour, HPos::Right)?;
-            let end = position(evidence(ranked)).max(position(0.0) + px(1));
-            let bar = [(position(0.0), px(y - 6)), (end, px(y + 6))];
-            let style = match (k, alike(ranked), is_significant) {
-                (0, _, true) => ACCENT.filled(),
-                (_, true, _) => ACCENT.mix(0.4).filled(),
-                _ => FAINT.filled(),
-            };
-            area.draw(&Rectangle::new(bar, style))?;
-            let mark = if k > 0 && alike(ranked) { "≈ first, " } else { "" };
-            let gain = format!("{mark}{} mm", mm(ranked.gain.max(0.0), 4));
-            // The text is to the right of both bar and line.
-            let beside = end.max(position(-trace.level.log10()));
-            write(area, &gain, (beside / px(1) + 6, y), MUTED, HPos::Left)?;
-        }
-        let level = position(-trace.level.log10());
-        vertical_line(area, level, (top - 4, bottom), INK)?;
-        write(
-            area,
-            "evidence, −log₁₀ p",
-            (NAMES + (WIDTH - NAMES - 96) / 2, bottom + 28),
-            INK,
-            HPos::Center,
-        )
+    let highest = shown.iter().map(|ranked| evidence(ranked)).fold(1.0, f64::max).max(2.0 * level);
+    let is_alike = |ranked: &Ranked| first.alike.iter().any(|(other, _)| *other == ranked.effect);
+    let names = shown.iter().map(|ranked| {
+        let colour = if ranked.p_value < trace.level { INK } else { MUTED };
+        (named(&ranked.effect, trace), colour)
     });
+    let shapes = shown.iter().enumerate().flat_map(|(k, ranked)| {
+        let (row, end) = (k as f64, evidence(ranked).max(0.004 * highest));
+        let is_alike = k > 0 && is_alike(ranked);
+        let paint = match (k, is_alike, ranked.p_value < trace.level) {
+            (0, _, true) => Paint::fill(ACCENT),
+            (_, true, _) => Paint::fill(ACCENT).faded(0.4),
+            _ => Paint::fill(FAINT),
+        };
+        let mark = if is_alike { "≈ first, " } else { "" };
+        let gain = format!("{mark}{} mm", mm(ranked.gain.max(0.0), 4));
+        // The text is to the right of both bar and line.
+        let text = Shape::text((end.max(level), row), 6.0, gain, MUTED);
+        [Shape::area((0.0, row - 0.28), (end, row + 0.28), paint), text]
+    });
+    let x = Axis::linear((0.0, highest), "evidence, −log₁₀ p", 5);
+    let panel =
+        Panel::of_rows(22.0, (200.0, 96.0), x, names).with(shapes).with_reference(level, INK);
     let caption = format!(
-        "{} candidates were tested on the fit of the declared model; these are the best. A longer bar is less likely to \
-             arise by chance; left of the vertical line (p = {}) a candidate is not significant. Next to each bar: the \
-             expected decrease of the root mean square error. Pale blue: hardly distinguishable from the first candidate \
-             with these poses.",
+        "{} candidates were tested on the fit of the declared model; these are the best. A longer \
+         bar is less likely to arise by chance; left of the vertical line (p = {}) a candidate is \
+         not significant. Next to each bar: the expected decrease of the root mean square error. \
+         Pale blue: hardly distinguishable from the first candidate with these poses.",
         trace.tried, trace.level
     );
-    let row = |ranked: &&Ranked| {
-        vec![
-            named(&ranked.effect, trace),
-            format!("{:e}", ranked.p_value),
-            fixed(ranked.gain * 1e3, 6),
-        ]
-    };
-    let sheet =
-        Sheet::new(&["effect", "p_value", "expected_gain_mm"], shown.iter().map(row).collect());
-    Some(Drawing::new("ranking", "Candidate effects by evidence", caption, svg).with(sheet))
+    let rows = shown.iter().map(|ranked| {
+        let name = named(&ranked.effect, trace);
+        vec![name, format!("{:e}", ranked.p_value), fixed(ranked.gain * 1e3, 6)]
+    });
+    let title = "Candidate effects by evidence";
+    let data = sheet(["effect", "p_value", "expected_gain_mm"], rows);
+    Some(Drawing::new(("ranking", title), caption, chart(title, &[], &[panel]), data))
 }

@@ -5,16 +5,8 @@ use crate::fit::{Comparison, Errors};
 use crate::problem::Effect;
 use crate::select::{ClosedLoop, Round};
 
-/// Height of a row in pixels.
-const ROW: i32 = 22;
-/// Width for names in pixels.
-const NAMES: i32 = 236;
-/// Width for numbers in pixels.
-const NUMBERS: i32 = 66;
-/// Height above the rows in pixels.
-const TOP: i32 = 26;
-/// Number of decades below which 2 and 5 are labelled, too.
-const MAX_LABELLED_DECADES: f64 = 2.2;
+/// Difference of two logarithms of errors below which both are the best.
+const TIE: f64 = 1e-4;
 
 /// Row of the figure.
 struct Entry {
@@ -85,14 +77,46 @@ pub fn rounds(closure: &ClosedLoop) -> Option<Drawing> {
     (entries.len() > 1).then(|| draw_entries("rounds", titles, caption, &entries))
 }
 
-/// Draws entries with a title, and a label for screen readers.
+/// Draws the mean errors of entries with a title, and a label for screen readers.
 fn draw_entries(
     name: &str,
     (title, label): (&str, &str),
     caption: &str,
     entries: &[Entry],
 ) -> Drawing {
-    Drawing::new(name, title, caption, rows(entries, label)).with(sheet(entries))
+    let means = |entry: &Entry| {
+        [entry.errors.identification.mean.norm, entry.errors.held_out.mean.norm].map(|e| e * 1e3)
+    };
+    let log_means = |entry: &Entry| means(entry).map(|mean| mean.max(1e-9).log10());
+    let (low, high) = range(entries.iter().flat_map(log_means));
+    let ends = if low < high { (low - 0.1, high + 0.1) } else { (low - 0.5, low + 0.5) };
+    let best = entries.iter().map(|entry| log_means(entry)[1]).fold(f64::INFINITY, f64::min);
+    let marks = entries.iter().enumerate().flat_map(|(k, entry)| {
+        let (row, [fitted, held_out]) = (k as f64, log_means(entry));
+        if !(fitted.is_finite() && held_out.is_finite()) {
+            return vec![Shape::text((ends.0, row), 8.0, "no result", MUTED)];
+        }
+        let colour = if held_out <= best + TIE { ACCENT } else { INK };
+        let value = means(entry)[1];
+        let value = number(value, decimals(value, 4) + 1);
+        vec![
+            Shape::line([(fitted, row), (held_out, row)], Paint::line(FAINT, 1.4)),
+            Shape::dot((fitted, row), 3.4, Paint::fill(FAINT), None),
+            Shape::dot((held_out, row), 3.4, Paint::fill(colour), None),
+            Shape::text((ends.1, row), 8.0, value, colour),
+        ]
+    });
+    let names = entries.iter().map(|entry| (entry.name.clone(), INK));
+    let x = Axis::logarithmic(ends, "mean position error [mm]", 5);
+    let panel = Panel::of_rows(22.0, (236.0, 66.0), x, names).with(marks);
+    let legend = [("fitted poses", FAINT), ("held-out poses", INK), ("best", ACCENT)];
+    let legend = legend.map(|(name, colour)| (name, colour, Mark::Dot));
+    let rows = entries.iter().map(|entry| {
+        let means = means(entry).map(|mean| fixed(mean, 6));
+        std::iter::once(entry.name.clone()).chain(means).collect()
+    });
+    let data = sheet(["name", "fitted_mean_mm", "held_out_mean_mm"], rows);
+    Drawing::new((name, title), caption, chart(label, &legend, &[panel]), data)
 }
 
 /// Returns the change by a round, counted from 0.
@@ -111,73 +135,4 @@ fn round_name(closure: &ClosedLoop, k: usize) -> String {
         [first, others @ ..] => format!("+ {} and {} more", named(first), others.len()),
     };
     format!("{} {change}", k + 1)
-}
-
-fn sheet(entries: &[Entry]) -> Sheet {
-    let row = |entry: &Entry| {
-        let errors = [entry.errors.identification.mean.norm, entry.errors.held_out.mean.norm];
-        let errors = errors.map(|error| fixed(error * 1e3, 6));
-        std::iter::once(entry.name.clone()).chain(errors).collect()
-    };
-    Sheet::new(&["name", "fitted_mean_mm", "held_out_mean_mm"], entries.iter().map(row).collect())
-}
-
-fn rows(entries: &[Entry], label: &str) -> String {
-    let log_means = |entry: &Entry| {
-        [entry.errors.identification.mean.norm, entry.errors.held_out.mean.norm]
-            .map(|e| (e * 1e3).max(1e-9).log10())
-    };
-    let (low, high) = range(entries.iter().flat_map(log_means));
-    let (low, high) = if low < high { ((low - 0.1), (high + 0.1)) } else { (low - 0.5, low + 0.5) };
-    let bottom = TOP + ROW * i32::try_from(entries.len()).unwrap_or_default();
-    let room = f64::from(WIDTH - NAMES - NUMBERS);
-    let position = |value: f64| px(NAMES) + pixels((value - low) / (high - low) * room);
-    let best = entries.iter().map(|entry| log_means(entry)[1]).fold(f64::INFINITY, f64::min);
-    figure((WIDTH, bottom + BELOW), label, |area| {
-        let marks = [("fitted poses", FAINT), ("held-out poses", INK), ("best", ACCENT)];
-        legend(area, TOP, &marks.map(|(name, colour)| (name, colour, Mark::Dot)))?;
-        for decade in -6..=6 {
-            for step in [1.0_f64, 2.0, 5.0] {
-                let value = f64::from(decade) + step.log10();
-                if (low..=high).contains(&value) {
-                    let at = position(value);
-                    vertical_line(area, at, (TOP, bottom), GRID)?;
-                    if step < 1.5 || high - low < MAX_LABELLED_DECADES {
-                        let digits = usize::try_from(-decade).unwrap_or_default();
-                        let number = number(10.0_f64.powf(value), digits);
-                        write(area, &number, (at / px(1), bottom + 10), MUTED, HPos::Center)?;
-                    }
-                }
-            }
-        }
-        for (k, entry) in (0..).zip(entries) {
-            let y = TOP + ROW * k + ROW / 2;
-            let [fitted, held_out] = log_means(entry);
-            let colour = if held_out <= best + 1e-4 { ACCENT } else { INK };
-            write(area, &entry.name, (NAMES - 10, y), INK, HPos::Right)?;
-            if !(fitted.is_finite() && held_out.is_finite()) {
-                write(area, "no result", (NAMES + 8, y), MUTED, HPos::Left)?;
-                continue;
-            }
-            let ends = vec![(position(fitted), px(y)), (position(held_out), px(y))];
-            area.draw(&PathElement::new(ends, line(FAINT, 1.4)))?;
-            area.draw(&Circle::new((position(fitted), px(y)), pixels(3.4), FAINT.filled()))?;
-            area.draw(&Circle::new((position(held_out), px(y)), pixels(3.4), colour.filled()))?;
-            let value = entry.errors.held_out.mean.norm * 1e3;
-            write(
-                area,
-                &number(value, decimals(value, 4) + 1),
-                (WIDTH - 6, y),
-                colour,
-                HPos::Right,
-            )?;
-        }
-        write(
-            area,
-            "mean position error [mm]",
-            (NAMES + (WIDTH - NAMES - NUMBERS) / 2, bottom + 28),
-            INK,
-            HPos::Center,
-        )
-    })
 }

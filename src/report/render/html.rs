@@ -249,7 +249,7 @@ fn grid<'a>(new: &'a [Drawing], shown: &mut Vec<&'a Drawing>) -> Markup {
                         figcaption {
                             b { "Figure " (first + k) ". " (figure.title) }
                             (figure.caption) " "
-                            a.data download={ (figure.name) ".csv" } href=(address(&figure.data.csv())) { "Data of this figure (CSV)" }
+                            a.data download={ (figure.name) ".csv" } href=(address(&figure.data)) { "Data of this figure (CSV)" }
                         }
                     }
                 }

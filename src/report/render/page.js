@@ -26,7 +26,7 @@ const flexcal = (() => {
     figure.rings = figure.dots.filter((own) => own.row === row).map((own) => {
       const ring = own.dot.cloneNode();
       ring.setAttribute("class", "ring");
-      ring.setAttribute("r", "20");
+      ring.setAttribute("r", "5");
       ["fill", "stroke", "data-p"].forEach((name) => ring.removeAttribute(name));
       figure.svg.append(ring);
       return ring;

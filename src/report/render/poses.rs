@@ -7,9 +7,8 @@ use serde::Serialize;
 
 use crate::model::CentreLine;
 use crate::observation::Needs;
-use crate::report::figures::{PlotData, Point};
-use crate::report::quantity::{mm, number};
-use crate::report::table::Command;
+use crate::quantity::format::{mm, number};
+use crate::results::{CommandedJoint, PlotData, Point};
 
 /// Number of poses in the table of the largest residuals.
 const LISTED_POSES: usize = 12;
@@ -79,11 +78,11 @@ fn deflections(arm: &CentreLine) -> Vec<f64> {
 
 impl ScriptData {
     fn of(data: &PlotData) -> Self {
-        let joint = |command: &Command| (command.name(), command.symbol(), command.joint);
+        let joint = |command: &CommandedJoint| (command.name(), command.symbol(), command.joint);
         let entry = |((&row, &count), arm): ((&usize, &f64), &Option<CentreLine>)| {
             let residual = &data.residuals[row];
             let observation = &residual.observation;
-            let coordinate = |command: &Command| {
+            let coordinate = |command: &CommandedJoint| {
                 rounded(residual.configuration[command.joint] * command.factor(), 5)
             };
             Entry {

@@ -2,12 +2,10 @@
 
 use std::fmt::Write as _;
 
-use plotters::style::RGBColor;
-
-use crate::report::figures::{ACCENT, FAINT, GRID, INK, MUTED, WARM};
+use crate::report::figures::{ACCENT, Colour, FAINT, GRID, INK, MUTED, WARM};
 
 /// Colours of the figures with their names and their values in the dark theme.
-const COLOURS: [(RGBColor, &str, &str); 6] = [
+const COLOURS: [(Colour, &str, &str); 6] = [
     (INK, "ink", "#e6e9ec"),
     (MUTED, "muted", "#9aa4ae"),
     (FAINT, "faint", "#77828d"),
@@ -20,16 +18,11 @@ const DARK_PAPER: &str = "#14181c";
 
 const LAYOUT: &str = include_str!("page.css");
 
-/// Returns a colour in hexadecimal notation.
-fn hex(colour: RGBColor) -> String {
-    format!("#{:02X}{:02X}{:02X}", colour.0, colour.1, colour.2)
-}
-
 /// Returns the colour variables of both themes; printed paper is always light.
 fn themes() -> String {
     let mut text = format!(":root{{color-scheme:light dark;--paper:{LIGHT_PAPER}");
     for (light, name, _) in COLOURS {
-        let _ = write!(text, ";--{name}:{}", hex(light));
+        let _ = write!(text, ";--{name}:{light}");
     }
     let _ = write!(
         text,
@@ -46,7 +39,7 @@ fn themes() -> String {
 fn replaced_colours(colour: impl Fn(&'static str, &'static str) -> String) -> String {
     let mut text = String::new();
     for (light, name, dark) in COLOURS {
-        let (light, colour) = (hex(light), colour(name, dark));
+        let colour = colour(name, dark);
         let _ = writeln!(
             text,
             "[fill=\"{light}\"]{{fill:{colour}}}[stroke=\"{light}\"]{{stroke:{colour}}}"

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::arm::{Arm, Poses};
-use super::frame::range;
 use crate::model::Pose;
+use crate::numeric::range;
 use crate::problem::{JointKind, Problem};
 
 /// Number of configurations that are tried.

@@ -18,8 +18,8 @@ use crate::fit::{
 use crate::measurement::Dataset;
 use crate::model::{CentreLine, Model, Pose};
 use crate::problem::Problem;
-use crate::report::table::{Command, commands};
 use crate::residual_tests::Findings;
+use crate::results::tables::{CommandedJoint, commanded_joints};
 use crate::select::{ClosedLoop, Found, examine};
 
 /// Maximum number of poses that a page holds individually.
@@ -67,7 +67,7 @@ pub struct PlotData {
     /// Number of rows that each row of `shown` represents.
     pub stand_for: Vec<f64>,
     /// Joints that take a command.
-    pub commands: Vec<Command>,
+    pub commands: Vec<CommandedJoint>,
     /// Contribution of each parameter and effect to the predicted positions, in descending order.
     #[doc(hidden)]
     pub contributions: Vec<Contribution>,
@@ -244,7 +244,7 @@ impl PlotData {
             stages,
             arms: best.model.centre_lines(&drawn, best.x.as_slice()),
             contributions: contribution::of(problem, poses, best, (identification, &shown)),
-            commands: commands(problem),
+            commands: commanded_joints(problem),
             coverage: coverage::of(problem, poses, best),
             shown,
             stand_for,
@@ -291,7 +291,7 @@ fn nominal_arm(best: &Arm, identification: &Identification) -> Arm {
 
 /// Returns the errors before and after a procedure, and with elasticity ignored [Chen2021, fig.
 /// 13].
-pub(super) fn procedure_stages(before: &Before, procedure: &Procedure) -> Vec<StageErrors> {
+pub(crate) fn procedure_stages(before: &Before, procedure: &Procedure) -> Vec<StageErrors> {
     let of = |stage, errors: &Vec<Vector3<f64>>| StageErrors { stage, errors: errors.clone() };
     let mut stages = vec![of(Stage::Before, &before.errors)];
     stages.extend(procedure.ignoring.iter().map(|errors| of(Stage::Ignoring, errors)));

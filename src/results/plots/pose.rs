@@ -73,26 +73,6 @@ pub fn weighted_sample(
     sampled
 }
 
-/// Returns the sentence of a caption on omitted poses, for example " 300 of 6487 poses are drawn,
-/// including those with the largest residuals."; empty if all are drawn.
-pub fn thinning_note(drawn: usize, total: usize) -> String {
-    if drawn < total {
-        format!(" {drawn} of {total} poses are drawn, including those with the largest residuals.")
-    } else {
-        String::new()
-    }
-}
-
-/// Returns the sentence of a caption on poses without equilibrium, for example " 3 poses without an
-/// equilibrium are omitted."; empty for none.
-pub fn omission_note(poses: usize) -> String {
-    match poses {
-        0 => String::new(),
-        1 => " One pose without an equilibrium is omitted.".to_owned(),
-        n => format!(" {n} poses without an equilibrium are omitted."),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

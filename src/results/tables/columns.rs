@@ -4,8 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use super::quantity::fixed;
-use super::table;
+use super::commanded::{sessions, word};
 use crate::files::csv;
 use crate::fit::Residual;
 use crate::measurement::{Labels, Measurements};
@@ -13,6 +12,7 @@ use crate::observation::{Content, Kind, Observation};
 use crate::problem::Problem;
 use crate::problem::fixture::reference_cells;
 use crate::quantity::TableUnit;
+use crate::quantity::format::fixed;
 
 /// Cells of a column.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,7 +33,7 @@ impl Column {
     /// Returns the cell of a row as text.
     pub(super) fn cell(&self, row: usize) -> String {
         match self {
-            Self::Words(labels) => table::word(labels, row),
+            Self::Words(labels) => word(labels, row),
             Self::Counts(values) => values[row].to_string(),
             Self::Numbers(values, None) => values[row].to_string(),
             Self::Numbers(values, Some(decimals)) => fixed(values[row], *decimals),
@@ -71,7 +71,7 @@ pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) ->
     }
     let words = [
         ("pose", rows.pose_names.as_ref()),
-        ("session", table::sessions(rows)),
+        ("session", sessions(rows)),
         ("target", rows.target.as_ref()),
     ];
     for (name, all) in words {

@@ -1,4 +1,4 @@
-//! Columns of joints, sessions and targets in tables for other programs.
+//! Joints that take a command, and the words of rows, in tables for other programs.
 
 use crate::measurement::{Labels, Measurements};
 use crate::problem::{Joint, JointKind, Problem};
@@ -6,51 +6,51 @@ use crate::quantity::Unit;
 
 /// Joint that takes a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Command {
+pub struct CommandedJoint {
     /// Index of the joint, from 0.
     pub joint: usize,
     /// Unit of the command, an angle or a length.
     pub unit: Unit,
 }
 
-impl Command {
+impl CommandedJoint {
     /// Returns the name, for example `q2`.
     pub fn name(self) -> String {
         format!("q{}", self.joint + 1)
     }
 
     /// Returns the readable unit, ° or mm.
-    pub(super) fn symbol(self) -> String {
+    pub(crate) fn symbol(self) -> String {
         self.unit.display(1.0).symbol
     }
 
     /// Returns the name of its column, for example `q2_deg` or `q3_mm`.
-    pub(super) fn column(self) -> String {
+    pub(crate) fn column(self) -> String {
         format!("{}_{}", self.name(), if self.unit == Unit::Angle { "deg" } else { "mm" })
     }
 
     /// Returns the factor from \[rad\] or \[m\] to ° or mm.
-    pub(super) fn factor(self) -> f64 {
+    pub(crate) fn factor(self) -> f64 {
         self.unit.display(1.0).factor
     }
 }
 
 /// Lists the joints that take a command.
-pub(super) fn commands(problem: &Problem) -> Vec<Command> {
+pub(crate) fn commanded_joints(problem: &Problem) -> Vec<CommandedJoint> {
     let command = |(joint, kind)| match kind {
-        JointKind::Revolute => Some(Command { joint, unit: Unit::Angle }),
-        JointKind::Prismatic => Some(Command { joint, unit: Unit::Length }),
+        JointKind::Revolute => Some(CommandedJoint { joint, unit: Unit::Angle }),
+        JointKind::Prismatic => Some(CommandedJoint { joint, unit: Unit::Length }),
         JointKind::Fixed => None,
     };
     problem.joints.iter().map(Joint::command_kind).enumerate().filter_map(command).collect()
 }
 
 /// Returns the sessions of the rows, if any has a name.
-pub(super) fn sessions(rows: &Measurements) -> Option<&Labels> {
+pub(crate) fn sessions(rows: &Measurements) -> Option<&Labels> {
     Some(&rows.session).filter(|session| session.names.iter().any(|name| !name.is_empty()))
 }
 
 /// Returns the word of a row.
-pub(super) fn word(labels: &Labels, row: usize) -> String {
+pub(crate) fn word(labels: &Labels, row: usize) -> String {
     labels.names[labels.of_row[row]].clone()
 }

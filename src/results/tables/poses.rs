@@ -1,19 +1,19 @@
 //! Table of poses to measure.
 
-use super::quantity::fixed;
-use super::table::{Command, commands, sessions, word};
+use super::commanded::{CommandedJoint, commanded_joints, sessions, word};
 use crate::files::csv;
 use crate::measurement::Measurements;
 use crate::observation::fields;
 use crate::problem::fixture::reference_cells;
 use crate::problem::{HeldOut, Problem};
 use crate::quantity::Unit;
+use crate::quantity::format::fixed;
 
 /// Returns poses as CSV with the columns of measurements, except the positions.
 ///
 /// If the problem names a column that marks held-out rows, it marks every pose for identification.
 pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
-    let (joints, session) = (commands(problem), sessions(poses));
+    let (joints, session) = (commanded_joints(problem), sessions(poses));
     let split = match &problem.data.held_out {
         Some(HeldOut::Column(name)) => Some(name.clone()),
         _ => None,
@@ -57,7 +57,7 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
         },
     ));
     if let Some(approach) = &poses.approach {
-        columns.extend(joints.iter().map(|Command { joint, .. }| {
+        columns.extend(joints.iter().map(|CommandedJoint { joint, .. }| {
             let sides = (0..poses.len()).map(|row| plain(approach[row * poses.joints + joint]));
             (format!("approach{}", joint + 1), sides.collect())
         }));

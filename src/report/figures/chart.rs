@@ -1,0 +1,243 @@
+//! Charts: panels with axes, the shapes in them, and a legend. One renderer draws every figure.
+
+use super::axis::Axis;
+use super::svg::{Anchor, Colour, FAINT, GRID, INK, MUTED, Paint, Svg, TEXT, WARM};
+
+/// Width of a figure in displayed pixels.
+pub const WIDTH: f64 = 480.0;
+/// Space left of the area of a panel in displayed pixels.
+pub const LEFT: f64 = 62.0;
+/// Space right of the area of a panel in displayed pixels.
+pub const RIGHT: f64 = 12.0;
+/// Space above the area of a panel in displayed pixels.
+const ABOVE: f64 = 8.0;
+/// Height of the legend in displayed pixels.
+const LEGEND: f64 = 20.0;
+/// Opacity of a band.
+const BAND_OPACITY: f64 = 0.16;
+
+/// Position in the coordinates of a panel.
+pub type At = (f64, f64);
+
+/// Shape in the coordinates of a panel.
+#[derive(Debug, Clone)]
+pub enum Shape {
+    Dot {
+        at: At,
+        radius: f64,
+        paint: Paint,
+        row: Option<usize>,
+    },
+    Line {
+        points: Vec<At>,
+        paint: Paint,
+    },
+    /// Rectangle between two corners, with attributes for the script of the page.
+    Box {
+        corners: [At; 2],
+        paint: Paint,
+        tag: String,
+    },
+    /// Text at a position, shifted by displayed pixels.
+    Text {
+        at: At,
+        shift: (f64, f64),
+        text: String,
+        colour: Colour,
+        anchor: Anchor,
+    },
+}
+
+impl Shape {
+    /// Creates the dot of a pose in a row of the measurements, if it is one.
+    pub fn dot(at: At, radius: f64, paint: Paint, row: Option<usize>) -> Self {
+        Self::Dot { at, radius, paint, row }
+    }
+
+    pub fn line(points: impl IntoIterator<Item = At>, paint: Paint) -> Self {
+        Self::Line { points: points.into_iter().collect(), paint }
+    }
+
+    pub fn area(from: At, to: At, paint: Paint) -> Self {
+        Self::Box { corners: [from, to], paint, tag: String::new() }
+    }
+
+    /// Creates a translucent band behind the data.
+    pub fn band(from: At, to: At, colour: Colour) -> Self {
+        Self::area(from, to, Paint::fill(colour).faded(BAND_OPACITY))
+    }
+
+    /// Creates text that starts some pixels right of a position, or ends some pixels left of it.
+    pub fn text(at: At, right: f64, text: impl Into<String>, colour: Colour) -> Self {
+        let anchor = if right < 0.0 { Anchor::End } else { Anchor::Start };
+        Self::Text { at, shift: (right, 0.0), text: text.into(), colour, anchor }
+    }
+}
+
+/// Panel with its axes.
+#[derive(Debug, Clone)]
+pub struct Panel {
+    pub x: Axis,
+    pub y: Axis,
+    /// Height between the ends of the vertical axis in displayed pixels.
+    pub height: f64,
+    /// Space left and right of the area in displayed pixels.
+    pub sides: (f64, f64),
+    /// Size of the texts of the vertical axis in displayed pixels.
+    pub text: f64,
+    pub shapes: Vec<Shape>,
+}
+
+impl Panel {
+    pub fn new(height: f64, x: Axis, y: Axis) -> Self {
+        Self { x, y, height, sides: (LEFT, RIGHT), text: TEXT, shapes: Vec::new() }
+    }
+
+    /// Creates a panel with a name left of each row.
+    pub fn of_rows(
+        row: f64,
+        (names, numbers): (f64, f64),
+        x: Axis,
+        rows: impl IntoIterator<Item = (String, Colour)>,
+    ) -> Self {
+        let y = Axis::names(rows);
+        let height = row * y.ticks.len() as f64;
+        Self { sides: (names, numbers), ..Self::new(height, x, y) }
+    }
+
+    pub fn with(mut self, shapes: impl IntoIterator<Item = Shape>) -> Self {
+        self.shapes.extend(shapes);
+        self
+    }
+
+    /// Adds a line over the whole width at a height.
+    pub fn with_level(self, y: f64) -> Self {
+        let (left, right) = self.x.range;
+        self.with([Shape::line([(left, y), (right, y)], Paint::line(FAINT, 1.0))])
+    }
+
+    /// Adds a line over the whole height at a value.
+    pub fn with_reference(self, x: f64, colour: Colour) -> Self {
+        let (bottom, top) = self.y.range;
+        self.with([Shape::line([(x, bottom), (x, top)], Paint::line(colour, 1.0))])
+    }
+
+    /// Writes the number of values beyond the axes at the top, if there are any.
+    pub fn noting_beyond(self, count: usize, anchor: Anchor) -> Self {
+        let (x, shift) = match anchor {
+            Anchor::Start => (self.x.range.0, 6.0),
+            _ => (self.x.range.1, -4.0),
+        };
+        let (at, text) = ((x, self.y.range.1), format!("{count} beyond"));
+        let note = Shape::Text { at, shift: (shift, 8.0), text, colour: WARM, anchor };
+        self.with((count > 0).then_some(note))
+    }
+
+    /// Returns the space below the area in displayed pixels.
+    fn below(&self) -> f64 {
+        match (self.x.label.is_empty(), self.x.ticks.is_empty()) {
+            (true, true) => 6.0,
+            (true, false) | (false, true) => 20.0,
+            (false, false) => 38.0,
+        }
+    }
+
+    fn total_height(&self) -> f64 {
+        ABOVE + self.height + self.below()
+    }
+
+    /// Draws the panel below a height of the figure.
+    fn draw(&self, svg: &mut Svg, top: f64) {
+        let (left, right) = (self.sides.0, WIDTH - self.sides.1);
+        let (top, bottom) = (top + ABOVE, top + ABOVE + self.height);
+        let share = |value: f64, (from, to): (f64, f64)| (value - from) / (to - from);
+        let x = |value: f64| left + (right - left) * share(value, self.x.range);
+        let y = |value: f64| bottom - (bottom - top) * share(value, self.y.range);
+        let place = |at: At| (x(at.0), y(at.1));
+        let grid = Paint::line(GRID, 1.0);
+        for tick in &self.x.ticks {
+            svg.line([(x(tick.at), top), (x(tick.at), bottom)], grid);
+            svg.text(&tick.text, (x(tick.at), bottom + 11.0), (tick.colour, TEXT), Anchor::Middle);
+        }
+        for tick in &self.y.ticks {
+            if self.y.is_numeric {
+                svg.line([(left, y(tick.at)), (right, y(tick.at))], grid);
+            }
+            svg.text(&tick.text, (left - 7.0, y(tick.at)), (tick.colour, self.text), Anchor::End);
+        }
+        if self.y.is_numeric && !self.y.ticks.is_empty() {
+            svg.line([(left, top), (left, bottom), (right, bottom)], Paint::line(FAINT, 1.0));
+        }
+        if !self.x.label.is_empty() {
+            let at = (0.5 * (left + right), bottom + self.below() - 10.0);
+            svg.text(&self.x.label, at, (INK, TEXT), Anchor::Middle);
+        }
+        if !self.y.label.is_empty() {
+            svg.text_upwards(&self.y.label, (6.0, 0.5 * (top + bottom)), INK);
+        }
+        for shape in &self.shapes {
+            match shape {
+                Shape::Dot { at, radius, paint, row } => {
+                    let tag = row.map_or_else(String::new, |row| format!(" data-p=\"{row}\""));
+                    svg.circle(place(*at), *radius, *paint, &tag);
+                }
+                Shape::Line { points, paint } => {
+                    svg.line(points.iter().copied().map(place), *paint)
+                }
+                Shape::Box { corners, paint, tag } => {
+                    svg.rectangle(corners.map(place), *paint, tag)
+                }
+                Shape::Text { at, shift, text, colour, anchor } => {
+                    let (x, y) = place(*at);
+                    svg.text(text, (x + shift.0, y + shift.1), (*colour, TEXT), *anchor);
+                }
+            }
+        }
+    }
+}
+
+/// Mark of an entry of the legend.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Mark {
+    Dot,
+    Ring,
+    Line,
+    Bar,
+    Band,
+    /// Line of a length in displayed pixels.
+    Scale(f64),
+}
+
+/// Name, colour and mark of an entry of the legend.
+pub type Entry<'a> = (&'a str, Colour, Mark);
+
+/// Returns the legend of fitted and held-out poses.
+pub fn poses_legend() -> Vec<Entry<'static>> {
+    vec![("fitted pose", FAINT, Mark::Dot), ("held-out pose", INK, Mark::Dot)]
+}
+
+/// Draws panels below each other under a legend; `label` describes the figure for screen readers.
+pub fn chart(label: &str, legend: &[Entry], panels: &[Panel]) -> String {
+    let mut svg = Svg::default();
+    let mut top = if legend.is_empty() { 0.0 } else { LEGEND };
+    let mut at = LEFT;
+    for &(name, colour, mark) in legend {
+        let square = [(at, 6.0), (at + 8.0, 14.0)];
+        let width = if let Mark::Scale(length) = mark { length } else { 8.0 };
+        match mark {
+            Mark::Dot => svg.circle((at + 4.0, 10.0), 3.2, Paint::fill(colour), ""),
+            Mark::Ring => svg.circle((at + 4.0, 10.0), 3.2, Paint::line(colour, 1.2), ""),
+            Mark::Line => svg.line([(at - 2.0, 10.0), (at + 9.0, 10.0)], Paint::line(colour, 2.2)),
+            Mark::Scale(_) => svg.line([(at, 10.0), (at + width, 10.0)], Paint::line(colour, 1.6)),
+            Mark::Bar => svg.rectangle(square, Paint::fill(colour), ""),
+            Mark::Band => svg.rectangle(square, Paint::fill(colour).faded(BAND_OPACITY), ""),
+        }
+        svg.text(name, (at + width + 5.0, 10.0), (MUTED, TEXT), Anchor::Start);
+        at += width + 19.0 + 6.0 * name.chars().count() as f64;
+    }
+    for panel in panels {
+        panel.draw(&mut svg, top);
+        top += panel.total_height();
+    }
+    svg.finish((WIDTH, top), label)
+}

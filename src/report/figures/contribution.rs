@@ -1,0 +1,63 @@
+//! Contribution of each parameter and effect to the predicted positions of the measured poses.
+
+use super::prelude::*;
+use crate::results::Contribution;
+
+/// Maximum number of bars.
+const MAX_BARS: usize = 20;
+/// Maximum number of decades that the bars span.
+const MAX_DECADES: f64 = 4.0;
+
+/// Draws the largest contributions as bars on a logarithmic scale; half of the bars are reserved
+/// for effects.
+pub fn contributions(contributions: &[Contribution]) -> Option<Drawing> {
+    let (mut effects, parameters): (Vec<&Contribution>, Vec<&Contribution>) = contributions
+        .iter()
+        .filter(|contribution| contribution.moved > 0.0)
+        .partition(|contribution| contribution.is_effect);
+    effects.truncate(MAX_BARS / 2);
+    let room = MAX_BARS - effects.len();
+    let has_effects = !effects.is_empty();
+    let mut shown: Vec<&Contribution> =
+        effects.into_iter().chain(parameters.into_iter().take(room)).collect();
+    shown.sort_by(|a, b| b.moved.total_cmp(&a.moved));
+    let log_mm = |contribution: &Contribution| (contribution.moved * 1e3).log10();
+    let most = log_mm(shown.first()?);
+    let least = shown.last().map_or(most, |last| log_mm(last)).max(most - MAX_DECADES) - 0.25;
+    let shapes = shown.iter().enumerate().flat_map(|(k, contribution)| {
+        let (row, value) = (k as f64, log_mm(contribution));
+        let colour = if contribution.is_effect { ACCENT } else { FAINT };
+        let end = value.max(least + 0.003 * (most - least));
+        let bar = Shape::area((least, row - 0.26), (end, row + 0.26), Paint::fill(colour));
+        let words = format!("{} mm", two_digits(contribution.moved * 1e3, 4));
+        let text = Shape::text((end, row), 6.0, words, MUTED);
+        let cut = Shape::dot((least, row), 2.0, Paint::fill(WARM), None);
+        [Some(bar), (value < least).then_some(cut), Some(text)].into_iter().flatten()
+    });
+    let names = shown.iter().map(|contribution| {
+        (contribution.name.clone(), if contribution.is_effect { INK } else { MUTED })
+    });
+    let label = "rms displacement of the predicted position [mm], logarithmic";
+    let x = Axis { label: label.to_owned(), ..Axis::bare((least, most)) };
+    let panel = Panel::of_rows(19.0, (220.0, 74.0), x, names).with(shapes);
+    let legend = [("parameter", FAINT, Mark::Bar), ("effect", ACCENT, Mark::Bar)];
+    let note = if contributions.len() > shown.len() {
+        format!(" The largest {} of {} are drawn.", shown.len(), contributions.len())
+    } else {
+        String::new()
+    };
+    let caption = format!(
+        "Root mean square displacement of the predicted positions of the measured poses if one \
+         parameter returns to its nominal value (base and tool: to their values for the nominal \
+         arm), or one effect is removed, and everything else stays unchanged. Parameters that \
+         compensate each other both have long bars.{note}"
+    );
+    let rows = contributions.iter().map(|contribution| {
+        let moved = fixed(contribution.moved * 1e3, 6);
+        vec![contribution.name.clone(), contribution.is_effect.to_string(), moved]
+    });
+    let title = "What each parameter and effect contributes";
+    let legend = if has_effects { &legend } else { &legend[..1] };
+    let data = sheet(["name", "is_effect", "rms_move_mm"], rows);
+    Some(Drawing::new(("contributions", title), caption, chart(title, legend, &[panel]), data))
+}

@@ -1,0 +1,125 @@
+//! Result of `export`: moved origins, errors, and what the file cannot hold.
+
+use std::path::Path;
+
+use nalgebra::{DVector, Vector3};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::document::Document;
+use super::summary::Summary;
+use crate::fit::{ErrorSummary, Placement, SavedEstimate};
+use crate::measurement::Dataset;
+use crate::model::Model;
+use crate::model::parameter::{Parameter, ParameterSite};
+use crate::problem::Problem;
+use crate::urdf::MovedOrigin;
+
+/// File with the identified geometry.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ExportResult {
+    pub problem: String,
+    pub file: Option<String>,
+    /// Origins that moved in a URDF.
+    pub origins: Option<Vec<Origin>>,
+    pub held_out: Option<ExportedErrors>,
+    /// Parts of the model that the file cannot hold.
+    pub not_held: Vec<String>,
+}
+
+impl Document for ExportResult {
+    const FORMAT: &'static str = "flexcal-export";
+}
+
+/// Origin of a joint in a URDF.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Origin {
+    pub joint: String,
+    pub xyz_m: [f64; 3],
+    pub rpy_rad: [f64; 3],
+    pub moved_mm: f64,
+    pub turned_deg: f64,
+}
+
+/// Errors on held-out rows of the whole model and of its rigid geometry.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ExportedErrors {
+    pub whole: Summary,
+    pub rigid: Summary,
+}
+
+impl ExportResult {
+    /// Collects the result of an export. `file` is the path of the file, if one was written, and
+    /// `moved` are the moved origins of a URDF.
+    pub fn new(
+        problem: &Problem,
+        model: &Model,
+        file: Option<&Path>,
+        moved: Option<&[MovedOrigin]>,
+        held_out: Option<ExportedErrors>,
+    ) -> Self {
+        let origin = |origin: &MovedOrigin| Origin {
+            joint: origin.joint.clone(),
+            xyz_m: origin.xyz.into(),
+            rpy_rad: origin.rpy.into(),
+            moved_mm: origin.distance * 1e3,
+            turned_deg: origin.angle.to_degrees(),
+        };
+        Self {
+            problem: problem.name.clone(),
+            file: file.map(|file| file.display().to_string()),
+            origins: moved.map(|moved| moved.iter().map(origin).collect()),
+            held_out,
+            not_held: left_out(problem, model),
+        }
+    }
+}
+
+impl ExportedErrors {
+    /// Computes the errors on the held-out rows of `data` of the first kind in the table. `x` are
+    /// the identified deviations in the order of the model's parameters; `saved` is the estimate
+    /// that they come from, if it was read from a file.
+    pub fn of(
+        model: &Model,
+        x: &DVector<f64>,
+        data: &Dataset,
+        saved: Option<&SavedEstimate>,
+    ) -> Self {
+        let Dataset { measurements, split } = data;
+        let placement = Placement::of(measurements);
+        let mut poses = placement.poses(measurements, &split.held_out, 1.0);
+        if let Some(saved) = saved {
+            saved.count_time_in(&mut poses);
+        }
+        let rigid = model.geometric_residuals(&poses, x.as_slice());
+        let whole = model.residuals(poses, x);
+        let of = |errors: &[Vector3<f64>]| {
+            let rows = split.held_out.iter().copied();
+            Summary::of(&ErrorSummary::of_rows(measurements, rows, errors))
+        };
+        Self { whole: of(&whole), rigid: of(&rigid) }
+    }
+}
+
+/// Lists the parts of the model beyond the geometry of the chain.
+fn left_out(problem: &Problem, model: &Model) -> Vec<String> {
+    let mut left_out: Vec<String> = Vec::new();
+    for (number, joint) in (1..).zip(&problem.joints) {
+        if joint.stiffness.is_some() {
+            left_out.push(format!("joint{number}.stiffness"));
+        }
+        if let Some(beam) = &joint.beam {
+            left_out.push(format!("elastic link {}", beam.name));
+        }
+    }
+    left_out.extend(problem.effects.iter().map(|declared| declared.effect.declaration()));
+    let set_up = |parameter: &&Parameter| {
+        matches!(parameter.site, ParameterSite::Base { .. } | ParameterSite::Target { .. })
+    };
+    let set_up: Vec<&str> =
+        model.parameters.iter().filter(set_up).map(|parameter| parameter.name.as_str()).collect();
+    if !set_up.is_empty() {
+        left_out.push(format!("base and target of the set-up ({})", set_up.join(", ")));
+    }
+    left_out
+}

@@ -1,0 +1,60 @@
+//! Quantities along the axes of the figure of an effect.
+
+use crate::problem::{JointKind, Problem};
+use crate::quantity::Unit;
+
+/// Number of degrees in a radian.
+const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+
+/// Quantity along an axis, with its unit and the factor from SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quantity {
+    /// Label with the unit, for example `temperature [°C]`.
+    pub label: String,
+    /// Factor from SI to the unit.
+    pub factor: f64,
+}
+
+impl Quantity {
+    pub(super) fn new(label: impl Into<String>, factor: f64) -> Self {
+        Self { label: label.into(), factor }
+    }
+
+    pub(super) fn command(problem: &Problem, joint: usize) -> Self {
+        let (unit, factor) = if slides(problem, joint) { ("mm", 1e3) } else { ("°", DEGREES) };
+        Self::new(format!("command of joint {joint}, q{joint} [{unit}]"), factor)
+    }
+
+    pub(super) fn temperature() -> Self {
+        Self::new("temperature [°C]", 1.0)
+    }
+
+    pub(super) fn lagging(time_constant: f64) -> Self {
+        Self::new(format!("temperature that lags by {time_constant} s [°C]"), 1.0)
+    }
+
+    /// Returns the axis of elapsed times up to `longest` \[s\].
+    pub(super) fn elapsed(longest: f64) -> Self {
+        let (unit, factor) = if longest > 7200.0 { ("h", 1.0 / 3600.0) } else { ("s", 1.0) };
+        Self::new(format!("time since the first pose [{unit}]"), factor)
+    }
+
+    /// Returns the axis of the error of a coordinate.
+    pub(super) fn error(of: &str, unit: Unit) -> Self {
+        match unit {
+            Unit::Length => Self::new(format!("error of {of} [mm]"), 1e3),
+            // Angles have the unit of the tables.
+            _ => Self::new(format!("error of {of} [°]"), DEGREES),
+        }
+    }
+
+    pub(super) fn small(what: &str, unit: &str, largest: f64) -> Self {
+        let (prefix, factor) = if largest < 1e-3 { ('µ', 1e6) } else { ('m', 1e3) };
+        Self::new(format!("{what} [{prefix}{unit}]"), factor)
+    }
+}
+
+/// Returns true if a joint (numbered from 1) is prismatic.
+pub(super) fn slides(problem: &Problem, joint: usize) -> bool {
+    problem.joints[joint - 1].kind == JointKind::Prismatic
+}

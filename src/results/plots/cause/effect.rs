@@ -1,0 +1,94 @@
+//! Figure data of an effect from the fit that declares it.
+
+use nalgebra::Vector3;
+
+use super::axis::slides;
+use super::figure::{Cause, Point};
+use super::terms::Rows;
+use super::view::{along, at_joint, beyond_joints};
+use crate::model::parameter::{EffectParameter, JointField, ParameterSite, value_regressor};
+use crate::numeric::range;
+use crate::problem::{Effect, Problem};
+use crate::results::plots::arm::{Arm, MIN_LEVER, Poses};
+
+/// Number of steps of a curve.
+const CURVE_STEPS: u32 = 160;
+
+/// Fit of a model that declares the effects, evaluated in every row.
+#[derive(Clone, Copy)]
+pub struct EffectFit<'a> {
+    /// Arm of the fit.
+    pub arm: &'a Arm,
+    /// Residual of each row \[m\].
+    pub residuals: &'a [Vector3<f64>],
+    /// Lever of each joint coordinate in each row \[m/rad\] or \[m/m\].
+    pub levers: &'a [Vec<Vector3<f64>>],
+}
+
+/// Returns the site of every joint coordinate.
+pub fn coordinates(problem: &Problem) -> Vec<ParameterSite> {
+    let field =
+        |joint: usize| if slides(problem, joint) { JointField::D } else { JointField::Theta };
+    (1..=problem.joints.len())
+        .map(|joint| ParameterSite::Joint { joint: joint - 1, field: field(joint) })
+        .collect()
+}
+
+/// Computes the figure data of an effect from the fit of `problem`, which declares it.
+pub fn of(
+    effect: &Effect,
+    problem: &Problem,
+    EffectFit { arm, residuals, levers }: EffectFit,
+    poses: &Poses,
+) -> Option<Cause> {
+    let parameters = effect.parameters(problem);
+    let index = |parameter: &EffectParameter| {
+        arm.model.parameters.iter().position(|free| free.name == parameter.name)
+    };
+    let indices: Vec<usize> = parameters.iter().map(index).collect::<Option<_>>()?;
+    let mut without = arm.clone();
+    for &k in &indices {
+        without.x[k] = 0.0;
+    }
+    let partial = poses.errors(&without, &poses.rows());
+    let all_poses = poses.all(1.0);
+    let term = |&k: &usize| {
+        let regressor = value_regressor(&arm.model.parameters, arm.x.as_slice(), k)?;
+        Some(((regressor, arm.x[k]), arm.model.parameters[k].site))
+    };
+    let (terms, sites) = indices.iter().filter_map(term).unzip();
+    let displacements = partial.iter().zip(residuals).map(|(partial, residual)| partial - residual);
+    let rows = Rows {
+        poses: all_poses.iter().map(|pose| pose.setup).collect(),
+        displacements: displacements.collect(),
+        terms,
+        sites,
+    };
+    let view = at_joint(problem, &rows, levers, poses)
+        .unwrap_or_else(|| beyond_joints(effect, problem, &rows));
+    let longest = view.levers.iter().map(Vector3::norm).fold(0.0, f64::max);
+    let point = |k: usize| Point {
+        x: view.x[k],
+        y: along(&view.levers[k], &partial[k]),
+        held_out: poses.split.held_out.binary_search(&k).is_ok(),
+        row: Some(k),
+    };
+    let informative = (0..partial.len()).filter(|&k| view.levers[k].norm() > MIN_LEVER * longest);
+    let points: Vec<Point> = informative.map(point).collect();
+    let (low, high) = range(points.iter().map(|point| point.x));
+    let abscissa = |step: u32| low + (high - low) * f64::from(step) / f64::from(CURVE_STEPS);
+    let curve: Vec<(f64, f64)> = (0..=CURVE_STEPS)
+        .filter(|_| low <= high)
+        .map(abscissa)
+        .map(|x| (x, (view.law)(x)))
+        .collect();
+    let up = (view.up)(largest(&points, &curve));
+    let title = effect.describe_in(poses.measurements.time_measured);
+    Some(Cause { title, across: view.across, up, points, curve, reading: view.reading })
+}
+
+/// Returns the largest absolute ordinate of points and curve.
+fn largest(points: &[Point], curve: &[(f64, f64)]) -> f64 {
+    let heights = points.iter().map(|point| point.y).chain(curve.iter().map(|at| at.1));
+    heights.filter(|height| height.is_finite()).map(f64::abs).fold(0.0, f64::max)
+}

@@ -1,0 +1,133 @@
+//! Terms of an effect evaluated in every pose.
+
+use nalgebra::Vector3;
+
+use super::axis::Quantity;
+use crate::laws::Quantity as Known;
+use crate::model::parameter::{ParameterSite, Regressor};
+use crate::problem::{PoseView, Problem};
+
+/// Poses with the displacement by an effect.
+pub struct Rows<'a> {
+    pub poses: Vec<PoseView<'a>>,
+    /// Displacement by the effect in each row \[m\].
+    pub displacements: Vec<Vector3<f64>>,
+    /// Regressor and value of each term.
+    pub terms: Vec<(Regressor, f64)>,
+    /// Site of each term.
+    pub sites: Vec<ParameterSite>,
+}
+
+/// Ordinate of a fitted law at a value of the regressor.
+pub type Law<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
+
+impl Rows<'_> {
+    /// Returns the site of all terms, where it is one.
+    pub fn site(&self) -> Option<ParameterSite> {
+        let (first, others) = self.sites.split_first()?;
+        others.iter().all(|site| site == first).then_some(*first)
+    }
+
+    /// Returns true if every term is multiplied by a formula.
+    pub fn is_driven(&self) -> bool {
+        self.terms.iter().all(|(regressor, _)| !regressor.is_constant())
+    }
+
+    /// Returns the quantities that the terms follow, each once.
+    pub fn quantities(&self) -> Vec<Known> {
+        let mut found = Vec::new();
+        for quantity in self.terms.iter().flat_map(|(regressor, _)| regressor.quantities()) {
+            if !found.contains(&quantity) {
+                found.push(quantity);
+            }
+        }
+        found
+    }
+
+    /// Returns Σ value · regressor.
+    pub fn driven(&self, pose: &PoseView) -> f64 {
+        self.terms.iter().map(|(regressor, value)| value * regressor.value(pose)).sum()
+    }
+
+    /// Returns the axis of a formula with its unit.
+    pub fn label(regressor: &Regressor) -> String {
+        match regressor.as_quantity() {
+            Some(Known::Friction { joint, .. }) => {
+                format!("friction that holds joint {} back [−1 … +1]", joint + 1)
+            }
+            _ => format!("{} [SI]", regressor.text()),
+        }
+    }
+
+    /// Returns the axis of one quantity, its values, and Σ value · regressor over it; `None` where no
+    /// pose can be made of a value of the quantity alone.
+    pub fn over_quantity<'r>(
+        &'r self,
+        quantity: Known,
+        problem: &Problem,
+    ) -> Option<(Quantity, Vec<f64>, Law<'r>)> {
+        let each =
+            |value: &dyn Fn(&PoseView) -> f64| self.poses.iter().map(value).collect::<Vec<f64>>();
+        let reference = problem.data.reference_temperature.unwrap_or_default();
+        Some(match quantity {
+            Known::Command(joint) => {
+                let count = self.poses.first()?.configuration.len();
+                let law = move |q: f64| self.driven(&PoseView::from_configuration(&vec![q; count]));
+                let across = Quantity::command(problem, joint + 1);
+                (across, each(&|pose| pose.configuration[joint]), Box::new(law))
+            }
+            Known::Warming => {
+                let law = move |t: f64| {
+                    let pose = PoseView::from_configuration(&[]);
+                    self.driven(&PoseView { temperature: Some(&t), ..pose })
+                };
+                let value = |pose: &PoseView| pose.temperature.copied().unwrap_or_default();
+                (Quantity::temperature(), each(&value), Box::new(law))
+            }
+            // The lagged temperature itself multiplies every term.
+            Known::Lagging { time_constant } if self.is_each(quantity) => {
+                let sum: f64 = self.terms.iter().map(|term| term.1).sum();
+                let regressor = &self.terms.first()?.0;
+                let values = each(&|pose| regressor.value(pose) + reference);
+                let law = move |lagged: f64| sum * (lagged - reference);
+                (Quantity::lagging(time_constant), values, Box::new(law))
+            }
+            Known::Covariate(index) => {
+                let name = &problem.data.covariates.get(index)?.name;
+                let law = move |value: f64| {
+                    let mut covariates = vec![0.0; index];
+                    covariates.push(value);
+                    let pose = PoseView::from_configuration(&[]);
+                    self.driven(&PoseView { covariates: &covariates, ..pose })
+                };
+                let value =
+                    |pose: &PoseView| pose.covariates.get(index).copied().unwrap_or_default();
+                (Quantity::new(name, 1.0), each(&value), Box::new(law))
+            }
+            Known::Elapsed | Known::Time => {
+                let elapsed = each(&|pose| pose.elapsed);
+                let last = elapsed.iter().copied().fold(0.0, f64::max);
+                let first = self.poses.first().map_or(0.0, |pose| pose.time - pose.elapsed);
+                let law = move |elapsed: f64| {
+                    let pose = PoseView::from_configuration(&[]);
+                    self.driven(&PoseView { elapsed, time: first + elapsed, ..pose })
+                };
+                (Quantity::elapsed(last), elapsed, Box::new(law))
+            }
+            _ => return None,
+        })
+    }
+
+    /// Returns true if every term is multiplied by a quantity itself.
+    pub fn is_each(&self, quantity: Known) -> bool {
+        self.terms.iter().all(|(regressor, _)| regressor.as_quantity() == Some(quantity))
+    }
+
+    /// Returns the effect's displacement over its size in each row; none where that is 0.
+    pub fn over(&self, sizes: impl Iterator<Item = f64>) -> Vec<Vector3<f64>> {
+        let lever = |(own, size): (&Vector3<f64>, f64)| {
+            if size == 0.0 { Vector3::zeros() } else { own / size }
+        };
+        self.displacements.iter().zip(sizes).map(lever).collect()
+    }
+}

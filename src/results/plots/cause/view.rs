@@ -1,0 +1,188 @@
+//! Axes and law of the figure of an effect, by the site at which the effect acts.
+
+use nalgebra::Vector3;
+
+use super::axis::{Quantity, slides};
+use super::terms::{Law, Rows};
+use crate::laws::Quantity as Known;
+use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
+use crate::problem::{Effect, PoseView, Problem};
+use crate::quantity::Unit;
+use crate::results::plots::arm::Poses;
+
+pub const COORDINATE: &str = "Each dot is the error of this coordinate from one pose alone, with all other parameters as fitted. \
+                          Poses with little sensitivity to the coordinate are omitted.";
+const ALONG: &str = "Each dot is the residual of one pose along the displacement by the effect, with all other parameters \
+                     as fitted.";
+const SIZE: &str = "Each dot is the size of the effect from one pose alone, with all other parameters as fitted. Poses with \
+                    little sensitivity to it are omitted.";
+
+/// Partial residuals of an effect before the selection of poses.
+pub struct View<'a> {
+    pub across: Quantity,
+    /// Vertical axis for the largest value \[SI\].
+    pub up: Box<dyn Fn(f64) -> Quantity + 'a>,
+    /// Value of the regressor in each row.
+    pub x: Vec<f64>,
+    /// Displacement by one unit of the ordinate in each row \[m\].
+    pub levers: Vec<Vector3<f64>>,
+    /// Fitted law: the ordinate at a value of the regressor.
+    pub law: Box<dyn Fn(f64) -> f64 + 'a>,
+    pub reading: &'static str,
+}
+
+/// Returns the least-squares change of a coordinate for a displacement.
+pub fn along(lever: &Vector3<f64>, displacement: &Vector3<f64>) -> f64 {
+    lever.dot(displacement) / lever.norm_squared()
+}
+
+/// Returns the view of an effect that changes the coordinate of a joint; `None` for other effects.
+pub fn at_joint<'a>(
+    problem: &'a Problem,
+    rows: &'a Rows,
+    levers: &[Vec<Vector3<f64>>],
+    poses: &Poses,
+) -> Option<View<'a>> {
+    let ParameterSite::Joint { joint, field } = rows.site()? else { return None };
+    let (number, levers) = (joint + 1, levers.get(joint)?);
+    let first = rows.terms.first()?.1;
+    let unit = if slides(problem, number) { Unit::Length } else { Unit::Angle };
+    // Δθ = c M, c₃ M³: the moment follows from the law itself.
+    let moments = |of: fn(f64) -> f64| -> (Quantity, Vec<f64>) {
+        let moment = |(lever, own): (&Vector3<f64>, &Vector3<f64>)| of(along(lever, own) / first);
+        let across = Quantity::new(format!("moment about joint {number} [N·m]"), 1.0);
+        (across, levers.iter().zip(&rows.displacements).map(moment).collect())
+    };
+    let (across, x, law): (_, _, Law) = match field {
+        JointField::Theta | JointField::D if rows.is_driven() => {
+            match (rows.quantities().as_slice(), rows.terms.as_slice()) {
+                (&[quantity], _) if rows.over_quantity(quantity, problem).is_some() => {
+                    rows.over_quantity(quantity, problem)?
+                }
+                (_, [(regressor, value)]) => {
+                    let across = Quantity::new(Rows::label(regressor), 1.0);
+                    let each = rows.poses.iter().map(|pose| regressor.value(pose)).collect();
+                    (across, each, Box::new(move |x| value * x))
+                }
+                _ => {
+                    let across = Quantity::error(&format!("joint {number} by the law"), unit);
+                    let each = rows.poses.iter().map(|pose| rows.driven(pose)).collect();
+                    (across, each, Box::new(|x| x))
+                }
+            }
+        }
+        JointField::Play | JointField::SlidingPlay if poses.measurements.approach.is_some() => {
+            let label = format!("side from which joint {number} came [−1 … +1]");
+            let side = |pose: &PoseView| pose.approach.map_or(0.0, |all| all[joint]);
+            let sides = rows.poses.iter().map(side).collect();
+            (Quantity::new(label, 1.0), sides, Box::new(move |side| 0.5 * first * side))
+        }
+        JointField::Compliance => {
+            let (across, x) = moments(|moment| moment);
+            (across, x, Box::new(move |moment| first * moment))
+        }
+        JointField::Cubic => {
+            let (across, x) = moments(f64::cbrt);
+            (across, x, Box::new(move |moment| first * moment.powi(3)))
+        }
+        _ => return None,
+    };
+    let up = Box::new(move |_| Quantity::error(&format!("joint {number}"), unit));
+    Some(View { across, up, x, levers: levers.clone(), law, reading: COORDINATE })
+}
+
+/// Returns the view of an effect that is no error of a joint's coordinate.
+pub fn beyond_joints<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> {
+    at_link(found, problem, rows)
+        .or_else(|| of_time(problem, rows))
+        .or_else(|| of_payload(rows))
+        .unwrap_or_else(|| View {
+            across: Quantity::new("displacement by the law [mm]", 1e3),
+            up: Box::new(|_| Quantity::new("displacement, measured [mm]", 1e3)),
+            x: rows.displacements.iter().map(Vector3::norm).collect(),
+            levers: rows
+                .displacements
+                .iter()
+                .map(|own| own.try_normalize(0.0).unwrap_or_default())
+                .collect(),
+            law: Box::new(|displacement| displacement),
+            reading: ALONG,
+        })
+}
+
+/// Returns the view of a strain of a link that follows one temperature.
+fn at_link<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
+    let is_strain = |site: &ParameterSite| matches!(site, ParameterSite::Beam { field, .. } if field.is_strain());
+    let &[quantity] = rows.quantities().as_slice() else { return None };
+    if !(quantity.is_thermal() && rows.sites.iter().all(is_strain) && rows.is_each(quantity)) {
+        return None;
+    }
+    let (across, values, _) = rows.over_quantity(quantity, problem)?;
+    let reference = problem.data.reference_temperature.unwrap_or_default();
+    let link = found.link()?;
+    let stretches =
+        matches!(rows.sites.first(), Some(ParameterSite::Beam { field: BeamField::Stretch, .. }));
+    // An expansion has one coefficient with a sign; a bending's two make one size.
+    let sizes = || rows.terms.iter().map(|term| term.1);
+    let size = if stretches { sizes().sum() } else { sizes().map(|c| c * c).sum::<f64>().sqrt() };
+    let up: Box<dyn Fn(f64) -> Quantity> = if stretches {
+        Box::new(move |_| Quantity::new(format!("strain of link {link} [10⁻⁶]"), 1e6))
+    } else {
+        Box::new(move |most| Quantity::small(&format!("curvature of link {link}"), "rad/m", most))
+    };
+    Some(View {
+        across,
+        up,
+        levers: rows.over(values.iter().map(|value| size * (value - reference))),
+        x: values,
+        law: Box::new(move |value| size * (value - reference)),
+        reading: SIZE,
+    })
+}
+
+/// Returns the view of a displacement of the measuring frame by a function of time: every pose moves
+/// in one direction.
+fn of_time<'a>(problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
+    let is_shift = |site: &ParameterSite| matches!(site, ParameterSite::Shift { .. });
+    let &[quantity @ (Known::Elapsed | Known::Time)] = rows.quantities().as_slice() else {
+        return None;
+    };
+    let (regressor, _) = rows.terms.first()?;
+    let is_one = rows.terms.iter().all(|(other, _)| other == regressor);
+    if !is_one || !rows.sites.iter().all(is_shift) {
+        return None;
+    }
+    let (across, x, _) = rows.over_quantity(quantity, problem)?;
+    let norm = rows.terms.iter().map(|term| term.1 * term.1).sum::<f64>().sqrt();
+    let first = rows.poses.first().map_or(0.0, |pose| pose.time - pose.elapsed);
+    let longest = |a: Vector3<f64>, b: &Vector3<f64>| if b.norm() > a.norm() { *b } else { a };
+    let most = rows.displacements.iter().fold(Vector3::zeros(), longest);
+    let law = move |elapsed: f64| {
+        let pose = PoseView::from_configuration(&[]);
+        norm * regressor.value(&PoseView { elapsed, time: first + elapsed, ..pose })
+    };
+    Some(View {
+        across,
+        up: Box::new(|_| Quantity::new("displacement, measured [mm]", 1e3)),
+        x,
+        levers: vec![most.try_normalize(0.0).unwrap_or_default(); rows.displacements.len()],
+        law: Box::new(law),
+        reading: ALONG,
+    })
+}
+
+/// Returns the view of a mass that is added to payloads.
+fn of_payload<'a>(rows: &'a Rows) -> Option<View<'a>> {
+    if rows.site()? != ParameterSite::Arm(ArmField::Payload) {
+        return None;
+    }
+    let sum: f64 = rows.terms.iter().map(|term| term.1).sum();
+    Some(View {
+        across: Quantity::new("payload [kg]", 1.0),
+        up: Box::new(|_| Quantity::new("missing mass [kg]", 1.0)),
+        x: rows.poses.iter().map(|pose| pose.payload.copied().unwrap_or_default()).collect(),
+        levers: rows.over(std::iter::repeat(sum)),
+        law: Box::new(move |_| sum),
+        reading: SIZE,
+    })
+}

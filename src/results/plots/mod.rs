@@ -1,0 +1,16 @@
+//! Data of the figures of reports: errors of each pose, partial residuals of effects, contributions
+//! and coverage.
+
+mod arm;
+mod cause;
+mod contribution;
+mod coverage;
+mod data;
+mod pose;
+
+pub use cause::{Cause, Point, Quantity};
+pub use contribution::Contribution;
+pub(crate) use data::procedure_stages;
+pub use data::{PlotData, Stage, StageErrors};
+pub use pose::PoseError;
+pub(crate) use pose::sample;

@@ -1,0 +1,57 @@
+//! Size of the residual of a fit against the declared noise.
+
+use crate::fit::{FindingCode, Identification, Noise};
+
+/// Relative difference of the scatter from the declared σ² below which the fit keeps that σ.
+const SAME_NOISE: f64 = 1e-9;
+
+/// Judgement of the size of a residual.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ResidualSize {
+    /// No σ is declared; the scatter of the residual is the estimate of it [m] or \[rad\].
+    Undeclared(f64),
+    /// No σ is declared, and no degree of freedom is left to estimate it.
+    Unknown,
+    /// Too few different poses to judge the declared σ, or the model.
+    TooFewPoses,
+    /// Too few measurements to judge the declared σ.
+    TooFewRows,
+    /// χ²/ν is within the interval for noise alone.
+    Expected(f64),
+    /// χ²/ν is outside of that interval, without clear evidence for another σ.
+    Unclear(f64),
+    /// Residuals and priors contradict the declared σ; the fit takes another one.
+    Contradicted(f64),
+}
+
+impl ResidualSize {
+    /// Judges the residual of a fit.
+    pub fn of(found: &Identification) -> Self {
+        let too_few =
+            found.has(FindingCode::PriorsDecide) || found.has(FindingCode::TooFewEquations);
+        let is_expected =
+            |chi2: f64| found.chance.is_none_or(|(low, high)| (low..=high).contains(&chi2));
+        match (found.noise, found.reduced_chi2) {
+            (Noise::Estimated(sigma), _) => Self::Undeclared(sigma),
+            (Noise::Unknown, _) => Self::Unknown,
+            (Noise::Declared, Some(_)) if too_few => Self::TooFewPoses,
+            (Noise::Declared, None) => Self::TooFewRows,
+            (Noise::Declared, Some(chi2)) if is_contradicted(found) => Self::Contradicted(chi2),
+            (Noise::Declared, Some(chi2)) if is_expected(chi2) => Self::Expected(chi2),
+            (Noise::Declared, Some(chi2)) => Self::Unclear(chi2),
+        }
+    }
+}
+
+/// Returns true if residuals and priors contradict the declared σ.
+fn is_contradicted(found: &Identification) -> bool {
+    found.noise == Noise::Declared && (found.noise_factor - 1.0).abs() > SAME_NOISE
+}
+
+/// Returns true if a fit leaves more than the declared noise explains.
+pub fn exceeds_noise(found: &Identification) -> bool {
+    let is_large = |(chi2, (_, high)): (f64, (f64, f64))| chi2 > high;
+    let by_chi2 = || found.reduced_chi2.zip(found.chance).is_some_and(is_large);
+    let by_scatter = is_contradicted(found).then_some(found.noise_factor > 1.0);
+    found.noise == Noise::Declared && by_scatter.unwrap_or_else(by_chi2)
+}

@@ -1,0 +1,134 @@
+//! Tables of predictions and of commands.
+
+use super::columns::{self, Column, Columns};
+use super::commanded::{commanded_joints, sessions, word};
+use crate::files::csv;
+use crate::fit::{Command, Prediction};
+use crate::measurement::Measurements;
+use crate::problem::Problem;
+use crate::quantity::format::fixed;
+use crate::remainder::Bounds;
+
+/// Returns predictions as CSV: columns that name the row, commands, and the predicted pose.
+pub fn predictions_csv(
+    problem: &Problem,
+    rows: &Measurements,
+    prediction: &Prediction,
+    bounds: Option<&Bounds>,
+) -> String {
+    let all: Vec<usize> = (0..prediction.positions.len()).collect();
+    let mut columns = columns::names(problem, rows, &all);
+    let mut add = |name: String, decimals, of: &dyn Fn(usize) -> f64| {
+        columns.push((
+            name,
+            Column::Numbers(all.iter().map(|&row| of(row)).collect(), Some(decimals)),
+        ));
+    };
+    for joint in commanded_joints(problem) {
+        add(joint.column(), 7, &|row| rows.configuration(row)[joint.joint] * joint.factor());
+    }
+    for (k, axis) in ["x", "y", "z"].into_iter().enumerate() {
+        add(format!("predicted_{axis}_mm"), 6, &|row| prediction.positions[row][k] * 1e3);
+    }
+    if let Some(turns) = &prediction.orientations {
+        for (k, axis) in ["rx", "ry", "rz"].into_iter().enumerate() {
+            add(format!("predicted_{axis}_deg"), 7, &|row| turns[row][k].to_degrees());
+        }
+    }
+    columns.extend(bounds.into_iter().flat_map(uncertainty));
+    columns::to_csv(&columns, all.len())
+}
+
+/// Returns the columns of the uncertainty of predictions: 1 σ along each axis, the bound of the
+/// error, and whether the pose lies outside of what was measured.
+fn uncertainty(bounds: &Bounds) -> Columns {
+    let numbers = |of: &dyn Fn(usize) -> f64| {
+        Column::Numbers((0..bounds.poses.len()).map(|pose| of(pose) * 1e3).collect(), Some(4))
+    };
+    let mut columns: Columns = ["x", "y", "z"]
+        .into_iter()
+        .enumerate()
+        .map(|(k, axis)| (format!("sigma_{axis}_mm"), numbers(&|pose| bounds.poses[pose].sigma[k])))
+        .collect();
+    columns.push((bounds.column(), numbers(&|pose| bounds.bound(pose))));
+    let flags = bounds.poses.iter().map(|own| own.is_extrapolated).collect();
+    columns.push(("extrapolated".to_owned(), Column::Flags(flags)));
+    columns
+}
+
+/// Decimals of commands, to a nanometre or a nanoradian.
+const DECIMALS: usize = 9;
+
+/// Returns index, column name and factor from SI of each commanded joint, as in the table of
+/// targets.
+fn columns(problem: &Problem, targets: &Measurements) -> Vec<(usize, String, f64)> {
+    if targets.command_columns.is_empty() {
+        let columns = commanded_joints(problem).into_iter();
+        return columns.map(|column| (column.joint, column.column(), column.factor())).collect();
+    }
+    targets
+        .command_columns
+        .iter()
+        .map(|column| (column.joint, column.name.clone(), column.unit.recip()))
+        .collect()
+}
+
+/// Formats an angle \[rad\] in degrees; empty for `None`.
+fn degrees(angle: Option<f64>) -> String {
+    angle.map_or_else(String::new, |angle| fixed(angle.to_degrees(), 6))
+}
+
+/// Returns commands as CSV: q of every moving joint (empty if the target is out of reach) with the
+/// names and units of the table of targets, desired pose and conditions, and predicted distances.
+pub fn commands_csv(
+    problem: &Problem,
+    targets: &Measurements,
+    commands: &[Command],
+    bounds: Option<&Bounds>,
+) -> String {
+    let (mut header, mut lines) = (Vec::new(), vec![Vec::new(); commands.len()]);
+    let mut add = |name: &str, cell: &dyn Fn(&Command) -> String| {
+        header.push(name.to_owned());
+        lines.iter_mut().zip(commands).for_each(|(line, command)| line.push(cell(command)));
+    };
+    for (joint, name, factor) in columns(problem, targets) {
+        // A controller must not receive a command that misses the target.
+        let show = |command: &Command| {
+            if command.is_reached() { command.configuration[joint] * factor } else { f64::NAN }
+        };
+        add(&name, &|command| fixed(show(command), DECIMALS));
+    }
+    for (axis, name) in ["x_mm", "y_mm", "z_mm"].into_iter().enumerate() {
+        add(name, &|command| fixed(targets.positions[command.row][axis] * 1e3, 4));
+    }
+    let turned = commands.iter().any(|command| command.turn.is_some());
+    for (axis, name) in ["rx_deg", "ry_deg", "rz_deg"].into_iter().enumerate().filter(|_| turned) {
+        add(name, &|command| {
+            degrees(targets.orientation(command.row).map(|desired| desired.scaled_axis()[axis]))
+        });
+    }
+    for (name, labels) in [("session", sessions(targets)), ("target", targets.target.as_ref())] {
+        if let Some(labels) = labels {
+            add(name, &|command| word(labels, command.row));
+        }
+    }
+    for (name, values) in [("payload_kg", &targets.payload), ("hoist_N", &targets.hoist)] {
+        if let Some(values) = values {
+            add(name, &|command| fixed(values[command.row], 4));
+        }
+    }
+    add("miss_mm", &|command| fixed(command.miss.norm() * 1e3, 4));
+    add("miss_before_mm", &|command| fixed(command.seed_miss * 1e3, 4));
+    if turned {
+        add("turn_deg", &|command| degrees(command.turn.map(|turn| turn.norm())));
+        add("turn_before_deg", &|command| degrees(command.seed_turn));
+    }
+    add("reached", &|command| command.is_reached().to_string());
+    for (name, column) in bounds.into_iter().flat_map(uncertainty) {
+        header.push(name);
+        for (row, line) in lines.iter_mut().enumerate() {
+            line.push(column.cell(row));
+        }
+    }
+    csv(header, lines)
+}
