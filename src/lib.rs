@@ -89,6 +89,7 @@ pub mod paper;
 #[deny(clippy::indexing_slicing)]
 pub mod problem;
 #[deny(clippy::indexing_slicing)]
+#[doc(hidden)]
 pub mod quantity;
 mod random;
 pub mod remainder;

@@ -385,6 +385,7 @@ impl Plan {
     /// Returns the factor by which the standard errors of the plan are smaller than those of random
     /// poses, the geometric mean over these parameters; `None` if there are none that both
     /// determine.
+    #[doc(hidden)]
     pub fn gain(&self, parameters: &[usize]) -> Option<f64> {
         let ratios: Vec<f64> = parameters
             .iter()

@@ -23,6 +23,7 @@ pub(crate) use plain::{escape_hidden, mask_hidden, one_line};
 pub(crate) use study::StudyErrorKind;
 pub(crate) use table::TableErrorKind;
 pub(crate) use urdf::UrdfErrorKind;
+#[doc(hidden)]
 pub use warning::WarningKind;
 // Public for the tests, the benches and the Python module only.
 #[doc(hidden)]
@@ -146,6 +147,7 @@ pub struct Warning {
     /// Place of the warning.
     pub location: Location,
     /// Kind of the message, with cause and remedy.
+    #[doc(hidden)]
     pub kind: WarningKind,
 }
 

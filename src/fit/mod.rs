@@ -14,6 +14,7 @@ mod stages;
 mod uncertainty;
 mod warm_start;
 
+pub use crate::quantity::Unit;
 pub(crate) use apply::acceptance::{Acceptance, Accuracy, acceptance, held_out_positions};
 pub use apply::command_jacobian::jacobian;
 pub use apply::compensate::{Command, compensate};

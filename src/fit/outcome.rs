@@ -43,6 +43,7 @@ pub struct Estimate {
     /// The bound on which the value rests.
     pub at_bound: Option<AtBound>,
     /// Price of this bound.
+    #[doc(hidden)]
     pub shadow_price: Option<ShadowPrice>,
     /// Part of the value that the data determine, 0…1; the rest is decided by prior, bound, or the
     /// start of the fit along unidentifiable combinations.
@@ -75,10 +76,12 @@ pub struct Identification {
     /// Number of evaluations of the residual, with or without derivatives, over all stages.
     pub evaluations: u64,
     /// Convergence of the alternating stages of a sequential strategy.
+    #[doc(hidden)]
     pub alternation: Option<Alternation>,
     /// Duration of the identification \[s\].
     pub seconds: f64,
     /// Source of the σ of the measurements.
+    #[doc(hidden)]
     pub noise: Noise,
     /// Errors of the registered nominal arm: base and target fitted where they are free.
     pub registered: Errors,
@@ -89,6 +92,7 @@ pub struct Identification {
     pub kinds: Vec<(Errors, Errors)>,
     /// Scatter of the predicted target at each touched point: of the registered nominal arm, of the
     /// identified arm, and whether all of the point's rows are held out.
+    #[doc(hidden)]
     pub spreads: Vec<(PointSpread, PointSpread, bool)>,
     /// Errors of orientation, where it is fitted.
     pub orientation: Option<OrientationErrors>,
@@ -127,8 +131,10 @@ pub struct Identification {
     /// Covariance of the estimates.
     pub covariance: Covariance,
     /// Prior widths that the fitted deviations contradict; none for a provisional fit.
+    #[doc(hidden)]
     pub prior_sizes: Vec<PriorSize>,
     /// Constraints on whose limits the fit rests, in the order of the file.
+    #[doc(hidden)]
     pub active_constraints: Vec<ActiveConstraint>,
     /// Identification rows whose residual is too long to be noise, in the order of the rows.
     pub outliers: Vec<Outlier>,
@@ -138,6 +144,7 @@ pub struct Identification {
     /// Rows whose removal removes most of the misfit, if a few do. They are looked for where
     /// [`Options::with_influential_rows`](crate::fit::Options::with_influential_rows) asks for it,
     /// but not with a robust loss.
+    #[doc(hidden)]
     pub influential_rows: Option<InfluentialRows>,
     /// Full parameter vector of the identified arm.
     pub x: DVector<f64>,

@@ -56,6 +56,7 @@ macro_rules! catalogue {
 
         impl Effect {
             /// Returns the family; `None` for a declared law.
+            #[doc(hidden)]
             pub fn family(&self) -> Option<&'static Family> {
                 let index = match self {
                     $(Self::$variant $({ $($field: _),+ })? => Index::$variant,)+
@@ -65,6 +66,7 @@ macro_rules! catalogue {
             }
 
             /// Returns the arguments with their keys, in the order of files.
+            #[doc(hidden)]
             pub fn arguments(&self) -> Vec<(&str, Argument)> {
                 match self {
                     $(Self::$variant $({ $($field),+ })? => {

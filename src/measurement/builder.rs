@@ -217,6 +217,7 @@ impl DatasetBuilder {
     ///
     /// # Errors
     /// The first array that does not agree with the others.
+    #[doc(hidden)]
     pub fn measurements(self) -> Result<Measurements, DatasetError> {
         let rows = self.configurations.len();
         let covariates = covariates(&self.covariates, rows)?;

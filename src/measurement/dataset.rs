@@ -39,6 +39,7 @@ impl Dataset {
     /// # Errors
     /// A part of the split is empty, the held-out session does not exist, no split is declared, or
     /// an unknown point, anchor or surface has too few rows to contribute information.
+    #[doc(hidden)]
     pub fn from_measurements(
         problem: &Problem,
         measurements: Measurements,
@@ -75,6 +76,7 @@ impl Dataset {
     ///
     /// # Errors
     /// The first error in the table or in the split.
+    #[doc(hidden)]
     pub fn read_columns(
         table: ColumnTable,
         problem: &Problem,

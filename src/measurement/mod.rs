@@ -52,6 +52,7 @@ use crate::error::{Location, Warning};
 use crate::problem::{LazyPast, Observation, PoseConditions, PoseView, Problem};
 
 pub use builder::{DatasetBuilder, DatasetError};
+#[doc(hidden)]
 pub use column_table::{ColumnTable, ColumnValues};
 pub use dataset::Dataset;
 pub(crate) use order::RowOrder;
@@ -197,6 +198,7 @@ impl Measurements {
     }
 
     /// Returns true if there are no rows.
+    #[doc(hidden)]
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }

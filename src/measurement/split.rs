@@ -22,6 +22,7 @@ impl Split {
     ///
     /// # Errors
     /// A part is empty, the held-out session does not exist, or no split is declared.
+    #[doc(hidden)]
     pub fn new(problem: &Problem, measurements: &Measurements) -> Result<Self, InputError> {
         let error = |kind| problem.data.held_out_location.clone().error(kind);
         let marked =

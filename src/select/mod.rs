@@ -25,15 +25,24 @@ mod separation;
 mod telling_pose;
 mod unexplained;
 
+#[doc(hidden)]
 pub use candidates::{HELD_FIXED, NOT_FINITE, REFUSED};
+#[doc(hidden)]
 pub use detection::{Detectable, Detection, Size, detectable};
+#[doc(hidden)]
 pub use evidence::{Claims, Evidence, Hypothesis, HypothesisKind, HypothesisSet, Site};
+#[doc(hidden)]
 pub use reference_check::{ReferenceCheck, ReferenceVerdict};
 pub use rules::SelectionRules;
-pub use screening::{Ranked, Trace, examine, trace, trace_by};
+#[doc(hidden)]
+pub use screening::examine;
+pub use screening::{Ranked, Trace, trace, trace_by};
 pub use selection::{
     ClosedLoop, Found, HarmonicPrior, Interval, Round, Status, Verdict, close, close_by,
 };
+#[doc(hidden)]
 pub use separation::{Separation, Side, separation};
+#[doc(hidden)]
 pub use telling_pose::TellingPose;
+#[doc(hidden)]
 pub use unexplained::{Correction, Curve, PartialResidual, Unexplained};

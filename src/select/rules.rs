@@ -260,6 +260,7 @@ impl SelectionRules {
     /// # Errors
     /// A probability or part that is none, a length or number that is not above zero, an empty
     /// range.
+    #[doc(hidden)]
     pub fn check(&self) -> Result<(), IdentifyError> {
         let part = |value: f64| value > 0.0 && value < 1.0;
         let size = |value: f64| value > 0.0 && value.is_finite();

@@ -99,6 +99,7 @@ impl Robot {
     ///
     /// # Errors
     /// The first error in the text.
+    #[doc(hidden)]
     pub fn parse(text: &str, file: &Path) -> Result<Self, InputError> {
         Self::from_document(Document { file: file.to_owned(), text: text.into() })
     }

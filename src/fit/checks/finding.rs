@@ -18,6 +18,7 @@ pub enum Severity {
 
 impl Severity {
     /// Returns the word for the severity in JSON files: `error`, `warning` or `note`.
+    #[doc(hidden)]
     pub const fn as_str(self) -> &'static str {
         match self {
             Self::Note => "note",
@@ -56,6 +57,7 @@ macro_rules! finding_codes {
             pub const EACH: &[Self] = &[$(Self::$name),*];
 
             /// Returns the description of the code.
+            #[doc(hidden)]
             pub const fn entry(self) -> FindingEntry {
                 match self {
                     $(Self::$name => FindingEntry {

@@ -36,6 +36,7 @@ impl Outlier {
 }
 
 /// Few rows without which the fit would explain the others far better.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct InfluentialRows {
     /// Influential rows, in the order of the table.

@@ -20,6 +20,7 @@ const MIN_ROWS: usize = 8;
 const MIN_POINTS: usize = 4;
 
 /// Scatter of the predicted target over the rows at one point, whatever the place of the point.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointSpread {
     /// Name of the touched point.

@@ -14,6 +14,7 @@ const POWERS: usize = 2000;
 const SETTLED: f64 = 1e-6;
 
 /// Convergence of an alternating fit.
+#[doc(hidden)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Alternation {
     /// Number of sweeps over all stages.

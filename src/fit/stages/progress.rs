@@ -55,6 +55,7 @@ impl Stop {
     }
 
     /// Returns true if the stop was requested.
+    #[doc(hidden)]
     pub fn is_requested(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

@@ -98,6 +98,7 @@ impl SolverChoice {
     }
 
     /// Returns the name in results, files and arguments.
+    #[doc(hidden)]
     pub const fn as_str(self) -> &'static str {
         self.words().0
     }

@@ -64,6 +64,7 @@ impl Strategy {
     }
 
     /// Returns the name in results, files and arguments.
+    #[doc(hidden)]
     pub const fn as_str(self) -> &'static str {
         self.words().0
     }

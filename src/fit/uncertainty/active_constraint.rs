@@ -8,6 +8,7 @@ use crate::model::Model;
 use crate::quantity::Unit;
 
 /// Active constraint: a `[[constraint]]` on whose limit the fit rests.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct ActiveConstraint {
     /// Index of the constraint in the model.

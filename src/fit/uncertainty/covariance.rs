@@ -87,6 +87,7 @@ impl Covariance {
 
 impl Correlations {
     /// Returns the pairs whose correlation exceeds `least` in absolute value, strongest first.
+    #[doc(hidden)]
     pub fn above(&self, least: f64) -> Vec<(&str, &str, f64)> {
         let n = self.names.len();
         let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));

@@ -32,6 +32,7 @@ const AS_DECLARED: (NoiseModel, NoiseModel) = (NoiseModel::DECLARED, NoiseModel:
 const BEYOND_DOUBT: f64 = 10.0;
 
 /// Source of the σ of the measurements.
+#[doc(hidden)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Noise {

@@ -23,6 +23,7 @@ const MAX_STEPS: usize = 500;
 const SETTLED: f64 = 1e-4;
 
 /// Prior width of one kind of geometry at all joints, estimated from the data.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PriorSize {

@@ -3,6 +3,7 @@
 use crate::quantity::Unit;
 
 /// Shadow price of a limit: improvement of the fit if the limit were moved out by one unit.
+#[doc(hidden)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShadowPrice {
     /// Lagrange multiplier −∂(½χ²)/∂limit, with priors counted in χ² \[1 / SI unit of the limit\];

@@ -61,6 +61,7 @@ impl Bounds {
     }
 
     /// Creates infinite bounds for `n` unknowns.
+    #[doc(hidden)]
     pub fn none(n: usize) -> Self {
         Self {
             lower: DVector::from_element(n, f64::NEG_INFINITY),

@@ -78,6 +78,7 @@ impl Termination {
     }
 
     /// Returns the stable name for files, in kebab case.
+    #[doc(hidden)]
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Gradient => "gradient",

@@ -25,6 +25,7 @@ pub enum Status {
 
 impl Status {
     /// Returns the word for the status in result files.
+    #[doc(hidden)]
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Found => "found",
@@ -65,6 +66,7 @@ pub enum Verdict {
 
 impl Verdict {
     /// Returns the word for the verdict in result files.
+    #[doc(hidden)]
     pub fn as_str(self) -> &'static str {
         match self {
             Self::NothingFound => "nothing-found",
