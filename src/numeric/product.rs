@@ -202,6 +202,37 @@ pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     out
 }
 
+/// Returns LᵀL for a square lower triangle L; the upper half is formed and mirrored.
+pub(crate) fn gram_of_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = lower.nrows();
+    if n * n * n < MIN_PARALLEL_WORK {
+        return lower.transpose() * lower;
+    }
+    let transposed = transposed_view(lower);
+    let mut out = zeros(n, n);
+    let form = |(part, entries): (usize, &mut [f64])| {
+        let (first, count) = (part * BLOCK_COLUMNS, entries.len() / n);
+        let mut block = DMatrixViewMut::from_slice(entries, n, count);
+        // Columns from `first` on have zeros above that row.
+        let (end, filled) = (first + count, n - first);
+        let right = lower.view((first, first), (filled, count));
+        let left = transposed.view((0, first), (end, filled));
+        if count <= NARROW {
+            block.rows_mut(0, end).gemm_tr(
+                1.0,
+                &lower.view((first, 0), (filled, end)),
+                &right,
+                0.0,
+            );
+        } else {
+            block.rows_mut(0, end).gemm(1.0, &left, &right, 0.0);
+        }
+    };
+    out.as_mut_slice().par_chunks_mut(n * BLOCK_COLUMNS).enumerate().for_each(form);
+    out.fill_lower_triangle_with_upper_triangle();
+    out
+}
+
 /// Returns a view of Aᵀ without copying. It is not for products with a size up to [`NARROW`]:
 /// nalgebra forms these by axpy operations that access strided columns out of bounds.
 fn transposed_view(a: &DMatrix<f64>) -> MatrixView<'_, f64, Dyn, Dyn, Dyn, Dyn> {
@@ -268,6 +299,11 @@ mod tests {
             assert!((in_place - expected).amax() <= scale);
             let (lower, wide) = (upper.transpose(), b.columns(0, columns.min(inner)).into_owned());
             assert!((lower_product(&lower, &wide) - &lower * &wide).amax() <= scale);
+            let square_of_lower = gram_of_lower(&lower);
+            assert!(
+                (&square_of_lower - lower.transpose() * &lower).amax() <= scale * 10.0
+                    && square_of_lower == square_of_lower.transpose()
+            );
             let square = gram(&a);
             assert!((&square - a.transpose() * &a).amax() <= scale * 10.0);
             assert!(square == square.transpose());

@@ -4,13 +4,14 @@ use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
+use super::judge::Conditioned;
 use super::linearise::Linearisation;
 use super::posterior::{Posterior, RowPosterior};
-use super::rows::{AXES, Layout, Rows};
+use super::rows::{AXES, Layout, Rows, SiteKind};
 use super::scores::{Scores, expected_size, fade};
 use crate::fit::Identification;
 use crate::model::{Model, Pose};
-use crate::problem::Problem;
+use crate::problem::{PoseView, Problem};
 
 /// Share of a remainder below which a pose counts as extrapolated.
 const MIN_SHARE: f64 = 0.5;
@@ -70,14 +71,12 @@ impl Correction {
         found: &Identification,
         problem: &Problem,
         (layout, unknowns): (&Layout, &[usize]),
-        posterior: Posterior,
-        scores: Scores,
+        Conditioned { posterior, scores }: Conditioned,
     ) -> Self {
         let mut layout = layout.clone();
         if posterior.hyper.sites() == 0 {
-            layout.joints.clear();
-            layout.levers.clear();
-            layout.inputs.site_of.iter_mut().for_each(|site| *site = None);
+            layout.sites.clear();
+            layout.inputs.sites.clear();
         }
         let parameter = |&k: &usize| Linearised {
             name: found.estimates[k].name.clone(),
@@ -101,13 +100,15 @@ impl Correction {
     }
 
     /// Joints whose errors the remainder describes, counted from 0.
-    pub(crate) fn joints(&self) -> &[usize] {
-        if self.has_remainder() { &self.layout.joints } else { &[] }
+    pub(crate) fn joints(&self) -> Vec<usize> {
+        let coordinates = self.layout.sites.iter().filter(|of| of.kind == SiteKind::Coordinate);
+        coordinates.map(|site| site.joint).collect()
     }
 
-    /// Names of the quantities on which the joints' errors depend: `q1`, ….
+    /// Names of the quantities on which the joints' errors depend: `q1`, …, `temperature`,
+    /// `payload`, `hoist`.
     pub(crate) fn inputs(&self) -> Vec<String> {
-        self.layout.inputs.joints.iter().map(|joint| format!("q{}", joint + 1)).collect()
+        self.layout.inputs.sources.iter().map(|source| source.name()).collect()
     }
 
     /// Names of the free parameters and the posterior covariance of their deviations from nominal,
@@ -168,7 +169,7 @@ impl Correction {
             let mean = posterior.mean - Vector3::from_fn(|axis, _| change[AXES * row + axis]);
             let has_remainder = self.has_remainder();
             let missed = if has_remainder { (1.0 - share) * mean.norm() } else { 0.0 };
-            let noise = hyper.noise_variance() * rows.relative_sigma[row].powi(2);
+            let noise = hyper.noise_variance_of(rows.relative_sigma[row]);
             let variance = posterior.covariance.diagonal().map(|value| value.max(0.0) + noise);
             let sigma = variance.map(|value| (value + missed * missed / AXES as f64).sqrt());
             let blank = if lost { f64::NAN } else { 0.0 };
@@ -178,18 +179,20 @@ impl Correction {
                 sigma: sigma.add_scalar(blank),
                 size: expected_size(variance.sum(), missed) + blank,
                 is_extrapolated: (has_remainder && share < MIN_SHARE)
-                    || self.is_outside(poses[row].setup.configuration),
+                    || self.is_outside(&poses[row].setup),
             }
         };
         self.posterior.at(rows).into_iter().enumerate().map(one).collect()
     }
 
-    /// True if a command lies outside of the range that was measured.
-    fn is_outside(&self, configuration: &[f64]) -> bool {
+    /// True if an input lies outside of the range that was measured, or is not stated.
+    fn is_outside(&self, setup: &PoseView) -> bool {
         let inputs = &self.layout.inputs;
-        inputs.joints.iter().zip(&inputs.ranges).any(|(&joint, &(low, high))| {
+        inputs.sources.iter().zip(&inputs.ranges).any(|(source, &(low, high))| {
             let margin = RANGE_MARGIN * (high - low);
-            !(low - margin..=high + margin).contains(&configuration[joint])
+            source
+                .value(setup)
+                .is_some_and(|value| !(low - margin..=high + margin).contains(&value))
         })
     }
 }

@@ -1,22 +1,29 @@
 //! Marginal likelihood of the hyperparameters, with the free parameters integrated out.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::kernel::{Hyperparameters, covariance, matern, squared_distance};
+use super::kernel::{Hyperparameters, carry, embedded, matern, squared_distances};
 use super::prior::ParameterPrior;
-use super::rows::{AXES, Inputs, Rows};
-use crate::numeric::{gram, inverse_lower, lower_factor, product};
+use super::rows::{AXES, Inputs, Rows, SiteFunctions, Source};
+use crate::numeric::{gram, gram_of_lower, inverse_lower, lower_factor, product};
 
-/// 1 σ of ln ℓ about 0: lengths of 0.05 to 20 rad lie within two of them.
+/// 1 σ of the mean of ln ℓ in a family about 0: lengths of 0.05 to 20 rad lie within two of them.
 const LENGTH_SPREAD: f64 = 1.5;
+/// 1 σ of each ln ℓ about the mean of its family.
+const LENGTH_DIFFERENCE: f64 = 0.15;
 /// 1 σ of ln a about the logarithm of the residual's size.
 const AMPLITUDE_SPREAD: f64 = 3.0;
 /// Bounds of ln ℓ, ln 0.02 and ln 8.
 const LENGTH_BOUNDS: (f64, f64) = (-3.912_023, 2.079_441_5);
-/// Bounds of ln a, of ln σ and of ln σ_c about the logarithm of the residual's size.
+/// Bounds of ln a about the logarithm of the residual's size.
 const AMPLITUDE_BOUNDS: (f64, f64) = (-7.0, 2.0);
-const NOISE_BOUNDS: (f64, f64) = (-4.0, 2.0);
+/// Bounds of ln σ and of ln σ_c about the logarithm of the residual's size.
+pub(super) const NOISE_BOUNDS: (f64, f64) = (-4.0, 2.0);
+/// Shares of the residual's size from which the search of σ and σ_c starts.
+pub(super) const NOISE_STARTS: [f64; 2] = [0.7, 0.3];
 
 /// Negative logarithm of the marginal likelihood and of the priors on hyperparameters, as a
 /// function of their logarithms.
@@ -31,12 +38,32 @@ pub(super) struct MarginalLikelihood<'a> {
     target: DVector<f64>,
     /// J S½.
     scaled: DMatrix<f64>,
-    /// Number of sites that err; 0 without a remainder.
-    sites: usize,
+    /// Functions and sites that each amplitude scales: all constants share one.
+    amplitudes: Vec<(Function, Vec<usize>)>,
+    /// Sites with a function of one input.
+    singles: Vec<usize>,
     /// True where rows of one configuration may share noise.
     shares_noise: bool,
     /// Logarithm of the root mean square of a residual's length \[ln m\].
     size: f64,
+    /// Squared distances in each input from a row (first index) to itself and the rows behind it.
+    distances: Vec<Vec<f64>>,
+}
+
+/// Kind of a function of a site.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Function {
+    Single,
+    Joint,
+    Constant,
+}
+
+/// Covariance of the sites at pairs of one row and the rows from it on.
+struct PairColumn {
+    /// Correlations of the single functions of each site and their slopes, site by site.
+    single: Vec<(f64, f64)>,
+    /// Correlation of the joint functions and its slope.
+    joint: Vec<(f64, f64)>,
 }
 
 impl<'a> MarginalLikelihood<'a> {
@@ -44,28 +71,65 @@ impl<'a> MarginalLikelihood<'a> {
     pub fn new(
         (rows, inputs): (&'a Rows, &'a Inputs),
         prior: &ParameterPrior,
-        (sites, shares_noise): (usize, bool),
+        shares_noise: bool,
         size: f64,
     ) -> Self {
+        let with = |has: fn(&SiteFunctions) -> bool| -> Vec<usize> {
+            (0..inputs.sites.len()).filter(|&site| has(&inputs.sites[site])).collect()
+        };
+        let singles = with(|site| site.single.is_some());
+        let constants = with(|site| site.constant);
+        let single = singles.iter().map(|&site| (Function::Single, vec![site]));
+        let joint = with(|site| site.joint).into_iter().map(|site| (Function::Joint, vec![site]));
+        let constant = (!constants.is_empty()).then_some((Function::Constant, constants));
+        let amplitudes = single.chain(joint).chain(constant).collect();
         let (target, scaled) = prior.reduce(rows);
-        Self { rows, inputs, target, scaled, sites, shares_noise, size: size.ln() }
+        let embedded = embedded(inputs, rows);
+        let width = embedded.nrows();
+        let of_row = |row: usize| &embedded.as_slice()[width * row..width * (row + 1)];
+        let behind = |first: usize| {
+            let pairs = first..rows.len();
+            pairs.flat_map(|second| squared_distances(of_row(first), of_row(second))).collect()
+        };
+        let distances = (0..rows.len()).into_par_iter().map(behind).collect();
+        let size = size.ln();
+        Self { rows, inputs, target, scaled, amplitudes, singles, shares_noise, size, distances }
     }
 
-    /// Number of hyperparameters: amplitudes of both families, two lengths, σ, σ_c.
+    /// Number of hyperparameters: amplitudes of both families, their lengths, σ, σ_c.
     pub fn len(&self) -> usize {
-        let kernel = if self.sites == 0 { 0 } else { 2 * self.sites + 2 };
-        kernel + 1 + usize::from(self.shares_noise)
+        self.joint_lengths().end + 1 + usize::from(self.shares_noise)
+    }
+
+    /// Places of the lengths ℓᵤ.
+    fn single_lengths(&self) -> Range<usize> {
+        self.amplitudes.len()..self.amplitudes.len() + self.singles.len()
+    }
+
+    /// Places of the lengths ℓᵥ.
+    fn joint_lengths(&self) -> Range<usize> {
+        let first = self.single_lengths().end;
+        first..first + self.inputs.angles.len()
+    }
+
+    /// Places of lengths that are about equal: those ℓᵤ, those ℓᵥ of commands, and each ℓᵥ of a
+    /// condition by itself.
+    fn length_families(&self) -> Vec<Range<usize>> {
+        let Range { start, end } = self.joint_lengths();
+        let is_command = |source: &&Source| matches!(source, Source::Command(_));
+        let conditions = start + self.inputs.sources.iter().filter(is_command).count();
+        let commands = [self.single_lengths(), start..conditions].into_iter();
+        commands.chain((conditions..end).map(|k| k..k + 1)).collect()
     }
 
     /// Logarithms of hyperparameters to start from, with these lengths ℓᵤ and ℓᵥ.
     pub fn start(&self, lengths: [f64; 2]) -> DVector<f64> {
-        let amplitudes = 2 * self.sites;
-        let amplitude = self.size - 0.5 * (amplitudes.max(1) as f64).ln();
+        let amplitude = self.size - 0.5 * (self.amplitudes.len() as f64).ln();
         DVector::from_fn(self.len(), |k, _| match k {
-            k if k < amplitudes => amplitude,
-            k if self.sites > 0 && k < amplitudes + 2 => lengths[k - amplitudes].ln(),
-            k if k + 1 == self.len() && self.shares_noise => self.size + 0.3_f64.ln(),
-            _ => self.size + 0.7_f64.ln(),
+            k if k < self.amplitudes.len() => amplitude,
+            k if self.single_lengths().contains(&k) => lengths[0].ln(),
+            k if self.joint_lengths().contains(&k) => lengths[1].ln(),
+            k => self.size + NOISE_STARTS[k - self.joint_lengths().end].ln(),
         })
     }
 
@@ -73,8 +137,8 @@ impl<'a> MarginalLikelihood<'a> {
     pub fn bounds(&self) -> Vec<(f64, f64)> {
         let about = |(low, high)| (self.size + low, self.size + high);
         let bound = |k| match k {
-            k if k < 2 * self.sites => about(AMPLITUDE_BOUNDS),
-            k if self.sites > 0 && k < 2 * self.sites + 2 => LENGTH_BOUNDS,
+            k if k < self.amplitudes.len() => about(AMPLITUDE_BOUNDS),
+            k if k < self.joint_lengths().end => LENGTH_BOUNDS,
             _ => about(NOISE_BOUNDS),
         };
         (0..self.len()).map(bound).collect()
@@ -82,22 +146,34 @@ impl<'a> MarginalLikelihood<'a> {
 
     /// Hyperparameters from their logarithms.
     pub fn hyperparameters(&self, logarithms: &DVector<f64>) -> Hyperparameters {
-        let value = |k: usize| logarithms[k].exp();
-        let noise = if self.sites == 0 { 0 } else { 2 * self.sites + 2 };
-        let lengths = [0, 1].map(|k| if self.sites == 0 { 1.0 } else { value(noise - 2 + k) });
-        Hyperparameters {
-            single: (0..self.sites).map(value).collect(),
-            joint: (self.sites..2 * self.sites).map(value).collect(),
-            lengths,
-            noise: value(noise),
-            shared_noise: if self.shares_noise { value(noise + 1) } else { 0.0 },
+        let (sites, noise) = (self.inputs.sites.len(), self.joint_lengths().end);
+        let mut hyper = Hyperparameters {
+            single: vec![0.0; sites],
+            joint: vec![0.0; sites],
+            constant: vec![0.0; sites],
+            single_lengths: vec![1.0; sites],
+            joint_lengths: self.joint_lengths().map(|k| logarithms[k].exp()).collect(),
+            noise: logarithms[noise].exp(),
+            shared_noise: if self.shares_noise { logarithms[noise + 1].exp() } else { 0.0 },
+        };
+        for (k, (function, sites)) in self.amplitudes.iter().enumerate() {
+            let amplitudes = match function {
+                Function::Single => &mut hyper.single,
+                Function::Joint => &mut hyper.joint,
+                Function::Constant => &mut hyper.constant,
+            };
+            sites.iter().for_each(|&site| amplitudes[site] = logarithms[k].exp());
         }
+        for (k, &site) in self.single_lengths().zip(&self.singles) {
+            hyper.single_lengths[site] = logarithms[k].exp();
+        }
+        hyper
     }
 
     /// Value and gradient; `None` where the covariance is not positive definite.
     pub fn value_and_gradient(&self, logarithms: &DVector<f64>) -> Option<(f64, DVector<f64>)> {
         let hyper = self.hyperparameters(logarithms);
-        let mut matrix = covariance(&hyper, self.inputs, self.rows, self.rows);
+        let (mut matrix, pairs) = self.covariance(&hyper);
         self.add_noise(&hyper, &mut matrix);
         let lower = lower_factor(matrix)?;
         let log_det_c = 2.0 * lower.diagonal().iter().map(|value| value.ln()).sum::<f64>();
@@ -107,26 +183,72 @@ impl<'a> MarginalLikelihood<'a> {
         let n = self.scaled.ncols();
         let outer = lower_factor(DMatrix::identity(n, n) + gram(&whitened))?;
         let log_det_h = 2.0 * outer.diagonal().iter().map(|value| value.ln()).sum::<f64>();
-        let mut inverse = gram(&inverse);
-        let reach = product(&inverse, &self.scaled);
-        let reach = product(&reach, &inverse_lower(&outer).transpose());
+        let reach = product(&whitened, &inverse_lower(&outer).transpose());
+        let reach = product(&inverse.transpose(), &reach);
+        let mut inverse = gram_of_lower(&inverse);
         inverse -= product(&reach, &reach.transpose());
         let weights = &inverse * &self.target;
         let mut value = 0.5 * (self.target.dot(&weights) + log_det_c + log_det_h);
         // ½ tr((K⁻¹ − α αᵀ) ∂C).
         inverse.ger(-1.0, &weights, &weights, 1.0);
-        let mut gradient = self.gradient(&hyper, &inverse);
-        for k in 0..2 * self.sites {
+        let mut gradient = self.gradient(&hyper, &inverse, &pairs);
+        for k in 0..self.amplitudes.len() {
             let away = (logarithms[k] - self.size) / AMPLITUDE_SPREAD;
             value += 0.5 * away * away;
             gradient[k] += away / AMPLITUDE_SPREAD;
         }
-        for k in (2 * self.sites..2 * self.sites + 2).filter(|_| self.sites > 0) {
-            let away = logarithms[k] / LENGTH_SPREAD;
-            value += 0.5 * away * away;
-            gradient[k] += away / LENGTH_SPREAD;
+        // ln ℓ ~ N(0, τ² I + s² 1 1ᵀ) within a family, by the Sherman–Morrison formula.
+        for family in self.length_families() {
+            let (each, common) = (LENGTH_DIFFERENCE.powi(2), LENGTH_SPREAD.powi(2));
+            let share = common / (each + common * family.len() as f64);
+            let sum: f64 = family.clone().map(|k| logarithms[k]).sum();
+            for k in family {
+                let slope = (logarithms[k] - share * sum) / each;
+                value += 0.5 * logarithms[k] * slope;
+                gradient[k] += slope;
+            }
         }
         value.is_finite().then_some((value, gradient))
+    }
+
+    /// Lower half of K_f, and the correlations of its pairs.
+    fn covariance(&self, hyper: &Hyperparameters) -> (DMatrix<f64>, Vec<PairColumn>) {
+        let (n, width) = (self.rows.len(), self.inputs.angles.len());
+        let sites = self.inputs.sites.len();
+        let scales = |lengths: &[f64]| lengths.iter().map(|l| l.powi(-2)).collect::<Vec<f64>>();
+        let [single, joint] = [&hyper.single_lengths, &hyper.joint_lengths].map(|l| scales(l));
+        let mut matrix = DMatrix::zeros(AXES * n, AXES * n);
+        let column = |(first, out): (usize, &mut [f64])| {
+            let count = n - first;
+            let mut pairs = PairColumn {
+                single: vec![(0.0, 0.0); sites * count],
+                joint: Vec::with_capacity(count),
+            };
+            let mut covariances = vec![0.0; sites];
+            for (pair, second) in (first..n).enumerate() {
+                let squared = &self.distances[first][width * pair..width * (pair + 1)];
+                let sum = squared.iter().zip(&joint).map(|(squared, scale)| squared * scale).sum();
+                let shared = matern(sum);
+                pairs.joint.push(shared);
+                for (site, covariance) in covariances.iter_mut().enumerate() {
+                    *covariance =
+                        hyper.joint[site].powi(2) * shared.0 + hyper.constant[site].powi(2);
+                    if let Some(input) = self.inputs.sites[site].single {
+                        let scaled = squared[input] * single[site];
+                        let (correlation, slope) = matern(scaled);
+                        pairs.single[sites * pair + site] = (correlation, slope * scaled);
+                        *covariance += hyper.single[site].powi(2) * correlation;
+                    }
+                }
+                carry(&covariances, (self.rows, second), (self.rows, first), |a, b, value| {
+                    out[b * AXES * n + AXES * second + a] = value;
+                });
+            }
+            pairs
+        };
+        let columns = matrix.as_mut_slice().par_chunks_mut(AXES * AXES * n).enumerate();
+        let pairs = columns.map(column).collect();
+        (matrix, pairs)
     }
 
     /// Adds N: σ² on the diagonal, σ_c² between rows of one configuration along each axis.
@@ -158,10 +280,16 @@ impl<'a> MarginalLikelihood<'a> {
     }
 
     /// ½ tr(M ∂C/∂h) of a symmetric M for each logarithm h.
-    fn gradient(&self, hyper: &Hyperparameters, weight: &DMatrix<f64>) -> DVector<f64> {
-        let (sites, n) = (self.sites, self.rows.len());
+    fn gradient(
+        &self,
+        hyper: &Hyperparameters,
+        weight: &DMatrix<f64>,
+        pairs: &[PairColumn],
+    ) -> DVector<f64> {
+        let (n, width) = (self.rows.len(), self.inputs.angles.len());
+        let sites = self.inputs.sites.len();
         let mut gradient = DVector::zeros(self.len());
-        let noise = self.len() - 1 - usize::from(self.shares_noise);
+        let noise = self.joint_lengths().end;
         for row in 0..n {
             let ratio = (hyper.noise * self.rows.relative_sigma[row]).powi(2);
             for k in AXES * row..AXES * (row + 1) {
@@ -173,52 +301,61 @@ impl<'a> MarginalLikelihood<'a> {
             self.each_shared(|first, second| sum += weight[(first, second)]);
             gradient[noise + 1] = hyper.shared_noise.powi(2) * sum;
         }
-        if sites == 0 {
-            return gradient;
-        }
-        let [single, joint] = hyper.lengths.map(|length| length.powi(-2));
-        let squares = |values: &[f64]| values.iter().map(|a| a * a).collect::<Vec<f64>>();
-        let (of_single, of_joint) = (squares(&hyper.single), squares(&hyper.joint));
-        let column = |second: usize| {
-            let mut out = vec![0.0; 2 * sites + 2];
+        // Sums over the pairs, before the factors that all pairs share: of each site for single,
+        // joint and constant functions and single lengths, and of each input for joint lengths.
+        let column = |first: usize| {
+            let mut out = vec![0.0; 4 * sites + width];
             let mut carried = vec![0.0; sites];
-            let mut correlations = vec![(0.0, 0.0); sites];
-            for first in 0..=second {
+            for (pair, second) in (first..n).enumerate() {
                 let factor = if first == second { 0.5 } else { 1.0 };
-                let (left, right) = (self.rows.inputs_of(first), self.rows.inputs_of(second));
-                let mut sum = 0.0;
-                for (input, (left, right)) in left.iter().zip(right).enumerate() {
-                    let squared = squared_distance(self.inputs.angles[input], left - right);
-                    sum += squared;
-                    if let Some(site) = self.inputs.site_of[input] {
-                        correlations[site] = matern(squared * single);
-                    }
-                }
-                let (all, slope) = matern(sum * joint);
                 carried.fill(0.0);
                 for b in 0..AXES {
                     for a in 0..AXES {
-                        let entry = weight[(AXES * first + a, AXES * second + b)];
-                        let pair = self.rows.sites_of(AXES * first + a).iter();
-                        let pair = pair.zip(self.rows.sites_of(AXES * second + b));
-                        for (out, (left, right)) in carried.iter_mut().zip(pair) {
+                        let entry = factor * weight[(AXES * second + a, AXES * first + b)];
+                        let columns = self.rows.sites_of(AXES * second + a).iter();
+                        let columns = columns.zip(self.rows.sites_of(AXES * first + b));
+                        for (out, (left, right)) in carried.iter_mut().zip(columns) {
                             *out += entry * left * right;
                         }
                     }
                 }
+                let (correlation, slope) = pairs[first].joint[pair];
+                let mut whole = 0.0;
                 for site in 0..sites {
-                    let (scale, single) = (factor * carried[site], correlations[site]);
-                    out[site] += 2.0 * of_single[site] * scale * single.0;
-                    out[sites + site] += 2.0 * of_joint[site] * scale * all;
-                    out[2 * sites] += of_single[site] * scale * single.1;
-                    out[2 * sites + 1] += of_joint[site] * scale * slope;
+                    let single = pairs[first].single[sites * pair + site];
+                    out[site] += carried[site] * single.0;
+                    out[sites + site] += carried[site] * correlation;
+                    out[2 * sites + site] += carried[site];
+                    out[3 * sites + site] += carried[site] * single.1;
+                    whole += hyper.joint[site].powi(2) * carried[site];
+                }
+                let squared = &self.distances[first][width * pair..width * (pair + 1)];
+                for (out, squared) in out[4 * sites..].iter_mut().zip(squared) {
+                    *out += whole * slope * squared;
                 }
             }
             out
         };
         let columns: Vec<Vec<f64>> = (0..n).into_par_iter().map(column).collect();
+        let mut sums = vec![0.0; 4 * sites + width];
         for column in columns {
-            column.iter().enumerate().for_each(|(k, value)| gradient[k] += value);
+            column.iter().zip(&mut sums).for_each(|(value, sum)| *sum += value);
+        }
+        for (k, (function, of)) in self.amplitudes.iter().enumerate() {
+            let (family, amplitudes) = match function {
+                Function::Single => (0, &hyper.single),
+                Function::Joint => (1, &hyper.joint),
+                Function::Constant => (2, &hyper.constant),
+            };
+            let slope =
+                |&site: &usize| 2.0 * amplitudes[site].powi(2) * sums[family * sites + site];
+            gradient[k] = of.iter().map(slope).sum();
+        }
+        for (k, &site) in self.single_lengths().zip(&self.singles) {
+            gradient[k] = hyper.single[site].powi(2) * sums[3 * sites + site];
+        }
+        for (input, k) in self.joint_lengths().enumerate() {
+            gradient[k] = hyper.joint_lengths[input].powi(-2) * sums[4 * sites + input];
         }
         gradient
     }

@@ -5,15 +5,18 @@ use std::collections::HashMap;
 use nalgebra::{DMatrix, DVector};
 
 use super::prior::ParameterPrior;
-use super::rows::{AXES, Inputs, Layout, Rows};
+use super::rows::{AXES, Inputs, Layout, Rows, Site, SiteKind, Source};
 use crate::fit::Placement;
 use crate::least_squares::jacobian_and_residual;
 use crate::measurement::Measurements;
+use crate::model::parameter::{JointField, ParameterSite};
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::{Joint, JointKind, Problem};
 
 /// A joint whose lever is below this share of the largest is no site.
 const MIN_LEVER: f64 = 1e-3;
+/// Share of its mean above which the spread of a condition counts as variation.
+const MIN_SPREAD: f64 = 1e-6;
 /// 1 σ of the target's motion by a parameter without a prior \[m\]: far beyond any plausible error.
 const WIDE_MOTION: f64 = 0.3;
 /// Largest 1 σ of a parameter without a prior, in its unit.
@@ -36,21 +39,121 @@ impl Linearisation<'_> {
     pub fn rows(&self, layout: &Layout, poses: Vec<Pose>) -> Rows {
         let relative_sigma = poses.iter().map(|pose| pose.sigma / self.sigma).collect();
         let poses: Vec<Pose> = poses.into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
-        let slopes = self.model.command_jacobian(self.problem, poses.clone(), self.x);
-        let inputs = DMatrix::from_fn(layout.inputs.joints.len(), poses.len(), |input, row| {
+        let sites = self.site_columns(&layout.sites, &poses);
+        let inputs = DMatrix::from_fn(layout.inputs.sources.len(), poses.len(), |input, row| {
             let (offset, unit) = layout.inputs.standard[input];
-            (poses[row].setup.configuration[layout.inputs.joints[input]] - offset) / unit
+            // A condition that is not stated counts as its mean.
+            let value = layout.inputs.sources[input].value(&poses[row].setup);
+            (value.unwrap_or(offset) - offset) / unit
         });
-        let sites =
-            DMatrix::from_fn(layout.joints.len(), AXES * poses.len(), |site, coordinate| {
-                let slope = slopes[coordinate / AXES][(coordinate % AXES, layout.joints[site])];
-                slope / layout.levers[site]
-            });
         let configuration = configurations(&poses);
         let residuals =
             PoseResiduals::new(self.model, poses, self.unknowns.clone(), self.x.clone());
         let (slopes, residual) = jacobian_and_residual(&residuals, &residuals.reduced(self.x));
         Rows { residual, jacobian: -slopes, sites, inputs, configuration, relative_sigma }
+    }
+
+    /// Columns of the sites at `poses`, over their levers, shape = (sites, 3 poses).
+    fn site_columns(&self, sites: &[Site], poses: &[Pose]) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(sites.len(), AXES * poses.len());
+        let of_kind = |kind| -> Vec<(usize, usize)> {
+            let sites = sites.iter().enumerate().filter(|(_, site)| site.kind == kind);
+            sites.map(|(k, site)| (k, site.joint)).collect()
+        };
+        let coordinates = of_kind(SiteKind::Coordinate);
+        if !coordinates.is_empty() {
+            let slopes = self.model.command_jacobian(self.problem, poses.to_vec(), self.x);
+            for (place, slope) in slopes.iter().enumerate() {
+                for &(site, joint) in &coordinates {
+                    for axis in 0..AXES {
+                        out[(site, AXES * place + axis)] = slope[(axis, joint)] / sites[site].lever;
+                    }
+                }
+            }
+        }
+        let compliances = of_kind(SiteKind::Compliance);
+        let joints: Vec<usize> = compliances.iter().map(|(_, joint)| *joint).collect();
+        let slopes = self.compliance_jacobian(&joints, poses);
+        for (column, (site, _)) in compliances.into_iter().enumerate() {
+            out.set_row(site, &(slopes.column(column).transpose() / sites[site].lever));
+        }
+        out
+    }
+
+    /// Slopes of positions by additional compliances of `joints` at 0, shape = (3 poses, joints)
+    /// \[N·m²/rad\].
+    fn compliance_jacobian(&self, joints: &[usize], poses: &[Pose]) -> DMatrix<f64> {
+        if joints.is_empty() {
+            return DMatrix::zeros(AXES * poses.len(), 0);
+        }
+        let field = JointField::Compliance;
+        let site = |&joint: &usize| (ParameterSite::Joint { joint, field }, 0.0);
+        let probed = self.model.with_probes(&joints.iter().map(site).collect::<Vec<_>>());
+        let first = self.x.len();
+        let x = self.x.clone().resize_vertically(first + joints.len(), 0.0);
+        let unknowns = (first..first + joints.len()).collect();
+        let poses: Vec<Pose> =
+            poses.iter().map(|pose| Pose { sigma: 1.0, ..pose.clone() }).collect();
+        let residuals = PoseResiduals::new(&probed, poses, unknowns, x.clone());
+        let (slopes, _) = jacobian_and_residual(&residuals, &residuals.reduced(&x));
+        -slopes
+    }
+
+    /// Sites and inputs of the arm in these poses.
+    pub fn layout(&self, poses: &[Pose]) -> Layout {
+        let joints = commanded(self.problem);
+        let sites = |kind| joints.iter().map(move |&joint| Site { joint, kind, lever: 1.0 });
+        let coordinates = self.with_levers(sites(SiteKind::Coordinate).collect(), poses);
+        let revolute = |site: &Site| self.problem.joints[site.joint].kind == JointKind::Revolute;
+        let compliances = sites(SiteKind::Compliance).filter(revolute).collect();
+        let mut compliances = self.with_levers(compliances, poses);
+        let largest = compliances.iter().map(|site| site.lever).fold(0.0, f64::max);
+        compliances.iter_mut().for_each(|site| site.lever = largest);
+        let sites = [coordinates, compliances].concat();
+        let count = poses.len().max(1) as f64;
+        let commands = joints.iter().map(|&joint| Source::Command(joint));
+        let mut inputs = Inputs {
+            sites: Vec::new(),
+            sources: Vec::new(),
+            angles: Vec::new(),
+            standard: Vec::new(),
+            ranges: Vec::new(),
+        };
+        for source in commands.chain(Source::CONDITIONS) {
+            let values: Option<Vec<f64>> =
+                poses.iter().map(|pose| source.value(&pose.setup)).collect();
+            let Some(values) = values else { continue };
+            let mean = values.iter().sum::<f64>() / count;
+            let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+            let spread = (squares / count).sqrt();
+            let is_angle = match source {
+                Source::Command(joint) => self.problem.joints[joint].kind == JointKind::Revolute,
+                _ if spread <= MIN_SPREAD * mean.abs() => continue,
+                _ => false,
+            };
+            let is_plain = is_angle || spread == 0.0;
+            inputs.sources.push(source);
+            inputs.angles.push(is_angle);
+            inputs.standard.push(if is_plain { (0.0, 1.0) } else { (mean, spread) });
+            inputs.ranges.push((
+                values.iter().copied().fold(f64::INFINITY, f64::min),
+                values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            ));
+        }
+        inputs.sites = Inputs::functions(&sites, &inputs.sources);
+        Layout { sites, inputs }
+    }
+
+    /// Sites with their levers; those that hardly move the target are left out.
+    fn with_levers(&self, sites: Vec<Site>, poses: &[Pose]) -> Vec<Site> {
+        let columns = self.site_columns(&sites, poses);
+        let count = poses.len().max(1) as f64;
+        let levers: Vec<f64> =
+            columns.row_iter().map(|row| (row.norm_squared() / count).sqrt()).collect();
+        let largest = levers.iter().copied().fold(0.0, f64::max);
+        let sites = sites.into_iter().zip(levers);
+        let moving = sites.filter(|(_, lever)| *lever > MIN_LEVER * largest && *lever > 0.0);
+        moving.map(|(site, lever)| Site { lever, ..site }).collect()
     }
 }
 
@@ -74,50 +177,6 @@ fn configurations(poses: &[Pose]) -> Vec<usize> {
 fn commanded(problem: &Problem) -> Vec<usize> {
     let joints = problem.joints.iter().map(Joint::command_kind).enumerate();
     joints.filter(|(_, kind)| *kind != JointKind::Fixed).map(|(joint, _)| joint).collect()
-}
-
-/// Sites and inputs of the arm in these poses.
-pub(super) fn layout(problem: &Problem, model: &Model, x: &DVector<f64>, poses: &[Pose]) -> Layout {
-    let joints = commanded(problem);
-    let slopes = model.command_jacobian(problem, poses.to_vec(), x);
-    let lever = |joint: usize| {
-        let squares: f64 = slopes.iter().map(|slope| slope.column(joint).norm_squared()).sum();
-        (squares / poses.len().max(1) as f64).sqrt()
-    };
-    let levers: Vec<f64> = joints.iter().map(|&joint| lever(joint)).collect();
-    let largest = levers.iter().copied().fold(0.0, f64::max);
-    let mut layout = Layout {
-        joints: Vec::new(),
-        levers: Vec::new(),
-        inputs: Inputs {
-            joints: joints.clone(),
-            angles: Vec::new(),
-            site_of: Vec::new(),
-            standard: Vec::new(),
-            ranges: Vec::new(),
-        },
-    };
-    for (&joint, lever) in joints.iter().zip(levers) {
-        let values = || poses.iter().map(|pose| pose.setup.configuration[joint]);
-        let is_angle = problem.joints[joint].kind == JointKind::Revolute;
-        let mean = values().sum::<f64>() / poses.len().max(1) as f64;
-        let square = values().map(|value| (value - mean).powi(2)).sum::<f64>();
-        let spread = (square / poses.len().max(1) as f64).sqrt();
-        let inputs = &mut layout.inputs;
-        inputs.angles.push(is_angle);
-        inputs.standard.push(if is_angle || spread == 0.0 { (0.0, 1.0) } else { (mean, spread) });
-        inputs.ranges.push((
-            values().fold(f64::INFINITY, f64::min),
-            values().fold(f64::NEG_INFINITY, f64::max),
-        ));
-        let is_site = lever > MIN_LEVER * largest && lever > 0.0;
-        inputs.site_of.push(is_site.then_some(layout.joints.len()));
-        if is_site {
-            layout.joints.push(joint);
-            layout.levers.push(lever);
-        }
-    }
-    layout
 }
 
 /// Prior of the parameters `unknowns` about the full parameter vector `x`.

@@ -9,10 +9,16 @@ mod apply;
 mod blocks;
 mod bounds;
 mod correction;
+mod cross_validation;
 mod fit;
+mod gain;
+mod hyperparameter_search;
+mod inducing;
+mod judge;
 mod kernel;
 mod likelihood;
 mod linearise;
+mod noise_likelihood;
 mod posterior;
 mod prior;
 mod residuals;
@@ -22,10 +28,12 @@ mod scores;
 mod search;
 #[cfg(test)]
 mod tests;
+mod training_rows;
 
 pub use apply::{CorrectedPrediction, predict};
 pub use correction::{CorrectedPose, Correction};
 pub use fit::{Fitted, fit};
+pub(crate) use gain::Gain;
 pub(crate) use saved::SavedRemainderError;
 // Public for the tests, the benches and the Python module only.
 #[doc(hidden)]

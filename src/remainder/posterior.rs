@@ -1,30 +1,32 @@
 //! Posterior of parameters and remainder: a linear model in features of the rows.
 
+use std::collections::HashMap;
+
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
+use super::inducing::Inducing;
 use super::kernel::{Hyperparameters, covariance, variance};
 use super::prior::ParameterPrior;
 use super::rows::{AXES, Inputs, Rows};
-use crate::numeric::{gram, inverse_lower, lower_factor, product};
+use crate::numeric::{gram, inverse_lower, lower_factor, product_with_upper};
 
-/// Share of its mean variance that is added to the covariance of the centres, against rounding.
+/// Share of its variance that is added to each inducing variable, against rounding.
 const JITTER: f64 = 1e-9;
 
-/// Gaussian posterior of the remainder's values at its centres and of the parameters.
+/// Gaussian posterior of the remainder's inducing variables z and of the parameters.
 ///
-/// With the centres' covariance K_c = L Lᵀ, a row has the features φ = (k(x, centres) L⁻ᵀ, J S½),
-/// standard normal weights w before and N(ŵ, A⁻¹) after, A = I + ΦᵀN⁻¹Φ. Where all rows are
-/// centres this is the Gaussian process itself; with fewer it is its fully independent training
-/// conditional approximation, whose N also holds what the features leave of K
-/// [Snelson & Ghahramani 2006].
+/// With the covariance K_z = L Lᵀ, a row has the features φ = (k(x, z) L⁻ᵀ, J S½), standard normal
+/// weights w before and N(ŵ, A⁻¹) after, A = I + ΦᵀN⁻¹Φ. Where all rows are centres this is the
+/// Gaussian process itself; with fewer it is its fully independent training conditional
+/// approximation, whose N also holds what the features leave of K [Snelson & Ghahramani 2006].
 #[derive(Debug, Clone)]
 pub(super) struct Posterior {
     pub hyper: Hyperparameters,
     pub inputs: Inputs,
     pub prior: ParameterPrior,
-    /// Rows that the functions are expanded about; their residuals and Jacobians are not used.
-    pub centres: Rows,
+    /// Values about which the functions are expanded.
+    pub inducing: Inducing,
     /// L⁻¹.
     inverse: DMatrix<f64>,
     /// Lower factor of A, and its inverse.
@@ -46,12 +48,12 @@ pub(super) struct RowPosterior {
 }
 
 /// A row as predicted from the others.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct LeftOut {
     /// Measured − predicted \[m\].
     pub error: Vector3<f64>,
-    /// Trace of the covariance of that, noise included \[m²\].
-    pub variance: f64,
+    /// Covariance of the error, noise included \[m²\].
+    pub covariance: Matrix3<f64>,
 }
 
 /// A posterior with what its training rows need to be left out again.
@@ -63,8 +65,6 @@ pub(super) struct Training {
     target: DVector<f64>,
     /// Rows of each configuration with the factor of their noise.
     groups: Vec<(Vec<usize>, DMatrix<f64>)>,
-    /// Φᵀ N⁻¹ y.
-    projected: DVector<f64>,
 }
 
 fn coordinates(rows: &[usize]) -> Vec<usize> {
@@ -74,29 +74,29 @@ fn coordinates(rows: &[usize]) -> Vec<usize> {
 impl Posterior {
     /// Features of rows, shape = (3 rows, features).
     fn features(&self, rows: &Rows) -> DMatrix<f64> {
-        features(&self.hyper, &self.inputs, (&self.centres, &self.inverse), &self.prior, rows)
+        features(&self.hyper, &self.inputs, (&self.inducing, &self.inverse), &self.prior, rows)
     }
 
-    /// Posterior restored from the factor of its precision, from the weights of the centres and
-    /// from the change of the parameters; `None` where the centres' covariance is not positive
-    /// definite.
+    /// Posterior restored from the factor of its precision, from the weights of the inducing
+    /// variables and from the change of the parameters; `None` where the covariance of the
+    /// inducing variables is not positive definite.
     pub fn restored(
         (hyper, inputs): (Hyperparameters, Inputs),
-        (centres, prior): (Rows, ParameterPrior),
+        (inducing, prior): (Inducing, ParameterPrior),
         (factor, weights, change): (DMatrix<f64>, DVector<f64>, DVector<f64>),
     ) -> Option<Self> {
-        let lower = centre_factor(&hyper, &inputs, &centres)?;
+        let lower = inducing_factor(&hyper, &inputs, &inducing)?;
         let standard = lower.tr_mul(&weights);
         let parameters = (change - &prior.mean).component_div(&prior.spread);
         let all = standard.iter().chain(parameters.iter()).copied();
         let weights = DVector::from_iterator(standard.len() + parameters.len(), all);
         let (inverse, inverse_factor) = (inverse_lower(&lower), inverse_lower(&factor));
-        Some(Self { hyper, inputs, prior, centres, inverse, factor, inverse_factor, weights })
+        Some(Self { hyper, inputs, prior, inducing, inverse, factor, inverse_factor, weights })
     }
 
-    /// Weights c of the centres: the remainder's mean at x is k(x, centres) c.
+    /// Weights c of the inducing variables: the remainder's mean at x is k(x, z) c.
     pub fn kernel_weights(&self) -> DVector<f64> {
-        self.inverse.tr_mul(&self.weights.rows(0, AXES * self.centres.len()))
+        self.inverse.tr_mul(&self.weights.rows(0, self.inducing.len()))
     }
 
     /// Change of each parameter beside the remainder: m + S½ ŵ.
@@ -118,8 +118,8 @@ impl Posterior {
     pub fn at(&self, rows: &Rows) -> Vec<RowPosterior> {
         let features = self.features(rows);
         let mean = &features * &self.weights + &rows.jacobian * &self.prior.mean;
-        let spread = product(&features, &self.inverse_factor.transpose());
-        let kernel = AXES * self.centres.len();
+        let spread = product_with_upper(&features, &self.inverse_factor.transpose());
+        let kernel = self.inducing.len();
         let one = |row: usize| {
             let first = AXES * row;
             let block = |of: &DMatrix<f64>, columns: usize| {
@@ -134,25 +134,41 @@ impl Posterior {
         };
         (0..rows.len()).into_par_iter().map(one).collect()
     }
+
+    /// Rows that took no part, as predicted.
+    pub fn left_out(&self, rows: &Rows) -> Vec<LeftOut> {
+        let one = |(row, predicted): (usize, RowPosterior)| {
+            let noise = self.hyper.noise_variance_of(rows.relative_sigma[row]);
+            let measured = Vector3::from_fn(|axis, _| rows.residual[AXES * row + axis]);
+            LeftOut {
+                error: measured - predicted.mean,
+                covariance: predicted.covariance + Matrix3::from_diagonal_element(noise),
+            }
+        };
+        self.at(rows).into_iter().enumerate().map(one).collect()
+    }
 }
 
-/// Factor L of the covariance of the centres.
-fn centre_factor(hyper: &Hyperparameters, inputs: &Inputs, centres: &Rows) -> Option<DMatrix<f64>> {
-    let mut matrix = covariance(hyper, inputs, centres, centres);
-    let jitter = JITTER * matrix.trace() / matrix.nrows().max(1) as f64;
-    (0..matrix.nrows()).for_each(|k| matrix[(k, k)] += jitter);
+/// Factor L of the covariance of the inducing variables.
+fn inducing_factor(
+    hyper: &Hyperparameters,
+    inputs: &Inputs,
+    inducing: &Inducing,
+) -> Option<DMatrix<f64>> {
+    let mut matrix = inducing.covariance(hyper, inputs);
+    (0..matrix.nrows()).for_each(|k| matrix[(k, k)] *= 1.0 + JITTER);
     lower_factor(matrix)
 }
 
 fn features(
     hyper: &Hyperparameters,
     inputs: &Inputs,
-    (centres, inverse): (&Rows, &DMatrix<f64>),
+    (inducing, inverse): (&Inducing, &DMatrix<f64>),
     prior: &ParameterPrior,
     rows: &Rows,
 ) -> DMatrix<f64> {
-    let cross = covariance(hyper, inputs, rows, centres);
-    let kernel = product(&cross, &inverse.transpose());
+    let cross = inducing.cross(hyper, inputs, rows);
+    let kernel = product_with_upper(&cross, &inverse.transpose());
     let parameters = prior.scale(&rows.jacobian);
     let width = kernel.ncols();
     let mut all = kernel.resize_horizontally(width + parameters.ncols(), 0.0);
@@ -161,19 +177,19 @@ fn features(
 }
 
 impl Training {
-    /// Conditions on `rows`, with functions expanded about `centres`, places among the rows; `None`
-    /// where rounding makes a matrix lose its definiteness.
+    /// Conditions on `rows`, with functions expanded about `centres`, places among the rows, and
+    /// about knots; `None` where rounding makes a matrix lose its definiteness.
     pub fn of(
         (rows, inputs): (&Rows, &Inputs),
         prior: &ParameterPrior,
         hyper: &Hyperparameters,
         centres: &[usize],
     ) -> Option<Self> {
-        let centres = rows.select(if hyper.sites() == 0 { &[] } else { centres });
-        let inverse = inverse_lower(&centre_factor(hyper, inputs, &centres)?);
-        let mut whitened = features(hyper, inputs, (&centres, &inverse), prior, rows);
+        let inducing = Inducing::new(rows, centres, hyper, inputs);
+        let inverse = inverse_lower(&inducing_factor(hyper, inputs, &inducing)?);
+        let mut whitened = features(hyper, inputs, (&inducing, &inverse), prior, rows);
         let (mut target, _) = prior.reduce(rows);
-        let kernel = AXES * centres.len();
+        let kernel = inducing.len();
         let groups: Option<Vec<_>> = rows
             .configurations()
             .into_iter()
@@ -196,98 +212,144 @@ impl Training {
         }
         let n = whitened.ncols();
         let factor = lower_factor(DMatrix::identity(n, n) + gram(&whitened))?;
-        let projected = whitened.tr_mul(&target);
-        let weights = solved(&factor, &projected);
+        let weights = solved(&factor, &whitened.tr_mul(&target));
         let posterior = Posterior {
             hyper: hyper.clone(),
             inputs: inputs.clone(),
             prior: prior.clone(),
-            centres,
+            inducing,
             inverse,
             inverse_factor: inverse_lower(&factor),
             factor,
             weights,
         };
-        Some(Self { posterior, whitened, target, groups, projected })
+        Some(Self { posterior, whitened, target, groups })
     }
 
-    /// Every row as predicted without its configuration, in closed form.
-    ///
-    /// e_b = [K⁻¹]_bb⁻¹ [K⁻¹y]_b and V_b = [K⁻¹]_bb⁻¹ of the rows b of a configuration
-    /// [Rasmussen & Williams 2006, section 5.4.2].
-    pub fn without_each_configuration(&self) -> Vec<LeftOut> {
-        let left = &self.target - &self.whitened * &self.posterior.weights;
-        let inverse = &self.posterior.inverse_factor;
-        let spread = product(&self.whitened, &inverse.transpose());
-        let mut out = vec![LeftOut { error: Vector3::zeros(), variance: 0.0 }; left.len() / AXES];
-        for (group, noise) in &self.groups {
-            let places = coordinates(group);
-            let of_group = spread.select_rows(&places);
-            let n = places.len();
-            let precision = DMatrix::identity(n, n) - &of_group * of_group.transpose();
-            let Some(precision) = precision.cholesky() else { continue };
-            let error = noise * precision.solve(&left.select_rows(&places));
-            let variance = noise * precision.solve(&noise.transpose());
-            enter(&mut out, group, &error, |k| variance[(k, k)]);
+    /// The rows `judged`, each predicted without the rows of its part, in closed form; `part` numbers
+    /// the part of every row, and rows of one configuration share it. `None` where rounding spoils a
+    /// factor.
+    pub fn without_each(&self, part: &[usize], judged: &[usize]) -> Option<Vec<LeftOut>> {
+        let mut parts = vec![Vec::new(); part.iter().max().map_or(0, |last| last + 1)];
+        for group in &self.groups {
+            parts[part[group.0[0]]].push(group);
         }
-        out
-    }
-
-    /// Every row as predicted without its block of configurations; `block` numbers the block of
-    /// each row.
-    pub fn without_each_block(&self, block: &[usize]) -> Option<Vec<LeftOut>> {
-        let blocks = block.iter().max().map_or(0, |last| last + 1);
-        let count = block.len();
-        let whole = product(&self.posterior.factor, &self.posterior.factor.transpose());
-        let one = |number: usize| {
-            let groups: Vec<_> =
-                self.groups.iter().filter(|(group, _)| block[group[0]] == number).collect();
-            let places: Vec<usize> =
-                groups.iter().flat_map(|(group, _)| coordinates(group)).collect();
-            let features = self.whitened.select_rows(&places);
-            let target = self.target.select_rows(&places);
-            if groups.is_empty() {
-                return Some(Vec::new());
-            }
-            let factor = lower_factor(&whole - gram(&features))?;
-            let weights = solved(&factor, &(&self.projected - features.tr_mul(&target)));
-            let left = target - &features * weights;
-            let spread = product(&features, &inverse_lower(&factor).transpose());
+        let mut is_judged = vec![false; part.len()];
+        judged.iter().for_each(|&row| is_judged[row] = true);
+        parts.retain(|groups: &Vec<&(Vec<usize>, DMatrix<f64>)>| {
+            groups.iter().any(|(group, _)| is_judged[group[0]])
+        });
+        let of_groups = |groups: &[&(Vec<usize>, DMatrix<f64>)]| -> Vec<usize> {
+            groups.iter().flat_map(|(group, _)| coordinates(group)).collect()
+        };
+        // S of all small parts at once, and A for the large ones.
+        let width = self.whitened.ncols();
+        let places: Vec<Vec<usize>> = parts.iter().map(|groups| of_groups(groups)).collect();
+        let small: Vec<usize> =
+            places.iter().filter(|of| of.len() <= width).flatten().copied().collect();
+        let upper = self.posterior.inverse_factor.transpose();
+        let spread = product_with_upper(&self.whitened.select_rows(&small), &upper);
+        let row_of: HashMap<usize, usize> =
+            small.iter().enumerate().map(|(row, &of)| (of, row)).collect();
+        let factor = &self.posterior.factor;
+        let whole = (small.len() < places.iter().map(Vec::len).sum())
+            .then(|| product_with_upper(factor, &factor.transpose()));
+        let without = |(groups, places): (&Vec<&(Vec<usize>, DMatrix<f64>)>, &Vec<usize>)| {
+            let judged = groups.iter().copied().filter(|(group, _)| is_judged[group[0]]);
+            let judged: Vec<_> = judged.collect();
+            let of_judged = of_groups(&judged);
+            let predicted = match &whole {
+                Some(whole) if places.len() > width => {
+                    self.without_large(places, &of_judged, whole)?
+                }
+                _ => {
+                    let rows: Vec<usize> = places.iter().map(|place| row_of[place]).collect();
+                    self.without_small(places, &of_judged, &spread.select_rows(&rows))?
+                }
+            };
             let mut out = Vec::new();
             let mut first = 0;
-            for (group, noise) in groups {
+            for (group, noise) in judged {
                 let n = AXES * group.len();
-                let of_group = spread.rows(first, n);
-                let covariance = DMatrix::identity(n, n) + of_group * of_group.transpose();
-                let variance = noise * covariance * noise.transpose();
-                out.push((group, noise * left.rows(first, n), variance));
+                let error = noise * predicted.error.rows(first, n);
+                let covariance = noise * predicted.covariance(first, n) * noise.transpose();
+                for (k, &row) in group.iter().enumerate() {
+                    let at = |a: usize| AXES * k + a;
+                    let error = Vector3::from_fn(|a, _| error[at(a)]);
+                    let covariance = Matrix3::from_fn(|a, b| covariance[(at(a), at(b))]);
+                    out.push((row, LeftOut { error, covariance }));
+                }
                 first += n;
             }
             Some(out)
         };
-        let mut all = vec![LeftOut { error: Vector3::zeros(), variance: 0.0 }; count];
-        for number in 0..blocks {
-            for (group, error, variance) in one(number)? {
-                enter(&mut all, group, &error, |k| variance[(k, k)]);
-            }
-        }
-        Some(all)
+        let each: Option<Vec<_>> = parts.par_iter().zip(&places).map(without).collect();
+        let mut out = vec![LeftOut::default(); part.len()];
+        each?.into_iter().flatten().for_each(|(row, left_out)| out[row] = left_out);
+        Some(judged.iter().map(|&row| out[row]).collect())
+    }
+
+    /// Predicts whitened coordinates `judged` without the coordinates `left_out`, which contain
+    /// them and whose S = Φ L⁻ᵀ is `spread`.
+    ///
+    /// e_b = [K⁻¹]_bb⁻¹ [K⁻¹y]_b and V_b = [K⁻¹]_bb⁻¹ of the coordinates b that are left out
+    /// [Rasmussen & Williams 2006, section 5.4.2]. With A = L Lᵀ, [K⁻¹]_bb = I − S Sᵀ.
+    fn without_small(
+        &self,
+        left_out: &[usize],
+        judged: &[usize],
+        spread: &DMatrix<f64>,
+    ) -> Option<Deleted> {
+        let n = left_out.len();
+        let features = self.whitened.select_rows(left_out);
+        let error = self.target.select_rows(left_out) - features * &self.posterior.weights;
+        let precision = DMatrix::identity(n, n) - spread * spread.transpose();
+        let root = inverse_lower(&lower_factor(precision)?);
+        let error = root.tr_mul(&(&root * error));
+        let place: HashMap<usize, usize> =
+            left_out.iter().enumerate().map(|(place, &of)| (of, place)).collect();
+        let of_judged: Vec<usize> = judged.iter().map(|of| place[of]).collect();
+        Some(Deleted {
+            error: error.select_rows(&of_judged),
+            identity: 0.0,
+            root: root.select_columns(&of_judged),
+        })
+    }
+
+    /// The same of more coordinates than features, with the precision A of the weights:
+    /// V_b = I + Φ_b (A − Φ_bᵀΦ_b)⁻¹ Φ_bᵀ.
+    fn without_large(
+        &self,
+        left_out: &[usize],
+        judged: &[usize],
+        whole: &DMatrix<f64>,
+    ) -> Option<Deleted> {
+        let Posterior { factor, weights, .. } = &self.posterior;
+        let features = self.whitened.select_rows(left_out);
+        let lower = lower_factor(whole - gram(&features))?;
+        // Φᵀy of the other rows.
+        let target = self.target.select_rows(left_out);
+        let projected = factor * factor.tr_mul(weights) - features.tr_mul(&target);
+        let of_judged = self.whitened.select_rows(judged);
+        let error = self.target.select_rows(judged) - &of_judged * solved(&lower, &projected);
+        let root = product_with_upper(&of_judged, &inverse_lower(&lower).transpose()).transpose();
+        Some(Deleted { error, identity: 1.0, root })
     }
 }
 
-/// Enters the errors of a group of rows and the traces of their covariances.
-fn enter(
-    out: &mut [LeftOut],
-    group: &[usize],
-    error: &DVector<f64>,
-    variance: impl Fn(usize) -> f64,
-) {
-    for (k, &row) in group.iter().enumerate() {
-        let first = AXES * k;
-        out[row] = LeftOut {
-            error: Vector3::from_fn(|axis, _| error[first + axis]),
-            variance: (first..first + AXES).map(&variance).sum(),
-        };
+/// Whitened coordinates predicted without themselves.
+struct Deleted {
+    error: DVector<f64>,
+    /// c and R of the covariance c I + RᵀR of the errors.
+    identity: f64,
+    root: DMatrix<f64>,
+}
+
+impl Deleted {
+    /// Covariance of `count` errors from `first` on.
+    fn covariance(&self, first: usize, count: usize) -> DMatrix<f64> {
+        let root = self.root.columns(first, count);
+        DMatrix::identity(count, count) * self.identity + root.tr_mul(&root)
     }
 }
 

@@ -1,36 +1,131 @@
-//! Measured rows linearised about a fit: residuals, Jacobians of parameters and of joints, inputs.
+//! Measured rows linearised about a fit: residuals, Jacobians of parameters and of sites, inputs.
 
 use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+use crate::problem::PoseView;
 
 /// Coordinates of a position.
 pub(super) const AXES: usize = 3;
 
-/// Joints at which an arm may err, and the quantities on which these errors may depend.
+/// Sites at which an arm may err, and the quantities on which these errors may depend.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Layout {
-    /// Joint of each site, counted from 0.
-    pub joints: Vec<usize>,
-    /// Lever of each site: root mean square of ‖∂p/∂q‖ over the rows fitted \[m/rad\] or \[1\].
-    pub levers: Vec<f64>,
+    pub sites: Vec<Site>,
     /// Inputs of the functions.
     pub inputs: Inputs,
 }
 
-/// Inputs of the remainder: the commands of the moving joints.
+/// Place of an error that the remainder describes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Site {
+    /// Joint, counted from 0.
+    pub joint: usize,
+    pub kind: SiteKind,
+    /// Unit of the site's columns: root mean square of the target's slope over the rows fitted,
+    /// \[m/rad\] or \[1\] for a coordinate. Compliances share the largest of theirs \[N·m²/rad\].
+    pub lever: f64,
+}
+
+/// Quantity of a joint that errs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum SiteKind {
+    /// Coordinate of the joint: a function of its command and one of all inputs.
+    Coordinate,
+    /// Compliance of the joint: a constant.
+    Compliance,
+}
+
+/// Quantity on which errors depend.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Source {
+    /// Command of a joint, counted from 0.
+    Command(usize),
+    /// Temperature of the pose \[°C\].
+    Temperature,
+    /// Payload of the pose \[kg\].
+    Payload,
+    /// Hoist force of the pose \[N\].
+    Hoist,
+}
+
+impl Source {
+    /// Conditions other than commands.
+    pub const CONDITIONS: [Self; 3] = [Self::Temperature, Self::Payload, Self::Hoist];
+
+    /// Value at a pose; `None` where the pose does not state it.
+    pub fn value(self, setup: &PoseView) -> Option<f64> {
+        match self {
+            Self::Command(joint) => setup.configuration.get(joint).copied(),
+            Self::Temperature => setup.temperature.copied(),
+            Self::Payload => setup.payload.copied(),
+            Self::Hoist => setup.hoist.copied(),
+        }
+    }
+
+    /// Name in files: `q1`, …, `temperature`, `payload`, `hoist`.
+    pub fn name(self) -> String {
+        match self {
+            Self::Command(joint) => format!("q{}", joint + 1),
+            Self::Temperature => "temperature".to_owned(),
+            Self::Payload => "payload".to_owned(),
+            Self::Hoist => "hoist".to_owned(),
+        }
+    }
+
+    /// Reads a name in a file.
+    pub fn parse(name: &str) -> Option<Self> {
+        if let Some(condition) = Self::CONDITIONS.into_iter().find(|of| of.name() == name) {
+            return Some(condition);
+        }
+        let joint: usize = name.strip_prefix('q')?.parse().ok()?;
+        Some(Self::Command(joint.checked_sub(1)?))
+    }
+}
+
+/// Functions whose sum is the error of a site.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct SiteFunctions {
+    /// Input of the function uⱼ of one input, if there is one.
+    pub single: Option<usize>,
+    /// True for a function vⱼ of all inputs.
+    pub joint: bool,
+    /// True for a constant.
+    pub constant: bool,
+}
+
+/// Inputs of the remainder: the commands of the moving joints, and conditions that vary.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Inputs {
-    /// Joint of each input, counted from 0.
-    pub joints: Vec<usize>,
+    /// Functions of each site.
+    pub sites: Vec<SiteFunctions>,
+    pub sources: Vec<Source>,
     /// True for an angle, whose distances are chords.
     pub angles: Vec<bool>,
-    /// Site whose own command the input is.
-    pub site_of: Vec<Option<usize>>,
     /// Offset and unit of each input: 0 and 1 for angles, mean and standard deviation for others.
     pub standard: Vec<(f64, f64)>,
-    /// Smallest and largest value in the rows fitted \[rad\] or \[m\].
+    /// Smallest and largest value in the rows fitted, in the unit of the source.
     pub ranges: Vec<(f64, f64)>,
+}
+
+impl Inputs {
+    /// Functions of the errors at these sites.
+    pub fn functions(sites: &[Site], sources: &[Source]) -> Vec<SiteFunctions> {
+        let functions = |site: &Site| {
+            let is_coordinate = site.kind == SiteKind::Coordinate;
+            let command = Source::Command(site.joint);
+            let input = sources.iter().position(|source| *source == command);
+            SiteFunctions {
+                single: input.filter(|_| is_coordinate),
+                joint: is_coordinate,
+                constant: !is_coordinate,
+            }
+        };
+        sites.iter().map(functions).collect()
+    }
 }
 
 /// Rows of positions linearised about a fit; three coordinates a row.
@@ -40,7 +135,7 @@ pub(super) struct Rows {
     pub residual: DVector<f64>,
     /// ∂p/∂x of the free parameters, shape = (3 rows, parameters).
     pub jacobian: DMatrix<f64>,
-    /// ∂p/∂q over the lever of each site, shape = (sites, 3 rows).
+    /// Slope of the position by each site's quantity over its lever, shape = (sites, 3 rows).
     pub sites: DMatrix<f64>,
     /// Standardised inputs, shape = (inputs, rows).
     pub inputs: DMatrix<f64>,

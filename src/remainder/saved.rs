@@ -8,10 +8,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::{RawValue, to_raw_value};
 
 use super::correction::{Correction, Linearised};
+use super::inducing::{Inducing, Knot};
 use super::kernel::Hyperparameters;
 use super::posterior::Posterior;
 use super::prior::ParameterPrior;
-use super::rows::{AXES, Inputs, Layout, Rows};
+use super::rows::{AXES, Inputs, Layout, Rows, Site, SiteKind, Source};
 use super::scores::Scores;
 use crate::files::read_limited;
 use crate::problem::Problem;
@@ -19,7 +20,7 @@ use crate::problem::Problem;
 /// Largest remainder.json that is read \[MiB\].
 const LARGEST_MIB: u64 = 256;
 /// Name and version of the format.
-const FORMAT: (&str, u32) = ("flexcal-remainder", 1);
+const FORMAT: (&str, u32) = ("flexcal-remainder", 2);
 /// What the file holds.
 const KIND: &str = "gaussian-process-at-joints";
 /// Correlation function of all processes.
@@ -48,32 +49,33 @@ struct Format {
 }
 
 #[derive(Serialize, Deserialize)]
-struct Site {
+struct SavedSite {
     /// Joint, counted from 1.
     joint: usize,
-    /// Root mean square of ‖∂p/∂q‖ [m/rad] or [1].
+    kind: SiteKind,
+    /// Unit of the site's columns [m/rad], [1] or [N·m²/rad].
     lever: f64,
     /// 1 σ of the error that follows the joint's command, as motion of the target.
     single_amplitude_m: f64,
-    /// The same of the error that follows all inputs.
+    /// Length ℓ of that function, in the unit of the joint's input.
+    single_length: f64,
+    /// 1 σ of the error that follows all inputs, likewise.
     joint_amplitude_m: f64,
+    /// 1 σ of a constant, likewise.
+    constant_amplitude_m: f64,
 }
 
 #[derive(Serialize, Deserialize)]
 struct Input {
+    /// `q1`, …, `temperature`, `payload` or `hoist`.
     name: String,
-    joint: usize,
     is_angle: bool,
     offset: f64,
     unit: f64,
     min: f64,
     max: f64,
-}
-
-#[derive(Serialize, Deserialize)]
-struct Lengths {
-    single: f64,
-    joint: f64,
+    /// Length ℓ of the functions of all inputs along this one, in its unit.
+    joint_length: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -104,9 +106,8 @@ struct Document {
     arm_digest: String,
     kind: String,
     kernel: String,
-    sites: Vec<Site>,
+    sites: Vec<SavedSite>,
     inputs: Vec<Input>,
-    lengths: Lengths,
     noise_m: f64,
     configuration_noise_m: f64,
     sigma_m: f64,
@@ -118,6 +119,9 @@ struct Document {
     columns: Vec<Box<RawValue>>,
     /// Weights of the three coordinates of each centre.
     weights: Vec<Box<RawValue>>,
+    /// Site, counted from 1, standardised input and weight of each value of a function of one input.
+    #[serde(default)]
+    knots: Vec<(usize, f64, f64)>,
     /// Lower triangle L, row by row, of the precision L Lᵀ of the standardised weights and of the
     /// parameters.
     covariance_factor: Vec<Box<RawValue>>,
@@ -137,24 +141,28 @@ impl Correction {
     /// The correction as JSON text, ending in a line break.
     #[doc(hidden)]
     pub fn to_json(&self) -> String {
-        let Posterior { hyper, prior, centres, factor, .. } = &self.posterior;
+        let Posterior { hyper, prior, inducing: Inducing { centres, knots }, factor, .. } =
+            &self.posterior;
         let change = self.posterior.parameters();
         let weights = self.posterior.kernel_weights();
-        let site = |(k, (&joint, &lever)): (usize, (&usize, &f64))| Site {
-            joint: joint + 1,
-            lever,
+        let site = |(k, site): (usize, &Site)| SavedSite {
+            joint: site.joint + 1,
+            kind: site.kind,
+            lever: site.lever,
             single_amplitude_m: hyper.single[k],
+            single_length: hyper.single_lengths[k],
             joint_amplitude_m: hyper.joint[k],
+            constant_amplitude_m: hyper.constant[k],
         };
         let inputs = &self.layout.inputs;
-        let input = |(k, &joint): (usize, &usize)| Input {
-            name: format!("q{}", joint + 1),
-            joint: joint + 1,
+        let input = |(k, source): (usize, &Source)| Input {
+            name: source.name(),
             is_angle: inputs.angles[k],
             offset: inputs.standard[k].0,
             unit: inputs.standard[k].1,
             min: inputs.ranges[k].0,
             max: inputs.ranges[k].1,
+            joint_length: hyper.joint_lengths.get(k).copied().unwrap_or(1.0),
         };
         let parameter = |(k, parameter): (usize, &Linearised)| Parameter {
             name: parameter.name.clone(),
@@ -172,16 +180,8 @@ impl Correction {
             arm_digest: self.arm_digest.clone(),
             kind: KIND.to_owned(),
             kernel: KERNEL.to_owned(),
-            sites: self
-                .layout
-                .joints
-                .iter()
-                .zip(&self.layout.levers)
-                .enumerate()
-                .map(site)
-                .collect(),
-            inputs: inputs.joints.iter().enumerate().map(input).collect(),
-            lengths: Lengths { single: hyper.lengths[0], joint: hyper.lengths[1] },
+            sites: self.layout.sites.iter().enumerate().map(site).collect(),
+            inputs: inputs.sources.iter().enumerate().map(input).collect(),
             noise_m: hyper.noise,
             configuration_noise_m: hyper.shared_noise,
             sigma_m: self.sigma,
@@ -193,7 +193,15 @@ impl Correction {
             },
             centres: (0..centres.len()).filter_map(|row| line(centres.inputs_of(row))).collect(),
             columns: centres.sites.as_slice().chunks(of_site.max(1)).filter_map(line).collect(),
-            weights: weights.as_slice().chunks(AXES).filter_map(line).collect(),
+            weights: weights.as_slice()[..AXES * centres.len()]
+                .chunks(AXES)
+                .filter_map(line)
+                .collect(),
+            knots: knots
+                .iter()
+                .zip(&weights.as_slice()[AXES * centres.len()..])
+                .map(|(knot, weight)| (knot.site + 1, knot.at, *weight))
+                .collect(),
             covariance_factor: (0..factor.nrows())
                 .filter_map(|row| {
                     line(&(0..=row).map(|k| shortened(factor[(row, k)])).collect::<Vec<_>>())
@@ -242,7 +250,7 @@ impl Correction {
         let (weights, lower) = (rows(&document.weights)?, rows(&document.covariance_factor)?);
         let (count, sites) = (centres.len(), document.sites.len());
         let parameters = document.parameters.len();
-        let size = AXES * count + parameters;
+        let size = AXES * count + document.knots.len() + parameters;
         let has_sizes = columns.len() == count
             && weights.len() == count
             && lower.len() == size
@@ -256,21 +264,25 @@ impl Correction {
         let hyper = Hyperparameters {
             single: document.sites.iter().map(|site| site.single_amplitude_m).collect(),
             joint: document.sites.iter().map(|site| site.joint_amplitude_m).collect(),
-            lengths: [document.lengths.single, document.lengths.joint],
+            constant: document.sites.iter().map(|site| site.constant_amplitude_m).collect(),
+            single_lengths: document.sites.iter().map(|site| site.single_length).collect(),
+            joint_lengths: document.inputs.iter().map(|input| input.joint_length).collect(),
             noise: document.noise_m,
             shared_noise: document.configuration_noise_m,
         };
-        let joints: Vec<usize> =
-            document.sites.iter().map(|site| site.joint.wrapping_sub(1)).collect();
-        let of_input = |input: &Input| input.joint.wrapping_sub(1);
+        let site = |saved: &SavedSite| {
+            Some(Site { joint: saved.joint.checked_sub(1)?, kind: saved.kind, lever: saved.lever })
+        };
+        let found_sites: Option<Vec<Site>> = document.sites.iter().map(site).collect();
+        let found_sources: Option<Vec<Source>> =
+            document.inputs.iter().map(|input| Source::parse(&input.name)).collect();
+        let (Some(found_sites), Some(sources)) = (found_sites, found_sources) else {
+            return Err(wrong("a site or an input has no joint"));
+        };
         let inputs = Inputs {
-            joints: document.inputs.iter().map(of_input).collect(),
+            sites: Inputs::functions(&found_sites, &sources),
+            sources,
             angles: document.inputs.iter().map(|input| input.is_angle).collect(),
-            site_of: document
-                .inputs
-                .iter()
-                .map(|input| joints.iter().position(|&joint| joint == of_input(input)))
-                .collect(),
             standard: document.inputs.iter().map(|input| (input.offset, input.unit)).collect(),
             ranges: document.inputs.iter().map(|input| (input.min, input.max)).collect(),
         };
@@ -289,15 +301,22 @@ impl Correction {
             configuration: (0..count).collect(),
             relative_sigma: vec![1.0; count],
         };
+        let knot = |&(site, at, _): &(usize, f64, f64)| {
+            let site = site.checked_sub(1)?;
+            inputs.sites.get(site)?.single.map(|_| Knot { site, at })
+        };
+        let knots: Option<Vec<Knot>> = document.knots.iter().map(knot).collect();
+        let knots = knots.ok_or_else(|| wrong("a knot is at a site without a function"))?;
+        let weights = weights.into_iter().flatten();
+        let weights = weights.chain(document.knots.iter().map(|knot| knot.2)).collect::<Vec<_>>();
         let factor = DMatrix::from_fn(size, size, |i, j| if j <= i { lower[i][j] } else { 0.0 });
         let change = of_parameters(|parameter| parameter.change);
         let posterior = Posterior::restored(
             (hyper, inputs.clone()),
-            (centres, prior),
-            (factor, DVector::from_vec(weights.concat()), change),
+            (Inducing { centres, knots }, prior),
+            (factor, DVector::from_vec(weights), change),
         )
         .ok_or_else(|| wrong("the covariance of the centres is not positive definite"))?;
-        let levers = document.sites.iter().map(|site| site.lever).collect();
         let linearised = |parameter: Parameter| Linearised {
             name: parameter.name,
             deviation: parameter.deviation,
@@ -308,7 +327,7 @@ impl Correction {
             problem: document.problem,
             arm_digest: document.arm_digest,
             sigma: document.sigma_m,
-            layout: Layout { joints, levers, inputs },
+            layout: Layout { sites: found_sites, inputs },
             parameters: document.parameters.into_iter().map(linearised).collect(),
             posterior,
             scores: Scores { configurations, single, blocks },
@@ -326,8 +345,12 @@ impl Correction {
             let (found, expected) = (self.problem.clone(), problem.name.clone());
             return Err(SavedRemainderError::OtherProblem { file: file(), found, expected });
         }
-        let joints = self.layout.joints.iter().chain(&self.layout.inputs.joints);
-        let is_known = joints.copied().all(|joint| joint < problem.joints.len());
+        let commands = self.layout.inputs.sources.iter().filter_map(|source| match source {
+            Source::Command(joint) => Some(*joint),
+            _ => None,
+        });
+        let mut joints = self.layout.sites.iter().map(|site| site.joint).chain(commands);
+        let is_known = joints.all(|joint| joint < problem.joints.len());
         if self.arm_digest != problem.digest() || !is_known {
             return Err(SavedRemainderError::OtherArm { file: file() });
         }

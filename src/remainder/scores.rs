@@ -1,5 +1,9 @@
 //! Errors of rows that were left out, and what they say of further rows.
 
+use std::f64::consts::TAU;
+
+use nalgebra::{Matrix3, Vector3};
+
 use super::kernel::{Hyperparameters, variance};
 use super::posterior::LeftOut;
 use super::rows::{AXES, Rows};
@@ -16,73 +20,54 @@ pub(super) fn fade(left: f64, prior: f64) -> f64 {
     if prior > 0.0 { 1.0 - (left / prior).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Errors of the rows fitted, each predicted without its configuration or its block.
-#[derive(Debug, Clone)]
-pub(super) struct LeftOutErrors {
-    /// Length of measured − predicted of each row \[m\].
-    pub errors: Vec<f64>,
-    /// The same over the size that its variance leads to expect \[1\].
-    pub scores: Vec<f64>,
+/// Error of a row that was predicted without its configuration or its block.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct LeftOutError {
+    /// Length of measured − predicted \[m\].
+    pub length: f64,
+    /// Length over the size that the variance leads to expect \[1\].
+    pub score: f64,
+    /// Logarithm of the predictive density \[ln m⁻³\].
+    pub density: f64,
 }
 
-impl LeftOutErrors {
-    /// Errors of a faded correction: `beside` the remainder, and with parameters `alone`.
-    pub fn of(hyper: &Hyperparameters, rows: &Rows, alone: &[LeftOut], beside: &[LeftOut]) -> Self {
-        let noise = AXES as f64 * hyper.noise_variance();
-        let one = |(row, (alone, beside)): (usize, (&LeftOut, &LeftOut))| {
-            let prior = variance(hyper, rows, row).trace();
-            let share = fade(beside.variance - noise, prior);
-            let correction = alone.error - beside.error;
-            let error = (alone.error - correction * share).norm();
-            let missed = if prior > 0.0 { (1.0 - share) * correction.norm() } else { 0.0 };
-            (error, error / expected_size(beside.variance, missed))
-        };
-        let (errors, scores) = alone.iter().zip(beside).enumerate().map(one).unzip();
-        Self { errors, scores }
-    }
+/// Errors of a faded correction, from rows predicted by the parameters `alone` and `with` the
+/// remainder that has these hyperparameters.
+pub(super) fn left_out_errors(
+    hyper: &Hyperparameters,
+    rows: &Rows,
+    alone: &[LeftOut],
+    with: &[LeftOut],
+) -> Vec<LeftOutError> {
+    let one = |(row, (alone, with)): (usize, (&LeftOut, &LeftOut))| {
+        let noise = AXES as f64 * hyper.noise_variance_of(rows.relative_sigma[row]);
+        let prior = variance(hyper, rows, row).trace();
+        let whole = with.covariance.trace();
+        let share = fade(whole - noise, prior);
+        let correction = alone.error - with.error;
+        let error = alone.error - correction * share;
+        let missed = if prior > 0.0 { (1.0 - share) * correction.norm() } else { 0.0 };
+        let faded = Matrix3::from_diagonal_element(missed * missed / AXES as f64);
+        LeftOutError {
+            length: error.norm(),
+            score: error.norm() / expected_size(whole, missed),
+            density: log_density(&error, &(with.covariance + faded)),
+        }
+    };
+    alone.iter().zip(with).enumerate().map(one).collect()
+}
+
+/// Logarithm of the density of a normal distribution with mean 0; NaN where the covariance is not
+/// positive definite.
+fn log_density(error: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
+    let Some(factor) = covariance.cholesky() else { return f64::NAN };
+    let square = error.dot(&factor.solve(error));
+    -0.5 * (square + covariance.determinant().ln() + AXES as f64 * TAU.ln())
 }
 
 /// Size of an error from the trace of its covariance and from what fading leaves out \[m\].
 pub(super) fn expected_size(variance: f64, missed: f64) -> f64 {
     (variance + missed * missed).sqrt()
-}
-
-/// What a remainder gains on configurations left out.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gain {
-    /// Mean left-out error with the parameters alone \[m\].
-    pub without: f64,
-    /// Mean left-out error with the remainder \[m\].
-    pub with: f64,
-    /// Standard error of the mean difference over the configurations \[m\].
-    pub std_error: f64,
-    /// Gain in the logarithm of the marginal likelihood, priors of the hyperparameters included.
-    pub evidence: f64,
-}
-
-impl Gain {
-    /// Gain of each configuration's mean error, averaged over `configurations`.
-    pub(super) fn of(
-        configurations: &[Vec<usize>],
-        (without, with): (&[f64], &[f64]),
-        evidence: f64,
-    ) -> Self {
-        let mean = |rows: &[usize], of: &[f64]| {
-            rows.iter().map(|&row| of[row]).sum::<f64>() / rows.len() as f64
-        };
-        let n = configurations.len() as f64;
-        let before: Vec<f64> = configurations.iter().map(|rows| mean(rows, without)).collect();
-        let after: Vec<f64> = configurations.iter().map(|rows| mean(rows, with)).collect();
-        let (without, with) = (before.iter().sum::<f64>() / n, after.iter().sum::<f64>() / n);
-        let squares = before.iter().zip(&after).map(|(a, b)| (a - b - (without - with)).powi(2));
-        let std_error = (squares.sum::<f64>() / (n - 1.0) / n).sqrt();
-        Self { without, with, std_error, evidence }
-    }
-
-    /// Mean gain over its standard error.
-    pub fn ratio(&self) -> f64 {
-        (self.without - self.with) / self.std_error
-    }
 }
 
 /// Scores of rows left out, in ascending order: their quantiles turn an expected size into a bound.

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 /// Change of the value below which a step is the last one.
-const SETTLED: f64 = 1e-3;
+const SETTLED: f64 = 5e-3;
 /// Longest step of a variable: hyperparameters are logarithms.
 const MAX_STEP: f64 = 2.0;
 /// Part of the expected decrease that a step has to reach                      [Armijo 1966]
@@ -11,24 +11,34 @@ const SUFFICIENT: f64 = 1e-4;
 /// Halvings of a step before the search gives up.
 const MAX_HALVINGS: usize = 12;
 
+/// Minimum that a search has reached.
+#[derive(Debug, Clone)]
+pub(super) struct Minimum {
+    pub at: DVector<f64>,
+    pub value: f64,
+    /// Estimate of the inverse Hessian, from which a search of a similar function may start.
+    pub inverse: DMatrix<f64>,
+}
+
 /// Returns the minimum of `function` that a descent from `start` within `bounds` reaches in at most
 /// `max_steps` steps; `None` where the function has no value at the start.
 ///
+/// The start is a point, and an estimate of the inverse Hessian there if one is known.
 /// Variables at a bound towards which the function falls are held there for the step. Each step
 /// evaluates value and gradient at once, because both need one factorisation.
 pub(super) fn minimise(
     function: impl Fn(&DVector<f64>) -> Option<(f64, DVector<f64>)>,
-    start: DVector<f64>,
+    (start, inverse): (DVector<f64>, Option<DMatrix<f64>>),
     bounds: &[(f64, f64)],
     max_steps: usize,
-) -> Option<DVector<f64>> {
+) -> Option<Minimum> {
     let within =
         |x: DVector<f64>| DVector::from_fn(x.len(), |k, _| x[k].clamp(bounds[k].0, bounds[k].1));
     let mut at = within(start);
     let (mut value, mut gradient) = function(&at)?;
     let n = at.len();
-    let mut inverse = DMatrix::identity(n, n);
-    let mut is_scaled = false;
+    let mut is_scaled = inverse.is_some();
+    let mut inverse = inverse.unwrap_or_else(|| DMatrix::identity(n, n));
     for _ in 0..max_steps {
         let held: Vec<bool> = (0..n)
             .map(|k| {
@@ -82,7 +92,7 @@ pub(super) fn minimise(
             break;
         }
     }
-    Some(at)
+    Some(Minimum { at, value, inverse })
 }
 
 #[cfg(test)]
@@ -94,13 +104,13 @@ mod tests {
         // Rosenbrock's valley with its minimum at (1, 1), and the same cut off at x = 0.5.
         let function = |x: &DVector<f64>| {
             let (a, b) = (1.0 - x[0], x[1] - x[0] * x[0]);
-            let gradient = vec![-2.0 * a - 400.0 * x[0] * b, 200.0 * b];
-            Some((a * a + 100.0 * b * b, DVector::from_vec(gradient)))
+            let gradient = DVector::from_vec(vec![-2.0 * a - 400.0 * x[0] * b, 200.0 * b]);
+            Some((1e3 * (a * a + 100.0 * b * b), gradient * 1e3))
         };
         let start = DVector::from_vec(vec![-1.2, 1.0]);
-        let free = minimise(function, start.clone(), &[(-5.0, 5.0); 2], 500).unwrap();
+        let free = minimise(function, (start.clone(), None), &[(-5.0, 5.0); 2], 500).unwrap().at;
         assert!((&free - DVector::from_vec(vec![1.0, 1.0])).amax() < 0.1, "{free}");
-        let cut = minimise(function, start, &[(-5.0, 0.5), (-5.0, 5.0)], 500).unwrap();
+        let cut = minimise(function, (start, None), &[(-5.0, 0.5), (-5.0, 5.0)], 500).unwrap().at;
         assert!((&cut - DVector::from_vec(vec![0.5, 0.25])).amax() < 0.05, "{cut}");
     }
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::fit::{Identification, Residual};
 use crate::quantity::format::{counted, number};
-use crate::remainder::{Bounds, Fitted};
+use crate::remainder::{Bounds, Fitted, Gain};
 
 /// Returns one sentence on the search for a remainder; `found` has the errors without it.
 pub fn remainder_text(found: &Identification, fitted: &Fitted) -> String {
@@ -35,10 +35,14 @@ pub fn remainder_text(found: &Identification, fitted: &Fitted) -> String {
         }
         None => format!(
             "No remainder is kept: mean error of configurations left out {without} mm without it, \
-             {with} mm with it, a gain of {} standard errors and of {} in the logarithm of the \
-             likelihood (more than 3 and 6 are needed).",
-            number(gain.ratio(), 2),
+             {with} mm with it, a gain of {} standard errors (more than {} are needed); the log \
+             predictive density changes by {} per row (a rise is needed), the log likelihood by {} \
+             (more than {} is needed).",
+            number(gain.error.ratio(), 2),
+            number(gain.threshold(), 2),
+            number(gain.density.mean, 2),
             number(gain.evidence, 2),
+            number(Gain::least_evidence(), 2),
         ),
     }
 }

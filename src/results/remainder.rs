@@ -35,14 +35,14 @@ impl Remainder {
     /// Summarises the remainder that was kept; `found` has the errors without it.
     pub(super) fn new(found: &Identification, fitted: &Fitted) -> Option<Self> {
         let remainder = fitted.remainder.as_ref()?;
-        let joints = remainder.joints().iter();
+        let joints = remainder.joints().into_iter();
         Some(Self {
             file: (!fitted.is_declared).then_some(REMAINDER_FILE),
             sites: joints.map(|joint| format!("joint {}", joint + 1)).collect(),
             inputs: remainder.inputs(),
             left_out_without_mm: fitted.gain.map(|gain| gain.without * 1e3),
             left_out_mm: fitted.gain.map(|gain| gain.with * 1e3),
-            gain_over_std_error: fitted.gain.map(|gain| gain.ratio()),
+            gain_over_std_error: fitted.gain.map(|gain| gain.error.ratio()),
             identification_without: Summary::of(&found.fitted.identification),
             held_out_without: Summary::of(&found.fitted.held_out),
         })

@@ -1,0 +1,82 @@
+//! Search of the hyperparameters of a remainder.
+
+use super::kernel::Hyperparameters;
+use super::likelihood::MarginalLikelihood;
+use super::noise_likelihood::evidence_of_noise;
+use super::posterior::Training;
+use super::rows::Rows;
+use super::search::{Minimum, minimise};
+use super::training_rows::TrainingRows;
+
+/// Maximum rows from which hyperparameters are searched, and then refined: the time grows with
+/// their cube.
+const MAX_SEARCH_ROWS: [usize; 2] = [120, 300];
+/// Lengths ℓᵤ and ℓᵥ from which hyperparameters are searched: each start reaches another optimum on
+/// some of the arms measured.
+const STARTS: [[f64; 2]; 3] = [[1.0, 1.0], [0.15, 0.15], [0.1, 3.0]];
+/// Maximum steps of the search from each start, and of the refinement.
+const MAX_STEPS: [usize; 2] = [60, 20];
+
+/// Hyperparameters at a maximum of the marginal likelihood.
+pub(super) struct Searched {
+    pub hyper: Hyperparameters,
+    pub minimum: Minimum,
+    /// Rise of the logarithm of the likelihood over noise alone.
+    pub evidence: f64,
+}
+
+fn likelihood<'a>(training: &'a TrainingRows, rows: &'a Rows) -> MarginalLikelihood<'a> {
+    let shares_noise = training.shares_noise();
+    let rows = (rows, &training.layout.inputs);
+    MarginalLikelihood::new(rows, &training.prior, shares_noise, training.size)
+}
+
+/// Searches a local maximum of the marginal likelihood: on few of the rows from every start, taken
+/// where rows left out are predicted best, refined on more rows.
+pub(super) fn search(training: &TrainingRows) -> Option<Searched> {
+    let [few, more] =
+        MAX_SEARCH_ROWS.map(|count| training.rows.select(&training.some_rows(count, 0)));
+    let searched = likelihood(training, &few);
+    let value = |x: &_| searched.value_and_gradient(x);
+    let bounds = searched.bounds();
+    let minima = STARTS.into_iter().filter_map(|lengths| {
+        let minimum = minimise(value, (searched.start(lengths), None), &bounds, MAX_STEPS[0])?;
+        let hyper = searched.hyperparameters(&minimum.at);
+        Some((left_out_error(training, &few, &hyper)?, minimum))
+    });
+    let (_, mut minimum) = minima.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    if few.len() < more.len() {
+        minimum = refine(training, &more, &minimum, few.len())?;
+    }
+    let hyper = searched.hyperparameters(&minimum.at);
+    let noise = evidence_of_noise(&more, &training.prior, training.shares_noise(), training.size)?;
+    let evidence = -minimum.value - noise;
+    Some(Searched { hyper, minimum, evidence })
+}
+
+/// Maximum of the likelihood of `rows` near one that was found on `count` others.
+fn refine(training: &TrainingRows, rows: &Rows, near: &Minimum, count: usize) -> Option<Minimum> {
+    let refined = likelihood(training, rows);
+    let inverse = &near.inverse * (count as f64 / rows.len() as f64);
+    let value = |x: &_| refined.value_and_gradient(x);
+    minimise(value, (near.at.clone(), Some(inverse)), &refined.bounds(), MAX_STEPS[1])
+}
+
+/// Hyperparameters of part of the rows, near the optimum of all of them.
+pub(super) fn search_near(
+    training: &TrainingRows,
+    rows: &Rows,
+    near: &Minimum,
+) -> Option<Hyperparameters> {
+    let minimum = refine(training, rows, near, training.rows.len())?;
+    Some(likelihood(training, rows).hyperparameters(&minimum.at))
+}
+
+/// Mean error of rows predicted without their configuration \[m\].
+fn left_out_error(training: &TrainingRows, rows: &Rows, hyper: &Hyperparameters) -> Option<f64> {
+    let centres: Vec<usize> = (0..rows.len()).collect();
+    let inputs = &training.layout.inputs;
+    let conditioned = Training::of((rows, inputs), &training.prior, hyper, &centres)?;
+    let left_out = conditioned.without_each(&rows.configuration, &centres)?;
+    Some(left_out.iter().map(|row| row.error.norm()).sum::<f64>() / rows.len() as f64)
+}

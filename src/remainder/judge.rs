@@ -1,0 +1,80 @@
+//! Conditions parameters with and without a remainder on the training rows, and judges both.
+
+use super::blocks::blocks;
+use super::cross_validation::{MAX_CONFIGURATIONS, cross_validated};
+use super::gain::Gain;
+use super::hyperparameter_search::{Searched, search};
+use super::kernel::Hyperparameters;
+use super::posterior::{LeftOut, Posterior, Training};
+use super::scores::{LeftOutError, Scores, left_out_errors};
+use super::training_rows::TrainingRows;
+
+/// Minimum configurations to which a remainder is fitted.
+const MIN_CONFIGURATIONS_FOR_REMAINDER: usize = 20;
+/// Number of blocks of neighbouring configurations that are left out.
+const BLOCKS: usize = 10;
+/// Minimum configurations of a block on average.
+const MIN_BLOCK: usize = 3;
+
+/// Posterior with the scores of its training rows, left out.
+pub(super) struct Conditioned {
+    pub posterior: Posterior,
+    pub scores: Scores,
+}
+
+/// Predictions with and without a remainder.
+pub(super) struct Judged {
+    pub alone: Conditioned,
+    /// Predictions with the remainder if it is kept.
+    pub remainder: Option<Conditioned>,
+    pub gain: Option<Gain>,
+}
+
+/// Predictions with and without a remainder; `None` where rounding spoils a factorisation.
+pub(super) fn judge(training: &TrainingRows, is_remainder_wanted: bool) -> Option<Judged> {
+    let count = BLOCKS.min(training.configurations.len() / MIN_BLOCK).max(2);
+    let block = blocks(&training.rows, &training.layout.inputs, count);
+    let conditioned = |hyper: &Hyperparameters| {
+        let centres = training.some_rows(training.centres(), 1);
+        let rows = (&training.rows, &training.layout.inputs);
+        Training::of(rows, &training.prior, hyper, &centres)
+    };
+    let judged_rows = training.rows.select(&training.judged);
+    let configurations = judged_rows.configurations();
+    let with_scores = |of: Training, single: &[LeftOutError], blocks: &[LeftOutError]| {
+        let [single, blocks] =
+            [single, blocks].map(|errors| errors.iter().map(|error| error.score).collect());
+        let scores = Scores::new(configurations.len(), single, blocks);
+        Conditioned { posterior: of.posterior, scores }
+    };
+    let errors = |hyper: &Hyperparameters, alone: &[LeftOut], with: &[LeftOut]| {
+        left_out_errors(hyper, &judged_rows, alone, with)
+    };
+    let left_out = |of: &Training| {
+        let each = of.without_each(&training.rows.configuration, &training.judged)?;
+        Some((each, of.without_each(&block, &training.judged)?))
+    };
+    let noise = training.noise();
+    let alone = conditioned(&noise)?;
+    let (single_alone, blocks_alone) = left_out(&alone)?;
+    let errors_alone = errors(&noise, &single_alone, &single_alone);
+    let plain = with_scores(alone, &errors_alone, &errors(&noise, &blocks_alone, &blocks_alone));
+    let without = Judged { alone: plain, remainder: None, gain: None };
+    let enough = is_remainder_wanted
+        && !training.layout.sites.is_empty()
+        && training.configurations.len() >= MIN_CONFIGURATIONS_FOR_REMAINDER;
+    let searched = enough.then(|| search(training)).flatten();
+    let Some(Searched { hyper, minimum, evidence }) = searched else { return Some(without) };
+    let beside = conditioned(&hyper).and_then(|with| Some((left_out(&with)?, with)));
+    let Some(((single_with, blocks_with), with)) = beside else { return Some(without) };
+    let blocks = errors(&hyper, &blocks_alone, &blocks_with);
+    let [errors_alone, single] = if training.configurations.len() <= MAX_CONFIGURATIONS {
+        let errors = cross_validated(training, &minimum)?;
+        errors.map(|errors| training.judged.iter().map(|&row| errors[row]).collect::<Vec<_>>())
+    } else {
+        [errors_alone, errors(&hyper, &single_alone, &single_with)]
+    };
+    let gain = Gain::of(&configurations, (&errors_alone, &single), evidence);
+    let remainder = gain.is_significant().then(|| with_scores(with, &single, &blocks));
+    Some(Judged { remainder, gain: Some(gain), ..without })
+}
