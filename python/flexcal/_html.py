@@ -40,9 +40,12 @@ def closed_loop(result: ClosedLoop) -> str:
 
 
 def _gain(entry: dict[str, Any]) -> str:
-    """What an effect takes off the error: a length, or of tilts an angle."""
-    length = entry.get("expected_gain_mm")
-    return f"{entry['expected_gain_deg']:.5f}°" if length is None else f"{length:.4f} mm"
+    """Return what an effect takes off the error: a length, an angle of tilts, or pixels."""
+    for key, unit, decimals in [("mm", " mm", 4), ("deg", "°", 5), ("px", " px", 4)]:
+        gain = entry.get(f"expected_gain_{key}")
+        if gain is not None:
+            return f"{gain:.{decimals}f}{unit}"
+    return ""
 
 
 def trace(result: Trace) -> str:

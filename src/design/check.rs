@@ -222,7 +222,7 @@ fn finite(sensitivity: &Sensitivity) -> Sensitivity {
 
 /// Returns √3 σ, from the mean σ² of the rows of one kind.
 fn noise(problem: &Problem, table: &Measurements, kind: Observation) -> f64 {
-    let declared = problem.data.sigma_of(kind).unwrap_or(1.0);
+    let declared = problem.sigma_of(kind).unwrap_or(1.0);
     let is_of_kind = |row: &usize| table.observation(*row).kind() == kind.kind();
     let squares = match &table.sigma {
         Some(sigmas) => {

@@ -72,9 +72,9 @@ impl<'a> Site<'a> {
             for pose in &poses {
                 // Before any measurement, contacts locate a fixture, but distances do not.
                 let planned = !locates(pose.observation, table);
-                if let Some(fixture) = pose.observation.fixture() {
-                    if planned { &mut planned_only } else { &mut located }.insert(fixture);
-                }
+                let fixtures = pose.observation.fixtures().into_iter().flatten();
+                let known = if planned { &mut planned_only } else { &mut located };
+                known.extend(fixtures.filter(|_| pose.observation.is_of_arm()));
             }
             poses.retain(|pose| locates(pose.observation, table));
             let mut nominal = std::mem::take(&mut site.nominal);

@@ -189,6 +189,13 @@ pub enum InputErrorKind {
     TooFewContacts { what: &'static str, name: String, rows: usize, numbers: usize },
     #[error("{has} without {lacks}; write both or neither")]
     IncompleteObservation { has: &'static str, lacks: &'static str },
+    #[error("{word} is no point of the marker, whose points are numbered from 0 to {last}")]
+    NoSuchPoint { word: String, last: usize },
+    #[error(
+        "the point is behind the camera; check the names and numbers of the row, and the poses of \
+         camera and marker (at_m and rotation_deg), which views of one direction do not determine"
+    )]
+    PointBehindCamera,
     #[error("nothing is measured in this row: every column that could hold something is empty")]
     NothingMeasured,
     #[error("the column has no meaning in this problem; declare {write}")]

@@ -35,6 +35,9 @@ pub struct ErrorSummary {
     pub max: AxisValues,
     /// Root mean square per axis, and root of the mean squared norm.
     pub rms: AxisValues,
+    /// Mean, largest and root mean squared lengths at the seen points that errors in images stand
+    /// for \[m\]; `None` for other kinds.
+    pub at_point: Option<[AxisValues; 3]>,
 }
 
 /// Errors on identification rows and on held-out rows.
@@ -102,6 +105,12 @@ impl ErrorSummary {
         of_kind(table, rows, errors, table.leading())
     }
 
+    /// Adds the lengths at the seen points that these errors in images stand for: `lengths` \[m\].
+    pub(super) fn with_lengths(self, lengths: &[Vector3<f64>]) -> Self {
+        let Self { mean, max, rms, .. } = Self::of(lengths);
+        Self { at_point: Some([mean, max, rms]), ..self }
+    }
+
     /// Summarises the residuals of rows of one kind \[m\].
     pub(crate) fn of_kind(observation: Observation, errors: &[Vector3<f64>]) -> Self {
         let values: Vec<[f64; 4]> =
@@ -118,6 +127,7 @@ impl ErrorSummary {
             mean: over(&|sum, v| sum + v, &|sum| sum / n),
             max: over(&|max, v| if v > max || v.is_nan() { v } else { max }, &|max| max),
             rms: over(&|sum, v| v.mul_add(v, sum), &|sum| (sum / n).sqrt()),
+            at_point: None,
         }
     }
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::error::{InputErrorKind, TableErrorKind};
+use crate::error::TableErrorKind;
 use crate::fit::checks::checked_fit::CheckedFit;
 use crate::fit::checks::finding::{Finding, FindingCode};
 use crate::fit::checks::fitted_rows::influential_finding;
@@ -304,8 +304,8 @@ fn prepared(
 /// # Errors
 /// Returns an error if a row has no equilibrium, or the strategy varies only bases and targets.
 fn fitted_parameters<'a>(fitting: &Fitting<'a>) -> Result<Vec<&'a Parameter>, IdentifyError> {
-    if let Some(row) = fitting.without_equilibrium() {
-        return Err(fitting.measurements.location(row).error(InputErrorKind::NoEquilibrium).into());
+    if let Some(error) = fitting.unpredictable() {
+        return Err(error.into());
     }
     let unknowns: Vec<&Parameter> = fitting.whole().parameters().collect();
     if fitting.strategy != Strategy::Joint

@@ -10,7 +10,7 @@ use super::table::Table;
 use crate::error::{
     InputError, InputErrorKind, Location, TableErrorKind, Warning, WarningKind, nearest, one_typo,
 };
-use crate::observation::{Field, Kind, kinds};
+use crate::observation::{Content, Field, Kind, kinds};
 use crate::problem::{ColumnRule, HeldOut, JointSource, Problem};
 use crate::quantity::Unit;
 
@@ -255,7 +255,9 @@ impl Columns {
         let declared = kinds().filter(|kind| is_declared(kind, problem));
         for kind in declared.filter(|kind| !kind.declared_by.is_empty()) {
             let has_number = kind.measured_fields().any(|field| has_field(&field));
-            let is_named = kind.references().any(|field| field.required && has_field(&field));
+            let is_named = kind.references().any(|field| {
+                field.required && field.content != Content::Index && has_field(&field)
+            });
             let lacks = |field: &&Field| {
                 let is_needed = field.unit().is_none() || has_number || (measured && is_named);
                 field.required && is_needed && !has_field(field)

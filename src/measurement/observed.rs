@@ -7,11 +7,12 @@ use nalgebra::Vector3;
 
 use super::Measurements;
 use super::columns::{self, Columns};
-use super::role::{POINT, POSITION, Role};
+use super::role::{POINT, POSITION, Role, is_declared};
 use super::table::Table;
 use crate::error::{InputError, InputErrorKind};
 use crate::observation::{Content, Field, Kind, Needs, kinds};
-use crate::problem::fixture::{frame, unknown};
+use crate::problem::fixture::unknown;
+use crate::problem::frame::frame;
 use crate::problem::{Fixture, KnownDistance, Observation, Problem};
 
 /// Quantity that a row measures.
@@ -47,8 +48,23 @@ pub(super) fn of_row(
             None => of_file.map(|stem| Cell { field, place: None, stem }),
         }
     };
-    for kind in kinds().filter(|kind| !kind.declared_by.is_empty()) {
-        let cells: Vec<Cell> = kind.fields.iter().filter_map(cell).collect();
+    let cells_of = |kind: &Kind| kind.fields.iter().filter_map(cell).collect::<Vec<Cell>>();
+    let others = || {
+        let others = kinds().filter(|kind| !kind.declared_by.is_empty());
+        others.filter(|kind| is_declared(kind, problem))
+    };
+    for kind in others() {
+        let cells = cells_of(kind);
+        // Kinds may share a column: the one with more filled cells takes it, and a number of a
+        // point says nothing by itself.
+        let is_taken = |other: &Kind| {
+            cells.iter().all(|cell| other.field(cell.field.name).is_some())
+                && cells_of(other).len() > cells.len()
+        };
+        let are_numbers = cells.iter().all(|cell| cell.field.content == Content::Index);
+        if are_numbers || others().any(is_taken) {
+            continue;
+        }
         found.extend(of_kind(table, kind, &cells, (problem, measured))?);
     }
     let filled = |place: usize| columns::is_filled(table, place);
@@ -97,6 +113,9 @@ fn of_kind(
     for field in kind.references() {
         let cell = cells.iter().find(|cell| cell.field.name == field.name);
         indices.push(match (field.content, cell) {
+            (Content::Index, Some(Cell { place: Some(place), .. })) => {
+                point(table, *place, indices.last().copied(), problem)?
+            }
             (Content::Frame, _) => frame_of(table, cell.and_then(|cell| cell.place), problem)?,
             (_, Some(cell)) => {
                 let name = cell.place.map_or(Ok(cell.stem), |place| table.name(place))?;
@@ -116,6 +135,25 @@ fn frame_of(table: &Table, place: Option<usize>, problem: &Problem) -> Result<us
     let Some(place) = place else { return Ok(problem.tool.joint + 1) };
     frame(table.name(place)?, &problem.joints, problem.tool.joint)
         .map_err(|kind| table.cell_error(place, kind))
+}
+
+/// Returns the number in a cell, which counts the points of a marker from 0.
+fn point(
+    table: &Table,
+    place: usize,
+    marker: Option<usize>,
+    problem: &Problem,
+) -> Result<usize, InputError> {
+    let points = marker
+        .and_then(|marker| problem.fixtures.get(marker))
+        .map_or(0, |known| known.points.len());
+    let word = table.name(place)?;
+    let number = word.parse().ok().filter(|number| *number < points);
+    number.ok_or_else(|| {
+        let kind =
+            InputErrorKind::NoSuchPoint { word: word.to_owned(), last: points.saturating_sub(1) };
+        table.cell_error(place, kind)
+    })
 }
 
 /// Returns the fixture that a cell names.
@@ -219,7 +257,7 @@ pub(super) fn add_known_distances(
             kinds.push(observation.kind());
         }
         if measurements.sigma_of(row).is_none() {
-            match problem.data.sigma_of(observation) {
+            match problem.sigma_of(observation) {
                 Some(sigma) => measurements.set_sigma(row, sigma),
                 None => without = without.or(Some(observation)),
             }
@@ -243,7 +281,8 @@ impl Measurements {
     pub(super) fn enough_contacts(&self, problem: &Problem) -> Result<(), InputError> {
         for (index, fixture) in problem.fixtures.iter().enumerate() {
             let rows: Vec<usize> = (0..self.len())
-                .filter(|&row| self.observation(row).fixture() == Some(index))
+                .filter(|&row| self.observation(row).fixtures().contains(&Some(index)))
+                .filter(|&row| self.observation(row).is_of_arm())
                 .collect();
             let Some(&first) = rows.first() else { continue };
             let known = problem

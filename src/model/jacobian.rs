@@ -20,11 +20,12 @@ use super::rows::{Rows, clear};
 use super::tilt::TiltDerivatives;
 use crate::least_squares::Block;
 use crate::model::parameter::{ParameterSite, Regressor, slope_regressor};
-use crate::observation::{FixtureValues, Needs, Scene};
+use crate::observation::{FixtureValues, MAX_NUMBERS, Needs, Scene, Slopes};
 use crate::spatial::Frame;
 
 /// Writer of residuals and Jacobian rows at one parameter vector, used for every row.
-pub(super) struct JacobianWriter {
+pub(super) struct JacobianWriter<'m> {
+    model: &'m Model,
     commands: CommandTerms,
     instrument: Instrument,
     /// Columns of the instrument's errors, with site and regressor.
@@ -35,7 +36,7 @@ pub(super) struct JacobianWriter {
     targets: Vec<Target>,
     fixtures: Vec<FixtureValues<f64>>,
     /// Columns of the numbers of each fixture.
-    fixture_columns: Vec<[Option<usize>; 4]>,
+    fixture_columns: Vec<[Option<usize>; MAX_NUMBERS]>,
     /// Derivatives of tilts, if some are measured.
     tilts: Option<TiltDerivatives>,
     arm: ArmDerivatives,
@@ -43,11 +44,11 @@ pub(super) struct JacobianWriter {
     points: Block,
 }
 
-impl JacobianWriter {
+impl<'m> JacobianWriter<'m> {
     /// Creates a writer at the full parameter vector `x`; `unknowns[j]` is the parameter of column
     /// j. Only an `oriented` writer takes orientations, only a `tilted` one takes tilts.
     pub fn new(
-        model: &Model,
+        model: &'m Model,
         x: &[f64],
         unknowns: &[usize],
         (oriented, tilted): (bool, bool),
@@ -60,7 +61,7 @@ impl JacobianWriter {
         };
         let mut targets: Vec<Target> = places.enumerate().map(target).collect();
         let fixtures = model.fixtures(x);
-        let mut fixture_columns = vec![[None; 4]; fixtures.len()];
+        let mut fixture_columns = vec![[None; MAX_NUMBERS]; fixtures.len()];
         let (mut instrument_columns, mut base_rotations) = (Vec::new(), Vec::new());
         let regressor = |k| slope_regressor(&model.parameters, x, k);
         for (column, &k) in unknowns.iter().enumerate() {
@@ -97,6 +98,7 @@ impl JacobianWriter {
             (false, true) => 0,
         };
         Self {
+            model,
             commands: model.commands(x),
             instrument: model.instrument_at(x),
             instrument_columns,
@@ -140,6 +142,10 @@ impl JacobianWriter {
                 rows.put(last_column, &tilts.map_or(lost, |tilts| tilts - pose.measured));
                 return;
             }
+            Needs::Carriers => match self.write_carriers(pose, &mut scene, &mut rows) {
+                Some(by) => slopes = Some(by),
+                None => return rows.put(last_column, &lost),
+            },
             Needs::Target => {
                 let (base, target) = (&self.bases[pose.base], &self.targets[pose.target]);
                 let rotated = self.rotated(base, pose);
@@ -176,6 +182,57 @@ impl JacobianWriter {
             }
         }
         rows.put(last_column, &(slopes.value - pose.measured));
+    }
+
+    /// Writes the derivatives of a row with respect to the arm and the base that move the frames
+    /// which carry its fixtures, and returns those of its prediction; `None` without equilibrium.
+    ///
+    /// Only the motion of the second fixture's point against the frame of the first one counts: the
+    /// point's motion with its own carrier, less its motion as if the first carrier held it.
+    fn write_carriers(
+        &mut self,
+        pose: &Pose,
+        scene: &mut Scene<f64>,
+        rows: &mut Rows,
+    ) -> Option<Slopes> {
+        let base = &self.bases[pose.base];
+        let rotated = self.rotated(base, pose);
+        let base = rotated.as_ref().unwrap_or(base);
+        let setup = self.commands.apply(&pose.setup);
+        let carriers = self.model.carriers(pose.observation);
+        scene.point = self.model.fixture_point(pose.observation);
+        let points = &mut self.points;
+        let mut write = |joint: Option<usize>, point: &Vector3<f64>, points: &mut Block| {
+            clear(points);
+            let mut moves = Rows { block: points, row: 0, scale: 1.0 };
+            let Some(joint) = joint else { return Some(base.frame) };
+            self.arm.write((&pose.setup, &setup), base, (joint, point), &mut moves)
+        };
+        for (frame, carrier) in scene.carriers.iter_mut().zip(carriers) {
+            if let Some(carrier) = carrier {
+                *frame = write(carrier.checked_sub(1), &Vector3::zeros(), points)?;
+            }
+        }
+        let by = pose.observation.slopes(scene);
+        let place = scene.carriers[1].point(&scene.fixtures[1].frame().point(&scene.point));
+        for ((frame, carrier), sign) in scene.carriers.iter().zip(carriers).zip([-1.0, 1.0]) {
+            let Some(carrier) = carrier else { continue };
+            let point = frame.resolve(&(place - frame.origin));
+            write(carrier.checked_sub(1), &point, points)?;
+            let mut moves = Rows { block: points, row: 0, scale: 1.0 };
+            for (axis, &column) in base.columns.iter().take(3).enumerate() {
+                moves.put_if(column, || base.directions[axis]);
+            }
+            for (column, slope) in base.point_slopes(&place) {
+                moves.put(column, &slope);
+            }
+            for column in 0..points.parameters() {
+                let moved = points.column(column);
+                let moved = Vector3::new(moved[0], moved[1], moved[2]);
+                rows.add(column, &(by.by_target * moved * sign));
+            }
+        }
+        Some(by)
     }
 
     /// Returns the base as effects rotate it in a pose; `None` if none does.

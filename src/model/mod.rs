@@ -40,8 +40,8 @@ use crate::mechanics::{Arm, Joint};
 use crate::model::parameter::{
     LinearConstraint, Parameter, ParameterSite, Regressor, constrain, resolve,
 };
-use crate::observation::FixtureValues;
-use crate::problem::{BasePose, Effect, Problem};
+use crate::observation::{FixtureValues, Observation};
+use crate::problem::{BasePose, Effect, Fixture, Problem};
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 use command_term::CommandTerm;
@@ -66,8 +66,8 @@ pub struct Model {
     target_rotations: Vec<Vector3<f64>>,
     /// Declared values of points, anchors and surfaces; undeclared numbers are 0.
     fixtures: Vec<FixtureValues<f64>>,
-    /// Declared numbers of each fixture.
-    declared: Vec<Vec<Option<f64>>>,
+    /// Declared fixtures.
+    declared: Vec<Fixture>,
     /// Free parameters, in the order of every full parameter vector.
     #[doc(hidden)]
     pub parameters: Vec<Parameter>,
@@ -113,7 +113,7 @@ impl Model {
                 .iter()
                 .map(|fixture| FixtureValues::new(fixture.kind, &fixture.known))
                 .collect(),
-            declared: problem.fixtures.iter().map(|fixture| fixture.known.clone()).collect(),
+            declared: problem.fixtures.clone(),
             parameters,
         })
     }
@@ -262,11 +262,27 @@ impl Model {
     pub(crate) fn is_declared(&self, fixture: usize, axis: usize) -> bool {
         self.declared
             .get(fixture)
-            .and_then(|numbers| numbers.get(axis))
+            .and_then(|fixture| fixture.known.get(axis))
             .is_some_and(Option::is_some)
     }
 
-    /// Returns the values of points, anchors and surfaces at `x`, measuring frame.
+    /// Returns the frame of the arm that carries each fixture of a row: 0 is the base, i that of
+    /// joint i; `None` if it stands in the measuring frame.
+    pub(crate) fn carriers(&self, observation: Observation) -> [Option<usize>; 2] {
+        let carrier = |fixture: Option<usize>| self.declared.get(fixture?)?.carrier;
+        observation.fixtures().map(carrier)
+    }
+
+    /// Returns the point of the second fixture that a row measures, in the fixture's frame \[m\].
+    pub(crate) fn fixture_point(&self, observation: Observation) -> Vector3<f64> {
+        let point = || {
+            let fixture = self.declared.get(observation.fixtures()[1]?)?;
+            fixture.points.get(observation.point()?).copied()
+        };
+        point().unwrap_or_default()
+    }
+
+    /// Returns the values of points, anchors, surfaces, cameras and markers at `x`.
     pub(crate) fn fixtures(&self, x: &[f64]) -> Vec<FixtureValues<f64>> {
         let mut fixtures = self.fixtures.clone();
         for (parameter, x) in self.parameters.iter().zip(x) {

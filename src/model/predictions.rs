@@ -9,7 +9,7 @@ use super::pose_residuals::PoseResiduals;
 use super::predictor::Predictor;
 use crate::least_squares::CHUNK_ITEMS;
 use crate::mechanics::CentreLine;
-use crate::observation::Observation;
+use crate::observation::{FixtureValues, Needs, Observation};
 use crate::spatial::{Frame, rotation_between};
 
 impl Model {
@@ -122,6 +122,44 @@ impl Model {
             points.for_each(|point| *point = bases[pose.base].point(point));
             Some(CentreLine { rigid, bent })
         })
+    }
+
+    /// Returns the frames that carry the fixtures of each row at the full parameter vector `x`,
+    /// measuring frame; `None` without equilibrium.
+    pub(crate) fn carrier_frames(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<[Frame<f64>; 2]>> {
+        #[expect(
+            clippy::redundant_closure_for_method_calls,
+            reason = "a path is not general enough over lifetimes"
+        )]
+        self.map(poses, x, |predictor, pose| predictor.carriers(pose))
+    }
+
+    /// Returns the lengths at the seen points that errors in images stand for, at the full
+    /// parameter vector `x` \[m\]: along u and v, the error over the focal length times the depth.
+    /// Rows of other kinds are left out.
+    pub(crate) fn lengths_at_points(
+        &self,
+        poses: &[Pose],
+        errors: &[Vector3<f64>],
+        x: &DVector<f64>,
+    ) -> Vec<Vector3<f64>> {
+        let fixtures = self.fixtures(x.as_slice());
+        let carriers = self.carrier_frames(poses, x.as_slice());
+        let length = |((pose, error), carriers): ((&Pose, &Vector3<f64>), _)| {
+            let [camera, marker] = pose.observation.fixtures();
+            let (camera, marker): (&FixtureValues<f64>, _) =
+                (&fixtures[camera?], &fixtures[marker?]);
+            let [of_camera, of_marker]: [Frame<f64>; 2] = carriers?;
+            let frame = of_camera.compose(&camera.frame());
+            let point = marker.frame().point(&self.fixture_point(pose.observation));
+            let depth = frame.resolve(&(of_marker.point(&point) - frame.origin)).z;
+            let [_, _, _, _, _, _, fx, fy, ..] = camera.numbers;
+            Some(Vector3::new(error.x * depth / fx, error.y * depth / fy, 0.0))
+        };
+        let of_images = |((pose, _), _): &((&Pose, _), _)| {
+            pose.observation.description().needs == Needs::Carriers
+        };
+        poses.iter().zip(errors).zip(carriers).filter(of_images).filter_map(length).collect()
     }
 
     /// Evaluates `value` for each pose, in parallel.

@@ -70,8 +70,13 @@ impl<'m> Predictor<'m> {
     /// Returns the frame that carries the target, arm base frame; `None` without equilibrium.
     #[inline]
     pub fn target_frame(&mut self, pose: &Pose) -> Option<Frame<f64>> {
+        self.joint_frame(pose, self.model.target_joint(pose.target))
+    }
+
+    /// Returns the frame of a joint, arm base frame; `None` without equilibrium.
+    #[inline]
+    fn joint_frame(&mut self, pose: &Pose, joint: usize) -> Option<Frame<f64>> {
         let setup = self.commands.apply(&pose.setup);
-        let joint = self.model.target_joint(pose.target);
         if self.is_rigid {
             return Some(self.arm.rigid_frame(&setup, joint));
         }
@@ -120,6 +125,11 @@ impl<'m> Predictor<'m> {
                 let frame = self.frame_axes(pose)?;
                 Scene { frame, gravity: self.arm.gravity, ..Scene::default() }
             }
+            Needs::Carriers => {
+                let carriers = self.carriers(pose)?;
+                let point = self.model.fixture_point(observation);
+                Scene { carriers, point, ..Scene::default() }
+            }
             Needs::Target => {
                 let frame = self.target_frame(pose)?;
                 let base = self.base(pose);
@@ -137,6 +147,20 @@ impl<'m> Predictor<'m> {
         };
         let fixtures = fixtures_of(observation, |fixture| self.fixtures[fixture]);
         Some(Prediction { numbers: observation.predict(&Scene { fixtures, ..scene }), turn })
+    }
+
+    /// Returns the frames that carry the fixtures of a row, measuring frame.
+    pub fn carriers(&mut self, pose: &Pose) -> Option<[Frame<f64>; 2]> {
+        let base = self.base(pose);
+        let mut carriers = [Frame::identity(); 2];
+        for (frame, carrier) in carriers.iter_mut().zip(self.model.carriers(pose.observation)) {
+            *frame = match carrier.map(|carrier| carrier.checked_sub(1)) {
+                None => continue,
+                Some(None) => base,
+                Some(Some(joint)) => base.compose(&self.joint_frame(pose, joint)?),
+            };
+        }
+        Some(carriers)
     }
 
     /// Returns the axes of the frame whose tilt is measured, arm base frame.

@@ -1,12 +1,13 @@
-//! Points, anchors and surfaces around the arm.
+//! Points, anchors and surfaces around the arm; cameras and markers, which the arm may carry.
 
 use nalgebra::Vector3;
 
 use crate::quantity::Unit;
 use crate::scalar::Scalar;
+use crate::spatial::Frame;
 
 /// Largest count of numbers that describe a fixture.
-const MAX_NUMBERS: usize = 4;
+pub(crate) const MAX_NUMBERS: usize = 15;
 
 /// Kind of a fixture, which determines its numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -21,6 +22,14 @@ pub enum FixtureKind {
     Plane,
     /// Sphere: centre x, y, z and radius \[m\].
     Sphere,
+    /// Pinhole camera: position \[m\] and rotation vector \[rad\] in the frame that carries it,
+    /// focal lengths and centre \[px\], distortion.
+    Camera,
+    /// Camera with an equidistant lens: the same numbers with another distortion.
+    Fisheye,
+    /// Object with points that cameras see: position \[m\] and rotation vector \[rad\] in the
+    /// frame that carries it.
+    Marker,
 }
 
 impl FixtureKind {
@@ -30,7 +39,14 @@ impl FixtureKind {
             Self::Point => "point",
             Self::Anchor => "anchor",
             Self::Plane | Self::Sphere => "surface",
+            Self::Camera | Self::Fisheye => "camera",
+            Self::Marker => "marker",
         }
+    }
+
+    /// Returns true if its first six numbers are a pose in the frame that carries it.
+    pub fn has_pose(self) -> bool {
+        matches!(self, Self::Camera | Self::Fisheye | Self::Marker)
     }
 
     /// Returns the names of its numbers, as they follow the dot in the name of a parameter.
@@ -39,6 +55,14 @@ impl FixtureKind {
             Self::Point | Self::Anchor => &["x", "y", "z"],
             Self::Plane => &["rx", "ry", "d"],
             Self::Sphere => &["x", "y", "z", "radius"],
+            Self::Camera => &[
+                "x", "y", "z", "rx", "ry", "rz", "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2",
+                "k3",
+            ],
+            Self::Fisheye => {
+                &["x", "y", "z", "rx", "ry", "rz", "fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"]
+            }
+            Self::Marker => &["x", "y", "z", "rx", "ry", "rz"],
         }
     }
 
@@ -47,13 +71,20 @@ impl FixtureKind {
         match (self, axis) {
             (Self::Plane, _) => "normal and at_m",
             (Self::Sphere, 3) => "radius_m",
+            (kind, _) if kind.has_pose() => "at_m and rotation_deg",
             _ => "at_m",
         }
     }
 
     /// Returns the unit of one of its numbers.
     pub fn unit(self, axis: usize) -> Unit {
-        if self == Self::Plane && axis < 2 { Unit::Angle } else { Unit::Length }
+        match (self, axis) {
+            (Self::Plane, 0 | 1) => Unit::Angle,
+            (kind, 3..6) if kind.has_pose() => Unit::Angle,
+            (Self::Camera | Self::Fisheye, 6..10) => Unit::Pixel,
+            (Self::Camera | Self::Fisheye, 10..) => Unit::Number,
+            _ => Unit::Length,
+        }
     }
 }
 
@@ -87,7 +118,13 @@ impl FixtureValues<f64> {
 impl<S: Scalar> FixtureValues<S> {
     /// Returns its position \[m\]: of a sphere the centre. A plane has none.
     pub fn position(&self) -> Vector3<S> {
-        let [x, y, z, _] = self.numbers;
+        let [x, y, z, ..] = self.numbers;
         Vector3::new(x, y, z)
+    }
+
+    /// Returns the frame of a camera or marker in the frame that carries it.
+    pub fn frame(&self) -> Frame<S> {
+        let [_, _, _, rx, ry, rz, ..] = self.numbers;
+        Frame::from_rotation_vector(self.position(), &Vector3::new(rx, ry, rz))
     }
 }

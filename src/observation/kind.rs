@@ -9,7 +9,7 @@ pub struct Kind {
     pub name: &'static str,
     /// Count of numbers that a row measures, at most three.
     pub numbers: usize,
-    /// Unit of these numbers.
+    /// Unit of these numbers: a length, an angle or pixels.
     pub unit: Unit,
     /// Parts of the scene that predict a row.
     pub needs: Needs,
@@ -49,6 +49,8 @@ pub struct Field {
 pub enum Content {
     /// Name of a fixture, declared in the table of the column's name.
     Fixture,
+    /// Number of a point of the fixture before it, from 0.
+    Index,
     /// Name of a frame of the arm; the tool's frame if the cell is empty.
     Frame,
     /// Measured number; 0 if the cell is empty.
@@ -66,6 +68,8 @@ pub enum Needs {
     Target,
     /// Frame of the arm and gravity.
     Frame,
+    /// Fixtures, the frames that carry them, and a point of the second one.
+    Carriers,
 }
 
 impl Kind {
@@ -100,7 +104,7 @@ impl Field {
     pub fn unit(&self) -> Option<Unit> {
         match self.content {
             Content::Number(unit) | Content::Positive(unit) => Some(unit),
-            Content::Fixture | Content::Frame => None,
+            Content::Fixture | Content::Index | Content::Frame => None,
         }
     }
 }

@@ -9,38 +9,44 @@ mod distance;
 mod fixture;
 mod kind;
 mod known_distance;
+mod lens;
 mod point;
 mod position;
 mod scene;
 mod surface;
 mod tilt;
 
-pub(crate) use fixture::{FixtureKind, FixtureValues};
+pub(crate) use fixture::{FixtureKind, FixtureValues, MAX_NUMBERS};
 pub use kind::Kind;
 pub(crate) use kind::{Content, Field, Needs};
+pub(crate) use lens::slopes_of_pixel;
 pub(crate) use scene::Scene;
 
-use nalgebra::{Matrix3, Matrix3x4, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use crate::quantity::Unit;
 use crate::scalar::{Scalar, gradient, seeded};
-use crate::spatial::rotate;
+use crate::spatial::{Frame, rotate};
 
 /// Predicted numbers of a row and their first derivatives.
 #[derive(Debug, Clone, Copy)]
 pub struct Slopes {
     /// Predicted numbers, followed by zeros.
     pub value: Vector3<f64>,
-    /// Derivative with respect to the position of the target.
+    /// Derivative with respect to the position of the target, or of the point of the second fixture.
     pub by_target: Matrix3<f64>,
     /// Derivative with respect to a small rotation of the base's axes, measuring frame [1/rad].
     pub by_base: Matrix3<f64>,
     /// Derivatives with respect to the numbers of the fixtures.
-    pub by_fixtures: [Matrix3x4<f64>; 2],
+    pub by_fixtures: [SMatrix<f64, 3, MAX_NUMBERS>; 2],
 }
 
-/// Count of inputs of a prediction: target 3, rotation of the base 3, two fixtures of 4.
-const INPUTS: usize = 14;
+/// Count of inputs before those of the fixtures: position of the target 3, rotation of the base 3.
+const INPUTS_BEFORE_FIXTURES: usize = 6;
+/// Count of inputs of a prediction with two fixtures of at most four numbers.
+const INPUTS: usize = INPUTS_BEFORE_FIXTURES + 8;
+/// Count of inputs of a prediction with two fixtures of any kind.
+const ALL_INPUTS: usize = INPUTS_BEFORE_FIXTURES + 2 * MAX_NUMBERS;
 
 /// Declares [`Observation`] and hands each variant on to the file of its kind.
 macro_rules! observations {
@@ -78,9 +84,9 @@ macro_rules! observations {
             }
 
             /// Returns the indices that the variant carries.
-            fn indices(self) -> [Option<usize>; 2] {
+            fn indices(self) -> [Option<usize>; 3] {
                 match self {
-                    $(Self::$variant $(($($index),+))? => pair(&[$($($index as usize),+)?]),)+
+                    $(Self::$variant $(($($index),+))? => padded(&[$($($index as usize),+)?]),)+
                 }
             }
         }
@@ -105,8 +111,9 @@ observations! {
     Between(first: u32, second: u32) => known_distance,
 }
 
-fn pair(indices: &[usize]) -> [Option<usize>; 2] {
-    [indices.first().copied(), indices.get(1).copied()]
+/// Returns some indices as a list of three.
+fn padded(indices: &[usize]) -> [Option<usize>; 3] {
+    std::array::from_fn(|k| indices.get(k).copied())
 }
 
 /// Returns the kind of rows called `name`; positions if no kind has this name.
@@ -153,14 +160,20 @@ impl Observation {
 
     /// Returns the fixtures that the row refers to.
     pub fn fixtures(self) -> [Option<usize>; 2] {
-        if self.description().needs == Needs::Frame { [None; 2] } else { self.indices() }
+        let [first, second, _] = self.indices();
+        if self.description().needs == Needs::Frame { [None; 2] } else { [first, second] }
+    }
+
+    /// Returns the number of the point of the second fixture, if the row names one.
+    pub(crate) fn point(self) -> Option<usize> {
+        self.indices()[2]
     }
 
     /// Returns numbers that differ for any two observations that differ.
-    pub(crate) fn key(self) -> [usize; 3] {
+    pub(crate) fn key(self) -> [usize; 4] {
         let kind = kinds().take_while(|kind| kind.name != self.kind()).count();
-        let [first, second] = self.indices().map(|index| index.map_or(0, |index| index + 1));
-        [kind, first, second]
+        let [first, second, third] = self.indices().map(|index| index.map_or(0, |index| index + 1));
+        [kind, first, second, third]
     }
 
     /// Returns true if the row measures a length on the arm.
@@ -198,28 +211,50 @@ impl Observation {
     /// Returns the predicted numbers of a row with their derivatives with respect to the target,
     /// the axes of the base and the fixtures.
     pub(crate) fn slopes(self, scene: &Scene<f64>) -> Slopes {
-        let seed = |value: f64, k: usize| seeded::<INPUTS>(value, Some(k));
+        if self.description().needs == Needs::Carriers {
+            self.slopes_of::<ALL_INPUTS>(scene)
+        } else {
+            self.slopes_of::<INPUTS>(scene)
+        }
+    }
+
+    fn slopes_of<const N: usize>(self, scene: &Scene<f64>) -> Slopes {
+        let seed = |value: f64, k: usize| seeded::<N>(value, Some(k));
         let turn = Vector3::from_fn(|i, _| seed(0.0, 3 + i));
-        let mut first = 6;
-        let fixtures = scene.fixtures.map(|fixture| {
-            first += 4;
-            FixtureValues {
-                kind: fixture.kind,
-                numbers: std::array::from_fn(|k| seed(fixture.numbers[k], first - 4 + k)),
-            }
-        });
+        let per_fixture = (N - INPUTS_BEFORE_FIXTURES) / 2;
+        let starts = [0, 1].map(|k| INPUTS_BEFORE_FIXTURES + k * per_fixture);
+        let fixture = |k: usize| FixtureValues {
+            kind: scene.fixtures[k].kind,
+            numbers: std::array::from_fn(|axis| {
+                let direction = (axis < per_fixture).then_some(starts[k] + axis);
+                seeded(scene.fixtures[k].numbers[axis], direction)
+            }),
+        };
+        let seeded_position =
+            |position: &Vector3<f64>| Vector3::from_fn(|i, _| seed(position[i], i));
+        let lifted = |frame: &Frame<f64>| Frame {
+            axes: frame.axes.map(|axis| axis.map(Into::into)),
+            origin: frame.origin.map(Into::into),
+        };
+        let [first, second] = scene.carriers.each_ref().map(lifted);
+        let second = Frame { origin: seeded_position(&scene.carriers[1].origin), ..second };
         let predicted = self.predict(&Scene {
-            target: Vector3::from_fn(|i, _| seed(scene.target[i], i)),
+            target: seeded_position(&scene.target),
             base: scene.base.map(|axis| rotate(&turn, &axis.map(Into::into))),
-            fixtures,
+            fixtures: [fixture(0), fixture(1)],
+            carriers: [first, second],
+            point: scene.point.map(Into::into),
             ..Scene::default()
         });
-        let rows: [SVector<f64, INPUTS>; 3] = std::array::from_fn(|i| gradient(&predicted[i]));
+        let rows: [SVector<f64, N>; 3] = std::array::from_fn(|i| gradient(&predicted[i]));
+        let by_number = |start: usize| {
+            SMatrix::from_fn(|i, j| if j < per_fixture { rows[i][start + j] } else { 0.0 })
+        };
         Slopes {
             value: predicted.map(|number| number.re),
             by_target: Matrix3::from_fn(|i, j| rows[i][j]),
             by_base: Matrix3::from_fn(|i, j| rows[i][3 + j]),
-            by_fixtures: [6, 10].map(|first| Matrix3x4::from_fn(|i, j| rows[i][first + j])),
+            by_fixtures: starts.map(by_number),
         }
     }
 }

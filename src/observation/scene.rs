@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::FixtureValues;
 use crate::scalar::Scalar;
+use crate::spatial::Frame;
 
 /// Quantities that predict a row: measuring frame, except where stated.
 #[derive(Debug, Clone, Copy)]
@@ -18,6 +19,10 @@ pub struct Scene<S> {
     pub frame: [Vector3<S>; 3],
     /// Gravity, arm base frame [m/s²].
     pub gravity: Vector3<S>,
+    /// Frames that carry the fixtures, in their order.
+    pub carriers: [Frame<S>; 2],
+    /// Point of the second fixture, in its frame \[m\].
+    pub point: Vector3<S>,
 }
 
 impl<S: Scalar> Default for Scene<S> {
@@ -29,6 +34,8 @@ impl<S: Scalar> Default for Scene<S> {
             fixtures: [FixtureValues::default(); 2],
             frame: axes,
             gravity: Vector3::from_element(S::from(0.0)),
+            carriers: [Frame::identity(); 2],
+            point: Vector3::from_element(S::from(0.0)),
         }
     }
 }

@@ -30,7 +30,7 @@ pub(super) const KIND: Kind = Kind {
 /// from a sphere.
 pub(super) fn predict<S: Scalar>(scene: &Scene<S>) -> Vector3<S> {
     let [surface, _] = scene.fixtures;
-    let [x, y, z, radius] = surface.numbers;
+    let [x, y, z, radius, ..] = surface.numbers;
     single(if surface.kind == FixtureKind::Plane {
         plane_normal(x, y).dot(&scene.target) - z
     } else {

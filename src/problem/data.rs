@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::Problem;
 use super::dialect::{self, Dialect};
 use super::item::Item;
 use super::joint_log::{self, JointLog};
@@ -81,12 +82,22 @@ pub enum HeldOut {
 }
 
 impl Data {
-    /// Returns the declared standard deviation of an observation \[m\] or \[rad\].
-    pub fn sigma_of(&self, observation: Observation) -> Option<f64> {
+    /// Returns the standard deviation that `[data]` declares for an observation \[m\] or \[rad\].
+    fn sigma_of(&self, observation: Observation) -> Option<f64> {
         if observation.is_position() {
             return self.position_sigma;
         }
         self.kind_sigmas.get(observation.kind()).copied()
+    }
+}
+
+impl Problem {
+    /// Returns the declared standard deviation of a number that a row measures \[m\], \[rad\] or
+    /// \[px\].
+    pub fn sigma_of(&self, observation: Observation) -> Option<f64> {
+        let mut fixtures = observation.fixtures().into_iter().flatten();
+        let of_fixture = fixtures.find_map(|fixture| self.fixtures.get(fixture)?.sigma);
+        of_fixture.or(self.data.sigma_of(observation))
     }
 }
 
@@ -125,8 +136,9 @@ pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Data, InputError> {
         files_location = item.location();
     }
     let mut kind_sigmas = BTreeMap::new();
-    // The σ of a known distance stands beside the distance.
-    for kind in kinds().filter(|kind| kind.needs != Needs::Fixtures) {
+    // The σ of a known distance stands beside the distance, that of a pixel beside the camera.
+    let beside = [Needs::Fixtures, Needs::Carriers];
+    for kind in kinds().filter(|kind| !beside.contains(&kind.needs)) {
         let not_positive = |value| InputErrorKind::NotPositive { value };
         let sigma = section.positive(&format!("{}_sigma", kind.name), kind.unit, not_positive)?;
         kind_sigmas.extend(sigma.map(|sigma| (kind.name, sigma)));

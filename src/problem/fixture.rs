@@ -1,15 +1,16 @@
 //! Fixtures: objects around the arm that are touched or measured against instead of a tracked
 //! target. Reads `[[point]]`, `[[anchor]]`, `[[surface]]`, and `[[distance]]` between points.
 //!
-//! All coordinates are in the measuring frame.
+//! All coordinates are in the measuring frame, except those of cameras and markers on the arm.
 
 use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
 use super::Problem;
+use super::camera::{Carriers, Declared, camera, marker};
+use super::frame::frame_word;
 use super::item::Item;
-use super::joint::Joint;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::observation::{Content, Field, FixtureKind, Observation};
@@ -28,6 +29,13 @@ pub struct Fixture {
     pub kind: FixtureKind,
     /// Coordinates in the order of [`FixtureKind::fields`], SI; `None` for an unknown coordinate.
     pub known: Vec<Option<f64>>,
+    /// Frame of the arm that carries it: 0 is the base, i that of joint i; `None` if it stands in
+    /// the measuring frame.
+    pub carrier: Option<usize>,
+    /// Points of a marker in its frame \[m\]; empty for others.
+    pub points: Vec<Vector3<f64>>,
+    /// 1 σ of a coordinate that a camera measures \[px\]; `None` for others.
+    pub sigma: Option<f64>,
     /// Place in the file, for errors.
     pub location: Location,
 }
@@ -45,33 +53,6 @@ pub struct KnownDistance {
     pub location: Location,
 }
 
-/// Returns the frame that a word names: `base`, a joint by its name, or `joint3`. The word `tool`
-/// means the frame of joint `tool` (counted from 0).
-///
-/// # Errors
-/// The word names no frame.
-pub(crate) fn frame(word: &str, joints: &[Joint], tool: usize) -> Result<usize, InputErrorKind> {
-    let named = || joints.iter().position(|joint| joint.name == word).map(|index| index + 1);
-    let numbered = || {
-        word.strip_prefix("joint")?
-            .parse()
-            .ok()
-            .filter(|number| (1..=joints.len()).contains(number))
-    };
-    match word {
-        "base" => Ok(0),
-        "tool" => Ok(tool + 1),
-        _ => named().or_else(numbered).ok_or_else(|| {
-            let joints = joints.iter().map(|joint| joint.name.clone());
-            let known = std::iter::once("base".to_owned())
-                .chain(joints)
-                .chain(["tool".to_owned()])
-                .collect();
-            InputErrorKind::UnknownFixture { what: "frame", name: word.to_owned(), known }
-        }),
-    }
-}
-
 /// Returns the columns that name what a row is measured against, each with its cell.
 pub(crate) fn reference_cells(
     problem: &Problem,
@@ -80,19 +61,11 @@ pub(crate) fn reference_cells(
     observation.references().map(|(field, index)| {
         let word = match field.content {
             Content::Frame => frame_word(index, &problem.joints, problem.tool.joint),
+            Content::Index => index.to_string(),
             _ => problem.fixtures.get(index).map_or(String::new(), |known| known.name.clone()),
         };
         (field, word)
     })
-}
-
-/// Returns a word that names a frame: the joint's name if it is unambiguous, otherwise `joint3`.
-pub(crate) fn frame_word(place: usize, joints: &[Joint], tool: usize) -> String {
-    let Some(joint) = place.checked_sub(1).and_then(|joint| joints.get(joint)) else {
-        return "base".to_owned();
-    };
-    let is_it = frame(&joint.name, joints, tool).is_ok_and(|named| named == place);
-    if is_it { joint.name.clone() } else { format!("joint{place}") }
 }
 
 /// Reads the name of a fixture or target, which parameter names contain; `what` is used in
@@ -106,12 +79,13 @@ pub(super) fn name_of(item: &Item<'_, '_>, what: &'static str) -> Result<String,
     Ok(name)
 }
 
-/// Reads all fixtures in the order point, anchor, surface, and the known distances.
+/// Reads all fixtures in the order point, anchor, surface, camera, marker, and the known distances.
 pub(super) fn read(
     root: &mut Section<'_, '_>,
+    carriers: Carriers,
 ) -> Result<(Vec<Fixture>, Vec<KnownDistance>), InputError> {
     let mut fixtures: Vec<Fixture> = Vec::new();
-    for table in ["point", "anchor", "surface"] {
+    for table in ["point", "anchor", "surface", "camera", "marker"] {
         for mut section in root.sections(table)? {
             let item = section.require("name", "name = \"…\"")?;
             let name = name_of(&item, "a fixture")?;
@@ -125,13 +99,17 @@ pub(super) fn read(
                     line,
                 }));
             }
-            let (kind, known) = match table {
-                "point" => place(&mut section, FixtureKind::Point)?,
-                "anchor" => place(&mut section, FixtureKind::Anchor)?,
-                _ => surface(&mut section)?,
+            let declared = match table {
+                "point" => Declared::new(FixtureKind::Point, place(&mut section)?),
+                "anchor" => Declared::new(FixtureKind::Anchor, place(&mut section)?),
+                "surface" => surface(&mut section)?,
+                "camera" => camera(&mut section, carriers)?,
+                _ => marker(&mut section, carriers)?,
             };
             section.finish()?;
-            fixtures.push(Fixture { name, kind, known, location: section.location() });
+            let Declared { kind, known, carrier, points, sigma } = declared;
+            let location = section.location();
+            fixtures.push(Fixture { name, kind, known, carrier, points, sigma, location });
         }
     }
     let distances =
@@ -140,35 +118,35 @@ pub(super) fn read(
     Ok((fixtures, distances))
 }
 
-/// Kind of a fixture with its declared coordinates.
-type Coordinates = (FixtureKind, Vec<Option<f64>>);
-
-fn place(section: &mut Section<'_, '_>, kind: FixtureKind) -> Result<Coordinates, InputError> {
+fn place(section: &mut Section<'_, '_>) -> Result<Vec<Option<f64>>, InputError> {
     let at = section.vector("at", Unit::Length)?;
-    Ok((kind, at.map_or(vec![None; 3], |at| at.iter().map(|x| Some(*x)).collect())))
+    Ok(at.map_or(vec![None; 3], |at| at.iter().map(|x| Some(*x)).collect()))
 }
 
-fn surface(section: &mut Section<'_, '_>) -> Result<Coordinates, InputError> {
+fn surface(section: &mut Section<'_, '_>) -> Result<Declared, InputError> {
     section.require("kind", "kind = \"plane\" or \"sphere\"")?;
     let kinds = [FixtureKind::Plane, FixtureKind::Sphere];
     let kind = section.word("kind", &["plane", "sphere"], &kinds)?.unwrap_or(FixtureKind::Plane);
     if kind == FixtureKind::Sphere {
-        let (_, mut known) = place(section, kind)?;
+        let mut known = place(section)?;
         known.push(
             section
                 .positive("radius", Unit::Length, |value| InputErrorKind::NotPositive { value })?,
         );
-        return Ok((kind, known));
+        return Ok(Declared::new(kind, known));
     }
     let at = section.vector("at", Unit::Length)?;
-    let Some(item) = section.get("normal") else { return Ok((kind, vec![None, None, None])) };
+    let Some(item) = section.get("normal") else {
+        return Ok(Declared::new(kind, vec![None; 3]));
+    };
     let normal = item.vector()?;
     let length = normal.norm();
     if length == 0.0 {
         return Err(item.error(InputErrorKind::NoDirection));
     }
     let [rx, ry] = lean(&(normal / length));
-    Ok((kind, vec![Some(rx), Some(ry), at.map(|at| at.dot(&normal) / length)]))
+    let distance = at.map(|at| at.dot(&normal) / length);
+    Ok(Declared::new(kind, vec![Some(rx), Some(ry), distance]))
 }
 
 /// Returns the coordinates (rx, ry) of a plane from its unit normal \[rad\]; see

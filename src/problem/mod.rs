@@ -5,6 +5,7 @@
 
 mod argument;
 mod arm;
+mod camera;
 mod conditions;
 mod constraints;
 mod data;
@@ -14,6 +15,7 @@ pub(crate) mod edit;
 pub(crate) mod effect;
 pub(crate) mod effects;
 pub(crate) mod fixture;
+pub(crate) mod frame;
 pub(crate) mod item;
 mod joint;
 mod joint_log;
@@ -101,7 +103,7 @@ pub struct Problem {
     /// Effects declared by the model.
     #[doc(hidden)]
     pub effects: Vec<EffectDeclaration>,
-    /// Points, anchors and surfaces that rows are measured against.
+    /// Points, anchors, surfaces, cameras and markers that rows are measured against.
     #[doc(hidden)]
     pub fixtures: Vec<Fixture>,
     /// Known distances between points.

@@ -42,6 +42,8 @@ pub struct Quantities {
     pub angle: Option<f64>,
     /// Value for lengths \[m\].
     pub length: Option<f64>,
+    /// Value for coordinates in an image \[px\].
+    pub pixel: Option<f64>,
     /// Value relative to nominal; as a standard deviation, that of ln(value / nominal).
     pub relative: Option<f64>,
 }
@@ -52,9 +54,9 @@ const MAX_RULES: usize = 2000;
 /// Maximum length of a pattern [bytes], which bounds the work of matching all parameters.
 const MAX_PATTERN_BYTES: usize = 500;
 
-const KINDS: [Unit; 3] = [Unit::Angle, Unit::Length, Unit::Ratio];
+const KINDS: [Unit; 4] = [Unit::Angle, Unit::Length, Unit::Pixel, Unit::Ratio];
 /// Nominal value on the scale of each kind: deviation 0 or ratio 1.
-const NOMINAL_VALUES: [f64; 3] = [0.0, 0.0, 1.0];
+const NOMINAL_VALUES: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 
 /// Reads all rules in the order of the file.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Vec<ParameterRule>, InputError> {
@@ -114,7 +116,7 @@ fn flag(section: &mut Section<'_, '_>, key: &str) -> Result<Option<bool>, InputE
 type Value<'a, 'i> = (f64, Item<'a, 'i>);
 
 /// Prior widths or bounds, one for each unit in [`KINDS`].
-struct Spread<'a, 'i>([Option<Value<'a, 'i>>; 3]);
+struct Spread<'a, 'i>([Option<Value<'a, 'i>>; KINDS.len()]);
 
 impl<'a, 'i> Spread<'a, 'i> {
     fn read(section: &mut Section<'a, 'i>, base: &str) -> Result<Self, InputError> {
@@ -122,7 +124,7 @@ impl<'a, 'i> Spread<'a, 'i> {
             let write = KINDS.map(|unit| unit.alternatives(base)).join(" or ");
             return Err(bare.error(InputErrorKind::NeedsUnit { noun: "a spread or bound", write }));
         }
-        let mut values = [None, None, None];
+        let mut values = [None, None, None, None];
         for (value, unit) in values.iter_mut().zip(KINDS) {
             if let Some((item, suffix)) = section.pick(base, unit)? {
                 *value = Some(((suffix.to_si)(item.number()?), item));
@@ -132,9 +134,9 @@ impl<'a, 'i> Spread<'a, 'i> {
     }
 
     fn quantities(&self) -> Quantities {
-        let [angle, length, relative] =
+        let [angle, length, pixel, relative] =
             self.0.each_ref().map(|value| value.as_ref().map(|(value, _)| *value));
-        Quantities { angle, length, relative }
+        Quantities { angle, length, pixel, relative }
     }
 }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
+use super::camera::Carriers;
 use super::item::Document;
 use super::section::Section;
 use super::target::CarrierJoints;
@@ -98,7 +99,8 @@ fn problem(mut root: Section<'_, '_>) -> Result<Problem, InputError> {
     let targets = target::targets(&mut root, &tool, &carriers)?;
     let base = base(root.section("base")?)?;
     let urdf = root.section("urdf")?.map(urdf).transpose()?;
-    let (fixtures, distances) = fixture::read(&mut root)?;
+    let (fixtures, distances) =
+        fixture::read(&mut root, Carriers { joints: &joints, tool: tool.joint })?;
     let parameters = parameters::read(&mut root)?;
     let constraints = constraints::read(&mut root)?;
     let data = data::read(&mut root)?;

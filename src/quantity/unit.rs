@@ -10,6 +10,8 @@ pub enum Unit {
     Angle,
     /// Length \[m\].
     Length,
+    /// Length in an image \[px\].
+    Pixel,
     /// Mass \[kg\].
     Mass,
     /// Force \[N\].
@@ -153,6 +155,7 @@ impl Unit {
                 const { &[si("m"), suffix("mm", |x| x / 1000.0)] },
                 As(1e3, "mm"),
             ),
+            Self::Pixel => row("a number of pixels", "px", const { &[si("px")] }, Plain),
             Self::Mass => row("a mass", "kg", const { &[si("kg")] }, Plain),
             Self::Force => row("a force", "N", const { &[si("N")] }, Plain),
             Self::Acceleration => row("an acceleration", "m/s²", const { &[si("m_s2")] }, Plain),

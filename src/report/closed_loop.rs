@@ -456,7 +456,7 @@ fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
         let errors = [fitted_rms, mean, rms].map(|error| number(error, 4));
         [vec![(k + 1).to_string(), effects], errors.to_vec()].concat()
     };
-    let rms = ["identification rms, mm", "identification rms, °"];
+    let rms = ["identification rms, mm", "identification rms, °", "identification rms, px"];
     let rms = header(&closure.after.fitted.held_out, rms);
     let header = ["round", "effects in the model", rms, "held out mean", "held out rms"];
     let rows = result.steps.iter().enumerate().map(row).collect();

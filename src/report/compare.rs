@@ -184,7 +184,7 @@ fn parts(comparison: &Comparison) -> Table {
 }
 
 fn side_by_side(comparison: &Comparison, first: &'static str, rows: Vec<Vec<String>>) -> Table {
-    let rms = header(&comparison.joint.fitted.held_out, ["rms, mm", "rms, °"]);
+    let rms = header(&comparison.joint.fitted.held_out, ["rms, mm", "rms, °", "rms, px"]);
     let columns = ROWS.map(|name| if name == "rms, mm" { rms } else { name });
     let header: Vec<&str> = std::iter::once(first).chain(columns).collect();
     Table { minor: vec![1, 4, 5, 6, 7, 8], ..Table::new(&header, rows, &[0, 1, 9]) }

@@ -39,9 +39,13 @@ pub(super) fn unit(of: &ErrorSummary) -> &'static str {
     of.unit().in_tables().symbol
 }
 
-/// Returns the header for errors in the unit of their kind: the one in mm or the one in °.
-pub(super) fn header(of: &ErrorSummary, [mm, degrees]: [&'static str; 2]) -> &'static str {
-    if of.unit() == Unit::Angle { degrees } else { mm }
+/// Returns the header for errors in the unit of their kind: the one in mm, in ° or in px.
+pub(super) fn header(of: &ErrorSummary, [mm, degrees, px]: [&'static str; 3]) -> &'static str {
+    match of.unit() {
+        Unit::Angle => degrees,
+        Unit::Pixel => px,
+        _ => mm,
+    }
 }
 
 /// Returns the cells of a table of errors: poses, arm, mean, rms and largest error.

@@ -202,7 +202,16 @@ pub(super) fn errors<'a>(found: &Identification) -> Vec<Block<'a>> {
         rows,
         &[0, 1],
     ));
-    std::iter::once(table).chain(no_errors(found).map(Block::Note)).collect()
+    let notes = at_points(&after.held_out).into_iter().chain(no_errors(found));
+    std::iter::once(table).chain(notes.map(Block::Note)).collect()
+}
+
+/// States the lengths at the seen points that held-out errors in images stand for.
+fn at_points(held_out: &ErrorSummary) -> Option<String> {
+    let [mean, max, rms] = held_out.at_point?.map(|sizes| number(sizes.norm * 1e3, 4));
+    Some(format!(
+        "At the points seen, held-out errors stand for mean {mean} mm, rms {rms} mm, max {max} mm."
+    ))
 }
 
 /// Names the poses without an equilibrium in an identification.

@@ -164,7 +164,7 @@ pub(super) fn ranking<'a>(
 
 fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
     let show = |value: f64| format!("{} {unit}", number(value.abs(), 4));
-    let gain = candidate.expected_gain_mm.or(candidate.expected_gain_deg).unwrap_or(f64::NAN);
+    let gain = candidate.expected_gain().unwrap_or(f64::NAN);
     let change = |gain: f64| if gain < 0.0 { "rise" } else { "fall" };
     let mut words = format!(
         "p {}; the rms error of the identification poses would {} by {}",
@@ -172,8 +172,7 @@ fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
         change(gain),
         show(gain)
     );
-    if let Some(left_out) = candidate.cross_validated_gain_mm.or(candidate.cross_validated_gain_deg)
-    {
+    if let Some(left_out) = candidate.cross_validated_gain() {
         let changes =
             if change(left_out) == change(gain) { "" } else { &format!("{} ", change(left_out)) };
         let _ = write!(words, ", that of poses left out in turn {changes}by {}", show(left_out));
@@ -188,7 +187,7 @@ fn point(problem: &Problem, candidate: &Candidate, unit: &str) -> Point {
         ));
     }
     if let (Some(pose), Some(first)) = (&candidate.told_apart, candidate.alike.first()) {
-        let difference = pose.difference_mm.or(pose.difference_deg).unwrap_or(f64::NAN);
+        let difference = pose.difference().unwrap_or(f64::NAN);
         details.push(format!(
             "“{}” would differ by {} at {}",
             first.effect.description,

@@ -43,6 +43,8 @@ pub struct LoopResult {
     pub held_out_gain_mm: Option<Gain>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out_gain_deg: Option<Gain>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_gain_px: Option<Gain>,
     /// Effects of the extended problem that were not declared.
     pub effects: Vec<FoundEffect>,
     /// Remainder beside the effects; `after` is with it.
@@ -160,6 +162,8 @@ pub struct Correction {
     pub cross_validated_rms_mm: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_validated_rms_deg: Option<[f64; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cross_validated_rms_px: Option<[f64; 2]>,
 }
 
 /// Row of a file.
@@ -194,7 +198,7 @@ impl LoopResult {
             let select::Interval { value, low, high } = closure.gain;
             Gain { mean: in_unit(value), interval_95: [in_unit(low), in_unit(high)] }
         };
-        let is_angle = held_out.unit() == Unit::Angle;
+        let gain_in = |unit: Unit| (held_out.unit() == unit).then_some(gain);
         let mut structures = closure.unexplained.iter().map(|left| Structure::new(left, before));
         let prior = closure.harmonic_prior.as_ref().map(|prior| {
             let order = |&(order, sigma_rad): &(u32, f64)| OrderPrior { order, sigma_rad };
@@ -210,8 +214,9 @@ impl LoopResult {
             before: Fit::new(&before.fit),
             after: Fit::new(&closure.after),
             with_found: Errors::of(&closure.with_found),
-            held_out_gain_mm: (!is_angle).then_some(gain),
-            held_out_gain_deg: is_angle.then_some(gain),
+            held_out_gain_mm: gain_in(Unit::Length),
+            held_out_gain_deg: gain_in(Unit::Angle),
+            held_out_gain_px: gain_in(Unit::Pixel),
             effects: closure.effects.iter().map(|found| FoundEffect::new(found, before)).collect(),
             remainder: None,
             unexplained: structures.next(),
@@ -272,7 +277,7 @@ impl LoopResult {
 
     /// Returns the decrease of the mean held-out error, in mm or ° as its key says.
     pub(crate) fn gain(&self) -> Option<Gain> {
-        self.held_out_gain_mm.or(self.held_out_gain_deg)
+        self.held_out_gain_mm.or(self.held_out_gain_deg).or(self.held_out_gain_px)
     }
 }
 
@@ -370,7 +375,7 @@ impl Correction {
     fn new(correction: &select::Correction) -> Self {
         let (without, with) = correction.cross_validated;
         let unit = correction.held_out.unit();
-        let [(without_mm, without_deg), (with_mm, with_deg)] =
+        let [(without_mm, without_deg, without_px), (with_mm, with_deg, with_px)] =
             [without, with].map(|value| by_unit(unit, value));
         let range = |(input, range): &(Covariate, (f64, f64))| (input.to_string(), *range);
         Self {
@@ -378,6 +383,7 @@ impl Correction {
             held_out_beyond: correction.beyond,
             cross_validated_rms_mm: without_mm.zip(with_mm).map(Into::into),
             cross_validated_rms_deg: without_deg.zip(with_deg).map(Into::into),
+            cross_validated_rms_px: without_px.zip(with_px).map(Into::into),
         }
     }
 }

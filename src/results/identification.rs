@@ -53,10 +53,12 @@ pub struct IdentificationResult {
     /// Interval of `reduced_chi2` for noise alone, with probability 0.999.
     pub chance: Option<(f64, f64)>,
     pub noise_factor: f64,
-    /// 1 σ of a coordinate in the fit; null if the rows measure angles.
+    /// 1 σ of a coordinate in the fit; null unless the rows measure lengths.
     pub sigma_taken_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma_taken_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sigma_taken_px: Option<f64>,
     pub rank: usize,
     #[serde(flatten)]
     pub conditioning: Conditioning,
@@ -205,6 +207,8 @@ pub struct OutlierRow {
     pub error_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub error_px: Option<f64>,
     /// Length of the whitened residual over the scatter of all rows.
     pub sigmas: f64,
 }
@@ -257,7 +261,7 @@ impl IdentificationResult {
     pub fn new(problem: &Problem, found: &Identification) -> Self {
         let identifiability = found.identifiability();
         let unit = found.fitted.identification.unit();
-        let (sigma_taken_mm, sigma_taken_deg) = by_unit(unit, found.sigma_taken);
+        let (sigma_taken_mm, sigma_taken_deg, sigma_taken_px) = by_unit(unit, found.sigma_taken);
         let name = |k: usize| found.unknowns[k].clone();
         let spread = |(before, after, held_out): &(PointSpread, PointSpread, bool)| {
             let change = SpreadChange {
@@ -296,6 +300,7 @@ impl IdentificationResult {
             noise_factor: found.noise_factor,
             sigma_taken_mm,
             sigma_taken_deg,
+            sigma_taken_px,
             rank: identifiability.rank,
             conditioning: Conditioning::new(identifiability, found.coordinates),
             orientation: found.orientation.as_ref().map(Orientation::new),
@@ -368,13 +373,15 @@ impl Constraint {
 
 impl OutlierRow {
     fn new(outlier: &Outlier) -> Self {
-        let (error_mm, error_deg) = by_unit(kind_named(outlier.kind).unit, outlier.error.norm());
+        let (error_mm, error_deg, error_px) =
+            by_unit(kind_named(outlier.kind).unit, outlier.error.norm());
         Self {
             file: outlier.location.file.display().to_string(),
             line: outlier.location.line,
             pose_row: outlier.row + 1,
             error_mm,
             error_deg,
+            error_px,
             sigmas: outlier.distance,
         }
     }

@@ -32,8 +32,25 @@ pub struct Summary {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Sizes {
-    Lengths { mean_mm: Axes, max_mm: Axes, rms_mm: Axes },
-    Angles { mean_deg: Axes, max_deg: Axes, rms_deg: Axes },
+    Lengths {
+        mean_mm: Axes,
+        max_mm: Axes,
+        rms_mm: Axes,
+    },
+    Angles {
+        mean_deg: Axes,
+        max_deg: Axes,
+        rms_deg: Axes,
+    },
+    /// Errors in an image, and the lengths at the seen points that they stand for.
+    Pixels {
+        mean_px: Axes,
+        max_px: Axes,
+        rms_px: Axes,
+        mean_mm: Option<Axes>,
+        max_mm: Option<Axes>,
+        rms_mm: Option<Axes>,
+    },
 }
 
 impl Summary {
@@ -48,22 +65,30 @@ impl Summary {
         let (axes, unit) = match &self.sizes {
             Sizes::Lengths { mean_mm, max_mm, rms_mm } => ([mean_mm, rms_mm, max_mm], "mm"),
             Sizes::Angles { mean_deg, max_deg, rms_deg } => ([mean_deg, rms_deg, max_deg], "°"),
+            Sizes::Pixels { mean_px, max_px, rms_px, .. } => ([mean_px, rms_px, max_px], "px"),
         };
         (axes.map(|axes| axes.norm), unit)
     }
 }
 
 impl Sizes {
-    /// Converts sizes in `unit` [m] or \[rad\] to mm or °.
+    /// Converts sizes in `unit` [m], \[rad\] or \[px\] to mm, ° or px.
     fn of(errors: &ErrorSummary, unit: Unit) -> Self {
-        let factor = unit.in_tables().factor;
-        let axes = |values: &AxisValues| {
+        let axes = |values: &AxisValues, factor: f64| {
             let [x, y, z, norm] =
                 [values.x, values.y, values.z, values.norm].map(|value| value * factor);
             Axes { x, y, z, norm }
         };
-        let [mean, max, rms] = [&errors.mean, &errors.max, &errors.rms].map(axes);
+        let [mean, max, rms] = [&errors.mean, &errors.max, &errors.rms]
+            .map(|values| axes(values, unit.in_tables().factor));
         match unit {
+            Unit::Pixel => {
+                let millimetres = Unit::Length.in_tables().factor;
+                let at_point = errors.at_point.map(|sizes| sizes.map(|of| axes(&of, millimetres)));
+                let at_point = |k: usize| at_point.map(|sizes| sizes[k]);
+                let (mean_mm, max_mm, rms_mm) = (at_point(0), at_point(1), at_point(2));
+                Self::Pixels { mean_px: mean, max_px: max, rms_px: rms, mean_mm, max_mm, rms_mm }
+            }
             Unit::Angle => Self::Angles { mean_deg: mean, max_deg: max, rms_deg: rms },
             _ => Self::Lengths { mean_mm: mean, max_mm: max, rms_mm: rms },
         }
@@ -116,11 +141,12 @@ impl KindErrors {
     }
 }
 
-/// Splits a value \[m\] or \[rad\] between the keys `…_mm` and `…_deg`, converted to their unit.
-pub(super) fn by_unit(unit: Unit, value: f64) -> (Option<f64>, Option<f64>) {
+/// Splits a value \[m\], \[rad\] or \[px\] between the keys `…_mm`, `…_deg` and `…_px`, converted to
+/// their unit.
+pub(super) fn by_unit(unit: Unit, value: f64) -> (Option<f64>, Option<f64>, Option<f64>) {
     let value = value * unit.in_tables().factor;
     let only = |wanted: Unit| (unit == wanted).then_some(value);
-    (only(Unit::Length), only(Unit::Angle))
+    (only(Unit::Length), only(Unit::Angle), only(Unit::Pixel))
 }
 
 /// Returns the number of rows of all kinds in one part of the data.

@@ -65,10 +65,14 @@ pub struct Candidate {
     pub expected_gain_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_gain_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected_gain_px: Option<f64>,
     /// Decrease of the rms error of poses left out in turn.
     pub cross_validated_gain_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_validated_gain_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cross_validated_gain_px: Option<f64>,
     /// Effects confounded with it.
     pub alike: Vec<Confounded>,
     /// Pose that would tell the effect from the first confounded one.
@@ -102,6 +106,8 @@ pub struct ToldApart {
     pub difference_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub difference_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub difference_px: Option<f64>,
 }
 
 /// Set of hypotheses that act together.
@@ -156,18 +162,36 @@ impl TraceResult {
     }
 }
 
+impl ToldApart {
+    /// Returns the difference in the unit of the errors.
+    pub fn difference(&self) -> Option<f64> {
+        self.difference_mm.or(self.difference_deg).or(self.difference_px)
+    }
+}
+
 impl Candidate {
+    /// Returns the expected gain in the unit of the errors.
+    pub fn expected_gain(&self) -> Option<f64> {
+        self.expected_gain_mm.or(self.expected_gain_deg).or(self.expected_gain_px)
+    }
+
+    /// Returns the gain of poses left out in the unit of the errors.
+    pub fn cross_validated_gain(&self) -> Option<f64> {
+        let angle = self.cross_validated_gain_deg;
+        self.cross_validated_gain_mm.or(angle).or(self.cross_validated_gain_px)
+    }
+
     fn new(ranked: &select::Ranked, trace: &Trace, errors: &ErrorSummary) -> Self {
         let by_unit = |value: f64| by_unit(errors.unit(), value);
-        let (expected_gain_mm, expected_gain_deg) = by_unit(ranked.gain);
-        let (cross_validated_gain_mm, cross_validated_gain_deg) =
-            ranked.cross_validated.map_or((None, None), by_unit);
+        let (expected_gain_mm, expected_gain_deg, expected_gain_px) = by_unit(ranked.gain);
+        let (cross_validated_gain_mm, cross_validated_gain_deg, cross_validated_gain_px) =
+            ranked.cross_validated.map_or((None, None, None), by_unit);
         let alike = |(effect, angle): &(Effect, f64)| Confounded {
             effect: NamedEffect::new(effect, trace),
             angle_deg: angle.to_degrees(),
         };
         let told_apart = |pose: &TellingPose| {
-            let (difference_mm, difference_deg) = by_unit(pose.difference);
+            let (difference_mm, difference_deg, difference_px) = by_unit(pose.difference);
             ToldApart {
                 from: pose.other.clone(),
                 q: pose.configuration.clone(),
@@ -177,6 +201,7 @@ impl Candidate {
                 temperature: pose.temperature,
                 difference_mm,
                 difference_deg,
+                difference_px,
             }
         };
         Self {
@@ -186,8 +211,10 @@ impl Candidate {
             freedom: ranked.f.1,
             expected_gain_mm,
             expected_gain_deg,
+            expected_gain_px,
             cross_validated_gain_mm,
             cross_validated_gain_deg,
+            cross_validated_gain_px,
             alike: ranked.alike.iter().map(alike).collect(),
             told_apart: ranked.telling_pose.as_ref().map(told_apart),
         }

@@ -41,6 +41,8 @@ impl Rig {
             FixtureKind::Plane => {
                 scalar(plane_normal(position.x, position.y).dot(target) - position.z)
             }
+            // The rig takes no images.
+            _ => Vector3::zeros(),
         }
     }
 
@@ -83,12 +85,8 @@ impl Rig {
                 row.orientation = None;
                 return Ok(Some(()));
             }
-            Observation::Position | Observation::Between(..) => {
-                let (position, orientation) = self.pose_of(&row.target, &row.conditions)?;
-                row.position += position;
-                row.orientation = row.orientation.map(|noise| noise * orientation);
-                return Ok(Some(()));
-            }
+            Observation::Point(fixture) => (fixture, noise),
+            Observation::Surface(fixture) => (fixture, Vector3::new(noise.x, 0.0, 0.0)),
             Observation::Distance(anchor) => {
                 let (target, _) = self.placed(&row.target, &row.conditions)?;
                 row.position =
@@ -96,8 +94,12 @@ impl Rig {
                 row.orientation = None;
                 return Ok(Some(()));
             }
-            Observation::Point(fixture) => (fixture, noise),
-            Observation::Surface(fixture) => (fixture, Vector3::new(noise.x, 0.0, 0.0)),
+            _ => {
+                let (position, orientation) = self.pose_of(&row.target, &row.conditions)?;
+                row.position += position;
+                row.orientation = row.orientation.map(|noise| noise * orientation);
+                return Ok(Some(()));
+            }
         };
         (row.position, row.orientation) = (Vector3::zeros(), None);
         let (count, measured) = (row.observation.coordinates(), row.target.clone());

@@ -2,7 +2,7 @@
 
 use super::truth::HeldOutRows;
 use crate::error::{InputError, InputErrorKind};
-use crate::problem::fixture::frame;
+use crate::problem::frame::frame;
 use crate::problem::item::Item;
 use crate::problem::section::Section;
 use crate::problem::{Joint, JointKind, PoseRanges, Problem};

@@ -132,7 +132,7 @@ fn either_unit_of_a_kind_will_do() {
     let Freedom::Free { sigma, min, .. } = &degrees.parameters[0].freedom else {
         panic!("joint* is free")
     };
-    assert_eq!(*sigma, Quantities { angle: Some(1.0), length: Some(1.0), relative: None });
+    assert_eq!(*sigma, Quantities { angle: Some(1.0), length: Some(1.0), ..Quantities::default() });
     assert_eq!(min.length, Some(-1e-3));
 }
 

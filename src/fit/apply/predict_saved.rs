@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::{DVector, Vector3};
 
-use crate::error::InputError;
+use crate::error::{InputError, InputErrorKind};
 use crate::fit::apply::predict::{Residual, in_space};
 use crate::fit::apply::saved_estimate::{SavedEstimate, SavedEstimateError};
 use crate::fit::checks::point_spread::{PointSpread, spreads};
@@ -21,6 +21,7 @@ use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::ParameterSite;
 use crate::model::{Model, Pose};
+use crate::observation::Needs;
 use crate::problem::{Observation, Problem};
 
 /// Part of a parameter in an undetermined combination beyond which it is not determined.
@@ -187,6 +188,13 @@ pub fn predict(
     let base_of: Vec<usize> = poses.iter().map(|pose| pose.base).collect();
     let spreads = spreads(&model, &problem.fixtures, &poses, &x);
     let errors = model.residuals(poses, &x);
+    let is_behind = |&row: &usize| {
+        let is_of_camera = rows.observation(row).description().needs == Needs::Carriers;
+        is_of_camera && rows.position_measured && targets[row].is_some() && errors[row].x.is_nan()
+    };
+    if let Some(row) = (0..rows.len()).find(is_behind) {
+        return Err(rows.location(row).error(InputErrorKind::PointBehindCamera).into());
+    }
     let (fixtures, bases) = (model.fixtures(x.as_slice()), model.base_frames(x.as_slice()));
     let of_row =
         |(row, error): (usize, &Vector3<f64>)| in_space(rows, row, (&fixtures, &bases), error);

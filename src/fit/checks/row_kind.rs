@@ -49,6 +49,7 @@ pub(crate) fn size(kind: &str, error: f64, decimals: usize) -> String {
     match kind_named(kind).unit {
         _ if !error.is_finite() => "more than numbers hold".to_owned(),
         Unit::Angle => format!("{:.*}°", decimals + 1, error.to_degrees()),
+        Unit::Pixel => format!("{error:.decimals$} px"),
         _ if error < HUGE => format!("{:.*} mm", decimals, error * 1e3),
         _ => format!("{:.2e} mm", error * 1e3),
     }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::DVector;
 
+use crate::error::{InputError, InputErrorKind};
 use crate::fit::errors::of_kind;
 use crate::fit::stages::alternation::{Alternation, Anderson, contraction};
 use crate::fit::stages::custom_solver::CustomSolver;
@@ -20,7 +21,9 @@ use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Parameter;
 use crate::model::{LinearModel, Model, Pose};
+use crate::observation::Needs;
 use crate::problem::Observation;
+use crate::quantity::Unit;
 
 /// Maximum number of sweeps of a sequential strategy.
 const MAX_SWEEPS: usize = 500;
@@ -210,16 +213,36 @@ impl<'a> Fitting<'a> {
         (!unknowns.is_empty()).then(|| Stage { counts_fixed: true, ..self.placing(rows, unknowns) })
     }
 
-    /// Returns the first row whose pose has no equilibrium on the nominal arm.
-    pub fn without_equilibrium(&self) -> Option<usize> {
-        let rows: Vec<usize> = (0..self.measurements.len()).collect();
-        let errors = self.position_errors(&rows, &DVector::zeros(self.model.parameters.len()));
-        errors.iter().position(|error| error.x.is_nan())
+    /// Returns the error of the first row that cannot be predicted with the nominal arm: its pose
+    /// has no equilibrium, or it sees a point behind a camera.
+    pub fn unpredictable(&self) -> Option<InputError> {
+        let is_of_camera = |row: &usize| {
+            let kind = self.measurements.observation(*row).description();
+            kind.needs == Needs::Carriers
+        };
+        let (of_cameras, others): (Vec<usize>, Vec<usize>) =
+            (0..self.measurements.len()).partition(is_of_camera);
+        let lost = |rows: &[usize], x: &DVector<f64>, kind| {
+            let errors = self.position_errors(rows, x);
+            let place = errors.iter().position(|error| error.x.is_nan())?;
+            Some(self.measurements.location(rows[place]).error(kind))
+        };
+        let x = DVector::zeros(self.model.parameters.len());
+        let behind = || {
+            let carriers = self.model.carrier_frames(&self.poses(&of_cameras), x.as_slice());
+            let place = carriers.iter().position(Option::is_none);
+            let kind = InputErrorKind::NoEquilibrium;
+            let lost_pose = place.map(|k| self.measurements.location(of_cameras[k]).error(kind));
+            let behind = InputErrorKind::PointBehindCamera;
+            lost_pose.or_else(|| lost(&of_cameras, &self.located(), behind))
+        };
+        lost(&others, &x, InputErrorKind::NoEquilibrium)
+            .or_else(|| if of_cameras.is_empty() { None } else { behind() })
     }
 
-    /// Returns the full parameter vector of the registered nominal arm: bases and targets are
-    /// fitted where they are free.
-    pub fn registered(&self) -> Result<DVector<f64>, StageError> {
+    /// Returns the full parameter vector of the nominal arm with bases, targets and fixtures in
+    /// closed form where they are free.
+    fn located(&self) -> DVector<f64> {
         let mut x = DVector::zeros(self.model.parameters.len());
         let mut poses = self.poses(&self.split.identification);
         let mut known = vec![false; self.placement.bases.len()];
@@ -237,6 +260,13 @@ impl<'a> Fitting<'a> {
             &mut x,
         );
         locate(self.model, &self.poses(&later.rows), |k| later.parameters[k], &mut x);
+        x
+    }
+
+    /// Returns the full parameter vector of the registered nominal arm: bases and targets are
+    /// fitted where they are free.
+    pub fn registered(&self) -> Result<DVector<f64>, StageError> {
+        let mut x = self.located();
         let placements = self.choose(|parameter| parameter.site.is_placement());
         if !placements.is_empty() {
             x = self.placing(&self.split.identification, placements).run(&x)?.x;
@@ -359,7 +389,13 @@ impl<'a> Fitting<'a> {
 
     fn errors_of(&self, kind: Observation, x: &DVector<f64>) -> Errors {
         let of = |rows: &[usize]| {
-            of_kind(self.measurements, rows.iter().copied(), &self.position_errors(rows, x), kind)
+            let errors = self.position_errors(rows, x);
+            let summary = of_kind(self.measurements, rows.iter().copied(), &errors, kind);
+            if kind.description().unit == Unit::Pixel {
+                summary.with_lengths(&self.model.lengths_at_points(&self.poses(rows), &errors, x))
+            } else {
+                summary
+            }
         };
         Errors {
             identification: of(&self.split.identification),

@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen, Vector3};
 
+use super::camera_start::poses_from_views;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::model::{Model, Pose};
 use crate::problem::FixtureKind;
@@ -42,6 +43,7 @@ pub(crate) fn locate(
     if free.is_empty() {
         return;
     }
+    locate_cameras(model, poses, &free, x);
     let bases = model.base_frames(x.as_slice());
     let points = model.predicted_targets_in_base(poses, x.as_slice());
     let mut first = 0;
@@ -68,6 +70,31 @@ pub(crate) fn locate(
     }
 }
 
+/// Sets the poses of cameras and markers of which all six coordinates are free.
+fn locate_cameras(
+    model: &Model,
+    poses: &[Pose],
+    free: &[(usize, FixtureKind, usize, usize)],
+    x: &mut DVector<f64>,
+) {
+    let of_pose = |fixture: usize| {
+        free.iter()
+            .filter(move |(of, kind, axis, _)| *of == fixture && kind.has_pose() && *axis < 6)
+    };
+    let mut wanted: Vec<usize> = free.iter().map(|(fixture, ..)| *fixture).collect();
+    wanted.dedup();
+    wanted.retain(|&fixture| of_pose(fixture).count() == 6);
+    if wanted.is_empty() {
+        return;
+    }
+    for (fixture, pose) in poses_from_views(model, poses, &wanted, x) {
+        let (at, turn) = (pose.translation.vector, pose.rotation.scaled_axis());
+        for (&(.., k), number) in of_pose(fixture).zip(at.iter().chain(&turn)) {
+            x[k] = number - model.parameters[k].nominal;
+        }
+    }
+}
+
 /// Returns the parameters of a fixture that fit the contacts best: predicted points with the
 /// measured distances or offsets there \[m\].
 fn found(
@@ -87,6 +114,7 @@ fn found(
             numbers(place, radius)
         }
         FixtureKind::Plane => plane(contacts, base),
+        FixtureKind::Camera | FixtureKind::Fisheye | FixtureKind::Marker => return None,
     };
     all.iter().all(|number| number.is_finite()).then_some(all)
 }

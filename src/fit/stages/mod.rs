@@ -2,10 +2,12 @@
 
 pub(super) mod active_limits;
 pub(super) mod alternation;
+mod camera_start;
 pub(super) mod constraints;
 pub(super) mod custom_solver;
 pub(super) mod fitting;
 pub(super) mod fixture_location;
+mod marker_pose;
 pub(super) mod noise_model;
 pub(super) mod parameter_size;
 pub(super) mod placement;

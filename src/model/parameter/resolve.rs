@@ -318,7 +318,7 @@ fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), Inp
     let Freedom::Free { sigma, min, max } = &rule.freedom else { return Ok(()) };
     let fail = |kind| Err(rule.location.clone().error(kind));
     let given = |unit| [sigma, min, max].iter().any(|q| of_kind(q, unit).is_some());
-    let kinds = [Unit::Angle, Unit::Length, Unit::TorsionalStiffness];
+    let kinds = [Unit::Angle, Unit::Length, Unit::Pixel, Unit::TorsionalStiffness];
     if !kinds.iter().any(|&unit| given(unit)) {
         return Ok(());
     }
@@ -359,6 +359,7 @@ fn suffixes(unit: Unit) -> &'static str {
     match unit {
         Unit::Angle => "_deg or _rad",
         Unit::Length => "_mm or _m",
+        Unit::Pixel => "_px",
         Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => "_relative",
         _ => "free = true or fixed = true",
     }
@@ -368,6 +369,7 @@ fn of_kind(quantities: &Quantities, unit: Unit) -> Option<f64> {
     match unit {
         Unit::Angle => quantities.angle,
         Unit::Length => quantities.length,
+        Unit::Pixel => quantities.pixel,
         Unit::TorsionalStiffness | Unit::AxialRigidity | Unit::FlexuralRigidity => {
             quantities.relative
         }

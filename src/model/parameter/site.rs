@@ -155,8 +155,11 @@ impl ParameterSite {
         matches!(self, Self::Target { axis: 3.., .. })
     }
 
-    /// Returns true for the set-up (base, target, fixture), false for the arm.
+    /// Returns true for the set-up (base, target, place of a fixture), false for the arm and lenses.
     pub fn is_placement(self) -> bool {
-        matches!(self, Self::Base { .. } | Self::Target { .. } | Self::Fixture { .. })
+        match self {
+            Self::Fixture { kind, axis, .. } => !kind.has_pose() || axis < 6,
+            _ => matches!(self, Self::Base { .. } | Self::Target { .. }),
+        }
     }
 }

@@ -6,7 +6,6 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::model::CentreLine;
-use crate::observation::Needs;
 use crate::quantity::format::{mm, number};
 use crate::results::{CommandedJoint, PlotData, Point};
 
@@ -156,18 +155,21 @@ fn without_positions(data: &PlotData) -> String {
     } else {
         "are omitted: no row measures a position"
     };
-    let tilts = if data
-        .residuals
-        .iter()
-        .any(|residual| residual.observation.description().needs == Needs::Frame)
-    {
-        "; tilts have no position"
-    } else {
-        ""
+    let mut placeless: Vec<&str> = Vec::new();
+    for observation in data.residuals.iter().map(|residual| residual.observation) {
+        let kind = observation.description();
+        let has_place = observation.measures_length() || !observation.is_of_arm();
+        if !has_place && !placeless.contains(&kind.measured) {
+            placeless.push(kind.measured);
+        }
+    }
+    let placeless = match placeless.join(" and ") {
+        words if words.is_empty() => words,
+        words => format!("; {words} have no position"),
     };
     format!(
         "Figures of errors along axes, of residual vectors and of residuals in order {figures}. In the view of the arm, contacts and \
-         distances are at the target of the fitted arm, single values without a line{tilts}."
+         distances are at the target of the fitted arm, single values without a line{placeless}."
     )
 }
 

@@ -1,0 +1,195 @@
+//! Start poses of cameras and markers without a guess, by linear solutions from the views.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Rotation3, SMatrix, Translation3, Vector3};
+
+use super::marker_pose::{marker_in_camera, nearest_rotation};
+use crate::model::{Model, Pose};
+use crate::observation::{FixtureValues, Needs};
+use crate::spatial::Frame;
+
+/// Ratio of the second smallest to the largest singular value of the rotations below which the
+/// views leave the pose of camera and marker open.
+const MIN_RATIO: f64 = 1e-4;
+/// Count of views with a pose each from which camera and marker are solved together.
+const MIN_VIEWS: usize = 3;
+
+/// View of a marker by a camera in one configuration.
+struct View {
+    camera: usize,
+    marker: usize,
+    /// Frame of the camera's carrier in the frame of the marker's carrier.
+    carrier: Isometry3<f64>,
+    /// Marker in the camera's frame.
+    marker_in_camera: Isometry3<f64>,
+}
+
+/// Returns the poses of the `wanted` cameras and markers in the frames that carry them, as far as
+/// the `poses` at the full parameter vector `x` determine them.
+///
+/// In each view, the marker's pose V in the camera's frame follows from its points. With the pose A
+/// of the camera's carrier in the marker's, A C V = M for the poses C of the camera and M of the
+/// marker; if both are unknown, all views of the pair give them together [Shah 2013].
+pub(super) fn poses_from_views(
+    model: &Model,
+    poses: &[Pose],
+    wanted: &[usize],
+    x: &DVector<f64>,
+) -> BTreeMap<usize, Isometry3<f64>> {
+    let fixtures = model.fixtures(x.as_slice());
+    let views = views(model, poses, &fixtures, x);
+    let declared = (0..fixtures.len()).filter(|fixture| !wanted.contains(fixture));
+    let mut known: BTreeMap<usize, Isometry3<f64>> =
+        declared.map(|fixture| (fixture, isometry(&fixtures[fixture].frame()))).collect();
+    loop {
+        let half_known = views
+            .iter()
+            .find(|view| known.contains_key(&view.camera) != known.contains_key(&view.marker));
+        if let Some(view) = half_known {
+            let (fixture, pose) = match known.get(&view.camera) {
+                Some(camera) => {
+                    let marker = |view: &View| view.carrier * camera * view.marker_in_camera;
+                    let of_pair =
+                        |other: &&View| (other.camera, other.marker) == (view.camera, view.marker);
+                    (view.marker, mean(views.iter().filter(of_pair).map(marker)))
+                }
+                None => {
+                    let marker = known.get(&view.marker).copied().unwrap_or_default();
+                    let camera = |view: &View| {
+                        view.carrier.inverse() * marker * view.marker_in_camera.inverse()
+                    };
+                    let of_pair =
+                        |other: &&View| (other.camera, other.marker) == (view.camera, view.marker);
+                    (view.camera, mean(views.iter().filter(of_pair).map(camera)))
+                }
+            };
+            known.insert(fixture, pose);
+            continue;
+        }
+        let mut of_pairs: BTreeMap<(usize, usize), Vec<&View>> = BTreeMap::new();
+        for view in views.iter().filter(|view| !known.contains_key(&view.camera)) {
+            of_pairs.entry((view.camera, view.marker)).or_default().push(view);
+        }
+        let mut by_count: Vec<_> = of_pairs.into_iter().collect();
+        by_count.sort_by_key(|(_, views)| std::cmp::Reverse(views.len()));
+        let solved = by_count
+            .iter()
+            .find_map(|((camera, marker), views)| Some((*camera, *marker, both(views)?)));
+        let Some((camera, marker, [of_camera, of_marker])) = solved else { break };
+        known.insert(camera, of_camera);
+        known.insert(marker, of_marker);
+    }
+    known.retain(|fixture, _| wanted.contains(fixture));
+    known
+}
+
+/// Returns the views in which enough points determine the marker's pose.
+fn views(
+    model: &Model,
+    poses: &[Pose],
+    fixtures: &[FixtureValues<f64>],
+    x: &DVector<f64>,
+) -> Vec<View> {
+    let of_cameras =
+        poses.iter().filter(|pose| pose.observation.description().needs == Needs::Carriers);
+    let of_cameras: Vec<Pose> = of_cameras.copied().collect();
+    let carriers = model.carrier_frames(&of_cameras, x.as_slice());
+    let bits = |frame: &Frame<f64>| -> Vec<u64> {
+        let numbers = frame.axes.iter().chain([&frame.origin]).flatten();
+        numbers.map(|number| number.to_bits()).collect()
+    };
+    let mut points: BTreeMap<_, Vec<(Vector3<f64>, [f64; 2])>> = BTreeMap::new();
+    let mut carriers_of = BTreeMap::new();
+    for (pose, carriers) in of_cameras.iter().zip(carriers) {
+        let ([Some(camera), Some(marker)], Some(carriers)) =
+            (pose.observation.fixtures(), carriers)
+        else {
+            continue;
+        };
+        let key = (camera, marker, bits(&carriers[0]), bits(&carriers[1]));
+        carriers_of.insert(key.clone(), carriers);
+        let pixel = [pose.measured.x, pose.measured.y];
+        points.entry(key).or_default().push((model.fixture_point(pose.observation), pixel));
+    }
+    let view = |(key, points): (_, Vec<_>)| {
+        let [of_camera, of_marker] = carriers_of.get(&key)?.each_ref().map(isometry);
+        let (camera, marker, ..) = key;
+        Some(View {
+            camera,
+            marker,
+            carrier: of_marker.inverse() * of_camera,
+            marker_in_camera: marker_in_camera(&fixtures[camera], &points)?,
+        })
+    };
+    points.into_iter().filter_map(view).collect()
+}
+
+/// Returns the poses of camera and marker from all views of the pair, A C V = M; `None` if the
+/// views leave them open.
+///
+/// For the rotations, (Vᵀ ⊗ A) vec C − vec M = 0 is linear; for the translations,
+/// A t_C − t_M = −t_A − A C t_V.
+fn both(views: &[&View]) -> Option<[Isometry3<f64>; 2]> {
+    if views.len() < MIN_VIEWS {
+        return None;
+    }
+    let mut normal = SMatrix::<f64, 18, 18>::zeros();
+    for view in views {
+        let turn = |pose: &Isometry3<f64>| *pose.rotation.to_rotation_matrix().matrix();
+        let of_camera = turn(&view.marker_in_camera).transpose().kronecker(&turn(&view.carrier));
+        let mut rows = SMatrix::<f64, 9, 18>::zeros();
+        rows.fixed_view_mut::<9, 9>(0, 0).copy_from(&of_camera);
+        rows.fixed_view_mut::<9, 9>(0, 9).fill_with_identity();
+        rows.fixed_view_mut::<9, 9>(0, 9).neg_mut();
+        normal += rows.transpose() * rows;
+    }
+    let eigen = normal.symmetric_eigen();
+    let mut order: Vec<usize> = (0..18).collect();
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    let largest = eigen.eigenvalues[order[17]];
+    if eigen.eigenvalues[order[1]] < MIN_RATIO * MIN_RATIO * largest {
+        return None;
+    }
+    let solution = eigen.eigenvectors.column(order[0]);
+    let matrix = |first: usize| Matrix3::from_fn(|i, j| solution[first + 3 * j + i]);
+    let sign = matrix(0).determinant().signum();
+    let [camera, marker] =
+        [0, 9].map(|first| Rotation3::from_matrix(&nearest_rotation(&(matrix(first) * sign))));
+    let mut matrix = DMatrix::zeros(3 * views.len(), 6);
+    let mut right = DVector::zeros(3 * views.len());
+    for (k, view) in views.iter().enumerate() {
+        let turn = view.carrier.rotation.to_rotation_matrix();
+        matrix.fixed_view_mut::<3, 3>(3 * k, 0).copy_from(turn.matrix());
+        matrix.fixed_view_mut::<3, 3>(3 * k, 3).copy_from(&-Matrix3::identity());
+        let shift = view.carrier.translation.vector
+            + turn * (camera * view.marker_in_camera.translation.vector);
+        right.fixed_rows_mut::<3>(3 * k).copy_from(&-shift);
+    }
+    let size = matrix.amax();
+    let solved = matrix.svd(true, true).solve(&right, 1e-9 * size).ok()?;
+    let pose = |first: usize, rotation: Rotation3<f64>| {
+        let translation = Vector3::new(solved[first], solved[first + 1], solved[first + 2]);
+        Isometry3::from_parts(Translation3::from(translation), rotation.into())
+    };
+    let found = [pose(0, camera), pose(3, marker)];
+    found.iter().all(|pose| pose.translation.vector.iter().all(|x| x.is_finite())).then_some(found)
+}
+
+/// Returns the mean of poses: that of the positions, and the rotation nearest to the mean matrix.
+fn mean(poses: impl Iterator<Item = Isometry3<f64>>) -> Isometry3<f64> {
+    let (mut turn, mut shift, mut count) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
+    for pose in poses {
+        turn += pose.rotation.to_rotation_matrix().matrix();
+        shift += pose.translation.vector;
+        count += 1.0;
+    }
+    let rotation = Rotation3::from_matrix(&nearest_rotation(&turn));
+    Isometry3::from_parts(Translation3::from(shift / count), rotation.into())
+}
+
+/// Returns a frame as a rigid motion.
+fn isometry(frame: &Frame<f64>) -> Isometry3<f64> {
+    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&frame.axes));
+    Isometry3::from_parts(Translation3::from(frame.origin), rotation.into())
+}

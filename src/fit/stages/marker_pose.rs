@@ -1,0 +1,124 @@
+//! Pose of a marker in the frame of a camera that sees it.
+
+use nalgebra::{
+    DMatrix, Isometry3, Matrix3, Rotation3, SMatrix, SVector, SymmetricEigen, Translation3,
+    UnitQuaternion, Vector3,
+};
+
+use crate::observation::{FixtureValues, slopes_of_pixel};
+
+/// Ratio of the smallest to the largest spread of points below which they lie in a plane.
+const IN_A_PLANE: f64 = 1e-6;
+/// Count of points that determine a pose: in a plane, and in space.
+const MIN_POINTS: [usize; 2] = [4, 6];
+/// Count of Gauss–Newton steps of the refinement.
+const REFINEMENT_STEPS: usize = 10;
+
+/// Returns the pose of a marker in the camera's frame from its points and their pixels, by the
+/// direct linear transform and a refinement; `None` if the points do not determine it.
+pub(super) fn marker_in_camera(
+    camera: &FixtureValues<f64>,
+    points: &[(Vector3<f64>, [f64; 2])],
+) -> Option<Isometry3<f64>> {
+    let slopes: Vec<[f64; 2]> =
+        points.iter().map(|(_, pixel)| slopes_of_pixel(camera, *pixel)).collect();
+    let places: Vec<Vector3<f64>> = points.iter().map(|(place, _)| *place).collect();
+    let start = linear_pose(&places, &slopes)?;
+    refined(start, &places, &slopes)
+}
+
+/// Returns the pose by the direct linear transform: in axes of least spread, the columns of the
+/// matrix (r₁ r₂ t), or (r₁ r₂ r₃ t) for points in space, up to scale.
+fn linear_pose(places: &[Vector3<f64>], slopes: &[[f64; 2]]) -> Option<Isometry3<f64>> {
+    let middle = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
+    let spread: Matrix3<f64> =
+        places.iter().map(|place| (place - middle) * (place - middle).transpose()).sum();
+    let eigen = SymmetricEigen::new(spread);
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[b].total_cmp(&eigen.eigenvalues[a]));
+    let [first, second, third] = order.map(|k| eigen.eigenvalues[k].max(0.0).sqrt());
+    let is_flat = third < IN_A_PLANE * first;
+    let (least, columns) = if is_flat { (MIN_POINTS[0], 3) } else { (MIN_POINTS[1], 4) };
+    if places.len() < least || second < IN_A_PLANE * first {
+        return None;
+    }
+    let [x, y] = [0, 1].map(|k| eigen.eigenvectors.column(order[k]).into_owned());
+    let axes = Matrix3::from_columns(&[x, y, x.cross(&y)]);
+    let scale = first / (places.len() as f64).sqrt();
+    let mut matrix = DMatrix::zeros(2 * places.len(), 3 * columns);
+    for (k, (place, slope)) in places.iter().zip(slopes).enumerate() {
+        let local = axes.transpose() * (place - middle) / scale;
+        let mut entries = local.as_slice()[..columns - 1].to_vec();
+        entries.push(1.0);
+        for (column, entry) in entries.into_iter().enumerate() {
+            for axis in 0..2 {
+                matrix[(2 * k + axis, 3 * column + axis)] = entry;
+                matrix[(2 * k + axis, 3 * column + 2)] = -entry * slope[axis];
+            }
+        }
+    }
+    let normal = SymmetricEigen::new(matrix.transpose() * &matrix);
+    let smallest = normal.eigenvalues.imin();
+    let solution = normal.eigenvectors.column(smallest);
+    let column = |k: usize| Vector3::new(solution[3 * k], solution[3 * k + 1], solution[3 * k + 2]);
+    let shift = column(columns - 1);
+    // The points are in front of the camera.
+    let sign = if shift.z < 0.0 { -1.0 } else { 1.0 };
+    let [first, second] = [column(0) * sign, column(1) * sign];
+    let third = if is_flat { first.cross(&second) } else { column(2) * sign };
+    let length = if is_flat {
+        (first.norm() + second.norm()) / 2.0
+    } else {
+        (first.norm() + second.norm() + third.norm()) / 3.0
+    };
+    let third = if is_flat { third / length } else { third };
+    let turn = nearest_rotation(&Matrix3::from_columns(&[first, second, third]));
+    let rotation = Rotation3::from_matrix(&(turn * axes.transpose()));
+    let shift = shift * sign * scale / length - rotation * middle;
+    shift
+        .iter()
+        .all(|x| x.is_finite())
+        .then(|| Isometry3::from_parts(Translation3::from(shift), rotation.into()))
+}
+
+/// Returns the pose with the least squared errors of the slopes, by Gauss–Newton steps from
+/// `start`; `None` if a point lies behind the camera.
+fn refined(
+    mut pose: Isometry3<f64>,
+    places: &[Vector3<f64>],
+    slopes: &[[f64; 2]],
+) -> Option<Isometry3<f64>> {
+    for _ in 0..REFINEMENT_STEPS {
+        let (mut normal, mut right) = (SMatrix::<f64, 6, 6>::zeros(), SVector::<f64, 6>::zeros());
+        for (place, slope) in places.iter().zip(slopes) {
+            let turned = pose.rotation * place;
+            let seen = turned + pose.translation.vector;
+            if seen.z <= 0.0 {
+                return None;
+            }
+            for axis in 0..2 {
+                let mut by_seen = Vector3::zeros();
+                by_seen[axis] = 1.0 / seen.z;
+                by_seen.z = -seen[axis] / (seen.z * seen.z);
+                let by_turn = turned.cross(&by_seen);
+                let row = SVector::<f64, 6>::from_iterator(by_seen.iter().chain(&by_turn).copied());
+                normal += row * row.transpose();
+                right += row * (slope[axis] - seen[axis] / seen.z);
+            }
+        }
+        let step = normal.cholesky()?.solve(&right);
+        pose.translation.vector += step.fixed_rows::<3>(0);
+        let turn = UnitQuaternion::from_scaled_axis(step.fixed_rows::<3>(3).into_owned());
+        pose.rotation = turn * pose.rotation;
+    }
+    let in_front = places.iter().all(|place| (pose * nalgebra::Point3::from(*place)).z > 0.0);
+    in_front.then_some(pose)
+}
+
+/// Returns the rotation matrix nearest to a matrix.
+pub(super) fn nearest_rotation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
+    let svd = matrix.svd(true, true);
+    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Matrix3::identity() };
+    let mirror = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v_t).determinant().signum()));
+    u * mirror * v_t
+}

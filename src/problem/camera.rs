@@ -1,0 +1,114 @@
+//! Reader of `[[camera]]` and `[[marker]]`: cameras and what they see.
+
+use nalgebra::Vector3;
+
+use super::frame::frame;
+use super::item::Item;
+use super::joint::Joint;
+use super::section::Section;
+
+use crate::error::{InputError, InputErrorKind};
+use crate::observation::FixtureKind;
+use crate::quantity::Unit;
+
+/// Maximum number of points of a marker.
+const MAX_POINTS: usize = 10_000;
+
+/// Arm whose frames may carry a camera or a marker: its joints, and the joint of the tool.
+#[derive(Clone, Copy)]
+pub(super) struct Carriers<'a> {
+    pub joints: &'a [Joint],
+    pub tool: usize,
+}
+
+/// Declared properties of a fixture, with the fields of [`Fixture`](super::Fixture).
+pub(super) struct Declared {
+    pub kind: FixtureKind,
+    pub known: Vec<Option<f64>>,
+    pub carrier: Option<usize>,
+    pub points: Vec<Vector3<f64>>,
+    pub sigma: Option<f64>,
+}
+
+impl Declared {
+    /// Creates the properties of a fixture that stands in the measuring frame.
+    pub fn new(kind: FixtureKind, known: Vec<Option<f64>>) -> Self {
+        Self { kind, known, carrier: None, points: Vec::new(), sigma: None }
+    }
+}
+
+/// Reads the remaining keys of a camera.
+pub(super) fn camera(
+    section: &mut Section<'_, '_>,
+    carriers: Carriers,
+) -> Result<Declared, InputError> {
+    let kinds = [FixtureKind::Camera, FixtureKind::Fisheye];
+    let kind = section.word("model", &["pinhole", "fisheye"], &kinds)?;
+    let kind = kind.unwrap_or(FixtureKind::Camera);
+    section.word("mm_or_px", &["px"], &[()])?;
+    let on = section.require("on", "on = \"joint6\", another frame of the arm, or \"world\"")?;
+    let carrier = carrier(&on, carriers)?;
+    let mut known = pose(section)?;
+    let item = section.require("focal_px", "focal_px = [fx, fy]")?;
+    let focal = item.pair()?;
+    if let Some(&value) = focal.iter().find(|focal| **focal <= 0.0) {
+        return Err(item.error(InputErrorKind::NotPositive { value }));
+    }
+    let centre = section.require("centre_px", "centre_px = [cx, cy]")?.pair()?;
+    known.extend(focal.into_iter().chain(centre).map(Some));
+    let count = kind.fields().len() - known.len();
+    let mut distortion = vec![0.0; count];
+    if let Some(item) = section.get("distortion") {
+        let numbers = item.list("a list of numbers")?;
+        item.check_count("coefficients", numbers.len(), count)?;
+        for (coefficient, number) in distortion.iter_mut().zip(&numbers) {
+            *coefficient = number.number()?;
+        }
+    }
+    known.extend(distortion.into_iter().map(Some));
+    let item = section.require("pixel_sigma", "pixel_sigma = 0.2, 1 σ of u and v in pixels")?;
+    let sigma = item.number()?;
+    if sigma <= 0.0 {
+        return Err(item.error(InputErrorKind::NotPositive { value: sigma }));
+    }
+    Ok(Declared { carrier, sigma: Some(sigma), ..Declared::new(kind, known) })
+}
+
+/// Reads the remaining keys of a marker.
+pub(super) fn marker(
+    section: &mut Section<'_, '_>,
+    carriers: Carriers,
+) -> Result<Declared, InputError> {
+    let carrier = section.get("on").map_or(Ok(None), |on| carrier(&on, carriers))?;
+    let known = pose(section)?;
+    let Some((item, suffix)) = section.quantity("points", Unit::Length)? else {
+        return Err(section.missing("points_mm", "points_mm = [[x, y, z], …]"));
+    };
+    let listed = item.list("a list of points, each a list of 3 numbers")?;
+    item.check_count("points", listed.len(), MAX_POINTS)?;
+    if listed.is_empty() {
+        return Err(item.error(InputErrorKind::Empty));
+    }
+    let point = |point: &Item<'_, '_>| Ok(point.vector()?.map(suffix.to_si));
+    let points = listed.iter().map(point).collect::<Result<_, InputError>>()?;
+    Ok(Declared { carrier, points, ..Declared::new(FixtureKind::Marker, known) })
+}
+
+/// Reads the frame that carries an object; `None` for the measuring frame.
+fn carrier(on: &Item<'_, '_>, carriers: Carriers) -> Result<Option<usize>, InputError> {
+    let word = on.text()?;
+    if word == "world" {
+        return Ok(None);
+    }
+    frame(word, carriers.joints, carriers.tool).map(Some).map_err(|kind| on.error(kind))
+}
+
+/// Reads a pose: the position, then the rotation vector; unknown without `at` and `rotation`.
+fn pose(section: &mut Section<'_, '_>) -> Result<Vec<Option<f64>>, InputError> {
+    let at = section.vector("at", Unit::Length)?;
+    let rotation = section.vector("rotation", Unit::Angle)?;
+    let numbers = [at, rotation].map(|vector| {
+        vector.map_or([None; 3], |vector| [Some(vector.x), Some(vector.y), Some(vector.z)])
+    });
+    Ok(numbers.concat())
+}
