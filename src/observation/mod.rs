@@ -10,6 +10,7 @@ mod fixture;
 mod kind;
 mod known_distance;
 mod lens;
+mod pixel;
 mod point;
 mod position;
 mod scene;
@@ -109,6 +110,8 @@ observations! {
     /// Known distance between two points, without the arm. Two narrow indices take the space of
     /// one.
     Between(first: u32, second: u32) => known_distance,
+    /// Pixel of a numbered point of a marker in the image of a camera.
+    Pixel(camera: u32, marker: u32, point: u32) => pixel,
 }
 
 /// Returns some indices as a list of three.
