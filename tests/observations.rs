@@ -11,6 +11,8 @@ mod arms;
 mod bad;
 #[path = "observations/bench.rs"]
 mod bench;
+#[path = "observations/cameras.rs"]
+mod cameras;
 #[path = "observations/derivatives.rs"]
 mod derivatives;
 #[path = "observations/named.rs"]
