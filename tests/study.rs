@@ -15,7 +15,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use assert_cmd::Command;
-use flexcal::report;
 use flexcal::results::{Document as _, StudyResult, study_csv, study_parameters_csv};
 use flexcal::study::{Results, Shard, Store, Study, collect, pending, run};
 use serde_json::Value;

@@ -5,7 +5,6 @@ use flexcal::measurement::{Dataset, Measurements, Split};
 use flexcal::model::Model;
 use flexcal::problem::{Observation, Problem};
 use flexcal::results::commands_csv;
-use flexcal::results::commands_csv;
 use flexcal::rig::{Simulation, Truth, simulate};
 use flexcal::select::{Verdict, close};
 use flexcal::study::table;
