@@ -94,7 +94,7 @@ impl Data {
 impl Problem {
     /// Returns the declared standard deviation of a number that a row measures \[m\], \[rad\] or
     /// \[px\].
-    pub fn sigma_of(&self, observation: Observation) -> Option<f64> {
+    pub(crate) fn sigma_of(&self, observation: Observation) -> Option<f64> {
         let mut fixtures = observation.fixtures().into_iter().flatten();
         let of_fixture = fixtures.find_map(|fixture| self.fixtures.get(fixture)?.sigma);
         of_fixture.or(self.data.sigma_of(observation))
