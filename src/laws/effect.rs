@@ -4,7 +4,7 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 
 use super::argument::{Argument, ArgumentKind};
 use super::catalogue::Effect;
-use super::expression::{Expression, Vocabulary, parse};
+use super::expression::{Vocabulary, parse};
 use super::family::{At, Family, TermEntry};
 use super::law::LAW;
 use super::quantity::Quantity;
@@ -214,8 +214,9 @@ impl Effect {
     /// that joint itself.
     pub(crate) fn waves(&self) -> Vec<(usize, f64)> {
         let Some((joint, from)) = self.function_of() else { return Vec::new() };
-        let wave =
-            |entry: EffectTerm| entry.formula.and_then(|formula| formula.expression.wave_order());
+        let wave = |entry: EffectTerm| {
+            entry.formula.and_then(|formula| Some(formula.expression.wave()?.1))
+        };
         let waves = self.loose_entries().into_iter().filter_map(wave);
         let mut orders: Vec<f64> = waves.filter(|_| joint == from).collect();
         orders.dedup();
@@ -403,22 +404,6 @@ pub(crate) fn to_three_digits(number: f64) -> Option<f64> {
     // As written with three digits, not as the product has it.
     let written = if step < 1.0 { format!("{rounded:.6}").parse().ok()? } else { rounded.round() };
     (written > 0.0).then_some(written)
-}
-
-impl Expression {
-    /// Returns the order k of sin kq or cos kq.
-    fn wave_order(&self) -> Option<f64> {
-        use super::expression::{Function, Operator};
-        let Self::Call(Function::Sin | Function::Cos, argument) = self else { return None };
-        match &**argument {
-            Self::Quantity(Quantity::Command(_)) => Some(1.0),
-            Self::Binary(Operator::Multiply, operands) => match &**operands {
-                [Self::Number(order), Self::Quantity(Quantity::Command(_))] => Some(*order),
-                _ => None,
-            },
-            _ => None,
-        }
-    }
 }
 
 /// `{"effect": "gear-ratio", "joint": 3}`.

@@ -137,22 +137,28 @@ impl Expression {
         found
     }
 
-    /// Returns joint (from 0), whole order and whether it is a cosine, of sin kq or cos kq.
-    pub fn wave(&self) -> Option<(usize, u32, bool)> {
+    /// Returns joint (from 0), order k and whether it is a cosine, of sin kq or cos kq.
+    pub fn wave(&self) -> Option<(usize, f64, bool)> {
         let Self::Call(function @ (Function::Sin | Function::Cos), argument) = self else {
             return None;
         };
         let cosine = *function == Function::Cos;
         match &**argument {
-            Self::Quantity(Quantity::Command(joint)) => Some((*joint, 1, cosine)),
+            Self::Quantity(Quantity::Command(joint)) => Some((*joint, 1.0, cosine)),
             Self::Binary(Operator::Multiply, operands) => match &**operands {
                 [Self::Number(order), Self::Quantity(Quantity::Command(joint))] => {
-                    Some((*joint, whole(*order)?, cosine))
+                    Some((*joint, *order, cosine))
                 }
                 _ => None,
             },
             _ => None,
         }
+    }
+
+    /// Returns joint, whole order and whether it is a cosine, like [`wave`](Self::wave).
+    pub fn whole_wave(&self) -> Option<(usize, u32, bool)> {
+        let (joint, order, cosine) = self.wave()?;
+        Some((joint, whole(order)?, cosine))
     }
 }
 

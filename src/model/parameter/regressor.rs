@@ -158,7 +158,7 @@ impl Regressor {
         problem: &Problem,
         moves_base: bool,
     ) -> Self {
-        match formula.expression.wave().filter(|_| !moves_base) {
+        match formula.expression.whole_wave().filter(|_| !moves_base) {
             Some((joint, order, false)) => return Self::Sine(joint, order),
             Some((joint, order, true)) => return Self::Cosine(joint, order),
             None => {}

@@ -30,7 +30,7 @@ impl Candidate {
     }
 
     fn matches(&self, rule: &ParameterRule) -> bool {
-        matches(&rule.pattern, &self.name) || matches(&rule.pattern, &self.plain)
+        names(rule, &self.name, &self.plain)
     }
 }
 
@@ -62,8 +62,13 @@ impl EffectParameter {
     }
 
     fn is_named(&self, rule: &ParameterRule) -> bool {
-        matches(&rule.pattern, &self.name) || matches(&rule.pattern, &self.plain)
+        names(rule, &self.name, &self.plain)
     }
+}
+
+/// Returns true if the pattern of a rule matches one of the two names of a parameter.
+fn names(rule: &ParameterRule, name: &str, plain: &str) -> bool {
+    matches(&rule.pattern, name) || matches(&rule.pattern, plain)
 }
 
 /// Returns the free parameters of `problem` with one base per name in `bases` and one target per
@@ -251,22 +256,17 @@ pub(super) fn candidates(
             out.push(declared(name.clone(), name, ParameterSite::Beam { joint, field }, nominal));
         }
     }
-    let label = |what: &str, word: &str| {
-        if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") }
+    let place = |what: &str, word: &str, axis: usize, site, nominal| {
+        let suffix = ["x", "y", "z", "rx", "ry", "rz"][axis];
+        let label = if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") };
+        declared(format!("{label}.{suffix}"), format!("{what}.{suffix}"), site, nominal)
     };
     let pose = problem.base.translation.iter().chain(problem.base.rotation.iter());
     for (base, word) in bases.iter().enumerate() {
-        for (axis, (suffix, &nominal)) in
-            ["x", "y", "z", "rx", "ry", "rz"].iter().zip(pose.clone()).enumerate()
-        {
-            let name = format!("{}.{suffix}", label("base", word));
-            out.push(declared(
-                name,
-                format!("base.{suffix}"),
-                ParameterSite::Base { base, axis },
-                nominal,
-            ));
-        }
+        let base_of = |(axis, &nominal): (usize, &f64)| {
+            place("base", word, axis, ParameterSite::Base { base, axis }, nominal)
+        };
+        out.extend(pose.clone().enumerate().map(base_of));
     }
     for (target, word) in targets.iter().enumerate() {
         // The constructor of the model refuses a word that names no target.
@@ -274,17 +274,10 @@ pub(super) fn candidates(
         let rotation =
             declared_target.rotation.iter().filter(|_| problem.data.orientation_sigma.is_some());
         let pose = declared_target.at.iter().chain(rotation);
-        for (axis, (suffix, &nominal)) in
-            ["x", "y", "z", "rx", "ry", "rz"].iter().zip(pose).enumerate()
-        {
-            let name = format!("{}.{suffix}", label("tool", word));
-            out.push(declared(
-                name,
-                format!("tool.{suffix}"),
-                ParameterSite::Target { target, axis },
-                nominal,
-            ));
-        }
+        let target_of = |(axis, &nominal): (usize, &f64)| {
+            place("tool", word, axis, ParameterSite::Target { target, axis }, nominal)
+        };
+        out.extend(pose.enumerate().map(target_of));
     }
     for (fixture, Fixture { name, kind, known, .. }) in problem.fixtures.iter().enumerate() {
         for (axis, (field, known)) in kind.fields().iter().zip(known).enumerate() {
