@@ -32,12 +32,16 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     // Laws are data: formulas and the catalogue of effects.
     ("laws", &[&["scalar", "error"]]),
     ("problem", &[&["quantity", "error", "spatial", "observation", "files", "laws"]]),
-    ("measurement", &[&["quantity", "error", "problem", "files"]]),
+    ("measurement", &[&["quantity", "error", "observation", "problem", "files"]]),
     // Least squares is independent of robots.
     ("least_squares", &[&["scalar", "error", "numeric"]]),
     // Mechanics is independent of sensors; the test rig shares no mechanics.
     ("mechanics", &[&["scalar", "spatial", "error", "problem"]]),
-    ("rig", &[&["scalar", "spatial", "quantity", "error", "problem", "files", "random"]]),
+    // The rig reads the columns of kinds of rows, not their predictions.
+    (
+        "rig",
+        &[&["scalar", "spatial", "quantity", "error", "observation", "problem", "files", "random"]],
+    ),
     (
         "model",
         &[&[
