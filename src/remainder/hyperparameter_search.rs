@@ -10,7 +10,7 @@ use super::training_rows::TrainingRows;
 
 /// Maximum rows from which hyperparameters are searched, and then refined: the time grows with
 /// their cube.
-const MAX_SEARCH_ROWS: [usize; 2] = [120, 300];
+const MAX_SEARCH_ROWS: [usize; 2] = [120, 400];
 /// Lengths ℓᵤ and ℓᵥ from which hyperparameters are searched: each start reaches another optimum on
 /// some of the arms measured.
 const STARTS: [[f64; 2]; 3] = [[1.0, 1.0], [0.15, 0.15], [0.1, 3.0]];

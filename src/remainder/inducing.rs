@@ -8,7 +8,7 @@ use super::rows::{AXES, Inputs, Rows};
 /// Knots of a function per length ℓᵤ.
 const KNOTS_PER_LENGTH: f64 = 2.0;
 /// Maximum knots of the function of one site.
-const MAX_KNOTS: usize = 40;
+const MAX_KNOTS: usize = 90;
 
 /// Values that carry the remainder: of its effect on the target at some rows, and of the functions
 /// uⱼ of single joints at knots.

@@ -12,7 +12,7 @@ const MIN_NOISE_SHARE: f64 = 1e-4;
 /// Maximum rows up to which the processes are exact: all rows are centres.
 const MAX_EXACT_ROWS: usize = 500;
 /// Maximum rows that the functions are expanded about if not all are, beside knots.
-const MAX_CENTRES: usize = 250;
+const MAX_CENTRES: usize = 150;
 /// Maximum rows that are left out to judge predictions.
 const MAX_JUDGED_ROWS: usize = 1000;
 /// Seed of the rows for hyperparameters, of the centres, and of the folds.
