@@ -1,5 +1,12 @@
 //! Identification of an arm: fits, their uncertainty, checks of their results, and their
 //! application.
+//!
+//! [`identify`] fits the free parameters of a problem with [`Options`], which may name a strategy,
+//! a solver or a [`CustomSolver`]. The [`Identification`] holds estimates with standard errors,
+//! their covariance, errors of identification and held-out rows, and what the checks found
+//! ([`Finding`]). [`Identification::predict`] and [`Identification::predict_with_covariance`]
+//! apply it to other poses; [`compensate`] finds the commands that bring the identified arm to
+//! given positions. A [`SavedEstimate`] is an identification read back from `estimate.json`.
 
 mod apply;
 mod checks;

@@ -1,4 +1,8 @@
 //! Measured poses, stored by column in SI units.
+//!
+//! [`Dataset::read`] reads the tables that a problem names, and [`Dataset::builder`] takes arrays.
+//! [`Dataset::poses`] makes rows without measured positions, for predictions. `docs/problem.md`
+//! lists the columns and their units.
 
 mod builder;
 #[deny(clippy::indexing_slicing)]

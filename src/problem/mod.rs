@@ -2,6 +2,10 @@
 //!
 //! All values are plain data in SI units (m, rad, N, kg, s; temperatures in °C). They are read once
 //! from `problem.toml` and never changed afterwards.
+//!
+//! [`Problem::read`] reads a file and [`Problem::parse`] a text, with the same errors.
+//! [`Problem::effect`] reads one effect or law, and [`Problem::with_effect`] adds it.
+//! `docs/problem.md` lists every key and its unit.
 
 mod argument;
 mod arm;

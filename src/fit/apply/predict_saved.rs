@@ -1,7 +1,5 @@
 //! Predictions of a saved estimate for any rows, without another fit of the arm.
 
-use std::sync::Arc;
-
 use nalgebra::{DVector, Vector3};
 
 use crate::error::{InputError, InputErrorKind};
@@ -13,11 +11,10 @@ use crate::fit::errors::of_kind;
 use crate::fit::stages::fixture_location::locate;
 use crate::fit::stages::placement::UNKNOWN_SIGMA;
 use crate::fit::stages::registration::register;
-use crate::fit::stages::stage::{COST_TOLERANCE, Stage, StageError};
+use crate::fit::stages::stage::{Stage, StageError};
 use crate::fit::uncertainty::residual_lengths::outlying;
 use crate::fit::{ErrorSummary, Placement, SolverChoice};
-use crate::least_squares::solver::Settings;
-use crate::least_squares::{LinearisationCache, Loss};
+use crate::least_squares::LinearisationCache;
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::ParameterSite;
 use crate::model::{Model, Pose};
@@ -282,23 +279,9 @@ fn place(
     register(model, &registrable, &mut x);
     locate(model, &users, |k| missing.contains(&k), &mut x);
     let cache = LinearisationCache::default();
-    let stage = Stage {
-        model,
-        declared: users.iter().map(|pose| pose.sigma).collect(),
-        declared_turn: users.iter().find_map(|pose| pose.orientation).map(|turn| turn.sigma),
-        poses: Arc::new(users),
-        unknowns: missing.to_vec(),
-        solver: SolverChoice::Auto.decide(model),
-        custom_solver: None,
-        max_steps: Settings::default().max_iterations,
-        cost_tolerance: COST_TOLERANCE,
-        loss: Loss::Squares,
-        counts_fixed: true,
-        cache: &cache,
-        linear_model: None,
-        progress: None,
-        stop: None,
-    };
+    let solver = SolverChoice::Auto.decide(model);
+    let stage =
+        Stage { counts_fixed: true, ..Stage::new(model, users, missing.to_vec(), solver, &cache) };
     let placed = stage.run(&x)?.x;
     let open = stage.gauge(&placed, &vec![false; missing.len()], &[]).rows;
     let open = missing

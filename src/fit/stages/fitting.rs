@@ -1,7 +1,5 @@
 //! Fits of an identification: bases and targets, the stages of the strategy, held-out sessions.
 
-use std::sync::Arc;
-
 use nalgebra::DVector;
 
 use crate::error::{InputError, InputErrorKind};
@@ -12,11 +10,11 @@ use crate::fit::stages::fixture_location::locate;
 use crate::fit::stages::noise_model::NoiseModel;
 use crate::fit::stages::placement::HeldOutOnly;
 use crate::fit::stages::registration::register;
-use crate::fit::stages::stage::{COST_TOLERANCE, Gauge, Stage, StageEnd, StageError};
+use crate::fit::stages::stage::{Gauge, Stage, StageEnd, StageError};
 use crate::fit::{
     ErrorSummary, Errors, OrientationErrors, Placement, ProgressSink, SolverChoice, Stop, Strategy,
 };
-use crate::least_squares::solver::{AtBound, Settings, Termination};
+use crate::least_squares::solver::{AtBound, Termination};
 use crate::least_squares::{LinearisationCache, Loss};
 use crate::measurement::{Measurements, Split};
 use crate::model::parameter::Parameter;
@@ -159,21 +157,13 @@ impl<'a> Fitting<'a> {
             }
         }
         Stage {
-            model: self.model,
-            poses: Arc::new(poses),
             declared,
             declared_turn: self.turn_sigma,
-            unknowns,
-            solver: self.solver,
             custom_solver: self.custom_solver,
-            max_steps: Settings::default().max_iterations,
-            cost_tolerance: COST_TOLERANCE,
-            loss: Loss::Squares,
-            counts_fixed: false,
-            cache: self.cache,
             linear_model: self.linear_model,
             progress: self.progress,
             stop: self.stop,
+            ..Stage::new(self.model, poses, unknowns, self.solver, self.cache)
         }
     }
 

@@ -100,6 +100,33 @@ pub(in crate::fit) struct Gauge {
 }
 
 impl<'a> Stage<'a> {
+    /// Creates a stage of least squares with the σ of the poses and the limits of every solver.
+    pub fn new(
+        model: &'a Model,
+        poses: Vec<Pose<'a>>,
+        unknowns: Vec<usize>,
+        solver: SolverChoice,
+        cache: &'a LinearisationCache,
+    ) -> Self {
+        Self {
+            model,
+            declared: poses.iter().map(|pose| pose.sigma).collect(),
+            declared_turn: poses.iter().find_map(|pose| pose.orientation).map(|turn| turn.sigma),
+            poses: Arc::new(poses),
+            unknowns,
+            solver,
+            custom_solver: None,
+            max_steps: Settings::default().max_iterations,
+            cost_tolerance: COST_TOLERANCE,
+            loss: Loss::Squares,
+            counts_fixed: false,
+            cache,
+            linear_model: None,
+            progress: None,
+            stop: None,
+        }
+    }
+
     /// Returns the parameters that vary.
     pub fn parameters(&self) -> impl Iterator<Item = &'a Parameter> + '_ {
         self.unknowns.iter().map(|&k| &self.model.parameters[k])
