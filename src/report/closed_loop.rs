@@ -17,8 +17,9 @@ use super::verdict::{causes, counts, stand_in, title, verdict};
 use super::{effect, findings, trace};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, number, or_dash, p_value};
-use crate::results::PlotData;
-use crate::results::{FoundEffect, Gain, LoopResult, Step, Summary, TraceResult, Witness};
+use crate::results::{
+    FoundEffect, Gain, LoopResult, PlotData, Step, Summary, TraceResult, Witness,
+};
 use crate::select::ClosedLoop;
 
 /// Alternatives that a text names; the page names twice as many.
@@ -45,7 +46,7 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
     table.header.pop();
     table.rows.iter_mut().for_each(|row| _ = row.pop());
     blocks.push(Block::Table(table));
-    blocks.extend(gained(closure, result));
+    blocks.extend(gained(closure, result).map(Block::Text));
     let end = remains(closure, result)
         .map_or_else(String::new, |words| format!("\n{}", text(&[Block::Text(words)])));
     let points: Vec<Point> = causes(result).map(cause).collect();
@@ -142,7 +143,7 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
 pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     let result = &LoopResult::new(problem, closure);
     let mut blocks = head(problem, closure, result);
-    blocks.extend([Block::Table(errors(closure, result)), Block::Text(gain(closure, result))]);
+    blocks.extend([Block::Table(errors(closure, result)), gain(closure, result)]);
     let failed = findings::failed(&closure.before.findings);
     if !failed.is_empty() {
         blocks.push(Block::heading("Residual tests that the declared problem fails"));
@@ -189,7 +190,7 @@ fn blocks<'a>(
     blocks.extend(beware(after, plots));
     blocks.extend([
         Block::Table(errors(closure, result)),
-        Block::Text(gain(closure, result)),
+        gain(closure, result),
         Block::figures([figures::errors(plots), figures::vectors(plots)]),
         Block::Poses(plots),
         Block::heading("What the declared problem leaves"),
@@ -320,30 +321,32 @@ fn known_gain(result: &LoopResult) -> Option<Gain> {
     result.gain().filter(|gain| !result.effects.is_empty() && gain.mean.is_finite())
 }
 
-/// States the gain with its interval, and the size of the residual, for one screen.
-fn gained<'a>(closure: &ClosedLoop, result: &LoopResult) -> Option<Block<'a>> {
-    let (_, unit) = result.after.errors.held_out.norms();
-    let rows = if result.after.errors.held_out.kind.is_none() { "poses" } else { "rows" };
+/// States the gain on the held-out rows with its interval, and the size of the residual.
+fn gained(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
+    let after = &closure.after;
     let gain = known_gain(result).map(|Gain { mean, interval_95: [low, high] }| {
-        let [mean, low, high] = [mean, low, high].map(|value| number(value, 4));
+        let (_, unit) = result.after.errors.held_out.norms();
+        let falls = if mean < 0.0 { "rises" } else { "falls" };
+        let [size, low, high] = [mean.abs(), low, high].map(|value| number(value, 4));
         format!(
-            "Gain on the held-out {rows}: {mean} {unit} in the mean, {low} to {high} {unit} (95 %)."
+            "With what was found the mean error of the {} {falls} by {size} {unit} (gain {low} to \
+             {high} {unit}, 95 %).",
+            held_out_rows(after)
         )
     });
-    let chi2 = match (result.before.reduced_chi2, result.after.reduced_chi2) {
-        (Some(before), Some(after)) if !result.effects.is_empty() => {
-            format!("χ²/ν of the residual: {} before, {} after", short(before), short(after))
+    let has_effects = !result.effects.is_empty();
+    let size = match (result.before.reduced_chi2, result.after.reduced_chi2) {
+        (Some(before), Some(after)) if has_effects => {
+            Some(format!("{} before, {} after", short(before), short(after)))
         }
-        (Some(before), _) => format!("χ²/ν of the residual: {}", short(before)),
-        _ => return gain.map(Block::Text),
+        (before, _) => before.map(short),
     };
-    let too_large = if !result.effects.is_empty() && closure.after.sigma_scale < 1.0 {
-        " The declared σ is too large."
-    } else {
-        ""
-    };
-    let chi2 = format!("{chi2}; {}.{too_large}", expected(&closure.after));
-    Some(Block::Text(gain.into_iter().chain([chi2]).collect::<Vec<_>>().join(" ")))
+    let is_overstated = has_effects && after.sigma_scale < 1.0;
+    let overstated = if is_overstated { " The declared σ is too large." } else { "" };
+    let chi2 =
+        size.map(|size| format!("χ²/ν of the residual: {size}; {}.{overstated}", expected(after)));
+    let words: Vec<String> = gain.into_iter().chain(chi2).collect();
+    (!words.is_empty()).then(|| words.join(" "))
 }
 
 /// States what is left, and where it is shown.
@@ -359,7 +362,7 @@ fn remains(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
 }
 
 /// States the gain and how the figures are to be read.
-fn gain(closure: &ClosedLoop, result: &LoopResult) -> String {
+fn gain(closure: &ClosedLoop, result: &LoopResult) -> Block<'static> {
     let (before, after) = (&closure.before, &closure.after);
     let another = findings::another_size(&before.findings, before.fit.reduced_chi2)
         .or_else(|| findings::another_size(&closure.findings, after.reduced_chi2));
@@ -368,18 +371,8 @@ fn gain(closure: &ClosedLoop, result: &LoopResult) -> String {
         ("the arm as declared, fitted", &before.fit.fitted),
     ];
     arms.extend((!result.effects.is_empty()).then_some(("what was found", &after.fitted)));
-    let chi2 = "χ²/ν compares the residual with the declared noise: 1 if only noise is left.";
-    let notes = [Some(chi2.to_owned()), another, unpredicted(&arms)];
-    let notes = notes.into_iter().flatten().collect::<Vec<_>>().join(" ");
-    let Some(Gain { mean, interval_95: [low, high] }) = known_gain(result) else { return notes };
-    let (_, unit) = result.after.errors.held_out.norms();
-    let falls = if mean < 0.0 { "rises" } else { "falls" };
-    let [size, low, high] = [mean.abs(), low, high].map(|value| number(value, 4));
-    format!(
-        "With what was found the mean error of the {} {falls} by {size} {unit} (gain {low} to {high} {unit}, 95 %). They took no part \
-         in any choice. {notes}",
-        held_out_rows(after),
-    )
+    let words = [gained(closure, result), another, unpredicted(&arms)];
+    Block::Text(words.into_iter().flatten().collect::<Vec<_>>().join(" "))
 }
 
 /// Lists every effect of the extended problem.

@@ -4,7 +4,7 @@ use super::document::{Block, Headline, Table, code};
 use super::errors::{both_parts, header, held_out_rows, noun, shown, unit};
 use super::figures;
 use super::identify::{
-    BEFORE, beware, counts, errors, fitted_parameters, mean, no_errors, poses, remainder,
+    BEFORE, beware, counts, errors_by_axis, fitted_parameters, mean, no_errors, poses, remainder,
 };
 use super::noise::size;
 use super::paper_tables::{table_2, table_3, title};
@@ -109,11 +109,9 @@ fn blocks<'a>(
             size("Residual against σ", joint),
         ],
     };
-    let mut blocks = vec![
-        Block::Headline(head),
-        Block::Text(counts(joint)),
-        Block::Words(beware(joint, plots).into_iter().collect()),
-        Block::Page(beware(joint, plots).into_iter().collect()),
+    let mut blocks = vec![Block::Headline(head), Block::Text(counts(joint))];
+    blocks.extend(beware(joint, plots));
+    blocks.extend([
         Block::heading("Strategies and solvers side by side"),
         Block::Figures(vec![figures::strategies(comparison)]),
         Block::Words(vec![Block::Table(untimed(strategies(comparison)))]),
@@ -121,7 +119,7 @@ fn blocks<'a>(
         Block::heading("Gain of each part of the elasticity"),
         Block::figures([figures::ablations(comparison)]),
         Block::Table(untimed(parts(comparison))),
-    ];
+    ]);
     if !comparison.procedures.is_empty() {
         blocks.push(Block::heading(
             "From each procedure, as in tables 2 and 3 and figure 13 of the paper",
@@ -141,7 +139,7 @@ fn blocks<'a>(
         );
     }
     blocks.push(Block::heading("Everything fitted at once"));
-    blocks.extend(errors(joint));
+    blocks.push(Block::Table(errors_by_axis(joint)));
     blocks.push(Block::figures([figures::errors(plots), figures::vectors(plots)]));
     blocks.push(Block::Poses(plots));
     blocks.extend(remainder(

@@ -48,11 +48,6 @@ pub(super) fn header(of: &ErrorSummary, [mm, degrees, px]: [&'static str; 3]) ->
     }
 }
 
-/// Returns the cells of a table of errors: poses, arm, mean, rms and largest error.
-pub(super) fn row(poses: &str, arm: &str, of: &ErrorSummary) -> Vec<String> {
-    [vec![poses.to_owned(), arm.to_owned()], sizes(of).to_vec()].concat()
-}
-
 /// Formats mean, rms and largest error.
 pub(super) fn sizes(of: &ErrorSummary) -> [String; 3] {
     [of.mean.norm, of.rms.norm, of.max.norm].map(|value| shown(of, value))

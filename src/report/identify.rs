@@ -2,24 +2,19 @@
 
 use super::around::around;
 use super::document::{Block, Headline, Table};
-use super::errors::{
-    NOMINAL, axes, brief, held_out_rows, measure, row, rows_of, shown, unit, unpredicted,
-};
+use super::errors::{axes, brief, held_out_rows, measure, rows_of, shown, unit, unpredicted};
 use super::figures;
 use super::findings;
-use super::limits::{alternation, shadow_prices};
+use super::limits::{active_limits, alternation};
 use super::noise::{carried, noise, outliers, size};
 use super::parameters::{
     conditioning, correlations, more_unidentifiable, parameters, unidentifiable, weak,
 };
 use super::render::{Report, report, text};
-use crate::fit::{
-    ActiveConstraint, ErrorSummary, Errors, Identification, JointSources, OrientationErrors,
-};
+use crate::fit::{ErrorSummary, Errors, Identification, JointSources, OrientationErrors};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, number};
-use crate::results::PlotData;
-use crate::results::rows_in;
+use crate::results::{PlotData, rows_in};
 
 /// File that holds the whole result.
 const FILE: &str = "estimate.json";
@@ -62,12 +57,12 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
             ("Held out, after", spread(&held_out)),
             size("Residual against σ", found),
             ("Strategy", found.strategy.as_str().to_owned()),
-            ("Solver", format!("{}, {}", found.solver.as_str(), steps(found))),
+            ("Solver", format!("{}, {} steps", found.solver.as_str(), found.iterations)),
         ],
     };
     let mut blocks = vec![Block::Headline(head), Block::Text(counts(found))];
     blocks.extend(beware(found, plots));
-    blocks.extend(errors(found));
+    blocks.push(Block::Table(errors_by_axis(found)));
     blocks.extend(orientation(found));
     blocks.extend(around(found));
     blocks.push(Block::figures([figures::errors(plots), figures::vectors(plots)]));
@@ -86,36 +81,32 @@ pub fn why_not_trusted(found: &Identification) -> String {
 
 /// States in three lines what was fitted to what, and how the fit ended.
 pub(super) fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'a> {
-    let reason = found.solver_reason.map(|reason| format!(" (auto: {reason})")).unwrap_or_default();
-    Block::lines(format!(
-        "{}\n{} from {}, {} held out; strategy {}, solver {}{reason}\n{} after {}, {:.3} s",
-        problem.title,
-        counted(found.unknowns.len(), "parameter"),
-        measured(found),
-        rows_of(found, |errors| errors.held_out),
-        found.strategy.as_str(),
-        found.solver.as_str(),
-        found.termination,
-        steps(found),
-        found.seconds,
-    ))
+    let seconds = found.seconds;
+    Block::lines(format!("{}\n{}, {seconds:.3} s", problem.title, fitted(found, "\n")))
 }
 
 /// States what was fitted to what, and how the fit ended.
 pub(super) fn counts(found: &Identification) -> String {
-    let beware = if found.is_trusted() {
+    let warning = if found.is_trusted() {
         String::new()
     } else {
         format!(" Warning: {}.", why_not_trusted(found))
     };
+    format!("{}.{warning}", fitted(found, "; "))
+}
+
+/// States counts, strategy and solver, and behind `separator` how the fit ended.
+fn fitted(found: &Identification, separator: &str) -> String {
+    let reason = found.solver_reason.map(|reason| format!(" (auto: {reason})")).unwrap_or_default();
     format!(
-        "{} from {}; {} held out. Strategy {}, solver {}: {}.{beware}",
+        "{} from {}, {} held out; strategy {}, solver {}{reason}{separator}{} after {}",
         counted(found.unknowns.len(), "parameter"),
         measured(found),
         rows_of(found, |errors| errors.held_out),
         found.strategy.as_str(),
         found.solver.as_str(),
         found.termination,
+        counted(usize::try_from(found.iterations).unwrap_or(usize::MAX), "step"),
     )
 }
 
@@ -136,11 +127,6 @@ fn measured(found: &Identification) -> String {
     }
 }
 
-fn steps(found: &Identification) -> String {
-    let steps = found.iterations;
-    format!("{steps} step{}", if steps == 1 { "" } else { "s" })
-}
-
 pub(super) fn errors_by_axis(found: &Identification) -> Table {
     let row = |poses: &str, when: &str, of: &ErrorSummary| {
         let axes = &[of.mean.x, of.mean.y, of.mean.z][..axes(of)];
@@ -155,10 +141,12 @@ pub(super) fn errors_by_axis(found: &Identification) -> Table {
     let sizes =
         if axes(of) > 0 { ["mean norm", "rms norm", "max norm"] } else { ["mean", "rms", "max"] };
     let header = [&[measure(of), ""], &["mean x", "mean y", "mean z"][..axes(of)], &sizes].concat();
-    let mut table = Table::new(&header, rows, &[0, 1]);
+    let minor = (2..2 + axes(of)).collect();
+    let mut table = Table { minor, ..Table::new(&header, rows, &[0, 1]) };
     table
         .notes
         .push("before: nominal arm, with its base and tool fitted if they are free".to_owned());
+    table.notes.extend(at_points(of));
     table.notes.extend(no_errors(found).map(|words| format!("–: {words}")));
     table
 }
@@ -186,24 +174,6 @@ fn orientation<'a>(found: &Identification) -> Option<Block<'a>> {
     };
     let rows = before_and_after((registered, fitted), row);
     Some(Block::Table(Table::new(&["orientation, °", "", "mean", "rms", "max"], rows, &[0, 1])))
-}
-
-/// Returns the errors before and after, on held-out and identification poses.
-pub(super) fn errors<'a>(found: &Identification) -> Vec<Block<'a>> {
-    let (before, after) = (&found.registered, &found.fitted);
-    let rows = vec![
-        row("held out", NOMINAL, &before.held_out),
-        row("", "as identified", &after.held_out),
-        row("identification", NOMINAL, &before.identification),
-        row("", "as identified", &after.identification),
-    ];
-    let table = Block::Table(Table::new(
-        &[measure(&after.held_out), "", "mean", "rms", "max"],
-        rows,
-        &[0, 1],
-    ));
-    let notes = at_points(&after.held_out).into_iter().chain(no_errors(found));
-    std::iter::once(table).chain(notes.map(Block::Note)).collect()
 }
 
 /// States the lengths at the seen points that held-out errors in images stand for.
@@ -246,10 +216,7 @@ pub(super) fn remainder<'a>(
 
 /// Returns the blocks on active limits and on alternating stages.
 fn limits<'a>(found: &Identification) -> Vec<Block<'a>> {
-    [active_constraints(found), shadow_prices(found), alternation(found)]
-        .into_iter()
-        .flatten()
-        .collect()
+    active_limits(found).into_iter().chain(alternation(found)).collect()
 }
 
 /// Returns the blocks on identifiability, with figures.
@@ -288,17 +255,6 @@ pub fn joint_sources_text(sources: &JointSources) -> String {
         mm(read, 4),
         better.as_str(),
     )
-}
-
-/// Lists the active constraints, if there are any.
-fn active_constraints<'a>(found: &Identification) -> Option<Block<'a>> {
-    let point = |active: &ActiveConstraint| {
-        let line = active.location.line.map_or_else(String::new, |line| format!("line {line}: "));
-        format!("{line}{}", active.words)
-    };
-    let words = "Active constraints (standard errors are along them):".to_owned();
-    let points: Vec<String> = found.active_constraints.iter().map(point).collect();
-    (!points.is_empty()).then_some(Block::Lines(words, points))
 }
 
 /// Name of the arm before identification, in a headline.

@@ -6,28 +6,27 @@ use crate::least_squares::solver::AtBound;
 use crate::quantity::Unit;
 use crate::quantity::format::{decimals, number, two_digits};
 
-/// Lists the costs of active bounds and constraints, if there are any.
-pub(super) fn shadow_prices<'a>(found: &Identification) -> Option<Block<'a>> {
+/// Lists active bounds and constraints with their costs, if there are any.
+pub(super) fn active_limits<'a>(found: &Identification) -> Option<Block<'a>> {
     let line = |name: &str, price: ShadowPrice, unit: Unit| {
         let (fall, per) = price.in_mm(unit);
         format!("{name}: {} mm for 1 {per}", two_digits(fall, 6))
     };
     let bound = |estimate: &Estimate| {
         let side = if estimate.at_bound? == AtBound::Lower { "lower" } else { "upper" };
-        Some(line(
-            &format!("{}, {side} bound", estimate.name),
-            estimate.shadow_price?,
-            estimate.unit,
-        ))
+        let name = format!("{}, {side} bound", estimate.name);
+        Some(line(&name, estimate.shadow_price?, estimate.unit))
     };
-    let constraint =
-        |active: &ActiveConstraint| line(&active.words, active.shadow_price, active.unit);
+    let constraint = |active: &ActiveConstraint| {
+        let place = active.location.line.map_or_else(String::new, |line| format!("line {line}: "));
+        line(&format!("{place}{}", active.words), active.shadow_price, active.unit)
+    };
     let bounds = found.estimates.iter().filter_map(bound);
     let points: Vec<String> =
         bounds.chain(found.active_constraints.iter().map(constraint)).collect();
-    let words =
-        "Cost of active limits (decrease of the rms residual of the fit if the limit moves out):"
-            .to_owned();
+    let words = "Active limits, with their cost: the decrease of the rms residual of the fit if \
+                 the limit moves out (standard errors are along constraints):"
+        .to_owned();
     (!points.is_empty()).then_some(Block::Lines(words, points))
 }
 

@@ -102,35 +102,27 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
 fn found(result: &LoopResult) -> String {
     let found: Vec<&FoundEffect> = result.with_status(Status::Found).collect();
     let doubted: Vec<&FoundEffect> = causes(result).filter(|cause| cause.is_doubted()).collect();
-    let first = match found.as_slice() {
-        [] => "No effect was found".to_owned(),
+    let mut words = match found.as_slice() {
+        [] if doubted.is_empty() => "No effect was found".to_owned(),
+        [] => "No effect is sure".to_owned(),
         [effect] => format!("One effect was found ({})", effect.effect.description),
         effects => format!("{} effects were found", effects.len()),
     };
-    let words = match (doubted.as_slice(), found.is_empty()) {
-        ([], _) => first,
-        ([cause], true) => match doubt(cause) {
-            (true, words) => format!("No effect is sure; the most probable one is {words}"),
-            (false, words) => format!("No effect is sure; something acts, {words}"),
-        },
-        ([cause], false) => match doubt(cause) {
-            (true, words) => format!("{first}; one more is probable: {words}"),
-            (false, words) => format!("{first}; something more acts, {words}"),
-        },
-        (causes, true) => {
-            format!("No effect is sure; {} are probable, their laws not sure", causes.len())
+    match doubted.as_slice() {
+        [] => {}
+        [cause] => {
+            let rival = cause.alternatives.first();
+            let or_else =
+                rival.map_or_else(String::new, |rival| format!(", or else {}", rival.description));
+            words += &format!("; {}{or_else}", claim(cause, &cause.effect.description));
         }
-        (causes, false) => {
-            format!("{first}; {} more are probable, their laws not sure", causes.len())
-        }
-    };
+        causes => words += &format!("; {} causes are probable or located", causes.len()),
+    }
     let contradicted: Vec<&FoundEffect> = result.with_status(Status::Contradicted).collect();
     match contradicted.as_slice() {
         [] => words,
-        [one] => {
-            format!("{words}; data outside the fit contradict {}", one.effect.description)
-        }
-        several => format!("{words}; data outside the fit contradict {} causes", several.len()),
+        [effect] => format!("{words}; {}", claim(effect, &effect.effect.description)),
+        effects => format!("{words}; data outside the fit contradict {} causes", effects.len()),
     }
 }
 
@@ -148,29 +140,6 @@ fn nothing_below(ratio: f64, takes_less: bool) -> String {
     )
 }
 
-/// Describes a cause whose law is not sure, with probabilities and the best alternative; true if
-/// the words name what is most probable.
-fn doubt(cause: &FoundEffect) -> (bool, String) {
-    let words = &cause.effect.description;
-    let Some(claims) = &cause.claims else { return (true, words.clone()) };
-    let rival = cause.alternatives.first().map(|other| other.description.as_str());
-    let place = (claims.place.value.as_str(), claims.place.probability);
-    doubted(place, claims.law.probability, words, rival)
-}
-
-fn doubted((place, at): (&str, f64), law: f64, words: &str, rival: Option<&str>) -> (bool, String) {
-    let or_else = rival.map_or_else(String::new, |rival| format!(", or else {rival}"));
-    let there = format!("an error at {place} ({}) whose law is not known", percent(at));
-    let candidate = format!("one candidate law: {words} ({}){or_else}", percent(law));
-    match law {
-        EVEN.. => (true, format!("{words} ({}){or_else}", percent(law))),
-        LEAST_CANDIDATE.. if at >= EVEN => (true, format!("{there}; {candidate}")),
-        LEAST_CANDIDATE.. => (false, candidate),
-        _ if at >= EVEN => (true, there),
-        _ => (false, "neither its place nor its law known".to_owned()),
-    }
-}
-
 /// Describes an effect, followed by its declaration unless that lists many orders.
 pub(super) fn declared(effect: &NamedEffect) -> String {
     match effect.effect.harmonic_orders() {
@@ -182,31 +151,37 @@ pub(super) fn declared(effect: &NamedEffect) -> String {
 /// Returns the title of a cause: its status, what the status allows to claim, and the line that
 /// declares it.
 pub(super) fn title(found: &FoundEffect) -> String {
-    let words = declared(&found.effect);
-    let claim = match (found.status, &found.claims) {
+    claim(found, &declared(&found.effect))
+}
+
+/// States the status of an effect and what the status allows to claim; `words` describe the effect.
+fn claim(found: &FoundEffect, words: &str) -> String {
+    let status = found.status.as_str();
+    match (found.status, &found.claims) {
         (Status::Probable, Some(claims)) => {
-            format!("{words} ({})", percent(claims.law.probability))
+            format!("{status}: {words} ({})", percent(claims.law.probability))
         }
         (Status::Located, Some(claims)) => {
             let place = (claims.place.value.as_str(), claims.place.probability);
-            located(place, claims.law.probability, &words)
+            format!("{status}: {}", located(place, claims.law.probability, words))
         }
         (Status::Located, None) => {
-            format!("only together with the others, not significant by itself; {words}")
+            format!("{status}: only together with the others, not significant by itself; {words}")
         }
-        _ => words,
-    };
-    format!("{}: {claim}", found.status.as_str())
+        _ => format!("{status}: {words}"),
+    }
 }
 
 /// Returns what may be claimed of a cause whose law is not known.
 fn located((place, at): (&str, f64), law: f64, words: &str) -> String {
-    let place = if at >= EVEN { place } else { "place" };
-    let law_not_known = if at >= EVEN { "law not known" } else { "and law not known" };
-    let separator = if at >= EVEN { ", " } else { " " };
+    let unknown = if at >= EVEN {
+        format!("{place} ({}), law not known", percent(at))
+    } else {
+        "place and law not known".to_owned()
+    };
     match law {
-        LEAST_CANDIDATE.. => format!("{place}{separator}{law_not_known}; one candidate: {words}"),
-        _ => format!("{place}{separator}{law_not_known}"),
+        LEAST_CANDIDATE.. => format!("{unknown}; one candidate law: {words} ({})", percent(law)),
+        _ => unknown,
     }
 }
 
@@ -228,17 +203,12 @@ mod tests {
 
     #[test]
     fn sentences_claim_no_more_than_the_probabilities_allow() {
-        let words = |at: f64, law: f64| doubted(("joint 2", at), law, "a wave", Some("a drift"));
-        let title = |at: f64, law: f64| located(("joint 2", at), law, "a wave");
-        assert_eq!(words(0.99, 0.78), (true, "a wave (78 %), or else a drift".to_owned()));
-        let candidate = "one candidate law: a wave (39 %), or else a drift";
-        let there = "an error at joint 2 (80 %) whose law is not known";
-        assert_eq!(words(0.8, 0.39), (true, format!("{there}; {candidate}")));
-        assert_eq!(title(0.8, 0.39), "joint 2, law not known; one candidate: a wave");
-        assert_eq!(words(0.45, 0.39), (false, candidate.to_owned()));
-        assert_eq!(title(0.45, 0.39), "place and law not known; one candidate: a wave");
-        assert_eq!(title(0.999, 0.0), "joint 2, law not known");
-        assert!(!words(0.2, 0.001).1.contains("wave") && !title(0.2, 0.001).contains("wave"));
+        let words = |at: f64, law: f64| located(("joint 2", at), law, "a wave");
+        let candidate = "; one candidate law: a wave (39 %)";
+        assert_eq!(words(0.8, 0.39), format!("joint 2 (80 %), law not known{candidate}"));
+        assert_eq!(words(0.45, 0.39), format!("place and law not known{candidate}"));
+        assert_eq!(words(0.999, 0.0), "joint 2 (over 99 %), law not known");
+        assert_eq!(words(0.2, 0.001), "place and law not known");
     }
 
     #[test]

@@ -44,7 +44,7 @@ pub(crate) use knowledge::{
 };
 pub use plots::PlotData;
 pub(crate) use plots::{
-    Contribution, Point, PoseError, Stage, StageErrors, procedure_stages, sample,
+    Contribution, Point, PoseError, ScriptData, Stage, StageErrors, procedure_stages, sample,
 };
 pub(crate) use remainder::REMAINDER_FILE;
 pub(crate) use residual_size::{ResidualSize, exceeds_noise};

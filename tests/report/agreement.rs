@@ -68,7 +68,7 @@ fn claim(found: &FoundEffect) -> String {
             "located: place and law not known".to_owned()
         }
         (Status::Located, Some(claims)) => {
-            format!("located: {}, law not known", claims.place.value)
+            format!("located: {} (", claims.place.value)
         }
         (Status::Located, None) => {
             "located: only together with the others, not significant by itself".to_owned()

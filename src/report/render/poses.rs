@@ -2,117 +2,12 @@
 //! data of the script.
 
 use maud::{Markup, PreEscaped, html};
-use nalgebra::Vector3;
-use serde::Serialize;
 
-use crate::model::CentreLine;
 use crate::quantity::format::{mm, number};
-use crate::results::{CommandedJoint, PlotData, Point};
+use crate::results::{PlotData, ScriptData};
 
 /// Number of poses in the table of the largest residuals.
 const LISTED_POSES: usize = 12;
-
-/// Data of the script of a page.
-#[derive(Debug, Serialize)]
-struct ScriptData {
-    /// Name, unit and index of each joint that takes a command.
-    joints: Vec<(String, String, usize)>,
-    poses: Vec<Entry>,
-    /// Regressors of the effects found: label, and rows with their values.
-    traced: Vec<(String, Vec<(usize, f64)>)>,
-    /// Positions without a fitted pose near \[mm\].
-    uncovered: Vec<[f64; 3]>,
-}
-
-/// Pose in the data of the script; lengths in mm.
-#[derive(Debug, Serialize)]
-struct Entry {
-    row: usize,
-    place: String,
-    held_out: bool,
-    /// Kind of measurement, if it is no position.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    kind: Option<&'static str>,
-    /// Number of poses that it represents, if not all are included.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    n: Option<f64>,
-    q: Vec<f64>,
-    position: [f64; 3],
-    before: [f64; 3],
-    after: [f64; 3],
-    /// Centre line of the rigid arm.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    rigid: Option<Vec<i64>>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    give: Option<Vec<f64>>,
-}
-
-/// Rounds to a number of decimals; NaN becomes null in JSON.
-fn rounded(value: f64, decimals: i32) -> f64 {
-    let power = 10.0_f64.powi(decimals);
-    let rounded = (value * power).round() / power;
-    // Adding zero turns −0 into 0.
-    rounded + 0.0
-}
-
-fn millimetres(length: &Vector3<f64>, decimals: i32) -> [f64; 3] {
-    [length.x, length.y, length.z].map(|x| rounded(x * 1e3, decimals))
-}
-
-/// Returns the points of the rigid arm \[mm\].
-fn rigid(arm: &CentreLine) -> Vec<i64> {
-    #[expect(clippy::cast_possible_truncation, reason = "millimetres of an arm")]
-    let rounded = |x: f64| (x * 1e3).round() as i64;
-    arm.rigid.iter().flat_map(|at| [at.x, at.y, at.z]).map(rounded).collect()
-}
-
-/// Returns the deflections of these points \[mm\].
-fn deflections(arm: &CentreLine) -> Vec<f64> {
-    arm.bent
-        .iter()
-        .zip(&arm.rigid)
-        .flat_map(|(bent, rigid)| millimetres(&(bent - rigid), 2))
-        .collect()
-}
-
-impl ScriptData {
-    fn of(data: &PlotData) -> Self {
-        let joint = |command: &CommandedJoint| (command.name(), command.symbol(), command.joint);
-        let entry = |((&row, &count), arm): ((&usize, &f64), &Option<CentreLine>)| {
-            let residual = &data.residuals[row];
-            let observation = &residual.observation;
-            let coordinate = |command: &CommandedJoint| {
-                rounded(residual.configuration[command.joint] * command.factor(), 5)
-            };
-            Entry {
-                row,
-                place: residual.place.clone(),
-                held_out: residual.held_out,
-                kind: Some(observation.kind()).filter(|_| !observation.is_position()),
-                n: Some(count).filter(|count| *count > 1.0),
-                q: data.commands.iter().map(coordinate).collect(),
-                position: millimetres(&residual.position, 2),
-                before: millimetres(&residual.before, 4),
-                after: millimetres(&residual.error, 4),
-                rigid: arm.as_ref().map(rigid),
-                give: arm.as_ref().filter(|arm| arm.bent != arm.rigid).map(deflections),
-            }
-        };
-        let traced = data.causes.iter().map(|cause| {
-            let value = |point: &Point| {
-                let row = point.row.filter(|row| data.shown.binary_search(row).is_ok())?;
-                Some((row, rounded(point.x * cause.across.factor, 4)))
-            };
-            (cause.across.label.clone(), cause.points.iter().filter_map(value).collect())
-        });
-        Self {
-            joints: data.commands.iter().map(joint).collect(),
-            poses: data.shown.iter().zip(&data.stand_for).zip(&data.arms).map(entry).collect(),
-            traced: traced.collect(),
-            uncovered: data.coverage.uncovered.iter().map(|at| millimetres(at, 0)).collect(),
-        }
-    }
-}
 
 /// Returns the data of the script as JSON that cannot end the element that holds it.
 fn script_data(data: &PlotData) -> String {

@@ -7,6 +7,7 @@ mod contribution;
 mod coverage;
 mod data;
 mod pose;
+mod script;
 
 pub use cause::{Cause, Point, Quantity};
 pub use contribution::Contribution;
@@ -14,3 +15,4 @@ pub(crate) use data::procedure_stages;
 pub use data::{PlotData, Stage, StageErrors};
 pub use pose::PoseError;
 pub(crate) use pose::sample;
+pub(crate) use script::ScriptData;
