@@ -105,7 +105,7 @@ fn an_active_constraint_holds_exactly_and_is_named() {
         "{words:?}"
     );
     let text = estimate_text(&problem, &held);
-    assert!(text.contains("Active constraints") && text.contains(words[1]), "{text}");
+    assert!(text.contains("Active limits") && text.contains(words[1]), "{text}");
     let json: serde_json::Value =
         serde_json::from_str(&IdentificationResult::new(&problem, &held).to_json()).unwrap();
     assert_eq!(json["active_constraints"][0]["side"], "at_least");
@@ -279,7 +279,7 @@ fn shadow_prices_are_differences_of_fits() {
     assert_eq!(per, "mm");
     let gained = 1e3 * (fall(&tight) - fall(&loose)) / 0.01;
     assert!(price > 0.0 && (gained / price - 1.0).abs() < 0.3, "{price} against {gained}");
-    assert!(estimate_text(&problem(""), &tight).contains("Cost of active limits"));
+    assert!(estimate_text(&problem(""), &tight).contains("Active limits and their cost"));
     assert!(
         IdentificationResult::new(&problem(""), &tight).to_json().contains("\"shadow_price\": {")
     );
