@@ -1,11 +1,11 @@
 //! Text of `check`: what measurements at some poses will tell.
 
 use super::detection;
-use super::document::{Block, Table};
+use super::document::{Block, Column, Table};
 use super::forecast::{assumptions, cells};
 use super::parameters::{conditioning, unidentifiable};
 use super::render::text;
-use crate::design::{Check, ExpectedParameter, Forecast, Prediction, PredictionPoses};
+use crate::design::{Check, ExpectedParameter, Forecast, GrowthStep, Prediction, PredictionPoses};
 use crate::fit::rows_of_kind;
 use crate::problem::Problem;
 use crate::quantity::format::{counted, mm};
@@ -125,18 +125,26 @@ fn positions(check: &Check) -> bool {
 }
 
 fn growth(check: &Check) -> Table {
-    let rows = check.growth.steps.iter().map(|step| {
-        let Prediction { median, quantile_95, rms } = step.prediction;
-        let mut row: Vec<String> =
-            [step.poses, step.rank, step.well_identified].iter().map(usize::to_string).collect();
-        row.extend([median, quantile_95, rms].map(|length| mm(length, 3)));
-        row.push(if step.poses == check.forecast.poses { "these" } else { "" }.to_owned());
-        row
-    });
-    Table::new(
-        &["poses", "rank", "≥ 90 %", "median, mm", "95 %, mm", "rms, mm", ""],
-        rows.collect(),
-        &[6],
+    let count = |name, of: fn(&GrowthStep) -> usize| {
+        Column::number(name, move |step: &GrowthStep| of(step).to_string())
+    };
+    let length = |name, of: fn(&Prediction) -> f64| {
+        Column::number(name, move |step: &GrowthStep| mm(of(&step.prediction), 3))
+    };
+    let these = |step: &GrowthStep| {
+        if step.poses == check.forecast.poses { "these" } else { "" }.to_owned()
+    };
+    Table::of(
+        &check.growth.steps,
+        &[
+            count("poses", |step| step.poses),
+            count("rank", |step| step.rank),
+            count("≥ 90 %", |step| step.well_identified),
+            length("median, mm", |error| error.median),
+            length("95 %, mm", |error| error.quantile_95),
+            length("rms, mm", |error| error.rms),
+            Column::words("", these),
+        ],
     )
 }
 

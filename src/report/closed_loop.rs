@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::document::{Block, Headline, Point, Table, code, named, some_of};
+use super::document::{Block, Column, Headline, Point, Table, code, named, some_of};
 use super::errors::{NOMINAL, both_parts, header, held_out_rows, measure, rows_of, unpredicted};
 use super::figures;
 use super::identify::{
@@ -203,7 +203,7 @@ fn blocks<'a>(
     blocks.extend(ranking);
     blocks.push(Block::Page(trace::not_seen(&closure.before)));
     blocks.extend(rounds(closure, result));
-    blocks.extend(sureness(result));
+    blocks.extend(sureness(closure, result));
     blocks.push(Block::Words(found(result, SHOWN_ALTERNATIVES)));
     blocks.push(Block::Page(found(result, 2 * SHOWN_ALTERNATIVES)));
     let causes = plots.causes.iter().zip(1..);
@@ -440,49 +440,55 @@ fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     if result.steps.is_empty() {
         return Vec::new();
     }
-    let row = |(k, step): (usize, &Step)| {
-        let effects: Vec<String> =
-            step.effects.iter().map(|effect| closure.before.describe(effect)).collect();
-        let effects = if effects.is_empty() { "none".to_owned() } else { effects.join("; ") };
-        let ([_, fitted_rms, _], _) = step.errors.identification.norms();
-        let ([mean, rms, _], _) = step.errors.held_out.norms();
-        let errors = [fitted_rms, mean, rms].map(|error| number(error, 4));
-        [vec![(k + 1).to_string(), effects], errors.to_vec()].concat()
+    let effects = |(_, step): &(usize, &Step)| match step.effects.as_slice() {
+        [] => "none".to_owned(),
+        effects => {
+            let words = effects.iter().map(|effect| closure.before.describe(effect));
+            words.collect::<Vec<_>>().join("; ")
+        }
+    };
+    let error = |name, of: fn(&Step) -> f64| {
+        Column::number(name, move |(_, step): &(usize, &Step)| number(of(step), 4))
     };
     let rms = ["identification rms, mm", "identification rms, °", "identification rms, px"];
     let rms = header(&closure.after.fitted.held_out, rms);
-    let header = ["round", "effects in the model", rms, "held out mean", "held out rms"];
-    let rows = result.steps.iter().enumerate().map(row).collect();
+    let steps: Vec<(usize, &Step)> = (1..).zip(&result.steps).collect();
+    let columns = [
+        Column::number("round", |(round, _): &(usize, &Step)| round.to_string()),
+        Column::words("effects in the model", effects),
+        error(rms, |step| step.errors.identification.norms().0[1]),
+        error("held out mean", |step| step.errors.held_out.norms().0[0]),
+        error("held out rms", |step| step.errors.held_out.norms().0[1]),
+    ];
     vec![
         Block::heading("Rounds"),
         Block::figures([figures::rounds(closure)]),
-        Block::Table(Table::new(&header, rows, &[1])),
+        Block::Table(Table::of(&steps, &columns)),
     ]
 }
 
 /// Returns the status of each effect with its grounds.
-fn sureness<'a>(result: &LoopResult) -> Option<Block<'a>> {
+fn sureness<'a>(closure: &ClosedLoop, result: &LoopResult) -> Option<Block<'a>> {
     let share = |part: f64| format!("{} %", number(part * 100.0, 0));
-    let row = |found: &FoundEffect| {
-        let ([mean, ..], _) = found.held_out_after.norms();
-        let witness =
-            found.witness.as_ref().map(|check| format!("{} by {}", check.says, check.data));
-        vec![
-            found.effect.description.clone(),
-            found.status.as_str().to_owned(),
-            p_value(found.p_value),
-            or_dash(found.claims.as_ref(), |claims| share(claims.law.probability)),
-            or_dash(found.stability, share),
-            or_dash(witness, |words| words),
-            number(mean, 4),
-        ]
+    let law = |found: &FoundEffect| {
+        or_dash(found.claims.as_ref(), |claims| share(claims.law.probability))
     };
-    let (_, unit) = result.after.errors.held_out.norms();
-    let mean = if unit == "°" { "held out mean, °" } else { "held out mean, mm" };
-    let header = ["effect", "status", "p", "law", "refits", "data outside the fit", mean];
-    let note = "p: probability that noise alone does as well; law: probability of the law against every other at its place; refits: share of \
-                refits on random 80 % subsets of the poses that name it; held out mean: once it was in the model";
-    let rows = result.effects.iter().map(row).collect();
-    let table = Table::new(&header, rows, &[0, 1, 5]).noted(&[note]);
+    let mean = ["held out mean, mm", "held out mean, °", "held out mean, px"];
+    let mean = header(&closure.after.fitted.held_out, mean);
+    let columns = [
+        Column::words("effect", |found: &FoundEffect| found.effect.description.clone()),
+        Column::words("status", |found: &FoundEffect| found.status.as_str().to_owned()),
+        Column::number("p", |found: &FoundEffect| p_value(found.p_value)),
+        Column::number("law", law),
+        Column::number("refits", |found: &FoundEffect| or_dash(found.stability, share)),
+        Column::words("data outside the fit", |found: &FoundEffect| {
+            or_dash(found.witness.as_ref(), |check| format!("{} by {}", check.says, check.data))
+        }),
+        Column::number(mean, |found: &FoundEffect| number(found.held_out_after.norms().0[0], 4)),
+    ];
+    let note = "p: probability that noise alone does as well; law: probability of the law against \
+                every other at its place; refits: share of refits on random 80 % subsets of the \
+                poses that name it; held out mean: once it was in the model";
+    let table = Table::of(&result.effects, &columns).noted(&[note]);
     (!result.effects.is_empty()).then_some(Block::Table(table))
 }

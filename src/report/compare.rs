@@ -1,7 +1,7 @@
 //! Texts of `compare`: every strategy, solver and ablation, and the paper's tables 2 and 3.
 
-use super::document::{Block, Headline, Table, code};
-use super::errors::{both_parts, header, held_out_rows, noun, shown, unit};
+use super::document::{Block, Column, Headline, Table, code};
+use super::errors::{both_parts, header, held_out_rows, noun, unit};
 use super::figures;
 use super::identify::{
     BEFORE, beware, counts, errors_by_axis, fitted_parameters, mean, no_errors, poses, remainder,
@@ -9,33 +9,13 @@ use super::identify::{
 use super::noise::size;
 use super::paper_tables::{table_2, table_3, title};
 use super::render::{Report, report, text};
-use crate::fit::{Comparison, Errors, Identification};
-use crate::model::Ablation;
+use crate::fit::{Comparison, Identification};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number, or_dash};
-use crate::results::ComparedFit;
-use crate::results::PlotData;
+use crate::results::{ComparedFit, PlotData, Summary};
 
-/// Columns of a comparison after the first; only the time differs from run to run.
-const ROWS: [&str; 9] = [
-    "solver",
-    "held out mean",
-    "rms, mm",
-    "fitted rms",
-    "steps",
-    "evaluations",
-    "ms",
-    "condition",
-    "termination",
-];
-/// Index of the column with the time.
-const TIME: usize = 7;
-
-/// Returns every strategy and solver, those of the paper last.
-fn fits(comparison: &Comparison) -> impl Iterator<Item = (ComparedFit, &Errors)> {
-    let strategies = comparison.strategies.iter().map(|found| (found.into(), &found.fitted));
-    strategies.chain(comparison.paper.iter().map(|paper| (paper.into(), &paper.errors)))
-}
+/// Fit with its name in a table.
+type NamedFit = (String, ComparedFit);
 
 /// Returns the comparison as text, ending in a line break.
 pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
@@ -49,13 +29,13 @@ pub fn compare_text(problem: &Problem, comparison: &Comparison) -> String {
     let mut blocks = vec![Block::lines(format!("{}\n{parts_of}", problem.title))];
     blocks.extend(in_the_papers_shape(comparison));
     blocks.extend(no_errors(joint).map(|words| Block::lines(format!("  –: {words}"))));
-    blocks.push(Block::Table(strategies(comparison)));
+    blocks.push(Block::Table(strategies(comparison, true)));
     if !comparison.paper.is_empty() && !problem.effects.is_empty() {
         blocks.push(Block::lines(
             "  paper: the closed forms of [Chen2021], without the declared effects",
         ));
     }
-    blocks.push(Block::Table(parts(comparison)));
+    blocks.push(Block::Table(parts(comparison, true)));
     text(&blocks)
 }
 
@@ -114,11 +94,10 @@ fn blocks<'a>(
     blocks.extend([
         Block::heading("Strategies and solvers side by side"),
         Block::Figures(vec![figures::strategies(comparison)]),
-        Block::Words(vec![Block::Table(untimed(strategies(comparison)))]),
-        Block::Page(vec![Block::Table(in_full(comparison))]),
+        Block::Table(strategies(comparison, false)),
         Block::heading("Gain of each part of the elasticity"),
         Block::figures([figures::ablations(comparison)]),
-        Block::Table(untimed(parts(comparison))),
+        Block::Table(parts(comparison, false)),
     ]);
     if !comparison.procedures.is_empty() {
         blocks.push(Block::heading(
@@ -151,61 +130,60 @@ fn blocks<'a>(
     blocks
 }
 
-/// Returns the table with a row for each strategy and solver.
-fn strategies(comparison: &Comparison) -> Table {
-    side_by_side(
-        comparison,
-        "strategy",
-        fits(comparison).map(|(fit, errors)| cells(&fit.strategy, &fit, errors)).collect(),
-    )
-}
-
-/// Returns the table of strategies without times, with two more errors.
-fn in_full(comparison: &Comparison) -> Table {
-    let mut table = untimed(strategies(comparison));
-    table.header.extend(["fitted mean", "held out, largest"]);
-    for (row, (_, errors)) in table.rows.iter_mut().zip(fits(comparison)) {
-        row.extend([
-            shown(&errors.identification, errors.identification.mean.norm),
-            shown(&errors.held_out, errors.held_out.max.norm),
-        ]);
-    }
-    table
+/// Returns the table of every strategy and solver, those of the paper last.
+fn strategies(comparison: &Comparison, is_timed: bool) -> Table {
+    let strategies = comparison.strategies.iter().map(ComparedFit::from);
+    let fits = strategies.chain(comparison.paper.iter().map(ComparedFit::from));
+    let named: Vec<NamedFit> = fits.map(|fit| (fit.strategy.clone(), fit)).collect();
+    side_by_side(comparison, "strategy", &named, is_timed)
 }
 
 /// Returns the table with a row for each part of the elasticity.
-fn parts(comparison: &Comparison) -> Table {
-    let row = |(part, found): &(Ablation, Identification)| {
-        cells(part.as_str(), &found.into(), &found.fitted)
+fn parts(comparison: &Comparison, is_timed: bool) -> Table {
+    let named = comparison.ablations.iter();
+    let named: Vec<NamedFit> =
+        named.map(|(part, found)| (part.as_str().to_owned(), found.into())).collect();
+    side_by_side(comparison, "elasticity", &named, is_timed)
+}
+
+/// Returns the table of some fits: with times, which differ from run to run, or else with more
+/// errors.
+fn side_by_side(
+    comparison: &Comparison,
+    first: &'static str,
+    fits: &[NamedFit],
+    is_timed: bool,
+) -> Table {
+    let column = |name: &'static str, cell: fn(&ComparedFit) -> String| {
+        Column::number(name, move |(_, fit): &NamedFit| cell(fit))
     };
-    side_by_side(comparison, "elasticity", comparison.ablations.iter().map(row).collect())
-}
-
-fn side_by_side(comparison: &Comparison, first: &'static str, rows: Vec<Vec<String>>) -> Table {
+    let norm = |summary: &Summary, which: usize| number(summary.norms().0[which], 4);
+    let held_out = move |name: &'static str, which: usize| {
+        Column::number(name, move |(_, fit): &NamedFit| norm(&fit.errors.held_out, which))
+    };
+    let fitted = move |name: &'static str, which: usize| {
+        Column::number(name, move |(_, fit): &NamedFit| norm(&fit.errors.identification, which))
+    };
     let rms = header(&comparison.joint.fitted.held_out, ["rms, mm", "rms, °", "rms, px"]);
-    let columns = ROWS.map(|name| if name == "rms, mm" { rms } else { name });
-    let header: Vec<&str> = std::iter::once(first).chain(columns).collect();
-    Table { minor: vec![1, 4, 5, 6, 7, 8], ..Table::new(&header, rows, &[0, 1, 9]) }
-}
-
-/// Removes the column with the time, so that the same input gives the same page.
-fn untimed(mut table: Table) -> Table {
-    table.header.remove(TIME);
-    table.rows.iter_mut().for_each(|row| _ = row.remove(TIME));
-    Table { left: vec![0, 1, 8], ..table }
-}
-
-fn cells(name: &str, fit: &ComparedFit, errors: &Errors) -> Vec<String> {
-    vec![
-        name.to_owned(),
-        fit.solver.to_owned(),
-        shown(&errors.held_out, errors.held_out.mean.norm),
-        shown(&errors.held_out, errors.held_out.rms.norm),
-        shown(&errors.identification, errors.identification.rms.norm),
-        fit.iterations.to_string(),
-        fit.evaluations.to_string(),
-        number(fit.seconds * 1e3, 1),
-        or_dash(fit.condition_number, |condition| format!("{condition:.1e}")),
-        fit.termination.to_owned(),
-    ]
+    let mut columns = vec![
+        Column::words(first, |(name, _): &NamedFit| name.clone()),
+        Column::words("solver", |(_, fit): &NamedFit| fit.solver.to_owned()).minor(),
+        held_out("held out mean", 0),
+        held_out(rms, 1),
+        fitted("fitted rms", 1).minor(),
+        column("steps", |fit| fit.iterations.to_string()).minor(),
+        column("evaluations", |fit| fit.evaluations.to_string()).minor(),
+    ];
+    if is_timed {
+        columns.push(column("ms", |fit| number(fit.seconds * 1e3, 1)));
+    }
+    let condition =
+        |fit: &ComparedFit| or_dash(fit.condition_number, |value| format!("{value:.1e}"));
+    columns.push(column("condition", condition).minor());
+    let termination = |(_, fit): &NamedFit| fit.termination.to_owned();
+    columns.push(Column::words("termination", termination).minor());
+    if !is_timed {
+        columns.extend([fitted("fitted mean", 0), held_out("held out, largest", 2)]);
+    }
+    Table::of(fits, &columns)
 }

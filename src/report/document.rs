@@ -74,6 +74,31 @@ pub(super) struct Table {
     pub bars: Option<(&'static str, Vec<Bar>)>,
 }
 
+/// Column of a table: its name with the unit, its alignment, and the cell of each item.
+pub(super) struct Column<'a, T> {
+    name: &'static str,
+    is_left: bool,
+    is_minor: bool,
+    cell: Box<dyn Fn(&T) -> String + 'a>,
+}
+
+impl<'a, T> Column<'a, T> {
+    /// Creates a column of numbers, aligned to the right.
+    pub fn number(name: &'static str, cell: impl Fn(&T) -> String + 'a) -> Self {
+        Self { name, is_left: false, is_minor: false, cell: Box::new(cell) }
+    }
+
+    /// Creates a column of words, aligned to the left.
+    pub fn words(name: &'static str, cell: impl Fn(&T) -> String + 'a) -> Self {
+        Self { is_left: true, ..Self::number(name, cell) }
+    }
+
+    /// Leaves the column out on narrow pages.
+    pub fn minor(self) -> Self {
+        Self { is_minor: true, ..self }
+    }
+}
+
 /// Change of a parameter in units of its standard error.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Bar {
@@ -124,6 +149,21 @@ impl From<String> for Point {
 impl Table {
     pub fn new(header: &[&'static str], rows: Vec<Vec<String>>, left: &[usize]) -> Self {
         Self { header: header.to_vec(), rows, left: left.to_vec(), ..Self::default() }
+    }
+
+    /// Creates a table with a row for each item.
+    pub fn of<'t, T: 't>(items: impl IntoIterator<Item = &'t T>, columns: &[Column<T>]) -> Self {
+        let places = |is: fn(&Column<T>) -> bool| {
+            columns.iter().enumerate().filter(|(_, column)| is(column)).map(|(k, _)| k).collect()
+        };
+        let row = |item: &'t T| columns.iter().map(|column| (column.cell)(item)).collect();
+        Self {
+            header: columns.iter().map(|column| column.name).collect(),
+            rows: items.into_iter().map(row).collect(),
+            left: places(|column| column.is_left),
+            minor: places(|column| column.is_minor),
+            ..Self::default()
+        }
     }
 
     pub fn noted(self, notes: &[&str]) -> Self {
