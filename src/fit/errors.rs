@@ -51,6 +51,7 @@ pub struct Errors {
 
 /// Errors of orientation \[rad\]: lengths and components of the rotation vectors from predicted to
 /// measured, measuring frame.
+#[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct OrientationErrors {
     /// Errors of the registered nominal arm.

@@ -23,6 +23,7 @@ mod warm_start;
 
 pub use crate::quantity::Unit;
 pub(crate) use apply::acceptance::{Acceptance, Accuracy, acceptance, held_out_positions};
+#[doc(hidden)]
 pub use apply::command_jacobian::jacobian;
 pub use apply::compensate::{Command, compensate};
 pub(crate) use apply::joint_source::{JointSources, joint_sources};

@@ -95,6 +95,7 @@ pub struct Identification {
     #[doc(hidden)]
     pub spreads: Vec<(PointSpread, PointSpread, bool)>,
     /// Errors of orientation, where it is fitted.
+    #[doc(hidden)]
     pub orientation: Option<OrientationErrors>,
     /// χ² of the identification data over its degrees of freedom; `None` where there are none, or
     /// where the noise is estimated. A robust loss leaves outliers out.
