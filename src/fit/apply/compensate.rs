@@ -4,8 +4,9 @@ use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::error::{InputError, InputErrorKind};
 use crate::fit::Placement;
+use crate::fit::apply::nearest_command::Goal;
 use crate::least_squares::solver::{self, Bounds, Settings};
-use crate::least_squares::{Fit, LinearRows};
+use crate::least_squares::{Fit, LinearRows, jacobian_and_residual};
 use crate::measurement::Measurements;
 use crate::model::{CommandResiduals, Model, Pose};
 use crate::problem::{JointKind, LazyPast, Mimic, PoseView, Problem};
@@ -51,8 +52,12 @@ pub struct Command {
 impl Command {
     /// Returns true if the arm reaches the target.
     pub fn is_reached(&self) -> bool {
-        self.miss.norm() <= REACHED && self.turn.is_none_or(|turn| turn.norm() <= REACHED_TURN)
+        is_reached(&self.miss, self.turn.as_ref())
     }
+}
+
+fn is_reached(miss: &Vector3<f64>, turn: Option<&Vector3<f64>>) -> bool {
+    miss.norm() <= REACHED && turn.is_none_or(|turn| turn.norm() <= REACHED_TURN)
 }
 
 /// Returns `rows` with the targets that the nominal arm would have reached by their commands, on
@@ -141,8 +146,8 @@ fn moved(targets: &Measurements, bases: &[Frame<f64>]) -> Measurements {
 /// as an instrument that drifts, are left out: targets are desired places of the arm.
 ///
 /// Minimises ‖(desired − predicted(q)) / 1 µm‖² + ‖log(desired predicted(q)ᵀ) / 1 µrad‖² + ‖q −
-/// seed‖² over q by Newton's method with dual numbers. Effects that follow the command, such as
-/// harmonics, are evaluated at the command of the pass before, until it settles.
+/// seed‖² over q by damped Newton steps with dual numbers; slopes leave out that effects such as
+/// harmonics follow the command.
 ///
 /// # Errors
 /// Returns an error if the limits of a joint exclude each other.
@@ -183,36 +188,79 @@ pub fn compensate(
                 .map(|_| arm.orientation_residuals(vec![pose], &DVector::zeros(n))[0]);
             (arm.residuals(vec![pose], &DVector::zeros(n))[0], turn)
         };
-        let mut configuration = seed.to_vec();
-        for _ in 0..MAX_PASSES {
-            let bound = |pick: fn((f64, f64)) -> f64| {
-                let room = |j: usize| pick(problem.joints[j].limits) - configuration[j];
-                let room = moving.iter().map(|&j| if serves(j) { room(j) } else { 0.0 });
-                DVector::from_iterator(n, room)
-            };
-            let bounds = Bounds::new(bound(|limits| limits.0), bound(|limits| limits.1))?;
-            let away =
-                DVector::from_iterator(n, moving.iter().map(|&j| configuration[j] - seed[j]));
-            let pose =
-                Pose { setup: PoseView { configuration: &configuration, ..pose.setup }, ..pose };
-            let residuals = CommandResiduals::new(problem, &led, n, vec![pose]);
-            let near = LinearRows { matrix: DMatrix::identity(n, n), constant: away };
-            let fit = Fit::new(&residuals).with_rows(near)?;
-            let step =
-                solver::minimise_bounded(fit, DVector::zeros(n), &bounds, &Settings::default()).x;
-            for (&joint, step) in
-                moving.iter().zip(step.iter()).filter(|(joint, _)| serves(**joint))
-            {
-                let (min, max) = problem.joints[joint].limits;
-                configuration[joint] = (configuration[joint] + step).clamp(min, max);
-            }
-            if !arm.follows_commands() || step.amax() <= SETTLED {
-                break;
-            }
+        let serving: Vec<usize> = moving.iter().copied().filter(|&joint| serves(joint)).collect();
+        let full = |q: &DVector<f64>| {
+            let mut configuration = seed.to_vec();
+            serving.iter().zip(q.iter()).for_each(|(&joint, &q)| configuration[joint] = q);
+            configuration
+        };
+        let limits: Vec<(f64, f64)> =
+            serving.iter().map(|&joint| problem.joints[joint].limits).collect();
+        let goal = Goal {
+            misfit: &|q| {
+                let (miss, turn) = at(&full(q));
+                let turn = turn.as_ref().map(Vector3::iter).into_iter().flatten();
+                DVector::from_vec(miss.iter().chain(turn).copied().collect())
+            },
+            slopes: &|q| {
+                let configuration = full(q);
+                let setup = PoseView { configuration: &configuration, ..pose.setup };
+                let residuals =
+                    CommandResiduals::new(problem, &led, n, vec![Pose { setup, ..pose }]);
+                let (slopes, _) = jacobian_and_residual(&residuals, &DVector::zeros(n));
+                let columns = moving.iter().enumerate().filter(|(_, joint)| serves(**joint));
+                slopes.select_columns(&columns.map(|(k, _)| k).collect::<Vec<_>>())
+                    * -POSITION_WEIGHT
+            },
+            limits: &limits,
+        };
+        let start = DVector::from_iterator(serving.len(), serving.iter().map(|&joint| seed[joint]));
+        let mut configuration = full(&goal.nearest(&start));
+        let (miss, turn) = at(&configuration);
+        if !is_reached(&miss, turn.as_ref()) {
+            configuration = damped(problem, (&arm, &led), &serving, pose)?;
         }
         let ((miss, turn), (before, turn_before)) = (at(&configuration), at(seed));
         let (seed_miss, seed_turn) = (before.norm(), turn_before.map(|turn| turn.norm()));
         commands.push(Command { row, configuration, miss, seed_miss, turn, seed_turn });
     }
     Ok(commands)
+}
+
+/// Computes the command of one pose by Levenberg–Marquardt steps, for targets that Newton steps do
+/// not reach. Effects that follow the command are evaluated at the command of the pass before.
+fn damped(
+    problem: &Problem,
+    (arm, led): (&Model, &Model),
+    serving: &[usize],
+    pose: Pose,
+) -> Result<Vec<f64>, StageError> {
+    let (seed, moving) = (pose.setup.configuration, arm.moving_joints());
+    let n = moving.len();
+    let mut configuration = seed.to_vec();
+    for _ in 0..MAX_PASSES {
+        let bound = |pick: fn((f64, f64)) -> f64| {
+            let room = |j: usize| pick(problem.joints[j].limits) - configuration[j];
+            let room = moving.iter().map(|j| if serving.contains(j) { room(*j) } else { 0.0 });
+            DVector::from_iterator(n, room)
+        };
+        let bounds = Bounds::new(bound(|limits| limits.0), bound(|limits| limits.1))?;
+        let away = DVector::from_iterator(n, moving.iter().map(|&j| configuration[j] - seed[j]));
+        let pose = Pose { setup: PoseView { configuration: &configuration, ..pose.setup }, ..pose };
+        let residuals = CommandResiduals::new(problem, led, n, vec![pose]);
+        let near = LinearRows { matrix: DMatrix::identity(n, n), constant: away };
+        let fit = Fit::new(&residuals).with_rows(near)?;
+        let step =
+            solver::minimise_bounded(fit, DVector::zeros(n), &bounds, &Settings::default()).x;
+        for (&joint, step) in
+            moving.iter().zip(step.iter()).filter(|(joint, _)| serving.contains(joint))
+        {
+            let (min, max) = problem.joints[joint].limits;
+            configuration[joint] = (configuration[joint] + step).clamp(min, max);
+        }
+        if !arm.follows_commands() || step.amax() <= SETTLED {
+            break;
+        }
+    }
+    Ok(configuration)
 }

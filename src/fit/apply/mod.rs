@@ -4,6 +4,7 @@ pub(super) mod acceptance;
 pub(super) mod command_jacobian;
 pub(super) mod compensate;
 pub(super) mod joint_source;
+mod nearest_command;
 pub(super) mod predict;
 pub(super) mod predict_saved;
 pub(super) mod predicted_covariance;
