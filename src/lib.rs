@@ -18,6 +18,7 @@
 //! | choose poses to measure, judge given ones | [`design::plan`], [`design::check`] | [`design::Plan`], [`design::Check`] |
 //! | simulate measurements with known truth | [`rig::simulate`] | [`rig::Simulation`] |
 //! | read and write URDF | [`urdf::describe`], [`urdf::export`] | [`urdf::Description`], [`urdf::Export`] |
+//! | write an identified arm as C code | [`export::sources`] | [`export::Sources`] |
 //! | write results as JSON | [`results::Document::to_json`] | documented in `docs/results.md` |
 //! | write text and HTML reports with figures | [`report`] | [`report::Report`] |
 //!
@@ -70,6 +71,7 @@ pub mod cli;
 pub mod design;
 #[deny(clippy::indexing_slicing)]
 pub mod error;
+pub mod export;
 #[deny(clippy::indexing_slicing)]
 #[doc(hidden)]
 pub mod files;

@@ -4,29 +4,35 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use flexcal::fit::{Placement, SavedEstimate, check_columns};
+use flexcal::design::Workspace;
+use flexcal::export as code;
+use flexcal::fit::{ErrorSummary, Placement, SavedEstimate, check_columns};
 use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
+use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
 use flexcal::report::{self, shell_word};
-use flexcal::results::{Document as _, ExportResult, ExportedErrors};
+use flexcal::results::{Document as _, ExportResult, ExportedErrors, Summary};
 use flexcal::urdf::{Chain, Robot, YamlFormat, export, joint_origins, yaml};
 
 use super::diagnostic;
 use super::flags::Flags;
 use super::outcome::Outcome;
 use super::output::Results;
+use super::plan::numbers;
 
 /// Arguments of `flexcal export`.
 #[derive(Debug, Args)]
 #[command(
     mut_arg("out", |arg| {
-        let default = "in out/<name of the problem>, under the name of the URDF or as kinematics.yaml";
+        let default = "in out/<name of the problem>, under the name of the URDF or the form; a folder for --format c";
         arg.value_name("FILE").help(format!("The file to write [default: {default}]"))
     }),
     after_help = "Examples:
   flexcal export panda --estimate out/panda/estimate.json --urdf panda.urdf
-  flexcal export panda --estimate out/panda/estimate.json --format ros-yaml --out kinematics.yaml"
+  flexcal export panda --estimate out/panda/estimate.json --format ros-yaml --out kinematics.yaml
+  flexcal export panda --estimate out/panda/estimate.json --format dh --best-rigid --workspace-mm=200,700,-400,400,0,800
+  flexcal export panda --estimate out/panda/estimate.json --format c --out model"
 )]
 pub struct Arguments {
     /// A problem.toml, or the folder that holds one
@@ -42,23 +48,42 @@ pub struct Arguments {
         conflicts_with = "format"
     )]
     urdf: Option<PathBuf>,
-    /// Origins of the joints as YAML instead
+    /// Origins of the joints as YAML, or the whole model as C, instead
     #[arg(long, value_name = "FORMAT")]
     format: Option<Format>,
     /// Measurement files instead of those the problem names
     #[arg(long, value_name = "FILE", num_args = 1..)]
     data: Vec<PathBuf>,
+    /// Write the rigid geometry that is nearest to the whole model in the workspace, instead of the
+    /// identified one
+    #[arg(long)]
+    best_rigid: bool,
+    /// Box of the target in which --best-rigid fits, frame of the arm's base
+    #[arg(long, value_name = "X0,X1,Y0,Y1,Z0,Z1", value_parser = numbers::<6>, allow_hyphen_values = true, requires = "best_rigid")]
+    workspace_mm: Option<[f64; 6]>,
+    /// Poses in the test program of --format c
+    #[arg(long, value_name = "N", default_value_t = 100, requires = "format")]
+    test_poses: usize,
+    /// Poses of the test for which it compares commands too
+    #[arg(long, value_name = "N", default_value_t = 100, requires = "format")]
+    test_commands: usize,
     #[command(flatten)]
     flags: Flags,
 }
 
-/// Dialect of the exported YAML.
+/// Form of the exported model.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Format {
     /// The calibration file of a Universal Robots driver
     UrYaml,
     /// Every joint by its name
     RosYaml,
+    /// Modified Denavit-Hartenberg parameters, with β
+    Mdh,
+    /// Standard Denavit-Hartenberg parameters
+    Dh,
+    /// The whole model as C99, into the folder --out
+    C,
 }
 
 /// Writes the identified geometry, and prints what the file cannot hold.
@@ -66,10 +91,26 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let flags = &arguments.flags;
     let problem = Problem::read(&arguments.problem)?;
     let estimates = SavedEstimate::read(&arguments.estimate)?;
+    if matches!(arguments.format, Some(Format::C)) {
+        return write_c(arguments, &problem, &estimates);
+    }
     let model =
         estimates.model(Model::new(&problem, &estimates.words("base"), &estimates.words("tool"))?);
     let x = estimates.vector(&problem, &model)?;
-    let arm = model.arm(|k| x.get(k).copied().unwrap_or(0.0));
+    let best = if arguments.best_rigid {
+        let correction = super::remainder::of_estimate(&problem, &estimates)?;
+        let corners = arguments.workspace_mm.map(|[x0, x1, y0, y1, z0, z1]| {
+            [Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)].map(|corner| corner * 1e-3)
+        });
+        let workspace = Workspace { corners, planes: Vec::new() };
+        Some(code::best_rigid(&problem, &estimates, correction.as_ref(), &workspace)?)
+    } else {
+        None
+    };
+    let arm = match &best {
+        Some(best) => best.arm.clone(),
+        None => model.arm(|k| x.get(k).copied().unwrap_or(0.0)),
+    };
     let (text, moved, default) = match (&arguments.urdf, arguments.format) {
         (Some(file), _) => {
             let robot = Robot::read(file)?;
@@ -78,16 +119,19 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             (export.text, Some(export.moved), PathBuf::from(name))
         }
         (None, format) => {
-            let form = if matches!(format, Some(Format::UrYaml)) {
-                YamlFormat::UniversalRobots
-            } else {
-                YamlFormat::Ros
+            let (text, name) = match format {
+                Some(Format::Mdh) => (code::modified_dh(&problem, &arm), "mdh.yaml"),
+                Some(Format::Dh) => (code::standard_dh(&problem, &arm)?, "dh.yaml"),
+                Some(Format::UrYaml) => {
+                    let form = YamlFormat::UniversalRobots;
+                    (yaml(&joint_origins(&problem, &arm, form)?, form), "kinematics.yaml")
+                }
+                _ => {
+                    let form = YamlFormat::Ros;
+                    (yaml(&joint_origins(&problem, &arm, form)?, form), "kinematics.yaml")
+                }
             };
-            (
-                yaml(&joint_origins(&problem, &arm, form)?, form),
-                None,
-                PathBuf::from("kinematics.yaml"),
-            )
+            (text, None, PathBuf::from(name))
         }
     };
     let path = flags.out.clone().unwrap_or_else(|| flags.folder(&problem.name).join(default));
@@ -113,13 +157,27 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     {
         diagnostic::warn(&format!("errors are not judged: {} is not there", absent.display()));
     }
-    let errors = if at_hand { Some(errors(&problem, files, &estimates, flags)?) } else { None };
+    let errors = if at_hand {
+        Some(errors(&problem, files, (&estimates, best.as_ref()), flags)?)
+    } else {
+        None
+    };
     results.write(&[(&name, &text)])?;
     let result = ExportResult::new(&problem, &model, Some(&path), moved.as_deref(), errors);
     flags.tell(&result.to_json(), || {
         let [problem, estimate] = [&arguments.problem, &arguments.estimate].map(|path| shell_word(path));
+        let of_workspace = best.as_ref().map_or_else(String::new, |best| {
+            format!(
+                "In the workspace the whole model differs from the exported geometry by {:.4} mm on average ({:.4} at most), \
+                 from the identified geometry by {:.4} mm ({:.4}).\n",
+                best.best.mean.norm * 1e3,
+                best.best.max.norm * 1e3,
+                best.identified.mean.norm * 1e3,
+                best.identified.max.norm * 1e3
+            )
+        });
         format!(
-            "{}\nNext: flexcal predict {problem} --estimate {estimate} --data MEASURED.csv judges new measurements\n",
+            "{}\n{of_workspace}Next: flexcal predict {problem} --estimate {estimate} --data MEASURED.csv judges new measurements\n",
             report::export_text(&result)
         )
     })?;
@@ -129,11 +187,52 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(if estimates.trusted { Outcome::Done } else { Outcome::NotTrusted })
 }
 
+/// Names of the files of `--format c`.
+const C_FILES: [&str; 3] = ["flexcal_model.h", "flexcal_model.c", "flexcal_model_test.c"];
+
+/// Writes the model as C, with a test program.
+fn write_c(
+    arguments: &Arguments,
+    problem: &Problem,
+    estimate: &SavedEstimate,
+) -> Result<Outcome, Box<dyn Error>> {
+    let flags = &arguments.flags;
+    let correction = super::remainder::of_estimate(problem, estimate)?;
+    let counts = (arguments.test_poses, arguments.test_commands);
+    let (answers, model, x) = code::answers(problem, estimate, correction.as_ref(), counts)?;
+    let sources = code::sources(problem, &model, &x, correction.as_ref(), &answers)?;
+    let folder = flags.folder(&problem.name);
+    let inputs = vec![arguments.problem.clone(), arguments.estimate.clone()];
+    let quiet = (flags.force, flags.quiet);
+    let results = Results::claim("export", folder.clone(), inputs, &C_FILES, quiet)?;
+    let texts = [&sources.header, &sources.model, &sources.test].map(String::as_str);
+    results.write(&C_FILES.into_iter().zip(texts).collect::<Vec<_>>())?;
+    let mut result = ExportResult::new(problem, &model, Some(&folder), None, None);
+    result.not_held.clear();
+    flags.tell(&result.to_json(), || {
+        let remainder = correction.is_some_and(|correction| correction.has_remainder());
+        format!(
+            "The whole model{}, and the correction of commands, in {} lines of C99\nWritten to {}: {}\n\
+             Next: cc -std=c99 -O2 {} -lm && ./a.out compares the code with flexcal at {} poses\n",
+            if remainder { " with its remainder" } else { "" },
+            sources.model.lines().count(),
+            folder.display(),
+            C_FILES.join(", "),
+            [1, 2].map(|k| shell_word(&folder.join(C_FILES[k]))).join(" "),
+            answers.rows.len()
+        )
+    })?;
+    if !estimate.trusted {
+        diagnostic::warn("the estimate is not to be trusted, so this code is not either");
+    }
+    Ok(if estimate.trusted { Outcome::Done } else { Outcome::NotTrusted })
+}
+
 /// Computes the held-out errors of the whole model and of its rigid geometry.
 fn errors(
     problem: &Problem,
     files: &[PathBuf],
-    estimates: &SavedEstimate,
+    (estimates, best): (&SavedEstimate, Option<&code::RigidFit>),
     flags: &Flags,
 ) -> Result<ExportedErrors, Box<dyn Error>> {
     let (rows, warnings) = Measurements::read(files, problem)?;
@@ -143,5 +242,16 @@ fn errors(
     let placement = Placement::of(&data.measurements);
     let model = estimates.model(Model::new(problem, &placement.bases, &placement.targets)?);
     let x = estimates.vector(problem, &model)?;
-    Ok(ExportedErrors::of(&model, &x, &data, Some(estimates)))
+    let mut errors = ExportedErrors::of(&model, &x, &data, Some(estimates));
+    let held_out = &data.split.held_out;
+    let poses = placement.poses(&data.measurements, held_out, 1.0);
+    if let Some(best) = best
+        && poses.iter().all(|pose| pose.observation.is_position())
+    {
+        let rigid = code::rigid_errors(problem, (&model, &x), &best.arm, &poses);
+        let rows = held_out.iter().copied();
+        errors.rigid =
+            Summary::of(&ErrorSummary::of_rows(&data.measurements, rows, &rigid));
+    }
+    Ok(errors)
 }

@@ -57,7 +57,7 @@ pub struct Arguments {
 }
 
 /// Parses `N` finite numbers with commas between them.
-fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let numbers = text
         .split(',')
         .map(|word| word.trim().parse().ok().filter(|number: &f64| number.is_finite()));

@@ -46,6 +46,16 @@ impl Instrument {
         instrument
     }
 
+    /// Returns axis, regressor and size of each displacement and of each rotation.
+    pub fn terms(&self) -> [&[(usize, Regressor, f64)]; 2] {
+        [&self.shifts, &self.rotations]
+    }
+
+    /// Returns the strain as its entries, in the order of [`ParameterSite::Strain`].
+    pub fn strain_entries(&self) -> [f64; 6] {
+        self.strain.map_or([0.0; 6], |strain| STRAIN_PLACES.map(|place| strain[place]))
+    }
+
     /// Returns the part that moves the arm itself: motions of the bases. Errors of the instrument
     /// are left out.
     pub fn without_errors(&self) -> Self {
@@ -131,11 +141,13 @@ fn sum(terms: &[(usize, Regressor, f64)], value: impl Fn(&Regressor) -> f64) -> 
     sum
 }
 
+/// Row and column of each entry of a strain, in the order of [`ParameterSite::Strain`].
+const STRAIN_PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+
 /// Returns ∂E by one of its entries, in the order of [`ParameterSite::Strain`].
 fn unit_strain(entry: usize) -> Matrix3<f64> {
-    const PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
     let mut matrix = Matrix3::zeros();
-    if let Some(place) = PLACES.get(entry) {
+    if let Some(place) = STRAIN_PLACES.get(entry) {
         matrix[*place] = 1.0;
     }
     matrix

@@ -19,6 +19,7 @@ mod linear_model;
 mod orientation;
 #[doc(hidden)]
 pub mod parameter;
+mod parts;
 mod pose;
 mod pose_residuals;
 mod predictions;
@@ -31,6 +32,7 @@ mod tilt;
 pub(crate) use crate::mechanics::CentreLine;
 pub(crate) use command_residuals::CommandResiduals;
 pub(crate) use linear_model::LinearModel;
+pub(crate) use parts::{ModelParts, PartSite};
 pub(crate) use pose::MeasuredOrientation;
 
 use nalgebra::Vector3;

@@ -26,6 +26,7 @@ mod rows;
 mod saved;
 mod scores;
 mod search;
+mod tables;
 #[cfg(test)]
 mod tests;
 mod training_rows;
@@ -38,3 +39,4 @@ pub(crate) use saved::SavedRemainderError;
 // Public for the tests, the benches and the Python module only.
 #[doc(hidden)]
 pub use self::{apply::compensate, bounds::Bounds, fit::uncertainty};
+pub(crate) use tables::{CorrectionTables, InputSource, InputTable, SiteTable};

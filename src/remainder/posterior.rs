@@ -114,6 +114,19 @@ impl Posterior {
         gram(&scaled)
     }
 
+    /// Returns E, with which data explain tr (k(x, centres), J S½) E (k(x, centres), J S½)ᵀ of the
+    /// prior variance of the remainder, covariance of the parameters taken off.
+    pub fn explained(&self) -> DMatrix<f64> {
+        let kernel = AXES * self.centres.len();
+        let precision = gram(&self.inverse_factor);
+        let mut middle = -precision;
+        (0..kernel).for_each(|k| middle[(k, k)] += 1.0);
+        let n = middle.nrows();
+        let mut outer = DMatrix::identity(n, n);
+        outer.view_mut((0, 0), (kernel, kernel)).copy_from(&self.inverse);
+        product(&outer.transpose(), &product(&middle, &outer))
+    }
+
     /// Posterior of the correction at rows whose Jacobian has the columns of the prior.
     pub fn at(&self, rows: &Rows) -> Vec<RowPosterior> {
         let features = self.features(rows);

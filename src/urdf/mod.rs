@@ -29,3 +29,4 @@ pub use self::{
     describe::HELD_OUT,
     yaml::{YamlFormat, joint_origins, yaml},
 };
+pub(crate) use yaml::key as yaml_key;

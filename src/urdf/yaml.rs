@@ -112,7 +112,7 @@ fn float(value: f64) -> String {
 }
 
 /// Returns a YAML key, quoted if needed.
-fn key(name: &str) -> String {
+pub(crate) fn key(name: &str) -> String {
     let plain = name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c));
     if plain {

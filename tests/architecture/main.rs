@@ -80,6 +80,8 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
     ),
     // Choice of poses, and forecasts of their measurement.
     ("design", &[GROUND, BELOW_FIT, &["fit", "select"]]),
+    // Identified models as code, with the corrections of their remainders, and rigid tables.
+    ("export", &[GROUND, BELOW_FIT, &["fit", "remainder", "urdf", "design"]]),
     // Monte Carlo studies with data from the model or the rig.
     ("study", &[GROUND, BELOW_FIT, &["fit", "rig", "files"]]),
     // Results as data, which reports turn into text and figures.
@@ -117,6 +119,7 @@ const STOREYS: &[(&str, &[&[&str]])] = &[
             &[
                 "fit",
                 "remainder",
+                "export",
                 "residual_tests",
                 "select",
                 "design",

@@ -70,6 +70,16 @@ pub struct Formula {
 }
 
 impl Formula {
+    /// Returns the reference temperature T₀ [°C].
+    pub(crate) fn reference(&self) -> f64 {
+        self.reference
+    }
+
+    /// Returns the hoist force of poses that name none \[N\].
+    pub(crate) fn hoist(&self) -> f64 {
+        self.hoist
+    }
+
     /// Returns the value of a quantity in a pose.
     fn quantity(&self, quantity: Quantity, setup: &PoseView) -> f64 {
         let side = |joint: usize| {
@@ -115,7 +125,7 @@ impl Formula {
     }
 
     /// Returns full names and values of the parameters inside of the formula.
-    pub(super) fn parameters(&self) -> &[(String, f64)] {
+    pub(crate) fn parameters(&self) -> &[(String, f64)] {
         &self.parameters
     }
 

@@ -1,0 +1,191 @@
+//! Poses with the answers of this library, for the test of the generated code.
+
+use nalgebra::{DVector, UnitQuaternion, Vector3};
+use rand::RngExt as _;
+
+use super::error::ExportError;
+use crate::fit::{self, Placement, SavedEstimate};
+use crate::measurement::{Dataset, Measurements};
+use crate::model::Model;
+use crate::problem::{JointKind, Problem};
+use crate::random::stream;
+use crate::remainder::{self, Correction};
+use crate::spatial::rotation_axes;
+
+/// Seed of the poses.
+const SEED: u64 = 0x6578_706f_7274;
+/// Range of commands without limits, to both sides \[rad\] and \[m\].
+const WIDE: (f64, f64) = (3.0, 0.5);
+/// Range of the temperature about the reference, to both sides \[K\].
+const TEMPERATURES: f64 = 10.0;
+/// Range of the hoist force over the declared one, to both sides.
+const HOIST_SHARE: f64 = 0.1;
+/// Largest time of a pose after the first \[s\].
+const LAST_TIME: f64 = 3600.0;
+
+/// Poses of a test, with what this library answers.
+#[derive(Debug, Clone)]
+pub struct Answers {
+    /// Names of the bases, in the order of the generated code.
+    pub bases: Vec<String>,
+    /// Names of the targets.
+    pub targets: Vec<String>,
+    /// Numbers of each pose, in the order of the test program.
+    pub rows: Vec<Vec<f64>>,
+}
+
+/// Draws `count` poses within the limits of the joints and predicts them with the identified arm;
+/// for the first `commands` poses it also computes the command that brings the arm to where the
+/// nominal arm would have been. Poses without equilibrium are left out.
+///
+/// Returns the answers, and the model and full parameter vector for their bases and targets.
+///
+/// # Errors
+/// The estimate is of another problem, or a joint's limits exclude each other.
+pub fn answers(
+    problem: &Problem,
+    estimate: &SavedEstimate,
+    correction: Option<&Correction>,
+    (count, commands): (usize, usize),
+) -> Result<(Answers, Model, DVector<f64>), ExportError> {
+    let rows = random_rows(problem, estimate, count)?;
+    let placement = Placement::of(&rows);
+    let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
+    let x = estimate.vector(problem, &model)?;
+    let positions = match correction {
+        Some(correction) => {
+            remainder::predict(problem, estimate, correction, &rows, None)?.prediction.positions
+        }
+        None => fit::predict(problem, Some(estimate), &rows, None)?.positions,
+    };
+    let all: Vec<usize> = (0..rows.len()).collect();
+    let mut poses = placement.poses(&rows, &all, 1.0);
+    estimate.count_time_in(&mut poses);
+    let axes = model.orientations(&poses, x.as_slice());
+    let few = rows.select(&all[..commands.min(rows.len())]);
+    let goals = fit::waypoints(problem, &model, &x, &few).ok();
+    let found = match (&goals, correction) {
+        (None, _) => Vec::new(),
+        (Some(goals), Some(correction)) => {
+            let fitted = (estimate, &x);
+            let found = remainder::compensate(problem, &model, fitted, goals, correction)?;
+            found.into_iter().map(|(command, _)| command).collect()
+        }
+        (Some(goals), None) => fit::compensate(problem, &model, &x, goals)?,
+    };
+    let mut numbers = Vec::new();
+    for (row, pose) in poses.iter().enumerate() {
+        let setup = &pose.setup;
+        let (position, turn) = (positions[row], axes[row]);
+        if !position.iter().chain(turn.iter()).all(|value| value.is_finite()) {
+            continue;
+        }
+        let reference = problem.data.reference_temperature.unwrap_or(0.0);
+        let flag = |is_set: bool| f64::from(u8::from(is_set));
+        let mut line = vec![
+            pose.base as f64,
+            pose.target as f64,
+            setup.payload.copied().unwrap_or(problem.tool.payload_mass),
+            setup.hoist.copied().unwrap_or(0.0),
+            flag(setup.hoist.is_some()),
+            setup.temperature.copied().unwrap_or(reference),
+            setup.elapsed,
+            setup.time,
+            flag(setup.approach.is_some()),
+        ];
+        line.extend(setup.configuration);
+        line.extend(setup.approach.map_or(vec![0.0; rows.joints], <[f64]>::to_vec));
+        line.extend(setup.covariates);
+        line.resize(9 + 2 * rows.joints + problem.data.covariates.len(), 0.0);
+        line.extend(position.iter());
+        line.extend(columns(&turn));
+        match (found.get(row), &goals) {
+            (Some(command), Some(goals)) => {
+                let orientation = goals.orientation(row).map(UnitQuaternion::scaled_axis);
+                line.extend(goals.positions[row].iter());
+                line.push(flag(orientation.is_some()));
+                line.extend(columns(&orientation.unwrap_or_default()));
+                line.push(flag(command.is_reached()));
+                line.extend(&command.configuration);
+            }
+            _ => {
+                line.resize(line.len() + 13, 0.0);
+                line.push(-1.0);
+                line.resize(line.len() + rows.joints, 0.0);
+            }
+        }
+        numbers.push(line);
+    }
+    let Placement { bases, targets, .. } = placement;
+    Ok((Answers { bases, targets, rows: numbers }, model, x))
+}
+
+/// Returns the axes of a rotation vector.
+fn columns(turn: &Vector3<f64>) -> Vec<f64> {
+    rotation_axes(turn).iter().flat_map(|axis| axis.iter().copied()).collect()
+}
+
+/// Draws poses over all bases, targets and conditions that matter.
+pub(super) fn random_rows(
+    problem: &Problem,
+    estimate: &SavedEstimate,
+    count: usize,
+) -> Result<Measurements, ExportError> {
+    let mut random = stream(SEED, 0);
+    let range = |joint: &crate::problem::Joint| {
+        let wide = if joint.kind == JointKind::Prismatic { WIDE.1 } else { WIDE.0 };
+        let (low, high) = joint.limits;
+        (low.max(-wide), high.min(wide))
+    };
+    let mut between = |(low, high): (f64, f64)| low + (high - low) * random.random::<f64>();
+    let configurations: Vec<Vec<f64>> = (0..count)
+        .map(|_| {
+            let commanded = |joint: &crate::problem::Joint| match joint.command_kind() {
+                JointKind::Fixed => 0.0,
+                _ => between(range(joint)),
+            };
+            problem.joints.iter().map(commanded).collect()
+        })
+        .collect();
+    let mut list = |range: (f64, f64)| (0..count).map(|_| between(range)).collect::<Vec<f64>>();
+    let first = estimate.first_time.unwrap_or(0.0);
+    let mut time = list((first, first + LAST_TIME));
+    // Time counts from the first row in commands, and from the first pose of the fit in predictions.
+    if let Some(time) = time.first_mut() {
+        *time = first;
+    }
+    let mut rows = Dataset::poses(configurations).time(time);
+    rows = rows.payload(list((0.0, problem.tool.payload_mass)));
+    let hoists = || problem.joints.iter().filter_map(|joint| joint.beam.as_ref()?.hoist.as_ref());
+    if let Some(hoist) = hoists().next() {
+        let spread = HOIST_SHARE * hoist.force;
+        rows = rows.hoist(list((hoist.force - spread, hoist.force + spread)));
+    }
+    let reference = problem.data.reference_temperature.unwrap_or(20.0);
+    rows = rows.temperature(list((reference - TEMPERATURES, reference + TEMPERATURES)));
+    if problem.effects.iter().any(|declared| declared.effect.has_sides()) {
+        let columns: Vec<Vec<f64>> = problem.joints.iter().map(|_| list((-1.0, 1.0))).collect();
+        let sides = |row: usize| columns.iter().map(|c| c[row].signum()).collect::<Vec<f64>>();
+        rows = rows.approach((0..count).map(sides));
+    }
+    let covariates = problem.data.covariates.len();
+    if covariates > 0 {
+        let columns: Vec<Vec<f64>> = (0..covariates).map(|_| list((-1.0, 1.0))).collect();
+        rows = rows
+            .covariates((0..count).map(|row| columns.iter().map(|c| c[row]).collect::<Vec<f64>>()));
+    }
+    let words = |names: &[String], each: usize| {
+        (0..count).map(|row| names[(row / each) % names.len()].clone()).collect::<Vec<String>>()
+    };
+    let [sessions, tools] = ["base", "tool"].map(|of| estimate.words(of));
+    let declared: Vec<String> = problem.targets.iter().map(|target| target.name.clone()).collect();
+    // Without a column of targets each session has its own tool.
+    let targets = if declared.is_empty() && tools != sessions { tools } else { declared };
+    if sessions != [String::new()] {
+        rows = rows.session(words(&sessions, 1));
+    }
+    if !targets.is_empty() {
+        rows = rows.target(words(&targets, sessions.len()));
+    }
+    Ok(rows.measurements()?)
+}

@@ -1,0 +1,53 @@
+//! Errors of exports.
+
+use crate::error::InputError;
+use crate::fit::{PredictError, SavedEstimateError, StageError};
+use crate::measurement::DatasetError;
+
+/// Error of a model that cannot be written as C.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ExportError {
+    /// A law depends on earlier poses.
+    #[error(
+        "{formula} depends on earlier poses, which the generated code does not keep; identify \
+         the problem without this effect and export that"
+    )]
+    NeedsPast {
+        /// Formula of the law.
+        formula: String,
+    },
+    /// A number is too large for a constant.
+    #[error("{what} is {value}, which C cannot hold")]
+    NotFinite {
+        /// Meaning of the number.
+        what: String,
+        /// The number.
+        value: f64,
+    },
+    /// Hardly any pose reaches the workspace.
+    #[error(
+        "{found} of {draws} poses within the joint limits are inside of the workspace; widen it"
+    )]
+    Unreachable {
+        /// Number of poses inside.
+        found: usize,
+        /// Number of poses drawn.
+        draws: usize,
+    },
+    /// Problem and poses do not fit each other.
+    #[error(transparent)]
+    Input(#[from] InputError),
+    /// Poses of the test cannot be predicted.
+    #[error(transparent)]
+    Predict(#[from] PredictError),
+    /// Poses of the test do not fit together.
+    #[error(transparent)]
+    Poses(#[from] DatasetError),
+    /// The estimate is of another problem.
+    #[error(transparent)]
+    Estimate(#[from] SavedEstimateError),
+    /// Commands of the test cannot be computed.
+    #[error(transparent)]
+    Compensate(#[from] StageError),
+}

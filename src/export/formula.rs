@@ -1,0 +1,122 @@
+//! Numbers and formulas of laws as C.
+
+use std::fmt::Write as _;
+
+use super::error::ExportError;
+use crate::laws::Quantity;
+use crate::laws::expression::{Expression, Function, Operator};
+use crate::model::parameter::Regressor;
+
+/// Numbers of a table on one line.
+const NUMBERS_PER_LINE: usize = 6;
+
+/// Returns the definitions of the functions that `code` calls and C lacks.
+pub(super) fn helpers(code: &str) -> String {
+    let functions = include_str!("c/helpers.c").split_inclusive("}\n\n");
+    let name =
+        |text: &str| text.split_once("real ")?.1.split_once('(').map(|(name, _)| name.to_owned());
+    let is_called = |text: &&str| name(text).is_some_and(|name| code.contains(&(name + "(")));
+    functions.filter(is_called).collect()
+}
+
+/// Returns a number as a C constant.
+pub(super) fn real(number: f64) -> String {
+    if number.is_infinite() {
+        return (if number > 0.0 { "R(1e30)" } else { "R(-1e30)" }).to_owned();
+    }
+    format!("R({number:?})")
+}
+
+/// Writes a table of numbers.
+pub(super) fn array(text: &mut String, name: &str, values: &[f64]) {
+    let _ = writeln!(text, "static const real {name}[{}] = {{", values.len().max(1));
+    if values.is_empty() {
+        text.push_str("    R(0.0)\n");
+    }
+    for line in values.chunks(NUMBERS_PER_LINE) {
+        let numbers: Vec<String> = line.iter().map(|&number| real(number)).collect();
+        let _ = writeln!(text, "    {},", numbers.join(", "));
+    }
+    text.push_str("};\n");
+}
+
+/// Returns the value of a regressor in a pose; the parameters inside of it stand in the table from
+/// `first` on.
+pub(super) fn formula(regressor: &Regressor, first: usize) -> Result<String, ExportError> {
+    let Some(expression) = super::numbers::expression(regressor) else {
+        return Ok("R(1.0)".to_owned());
+    };
+    let (reference, hoist) = match regressor {
+        Regressor::Formula(formula) => (formula.reference(), formula.hoist()),
+        _ => (0.0, 0.0),
+    };
+    let refuse = || ExportError::NeedsPast { formula: regressor.text() };
+    Printer { first, reference, hoist }.print(&expression).ok_or_else(refuse)
+}
+
+struct Printer {
+    first: usize,
+    reference: f64,
+    hoist: f64,
+}
+
+impl Printer {
+    /// Returns the text of an expression; `None` if it depends on earlier poses.
+    fn print(&self, expression: &Expression) -> Option<String> {
+        Some(match expression {
+            Expression::Number(number) => real(*number),
+            Expression::Parameter(index) => format!("number[{}]", self.first + index),
+            Expression::Quantity(quantity) => self.quantity(*quantity)?,
+            Expression::Negative(inner) => format!("(-{})", self.print(inner)?),
+            Expression::Call(function, argument) => {
+                let name = match function {
+                    Function::Sin => "SIN",
+                    Function::Cos => "COS",
+                    Function::Tan => "TAN",
+                    Function::Exp => "EXP",
+                    Function::Expm1 => "EXPM1",
+                    Function::Log => "LOG",
+                    Function::Sqrt => "SQRT",
+                    Function::Abs => "FABS",
+                    Function::Tanh => "TANH",
+                    Function::Sign => "sign_of",
+                    Function::Step => "step_of",
+                    Function::Spline => "spline_of",
+                };
+                format!("{name}({})", self.print(argument)?)
+            }
+            Expression::Binary(operator, operands) => {
+                let [left, right] = &**operands;
+                let (left, right) = (self.print(left)?, self.print(right)?);
+                match operator {
+                    Operator::Add => format!("({left} + {right})"),
+                    Operator::Subtract => format!("({left} - {right})"),
+                    Operator::Multiply => format!("({left} * {right})"),
+                    Operator::Divide => format!("({left} / {right})"),
+                    Operator::Power => format!("POW({left}, {right})"),
+                    Operator::Atan2 => format!("ATAN2({left}, {right})"),
+                    Operator::Minimum => format!("smaller_of({left}, {right})"),
+                    Operator::Maximum => format!("larger_of({left}, {right})"),
+                }
+            }
+        })
+    }
+
+    fn quantity(&self, quantity: Quantity) -> Option<String> {
+        Some(match quantity {
+            Quantity::Command(joint) => format!("pose->q[{joint}]"),
+            Quantity::Warming => format!("(pose->temperature_C - {})", real(self.reference)),
+            Quantity::Elapsed => "pose->elapsed_s".to_owned(),
+            Quantity::Time => "pose->time_s".to_owned(),
+            Quantity::Payload => "pose->payload_kg".to_owned(),
+            Quantity::Hoist => {
+                format!("(pose->has_hoist != 0 ? pose->hoist_N : {})", real(self.hoist))
+            }
+            Quantity::Approach(joint) => {
+                format!("(pose->has_approach != 0 ? pose->approach[{joint}] : R(0.0))")
+            }
+            Quantity::Covariate(index) => format!("pose->covariate[{index}]"),
+            Quantity::Lagging { .. } | Quantity::Friction { .. } => return None,
+        })
+    }
+}

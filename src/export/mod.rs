@@ -1,0 +1,21 @@
+//! Export of an identified arm: C code that predicts poses and corrects commands, and tables of its
+//! best rigid geometry.
+//!
+//! The physics stands in hand-written templates (`c/`), which follow [`crate::mechanics`],
+//! [`crate::model`] and [`crate::remainder`] equation by equation. Tables and formulas of laws are
+//! generated. The test program compares the code with this library.
+
+mod answers;
+mod error;
+mod formula;
+mod numbers;
+mod remainder;
+mod rigid;
+mod source;
+mod tables;
+
+pub use answers::{Answers, answers};
+pub use error::ExportError;
+pub use rigid::{RigidFit, best_rigid, rigid_errors};
+pub use source::{Sources, sources};
+pub use tables::{modified_dh, standard_dh};

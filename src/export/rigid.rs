@@ -1,0 +1,170 @@
+//! Best rigid geometry of a workspace: the pose-independent part of a whole model.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::answers::random_rows;
+use super::error::ExportError;
+use crate::design::Workspace;
+use crate::fit::{ErrorSummary, Placement, SavedEstimate};
+use crate::mechanics::{Angle, Arm};
+use crate::model::{Model, Pose};
+use crate::problem::{Joint, JointKind, PoseView, Problem};
+use crate::remainder::Correction;
+use crate::spatial::Frame;
+
+/// Poses that the geometry is fitted to, and as many others that judge it.
+const POSES: usize = 300;
+/// Poses that are drawn for each one inside of the workspace.
+const DRAWS: usize = 40;
+/// Distance from the target of two more points, which hold its orientation \[m\].
+const LEVER: f64 = 0.1;
+/// Step of differences by a parameter \[rad\] or \[m\].
+const STEP: f64 = 1e-6;
+/// Passes of Gauss–Newton; the problem is nearly linear.
+const PASSES: usize = 5;
+/// Ridge over the largest squared singular value: directions below it keep their values.
+const RIDGE: f64 = 1e-10;
+
+/// Rigid arm that comes nearest to a whole model in a workspace.
+#[derive(Debug, Clone)]
+pub struct RigidFit {
+    /// Arm with the fitted geometry.
+    pub arm: Arm<f64>,
+    /// Distance of the identified geometry from the whole model, in poses that took no part.
+    pub identified: ErrorSummary,
+    /// Distance of the fitted geometry from the whole model in these poses.
+    pub best: ErrorSummary,
+}
+
+/// Fits α, a, θ, d and β of all joints to the positions and orientations of the whole model in
+/// poses drawn within the limits of the joints and a workspace.
+///
+/// Minimises Σ ‖p − p̂(x)‖² over the target and two points beside it; directions that no pose
+/// determines keep their identified values. Base and target stay.
+///
+/// # Errors
+/// The estimate is of another problem, or too few poses reach the workspace.
+pub fn best_rigid(
+    problem: &Problem,
+    estimate: &SavedEstimate,
+    correction: Option<&Correction>,
+    workspace: &Workspace,
+) -> Result<RigidFit, ExportError> {
+    let rows = random_rows(problem, estimate, DRAWS * POSES)?;
+    let placement = Placement::of(&rows);
+    let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
+    let x = estimate.vector(problem, &model)?;
+    let all: Vec<usize> = (0..rows.len()).collect();
+    let mut poses = placement.poses(&rows, &all, 1.0);
+    estimate.count_time_in(&mut poses);
+    let targets = model.target_positions(x.as_slice());
+    let frames = model.frames(&poses, x.as_slice());
+    let inside = poses.into_iter().zip(frames).filter_map(|(pose, frame)| {
+        let frame = frame?;
+        workspace.contains(&frame.point(&targets[pose.target])).then_some((pose, frame))
+    });
+    let (poses, frames): (Vec<Pose>, Vec<Frame<f64>>) = inside.take(2 * POSES).unzip();
+    if poses.len() < 2 * POSES {
+        return Err(ExportError::Unreachable { found: poses.len(), draws: DRAWS * POSES });
+    }
+    let bases = model.base_frames(x.as_slice());
+    let shifts: Vec<Vector3<f64>> = match correction.filter(|of| of.has_remainder()) {
+        Some(correction) => {
+            let corrected = correction.at(problem, &model, &x, &poses);
+            let in_base = |(pose, shift): (&Pose, Vector3<f64>)| bases[pose.base].resolve(&shift);
+            poses.iter().zip(corrected.iter().map(|pose| pose.shift)).map(in_base).collect()
+        }
+        None => vec![Vector3::zeros(); poses.len()],
+    };
+    let points = |frame: &Frame<f64>, target: usize| {
+        let at = targets[target];
+        [Vector3::zeros(), Vector3::x() * LEVER, Vector3::y() * LEVER]
+            .map(|p| frame.point(&(at + p)))
+    };
+    let rigid =
+        |arm: &Arm<f64>, pose: &Pose| points(&rigid_frame(problem, &model, arm, pose), pose.target);
+    let wanted: Vec<[Vector3<f64>; 3]> = (poses.iter().zip(&frames).zip(&shifts))
+        .map(|((pose, frame), shift)| points(frame, pose.target).map(|point| point + shift))
+        .collect();
+    let residual = |arm: &Arm<f64>| {
+        let each = poses[..POSES].iter().zip(&wanted);
+        let of_pose = |(pose, wanted): (&Pose, &[Vector3<f64>; 3])| {
+            rigid(arm, pose)
+                .iter()
+                .zip(wanted)
+                .flat_map(|(a, b)| (b - a).data.0[0])
+                .collect::<Vec<_>>()
+        };
+        DVector::from_vec(each.flat_map(of_pose).collect())
+    };
+    let identified = model.arm(|k| x[k]);
+    let free: Vec<(usize, usize)> = (0..identified.joints.len())
+        .filter(|&joint| identified.joints[joint].kind != JointKind::Fixed)
+        .flat_map(|joint| (0..5).map(move |field| (joint, field)))
+        .collect();
+    let mut arm = identified.clone();
+    for _ in 0..PASSES {
+        let here = residual(&arm);
+        let mut slopes = DMatrix::zeros(here.len(), free.len());
+        for (mut column, &(joint, field)) in slopes.column_iter_mut().zip(&free) {
+            let mut moved = arm.clone();
+            change(&mut moved, joint, field, STEP);
+            column.copy_from(&((&here - residual(&moved)) / STEP));
+        }
+        let mut normal = slopes.tr_mul(&slopes);
+        let ridge = RIDGE * normal.diagonal().max();
+        (0..free.len()).for_each(|k| normal[(k, k)] += ridge);
+        let Some(factor) = normal.cholesky() else { break };
+        let step = factor.solve(&slopes.tr_mul(&here));
+        free.iter()
+            .zip(step.iter())
+            .for_each(|(&(joint, field), &by)| change(&mut arm, joint, field, by));
+    }
+    let judged = |arm: &Arm<f64>| {
+        let of_pose = |(pose, wanted): (&Pose, &[Vector3<f64>; 3])| wanted[0] - rigid(arm, pose)[0];
+        let errors: Vec<Vector3<f64>> =
+            poses[POSES..].iter().zip(&wanted[POSES..]).map(of_pose).collect();
+        ErrorSummary::of(&errors)
+    };
+    Ok(RigidFit { identified: judged(&identified), best: judged(&arm), arm })
+}
+
+/// Returns measured − predicted of the positions in `poses` by a rigid arm on the bases and with the
+/// targets of the full parameter vector `x`, measuring frame \[m\].
+pub fn rigid_errors(
+    problem: &Problem,
+    (model, x): (&Model, &DVector<f64>),
+    arm: &Arm<f64>,
+    poses: &[Pose],
+) -> Vec<Vector3<f64>> {
+    let (bases, targets) = (model.base_frames(x.as_slice()), model.target_positions(x.as_slice()));
+    let of_pose = |pose: &Pose| {
+        let frame = rigid_frame(problem, model, arm, pose);
+        pose.measured - bases[pose.base].point(&frame.point(&targets[pose.target]))
+    };
+    poses.iter().map(of_pose).collect()
+}
+
+/// Returns the frame that carries the target of a pose on a rigid arm; mimic joints follow their
+/// leaders.
+fn rigid_frame(problem: &Problem, model: &Model, arm: &Arm<f64>, pose: &Pose) -> Frame<f64> {
+    let commands = pose.setup.configuration;
+    let led = |(joint, q): (&Joint, &f64)| {
+        joint.mimic.map_or(*q, |mimic| q + mimic.ratio * commands[mimic.joint])
+    };
+    let configuration: Vec<f64> = problem.joints.iter().zip(commands).map(led).collect();
+    let setup = PoseView { configuration: &configuration, ..pose.setup };
+    arm.rigid_frame(&setup, model.target_joint(pose.target))
+}
+
+/// Adds to α, a, θ, d or β of a joint.
+fn change(arm: &mut Arm<f64>, joint: usize, field: usize, by: f64) {
+    let joint = &mut arm.joints[joint];
+    match field {
+        0 => joint.alpha = Angle::new(joint.alpha.value + by),
+        1 => joint.a += by,
+        2 => joint.theta += by,
+        3 => joint.d += by,
+        _ => joint.beta = Angle::new(joint.beta.value + by),
+    }
+}
