@@ -1,0 +1,152 @@
+//! Generated C code, compiled and compared with the library.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use flexcal::problem::Problem;
+use nalgebra::DVector;
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+
+use super::common::arms::path;
+use super::common::made::{at_random, csv, divided, measure, model_of};
+use super::{flexcal, lunar_sampler};
+
+/// Options under which the code compiles without a warning.
+const STRICT: &str = "-std=c99 -O1 -Wall -Wextra -Werror -pedantic";
+
+/// Compiles the code in a folder with each compiler and set of options, and runs its test.
+fn check(folder: &Path) {
+    let sources = ["flexcal_model.c", "flexcal_model_test.c"];
+    for compiler in ["gcc", "clang"] {
+        if Command::new(compiler).arg("--version").output().is_err() {
+            eprintln!("skipped: {compiler} is not installed, so it has not compiled the code");
+            continue;
+        }
+        for options in ["", "-DFLEXCAL_FLOAT", "-fsanitize=address,undefined"] {
+            let mut command = Command::new(compiler);
+            command.args(STRICT.split(' ')).args(options.split_whitespace()).args(sources);
+            let built = command.args(["-o", "test", "-lm"]).current_dir(folder).output().unwrap();
+            let said = String::from_utf8_lossy(&built.stderr);
+            assert!(built.status.success(), "{compiler} {options}: {said}");
+            let ran = Command::new(folder.join("test")).output().unwrap();
+            let (told, said) =
+                (String::from_utf8_lossy(&ran.stdout), String::from_utf8_lossy(&ran.stderr));
+            assert!(ran.status.success(), "{compiler} {options}: {told}{said}");
+        }
+    }
+}
+
+/// Exports the estimate in `out` of a folder, and checks the code.
+fn export(folder: &Path, problem: &str) {
+    let words = format!(
+        "export {problem} --estimate out/estimate.json --format c --out code --test-poses 100 --test-commands 20"
+    );
+    let ran = flexcal(folder, &words);
+    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    check(&folder.join("code"));
+}
+
+#[test]
+fn an_elastic_arm_with_hoist_and_loads() {
+    let folder = lunar_sampler();
+    export(folder.path(), &path("tests/cases").display().to_string());
+}
+
+/// Writes a problem and rows of its arm with drawn parameters, identifies and exports it.
+fn made(text: &str, commands: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("problem.toml");
+    fs::write(&file, text).unwrap();
+    let problem = Problem::read(&file).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut rows = at_random(&problem, 60, 1.0, &mut rng);
+    let x = DVector::zeros(model_of(&problem, &rows).parameters.len());
+    measure(&problem, &mut rows, &x, 2e-5, &mut rng);
+    fs::write(folder.path().join("rows.csv"), csv(&problem, &divided(40, &rows))).unwrap();
+    let ran = flexcal(folder.path(), commands);
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert!(folder.path().join("out/estimate.json").exists(), "{said}");
+    export(folder.path(), ".");
+}
+
+const IDENTIFY: &str = "identify . --data rows.csv --out out --quiet";
+
+#[test]
+fn laws_play_springs_and_slides() {
+    let law = |at: &str, terms: &str| {
+        format!(
+            "[[effect]]\nlaw = {{ name = 'w{}', at = '{at}', terms = ['{terms}'] }}\n",
+            terms.len()
+        )
+    };
+    let text = format!(
+        "name = 'odd'\n[[joint]]\nalpha_deg = 10\nstiffness_N_m_per_rad = 2e4\n\
+         [[joint]]\na_m = 0.4\nalpha_deg = 90\n[[joint.body]]\nmass_kg = 4\ncom_m = [0.1, 0, 0]\n\
+         [[joint]]\na_m = 0.3\nd_m = 0.1\n[[joint]]\nkind = 'prismatic'\nalpha_deg = 90\nd_m = 0.2\nmin_mm = 0\nmax_mm = 300\n\
+         [tool]\ntarget_m = [0.1, 0.05, 0.1]\npayload_kg = 3\n{}{}{}\
+         [[effect]]\njoint-lateral-compliance = {{ joint = 2 }}\n[[effect]]\nbase-compliance = {{}}\n\
+         [[effect]]\njoint-compliance = {{ joint = 3 }}\n[[effect]]\njoint-nonlinear-stiffness = {{ joint = 2 }}\n\
+         [[effect]]\ntracker-scale = {{}}\n[[effect]]\nlink-bending = {{ joint = 2 }}\n\
+         [parameters]\n'*' = {{ sigma_relative = 0.1 }}\n'joint*.theta' = {{ sigma_deg = 0.1 }}\n\
+         [data]\nfiles = ['rows.csv']\nposition_sigma_mm = 0.02\n",
+        law("joint3", "sin(2*q2)*max(q3, 0.2) + sign(q2)*spline(q3 + 2)"),
+        law("joint2.rx", "tanh(q3)^3 + atan2(q2, 2)"),
+        law("measurement.x", "expm1(q2/5) + step(q3)*abs(q2)^1.5"),
+    );
+    made(&text, IDENTIFY);
+}
+
+#[test]
+fn a_remainder_at_the_joints() {
+    let problem = Problem::read(&path("problems/panda")).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut rows = at_random(&problem, 180, 1.0, &mut rng);
+    let mut moved = rows.clone();
+    let n = moved.joints;
+    for configuration in moved.configurations.chunks_mut(n) {
+        for joint in [1, 3] {
+            configuration[joint] += 3e-4 * (5.0 * configuration[joint]).sin();
+        }
+    }
+    let x = DVector::zeros(model_of(&problem, &rows).parameters.len());
+    measure(&problem, &mut moved, &x, 2e-5, &mut rng);
+    rows.positions = moved.positions;
+    let folder = tempfile::tempdir().unwrap();
+    fs::copy(path("problems/panda/problem.toml"), folder.path().join("problem.toml")).unwrap();
+    fs::write(folder.path().join("rows.csv"), csv(&problem, &divided(90, &rows))).unwrap();
+    let ran = flexcal(folder.path(), "identify . --data rows.csv --remainder --out out --quiet");
+    assert!(folder.path().join("out/remainder.json").exists(), "{ran:?}");
+    export(folder.path(), ".");
+    let code = fs::read_to_string(folder.path().join("code/flexcal_model.c")).unwrap();
+    assert!(code.contains("#define REMAINDER 1"));
+}
+
+#[test]
+fn effects_with_memory_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = fs::read_to_string(path("tests/cases/problem.toml")).unwrap();
+    let lagging = "\n[[effect]]\nlink-thermal-bending-lag = { link = 'A' }\n";
+    fs::write(folder.path().join("problem.toml"), text + lagging).unwrap();
+    let rows = path("tests/cases/a-none.csv");
+    let run = format!("identify . --data {} --out out --quiet", rows.display());
+    let _ = flexcal(folder.path(), &run);
+    assert!(folder.path().join("out/estimate.json").exists());
+    let ran = flexcal(folder.path(), "export . --estimate out/estimate.json --format c --out code");
+    let said = String::from_utf8_lossy(&ran.stderr);
+    assert!(ran.status.code() == Some(2) && said.contains("depends on earlier poses"), "{said}");
+    assert!(!folder.path().join("code").exists());
+}
+
+#[test]
+fn the_page_shows_what_is_printed() {
+    let folder = lunar_sampler();
+    let page = fs::read_to_string(path("docs/accuracy.md")).unwrap();
+    let block = page.split("```console\n$ flexcal export ").nth(1).unwrap();
+    let (block, _) = block.split_once("```").unwrap();
+    let (words, expected) = block.split_once('\n').unwrap();
+    let words = words.replace("problems/lunar-sampler", &path("tests/cases").display().to_string());
+    let ran = flexcal(folder.path(), &format!("export {words}"));
+    assert_eq!(String::from_utf8_lossy(&ran.stdout), expected);
+}
