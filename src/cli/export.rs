@@ -212,10 +212,9 @@ fn write_c(
     flags.tell(&result.to_json(), || {
         let remainder = correction.is_some_and(|correction| correction.has_remainder());
         format!(
-            "The whole model{}, and the correction of commands, in {} lines of C99\nWritten to {}: {}\n\
+            "The whole model{}, and the correction of commands, as C99\nWritten to {}: {}\n\
              Next: cc -std=c99 -O2 {} -lm && ./a.out compares the code with flexcal at {} poses\n",
             if remainder { " with its remainder" } else { "" },
-            sources.model.lines().count(),
             folder.display(),
             C_FILES.join(", "),
             [1, 2].map(|k| shell_word(&folder.join(C_FILES[k]))).join(" "),
@@ -250,8 +249,7 @@ fn errors(
     {
         let rigid = code::rigid_errors(problem, (&model, &x), &best.arm, &poses);
         let rows = held_out.iter().copied();
-        errors.rigid =
-            Summary::of(&ErrorSummary::of_rows(&data.measurements, rows, &rigid));
+        errors.rigid = Summary::of(&ErrorSummary::of_rows(&data.measurements, rows, &rigid));
     }
     Ok(errors)
 }
