@@ -73,10 +73,16 @@ pub(super) fn remainder(
         let [single, all, constant] = site.variances.map(real);
         let (input, scale) = site.single.map_or((-1, 0.0), |(input, scale)| (input as i64, scale));
         let (lever, scale) = (real(site.lever), real(scale));
-        format!("{{{}, {input}, {lever}, {single}, {all}, {constant}, {scale}}}", site.joint)
+        let (joint, kind) = (site.joint, u8::from(site.is_compliance));
+        format!("{{{joint}, {kind}, {input}, {lever}, {single}, {all}, {constant}, {scale}}}")
     };
     let input = |input: &InputTable| {
-        let InputSource::Command(source) = input.source;
+        let source = match input.source {
+            InputSource::Command(joint) => joint.to_string(),
+            InputSource::Temperature => "TEMPERATURE".to_owned(),
+            InputSource::Payload => "PAYLOAD_MASS".to_owned(),
+            InputSource::Hoist => "HOIST".to_owned(),
+        };
         let (offset, unit) = (real(input.standard.0), real(input.standard.1));
         let is_angle = u8::from(input.is_angle);
         format!("{{{source}, {is_angle}, {offset}, {unit}, {}}}", real(input.scale))

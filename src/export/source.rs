@@ -9,6 +9,7 @@ use super::error::ExportError;
 use super::formula::{array, formula, helpers, real};
 use super::numbers::{BEAM, FRAME, HOIST, JOINT, LOAD, Numbers, inner};
 use super::remainder::remainder;
+use crate::model::parameter::{JointField, ParameterSite};
 use crate::model::{Model, ModelParts, PartSite};
 use crate::problem::{Equilibrium, JointKind, Problem};
 use crate::remainder::Correction;
@@ -35,6 +36,13 @@ pub fn sources(
     correction: Option<&Correction>,
     answers: &Answers,
 ) -> Result<Sources, ExportError> {
+    // Joints whose compliances a remainder corrects need a section that deflects.
+    let tables = correction.and_then(|correction| correction.tables(model, x));
+    let compliant = correction.map_or_else(Vec::new, Correction::compliant_joints);
+    let field = JointField::Compliance;
+    let probe = |&joint: &usize| (ParameterSite::Joint { joint, field }, 0.0);
+    let model = &model.with_probes(&compliant.iter().map(probe).collect::<Vec<_>>());
+    let x = &x.clone().resize_vertically(x.len() + compliant.len(), 0.0);
     let parts = model.parts(x.as_slice());
     let joints: Vec<String> = problem.joints.iter().map(|joint| plain(&joint.name)).collect();
     let plain_all = |names: &[String]| names.iter().map(|name| plain(name)).collect::<Vec<_>>();
@@ -68,7 +76,6 @@ pub fn sources(
         list(&covariates),
         include_str!("c/model.h")
     );
-    let tables = correction.and_then(|correction| correction.tables(model, x));
     let changes = tables.as_ref().map(|tables| {
         let at = |x: &DVector<f64>| Numbers::of(&model.parts(x.as_slice()), names).values;
         remainder(tables, x, at)

@@ -9,7 +9,7 @@ use super::inducing::Inducing;
 use super::kernel::{Hyperparameters, covariance, variance};
 use super::prior::ParameterPrior;
 use super::rows::{AXES, Inputs, Rows};
-use crate::numeric::{gram, inverse_lower, lower_factor, product_with_upper};
+use crate::numeric::{gram, inverse_lower, lower_factor, product, product_with_upper};
 
 /// Share of its variance that is added to each inducing variable, against rounding.
 const JITTER: f64 = 1e-9;
@@ -114,10 +114,10 @@ impl Posterior {
         gram(&scaled)
     }
 
-    /// Returns E, with which data explain tr (k(x, centres), J S½) E (k(x, centres), J S½)ᵀ of the
+    /// Returns E, with which data explain tr (k(x, z), J S½) E (k(x, z), J S½)ᵀ of the
     /// prior variance of the remainder, covariance of the parameters taken off.
     pub fn explained(&self) -> DMatrix<f64> {
-        let kernel = AXES * self.centres.len();
+        let kernel = self.inducing.len();
         let precision = gram(&self.inverse_factor);
         let mut middle = -precision;
         (0..kernel).for_each(|k| middle[(k, k)] += 1.0);

@@ -3,16 +3,19 @@
 use nalgebra::DVector;
 
 use super::correction::Correction;
+use super::inducing::Inducing;
 use super::kernel::Hyperparameters;
-use super::rows::{AXES, Inputs, Layout};
+use super::rows::{AXES, Inputs, Layout, Site, SiteKind, Source};
 use crate::model::Model;
 
-/// Site at which an arm errs: the coordinate of a joint.
+/// Site at which an arm errs: the coordinate or the compliance of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SiteTable {
     /// Index of the joint.
     pub joint: usize,
-    /// Unit of its slope ∂p/∂q \[m/rad\] or \[1\].
+    /// True for the compliance of the joint.
+    pub is_compliance: bool,
+    /// Unit of the slope of the position \[m/rad\], \[1\] or \[N·m²/rad\].
     pub lever: f64,
     /// Variances of the errors that follow its own command, all inputs, and none \[m²\].
     pub variances: [f64; 3],
@@ -25,6 +28,12 @@ pub struct SiteTable {
 pub enum InputSource {
     /// Command of a joint, counted from 0.
     Command(usize),
+    /// Temperature [°C].
+    Temperature,
+    /// Payload \[kg\].
+    Payload,
+    /// Hoist force \[N\].
+    Hoist,
 }
 
 /// Input of the errors.
@@ -63,6 +72,12 @@ pub struct CorrectionTables {
 }
 
 impl Correction {
+    /// Returns the joints whose compliances err, counted from 0.
+    pub fn compliant_joints(&self) -> Vec<usize> {
+        let sites = self.layout.sites.iter().filter(|site| site.kind == SiteKind::Compliance);
+        sites.map(|site| site.joint).collect()
+    }
+
     /// Returns the tables of the remainder for the arm at the full parameter vector `x` of `model`;
     /// `None` without a remainder.
     pub fn tables(&self, model: &Model, x: &DVector<f64>) -> Option<CorrectionTables> {
@@ -70,11 +85,18 @@ impl Correction {
             return None;
         }
         // Named without rest: a new field must be exported too.
-        let Layout { joints, levers, inputs } = &self.layout;
-        let Inputs { joints: input_joints, angles, site_of, standard, ranges: _ } = inputs;
-        let Hyperparameters { single, joint, lengths, noise: _, shared_noise: _ } =
-            &self.posterior.hyper;
-        let centres = &self.posterior.centres;
+        let Layout { sites, inputs } = &self.layout;
+        let Inputs { sites: functions, sources, angles, standard, ranges: _ } = inputs;
+        let Hyperparameters {
+            single,
+            joint,
+            constant,
+            single_lengths,
+            joint_lengths,
+            noise: _,
+            shared_noise: _,
+        } = &self.posterior.hyper;
+        let Inducing { centres, knots } = &self.posterior.inducing;
         let change = self.posterior.parameters();
         let place = |name: &str| model.parameters.iter().position(|found| found.name == name);
         let known: Vec<(usize, usize)> = (self.parameters.iter().enumerate())
@@ -84,36 +106,41 @@ impl Correction {
             let moved = x[k] - self.parameters[column].deviation;
             (k, change[column] - moved, self.posterior.prior.spread[column])
         };
-        let kernel = AXES * centres.len();
+        let kernel = self.posterior.inducing.len();
         let explained = self.posterior.explained();
         let kept: Vec<usize> =
             (0..kernel).chain(known.iter().map(|&(column, _)| kernel + column)).collect();
         let lower = |(i, &row): (usize, &usize)| {
             kept[..=i].iter().map(|&column| explained[(row, column)]).collect::<Vec<f64>>()
         };
-        let [single_scale, scale] = lengths.map(|length: f64| length.powi(-2));
-        let site = |(s, (&joint_index, &lever)): (usize, (&usize, &f64))| SiteTable {
-            joint: joint_index,
-            lever,
-            variances: [single[s].powi(2), joint[s].powi(2), 0.0],
-            single: (site_of.iter().position(|of| *of == Some(s)))
-                .map(|input| (input, single_scale)),
+        let inverse_square = |length: f64| length.powi(-2);
+        let site = |(s, site): (usize, &Site)| SiteTable {
+            joint: site.joint,
+            is_compliance: site.kind == SiteKind::Compliance,
+            lever: site.lever,
+            variances: [single[s], joint[s], constant[s]].map(|size: f64| size * size),
+            single: (functions[s].single).map(|input| (input, inverse_square(single_lengths[s]))),
         };
-        let input = |(k, &joint): (usize, &usize)| InputTable {
-            source: InputSource::Command(joint),
+        let input = |(k, &source): (usize, &Source)| InputTable {
+            source: match source {
+                Source::Command(joint) => InputSource::Command(joint),
+                Source::Temperature => InputSource::Temperature,
+                Source::Payload => InputSource::Payload,
+                Source::Hoist => InputSource::Hoist,
+            },
             is_angle: angles[k],
             standard: standard[k],
-            scale,
+            scale: inverse_square(joint_lengths[k]),
         };
         let rows = |numbers: &[f64], width: usize| {
             numbers.chunks(width.max(1)).map(<[f64]>::to_vec).collect::<Vec<_>>()
         };
         Some(CorrectionTables {
-            sites: joints.iter().zip(levers).enumerate().map(site).collect(),
-            inputs: input_joints.iter().enumerate().map(input).collect(),
-            centres: rows(centres.inputs.as_slice(), input_joints.len()),
-            slopes: rows(centres.sites.as_slice(), AXES * joints.len()),
-            knots: Vec::new(),
+            sites: sites.iter().enumerate().map(site).collect(),
+            inputs: sources.iter().enumerate().map(input).collect(),
+            centres: rows(centres.inputs.as_slice(), sources.len()),
+            slopes: rows(centres.sites.as_slice(), AXES * sites.len()),
+            knots: knots.iter().map(|knot| (knot.site, knot.at)).collect(),
             weights: self.posterior.kernel_weights().as_slice().to_vec(),
             parameters: known.iter().map(parameter).collect(),
             explained: kept.iter().enumerate().flat_map(lower).collect(),

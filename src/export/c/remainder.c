@@ -37,6 +37,24 @@ static vec command_slope(const flexcal_pose *pose, const terms *here, int joint)
     return add(vec_of(R(0.0), R(0.0), R(0.0)), R(0.5) / FINE_STEP, at[0]);
 }
 
+/* Returns the slope of the reading by an additional compliance of a joint; h [rad/(N m)] moves it by
+   about 10 um. */
+static vec compliance_slope(const flexcal_pose *pose, const terms *here, int joint, real h)
+{
+    vec at[2];
+    int side, k;
+    for (side = 0; side < 2; ++side) {
+        real number[NUMBERS];
+        for (k = 0; k < NUMBERS; ++k) {
+            number[k] = NUMBER[k];
+        }
+        number[N_JOINT + joint * J_SIZE + J_FLEXIBILITY] += side == 0 ? h : -h;
+        at[side] = reading_of(number, pose, here);
+    }
+    at[0] = add(at[0], R(-1.0), at[1]);
+    return add(vec_of(R(0.0), R(0.0), R(0.0)), R(0.5) / h, at[0]);
+}
+
 /* Returns the derivative of the reading along a direction of the parameters: listed numbers take
    their values at +h and -h. */
 static vec parameter_slope(const flexcal_pose *pose, int first, int count, real h)
@@ -66,15 +84,16 @@ static real matern(real square)
     return (R(1.0) + scaled + R(5.0) / R(3.0) * square) * EXP(-scaled);
 }
 
-static real input_of(const flexcal_pose *pose, int source)
+/* Returns an input of a pose; a hoist force that is not stated counts as the mean of those fitted. */
+static real input_of(const flexcal_pose *pose, const input_info *input)
 {
-    if (source >= 0) {
-        return pose->q[source];
+    if (input->source >= 0) {
+        return pose->q[input->source];
     }
-    if (source == HOIST) {
-        return pose->has_hoist ? pose->hoist_N : HOIST_FORCE;
+    if (input->source == HOIST) {
+        return pose->has_hoist ? pose->hoist_N : input->offset;
     }
-    return source == TEMPERATURE ? pose->temperature_C : pose->payload_kg;
+    return input->source == TEMPERATURE ? pose->temperature_C : pose->payload_kg;
 }
 
 static real squared_distance(int is_angle, real difference)
@@ -106,11 +125,13 @@ static int remainder_shift(const flexcal_pose *pose, vec *out)
     int s, c, b, k, i, axis;
     evaluate_terms(NUMBER, pose, &here);
     for (s = 0; s < SITES; ++s) {
-        slope[s] = add(zero, R(1.0) / SITE[s].lever, command_slope(pose, &here, SITE[s].joint));
+        slope[s] = SITE[s].is_compliance ? compliance_slope(pose, &here, SITE[s].joint, R(1e-5) / SITE[s].lever)
+                                         : command_slope(pose, &here, SITE[s].joint);
+        slope[s] = add(zero, R(1.0) / SITE[s].lever, slope[s]);
         prior += (SITE[s].single + SITE[s].all + SITE[s].constant) * dot(slope[s], slope[s]);
     }
     for (i = 0; i < INPUTS; ++i) {
-        value[i] = (input_of(pose, INPUT[i].source) - INPUT[i].offset) / INPUT[i].unit;
+        value[i] = (input_of(pose, &INPUT[i]) - INPUT[i].offset) / INPUT[i].unit;
     }
     /* Richardson's combination of two central differences: exact to the fourth order. */
     mean = parameter_slope(pose, DELTA_FIRST[1], DELTA_FIRST[2] - DELTA_FIRST[1], DELTA_STEP);

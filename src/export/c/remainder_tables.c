@@ -4,10 +4,11 @@
 /* Sources of inputs that are no commands. */
 enum { TEMPERATURE = -1, PAYLOAD_MASS = -2, HOIST = -3 };
 
-/* Site that errs: its joint, the input that is its own command, lever [m/rad] or [1], variances of the
-   errors that follow its own command, all inputs and none [m^2], and 1/length^2 of the first. */
+/* Site that errs: the coordinate or compliance of a joint, the input that is its own command, lever
+   [m/rad], [1] or [N m^2/rad], variances of the errors that follow its own command, all inputs and
+   none [m^2], and 1/length^2 of the first. */
 typedef struct {
-    int joint, input;
+    int joint, is_compliance, input;
     real lever, single, all, constant, scale;
 } site_info;
 
