@@ -89,10 +89,10 @@ fn laws_play_springs_and_slides() {
          [[effect]]\njoint-lateral-compliance = {{ joint = 2 }}\n[[effect]]\nbase-compliance = {{}}\n\
          [[effect]]\njoint-compliance = {{ joint = 3 }}\n[[effect]]\njoint-nonlinear-stiffness = {{ joint = 2 }}\n\
          [[effect]]\ntracker-scale = {{}}\n[[effect]]\nlink-bending = {{ joint = 2 }}\n\
-         [parameters]\n'*' = {{ sigma_relative = 0.1 }}\n'joint*.theta' = {{ sigma_deg = 0.1 }}\n\
+         [parameters]\n'joint1.stiffness' = {{ sigma_relative = 0.1 }}\n'joint*.theta' = {{ sigma_deg = 0.1 }}\n\
          [data]\nfiles = ['rows.csv']\nposition_sigma_mm = 0.02\n",
         law("joint3", "sin(2*q2)*max(q3, 0.2) + sign(q2)*spline(q3 + 2)"),
-        law("joint2.rx", "tanh(q3)^3 + atan2(q2, 2)"),
+        law("joint2", "tanh(q3)^3 + atan2(q2, 2)"),
         law("measurement.x", "expm1(q2/5) + step(q3)*abs(q2)^1.5"),
     );
     made(&text, IDENTIFY);
@@ -127,7 +127,8 @@ fn a_remainder_at_the_joints() {
 fn effects_with_memory_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let text = fs::read_to_string(path("tests/cases/problem.toml")).unwrap();
-    let lagging = "\n[[effect]]\nlink-thermal-bending-lag = { link = 'A' }\n";
+    let lagging =
+        "\n[[effect]]\nlink-thermal-bending-lag = { link = 'A', time_constant_s = 600 }\n";
     fs::write(folder.path().join("problem.toml"), text + lagging).unwrap();
     let rows = path("tests/cases/a-none.csv");
     let run = format!("identify . --data {} --out out --quiet", rows.display());
