@@ -309,12 +309,6 @@ impl Effect {
         self == other || (self.is_searched() && is_alike())
     }
 
-    /// Returns true if it depends on the poses before as another effect of its family at the same
-    /// place does for another time or path.
-    pub(crate) fn remembers_like(&self, other: &Self) -> bool {
-        self.name_and_place() == other.name_and_place() && self.has_memory()
-    }
-
     /// Returns the same with its searched argument multiplied, to three digits; `None` where values
     /// between those of the candidates cannot be told apart.
     pub(crate) fn scaled(&self, factor: f64) -> Option<Self> {

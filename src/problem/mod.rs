@@ -45,7 +45,6 @@ pub use crate::laws::Effect;
 pub(crate) use crate::laws::quoted;
 
 pub(crate) use crate::observation::FixtureKind;
-pub(crate) use argument::HIGHEST_ORDER;
 pub use conditions::PoseRanges;
 pub(crate) use constraints::{Constraint, Limit, LimitKind};
 pub(crate) use dialect::{ColumnRule, ColumnSelector, Delimiter, Dialect, Missing, RotationKind};

@@ -1,4 +1,4 @@
-//! What a statistic does by chance alone.
+//! Null distributions of the test statistics.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor, Gamma};
 
@@ -12,7 +12,7 @@ const LEAST_SKEWNESS: f64 = 0.02;
 /// Values of A² beyond this have the same p-value: the fitted curve of [Stephens 1986] ends.
 const LARGEST: f64 = 150.0;
 
-/// The distribution of a statistic without structure; large values are improbable.
+/// Null distribution of a test statistic; large values are improbable.
 #[derive(Debug, Clone)]
 pub(super) enum Chance {
     /// `scale` times a variable with the χ² distribution.
@@ -21,7 +21,7 @@ pub(super) enum Chance {
     Fisher { distribution: FisherSnedecor, of: f64 },
     /// Anderson and Darling's A² of normal variables with mean and variance estimated.
     AndersonDarling,
-    /// As often drawn.
+    /// Empirical distribution of permutation draws.
     Drawn(Drawn),
 }
 
@@ -62,7 +62,7 @@ impl Chance {
     }
 }
 
-/// Values drawn without structure.
+/// Values of a statistic drawn under the null hypothesis.
 ///
 /// The p-value is (1 + number of draws that reach the statistic) / (1 + draws), a valid one for any
 /// number of draws; where fewer than ten do, that of a gamma distribution with the draws' mean,
@@ -70,17 +70,17 @@ impl Chance {
 /// 2016, NeuroImage 141, 502-516].
 #[derive(Debug, Clone)]
 pub(super) struct Drawn {
-    /// Ascending.
+    /// Drawn values, ascending.
     values: Vec<f64>,
-    /// Of the shape parameter k and scale 1.
+    /// Gamma distribution of shape k and scale 1 that describes the upper tail.
     tail: Gamma,
-    /// The statistic at 0 of that distribution, and its unit.
+    /// Statistic at 0 of that distribution, and its unit.
     origin: f64,
     unit: f64,
 }
 
 impl Drawn {
-    /// From draws; `None` where they are all the same.
+    /// Creates the distribution from draws; `None` where all draws are equal.
     pub fn of(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
         let n = values.len() as f64;

@@ -1,4 +1,4 @@
-//! What is known of every pose and a residual may depend on.
+//! Known quantities of every pose on which a residual may depend.
 
 use std::fmt;
 use std::sync::Arc;
@@ -6,30 +6,30 @@ use std::sync::Arc;
 use crate::laws::Quantity;
 use crate::problem::Problem;
 
-/// What is known of every pose and a residual may depend on; joints are counted from 0. Its
+/// Known quantity of every pose on which a residual may depend; joints are counted from 0. Its
 /// `Display` is the name in files.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Covariate {
-    /// q of a joint \[rad\] or, where it slides, \[m\].
+    /// Command q of a joint \[rad\] or, where it slides, \[m\].
     Command(usize),
-    /// Temperature [°C].
+    /// Temperature of the pose [°C].
     Temperature,
-    /// Payload \[kg\].
+    /// Mass of the payload \[kg\].
     Payload,
-    /// Hoist force \[N\].
+    /// Force of the hoist \[N\].
     Hoist,
     /// Time since the first pose \[s\].
     Time,
-    /// Number of the row, where no time was measured.
+    /// Number of the row, used where no time was measured.
     Row,
-    /// Side from which a joint came, −1 to 1.
+    /// Side from which a joint approached the pose, −1 to 1.
     Approach(usize),
     /// Forces and moments of the loads.
     Load,
-    /// Measured position.
+    /// Measured position of the target.
     Position,
-    /// One of the problem's own covariates, by the name of its column, in its unit.
+    /// Covariate that the user declares, by the name of its column, in its unit.
     Own(Arc<str>),
 }
 
@@ -51,7 +51,7 @@ impl Covariate {
             Quantity::Hoist => vec![Self::Hoist],
             Quantity::Elapsed | Quantity::Time => vec![Self::time(time_measured)],
             Quantity::Approach(joint) => vec![Self::Approach(joint)],
-            Quantity::Covariate(index) => vec![Self::own(index, problem)],
+            Quantity::Covariate(index) => vec![Self::declared(index, problem)],
         }
     }
 
@@ -59,9 +59,9 @@ impl Covariate {
         if measured { Self::Time } else { Self::Row }
     }
 
-    /// The problem's own covariate of that number, from 0.
-    pub fn own(which: usize, problem: &Problem) -> Self {
-        Self::Own(problem.data.covariates.get(which).map_or("", |own| &own.name).into())
+    /// Returns the covariate that the user declared under this number, from 0.
+    pub fn declared(which: usize, problem: &Problem) -> Self {
+        Self::Own(problem.data.covariates.get(which).map_or("", |covariate| &covariate.name).into())
     }
 }
 

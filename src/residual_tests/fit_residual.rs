@@ -1,4 +1,4 @@
-//! What residual tests are made on.
+//! Input of the residual tests.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,16 +9,16 @@ use super::outcome::Untestable;
 /// is not tested.
 pub(crate) const ROUNDING: f64 = 1e-3;
 
-/// Something that the residuals may depend on, pose by pose.
+/// Values of a covariate, one for each pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CovariateValues {
-    /// What it is.
+    /// Quantity of which these are the values.
     pub covariate: Covariate,
-    /// One value per pose, any unit.
+    /// Value in each pose, any unit.
     pub values: Vec<f64>,
 }
 
-/// What a fit leaves, as the tests see it: N poses, p fitted directions.
+/// Residual of a linear least-squares fit: N poses, p fitted directions.
 #[derive(Debug, Clone, Copy)]
 pub struct FitResidual<'a> {
     /// Whitened residuals (measured − predicted) / σ, measuring frame, pose after pose, shape = (3
@@ -29,10 +29,9 @@ pub struct FitResidual<'a> {
     /// The data's rows of the thin orthonormal factor of [J; prior rows]: with priors, H has
     /// eigenvalues between 0 and 1.
     pub fitted: &'a DMatrix<f64>,
-    /// How many numbers each pose measures, 1…3; empty where all measure three.
+    /// Number of measured coordinates of each pose, 1…3; empty where all poses measure three.
     pub coordinates: &'a [usize],
-    /// Whether σ was declared; one that was estimated from the residuals says nothing about their
-    /// size.
+    /// True if σ was declared; a σ estimated from the residuals says nothing about their size.
     pub sigma_is_declared: bool,
     /// Time of each pose, any unit and origin.
     pub time: &'a [f64],
@@ -41,17 +40,17 @@ pub struct FitResidual<'a> {
     /// Setup of each pose, as a number: poses with the same one are repeats, for which the model
     /// predicts the same position.
     pub setup: &'a [usize],
-    /// What the residuals may depend on.
+    /// Covariates whose influence on the residuals is tested.
     pub covariates: &'a [CovariateValues],
 }
 
 impl FitResidual<'_> {
-    /// How many numbers a pose measures.
+    /// Returns the number of measured coordinates of a pose.
     pub(super) fn coordinates_of(&self, pose: usize) -> usize {
         self.coordinates.get(pose).copied().unwrap_or(3)
     }
 
-    /// Whether the input makes sense.
+    /// Checks that sizes agree and values are finite.
     pub(super) fn testable(&self) -> Result<(), Untestable> {
         let rows = self.residual.len();
         let poses = rows / 3;
@@ -70,7 +69,7 @@ impl FitResidual<'_> {
         }
     }
 
-    /// A residual far below a declared σ is rounding.
+    /// Returns an error if the residual is so far below a declared σ that it is rounding.
     pub(super) fn above_rounding(&self) -> Result<(), Untestable> {
         let size = self.residual.norm_squared() / self.residual.len().max(1) as f64;
         let is_rounding = self.sigma_is_declared && size < ROUNDING.powi(2);

@@ -1,23 +1,23 @@
-//! The verdict of all residual tests together.
+//! Decision over all residual tests together.
 
 use super::chance::Chance;
 use super::outcome::{Findings, Outcome, ResidualTest, Test, Untestable};
 
-/// A test, and what it found before others are considered.
+/// A test and its result before the correction for multiple tests.
 pub(super) struct Tried {
-    /// What was tested.
+    /// Test that was made.
     pub test: Test,
-    /// What came of it.
+    /// Statistic with its null distribution, or the reason why there is none.
     pub trial: Result<Trial, Untestable>,
 }
 
-/// A statistic and what it does by chance.
+/// A statistic with its null distribution.
 pub(super) struct Trial {
-    /// Its value.
+    /// Value of the statistic.
     pub statistic: f64,
-    /// Its distribution without structure.
+    /// Null distribution of the statistic.
     pub chance: Chance,
-    /// How it is shown to people, an increasing function.
+    /// Increasing function that converts the statistic to the number that is shown.
     pub shown: fn(f64) -> f64,
 }
 

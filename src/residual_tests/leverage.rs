@@ -1,4 +1,4 @@
-//! How much of each pose the fit takes away, and what it would leave without some of its poses.
+//! Leverage of each pose, and the fit without some poses.
 
 use std::borrow::Cow;
 
@@ -9,28 +9,29 @@ use super::fit_residual::FitResidual;
 use super::outcome::Untestable;
 use crate::numeric::{gram, lower_factor, multiply_by_upper};
 
-/// Degrees of freedom below which nothing is tested.
+/// Minimum residual degrees of freedom of a test.
 const LEAST_FREEDOM: f64 = 4.0;
 /// Smallest part of the length² of a direction that the kept poses must have for the fit without the
 /// other poses to be defined.
 const LEAST_DECIDED: f64 = 1e-6;
-/// Directions of a pose that keep less than this part of their variance say nothing.
+/// Minimum part of its variance that a direction of a pose must keep to be studentised.
 const LEAST_LEFT: f64 = 1e-4;
-/// Directions that priors decide by less than this part count as decided by the data.
+/// Minimum part of a direction that must be decided by priors to count as such.
 const LEAST_PRIOR: f64 = 1e-6;
-/// What keeps a root of rounding real.
+/// Value added to a diagonal so that a Cholesky factor exists despite rounding.
 const ROUNDING: f64 = 1e-10;
-/// Poses whose rows of Q are turned at a time.
+/// Number of poses whose rows of Q are transposed at a time, for cache use.
 const TOGETHER: usize = 32;
-/// Directions from which on their eigenvectors take longer than draws in all of them.
+/// Number of directions above which a Cholesky factor replaces the eigenvectors: it takes less
+/// time.
 const MANY: usize = 100;
 
-/// The projection I − H with H = Q Qᵀ, and the studentising of each pose.
+/// Projection I − H with H = Q Qᵀ, and the matrices that studentise each pose.
 #[derive(Debug, Clone)]
 pub(super) struct Leverage<'a> {
     /// Q, shape = (3 N, p).
     pub fitted: Cow<'a, DMatrix<f64>>,
-    /// QᵀQ.
+    /// Gram matrix QᵀQ, shape = (p, p).
     gram: DMatrix<f64>,
     /// Degrees of freedom ν = tr(I − H).
     pub freedom: f64,
@@ -38,13 +39,13 @@ pub(super) struct Leverage<'a> {
     pub squared_freedom: f64,
     /// (I − H)ᵦᵦ^(−½) of each pose b.
     pub whiteners: Vec<Matrix3<f64>>,
-    /// How many numbers each pose measures.
+    /// Number of measured coordinates of each pose.
     pub coordinates: Vec<usize>,
 }
 
 impl<'a> Leverage<'a> {
-    /// Of Q, shape = (3 N, p), of poses that measure so many numbers each: the rows behind these
-    /// are 0.
+    /// Creates the leverage from Q, shape = (3 N, p), and the number of measured coordinates of
+    /// each pose; unmeasured rows of Q are 0.
     ///
     /// # Errors
     /// The fit leaves too few degrees of freedom.
@@ -62,7 +63,8 @@ impl<'a> Leverage<'a> {
         Ok(Self { fitted, gram, freedom, squared_freedom, whiteners, coordinates })
     }
 
-    /// A root of I − QᵀQ, shape = (p, k): what priors add to the residuals, k directions.
+    /// Returns a root of I − QᵀQ, shape = (p, k): the k directions along which priors add to the
+    /// residuals.
     pub fn prior_root(&self) -> DMatrix<f64> {
         let p = self.gram.nrows();
         let mut left = DMatrix::identity(p, p) - &self.gram;
@@ -75,8 +77,8 @@ impl<'a> Leverage<'a> {
         lower_factor(left.clone()).unwrap_or_else(|| root_of_priors(left))
     }
 
-    /// (I − H)ᵦᵦ^(−½) rᵦ of each pose b: residuals with unit covariance, if the noise has it [Cook
-    /// and Weisberg 1982].
+    /// Returns (I − H)ᵦᵦ^(−½) rᵦ of each pose b: residuals of unit covariance if the noise has it
+    /// [Cook and Weisberg 1982].
     ///
     /// Directions of a pose that the fit always meets become zero.
     pub fn studentise(&self, residual: &[f64]) -> Vec<Vector3<f64>> {
@@ -85,16 +87,16 @@ impl<'a> Leverage<'a> {
         poses.into_iter().map(Vector3::from).collect()
     }
 
-    /// The same in the place of the residuals.
+    /// Replaces the residuals by the studentised ones.
     pub fn studentise_in_place(&self, poses: &mut [[f64; 3]]) {
-        for (own, whitener) in poses.iter_mut().zip(&self.whiteners) {
-            *own = (whitener * Vector3::from(*own)).into();
+        for (pose, whitener) in poses.iter_mut().zip(&self.whiteners) {
+            *pose = (whitener * Vector3::from(*pose)).into();
         }
     }
 }
 
-/// What comes of some poses after others, on every core: from the number of the first and their
-/// rows of Q as columns, three a pose.
+/// Applies a function to chunks of poses in parallel. It receives the number of the first pose and
+/// the rows of Q as columns, three a pose.
 fn by_poses<T: Send>(
     fitted: &DMatrix<f64>,
     of: impl Fn(usize, &DMatrix<f64>) -> Vec<T> + Sync,
@@ -110,12 +112,12 @@ fn by_poses<T: Send>(
     parts.into_iter().flatten().collect()
 }
 
-/// AᵦᵀBᵦ of the columns of one pose.
+/// Returns AᵦᵀBᵦ of the three columns of one pose.
 fn products(a: &DMatrix<f64>, b: &DMatrix<f64>, pose: usize) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| a.column(3 * pose + i).dot(&b.column(3 * pose + j)))
 }
 
-/// A root of I − QᵀQ, a column for each direction that priors help to decide.
+/// Returns a root of I − QᵀQ with a column for each direction that priors help to decide.
 fn root_of_priors(left: DMatrix<f64>) -> DMatrix<f64> {
     let p = left.nrows();
     if left.trace() <= LEAST_PRIOR {
@@ -129,7 +131,7 @@ fn root_of_priors(left: DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(p, by_priors.len(), entry)
 }
 
-/// A^(−½) of a symmetric matrix, zero along directions in which A vanishes.
+/// Returns A^(−½) of a symmetric matrix, zero along directions in which A vanishes.
 fn inverse_root(matrix: Matrix3<f64>) -> Matrix3<f64> {
     let eigen = matrix.symmetric_eigen();
     let roots =
@@ -137,25 +139,25 @@ fn inverse_root(matrix: Matrix3<f64>) -> Matrix3<f64> {
     eigen.eigenvectors * Matrix3::from_diagonal(&roots) * eigen.eigenvectors.transpose()
 }
 
-/// The poses that are kept, and what a (linear) fit to them alone leaves.
+/// Some of the poses, and the residual of a linear fit to them alone.
 #[derive(Debug, Clone)]
 pub(super) struct Kept<'a> {
-    /// Their numbers, ascending.
+    /// Numbers of the kept poses, ascending.
     pub poses: Vec<usize>,
-    /// Their residuals, shape = (3 per pose).
+    /// Residuals of the kept poses, shape = (3 per pose).
     pub residual: DVector<f64>,
-    /// Their leverage.
+    /// Leverage of the kept poses.
     pub leverage: Leverage<'a>,
 }
 
 impl<'a> Kept<'a> {
-    /// All poses.
+    /// Keeps all poses.
     pub fn all(fit: &FitResidual, leverage: Leverage<'a>) -> Self {
         let residual = fit.residual.clone();
         Self { poses: (0..residual.len() / 3).collect(), residual, leverage }
     }
 
-    /// All but those `out`; `None` where the others do not decide the fit.
+    /// Keeps all poses but those marked `out`; `None` where the kept ones do not determine the fit.
     ///
     /// With Q_A and Q_B the rows of the kept and the others, and M = I − Q_BᵀQ_B = L Lᵀ, it leaves
     /// r_A + Q_A M⁻¹ Q_Bᵀ r_B, and Q_A L⁻ᵀ takes the place of Q [Cook and Weisberg 1982, section
@@ -186,16 +188,16 @@ impl<'a> Kept<'a> {
     }
 }
 
-/// What a fit without one pose leaves at the others.
+/// Sum of squares of the other poses in the fit without one pose.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Others {
-    /// ‖r‖² of the others.
+    /// Sum of squared residuals of the other poses.
     pub squares: f64,
-    /// Its degrees of freedom.
+    /// Degrees of freedom of that sum.
     pub freedom: f64,
 }
 
-/// Leaves out each pose in turn.
+/// Returns the sum of squares of the others for each pose that is left out in turn.
 ///
 /// The rows of pose b are Q_b; with D = (I − H_bb)⁻¹, a = D r_b and W = Q_b QᵀQ Q_bᵀ, as in
 /// [`Kept::without`],
@@ -211,14 +213,15 @@ pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec
         let others = |number: usize| {
             let pose = first + number;
             let of_pose = |values: &DVector<f64>| values.fixed_rows::<3>(3 * pose).into_owned();
-            let (own, again) = (of_pose(residual), of_pose(&again));
+            let (residual_of_pose, again) = (of_pose(residual), of_pose(&again));
             let taken = products(rows, rows, number);
             let more = products(rows, &gram_rows, number) - taken * taken;
             let inverse = leverage.whiteners[pose] * leverage.whiteners[pose];
-            let pull = inverse * own;
-            let change = 2.0 * pull.dot(&(again - taken * own)) + pull.dot(&(more * pull));
+            let pull = inverse * residual_of_pose;
+            let change =
+                2.0 * pull.dot(&(again - taken * residual_of_pose)) + pull.dot(&(more * pull));
             Others {
-                squares: total - own.norm_squared() + change,
+                squares: total - residual_of_pose.norm_squared() + change,
                 freedom: leverage.freedom - leverage.coordinates[pose] as f64 + taken.trace()
                     - (inverse * more).trace(),
             }
@@ -227,7 +230,7 @@ pub(super) fn each_left_out(leverage: &Leverage, residual: &DVector<f64>) -> Vec
     })
 }
 
-/// Qᵀr, summed row after row.
+/// Returns Qᵀr, summed row after row.
 fn along(fitted: &DMatrix<f64>, residual: &DVector<f64>) -> DVector<f64> {
     let mut sum = DVector::zeros(fitted.ncols());
     for first in (0..residual.len()).step_by(3 * TOGETHER) {
@@ -241,8 +244,7 @@ fn along(fitted: &DMatrix<f64>, residual: &DVector<f64>) -> DVector<f64> {
 mod tests {
     use super::*;
 
-    /// Rows of data of an orthonormal factor of 60 poses and p unknowns, with or without a prior on
-    /// each second one.
+    /// Returns the leverage of 60 poses and p unknowns, with or without a prior on each second one.
     fn leverage(p: usize, has_priors: bool) -> Leverage<'static> {
         let entry =
             |i: usize, j: usize| ((12.9898 * i as f64 + 78.233 * j as f64).sin() * 43.7) % 1.0;
@@ -261,9 +263,9 @@ mod tests {
     #[test]
     fn what_priors_add_is_a_root_of_what_the_data_leave_open() {
         for p in [9, 110] {
-            let own = leverage(p, true);
-            let root = own.prior_root();
-            let left = DMatrix::identity(p, p) - &own.gram;
+            let leverage_with_priors = leverage(p, true);
+            let root = leverage_with_priors.prior_root();
+            let left = DMatrix::identity(p, p) - &leverage_with_priors.gram;
             assert!(left.trace() > 1.0 && (&root * root.transpose() - left).amax() < 1e-6, "{p}");
             assert_eq!(leverage(p, false).prior_root().shape(), (p, 0));
         }

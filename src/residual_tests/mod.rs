@@ -1,15 +1,14 @@
-//! Whether structure is left in the residual of a fit: statistical tests, each with its bounds
-//! under chance.
+//! Statistical tests of the residual of a fit: is structure left that an effect could explain? Each
+//! test states its bounds under noise alone.
 //!
-//! A fitted residual r = (I − H) ε is neither independent nor equally scattered from pose to pose.
-//! So the residual of each pose is studentised by its own leverage, and the tests of order and
-//! dependence learn from permuted residuals, fitted again, what chance does.
+//! A fitted residual r = (I − H) ε is neither independent nor of equal variance from pose to pose.
+//! So the residual of each pose is studentised by its leverage. Null distributions of the tests of
+//! order and dependence come from permuted residuals that are fitted again.
 //!
-//! - `fit_residual`, `leverage`: what is tested; studentised residuals, poses left out.
-//! - `size`, `outliers`, `statistic`: how large the residuals are and how they scatter, whether
-//!   they follow one another or a covariate.
-//! - `chance`, `permutation`: what each statistic does by chance. `judgement`, `outcome`: the
-//!   verdict of all, and words for it.
+//! - `fit_residual`, `leverage`: the input, studentised residuals, fits without some poses. -
+//! `size`, `outliers`, `statistic`: size and distribution of the residuals, order, dependence on
+//! covariates. - `chance`, `permutation`: null distributions. `judgement`, `outcome`: decision over
+//! all tests, and sentences.
 
 mod chance;
 mod covariate;
@@ -24,6 +23,7 @@ mod statistic;
 mod test;
 
 pub use covariate::Covariate;
+pub(crate) use fit_residual::ROUNDING;
 pub use fit_residual::{CovariateValues, FitResidual};
 pub use outcome::{Findings, Outcome, ResidualTest, Sequence, Test, Untestable};
 pub use test::test_residual;

@@ -1,4 +1,4 @@
-//! What the residual tests found.
+//! Results of the residual tests.
 
 use std::fmt;
 
@@ -9,13 +9,13 @@ use crate::error::Location;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Sequence {
-    /// By time, session by session.
+    /// By measured time, within each session.
     Time,
-    /// As the rows stand in the files, session by session.
+    /// As rows of the files, within each session.
     Rows,
 }
 
-/// A test of what a fit leaves.
+/// Test of the residual of a fit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Test {
@@ -26,17 +26,17 @@ pub enum Test {
     /// Runs of equal sign in some order; statistic: share of steps from pose to pose at which a
     /// coordinate keeps its sign.
     Runs {
-        /// The order.
+        /// Order of the poses.
         sequence: Sequence,
     },
     /// Autocorrelation in some order; statistic: Ljung and Box's Q.
     LjungBox {
-        /// The order.
+        /// Order of the poses.
         sequence: Sequence,
     },
     /// Dependence of the mean residual on a covariate; statistic: a distance correlation, 0…1.
     Dependence {
-        /// Which.
+        /// Covariate whose influence is tested.
         covariate: Covariate,
     },
     /// Poses too far off to be noise; statistic: the largest distance in units of the others'
@@ -49,7 +49,7 @@ pub enum Test {
     Normality,
 }
 
-/// Why a test says nothing.
+/// Reason why a test cannot be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Untestable {
@@ -62,13 +62,13 @@ pub enum Untestable {
     /// The covariate has the same value everywhere.
     #[error("it is the same at every pose")]
     Constant,
-    /// No σ was declared.
+    /// The problem declares no σ.
     #[error("no σ is declared")]
     NoSigma,
     /// The residual is below a thousandth of σ.
     #[error("the residual is below a thousandth of σ: rounding")]
     Rounding,
-    /// No setup was measured more than once.
+    /// No setup was measured repeatedly.
     #[error("no setup was measured twice")]
     NoRepeats,
     /// A value is not a finite number.
@@ -79,34 +79,36 @@ pub enum Untestable {
     SizeMismatch,
 }
 
-/// What a test found.
+/// Result of a test.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// Its value.
+    /// Value of the statistic.
     pub statistic: f64,
-    /// Where chance keeps it, from and to, at the level at which Holm's procedure judges this test.
+    /// Lower and upper bound of the statistic under noise alone, at the level at which Holm's
+    /// procedure judges the test.
     ///
-    /// Above is what fails; below the lower bound (of χ² / ν alone; else 0) σ is overstated.
+    /// A statistic above the upper bound fails. One below the lower bound (of χ² / ν alone; else 0)
+    /// shows an overstated σ.
     pub bounds: (f64, f64),
-    /// Probability that chance alone gives as much, by itself.
+    /// p-value of the statistic, for this test by itself.
     pub p_value: f64,
-    /// Whether it failed, all tests together taken into account.
+    /// True if the test failed after correction for all tests.
     pub failed: bool,
 }
 
 /// One test; its `Display` is a sentence for people.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResidualTest {
-    /// What was tested.
+    /// Test that was made.
     pub test: Test,
-    /// What came of it, or why nothing did.
+    /// Result, or the reason why the test cannot be made.
     pub outcome: Result<Outcome, Untestable>,
-    /// Of outliers the row that is farthest off, where that is known.
+    /// Row of the worst outlier in the test of outliers, where it is known.
     pub row: Option<Location>,
 }
 
 impl ResidualTest {
-    /// Short name of the test.
+    /// Returns the short name of the test.
     pub fn name(&self) -> &'static str {
         match self.test {
             Test::ReducedChiSquared => "reduced-chi-squared",
@@ -119,7 +121,7 @@ impl ResidualTest {
         }
     }
 
-    /// The covariate that the test is about: of a test of order, time or row.
+    /// Returns the covariate that the test is about: of a test of order, time or row.
     pub fn about(&self) -> Option<Covariate> {
         match &self.test {
             Test::Dependence { covariate } => Some(covariate.clone()),
@@ -133,33 +135,33 @@ impl ResidualTest {
         }
     }
 
-    /// Whether a failure means structure that an effect could explain.
+    /// Returns true if a failure means structure that an effect could explain.
     pub fn is_structure(&self) -> bool {
         !matches!(self.test, Test::Outliers { .. } | Test::Normality)
     }
 
-    /// Whether it failed.
+    /// Returns true if the test failed.
     pub fn failed(&self) -> bool {
         self.outcome.as_ref().is_ok_and(|outcome| outcome.failed)
     }
 }
 
-/// All tests of what a fit leaves.
+/// Results of all tests of a residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Findings {
-    /// Every test, testable or not.
+    /// Every test, those that cannot be made included.
     pub tests: Vec<ResidualTest>,
     /// Poses that were left out as outliers, counted from 0.
     pub outliers: Vec<usize>,
 }
 
 impl Findings {
-    /// Whether there is structure left, beyond chance at the family-wise level 0.01.
+    /// Returns true if a test of structure failed at the family-wise level.
     pub fn is_structured(&self) -> bool {
         self.strongest().is_some()
     }
 
-    /// The failed test of structure that chance explains least.
+    /// Returns the failed test of structure with the smallest p-value.
     pub fn strongest(&self) -> Option<&ResidualTest> {
         let p_value = |test: &ResidualTest| {
             test.outcome.as_ref().map_or(f64::INFINITY, |outcome| outcome.p_value)
@@ -168,8 +170,8 @@ impl Findings {
         failed.min_by(|a, b| p_value(a).total_cmp(&p_value(b)))
     }
 
-    /// The residual in units of the declared σ, where its size alone is beyond chance and no test
-    /// sees structure in it.
+    /// Returns the residual in units of the declared σ if only its size is beyond chance; `None`
+    /// otherwise.
     pub fn size_alone(&self) -> Option<f64> {
         let mut failed = self.tests.iter().filter(|test| test.is_structure() && test.failed());
         let (Some(only), None) = (failed.next(), failed.next()) else { return None };
@@ -181,15 +183,17 @@ impl Findings {
         }
     }
 
-    /// The residual in units of the declared σ, where it is smaller than chance makes one of that
-    /// σ.
+    /// Returns the residual in units of the declared σ if it is smaller than noise of that σ;
+    /// `None` otherwise.
     pub fn overstated_sigma(&self) -> Option<f64> {
         let size = self.tests.iter().filter(|test| test.test == Test::ReducedChiSquared);
         let mut sizes = size.filter_map(|test| test.outcome.as_ref().ok());
-        sizes.find(|own| own.statistic < own.bounds.0).map(|own| own.statistic.max(0.0).sqrt())
+        sizes
+            .find(|outcome| outcome.statistic < outcome.bounds.0)
+            .map(|outcome| outcome.statistic.max(0.0).sqrt())
     }
 
-    /// Whether anything was tested for structure.
+    /// Returns true if at least one test of structure could be made.
     pub fn is_testable(&self) -> bool {
         self.tests.iter().any(|test| test.is_structure() && test.outcome.is_ok())
     }

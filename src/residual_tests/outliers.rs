@@ -9,15 +9,15 @@ use super::judgement::{Trial, Tried};
 use super::leverage::{Kept, Leverage, Others, each_left_out};
 use super::outcome::{Test, Untestable};
 
-/// Poses left out in one round: one in so many, at least one. Large outliers pull the fit off
-/// others and hide smaller ones.
+/// Number of poses for each pose left out in one round, at least one. Large outliers pull the fit
+/// off others and hide smaller ones.
 const ONE_A_ROUND_IN: usize = 100;
-/// More than one pose in so many is no outlier.
+/// Smallest number of poses for each outlier: where more are far off, they are no outliers.
 const ONE_IN: usize = 5;
 
-/// What a search for outliers found.
+/// Result of a search for outliers.
 pub(super) struct Found<'a> {
-    /// The test of the pose that is farthest off, with all poses present.
+    /// Returns the test of the pose that is farthest off.
     pub tried: Tried,
     /// The poses without the outliers; `None` where there are none.
     pub kept: Option<Kept<'a>>,
@@ -61,22 +61,22 @@ pub(super) fn find<'a>(fit: &FitResidual<'a>, leverage: &Leverage, level: f64) -
     Found { tried, kept }
 }
 
-/// F of a pose and its distribution.
+/// F statistic of a pose and its distribution.
 struct Distance {
     ratio: f64,
     distribution: FisherSnedecor,
 }
 
-/// Of each pose; `None` where the others leave no degrees of freedom.
+/// Returns the F statistic of each pose; `None` where the other poses leave no degrees of freedom.
 fn distances(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Option<Distance>> {
     let rounding = f64::EPSILON * residual.norm_squared();
-    let distance = |((own, others), &numbers): ((Vector3<f64>, Others), &usize)| {
+    let distance = |((residual, others), &numbers): ((Vector3<f64>, Others), &usize)| {
         let numbers = numbers as f64;
         let distribution = FisherSnedecor::new(numbers, others.freedom).ok()?;
-        let own = own.norm_squared();
+        let residual = residual.norm_squared();
         let variance = others.squares.max(rounding) / others.freedom;
         Some(Distance {
-            ratio: if own > 0.0 { own / numbers / variance } else { 0.0 },
+            ratio: if residual > 0.0 { residual / numbers / variance } else { 0.0 },
             distribution,
         })
     };
@@ -103,7 +103,8 @@ fn test(distances: &[Option<Distance>]) -> Tried {
     Tried { test: Test::Outliers { worst: Some(worst) }, trial: Ok(trial) }
 }
 
-/// Those that are too far off, the farthest first, as many as leave in one round.
+/// Returns the poses that are too far off, the farthest first, at most as many as one round leaves
+/// out.
 fn too_far(distances: &[Option<Distance>], level: f64) -> Vec<usize> {
     let count = distances.len();
     let far = |(number, distance): (usize, &Option<Distance>)| {

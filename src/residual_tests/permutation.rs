@@ -1,4 +1,4 @@
-//! Residuals as chance would leave them: permuted, and fitted again.
+//! Null distributions from permuted residuals that are fitted again.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rand::seq::SliceRandom as _;
@@ -12,19 +12,18 @@ use super::leverage::Leverage;
 use super::statistic::{Sample, Statistic};
 use crate::numeric::{subtract_product, transposed_product};
 
-/// Number of draws. Fewer where a product of all of them with Q takes more multiplications than
-/// `WORK`: of a fit of hundreds of parameters to thousands of poses what is less probable than one
-/// in a hundred is then told by the fitted tail, instead of one in two hundred.
+/// Number of permutation draws, fewer where their product with Q takes more than `WORK`
+/// multiplications; p-values below 1 % then come from the fitted tail.
 const DRAWS: usize = 1999;
 const FEWEST: usize = 999;
 const WORK: u64 = 1 << 32;
-/// Draws that are fitted together, fewer where they have more than so many numbers: Q is gone
-/// through once for all of them.
+/// Number of draws that are fitted together; fewer where they have more than `NUMBERS` numbers. Q
+/// is read once for all of them.
 const TOGETHER: usize = 96;
 const FEWEST_TOGETHER: usize = 16;
 const NUMBERS: usize = 1 << 21;
 
-/// What each statistic does by chance; `None` where it cannot vary.
+/// Returns the null distribution of each statistic; `None` where it cannot vary.
 ///
 /// A draw permutes the studentised poses e, takes the fit away again and studentises anew:
 ///
@@ -67,8 +66,7 @@ pub(super) fn chances(
     (0..statistics.len()).map(of).collect()
 }
 
-/// Residuals r* of some draws as columns, shape = (3 N, draws), in the place of what `residuals`
-/// held.
+/// Writes residuals r* of some draws into the columns of `residuals`, shape = (3 N, draws).
 fn draw(
     (leverage, prior): (&Leverage, &DMatrix<f64>),
     studentised: &[Vector3<f64>],
@@ -104,7 +102,7 @@ fn draw(
     subtract_product(residuals.as_view_mut(), &leverage.fitted, &taken);
 }
 
-/// The statistics of each draw, from its residuals, which are studentised in their place.
+/// Returns the statistics of each draw from its residuals, which are studentised in place.
 fn values(
     leverage: &Leverage,
     statistics: &[&Statistic],

@@ -1,4 +1,4 @@
-//! Whether residuals are larger than noise, and normally distributed.
+//! Tests of the size of the residuals and of their normality.
 
 use std::collections::BTreeMap;
 
@@ -11,9 +11,9 @@ use super::judgement::{Trial, Tried};
 use super::leverage::Kept;
 use super::outcome::{Test, Untestable};
 
-/// Coordinates below which the distribution is not tested.
+/// Minimum number of coordinates for the test of normality.
 const LEAST_COORDINATES: usize = 8;
-/// Probabilities are kept this far from 0 and 1.
+/// Distance that probabilities keep from 0 and 1.
 const EXTREME: f64 = 1e-300;
 
 /// χ² / ν of the residuals against the declared σ, with ν = 3 N − tr H.
@@ -50,9 +50,9 @@ pub(super) fn lack_of_fit(fit: &FitResidual, kept: &Kept) -> Tried {
 fn ratio(fit: &FitResidual, kept: &Kept) -> Result<Trial, Untestable> {
     let mut setups = BTreeMap::<usize, (usize, Vec<Vector3<f64>>)>::new();
     for (&pose, residual) in kept.poses.iter().zip(kept.residual.as_slice().chunks_exact(3)) {
-        let (_, own) =
+        let (_, repeats) =
             setups.entry(fit.setup[pose]).or_insert_with(|| (fit.coordinates_of(pose), Vec::new()));
-        own.push(Vector3::from_column_slice(residual));
+        repeats.push(Vector3::from_column_slice(residual));
     }
     let (mut pure, mut pure_freedom) = (0.0, 0.0);
     for (numbers, repeats) in setups.values() {

@@ -1,4 +1,4 @@
-//! Statistics of studentised residuals: whether they follow one another, or depend on a covariate.
+//! Statistics of studentised residuals: order and dependence on covariates.
 
 use std::sync::Arc;
 
@@ -7,28 +7,29 @@ use nalgebra::{Matrix3, Vector3};
 use super::fit_residual::FitResidual;
 use super::outcome::{Sequence, Untestable};
 
-/// Poses below which order and dependence are not tested.
+/// Minimum number of poses for tests of order and dependence.
 const LEAST_POSES: usize = 5;
-/// Most lags of the autocorrelation, and poses of a session per lag [Hyndman and Athanasopoulos
-/// 2018, section 5.4].
+/// Maximum number of lags of the autocorrelation, and poses of a session for each lag [Hyndman and
+/// Athanasopoulos 2018, section 5.4].
 const MOST_LAGS: usize = 10;
 const POSES_PER_LAG: usize = 5;
-/// Poses from all over memory that are fetched together, before anything is done with them.
+/// Number of poses that are copied together before they are used: reads from scattered memory then
+/// overlap.
 const FETCHED: usize = 64;
-/// A range this small beside the values is rounding.
+/// Range of a covariate, relative to its values, below which it counts as constant.
 const ROUNDING: f64 = 1e-12;
 
-/// Studentised residuals, about their mean.
+/// Studentised residuals, centred.
 #[derive(Debug)]
 pub(super) struct Sample<'a> {
-    /// y of each pose, with Σ y = 0.
+    /// Centred residual y of each pose, with Σ y = 0.
     centred: &'a [[f64; 3]],
-    /// Σ y yᵀ.
+    /// Sum of outer products Σ y yᵀ.
     squares: Matrix3<f64>,
 }
 
 impl<'a> Sample<'a> {
-    /// Of studentised residuals, in their place.
+    /// Centres studentised residuals in place.
     pub fn of(values: &'a mut [[f64; 3]]) -> Self {
         let mean = values.iter().copied().map(Vector3::from).sum::<Vector3<f64>>()
             / values.len().max(1) as f64;
@@ -46,7 +47,7 @@ impl<'a> Sample<'a> {
     }
 }
 
-/// A number that grows with structure of one kind; free of the residuals' unit.
+/// Statistic that grows with one kind of structure; independent of the unit of the residuals.
 #[derive(Debug)]
 pub(super) enum Statistic {
     /// Share of steps at which a coordinate keeps its sign.
@@ -58,7 +59,7 @@ pub(super) enum Statistic {
 }
 
 impl Statistic {
-    /// Its value.
+    /// Returns the value of the statistic.
     pub fn of(&self, sample: &Sample) -> f64 {
         match self {
             Self::Runs(order) => order.kept_signs(sample),
@@ -68,15 +69,15 @@ impl Statistic {
     }
 }
 
-/// Poses of each session in some order; nothing follows across sessions.
+/// Poses of each session in some order; nothing is compared across sessions.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Order {
     sessions: Vec<Vec<usize>>,
     lags: usize,
 }
 
-/// The poses `kept` (which count from 0 anew) in the order of time, and in that of the rows where
-/// it is another.
+/// Returns the poses `kept` (renumbered from 0) in the order of time, and in that of the rows where
+/// it differs.
 pub(super) fn sequences(
     fit: &FitResidual,
     kept: &[usize],
@@ -113,7 +114,7 @@ impl Order {
         Ok(Self { sessions, lags: (longest / POSES_PER_LAG).min(MOST_LAGS) })
     }
 
-    /// Poses that are `lag` steps apart, earlier and later, of all sessions.
+    /// Returns the pairs of poses that are `lag` steps apart, earlier and later, of all sessions.
     fn pairs<'a>(
         &'a self,
         sample: &'a Sample,
@@ -123,8 +124,8 @@ impl Order {
         self.sessions.iter().flat_map(within).map(|(&a, &b)| (sample.at(a), sample.at(b)))
     }
 
-    /// Share of steps at which a coordinate keeps its sign: few runs, many kept signs [Wald and
-    /// Wolfowitz 1940].
+    /// Returns the share of steps at which a coordinate keeps its sign: few runs, many kept signs
+    /// [Wald and Wolfowitz 1940].
     pub fn kept_signs(&self, sample: &Sample) -> f64 {
         let (mut steps, mut kept) = (0_u32, 0_u32);
         for (a, b) in self.pairs(sample, 1) {
@@ -159,7 +160,7 @@ impl Order {
     }
 }
 
-/// Distance correlation with a covariate, of the mean.
+/// Squared distance correlation of the mean residual with a covariate.
 ///
 /// ρ² = − Σᵢⱼ |xᵢ − xⱼ| yᵢ·yⱼ / (‖K‖ ‖Σ y yᵀ‖) = 2 Σₖ (x₍ₖ₊₁₎ − x₍ₖ₎) |Cₖ|² / (‖K‖ ‖Σ y yᵀ‖)
 ///
@@ -179,7 +180,8 @@ pub(super) struct Cumulative {
 }
 
 impl Cumulative {
-    /// Of the values at the poses `kept`, which count from 0 anew; there should be `all` values.
+    /// Creates the statistic from the values at the poses `kept`, renumbered from 0; `values` must
+    /// have `all` entries.
     pub fn of(values: &[f64], all: usize, kept: &[usize]) -> Result<Self, Untestable> {
         if values.len() != all {
             return Err(Untestable::SizeMismatch);
@@ -204,15 +206,15 @@ impl Cumulative {
         Ok(Self { order, weights })
     }
 
-    /// ρ².
+    /// Returns ρ² of a sample.
     pub fn correlation(&self, sample: &Sample) -> f64 {
         let mut sum = Vector3::zeros();
         let mut total = 0.0;
         let mut near = [Vector3::zeros(); FETCHED];
         for (numbers, weights) in self.order.chunks(FETCHED).zip(self.weights.chunks(FETCHED)) {
             near.iter_mut().zip(numbers).for_each(|(near, &number)| *near = sample.at(number));
-            for (own, weight) in near.iter().zip(weights) {
-                sum += own;
+            for (centred, weight) in near.iter().zip(weights) {
+                sum += centred;
                 total += weight * sum.norm_squared();
             }
         }

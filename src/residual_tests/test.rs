@@ -46,7 +46,7 @@ pub fn test_residual(fit: &FitResidual, level: f64, seed: u64) -> Findings {
     judge(tried, level, (0..poses).filter(|pose| kept.poses.binary_search(pose).is_err()).collect())
 }
 
-/// The tests of order and dependence.
+/// Returns the tests of order and dependence.
 fn permuted(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<Tried> {
     let statistics = statistics(fit, &kept.poses);
     let working: Vec<&Statistic> =
@@ -54,8 +54,8 @@ fn permuted(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<Tried> {
     let studentised = kept.leverage.studentise(kept.residual.as_slice());
     let mut chances =
         permutation::chances(&kept.leverage, &studentised, &working, seed).into_iter();
-    let mut own: Vec<[f64; 3]> = studentised.into_iter().map(Into::into).collect();
-    let sample = Sample::of(&mut own);
+    let mut coordinates: Vec<[f64; 3]> = studentised.into_iter().map(Into::into).collect();
+    let sample = Sample::of(&mut coordinates);
     let tried = statistics.iter().map(|(test, statistic)| {
         let trial = statistic.as_ref().map_err(Clone::clone).and_then(|statistic| {
             let chance = chances.next().flatten().ok_or(Untestable::NoFreedom)?;
@@ -68,7 +68,8 @@ fn permuted(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<Tried> {
     tried.collect()
 }
 
-/// The statistics of order and dependence on some of the poses, or why there is none.
+/// Returns the statistics of order and dependence on some of the poses, or the reasons why there
+/// are none.
 fn statistics(fit: &FitResidual, poses: &[usize]) -> Vec<(Test, Result<Statistic, Untestable>)> {
     let mut all = Vec::new();
     for (sequence, order) in sequences(fit, poses) {
@@ -86,7 +87,7 @@ fn statistics(fit: &FitResidual, poses: &[usize]) -> Vec<(Test, Result<Statistic
     all
 }
 
-/// Every test, with the same reason why it is not testable.
+/// Returns every test with the same reason why it cannot be made.
 fn all_untestable(fit: &FitResidual, why: &Untestable) -> Vec<Tried> {
     let sequence = Sequence::Time;
     let mut tests = vec![

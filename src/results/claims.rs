@@ -74,6 +74,7 @@ pub(super) fn law_name(law: &HypothesisKind) -> &str {
     match law {
         HypothesisKind::Effect(effect) => effect.name(),
         HypothesisKind::NearHarmonic(_) => "near-harmonic",
+        HypothesisKind::Gear(_) => "gear",
         HypothesisKind::PerPose => "per-pose",
         HypothesisKind::Wandering => "wandering",
         HypothesisKind::Linear => "linear",
@@ -95,6 +96,9 @@ fn describe(hypothesis: &select::Hypothesis, effect_words: impl Fn(&Effect) -> S
             format!(
                 "{place}: a function of {inputs} with about {order} periods a revolution, law unknown"
             )
+        }
+        HypothesisKind::Gear(highest) => {
+            format!("{place}: periodic error of all orders up to {highest} a turn")
         }
         HypothesisKind::PerPose => {
             format!("{place}: an error that differs in every pose and depends on no known quantity")

@@ -1,20 +1,20 @@
-//! Which effects of the catalogue may be looked for.
+//! Effects of the catalogue that the search may add.
 
 use super::data::Data;
 use crate::model::effect::{self, Candidate};
 use crate::model::parameter::{holds_all, refuses};
 use crate::problem::{Effect, Problem};
 
-/// Why an effect that the rules of the problem hold at zero is not looked for.
+/// Reason of an effect that the rules of the problem hold at zero.
 pub const HELD_FIXED: &str = "[parameters] holds it fixed";
 
-/// Why an effect is not looked for that the problem could not declare as its rules are.
+/// Reason of an effect that the problem could not declare under its rules.
 pub const REFUSED: &str = "a rule of [parameters] speaks of it in another unit";
 
-/// Why an effect is not judged whose derivative is not a number in these poses.
+/// Reason of an effect whose derivative is not finite in these poses.
 pub const NOT_FINITE: &str = "its derivative is not a finite number in these poses";
 
-/// Candidates that are not declared, divided into those that the data can show and the others.
+/// Effects that are not declared: those that the data can show, and the others with the reason.
 pub(super) struct Candidates {
     pub testable: Vec<Effect>,
     pub untestable: Vec<(Effect, &'static str)>,
@@ -45,7 +45,7 @@ impl Candidates {
     }
 }
 
-/// Effects with one more; harmonics of one joint become one effect.
+/// Returns effects with one more; harmonics of one joint become one effect.
 pub(super) fn joined(effects: &[Effect], new: &Effect) -> Vec<Effect> {
     let mut all = effects.to_vec();
     match all.iter_mut().find_map(|known| Some((known.joined(new)?, known))) {

@@ -1,11 +1,13 @@
-//! The identification poses as a diagnosis sees them.
+//! Identification poses with everything that the search asks of them.
 
+use crate::select::settings::{CROSS_VALIDATION_BLOCKS, MAX_SHIFT_TIMES, MIN_POSES_BESIDE_SHIFT};
 use std::collections::BTreeMap;
 
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 
+use super::harmonic_prior::takes_common_prior;
 use super::rules::SelectionRules;
 use crate::fit::Stop;
 use crate::measurement::{Dataset, Measurements, Split};
@@ -14,26 +16,28 @@ use crate::problem::{Effect, JointKind, Problem};
 use crate::residual_tests::Covariate;
 use crate::residual_tests::CovariateValues;
 
-/// Measurements and which of their rows take part.
+/// Measurements, their split, and the settings of a search.
 #[derive(Debug, Clone)]
 pub(super) struct Data<'a> {
-    /// What is fitted again.
+    /// Data set that is fitted again.
     pub dataset: &'a Dataset,
     pub measurements: &'a Measurements,
     pub split: &'a Split,
     pub rules: &'a SelectionRules,
-    /// Number of the conditions of each identification row; rows with the same are repeats.
+    /// Number of the conditions of each identification row; rows with equal numbers are repeats.
     pub setup: Vec<usize>,
     /// Block of each identification row; repeats share one.
     pub block: Vec<usize>,
-    /// Effects that are looked for besides those of the catalogue.
+    /// Effects that the search considers besides those of the catalogue.
     pub candidates: &'a [Effect],
-    /// The wish that the search end early.
+    /// True if the harmonics of the problem may have a common prior.
+    pub takes_gears: bool,
+    /// Request to stop the search early.
     pub stop: Stop,
 }
 
 impl<'a> Data<'a> {
-    pub fn new(dataset: &'a Dataset, rules: &'a SelectionRules) -> Self {
+    pub fn new(problem: &Problem, dataset: &'a Dataset, rules: &'a SelectionRules) -> Self {
         let Dataset { measurements, split } = dataset;
         let rows = &split.identification;
         let setup = number(rows.iter().map(|&row| conditions_of(measurements, row)));
@@ -43,7 +47,7 @@ impl<'a> Data<'a> {
         order.shuffle(&mut ChaCha8Rng::seed_from_u64(rules.seed));
         let mut block_of = vec![0; count];
         for (place, configuration) in order.into_iter().enumerate() {
-            block_of[configuration] = place % rules.blocks.min(count.max(1));
+            block_of[configuration] = place % CROSS_VALIDATION_BLOCKS.min(count.max(1));
         }
         let block =
             configurations.into_iter().map(|configuration| block_of[configuration]).collect();
@@ -55,58 +59,50 @@ impl<'a> Data<'a> {
             setup,
             block,
             candidates: &[],
+            takes_gears: takes_common_prior(problem),
             stop: Stop::default(),
         }
     }
 
-    /// The same with more effects to look for.
+    /// Adds effects that the search considers.
     pub fn with_candidates(self, candidates: &'a [Effect]) -> Self {
         Self { candidates, ..self }
     }
 
-    /// The same, whose hypotheses are weighed until `stop` asks for the end.
+    /// Sets the request that stops the evaluation of evidence.
     pub fn with_stop(self, stop: Stop) -> Self {
         Self { stop, ..self }
     }
 
-    /// The identification rows.
+    /// Returns the identification rows.
     pub fn rows(&self) -> &'a [usize] {
         &self.split.identification
     }
 
-    /// A column at the identification rows.
+    /// Returns the values of a column at the identification rows.
     fn pick(&self, column: &[f64]) -> Vec<f64> {
         self.rows().iter().map(|&row| column[row]).collect()
     }
 
-    /// The same with no more than `most` identification rows, taken evenly.
-    pub fn thinned(&self, most: usize) -> Vec<usize> {
+    /// Returns the identification rows on which evidence is evaluated: at most
+    /// `evidence_poses`, taken evenly.
+    pub fn evidence_rows(&self) -> Vec<usize> {
         let rows = self.rows();
-        let taken = rows.len().min(most);
+        let taken = rows.len().min(self.rules.evidence_poses);
         (0..taken).map(|k| rows[k * rows.len() / taken]).collect()
     }
 
-    /// Whether evidence leads the choice of effects, weighed on all rows.
-    pub fn is_led(&self) -> bool {
-        self.rows().len() <= self.rules.led_poses
-    }
-
-    /// Rows on which hypotheses are weighed: all where evidence leads, else some, taken evenly.
-    pub fn weighed(&self) -> Vec<usize> {
-        self.thinned(if self.is_led() { self.rules.led_poses } else { self.rules.weighed_poses })
-    }
-
-    /// Time of each identification row \[s\].
+    /// Returns the time of each identification row \[s\].
     pub fn time(&self) -> Vec<f64> {
         self.pick(&self.measurements.time)
     }
 
-    /// Session of each identification row.
+    /// Returns the session of each identification row.
     pub fn session(&self) -> Vec<usize> {
         self.rows().iter().map(|&row| self.measurements.session.of_row[row]).collect()
     }
 
-    /// What the identification poses have and vary.
+    /// Returns the columns of the identification poses, their ranges, and which of them vary.
     pub fn conditions(&self, problem: &Problem) -> DataCoverage {
         fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
@@ -146,7 +142,7 @@ impl<'a> Data<'a> {
         }
     }
 
-    /// The problem's own covariates, one value per identification row.
+    /// Returns the covariates that the user declares, one value for each identification row.
     fn own_covariates(&self) -> impl Iterator<Item = Vec<f64>> {
         let count =
             self.rows().first().map_or(0, |&row| self.measurements.covariates_of(row).len());
@@ -155,21 +151,26 @@ impl<'a> Data<'a> {
         })
     }
 
-    /// Times about half way between poses that leave enough of them on either side, in few digits,
-    /// thinned evenly.
+    /// Returns the candidate times of a station shift, at most `shift_times` of
+    /// [`Self::times_between_poses`], taken evenly.
     pub fn shift_times(&self) -> Vec<f64> {
-        let mut times = self.time();
-        times.sort_by(f64::total_cmp);
-        let (count, side) = (times.len(), self.rules.least_side);
-        let between =
-            |k: usize| (times[k] > times[k - 1]).then(|| half_way(times[k - 1], times[k]));
-        let all: Vec<f64> =
-            (side..count).take_while(|k| k + side <= count).filter_map(between).collect();
-        let every = all.len().div_ceil(self.rules.shift_times).max(1);
+        let all = self.times_between_poses();
+        let every = all.len().div_ceil(MAX_SHIFT_TIMES).max(1);
         all.into_iter().step_by(every).collect()
     }
 
-    /// Everything that the residual may depend on, one value per identification row.
+    /// Returns times about half way between consecutive poses that leave `least_side` poses on either
+    /// side, ascending, in few digits \[s\].
+    pub fn times_between_poses(&self) -> Vec<f64> {
+        let mut times = self.time();
+        times.sort_by(f64::total_cmp);
+        let (count, side) = (times.len(), MIN_POSES_BESIDE_SHIFT);
+        let between =
+            |k: usize| (times[k] > times[k - 1]).then(|| half_way(times[k - 1], times[k]));
+        (side..count).take_while(|k| k + side <= count).filter_map(between).collect()
+    }
+
+    /// Returns everything that the residual may depend on, one value for each identification row.
     pub fn covariates(&self, problem: &Problem) -> Vec<CovariateValues> {
         let measurements = self.measurements;
         let moving = problem
@@ -192,9 +193,9 @@ impl<'a> Data<'a> {
                 covariates.push(CovariateValues { covariate, values: self.pick(column) });
             }
         }
-        let own = self.own_covariates().enumerate();
-        covariates.extend(own.map(|(which, values)| CovariateValues {
-            covariate: Covariate::own(which, problem),
+        let declared = self.own_covariates().enumerate();
+        covariates.extend(declared.map(|(which, values)| CovariateValues {
+            covariate: Covariate::declared(which, problem),
             values,
         }));
         covariates.push(CovariateValues { covariate: Covariate::Time, values: self.time() });
@@ -209,7 +210,7 @@ impl<'a> Data<'a> {
     }
 }
 
-/// What one row was measured under, to the bit.
+/// Returns the conditions of one row, to the bit.
 fn conditions_of(measurements: &Measurements, row: usize) -> Vec<u64> {
     let mut key = bits(measurements.configuration(row));
     let n = measurements.joints;
@@ -233,7 +234,7 @@ pub(super) fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
-/// Numbers keys in order of appearance.
+/// Returns the number of each key in order of first appearance.
 pub(super) fn number<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
     let mut known = BTreeMap::new();
     keys.map(|key| {
@@ -243,8 +244,8 @@ pub(super) fn number<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
     .collect()
 }
 
-/// A number about half way between two, in no more decimals than it takes to be within a twentieth
-/// of their distance of the middle.
+/// Returns a number about half way between two, in no more decimals than it takes to be within a
+/// twentieth of their distance of the middle.
 fn half_way(low: f64, high: f64) -> f64 {
     let middle = 0.5 * (low + high);
     let unit = 10.0_f64.powf(((high - low) / 10.0).log10().floor());

@@ -1,5 +1,6 @@
-//! Which effects measurements in given poses would show, and from what size on.
+//! Effects that measurements in given poses would show, and from which size on.
 
+use crate::select::settings::{ASSUMED_TIME_STEP, MIN_NEW_LENGTH, POWER};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -16,61 +17,58 @@ use crate::model::parameter::unit;
 use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
 
-const RULES: &SelectionRules = &SelectionRules::DEFAULT;
-
-/// What measurements in some poses would show of the effects of the catalogue.
+/// Sizes from which on measurements in some poses would show each effect of the catalogue.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detection {
     /// Probability with which an effect of the stated size is found.
     pub power: f64,
     /// Probability that chance points to any effect.
     pub level: f64,
-    /// Every candidate that these poses can test, in the order of the catalogue.
+    /// Candidates that these poses can test, in the order of the catalogue.
     pub effects: Vec<Detectable>,
-    /// The others, and why they cannot.
+    /// Candidates that they cannot test, with the reason.
     pub untestable: Vec<(Effect, &'static str)>,
-    /// Whether the poses have no times yet, and are taken to be measured one after another, a
-    /// minute apart.
+    /// True if the poses have no times yet and are taken to be measured a minute apart.
     pub times_assumed: bool,
 }
 
-/// From what size on an effect is found.
+/// Sizes from which on an effect is found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detectable {
-    /// Which.
+    /// Effect in question.
     pub effect: Effect,
-    /// Of its parameters, those of one unit together.
+    /// Sizes of its parameters, those of one unit together.
     pub sizes: Vec<Size>,
 }
 
-/// From what size on some parameters of an effect, all others at zero, make it known.
+/// Size from which on some parameters of an effect, all others at zero, are found.
 ///
 /// The size of one parameter is its absolute value, that of several their length √(Σ p²): for a
 /// harmonic its amplitude.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Size {
-    /// Names: `joint-harmonic[3].sin1`, `joint-harmonic[3].cos1`.
+    /// Names of the parameters, such as `joint-harmonic[3].sin1`.
     pub parameters: Vec<String>,
-    /// Their unit.
+    /// Unit of the parameters.
     pub unit: Unit,
-    /// 1 σ of the catalogue's prior, SI: no realistic effect is larger by much.
+    /// 1 σ of the catalogue's prior, SI: realistic effects are not much larger.
     pub prior: f64,
-    /// In the direction (phase, axis) that is hardest to see, SI; `None` where the fitted
-    /// parameters take it up wholly, or leave hardly any degree of freedom to judge it by.
+    /// Size in the direction (phase, axis) that is hardest to see, SI; `None` where the fitted
+    /// parameters absorb it or leave hardly any degree of freedom.
     pub worst: Option<f64>,
-    /// In the direction that is easiest to see, SI.
+    /// Size in the direction that is easiest to see, SI.
     pub best: Option<f64>,
 }
 
 impl Size {
-    /// Whether effects as large as the prior are found in some direction at least.
+    /// Returns true if effects as large as the prior are found in some direction.
     pub fn is_within_prior(&self) -> bool {
         self.best.is_some_and(|best| best <= self.prior)
     }
 }
 
-/// From what size on each effect of the catalogue would be found by the first round of the loop,
-/// were `poses` measured.
+/// Computes the size from which on a scan of the catalogue would find each effect, were `poses`
+/// measured.
 ///
 /// LinearNeighbourhood about the nominal arm. With the columns C of an effect's parameters p,
 /// everything free projected out as a fit with priors does, an effect of size p has the
@@ -93,32 +91,35 @@ pub fn detectable(problem: &Problem, poses: &Measurements) -> Result<Detection, 
         testable.par_iter().zip(tries).map(sizes).collect()
     })?;
     Ok(Detection {
-        power: RULES.power,
-        level: RULES.level,
+        power: POWER,
+        level: SelectionRules::DEFAULT.level,
         effects,
         untestable,
         times_assumed: !is_known,
     })
 }
 
-/// The poses with times.
+/// Returns the poses with assumed times.
 pub(super) fn timed(poses: &Measurements) -> Measurements {
     let mut poses = poses.clone();
     if !poses.time_measured {
         poses.time =
-            (0_u32..).take(poses.len()).map(|row| f64::from(row) * RULES.time_step).collect();
+            (0_u32..).take(poses.len()).map(|row| f64::from(row) * ASSUMED_TIME_STEP).collect();
         poses.time_measured = true;
     }
     poses
 }
 
-/// What of the catalogue all these poses could show.
+/// Returns the effects of the catalogue that these poses can show.
 pub(super) fn candidates(problem: &Problem, poses: &Measurements) -> Candidates {
     let split = Split { identification: (0..poses.len()).collect(), held_out: Vec::new() };
-    Candidates::of(problem, &Data::new(&Dataset::new(poses.clone(), split), RULES))
+    Candidates::of(
+        problem,
+        &Data::new(problem, &Dataset::new(poses.clone(), split), &SelectionRules::DEFAULT),
+    )
 }
 
-/// Gives `with` the nominal arm linearised at these poses, and its neighbourhood with all
+/// Calls `with` with the nominal arm linearised at these poses, and its neighbourhood with all
 /// parameters fitted and no residual.
 pub(super) fn with_linear<T>(
     problem: &Problem,
@@ -154,8 +155,8 @@ pub(super) fn with_linear<T>(
     Ok(with(&linearised, &linear))
 }
 
-/// Sizes of an effect, by the units of its parameters; those whose zero means nothing, as the place
-/// of a mass, are left out.
+/// Returns the sizes of an effect for the units of its parameters; parameters whose zero means
+/// nothing, as the place of a mass, are left out.
 pub(super) fn sizes(
     problem: &Problem,
     linearised: &Linearised,
@@ -164,17 +165,22 @@ pub(super) fn sizes(
     tries: f64,
 ) -> Vec<Size> {
     let score = linear.score(&linearised.columns(effect));
-    let test = ScanTest::new(score.rank(RULES), linear.expected_freedom(), tries);
-    let needed = test.and_then(|test| test.noncentrality(RULES.power));
+    let test = ScanTest::new(
+        score.rank(),
+        linear.expected_freedom(),
+        SelectionRules::DEFAULT.level,
+        tries,
+    );
+    let needed = test.and_then(|test| test.noncentrality(POWER));
     let parameters = effect.parameters(problem);
     let mut groups: Vec<(Unit, Vec<usize>)> = Vec::new();
     for (k, parameter) in
         parameters.iter().enumerate().filter(|(_, parameter)| parameter.nominal == 0.0)
     {
-        let own = unit(parameter.site, &parameter.regressor);
-        match groups.iter_mut().find(|(unit, _)| *unit == own) {
+        let unit_of_parameter = unit(parameter.site, &parameter.regressor);
+        match groups.iter_mut().find(|(unit, _)| *unit == unit_of_parameter) {
             Some((_, members)) => members.push(k),
-            None => groups.push((own, vec![k])),
+            None => groups.push((unit_of_parameter, vec![k])),
         }
     }
     let size = |(unit, members): (Unit, Vec<usize>)| {
@@ -182,7 +188,7 @@ pub(super) fn sizes(
         let longest = members.iter().map(|&k| score.lengths[k]).fold(0.0, f64::max);
         let seen = gram.symmetric_eigenvalues();
         let from = |value: f64| {
-            (value > RULES.absorbed.powi(2) * longest)
+            (value > MIN_NEW_LENGTH.powi(2) * longest)
                 .then(|| Some((needed? / value).sqrt()))
                 .flatten()
         };

@@ -1,45 +1,50 @@
-//! A problem with its effects, fitted, and its linear neighbourhood.
+//! A fitted problem and its linear neighbourhood.
 
+use crate::select::settings::{MAX_OUTLIER_SHARE, OUTLIER_DISTANCE};
+use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
+use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use super::data::Data;
 use super::neighbourhood::{Derivatives, LinearNeighbourhood, Linearised, Unknowns};
 use crate::fit::{Identification, IdentifyError, Noise, Options, Placement, identify};
 use crate::least_squares::MANY_UNKNOWNS;
-use crate::model::parameter::{BeamField, EffectParameter, ParameterSite};
+use crate::model::parameter::{BeamField, ParameterSite};
 use crate::model::{Model, Pose};
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
-/// Factor of σ that takes all weight from a position: an outlier of a robust fit takes no part in
-/// the choice of effects.
+/// Factor of σ that takes all weight from an outlier.
 const WITHOUT_WEIGHT: f64 = 1e6;
 
 /// Median of |r|² of one, two and three normal coordinates of unit scatter.
 const MEDIAN: [f64; 3] = [0.455, 1.386, 2.366];
-/// Fits without what was set aside before; an outlier bends the fit to itself and away from others.
+/// Maximum number of concentration steps of the search for outliers.
 const TIMES: usize = 10;
-/// Part of the variance of a pose that is left where it decides a direction alone.
+/// Work of one least-squares solve, in poses × unknowns², above which the outliers of the previous
+/// fit are kept instead of searched again: a search solves about ten times.
+const MAX_OUTLIER_WORK: f64 = 2e8;
+/// Part of its variance that a pose keeps where it determines a direction alone.
 const DECIDED: f64 = 1e-3;
 
-/// A fitted problem.
+/// Problem with its effects, fitted to the identification rows.
 #[derive(Clone)]
 pub(super) struct Fitted {
     pub problem: Problem,
     pub model: Model,
     pub found: Identification,
-    /// Parameters that were fitted to the identification rows and rest on no bound.
+    /// Numbers of the parameters that were fitted and rest on no bound.
     pub unknowns: Vec<usize>,
-    /// Rows of the active constraints, shape = (constraints, unknowns).
+    /// Coefficients of the active constraints, shape = (constraints, unknowns).
     active: DMatrix<f64>,
-    /// 1 σ of a coordinate in rows without one of their own \[m\].
+    /// 1 σ of a coordinate in rows without a declared σ \[m\].
     pub sigma: f64,
-    /// Rows that take no part in the choice of effects: outliers.
+    /// Rows that take no part in the evidence: outliers.
     pub set_aside: Vec<usize>,
-    /// The linear neighbourhood at the identification rows, once it was asked for.
+    /// Linear neighbourhood at the identification rows, computed on first use.
     around: OnceLock<Arc<LinearNeighbourhood>>,
-    /// The derivatives there that were taken last.
+    /// Derivatives there that were computed last.
     derivatives: Arc<Mutex<Option<Arc<Derivatives>>>>,
 }
 
@@ -50,8 +55,29 @@ impl Fitted {
         Self::of(problem, data, found)
     }
 
-    /// A problem that was fitted to the identification rows before.
+    /// Fits another problem to the same rows. A fit of too much work to search for outliers again
+    /// sets aside the rows that this fit set aside.
+    pub fn next(
+        &self,
+        problem: Problem,
+        data: &Data,
+        options: &Options,
+    ) -> Result<Self, IdentifyError> {
+        let found = identify(&problem, data.dataset, options)?;
+        Self::with_outliers_of(Some(self), problem, data, found)
+    }
+
+    /// Wraps a problem that was fitted to the identification rows before.
     pub fn of(problem: Problem, data: &Data, found: Identification) -> Result<Self, IdentifyError> {
+        Self::with_outliers_of(None, problem, data, found)
+    }
+
+    fn with_outliers_of(
+        previous: Option<&Self>,
+        problem: Problem,
+        data: &Data,
+        found: Identification,
+    ) -> Result<Self, IdentifyError> {
         let placement = Placement::of(data.measurements);
         let model =
             found.strategy.model(Model::new(&problem, &placement.bases, &placement.targets)?);
@@ -90,16 +116,20 @@ impl Fitted {
             around,
             derivatives,
         };
-        // Rounds on many poses fit too often to look for them.
-        let looks = fitted.problem.robust.is_none() && data.is_led();
-        fitted.set_aside = if looks { outliers(&fitted, data) } else { outliers_of_fit };
+        let work = data.rows().len() as f64 * (fitted.unknowns.len() as f64).powi(2);
+        fitted.set_aside = match previous {
+            _ if fitted.problem.robust.is_some() => outliers_of_fit,
+            _ if work <= MAX_OUTLIER_WORK => outliers(&fitted, data),
+            Some(previous) => previous.set_aside.clone(),
+            None => outliers_of_fit,
+        };
         if !fitted.set_aside.is_empty() {
             fitted.derivatives = Arc::default();
         }
         Ok(fitted)
     }
 
-    /// Fits on until it converges, if it was stopped before that or fitted provisionally.
+    /// Continues the fit until it converges, if it was stopped before or is provisional.
     pub fn settled(self, data: &Data, options: &Options) -> Result<Self, IdentifyError> {
         if self.found.termination.converged() && !self.found.provisional {
             return Ok(self);
@@ -109,18 +139,18 @@ impl Fitted {
         } else {
             self.onwards(options)
         };
-        Self::new(self.problem.clone(), data, &onwards)
+        self.next(self.problem.clone(), data, &onwards)
     }
 
-    /// Options to fit a problem that differs by a few effects: from where this fit ended.
+    /// Returns options that start a fit where this one ended.
     pub fn onwards(&self, options: &Options) -> Options {
         let values =
             self.found.estimates.iter().map(|estimate| (estimate.name.clone(), estimate.estimate));
         Options { start: values.collect(), influential_rows: false, ..options.clone() }
     }
 
-    /// The same, with what need not be found anew: the registered nominal arm, derivatives where
-    /// this one ended, and of a fit that is `alike` the σ that this one took.
+    /// Returns such options with the state that the next fit reuses: the registered nominal arm,
+    /// the derivatives at the optimum and, if the fits are `alike`, the noise scale.
     pub fn succeeding(&self, options: &Options, alike: bool) -> Options {
         let derivatives = self.derivatives.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let at = (self.model.parameters.as_slice(), &self.found.x);
@@ -130,7 +160,7 @@ impl Fitted {
         Options { warm_start: Some(Arc::new(warm_start)), ..self.onwards(options) }
     }
 
-    /// The same problem with other effects declared.
+    /// Returns the problem with other effects declared.
     pub fn with_effects(&self, effects: &[Effect]) -> Problem {
         let mut problem = self.problem.clone();
         let location = problem.data.location.clone();
@@ -141,12 +171,12 @@ impl Fitted {
         problem
     }
 
-    /// Declared effects.
+    /// Returns the declared effects.
     pub fn effects(&self) -> Vec<Effect> {
         self.problem.effects.iter().map(|declared| declared.effect.clone()).collect()
     }
 
-    /// The poses of some rows.
+    /// Returns the poses of some rows.
     pub fn poses<'a>(&self, data: &Data<'a>, rows: &[usize]) -> Vec<Pose<'a>> {
         let mut poses = Placement::of(data.measurements).poses(data.measurements, rows, self.sigma);
         if data.measurements.sigma.is_some() {
@@ -162,12 +192,13 @@ impl Fitted {
         &self.active
     }
 
-    /// Residuals of some rows, measuring frame \[m\].
+    /// Returns the residuals of some rows in the measuring frame \[m\].
     pub fn errors(&self, data: &Data, rows: &[usize]) -> Vec<Vector3<f64>> {
         self.model.residuals(self.poses(data, rows), &self.found.x)
     }
 
-    /// The model about the fit at the identification rows, with every place where `effects` enter.
+    /// Returns the model linearised at the fit in the identification rows, with every site at which
+    /// `effects` enter.
     ///
     /// Of many unknowns the derivatives are kept for who asks next; `data` are those that were
     /// fitted.
@@ -182,7 +213,7 @@ impl Fitted {
         found
     }
 
-    /// The same at other rows.
+    /// Returns the model linearised at the fit in other rows.
     pub fn linearised_at<'a>(
         &'a self,
         data: &Data<'a>,
@@ -192,7 +223,7 @@ impl Fitted {
         self.linearised_with(data, rows, effects, &[])
     }
 
-    /// The same with further slots.
+    /// Returns the model linearised at the fit with further sites.
     pub fn linearised_with<'a>(
         &'a self,
         data: &Data<'a>,
@@ -223,12 +254,12 @@ impl Fitted {
         )
     }
 
-    /// The fit in its linear neighbourhood.
+    /// Returns the fit in its linear neighbourhood.
     pub fn neighbourhood(&self, linearised: &Linearised) -> LinearNeighbourhood {
         self.neighbourhood_without(linearised, &[])
     }
 
-    /// The same at the identification rows, made once: all of a loop is of the same rows.
+    /// Returns the linear neighbourhood at the identification rows, computed once.
     pub fn around(&self, data: &Data) -> Arc<LinearNeighbourhood> {
         if let Some(known) = self.around.get() {
             return Arc::clone(known);
@@ -237,7 +268,24 @@ impl Fitted {
         Arc::clone(self.around.get_or_init(|| new))
     }
 
-    /// The same fit, in which every row counts.
+    /// Returns true if this fit predicts blocks of poses that are left out better than another fit
+    /// of the same rows, beyond chance: t test over the blocks at 2.5 %, one-sided.
+    pub fn predicts_better_than(&self, other: &Self, data: &Data) -> bool {
+        let squares = |fitted: &Self| {
+            let fit = fitted.with_all_rows().around(data);
+            let blocks = fit.left_out_squares(&data.block)?;
+            Some(blocks.into_iter().map(|sum| sum * fitted.sigma.powi(2)).collect::<Vec<f64>>())
+        };
+        let Some((before, after)) = squares(other).zip(squares(self)) else { return false };
+        let gains: Vec<f64> = before.iter().zip(&after).map(|(b, a)| b - a).collect();
+        let count = gains.len() as f64;
+        let mean = gains.iter().sum::<f64>() / count;
+        let variance = gains.iter().map(|gain| (gain - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        let quantile = StudentsT::new(0.0, 1.0, (count - 1.0).max(1.0));
+        quantile.is_ok_and(|t| mean > t.inverse_cdf(0.975) * (variance / count).sqrt())
+    }
+
+    /// Returns the fit with outliers at full weight.
     pub fn with_all_rows(&self) -> Self {
         Self {
             set_aside: Vec::new(),
@@ -247,8 +295,8 @@ impl Fitted {
         }
     }
 
-    /// The same weighed as the fit was: where that took a σ larger than the declared one, its
-    /// priors counted for more.
+    /// Returns the linear neighbourhood with priors weighted as in the fit, which may have taken a
+    /// σ larger than the declared one.
     pub fn neighbourhood_as_fitted(&self, linearised: Linearised) -> LinearNeighbourhood {
         let unknowns =
             self.unknowns_without(&linearised, &[], self.found.noise_factor.max(1.0).sqrt());
@@ -257,8 +305,7 @@ impl Fitted {
         LinearNeighbourhood::in_place_of(columns, residual, &unknowns, empty)
     }
 
-    /// The unknowns but those `without`, those that the data let go last; 1 σ of their priors is
-    /// divided by `weight`.
+    /// Returns the unknowns but those `without`; 1 σ of their priors is divided by `weight`.
     fn unknowns_without(
         &self,
         linearised: &Linearised,
@@ -267,19 +314,19 @@ impl Fitted {
     ) -> Unknowns {
         let kept: Vec<usize> = (0..self.unknowns.len()).filter(|j| !without.contains(j)).collect();
         let relaxed = linearised.relaxed().iter().copied();
-        let own = kept.iter().map(|&j| self.model.parameters[self.unknowns[j]].sigma);
+        let sigmas = kept.iter().map(|&j| self.model.parameters[self.unknowns[j]].sigma);
         Unknowns {
             x: kept
                 .iter()
                 .map(|&j| self.found.x[self.unknowns[j]])
                 .chain(relaxed.clone().map(|_| 0.0))
                 .collect(),
-            priors: own.chain(relaxed).map(|sigma| Some(sigma? / weight)).collect(),
+            priors: sigmas.chain(relaxed).map(|sigma| Some(sigma? / weight)).collect(),
             active: self.active.select_columns(&kept),
         }
     }
 
-    /// The same with some unknowns left out of the fit.
+    /// Returns the linear neighbourhood of the fit without some unknowns.
     pub fn neighbourhood_without(
         &self,
         linearised: &Linearised,
@@ -310,24 +357,7 @@ impl Fitted {
         )
     }
 
-    /// 1 σ of the priors of an effect's parameters in a problem with other effects than this one;
-    /// `None` where one of them is not free.
-    pub fn priors_in(
-        &self,
-        problem: &Problem,
-        data: &Data,
-        effect: &Effect,
-    ) -> Option<Vec<Option<f64>>> {
-        let placement = Placement::of(data.measurements);
-        let model = Model::new(problem, &placement.bases, &placement.targets).ok()?;
-        let model = self.found.strategy.model(model);
-        let sigma = |own: EffectParameter| {
-            model.parameters.iter().find(|k| k.name == own.name).map(|k| k.sigma)
-        };
-        effect.parameters(problem).into_iter().map(sigma).collect()
-    }
-
-    /// Numbers of an effect's parameters among the unknowns.
+    /// Returns the numbers of an effect's parameters among the unknowns.
     pub fn unknowns_of(&self, effect: &Effect) -> Vec<usize> {
         let parameters = self.parameters_of(effect);
         parameters
@@ -336,32 +366,29 @@ impl Fitted {
             .collect()
     }
 
-    /// Numbers of an effect's parameters in the model.
+    /// Returns the numbers of an effect's parameters in the model.
     pub fn parameters_of(&self, effect: &Effect) -> Vec<usize> {
-        let own = effect.parameters(&self.problem);
+        let parameters = effect.parameters(&self.problem);
         let is_own = |&k: &usize| {
-            own.iter().any(|parameter| parameter.name == self.model.parameters[k].name)
+            parameters.iter().any(|parameter| parameter.name == self.model.parameters[k].name)
         };
         (0..self.model.parameters.len()).filter(is_own).collect()
     }
 }
 
-/// Identification rows whose residual is no noise of the others' size, in the linear neighbourhood
-/// of the fit without them.
+/// Returns the identification rows whose residual is no noise of the others' size, in the linear
+/// neighbourhood of the fit without them.
 ///
-/// From the fit to all on, as many rows as may be outliers, those farthest off, are left out until
-/// they stay the same, as in one start of the trimmed squares of [Rousseeuw and Van Driessen 2006]:
-/// that shows what bends a fit to itself; those beyond `gross` then leave, and no others.
+/// As many rows as may be outliers, those farthest off, are left out until they stay the same, as
+/// in one start of the trimmed squares of [Rousseeuw and Van Driessen 2006]; then those beyond
+/// `OUTLIER_DISTANCE` alone are left out.
 fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
-    let rows = data.rows();
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "a part of a count"
     )]
-    let most = (data.rules.few * rows.len() as f64) as usize;
-    let linearised = fitted.linearised(data, &[]);
-    let distances = |aside: &[usize]| distances(fitted, &linearised, aside);
+    let allowed = |count: usize| (MAX_OUTLIER_SHARE * count as f64) as usize;
     let worst = |squares: &[f64], count: usize| -> Vec<usize> {
         let mut order: Vec<usize> = (0..squares.len()).collect();
         order.sort_by(|&a, &b| squares[b].total_cmp(&squares[a]));
@@ -369,18 +396,25 @@ fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
         order.sort_unstable();
         order
     };
+    // Concentration steps on the rows of the evidence, the final steps on all rows.
+    let (rows, subset) = (data.rows(), data.evidence_rows());
+    let linearised = fitted.linearised_at(data, &subset, &[]);
     let mut aside = Vec::new();
     for _ in 0..TIMES {
-        let next = worst(&distances(&aside), most);
+        let next = worst(&distances(fitted, &linearised, &aside), allowed(subset.len()));
         if next == aside {
             break;
         }
         aside = next;
     }
+    let linearised = fitted.linearised(data, &[]);
+    let kept: BTreeSet<usize> =
+        (0..subset.len()).filter(|k| !aside.contains(k)).map(|k| subset[k]).collect();
+    let mut aside: Vec<usize> = (0..rows.len()).filter(|&k| !kept.contains(&rows[k])).collect();
     for _ in 0..TIMES {
-        let squares = distances(&aside);
-        let far = squares.iter().filter(|square| **square > data.rules.gross).count();
-        if far > most {
+        let squares = distances(fitted, &linearised, &aside);
+        let far = squares.iter().filter(|square| **square > OUTLIER_DISTANCE).count();
+        if far > allowed(rows.len()) {
             return Vec::new();
         }
         let next = worst(&squares, far);
@@ -401,13 +435,16 @@ fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f
         columns.rows_mut(3 * pose, 3).unscale_mut(WITHOUT_WEIGHT);
         here.rows_mut(3 * pose, 3).unscale_mut(WITHOUT_WEIGHT);
     }
+    let mut is_aside = vec![false; residual.len() / 3];
+    aside.iter().for_each(|&pose| is_aside[pose] = true);
     let unknowns = fitted.unknowns_without(linearised, &[], 1.0);
     let fit = LinearNeighbourhood::new(&columns, &here, &unknowns, linearised.empty());
     let (left, along) = (residual + whole * fit.step(), fit.fitted());
     let square = |pose: usize| {
-        let (own, r) = (along.rows(3 * pose, 3), left.fixed_rows::<3>(3 * pose).into_owned());
-        let hat = Matrix3::from_fn(|i, j| own.row(i).dot(&own.row(j)));
-        let covariance = if aside.contains(&pose) {
+        let (rows_of_pose, r) =
+            (along.rows(3 * pose, 3), left.fixed_rows::<3>(3 * pose).into_owned());
+        let hat = Matrix3::from_fn(|i, j| rows_of_pose.row(i).dot(&rows_of_pose.row(j)));
+        let covariance = if is_aside[pose] {
             Matrix3::identity() + hat * WITHOUT_WEIGHT.powi(2)
         } else {
             Matrix3::identity() * (1.0 + DECIDED) - hat
@@ -416,11 +453,14 @@ fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f
     };
     let numbers = |pose: usize| linearised.poses()[pose].observation.coordinates();
     let squares: Vec<f64> = (0..left.len() / 3).map(square).collect();
-    let mut ratios: Vec<f64> =
-        squares.iter().enumerate().map(|(pose, own)| own / MEDIAN[numbers(pose) - 1]).collect();
+    let mut ratios: Vec<f64> = squares
+        .iter()
+        .enumerate()
+        .map(|(pose, square)| square / MEDIAN[numbers(pose) - 1])
+        .collect();
     ratios.sort_by(|a, b| b.total_cmp(a));
     // No less than a σ that was declared: beside rounding everything is far off.
     let least = if fitted.found.noise == Noise::Declared { 1.0 } else { 0.0 };
     let scatter = ratios.get(ratios.len() / 2).copied().unwrap_or(0.0).max(least);
-    squares.into_iter().map(|own| if scatter > 0.0 { own / scatter } else { 0.0 }).collect()
+    squares.into_iter().map(|square| if scatter > 0.0 { square / scatter } else { 0.0 }).collect()
 }

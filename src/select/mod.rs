@@ -1,4 +1,4 @@
-//! What a fit's residual says about effects that the model lacks, and the loop that adds them.
+//! Effects that a model lacks, found from the residual of its fit.
 //!
 //! - [`trace`]: score screening, every candidate of the catalogue scored in the linear
 //!   neighbourhood of a fit and ranked.
@@ -14,6 +14,7 @@ mod data;
 mod detection;
 mod evidence;
 mod fitted;
+mod harmonic_prior;
 mod neighbourhood;
 mod power;
 
@@ -22,6 +23,7 @@ mod rules;
 mod screening;
 mod selection;
 mod separation;
+mod settings;
 mod telling_pose;
 mod unexplained;
 
@@ -32,13 +34,15 @@ pub use detection::{Detectable, Detection, Size, detectable};
 #[doc(hidden)]
 pub use evidence::{Claims, Evidence, Hypothesis, HypothesisKind, HypothesisSet, Site};
 #[doc(hidden)]
+pub use harmonic_prior::HarmonicPrior;
+#[doc(hidden)]
 pub use reference_check::{ReferenceCheck, ReferenceVerdict};
 pub use rules::SelectionRules;
 #[doc(hidden)]
 pub use screening::examine;
 pub use screening::{Ranked, Trace, trace, trace_by};
 pub use selection::{
-    ClosedLoop, Found, HarmonicPrior, Interval, Round, Status, Verdict, close, close_by,
+    ClosedLoop, Found, Interval, Round, Status, Verdict, close, close_by,
 };
 #[doc(hidden)]
 pub use separation::{Separation, Side, separation};

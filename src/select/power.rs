@@ -1,48 +1,46 @@
-//! How large an effect must be for a scan to find it.
+//! Power of the scan of the catalogue.
 
 use statrs::function::beta::beta_reg;
 
-use super::rules::SelectionRules;
 use crate::numeric::bisect;
 
-/// Halvings of the interval in which a noncentrality is sought.
+/// Number of bisections for a noncentrality.
 const HALVINGS: usize = 24;
-/// Standard deviations of a Poisson distribution beyond which nothing of it counts.
+/// Number of standard deviations of a Poisson distribution beyond which its terms are left out.
 const FAR: f64 = 9.0;
-/// Largest noncentrality that is looked at: that of an effect some 30 times its error.
+/// Largest noncentrality: that of an effect some 30 times its error.
 const MOST: f64 = 1024.0;
 
-/// The test that a scan makes of one candidate: part = squares gained / all squares, Beta(k/2, (ν −
-/// k)/2) where there is none.
+/// F test of one candidate in a scan, as a test of the part of the squares gained: Beta(k/2, (ν −
+/// k)/2) without an effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ScanTest {
-    /// k / 2: half of the new directions.
+    /// Half of the number of new directions, k / 2.
     new: f64,
-    /// (ν − k) / 2.
+    /// Half of the residual degrees of freedom, (ν − k) / 2.
     left: f64,
     /// Part that the candidate must gain.
     threshold: f64,
 }
 
 impl ScanTest {
-    /// Of a candidate with `k` new directions, ν = `freedom`, and so many `tries`; `None` where
-    /// nothing would be left to judge by.
+    /// Creates the test of a candidate with `k` new directions and ν = `freedom` degrees of freedom
+    /// at `level` / `tries`. Returns `None` if no degree of freedom would remain.
     ///
     /// The part must be beyond chance at level / tries, and better than nothing by the information
     /// criterion ν ln(1 − part) + k ln ν + 2 ln(tries).
-    pub fn new(k: usize, freedom: f64, tries: f64) -> Option<Self> {
+    pub fn new(k: usize, freedom: f64, level: f64, tries: f64) -> Option<Self> {
         let (new, left) = (k as f64 / 2.0, (freedom - k as f64) / 2.0);
         if k == 0 || left < 0.5 {
             return None;
         }
-        let level = SelectionRules::DEFAULT.level / tries;
+        let level = level / tries;
         let chance = halved(|part| beta_reg(left, new, 1.0 - part) > level, (0.0, 1.0));
         let better = -(-(k as f64 * freedom.ln() + 2.0 * tries.ln()) / freedom).exp_m1();
         Some(Self { new, left, threshold: chance.max(better) })
     }
 
-    /// Probability that the candidate is found at a noncentrality λ, that of a noncentral F test:
-    /// Σ_j Poisson(j; λ/2) P(Beta(k/2 + j, (ν − k)/2) > threshold)          [Graybill 1961, ch. 4]
+    /// Returns the probability that the candidate is found at a noncentrality λ of the F test.
     pub fn power(&self, noncentrality: f64) -> f64 {
         let mean = 0.5 * noncentrality;
         let reach = FAR * mean.sqrt() + FAR;
@@ -57,15 +55,15 @@ impl ScanTest {
         sum
     }
 
-    /// p of the part that a noncentrality makes the candidate gain on average, for one candidate
+    /// Returns the p-value at the gain that a noncentrality gives on average, for one candidate
     /// alone.
     pub fn expected_p(&self, noncentrality: f64) -> f64 {
         let gained = 2.0 * self.new + noncentrality;
         beta_reg(self.left, self.new, 2.0 * self.left / (2.0 * self.left + gained))
     }
 
-    /// The noncentrality at which the candidate is found with probability `power`; `None` where
-    /// hardly anything is left to judge by, so that one beyond [`MOST`] would not do.
+    /// Returns the noncentrality at which the candidate is found with probability `power`; `None`
+    /// above [`MOST`].
     pub fn noncentrality(&self, power: f64) -> Option<f64> {
         let mut most = 32.0;
         while self.power(most) < power {
@@ -78,7 +76,7 @@ impl ScanTest {
     }
 }
 
-/// The middle of the interval in which `is_below` turns false.
+/// Returns the middle of the interval in which `is_below` turns false.
 fn halved(is_below: impl Fn(f64) -> bool, range: (f64, f64)) -> f64 {
     let (low, high) = bisect(is_below, range, HALVINGS);
     0.5 * (low + high)
@@ -98,7 +96,7 @@ mod tests {
             (3, 600.0, 2000.0, 40.0, 0.055_709_087, 0.708_206_7),
         ];
         for (k, freedom, tries, lambda, threshold, power) in cases {
-            let test = ScanTest::new(k, freedom, tries);
+            let test = ScanTest::new(k, freedom, 0.01, tries);
             assert!(test.is_some_and(|test| (test.threshold - threshold).abs() < 1e-6), "{test:?}");
             assert!(
                 test.is_some_and(|test| (test.power(lambda) - power).abs() < 1e-5),
@@ -107,17 +105,17 @@ mod tests {
             let needed = test.and_then(|test| test.noncentrality(0.8)).unwrap_or(0.0);
             assert!(test.is_some_and(|test| (test.power(needed) - 0.8).abs() < 1e-4), "{needed}");
         }
-        assert_eq!(ScanTest::new(0, 84.0, 1.0), None);
+        assert_eq!(ScanTest::new(0, 84.0, 0.01, 1.0), None);
     }
 
     #[test]
     fn two_degrees_of_freedom_find_nothing_among_many() {
-        let test = ScanTest::new(1, 3.0, 2000.0);
+        let test = ScanTest::new(1, 3.0, 0.01, 2000.0);
         assert!(
             test.is_some_and(|test| test.power(MOST) < 0.1 && test.noncentrality(0.8).is_none()),
             "{test:?}"
         );
-        let sure = ScanTest::new(1, 300.0, 2000.0).and_then(|test| test.noncentrality(0.8));
+        let sure = ScanTest::new(1, 300.0, 0.01, 2000.0).and_then(|test| test.noncentrality(0.8));
         assert!(sure.is_some_and(|lambda| lambda < 50.0), "{sure:?}");
     }
 }

@@ -1,4 +1,5 @@
-//! What data that took no part in the fit say of an effect: fixed points that were measured again.
+//! Check of an effect of the instrument against data that took no part in the fit: readings of
+//! fixed points.
 //!
 //! An instrument that moved by d f(t) and turned by ω f(t) moves a fixed point p with it: z = p +
 //! (d + ω × p) f(t) + noise of σ, the true place unknown and p near it. With θ = (d, ω), or d
@@ -25,45 +26,46 @@ use crate::measurement::NestReading;
 use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::{Effect, PoseView, Problem};
 
-/// Twice the logarithm of the odds at which readings decide: 100 to 1.
+/// Twice the log odds from which on readings decide: 100 to 1.
 const DECIDED: f64 = 9.21;
 
-/// What it says.
+/// Outcome of a reference check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReferenceVerdict {
-    /// It moved as the effect has it.
+    /// The instrument moved as the effect says.
     Corroborated,
-    /// It did not.
+    /// The instrument did not move so.
     Contradicted,
 }
 
-/// A witness of an effect.
+/// Check of an effect against data that took no part in the fit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReferenceCheck {
-    /// Which data.
+    /// Data of the check, in words.
     pub data: String,
-    /// What they say.
+    /// Outcome of the check.
     pub verdict: ReferenceVerdict,
 }
 
 /// A reading of a fixed point.
 struct Reading {
-    /// z \[m\].
+    /// Reading z of the point, measuring frame \[m\].
     seen: Vector3<f64>,
-    /// f.
+    /// Factor f(t) of the motion at the time of the reading.
     moved: f64,
-    /// 1/σ² of a coordinate [1/m²].
+    /// Weight 1/σ² of a coordinate [1/m²].
     weight: f64,
 }
 
-/// v and M of one point for so many parameters: d, or d and ω.
+/// Returns v and M of one point for 3 parameters, d, or 6, d and ω.
 fn told(readings: &[Reading], parameters: usize) -> (DVector<f64>, DMatrix<f64>) {
-    let all: f64 = readings.iter().map(|own| own.weight).sum();
-    let place = readings.iter().map(|own| own.seen * own.weight).sum::<Vector3<f64>>() / all;
-    let moved = readings.iter().map(|own| own.moved * own.weight).sum::<f64>() / all;
-    let one = |own: &Reading| {
-        let f = own.moved - moved;
-        ((own.seen - place) * (own.weight * f), own.weight * f * f)
+    let all: f64 = readings.iter().map(|reading| reading.weight).sum();
+    let place =
+        readings.iter().map(|reading| reading.seen * reading.weight).sum::<Vector3<f64>>() / all;
+    let moved = readings.iter().map(|reading| reading.moved * reading.weight).sum::<f64>() / all;
+    let one = |reading: &Reading| {
+        let f = reading.moved - moved;
+        ((reading.seen - place) * (reading.weight * f), reading.weight * f * f)
     };
     let (sum, certainty) = readings
         .iter()
@@ -79,7 +81,7 @@ fn told(readings: &[Reading], parameters: usize) -> (DVector<f64>, DMatrix<f64>)
     (moves.tr_mul(&sum), moves.tr_mul(&moves) * certainty)
 }
 
-/// Twice the logarithm of the odds of θ ∼ N(θ̂, C) against θ = 0; `None` where no point was read at
+/// Returns twice the log odds of θ ∼ N(θ̂, C) against θ = 0; `None` where no point was read at
 /// different f.
 fn odds(
     found: &DVector<f64>,
@@ -94,7 +96,7 @@ fn odds(
     let mut root = eigen.eigenvectors;
     root.column_iter_mut()
         .zip(&eigen.eigenvalues)
-        .for_each(|(mut own, value)| own *= value.max(0.0).sqrt());
+        .for_each(|(mut column, value)| column *= value.max(0.0).sqrt());
     let known = certainty * found;
     let left = root.tr_mul(&(told - &known));
     let inner = (root.tr_mul(&(certainty * &root)) + DMatrix::identity(root.ncols(), root.ncols()))
@@ -114,14 +116,14 @@ fn course(effect: &Effect, problem: &Problem) -> Option<Regressor> {
     };
     let quantities = first.regressor.quantities();
     let follows_time =
-        quantities.iter().all(|own| matches!(own, Quantity::Elapsed | Quantity::Time));
+        quantities.iter().all(|quantity| matches!(quantity, Quantity::Elapsed | Quantity::Time));
     let is_one = is_of_instrument(first.site)
         && terms.all(|term| is_of_instrument(term.site) && term.regressor == first.regressor);
     (is_one && follows_time && !quantities.is_empty()).then_some(first.regressor)
 }
 
-/// What readings of fixed points say of an effect of the instrument; `None` for other effects, and
-/// where they do not decide.
+/// Checks an effect of the instrument against readings of fixed points; `None` for other effects,
+/// and where the readings do not decide.
 pub(super) fn reference_check(
     fitted: &Fitted,
     data: &Data,
@@ -153,8 +155,8 @@ pub(super) fn reference_check(
     let mut points: BTreeMap<(&str, &str), Vec<Reading>> = BTreeMap::new();
     for reading in &measurements.nests {
         let weight = reading.sigma.unwrap_or(fitted.sigma).powi(-2);
-        let own = Reading { seen: reading.position, moved: moves(reading)?, weight };
-        points.entry((&reading.session, &reading.name)).or_default().push(own);
+        let reading_of_point = Reading { seen: reading.position, moved: moves(reading)?, weight };
+        points.entry((&reading.session, &reading.name)).or_default().push(reading_of_point);
     }
     let nothing = (DVector::zeros(count), DMatrix::zeros(count, count));
     let (told, certainty) =

@@ -1,8 +1,8 @@
-//! What the residual of one fit points to.
+//! Ranking of the catalogue by the residual of one fit.
 
 use super::candidates::{Candidates, NOT_FINITE};
 use super::data::Data;
-use super::evidence::{Evidence, weigh};
+use super::evidence::{Evidence, evaluate};
 use super::fitted::Fitted;
 use super::neighbourhood::{Scan, Tried};
 use super::rules::SelectionRules;
@@ -11,37 +11,38 @@ use crate::fit::{Identification, IdentifyError, Noise, Options};
 use crate::measurement::Dataset;
 use crate::problem::{Effect, Problem};
 use crate::residual_tests::{Findings, FitResidual, Test, test_residual};
+use crate::select::settings::{CONFOUNDED_ANGLE, MAX_COMPARED, MAX_RANKED};
 
-/// A candidate as the residual sees it.
+/// Candidate of the ranking.
 #[derive(Debug, Clone)]
 pub struct Ranked {
-    /// Which effect.
+    /// Effect in question.
     pub effect: Effect,
-    /// Probability that chance would do as well, corrected for the candidates tried.
+    /// p-value of the F test, corrected for the candidates tried.
     pub p_value: f64,
     /// F statistic and its degrees of freedom.
     pub f: (f64, usize),
     /// Expected reduction of the root mean squared error on the identification poses \[m\].
     pub gain: f64,
-    /// The same on identification poses left out in turn \[m\]; `None` where it was not worked out.
+    /// Reduction of that error on identification poses left out in turn \[m\]; `None` where it was
+    /// not computed.
     pub cross_validated: Option<f64>,
-    /// Entries of the ranking that it is hard to tell from, with the largest principal angle
-    /// between them \[rad\].
+    /// Confounded effects of the ranking, with the largest principal angle between them \[rad\].
     pub alike: Vec<(Effect, f64)>,
-    /// A pose that would tell it from the first of those.
+    /// Pose that would separate it from the first of those.
     pub telling_pose: Option<TellingPose>,
 }
 
-/// What the residual of the declared problem's fit points to.
+/// Result of `trace`: what the residual of the fit of the declared problem points to.
 #[derive(Debug, Clone)]
 pub struct Trace {
-    /// The fit.
+    /// Fit of the declared problem.
     pub fit: Identification,
     /// Tests of its residual.
     pub findings: Findings,
     /// Candidates by what they explain, best first; the best of each family at each place.
     pub ranking: Vec<Ranked>,
-    /// Candidates that were tried, orders and times counted.
+    /// Number of candidates that were tried, orders and times counted.
     pub tried: usize,
     /// Level that a corrected p must be below to stand out.
     pub level: f64,
@@ -49,15 +50,17 @@ pub struct Trace {
     pub untestable: Vec<(Effect, &'static str)>,
     /// Candidates that the fitted parameters absorb: nothing is left to show them.
     pub absorbed: Vec<Effect>,
-    /// Explanations weighed against each other, functions of unknown law among them; `None` where
-    /// only the ranking was asked for, or the residual is not finite.
+    /// Evidence for sets of hypotheses; `None` where only the ranking was asked for, or the
+    /// residual is not finite.
     pub evidence: Option<Evidence>,
-    /// Whether times were measured; where not, the order of the rows stands for them.
+    /// Settings of the search.
+    pub rules: SelectionRules,
+    /// True if times were measured; otherwise the order of the rows replaces them.
     pub time_measured: bool,
 }
 
 impl Trace {
-    /// What an effect is in these data, in words.
+    /// Describes an effect in these data, in words.
     pub fn describe(&self, effect: &Effect) -> String {
         effect.describe_in(self.time_measured)
     }
@@ -71,7 +74,7 @@ pub fn trace(problem: &Problem, data: &Dataset, options: &Options) -> Result<Tra
     trace_by(problem, data, options, &SelectionRules::DEFAULT)
 }
 
-/// The same by other rules.
+/// Traces the residual by other settings.
 ///
 /// # Errors
 /// Problem, data and options do not fit each other.
@@ -82,18 +85,18 @@ pub fn trace_by(
     rules: &SelectionRules,
 ) -> Result<Trace, IdentifyError> {
     rules.check()?;
-    let data = Data::new(data, rules).with_candidates(&options.candidates);
+    let data = Data::new(problem, data, rules).with_candidates(&options.candidates);
     // Evidence is of positions: so is the fit.
     let fitted = Fitted::new(problem.positions_alone(), &data, options)?;
-    Ok(Trace { evidence: weigh(&fitted, &data, &[]), ..trace_fit(&fitted, &data) })
+    Ok(Trace { evidence: evaluate(&fitted, &data, &[]), ..trace_fit(&fitted, &data) })
 }
 
-/// Traces the residual of a fit.
+/// Ranks the catalogue by the residual of a fit.
 pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
     let rules = data.rules;
     let Candidates { testable, mut untestable } = Candidates::of(&fitted.problem, data);
     let linearised = fitted.linearised(data, &testable);
-    let scan = Scan::new(&linearised, fitted.around(data), testable, rules);
+    let scan = Scan::new(&linearised, fitted.around(data), testable);
     untestable.extend(scan.refused.iter().map(|effect| (effect.clone(), NOT_FINITE)));
     let mut best: Vec<Tried> = Vec::new();
     for tried in scan.ranking() {
@@ -104,15 +107,15 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
             best.push(tried);
         }
     }
-    best.truncate(rules.ranked);
+    best.truncate(MAX_RANKED);
     let looked_at =
-        best.iter().take(rules.looked_at).filter(|tried| tried.corrected < rules.level).count();
+        best.iter().take(MAX_COMPARED).filter(|tried| tried.corrected < rules.level).count();
     let rms =
         |squares: f64| (3.0 * squares.max(0.0) / scan.linear.rows() as f64).sqrt() * fitted.sigma;
     let without = scan.linear.cross_validate(&data.block);
     let poses = shuffled(data);
     let looked: Vec<Effect> =
-        best.iter().take(rules.looked_at).map(|tried| scan.effects[tried.index].clone()).collect();
+        best.iter().take(MAX_COMPARED).map(|tried| scan.effects[tried.index].clone()).collect();
     let all: Vec<usize> = (0..poses.len()).collect();
     let elsewhere = Data { measurements: &poses, ..data.clone() };
     let there = (looked_at > 0).then(|| fitted.linearised_at(&elsewhere, &all, &looked));
@@ -124,20 +127,20 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         });
         let alike = best
             .iter()
-            .take(if close { rules.looked_at } else { 0 })
+            .take(if close { MAX_COMPARED } else { 0 })
             .filter(|other| other.index != tried.index);
         let angle = |other: &Tried| {
             let angle =
-                scan.angle(tried.index, other.index).filter(|angle| *angle < rules.alike)?;
+                scan.angle(tried.index, other.index).filter(|angle| *angle < CONFOUNDED_ANGLE)?;
             Some((scan.effects[other.index].clone(), angle))
         };
         let alike: Vec<(Effect, f64)> = alike.filter_map(angle).collect();
-        let own = &scan.effects[tried.index];
+        let candidate = &scan.effects[tried.index];
         // Of what remembers the poses before none tells by itself.
-        let tells = |(other, _): &&(Effect, f64)| !own.has_memory() && !other.has_memory();
+        let tells = |(other, _): &&(Effect, f64)| !candidate.has_memory() && !other.has_memory();
         let pair = alike.first().filter(tells).zip(there.as_ref());
         let telling_pose = pair.and_then(|((other, _), there)| {
-            telling_pose(&scan.linear, [&linearised, there], &poses, (own, other))
+            telling_pose(&scan.linear, [&linearised, there], &poses, (candidate, other))
         });
         Ranked {
             effect: scan.effects[tried.index].clone(),
@@ -158,6 +161,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
         ranking,
         tried: scan.effects.len(),
         level: rules.level,
+        rules: rules.clone(),
         untestable,
         absorbed,
         evidence: None,
@@ -165,7 +169,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
     }
 }
 
-/// Tests what a fit of `problem` leaves of the identification rows.
+/// Tests the residual of a fit of `problem` at the identification rows.
 ///
 /// # Errors
 /// Problem, data and fit do not belong together.
@@ -174,11 +178,11 @@ pub fn examine(
     data: &Dataset,
     found: &Identification,
 ) -> Result<Findings, IdentifyError> {
-    let data = Data::new(data, &SelectionRules::DEFAULT);
+    let data = Data::new(problem, data, &SelectionRules::DEFAULT);
     Ok(check_fit(&Fitted::of(problem.clone(), &data, found.clone())?, &data))
 }
 
-/// Tests what a fit leaves.
+/// Tests the residual of a fit.
 pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
     let linearised = fitted.linearised(data, &[]);
     let coordinates: Vec<usize> =
@@ -197,14 +201,14 @@ pub(super) fn check_fit(fitted: &Fitted, data: &Data) -> Findings {
     };
     let mut findings = test_residual(&fit, data.rules.level, data.rules.seed);
     // The tests count poses; people count rows of files.
-    for own in &mut findings.tests {
-        if let Test::Outliers { worst: Some(pose) } = own.test {
-            own.row = data.rows().get(pose).map(|&row| data.measurements.location(row));
+    for test in &mut findings.tests {
+        if let Test::Outliers { worst: Some(pose) } = test.test {
+            test.row = data.rows().get(pose).map(|&row| data.measurements.location(row));
         }
     }
     // Against the σ declared, not the smaller one that the scatter speaks for.
-    let size = findings.tests.iter_mut().find(|own| own.test == Test::ReducedChiSquared);
-    if let Some(outcome) = size.and_then(|own| own.outcome.as_mut().ok()) {
+    let size = findings.tests.iter_mut().find(|entry| entry.test == Test::ReducedChiSquared);
+    if let Some(outcome) = size.and_then(|test| test.outcome.as_mut().ok()) {
         outcome.statistic *= fitted.found.sigma_scale.powi(2);
     }
     findings

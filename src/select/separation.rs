@@ -1,4 +1,4 @@
-//! How well poses tell two effects apart, before anyone measures them.
+//! Separation of two effects by poses that are not measured yet.
 
 use super::candidates::Candidates;
 use super::detection::{Size, candidates, sizes, timed, with_linear};
@@ -8,8 +8,9 @@ use super::rules::SelectionRules;
 use crate::error::InputError;
 use crate::measurement::Measurements;
 use crate::problem::{Effect, Problem};
+use crate::select::settings::POWER;
 
-/// How well some poses tell two effects apart.
+/// Separation of two effects by some poses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Separation {
     /// Largest principal angle \[rad\] between what the two do once all parameters have been
@@ -22,26 +23,25 @@ pub struct Separation {
 /// One of two effects beside the other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Side {
-    /// From what size on a scan of the whole catalogue finds it; of its parameters, those of the
-    /// first one's unit.
+    /// Size from which on a scan of the whole catalogue finds it, for its parameters of the first
+    /// one's unit.
     pub found: Size,
-    /// From what size on the other in its place is ruled out, at the level of the loop.
+    /// Size from which on the other effect in its place is ruled out, at the level of the loop.
     pub told: Size,
     test: Option<ScanTest>,
 }
 
 impl Side {
-    /// p to be expected of it beside the other, if it has this size \[SI\] in the direction that is
-    /// hardest to tell; 1 where nothing tells it.
+    /// Returns the expected p-value of the effect beside the other at a size \[SI\] in the
+    /// direction that is hardest to separate; 1 where nothing separates them.
     pub fn expected_p(&self, size: f64) -> f64 {
-        let told = self.test.and_then(|test| {
-            Some((test, test.noncentrality(SelectionRules::DEFAULT.power)?, self.told.worst?))
-        });
+        let told =
+            self.test.and_then(|test| Some((test, test.noncentrality(POWER)?, self.told.worst?)));
         told.map_or(1.0, |(test, needed, least)| test.expected_p(needed * (size / least).powi(2)))
     }
 }
 
-/// How well `poses` would tell two effects apart; linear about the nominal arm, as
+/// Computes how well `poses` would separate two effects, linear about the nominal arm as in
 /// [`super::detectable`].
 ///
 /// # Errors
@@ -65,15 +65,16 @@ pub fn separation(
     };
     let pair = [one.clone(), other.clone()];
     with_linear(problem, &poses, &pair, |linearised, linear| {
-        let side = |own: &Effect, beside: &Effect| {
+        let side = |effect: &Effect, beside: &Effect| {
             let both = linear.with(&linearised.columns(beside));
-            let score = both.score(&linearised.columns(own));
+            let score = both.score(&linearised.columns(effect));
             Side {
-                found: first(sizes(problem, linearised, linear, own, tries_of(own))),
-                told: first(sizes(problem, linearised, &both, own, 1.0)),
+                found: first(sizes(problem, linearised, linear, effect, tries_of(effect))),
+                told: first(sizes(problem, linearised, &both, effect, 1.0)),
                 test: ScanTest::new(
-                    score.rank(&SelectionRules::DEFAULT),
+                    score.rank(),
                     both.expected_freedom(),
+                    SelectionRules::DEFAULT.level,
                     1.0,
                 ),
             }
@@ -83,7 +84,7 @@ pub fn separation(
     })
 }
 
-/// The size of those parameters of an effect that are named first; every effect has one.
+/// Returns the size of the parameters of an effect that are named first.
 fn first(sizes: Vec<Size>) -> Size {
     let none = Size {
         parameters: Vec::new(),

@@ -1,5 +1,6 @@
-//! Which pose would tell two effects apart that the measured poses hardly tell.
+//! Pose that would separate two effects that the measured poses hardly separate.
 
+use crate::select::settings::MAX_SEPARATING_POSES;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -12,7 +13,7 @@ use crate::problem::Effect;
 /// A pose that tells two effects apart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TellingPose {
-    /// The other effect.
+    /// Effect from which the pose separates.
     pub other: Effect,
     /// Configuration within the measured ranges, shape = (joints) \[rad\] or \[m\].
     pub configuration: Vec<f64>,
@@ -21,9 +22,9 @@ pub struct TellingPose {
     /// Payload \[kg\], hoist force \[N\] and temperature [°C] there, where the data have such a
     /// column.
     pub payload: Option<f64>,
-    /// Hoist force \[N\].
+    /// Force of the hoist in the pose \[N\].
     pub hoist: Option<f64>,
-    /// Temperature [°C].
+    /// Temperature in the pose [°C].
     pub temperature: Option<f64>,
     /// Distance between what the arm does with the one effect and with the other, each fitted to
     /// the measured poses \[m\].
@@ -34,7 +35,7 @@ pub struct TellingPose {
 /// from another.
 pub(super) fn shuffled(data: &Data) -> Measurements {
     let mut rng = ChaCha8Rng::seed_from_u64(data.rules.seed);
-    let (rows, count) = (data.rows(), data.rules.telling_poses);
+    let (rows, count) = (data.rows(), MAX_SEPARATING_POSES);
     let drawn: Vec<usize> = (0..count).map(|_| rows[rng.random_range(0..rows.len())]).collect();
     let mut poses = data.measurements.select(&drawn);
     let mut from = || rows[rng.random_range(0..rows.len())];
@@ -76,7 +77,10 @@ pub(super) fn telling_pose(
     Some(TellingPose {
         other: other.clone(),
         configuration: poses.configuration(best).to_vec(),
-        target: poses.target.as_ref().and_then(|own| own.names.get(own.of_row[best]).cloned()),
+        target: poses
+            .target
+            .as_ref()
+            .and_then(|table| table.names.get(table.of_row[best]).cloned()),
         payload: at(&poses.payload),
         hoist: at(&poses.hoist),
         temperature: at(&poses.temperature),

@@ -1,6 +1,6 @@
-//! Structure whose law is not known: where it is, what it depends on, and what a smooth correction
-//! gains.
+//! Structure without a law: its site, its quantities, and the gain of a correction.
 
+use crate::select::settings::MAX_CORRECTED_ERROR;
 use nalgebra::DVector;
 
 use super::data::Data;
@@ -14,20 +14,19 @@ use crate::quantity::Unit;
 use crate::residual_tests::Covariate;
 use crate::residual_tests::Findings;
 
-/// Structure that is left.
+/// Structure in the residual that no effect explains.
 #[derive(Debug, Clone)]
 pub struct Unexplained {
-    /// Where it is; `None`: at no part in particular.
+    /// Site of the structure; `None` where no site is known.
     pub site: Option<Site>,
-    /// What it depends on.
+    /// Quantities on which it depends.
     pub depends_on: Vec<Covariate>,
-    /// Probability of no more than this that noise alone makes it, for all that was looked at
-    /// together.
+    /// Upper limit of the probability that noise alone makes it, for all hypotheses together.
     pub p_value: f64,
-    /// Probabilities of what is said; `None` where only the residual tests see it.
+    /// Claims with their probabilities; `None` where only the residual tests see the structure.
     pub claims: Option<Claims>,
-    /// What an empirical correction gains; `None` where it takes less than 5 % off the error of
-    /// poses that were left out, and beside a fit that is not to be trusted.
+    /// Gain of an empirical correction; `None` where it takes less than 5 % off the error of poses
+    /// left out, or the fit has cautions.
     pub correction: Option<Correction>,
 }
 
@@ -44,23 +43,23 @@ pub struct Correction {
     pub cross_validated: (f64, f64),
     /// Error on held-out poses with the correction.
     pub held_out: ErrorSummary,
-    /// Its curve, where it is a function of one covariate at one coordinate.
+    /// Curve of the correction where it is a function of one covariate at one coordinate.
     pub curve: Option<Curve>,
 }
 
 /// A correction as a function of one covariate.
 #[derive(Debug, Clone)]
 pub struct Curve {
-    /// What it is a function of.
+    /// Covariate of the curve.
     pub covariate: Covariate,
     /// Unit of the coordinate that it is added to: an angle or a length.
     pub unit: Unit,
-    /// What it does and what each identification pose alone says, by the covariate.
+    /// Correction and partial residual of each identification pose, by the covariate.
     pub points: Vec<PartialResidual>,
 }
 
-/// What one pose alone says about a coordinate: the correction there and what the corrected fit
-/// leaves along the lever.
+/// Partial residual of one pose: the correction there plus what the corrected fit leaves along the
+/// lever.
 ///
 /// f(x) + l·r / |l|²   with the pose's lever l = ∂p/∂(coordinate) and its residual r once
 /// everything is fitted anew.
@@ -68,19 +67,19 @@ pub struct Curve {
 pub struct PartialResidual {
     /// Value of the covariate, in its unit.
     pub covariate: f64,
-    /// Of the correction there \[rad\] or \[m\].
+    /// Value of the correction there \[rad\] or \[m\].
     pub correction: f64,
-    /// Of the coordinate as the pose alone measures it \[rad\] or \[m\].
+    /// Error of the coordinate by this pose alone \[rad\] or \[m\].
     pub value: f64,
-    /// |l| [m/rad] or [m/m]: poses where it is small say little.
+    /// Length |l| of the lever [m/rad] or [m/m]: poses with a short lever carry little information.
     pub lever: f64,
 }
 
-/// What is known of structure that has no law, the surest first, with the correction of the first.
+/// Returns the structure without a law, the most probable first, with the correction of the first.
 ///
-/// All functions of the best explanation are stated where there are as many hypotheses as surely as
-/// `located` says, whichever they are. Otherwise those are at whose part some function is at work
-/// as surely, one of a part.
+/// All functions of the best set are stated if there are at least as many hypotheses with
+/// probability `located`. Otherwise those are stated at whose site some function acts with that
+/// probability, one for each site.
 pub(super) fn without_law(
     fitted: &Fitted,
     data: &Data,
@@ -117,7 +116,7 @@ pub(super) fn without_law(
     all.into_iter().map(|(_, found)| found).collect()
 }
 
-/// Structure that the residual tests see and no place or quantity shows.
+/// Returns the structure that the residual tests see without a site or quantity.
 pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
     if !findings.is_structured() {
         return None;
@@ -132,8 +131,8 @@ pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
     })
 }
 
-/// The most probable function of a hypothesis, applied to the held-out poses; `None` where poses
-/// that are left out gain nothing worth stating.
+/// Applies the most probable function of a hypothesis to the held-out poses; `None` where poses
+/// left out gain too little.
 fn correction(
     fitted: &Fitted,
     data: &Data,
@@ -146,27 +145,30 @@ fn correction(
     let whole = bends.then(|| fitted.with_all_rows());
     let fitted = whole.as_ref().unwrap_or(fitted);
     let (here, there) = (data.rows(), &data.split.held_out);
-    let weighed = data.weighed();
+    let weighed = data.evidence_rows();
     let few = Hypotheses::only(fitted, data, &weighed, weighed.len(), hypothesis);
     let (shape, sigma) = best_form(fitted, data, &few, best, hypothesis)?;
     let rows = [here, there.as_slice()].concat();
     let hypotheses = Hypotheses::only(fitted, data, &rows, here.len(), hypothesis);
-    let own = hypotheses.form(best, hypothesis, (shape, here.len()))?;
+    let function_columns = hypotheses.form(best, hypothesis, (shape, here.len()))?;
     let linearised = fitted.linearised(data, &[]);
     let fit = fitted.around(data);
     let first = 3 * here.len();
-    let (own, beyond) = (own.rows(0, first).into_owned(), own.rows_range(first..));
-    let with = fit.with_priors(&own, sigma);
+    let (function_columns, beyond) =
+        (function_columns.rows(0, first).into_owned(), function_columns.rows_range(first..));
+    let with = fit.with_priors(&function_columns, sigma);
     let rms = |squares: f64| (3.0 * squares / fit.rows() as f64).sqrt() * fitted.sigma;
     let (without, corrected) =
         fit.cross_validate(&data.block).zip(with.cross_validate(&data.block))?;
     let cross_validated = (rms(without), rms(corrected));
-    if cross_validated.1 >= data.rules.worthwhile * cross_validated.0 {
+    if cross_validated.1 >= MAX_CORRECTED_ERROR * cross_validated.0 {
         return None;
     }
     let step = with.step();
-    let (parameters, coefficients) =
-        (step.rows(0, step.len() - own.ncols()), step.rows_range(step.len() - own.ncols()..));
+    let (parameters, coefficients) = (
+        step.rows(0, step.len() - function_columns.ncols()),
+        step.rows_range(step.len() - function_columns.ncols()..),
+    );
     let held_out = fitted.linearised_at(data, there, &[]);
     let moved = held_out.fitted() * parameters + beyond * coefficients;
     let reached = hypotheses.reached(hypothesis, here.len());
@@ -176,7 +178,7 @@ fn correction(
     for (pose, error) in errors.iter_mut().enumerate() {
         *error += moved.fixed_rows::<3>(3 * pose) * held_out.poses()[pose].sigma;
     }
-    let function = own * coefficients;
+    let function = function_columns * coefficients;
     let left = linearised.residual() + linearised.fitted() * parameters + &function;
     Some(Correction {
         ranges: hypotheses.ranges(hypothesis),
@@ -187,8 +189,8 @@ fn correction(
     })
 }
 
-/// A correction, given by what it does to the residual of every identification pose and what it
-/// leaves, as a function of one covariate.
+/// Returns a correction as a function of one covariate, from its effect on the residual and from
+/// what it leaves.
 fn curve(
     hypotheses: &Hypotheses,
     hypothesis: &Hypothesis,

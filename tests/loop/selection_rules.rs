@@ -39,18 +39,15 @@ fn rules_that_make_no_sense_are_refused() {
         Problem::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("problems/lunar-sampler"))
             .unwrap();
     let (data, _) = Dataset::read(&problem).unwrap();
-    let change: [(&str, Change); 11] = [
-        ("resamples", |rules| rules.resamples = 0),
-        ("blocks", |rules| rules.blocks = 0),
+    let change: [(&str, Change); 8] = [
         ("level", |rules| rules.level = f64::NAN),
         ("leaving_level", |rules| rules.leaving_level = 1e-9),
-        ("sure", |rules| rules.sure = 1.5),
+        ("inclusion_threshold", |rules| rules.inclusion_threshold = 1.5),
+        ("located", |rules| rules.located = 1.0),
         ("stated", |rules| rules.stated = 0.0),
-        ("covered", |rules| rules.covered = 1.0),
-        ("led_poses", |rules| rules.led_poses = 0),
-        ("weighed_poses", |rules| rules.weighed_poses = 0),
-        ("time_step", |rules| rules.time_step = f64::INFINITY),
-        ("wave_orders", |rules| rules.wave_orders = 1e5),
+        ("evidence_poses", |rules| rules.evidence_poses = 0),
+        ("fit_work", |rules| rules.fit_work = f64::INFINITY),
+        ("max_rounds", |rules| rules.max_rounds = 0),
     ];
     assert!(SelectionRules::DEFAULT.check().is_ok());
     for (name, change) in change {

@@ -1,5 +1,6 @@
-//! What evidence says without some of the poses.
+//! Evidence without some of the poses.
 
+use crate::select::settings::{SUBSET_PARTS, SUBSETS};
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
@@ -18,15 +19,15 @@ use super::products::{Products, Target};
 use super::search::{left_by, search};
 use crate::problem::Effect;
 
-/// Probability below which an explanation is not looked at in fits to fewer poses.
+/// Minimum probability of a set whose hypotheses are evaluated again on fewer poses.
 const WORTH_A_DRAW: f64 = 1e-3;
 
-/// A fit with what is probable of what may explain its residual.
+/// A fit with the probable hypotheses about its residual.
 struct Again<'a> {
     fitted: &'a Fitted,
     data: &'a Data<'a>,
     hypotheses: &'a Hypotheses<'a>,
-    /// Numbers of the probable ones among all.
+    /// Numbers of the probable hypotheses among all.
     probable: Vec<usize>,
     best: &'a HypothesisSet,
 }
@@ -42,8 +43,8 @@ impl<'a> Again<'a> {
             || evidence.sets.iter().filter(|known| known.probability > WORTH_A_DRAW).chain([best]);
         let all = || worth().flat_map(|known| known.hypotheses.iter().zip(&known.functions));
         let is_known = |candidate: &Candidate| {
-            all().any(|(own, (variant, _))| {
-                *variant == candidate.variant && *own == candidate.hypothesis
+            all().any(|(member, (variant, _))| {
+                *variant == candidate.variant && *member == candidate.hypothesis
             })
         };
         let probable =
@@ -51,41 +52,40 @@ impl<'a> Again<'a> {
         Self { fitted, data, hypotheses, probable, best }
     }
 
-    fn own(&self) -> Vec<&Candidate> {
+    fn probable_candidates(&self) -> Vec<&Candidate> {
         self.probable.iter().map(|&k| &self.hypotheses.all[k]).collect()
     }
 
-    /// Places among the probable ones of what the best explanation holds.
+    /// Returns the places, among the probable hypotheses, of members of the best set.
     fn members(&self, of: impl Fn(&Hypothesis) -> bool) -> Vec<usize> {
-        let own = self.own();
+        let candidates = self.probable_candidates();
         let is_held = |k: &usize| {
-            let candidate = own[*k];
+            let candidate = candidates[*k];
             self.best.hypotheses.iter().zip(&self.best.functions).any(|(known, (variant, _))| {
                 *variant == candidate.variant && known.says(&candidate.hypothesis) && of(known)
             })
         };
-        (0..own.len()).filter(is_held).collect()
+        (0..candidates.len()).filter(is_held).collect()
     }
 
     fn blocks(&self, left_out: &[usize]) -> Option<(Vec<Block>, Target)> {
-        blocks(self.fitted, self.data, self.hypotheses, &self.own(), left_out)
+        blocks(self.fitted, self.data, self.hypotheses, &self.probable_candidates(), left_out)
     }
 
-    /// The hypotheses that explain the other poses best.
+    /// Returns the most probable hypotheses about the other poses.
     fn most_probable(&self, left_out: &[usize]) -> Option<Vec<&Hypothesis>> {
         let (blocks, target) = self.blocks(left_out)?;
         let present = self.members(|known| known.effect().is_some());
-        let most = search(&Products::new((&blocks, &target), self.data.rules), &present)
-            .into_iter()
-            .next()?;
-        let own = self.own();
-        Some(most.members.into_iter().map(|k| &own[k].hypothesis).collect())
+        let most = search(&Products::new(&blocks, &target), &present).into_iter().next()?;
+        let candidates = self.probable_candidates();
+        Some(most.members.into_iter().map(|k| &candidates[k].hypothesis).collect())
     }
 
-    /// The pose whose squares a member of the best explanation lowers most, beside all others.
+    /// Returns the pose whose squared residual an effect of the best set lowers most, beside all
+    /// other members.
     fn single_influential_pose(&self, effect: &Effect, left_out: &[usize]) -> Option<usize> {
         let (blocks, target) = self.blocks(left_out)?;
-        let products = Products::new((&blocks, &target), self.data.rules);
+        let products = Products::new(&blocks, &target);
         let left = |of: &dyn Fn(&Hypothesis) -> bool| {
             Some(left_by(&self.members(of), &products)?.residual())
         };
@@ -98,33 +98,33 @@ impl<'a> Again<'a> {
     }
 }
 
-/// A pose without which nothing acts, by the most probable explanation, where an effect of the sure
-/// one does whose time, distance or order is searched: that pose alone carries it.
+/// Returns a pose that alone supports an effect with a searched argument: without it the most
+/// probable set has nothing at that site.
 pub(super) fn carried_by_one(
     fitted: &Fitted,
     data: &Data,
     (evidence, hypotheses): (&Evidence, &Hypotheses),
 ) -> Option<usize> {
-    let best = evidence.sure(data.rules.sure)?;
+    let best = evidence.sure(data.rules.inclusion_threshold)?;
     let searched: Vec<&Hypothesis> = best
         .hypotheses
         .iter()
-        .filter(|own| own.effect().is_some_and(Effect::is_searched))
+        .filter(|hypothesis| hypothesis.effect().is_some_and(Effect::is_searched))
         .collect();
-    if searched.is_empty() {
+    if searched.is_empty() || !best.gears().is_empty() {
         return None;
     }
     let again = Again::new(fitted, data, hypotheses, (evidence, best));
-    let alone = |own: &Hypothesis| {
-        let pose = again.single_influential_pose(own.effect()?, &evidence.left_out)?;
+    let alone = |hypothesis: &Hypothesis| {
+        let pose = again.single_influential_pose(hypothesis.effect()?, &evidence.left_out)?;
         let others = again.most_probable(&[evidence.left_out.as_slice(), &[pose]].concat())?;
-        (!others.iter().any(|other| other.site == own.site)).then_some(pose)
+        (!others.iter().any(|other| other.site == hypothesis.site)).then_some(pose)
     };
     searched.into_iter().find_map(alone)
 }
 
-/// For each effect of an explanation the part of fits to whole configurations drawn anew, a fifth
-/// left out, whose most probable explanation holds it; linear about the fit to all.
+/// Returns for each effect of a set the part of random subsets of the configurations, a fifth left
+/// out, whose most probable set holds it; linear about the fit to all.
 pub(in crate::select) fn stability(
     fitted: &Fitted,
     data: &Data,
@@ -134,7 +134,7 @@ pub(in crate::select) fn stability(
     if best.effects().is_empty() {
         return Vec::new();
     }
-    let rows = data.weighed();
+    let rows = data.evidence_rows();
     let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
     let again = Again::new(fitted, data, &hypotheses, (evidence, best));
     let configurations = number(rows.iter().map(|&row| bits(data.measurements.configuration(row))));
@@ -142,7 +142,7 @@ pub(in crate::select) fn stability(
     let drawn = |seed: u64| {
         let mut order: Vec<usize> = (0..count).collect();
         order.shuffle(&mut ChaCha8Rng::seed_from_u64(data.rules.seed ^ seed));
-        let left_out = &order[..count / data.rules.left_out];
+        let left_out = &order[..count / SUBSET_PARTS];
         let is_out = |&pose: &usize| {
             left_out.contains(&configurations[pose]) || evidence.left_out.contains(&pose)
         };
@@ -150,8 +150,7 @@ pub(in crate::select) fn stability(
         let most = again.most_probable(&poses)?;
         Some(most.into_iter().filter_map(Hypothesis::effect).cloned().collect::<Vec<Effect>>())
     };
-    let drawn: Vec<Vec<Effect>> =
-        (0..data.rules.drawn_again).into_par_iter().filter_map(drawn).collect();
+    let drawn: Vec<Vec<Effect>> = (0..SUBSETS).into_par_iter().filter_map(drawn).collect();
     let share = |effect: &Effect| {
         let holds = drawn.iter().filter(|all| all.contains(effect)).count();
         holds as f64 / drawn.len().max(1) as f64

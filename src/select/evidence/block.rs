@@ -1,6 +1,7 @@
-//! Columns of one hypothesis, and what a residual says about them: a few for all poses together, or
-//! one in every pose.
+//! Columns of one hypothesis and their products with the residual: a few for all poses together, or
+//! one for every pose.
 
+use crate::select::settings::{DISPLACEMENTS, MAX_WIDE_COLUMNS};
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -9,29 +10,28 @@ use nalgebra::{DMatrix, DVector};
 use super::marginal::{Coefficients, Normal, of_block};
 use crate::least_squares::kernel::products;
 use crate::select::neighbourhood::LinearNeighbourhood;
-use crate::select::rules::SelectionRules;
 
-/// Columns on either side from which on a product of tall matrices is worth rearranging them.
+/// Number of columns from which on a product of tall matrices is computed by rows.
 const MANY: usize = 24;
 
 /// Columns A of a hypothesis, shape = (3 N, k).
 #[derive(Debug, Clone)]
 pub(super) enum Design {
-    /// All of them.
+    /// Columns written out.
     Dense(DMatrix<f64>),
-    /// For each lever, shape = (3 N), one column of each group of poses: the lever there, 0
+    /// For each lever, shape = (3 N), one column for each group of poses: the lever there, 0
     /// elsewhere. Levers are orthogonal in every pose, so that AᵀA is diagonal.
     Grouped { levers: DMatrix<f64>, groups: Vec<Option<usize>> },
 }
 
 impl Design {
-    /// Another error in every pose along one lever.
+    /// Creates one column for every pose along one lever.
     pub fn per_pose(lever: &DVector<f64>) -> Self {
         let levers = DMatrix::from_columns(std::slice::from_ref(lever));
         Self::Grouped { levers, groups: (0..lever.len() / 3).map(Some).collect() }
     }
 
-    /// What is kept in numbers: the columns, or the levers.
+    /// Returns the stored matrix: the columns or the levers.
     fn values(&self) -> &DMatrix<f64> {
         match self {
             Self::Dense(values) | Self::Grouped { levers: values, .. } => values,
@@ -44,8 +44,8 @@ impl Design {
         }
     }
 
-    /// The same of root mean square 1 over the first poses, all columns together; `None` where
-    /// nothing is to be seen there.
+    /// Scales all columns together to root mean square 1 over the first poses; `None` where they
+    /// are zero there.
     pub fn scaled(mut self, poses: usize) -> Option<Self> {
         let first = self.values().rows(0, 3 * poses);
         let size = (first.norm_squared() / first.nrows().max(1) as f64).sqrt();
@@ -54,7 +54,7 @@ impl Design {
         is_seen.then_some(self)
     }
 
-    /// The same without some poses.
+    /// Sets the rows of some poses to zero.
     pub fn without(mut self, poses: &[usize]) -> Self {
         for &pose in poses {
             self.values_mut().rows_mut(3 * pose, 3).fill(0.0);
@@ -62,7 +62,7 @@ impl Design {
         self
     }
 
-    /// All columns.
+    /// Returns all columns.
     pub fn columns(&self) -> Cow<'_, DMatrix<f64>> {
         match self {
             Self::Dense(columns) => Cow::Borrowed(columns),
@@ -80,8 +80,7 @@ fn count(groups: &[Option<usize>]) -> usize {
     groups.iter().flatten().max().map_or(0, |last| last + 1)
 }
 
-/// Sum over the poses of each group of some row vectors times the levers: M A, shape = (rows of M,
-/// k).
+/// Returns M A of row vectors M, summed over the poses of each group, shape = (rows of M, k).
 fn along(rows: &DMatrix<f64>, levers: &DMatrix<f64>, groups: &[Option<usize>]) -> DMatrix<f64> {
     let count = count(groups);
     let mut all = DMatrix::zeros(rows.nrows(), levers.ncols() * count);
@@ -96,7 +95,7 @@ fn along(rows: &DMatrix<f64>, levers: &DMatrix<f64>, groups: &[Option<usize>]) -
     all
 }
 
-/// Products of columns of groups of poses, everything fitted projected out.
+/// Returns AᵀA and Aᵀr of grouped columns, everything fitted projected out.
 fn grouped(levers: &DMatrix<f64>, groups: &[Option<usize>], fit: &LinearNeighbourhood) -> Normal {
     let squares = levers.map(|value| value * value);
     let diagonal = along(&DMatrix::repeat(1, squares.nrows(), 1.0), &squares, groups).transpose();
@@ -115,13 +114,15 @@ fn grouped(levers: &DMatrix<f64>, groups: &[Option<usize>], fit: &LinearNeighbou
 #[derive(Debug, Clone)]
 pub(super) struct Block {
     columns: Columns,
-    /// AᵀA and Aᵀr.
+    /// Products AᵀA and Aᵀr.
     normal: Normal,
     pub ln_prior: f64,
     coefficients: Coefficients,
-    /// Whether it is of a function of several covariates.
+    /// True for a function of several covariates.
     pub is_surface: bool,
-    /// The family of its effect; `None` of a function without a law.
+    /// True for a periodic error of many orders.
+    pub is_gear: bool,
+    /// Family of its effect; `None` for a function without a law.
     pub family: Option<String>,
 }
 
@@ -129,12 +130,12 @@ pub(super) struct Block {
 enum Columns {
     /// Everything fitted projected out.
     Dense(Arc<DMatrix<f64>>),
-    /// As they are.
+    /// Columns before the projection.
     Grouped { levers: DMatrix<f64>, groups: Vec<Option<usize>> },
 }
 
 impl Block {
-    /// Of columns of root mean square 1 in the data.
+    /// Creates a block from columns of root mean square 1.
     #[cfg(test)]
     pub fn new(
         design: Design,
@@ -145,50 +146,62 @@ impl Block {
         Self::all(vec![(design, ln_prior, coefficients)], fit).remove(0)
     }
 
-    /// Of several designs of columns of root mean square 1 in the data, projected together: a
-    /// product of many columns is fast.
+    /// Creates blocks from several designs of root mean square 1, projected together: a product of
+    /// many columns is fast.
     pub fn all(designs: Vec<(Design, f64, Coefficients)>, fit: &LinearNeighbourhood) -> Vec<Self> {
         let dense = designs.iter().filter_map(|(design, ..)| {
-            if let Design::Dense(own) = design { Some(own) } else { None }
+            if let Design::Dense(columns) = design { Some(columns) } else { None }
         });
         let rows = designs.first().map_or(0, |(design, ..)| design.values().nrows());
         let mut all = DMatrix::zeros(rows, dense.clone().map(DMatrix::ncols).sum());
         let columns = dense.flat_map(DMatrix::column_iter);
-        all.column_iter_mut().zip(columns).for_each(|(mut own, column)| own.copy_from(&column));
+        all.column_iter_mut()
+            .zip(columns)
+            .for_each(|(mut target, column)| target.copy_from(&column));
         let left = fit.left_of(&all);
         let mut first = 0;
         let of = |(design, ln_prior, coefficients): (Design, f64, Coefficients)| {
             let (columns, normal) = match design {
                 Design::Dense(columns) => {
-                    let own = left.columns(first, columns.ncols()).into_owned();
+                    let projected = left.columns(first, columns.ncols()).into_owned();
                     first += columns.ncols();
-                    let mut gram = DMatrix::zeros(own.ncols(), own.ncols());
+                    let mut gram = DMatrix::zeros(projected.ncols(), projected.ncols());
                     // The narrow side is transposed: this is the product that is fast.
-                    gram.gemm(1.0, &own.transpose(), &own, 0.0);
-                    let product = own.tr_mul(fit.residual());
-                    (Columns::Dense(Arc::new(own)), Normal::Dense { product, gram })
+                    gram.gemm(1.0, &projected.transpose(), &projected, 0.0);
+                    let product = projected.tr_mul(fit.residual());
+                    (Columns::Dense(Arc::new(projected)), Normal::Dense { product, gram })
                 }
                 Design::Grouped { levers, groups } => {
                     let normal = grouped(&levers, &groups, fit);
                     (Columns::Grouped { levers, groups }, normal)
                 }
             };
-            Self { columns, normal, ln_prior, coefficients, is_surface: false, family: None }
+            Self {
+                columns,
+                normal,
+                ln_prior,
+                coefficients,
+                is_surface: false,
+                is_gear: false,
+                family: None,
+            }
         };
         designs.into_iter().map(of).collect()
     }
 
-    /// Whether it is of an effect.
+    /// Returns true if the block is that of an effect.
     pub fn is_law(&self) -> bool {
         self.family.is_some()
     }
 
-    /// Whether it has more columns than a set that is extended may hold.
-    pub fn is_wide(&self, rules: &SelectionRules) -> bool {
-        matches!(&self.columns, Columns::Grouped { levers, groups } if levers.ncols() * count(groups) > rules.widest)
+    /// Returns true if a set with this block cannot grow: it has more than `MAX_WIDE_COLUMNS`
+    /// columns for single poses.
+    pub fn is_wide(&self) -> bool {
+        self.is_gear
+            || matches!(&self.columns, Columns::Grouped { levers, groups } if levers.ncols() * count(groups) > MAX_WIDE_COLUMNS)
     }
 
-    /// A, everything that was fitted projected out.
+    /// Returns A with everything fitted projected out.
     pub fn columns(&self, fit: &LinearNeighbourhood) -> Arc<DMatrix<f64>> {
         match &self.columns {
             Columns::Dense(columns) => Arc::clone(columns),
@@ -199,12 +212,13 @@ impl Block {
         }
     }
 
-    /// Aᵀr.
+    /// Returns Aᵀr.
     pub fn product(&self) -> &DVector<f64> {
         self.normal.product()
     }
 
-    /// MᵀA of other columns M with everything fitted projected out, also transposed.
+    /// Returns MᵀA of other columns M with everything fitted projected out; M is also given
+    /// transposed.
     pub fn times(&self, (others, transposed): (&DMatrix<f64>, &DMatrix<f64>)) -> DMatrix<f64> {
         match &self.columns {
             Columns::Dense(columns) if columns.ncols().min(others.ncols()) < MANY => {
@@ -219,35 +233,26 @@ impl Block {
         }
     }
 
-    /// ln p(r | set and block) − ln p(r | set), and the most probable size, of a residual from
-    /// which a set takes Z r off, and Z A off the columns: with both, `None` for nothing. `left`
-    /// are the squares that the set leaves, and their degrees of freedom.
+    /// Returns ln p(r | set and block) − ln p(r | set) and the most probable size. The set takes Z
+    /// r off the residual and Z A off the columns; `None` for the empty set. `left` holds the
+    /// squares that the set leaves and their degrees of freedom.
     pub fn gain(
         &self,
         set: Option<(&DMatrix<f64>, &DVector<f64>)>,
         (left, without): ((f64, f64), f64),
         grid: &[(f64, f64)],
-        rules: &SelectionRules,
     ) -> (f64, f64) {
         let (with, size) = match set {
-            None => self.over_sizes(&self.normal, left, grid, rules),
-            Some((along, taken)) => {
-                self.over_sizes(&self.normal.beside(along, taken), left, grid, rules)
-            }
+            None => self.over_sizes(&self.normal, left, grid),
+            Some((along, taken)) => self.over_sizes(&self.normal.beside(along, taken), left, grid),
         };
         (with - without, size)
     }
 
-    /// ln p(r | block) up to a constant, of columns and a residual of which `normal` and `left` are
-    /// what others leave, and the most probable size.
-    pub fn over_sizes(
-        &self,
-        normal: &Normal,
-        left: (f64, f64),
-        grid: &[(f64, f64)],
-        rules: &SelectionRules,
-    ) -> (f64, f64) {
-        of_block(normal, left, grid, (&rules.displacements, &self.coefficients))
+    /// Returns ln p(r | block) up to a constant, and the most probable size, of columns and a
+    /// residual of which `normal` and `left` are what others leave.
+    pub fn over_sizes(&self, normal: &Normal, left: (f64, f64), grid: &[(f64, f64)]) -> (f64, f64) {
+        of_block(normal, left, grid, (&DISPLACEMENTS, &self.coefficients))
     }
 }
 
@@ -256,7 +261,7 @@ mod tests {
     use super::*;
     use crate::select::neighbourhood::Unknowns;
 
-    /// Numbers without pattern.
+    /// Returns a matrix of pseudo-random numbers.
     fn matrix(rows: usize, columns: usize) -> DMatrix<f64> {
         DMatrix::from_fn(rows, columns, |i, j| {
             (12.9898 * i as f64 + 78.233 * (j + 1) as f64).sin() * 43.7 % 1.0
@@ -265,7 +270,6 @@ mod tests {
 
     #[test]
     fn a_column_for_every_pose_weighs_the_same_written_out() {
-        let rules = SelectionRules::DEFAULT;
         let (jacobian, residual) = (matrix(36, 4), matrix(36, 6).column(5) * 4.0);
         let unknowns = Unknowns {
             x: vec![0.0; 4],
@@ -291,7 +295,7 @@ mod tests {
                     let block = Block::new(design, &fit, 0.0, Coefficients::default());
                     let along = block.times((&others, &within));
                     let set = is_beside.then_some((&along, &taken));
-                    (block.gain(set, ((100.0, 30.0), 0.0), &grid, &rules), block.columns(&fit))
+                    (block.gain(set, ((100.0, 30.0), 0.0), &grid), block.columns(&fit))
                 });
                 assert!(
                     (one.0.0 - other.0.0).abs() < 1e-9 && (one.0.1 - other.0.1).abs() < 1e-12,

@@ -1,5 +1,8 @@
-//! Hypotheses as blocks of columns beside one another, with what they explain.
+//! Hypotheses as blocks of columns beside one another.
 
+use crate::select::settings::{
+    PRIOR_OF_SAME_FAMILY, SPREAD_OF_DECLARED_NOISE, SPREAD_OF_ESTIMATED_NOISE,
+};
 use rayon::prelude::*;
 
 use super::block::Block;
@@ -13,13 +16,13 @@ use crate::problem::Effect;
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
 
-/// Hypotheses and the residual with everything that is fitted projected out, some poses left out;
-/// `None` where the residual is not a finite number, or the end was asked for.
+/// Returns the blocks of hypotheses and the residual, everything fitted projected out and some
+/// poses left out; `None` where the residual is not finite or the search was stopped.
 pub(super) fn blocks(
     fitted: &Fitted,
     data: &Data,
     hypotheses: &Hypotheses,
-    own: &[&Candidate],
+    candidates: &[&Candidate],
     left_out: &[usize],
 ) -> Option<(Vec<Block>, Target)> {
     let linearised = hypotheses.linearised.without(left_out);
@@ -35,9 +38,9 @@ pub(super) fn blocks(
             .then(|| Candidate::blocks(some, (fitted, &neighbourhood), left_out))
     };
     let blocks: Vec<Vec<Block>> =
-        own.par_chunks(TOGETHER).map(unless_stopped).collect::<Option<_>>()?;
+        candidates.par_chunks(TOGETHER).map(unless_stopped).collect::<Option<_>>()?;
     let mut blocks: Vec<Block> = blocks.into_iter().flatten().collect();
-    let rows = data.weighed();
+    let rows = data.evidence_rows();
     let is_aside = |&(pose, row): &(usize, &usize)| {
         !left_out.contains(&pose) && fitted.set_aside.contains(row)
     };
@@ -46,17 +49,18 @@ pub(super) fn blocks(
         + rows.iter().enumerate().filter(is_aside).map(|(_, &row)| numbers(row)).sum::<usize>();
     let noise = marginal::Noise {
         freedom: (neighbourhood.sums().freedom() - without_weight as f64).max(1.0),
-        trust: if holds { data.rules.trust_declared } else { data.rules.trust_estimated },
+        trust: if holds { SPREAD_OF_DECLARED_NOISE } else { SPREAD_OF_ESTIMATED_NOISE },
         least: if holds { 0.0 } else { f64::NEG_INFINITY },
     };
-    let alike = (data.rules.of_a_kind.ln() - hypotheses.ln_family - 2.0_f64.ln()).max(0.0);
+    let alike = (PRIOR_OF_SAME_FAMILY.ln() - hypotheses.ln_family - 2.0_f64.ln()).max(0.0);
     let target = Target { fit: neighbourhood, noise, alike, stop: data.stop.clone() };
     let is_added = |&k: &usize| {
-        own[k].hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect))
+        candidates[k].hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect))
     };
-    let added: Vec<usize> = (0..own.len()).filter(is_added).collect();
-    let effects: Vec<&Effect> = added.iter().filter_map(|&k| own[k].hypothesis.effect()).collect();
-    let products = Products::new((&blocks, &target), data.rules);
+    let added: Vec<usize> = (0..candidates.len()).filter(is_added).collect();
+    let effects: Vec<&Effect> =
+        added.iter().filter_map(|&k| candidates[k].hypothesis.effect()).collect();
+    let products = Products::new(&blocks, &target);
     let waves = Waves { hypotheses, products: &products, fitted, left_out };
     let spreads = waves.spreads(&added, &effects);
     for (k, ln_spread) in spreads {

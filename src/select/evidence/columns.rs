@@ -1,5 +1,9 @@
 //! Columns of the hypotheses: what each would do to every measured coordinate.
 
+use crate::select::settings::{
+    GEAR_ORDERS, MAX_NEAR_ORDER, PRIOR_OF_FUNCTIONS, PRIOR_OF_RIGID_LINKS, ROUGH_LENGTHS,
+    SLOW_LENGTH, SMOOTH_LENGTHS, SURFACE_LENGTH,
+};
 use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
@@ -12,43 +16,44 @@ use crate::laws::Quantity;
 use crate::model::Pose;
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, JointField, ParameterSite};
-use crate::problem::{Effect, JointKind, Observation, Problem};
+use crate::problem::{Effect, EffectDeclaration, JointKind, Observation, Problem};
 use crate::residual_tests::Covariate;
 use crate::select::data::{bits, number};
+use crate::select::harmonic_prior::is_gear_of;
 use crate::select::neighbourhood::{Linearised, tries};
-use crate::select::rules::SelectionRules;
 
-/// Commands in contact that differ by what moves the target by no more than this, in σ, may differ
-/// by noise alone.
+/// Displacement of the target, in σ, up to which commands in contact may differ by noise alone.
 const NOISE_ALONE: f64 = 3.0;
-/// A contact that decides a command no better than by this \[rad or m\] decides none.
+/// Error \[rad or m\] above which a contact does not determine a command.
 const DECIDES: f64 = 0.02;
 
-/// Everything that may explain a residual.
+/// Builder of all hypotheses about a residual.
 pub(super) struct Columns<'a, 'l> {
     pub problem: &'a Problem,
     pub linearised: &'a Linearised<'l>,
     pub time_measured: bool,
-    pub rules: &'a SelectionRules,
-    /// Poses, the first ones, that hypotheses are weighed on; at those behind them they are
-    /// predicted.
+    /// True if the harmonics of the problem may have a common prior.
+    takes_gears: bool,
+    /// Number of poses, the first ones, on which evidence is evaluated; functions are predicted at
+    /// the others.
     pub weighed: usize,
-    /// Functions of one hypothesis alone are wanted.
+    /// Hypothesis whose functions alone are wanted.
     only: Option<&'a Hypothesis>,
     candidates: Vec<Candidate>,
-    /// Family of each candidate and its share of the family's chance.
+    /// Family of each candidate and its share of the family's probability.
     shares: Vec<(String, f64)>,
-    /// What functions are functions of.
+    /// Covariates of the functions.
     covariates: Vec<Known>,
 }
 
 impl<'a, 'l> Columns<'a, 'l> {
-    /// Effects with their columns and functions of unknown law, or those of one hypothesis alone;
-    /// the covariates of those functions; and ln of the chance of a family of effects.
+    /// Returns effects with their columns and functions without a law, or those of one hypothesis
+    /// alone; the covariates of those functions; and ln of the prior probability of a family of
+    /// effects.
     pub fn all(
         problem: &'a Problem,
         linearised: &'a Linearised<'l>,
-        (time_measured, rules, weighed): (bool, &'a SelectionRules, usize),
+        (time_measured, takes_gears, weighed): (bool, bool, usize),
         effects: &[(Effect, DMatrix<f64>)],
         only: Option<&'a Hypothesis>,
     ) -> (Vec<Candidate>, Vec<Known>, f64) {
@@ -57,7 +62,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             problem,
             linearised,
             time_measured,
-            rules,
+            takes_gears,
             weighed,
             only,
             candidates,
@@ -115,8 +120,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// One of the functions of a hypothesis, by a number that is the same whichever others there
-    /// are.
+    /// Adds one of the functions of a hypothesis under a number that does not depend on the others.
     fn add_variant(
         &mut self,
         family: &str,
@@ -126,8 +130,8 @@ impl<'a, 'l> Columns<'a, 'l> {
     ) {
         let known = self.candidates.len();
         self.add(family, 1.0, hypothesis.clone(), columns);
-        if let Some(own) = self.candidates.get_mut(known) {
-            own.variant = variant;
+        if let Some(candidate) = self.candidates.get_mut(known) {
+            candidate.variant = variant;
         }
     }
 
@@ -137,7 +141,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         let approach = self.linearised.poses().iter().any(|pose| pose.setup.approach.is_some());
         for ((effect, columns), tries) in effects.iter().zip(tries) {
             let terms = effect.terms(self.problem);
-            let (columns, largest) = even(columns.clone(), &terms, self.weighed, self.rules);
+            let (columns, largest) = even(columns.clone(), &terms, self.weighed);
             let hypothesis =
                 Hypothesis::of_effect(effect, self.problem, approach, self.time_measured);
             let coefficients = Coefficients {
@@ -158,14 +162,14 @@ impl<'a, 'l> Columns<'a, 'l> {
     fn functions(&mut self) {
         let (known, loads) = (self.known(), self.loads());
         // The shortest only of the coordinates that joints move: it takes many poses.
-        let lengths = self.rules.smooth_lengths;
+        let lengths = SMOOTH_LENGTHS;
         for site in geometry_sites(self.problem) {
             let Some(at) = self.linearised.place(site) else { continue };
             let moving = self.moving(site);
-            let (family, own) =
+            let (family, lengths_here) =
                 if moving { ("smooth", &lengths[..]) } else { ("smooth elsewhere", &lengths[..2]) };
             for of in &known {
-                self.smooth(family, site, &[&at], of, own);
+                self.smooth(family, site, &[&at], of, lengths_here);
             }
             for of in &loads {
                 self.smooth(family, site, &[&at], of, &lengths[..2]);
@@ -176,6 +180,7 @@ impl<'a, 'l> Columns<'a, 'l> {
                 self.per_pose(site, &at);
                 if let ParameterSite::Joint { joint, .. } = site {
                     self.near_harmonics(site, &at, joint);
+                    self.gears(site, &at, joint);
                 }
             }
         }
@@ -187,7 +192,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         self.covariates.extend(known);
     }
 
-    /// Whether a site is the coordinate that a joint moves.
+    /// Returns true if a site is the coordinate that a joint moves.
     fn moving(&self, site: ParameterSite) -> bool {
         let ParameterSite::Joint { joint, field } = site else { return false };
         match self.problem.joints[joint].kind {
@@ -197,7 +202,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// What is known of every pose and varies.
+    /// Returns the known quantities of every pose that vary.
     fn known(&self) -> Vec<Known> {
         let poses = self.linearised.poses();
         let mut all: Vec<(Covariate, Vec<f64>)> = Vec::new();
@@ -225,10 +230,11 @@ impl<'a, 'l> Columns<'a, 'l> {
             );
         }
         for which in 0..self.problem.data.covariates.len() {
-            let own = poses.iter().map(|pose| pose.setup.covariates.get(which).copied());
+            let values = poses.iter().map(|pose| pose.setup.covariates.get(which).copied());
             all.extend(
-                own.collect::<Option<Vec<f64>>>()
-                    .map(|values| (Covariate::own(which, self.problem), values)),
+                values
+                    .collect::<Option<Vec<f64>>>()
+                    .map(|values| (Covariate::declared(which, self.problem), values)),
             );
         }
         let time = if self.time_measured { Covariate::Time } else { Covariate::Row };
@@ -244,7 +250,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             .collect()
     }
 
-    /// The command of a joint in every pose, as what depends on it sees it.
+    /// Returns the command of a joint in every pose as functions see it.
     ///
     /// In contact the noise is in the command, not in what is measured: a joint without which the
     /// target cannot come to its point has, beside each point, values that noise alone sets apart,
@@ -301,8 +307,8 @@ impl<'a, 'l> Columns<'a, 'l> {
             .collect()
     }
 
-    /// Whether an effect is looked for that is linear in a covariate there; of two values every one
-    /// is.
+    /// Returns true if the search has an effect that is linear in a covariate there; of two values
+    /// every effect is.
     fn has_law(&self, site: ParameterSite, of: &Known) -> bool {
         let is_line = |term: &Term| {
             let is_linear = matches!(
@@ -311,19 +317,18 @@ impl<'a, 'l> Columns<'a, 'l> {
             );
             term.site == site && (is_linear || of.levels < 3)
         };
-        let acts = |own: &Candidate| {
-            let effect = own
+        let acts = |candidate: &Candidate| {
+            let effect = candidate
                 .hypothesis
                 .effect()
-                .filter(|_| own.hypothesis.depends_on == [of.covariate.clone()]);
+                .filter(|_| candidate.hypothesis.depends_on == [of.covariate.clone()]);
             effect.is_some_and(|effect| effect.terms(self.problem).iter().any(is_line))
         };
         self.candidates.iter().any(acts)
     }
 
-    /// Smooth functions of one covariate at some columns that belong together: any, which changes
-    /// over some length, and of what is no command, direction of approach or load a straight line,
-    /// unless that is a law.
+    /// Adds smooth functions of one covariate at some columns that belong together, and a straight
+    /// line unless an effect is that.
     fn smooth(
         &mut self,
         family: &str,
@@ -367,7 +372,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// Functions of two covariates: of two commands, of a direction and something else, of
+    /// Adds functions of two covariates: of two commands, of a direction and another quantity, of
     /// temperature and time.
     fn surfaces(&mut self, site: ParameterSite, at: &DVector<f64>, known: &[Known]) {
         for (k, one) in known.iter().enumerate() {
@@ -379,21 +384,22 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// Functions of a joint's own command that grow evenly, from zero, with what is no command: a
-    /// gear or a scale that warms, a payload held out. Where that hardly varies they are functions
-    /// of the command alone, and are not looked for.
+    /// Adds functions of a joint's command that grow from zero with a quantity that is no command:
+    /// a gear that warms, a payload held out.
     fn scaled_by(&mut self, site: ParameterSite, at: &DVector<f64>, known: &[Known]) {
         let ParameterSite::Joint { joint, .. } = site else { return };
-        let Some(own) = known.iter().find(|own| own.covariate == Covariate::Command(joint)) else {
+        let Some(command) =
+            known.iter().find(|command| command.covariate == Covariate::Command(joint))
+        else {
             return;
         };
         let reference = self.problem.data.reference_temperature;
         for size in known.iter().filter(|of| of.is_size(reference)) {
-            let (zero, length) = (size.zero(reference), self.rules.slow_length);
+            let (zero, length) = (size.zero(reference), SLOW_LENGTH);
             let hypothesis =
-                Hypothesis::smooth(site, vec![own.covariate.clone(), size.covariate.clone()]);
+                Hypothesis::smooth(site, vec![command.covariate.clone(), size.covariate.clone()]);
             self.add("surface", 1.0, hypothesis, || {
-                times(&[at], &growing(&own.scaled, size, zero, length))
+                times(&[at], &growing(&command.scaled, size, zero, length))
             });
         }
     }
@@ -407,14 +413,13 @@ impl<'a, 'l> Columns<'a, 'l> {
     ) {
         let mut depends_on = vec![one.covariate.clone(), other.covariate.clone()];
         depends_on.sort();
-        let (hypothesis, length) =
-            (Hypothesis::smooth(site, depends_on), self.rules.surface_length);
+        let (hypothesis, length) = (Hypothesis::smooth(site, depends_on), SURFACE_LENGTH);
         self.add(family, 1.0, hypothesis, || {
             times(at, &products_of(&[&one.scaled, &other.scaled], length))
         });
     }
 
-    /// Another error in every pose.
+    /// Adds another value in every pose.
     fn per_pose(&mut self, site: ParameterSite, at: &DVector<f64>) {
         let hypothesis = Hypothesis {
             kind: HypothesisKind::PerPose,
@@ -425,8 +430,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         self.add_design("per pose", 1.0, hypothesis, || Design::per_pose(at));
     }
 
-    /// Harmonics whose height and phase change slowly: orders that are no whole numbers, and sums
-    /// of neighbouring ones.
+    /// Adds harmonics whose height and phase change slowly: orders that are no whole numbers, and
+    /// sums of neighbouring ones.
     fn near_harmonics(&mut self, site: ParameterSite, at: &DVector<f64>, joint: usize) {
         if self.problem.joints[joint].command_kind() != JointKind::Revolute {
             return;
@@ -435,8 +440,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         else {
             return;
         };
-        let slow = basis(&known.scaled, self.rules.slow_length);
-        for order in 1..=self.rules.near_orders {
+        let slow = basis(&known.scaled, SLOW_LENGTH);
+        for order in 1..=MAX_NEAR_ORDER {
             let waves = || {
                 let (k, mut waves) = (slow.ncols(), DMatrix::zeros(slow.nrows(), 2 * slow.ncols()));
                 for (row, q) in known.values.iter().enumerate() {
@@ -458,7 +463,38 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// What moves every measured position: functions of one covariate, and of the position.
+    /// Adds periodic errors of a joint with many orders under one prior, one hypothesis for each
+    /// highest order, unless the fit holds one or the command takes too few values.
+    fn gears(&mut self, site: ParameterSite, at: &DVector<f64>, joint: usize) {
+        let held = |declared: &EffectDeclaration| is_gear_of(&declared.effect, joint + 1);
+        if !self.takes_gears || self.problem.effects.iter().any(held) {
+            return;
+        }
+        let Some(known) = Known::of(Covariate::Command(joint), self.command(joint), self.weighed)
+        else {
+            return;
+        };
+        for highest in GEAR_ORDERS {
+            if known.levels < 2 * highest as usize {
+                continue;
+            }
+            let hypothesis = Hypothesis {
+                kind: HypothesisKind::Gear(highest),
+                site: Site::Joint(joint),
+                coordinate: Some(site),
+                depends_on: vec![known.covariate.clone()],
+            };
+            self.add("gear", 1.0, hypothesis, || {
+                let waves = DMatrix::from_fn(known.values.len(), 2 * highest as usize, |row, k| {
+                    let phase = (k / 2 + 1) as f64 * known.values[row];
+                    if k % 2 == 0 { phase.sin() } else { phase.cos() }
+                });
+                times(&[at], &waves)
+            });
+        }
+    }
+
+    /// Adds functions of one covariate, and of the position, that move every measured position.
     fn measurement(&mut self, known: &[Known]) {
         let axes: Vec<DVector<f64>> = (0..3)
             .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
@@ -467,7 +503,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             return;
         }
         let (site, at) = (ParameterSite::Shift { axis: 0 }, axes.iter().collect::<Vec<_>>());
-        let lengths = self.rules.smooth_lengths;
+        let lengths = SMOOTH_LENGTHS;
         for of in known {
             self.smooth("smooth in the measurement", site, &at, of, &lengths);
         }
@@ -495,18 +531,19 @@ impl<'a, 'l> Columns<'a, 'l> {
             depends_on: vec![Covariate::Position],
         };
         // Where the strain of the frame is looked for, that is the linear law.
-        let strain = |own: &Candidate| own.hypothesis.effect() == Some(&Effect::FrameStrain);
+        let strain =
+            |candidate: &Candidate| candidate.hypothesis.effect() == Some(&Effect::FrameStrain);
         if !self.candidates.iter().any(strain) {
             self.add("field", 1.0, hypothesis(HypothesisKind::Linear), || times(&at, &linear));
         }
         if let [x, y, z] = coordinates.as_slice() {
-            let plane = products_of(&[&x.scaled, &y.scaled, &z.scaled], self.rules.slow_length);
+            let plane = products_of(&[&x.scaled, &y.scaled, &z.scaled], SLOW_LENGTH);
             self.add("field", 1.0, hypothesis(HypothesisKind::Smooth), || times(&at, &plane));
         }
         self.covariates.extend(coordinates);
     }
 
-    /// What measures wanders, or one reading errs as the last did.
+    /// Adds an instrument that wanders in time, or in which one reading errs as the last did.
     fn wandering(&mut self, site: ParameterSite, at: &[&DVector<f64>], of: &Known) {
         let hypothesis = Hypothesis {
             kind: HypothesisKind::Wandering,
@@ -514,7 +551,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             coordinate: Some(site),
             depends_on: vec![of.covariate.clone()],
         };
-        for (variant, &length) in self.rules.rough_lengths.iter().enumerate() {
+        for (variant, &length) in ROUGH_LENGTHS.iter().enumerate() {
             if let Some(basis) = rough_basis(&of.scaled, length, of.levels) {
                 self.add_variant("smooth in the measurement", &hypothesis, variant, || {
                     times(at, &basis)
@@ -523,8 +560,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// How the base leans by what is no command: it stands on a floor that warms, creeps or gives
-    /// way.
+    /// Adds leans of the base as functions of quantities that are no commands: its floor warms,
+    /// creeps or gives way.
     fn base(&mut self, known: &[Known]) {
         let axes: Vec<DVector<f64>> =
             (0..3).filter_map(|axis| self.linearised.place(ParameterSite::Turn { axis })).collect();
@@ -532,11 +569,11 @@ impl<'a, 'l> Columns<'a, 'l> {
         let is_command =
             |of: &&Known| matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_));
         for of in known.iter().filter(|of| axes.len() == 3 && !is_command(of)) {
-            self.smooth("smooth at the base", site, &at, of, &self.rules.smooth_lengths[..2]);
+            self.smooth("smooth at the base", site, &at, of, &SMOOTH_LENGTHS[..2]);
         }
     }
 
-    /// Another error in every configuration, which all positions measured in it share.
+    /// Adds another value in every configuration, shared by all positions measured in it.
     fn repeats(&mut self) {
         let axes: Vec<DVector<f64>> = (0..3)
             .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
@@ -560,7 +597,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         self.add_design("per pose", 1.0, hypothesis, design);
     }
 
-    /// Curvature and strain of beams by other functions than the temperature's multiple.
+    /// Adds curvature and strain of beams by other functions of temperature than a multiple.
     fn warming(&mut self, known: &[Known]) {
         if self.problem.data.reference_temperature.is_none() {
             return;
@@ -585,7 +622,7 @@ impl<'a, 'l> Columns<'a, 'l> {
                 for of in
                     known.iter().filter(|known| !matches!(known.covariate, Covariate::Approach(_)))
                 {
-                    self.smooth("smooth in a link", site, &at, of, &self.rules.smooth_lengths[..2]);
+                    self.smooth("smooth in a link", site, &at, of, &SMOOTH_LENGTHS[..2]);
                 }
                 let time = if self.time_measured { Covariate::Time } else { Covariate::Row };
                 if let (Some(one), Some(other)) =
@@ -597,9 +634,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// The candidates with their prior probabilities: odds of one to two for each further
-    /// hypothesis, then equal chances for all families and, but for harmonics, all members of a
-    /// family.
+    /// Returns the candidates with their prior probabilities: odds of one to two for each further
+    /// hypothesis, equal probabilities for families, and shares within a family.
     fn weighted(self) -> (Vec<Candidate>, Vec<Known>, f64) {
         let mut families: Vec<(&str, f64, f64)> = Vec::new();
         for ((family, share), candidate) in self.shares.iter().zip(&self.candidates) {
@@ -609,9 +645,9 @@ impl<'a, 'l> Columns<'a, 'l> {
                 *sum += share;
             } else {
                 let weight = match candidate.hypothesis.effect() {
-                    Some(Effect::LinkBending { .. }) => self.rules.rigid_links,
+                    Some(Effect::LinkBending { .. }) => PRIOR_OF_RIGID_LINKS,
                     Some(_) => 1.0,
-                    None => self.rules.unknown_law,
+                    None => PRIOR_OF_FUNCTIONS,
                 };
                 families.push((family, weight, *share));
             }
@@ -619,8 +655,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         let all: f64 = families.iter().map(|(_, weight, _)| weight).sum();
         let mut candidates = self.candidates;
         for (candidate, (family, share)) in candidates.iter_mut().zip(&self.shares) {
-            let own = families.iter().find(|(known, ..)| *known == family.as_str());
-            let (weight, sum) = own.map_or((1.0, 1.0), |(_, weight, sum)| (*weight, *sum));
+            let entry = families.iter().find(|(known, ..)| *known == family.as_str());
+            let (weight, sum) = entry.map_or((1.0, 1.0), |(_, weight, sum)| (*weight, *sum));
             candidate.ln_prior = (share / sum * weight / all / 2.0).ln();
         }
         (candidates, self.covariates, -(2.0 * all.max(1.0)).ln())

@@ -10,21 +10,21 @@ use super::marginal::Coefficients;
 use super::products::Products;
 use super::search::{Weighted, left_by};
 use crate::problem::{Effect, Problem};
-use crate::select::rules::SelectionRules;
 
-/// Probability of an explanation from which on its arguments are looked at.
+/// Minimum probability of a set whose arguments are refined.
 const WORTH_A_LOOK: f64 = 0.01;
-/// Explanations that are looked at, the most probable ones.
+/// Maximum number of sets whose arguments are refined.
 const MOST: usize = 6;
-/// Values to either side.
+/// Number of values on either side.
 const STEPS: i32 = 8;
-/// How far the last of them is off: listed ones are closer; then as far as from one to the next.
+/// Ratio of the last of these values to the first: listed arguments are closer; then the distance
+/// between neighbours.
 const FARTHEST: [f64; 2] = [1.4, 1.043];
-/// ln of the odds by which another value has to do better.
+/// Log odds by which another value must be better.
 const BETTER: f64 = 0.5;
 
-/// Effects of finer arguments than those known that do better in their places in `weighted`
-/// explanations.
+/// Returns effects with arguments between the listed ones that do better in their places in
+/// probable sets.
 pub(super) fn finer(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],
@@ -32,12 +32,21 @@ pub(super) fn finer(
     blocks_of: impl Fn(&[Candidate]) -> Vec<Block>,
     problem: &Problem,
 ) -> Vec<Candidate> {
-    let Products { blocks, target, rules, .. } = *products;
+    let Products { blocks, target, .. } = *products;
     let mut found: Vec<Candidate> = Vec::new();
-    for set in weighted.iter().filter(|set| set.probability > WORTH_A_LOOK).take(MOST) {
+    for set in weighted
+        .iter()
+        .filter(|set| set.probability > WORTH_A_LOOK)
+        .take(MOST)
+        .filter(|set| !products.has_gear(&set.members))
+    {
         for &member in &set.members {
-            let own = &hypotheses.all[member];
-            if own.hypothesis.effect().is_none_or(|effect| effect.scaled(FARTHEST[0]).is_none()) {
+            let candidate = &hypotheses.all[member];
+            if candidate
+                .hypothesis
+                .effect()
+                .is_none_or(|effect| effect.scaled(FARTHEST[0]).is_none())
+            {
                 continue;
             }
             // Beside everything else, and beside what is no such effect of that place: one may do
@@ -61,7 +70,7 @@ pub(super) fn finer(
                     left.gain(member).0 + products.ln_prior(&blocks[member], rest) + BETTER;
                 for farthest in FARTHEST {
                     let near =
-                        hypotheses.near(best.as_ref().unwrap_or(own), farthest, problem, rules);
+                        hypotheses.near(best.as_ref().unwrap_or(candidate), farthest, problem);
                     if target.stop.is_requested() {
                         break;
                     }
@@ -85,15 +94,9 @@ pub(super) fn finer(
 }
 
 impl Hypotheses<'_> {
-    /// The same hypothesis with other values of its searched argument that no candidate has.
-    fn near(
-        &self,
-        own: &Candidate,
-        farthest: f64,
-        problem: &Problem,
-        rules: &SelectionRules,
-    ) -> Vec<Candidate> {
-        let Some(effect) = own.hypothesis.effect() else { return Vec::new() };
+    /// Returns a hypothesis with other values of its searched argument that no candidate has.
+    fn near(&self, candidate: &Candidate, farthest: f64, problem: &Problem) -> Vec<Candidate> {
+        let Some(effect) = candidate.hypothesis.effect() else { return Vec::new() };
         let factors = (-STEPS..=STEPS)
             .filter(|step| *step != 0)
             .map(|step| farthest.powf(f64::from(step) / f64::from(STEPS)));
@@ -101,23 +104,23 @@ impl Hypotheses<'_> {
         let is_new = |effect: &Effect| {
             !self.all.iter().any(|known| known.hypothesis.effect() == Some(effect))
         };
-        others.filter(is_new).filter_map(|effect| self.like(own, effect, problem, rules)).collect()
+        others.filter(is_new).filter_map(|effect| self.like(candidate, effect, problem)).collect()
     }
 
-    /// A hypothesis like another one with an effect of another argument.
-    fn like(
-        &self,
-        own: &Candidate,
-        effect: Effect,
-        problem: &Problem,
-        rules: &SelectionRules,
-    ) -> Option<Candidate> {
+    /// Returns a hypothesis with an effect of another argument.
+    fn like(&self, candidate: &Candidate, effect: Effect, problem: &Problem) -> Option<Candidate> {
         let columns = self.linearised.columns(&effect);
-        let (columns, largest) = even(columns, &effect.terms(problem), self.weighed, rules);
+        let (columns, largest) = even(columns, &effect.terms(problem), self.weighed);
         let design = Design::Dense(columns).scaled(self.weighed)?;
-        let coefficients = Coefficients { largest, ..own.coefficients.clone() };
+        let coefficients = Coefficients { largest, ..candidate.coefficients.clone() };
         let hypothesis =
-            Hypothesis { kind: HypothesisKind::Effect(effect), ..own.hypothesis.clone() };
-        Some(Candidate { hypothesis, variant: 0, design, ln_prior: own.ln_prior, coefficients })
+            Hypothesis { kind: HypothesisKind::Effect(effect), ..candidate.hypothesis.clone() };
+        Some(Candidate {
+            hypothesis,
+            variant: 0,
+            design,
+            ln_prior: candidate.ln_prior,
+            coefficients,
+        })
     }
 }

@@ -10,7 +10,8 @@ use crate::residual_tests::Covariate;
 const MARGIN: f64 = 0.25;
 /// Variance of a basis function, of that of the first, below which it is left out.
 const NEGLIGIBLE: f64 = 1e-3;
-/// The same of functions that are not smooth: what is below is little beside the noise.
+/// Minimum variance of a basis function that is not smooth, relative to the first: below, it is
+/// little beside the noise.
 const SLIGHT: f64 = 0.1;
 
 /// A row of values wider than so many of the gaps that it may have is none that noise alone makes.
@@ -18,7 +19,7 @@ const WIDEST: f64 = 4.0;
 
 /// Centres of single bumps and steps along the range.
 const CENTRES: u32 = 16;
-/// Their widths as parts of the range.
+/// Widths of single bumps and steps as parts of the range.
 const WIDTHS: [f64; 5] = [0.04, 0.07, 0.12, 0.2, 0.35];
 /// Steps of a finer search about one, of the centre as parts of the width, and factors of the
 /// width.
@@ -35,7 +36,7 @@ pub(in crate::select) struct Shape {
 }
 
 impl Shape {
-    /// All over the range.
+    /// Returns all shapes over the range.
     pub fn all() -> Vec<Self> {
         let centres = (0..CENTRES).map(|k| (f64::from(k) + 0.5) / f64::from(CENTRES));
         let of_centre = |centre| {
@@ -46,7 +47,7 @@ impl Shape {
         centres.flat_map(of_centre).collect()
     }
 
-    /// Those about this one.
+    /// Returns the shapes about this one.
     pub fn finer(self) -> Vec<Self> {
         let (steps, factors) = FINER;
         let at = |step: f64| {
@@ -65,18 +66,19 @@ impl Shape {
 /// A covariate at every pose.
 pub(super) struct Known {
     pub covariate: Covariate,
-    /// As measured.
+    /// Values in every pose.
     pub values: Vec<f64>,
     /// From 0 to 1 over the range; beyond it the nearer end.
     pub scaled: Vec<f64>,
-    /// Of the poses that hypotheses are weighed on.
+    /// Range over the poses on which evidence is evaluated.
     pub range: (f64, f64),
     /// Different values among them.
     pub levels: usize,
 }
 
 impl Known {
-    /// Where its size is zero, if that is known; a temperature counts from `reference` \[°C\].
+    /// Returns the value at which its size is zero, if that is known; a temperature counts from
+    /// `reference` \[°C\].
     pub(super) fn zero(&self, reference: Option<f64>) -> Option<f64> {
         match self.covariate {
             Covariate::Temperature => reference,
@@ -85,8 +87,8 @@ impl Known {
         }
     }
 
-    /// Whether functions of a command may grow with its size: it varies by half its largest size,
-    /// where its zero is known.
+    /// Returns true if functions of a command may grow with its size: it varies by half its largest
+    /// size, and its zero is known.
     pub(super) fn is_size(&self, reference: Option<f64>) -> bool {
         use Covariate::{Hoist, Own, Payload, Temperature};
         let (low, high) = self.range;
@@ -128,7 +130,7 @@ pub(super) fn merge(values: &mut [f64], mut some: Vec<usize>, apart: f64) {
     }
 }
 
-/// Whether a function of these two is looked for.
+/// Returns true if functions of these two covariates are hypotheses.
 pub(super) fn goes_with(one: &Covariate, other: &Covariate) -> bool {
     use Covariate::{Approach, Command, Row, Temperature, Time};
     match (one, other) {
@@ -146,9 +148,8 @@ pub(super) fn basis(scaled: &[f64], length: f64) -> DMatrix<f64> {
     DMatrix::from_fn(scaled.len(), weights.len(), |row, k| weights[k] * cosine(k, scaled[row]))
 }
 
-/// The same of exponential covariance exp(−|Δ|/length), of what is anew at every moment and lasts a
-/// while: a station that wanders, noise in which one reading follows the last. `None` where more
-/// functions than half the `levels` were needed: those would be the noise itself.
+/// Returns a basis of functions of exponential covariance exp(−|Δ|/length): a station that wanders,
+/// noise in which one reading follows the last.
 pub(super) fn rough_basis(scaled: &[f64], length: f64, levels: usize) -> Option<DMatrix<f64>> {
     // Of the constant alone the mean square is 1 and not a half.
     let of_constant = |k: usize| if k == 0 { 0.5 } else { 1.0 };
@@ -256,8 +257,8 @@ mod tests {
         assert!(!known(&[29.5, 30.5]).is_size(Some(20.0)));
         let grown = growing(&[0.0, 0.5], &known(&[20.0, 31.0]), Some(20.0), 0.5);
         assert!(
-            grown.row(0).iter().all(|own| *own == 0.0)
-                && grown.row(1).iter().any(|own| *own != 0.0),
+            grown.row(0).iter().all(|value| *value == 0.0)
+                && grown.row(1).iter().any(|value| *value != 0.0),
             "{grown}"
         );
     }
@@ -276,7 +277,7 @@ mod tests {
         let expected: Vec<f64> =
             [3.0, 1.2, 1.2, 1.2, 2.0].into_iter().chain(long).chain([1.1]).collect();
         assert!(
-            values.iter().zip(&expected).all(|(own, expected)| (own - expected).abs() < 1e-12),
+            values.iter().zip(&expected).all(|(value, expected)| (value - expected).abs() < 1e-12),
             "{values:?}"
         );
     }

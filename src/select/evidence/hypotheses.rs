@@ -18,27 +18,27 @@ use crate::select::candidates::Candidates;
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
 use crate::select::neighbourhood::Linearised;
-use crate::select::rules::SelectionRules;
 
 /// A fit linearised at some rows, with every hypothesis.
 pub(in crate::select) struct Hypotheses<'a> {
     pub linearised: Linearised<'a>,
-    /// Effects that the search added, part by part.
+    /// Effects that are taken out of the fit, part by part.
     pub added: Vec<Effect>,
-    /// Their columns among those of the fit.
+    /// Places of their columns among those of the fit.
     pub unknowns: Vec<usize>,
     pub(super) all: Vec<Candidate>,
-    /// Poses, the first ones, that hypotheses are weighed on.
+    /// Number of poses, the first ones, on which evidence is evaluated.
     pub(super) weighed: usize,
-    /// ln of the chance of a family of effects.
+    /// Log prior probability of a family of effects.
     pub(super) ln_family: f64,
     covariates: Vec<Known>,
-    /// Times at which what measures may have moved.
+    /// Candidate times of a move of the instrument.
     pub(super) times: Vec<f64>,
 }
 
 impl<'a> Hypotheses<'a> {
-    /// About what the fit without what was `added` leaves of the first `weighed` of some rows.
+    /// Creates the hypotheses about what the fit without the effects `added` leaves of the first
+    /// `weighed` of some rows.
     pub fn of(
         fitted: &'a Fitted,
         data: &Data<'a>,
@@ -48,13 +48,15 @@ impl<'a> Hypotheses<'a> {
     ) -> Self {
         let candidates = Candidates::of(&fitted.problem, data).testable;
         let added: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
-        let own: Vec<Vec<usize>> = added.iter().map(|part| fitted.unknowns_of(part)).collect();
-        let unknowns = own.concat();
-        let linearised =
-            fitted.linearised_with(data, rows, &candidates, &hypothesis_sites(&fitted.problem));
+        let columns_of_part: Vec<Vec<usize>> =
+            added.iter().map(|part| fitted.unknowns_of(part)).collect();
+        let unknowns = columns_of_part.concat();
+        let linearised = fitted.linearised_with(data, rows, &candidates, &hypothesis_sites(&fitted.problem));
         let fit = linearised.fitted();
-        let known =
-            added.iter().zip(&own).map(|(part, own)| (part.clone(), fit.select_columns(own)));
+        let known = added
+            .iter()
+            .zip(&columns_of_part)
+            .map(|(part, columns_of_part)| (part.clone(), fit.select_columns(columns_of_part)));
         // No list holds all waves and moves: each has its own chance, whichever others are looked
         // at.
         let is_unlisted = |effect: &Effect| {
@@ -65,35 +67,39 @@ impl<'a> Hypotheses<'a> {
         let new =
             candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect)));
         let effects: Vec<(Effect, DMatrix<f64>)> = known.into_iter().chain(new).collect();
-        let how = (data.measurements.time_measured, data.rules, weighed);
+        let how = (data.measurements.time_measured, data.takes_gears, weighed);
         let (all, covariates, ln_family) =
             Columns::all(&fitted.problem, &linearised, how, &effects, None);
         let times = data.shift_times();
-        let mut own =
+        let mut hypotheses =
             Self { linearised, added, unknowns, all, weighed, ln_family, covariates, times };
-        let entered =
-            |(effect, columns)| own.entered(&effect, columns, (&fitted.problem, data.rules));
+        let entered = |(effect, columns)| hypotheses.entered(&effect, columns, &fitted.problem);
         let unlisted: Vec<Candidate> = unlisted.into_iter().filter_map(entered).collect();
-        own.all.extend(unlisted);
-        own.all.extend(limits(fitted, &own.linearised, weighed, (own.ln_family, data.rules)));
-        own
+        hypotheses.all.extend(unlisted);
+        hypotheses.all.extend(limits(
+            fitted,
+            &hypotheses.linearised,
+            weighed,
+            hypotheses.ln_family,
+        ));
+        hypotheses
     }
 
-    /// The hypothesis of an effect that no list has, with its columns.
+    /// Returns the hypothesis of an effect that no list has, with its columns.
     pub(super) fn entered(
         &self,
         effect: &Effect,
         columns: DMatrix<f64>,
-        (problem, rules): (&Problem, &SelectionRules),
+        problem: &Problem,
     ) -> Option<Candidate> {
-        let (columns, largest) = even(columns, &effect.terms(problem), self.weighed, rules);
+        let (columns, largest) = even(columns, &effect.terms(problem), self.weighed);
         let design = Design::Dense(columns).scaled(self.weighed)?;
         let coefficients = Coefficients { largest, ..Coefficients::default() };
         let family = self
             .all
             .iter()
-            .filter_map(|own| own.hypothesis.effect())
-            .filter(|own| own.name() == effect.name());
+            .filter_map(|candidate| candidate.hypothesis.effect())
+            .filter(|member| member.name() == effect.name());
         let tries = match effect {
             Effect::StationMove { .. } => self.times.len().max(1) as f64,
             _ => effect.tries(&family.collect::<Vec<_>>(), problem),
@@ -103,7 +109,7 @@ impl<'a> Hypotheses<'a> {
         Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
     }
 
-    /// The functions of one hypothesis alone, about what the whole fit leaves.
+    /// Creates the functions of one hypothesis alone, about what the whole fit leaves.
     pub fn only(
         fitted: &'a Fitted,
         data: &Data<'a>,
@@ -111,16 +117,15 @@ impl<'a> Hypotheses<'a> {
         weighed: usize,
         of: &Hypothesis,
     ) -> Self {
-        let linearised =
-            fitted.linearised_with(data, rows, &[], &hypothesis_sites(&fitted.problem));
-        let how = (data.measurements.time_measured, data.rules, weighed);
+        let linearised = fitted.linearised_with(data, rows, &[], &hypothesis_sites(&fitted.problem));
+        let how = (data.measurements.time_measured, data.takes_gears, weighed);
         let (all, covariates, ln_family) =
             Columns::all(&fitted.problem, &linearised, how, &[], Some(of));
         let (added, unknowns, times) = (Vec::new(), Vec::new(), Vec::new());
         Self { linearised, added, unknowns, all, weighed, ln_family, covariates, times }
     }
 
-    /// The function of a hypothesis that an explanation holds.
+    /// Returns the function of a hypothesis that a set holds.
     pub(super) fn candidate(
         &self,
         explanation: &HypothesisSet,
@@ -128,11 +133,13 @@ impl<'a> Hypotheses<'a> {
     ) -> Option<&Candidate> {
         let mut members = explanation.hypotheses.iter().zip(&explanation.functions);
         let (_, &(variant, _)) = members.find(|(known, _)| *known == hypothesis)?;
-        self.all.iter().find(|own| own.variant == variant && own.hypothesis == *hypothesis)
+        self.all
+            .iter()
+            .find(|candidate| candidate.variant == variant && candidate.hypothesis == *hypothesis)
     }
 
-    /// Columns of a function that an explanation holds at all poses, shape = (3 N, k): smooth, or
-    /// of one shape.
+    /// Returns the columns of a function that a set holds, at all poses, shape = (3 N, k): smooth,
+    /// or of one shape.
     pub fn form(
         &self,
         explanation: &HypothesisSet,
@@ -142,12 +149,12 @@ impl<'a> Hypotheses<'a> {
         let Some(shape) = shape else {
             return Some(self.candidate(explanation, hypothesis)?.design.columns().into_owned());
         };
-        let (_, own) = self.shaped(hypothesis, weighed, &[shape]).pop()?;
-        Some(own.design.columns().into_owned())
+        let (_, candidate) = self.shaped(hypothesis, weighed, &[shape]).pop()?;
+        Some(candidate.design.columns().into_owned())
     }
 
-    /// Single bumps and steps in the place of a function of one covariate at one coordinate; all
-    /// together as probable as the function.
+    /// Returns single bumps and steps in the place of a function of one covariate at one
+    /// coordinate, all together as probable as the function.
     pub(super) fn shaped(
         &self,
         hypothesis: &Hypothesis,
@@ -180,22 +187,22 @@ impl<'a> Hypotheses<'a> {
         shapes.iter().filter_map(one).collect()
     }
 
-    /// A covariate at every pose.
+    /// Returns the values of a covariate at every pose.
     pub(super) fn known(&self, covariate: &Covariate) -> Option<&Known> {
         self.covariates.iter().find(|known| known.covariate == *covariate)
     }
 
-    /// The covariates that a hypothesis depends on.
+    /// Returns the covariates on which a hypothesis depends.
     fn covariates(&self, hypothesis: &Hypothesis) -> impl Iterator<Item = &Known> {
         self.covariates.iter().filter(|known| hypothesis.depends_on.contains(&known.covariate))
     }
 
-    /// Their ranges where hypotheses were weighed.
+    /// Returns the covariates of a hypothesis with their ranges over the poses of the evidence.
     pub fn ranges(&self, hypothesis: &Hypothesis) -> Vec<(Covariate, (f64, f64))> {
         self.covariates(hypothesis).map(|known| (known.covariate.clone(), known.range)).collect()
     }
 
-    /// For each pose from number `first` on, whether it is within those ranges.
+    /// Returns for each pose from number `first` on whether it is within those ranges.
     pub fn reached(&self, hypothesis: &Hypothesis, first: usize) -> Vec<bool> {
         let within = |known: &Known, pose: usize| {
             (known.range.0..=known.range.1).contains(&known.values[pose])
@@ -206,8 +213,8 @@ impl<'a> Hypotheses<'a> {
             .collect()
     }
 
-    /// Values of the only covariate of a function at one coordinate of a joint, and the lever of
-    /// that coordinate; `None` for others.
+    /// Returns the values of the only covariate of a function at one coordinate of a joint, and the
+    /// lever of that coordinate; `None` for other functions.
     pub fn coordinate(
         &self,
         hypothesis: &Hypothesis,

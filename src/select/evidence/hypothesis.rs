@@ -1,4 +1,4 @@
-//! What may explain a residual: effects by their laws, and functions whose law nobody knows.
+//! Hypotheses about a residual: effects, and functions without a law.
 
 use std::fmt;
 
@@ -6,29 +6,29 @@ use crate::model::parameter::{ArmField, JointField, ParameterSite, Regressor};
 use crate::problem::{Effect, Problem};
 use crate::residual_tests::Covariate;
 
-/// A part of the arm or of its measurement; joints are counted from 0. Its `Display` is the name in
-/// files.
+/// Site of an error: a part of the arm or of its measurement. Joints are counted from 0. Its
+/// `Display` is the name in files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Site {
-    /// A joint.
+    /// Joint, from 0.
     Joint(usize),
-    /// The link before a joint.
+    /// Link before a joint, from 0.
     LinkBefore(usize),
-    /// The base, or what it stands on.
+    /// Base, or what it stands on.
     Base,
-    /// The payload.
+    /// Payload at the tool.
     Payload,
-    /// The hoist.
+    /// Hoist that carries weight.
     Hoist,
-    /// The arm as a whole.
+    /// Arm as a whole.
     Arm,
-    /// What measures.
+    /// Instrument and its frame.
     Measurement,
 }
 
 impl Site {
-    /// The part that a site belongs to.
+    /// Returns the site of a parameter.
     pub fn of(site: ParameterSite) -> Self {
         match site {
             ParameterSite::Joint { joint, field: JointField::Alpha | JointField::A }
@@ -72,56 +72,58 @@ impl fmt::Display for Site {
     }
 }
 
-/// How a part's error follows from what it depends on.
+/// Form of an error as a function of its quantities.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum HypothesisKind {
-    /// As an effect says.
+    /// Law of an effect.
     Effect(Effect),
-    /// Some smooth function.
+    /// Smooth function without a law.
     Smooth,
-    /// Some function that repeats about so many times a turn of the joint, its height and phase
-    /// changing slowly.
+    /// Function that repeats about so many times a turn of the joint, its height and phase changing
+    /// slowly.
     NearHarmonic(u32),
-    /// Another value in every pose: nothing that is known of a pose tells it.
+    /// Periodic error of a joint: all harmonics up to this order, their coefficients under one prior.
+    Gear(u32),
+    /// Another value in every pose: no known quantity predicts it.
     PerPose,
-    /// Wanders in time: near what it was a little before, and not smooth, as noise is in which one
+    /// Error that wanders in time: near its last value, and not smooth, as noise in which one
     /// reading follows the last.
     Wandering,
-    /// Linear in the position.
+    /// Displacement linear in the position.
     Linear,
-    /// Gives way under the weight of links whose masses nobody declared.
+    /// Deflection under the weight of links whose masses are not declared.
     Sag,
-    /// A limit of the declared problem, in words, that holds the fit is wrong.
+    /// Wrong limit of the declared problem that holds the fit; its words.
     Limit(String),
 }
 
 impl HypothesisKind {
-    /// Whether it is the same law: of an effect whose time or order is searched with whatever one.
+    /// Returns true if the law is the same whatever the value of its searched argument.
     pub(super) fn is_of(&self, other: &Self) -> bool {
         match (self, other) {
-            (Self::Effect(own), Self::Effect(other)) => own.is_but_for_search(other),
+            (Self::Effect(effect), Self::Effect(other)) => effect.is_but_for_search(other),
             _ => self == other,
         }
     }
 }
 
-/// One explanation of a residual.
+/// One hypothesis about a residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hypothesis {
-    /// The law, or what is known of it.
+    /// Law of the error, or its form.
     pub kind: HypothesisKind,
-    /// Where it acts.
+    /// Site at which the error acts.
     pub site: Site,
-    /// The coordinate of the part, where the error is one of a single coordinate.
+    /// Coordinate of the site, where the error is one of a single coordinate.
     pub coordinate: Option<ParameterSite>,
-    /// What it depends on, ascending.
+    /// Quantities on which it depends, ascending.
     pub depends_on: Vec<Covariate>,
 }
 
 impl Hypothesis {
-    /// An effect of the catalogue or of one's own: where its parameters enter and what drives them
-    /// say the rest.
+    /// Returns the hypothesis of an effect: its sites and regressors give the site and the
+    /// quantities.
     pub fn of_effect(
         effect: &Effect,
         problem: &Problem,
@@ -141,7 +143,7 @@ impl Hypothesis {
         Self { kind: HypothesisKind::Effect(effect.clone()), site, coordinate: None, depends_on }
     }
 
-    /// A smooth function of some covariates at a place.
+    /// Returns a smooth function of some covariates at a site.
     pub(super) fn smooth(site: ParameterSite, depends_on: Vec<Covariate>) -> Self {
         Self {
             kind: HypothesisKind::Smooth,
@@ -151,17 +153,17 @@ impl Hypothesis {
         }
     }
 
-    /// Whether another says the same: the same law at the same part, of the same covariates.
+    /// Returns true if two hypotheses have the same law, site and covariates.
     pub fn says(&self, other: &Self) -> bool {
         self.kind == other.kind && self.site == other.site && self.depends_on == other.depends_on
     }
 
-    /// Whether it is that a limit of the declared problem is wrong.
+    /// Returns true if the hypothesis is that a limit of the declared problem is wrong.
     pub(super) fn is_limit(&self) -> bool {
         matches!(self.kind, HypothesisKind::Limit(_))
     }
 
-    /// Its effect, if its law is one.
+    /// Returns its effect, if its law is one.
     pub fn effect(&self) -> Option<&Effect> {
         match &self.kind {
             HypothesisKind::Effect(effect) => Some(effect),

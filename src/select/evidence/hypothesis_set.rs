@@ -1,29 +1,45 @@
-//! Hypotheses that explain a residual together.
+//! Set of hypotheses that explain a residual together.
 
-use super::hypothesis::Hypothesis;
+use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use crate::problem::Effect;
 
-/// Hypotheses that may be at work together.
+/// Hypotheses that act together, with their probability.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HypothesisSet {
-    /// Which; none: what is left is noise.
+    /// Members of the set; empty: the residual is noise.
     pub hypotheses: Vec<Hypothesis>,
-    /// Its probability among all explanations that were looked at.
+    /// Probability among all sets that were evaluated.
     pub probability: f64,
-    /// For each which of its functions, and 1 σ of their coefficients.
+    /// Number of the function of each member, and 1 σ of its coefficients.
     pub(super) functions: Vec<(usize, f64)>,
 }
 
 impl HypothesisSet {
-    /// Its effects.
+    /// Returns the effects of the set.
     pub fn effects(&self) -> Vec<Effect> {
         self.hypotheses.iter().filter_map(Hypothesis::effect).cloned().collect()
     }
 
-    /// Its functions without a law, each with which one of its hypothesis it is.
+    /// Returns the gear hypotheses of the set: the joint, from 1, the highest order, and 1 σ of the
+    /// coefficients in root mean square displacements of all columns together.
+    pub(in crate::select) fn gears(&self) -> Vec<(usize, u32, f64)> {
+        let gear =
+            |(member, (_, size)): (&Hypothesis, &(usize, f64))| match (&member.kind, member.site) {
+                (HypothesisKind::Gear(highest), Site::Joint(joint)) => {
+                    Some((joint + 1, *highest, *size))
+                }
+                _ => None,
+            };
+        self.hypotheses.iter().zip(&self.functions).filter_map(gear).collect()
+    }
+
+    /// Returns the functions without a law, each with its number among those of its hypothesis.
     pub(in crate::select) fn without_law(&self) -> Vec<(Hypothesis, usize)> {
-        let all =
-            self.hypotheses.iter().zip(&self.functions).filter(|(own, _)| own.effect().is_none());
-        all.map(|(own, (variant, _))| (own.clone(), *variant)).collect()
+        let all = self
+            .hypotheses
+            .iter()
+            .zip(&self.functions)
+            .filter(|(member, _)| member.effect().is_none());
+        all.map(|(member, (variant, _))| (member.clone(), *variant)).collect()
     }
 }

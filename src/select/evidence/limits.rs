@@ -7,6 +7,7 @@
 //! freed together. How far a limit may be off is told by the priors: of a freed parameter by its σ
 //! from the bound on.
 
+use crate::select::settings::MAX_PLAUSIBLE;
 use nalgebra::DMatrix;
 
 use super::block::Design;
@@ -15,18 +16,17 @@ use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::marginal::Coefficients;
 use crate::select::fitted::Fitted;
 use crate::select::neighbourhood::Linearised;
-use crate::select::rules::SelectionRules;
 
-/// Singular value of the rows of constraints below which one depends on others.
+/// Smallest singular value of independent rows of constraints.
 const DEPENDENT: f64 = 1e-9;
 
-/// For each limit that holds a fit the hypothesis that it is wrong, all together with the chance of
-/// a family.
+/// Returns for each limit that holds a fit the hypothesis that it is wrong; all together have the
+/// probability of a family.
 pub(super) fn limits(
     fitted: &Fitted,
     linearised: &Linearised,
     weighed: usize,
-    (ln_family, rules): (f64, &SelectionRules),
+    ln_family: f64,
 ) -> Vec<Candidate> {
     let found = &fitted.found;
     let is_held = |&k: &usize| {
@@ -55,7 +55,7 @@ pub(super) fn limits(
     let freed = linearised.of_parameters(&fitted.model, &held, &found.x);
     let sigma_of = |k: usize| fitted.model.parameters[k].sigma;
     let bounds = held.iter().enumerate().filter_map(|(j, &k)| {
-        let largest = sigma_of(k).map_or(f64::INFINITY, |sigma| rules.plausible * sigma);
+        let largest = sigma_of(k).map_or(f64::INFINITY, |sigma| MAX_PLAUSIBLE * sigma);
         candidate(
             format!("of {}", found.estimates[k].name),
             k,
@@ -63,7 +63,7 @@ pub(super) fn limits(
             largest,
         )
     });
-    let own = linearised.fitted().columns(0, fitted.unknowns.len()).into_owned();
+    let fitted_columns = linearised.fitted().columns(0, fitted.unknowns.len()).into_owned();
     let active = fitted.active();
     // Of no row there is no decomposition.
     let directions =
@@ -77,11 +77,11 @@ pub(super) fn limits(
             if a == 0.0 { Some(0.0) } else { sigma_of(k).map(|sigma| (a * sigma).powi(2)) }
         };
         let variance: Option<f64> = row.iter().zip(&fitted.unknowns).map(variance).sum();
-        let largest = variance.map_or(f64::INFINITY, |variance| rules.plausible * variance.sqrt());
+        let largest = variance.map_or(f64::INFINITY, |variance| MAX_PLAUSIBLE * variance.sqrt());
         candidate(
             constraint.words.clone(),
             fitted.unknowns[first],
-            DMatrix::from_columns(&[&own * along]),
+            DMatrix::from_columns(&[&fitted_columns * along]),
             largest,
         )
     });

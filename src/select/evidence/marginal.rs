@@ -20,7 +20,7 @@ use crate::numeric::lower_factor;
 /// closer: of half of what the likelihood of ν degrees of freedom is wide, 1/√(2ν).
 const REACH: f64 = 3.5;
 const STEP: f64 = 0.05;
-/// No closer than this: no data have more degrees of freedom.
+/// Smallest step of the grid: no data have more degrees of freedom.
 const LEAST_STEP: f64 = 1e-4;
 
 /// Degrees of freedom ν of a residual and the half width of the distribution of ln f.
@@ -28,13 +28,13 @@ const LEAST_STEP: f64 = 1e-4;
 pub(super) struct Noise {
     pub freedom: f64,
     pub trust: f64,
-    /// The least ln f: that of a declared σ, for what is smaller is no effect that such an
+    /// Smallest ln f: that of a declared σ, for a smaller error is no effect that such an
     /// instrument can show.
     pub least: f64,
 }
 
 impl Noise {
-    /// For each factor f of the grid ln of its prior and of f^−ν, and 1 / (2 f²).
+    /// Returns for each factor f of the grid ln of its prior times f^−ν, and 1 / (2 f²).
     pub fn grid(self) -> Vec<(f64, f64)> {
         let step = STEP.min(0.5 / (2.0 * self.freedom).sqrt()).max(LEAST_STEP);
         let least = self.least.clamp(-REACH, REACH);
@@ -51,12 +51,13 @@ impl Noise {
     }
 }
 
-/// ln of the likelihood of ν squares of sum S, summed over the noise factor f; up to a constant.
+/// Returns ln of the likelihood of ν squares of sum S, summed over the noise factor f; up to a
+/// constant.
 pub(super) fn over_noise(squares: f64, grid: &[(f64, f64)]) -> f64 {
     ln_sum(grid.iter().map(|(ln_weight, half)| ln_weight - half * squares))
 }
 
-/// ln Σ exp.
+/// Returns ln Σ exp of some terms.
 pub(super) fn ln_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
     let most = terms.clone().fold(f64::NEG_INFINITY, f64::max);
     // What is e⁴⁰ times less probable adds nothing.
@@ -64,10 +65,10 @@ pub(super) fn ln_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
     if most == f64::NEG_INFINITY { most } else { most + sum.ln() }
 }
 
-/// What a residual r says about columns A: G = AᵀA and b = Aᵀr.
+/// Products of columns A with themselves and with a residual r: G = AᵀA and b = Aᵀr.
 #[derive(Debug, Clone)]
 pub(super) enum Normal {
-    /// G, shape = (k, k), and b.
+    /// Matrix G, shape = (k, k), and b.
     Dense { gram: DMatrix<f64>, product: DVector<f64> },
     /// G = D − LᵀL with D diagonal and few rows in L, shape = (few, k): columns for every pose,
     /// projected.
@@ -75,15 +76,15 @@ pub(super) enum Normal {
 }
 
 impl Normal {
-    /// b.
+    /// Returns b = Aᵀr.
     pub fn product(&self) -> &DVector<f64> {
         match self {
             Self::Dense { product, .. } | Self::LessFew { product, .. } => product,
         }
     }
 
-    /// The same beside a set that takes Z A = `along` off the columns and `taken` = Z r off the
-    /// residual.
+    /// Returns the products beside a set that takes Z A = `along` off the columns and `taken` = Z r
+    /// off the residual.
     pub fn beside(&self, along: &DMatrix<f64>, taken: &DVector<f64>) -> Self {
         match self {
             Self::Dense { gram, product } => {
@@ -103,7 +104,7 @@ impl Normal {
         }
     }
 
-    /// The same kept whole where rows in L are so many that this is less work for every size.
+    /// Writes G out where L has so many rows that this is less work for every size.
     pub fn whole_if_less_work(self) -> Self {
         match self {
             Self::LessFew { diagonal, less, product } if 2 * less.nrows() > less.ncols() => {
@@ -115,7 +116,7 @@ impl Normal {
         }
     }
 
-    /// ½ ln det(1 + c² G) and bᵀ (1/c² + G)⁻¹ b, for a size c.
+    /// Returns ½ ln det(1 + c² G) and bᵀ (1/c² + G)⁻¹ b for a size c.
     fn taken(&self, size: f64) -> Option<(f64, f64)> {
         let precision = (size * size).recip();
         match self {
@@ -131,7 +132,7 @@ impl Normal {
             Self::LessFew { diagonal, less, product } => {
                 // E = 1/c² + D, K = 1 − L E⁻¹ Lᵀ: det(E − LᵀL) = det E det K,
                 // (E − LᵀL)⁻¹ = E⁻¹ + E⁻¹Lᵀ K⁻¹ L E⁻¹.
-                let root = diagonal.map(|own| (own + precision).sqrt());
+                let root = diagonal.map(|entry| (entry + precision).sqrt());
                 let mut scaled = less.clone();
                 scaled.column_iter_mut().zip(&root).for_each(|(mut column, root)| column /= *root);
                 let along = product.component_div(&root);
@@ -149,7 +150,7 @@ impl Normal {
     }
 }
 
-/// 1/c² + G, for a precision 1/c².
+/// Returns 1/c² + G for a precision 1/c².
 fn with_prior(gram: &DMatrix<f64>, precision: f64) -> DMatrix<f64> {
     let mut inner = gram.clone();
     for j in 0..inner.nrows() {
@@ -158,27 +159,27 @@ fn with_prior(gram: &DMatrix<f64>, precision: f64) -> DMatrix<f64> {
     inner
 }
 
-/// ln Π c dⱼ, a few factors at a time before their product runs out of range.
+/// Returns ln Π c dⱼ, a few factors at a time so that their product stays in range.
 fn ln_product(diagonal: &DVector<f64>, size: f64) -> f64 {
-    let all: Vec<f64> = diagonal.iter().map(|own| own * size).collect();
+    let all: Vec<f64> = diagonal.iter().map(|entry| entry * size).collect();
     all.chunks(16).map(|some| some.iter().product::<f64>().ln()).sum()
 }
 
-/// What is known of the coefficients of a block before any data.
+/// Prior knowledge about the coefficients of a block.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Coefficients {
-    /// For each whether it is never negative; empty: none.
+    /// True for coefficients that are never negative; empty: none.
     pub never_negative: Vec<bool>,
-    /// Whether each may be at work without the others.
+    /// True if each coefficient may act without the others.
     pub alone: bool,
-    /// For each the root mean square displacement, in units of σ, that the largest plausible value
-    /// causes; empty: any.
+    /// Root mean square displacement, in units of σ, of the largest plausible value of each
+    /// coefficient; empty: any.
     pub largest: Vec<f64>,
 }
 
 impl Coefficients {
-    /// Sizes that are plausible for some of them, of columns of that root mean square: larger ones
-    /// stand for the largest.
+    /// Returns the sizes that are plausible for some coefficients; larger ones are replaced by the
+    /// largest plausible one.
     fn plausible(&self, sizes: &[f64], of: impl Iterator<Item = usize>, column: f64) -> Vec<f64> {
         let largest = of
             .filter_map(|j| self.largest.get(j))
@@ -189,8 +190,8 @@ impl Coefficients {
     }
 }
 
-/// A block of columns against a residual of squares S: ln p(r | block) summed over sizes, and the
-/// most probable of its sizes, that of all columns together.
+/// Returns ln p(r | block) summed over sizes, and the most probable size of all columns together,
+/// for a residual of squares S.
 ///
 /// Where its k columns may be at work one without the others, all together and each alone have the
 /// same chance 1/(k + 1): otherwise what one column of two explains would be held by another effect
@@ -213,7 +214,7 @@ pub(super) fn of_block(
         _ => return (whole, size),
     };
     let one = |j: usize| {
-        let own = Normal::Dense {
+        let single = Normal::Dense {
             gram: gram.view((j, j), (1, 1)).into_owned(),
             product: product.rows(j, 1).into_owned(),
         };
@@ -223,13 +224,13 @@ pub(super) fn of_block(
             .iter()
             .map(|size| size / column)
             .collect();
-        of_columns(&own, left, grid, (&sizes, &[sign])).0
+        of_columns(&single, left, grid, (&sizes, &[sign])).0
     };
     let all: Vec<f64> = std::iter::once(whole).chain((0..gram.ncols()).map(one)).collect();
     (ln_sum(all.iter().copied()) - (all.len() as f64).ln(), size)
 }
 
-/// The same of all columns together.
+/// Returns the same for all columns together, without single columns.
 ///
 /// Of a parameter that is `never_negative` the prior is the half β ≥ 0 of its normal distribution:
 /// with the estimate m and its standard error s the likelihood changes by 2 Φ(m / s).
@@ -263,8 +264,8 @@ fn of_columns(
     (ln_sum(tried.iter().map(|(_, ln)| *ln)) - (sizes.len() as f64).ln(), best.0)
 }
 
-/// Σ ln 2 Φ(m / s) over the parameters that are never negative; columns are derivatives of the
-/// residual, so m = − (G + 1/c²)⁻¹ b.
+/// Returns Σ ln 2 Φ(m / s) over the coefficients that are never negative; columns are derivatives
+/// of the residual, so m = − (G + 1/c²)⁻¹ b.
 fn signs(
     covariance: &DMatrix<f64>,
     product: &DVector<f64>,

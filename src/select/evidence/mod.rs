@@ -1,5 +1,5 @@
-//! How probable each explanation of a residual is: effects, functions whose law nobody knows,
-//! several together, or nothing.
+//! Evidence for sets of hypotheses about a residual: effects, functions without a law, several
+//! together, or none.
 //!
 //! Every hypothesis is a block of columns in the linear neighbourhood of a fit, with everything
 //! fitted projected out. One closed-form marginal likelihood ([`marginal`]) compares sets of them;
@@ -29,6 +29,7 @@ mod search;
 mod sites;
 mod waves;
 
+use crate::select::settings::{MAX_SINGLE_POSES, MAX_STAND_INS};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
@@ -50,11 +51,11 @@ use products::{Known, Products};
 use search::{Weighted, search};
 use waves::Waves;
 
-/// Shapes that are looked at more closely.
+/// Number of shapes that are refined.
 const FINEST: usize = 4;
 
-/// ln of the marginal likelihood and prior of a fit's own explanation: the effects `added` by the
-/// search, and functions without a law.
+/// Returns ln of the marginal likelihood times the prior of the set that a fit holds: the effects
+/// `added` by the search and functions without a law.
 ///
 /// The fit is linear about its own optimum: sets whose effects are strong are compared by this,
 /// each at a fit of its own. A fit divides its residual by a σ of its own; the density is that of
@@ -66,24 +67,24 @@ pub(super) fn ln_posterior(
     (added, left_out): (&[Effect], &[usize]),
     (functions, sigma): (&[(Hypothesis, usize)], f64),
 ) -> Option<f64> {
-    let rows = data.weighed();
+    let rows = data.evidence_rows();
     let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
     let is_own = |candidate: &&Candidate| match candidate.hypothesis.effect() {
         Some(effect) => hypotheses.added.contains(effect),
-        None => functions
-            .iter()
-            .any(|(own, variant)| candidate.variant == *variant && candidate.hypothesis == *own),
+        None => functions.iter().any(|(function, variant)| {
+            candidate.variant == *variant && candidate.hypothesis == *function
+        }),
     };
-    let own: Vec<&Candidate> = hypotheses.all.iter().filter(is_own).collect();
-    let (blocks, target) = blocks(fitted, data, &hypotheses, &own, left_out)?;
+    let members: Vec<&Candidate> = hypotheses.all.iter().filter(is_own).collect();
+    let (blocks, target) = blocks(fitted, data, &hypotheses, &members, left_out)?;
     Some(
-        search::ln_posterior(&Products::new((&blocks, &target), data.rules))?
+        search::ln_posterior(&Products::new(&blocks, &target))?
             - target.noise.freedom * (fitted.sigma / sigma).ln(),
     )
 }
 
-/// The most probable form of a function without a law, beside what the fit holds, and 1 σ of the
-/// coefficients of its columns: one of `hypotheses`, smooth where it has no shape.
+/// Returns the most probable form of a function without a law beside what the fit holds, and 1 σ of
+/// its coefficients: one of `hypotheses`, smooth where it has no shape.
 pub(super) fn best_form(
     fitted: &Fitted,
     data: &Data,
@@ -96,8 +97,7 @@ pub(super) fn best_form(
     let gains = |forms: &[&Candidate]| {
         let (blocks, target) = blocks(fitted, data, hypotheses, forms, &[])?;
         let all: Vec<usize> = (0..blocks.len()).collect();
-        let mut gains =
-            search::gains_beside(&[], &all, &Products::new((&blocks, &target), data.rules));
+        let mut gains = search::gains_beside(&[], &all, &Products::new(&blocks, &target));
         gains.sort_by(|a, b| b.1.total_cmp(&a.1));
         Some(gains)
     };
@@ -105,12 +105,12 @@ pub(super) fn best_form(
     let coarse = hypotheses.shaped(hypothesis, weighed, &shapes);
     let best_of = |(k, ..): &(usize, f64, f64)| coarse[*k].0.finer();
     if !coarse.is_empty() {
-        let found = gains(&coarse.iter().map(|(_, own)| own).collect::<Vec<_>>())?;
+        let found = gains(&coarse.iter().map(|(_, candidate)| candidate).collect::<Vec<_>>())?;
         shapes = found.iter().take(FINEST).flat_map(best_of).collect();
     }
     let finer = hypotheses.shaped(hypothesis, weighed, &shapes);
     let forms: Vec<&Candidate> =
-        std::iter::once(smooth).chain(finer.iter().map(|(_, own)| own)).collect();
+        std::iter::once(smooth).chain(finer.iter().map(|(_, candidate)| candidate)).collect();
     // Half of the chance for the smooth function, half for all shapes together.
     let even = |(k, gain, size): (usize, f64, f64)| {
         (k, if k == 0 { gain - smooth.ln_prior } else { gain }, size)
@@ -119,57 +119,63 @@ pub(super) fn best_form(
     Some((k.checked_sub(1).map(|shaped| finer[shaped].0), size))
 }
 
-/// Weighs what may explain the residual of a fit, the effects `added` by the search taken out of it
-/// again. A pose that alone carries an effect, however well, is left out: one row that is off shows
-/// no law.
+/// Evaluates the evidence about the residual of a fit, the effects `added` by the search taken out
+/// of it. A pose that alone supports an effect is left out.
 ///
-/// `None` where the residual is not a finite number, as that of a pose without equilibrium, or the
-/// end was asked for.
-pub(super) fn weigh(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Evidence> {
+/// Returns `None` if the residual is not finite, as that of a pose without equilibrium, or the
+/// search was stopped.
+pub(super) fn evaluate(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Evidence> {
     let mut left_out = Vec::new();
     loop {
         let (evidence, hypotheses) = weighed_without(fitted, data, added, &left_out)?;
         match carried_by_one(fitted, data, (&evidence, &hypotheses)) {
-            Some(pose) if left_out.len() < data.rules.mainstays => left_out.push(pose),
+            Some(pose) if left_out.len() < MAX_SINGLE_POSES => left_out.push(pose),
             _ => return Some(evidence),
         }
     }
 }
 
-/// The same without some poses, and the hypotheses that were weighed.
+/// Evaluates the evidence without some poses; also returns the hypotheses.
 fn weighed_without<'a>(
     fitted: &'a Fitted,
     data: &Data<'a>,
     added: &[Effect],
     left_out: &[usize],
 ) -> Option<(Evidence, Hypotheses<'a>)> {
-    let rows = data.weighed();
+    let rows = data.evidence_rows();
     let mut hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
     let (mut blocks, target) =
         blocks(fitted, data, &hypotheses, &hypotheses.all.iter().collect::<Vec<_>>(), left_out)?;
-    let is_present = |own: &Candidate| {
-        own.hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect))
+    let is_present = |candidate: &Candidate| {
+        candidate.hypothesis.effect().is_some_and(|effect| hypotheses.added.contains(effect))
     };
     let present: Vec<usize> =
         (0..blocks.len()).filter(|&k| is_present(&hypotheses.all[k])).collect();
     let mut explanations: Vec<HypothesisSet> = Vec::new();
     let (mut weighted, unlisted, mut known) = {
-        let products = Products::new((&blocks, &target), data.rules);
+        let products = Products::new(&blocks, &target);
         let weighted = search(&products, &present);
         if data.stop.is_requested() {
             return None;
         }
-        let waves = Waves { hypotheses: &hypotheses, products: &products, fitted, left_out }
-            .promising(&weighted);
-        let times = (&products, hypotheses.times.as_slice());
-        let moves = moves::promising(&hypotheses, &weighted, times, (fitted, left_out));
-        (weighted, [waves, moves].concat(), products.into_known())
+        // A periodic error of many orders is fitted before arguments are searched beside it.
+        let has_gear = weighted.first().is_some_and(|set| products.has_gear(&set.members));
+        let unlisted = if has_gear {
+            Vec::new()
+        } else {
+            let waves = Waves { hypotheses: &hypotheses, products: &products, fitted, left_out }
+                .promising(&weighted);
+            let times = (&products, hypotheses.times.as_slice());
+            let moves = moves::promising(&hypotheses, &weighted, times, (fitted, left_out));
+            [waves, moves].concat()
+        };
+        (weighted, unlisted, products.into_known())
     };
     let blocks_of = |some: &[Candidate]| {
         Candidate::blocks(&some.iter().collect::<Vec<_>>(), (fitted, &target.fit), left_out)
     };
     let again = |known: Known, blocks: &[Block]| {
-        let products = Products::knowing(known, (blocks, &target), data.rules);
+        let products = Products::knowing(known, blocks, &target);
         (search(&products, &present), products.into_known())
     };
     if !unlisted.is_empty() {
@@ -177,7 +183,7 @@ fn weighed_without<'a>(
         hypotheses.all.extend(unlisted);
         (weighted, known) = again(known, &blocks);
     }
-    let products = Products::knowing(known, (&blocks, &target), data.rules);
+    let products = Products::knowing(known, &blocks, &target);
     let finer = finer::finer(&hypotheses, &weighted, &products, blocks_of, &fitted.problem);
     known = products.into_known();
     if !finer.is_empty() {
@@ -205,31 +211,37 @@ fn weighed_without<'a>(
     for Weighted { members, sizes, probability } in
         weighted.into_iter().filter(|set| set.probability > posterior::NEGLIGIBLE)
     {
-        let mut own: Vec<usize> = members.iter().map(|&member| number(member)).collect();
-        own.sort_unstable();
-        match places.entry(own) {
+        let mut members_of_set: Vec<usize> = members.iter().map(|&member| number(member)).collect();
+        members_of_set.sort_unstable();
+        match places.entry(members_of_set) {
             Entry::Occupied(place) => explanations[*place.get()].probability += probability,
             Entry::Vacant(place) => {
                 place.insert(explanations.len());
-                let own = members.iter().map(|&member| of(member).clone()).collect();
+                let members_of_set = members.iter().map(|&member| of(member).clone()).collect();
                 let variants = members.into_iter().map(|member| hypotheses.all[member].variant);
                 let functions = variants.zip(sizes).collect();
-                explanations.push(HypothesisSet { hypotheses: own, probability, functions });
+                explanations.push(HypothesisSet {
+                    hypotheses: members_of_set,
+                    probability,
+                    functions,
+                });
             }
         }
     }
     explanations.sort_by(|a, b| b.probability.total_cmp(&a.probability));
     let mut evidence =
         Evidence { sets: explanations, stand_ins: Vec::new(), left_out: left_out.to_vec() };
-    if let Some(best) = evidence.sure(data.rules.sure) {
-        let products = Products::knowing(known, (&blocks, &target), data.rules);
+    if let Some(best) = evidence.sure(data.rules.inclusion_threshold)
+        && best.gears().is_empty()
+    {
+        let products = Products::knowing(known, &blocks, &target);
         evidence.stand_ins = stand_ins(best, &hypotheses, &products);
     }
     Some((evidence, hypotheses))
 }
 
-/// For each hypothesis of an explanation the few other effects, one of a family at each place, that
-/// do best in its place, if at least half as well.
+/// Returns for each member of a set the other effects that do best in its place, one of a family at
+/// each site, if at least half as well.
 fn stand_ins(
     best: &HypothesisSet,
     hypotheses: &Hypotheses,
@@ -237,29 +249,29 @@ fn stand_ins(
 ) -> Vec<(Hypothesis, Hypothesis)> {
     let effect = |k: usize| hypotheses.all[k].hypothesis.effect();
     let tried: Vec<usize> = (0..products.blocks.len()).filter(|&k| effect(k).is_some()).collect();
-    let number = |(own, (variant, _)): (&Hypothesis, &(usize, f64))| {
+    let number = |(member, (variant, _)): (&Hypothesis, &(usize, f64))| {
         hypotheses
             .all
             .iter()
-            .position(|known| known.variant == *variant && known.hypothesis == *own)
+            .position(|known| known.variant == *variant && known.hypothesis == *member)
     };
     let members: Vec<usize> =
         best.hypotheses.iter().zip(&best.functions).filter_map(number).collect();
     let mut all = Vec::new();
-    for &own in &members {
-        let others: Vec<usize> = members.iter().copied().filter(|&other| other != own).collect();
+    for &member in &members {
+        let others: Vec<usize> = members.iter().copied().filter(|&other| other != member).collect();
         let mut gains = search::gains_beside(&others, &tried, products);
-        let of_own = search::gains_beside(&others, &[own], products);
+        let of_own = search::gains_beside(&others, &[member], products);
         let least = of_own.first().map_or(f64::INFINITY, |(_, gain, _)| 0.5 * gain);
         gains.retain(|(k, gain, _)| *gain > least && !members.contains(k));
         gains.sort_by(|a, b| b.1.total_cmp(&a.1));
         let name = |k: usize| effect(k).map(Effect::name_and_place).unwrap_or_default();
-        let mut known = vec![name(own)];
+        let mut known = vec![name(member)];
         for (k, ..) in gains {
-            if !known.contains(&name(k)) && known.len() <= products.rules.stand_ins {
+            if !known.contains(&name(k)) && known.len() <= MAX_STAND_INS {
                 known.push(name(k));
                 all.push((
-                    hypotheses.all[own].hypothesis.clone(),
+                    hypotheses.all[member].hypothesis.clone(),
                     hypotheses.all[k].hypothesis.clone(),
                 ));
             }

@@ -1,5 +1,5 @@
-//! Times at which what measures may have moved and turned: looked for where explanations hold
-//! something that follows time, for a turn looks like many other things that change then.
+//! Times at which the instrument may have moved and turned, searched where probable sets hold
+//! something that follows time.
 
 use std::collections::BTreeSet;
 
@@ -14,13 +14,13 @@ use crate::problem::Effect;
 use crate::residual_tests::Covariate;
 use crate::select::fitted::Fitted;
 
-/// Probability of an explanation from which on its members are looked at.
+/// Minimum probability of a set whose members are replaced.
 const WORTH_A_LOOK: f64 = 0.01;
-/// Rests of explanations that are looked at.
+/// Maximum number of sets beside which moves are tried.
 const MOST: usize = 6;
 
-/// The move that does best in the place of what follows time in each of some `weighted`
-/// explanations: of one such member, and of all.
+/// Returns the move that does best in the place of what follows time in each of some sets: of one
+/// such member, and of all.
 pub(super) fn promising(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],
@@ -28,8 +28,9 @@ pub(super) fn promising(
     (fitted, left_out): (&Fitted, &[usize]),
 ) -> Vec<Candidate> {
     let of = |at_time: f64| Effect::StationMove { at_time };
-    let is_known =
-        |effect: &Effect| hypotheses.all.iter().any(|own| own.hypothesis.effect() == Some(effect));
+    let is_known = |effect: &Effect| {
+        hypotheses.all.iter().any(|candidate| candidate.hypothesis.effect() == Some(effect))
+    };
     let new: Vec<Effect> =
         times.iter().map(|&time| of(time)).filter(|effect| !is_known(effect)).collect();
     if !new.first().is_some_and(|effect| is_free(effect, &fitted.problem)) {
@@ -62,11 +63,7 @@ pub(super) fn promising(
             return Vec::new();
         }
         let entered = |effect: &Effect| {
-            hypotheses.entered(
-                effect,
-                hypotheses.linearised.columns(effect),
-                (&fitted.problem, products.rules),
-            )
+            hypotheses.entered(effect, hypotheses.linearised.columns(effect), &fitted.problem)
         };
         let some: Vec<Candidate> = effects.iter().filter_map(entered).collect();
         let blocks = Candidate::blocks(
@@ -77,7 +74,7 @@ pub(super) fn promising(
         let odds: Vec<Vec<f64>> = left.iter().map(|left| left.odds_of(&blocks)).collect();
         some.into_iter()
             .enumerate()
-            .map(|(k, own)| (own, odds.iter().map(|of| of[k]).collect()))
+            .map(|(k, candidate)| (candidate, odds.iter().map(|of| of[k]).collect()))
             .collect()
     };
     let all: Vec<(Candidate, Vec<f64>)> = new.par_chunks(TOGETHER).flat_map_iter(odds_of).collect();

@@ -1,48 +1,46 @@
-//! All explanations of a residual with their probabilities, and what may be claimed by them.
+//! Probabilities of all sets of hypotheses, and the claims that follow.
 
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use super::hypothesis_set::HypothesisSet;
 use crate::problem::Effect;
 use crate::residual_tests::Covariate;
 
-/// Probability below which an explanation is not kept: thousands of them add up to nothing.
+/// Probability below which a set is dropped: thousands of them add up to nothing.
 pub(super) const NEGLIGIBLE: f64 = 1e-10;
-/// All explanations of a residual that were looked at.
+/// All sets of hypotheses that were evaluated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
-    /// Most probable first.
+    /// Sets, the most probable first.
     pub sets: Vec<HypothesisSet>,
-    /// For hypotheses of the sure explanation, effects that do best in their place.
+    /// Members of the accepted set, each with an effect that does best in its place.
     pub(super) stand_ins: Vec<(Hypothesis, Hypothesis)>,
-    /// Poses without which it was weighed, among those that are: each alone would have carried an
-    /// effect.
+    /// Poses that were left out of the evidence: each alone would have supported an effect.
     pub(in crate::select) left_out: Vec<usize>,
 }
 
-/// What is claimed of a hypothesis, from the least to the most.
+/// Claims about a hypothesis, from the least to the most.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Claims {
-    /// Where, and the probability that something acts there.
+    /// Site, and the probability that something acts there.
     pub place: (Site, f64),
-    /// On what it depends, and the probability that what acts there depends on that.
+    /// Quantities, and the probability that the error at the site depends on them.
     pub depends_on: (Vec<Covariate>, f64),
-    /// The hypothesis, and the probability that its law is at work there and no function that knows
-    /// none.
+    /// Hypothesis, and the probability that its law acts at the site and no function without a law.
     pub law: (Hypothesis, f64),
 }
 
-/// The odds against what is so probable, no more than even: the chance of [`Evidence::chance`].
+/// Returns the odds against a probability, at most even.
 pub(in crate::select) fn odds_against(probability: f64) -> f64 {
     ((1.0 - probability).max(NEGLIGIBLE) / probability.max(NEGLIGIBLE)).min(1.0)
 }
 
 impl Evidence {
-    /// The most probable explanation.
+    /// Returns the most probable set.
     pub fn best(&self) -> &[Hypothesis] {
         self.sets.first().map_or(&[], |best| &best.hypotheses)
     }
 
-    /// Probability that some hypothesis of a kind is at work.
+    /// Returns the probability that some hypothesis of a kind acts.
     pub fn probability(&self, of: impl Fn(&Hypothesis) -> bool) -> f64 {
         let holds = |explanation: &&HypothesisSet| explanation.hypotheses.iter().any(&of);
         self.sets
@@ -53,39 +51,46 @@ impl Evidence {
             .min(1.0)
     }
 
-    /// The most probable explanation that claims no more than is sure: with as many hypotheses as
-    /// there are with probability `level`, whichever they are.
+    /// Returns the probability that a joint, from 1, has a periodic error of many orders.
+    pub(in crate::select) fn gear_probability(&self, joint: usize) -> f64 {
+        self.probability(|hypothesis| {
+            matches!(hypothesis.kind, HypothesisKind::Gear(_))
+                && hypothesis.site == Site::Joint(joint - 1)
+        })
+    }
+
+    /// Returns the most probable set that has no more members than act with probability `level`,
+    /// whichever they are.
     pub fn sure(&self, level: f64) -> Option<&HypothesisSet> {
         self.sets.iter().find(|explanation| self.as_many(explanation) >= level)
     }
 
-    /// Probability that there are as many hypotheses as an explanation has, whichever they are.
+    /// Returns the probability that at least as many hypotheses act as a set has.
     pub(in crate::select) fn as_many(&self, as_in: &HypothesisSet) -> f64 {
         let holds =
             |explanation: &&HypothesisSet| explanation.hypotheses.len() >= as_in.hypotheses.len();
         self.sets.iter().filter(holds).map(|explanation| explanation.probability).sum()
     }
 
-    /// Chance that fewer hypotheses than `best` has and noise make as many as probable, for all
-    /// that were looked at together: a ratio of likelihoods is above B no more than once in B
-    /// times.          [Ville 1939]
+    /// Returns an upper limit of the probability that fewer hypotheses and noise make such
+    /// evidence: a ratio of likelihoods exceeds B at most once in B times [Ville 1939].
     pub fn chance(&self, best: &HypothesisSet) -> f64 {
         let is_fewer = |known: &&HypothesisSet| known.hypotheses.len() < best.hypotheses.len();
         let fewer: f64 = self.sets.iter().filter(is_fewer).map(|known| known.probability).sum();
         odds_against(1.0 - fewer)
     }
 
-    /// Explanations with an effect in the place of another hypothesis of `best`: the most probable
-    /// ones, and those that do best in the place of each, which strong effects decide only at a fit
-    /// of their own; so do laws in the place of a function without one. A fit with an effect in the
-    /// place of a limit that is wrong may leave other limits too: it is no rival.
+    /// Returns sets with an effect in the place of another member of `best`: the most probable
+    /// ones, and those that do best in the place of each. Limits that are wrong have no rivals.
     pub(in crate::select) fn exchanged(
         &self,
         best: &HypothesisSet,
         most: usize,
     ) -> Vec<HypothesisSet> {
         let differ = |one: &HypothesisSet, other: &HypothesisSet| {
-            let is_new = |own: &&Hypothesis| !other.hypotheses.iter().any(|known| known.says(own));
+            let is_new = |candidate: &&Hypothesis| {
+                !other.hypotheses.iter().any(|known| known.says(candidate))
+            };
             one.hypotheses.iter().filter(is_new).cloned().collect::<Vec<Hypothesis>>()
         };
         let is_exchange = |other: &&HypothesisSet| {
@@ -95,15 +100,15 @@ impl Evidence {
         };
         let mut all: Vec<HypothesisSet> =
             self.sets.iter().filter(is_exchange).take(most).cloned().collect();
-        for (own, other) in self.stand_ins.iter().filter(|(own, _)| !own.is_limit()) {
-            let Some(place) = best.hypotheses.iter().position(|known| known == own) else {
+        for (member, other) in self.stand_ins.iter().filter(|(member, _)| !member.is_limit()) {
+            let Some(place) = best.hypotheses.iter().position(|known| known == member) else {
                 continue;
             };
             let mut exchanged = HypothesisSet { probability: 0.0, ..best.clone() };
             exchanged.hypotheses[place] = other.clone();
             exchanged.functions[place].0 = 0;
             let is_known = |known: &HypothesisSet| {
-                known.hypotheses.iter().all(|own| exchanged.hypotheses.contains(own))
+                known.hypotheses.iter().all(|member| exchanged.hypotheses.contains(member))
             };
             if !all.iter().any(is_known) && !best.hypotheses.contains(other) {
                 all.push(exchanged);
@@ -112,8 +117,7 @@ impl Evidence {
         all
     }
 
-    /// The same with other odds for some explanations: ln of those to `best`, each at a fit of its
-    /// own.
+    /// Replaces the odds of some sets by ln odds to `best` at fits of their own.
     pub(in crate::select) fn corrected(
         mut self,
         best: &HypothesisSet,
@@ -122,28 +126,28 @@ impl Evidence {
         let of_best = self
             .sets
             .iter()
-            .find(|own| own.hypotheses == best.hypotheses)
-            .map_or(0.0, |own| own.probability);
+            .find(|set| set.hypotheses == best.hypotheses)
+            .map_or(0.0, |set| set.probability);
         for (explanation, ln_odds) in odds {
             // Beyond that nothing is left of the best one.
             let probability = of_best * ln_odds.min(40.0).exp();
-            let is_same = |own: &&mut HypothesisSet| {
-                own.hypotheses.len() == explanation.hypotheses.len()
-                    && own.hypotheses.iter().all(|known| explanation.hypotheses.contains(known))
+            let is_same = |set: &&mut HypothesisSet| {
+                set.hypotheses.len() == explanation.hypotheses.len()
+                    && set.hypotheses.iter().all(|known| explanation.hypotheses.contains(known))
             };
             match self.sets.iter_mut().find(is_same) {
-                Some(own) => own.probability = probability,
+                Some(set) => set.probability = probability,
                 None => self.sets.push(HypothesisSet { probability, ..explanation.clone() }),
             }
         }
-        let total: f64 = self.sets.iter().map(|own| own.probability).sum();
-        self.sets.iter_mut().for_each(|own| own.probability /= total);
+        let total: f64 = self.sets.iter().map(|set| set.probability).sum();
+        self.sets.iter_mut().for_each(|set| set.probability /= total);
         self.sets.sort_by(|a, b| b.probability.total_cmp(&a.probability));
         self
     }
 
-    /// Effects that may stand in the place of one of those that a model holds, each as probable
-    /// without it as the part `beside` of it, best first.
+    /// Returns effects that may stand in the place of one that a model holds, each at least
+    /// `beside` times as probable, best first.
     pub fn alternatives(&self, effect: &Effect, held: &[Effect], beside: f64) -> Vec<Effect> {
         // Of very many effects in a model most are in no explanation: nothing else need be looked
         // at.
@@ -152,9 +156,9 @@ impl Evidence {
         {
             return Vec::new();
         }
-        let others: Vec<&Effect> = held.iter().filter(|own| *own != effect).collect();
+        let others: Vec<&Effect> = held.iter().filter(|other| *other != effect).collect();
         // What an explanation holds beside these; of one that is searched another value stands for
-        // it where its own is not there.
+        // it where that is not there.
         let beside_others = |explanation: &HypothesisSet| {
             let mut rest = explanation.effects();
             for other in &others {
@@ -190,17 +194,17 @@ impl Evidence {
         instead.into_iter().map(|(effect, _)| effect).collect()
     }
 
-    /// What is claimed of an effect; `None` where it is in no explanation.
+    /// Returns the claims about an effect; `None` where no set holds it.
     pub fn claims_of(&self, effect: &Effect) -> Option<Claims> {
         let mut all = self.sets.iter().flat_map(|explanation| &explanation.hypotheses);
         all.find(|hypothesis| hypothesis.effect() == Some(effect))
             .map(|hypothesis| self.claims(hypothesis))
     }
 
-    /// What is claimed of a hypothesis.
+    /// Returns the claims about a hypothesis.
     ///
-    /// Where its time or order is searched, another one counts for it, but not one that is beside
-    /// it in the most probable explanation.
+    /// Another value of its searched argument counts for it, unless the most probable set holds
+    /// both.
     pub fn claims(&self, of: &Hypothesis) -> Claims {
         let most = self.sets.iter().map(|known| &known.hypotheses).find(|known| known.contains(of));
         let is_beside =
@@ -233,7 +237,7 @@ impl Evidence {
             .iter()
             .filter(has_law)
             .map(|explanation| explanation.probability)
-            .fold(0.0, |sum, own| sum + own)
+            .fold(0.0, |sum, probability| sum + probability)
             .min(1.0);
         Claims {
             place: (of.site, place),

@@ -1,6 +1,5 @@
-//! Products of the columns of hypotheses with one another and with the residual: what a set leaves,
-//! and what a further hypothesis gains beside it, is told by these alone. Each is made when the
-//! first set asks for it, and kept, further hypotheses or not.
+//! Products of the columns of hypotheses with one another and with the residual. The evidence of a
+//! set needs these alone; each is computed on first use and kept.
 
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
@@ -14,62 +13,59 @@ use super::marginal::{Noise, Normal, over_noise};
 use crate::fit::Stop;
 use crate::numeric::{inverse_factor, inverse_lower, lower_factor, lower_product};
 use crate::select::neighbourhood::LinearNeighbourhood;
-use crate::select::rules::SelectionRules;
 
-/// Hypotheses whose gains are worked out together: one product of many columns is fast.
+/// Number of hypotheses whose gains are computed together: one product of many columns is fast.
 const TOGETHER: usize = 16;
 
-/// Size below which Pₖₖ⁻¹ is too close to 1 to tell what a member's columns are beside the others.
+/// Size below which Pₖₖ⁻¹ is too close to 1 to determine a member's columns beside the others.
 const LEAST: f64 = 1e-3;
 
-/// What is explained: what a fit leaves, with its degrees of freedom, and how far its σ is trusted.
+/// Residual that the hypotheses explain, with its degrees of freedom and the trust in its σ.
 #[derive(Debug, Clone)]
 pub(super) struct Target {
     pub fit: LinearNeighbourhood,
     pub noise: Noise,
-    /// ln of how much more often a further effect is of a family that is there than of any one of
-    /// the others.
+    /// Log factor of the prior of a further effect of a family that the set holds.
     pub alike: f64,
-    /// The wish that the search end early.
+    /// Request to stop the search early.
     pub stop: Stop,
 }
 
-/// Columns of hypotheses, the residual they are to explain, and their products.
+/// Columns of hypotheses, the residual they explain, and their products.
 pub(super) struct Products<'a> {
     pub blocks: &'a [Block],
     pub target: &'a Target,
-    pub rules: &'a SelectionRules,
-    /// rᵀr, everything fitted projected out.
+    /// Sum of squares rᵀr, everything fitted projected out.
     pub squares: f64,
-    /// Of the noise.
+    /// Grid of noise factors.
     grid: Vec<(f64, f64)>,
     known: Known,
 }
 
-/// What was worked out of some hypotheses about one target by one set of rules, and stays true when
-/// further ones come behind them, as long as their own chances stay.
+/// Results about some hypotheses and one target that stay true when further hypotheses are
+/// appended.
 #[derive(Default)]
 pub(super) struct Known {
     /// Products, by the number of the hypothesis.
     members: Vec<OnceLock<Member>>,
-    /// How many hypotheses there were each time that further ones had come; 0 first.
+    /// Number of hypotheses after each extension, 0 first.
     came: Vec<usize>,
-    /// What some hypotheses gain beside a set.
+    /// Gains of hypotheses beside a set.
     gains: Recalled<Beside, Vec<(f64, f64)>>,
-    /// What settled sets come to.
+    /// Sizes and log posterior of settled sets.
     settled: Recalled<AtSizes, (Vec<f64>, f64)>,
 }
 
-/// A set: its members and their sizes, in the order in which they were taken.
+/// Key of a set: its members and their sizes, in order.
 type AtSizes = Vec<(usize, u64)>;
-/// A set, and hypotheses that are tried beside it.
+/// Key of gains: a set and the hypotheses tried beside it.
 type Beside = (AtSizes, Vec<usize>);
 
 fn at_sizes(members: &[usize], sizes: &[f64]) -> AtSizes {
     members.iter().copied().zip(sizes.iter().map(|size| size.to_bits())).collect()
 }
 
-/// Results by what they are of.
+/// Cache of results by key.
 struct Recalled<K, V>(Mutex<BTreeMap<K, V>>);
 
 impl<K, V> Default for Recalled<K, V> {
@@ -79,7 +75,7 @@ impl<K, V> Default for Recalled<K, V> {
 }
 
 impl<K: Ord + Clone, V: Clone> Recalled<K, V> {
-    /// What is known of `key`, or what `make` makes of it; that is kept where there is any.
+    /// Returns the cached result of `key`, or computes and keeps it.
     fn recall(&self, key: &K, make: impl FnOnce() -> Option<V>) -> Option<V> {
         let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let known = all().get(key).cloned();
@@ -91,27 +87,23 @@ impl<K: Ord + Clone, V: Clone> Recalled<K, V> {
     }
 }
 
-/// A hypothesis of some set.
+/// Hypothesis that is a member of some set.
 pub(super) struct Member {
     /// A, everything fitted projected out.
     columns: Arc<DMatrix<f64>>,
-    /// Aᵀ.
+    /// Transpose Aᵀ.
     transposed: DMatrix<f64>,
-    /// AᵀC of every one.
+    /// Products AᵀC with the columns of every hypothesis.
     products: Vec<OnceLock<DMatrix<f64>>>,
 }
 
 impl<'a> Products<'a> {
-    pub fn new((blocks, target): (&'a [Block], &'a Target), rules: &'a SelectionRules) -> Self {
-        Self::knowing(Known::default(), (blocks, target), rules)
+    pub fn new(blocks: &'a [Block], target: &'a Target) -> Self {
+        Self::knowing(Known::default(), blocks, target)
     }
 
-    /// The same where much of the first of these hypotheses is known.
-    pub fn knowing(
-        mut known: Known,
-        (blocks, target): (&'a [Block], &'a Target),
-        rules: &'a SelectionRules,
-    ) -> Self {
+    /// Creates the products from results about the first of these hypotheses.
+    pub fn knowing(mut known: Known, blocks: &'a [Block], target: &'a Target) -> Self {
         let squares = target.fit.residual().norm_squared();
         for member in known.members.iter_mut().filter_map(OnceLock::get_mut) {
             member.products.resize_with(blocks.len(), OnceLock::new);
@@ -121,20 +113,25 @@ impl<'a> Products<'a> {
             known.came.push(0);
         }
         known.came.push(blocks.len());
-        Self { blocks, target, rules, squares, grid: target.noise.grid(), known }
+        Self { blocks, target, squares, grid: target.noise.grid(), known }
     }
 
-    /// What was worked out.
+    /// Returns the cached results.
     pub fn into_known(self) -> Known {
         self.known
     }
 
-    /// ln of the density of a residual of such squares, up to a constant.
+    /// Returns ln of the density of a residual of such squares, up to a constant.
     pub fn over_noise(&self, squares: f64) -> f64 {
         over_noise(squares, &self.grid)
     }
 
-    /// ln of the chance of a hypothesis beside others.
+    /// Returns true if some of these hypotheses is a periodic error of many orders.
+    pub fn has_gear(&self, members: &[usize]) -> bool {
+        members.iter().any(|&member| self.blocks[member].is_gear)
+    }
+
+    /// Returns ln of the prior probability of a hypothesis beside others.
     pub fn ln_prior(&self, block: &Block, others: &[usize]) -> f64 {
         let is_alike =
             block.is_law() && others.iter().any(|&other| self.blocks[other].family == block.family);
@@ -160,8 +157,8 @@ impl<'a> Products<'a> {
             .get_or_init(|| self.blocks[other].times((&member.columns, &member.transposed)))
     }
 
-    /// What each hypothesis that is tried gains beside a set at some sizes, and its most probable
-    /// size; none where it is stopped, or the set leaves nothing that can be told.
+    /// Returns the gain of each tried hypothesis beside a set at some sizes, and its most probable
+    /// size; empty if the search was stopped or the set leaves nothing.
     pub fn gains(&self, members: &[usize], sizes: &[f64], tried: &[usize]) -> Vec<(f64, f64)> {
         let left = OnceCell::new();
         let mut all: Vec<Option<(f64, f64)>> = vec![None; tried.len()];
@@ -169,26 +166,28 @@ impl<'a> Products<'a> {
         // is multiplied together, whose rounding it decides, does not depend on what other threads
         // have found by now.
         for came in self.known.came.windows(2) {
-            let own: Vec<usize> =
+            let places: Vec<usize> =
                 (0..tried.len()).filter(|&k| (came[0]..came[1]).contains(&tried[k])).collect();
-            if own.is_empty() {
+            if places.is_empty() {
                 continue;
             }
-            let key =
-                (at_sizes(members, sizes), own.iter().map(|&k| tried[k]).collect::<Vec<usize>>());
+            let key = (
+                at_sizes(members, sizes),
+                places.iter().map(|&k| tried[k]).collect::<Vec<usize>>(),
+            );
             let gains = self.known.gains.recall(&key, || {
                 let left = left.get_or_init(|| self.left(members, sizes)).as_ref()?;
-                Some(left.gains(&key.1)).filter(|gains| gains.len() == own.len())
+                Some(left.gains(&key.1)).filter(|gains| gains.len() == places.len())
             });
-            own.into_iter()
+            places
+                .into_iter()
                 .zip(gains.unwrap_or_default())
                 .for_each(|(k, gain)| all[k] = Some(gain));
         }
         all.into_iter().collect::<Option<_>>().unwrap_or_default()
     }
 
-    /// What `settle` makes of a set at some sizes: the sizes that its members have beside one
-    /// another, and ln of its posterior.
+    /// Returns the settled sizes of a set and ln of its posterior, cached.
     pub fn settled(
         &self,
         (members, sizes): (&[usize], &[f64]),
@@ -197,7 +196,7 @@ impl<'a> Products<'a> {
         self.known.settled.recall(&at_sizes(members, sizes), settle)
     }
 
-    /// What a set leaves at some sizes.
+    /// Returns what a set leaves of the residual at some sizes.
     pub fn left(&self, members: &[usize], sizes: &[f64]) -> Option<Left<'_, 'a>> {
         let mut scales = Vec::new();
         let mut begins = Vec::new();
@@ -215,8 +214,8 @@ impl<'a> Products<'a> {
                 let gram = self.product(one, members[j]);
                 inner.view_mut((begins[i], begins[j]), gram.shape()).zip_apply(
                     gram,
-                    |own, value| {
-                        *own += size * sizes[j] * value;
+                    |entry, value| {
+                        *entry += size * sizes[j] * value;
                     },
                 );
             }
@@ -242,41 +241,41 @@ impl<'a> Products<'a> {
     }
 }
 
-/// What a set leaves of the residual: with A of its members, D of their sizes, 1 + D AᵀA D = L Lᵀ
-/// and Z = L⁻¹D Aᵀ it leaves CᵀC − (Z C)ᵀ(Z C) and Cᵀr − (Z C)ᵀ(Z r) of further columns C.
+/// Remainder of the residual beside a set. With A of its members, D of their sizes, 1 + D AᵀA D = L
+/// Lᵀ and Z = L⁻¹D Aᵀ it leaves CᵀC − (Z C)ᵀ(Z C) and Cᵀr − (Z C)ᵀ(Z r) of further columns C.
 pub(super) struct Left<'p, 'a> {
     products: &'p Products<'a>,
     members: Vec<usize>,
     sizes: Vec<f64>,
-    /// The first column of each member among all.
+    /// First column of each member among all.
     begins: Vec<usize>,
-    /// L⁻¹D.
+    /// Matrix L⁻¹D.
     within: DMatrix<f64>,
-    /// Z r.
+    /// Vector Z r.
     taken: DVector<f64>,
     squares: f64,
-    /// ln of the density of what is left.
+    /// Log density of the remainder.
     without: f64,
-    /// ln det L.
+    /// Log determinant of L.
     ln_determinant: f64,
-    /// Z, made when columns of hypotheses that are none of these are asked for.
+    /// Matrix Z, computed when columns of other hypotheses are asked for.
     reach: OnceLock<DMatrix<f64>>,
 }
 
 impl Left<'_, '_> {
-    /// ln p(r | set) at its sizes.
+    /// Returns ln p(r | set) at its sizes.
     pub fn ln_likelihood(&self) -> f64 {
         self.without - self.ln_determinant
     }
 
-    /// ln p(r | set), the size of the k-th member summed over, and its most probable size beside
-    /// the others at theirs.
+    /// Returns ln p(r | set) with the size of the k-th member summed over, and its most probable
+    /// size beside the others.
     ///
     /// With P = (1 + D AᵀA D)⁻¹, t = P D Aᵀr and c the size of k: beside the others its columns
     /// have G = (Pₖₖ⁻¹ − 1)/c² and b = Pₖₖ⁻¹tₖ/c; without it the set leaves tₖᵀPₖₖ⁻¹tₖ more
     /// squares, and its determinant is det(1 + D AᵀA D) det Pₖₖ.
     pub fn of_member(&self, k: usize) -> Option<(f64, f64)> {
-        let Products { blocks, target, grid, rules, .. } = self.products;
+        let Products { blocks, target, grid, .. } = self.products;
         let (block, size) = (&blocks[self.members[k]], self.sizes[k]);
         if size < LEAST {
             let others = [&self.members[..k], &self.members[k + 1..]].concat();
@@ -287,22 +286,21 @@ impl Left<'_, '_> {
         }
         // Of the lower L⁻¹D, columns of k have rows from the first of these on.
         let (first, count) = (self.begins[k], block.product().len());
-        let own = self.within.view((first, first), (self.within.nrows() - first, count)) / size;
-        let lower = lower_factor(own.transpose() * &own)?;
+        let rows = self.within.view((first, first), (self.within.nrows() - first, count)) / size;
+        let lower = lower_factor(rows.transpose() * &rows)?;
         let ln_determinant = lower.diagonal().iter().map(|value| value.ln()).sum::<f64>();
         let inverse = inverse_lower(&lower);
-        let along = own.tr_mul(&self.taken.rows_range(first..));
+        let along = rows.tr_mul(&self.taken.rows_range(first..));
         let product = inverse.tr_mul(&(&inverse * &along));
         let squares = self.squares + along.dot(&product);
         let mut gram = inverse.transpose() * inverse;
         (0..count).for_each(|j| gram[(j, j)] -= 1.0);
         let normal = Normal::Dense { gram: gram / (size * size), product: product / size };
-        let (ln_summed, size) =
-            block.over_sizes(&normal, (squares, target.noise.freedom), grid, rules);
+        let (ln_summed, size) = block.over_sizes(&normal, (squares, target.noise.freedom), grid);
         Some((ln_summed - self.ln_determinant - ln_determinant, size))
     }
 
-    /// What is left of the residual, everything fitted projected out.
+    /// Returns the remainder of the residual, everything fitted projected out.
     pub fn residual(&self) -> DVector<f64> {
         let mut left = self.products.target.fit.residual().clone();
         let along = self.within.tr_mul(&self.taken);
@@ -315,7 +313,7 @@ impl Left<'_, '_> {
         left
     }
 
-    /// Z.
+    /// Returns Z.
     fn reach(&self) -> &DMatrix<f64> {
         self.reach.get_or_init(|| {
             let mut all =
@@ -325,20 +323,20 @@ impl Left<'_, '_> {
                 let transposed = &self.products.member(member).transposed;
                 // Of a lower triangle.
                 let below = self.within.nrows() - first;
-                let own = self.within.view((first, first), (below, transposed.nrows()));
-                all.rows_range_mut(first..).gemm(1.0, &own, transposed, 1.0);
+                let block_of_within = self.within.view((first, first), (below, transposed.nrows()));
+                all.rows_range_mut(first..).gemm(1.0, &block_of_within, transposed, 1.0);
                 first += transposed.nrows();
             }
             all
         })
     }
 
-    /// ln p(r | set and a hypothesis) − ln p(r | set), and its most probable size.
+    /// Returns ln p(r | set and a hypothesis) − ln p(r | set) and its most probable size.
     pub fn gain(&self, block: usize) -> (f64, f64) {
         self.gains_together(&[block])[0]
     }
 
-    /// The same of several; none where it is stopped.
+    /// Returns the gains of several hypotheses; empty if the search was stopped.
     pub fn gains(&self, tried: &[usize]) -> Vec<(f64, f64)> {
         let stop = &self.products.target.stop;
         let of = |some: &[usize]| {
@@ -355,11 +353,11 @@ impl Left<'_, '_> {
         let mut first = 0;
         for &member in &self.members {
             let count = self.products.member(member).columns.ncols();
-            let mut own = all.rows_mut(first, count);
+            let mut target = all.rows_mut(first, count);
             let mut column = 0;
             for &block in tried {
                 let with = self.products.product(member, block);
-                own.columns_mut(column, with.ncols()).copy_from(with);
+                target.columns_mut(column, with.ncols()).copy_from(with);
                 column += with.ncols();
             }
             first += count;
@@ -370,11 +368,11 @@ impl Left<'_, '_> {
         )
     }
 
-    /// The gains of hypotheses that are none of the others, with their priors.
+    /// Returns the gains of hypotheses that are not among the blocks, with their priors.
     pub fn odds_of(&self, blocks: &[Block]) -> Vec<f64> {
         let columns: Vec<Arc<DMatrix<f64>>> =
             blocks.iter().map(|block| block.columns(&self.products.target.fit)).collect();
-        let all: Vec<_> = columns.iter().flat_map(|own| own.column_iter()).collect();
+        let all: Vec<_> = columns.iter().flat_map(|matrix| matrix.column_iter()).collect();
         if all.is_empty() {
             return Vec::new();
         }
@@ -387,19 +385,24 @@ impl Left<'_, '_> {
             .collect()
     }
 
-    /// The gains of hypotheses of whose columns C, side by side, the set takes Z C = `along`.
+    /// Returns the gains of hypotheses of whose columns C, side by side, the set takes Z C =
+    /// `along`.
     fn gains_along<'b>(
         &self,
         blocks: impl Iterator<Item = &'b Block>,
         along: &DMatrix<f64>,
     ) -> Vec<(f64, f64)> {
-        let Products { target, grid, rules, .. } = self.products;
+        let Products { target, grid, .. } = self.products;
         let left = ((self.squares, target.noise.freedom), self.without);
         let mut first = 0;
         let gain = |block: &Block| {
-            let own = along.columns(first, block.product().len()).into_owned();
-            first += own.ncols();
-            block.gain((!self.members.is_empty()).then_some((&own, &self.taken)), left, grid, rules)
+            let along_block = along.columns(first, block.product().len()).into_owned();
+            first += along_block.ncols();
+            block.gain(
+                (!self.members.is_empty()).then_some((&along_block, &self.taken)),
+                left,
+                grid,
+            )
         };
         blocks.map(gain).collect()
     }
@@ -412,7 +415,7 @@ mod tests {
     use crate::select::evidence::marginal::Coefficients;
     use crate::select::neighbourhood::Unknowns;
 
-    /// Numbers without pattern.
+    /// Returns a matrix of pseudo-random numbers.
     fn matrix(rows: usize, columns: usize, seed: f64) -> DMatrix<f64> {
         DMatrix::from_fn(rows, columns, |i, j| {
             (12.9898 * i as f64 + 78.233 * j as f64 + seed).sin() * 43.7 % 1.0
@@ -421,7 +424,6 @@ mod tests {
 
     #[test]
     fn products_tell_what_a_dense_solve_does() {
-        let rules = &SelectionRules::DEFAULT;
         let (jacobian, residual) = (matrix(120, 4, 0.5), matrix(120, 1, 9.0).column(0) * 4.0);
         let unknowns =
             Unknowns { x: vec![0.0; 4], priors: vec![None; 4], active: DMatrix::zeros(0, 4) };
@@ -432,11 +434,12 @@ mod tests {
             Design::per_pose(&lever),
             Design::Dense(matrix(120, 30, 2.0)),
         ];
-        let designs = designs.map(|own| (own.scaled(40).unwrap(), 0.0, Coefficients::default()));
+        let designs =
+            designs.map(|effect| (effect.scaled(40).unwrap(), 0.0, Coefficients::default()));
         let blocks = Block::all(designs.to_vec(), &fit);
         let noise = Noise { freedom: 116.0, trust: 0.1, least: 0.0 };
         let target = Target { fit, noise, alike: 0.0, stop: Stop::default() };
-        let products = Products::new((&blocks, &target), rules);
+        let products = Products::new(&blocks, &target);
         let (members, sizes) = ([0, 1, 2], [3.0, 0.3, 1.0]);
         let left = products.left(&members, &sizes).unwrap();
         let r = target.fit.residual();
@@ -461,17 +464,17 @@ mod tests {
                 .left(&others, &others.iter().map(|&other| sizes[other]).collect::<Vec<_>>())
                 .unwrap();
             let (gain, size) = beside.gain(k);
-            let own = products.left(&members, &sizes).unwrap().of_member(k).unwrap();
+            let summed = products.left(&members, &sizes).unwrap().of_member(k).unwrap();
             let expected = beside.ln_likelihood() + gain;
             assert!(
-                (own.0 / expected - 1.0).abs() < 1e-9 && (own.1 - size).abs() < 1e-12,
-                "{own:?} {expected} {size}"
+                (summed.0 / expected - 1.0).abs() < 1e-9 && (summed.1 - size).abs() < 1e-12,
+                "{summed:?} {expected} {size}"
             );
         }
         // One more gains as much whether it is among the blocks or not.
         let two = products.left(&members[..2], &sizes[..2]).unwrap();
         for (block, (gain, size)) in
-            two.gains(&[2, 0, 1]).into_iter().zip([2, 0, 1]).map(|(own, block)| (block, own))
+            two.gains(&[2, 0, 1]).into_iter().zip([2, 0, 1]).map(|(summed, block)| (block, summed))
         {
             let alone = two.gain(block);
             assert!((gain - alone.0).abs() < 1e-9 && (size - alone.1).abs() < 1e-12);
@@ -487,15 +490,15 @@ mod tests {
         let families =
             [Some("joint-compliance"), Some("joint-compliance"), Some("link-bending"), None, None];
         let block = |family: Option<&str>| {
-            let mut own =
+            let mut block =
                 Block::new(Design::Dense(matrix(30, 1, 1.0)), &fit, -3.0, Coefficients::default());
-            own.family = family.map(str::to_owned);
-            own
+            block.family = family.map(str::to_owned);
+            block
         };
         let blocks: Vec<Block> = families.map(block).to_vec();
         let noise = Noise { freedom: 29.0, trust: 0.1, least: 0.0 };
         let target = Target { fit: fit.clone(), noise, alike: 1.5, stop: Stop::default() };
-        let products = Products::new((&blocks, &target), &SelectionRules::DEFAULT);
+        let products = Products::new(&blocks, &target);
         let of = |block: usize, others: &[usize]| products.ln_prior(&blocks[block], others);
         let is = |value: f64, expected: f64| {
             assert!((value - expected).abs() < 1e-12, "{value} {expected}");

@@ -18,10 +18,10 @@ use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{JointKind, Problem};
 use crate::residual_tests::Covariate;
 
-/// Functions whose size is below this part of the largest repeat others.
+/// Part of the largest size below which a function repeats others.
 const REPEATED: f64 = 1e-3;
 
-/// Whether gravity acts on an arm of which no mass is declared.
+/// Returns true if gravity acts on an arm without declared masses.
 pub(super) fn weight_is_unknown(problem: &Problem) -> bool {
     let has_mass =
         problem.joints.iter().any(|joint| !joint.bodies.is_empty() || joint.beam.is_some());
@@ -42,24 +42,24 @@ impl Columns<'_, '_> {
             let Some(lever) = self.linearised.place(site) else { continue };
             let Some(columns) = self.sags(joint, &lever) else { continue };
             let site = Site::Joint(joint);
-            let own = Hypothesis {
+            let hypothesis = Hypothesis {
                 kind: HypothesisKind::Sag,
                 site,
                 coordinate: None,
                 depends_on: vec![Covariate::Load],
             };
-            self.add("sag", 1.0, own, || columns.clone());
+            self.add("sag", 1.0, hypothesis, || columns.clone());
             all.push(columns);
         }
         if all.len() > 1 {
-            let own = Hypothesis {
+            let hypothesis = Hypothesis {
                 kind: HypothesisKind::Sag,
                 site: Site::Arm,
                 coordinate: None,
                 depends_on: vec![Covariate::Load],
             };
             let columns: Vec<_> = all.iter().flat_map(DMatrix::column_iter).collect();
-            self.add("sag", all.len() as f64, own, || DMatrix::from_columns(&columns));
+            self.add("sag", all.len() as f64, hypothesis, || DMatrix::from_columns(&columns));
         }
     }
 
@@ -93,14 +93,14 @@ fn moments<'a>(
     configurations: impl Iterator<Item = &'a [f64]>,
 ) -> DMatrix<f64> {
     let arm = Arm::nominal(problem);
-    let lengths = problem.joints.iter().map(|own| own.a.abs() + own.d.abs()).sum::<f64>();
+    let lengths = problem.joints.iter().map(|joint| joint.a.abs() + joint.d.abs()).sum::<f64>();
     let length = lengths / problem.joints.len() as f64;
     let of_pose = |configuration: &[f64]| -> Vec<f64> {
         let joints = arm.rigid_joints(configuration);
         let (at, axis, _) = joints[joint];
         let about = |place: Vector3<f64>| axis.dot(&place.cross(&problem.gravity));
         let of_link = |frame: &crate::spatial::Frame<f64>| {
-            let along = frame.axes.map(|own| about(own * length));
+            let along = frame.axes.map(|axis| about(axis * length));
             std::iter::once(about(frame.origin - at)).chain(along).collect::<Vec<f64>>()
         };
         let outboard = joints.iter().enumerate().filter(|(k, _)| arm.tree.path_contains(joint, *k));

@@ -1,25 +1,26 @@
 //! Sets of hypotheses by their probability: a beam search over sets of blocks of columns.
 
+use crate::select::settings::{BEAM_WIDTH, LOG_ODDS_CUTOFF, MAX_EFFECTS, MAX_EXTENDING};
 use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use super::super::rules::SelectionRules;
 use super::block::Block;
 use super::products::{Left, Products};
 
-/// Passes over the sizes of a set until they are to one another as they stay.
+/// Maximum coordinate-ascent passes over the sizes of the members of a set.
 const SETTLING: usize = 4;
-/// Sets whose sizes are settled in the end, the most probable ones.
+/// Number of sets, the most probable ones, whose sizes are settled in the end.
 const LIKELY: usize = 32;
-/// Sets in which a function of several covariates is taken apart, the most probable ones.
+/// Number of sets, the most probable ones, in which a function of several covariates is replaced by
+/// two hypotheses.
 const SPLIT: usize = 3;
-/// Sets of so many members at most have two taken out together.
+/// Maximum number of members of a set of which two are exchanged together.
 const FEW: usize = 6;
-/// Times that the best set is changed by more than one member, each time the best of those before.
+/// Maximum number of exchanges in the best set, each in the best set so far.
 const CHANGES: usize = 4;
 
-/// A set of hypotheses, and its probability among all sets looked at.
+/// Set of hypotheses with its probability among all sets evaluated.
 #[derive(Debug, Clone)]
 pub(super) struct Weighted {
     /// Numbers of the hypotheses, in the order in which they were taken.
@@ -29,7 +30,7 @@ pub(super) struct Weighted {
     pub probability: f64,
 }
 
-/// A set with the sizes of its members and ln of its posterior, up to a constant.
+/// Set with the sizes of its members and ln of its posterior, up to a constant.
 #[derive(Debug, Clone)]
 struct Set {
     members: Vec<usize>,
@@ -38,7 +39,7 @@ struct Set {
 }
 
 impl Set {
-    /// The set with one more, which gains so much at this size.
+    /// Returns the set with one more hypothesis of this gain and size.
     fn with(&self, block: usize, (gain, size): (f64, f64), products: &Products) -> Self {
         Self {
             members: [self.members.as_slice(), &[block]].concat(),
@@ -49,18 +50,20 @@ impl Set {
         }
     }
 
-    /// Whether a member has another value in so many poses that the set is not extended.
-    fn has_wide(&self, blocks: &[Block], rules: &SelectionRules) -> bool {
-        self.members.iter().any(|&member| blocks[member].is_wide(rules))
+    /// Returns true if a member has more than `MAX_WIDE_COLUMNS` columns for single poses, so that
+    /// the set cannot grow.
+    fn has_wide(&self, blocks: &[Block]) -> bool {
+        self.members.iter().any(|&member| blocks[member].is_wide())
     }
 
-    /// The same with the size of each member beside all others, and its posterior at these sizes.
+    /// Returns the set with the size of each member settled beside all others, and its posterior at
+    /// these sizes.
     ///
-    /// Sizes are in units of the noise, which an effect that is not yet explained is taken for:
-    /// what was taken first would be held too tightly. ln p(r | set) = l + Σ (ln p(r | the others,
-    /// k) − l), l at the sizes of all, of k summed over its own.
+    /// Sizes are in units of the noise, which includes effects that are not explained yet: members
+    /// that were taken first would be held too tightly. ln p(r | set) = l + Σ (ln p(r | the others,
+    /// k) − l), l at the sizes of all, that of k summed over.
     fn settled(mut self, products: &Products) -> Self {
-        if self.members.len() < 2 || self.has_wide(products.blocks, products.rules) {
+        if self.members.len() < 2 || self.has_wide(products.blocks) {
             return self;
         }
         let settled = products.settled((&self.members, &self.sizes), || self.at_rest(products));
@@ -70,7 +73,7 @@ impl Set {
         self
     }
 
-    /// The sizes of its members beside all others, and ln of its posterior at these.
+    /// Returns the settled sizes of the members and ln of the posterior at these.
     fn at_rest(&self, products: &Products) -> Option<(Vec<f64>, f64)> {
         let (members, mut sizes) = (&self.members, self.sizes.clone());
         let mut all = products.left(members, &sizes)?;
@@ -101,13 +104,13 @@ impl Set {
     }
 }
 
-/// All sets that were looked at, most probable first; the empty set stands for "nothing".
+/// Returns all sets that were evaluated, the most probable first; the empty set stands for noise
+/// alone.
 ///
-/// The search starts from nothing and from the set `present`, whole and without one of its members:
-/// what was found before is judged again beside everything else. Stopped, it has looked at some
-/// sets only.
+/// The search starts from the empty set and from the set `present`, whole and without one of its
+/// members. A stopped search returns some sets only.
 pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
-    let Products { blocks, rules, .. } = *products;
+    let Products { blocks, .. } = *products;
     let mut known: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
     let without = |k: usize| [&present[..k], &present[k + 1..]].concat();
     let starts = std::iter::once(Vec::new())
@@ -120,8 +123,8 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
     }
     // What holds more than the search goes to is judged as it is, and with one more.
     let (longer, front): (usize, Vec<Set>) = match known.get(&sorted(present)) {
-        Some(all) if present.len() > rules.together => (1, vec![all.clone()]),
-        _ => (rules.together, known.values().cloned().collect()),
+        Some(all) if present.len() > MAX_EFFECTS => (1, vec![all.clone()]),
+        _ => (MAX_EFFECTS, known.values().cloned().collect()),
     };
     let (mut front, mut promising): (Vec<Set>, Option<Vec<usize>>) = (front, None);
     let every: Vec<usize> = (0..blocks.len()).collect();
@@ -145,7 +148,7 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
         promising.get_or_insert_with(|| {
             let mut promising: Vec<usize> = Vec::new();
             for last in sets.iter().filter_map(|set| set.members.last()) {
-                if promising.len() < rules.extending && !promising.contains(last) {
+                if promising.len() < MAX_EXTENDING && !promising.contains(last) {
                     promising.push(*last);
                 }
             }
@@ -153,17 +156,18 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
         });
         let best = sets
             .into_iter()
-            .filter(|set| !set.has_wide(blocks, rules))
-            .take(rules.extended)
+            .filter(|set| !set.has_wide(blocks))
+            .take(BEAM_WIDTH)
             .collect::<Vec<_>>();
         front = best.into_par_iter().map(|set| set.settled(products)).collect();
         front.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
         known.extend(front.iter().map(|set| (sorted(&set.members), set.clone())));
-        if front.first().is_none_or(|best| best.ln_posterior < best_known - rules.hopeless) {
+        if front.first().is_none_or(|best| best.ln_posterior < best_known - LOG_ODDS_CUTOFF) {
             break;
         }
     }
     changed(&mut known, products);
+    with_gears(&mut known, products);
     let mut likely: Vec<&Set> = known.values().collect();
     likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     let likely: Vec<Set> = likely.into_iter().take(LIKELY).cloned().collect();
@@ -182,7 +186,27 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
     all
 }
 
-/// A set with each of some further members.
+/// Extends the most probable set by periodic errors of many orders, as long as it becomes more
+/// probable, if it holds one: sets with them do not grow otherwise, for they have many columns.
+fn with_gears(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
+    let blocks = products.blocks;
+    let gears: Vec<usize> = (0..blocks.len()).filter(|&block| blocks[block].is_gear).collect();
+    let by_posterior = |a: &&Set, b: &&Set| a.ln_posterior.total_cmp(&b.ln_posterior);
+    while let Some(best) = known.values().max_by(by_posterior).cloned() {
+        if !products.has_gear(&best.members) {
+            return;
+        }
+        let longer = extended(&best, &gears, products);
+        match longer.into_iter().max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior)) {
+            Some(longer) if longer.ln_posterior > best.ln_posterior => {
+                known.insert(sorted(&longer.members), longer);
+            }
+            _ => return,
+        }
+    }
+}
+
+/// Returns a set extended by each of some hypotheses.
 fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
     let new: Vec<usize> =
         tried.iter().copied().filter(|block| !set.members.contains(block)).collect();
@@ -197,7 +221,7 @@ fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
 /// as one hypothesis can, or a third with a function beside it. In the place of two members effects
 /// alone are tried: any function does for two better than for one.
 fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
-    let Products { blocks, rules, .. } = *products;
+    let Products { blocks, .. } = *products;
     let every: Vec<usize> = (0..blocks.len()).collect();
     let of = |is_of: &dyn Fn(&Block) -> bool| -> Vec<usize> {
         every.iter().copied().filter(|&block| is_of(&blocks[block])).collect()
@@ -208,11 +232,10 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let instead: [[&[usize]; 2]; 3] = [[&every, &plain], [&every, &laws], [&laws, &laws]];
     let mut tried: BTreeSet<(Vec<usize>, usize)> = BTreeSet::new();
     for _ in 0..CHANGES {
-        let mut likely: Vec<&Set> =
-            known.values().filter(|set| !set.has_wide(blocks, rules)).collect();
+        let mut likely: Vec<&Set> = known.values().filter(|set| !set.has_wide(blocks)).collect();
         likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
         let Some(best) = likely.first().map(|set| set.ln_posterior) else { return };
-        likely.retain(|set| set.ln_posterior > best - rules.hopeless);
+        likely.retain(|set| set.ln_posterior > best - LOG_ODDS_CUTOFF);
         let is_surface = |member: &usize| blocks[*member].is_surface;
         let surfaces = likely
             .iter()
@@ -236,7 +259,7 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
         if rests.is_empty() {
             return;
         }
-        let least = best - rules.hopeless;
+        let least = best - LOG_ODDS_CUTOFF;
         let of_rest = |(rest, gone, kind): (Vec<usize>, Vec<usize>, usize)| {
             replaced((&rest, &gone), instead[kind], least, products)
         };
@@ -245,23 +268,23 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
             return;
         }
         for set in new.into_iter().flatten() {
-            let own = known.entry(sorted(&set.members)).or_insert_with(|| set.clone());
-            if set.ln_posterior > own.ln_posterior {
-                *own = set;
+            let entry = known.entry(sorted(&set.members)).or_insert_with(|| set.clone());
+            if set.ln_posterior > entry.ln_posterior {
+                *entry = set;
             }
         }
     }
 }
 
-/// The rest of a set whose members are `gone`, and beside it one and two others in their place,
-/// those of more than the `least` ln of the posterior.
+/// Returns the rest of a set without the members `gone`, and with one and two others in their
+/// place, those above the log posterior `least`.
 fn replaced(
     (rest, gone): (&[usize], &[usize]),
     [first, second]: [&[usize]; 2],
     least: f64,
     products: &Products,
 ) -> Vec<Set> {
-    let Products { blocks, rules, .. } = *products;
+    let Products { blocks, .. } = *products;
     let rest = if products.target.stop.is_requested() { None } else { assembled(rest, products) };
     let Some(rest) = rest else { return Vec::new() };
     let mut one = extended(&rest, first, products);
@@ -269,14 +292,10 @@ fn replaced(
     let second: BTreeSet<usize> =
         second.iter().copied().filter(|other| !gone.contains(other)).collect();
     let is_near = |set: &&Set| set.members.last().is_some_and(|last| second.contains(last));
-    let near: Vec<&Set> = one.iter().filter(is_near).take(rules.extending).collect();
+    let near: Vec<&Set> = one.iter().filter(is_near).take(MAX_EXTENDING).collect();
     let promising: Vec<usize> = near.iter().filter_map(|set| set.members.last().copied()).collect();
     let second: Vec<usize> = second.into_iter().collect();
-    let narrow = near
-        .into_iter()
-        .filter(|set| !set.has_wide(blocks, rules))
-        .take(rules.extended)
-        .enumerate();
+    let narrow = near.into_iter().filter(|set| !set.has_wide(blocks)).take(BEAM_WIDTH).enumerate();
     let longer = |(place, set): (usize, &Set)| {
         extended(set, if place == 0 { &second } else { &promising }, products)
     };
@@ -285,13 +304,13 @@ fn replaced(
     new.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
     // At settled sizes a set may be far more probable than with its members taken one after the
     // other.
-    let rest_of_new = new.split_off(new.len().min(rules.extended));
+    let rest_of_new = new.split_off(new.len().min(BEAM_WIDTH));
     let settled: Vec<Set> = new.into_par_iter().map(|set| set.settled(products)).collect();
     let probable = rest_of_new.into_iter().filter(|set| set.ln_posterior > least);
     std::iter::once(rest).chain(settled).chain(probable).collect()
 }
 
-/// Each member, and each two of them where they are few.
+/// Returns each member, and each pair of members where they are few.
 fn one_or_two(members: &[usize]) -> Vec<Vec<usize>> {
     let single = members.iter().map(|&member| vec![member]);
     let few = if members.len() <= FEW { members } else { &[] };
@@ -302,13 +321,13 @@ fn one_or_two(members: &[usize]) -> Vec<Vec<usize>> {
     single.chain(pairs).collect()
 }
 
-/// ln p(r | all blocks) and of their prior.
+/// Returns ln p(r | all blocks) plus ln of their prior.
 pub(super) fn ln_posterior(products: &Products) -> Option<f64> {
     let all: Vec<usize> = (0..products.blocks.len()).collect();
     Some(assembled(&all, products)?.ln_posterior + products.over_noise(products.squares))
 }
 
-/// What a set with these members leaves, at their most probable sizes.
+/// Returns what a set with these members leaves at their most probable sizes.
 pub(super) fn left_by<'p, 'a>(
     members: &[usize],
     products: &'p Products<'a>,
@@ -317,7 +336,7 @@ pub(super) fn left_by<'p, 'a>(
     products.left(&set.members, &set.sizes)
 }
 
-/// For each hypothesis that is tried the gain beside some others, its prior among it, and its most
+/// Returns for each tried hypothesis the gain beside some others, its prior included, and its most
 /// probable size.
 pub(super) fn gains_beside(
     others: &[usize],
@@ -387,10 +406,9 @@ mod tests {
 
     #[test]
     fn a_set_is_as_probable_in_whatever_order_it_was_taken() {
-        let rules = &SelectionRules::DEFAULT;
         let of = |names: [usize; 3], members: &[usize]| {
             let (blocks, target) = three(names);
-            assembled(members, &Products::new((&blocks, &target), rules)).unwrap().ln_posterior
+            assembled(members, &Products::new(&blocks, &target)).unwrap().ln_posterior
         };
         let first = of([0, 1, 2], &[0, 1]);
         assert!(
@@ -405,7 +423,6 @@ mod tests {
 
     #[test]
     fn two_that_a_third_does_for_are_found_where_one_alone_is_followed() {
-        let rules = &SelectionRules { extended: 1, ..SelectionRules::DEFAULT };
         let (one, other, noise) = (matrix(90, 1, 3.0), matrix(90, 1, 11.0), matrix(90, 1, 99.0));
         let residual = (&one * 20.0 + &other * 20.0 + noise).column(0).into_owned();
         let unknowns = Unknowns { x: vec![0.0], priors: vec![None], active: DMatrix::zeros(0, 1) };
@@ -425,23 +442,22 @@ mod tests {
             alike: 0.0,
             stop: Stop::default(),
         };
-        let found = search(&Products::new((&blocks, &target), rules), &[]);
+        let found = search(&Products::new(&blocks, &target), &[]);
         assert_eq!(sorted(&found[0].members), [1, 2], "{found:?}");
         assert!(found[0].probability > 0.9, "{}", found[0].probability);
     }
 
     #[test]
     fn what_was_worked_out_before_further_hypotheses_came_changes_nothing() {
-        let rules = &SelectionRules::DEFAULT;
         let (blocks, target) = three([2, 0, 1]);
-        let fewer = Products::new((&blocks[..2], &target), rules);
+        let fewer = Products::new(&blocks[..2], &target);
         assert!(!search(&fewer, &[0]).is_empty());
-        let again = search(&Products::knowing(fewer.into_known(), (&blocks, &target), rules), &[0]);
-        let anew = search(&Products::new((&blocks, &target), rules), &[0]);
+        let again = search(&Products::knowing(fewer.into_known(), &blocks, &target), &[0]);
+        let anew = search(&Products::new(&blocks, &target), &[0]);
         assert_eq!(again.len(), anew.len());
-        for (own, other) in again.iter().zip(&anew) {
-            assert_eq!(own.members, other.members);
-            assert!((own.probability - other.probability).abs() < 1e-9);
+        for (set, other) in again.iter().zip(&anew) {
+            assert_eq!(set.members, other.members);
+            assert!((set.probability - other.probability).abs() < 1e-9);
         }
     }
 }

@@ -15,6 +15,7 @@
 //! short a wave looks like noise to every function that another hypothesis could be, so that it is
 //! looked for beside every explanation.
 
+use crate::select::settings::{LN_ODDS_OF_ANOTHER_ARGUMENT, MAX_WAVE_ORDER};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
@@ -32,34 +33,33 @@ use crate::model::parameter::{ParameterSite, holds_all, refuses};
 use crate::problem::{Effect, JointKind, Problem};
 use crate::residual_tests::Covariate;
 use crate::select::fitted::Fitted;
-use crate::select::rules::SelectionRules;
+use crate::select::harmonic_prior::is_gear_of;
 
-/// Probability of an explanation from which on waves are looked for in the place of its functions.
+/// Minimum probability of a set in which waves are searched in the place of its functions.
 const WORTH_A_LOOK: f64 = 0.01;
-/// Explanations whose functions waves of a joint may stand for, the most probable ones.
+/// Maximum number of sets for each joint in which waves are searched.
 const MOST: usize = 6;
-/// Steps between orders, as phases \[rad\] from one end of the joint's range to the other: of the
-/// first look, and of the second one.
+/// Steps between orders of the first and the second scan, as phases \[rad\] from one end of the
+/// joint's range to the other.
 const STEPS: [f64; 2] = [1.0, 0.02];
-/// Orders of the first look about which there is a second.
+/// Number of orders of the first scan about which a finer scan follows.
 const LOOKED_AT: usize = 3;
-/// Orders that a row has at most: of a joint that turns four times and more in the data the highest
-/// are not looked for.
+/// Maximum number of orders of a scan: of a joint that turns four times and more the highest are
+/// not scanned.
 const MOST_ORDERS: usize = 8000;
-/// The shortest lead of a screw that is looked for \[m\].
+/// Shortest lead of a screw \[m\].
 const SHORTEST_LEAD: f64 = 0.002;
-/// Of orders further and further from one over which its likelihood is integrated, each step over
-/// that before it.
+/// Ratio of consecutive distances from an order over which its likelihood is integrated.
 const WIDER: f64 = 1.3;
 
-/// The joint, from 0, at which a hypothesis is a function of that joint's own command, or of
-/// nothing that is known.
+/// Returns the joint, from 0, at which a hypothesis is a function of that joint's command or of no
+/// known quantity.
 fn own_function(of: &Hypothesis, problem: &Problem) -> Option<usize> {
     let Site::Joint(joint) = of.site else { return None };
     let at_coordinate = of.coordinate == Some(ParameterSite::coordinate(problem, joint + 1));
     let is_own = match &of.kind {
         HypothesisKind::Effect(Effect::JointHarmonic { .. } | Effect::JointWave { .. }) => true,
-        HypothesisKind::Smooth | HypothesisKind::NearHarmonic(_) => {
+        HypothesisKind::Smooth | HypothesisKind::NearHarmonic(_) | HypothesisKind::Gear(_) => {
             at_coordinate && of.depends_on == [Covariate::Command(joint)]
         }
         HypothesisKind::PerPose => at_coordinate,
@@ -68,34 +68,39 @@ fn own_function(of: &Hypothesis, problem: &Problem) -> Option<usize> {
     is_own.then_some(joint)
 }
 
-/// Whether the rules of the problem let an effect be looked for.
+/// Returns true if the rules of the problem allow an effect.
 pub(super) fn is_free(effect: &Effect, problem: &Problem) -> bool {
     let parameters = effect.parameters(problem);
     !holds_all(problem, &parameters) && !refuses(problem, &parameters)
 }
 
-/// Orders from `low` to `high` in steps, so many at most.
+/// Returns orders from `low` to `high` in steps, at most `MOST_ORDERS`.
 fn row(low: f64, high: f64, step: f64) -> Vec<f64> {
     let all = std::iter::successors(Some(low), |order| Some(order + step));
     all.take_while(|order| *order <= high).take(MOST_ORDERS).collect()
 }
 
-/// Waves of any order beside the other hypotheses about what a fit leaves.
+/// Search for waves of any order beside the other hypotheses about a fit.
 #[derive(Clone, Copy)]
 pub(super) struct Waves<'w, 'h, 'a> {
     pub hypotheses: &'w Hypotheses<'h>,
     pub products: &'w Products<'a>,
     pub fitted: &'w Fitted,
-    /// Poses that are left out.
+    /// Poses that are left out of the evidence.
     pub left_out: &'w [usize],
 }
 
 impl<'w, 'a> Waves<'w, '_, 'a> {
-    /// Waves of any order, and harmonics of orders that no list has, that may stand in the place of
-    /// functions of `weighted` explanations.
+    /// Returns waves of any order, and harmonics of unlisted orders, that may stand in the place of
+    /// functions in probable sets.
     pub fn promising(&self, weighted: &[Weighted]) -> Vec<Candidate> {
         let mut found: Vec<Candidate> = Vec::new();
         for (joint, rests) in self.places(weighted) {
+            // The orders of a joint with a periodic error of many orders are in the fit.
+            let effects = &self.fitted.problem.effects;
+            if effects.iter().any(|declared| is_gear_of(&declared.effect, joint + 1)) {
+                continue;
+            }
             let Some((low, high)) = self.range(joint) else { continue };
             let (slides, highest) = (self.slides(joint), self.highest(joint));
             if !is_free(
@@ -117,11 +122,11 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                         .all
                         .iter()
                         .chain(&found)
-                        .filter_map(|own| own.hypothesis.effect())
+                        .filter_map(|candidate| candidate.hypothesis.effect())
                 };
                 let taken = known()
                     .filter_map(order_of)
-                    .filter(|(own, _)| *own == joint)
+                    .filter(|(of, _)| *of == joint)
                     .map(|(_, order)| order);
                 let taken: Vec<f64> = taken.collect();
                 let mut second = taken.clone();
@@ -143,21 +148,19 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 {
                     let spread =
                         order_of(&effect).map_or(1.0, |(_, order)| self.spread(joint, order, left));
-                    let candidate = self
-                        .hypotheses
-                        .function_of(&effect, (&self.fitted.problem, self.products.rules));
-                    found.extend(
-                        candidate
-                            .map(|own| Candidate { ln_prior: own.ln_prior + spread.ln(), ..own }),
-                    );
+                    let candidate = self.hypotheses.function_of(&effect, &self.fitted.problem);
+                    found.extend(candidate.map(|candidate| Candidate {
+                        ln_prior: candidate.ln_prior + spread.ln(),
+                        ..candidate
+                    }));
                 }
             }
         }
         found
     }
 
-    /// ln of what the chance of a wave gains as it stands for every order about its own, for those
-    /// of some hypotheses, by number, beside the others of them.
+    /// Returns for the waves among some hypotheses, by number, ln of the factor by which their
+    /// prior grows as each stands for all orders about its own.
     pub fn spreads(&self, numbers: &[usize], effects: &[&Effect]) -> Vec<(usize, f64)> {
         let one = |(&number, effect): (&usize, &&Effect)| {
             let (joint, order) = order_of(effect)?;
@@ -168,28 +171,28 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         numbers.iter().zip(effects).filter_map(one).collect()
     }
 
-    /// What some hypotheses leave.
+    /// Returns what some hypotheses leave of the residual.
     fn beside(&self, rest: &[usize]) -> Option<Left<'w, 'a>> {
         left_by(rest, self.products)
     }
 
-    /// Whether a joint slides.
+    /// Returns true if a joint slides.
     fn slides(&self, joint: usize) -> bool {
         self.fitted.problem.joints[joint].command_kind() == JointKind::Prismatic
     }
 
-    /// The highest order of a wave of a joint that is looked for; of one that slides \[rad/m\].
+    /// Returns the highest order of a wave of a joint; of one that slides \[rad/m\].
     fn highest(&self, joint: usize) -> f64 {
-        if self.slides(joint) { TAU / SHORTEST_LEAD } else { self.products.rules.wave_orders }
+        if self.slides(joint) { TAU / SHORTEST_LEAD } else { MAX_WAVE_ORDER }
     }
 
-    /// Least and greatest command of a joint \[rad\], \[m\].
+    /// Returns the smallest and largest command of a joint \[rad\], \[m\].
     fn range(&self, joint: usize) -> Option<(f64, f64)> {
-        self.hypotheses.known(&Covariate::Command(joint)).map(|own| own.range)
+        self.hypotheses.known(&Covariate::Command(joint)).map(|entry| entry.range)
     }
 
-    /// For joints, from 0, the sets in which a wave may stand: explanations without one function of
-    /// the joint's command, and without any; of joints that slide each explanation, too.
+    /// Returns for each joint, from 0, the sets in which a wave may stand: probable sets without
+    /// one function of the joint's command, and without any; for sliding joints each set, too.
     fn places(&self, weighted: &[Weighted]) -> BTreeMap<usize, Vec<Vec<usize>>> {
         let mut all: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
         let of = |member: usize| {
@@ -201,9 +204,9 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let mut whole = set.members.clone();
             whole.sort_unstable();
             for &joint in &sliding {
-                let own = all.entry(joint).or_default();
-                if !own.contains(&whole) && own.len() < MOST {
-                    own.push(whole.clone());
+                let sets_of_joint = all.entry(joint).or_default();
+                if !sets_of_joint.contains(&whole) && sets_of_joint.len() < MOST {
+                    sets_of_joint.push(whole.clone());
                 }
             }
             for &member in &set.members {
@@ -214,12 +217,12 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                     rest.sort_unstable();
                     rest
                 };
-                let own = all.entry(joint).or_default();
+                let sets_of_joint = all.entry(joint).or_default();
                 for rest in
                     [without(&|other| other == member), without(&|other| of(other) == Some(joint))]
                 {
-                    if !own.contains(&rest) && own.len() < MOST {
-                        own.push(rest);
+                    if !sets_of_joint.contains(&rest) && sets_of_joint.len() < MOST {
+                        sets_of_joint.push(rest);
                     }
                 }
             }
@@ -227,10 +230,10 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         all
     }
 
-    /// For what each of some sets leaves the orders, best first, with ln of the odds of such a wave
-    /// to the set alone.
+    /// Returns, for each of some sets, the orders with the log odds of such a wave to the set
+    /// alone, best first.
     fn gains(&self, joint: usize, orders: &[f64], left: &[Left]) -> Vec<Vec<(f64, f64)>> {
-        let how = (&self.fitted.problem, self.products.rules);
+        let problem = &self.fitted.problem;
         let of = |orders: &[f64]| {
             if self.products.target.stop.is_requested() {
                 return Vec::new();
@@ -239,7 +242,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 Some((
                     order,
                     self.hypotheses
-                        .function_of(&Effect::JointWave { joint: joint + 1, order }, how)?,
+                        .function_of(&Effect::JointWave { joint: joint + 1, order }, problem)?,
                 ))
             };
             let (orders, waves): (Vec<f64>, Vec<Candidate>) =
@@ -247,30 +250,29 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let fit = (self.fitted, &self.products.target.fit);
             let blocks = Candidate::blocks(&waves.iter().collect::<Vec<_>>(), fit, self.left_out);
             let of_sets: Vec<Vec<f64>> = left.iter().map(|left| left.odds_of(&blocks)).collect();
-            let odds = |k: usize| of_sets.iter().map(|own| own[k]).collect();
+            let odds = |k: usize| of_sets.iter().map(|odds| odds[k]).collect();
             orders.into_iter().enumerate().map(|(k, order)| (order, odds(k))).collect()
         };
         let all: Vec<(f64, Vec<f64>)> = orders.par_chunks(TOGETHER).flat_map_iter(of).collect();
         let of_set = |k: usize| {
-            let mut own: Vec<(f64, f64)> =
+            let mut of_orders: Vec<(f64, f64)> =
                 all.iter().map(|(order, odds)| (*order, odds[k])).collect();
-            own.sort_by(|a, b| b.1.total_cmp(&a.1));
-            own
+            of_orders.sort_by(|a, b| b.1.total_cmp(&a.1));
+            of_orders
         };
         (0..left.len()).map(of_set).collect()
     }
 
-    /// Of orders, best first, with ln of their odds: the best that is no whole number, unless one
-    /// does as well that was taken before; and harmonics beyond those that are listed, where they
-    /// do as well as the best.
+    /// Returns the best order that is no whole number, unless one taken before does as well; and
+    /// unlisted harmonics that do as well as the best. `gains` has orders with their log odds, best
+    /// first.
     fn another(&self, joint: usize, gains: &[(f64, f64)], taken: &[f64]) -> Vec<Effect> {
         let Some(&(_, most)) = gains.first().filter(|(_, most)| *most > 0.0) else {
             return Vec::new();
         };
         let as_good = || {
-            let near = gains
-                .iter()
-                .take_while(|(_, gain)| *gain > most - self.products.rules.another_order);
+            let near =
+                gains.iter().take_while(|(_, gain)| *gain > most - LN_ODDS_OF_ANOTHER_ARGUMENT);
             near.map(|(order, _)| *order)
         };
         let (joint, slides) = (joint + 1, self.slides(joint));
@@ -290,8 +292,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         all
     }
 
-    /// Orders about one, in units of orders, each by how well it does beside it: by the trapezoid
-    /// rule, none more than it.
+    /// Returns the width of the likelihood about an order, in orders, by the trapezoid rule.
     fn spread(&self, joint: usize, order: f64, left: &Left) -> f64 {
         let Some((low, high)) = self.range(joint) else { return 1.0 };
         let range = high - low;
@@ -303,11 +304,11 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         orders.sort_by(f64::total_cmp);
         let mut gains = self.gains(joint, &orders, std::slice::from_ref(left)).concat();
         gains.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let own = gains
+        let reference = gains
             .iter()
-            .find(|(own, _)| own.total_cmp(&order).is_eq())
+            .find(|(reference, _)| reference.total_cmp(&order).is_eq())
             .map_or(0.0, |(_, gain)| *gain);
-        let weight = |gain: f64| (gain - own).min(0.0).exp();
+        let weight = |gain: f64| (gain - reference).min(0.0).exp();
         let between = |pair: &[(f64, f64)]| {
             0.5 * (weight(pair[0].1) + weight(pair[1].1)) * (pair[1].0 - pair[0].0)
         };
@@ -316,24 +317,24 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     }
 }
 
-/// As written with so many digits, not as a product has it.
+/// Rounds an order to so many decimals.
 fn written(order: f64, digits: usize) -> f64 {
     format!("{order:.digits$}").parse().unwrap_or(order)
 }
 
 impl Hypotheses<'_> {
-    /// The hypothesis of an effect that is a wave of the command of its joint.
-    fn function_of(&self, effect: &Effect, how: (&Problem, &SelectionRules)) -> Option<Candidate> {
+    /// Returns the hypothesis of an effect that is a wave of the command of its joint.
+    fn function_of(&self, effect: &Effect, problem: &Problem) -> Option<Candidate> {
         let (joint, order) = match effect {
             Effect::JointHarmonic { joint, orders } => (joint - 1, f64::from(*orders.first()?)),
             other => order_of(other)?,
         };
         let known = self.known(&Covariate::Command(joint))?;
-        let at = self.linearised.place(ParameterSite::coordinate(how.0, joint + 1))?;
+        let at = self.linearised.place(ParameterSite::coordinate(problem, joint + 1))?;
         let waves = DMatrix::from_fn(known.values.len(), 2, |row, k| {
             let (sin, cos) = (order * known.values[row]).sin_cos();
             if k == 0 { sin } else { cos }
         });
-        self.entered(effect, times(&[&at], &waves), how)
+        self.entered(effect, times(&[&at], &waves), problem)
     }
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::orthonormal::RANK;
 use crate::numeric::{gram, inverse_factor, solve_positive};
 
-/// JᵀJ, Jᵀr, rᵀr and the number of rows of some poses.
+/// Products JᵀJ, Jᵀr, rᵀr and the number of rows of some poses.
 struct Squares {
     gram: DMatrix<f64>,
     product: DVector<f64>,
@@ -22,14 +22,15 @@ impl Squares {
     }
 }
 
-/// All poses of a fit in sums, and the parts that are left out in turn.
+/// Sums over all poses of a fit and over the parts that are left out in turn.
 pub(in crate::select) struct PartSquares {
     whole: Squares,
     parts: Vec<Squares>,
 }
 
 impl PartSquares {
-    /// Of columns, shape = (3 N, n), and the residual; `parts` are numbers of poses.
+    /// Creates the sums from columns, shape = (3 N, n), and the residual; `parts` are numbers of
+    /// poses.
     pub fn new(columns: &DMatrix<f64>, residual: &DVector<f64>, parts: &[Vec<usize>]) -> Self {
         let every: Vec<usize> = (0..residual.len() / 3).collect();
         let parts = parts.par_iter().map(|poses| Squares::of(columns, residual, poses)).collect();

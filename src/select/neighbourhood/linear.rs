@@ -6,26 +6,24 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::estimated::Estimated;
 use super::orthonormal::{open, orthonormal, orthonormal_above};
 use super::score::{Score, Sums};
 use crate::numeric::{gram, inverse_factor, product, transposed_narrow_product, zeros};
 
-/// A direction is decided by a block of poses alone when less than this part of its length² is left
-/// without the block: then the others say nothing of it.
+/// Minimum part of a direction's length² outside a block of poses for the other poses to determine
+/// it.
 const LEAST_DECIDED: f64 = 1e-6;
 
-/// So many columns at most are projected out by one direction of the basis after the other: it is
-/// gone through once for all of them.
+/// Maximum number of columns that are projected out by one direction of the basis after the other.
 const NARROW: usize = 4;
-/// Part of a column that is left from which on what one projection leaves along a basis is
-/// rounding. Of less, two are enough [Giraud, Langou & Rozložník 2005].
+/// Part of a column from which on one projection leaves only rounding along a basis. For less, two
+/// are enough [Giraud, Langou & Rozložník 2005].
 const MOSTLY: f64 = 0.1;
 
 /// The unknowns of a fit as it ended.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Unknowns {
-    /// Their values, deviations from nominal.
+    /// Values, as deviations from nominal.
     pub x: Vec<f64>,
     /// 1 σ of their priors.
     pub priors: Vec<Option<f64>>,
@@ -42,25 +40,25 @@ pub(crate) struct Unknowns {
 /// columns before them take up wholly have no part in T and stay where they are.
 #[derive(Debug)]
 pub(crate) struct LinearNeighbourhood {
-    /// Whitened residual at the optimum, priors below.
+    /// Returns the whitened residual at the optimum, priors below.
     residual: DVector<f64>,
     /// Q, shape = (3 N + priors, rank).
     basis: DMatrix<f64>,
-    /// T.
+    /// Matrix T, shape = (unknowns, rank).
     root: DMatrix<f64>,
     /// Values of the unknowns at the optimum.
     optimum: DVector<f64>,
     /// From where the derivatives were taken to the optimum.
     step: DVector<f64>,
-    /// Rows that are data.
+    /// Number of rows that are data.
     rows: usize,
-    /// Those of them that are 0 because nothing is measured there.
+    /// Number of these rows that are 0 because nothing is measured there.
     empty: usize,
     /// Sums of squares, with priors and of the data alone, and degrees of freedom of the data.
     sums: Sums,
 }
 
-/// On every core: most of its time is that of new memory.
+/// Clones on every core: most of the time is that of new memory.
 impl Clone for LinearNeighbourhood {
     fn clone(&self) -> Self {
         Self {
@@ -74,19 +72,10 @@ impl Clone for LinearNeighbourhood {
     }
 }
 
-/// What some unknowns alone give a fit.
-#[derive(Debug, Clone)]
-pub(crate) struct Share {
-    /// Orthonormal directions that only they fit, shape = (3 N + priors, k).
-    pub directions: DMatrix<f64>,
-    /// Part of the residual along them that they take off: without them the sum of squares is
-    /// larger by its square.
-    pub part: DVector<f64>,
-}
-
 impl LinearNeighbourhood {
-    /// From the Jacobian ∂r/∂x, shape = (3 N, n), and the residual r of a fit that ended at the
-    /// unknowns given; so many rows are `empty`: 0, since poses measure fewer numbers than three.
+    /// Creates the neighbourhood from the Jacobian ∂r/∂x, shape = (3 N, n), and the residual r of a
+    /// fit that ended at the unknowns given; `empty` rows are 0 since poses measure fewer numbers
+    /// than three.
     pub fn new(
         jacobian: &DMatrix<f64>,
         residual: &DVector<f64>,
@@ -96,7 +85,7 @@ impl LinearNeighbourhood {
         Self::of(Cow::Borrowed(jacobian), residual.clone(), unknowns, empty)
     }
 
-    /// The same of a Jacobian that nobody else needs, in its place.
+    /// Creates the neighbourhood in the memory of a Jacobian that nobody else needs.
     pub fn in_place_of(
         jacobian: DMatrix<f64>,
         residual: DVector<f64>,
@@ -154,9 +143,9 @@ impl LinearNeighbourhood {
         self.sums = Sums::of(&self.residual, self.rows, before - taken);
     }
 
-    /// What columns of the data, shape = (3 N, k) or as long as the basis, have along it, the
-    /// orthonormal directions that they add to it, and these in terms of what the basis leaves of
-    /// the columns.
+    /// Returns three matrices for columns of the data: their components along the basis, the
+    /// orthonormal directions that they add, and these directions in terms of what the basis leaves
+    /// of the columns.
     fn directions(&self, columns: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
         let lengths: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
@@ -173,8 +162,8 @@ impl LinearNeighbourhood {
         (along, new, within)
     }
 
-    /// Takes further columns of the data into the fit, shape = (3 N, k) or as long as the basis,
-    /// with unknowns of their own behind the others; gives the new orthonormal directions.
+    /// Adds columns of the data, shape = (3 N, k) or as long as the basis, with unknowns behind the
+    /// others; returns the new orthonormal directions.
     pub fn add(&mut self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let (first, n, k) = (self.basis.ncols(), self.root.nrows(), columns.ncols());
         let (along, new, within) = self.directions(columns);
@@ -191,15 +180,15 @@ impl LinearNeighbourhood {
         new
     }
 
-    /// The same fit with further columns.
+    /// Returns the fit with further columns.
     pub fn with(&self, columns: &DMatrix<f64>) -> Self {
         let mut with = self.clone();
         with.add(columns);
         with
     }
 
-    /// The same fit with further columns of the data, shape = (3 N, k), whose coefficients have a
-    /// prior of 1 σ about 0.
+    /// Returns the fit with further columns of the data, shape = (3 N, k), whose coefficients have
+    /// a prior of 1 σ about 0.
     pub fn with_priors(&self, columns: &DMatrix<f64>, sigma: f64) -> Self {
         let (rows, k) = (self.basis.nrows(), columns.ncols());
         let mut columns = columns.clone().resize_vertically(rows + k, 0.0);
@@ -216,42 +205,22 @@ impl LinearNeighbourhood {
         with
     }
 
-    /// The fit as its optimum and covariance.
-    pub fn estimated(&self) -> Estimated {
-        Estimated::new(&self.root, self.optimum.clone(), self.sums.squares)
-    }
-
-    /// What is left in numbers.
+    /// Returns the sums of squares and degrees of freedom.
     pub fn sums(&self) -> Sums {
         self.sums
     }
 
-    /// What would be left without some unknowns.
-    pub fn sums_without(&self, share: &Share) -> Sums {
-        let freed = share.directions.rows(0, self.rows).norm_squared();
-        Sums::of(
-            &(&self.residual + &share.directions * &share.part),
-            self.rows,
-            self.sums.data_freedom + freed,
-        )
-    }
-
-    /// Number of unknowns, those of added columns among them.
-    pub fn unknowns(&self) -> usize {
-        self.root.nrows()
-    }
-
-    /// Data rows, 3 N.
+    /// Returns the number of data rows, 3 N.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Q, the data's rows of the orthonormal factor: H = Q Qᵀ.
+    /// Returns Q, the data's rows of the orthonormal factor: H = Q Qᵀ.
     pub fn fitted(&self) -> DMatrix<f64> {
         self.basis.rows(0, self.rows).into_owned()
     }
 
-    /// The same and whitened residuals of the data, without a copy.
+    /// Returns Q and the whitened residuals of the data without a copy.
     pub fn into_fitted(self) -> (DMatrix<f64>, DVector<f64>) {
         (
             self.basis.resize_vertically(self.rows, 0.0),
@@ -259,45 +228,38 @@ impl LinearNeighbourhood {
         )
     }
 
-    /// From where the derivatives were taken to the optimum, all unknowns, those of added columns
+    /// Returns the step from the point of the derivatives to the optimum, unknowns of added columns
     /// last.
     pub fn step(&self) -> &DVector<f64> {
         &self.step
     }
 
-    /// What the degrees of freedom are to be expected to be where the priors are true: rows, priors
-    /// included, less rank.
+    /// Returns the expected degrees of freedom if the priors are true: rows, priors included, less
+    /// rank.
     pub fn expected_freedom(&self) -> f64 {
         (self.basis.nrows() - self.empty - self.basis.ncols()) as f64
     }
 
-    /// What some unknowns x alone give the fit; `None` where the fit does not tell them from
-    /// others.
+    /// Returns U and − S⁻ᵀ x of some unknowns x; `None` where the fit does not tell them from others.
     ///
-    /// With T_x their rows of T and T_xᵀ = U S its QR factors, only they fit the directions Q U,
-    /// and take − S⁻ᵀ x off along them.
-    pub fn share(&self, unknowns: &[usize]) -> Option<Share> {
-        self.share_within(unknowns)
-            .map(|(turned, part)| Share { directions: product(&self.basis, &turned), part })
-    }
-
-    /// U and − S⁻ᵀ x.
+    /// With T_x their rows of T and T_xᵀ = U S its QR factors, only these unknowns fit the directions
+    /// Q U, and take − S⁻ᵀ x off the residual along them.
     fn share_within(&self, unknowns: &[usize]) -> Option<(DMatrix<f64>, DVector<f64>)> {
-        let own = self.root.select_rows(unknowns).transpose();
+        let rows = self.root.select_rows(unknowns).transpose();
         // U = T_xᵀ W with W = S⁻¹.
-        let (turned, within) = orthonormal(&own, None);
+        let (turned, within) = orthonormal(&rows, None);
         let x = self.optimum.select_rows(unknowns);
         (turned.ncols() == unknowns.len()).then(|| (turned, -within.tr_mul(&x)))
     }
 
-    /// By how much the sum of squares is larger without some unknowns; `None` where the fit does
+    /// Returns the increase of the sum of squares without some unknowns; `None` where the fit does
     /// not tell them from others.
     pub fn loss_without(&self, unknowns: &[usize]) -> Option<f64> {
         self.share_within(unknowns).map(|(_, part)| part.norm_squared())
     }
 
-    /// Columns of the data, shape = (3 N, k), with everything fitted projected out, shape = (3 N +
-    /// priors, k).
+    /// Returns columns of the data, shape = (3 N, k), with everything fitted projected out, shape =
+    /// (3 N + priors, k).
     pub fn left_of(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
         // Below the data there is nothing at first.
@@ -315,8 +277,8 @@ impl LinearNeighbourhood {
         left
     }
 
-    /// Takes off columns what of them is along the basis, nothing of them being behind so many
-    /// rows.
+    /// Subtracts from columns their components along the basis; their rows from `filled` on are
+    /// zero.
     fn take_off(&self, left: &mut DMatrix<f64>, filled: usize) {
         if left.ncols() > NARROW {
             // The narrow side is transposed: this is the product that is fast.
@@ -336,12 +298,12 @@ impl LinearNeighbourhood {
         &self.residual
     }
 
-    /// What the residual says about columns, shape = (3 N, k).
+    /// Returns the score of columns, shape = (3 N, k).
     pub fn score(&self, columns: &DMatrix<f64>) -> Score {
         self.projected(columns, &self.basis.rows(0, self.rows).tr_mul(columns))
     }
 
-    /// The same of several sets of columns, multiplied together.
+    /// Returns the scores of several sets of columns, multiplied together.
     pub fn scores(&self, sets: &[DMatrix<f64>]) -> Vec<Score> {
         if sets.is_empty() {
             return Vec::new();
@@ -358,7 +320,7 @@ impl LinearNeighbourhood {
         sets.iter().map(&mut next).collect()
     }
 
-    /// The score of columns that have Qᵀ C along what was fitted.
+    /// Returns the score of columns that have Qᵀ C along what was fitted.
     fn projected(&self, columns: &DMatrix<f64>, along: &DMatrix<f64>) -> Score {
         let gram = columns.tr_mul(columns) - along.tr_mul(along);
         let product = columns.tr_mul(&self.residual.rows(0, self.rows));
@@ -369,8 +331,8 @@ impl LinearNeighbourhood {
         }
     }
 
-    /// Largest principal angle \[rad\] between what two sets of columns add to the fit; `None`
-    /// where one of them adds nothing.
+    /// Returns the largest principal angle \[rad\] between what two sets of columns add to the fit;
+    /// `None` where one of them adds nothing.
     pub fn angle(&self, one: &DMatrix<f64>, other: &DMatrix<f64>) -> Option<f64> {
         let (a, b) = (self.directions(one).1, self.directions(other).1);
         if a.is_empty() || b.is_empty() {
@@ -380,13 +342,18 @@ impl LinearNeighbourhood {
         cosines.iter().copied().reduce(f64::min).map(|cosine| cosine.clamp(0.0, 1.0).acos())
     }
 
-    /// Sum of squared residuals of poses that are left out, block by block, from the fit without
-    /// them.
+    /// Returns the sum of squared residuals of poses that are left out, block by block, from the
+    /// fit without them.
     ///
     /// `block` holds the block of each pose. A left-out residual is (I − H_bb)⁻¹ r_b, by Woodbury's
     /// identity r_b + Q_b (I − Q_bᵀQ_b)⁻¹ Q_bᵀ r_b. A direction that a block alone decides is left
     /// as it was fitted.
     pub fn cross_validate(&self, block: &[usize]) -> Option<f64> {
+        self.left_out_squares(block).map(|sums| sums.iter().sum())
+    }
+
+    /// Returns that sum for each block.
+    pub fn left_out_squares(&self, block: &[usize]) -> Option<Vec<f64>> {
         let blocks = block.iter().max().map_or(0, |last| last + 1);
         let n = self.basis.ncols();
         let left_out = |number: usize| {
@@ -398,13 +365,12 @@ impl LinearNeighbourhood {
             (residual + basis * step).norm_squared()
         };
         let sums: Vec<f64> = (0..blocks).into_par_iter().map(left_out).collect();
-        let sum: f64 = sums.iter().sum();
-        sum.is_finite().then_some(sum)
+        sums.iter().all(|sum| sum.is_finite()).then_some(sums)
     }
 }
 
-/// Q and T of columns with rows `below` them of one entry each, within the directions that the
-/// constraints `active` leave open.
+/// Returns Q and T of columns with rows `below` them of one entry each, within the directions that
+/// the constraints `active` leave open.
 fn held(
     jacobian: &DMatrix<f64>,
     below: &[(usize, f64)],
@@ -423,7 +389,7 @@ fn held(
     (basis, root)
 }
 
-/// A tall matrix with so many rows of zeros below it.
+/// Returns a matrix with `more` rows of zeros below it.
 fn lengthened(matrix: &DMatrix<f64>, more: usize) -> DMatrix<f64> {
     let (rows, n) = matrix.shape();
     let mut long = zeros(rows + more, n);
@@ -432,13 +398,13 @@ fn lengthened(matrix: &DMatrix<f64>, more: usize) -> DMatrix<f64> {
     long
 }
 
-/// Whether so much is left of every column.
+/// Returns true if at least `MOSTLY` of the length of every column is left.
 fn most_is_left(left: &DMatrix<f64>, lengths: &[f64]) -> bool {
     left.column_iter().zip(lengths).all(|(column, length)| column.norm() >= MOSTLY * length)
 }
 
-/// Solves with a symmetric matrix of eigenvalues from 0 to 1; nothing along those that are nearly
-/// 0.
+/// Solves with a symmetric matrix of eigenvalues from 0 to 1; the solution is zero along
+/// eigenvalues near 0.
 fn decided(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     if let Some(root) = inverse_factor(&matrix)
         && root.diagonal().iter().all(|value| (value * value).recip() > LEAST_DECIDED)
@@ -470,10 +436,9 @@ mod tests {
     }
 
     #[test]
-    fn a_share_is_what_the_fit_loses_without_its_unknowns() {
+    fn the_loss_without_unknowns_is_that_of_a_fit_without_them() {
         let (columns, residual, unknowns) = fit(5);
         let whole = LinearNeighbourhood::new(&columns, &residual, &unknowns, 0);
-        let share = whole.share(&[3, 4]).unwrap();
         let fewer = Unknowns {
             x: unknowns.x[..3].to_vec(),
             priors: unknowns.priors[..3].to_vec(),
@@ -483,9 +448,9 @@ mod tests {
             residual - columns.columns(3, 2) * DVector::from_column_slice(&unknowns.x[3..]);
         let rest =
             LinearNeighbourhood::new(&columns.columns(0, 3).into_owned(), &without, &fewer, 0);
-        let (lost, expected) = (whole.sums_without(&share), rest.sums());
-        assert!((lost.squares - expected.squares).abs() < 1e-10 && share.part.norm() > 0.1);
-        assert!((lost.data_freedom - expected.data_freedom).abs() < 1e-10);
+        let lost = whole.loss_without(&[3, 4]).unwrap();
+        let expected = rest.sums().squares - whole.sums().squares;
+        assert!((lost - expected).abs() < 1e-10 && lost > 0.01);
         let with = rest.with(&columns.columns(3, 2).into_owned());
         assert!((with.sums().squares - whole.sums().squares).abs() < 1e-10);
         assert!((with.optimum.rows(0, 3) - whole.optimum.rows(0, 3)).norm() < 1e-10);
@@ -547,6 +512,6 @@ mod tests {
         let odd = LinearNeighbourhood::new(&odd, &residual, &more, 0);
         assert!((odd.sums().squares - plain.sums().squares).abs() < 1e-9);
         assert_eq!(odd.fitted().ncols(), 5);
-        assert!(odd.share(&[5]).is_none());
+        assert!(odd.loss_without(&[5]).is_none());
     }
 }

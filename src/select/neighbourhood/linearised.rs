@@ -6,7 +6,6 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
 use rayon::prelude::*;
 
-use crate::least_squares::kernel::dot;
 use crate::least_squares::{MANY_UNKNOWNS, jacobian_and_residual};
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, Parameter, ParameterSite, Regressor};
@@ -25,7 +24,7 @@ pub(crate) struct Linearised<'a> {
     derivatives: Arc<Derivatives>,
 }
 
-/// What a model linearised in some poses comes to.
+/// Derivatives and residual of a model in some poses.
 #[derive(Debug, Clone)]
 pub(in crate::select) struct Derivatives {
     /// Columns of the fitted parameters, and of what is relaxed behind them, shape = (3 N, n).
@@ -41,8 +40,8 @@ pub(in crate::select) struct Derivatives {
 }
 
 impl Derivatives {
-    /// Those of the fitted parameters, as a fit that begins at the full parameter vector `x` takes
-    /// them.
+    /// Returns the derivatives of the fitted parameters as a fit reuses them that begins at the
+    /// full parameter vector `x`.
     pub fn linear_model(
         &self,
         at: (&[Parameter], &DVector<f64>),
@@ -72,9 +71,8 @@ impl Derivatives {
 }
 
 impl<'a> Linearised<'a> {
-    /// About the full parameter vector `x` of `model`, with the parameters `unknowns` fitted, for
-    /// the effects and other places given; of many unknowns from what is `known` of the same in the
-    /// same poses.
+    /// Linearises `model` about its full parameter vector `x` with the parameters `unknowns`
+    /// fitted, for the effects and sites given. Derivatives in `known` are reused.
     pub fn new(
         (problem, known): (&'a Problem, Option<Arc<Derivatives>>),
         model: &Model,
@@ -112,7 +110,7 @@ impl<'a> Linearised<'a> {
         slots.retain(|place| fitted_at(place).is_none());
         let first = model.parameters.len();
         // Columns of parameters and of slots, and the residual.
-        let pass = |own: &[usize], slots: &[(ParameterSite, f64)]| {
+        let pass = |parameters: &[usize], slots: &[(ParameterSite, f64)]| {
             let probing = model.with_springs_of(effects).with_probes(slots);
             let mut at = x.clone().resize_vertically(first + slots.len(), 0.0);
             for (index, (site, _)) in slots.iter().enumerate() {
@@ -120,7 +118,8 @@ impl<'a> Linearised<'a> {
                     at[first + index] = TRACE_OF_MASS;
                 }
             }
-            let all: Vec<usize> = own.iter().copied().chain(first..first + slots.len()).collect();
+            let all: Vec<usize> =
+                parameters.iter().copied().chain(first..first + slots.len()).collect();
             let residuals = PoseResiduals::new(&probing, Arc::clone(&poses), all, at.clone());
             jacobian_and_residual(&residuals, &residuals.reduced(&at))
         };
@@ -143,22 +142,22 @@ impl<'a> Linearised<'a> {
             let (_, residual) = jacobian_and_residual(&plain, &DVector::zeros(0));
             let fitted = unknowns.len() + shared.len();
             let beside = jacobian.columns_range(fitted..).into_owned();
-            let mut own = new(jacobian.resize_horizontally(fitted, 0.0), residual);
-            own.extend(&slots, beside.as_view());
-            own
+            let mut derivatives = new(jacobian.resize_horizontally(fitted, 0.0), residual);
+            derivatives.extend(&slots, beside.as_view());
+            derivatives
         } else {
-            let mut own = known.map_or_else(
+            let mut derivatives = known.map_or_else(
                 || {
                     let (fitted, residual) = pass(unknowns, &shared);
                     new(fitted, residual)
                 },
                 Arc::unwrap_or_clone,
             );
-            slots.retain(|(site, _)| !own.places.iter().any(|(known, _)| known == site));
+            slots.retain(|(site, _)| !derivatives.places.iter().any(|(known, _)| known == site));
             if !slots.is_empty() {
-                own.extend(&slots, pass(&[], &slots).0.as_view());
+                derivatives.extend(&slots, pass(&[], &slots).0.as_view());
             }
-            own
+            derivatives
         };
         for place in at_fitted {
             if !derivatives.places.contains(&place) {
@@ -168,12 +167,12 @@ impl<'a> Linearised<'a> {
         Self { problem, poses, derivatives: Arc::new(derivatives) }
     }
 
-    /// What it comes to, to be known where the same is asked for again.
+    /// Returns the derivatives for reuse.
     pub fn derivatives(&self) -> Arc<Derivatives> {
         Arc::clone(&self.derivatives)
     }
 
-    /// The same with poses that say nothing.
+    /// Returns the model with the rows of some poses set to zero.
     pub fn without(&self, poses: &[usize]) -> Self {
         let mut rest = self.clone();
         if poses.is_empty() {
@@ -189,24 +188,25 @@ impl<'a> Linearised<'a> {
         rest
     }
 
-    /// Columns of the fitted parameters and of what is relaxed beside them, shape = (3 N, n).
+    /// Returns the columns of the fitted parameters and of what is relaxed beside them, shape = (3
+    /// N, n).
     pub fn fitted(&self) -> &DMatrix<f64> {
         &self.derivatives.fitted
     }
 
-    /// The same and the whitened residual; copies only where others know them.
+    /// Returns the columns and the whitened residual; copies only where they are shared.
     pub fn into_fitted(self) -> (DMatrix<f64>, DVector<f64>) {
         let Derivatives { fitted, residual, .. } = Arc::unwrap_or_clone(self.derivatives);
         (Arc::unwrap_or_clone(fitted), Arc::unwrap_or_clone(residual))
     }
 
-    /// σ of the priors of what is relaxed, in the order of its columns.
+    /// Returns σ of the priors of what is relaxed, in the order of its columns.
     pub fn relaxed(&self) -> &[Option<f64>] {
         &self.derivatives.relaxed
     }
 
-    /// Columns of other parameters of the model, about its full parameter vector `x`, shape = (3 N,
-    /// parameters).
+    /// Returns the columns of other parameters of the model about its full parameter vector `x`,
+    /// shape = (3 N, parameters).
     pub fn of_parameters(
         &self,
         model: &Model,
@@ -218,27 +218,27 @@ impl<'a> Linearised<'a> {
         jacobian_and_residual(&residuals, &residuals.reduced(x)).0
     }
 
-    /// Whitened residual, 3 N.
+    /// Returns the whitened residual, 3 N.
     pub fn residual(&self) -> &DVector<f64> {
         &self.derivatives.residual
     }
 
-    /// Rows that are 0 because their poses measure fewer numbers than three.
+    /// Returns the number of rows that are 0 because their poses measure fewer numbers than three.
     pub fn empty(&self) -> usize {
         self.poses.iter().map(|pose| 3 - pose.observation.coordinates()).sum()
     }
 
-    /// The poses.
+    /// Returns the poses.
     pub fn poses(&self) -> &[Pose<'a>] {
         &self.poses
     }
 
-    /// Columns of an effect's parameters, shape = (3 N, k).
+    /// Returns the columns of an effect's parameters, shape = (3 N, k).
     pub fn columns(&self, effect: &Effect) -> DMatrix<f64> {
         self.columns_of(&Driven::of(self, std::slice::from_ref(effect)), 0)
     }
 
-    /// The same of one of some effects.
+    /// Returns the columns of one of some effects.
     pub fn columns_of(&self, driven: &Driven, effect: usize) -> DMatrix<f64> {
         let terms = driven.terms.get(effect).map_or(&[][..], Vec::as_slice);
         let mut columns = DMatrix::zeros(self.derivatives.fitted.nrows(), terms.len());
@@ -252,49 +252,17 @@ impl<'a> Linearised<'a> {
         columns
     }
 
-    /// Cᵀ D of the columns C of each of some effects, shape = (3 N, k), and directions D, shape =
-    /// (3 N, m): summed over the rows of a pose first, for all effects at a place.
-    pub fn along(&self, driven: &Driven, directions: &DMatrix<f64>) -> Vec<DMatrix<f64>> {
-        let (poses, width) = (self.poses.len(), directions.ncols());
-        let of_place = |place: &usize| {
-            let at_place = self.derivatives.column(*place);
-            let sum = |pose: usize, k: usize| {
-                at_place.fixed_rows::<3>(3 * pose).dot(&directions.fixed_view::<3, 1>(3 * pose, k))
-            };
-            DMatrix::from_fn(poses, width, sum)
-        };
-        let places: Vec<usize> = self.derivatives.places.iter().map(|(_, place)| *place).collect();
-        let sums: Vec<DMatrix<f64>> = places.par_iter().map(of_place).collect();
-        let of_effect = |terms: &Vec<(Option<usize>, usize)>| {
-            let mut along = DMatrix::zeros(terms.len(), width);
-            for (&(place, regressor), mut row) in terms.iter().zip(along.row_iter_mut()) {
-                let Some(known) =
-                    place.and_then(|place| places.iter().position(|own| *own == place))
-                else {
-                    continue;
-                };
-                let values = &driven.values[regressor];
-                debug_assert_eq!(values.len(), poses);
-                row.iter_mut()
-                    .zip(sums[known].column_iter())
-                    .for_each(|(out, own)| *out = dot(own.as_slice(), values));
-            }
-            along
-        };
-        driven.terms.par_iter().map(of_effect).collect()
-    }
-
-    /// The problem that it is of.
+    /// Returns the problem.
     pub fn problem(&self) -> &'a Problem {
         self.problem
     }
 
-    /// For each of an effect's parameters, whether it is never negative.
+    /// Returns for each of an effect's parameters whether it is never negative.
     pub fn never_negative(&self, effect: &Effect) -> Vec<bool> {
         effect.terms(self.problem).iter().map(|term| term.never_negative).collect()
     }
 
-    /// Column of a place, 3 N; `None` where no effect enters there.
+    /// Returns the column of a site, 3 N; `None` where no effect enters there.
     pub fn place(&self, site: ParameterSite) -> Option<DVector<f64>> {
         let &(_, place) = self.derivatives.places.iter().find(|(known, _)| *known == site)?;
         Some(self.derivatives.column(place).into_owned())
@@ -304,15 +272,15 @@ impl<'a> Linearised<'a> {
 /// Effects by where they enter and what they are multiplied by there in every pose, each regressor
 /// evaluated once.
 pub(crate) struct Driven {
-    /// For each effect and each of its terms the column of the place, if it has one, and the number
-    /// of the regressor.
+    /// Column of the site, if it has one, and number of the regressor, for each term of each
+    /// effect.
     terms: Vec<Vec<(Option<usize>, usize)>>,
     /// Values of each regressor in every pose.
     values: Vec<Vec<f64>>,
 }
 
 impl Driven {
-    /// In the poses and at the places of a linearised model.
+    /// Creates the regressors of effects in the poses of a linearised model.
     pub fn of(linearised: &Linearised, effects: &[Effect]) -> Self {
         let mut regressors: Vec<Regressor> = Vec::new();
         let mut term = |Term { site, regressor, .. }: Term| {

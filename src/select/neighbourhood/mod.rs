@@ -2,12 +2,10 @@
 //!
 //! - [`Linearised`]: the model with a column for every place where an effect may enter;
 //!   [`LinearNeighbourhood`]: a fit in it.
-//! - [`Estimated`]: a fit without its columns, which unknowns may leave.
 //! - [`Score`], [`Sums`], [`Gain`]: what columns would take off the residual, and how probable that
 //!   is by chance.
 //! - [`Scan`]: all candidates against one fit.
 
-mod estimated;
 mod left_out;
 mod linear;
 mod linearised;

@@ -29,8 +29,8 @@ pub(super) fn orthonormal(
     orthonormal_above(Cow::Borrowed(columns), &[], lengths)
 }
 
-/// The same of columns with rows `below` them of one entry each, its column and its value; in the
-/// place of columns that nobody else needs.
+/// Returns the basis of columns with rows `below` them of one entry each, its column and its value;
+/// computed in place of columns that nobody else needs.
 pub(super) fn orthonormal_above(
     columns: Cow<DMatrix<f64>>,
     below: &[(usize, f64)],
@@ -41,17 +41,20 @@ pub(super) fn orthonormal_above(
     for &(j, value) in below {
         products[(j, j)] += value * value;
     }
-    let own: Vec<f64> = products.diagonal().iter().map(|square| square.sqrt()).collect();
-    let (kept, first) = independent(&products, &own, lengths.unwrap_or(&own));
+    let norms: Vec<f64> = products.diagonal().iter().map(|square| square.sqrt()).collect();
+    let (kept, first) = independent(&products, &norms, lengths.unwrap_or(&norms));
     // L⁻ᵀ takes columns with the Gram matrix L Lᵀ to orthonormal ones.
     let mut turn = inverse_lower(&first).transpose();
-    turn.row_iter_mut().zip(&kept).for_each(|(mut row, &j)| row.unscale_mut(own[j]));
-    let own = if kept.len() == n { columns } else { Cow::Owned(columns.select_columns(&kept)) };
-    let mut basis = match own {
-        Cow::Borrowed(own) => product_with_upper_padded(own, &turn, below.len()),
-        Cow::Owned(mut own) => {
-            multiply_by_upper(&mut own, &turn);
-            own.resize_vertically(rows + below.len(), 0.0)
+    turn.row_iter_mut().zip(&kept).for_each(|(mut row, &j)| row.unscale_mut(norms[j]));
+    let independent_columns =
+        if kept.len() == n { columns } else { Cow::Owned(columns.select_columns(&kept)) };
+    let mut basis = match independent_columns {
+        Cow::Borrowed(independent_columns) => {
+            product_with_upper_padded(independent_columns, &turn, below.len())
+        }
+        Cow::Owned(mut independent_columns) => {
+            multiply_by_upper(&mut independent_columns, &turn);
+            independent_columns.resize_vertically(rows + below.len(), 0.0)
         }
     };
     for (row, (j, value)) in below.iter().enumerate() {
@@ -73,18 +76,18 @@ pub(super) fn orthonormal_above(
 
 /// Columns that are directions of their own, of those with the Gram matrix given, and the Cholesky
 /// factor of theirs, scaled to length one.
-fn independent(gram: &DMatrix<f64>, own: &[f64], lengths: &[f64]) -> (Vec<usize>, DMatrix<f64>) {
+fn independent(gram: &DMatrix<f64>, norms: &[f64], lengths: &[f64]) -> (Vec<usize>, DMatrix<f64>) {
     let mut kept: Vec<usize> = Vec::new();
     let mut factor: Vec<Vec<f64>> = Vec::new();
-    for j in (0..gram.ncols()).filter(|&j| own[j] > RANK * lengths[j] && own[j].is_finite()) {
+    for j in (0..gram.ncols()).filter(|&j| norms[j] > RANK * lengths[j] && norms[j].is_finite()) {
         let mut row: Vec<f64> = Vec::with_capacity(kept.len() + 1);
         for (&k, known) in kept.iter().zip(&factor) {
             let along: f64 = known.iter().zip(&row).map(|(a, b)| a * b).sum();
-            let value = (gram[(k, j)] / (own[k] * own[j]) - along) / known[row.len()];
+            let value = (gram[(k, j)] / (norms[k] * norms[j]) - along) / known[row.len()];
             row.push(value);
         }
         let left = 1.0 - row.iter().map(|value| value * value).sum::<f64>();
-        if left.max(0.0).sqrt() * own[j] > RANK * lengths[j] {
+        if left.max(0.0).sqrt() * norms[j] > RANK * lengths[j] {
             row.push(left.sqrt());
             factor.push(row);
             kept.push(j);

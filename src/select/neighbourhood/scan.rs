@@ -1,40 +1,39 @@
-//! Every candidate tried against what a fit leaves.
+//! Scores of all candidates against the residual of one fit.
 
+use crate::select::settings::MAX_NEGATIVE_ERRORS;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::linear::{LinearNeighbourhood, Share};
+use super::linear::LinearNeighbourhood;
 use super::linearised::{Driven, Linearised};
 use super::score::{Gain, Score, Sums};
 use crate::problem::{Effect, Problem};
-use crate::select::rules::SelectionRules;
 
-/// The candidates with what the residual says about each.
+/// Candidates with their scores.
 pub(crate) struct Scan<'a, 'l> {
     linearised: &'l Linearised<'a>,
     pub linear: Arc<LinearNeighbourhood>,
-    /// The candidates tried.
+    /// Candidates that were scored.
     pub effects: Vec<Effect>,
     driven: Driven,
-    /// Those that cannot be tried: a derivative of theirs is not a finite number.
+    /// Candidates with a derivative that is not finite.
     pub refused: Vec<Effect>,
     scores: Vec<Score>,
-    /// How often chance has a try at each candidate within its family.
+    /// Number of tries within its family that each candidate counts for.
     tries: Vec<f64>,
-    /// Families that are tried.
+    /// Number of families.
     families: usize,
-    /// For each candidate's parameters, whether they are never negative.
+    /// True for parameters of each candidate that are never negative.
     never_negative: Vec<Vec<bool>>,
-    pub rules: &'l SelectionRules,
 }
 
-/// Candidates that are projected together.
+/// Number of candidates that are projected together.
 const TOGETHER: usize = 48;
 
-/// A candidate with its gain.
+/// Candidate with its gain.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Tried {
     /// Index in the scan's list.
@@ -48,12 +47,11 @@ pub(crate) struct Tried {
 }
 
 impl<'a, 'l> Scan<'a, 'l> {
-    /// Tries `effects` against the fit that `linear` describes.
+    /// Scores `effects` against the fit that `linear` describes.
     pub fn new(
         linearised: &'l Linearised<'a>,
         linear: Arc<LinearNeighbourhood>,
         effects: Vec<Effect>,
-        rules: &'l SelectionRules,
     ) -> Self {
         let driven = Driven::of(linearised, &effects);
         let numbers: Vec<usize> = (0..effects.len()).collect();
@@ -95,39 +93,25 @@ impl<'a, 'l> Scan<'a, 'l> {
             tries,
             families,
             never_negative,
-            rules,
         }
     }
 
-    /// Candidates that the fit does not absorb and that are possible, best first.
+    /// Returns the candidates that the fit does not absorb and that are possible, best first.
     pub fn ranking(&self) -> Vec<Tried> {
-        self.ranked(&self.scores, self.linear.sums())
-    }
-
-    /// The ranking that there would be without some unknowns of the fit.
-    pub fn ranking_without(&self, share: &Share) -> Vec<Tried> {
-        let data = share.directions.rows(0, self.linear.rows()).into_owned();
-        let along = self.linearised.along(&self.driven, &data);
-        let without = |(along, score): (&DMatrix<f64>, &Score)| score.give_back(along, &share.part);
-        let scores: Vec<Score> = along.par_iter().zip(&self.scores).map(without).collect();
-        self.ranked(&scores, self.linear.sums_without(share))
-    }
-
-    fn ranked(&self, scores: &[Score], sums: Sums) -> Vec<Tried> {
+        let sums = self.linear.sums();
         let tried = |(index, score): (usize, &Score)| {
-            let gain =
-                sums.gain(score, self.rules).filter(|_| self.is_possible(index, score, sums))?;
+            let gain = sums.gain(score).filter(|_| self.is_possible(index, score, sums))?;
             let tries = self.tries[index] * self.families as f64;
             let (criterion, corrected) =
                 (gain.criterion + 2.0 * tries.ln(), (gain.p * tries).min(1.0));
             Some(Tried { index, gain, criterion, corrected })
         };
-        let mut all: Vec<Tried> = scores.iter().enumerate().filter_map(tried).collect();
+        let mut all: Vec<Tried> = self.scores.iter().enumerate().filter_map(tried).collect();
         all.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
         all
     }
 
-    /// Whether a candidate is no negative compliance or mass, beyond doubt.
+    /// Returns true unless a candidate is a negative compliance or mass beyond doubt.
     fn is_possible(&self, index: usize, score: &Score, sums: Sums) -> bool {
         let never_negative = &self.never_negative[index];
         if !never_negative.contains(&true) {
@@ -135,45 +119,30 @@ impl<'a, 'l> Scan<'a, 'l> {
         }
         let scatter = (sums.squares / sums.freedom()).sqrt();
         let fine = |((value, error), never): ((f64, f64), &bool)| {
-            !never || value > -self.rules.impossible * error * scatter
+            !never || value > -MAX_NEGATIVE_ERRORS * error * scatter
         };
-        score.estimates(self.rules).into_iter().zip(never_negative).all(fine)
+        score.estimates().into_iter().zip(never_negative).all(fine)
     }
 
-    /// Candidates that the fit absorbs, so that nothing is left to show them.
+    /// Returns the candidates that the fit absorbs.
     pub fn absorbed(&self) -> Vec<&Effect> {
-        let gone = |(effect, score): (_, &Score)| (score.rank(self.rules) == 0).then_some(effect);
+        let gone = |(effect, score): (_, &Score)| (score.rank() == 0).then_some(effect);
         self.effects.iter().zip(&self.scores).filter_map(gone).collect()
     }
 
-    /// Takes a candidate into the fit, in the linear neighbourhood.
-    pub fn take(&mut self, index: usize) {
-        let columns = self.columns(index);
-        let before = self.linear.residual().clone();
-        let added = Arc::make_mut(&mut self.linear).add(&columns);
-        let data = added.rows(0, self.linear.rows()).into_owned();
-        let given = added.tr_mul(&before);
-        let along = self.linearised.along(&self.driven, &data);
-        along
-            .par_iter()
-            .zip(&mut self.scores)
-            .for_each(|(along, score)| score.take_off(along, &given));
-    }
-
-    /// Columns of a candidate, shape = (3 N, k).
+    /// Returns the columns of a candidate, shape = (3 N, k).
     pub fn columns(&self, index: usize) -> DMatrix<f64> {
         self.linearised.columns_of(&self.driven, index)
     }
 
-    /// Largest principal angle \[rad\] between what two candidates add to the fit; none where one
-    /// of them adds nothing.
+    /// Returns the largest principal angle \[rad\] between what two candidates add to the fit;
+    /// `None` where one of them adds nothing.
     pub fn angle(&self, one: usize, other: usize) -> Option<f64> {
         self.linear.angle(&self.columns(one), &self.columns(other))
     }
 }
 
-/// For each candidate how often chance has a try at it within its family, and the number of
-/// families.
+/// Returns the number of tries of each candidate within its family, and the number of families.
 pub(crate) fn tries(effects: &[Effect], problem: &Problem) -> (Vec<f64>, usize) {
     let mut families: BTreeMap<&str, Vec<&Effect>> = BTreeMap::new();
     for effect in effects {

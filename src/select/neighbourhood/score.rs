@@ -1,40 +1,40 @@
-//! What a residual says about columns that were not fitted, and what that means.
+//! Score of columns that were not fitted, and the F test of its gain.
 
+use crate::residual_tests::ROUNDING;
+use crate::select::settings::MIN_NEW_LENGTH;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-use crate::select::rules::SelectionRules;
-
-/// What the residual says about columns that were not fitted.
+/// Score of columns that were not fitted: their products with everything fitted projected out.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Score {
-    /// C̃ᵀC̃ of the columns with everything fitted projected out.
+    /// Gram matrix C̃ᵀC̃ of the columns with everything fitted projected out.
     pub gram: DMatrix<f64>,
-    /// C̃ᵀr.
+    /// Product C̃ᵀr with the residual.
     pub product: DVector<f64>,
     /// ‖C‖² of each column before the projection.
     pub lengths: Vec<f64>,
 }
 
-/// What is left of a fit in numbers: all that judging a candidate needs.
+/// Sums of squares and degrees of freedom of a fit.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Sums {
-    /// With priors.
+    /// Sum of squares, priors included.
     pub squares: f64,
-    /// Of the data alone.
+    /// Sum of squares of the data alone.
     data_squares: f64,
     /// Degrees of freedom of the data.
     pub data_freedom: f64,
 }
 
-/// What a fit would gain by a candidate, and how probable that gain is by chance.
+/// Gain of a fit by a candidate, with its p-value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gain {
     /// Reduction of the sum of squares.
     pub squares: f64,
-    /// New directions.
+    /// Number of new directions.
     pub freedom: usize,
-    /// F statistic.
+    /// F statistic of the gain.
     pub f: f64,
     /// Probability of as large an F by chance, for one candidate alone.
     pub p: f64,
@@ -44,14 +44,14 @@ pub(crate) struct Gain {
 }
 
 impl Sums {
-    /// Of a residual, priors below its first `rows`, that has `data_freedom` degrees of freedom in
-    /// the data.
+    /// Creates the sums of a residual, priors below its first `rows`, with `data_freedom` degrees
+    /// of freedom in the data.
     pub fn of(residual: &DVector<f64>, rows: usize, data_freedom: f64) -> Self {
         let data_squares = residual.rows(0, rows).norm_squared();
         Self { squares: residual.norm_squared(), data_squares, data_freedom }
     }
 
-    /// Degrees of freedom of the whole sum of squares at the scatter of the data.
+    /// Returns the degrees of freedom of the whole sum of squares at the scatter of the data.
     ///
     /// With true priors it has 3 N, with priors far wider than the deviations 3 N − tr H: the
     /// data's scatter decides.
@@ -59,16 +59,16 @@ impl Sums {
         self.data_freedom * self.squares / self.data_squares.max(f64::MIN_POSITIVE)
     }
 
-    /// What the fit gains by columns with this score.
-    pub fn gain(&self, score: &Score, rules: &SelectionRules) -> Option<Gain> {
-        let (squares, freedom) = score.reduction(rules)?;
-        self.gain_of(squares, freedom, rules)
+    /// Returns the gain by columns with this score; `None` where they add nothing.
+    pub fn gain(&self, score: &Score) -> Option<Gain> {
+        let (squares, freedom) = score.reduction()?;
+        self.gain_of(squares, freedom)
     }
 
-    /// What a reduction of the sum of squares by so many new directions means.
-    pub fn gain_of(&self, squares: f64, freedom: usize, rules: &SelectionRules) -> Option<Gain> {
+    /// Returns the gain of a reduction of the sum of squares by so many new directions.
+    pub fn gain_of(&self, squares: f64, freedom: usize) -> Option<Gain> {
         let degrees = self.freedom();
-        let total = self.squares.max(rules.rounding.powi(2) * degrees);
+        let total = self.squares.max(ROUNDING.powi(2) * degrees);
         let left = degrees - freedom as f64;
         if left < 1.0 || freedom == 0 {
             return None;
@@ -84,12 +84,12 @@ impl Sums {
 }
 
 impl Score {
-    /// What the fit would make of the columns' parameters, −G⁺b, each with its standard error for
+    /// Returns the estimates −G⁺b of the columns' parameters, each with its standard error for
     /// residuals of unit scatter.
-    pub fn estimates(&self, rules: &SelectionRules) -> Vec<(f64, f64)> {
+    pub fn estimates(&self) -> Vec<(f64, f64)> {
         let scale = self.scale();
         let (mut estimates, mut variances) = (vec![0.0; scale.len()], vec![0.0; scale.len()]);
-        for (value, vector, along) in self.seen(rules) {
+        for (value, vector, along) in self.seen() {
             for (i, scale) in scale.iter().enumerate() {
                 estimates[i] -= vector[i] * along / value / scale;
                 variances[i] += vector[i] * vector[i] / value / (scale * scale);
@@ -102,14 +102,14 @@ impl Score {
             .collect()
     }
 
-    /// How many new directions the columns have.
-    pub fn rank(&self, rules: &SelectionRules) -> usize {
-        self.seen(rules).len()
+    /// Returns the number of new directions of the columns.
+    pub fn rank(&self) -> usize {
+        self.seen().len()
     }
 
-    /// bᵀ G⁺ b and the rank of G; `None` where nothing new is left of the columns.
-    fn reduction(&self, rules: &SelectionRules) -> Option<(f64, usize)> {
-        let seen = self.seen(rules);
+    /// Returns bᵀ G⁺ b and the rank of G; `None` where nothing new is left of the columns.
+    fn reduction(&self) -> Option<(f64, usize)> {
+        let seen = self.seen();
         let sum = seen.iter().map(|(value, _, along)| along * along / value).sum();
         (!seen.is_empty()).then_some((sum, seen.len()))
     }
@@ -118,31 +118,17 @@ impl Score {
         self.lengths.iter().map(|length| if *length > 0.0 { length.sqrt() } else { 1.0 }).collect()
     }
 
-    /// Eigenvalues and vectors of G, for columns of length one, with bᵀ along each; those that the
-    /// fit absorbs left out.
-    fn seen(&self, rules: &SelectionRules) -> Vec<(f64, DVector<f64>, f64)> {
+    /// Returns eigenvalues and eigenvectors of G for columns of length one, with bᵀ along each;
+    /// directions that the fit absorbs are left out.
+    fn seen(&self) -> Vec<(f64, DVector<f64>, f64)> {
         let (k, scale) = (self.lengths.len(), self.scale());
         let product = DVector::from_fn(k, |i, _| self.product[i] / scale[i]);
         let eigen = DMatrix::from_fn(k, k, |i, j| self.gram[(i, j)] / (scale[i] * scale[j]))
             .symmetric_eigen();
         let all = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
-        let is_seen = |(value, _): &(&f64, _)| **value > rules.absorbed.powi(2);
+        let is_seen = |(value, _): &(&f64, _)| **value > MIN_NEW_LENGTH.powi(2);
         all.filter(is_seen)
             .map(|(value, vector)| (*value, vector.into_owned(), vector.dot(&product)))
             .collect()
-    }
-
-    /// Takes off directions that have been fitted since: `along` = Cᵀq, `given` = qᵀr before they
-    /// were fitted.
-    pub fn take_off(&mut self, along: &DMatrix<f64>, given: &DVector<f64>) {
-        self.gram -= along * along.transpose();
-        self.product -= along * given;
-    }
-
-    /// The reverse: the score without directions that were fitted.
-    pub fn give_back(&self, along: &DMatrix<f64>, given: &DVector<f64>) -> Self {
-        let (gram, product) =
-            (&self.gram + along * along.transpose(), &self.product + along * given);
-        Self { gram, product, lengths: self.lengths.clone() }
     }
 }

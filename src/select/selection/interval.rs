@@ -1,5 +1,6 @@
-//! How sure the gain on held-out poses is.
+//! Interval of the gain on held-out poses.
 
+use crate::select::settings::{INTERVAL_LEVEL, RESAMPLES};
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
@@ -7,8 +8,8 @@ use nalgebra::Vector3;
 use super::super::data::{Data, bits};
 use crate::numeric::{Interval, mean_interval};
 
-/// Mean reduction of the distance to what was measured on held-out rows of the kind that errors are
-/// told of, \[m\] or \[rad\]; bootstrap over configurations.
+/// Returns the mean reduction of the error on held-out rows of the kind in which errors are stated,
+/// \[m\] or \[rad\], with a bootstrap interval over configurations.
 pub(super) fn gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>]) -> Interval {
     let (rows, kind) = (&data.split.held_out, data.measurements.leading().kind());
     let mut groups: BTreeMap<Vec<u64>, Vec<f64>> = BTreeMap::new();
@@ -21,5 +22,5 @@ pub(super) fn gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>])
     }
     let sums: Vec<(f64, f64)> =
         groups.values().map(|gains| (gains.iter().sum::<f64>(), gains.len() as f64)).collect();
-    mean_interval(&sums, data.rules.resamples, data.rules.covered, data.rules.seed)
+    mean_interval(&sums, RESAMPLES, INTERVAL_LEVEL, data.rules.seed)
 }

@@ -1,14 +1,21 @@
-//! Model selection: fit, screen, add the effect, fit again, until nothing is left to find.
+//! The loop: one search for the effects that a problem lacks, by the evidence about its fits.
+//!
+//! - `search`: evidence about a fit, its most probable set fitted, until both agree; `state`: the
+//!   fits made so far; `gears`: common prior of harmonics; `polish`: searched arguments on all rows.
+//! - `close`: the loop from the declared problem to its result; `found`, `status`, `interval`: what
+//!   is said of each effect, the verdict, and the gain on held-out poses.
 
-mod alternatives;
 mod close;
-mod harmonics;
+mod found;
+mod gears;
 mod interval;
-mod pick;
-mod rounds;
+mod polish;
+mod search;
+mod state;
 mod status;
 
 pub use crate::numeric::Interval;
-pub use close::{ClosedLoop, Found, Round, close, close_by};
-pub use harmonics::HarmonicPrior;
+pub use close::{ClosedLoop, close, close_by};
+pub use found::Found;
+pub use state::Round;
 pub use status::{Status, Verdict};

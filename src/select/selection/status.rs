@@ -8,8 +8,8 @@ use crate::select::reference_check::ReferenceVerdict;
 /// Probability of a law from which on it is the most probable one at its place.
 const EVEN: f64 = 0.5;
 
-/// What may be claimed of an effect in the extended problem, the strongest claim first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
+/// Strongest claim about an effect of the extended problem, the strongest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// The effect acts; the probability of its law is at least

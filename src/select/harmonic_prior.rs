@@ -1,0 +1,123 @@
+//! Prior that the harmonics of all joints share, for joints with a periodic error of many orders.
+
+use crate::model::effect;
+use crate::model::parameter::{Regressor, rule_of};
+use crate::problem::{Effect, Freedom, JointKind, ParameterRule, Problem, Quantities};
+use crate::quantity::Unit;
+
+/// Number of orders from which on the harmonics of a joint count as one periodic error whose
+/// coefficients have a common prior.
+const MIN_GEAR_ORDERS: usize = 12;
+
+/// Prior that harmonics of all joints share: 1 σ of the coefficients of each order about 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HarmonicPrior {
+    /// Orders, ascending, and σ \[rad\].
+    pub by_order: Vec<(u32, f64)>,
+}
+
+impl HarmonicPrior {
+    /// Returns the parameter patterns that declare the prior in a problem, and σ \[rad\].
+    pub fn rules(&self) -> impl Iterator<Item = (String, f64)> {
+        let of = |(order, sigma)| {
+            ["sin", "cos"].map(|wave| (format!("joint-harmonic.{wave}{order}"), sigma))
+        };
+        self.by_order.iter().copied().flat_map(of)
+    }
+
+    /// Returns the prior with every σ multiplied by a factor and rounded to four digits.
+    pub(super) fn scaled(&self, factor: f64) -> Self {
+        let rounded = |sigma: f64| format!("{sigma:.3e}").parse().unwrap_or(sigma);
+        Self {
+            by_order: self
+                .by_order
+                .iter()
+                .map(|&(order, sigma)| (order, rounded(factor * sigma)))
+                .collect(),
+        }
+    }
+
+    /// Returns σ of an order \[rad\].
+    pub(super) fn sigma(&self, order: u32) -> Option<f64> {
+        let place = self.by_order.binary_search_by_key(&order, |entry| entry.0).ok()?;
+        self.by_order.get(place).map(|entry| entry.1)
+    }
+
+    /// Adds the prior to the parameter rules of a problem.
+    pub(super) fn add_to(&self, problem: &mut Problem) {
+        let rule = |(pattern, sigma)| ParameterRule {
+            pattern,
+            freedom: Freedom::Free {
+                sigma: Quantities { angle: Some(sigma), ..Quantities::default() },
+                min: Quantities::default(),
+                max: Quantities::default(),
+            },
+            location: problem.data.location.clone(),
+        };
+        let rules: Vec<ParameterRule> = self.rules().map(rule).collect();
+        problem.parameters.extend(rules);
+    }
+}
+
+/// Returns true if an effect is a periodic error of many orders, whose coefficients have a common
+/// prior.
+pub(super) fn is_gear(effect: &Effect) -> bool {
+    matches!(effect, Effect::JointHarmonic { orders, .. } if orders.len() >= MIN_GEAR_ORDERS)
+}
+
+/// Returns true if an effect is the periodic error of many orders of a joint, from 1.
+pub(super) fn is_gear_of(effect: &Effect, joint: usize) -> bool {
+    is_gear(effect) && matches!(effect, Effect::JointHarmonic { joint: of, .. } if *of == joint)
+}
+
+/// Returns the order of a harmonic regressor.
+pub(super) fn order_of(regressor: &Regressor) -> Option<u32> {
+    match *regressor {
+        Regressor::Sine(_, order) | Regressor::Cosine(_, order) => Some(order),
+        _ => None,
+    }
+}
+
+/// Returns true if one prior in angles can hold the harmonics of a problem and those of one revolute
+/// joint besides: no declared harmonic is of a sliding joint, and no rule speaks of any harmonic.
+pub(super) fn takes_common_prior(problem: &Problem) -> bool {
+    let joints = (1..=problem.joints.len())
+        .filter(|&joint| problem.joints[joint - 1].command_kind() == JointKind::Revolute);
+    let possible = joints.flat_map(|joint| {
+        Effect::JointHarmonic { joint, orders: vec![1, 2, 3] }.parameters(problem)
+    });
+    let declared = effect::parameters(problem);
+    declared
+        .iter()
+        .chain(&possible.collect::<Vec<_>>())
+        .filter(|parameter| order_of(&parameter.regressor).is_some())
+        .all(|parameter| parameter.unit() == Unit::Angle && rule_of(problem, parameter).is_none())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    #[test]
+    fn a_rule_of_their_own_or_a_slide_keeps_harmonics_from_the_common_prior() {
+        let takes = |kind: &str, rule: &str| {
+            let text = format!(
+                "name = 'arm'\n[[joint]]\n[[joint]]\nkind = '{kind}'\n[[effect]]\njoint-harmonic = {{ joint = 1, orders = [1, 2] }}\n\
+                 [[effect]]\njoint-harmonic = {{ joint = 2, orders = [3] }}\n[parameters]\n'joint*.theta' = {{ free = true }}\n{rule}"
+            );
+            takes_common_prior(&Problem::parse(&text, Path::new("problem.toml")).unwrap())
+        };
+        assert!(takes("revolute", "") && takes("revolute", "'*.sin*' = { sigma_mm = 1 }"));
+        assert!(!takes("prismatic", ""));
+        for rule in [
+            "'joint-harmonic.*' = { sigma_deg = 0.01 }",
+            "'joint-harmonic[2].*' = { sigma_deg = 0.01 }",
+            "'joint-harmonic[1].sin2' = { fixed = true }",
+            "'*.cos3' = { free = true }",
+        ] {
+            assert!(!takes("revolute", rule), "{rule}");
+        }
+    }
+}

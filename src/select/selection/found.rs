@@ -1,0 +1,160 @@
+//! Claims, tests and alternatives of each effect that the search added.
+
+use crate::select::settings::MIN_ALTERNATIVE_ODDS;
+use std::collections::BTreeMap;
+
+use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
+
+use super::state::{Round, SearchState};
+use super::status::Status;
+use crate::fit::{ErrorSummary, Estimate};
+use crate::problem::Effect;
+use crate::select::candidates::Candidates;
+use crate::select::evidence::{Claims, Evidence, HypothesisSet, stability};
+use crate::select::fitted::Fitted;
+use crate::select::harmonic_prior::is_gear;
+use crate::select::neighbourhood::tries;
+use crate::select::reference_check::{ReferenceCheck, reference_check};
+
+/// Orders of one harmonic from which on the claim is that some of them act, not each.
+const SEVERAL_ORDERS: usize = 3;
+
+/// An effect that the loop added.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// Effect in question.
+    pub effect: Effect,
+    /// Strongest claim about the effect.
+    pub status: Status,
+    /// Claims with their probabilities; `None` where no evidence was evaluated.
+    pub claims: Option<Claims>,
+    /// Probability that chance alone gains as much, corrected for the candidates tried.
+    pub p_value: f64,
+    /// Estimates of its parameters.
+    pub estimates: Vec<Estimate>,
+    /// Effects that these data cannot tell from it, best first.
+    pub alternatives: Vec<Effect>,
+    /// Part of the fits to random subsets of the configurations that name it; `None` where no
+    /// evidence was evaluated.
+    pub stability: Option<f64>,
+    /// Test against data that took no part in the fit; `None` where no such data bear on it.
+    pub reference_check: Option<ReferenceCheck>,
+    /// Error on held-out poses after the first round whose effects include it and were all kept to
+    /// the end; that of the final fit where no round is such.
+    pub held_out_after: ErrorSummary,
+}
+
+/// Returns every effect that a fit holds beside the declared ones, with what is known of it.
+/// `is_trusted` is false where the fit has cautions: then no effect is more than probable.
+pub(super) fn found(
+    state: &SearchState,
+    fitted: &Fitted,
+    best: Option<(&Evidence, &HypothesisSet)>,
+    is_trusted: bool,
+) -> Vec<Found> {
+    let (data, rules) = (state.data, state.data.rules);
+    let added = state.added(fitted);
+    let parts: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
+    let reconsidered = state.reconsidered(fitted);
+    let stable = best.map(|best| stability(fitted, data, best, &reconsidered)).unwrap_or_default();
+    let p_values = p_values(state, fitted, &added);
+    let held_out_after = |effect: &Effect| {
+        let stays = |known: &Effect| added.iter().any(|kept| kept.covers(known));
+        let holds = |round: &&Round| round.effects.iter().any(|known| effect.covers(known));
+        let round =
+            state.rounds.iter().find(|round| holds(round) && round.effects.iter().all(stays));
+        round.map_or(fitted.found.fitted.held_out, |round| round.held_out)
+    };
+    let one = |(effect, p_value): (Effect, f64)| {
+        let alternatives = best.map_or_else(Vec::new, |(evidence, _)| {
+            alternatives(evidence, &effect, &parts, MIN_ALTERNATIVE_ODDS)
+        });
+        let shares = stable.iter().filter(|(part, _)| effect.covers(part)).map(|entry| entry.1);
+        let claims = best.and_then(|(evidence, _)| claims(evidence, &effect));
+        let check = reference_check(fitted, data, &effect);
+        let verdict = check.as_ref().map(|check| check.verdict);
+        let gear = match &effect {
+            Effect::JointHarmonic { joint, .. } if is_gear(&effect) => {
+                state.gear_probability.get(joint).copied()
+            }
+            _ => None,
+        };
+        let law = claims.as_ref().map(|claims| claims.law.1).or(gear);
+        let is_significant = p_value < rules.leaving_level;
+        let status = Status::of(law, rules.stated, (is_significant, verdict));
+        Found {
+            stability: shares.reduce(f64::min),
+            status: if is_trusted { status } else { status.max(Status::Probable) },
+            claims,
+            p_value,
+            estimates: fitted
+                .parameters_of(&effect)
+                .into_iter()
+                .map(|k| fitted.found.estimates[k].clone())
+                .collect(),
+            held_out_after: held_out_after(&effect),
+            alternatives,
+            reference_check: check,
+            effect,
+        }
+    };
+    added.iter().cloned().zip(p_values).map(one).collect()
+}
+
+/// Returns for each effect of a fit the p-value of the F test of the fit against the one without it,
+/// times the number of candidates that the search tried; for a harmonic of few orders the smallest
+/// of its orders.
+fn p_values(state: &SearchState, fitted: &Fitted, effects: &[Effect]) -> Vec<f64> {
+    let fit = fitted.around(state.data);
+    let tested: Vec<Vec<Effect>> = effects
+        .iter()
+        .map(|effect| if is_gear(effect) { vec![effect.clone()] } else { effect.parts() })
+        .collect();
+    let parts: Vec<Effect> = tested.iter().flatten().flat_map(Effect::parts).collect();
+    let mut everything = Candidates::of(&fitted.problem, state.data).testable;
+    let first = everything.len();
+    everything.extend(parts.iter().cloned());
+    let (all_tries, families) = tries(&everything, &fitted.problem);
+    let mut tries_left = all_tries[first..].iter();
+    let (squares, dof) = (fit.sums().squares, fit.sums().freedom());
+    let p_value = |effect: &Effect| {
+        let tries = tries_left.by_ref().take(effect.parts().len()).sum::<f64>() * families as f64;
+        let k = fitted.parameters_of(effect).len();
+        let lost = fit.loss_without(&fitted.unknowns_of(effect));
+        let ratio = lost.map(|lost| lost / k as f64 / (squares / dof)).filter(|f| !f.is_nan());
+        let chance = FisherSnedecor::new(k as f64, dof).ok().zip(ratio);
+        let p = chance.map_or(1.0, |(chance, ratio)| chance.sf(ratio).max(f64::MIN_POSITIVE));
+        (p * tries).min(1.0)
+    };
+    let by_part: Vec<f64> = tested.iter().flatten().map(p_value).collect();
+    let mut by_part = by_part.into_iter();
+    tested.iter().map(|parts| by_part.by_ref().take(parts.len()).fold(1.0, f64::min)).collect()
+}
+
+/// Returns the claims of an effect: of a few orders of a harmonic those of the least probable order,
+/// of several those of the most probable one.
+fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
+    let parts = effect.parts();
+    let claims =
+        parts.iter().map(|part| evidence.claims_of(part)).collect::<Option<Vec<Claims>>>()?;
+    let by_law = |a: &Claims, b: &Claims| a.law.1.total_cmp(&b.law.1);
+    if parts.len() >= SEVERAL_ORDERS {
+        claims.into_iter().max_by(by_law)
+    } else {
+        claims.into_iter().min_by(by_law)
+    }
+}
+
+/// Returns effects that may stand in the place of another, of a family at one place the most
+/// probable.
+fn alternatives(evidence: &Evidence, effect: &Effect, held: &[Effect], beside: f64) -> Vec<Effect> {
+    let mut by_place: BTreeMap<String, usize> = BTreeMap::new();
+    let mut found: Vec<Effect> = Vec::new();
+    for other in effect.parts().iter().flat_map(|part| evidence.alternatives(part, held, beside)) {
+        by_place.entry(other.name_and_place()).or_insert_with(|| {
+            found.push(other);
+            found.len()
+        });
+    }
+    found
+}

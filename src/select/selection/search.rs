@@ -1,0 +1,170 @@
+//! The search: evidence about a fit, the effects of its most probable set fitted, until the fit
+//! holds the set that the evidence about it calls most probable.
+
+use super::gears::estimated_prior;
+use super::polish::polished;
+use super::state::SearchState;
+use crate::fit::IdentifyError;
+use crate::problem::Effect;
+use crate::select::data::Data;
+use crate::select::evidence::{Evidence, Hypothesis, HypothesisSet, evaluate, ln_posterior};
+use crate::select::fitted::Fitted;
+use crate::select::harmonic_prior::is_gear;
+use crate::select::settings::MAX_RIVALS;
+
+/// Runs the search from the fit of the declared problem. Returns the final fit, converged, and the
+/// evidence about it, `None` where its residual is not finite or the fit moved since.
+///
+/// # Errors
+/// A fit fails, or the search was stopped.
+pub(super) fn search(
+    state: &mut SearchState,
+    first: Fitted,
+) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
+    let (fitted, evidence) = settled_set(state, first)?;
+    let evidence =
+        evidence.filter(|_| fitted.found.termination.converged() && !fitted.found.provisional);
+    Ok((fitted.settled(state.data, state.options)?, evidence))
+}
+
+fn settled_set(
+    state: &mut SearchState,
+    first: Fitted,
+) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
+    let rules = state.data.rules;
+    let mut fitted = first;
+    // Evidence that led to the fit at hand by odds between fits.
+    let mut leading: Option<Evidence> = None;
+    let mut has_estimated_prior = false;
+    while state.rounds.len() < rules.max_rounds {
+        state.report_progress(0, 0);
+        let Some(evidence) = state.evaluate(&fitted)? else { return Ok((fitted, None)) };
+        let Some(best) = evidence.sure(rules.inclusion_threshold) else {
+            return Ok((fitted, Some(evidence)));
+        };
+        if !is_held(best, &state.reconsidered(&fitted)) {
+            state.report_progress(1, 1);
+            let effects = state.effects_of(&fitted, (&evidence, best));
+            let next = state.fit(&fitted, &effects)?;
+            if state.is_new(&next) {
+                leading = None;
+                state.record(&next);
+                fitted = next;
+                continue;
+            }
+            // The evidence points back to a set that did less well at a fit of its own.
+            if let Some(leading) = leading {
+                return Ok((fitted, Some(leading)));
+            }
+        }
+        if !has_estimated_prior
+            && state.added(&fitted).iter().any(is_gear)
+            && let Some(prior) = state.prior.clone()
+        {
+            has_estimated_prior = true;
+            state.prior = Some(estimated_prior(&fitted, state.data, prior));
+            fitted = state.fit(&fitted, &state.added(&fitted))?;
+            state.record(&fitted);
+            continue;
+        }
+        let (evidence, better) = refitted(state, &fitted, evidence)?;
+        if let Some(better) = better.filter(|better| state.is_new(better)) {
+            leading = Some(evidence);
+            state.record(&better);
+            fitted = better;
+            continue;
+        }
+        let Some(better) = polished(state, &fitted)?.filter(|better| state.is_new(better)) else {
+            return Ok((fitted, Some(evidence)));
+        };
+        leading = None;
+        state.record(&better);
+        fitted = better;
+    }
+    let evidence = state.evaluate(&fitted)?;
+    Ok((fitted, evidence))
+}
+
+/// Returns true if the effects of a set are those that were added and the set has no further
+/// periodic error.
+fn is_held(set: &HypothesisSet, added: &[Effect]) -> bool {
+    let effects = set.effects();
+    let parts: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
+    effects.len() == parts.len()
+        && parts.iter().all(|part| effects.contains(part))
+        && set.gears().is_empty()
+}
+
+/// Returns the evidence with its rival sets evaluated at fits of their own, and the best of these
+/// fits where it is more probable than the one given.
+fn refitted(
+    state: &SearchState,
+    fitted: &Fitted,
+    evidence: Evidence,
+) -> Result<(Evidence, Option<Fitted>), IdentifyError> {
+    let (data, rules) = (state.data, state.data.rules);
+    let open = state.reconsidered(fitted);
+    let held = evidence
+        .sure(rules.inclusion_threshold)
+        .filter(|best| !best.hypotheses.is_empty() && is_held(best, &open));
+    let Some(best) = held.cloned() else { return Ok((evidence, None)) };
+    let left_out = evidence.left_out.clone();
+    let ln_posterior_of = |fitted: &Fitted, functions: &[(Hypothesis, usize)], sigma: f64| {
+        unless_stopped(data, || {
+            ln_posterior(fitted, data, (&state.reconsidered(fitted), &left_out), (functions, sigma))
+        })
+    };
+    let functions = best.without_law();
+    let Some(reference) = ln_posterior_of(fitted, &functions, fitted.sigma)? else {
+        return Ok((evidence, None));
+    };
+    let mut rivals = evidence.exchanged(&best, MAX_RIVALS);
+    rivals.truncate(state.paid_fits(fitted) - 1);
+    let mut tried: Vec<(HypothesisSet, f64, Fitted)> = Vec::new();
+    let count = rivals.len();
+    for (k, rival) in rivals.into_iter().enumerate() {
+        state.report_progress(k + 1, count);
+        let kept = state.added(fitted).into_iter().filter(|effect| !open.contains(effect));
+        let effects: Vec<Effect> = kept.chain(rival.effects()).collect();
+        let next = state.fit(fitted, &effects)?;
+        let other = ln_posterior_of(&next, &rival.without_law(), fitted.sigma)?;
+        tried.extend(other.map(|other| (rival, other - reference, next)));
+    }
+    tried.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut ln_odds_of: Vec<(HypothesisSet, f64)> = Vec::new();
+    let mut better: Option<Fitted> = None;
+    for (rival, ln_odds, next) in tried {
+        // Functions without a law are only linear about another fit. So a law in the place of one
+        // must be what the evidence about its own fit calls most probable.
+        let left = rival.without_law().len();
+        let is_best = ln_odds > 0.0 && better.is_none();
+        if is_best && left < functions.len() && !is_confirmed(state, &next, left)? {
+            continue;
+        }
+        ln_odds_of.push((rival, ln_odds));
+        if is_best {
+            better = Some(next);
+        }
+    }
+    Ok((evidence.corrected(&best, &ln_odds_of), better))
+}
+
+/// Returns true if the most probable set about a fit holds its effects and at most so many functions
+/// without a law.
+fn is_confirmed(
+    state: &SearchState,
+    fitted: &Fitted,
+    functions: usize,
+) -> Result<bool, IdentifyError> {
+    let open = state.reconsidered(fitted);
+    let evidence = unless_stopped(state.data, || evaluate(fitted, state.data, &open))?;
+    let threshold = state.data.rules.inclusion_threshold;
+    let best = evidence.as_ref().and_then(|evidence| evidence.sure(threshold));
+    Ok(best.is_some_and(|best| is_held(best, &open) && best.without_law().len() <= functions))
+}
+
+/// Returns what `evaluate` returns, an error if the search was stopped meanwhile.
+fn unless_stopped<T>(data: &Data, evaluate: impl FnOnce() -> T) -> Result<T, IdentifyError> {
+    let value = evaluate();
+    if data.stop.is_requested() { Err(IdentifyError::interrupted()) } else { Ok(value) }
+}

@@ -1,0 +1,226 @@
+//! State of one search: the fits made so far and how a set of effects is fitted.
+
+use std::collections::BTreeMap;
+
+use crate::fit::{ErrorSummary, IdentifyError, Options, Progress};
+use crate::model::parameter::ParameterSite;
+use crate::problem::{Effect, ParameterRule, Problem};
+use crate::select::candidates::joined;
+use crate::select::data::Data;
+use crate::select::evidence::{Evidence, HypothesisSet, evaluate};
+use crate::select::fitted::Fitted;
+use crate::select::harmonic_prior::{HarmonicPrior, is_gear};
+use crate::select::settings::MAX_RECONSIDERED;
+
+/// Steps of a fit on the way to the final one, for each fit of its size that `fit_work` pays for.
+const STEPS_PER_PAID_FIT: u64 = 4;
+
+/// One round of the loop.
+#[derive(Debug, Clone)]
+pub struct Round {
+    /// Effects in the model after it.
+    pub effects: Vec<Effect>,
+    /// Error on the identification poses.
+    pub identification: ErrorSummary,
+    /// Error on held-out poses, which decided nothing.
+    pub held_out: ErrorSummary,
+}
+
+/// State of one search.
+pub(super) struct SearchState<'a> {
+    pub data: &'a Data<'a>,
+    pub options: &'a Options,
+    /// Effects that the problem itself declares; they stay.
+    pub declared: Vec<Effect>,
+    /// Parameter rules that the problem itself declares.
+    declared_rules: Vec<ParameterRule>,
+    /// Common prior of the harmonics, where a joint has many.
+    pub prior: Option<HarmonicPrior>,
+    /// Probability of the periodic error of each joint, from 1, when it was taken into the fit.
+    pub gear_probability: BTreeMap<usize, f64>,
+    pub rounds: Vec<Round>,
+    /// Fit of the latest round; of the declared problem before the first.
+    pub latest: Fitted,
+    /// Evidence about the latest fit, once it was evaluated.
+    pub evidence: Option<Evidence>,
+    /// Sets of effects that were fitted.
+    fitted_sets: Vec<Vec<Effect>>,
+}
+
+impl<'a> SearchState<'a> {
+    /// Creates the state before the first round from the fit of the declared problem.
+    pub fn new(data: &'a Data<'a>, options: &'a Options, first: &Fitted) -> Self {
+        Self {
+            data,
+            options,
+            declared: first.effects(),
+            declared_rules: first.problem.parameters.clone(),
+            prior: None,
+            gear_probability: BTreeMap::new(),
+            rounds: Vec::new(),
+            latest: first.clone(),
+            evidence: None,
+            fitted_sets: vec![first.effects()],
+        }
+    }
+
+    /// Reports progress: the current round begins fit number `fit` of `fits`; 0 while it evaluates
+    /// evidence.
+    pub fn report_progress(&self, fit: usize, fits: usize) {
+        let (round, effects) = (self.rounds.len() + 1, || self.added(&self.latest));
+        self.options.tell(|| Progress::Round { round, effects: effects(), fit, fits });
+    }
+
+    /// Returns the effects of a fit that the search added; harmonics of one joint are one effect.
+    pub fn added(&self, fitted: &Fitted) -> Vec<Effect> {
+        let declared: Vec<Effect> = self.declared.iter().flat_map(Effect::parts).collect();
+        let parts = fitted.effects().into_iter().flat_map(|effect| effect.parts());
+        parts
+            .filter(|part| !declared.contains(part))
+            .fold(Vec::new(), |effects, part| joined(&effects, &part))
+    }
+
+    /// Returns the added effects that evidence takes out of the fit and evaluates again. Periodic
+    /// errors of many orders stay in the fit; so do all effects where they are more than
+    /// `max_reconsidered`.
+    pub fn reconsidered(&self, fitted: &Fitted) -> Vec<Effect> {
+        let effects: Vec<Effect> =
+            self.added(fitted).into_iter().filter(|effect| !is_gear(effect)).collect();
+        let count = effects.iter().flat_map(Effect::parts).count();
+        if count > MAX_RECONSIDERED { Vec::new() } else { effects }
+    }
+
+    /// Returns the added effects that stay in the fit while evidence is evaluated.
+    fn kept(&self, fitted: &Fitted) -> Vec<Effect> {
+        let open = self.reconsidered(fitted);
+        self.added(fitted).into_iter().filter(|effect| !open.contains(effect)).collect()
+    }
+
+    /// Evaluates the evidence about a fit; `None` where its residual is not finite.
+    ///
+    /// # Errors
+    /// The search was stopped.
+    pub fn evaluate(&mut self, fitted: &Fitted) -> Result<Option<Evidence>, IdentifyError> {
+        let evidence = evaluate(fitted, self.data, &self.reconsidered(fitted));
+        if self.data.stop.is_requested() {
+            return Err(IdentifyError::interrupted());
+        }
+        self.evidence.clone_from(&evidence);
+        Ok(evidence)
+    }
+
+    /// Returns how many fits with as many unknowns as this one `fit_work` pays for, at least one.
+    pub fn paid_fits(&self, fitted: &Fitted) -> usize {
+        let work = self.data.rows().len() as f64 * (fitted.unknowns.len() as f64).powi(2);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
+        let count = (self.data.rules.fit_work / work.max(1.0)) as usize;
+        count.max(1)
+    }
+
+    /// Returns the declared effects with others.
+    pub fn with_declared(&self, added: &[Effect]) -> Vec<Effect> {
+        added.iter().fold(self.declared.clone(), |effects, effect| joined(&effects, effect))
+    }
+
+    /// Returns the problem of a fit with the declared effects and these others, under the common
+    /// prior of the harmonics where a joint has many.
+    pub fn problem(&self, fitted: &Fitted, added: &[Effect]) -> Problem {
+        let mut problem = fitted.with_effects(&self.with_declared(added));
+        problem.parameters.clone_from(&self.declared_rules);
+        if added.iter().any(is_gear)
+            && let Some(prior) = &self.prior
+        {
+            prior.add_to(&mut problem);
+        }
+        problem
+    }
+
+    /// Fits the declared problem with these effects, from where another fit ended, in as many steps
+    /// as `fit_work` pays for.
+    ///
+    /// # Errors
+    /// The fit fails or was stopped.
+    pub fn fit(&self, from: &Fitted, added: &[Effect]) -> Result<Fitted, IdentifyError> {
+        let paid = self.paid_fits(from);
+        let steps = STEPS_PER_PAID_FIT * paid as u64;
+        let max_steps = Some(self.options.max_steps.map_or(steps, |most| most.min(steps)));
+        let provisional = paid == 1;
+        let options = if provisional {
+            from.succeeding(self.options, false)
+        } else {
+            from.onwards(self.options)
+        };
+        let options = Options { max_steps, provisional, ..options };
+        from.next(self.problem(from, added), self.data, &options)
+    }
+
+    /// Returns the effects of a hypothesis set as the next fit holds them: its laws, its periodic
+    /// errors of many orders, and the effects that stay in the fit. Sets the common prior of the
+    /// harmonics where the set brings the first or a longer periodic error.
+    pub fn effects_of(
+        &mut self,
+        fitted: &Fitted,
+        (evidence, set): (&Evidence, &HypothesisSet),
+    ) -> Vec<Effect> {
+        let mut effects = self.kept(fitted);
+        for effect in set.effects() {
+            effects = joined(&effects, &effect);
+        }
+        for (joint, highest, size) in set.gears() {
+            self.gear_probability.insert(joint, evidence.gear_probability(joint));
+            let sigma = self.coefficient_sigma(fitted, joint, highest, size);
+            self.extend_prior(highest, sigma);
+            let is_taken = |order: &u32| {
+                let single = Effect::JointHarmonic { joint, orders: vec![*order] };
+                self.declared.iter().chain(&effects).any(|known| known.covers(&single))
+            };
+            let orders: Vec<u32> = (1..=highest).filter(|order| !is_taken(order)).collect();
+            effects = joined(&effects, &Effect::JointHarmonic { joint, orders });
+        }
+        effects
+    }
+
+    /// Returns 1 σ \[rad\] of the coefficients of a periodic error of `highest` orders that together
+    /// displace by `size` times the noise in root mean square.
+    fn coefficient_sigma(&self, fitted: &Fitted, joint: usize, highest: u32, size: f64) -> f64 {
+        let rows = self.data.evidence_rows();
+        let site = ParameterSite::coordinate(&fitted.problem, joint);
+        let linearised = fitted.linearised_with(self.data, &rows, &[], &[site]);
+        let lever = linearised.place(site).map_or(0.0, |lever| lever.norm_squared());
+        let squares = f64::from(highest) * lever / (3 * rows.len()) as f64;
+        if squares > 0.0 { size / squares.sqrt() } else { size }
+    }
+
+    /// Gives orders up to `highest` that have no prior yet a σ \[rad\].
+    fn extend_prior(&mut self, highest: u32, sigma: f64) {
+        let prior = self.prior.get_or_insert_with(|| HarmonicPrior { by_order: Vec::new() });
+        let first = prior.by_order.last().map_or(1, |(order, _)| order + 1);
+        prior.by_order.extend((first..=highest).map(|order| (order, sigma)));
+        *prior = prior.scaled(1.0);
+    }
+
+    /// Records a fit as a round.
+    pub fn record(&mut self, fitted: &Fitted) {
+        let errors = fitted.found.fitted;
+        self.rounds.push(Round {
+            effects: self.added(fitted),
+            identification: errors.identification,
+            held_out: errors.held_out,
+        });
+        self.latest = fitted.clone();
+        self.evidence = None;
+    }
+
+    /// Returns true if the effects of a fit were not fitted together before, and remembers them.
+    pub fn is_new(&mut self, fitted: &Fitted) -> bool {
+        let effects = fitted.effects();
+        let is_same = |known: &Vec<Effect>| {
+            known.len() == effects.len() && effects.iter().all(|effect| known.contains(effect))
+        };
+        let is_new = !self.fitted_sets.iter().any(is_same);
+        if is_new {
+            self.fitted_sets.push(effects);
+        }
+        is_new
+    }
+}
