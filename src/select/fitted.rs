@@ -25,6 +25,9 @@ const TIMES: usize = 10;
 /// Work of one least-squares solve, in poses × unknowns², above which the outliers of the previous
 /// fit are kept instead of searched again: a search solves about ten times.
 const MAX_OUTLIER_WORK: f64 = 2e8;
+/// Root mean square change of the residuals, in σ, up to which evidence about a fit that was stopped
+/// early holds for the converged one.
+const MAX_UNSETTLED: f64 = 0.05;
 /// Part of its variance that a pose keeps where it determines a direction alone.
 const DECIDED: f64 = 1e-3;
 
@@ -140,6 +143,14 @@ impl Fitted {
             self.onwards(options)
         };
         self.next(self.problem.clone(), data, &onwards)
+    }
+
+    /// Returns true if the residuals of another fit of the same effects differ by more than
+    /// `MAX_UNSETTLED` σ in root mean square.
+    pub fn differs_from(&self, other: &Self, data: &Data) -> bool {
+        let [here, there] = [self, other].map(|fitted| fitted.errors(data, data.rows()));
+        let squares: f64 = here.iter().zip(&there).map(|(a, b)| (a - b).norm_squared()).sum();
+        squares.sqrt() > MAX_UNSETTLED * self.sigma * (3.0 * here.len() as f64).sqrt()
     }
 
     /// Returns options that start a fit where this one ended.

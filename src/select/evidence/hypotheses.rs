@@ -51,7 +51,8 @@ impl<'a> Hypotheses<'a> {
         let columns_of_part: Vec<Vec<usize>> =
             added.iter().map(|part| fitted.unknowns_of(part)).collect();
         let unknowns = columns_of_part.concat();
-        let linearised = fitted.linearised_with(data, rows, &candidates, &hypothesis_sites(&fitted.problem));
+        let linearised =
+            fitted.linearised_with(data, rows, &candidates, &hypothesis_sites(&fitted.problem));
         let fit = linearised.fitted();
         let known = added
             .iter()
@@ -117,7 +118,8 @@ impl<'a> Hypotheses<'a> {
         weighed: usize,
         of: &Hypothesis,
     ) -> Self {
-        let linearised = fitted.linearised_with(data, rows, &[], &hypothesis_sites(&fitted.problem));
+        let linearised =
+            fitted.linearised_with(data, rows, &[], &hypothesis_sites(&fitted.problem));
         let how = (data.measurements.time_measured, data.takes_gears, weighed);
         let (all, covariates, ln_family) =
             Columns::all(&fitted.problem, &linearised, how, &[], Some(of));

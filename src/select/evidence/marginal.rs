@@ -23,6 +23,9 @@ const STEP: f64 = 0.05;
 /// Smallest step of the grid: no data have more degrees of freedom.
 const LEAST_STEP: f64 = 1e-4;
 
+/// Terms that are e⁴⁰ times less probable than the largest add nothing to a sum.
+const NEGLIGIBLE_LN: f64 = 40.0;
+
 /// Degrees of freedom ν of a residual and the half width of the distribution of ln f.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Noise {
@@ -60,8 +63,8 @@ pub(super) fn over_noise(squares: f64, grid: &[(f64, f64)]) -> f64 {
 /// Returns ln Σ exp of some terms.
 pub(super) fn ln_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
     let most = terms.clone().fold(f64::NEG_INFINITY, f64::max);
-    // What is e⁴⁰ times less probable adds nothing.
-    let sum: f64 = terms.map(|term| term - most).filter(|term| *term > -40.0).map(f64::exp).sum();
+    let sum: f64 =
+        terms.map(|term| term - most).filter(|term| *term > -NEGLIGIBLE_LN).map(f64::exp).sum();
     if most == f64::NEG_INFINITY { most } else { most + sum.ln() }
 }
 
@@ -258,9 +261,19 @@ fn of_columns(
         };
         signs.unwrap_or(0.0) - determinant + over_noise(left, grid)
     };
-    let tried: Vec<(f64, f64)> = sizes.iter().map(|&size| (size, at(size))).collect();
-    let best =
-        tried.iter().copied().fold((1.0, f64::NEG_INFINITY), |a, b| if b.1 > a.1 { b } else { a });
+    // Sizes ascend, and beyond the most probable one the likelihood only falls: larger sizes of many
+    // columns are not factored once they add nothing to the sum.
+    let mut best = (1.0, f64::NEG_INFINITY);
+    let mut tried = Vec::with_capacity(sizes.len());
+    for &size in sizes {
+        let ln = at(size);
+        tried.push((size, ln));
+        if ln > best.1 {
+            best = (size, ln);
+        } else if ln < best.1 - NEGLIGIBLE_LN {
+            break;
+        }
+    }
     (ln_sum(tried.iter().map(|(_, ln)| *ln)) - (sizes.len() as f64).ln(), best.0)
 }
 

@@ -282,7 +282,7 @@ impl LinearNeighbourhood {
     fn take_off(&self, left: &mut DMatrix<f64>, filled: usize) {
         if left.ncols() > NARROW {
             // The narrow side is transposed: this is the product that is fast.
-            let along = (left.transpose() * &self.basis).transpose();
+            let along = (left.rows(0, filled).transpose() * self.basis.rows(0, filled)).transpose();
             left.gemm(-1.0, &self.basis, &along, 1.0);
             return;
         }

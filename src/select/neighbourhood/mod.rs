@@ -18,3 +18,4 @@ pub(crate) use linear::{LinearNeighbourhood, Unknowns};
 pub(super) use linearised::Derivatives;
 pub(crate) use linearised::Linearised;
 pub(crate) use scan::{Scan, Tried, tries};
+pub(super) use score::Score;

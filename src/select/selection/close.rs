@@ -133,9 +133,10 @@ pub fn close_by(
     } else {
         Some(fit_with_found(&state, &fitted, &effects, &unstoppable)?)
     };
+    let is_noise = unexplained.is_empty();
     let is_noise_with_found =
-        with_found.as_ref().is_none_or(|sure| !check_fit(sure, &data).is_structured());
-    let verdict = Verdict::of(&statuses, unexplained.is_empty(), is_noise_with_found);
+        is_noise && with_found.as_ref().is_none_or(|sure| !check_fit(sure, &data).is_structured());
+    let verdict = Verdict::of(&statuses, is_noise, is_noise_with_found);
     let with_found = with_found.map_or(fitted.found.fitted, |sure| sure.found.fitted);
     let held_out = &data.split.held_out;
     let gain =
@@ -205,5 +206,11 @@ fn fit_with_found(
     let sure = effects.iter().filter(|found| found.status == Status::Found);
     let sure: Vec<Effect> = sure.map(|found| found.effect.clone()).collect();
     let problem = state.problem(fitted, &sure);
-    fitted.next(problem, state.data, &fitted.onwards(options))
+    // Its errors are stated, nothing else: a fit of many unknowns need not be checked.
+    let options = if state.paid_fits(fitted) > 1 {
+        fitted.onwards(options)
+    } else {
+        Options { provisional: true, ..fitted.succeeding(options, true) }
+    };
+    fitted.next(problem, state.data, &options)
 }

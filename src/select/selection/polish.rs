@@ -1,17 +1,22 @@
 //! Searched arguments of the added effects on all rows: times between poses that the evidence did
 //! not see, and time constants, distances and orders between those that are listed.
 
+use nalgebra::DMatrix;
+
 use super::state::SearchState;
 use crate::fit::IdentifyError;
 use crate::problem::Effect;
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
+use crate::select::neighbourhood::{LinearNeighbourhood, Score};
 use crate::select::settings::{LN_ODDS_OF_ANOTHER_ARGUMENT, MAX_SHIFT_TIMES};
 
+/// Maximum number of moves of one argument to the best of its neighbours.
+const MAX_POLISHING_PASSES: usize = 8;
 /// Factors of a time constant, distance or order that are tried in its place.
 const FACTORS: [f64; 10] = [0.8, 0.86, 0.91, 0.95, 0.98, 1.02, 1.05, 1.1, 1.16, 1.25];
 
-/// Returns the fit with the searched argument of one effect exchanged for the one that explains all
+/// Returns the fit with the searched argument of each effect exchanged for the one that explains all
 /// identification rows best in the linear neighbourhood, where that is beyond doubt better; `None`
 /// where no argument is.
 ///
@@ -27,30 +32,43 @@ pub(super) fn polished(
         return Ok(None);
     }
     let added = state.added(fitted);
-    for effect in added.iter().filter(|effect| effect.is_searched()) {
-        let Some(better) = better_argument(fitted, data, effect) else { continue };
-        let others = added.iter().filter(|other| *other != effect);
-        let effects: Vec<Effect> = others.chain([&better]).cloned().collect();
-        return state.fit(fitted, &effects).map(Some);
-    }
-    Ok(None)
+    let polished = |effect: &Effect| {
+        let better = effect.is_searched().then(|| better_argument(fitted, data, effect));
+        better.flatten().unwrap_or_else(|| effect.clone())
+    };
+    let effects: Vec<Effect> = added.iter().map(polished).collect();
+    if effects == added { Ok(None) } else { state.fit(fitted, &effects).map(Some) }
 }
 
+/// Returns the effect with the argument that explains all rows best, `None` where its present one is
+/// not beyond doubt worse. The argument moves from neighbour to neighbour, at most
+/// `MAX_POLISHING_PASSES` times.
 fn better_argument(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<Effect> {
-    let mut tried = nearby(data, effect);
-    tried.push(effect.clone());
-    let linearised = fitted.linearised_at(data, data.rows(), &tried);
-    let without = fitted.neighbourhood_without(&linearised, &fitted.unknowns_of(effect));
-    let scatter = fitted.around(data).sums();
-    let variance = scatter.squares / scatter.freedom();
-    let ln_likelihood = |effect: &Effect| {
-        let gain = without.sums().gain(&without.score(&linearised.columns(effect)));
-        gain.map_or(0.0, |gain| 0.5 * gain.squares / variance)
-    };
-    let reference = ln_likelihood(effect);
-    let best = tried.into_iter().map(|effect| (ln_likelihood(&effect), effect));
-    let (gain, best) = best.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (gain > reference + LN_ODDS_OF_ANOTHER_ARGUMENT).then_some(best)
+    let sums = fitted.around(data).sums();
+    let variance = sums.squares / sums.freedom();
+    let mut without: Option<LinearNeighbourhood> = None;
+    let (mut best, mut gain_of_present) = ((f64::NEG_INFINITY, effect.clone()), f64::INFINITY);
+    for _ in 0..MAX_POLISHING_PASSES {
+        let tried: Vec<Effect> = [vec![best.1.clone()], nearby(data, &best.1)].concat();
+        let linearised = fitted.linearised_at(data, data.rows(), &tried);
+        let fit = without.get_or_insert_with(|| {
+            fitted.neighbourhood_without(&linearised, &fitted.unknowns_of(effect))
+        });
+        let columns: Vec<DMatrix<f64>> =
+            tried.iter().map(|effect| linearised.columns(effect)).collect();
+        let gain = |score: &Score| fit.sums().gain(score).map_or(0.0, |gain| gain.squares);
+        let gains: Vec<f64> =
+            fit.scores(&columns).iter().map(|score| 0.5 * gain(score) / variance).collect();
+        if best.0 == f64::NEG_INFINITY {
+            (best.0, gain_of_present) = (gains[0], gains[0]);
+        }
+        let next = gains.into_iter().zip(tried).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        if next.0 <= best.0 {
+            break;
+        }
+        best = next;
+    }
+    (best.0 > gain_of_present + LN_ODDS_OF_ANOTHER_ARGUMENT).then_some(best.1)
 }
 
 /// Returns the effect with other searched arguments: times between the poses up to the neighbouring

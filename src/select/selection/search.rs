@@ -22,9 +22,9 @@ pub(super) fn search(
     first: Fitted,
 ) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
     let (fitted, evidence) = settled_set(state, first)?;
-    let evidence =
-        evidence.filter(|_| fitted.found.termination.converged() && !fitted.found.provisional);
-    Ok((fitted.settled(state.data, state.options)?, evidence))
+    let settled = fitted.clone().settled(state.data, state.options)?;
+    let evidence = evidence.filter(|_| !settled.differs_from(&fitted, state.data));
+    Ok((settled, evidence))
 }
 
 fn settled_set(
@@ -36,20 +36,27 @@ fn settled_set(
     // Evidence that led to the fit at hand by odds between fits.
     let mut leading: Option<Evidence> = None;
     let mut has_estimated_prior = false;
+    let mut is_polished = false;
     while state.rounds.len() < rules.max_rounds {
         state.report_progress(0, 0);
         let Some(evidence) = state.evaluate(&fitted)? else { return Ok((fitted, None)) };
         let Some(best) = evidence.sure(rules.inclusion_threshold) else {
             return Ok((fitted, Some(evidence)));
         };
-        if !is_held(best, &state.reconsidered(&fitted)) {
+        let open = state.reconsidered(&fitted);
+        // Polished arguments stay: they explain all rows, of which the evidence has some.
+        if !is_held(best, &open) && !(is_polished && has_same_laws(best, &open)) {
             state.report_progress(1, 1);
             let effects = state.effects_of(&fitted, (&evidence, best));
             let next = state.fit(&fitted, &effects)?;
             if state.is_new(&next) {
-                leading = None;
+                (leading, is_polished) = (None, false);
                 state.record(&next);
                 fitted = next;
+                if !has_estimated_prior && state.added(&fitted).iter().any(is_gear) {
+                    has_estimated_prior = true;
+                    fitted = with_estimated_prior(state, &fitted)?;
+                }
                 continue;
             }
             // The evidence points back to a set that did less well at a fit of its own.
@@ -57,32 +64,32 @@ fn settled_set(
                 return Ok((fitted, Some(leading)));
             }
         }
-        if !has_estimated_prior
-            && state.added(&fitted).iter().any(is_gear)
-            && let Some(prior) = state.prior.clone()
-        {
-            has_estimated_prior = true;
-            state.prior = Some(estimated_prior(&fitted, state.data, prior));
-            fitted = state.fit(&fitted, &state.added(&fitted))?;
-            state.record(&fitted);
-            continue;
-        }
         let (evidence, better) = refitted(state, &fitted, evidence)?;
         if let Some(better) = better.filter(|better| state.is_new(better)) {
-            leading = Some(evidence);
+            (leading, is_polished) = (Some(evidence), false);
             state.record(&better);
             fitted = better;
             continue;
         }
-        let Some(better) = polished(state, &fitted)?.filter(|better| state.is_new(better)) else {
+        let next = if is_polished { None } else { polished(state, &fitted)? };
+        let Some(better) = next.filter(|better| state.is_new(better)) else {
             return Ok((fitted, Some(evidence)));
         };
-        leading = None;
+        (leading, is_polished) = (None, true);
         state.record(&better);
         fitted = better;
     }
     let evidence = state.evaluate(&fitted)?;
     Ok((fitted, evidence))
+}
+
+/// Returns the fit repeated with the common prior of the harmonics that its coefficients show.
+fn with_estimated_prior(state: &mut SearchState, fitted: &Fitted) -> Result<Fitted, IdentifyError> {
+    let Some(prior) = state.prior.take() else { return Ok(fitted.clone()) };
+    state.prior = Some(estimated_prior(fitted, state.data, prior));
+    let next = state.fit(fitted, &state.added(fitted))?;
+    state.record(&next);
+    Ok(next)
 }
 
 /// Returns true if the effects of a set are those that were added and the set has no further
@@ -93,6 +100,18 @@ fn is_held(set: &HypothesisSet, added: &[Effect]) -> bool {
     effects.len() == parts.len()
         && parts.iter().all(|part| effects.contains(part))
         && set.gears().is_empty()
+}
+
+/// Returns true if a set has as many effects of each kind at each place as were added and no further
+/// periodic error: they differ in searched arguments alone.
+fn has_same_laws(set: &HypothesisSet, added: &[Effect]) -> bool {
+    let names = |effects: Vec<Effect>| {
+        let mut names: Vec<String> = effects.iter().map(Effect::name_and_place).collect();
+        names.sort();
+        names
+    };
+    set.gears().is_empty()
+        && names(set.effects()) == names(added.iter().flat_map(Effect::parts).collect())
 }
 
 /// Returns the evidence with its rival sets evaluated at fits of their own, and the best of these

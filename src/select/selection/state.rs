@@ -111,7 +111,11 @@ impl<'a> SearchState<'a> {
 
     /// Returns how many fits with as many unknowns as this one `fit_work` pays for, at least one.
     pub fn paid_fits(&self, fitted: &Fitted) -> usize {
-        let work = self.data.rows().len() as f64 * (fitted.unknowns.len() as f64).powi(2);
+        self.paid_fits_of(fitted.unknowns.len())
+    }
+
+    fn paid_fits_of(&self, unknowns: usize) -> usize {
+        let work = self.data.rows().len() as f64 * (unknowns as f64).powi(2);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
         let count = (self.data.rules.fit_work / work.max(1.0)) as usize;
         count.max(1)
@@ -141,7 +145,12 @@ impl<'a> SearchState<'a> {
     /// # Errors
     /// The fit fails or was stopped.
     pub fn fit(&self, from: &Fitted, added: &[Effect]) -> Result<Fitted, IdentifyError> {
-        let paid = self.paid_fits(from);
+        let problem = self.problem(from, added);
+        let parameters = |effects: &[Effect]| -> usize {
+            effects.iter().map(|effect| effect.parameters(&problem).len()).sum()
+        };
+        let more = parameters(added).saturating_sub(parameters(&self.added(from)));
+        let paid = self.paid_fits_of(from.unknowns.len() + more);
         let steps = STEPS_PER_PAID_FIT * paid as u64;
         let max_steps = Some(self.options.max_steps.map_or(steps, |most| most.min(steps)));
         let provisional = paid == 1;
@@ -151,7 +160,7 @@ impl<'a> SearchState<'a> {
             from.onwards(self.options)
         };
         let options = Options { max_steps, provisional, ..options };
-        from.next(self.problem(from, added), self.data, &options)
+        from.next(problem, self.data, &options)
     }
 
     /// Returns the effects of a hypothesis set as the next fit holds them: its laws, its periodic
