@@ -37,7 +37,7 @@ pub(super) const SLOW_LENGTH: f64 = 0.5;
 pub(super) const MAX_NEAR_ORDER: u32 = 60;
 /// Highest orders of the periodic errors with many orders that are tried: some cycles a turn, and
 /// the highest order of a harmonic in the catalogue.
-pub(super) const GEAR_ORDERS: [u32; 2] = [20, 60];
+pub(super) const GEAR_ORDERS: [u32; 4] = [12, 20, 30, 60];
 
 // Searched arguments.
 

@@ -62,8 +62,13 @@ impl Set {
     /// Sizes are in units of the noise, which includes effects that are not explained yet: members
     /// that were taken first would be held too tightly. ln p(r | set) = l + Σ (ln p(r | the others,
     /// k) − l), l at the sizes of all, that of k summed over.
-    fn settled(mut self, products: &Products) -> Self {
-        if self.members.len() < 2 || self.has_wide(products.blocks) {
+    fn settled(self, products: &Products) -> Self {
+        if self.has_wide(products.blocks) { self } else { self.settled_whole(products) }
+    }
+
+    /// Returns the set settled however many columns its members have.
+    fn settled_whole(mut self, products: &Products) -> Self {
+        if self.members.len() < 2 {
             return self;
         }
         let settled = products.settled((&self.members, &self.sizes), || self.at_rest(products));
@@ -186,22 +191,24 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
     all
 }
 
-/// Extends the most probable set by periodic errors of many orders, as long as it becomes more
-/// probable, if it holds one: sets with them do not grow otherwise, for they have many columns.
+/// Extends the empty set, and the most probable set that holds a periodic error of many orders, by
+/// such errors, as long as the set becomes more probable. Sets with them do not grow otherwise, for
+/// they have many columns; of the errors of several joints each alone may do less well than smaller
+/// functions.
 fn with_gears(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let blocks = products.blocks;
     let gears: Vec<usize> = (0..blocks.len()).filter(|&block| blocks[block].is_gear).collect();
-    let by_posterior = |a: &&Set, b: &&Set| a.ln_posterior.total_cmp(&b.ln_posterior);
-    while let Some(best) = known.values().max_by(by_posterior).cloned() {
-        if !products.has_gear(&best.members) {
-            return;
-        }
-        let longer = extended(&best, &gears, products);
-        match longer.into_iter().max_by(|a, b| a.ln_posterior.total_cmp(&b.ln_posterior)) {
-            Some(longer) if longer.ln_posterior > best.ln_posterior => {
-                known.insert(sorted(&longer.members), longer);
-            }
-            _ => return,
+    let by_posterior = |a: &Set, b: &Set| a.ln_posterior.total_cmp(&b.ln_posterior);
+    let with_gear = known.values().filter(|set| products.has_gear(&set.members));
+    let best = with_gear.max_by(|a, b| by_posterior(a, b)).cloned();
+    for start in known.get(&Vec::new()).cloned().into_iter().chain(best) {
+        let mut next = Some(start);
+        while let Some(set) = next {
+            let longer = extended(&set, &gears, products).into_iter().max_by(by_posterior);
+            // Beside the errors of other joints the first would be held too tightly.
+            let longer = longer.map(|longer| longer.settled_whole(products));
+            next = longer.filter(|longer| longer.ln_posterior > set.ln_posterior);
+            known.extend(next.clone().map(|longer| (sorted(&longer.members), longer)));
         }
     }
 }
