@@ -1,25 +1,22 @@
 //! Columns of the hypotheses: what each would do to every measured coordinate.
 
 use crate::select::settings::{
-    GEAR_ORDERS, MAX_NEAR_ORDER, PRIOR_OF_FUNCTIONS, PRIOR_OF_RIGID_LINKS, ROUGH_LENGTHS,
-    SLOW_LENGTH, SMOOTH_LENGTHS, SURFACE_LENGTH,
+    PRIOR_OF_FUNCTIONS, PRIOR_OF_RIGID_LINKS, SLOW_LENGTH, SMOOTH_LENGTHS, SURFACE_LENGTH,
 };
 use nalgebra::{DMatrix, DVector};
 
 use super::block::Design;
 use super::candidate::{Candidate, even};
-use super::functions::{Known, basis, goes_with, growing, merge, products_of, rough_basis, times};
-use super::hypothesis::{Hypothesis, HypothesisKind, Site};
+use super::functions::{Known, basis, goes_with, growing, merge, products_of, times};
+use super::hypothesis::Hypothesis;
 use super::marginal::Coefficients;
 use super::sites::{acts_along_axes, geometry_sites};
 use crate::laws::Quantity;
 use crate::model::Pose;
 use crate::model::effect::Term;
-use crate::model::parameter::{BeamField, JointField, ParameterSite};
-use crate::problem::{Effect, EffectDeclaration, JointKind, Observation, Problem};
+use crate::model::parameter::{JointField, ParameterSite};
+use crate::problem::{Effect, JointKind, Observation, Problem};
 use crate::residual_tests::Covariate;
-use crate::select::data::{bits, number};
-use crate::select::harmonic_prior::is_gear_of;
 use crate::select::neighbourhood::{Linearised, tries};
 
 /// Displacement of the target, in σ, up to which commands in contact may differ by noise alone.
@@ -33,17 +30,17 @@ pub(super) struct Columns<'a, 'l> {
     pub linearised: &'a Linearised<'l>,
     pub time_measured: bool,
     /// True if the harmonics of the problem may have a common prior.
-    takes_gears: bool,
+    pub takes_gears: bool,
     /// Number of poses, the first ones, on which evidence is evaluated; functions are predicted at
     /// the others.
     pub weighed: usize,
     /// Hypothesis whose functions alone are wanted.
     only: Option<&'a Hypothesis>,
-    candidates: Vec<Candidate>,
+    pub candidates: Vec<Candidate>,
     /// Family of each candidate and its share of the family's probability.
     shares: Vec<(String, f64)>,
     /// Covariates of the functions.
-    covariates: Vec<Known>,
+    pub covariates: Vec<Known>,
 }
 
 impl<'a, 'l> Columns<'a, 'l> {
@@ -84,7 +81,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         self.add_design(family, share, hypothesis, || Design::Dense(columns()));
     }
 
-    fn add_design(
+    pub(super) fn add_design(
         &mut self,
         family: &str,
         share: f64,
@@ -121,7 +118,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     }
 
     /// Adds one of the functions of a hypothesis under a number that does not depend on the others.
-    fn add_variant(
+    pub(super) fn add_variant(
         &mut self,
         family: &str,
         hypothesis: &Hypothesis,
@@ -255,7 +252,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     /// In contact the noise is in the command, not in what is measured: a joint without which the
     /// target cannot come to its point has, beside each point, values that noise alone sets apart,
     /// and a function of those is one of the noise. They are taken for one value.
-    fn command(&self, joint: usize) -> Vec<f64> {
+    pub(super) fn command(&self, joint: usize) -> Vec<f64> {
         let poses = self.linearised.poses();
         let mut values: Vec<f64> =
             poses.iter().map(|pose| pose.setup.configuration[joint]).collect();
@@ -329,7 +326,7 @@ impl<'a, 'l> Columns<'a, 'l> {
 
     /// Adds smooth functions of one covariate at some columns that belong together, and a straight
     /// line unless an effect is that.
-    fn smooth(
+    pub(super) fn smooth(
         &mut self,
         family: &str,
         site: ParameterSite,
@@ -404,7 +401,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    fn surface(
+    pub(super) fn surface(
         &mut self,
         family: &str,
         site: ParameterSite,
@@ -417,221 +414,6 @@ impl<'a, 'l> Columns<'a, 'l> {
         self.add(family, 1.0, hypothesis, || {
             times(at, &products_of(&[&one.scaled, &other.scaled], length))
         });
-    }
-
-    /// Adds another value in every pose.
-    fn per_pose(&mut self, site: ParameterSite, at: &DVector<f64>) {
-        let hypothesis = Hypothesis {
-            kind: HypothesisKind::PerPose,
-            site: Site::of(site),
-            coordinate: Some(site),
-            depends_on: Vec::new(),
-        };
-        self.add_design("per pose", 1.0, hypothesis, || Design::per_pose(at));
-    }
-
-    /// Adds harmonics whose height and phase change slowly: orders that are no whole numbers, and
-    /// sums of neighbouring ones.
-    fn near_harmonics(&mut self, site: ParameterSite, at: &DVector<f64>, joint: usize) {
-        if self.problem.joints[joint].command_kind() != JointKind::Revolute {
-            return;
-        }
-        let Some(known) = Known::of(Covariate::Command(joint), self.command(joint), self.weighed)
-        else {
-            return;
-        };
-        let slow = basis(&known.scaled, SLOW_LENGTH);
-        for order in 1..=MAX_NEAR_ORDER {
-            let waves = || {
-                let (k, mut waves) = (slow.ncols(), DMatrix::zeros(slow.nrows(), 2 * slow.ncols()));
-                for (row, q) in known.values.iter().enumerate() {
-                    let (sin, cos) = (f64::from(order) * q).sin_cos();
-                    for j in 0..k {
-                        waves[(row, j)] = slow[(row, j)] * sin;
-                        waves[(row, j + k)] = slow[(row, j)] * cos;
-                    }
-                }
-                waves
-            };
-            let (kind, depends_on) =
-                (HypothesisKind::NearHarmonic(order), vec![known.covariate.clone()]);
-            let hypothesis =
-                Hypothesis { kind, site: Site::Joint(joint), coordinate: Some(site), depends_on };
-            self.add("near harmonic", 1.0 / f64::from(order * order), hypothesis, || {
-                times(&[at], &waves())
-            });
-        }
-    }
-
-    /// Adds periodic errors of a joint with many orders under one prior, one hypothesis for each
-    /// highest order, unless the fit holds one or the command takes too few values.
-    fn gears(&mut self, site: ParameterSite, at: &DVector<f64>, joint: usize) {
-        let held = |declared: &EffectDeclaration| is_gear_of(&declared.effect, joint + 1);
-        if !self.takes_gears || self.problem.effects.iter().any(held) {
-            return;
-        }
-        let Some(known) = Known::of(Covariate::Command(joint), self.command(joint), self.weighed)
-        else {
-            return;
-        };
-        for highest in GEAR_ORDERS {
-            if known.levels < 2 * highest as usize {
-                continue;
-            }
-            let hypothesis = Hypothesis {
-                kind: HypothesisKind::Gear(highest),
-                site: Site::Joint(joint),
-                coordinate: Some(site),
-                depends_on: vec![known.covariate.clone()],
-            };
-            self.add("gear", 1.0, hypothesis, || {
-                let waves = DMatrix::from_fn(known.values.len(), 2 * highest as usize, |row, k| {
-                    let phase = (k / 2 + 1) as f64 * known.values[row];
-                    if k % 2 == 0 { phase.sin() } else { phase.cos() }
-                });
-                times(&[at], &waves)
-            });
-        }
-    }
-
-    /// Adds functions of one covariate, and of the position, that move every measured position.
-    fn measurement(&mut self, known: &[Known]) {
-        let axes: Vec<DVector<f64>> = (0..3)
-            .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
-            .collect();
-        if axes.len() < 3 {
-            return;
-        }
-        let (site, at) = (ParameterSite::Shift { axis: 0 }, axes.iter().collect::<Vec<_>>());
-        let lengths = SMOOTH_LENGTHS;
-        for of in known {
-            self.smooth("smooth in the measurement", site, &at, of, &lengths);
-        }
-        let is_time = |of: &&Known| matches!(of.covariate, Covariate::Time | Covariate::Row);
-        for of in known.iter().filter(is_time) {
-            self.wandering(site, &at, of);
-        }
-        let poses = self.linearised.poses();
-        let coordinate = |axis: usize| {
-            Known::of(
-                Covariate::Position,
-                poses.iter().map(|p| p.measured[axis]).collect(),
-                self.weighed,
-            )
-        };
-        let coordinates: Vec<Known> = (0..3).filter_map(coordinate).collect();
-        let linear = DMatrix::from_fn(poses.len(), coordinates.len(), |k, j| {
-            let scaled = &coordinates[j].scaled;
-            scaled[k] - scaled[..self.weighed].iter().sum::<f64>() / self.weighed.max(1) as f64
-        });
-        let hypothesis = |kind| Hypothesis {
-            kind,
-            site: Site::Measurement,
-            coordinate: None,
-            depends_on: vec![Covariate::Position],
-        };
-        // Where the strain of the frame is looked for, that is the linear law.
-        let strain =
-            |candidate: &Candidate| candidate.hypothesis.effect() == Some(&Effect::FrameStrain);
-        if !self.candidates.iter().any(strain) {
-            self.add("field", 1.0, hypothesis(HypothesisKind::Linear), || times(&at, &linear));
-        }
-        if let [x, y, z] = coordinates.as_slice() {
-            let plane = products_of(&[&x.scaled, &y.scaled, &z.scaled], SLOW_LENGTH);
-            self.add("field", 1.0, hypothesis(HypothesisKind::Smooth), || times(&at, &plane));
-        }
-        self.covariates.extend(coordinates);
-    }
-
-    /// Adds an instrument that wanders in time, or in which one reading errs as the last did.
-    fn wandering(&mut self, site: ParameterSite, at: &[&DVector<f64>], of: &Known) {
-        let hypothesis = Hypothesis {
-            kind: HypothesisKind::Wandering,
-            site: Site::Measurement,
-            coordinate: Some(site),
-            depends_on: vec![of.covariate.clone()],
-        };
-        for (variant, &length) in ROUGH_LENGTHS.iter().enumerate() {
-            if let Some(basis) = rough_basis(&of.scaled, length, of.levels) {
-                self.add_variant("smooth in the measurement", &hypothesis, variant, || {
-                    times(at, &basis)
-                });
-            }
-        }
-    }
-
-    /// Adds leans of the base as functions of quantities that are no commands: its floor warms,
-    /// creeps or gives way.
-    fn base(&mut self, known: &[Known]) {
-        let axes: Vec<DVector<f64>> =
-            (0..3).filter_map(|axis| self.linearised.place(ParameterSite::Turn { axis })).collect();
-        let (site, at) = (ParameterSite::Turn { axis: 0 }, axes.iter().collect::<Vec<_>>());
-        let is_command =
-            |of: &&Known| matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_));
-        for of in known.iter().filter(|of| axes.len() == 3 && !is_command(of)) {
-            self.smooth("smooth at the base", site, &at, of, &SMOOTH_LENGTHS[..2]);
-        }
-    }
-
-    /// Adds another value in every configuration, shared by all positions measured in it.
-    fn repeats(&mut self) {
-        let axes: Vec<DVector<f64>> = (0..3)
-            .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
-            .collect();
-        let poses = self.linearised.poses();
-        let configurations: Vec<Vec<u64>> =
-            poses.iter().map(|pose| bits(pose.setup.configuration)).collect();
-        let numbers = number(configurations[..self.weighed].iter().cloned());
-        let count = numbers.iter().max().map_or(0, |last| last + 1);
-        if count == self.weighed || axes.len() < 3 {
-            return;
-        }
-        let groups = (0..poses.len()).map(|row| numbers.get(row).copied()).collect();
-        let hypothesis = Hypothesis {
-            kind: HypothesisKind::PerPose,
-            site: Site::Arm,
-            coordinate: None,
-            depends_on: Vec::new(),
-        };
-        let design = || Design::Grouped { levers: DMatrix::from_columns(&axes), groups };
-        self.add_design("per pose", 1.0, hypothesis, design);
-    }
-
-    /// Adds curvature and strain of beams by other functions of temperature than a multiple.
-    fn warming(&mut self, known: &[Known]) {
-        if self.problem.data.reference_temperature.is_none() {
-            return;
-        }
-        for joint in 0..self.problem.joints.len() {
-            for fields in [&BeamField::STRAINS[1..], &BeamField::STRAINS[..1]] {
-                let column = |&field: &BeamField| {
-                    self.linearised
-                        .place(ParameterSite::Beam { joint, field })
-                        .filter(|column| column.norm_squared() > 0.0)
-                };
-                let columns: Vec<DVector<f64>> = fields.iter().filter_map(column).collect();
-                if columns.is_empty() {
-                    continue;
-                }
-                let (site, at) = (
-                    ParameterSite::Beam { joint, field: fields[0] },
-                    columns.iter().collect::<Vec<_>>(),
-                );
-                let of_covariate =
-                    |wanted: &Covariate| known.iter().find(|known| known.covariate == *wanted);
-                for of in
-                    known.iter().filter(|known| !matches!(known.covariate, Covariate::Approach(_)))
-                {
-                    self.smooth("smooth in a link", site, &at, of, &SMOOTH_LENGTHS[..2]);
-                }
-                let time = if self.time_measured { Covariate::Time } else { Covariate::Row };
-                if let (Some(one), Some(other)) =
-                    (of_covariate(&Covariate::Temperature), of_covariate(&time))
-                {
-                    self.surface("surface in a link", site, &at, (one, other));
-                }
-            }
-        }
     }
 
     /// Returns the candidates with their prior probabilities: odds of one to two for each further

@@ -2,14 +2,14 @@
 //! set needs these alone; each is computed on first use and kept.
 
 use std::cell::OnceCell;
-use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::block::Block;
 use super::marginal::{Noise, Normal, over_noise};
+use super::recalled::Recalled;
 use crate::fit::Stop;
 use crate::numeric::{inverse_factor, inverse_lower, lower_factor, lower_product};
 use crate::select::neighbourhood::LinearNeighbourhood;
@@ -63,28 +63,6 @@ type Beside = (AtSizes, Vec<usize>);
 
 fn at_sizes(members: &[usize], sizes: &[f64]) -> AtSizes {
     members.iter().copied().zip(sizes.iter().map(|size| size.to_bits())).collect()
-}
-
-/// Cache of results by key.
-struct Recalled<K, V>(Mutex<BTreeMap<K, V>>);
-
-impl<K, V> Default for Recalled<K, V> {
-    fn default() -> Self {
-        Self(Mutex::default())
-    }
-}
-
-impl<K: Ord + Clone, V: Clone> Recalled<K, V> {
-    /// Returns the cached result of `key`, or computes and keeps it.
-    fn recall(&self, key: &K, make: impl FnOnce() -> Option<V>) -> Option<V> {
-        let all = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = all().get(key).cloned();
-        known.or_else(|| {
-            let new = make()?;
-            all().insert(key.clone(), new.clone());
-            Some(new)
-        })
-    }
 }
 
 /// Hypothesis that is a member of some set.

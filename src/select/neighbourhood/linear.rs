@@ -6,9 +6,9 @@ use std::borrow::Cow;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::orthonormal::{open, orthonormal, orthonormal_above};
+use super::orthonormal::{held, lengthened, orthonormal, orthonormal_above};
 use super::score::{Score, Sums};
-use crate::numeric::{gram, inverse_factor, product, transposed_narrow_product, zeros};
+use crate::numeric::{gram, inverse_factor, product, transposed_narrow_product};
 
 /// Minimum part of a direction's length² outside a block of poses for the other poses to determine
 /// it.
@@ -367,35 +367,6 @@ impl LinearNeighbourhood {
         let sums: Vec<f64> = (0..blocks).into_par_iter().map(left_out).collect();
         sums.iter().all(|sum| sum.is_finite()).then_some(sums)
     }
-}
-
-/// Returns Q and T of columns with rows `below` them of one entry each, within the directions that
-/// the constraints `active` leave open.
-fn held(
-    jacobian: &DMatrix<f64>,
-    below: &[(usize, f64)],
-    active: &DMatrix<f64>,
-) -> (DMatrix<f64>, DMatrix<f64>) {
-    let rows = jacobian.nrows();
-    let mut columns = lengthened(jacobian, below.len());
-    below.iter().enumerate().for_each(|(row, &(j, value))| columns[(rows + row, j)] = value);
-    let scale: Vec<f64> =
-        columns.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
-    let Some(open) = open(active, &scale) else { return orthonormal(&columns, None) };
-    columns.column_iter_mut().zip(&scale).for_each(|(mut column, scale)| column /= *scale);
-    let (basis, within) = orthonormal(&product(&columns, &open), None);
-    let mut root = open * within;
-    root.row_iter_mut().zip(&scale).for_each(|(mut row, scale)| row /= *scale);
-    (basis, root)
-}
-
-/// Returns a matrix with `more` rows of zeros below it.
-fn lengthened(matrix: &DMatrix<f64>, more: usize) -> DMatrix<f64> {
-    let (rows, n) = matrix.shape();
-    let mut long = zeros(rows + more, n);
-    let columns = long.as_mut_slice().par_chunks_mut((rows + more).max(1)).enumerate();
-    columns.for_each(|(j, out)| out[..rows].copy_from_slice(matrix.column(j).as_slice()));
-    long
 }
 
 /// Returns true if at least `MOSTLY` of the length of every column is left.

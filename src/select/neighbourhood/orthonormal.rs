@@ -3,10 +3,11 @@
 use std::borrow::Cow;
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use crate::numeric::{
-    gram, inverse_factor, inverse_lower, multiply_by_upper, product_with_upper,
-    product_with_upper_padded,
+    gram, inverse_factor, inverse_lower, multiply_by_upper, product, product_with_upper,
+    product_with_upper_padded, zeros,
 };
 
 /// A column is a direction of its own where those before it leave more than this part of its
@@ -116,6 +117,35 @@ pub(super) fn open(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>>
     let left: Vec<usize> =
         (0..active.ncols()).filter(|&k| eigen.eigenvalues[k] < RANK * RANK).collect();
     Some(eigen.eigenvectors.select_columns(&left))
+}
+
+/// Returns Q and T of columns with rows `below` them of one entry each, within the directions that
+/// the constraints `active` leave open.
+pub(super) fn held(
+    jacobian: &DMatrix<f64>,
+    below: &[(usize, f64)],
+    active: &DMatrix<f64>,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let rows = jacobian.nrows();
+    let mut columns = lengthened(jacobian, below.len());
+    below.iter().enumerate().for_each(|(row, &(j, value))| columns[(rows + row, j)] = value);
+    let scale: Vec<f64> =
+        columns.column_iter().map(|c| c.norm()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
+    let Some(open) = open(active, &scale) else { return orthonormal(&columns, None) };
+    columns.column_iter_mut().zip(&scale).for_each(|(mut column, scale)| column /= *scale);
+    let (basis, within) = orthonormal(&product(&columns, &open), None);
+    let mut root = open * within;
+    root.row_iter_mut().zip(&scale).for_each(|(mut row, scale)| row /= *scale);
+    (basis, root)
+}
+
+/// Returns a matrix with `more` rows of zeros below it.
+pub(super) fn lengthened(matrix: &DMatrix<f64>, more: usize) -> DMatrix<f64> {
+    let (rows, n) = matrix.shape();
+    let mut long = zeros(rows + more, n);
+    let columns = long.as_mut_slice().par_chunks_mut((rows + more).max(1)).enumerate();
+    columns.for_each(|(j, out)| out[..rows].copy_from_slice(matrix.column(j).as_slice()));
+    long
 }
 
 #[cfg(test)]

@@ -1,0 +1,157 @@
+//! Functions without a law elsewhere than at one joint: in the measurement, at the base, in whole
+//! configurations, and in links that warm.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::block::Design;
+use super::candidate::Candidate;
+use super::columns::Columns;
+use super::functions::{Known, products_of, rough_basis, times};
+use super::hypothesis::{Hypothesis, HypothesisKind, Site};
+use crate::model::parameter::{BeamField, ParameterSite};
+use crate::problem::Effect;
+use crate::residual_tests::Covariate;
+use crate::select::data::{bits, number};
+use crate::select::settings::{ROUGH_LENGTHS, SLOW_LENGTH, SMOOTH_LENGTHS};
+
+impl Columns<'_, '_> {
+    /// Adds functions of one covariate, and of the position, that move every measured position.
+    pub(super) fn measurement(&mut self, known: &[Known]) {
+        let axes: Vec<DVector<f64>> = (0..3)
+            .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
+            .collect();
+        if axes.len() < 3 {
+            return;
+        }
+        let (site, at) = (ParameterSite::Shift { axis: 0 }, axes.iter().collect::<Vec<_>>());
+        let lengths = SMOOTH_LENGTHS;
+        for of in known {
+            self.smooth("smooth in the measurement", site, &at, of, &lengths);
+        }
+        let is_time = |of: &&Known| matches!(of.covariate, Covariate::Time | Covariate::Row);
+        for of in known.iter().filter(is_time) {
+            self.wandering(site, &at, of);
+        }
+        let poses = self.linearised.poses();
+        let coordinate = |axis: usize| {
+            Known::of(
+                Covariate::Position,
+                poses.iter().map(|p| p.measured[axis]).collect(),
+                self.weighed,
+            )
+        };
+        let coordinates: Vec<Known> = (0..3).filter_map(coordinate).collect();
+        let linear = DMatrix::from_fn(poses.len(), coordinates.len(), |k, j| {
+            let scaled = &coordinates[j].scaled;
+            scaled[k] - scaled[..self.weighed].iter().sum::<f64>() / self.weighed.max(1) as f64
+        });
+        let hypothesis = |kind| Hypothesis {
+            kind,
+            site: Site::Measurement,
+            coordinate: None,
+            depends_on: vec![Covariate::Position],
+        };
+        // Where the strain of the frame is looked for, that is the linear law.
+        let strain =
+            |candidate: &Candidate| candidate.hypothesis.effect() == Some(&Effect::FrameStrain);
+        if !self.candidates.iter().any(strain) {
+            self.add("field", 1.0, hypothesis(HypothesisKind::Linear), || times(&at, &linear));
+        }
+        if let [x, y, z] = coordinates.as_slice() {
+            let plane = products_of(&[&x.scaled, &y.scaled, &z.scaled], SLOW_LENGTH);
+            self.add("field", 1.0, hypothesis(HypothesisKind::Smooth), || times(&at, &plane));
+        }
+        self.covariates.extend(coordinates);
+    }
+
+    /// Adds an instrument that wanders in time, or in which one reading errs as the last did.
+    pub(super) fn wandering(&mut self, site: ParameterSite, at: &[&DVector<f64>], of: &Known) {
+        let hypothesis = Hypothesis {
+            kind: HypothesisKind::Wandering,
+            site: Site::Measurement,
+            coordinate: Some(site),
+            depends_on: vec![of.covariate.clone()],
+        };
+        for (variant, &length) in ROUGH_LENGTHS.iter().enumerate() {
+            if let Some(basis) = rough_basis(&of.scaled, length, of.levels) {
+                self.add_variant("smooth in the measurement", &hypothesis, variant, || {
+                    times(at, &basis)
+                });
+            }
+        }
+    }
+
+    /// Adds leans of the base as functions of quantities that are no commands: its floor warms,
+    /// creeps or gives way.
+    pub(super) fn base(&mut self, known: &[Known]) {
+        let axes: Vec<DVector<f64>> =
+            (0..3).filter_map(|axis| self.linearised.place(ParameterSite::Turn { axis })).collect();
+        let (site, at) = (ParameterSite::Turn { axis: 0 }, axes.iter().collect::<Vec<_>>());
+        let is_command =
+            |of: &&Known| matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_));
+        for of in known.iter().filter(|of| axes.len() == 3 && !is_command(of)) {
+            self.smooth("smooth at the base", site, &at, of, &SMOOTH_LENGTHS[..2]);
+        }
+    }
+
+    /// Adds another value in every configuration, shared by all positions measured in it.
+    pub(super) fn repeats(&mut self) {
+        let axes: Vec<DVector<f64>> = (0..3)
+            .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
+            .collect();
+        let poses = self.linearised.poses();
+        let configurations: Vec<Vec<u64>> =
+            poses.iter().map(|pose| bits(pose.setup.configuration)).collect();
+        let numbers = number(configurations[..self.weighed].iter().cloned());
+        let count = numbers.iter().max().map_or(0, |last| last + 1);
+        if count == self.weighed || axes.len() < 3 {
+            return;
+        }
+        let groups = (0..poses.len()).map(|row| numbers.get(row).copied()).collect();
+        let hypothesis = Hypothesis {
+            kind: HypothesisKind::PerPose,
+            site: Site::Arm,
+            coordinate: None,
+            depends_on: Vec::new(),
+        };
+        let design = || Design::Grouped { levers: DMatrix::from_columns(&axes), groups };
+        self.add_design("per pose", 1.0, hypothesis, design);
+    }
+
+    /// Adds curvature and strain of beams by other functions of temperature than a multiple.
+    pub(super) fn warming(&mut self, known: &[Known]) {
+        if self.problem.data.reference_temperature.is_none() {
+            return;
+        }
+        for joint in 0..self.problem.joints.len() {
+            for fields in [&BeamField::STRAINS[1..], &BeamField::STRAINS[..1]] {
+                let column = |&field: &BeamField| {
+                    self.linearised
+                        .place(ParameterSite::Beam { joint, field })
+                        .filter(|column| column.norm_squared() > 0.0)
+                };
+                let columns: Vec<DVector<f64>> = fields.iter().filter_map(column).collect();
+                if columns.is_empty() {
+                    continue;
+                }
+                let (site, at) = (
+                    ParameterSite::Beam { joint, field: fields[0] },
+                    columns.iter().collect::<Vec<_>>(),
+                );
+                let of_covariate =
+                    |wanted: &Covariate| known.iter().find(|known| known.covariate == *wanted);
+                for of in
+                    known.iter().filter(|known| !matches!(known.covariate, Covariate::Approach(_)))
+                {
+                    self.smooth("smooth in a link", site, &at, of, &SMOOTH_LENGTHS[..2]);
+                }
+                let time = if self.time_measured { Covariate::Time } else { Covariate::Row };
+                if let (Some(one), Some(other)) =
+                    (of_covariate(&Covariate::Temperature), of_covariate(&time))
+                {
+                    self.surface("surface in a link", site, &at, (one, other));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! Functions without a law of one coordinate of a joint that are not smooth: another value in every
+//! pose, harmonics that change slowly, and periodic errors of many orders.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::block::Design;
+use super::columns::Columns;
+use super::functions::{Known, basis, times};
+use super::hypothesis::{Hypothesis, HypothesisKind, Site};
+use crate::model::parameter::ParameterSite;
+use crate::problem::{EffectDeclaration, JointKind};
+use crate::residual_tests::Covariate;
+use crate::select::harmonic_prior::is_gear_of;
+use crate::select::settings::{GEAR_ORDERS, MAX_NEAR_ORDER, SLOW_LENGTH};
+
+/// Number of values of a command, for each order, from which on a periodic error of many orders is
+/// told from any other function: twice the number of its coefficients.
+const LEVELS_PER_ORDER: usize = 4;
+
+impl Columns<'_, '_> {
+    /// Adds another value in every pose.
+    pub(super) fn per_pose(&mut self, site: ParameterSite, at: &DVector<f64>) {
+        let hypothesis = Hypothesis {
+            kind: HypothesisKind::PerPose,
+            site: Site::of(site),
+            coordinate: Some(site),
+            depends_on: Vec::new(),
+        };
+        self.add_design("per pose", 1.0, hypothesis, || Design::per_pose(at));
+    }
+
+    /// Adds harmonics whose height and phase change slowly: orders that are no whole numbers, and
+    /// sums of neighbouring ones.
+    pub(super) fn near_harmonics(&mut self, site: ParameterSite, at: &DVector<f64>, joint: usize) {
+        if self.problem.joints[joint].command_kind() != JointKind::Revolute {
+            return;
+        }
+        let Some(known) = Known::of(Covariate::Command(joint), self.command(joint), self.weighed)
+        else {
+            return;
+        };
+        let slow = basis(&known.scaled, SLOW_LENGTH);
+        for order in 1..=MAX_NEAR_ORDER {
+            let waves = || {
+                let (k, mut waves) = (slow.ncols(), DMatrix::zeros(slow.nrows(), 2 * slow.ncols()));
+                for (row, q) in known.values.iter().enumerate() {
+                    let (sin, cos) = (f64::from(order) * q).sin_cos();
+                    for j in 0..k {
+                        waves[(row, j)] = slow[(row, j)] * sin;
+                        waves[(row, j + k)] = slow[(row, j)] * cos;
+                    }
+                }
+                waves
+            };
+            let (kind, depends_on) =
+                (HypothesisKind::NearHarmonic(order), vec![known.covariate.clone()]);
+            let hypothesis =
+                Hypothesis { kind, site: Site::Joint(joint), coordinate: Some(site), depends_on };
+            self.add("near harmonic", 1.0 / f64::from(order * order), hypothesis, || {
+                times(&[at], &waves())
+            });
+        }
+    }
+
+    /// Adds periodic errors of a joint with many orders under one prior, one hypothesis for each
+    /// highest order, unless the fit holds one or the command takes too few values.
+    pub(super) fn gears(&mut self, site: ParameterSite, at: &DVector<f64>, joint: usize) {
+        let held = |declared: &EffectDeclaration| is_gear_of(&declared.effect, joint + 1);
+        if !self.takes_gears || self.problem.effects.iter().any(held) {
+            return;
+        }
+        let Some(known) = Known::of(Covariate::Command(joint), self.command(joint), self.weighed)
+        else {
+            return;
+        };
+        for highest in GEAR_ORDERS {
+            if known.levels < LEVELS_PER_ORDER * highest as usize {
+                continue;
+            }
+            let hypothesis = Hypothesis {
+                kind: HypothesisKind::Gear(highest),
+                site: Site::Joint(joint),
+                coordinate: Some(site),
+                depends_on: vec![known.covariate.clone()],
+            };
+            self.add("gear", 1.0, hypothesis, || {
+                let waves = DMatrix::from_fn(known.values.len(), 2 * highest as usize, |row, k| {
+                    let phase = (k / 2 + 1) as f64 * known.values[row];
+                    if k % 2 == 0 { phase.sin() } else { phase.cos() }
+                });
+                times(&[at], &waves)
+            });
+        }
+    }
+}
