@@ -1,6 +1,6 @@
 //! Cholesky factors and triangular inverses by blocked matrix products.
 
-use nalgebra::{Cholesky, DMatrix, DMatrixViewMut};
+use nalgebra::{Cholesky, DMatrix, DMatrixViewMut, DVector};
 
 /// Number of rows up to which a triangular solve or inverse proceeds column by column.
 const MAX_UNBLOCKED_ROWS: usize = 24;
@@ -89,10 +89,20 @@ pub(crate) fn inverse_factor(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     lower_factor(matrix.clone()).map(|lower| inverse_lower(&lower))
 }
 
+/// Solves M x = b and returns x, or `None` if M is not positive definite. Only the lower half of M
+/// is read.
+pub(crate) fn solve_positive(
+    matrix: DMatrix<f64>,
+    mut right: DVector<f64>,
+) -> Option<DVector<f64>> {
+    let lower = lower_factor(matrix)?;
+    let is_solved = lower.solve_lower_triangular_mut(&mut right)
+        && lower.tr_solve_lower_triangular_mut(&mut right);
+    is_solved.then_some(right)
+}
+
 #[cfg(test)]
 mod tests {
-    use nalgebra::DVector;
-
     use super::*;
 
     #[test]
@@ -108,8 +118,11 @@ mod tests {
                 (inverse_factor(&matrix).unwrap() * &lower - DMatrix::identity(n, n)).amax()
                     < 1e-11
             );
+            let x = DVector::from_fn(n, |i, _| (i as f64).cos());
+            let right = &lower * lower.tr_mul(&x);
+            assert!((solve_positive(matrix.clone(), right.clone()).unwrap() - x).amax() < 1e-10);
             matrix[(n - 1, n - 1)] = -1.0;
-            assert!(inverse_factor(&matrix).is_none());
+            assert!(inverse_factor(&matrix).is_none() && solve_positive(matrix, right).is_none());
         }
     }
 
@@ -126,10 +139,7 @@ mod tests {
         let right = &matrix * &x;
         let plain = matrix.clone().cholesky().unwrap().solve(&right);
         let error = |x: &DVector<f64>| (&matrix * x - &right).norm();
-        let lower = lower_factor(matrix.clone()).unwrap();
-        let mut blocked = right.clone();
-        assert!(lower.solve_lower_triangular_mut(&mut blocked));
-        assert!(lower.tr_solve_lower_triangular_mut(&mut blocked));
+        let blocked = solve_positive(matrix.clone(), right.clone()).unwrap();
         assert!(
             error(&blocked) <= 10.0 * error(&plain) + 1e-12 * right.norm(),
             "{:e} {:e}",

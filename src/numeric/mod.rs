@@ -6,7 +6,7 @@ mod product;
 
 pub use bootstrap::Interval;
 pub(crate) use bootstrap::mean_interval;
-pub(crate) use factor::{inverse_factor, inverse_lower, lower_factor};
+pub(crate) use factor::{inverse_factor, inverse_lower, lower_factor, solve_positive};
 pub(crate) use product::{
     gram, gram_of_lower, lower_product, multiply_by_upper, product, product_with_upper,
     product_with_upper_padded, subtract_product, transposed_narrow_product, transposed_product,

@@ -41,9 +41,7 @@ pub use rules::SelectionRules;
 #[doc(hidden)]
 pub use screening::examine;
 pub use screening::{Ranked, Trace, trace, trace_by};
-pub use selection::{
-    ClosedLoop, Found, Interval, Round, Status, Verdict, close, close_by,
-};
+pub use selection::{ClosedLoop, Found, Interval, Round, Status, Verdict, close, close_by};
 #[doc(hidden)]
 pub use separation::{Separation, Side, separation};
 #[doc(hidden)]

@@ -6,16 +6,16 @@
 //!   is by chance.
 //! - [`Scan`]: all candidates against one fit.
 
+mod left_out;
 mod linear;
 mod linearised;
 mod orthonormal;
-mod prior_evidence;
 mod scan;
 mod score;
 
+pub(super) use left_out::PartSquares;
 pub(crate) use linear::{LinearNeighbourhood, Unknowns};
 pub(super) use linearised::Derivatives;
 pub(crate) use linearised::Linearised;
-pub(super) use prior_evidence::PriorEvidence;
 pub(crate) use scan::{Scan, Tried, tries};
 pub(super) use score::Score;

@@ -7,16 +7,21 @@
 //!
 //! Joints of one arm have gears of a kind, which err at like orders. So σₖ = s hₖ is common to all
 //! joints: the spectrum hₖ is that of the coefficients of all joints, smoothed over neighbouring
-//! orders, and the scale s is the one of the largest evidence.
+//! orders. The scale s of the largest evidence leaves least to other hypotheses, so that the search
+//! uses it; the extended problem has the scale that predicts best when whole parts of a joint's
+//! range are left out, which is smaller where the errors are no exact harmonics.
 
+use crate::problem::Problem;
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
 use crate::select::harmonic_prior::{HarmonicPrior, order_of};
-use crate::select::neighbourhood::PriorEvidence;
+use crate::select::neighbourhood::PartSquares;
 
 /// Passes of the estimate of the spectrum: σₖ from the coefficients, then the coefficients under σₖ.
 /// More passes hardly change it.
 const SPECTRUM_PASSES: usize = 2;
+/// Parts of each joint's range that are left out in turn to find the scale of the prior.
+const RANGE_PARTS: usize = 5;
 /// Scales of the prior that are tried, as powers of two of the scale at which the evidence put it;
 /// then half and quarter powers about the best.
 const SCALE_POWERS: std::ops::RangeInclusive<i32> = -8..=4;
@@ -32,11 +37,28 @@ fn coefficients(fitted: &Fitted) -> Vec<(usize, u32)> {
     (0..fitted.unknowns.len()).filter_map(|j| Some((j, order(j)?))).collect()
 }
 
+/// Criterion by which the scale of the prior is chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ScaleBy {
+    /// Largest evidence.
+    Evidence,
+    /// Best prediction of parts of the joints' ranges that are left out.
+    LeftOutRanges,
+}
+
 /// Returns the prior whose spectrum the coefficients of a fit under the prior `first` show, at the
-/// scale of the largest evidence in the linear neighbourhood of the fit.
-pub(super) fn estimated_prior(fitted: &Fitted, data: &Data, first: HarmonicPrior) -> HarmonicPrior {
+/// best scale by a criterion, in the linear neighbourhood of the fit.
+pub(super) fn estimated_prior(
+    fitted: &Fitted,
+    data: &Data,
+    (first, criterion): (HarmonicPrior, ScaleBy),
+) -> HarmonicPrior {
     let linearised = fitted.linearised(data, &[]);
-    let evidence = PriorEvidence::new(linearised.fitted(), linearised.residual());
+    let parts = match criterion {
+        ScaleBy::Evidence => Vec::new(),
+        ScaleBy::LeftOutRanges => parts_of_ranges(&fitted.problem, data),
+    };
+    let squares = PartSquares::new(linearised.fitted(), linearised.residual(), &parts);
     let parameters =
         fitted.unknowns.iter().map(|&k| (fitted.found.x[k], fitted.model.parameters[k].sigma));
     let all = parameters.chain(linearised.relaxed().iter().map(|&sigma| (0.0, sigma)));
@@ -53,14 +75,19 @@ pub(super) fn estimated_prior(fitted: &Fitted, data: &Data, first: HarmonicPrior
         priors
     };
     let best_of = |prior: &HarmonicPrior, powers: &[f64]| {
-        let at = |&power: &f64| {
+        let error = |&power: &f64| {
             let prior = prior.scaled(power.exp2());
-            Some((evidence.posterior(&with(&prior))?.ln_evidence, prior))
+            let priors = with(&prior);
+            let error = match criterion {
+                ScaleBy::Evidence => squares.evidence(&priors),
+                ScaleBy::LeftOutRanges => squares.left_out(&priors),
+            };
+            Some((error?, prior))
         };
-        powers.iter().filter_map(at).max_by(|a, b| a.0.total_cmp(&b.0))
+        powers.iter().filter_map(error).min_by(|a, b| a.0.total_cmp(&b.0))
     };
-    let refined = |(most, prior): (f64, HarmonicPrior), step: f64| {
-        best_of(&prior, &[-step, step]).filter(|other| other.0 > most).unwrap_or((most, prior))
+    let refined = |(least, prior): (f64, HarmonicPrior), step: f64| {
+        best_of(&prior, &[-step, step]).filter(|other| other.0 < least).unwrap_or((least, prior))
     };
     // Under a looser prior coefficients of neighbouring orders are large and cancel, so that they do
     // not show the spectrum.
@@ -69,15 +96,15 @@ pub(super) fn estimated_prior(fitted: &Fitted, data: &Data, first: HarmonicPrior
         return first;
     };
     let spectrum = (0..SPECTRUM_PASSES).fold(flat.1.clone(), |prior, _| {
-        let Some(posterior) = evidence.posterior(&with(&prior)) else { return prior };
+        let Some((x, variances)) = squares.posterior(&with(&prior)) else { return prior };
         let expected: Vec<(u32, f64)> = coefficients
             .iter()
-            .map(|&(j, order)| (order, posterior.x[j].powi(2) + posterior.variances[j]))
+            .map(|&(j, order)| (order, x[j].powi(2) + weight.powi(2) * variances[j]))
             .collect();
         smoothed(&prior, &expected)
     });
     let shaped = best_of(&spectrum, &[0.0]).map(|best| refined(refined(best, 0.5), 0.25));
-    shaped.filter(|shaped| shaped.0 > flat.0).unwrap_or(flat).1
+    shaped.filter(|shaped| shaped.0 < flat.0).unwrap_or(flat).1
 }
 
 /// Returns σₖ of every order from expected squares of the coefficients of all joints.
@@ -108,4 +135,23 @@ fn smoothed(prior: &HarmonicPrior, expected: &[(u32, f64)]) -> HarmonicPrior {
     };
     let (before, after) = (size(prior), size(&shaped));
     if before > 0.0 && after > 0.0 { shaped.scaled(before / after) } else { prior.clone() }
+}
+
+/// Returns the identification poses in each of `RANGE_PARTS` parts of the range of each joint that
+/// moves, equally many in each part.
+fn parts_of_ranges(problem: &Problem, data: &Data) -> Vec<Vec<usize>> {
+    let (rows, conditions) = (data.rows(), data.conditions(problem));
+    let coordinate = |pose: usize, joint: usize| data.measurements.configuration(rows[pose])[joint];
+    let of_joint = |joint: usize| {
+        let mut order: Vec<usize> = (0..rows.len()).collect();
+        order.sort_by(|&a, &b| coordinate(a, joint).total_cmp(&coordinate(b, joint)));
+        order
+            .chunks(rows.len().div_ceil(RANGE_PARTS).max(1))
+            .map(<[usize]>::to_vec)
+            .collect::<Vec<_>>()
+    };
+    (0..data.measurements.joints)
+        .filter(|&joint| conditions.moves(joint))
+        .flat_map(of_joint)
+        .collect()
 }

@@ -1,7 +1,7 @@
 //! The search: evidence about a fit, the effects of its most probable set fitted, until the fit
 //! holds the set that the evidence about it calls most probable.
 
-use super::gears::estimated_prior;
+use super::gears::{ScaleBy, estimated_prior};
 use super::polish::polished;
 use super::state::SearchState;
 use crate::fit::IdentifyError;
@@ -13,7 +13,9 @@ use crate::select::harmonic_prior::is_gear;
 use crate::select::settings::MAX_RIVALS;
 
 /// Runs the search from the fit of the declared problem. Returns the final fit, converged, and the
-/// evidence about it, `None` where its residual is not finite or the fit moved since.
+/// evidence about it, `None` where its residual is not finite or the fit moved since. Evidence about
+/// a fit with periodic errors of many orders is evaluated under the prior of the largest evidence,
+/// the final fit has the prior that predicts best.
 ///
 /// # Errors
 /// A fit fails, or the search was stopped.
@@ -22,6 +24,10 @@ pub(super) fn search(
     first: Fitted,
 ) -> Result<(Fitted, Option<Evidence>), IdentifyError> {
     let (fitted, evidence) = settled_set(state, first)?;
+    if state.added(&fitted).iter().any(is_gear) {
+        let used = with_estimated_prior(state, &fitted, ScaleBy::LeftOutRanges)?;
+        return Ok((used.settled(state.data, state.options)?, evidence));
+    }
     let settled = fitted.clone().settled(state.data, state.options)?;
     let evidence = evidence.filter(|_| !settled.differs_from(&fitted, state.data));
     Ok((settled, evidence))
@@ -55,7 +61,7 @@ fn settled_set(
                 fitted = next;
                 if !has_estimated_prior && state.added(&fitted).iter().any(is_gear) {
                     has_estimated_prior = true;
-                    fitted = with_estimated_prior(state, &fitted)?;
+                    fitted = with_estimated_prior(state, &fitted, ScaleBy::Evidence)?;
                 }
                 continue;
             }
@@ -84,9 +90,13 @@ fn settled_set(
 }
 
 /// Returns the fit repeated with the common prior of the harmonics that its coefficients show.
-fn with_estimated_prior(state: &mut SearchState, fitted: &Fitted) -> Result<Fitted, IdentifyError> {
+fn with_estimated_prior(
+    state: &mut SearchState,
+    fitted: &Fitted,
+    criterion: ScaleBy,
+) -> Result<Fitted, IdentifyError> {
     let Some(prior) = state.prior.take() else { return Ok(fitted.clone()) };
-    state.prior = Some(estimated_prior(fitted, state.data, prior));
+    state.prior = Some(estimated_prior(fitted, state.data, (prior, criterion)));
     let next = state.fit(fitted, &state.added(fitted))?;
     state.record(&next);
     Ok(next)

@@ -1,0 +1,137 @@
+//! Parts of the data predicted from the rest, for many priors: normal equations of each part.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::orthonormal::RANK;
+use crate::numeric::{gram, inverse_factor, lower_factor, solve_positive};
+
+/// Products JᵀJ, Jᵀr, rᵀr and the number of rows of some poses.
+struct Squares {
+    gram: DMatrix<f64>,
+    product: DVector<f64>,
+    residual: f64,
+    rows: usize,
+}
+
+impl Squares {
+    fn of(columns: &DMatrix<f64>, residual: &DVector<f64>, poses: &[usize]) -> Self {
+        let rows: Vec<usize> = poses.iter().flat_map(|pose| 3 * pose..3 * pose + 3).collect();
+        let (j, r) = (columns.select_rows(&rows), residual.select_rows(&rows));
+        Self { gram: gram(&j), product: j.tr_mul(&r), residual: r.norm_squared(), rows: rows.len() }
+    }
+}
+
+/// Sums over all poses of a fit and over the parts that are left out in turn.
+pub(in crate::select) struct PartSquares {
+    whole: Squares,
+    parts: Vec<Squares>,
+}
+
+impl PartSquares {
+    /// Creates the sums from columns, shape = (3 N, n), and the residual; `parts` are numbers of
+    /// poses.
+    pub fn new(columns: &DMatrix<f64>, residual: &DVector<f64>, parts: &[Vec<usize>]) -> Self {
+        let every: Vec<usize> = (0..residual.len() / 3).collect();
+        let parts = parts.par_iter().map(|poses| Squares::of(columns, residual, poses)).collect();
+        Self { whole: Squares::of(columns, residual, &every), parts }
+    }
+
+    /// Returns the values of the unknowns fitted to all parts and their variances, priors as in
+    /// [`Self::left_out`].
+    pub fn posterior(&self, priors: &[(f64, Option<f64>)]) -> Option<(DVector<f64>, DVector<f64>)> {
+        let (normal, pull) = self.normal_of_all(priors);
+        let root = inverse_factor(&normal)?;
+        let mut x = -root.tr_mul(&(&root * pull));
+        for (j, prior) in priors.iter().enumerate() {
+            x[j] += prior.0;
+        }
+        let variances = root.column_iter().map(|column| column.norm_squared());
+        Some((x, DVector::from_iterator(root.ncols(), variances)))
+    }
+
+    /// Returns −2 ln p(r) of all parts under priors as in [`Self::left_out`], up to a constant.
+    ///
+    /// With W = diag(1/σ²), G = JᵀJ + W, g = Jᵀr + W x₀ and x₀ the present values it is
+    /// ln det G − Σ ln (1/σ²) + x₀ᵀW x₀ − gᵀG⁻¹g.
+    pub fn evidence(&self, priors: &[(f64, Option<f64>)]) -> Option<f64> {
+        let (normal, mut along) = self.normal_of_all(priors);
+        let lower = lower_factor(normal)?;
+        if !lower.solve_lower_triangular_mut(&mut along) {
+            return None;
+        }
+        let ln_determinant = 2.0 * lower.diagonal().map(f64::ln).sum();
+        let of_prior = |&(x, sigma): &(f64, Option<f64>)| {
+            sigma.map_or(0.0, |sigma| 2.0 * sigma.ln() + (x / sigma).powi(2))
+        };
+        let prior: f64 = priors.iter().map(of_prior).sum();
+        Some(ln_determinant + prior - along.norm_squared()).filter(|value| value.is_finite())
+    }
+
+    fn normal_of_all(&self, priors: &[(f64, Option<f64>)]) -> (DMatrix<f64>, DVector<f64>) {
+        self.normal(self.whole.gram.clone(), self.whole.product.clone(), priors)
+    }
+
+    /// The normal equations of some parts with priors.
+    ///
+    /// Directions that no pose sees stay where they are: to the diagonal comes (RANK)² of each
+    /// column's length².
+    fn normal(
+        &self,
+        mut gram: DMatrix<f64>,
+        mut product: DVector<f64>,
+        priors: &[(f64, Option<f64>)],
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        for j in 0..product.len() {
+            gram[(j, j)] += RANK * RANK * self.whole.gram[(j, j)] + f64::MIN_POSITIVE;
+        }
+        for (j, (x, sigma)) in priors.iter().enumerate() {
+            let weight = sigma.map_or(0.0, |sigma| sigma.powi(-2));
+            gram[(j, j)] += weight;
+            product[j] += weight * x;
+        }
+        (gram, product)
+    }
+
+    /// Σ rows · ln(mean square) of the parts, each predicted from the others; the first unknowns
+    /// have these values and 1 σ of their priors about 0. `None` where the others do not decide the
+    /// fit.
+    pub fn left_out(&self, priors: &[(f64, Option<f64>)]) -> Option<f64> {
+        let predicted = |part: &Squares| {
+            let (gram, product) =
+                (&self.whole.gram - &part.gram, &self.whole.product - &part.product);
+            let (normal, pull) = self.normal(gram, product, priors);
+            let step = -solve_positive(normal, pull)?;
+            let squares =
+                part.residual + 2.0 * part.product.dot(&step) + step.dot(&(&part.gram * &step));
+            Some(part.rows as f64 * (squares / part.rows as f64).ln())
+        };
+        let all: Option<Vec<f64>> = self.parts.par_iter().map(predicted).collect();
+        all.map(|all| all.iter().sum()).filter(|sum: &f64| sum.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn evidence_is_the_density_of_the_residual() {
+        let columns = DMatrix::from_fn(42, 3, |i, j| (1.7 * i as f64 + 2.3 * j as f64).sin());
+        let residual = DVector::from_fn(42, |i, _| (0.9 * i as f64).cos());
+        let present = [0.3, -0.2, 0.1];
+        // −2 ln p(r) of r₀ = r − J x₀ ~ N(0, 1 + J σ² Jᵀ).
+        let density = |sigma: f64| {
+            let at_zero = &residual - &columns * DVector::from_column_slice(&present);
+            let covariance =
+                DMatrix::identity(42, 42) + &columns * columns.transpose() * (sigma * sigma);
+            let factor = covariance.cholesky().unwrap();
+            let ln_determinant = 2.0 * factor.l().diagonal().map(f64::ln).sum();
+            at_zero.dot(&factor.solve(&at_zero)) + ln_determinant
+        };
+        let squares = PartSquares::new(&columns, &residual, &[]);
+        let evidence = |sigma: f64| squares.evidence(&present.map(|x| (x, Some(sigma)))).unwrap();
+        let expected = density(0.5) - density(2.0);
+        assert!((evidence(0.5) - evidence(2.0) - expected).abs() < 1e-6);
+    }
+}
