@@ -18,7 +18,6 @@
 //! | choose poses to measure, judge given ones | [`design::plan`], [`design::check`] | [`design::Plan`], [`design::Check`] |
 //! | simulate measurements with known truth | [`rig::simulate`] | [`rig::Simulation`] |
 //! | read and write URDF | [`urdf::describe`], [`urdf::export`] | [`urdf::Description`], [`urdf::Export`] |
-//! | write an identified arm as C code | [`export::sources`] | [`export::Sources`] |
 //! | write results as JSON | [`results::Document::to_json`] | documented in `docs/results.md` |
 //! | write text and HTML reports with figures | [`report`] | [`report::Report`] |
 //!
@@ -71,6 +70,7 @@ pub mod cli;
 pub mod design;
 #[deny(clippy::indexing_slicing)]
 pub mod error;
+#[doc(hidden)]
 pub mod export;
 #[deny(clippy::indexing_slicing)]
 #[doc(hidden)]
