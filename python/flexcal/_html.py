@@ -90,14 +90,14 @@ def _mm(errors: dict[str, Any]) -> str:
 
 def _effect(entry: dict[str, Any]) -> str:
     law = ((entry.get("claims") or {}).get("law") or {}).get("probability")
-    sure = f" ({escape(entry['status'])})" if law is None else f" ({escape(entry['status'])}, law {100 * law:.0f} %)"
+    sure = "" if law is None else f" (law {100 * law:.0f} %)"
     sizes = [
         f"{escape(own['name'])} = {own['estimate']:.4g}"
         + ("" if own["std_error"] is None else f" ± {own['std_error']:.2g}")
         + f" {escape(own['unit'])}"
         for own in entry["parameters"]
     ]
-    return f"<b>{escape(entry['description'])}</b>{sure}<br><small>{'; '.join(sizes)}</small>"
+    return f"{escape(entry['status'])}: <b>{escape(entry['description'])}</b>{sure}<br><small>{'; '.join(sizes)}</small>"
 
 
 def _probability(p: float) -> str:
