@@ -104,7 +104,8 @@ fn draw_stages(
     let floor = (FLOOR * typical * 1e3).log10();
     let largest =
         range(stages.iter().flat_map(|stage| &stage.errors).map(|error| error.norm() * 1e3)).1;
-    let extent = (floor, largest.log10() + 0.1);
+    // Without a finite positive error the axis has another range.
+    let extent = Axis::bare((floor, largest.log10() + 0.1)).range;
     let panel = |(axis, label): (usize, &str)| {
         let poses = (0.0, count as f64 + 1.0);
         let x = if axis == 3 { Axis::linear(poses, "held-out pose", 8) } else { Axis::bare(poses) };
