@@ -6,6 +6,7 @@ use super::gain::Gain;
 use super::hyperparameter_search::{Searched, search};
 use super::kernel::Hyperparameters;
 use super::posterior::{LeftOut, Posterior, Training};
+use super::rows::AXES;
 use super::scores::{LeftOutError, Scores, left_out_errors};
 use super::training_rows::TrainingRows;
 
@@ -75,6 +76,18 @@ pub(super) fn judge(training: &TrainingRows, is_remainder_wanted: bool) -> Optio
         [errors_alone, errors(&hyper, &single_alone, &single_with)]
     };
     let gain = Gain::of(&configurations, (&errors_alone, &single), evidence);
-    let remainder = gain.is_significant().then(|| with_scores(with, &single, &blocks));
+    let inflation = inflation(configurations.len(), minimum.at.len());
+    let remainder = gain.is_significant().then(|| {
+        let mut conditioned = with_scores(with, &single, &blocks);
+        conditioned.scores.scale(inflation);
+        conditioned
+    });
     Some(Judged { remainder, gain: Some(gain), ..without })
+}
+
+/// Factor of the bounds that accounts for hyperparameters that few configurations determine:
+/// √(m / (m − k)) of m coordinates and k hyperparameters.
+fn inflation(configurations: usize, hyperparameters: usize) -> f64 {
+    let coordinates = (AXES * configurations) as f64;
+    (coordinates / (coordinates - hyperparameters as f64).max(1.0)).sqrt()
 }

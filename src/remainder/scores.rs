@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Matrix3, Vector3};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use super::kernel::{Hyperparameters, variance};
 use super::posterior::LeftOut;
@@ -87,24 +88,41 @@ impl Scores {
         Self { configurations, single: thinned(single), blocks: thinned(blocks) }
     }
 
+    /// Multiplies all scores.
+    pub(super) fn scale(&mut self, factor: f64) {
+        self.single.iter_mut().chain(&mut self.blocks).for_each(|score| *score *= factor);
+    }
+
     /// Factor from the expected size of an error to a bound that holds with probability `level`:
-    /// the larger of both quantiles ⌈level (G + 1)⌉ / G over G configurations.
-    ///                                          [Lei, G'Sell, Rinaldo, Tibshirani & Wasserman 2018]
+    /// the larger of both quantiles of rank level (G + 1) of G configurations, interpolated.
+    /// [Lei, G'Sell, Rinaldo, Tibshirani & Wasserman 2018]
+    ///
+    /// A rank beyond G extends the largest score as the lengths of normal errors in three
+    /// coordinates would.
     pub fn quantile(&self, level: f64) -> f64 {
         let count = self.configurations.max(1) as f64;
-        let part = ((level * (count + 1.0)).ceil() / count).min(1.0);
+        let part = level * (count + 1.0) / count;
         let of = |scores: &[f64]| {
             let last = scores.len().saturating_sub(1);
+            let place = (part.min(1.0) * scores.len() as f64 - 1.0).max(0.0);
             #[expect(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
                 reason = "a rank between 0 and the last one"
             )]
-            let rank = (part * last as f64).ceil() as usize;
-            scores.get(rank).copied().unwrap_or(0.0)
+            let below = (place.floor() as usize).min(last);
+            let low = scores.get(below).copied().unwrap_or(0.0);
+            let high = scores.get(below + 1).copied().unwrap_or(low);
+            low + (high - low) * (place - below as f64)
         };
-        of(&self.single).max(of(&self.blocks))
+        let beyond = if part > 1.0 { length(level) / length(count / (count + 1.0)) } else { 1.0 };
+        beyond * of(&self.single).max(of(&self.blocks))
     }
+}
+
+/// Length of a normal error in three coordinates, over its σ, that holds with probability `level`.
+fn length(level: f64) -> f64 {
+    ChiSquared::new(AXES as f64).map_or(1.0, |squares| squares.inverse_cdf(level).sqrt())
 }
 
 /// Sorts finite scores and keeps at most [`MAX_SCORES`] evenly spaced ones.
@@ -127,9 +145,9 @@ mod tests {
     fn quantiles_come_from_the_larger_list_and_survive_thinning() {
         let ramp = |n: usize, scale: f64| (1..=n).map(|k| scale * k as f64 / n as f64).collect();
         let few = Scores::new(99, ramp(99, 1.0), ramp(99, 2.0));
-        // ⌈0.95 · 100⌉ = 95 of 99.
-        assert!((few.quantile(0.95) - 2.0 * 96.0 / 99.0).abs() < 1.1 / 99.0 * 2.0);
-        assert!((few.quantile(0.999) - 2.0).abs() < 1e-15, "no more than the largest");
+        // 0.95 · 100 = 95 of 99.
+        assert!((few.quantile(0.95) - 2.0 * 95.0 / 99.0).abs() < 1e-12);
+        assert!((2.2..2.6).contains(&few.quantile(0.999)), "more than the largest");
         let many = Scores::new(20_000, ramp(20_000, 1.0), ramp(20_000, 0.5));
         assert!(many.single.len() == MAX_SCORES && (many.quantile(0.95) - 0.95).abs() < 2e-3);
     }
