@@ -303,7 +303,7 @@ int flexcal_correct(const flexcal_pose *seed, const flexcal_target *goal, real *
     }
     find_serving(seed->target, serves);
     status = misfit(&pose, goal, 1, serves, r, slopes);
-    for (step = 0; step < FLEXCAL_STEPS && status == FLEXCAL_OK && longest > SETTLED; ++step) {
+    for (step = 0; step < FLEXCAL_STEPS && status == FLEXCAL_OK && longest > SETTLED && damping < MAX_DAMPING; ++step) {
         flexcal_pose next = pose;
         real tried[6] = {R(0.0), R(0.0), R(0.0), R(0.0), R(0.0), R(0.0)};
         bounded_step(pose.q, seed->q, serves, r, slopes, m, damping, d);
@@ -323,7 +323,7 @@ int flexcal_correct(const flexcal_pose *seed, const flexcal_target *goal, real *
         } else {
             /* Also where the arm has no equilibrium: nearer to the last command. */
             damping = damping > R(0.0) ? R(30.0) * damping : MIN_DAMPING;
-            longest = damping < MAX_DAMPING ? R(1.0) : R(0.0);
+            longest = R(1.0);
             status = FLEXCAL_OK;
         }
     }
