@@ -312,7 +312,7 @@ int flexcal_correct(const flexcal_pose *seed, const flexcal_target *goal, real *
             if (serves[j]) {
                 const real q = pose.q[j] + d[j];
                 next.q[j] = q < LIMIT[j][0] ? LIMIT[j][0] : (q > LIMIT[j][1] ? LIMIT[j][1] : q);
-                longest = FABS(d[j]) > longest ? FABS(d[j]) : longest;
+                longest = FABS(d[j]) * (R(1.0) + damping) > longest ? FABS(d[j]) * (R(1.0) + damping) : longest;
             }
         }
         status = misfit(&next, goal, 0, serves, tried, slopes);

@@ -48,10 +48,11 @@ impl Goal<'_> {
             if cost(&tried, &next) <= (1.0 + COST_ROUNDING) * cost(&misfit, &q) {
                 (q, misfit) = (next, tried);
                 slopes = (self.slopes)(&q);
-                damping = if damping > DAMPING.0 { FACTORS.1 * damping } else { 0.0 };
-                if step.amax() <= SETTLED {
+                // A damped step is shorter than what is left.
+                if step.amax() * (1.0 + damping) <= SETTLED {
                     break;
                 }
+                damping = if damping > DAMPING.0 { FACTORS.1 * damping } else { 0.0 };
             } else {
                 damping = if damping > 0.0 { FACTORS.0 * damping } else { DAMPING.0 };
                 if damping >= DAMPING.1 {
