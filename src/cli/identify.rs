@@ -99,15 +99,15 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         result = result.with_predictions(&identification, fitted);
     }
     let json = result.to_json();
-    let is_told = |own: &&Fitted| arguments.remainder || own.remainder.is_some();
+    let is_told = |corrected: &&Fitted| arguments.remainder || corrected.remainder.is_some();
     let words = fitted
         .as_ref()
         .filter(is_told)
-        .map(|own| {
+        .map(|corrected| {
             format!(
                 "\n{}\n",
                 textwrap::fill(
-                    &report::remainder_text(&identification, own),
+                    &report::remainder_text(&identification, corrected),
                     output::columns().min(110)
                 )
             )
@@ -115,12 +115,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         .unwrap_or_default();
     let shown = PlotData::of_identification(&problem, &data, &identification)?;
     let told = report::identification_report(&problem, &identification, &shown);
-    let residuals = match fitted.as_ref().and_then(|own| own.residuals.as_ref()) {
+    let residuals = match fitted.as_ref().and_then(|corrected| corrected.residuals.as_ref()) {
         Some(corrected) => corrected.rows.clone(),
         None => identification.residuals(&problem, &data)?,
     };
     let residuals = residuals_csv(&problem, &data.measurements, &residuals);
-    let kept = fitted.as_ref().and_then(|own| own.remainder.as_ref());
+    let kept = fitted.as_ref().and_then(|corrected| corrected.remainder.as_ref());
     let file = kept.filter(|_| arguments.remainder).map(Correction::to_json);
     let mut texts = vec![("estimate.json", json.as_str()), ("residuals.csv", residuals.as_str())];
     texts.extend(file.as_ref().map(|text| (REMAINDER_FILE, text.as_str())));

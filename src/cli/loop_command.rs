@@ -63,14 +63,14 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let shown = PlotData::of_loop(&problem, &data, &closure)?;
     let closed = report::closed_problem(&text, &problem, &closure, [&files, &joint_files])?;
     let fitted = fitted(&problem, &closed, &closure, &data)?;
-    let kept = fitted.as_ref().and_then(|own| own.remainder.as_ref());
+    let kept = fitted.as_ref().and_then(|corrected| corrected.remainder.as_ref());
     let closed = problem::with_remainder(&closed, kept.map(|_| REMAINDER_FILE))?;
     let mut result = LoopResult::new(&problem, &closure);
     if let Some(fitted) = &fitted {
         result = result.with_remainder(&closure, fitted);
     }
     let json = result.to_json();
-    let residuals = match fitted.as_ref().and_then(|own| own.residuals.as_ref()) {
+    let residuals = match fitted.as_ref().and_then(|corrected| corrected.residuals.as_ref()) {
         Some(corrected) => corrected.rows.clone(),
         None => closure.after.residuals(&closure.closed, &data)?,
     };
@@ -82,11 +82,11 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         ("residuals.csv", residuals.as_str()),
     ];
     texts.extend(file.as_ref().map(|text| (REMAINDER_FILE, text.as_str())));
-    let words = kept.and(fitted.as_ref()).map_or_else(String::new, |own| {
+    let words = kept.and(fitted.as_ref()).map_or_else(String::new, |corrected| {
         format!(
             "\n{}\n",
             textwrap::fill(
-                &report::remainder_text(&closure.after, own),
+                &report::remainder_text(&closure.after, corrected),
                 output::columns().min(110)
             )
         )

@@ -20,7 +20,7 @@ use super::outcome::Outcome;
 #[command(
     mut_arg("data", |arg| arg.help("Tables of poses like measurements; positions are not needed")),
     after_help = "Writes predictions.csv; where the table holds measured positions also residuals.csv and errors.json, the errors of all \
-rows and of each session. A session that the estimate does not know is given a base and a tool fitted to its own rows, with the arm as \
+rows and of each session. A session that the estimate does not know is given a base and a tool fitted to its known rows, with the arm as \
 it is.
 
 Examples:
@@ -80,8 +80,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             .map(|all| ("residuals.csv", residuals_csv(&problem, &rows, all))),
     );
     let residuals = prediction.residuals.as_deref().unwrap_or_default();
-    let errors = prediction.errors.as_ref().map(|own| {
-        let errors = PredictionErrors::new(own, &prediction.spreads);
+    let errors = prediction.errors.as_ref().map(|known| {
+        let errors = PredictionErrors::new(known, &prediction.spreads);
         match bounds {
             Some(bounds) => errors.with_bounds(residuals, bounds).to_json(),
             None => errors.to_json(),

@@ -8,8 +8,8 @@ use flexcal::remainder::{Correction, SavedRemainderError};
 
 /// Reads the remainder that a problem declares and uses.
 pub fn declared(problem: &Problem) -> Result<Option<Correction>, SavedRemainderError> {
-    let used = problem.remainder.as_ref().filter(|own| own.is_used);
-    used.map(|own| read(problem, &own.file)).transpose()
+    let used = problem.remainder.as_ref().filter(|declared| declared.is_used);
+    used.map(|declared| read(problem, &declared.file)).transpose()
 }
 
 /// Reads what predictions with `estimate` are corrected by: the remainder of the problem, or else
@@ -28,7 +28,7 @@ pub fn of_estimate(
     let parse = |text: &str| Correction::parse(text, &estimate.file);
     let correction = estimate.prediction.as_deref().map(parse).transpose()?;
     // An estimate of another arm is refused with a message of its own.
-    Ok(correction.filter(|own| own.check(problem, &estimate.file).is_ok()))
+    Ok(correction.filter(|declared| declared.check(problem, &estimate.file).is_ok()))
 }
 
 fn read(problem: &Problem, file: &Path) -> Result<Correction, SavedRemainderError> {

@@ -347,6 +347,24 @@ fn coupling(vectors: &[&[f64]; PANEL], width: usize) -> [[f64; PANEL]; PANEL] {
     products
 }
 
+impl Linearisation {
+    /// Adds rows W p = 0 for the step p, shape of `rows` = (k, n); the cost stays unchanged.
+    #[must_use]
+    pub(crate) fn with_rows(self, rows: &DMatrix<f64>) -> Self {
+        let n = self.projected.len();
+        let mut block = Block::zeros(n + rows.nrows(), n);
+        for j in 0..n {
+            let (triangle_part, added_part) = block.column_mut(j).split_at_mut(n);
+            triangle_part.copy_from_slice(self.triangle.column(j).as_slice());
+            added_part.copy_from_slice(rows.column(j).as_slice());
+        }
+        block.column_mut(n)[..n].copy_from_slice(self.projected.as_slice());
+        let mut triangle = Triangle::new(n);
+        triangle.absorb(&mut block);
+        Self { cost: self.cost, ..triangle.into_linearisation() }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

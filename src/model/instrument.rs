@@ -35,10 +35,12 @@ impl Instrument {
                         unit_strain(entry) * value;
                 }
                 ParameterSite::Shift { axis } => {
-                    instrument.shifts.extend(regressor().map(|own| (axis, own, value)));
+                    instrument.shifts.extend(regressor().map(|value_of| (axis, value_of, value)));
                 }
                 ParameterSite::Turn { axis } => {
-                    instrument.rotations.extend(regressor().map(|own| (axis, own, value)));
+                    instrument
+                        .rotations
+                        .extend(regressor().map(|value_of| (axis, value_of, value)));
                 }
                 _ => {}
             }

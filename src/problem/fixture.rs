@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use super::Problem;
 use super::camera::{Carriers, Declared, camera, marker};
 use super::frame::frame_word;
-use super::item::Item;
+use super::item::name_of;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::observation::{Content, Field, FixtureKind, Observation};
@@ -66,17 +66,6 @@ pub(crate) fn reference_cells(
         };
         (field, word)
     })
-}
-
-/// Reads the name of a fixture or target, which parameter names contain; `what` is used in
-/// messages.
-pub(super) fn name_of(item: &Item<'_, '_>, what: &'static str) -> Result<String, InputError> {
-    let name = item.text()?.trim().to_owned();
-    let barred = |c: char| c.is_control() || c.is_whitespace() || ".*[]\"".contains(c);
-    if name.is_empty() || name.contains(barred) {
-        return Err(item.error(InputErrorKind::NotAFixtureName { what, name }));
-    }
-    Ok(name)
 }
 
 /// Reads all fixtures in the order point, anchor, surface, camera, marker, and the known distances.

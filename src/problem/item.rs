@@ -262,3 +262,14 @@ pub(crate) fn join(path: &str, key: &str) -> String {
     let dot = if path.is_empty() { "" } else { "." };
     if bare { format!("{path}{dot}{key}") } else { format!("{path}{dot}\"{key}\"") }
 }
+
+/// Reads the name of a fixture or target, which parameter names contain; `what` is used in
+/// messages.
+pub(super) fn name_of(item: &Item<'_, '_>, what: &'static str) -> Result<String, InputError> {
+    let name = item.text()?.trim().to_owned();
+    let barred = |c: char| c.is_control() || c.is_whitespace() || ".*[]\"".contains(c);
+    if name.is_empty() || name.contains(barred) {
+        return Err(item.error(InputErrorKind::NotAFixtureName { what, name }));
+    }
+    Ok(name)
+}

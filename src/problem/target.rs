@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Joint;
-use super::fixture::name_of;
+use super::item::name_of;
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;

@@ -30,7 +30,7 @@ pub(super) fn blocks(rows: &Rows, inputs: &Inputs, count: usize) -> Vec<usize> {
             let members: Vec<&Vec<f64>> = points
                 .iter()
                 .zip(&block)
-                .filter(|(_, own)| **own == number)
+                .filter(|(_, block)| **block == number)
                 .map(|(p, _)| p)
                 .collect();
             if members.is_empty() {

@@ -107,7 +107,7 @@ fn leaving_out_in_closed_form_is_fitting_again() {
     let (rows, inputs, prior, hyper) = (rows(), inputs(), prior(), hyper());
     let training = Training::of((&rows, &inputs), &prior, &hyper, &all(&rows)).unwrap();
     let single = training.without_each(&rows.configuration, &all(&rows)).unwrap();
-    let block: Vec<usize> = rows.configuration.iter().map(|own| own % 4).collect();
+    let block: Vec<usize> = rows.configuration.iter().map(|predicted| predicted % 4).collect();
     let blocks = training.without_each(&block, &all(&rows)).unwrap();
     let check = |found: &super::posterior::LeftOut,
                  left_out: &dyn Fn(usize) -> bool,
@@ -115,11 +115,11 @@ fn leaving_out_in_closed_form_is_fitting_again() {
         let kept: Vec<usize> = all(&rows).into_iter().filter(|&row| !left_out(row)).collect();
         let others = rows.select(&kept);
         let again = Training::of((&others, &inputs), &prior, &hyper, &all(&others)).unwrap();
-        let own = again.posterior.at(&rows.select(&[row]))[0];
+        let predicted = again.posterior.at(&rows.select(&[row]))[0];
         let measured = Vector3::from_fn(|axis, _| rows.residual[AXES * row + axis]);
-        assert!((measured - own.mean - found.error).norm() < 1e-9, "{row}");
+        assert!((measured - predicted.mean - found.error).norm() < 1e-9, "{row}");
         let noise = (hyper.noise * rows.relative_sigma[row]).powi(2) + hyper.shared_noise.powi(2);
-        let expected = own.covariance.trace() + AXES as f64 * noise;
+        let expected = predicted.covariance.trace() + AXES as f64 * noise;
         assert!(
             (found.covariance.trace() / expected - 1.0).abs() < 1e-4,
             "{row}: {} {expected}",
@@ -145,24 +145,28 @@ fn far_from_all_rows_only_the_parameters_are_corrected() {
     let posterior = Training::of((&rows, &inputs), &prior, &hyper, &all(&rows)).unwrap().posterior;
     let mut far = rows.select(&[3]);
     far.inputs.fill(2.9);
-    let own = posterior.at(&far)[0];
-    assert!((own.covariance.trace() - own.prior) > -1e-6 * own.prior, "the prior is back");
+    let predicted = posterior.at(&far)[0];
+    assert!(
+        (predicted.covariance.trace() - predicted.prior) > -1e-6 * predicted.prior,
+        "the prior is back"
+    );
     let parameters = &far.jacobian * posterior.parameters();
-    assert!((own.mean - Vector3::from_column_slice(parameters.as_slice())).norm() < 1e-9);
-    assert!(super::scores::fade(own.covariance.trace(), own.prior).abs() < 1e-15);
+    assert!((predicted.mean - Vector3::from_column_slice(parameters.as_slice())).norm() < 1e-9);
+    assert!(super::scores::fade(predicted.covariance.trace(), predicted.prior).abs() < 1e-15);
 }
 
 #[test]
 fn weights_of_the_centres_restore_a_posterior() {
     let (rows, inputs, prior, hyper) = (rows(), inputs(), prior(), hyper());
-    let own = Training::of((&rows, &inputs), &prior, &hyper, &[0, 2, 5, 9, 11]).unwrap().posterior;
+    let predicted =
+        Training::of((&rows, &inputs), &prior, &hyper, &[0, 2, 5, 9, 11]).unwrap().posterior;
     let again = super::posterior::Posterior::restored(
         (hyper.clone(), inputs.clone()),
-        (own.inducing.clone(), prior.clone()),
-        (own.factor.clone(), own.kernel_weights(), own.parameters()),
+        (predicted.inducing.clone(), prior.clone()),
+        (predicted.factor.clone(), predicted.kernel_weights(), predicted.parameters()),
     )
     .unwrap();
-    for (a, b) in own.at(&rows).iter().zip(again.at(&rows)) {
+    for (a, b) in predicted.at(&rows).iter().zip(again.at(&rows)) {
         assert!((a.mean - b.mean).norm() < 1e-12 && (a.covariance - b.covariance).amax() < 1e-16);
     }
 }

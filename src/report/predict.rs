@@ -61,7 +61,7 @@ pub fn prediction_text(
         )));
     }
     let residuals = prediction.residuals.as_deref();
-    blocks.extend(bounds.map(|own| Block::lines(bounded(own, residuals))));
+    blocks.extend(bounds.map(|bounds| Block::lines(bounded(bounds, residuals))));
     let unsteady = unsteady(&prediction.spreads);
     if !unsteady.is_empty() {
         blocks.push(Block::list(unsteady));

@@ -26,7 +26,7 @@ pub fn remainder_text(found: &Identification, fitted: &Fitted) -> String {
         Some(corrected) => {
             let before = number(found.fitted.held_out.mean.norm * 1e3, 4);
             let after = number(corrected.errors.held_out.mean.norm * 1e3, 4);
-            let joints = fitted.remainder.as_ref().map_or(0, |own| own.joints().len());
+            let joints = fitted.remainder.as_ref().map_or(0, |pose| pose.joints().len());
             format!(
                 "Remainder at {}, kept: mean error of configurations left out {without} mm \
                  without it, {with} mm with it; of held-out poses {before} mm and {after} mm.",
@@ -57,10 +57,10 @@ pub(super) fn bounded(bounds: &Bounds, residuals: Option<&[Residual]>) -> String
         number(bounds.mean() * 1e3, 3),
     );
     if let Some(residuals) = residuals {
-        let share = bounds.coverage(residuals.iter().map(|own| own.position.norm()));
+        let share = bounds.coverage(residuals.iter().map(|pose| pose.position.norm()));
         let _ = write!(words, "; {} % of these rows lie within theirs", number(share * 100.0, 1));
     }
-    let beyond = bounds.poses.iter().filter(|own| own.is_extrapolated).count();
+    let beyond = bounds.poses.iter().filter(|pose| pose.is_extrapolated).count();
     if beyond > 0 {
         let poses = counted(beyond, "pose");
         let _ = write!(words, "; {poses} outside of what was measured, with wider bounds");

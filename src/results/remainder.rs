@@ -80,7 +80,7 @@ pub(super) fn prediction(fitted: &Fitted) -> Option<Box<RawValue>> {
 pub(super) fn covariance(found: &Identification, fitted: &Fitted) -> Vec<Box<RawValue>> {
     let n = found.estimates.len();
     let (names, posterior) = fitted.alone.parameter_covariance();
-    let place = |name: &&str| found.estimates.iter().position(|own| own.name == **name);
+    let place = |name: &&str| found.estimates.iter().position(|estimate| estimate.name == **name);
     let places: Vec<Option<usize>> = names.iter().map(place).collect();
     let slope = |k: usize| {
         let estimate = &found.estimates[k];

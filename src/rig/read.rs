@@ -64,14 +64,14 @@ fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
         return Err(error);
     }
     let noise_sigma = given.get(POSITION).copied().unwrap_or(0.0);
+    // Lengths without a σ of their kind have that of positions.
     let sigma = |kind: &'static Kind| {
-        let declared = match kind.unit {
-            Unit::Length => Some(noise_sigma),
-            _ => problem.data.kind_sigmas.get(kind.name).copied(),
-        };
-        (kind.name, given.get(kind.name).copied().or(declared).unwrap_or(0.0))
+        let sigma = given.get(kind.name).filter(|_| kind.name != POSITION).copied();
+        let declared = problem.data.kind_sigmas.get(kind.name).copied().unwrap_or(0.0);
+        let sigma = sigma.or_else(|| (kind.unit != Unit::Length).then_some(declared));
+        Some((kind.name, sigma?))
     };
-    let kind_sigmas = kinds().map(sigma).collect();
+    let kind_sigmas = kinds().filter_map(sigma).collect();
     if let Some(HeldOut::Session(session)) = &problem.data.held_out {
         let location = problem.data.held_out_location.clone();
         return Err(location.error(InputErrorKind::NoSessions { session: session.clone() }));

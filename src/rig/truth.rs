@@ -122,7 +122,7 @@ impl Truth {
     pub(crate) fn with_noise(&self, sigma: f64) -> Self {
         let mut truth = Self { noise_sigma: sigma, ..self.clone() };
         for kind in kinds().filter(|kind| kind.unit == Unit::Length) {
-            truth.kind_sigmas.insert(kind.name, sigma);
+            truth.kind_sigmas.remove(kind.name);
         }
         truth
     }

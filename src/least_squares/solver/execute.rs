@@ -1,11 +1,14 @@
 //! Execution of a solver by argmin's executor.
 
 use argmin::core::observers::{Observe, ObserverMode};
-use argmin::core::{Executor, Solver, State as _, TerminationReason, TerminationStatus};
+use argmin::core::{Executor, IterState, Solver, State as _, TerminationReason, TerminationStatus};
 use nalgebra::DVector;
 
-use super::{Solution, State, Termination};
+use super::{Solution, Termination};
 use crate::least_squares::Objective;
+
+/// State of argmin's executor, of which x and ½‖r‖² are used.
+pub type State = IterState<DVector<f64>, (), (), (), (), f64>;
 
 /// Observer that ignores every iteration.
 pub(super) struct NoObserver;

@@ -42,10 +42,10 @@ pub(crate) use trust_region::{Subproblem, TrustRegion};
 pub use self::{
     bounded::nearest,
     divergence::Divergence,
+    execute::State,
     factor::Factor,
     gauss_newton::{GaussNewtonSettings, minimise_gauss_newton},
     inequalities::Inequalities,
     pseudo_inverse::{PseudoInverseSettings, minimise_pseudo_inverse},
     run::{BoundMethod, minimise_constrained, minimise_constrained_by, minimise_observed},
-    trust_region::State,
 };

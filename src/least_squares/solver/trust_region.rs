@@ -1,21 +1,16 @@
 //! Trust-region loop shared by the solvers: try a step, compare it with its prediction, accept it
 //! or shrink the radius.
 
-use argmin::core::{
-    ArgminError, Error, IterState, KV, Problem, Solver, State as _, TerminationReason,
-};
+use argmin::core::{ArgminError, Error, KV, Problem, Solver, State as _, TerminationReason};
 use argmin::kv;
 use nalgebra::{DMatrix, DVector};
 
-use super::execute::ReportsTermination;
+use super::execute::{ReportsTermination, State};
 use super::second_order::{ConvexModel, SecondOrder};
 use super::step::Step;
 use super::trial::{GOOD_RATIO, Trial};
 use super::{Settings, Termination};
 use crate::least_squares::{Linearisation, Objective};
-
-/// State of argmin's executor, of which x and ½‖r‖² are used.
-pub type State = IterState<DVector<f64>, (), (), (), (), f64>;
 
 /// Smallest gain ratio ρ at which a step is accepted.
 const MIN_ACCEPTED_RATIO: f64 = 1e-4;

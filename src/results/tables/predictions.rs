@@ -51,7 +51,7 @@ fn uncertainty(bounds: &Bounds) -> Columns {
         .map(|(k, axis)| (format!("sigma_{axis}_mm"), numbers(&|pose| bounds.poses[pose].sigma[k])))
         .collect();
     columns.push((bounds.column(), numbers(&|pose| bounds.bound(pose))));
-    let flags = bounds.poses.iter().map(|own| own.is_extrapolated).collect();
+    let flags = bounds.poses.iter().map(|pose| pose.is_extrapolated).collect();
     columns.push(("extrapolated".to_owned(), Column::Flags(flags)));
     columns
 }

@@ -125,8 +125,8 @@ impl Rows<'_> {
 
     /// Returns the effect's displacement over its size in each row; none where that is 0.
     pub fn over(&self, sizes: impl Iterator<Item = f64>) -> Vec<Vector3<f64>> {
-        let lever = |(own, size): (&Vector3<f64>, f64)| {
-            if size == 0.0 { Vector3::zeros() } else { own / size }
+        let lever = |(lever_at_pose, size): (&Vector3<f64>, f64)| {
+            if size == 0.0 { Vector3::zeros() } else { lever_at_pose / size }
         };
         self.displacements.iter().zip(sizes).map(lever).collect()
     }

@@ -49,7 +49,7 @@ pub fn at_joint<'a>(
     let unit = if slides(problem, number) { Unit::Length } else { Unit::Angle };
     // Δθ = c M, c₃ M³: the moment follows from the law itself.
     let moments = |of: fn(f64) -> f64| -> (Quantity, Vec<f64>) {
-        let moment = |(lever, own): (&Vector3<f64>, &Vector3<f64>)| of(along(lever, own) / first);
+        let moment = |(lever, axis): (&Vector3<f64>, &Vector3<f64>)| of(along(lever, axis) / first);
         let across = Quantity::new(format!("moment about joint {number} [N·m]"), 1.0);
         (across, levers.iter().zip(&rows.displacements).map(moment).collect())
     };
@@ -103,7 +103,7 @@ pub fn beyond_joints<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> V
             levers: rows
                 .displacements
                 .iter()
-                .map(|own| own.try_normalize(0.0).unwrap_or_default())
+                .map(|axis| axis.try_normalize(0.0).unwrap_or_default())
                 .collect(),
             law: Box::new(|displacement| displacement),
             reading: ALONG,
