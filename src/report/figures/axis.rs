@@ -40,7 +40,9 @@ impl Axis {
     /// Creates an axis with about `count` numbers.
     pub fn linear(range: (f64, f64), label: &str, count: usize) -> Self {
         let (low, high) = widened(range);
-        let step = if count > 0 { round_step((high - low) / count as f64) } else { f64::INFINITY };
+        // That many numbers divide the axis into one part more.
+        let parts = (count + 1) as f64;
+        let step = if count > 0 { round_step((high - low) / parts) } else { f64::INFINITY };
         let digits = whole((-step.log10()).ceil());
         let first = (low / step - 1e-9).ceil();
         let values = (0..=64).map(|k| (first + f64::from(k)) * step);
