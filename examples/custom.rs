@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let at = |l: f64, a: f64| (Vector3::new(a.cos(), a.sin(), 0.0) * l * 1e4).map(f64::round) / 1e4;
     let tip = |[a, b]: &[f64; 2]| at(0.501, *a) + at(0.4, a + b + 3e-3 * a.sin());
     let q = [[-2.7, 0.4], [-1.9, 1.0], [-0.8, -1.2], [0.1, 0.9], [0.8, -0.5], [1.5, 1.3]];
-    let data = Dataset::builder(&q, q.iter().map(tip)).build()?;
+    let data = Dataset::builder(q, q.iter().map(tip)).build()?;
     let options = Options::default().with_custom_solver(std::sync::Arc::new(Projected));
     let found = identify(&arm, &data, &options)?;
     let cam = found.estimate("law[cam].1").map_or(0.0, |cam| cam.estimate * 1e3);

@@ -210,6 +210,8 @@ fn write_c(
     let mut result = ExportResult::new(problem, &model, Some(&folder), None, None);
     result.not_held.clear();
     flags.tell(&result.to_json(), || {
+        let sources: Vec<String> =
+            C_FILES.iter().skip(1).map(|name| shell_word(&folder.join(name))).collect();
         let remainder = correction.is_some_and(|correction| correction.has_remainder());
         format!(
             "The whole model{}, and the correction of commands, as C99\nWritten to {}: {}\n\
@@ -217,7 +219,7 @@ fn write_c(
             if remainder { " with its remainder" } else { "" },
             folder.display(),
             C_FILES.join(", "),
-            [1, 2].map(|k| shell_word(&folder.join(C_FILES[k]))).join(" "),
+            sources.join(" "),
             answers.rows.len()
         )
     })?;

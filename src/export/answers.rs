@@ -99,20 +99,17 @@ pub fn answers(
         line.resize(9 + 2 * rows.joints + problem.data.covariates.len(), 0.0);
         line.extend(position.iter());
         line.extend(columns(&turn));
-        match (found.get(row), &goals) {
-            (Some(command), Some(goals)) => {
-                let orientation = goals.orientation(row).map(UnitQuaternion::scaled_axis);
-                line.extend(goals.positions[row].iter());
-                line.push(flag(orientation.is_some()));
-                line.extend(columns(&orientation.unwrap_or_default()));
-                line.push(flag(command.is_reached()));
-                line.extend(&command.configuration);
-            }
-            _ => {
-                line.resize(line.len() + 13, 0.0);
-                line.push(-1.0);
-                line.resize(line.len() + rows.joints, 0.0);
-            }
+        if let (Some(command), Some(goals)) = (found.get(row), &goals) {
+            let orientation = goals.orientation(row).map(UnitQuaternion::scaled_axis);
+            line.extend(goals.positions[row].iter());
+            line.push(flag(orientation.is_some()));
+            line.extend(columns(&orientation.unwrap_or_default()));
+            line.push(flag(command.is_reached()));
+            line.extend(&command.configuration);
+        } else {
+            line.resize(line.len() + 13, 0.0);
+            line.push(-1.0);
+            line.resize(line.len() + rows.joints, 0.0);
         }
         numbers.push(line);
     }

@@ -71,7 +71,9 @@ pub(super) fn remainder(
     );
     let site = |site: &SiteTable| {
         let [single, all, constant] = site.variances.map(real);
-        let (input, scale) = site.single.map_or((-1, 0.0), |(input, scale)| (input as i64, scale));
+        let (input, scale) = site
+            .single
+            .map_or_else(|| ("-1".to_owned(), 0.0), |(input, scale)| (input.to_string(), scale));
         let (lever, scale) = (real(site.lever), real(scale));
         let (joint, kind) = (site.joint, u8::from(site.is_compliance));
         format!("{{{joint}, {kind}, {input}, {lever}, {single}, {all}, {constant}, {scale}}}")

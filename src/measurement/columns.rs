@@ -42,6 +42,7 @@ pub(super) struct Columns {
 impl Columns {
     /// Finds the columns in a header; unknown columns give warnings. Positions and the column of
     /// held-out rows are required if the poses are `measured`.
+    #[expect(clippy::too_many_lines, reason = "one column after the other, by what it may mean")]
     pub fn find(
         table: &Table,
         problem: &Problem,

@@ -162,7 +162,9 @@ impl<'a> MarginalLikelihood<'a> {
                 Function::Joint => &mut hyper.joint,
                 Function::Constant => &mut hyper.constant,
             };
-            sites.iter().for_each(|&site| amplitudes[site] = logarithms[k].exp());
+            for &site in sites {
+                amplitudes[site] = logarithms[k].exp();
+            }
         }
         for (k, &site) in self.single_lengths().zip(&self.singles) {
             hyper.single_lengths[site] = logarithms[k].exp();

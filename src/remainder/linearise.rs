@@ -92,8 +92,7 @@ impl Linearisation<'_> {
         let first = self.x.len();
         let x = self.x.clone().resize_vertically(first + joints.len(), 0.0);
         let unknowns = (first..first + joints.len()).collect();
-        let poses: Vec<Pose> =
-            poses.iter().map(|pose| Pose { sigma: 1.0, ..pose.clone() }).collect();
+        let poses: Vec<Pose> = poses.iter().map(|pose| Pose { sigma: 1.0, ..*pose }).collect();
         let residuals = PoseResiduals::new(&probed, poses, unknowns, x.clone());
         let (slopes, _) = jacobian_and_residual(&residuals, &residuals.reduced(&x));
         -slopes
@@ -108,7 +107,9 @@ impl Linearisation<'_> {
         let compliances = sites(SiteKind::Compliance).filter(revolute).collect();
         let mut compliances = self.with_levers(compliances, poses);
         let largest = compliances.iter().map(|site| site.lever).fold(0.0, f64::max);
-        compliances.iter_mut().for_each(|site| site.lever = largest);
+        for site in &mut compliances {
+            site.lever = largest;
+        }
         let sites = [coordinates, compliances].concat();
         let count = poses.len().max(1) as f64;
         let commands = joints.iter().map(|&joint| Source::Command(joint));

@@ -248,11 +248,13 @@ impl Training {
             parts[part[group.0[0]]].push(group);
         }
         let mut is_judged = vec![false; part.len()];
-        judged.iter().for_each(|&row| is_judged[row] = true);
+        for &row in judged {
+            is_judged[row] = true;
+        }
         parts.retain(|groups: &Vec<&(Vec<usize>, DMatrix<f64>)>| {
             groups.iter().any(|(group, _)| is_judged[group[0]])
         });
-        let of_groups = |groups: &[&(Vec<usize>, DMatrix<f64>)]| -> Vec<usize> {
+        let of_groups = |groups: &[&Group]| -> Vec<usize> {
             groups.iter().flat_map(|(group, _)| coordinates(group)).collect()
         };
         // S of all small parts at once, and A for the large ones.
@@ -267,7 +269,7 @@ impl Training {
         let factor = &self.posterior.factor;
         let whole = (small.len() < places.iter().map(Vec::len).sum())
             .then(|| product_with_upper(factor, &factor.transpose()));
-        let without = |(groups, places): (&Vec<&(Vec<usize>, DMatrix<f64>)>, &Vec<usize>)| {
+        let without = |(groups, places): (&Vec<&Group>, &Vec<usize>)| {
             let judged = groups.iter().copied().filter(|(group, _)| is_judged[group[0]]);
             let judged: Vec<_> = judged.collect();
             let of_judged = of_groups(&judged);
@@ -349,6 +351,9 @@ impl Training {
         Some(Deleted { error, identity: 1.0, root })
     }
 }
+
+/// Rows of one configuration and the covariance of their noise.
+type Group = (Vec<usize>, DMatrix<f64>);
 
 /// Whitened coordinates predicted without themselves.
 struct Deleted {

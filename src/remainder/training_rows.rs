@@ -74,7 +74,9 @@ impl TrainingRows {
         let count = count.min(configurations.len());
         let mut fold_of_row = vec![0; self.rows.len()];
         for (number, rows) in configurations.iter().enumerate() {
-            rows.iter().for_each(|&row| fold_of_row[row] = number % count);
+            for &row in rows {
+                fold_of_row[row] = number % count;
+            }
         }
         let divided = |fold: usize| (0..self.rows.len()).partition(|&row| fold_of_row[row] == fold);
         (0..count).map(divided).collect()

@@ -6,6 +6,9 @@ use crate::quantity::format::{number, or_dash};
 use crate::results::{Cell, StudyResult};
 use crate::study::{Results, Source, Study};
 
+/// Cell of a study with the median time of a fit \[s\].
+type Timed = (Cell, f64);
+
 /// Returns the study as text, ending in a line break.
 pub fn study_text(study: &Study, results: &Results) -> String {
     let by = match study.source {
@@ -20,12 +23,11 @@ pub fn study_text(study: &Study, results: &Results) -> String {
         study.parameters.len(),
         study.held_out
     );
-    let cells: Vec<(Cell, f64)> = StudyResult::new(study, results)
+    let cells: Vec<Timed> = StudyResult::new(study, results)
         .cells
         .into_iter()
         .zip(results.cells.iter().map(|timed| timed.timing().median))
         .collect();
-    type Timed = (Cell, f64);
     let shown = |value: Option<f64>, decimals| or_dash(value, |value| number(value, decimals));
     let percent = |share: Option<f64>| or_dash(share, |share| format!("{:.1} %", 100.0 * share));
     let bias = |(cell, _): &Timed| cell.largest_bias.as_ref().map(|bias| bias.bias_sd);

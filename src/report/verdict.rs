@@ -108,16 +108,17 @@ fn found(result: &LoopResult) -> String {
         [effect] => format!("One effect was found ({})", effect.effect.description),
         effects => format!("{} effects were found", effects.len()),
     };
-    match doubted.as_slice() {
-        [] => {}
+    let in_doubt = match doubted.as_slice() {
+        [] => String::new(),
         [cause] => {
             let rival = cause.alternatives.first();
             let or_else =
                 rival.map_or_else(String::new, |rival| format!(", or else {}", rival.description));
-            words += &format!("; {}{or_else}", claim(cause, &cause.effect.description));
+            format!("; {}{or_else}", claim(cause, &cause.effect.description))
         }
-        causes => words += &format!("; {} causes are probable or located", causes.len()),
-    }
+        causes => format!("; {} causes are probable or located", causes.len()),
+    };
+    words += &in_doubt;
     let contradicted: Vec<&FoundEffect> = result.with_status(Status::Contradicted).collect();
     match contradicted.as_slice() {
         [] => words,

@@ -3,6 +3,7 @@
 //! Every file begins with its `format` and the `program` ([`Document`]); docs/schema/ has the JSON
 //! Schema of each. Sentences, reports and the Python package state what these structs hold.
 
+#![allow(clippy::struct_field_names, reason = "fields are keys of the files, units included")]
 #![expect(
     missing_docs,
     reason = "a field bears the name of its key; it has a comment where docs/results.md says more than the name"

@@ -447,7 +447,9 @@ fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f
         here.rows_mut(3 * pose, 3).unscale_mut(WITHOUT_WEIGHT);
     }
     let mut is_aside = vec![false; residual.len() / 3];
-    aside.iter().for_each(|&pose| is_aside[pose] = true);
+    for &pose in aside {
+        is_aside[pose] = true;
+    }
     let unknowns = fitted.unknowns_without(linearised, &[], 1.0);
     let fit = LinearNeighbourhood::new(&columns, &here, &unknowns, linearised.empty());
     let (left, along) = (residual + whole * fit.step(), fit.fitted());

@@ -1,6 +1,7 @@
 //! The model as C code equals the library; rigid tables describe the exported arm.
 
 #![expect(clippy::unwrap_used, reason = "a test that fails may panic")]
+#![expect(clippy::print_stderr, reason = "what is not installed is said")]
 
 #[path = "../common/mod.rs"]
 mod common;

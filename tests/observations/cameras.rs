@@ -1,5 +1,6 @@
 //! Pixels of markers in the images of cameras.
 
+use std::fmt::Write as _;
 use std::path::Path;
 
 use flexcal::fit::{Options, Placement, identify};
@@ -89,12 +90,13 @@ fn table(problem: &Problem, configurations: usize, position: bool) -> String {
         for camera in ["hand", "head", "wall"] {
             for fixture in problem.fixtures.iter().filter(|known| !known.points.is_empty()) {
                 for point in 0..fixture.points.len() {
-                    text += &format!("{},{camera},{},{point},1,1,,,\n", q.join(","), fixture.name);
+                    writeln!(text, "{},{camera},{},{point},1,1,,,", q.join(","), fixture.name)
+                        .unwrap();
                 }
             }
         }
         if position {
-            text += &format!("{},,,,,,1,1,1\n", q.join(","));
+            writeln!(text, "{},,,,,,1,1,1", q.join(",")).unwrap();
         }
     }
     text
@@ -316,5 +318,5 @@ fn a_point_behind_the_camera_is_an_error_with_its_row() {
     let data = Dataset { measurements: rows, split };
     let error = identify(&problem, &data, &Options::default()).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("the point is behind the camera"), "{error}");
-    assert!(error.contains(":") && line > 1, "{error}");
+    assert!(error.contains(':') && line > 1, "{error}");
 }

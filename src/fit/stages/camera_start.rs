@@ -47,22 +47,18 @@ pub(super) fn poses_from_views(
             .iter()
             .find(|view| known.contains_key(&view.camera) != known.contains_key(&view.marker));
         if let Some(view) = half_known {
-            let (fixture, pose) = match known.get(&view.camera) {
-                Some(camera) => {
-                    let marker = |view: &View| view.carrier * camera * view.marker_in_camera;
-                    let of_pair =
-                        |other: &&View| (other.camera, other.marker) == (view.camera, view.marker);
-                    (view.marker, mean(views.iter().filter(of_pair).map(marker)))
-                }
-                None => {
-                    let marker = known.get(&view.marker).copied().unwrap_or_default();
-                    let camera = |view: &View| {
-                        view.carrier.inverse() * marker * view.marker_in_camera.inverse()
-                    };
-                    let of_pair =
-                        |other: &&View| (other.camera, other.marker) == (view.camera, view.marker);
-                    (view.camera, mean(views.iter().filter(of_pair).map(camera)))
-                }
+            let (fixture, pose) = if let Some(camera) = known.get(&view.camera) {
+                let marker = |view: &View| view.carrier * camera * view.marker_in_camera;
+                let of_pair =
+                    |other: &&View| (other.camera, other.marker) == (view.camera, view.marker);
+                (view.marker, mean(views.iter().filter(of_pair).map(marker)))
+            } else {
+                let marker = known.get(&view.marker).copied().unwrap_or_default();
+                let camera =
+                    |view: &View| view.carrier.inverse() * marker * view.marker_in_camera.inverse();
+                let of_pair =
+                    |other: &&View| (other.camera, other.marker) == (view.camera, view.marker);
+                (view.camera, mean(views.iter().filter(of_pair).map(camera)))
             };
             known.insert(fixture, pose);
             continue;

@@ -67,7 +67,7 @@ fn linear_pose(places: &[Vector3<f64>], slopes: &[[f64; 2]]) -> Option<Isometry3
     let [first, second] = [column(0) * sign, column(1) * sign];
     let third = if is_flat { first.cross(&second) } else { column(2) * sign };
     let length = if is_flat {
-        (first.norm() + second.norm()) / 2.0
+        f64::midpoint(first.norm(), second.norm())
     } else {
         (first.norm() + second.norm() + third.norm()) / 3.0
     };

@@ -182,10 +182,10 @@ impl Panel {
                     svg.circle(place(*at), *radius, *paint, &tag);
                 }
                 Shape::Line { points, paint } => {
-                    svg.line(points.iter().copied().map(place), *paint)
+                    svg.line(points.iter().copied().map(place), *paint);
                 }
                 Shape::Box { corners, paint, tag } => {
-                    svg.rectangle(corners.map(place), *paint, tag)
+                    svg.rectangle(corners.map(place), *paint, tag);
                 }
                 Shape::Text { at, shift, text, colour, anchor } => {
                     let (x, y) = place(*at);

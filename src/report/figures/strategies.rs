@@ -33,11 +33,11 @@ pub fn strategies(comparison: &Comparison) -> Drawing {
             entry.name = format!("{strategy}, {} solvers", entry.solvers);
         } else {
             let name = format!("{strategy} {}", outcome.solver.as_str());
-            entries.push(Entry { name, ..entry(strategy.to_owned(), errors) });
+            entries.push(Entry { name, ..entry(strategy.to_owned(), &errors) });
         }
     }
     let paper = comparison.paper.iter();
-    entries.extend(paper.map(|procedure| entry(procedure.name(), procedure.errors)));
+    entries.extend(paper.map(|procedure| entry(procedure.name(), &procedure.errors)));
     let caption = "Mean position error of each strategy at the fitted and at the held-out poses, on a logarithmic scale. A \
                    wide gap between the two marks of a row means that the strategy fits noise. Solvers with the same result \
                    share a row.";
@@ -45,8 +45,8 @@ pub fn strategies(comparison: &Comparison) -> Drawing {
     draw_entries("strategies", titles, caption, &entries)
 }
 
-fn entry(strategy: String, errors: Errors) -> Entry {
-    Entry { name: strategy.clone(), strategy, solvers: 1, errors }
+fn entry(strategy: String, errors: &Errors) -> Entry {
+    Entry { name: strategy.clone(), strategy, solvers: 1, errors: *errors }
 }
 
 /// Draws the errors with every part of the elasticity; `None` for an arm without elasticity.
@@ -54,7 +54,7 @@ pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
     let entries: Vec<Entry> = comparison
         .ablations
         .iter()
-        .map(|(part, outcome)| entry(part.as_str().to_owned(), outcome.fitted))
+        .map(|(part, outcome)| entry(part.as_str().to_owned(), &outcome.fitted))
         .collect();
     let caption = "Mean position error with only this part of the elasticity in the model and everything else fitted, \
                    from rigid to complete, on a logarithmic scale.";
@@ -67,9 +67,9 @@ pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
 pub fn rounds(closure: &ClosedLoop) -> Option<Drawing> {
     let after = |(k, round): (usize, &Round)| {
         let errors = Errors { identification: round.identification, held_out: round.held_out };
-        entry(round_name(closure, k), errors)
+        entry(round_name(closure, k), &errors)
     };
-    let mut entries = vec![entry("as declared".to_owned(), closure.before.fit.fitted)];
+    let mut entries = vec![entry("as declared".to_owned(), &closure.before.fit.fitted)];
     entries.extend(closure.rounds.iter().enumerate().map(after));
     let caption = "Mean position error after each round of the loop, at the fitted poses and at the held-out ones, which do not \
                    influence any choice, on a logarithmic scale. If the two diverge, a round has fitted noise.";

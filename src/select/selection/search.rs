@@ -51,7 +51,8 @@ fn settled_set(
         };
         let open = state.reconsidered(&fitted);
         // Polished arguments stay: they explain all rows, of which the evidence has some.
-        if !is_held(best, &open) && !(is_polished && has_same_laws(best, &open)) {
+        let stays = is_held(best, &open) || is_polished && has_same_laws(best, &open);
+        if !stays {
             state.report_progress(1, 1);
             let effects = state.effects_of(&fitted, (&evidence, best));
             let next = state.fit(&fitted, &effects)?;
