@@ -7,10 +7,12 @@
 #define MAX_POSITION 2e-4
 #define MAX_AXIS 2e-4
 #define MAX_COMMAND 1.0 /* near singular poses a command is not determined in float; it reaches its target */
+#define MAX_LAST_STEP 1e30 /* and rounding may end the steps: what counts is that the target is reached */
 #else
 #define MAX_POSITION 1e-9
 #define MAX_AXIS 1e-9
 #define MAX_COMMAND 1e-9
+#define MAX_LAST_STEP 1e-11
 #endif
 
 enum {
@@ -92,7 +94,7 @@ int main(void)
         status = flexcal_correct(&pose, &goal, q, &left);
         corrected += 1;
         if (number[IS_REACHED] > 0.0) {
-            if (status == FLEXCAL_NOT_REACHED || left.last_step > (flexcal_real)(0.01 * MAX_COMMAND)) {
+            if (status == FLEXCAL_NOT_REACHED || left.last_step > (flexcal_real)MAX_LAST_STEP) {
                 /* Near a singular pose it is still on its way to the target or to the nearest command. */
                 unsettled += 1;
                 continue;
