@@ -254,8 +254,8 @@ fn attainable_rank(
     (total, total.saturating_sub(before).div_ceil(candidates.coordinates))
 }
 
-/// Returns the given rows together with known distances between points that only the candidates
-/// contain.
+/// Returns the given rows and the known distances of the candidates that the given rows lack;
+/// `None` if there are neither.
 fn with_known_distances(
     given: Option<&Measurements>,
     candidates: &Candidates,

@@ -106,8 +106,8 @@ pub struct Identification {
     /// Noise variance that the fit took over the declared one; 1 where residuals and priors do not
     /// contradict the declared σ.
     pub noise_factor: f64,
-    /// 1 σ of a coordinate that the fit took \[m\], of tilts \[rad\]: root mean square over the
-    /// identification rows of the kind that `fitted` is about.
+    /// 1 σ of a measured coordinate that the fit assumed \[m\] (of a tilt \[rad\]): root mean square
+    /// over the identification rows of the kind that `fitted` is about.
     pub sigma_taken: f64,
     /// Factor on the declared σ, less than 1 where these are too large.
     pub sigma_scale: f64,

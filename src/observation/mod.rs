@@ -211,8 +211,9 @@ impl Observation {
         self.indices()[0].filter(|_| self.description().needs == Needs::Frame).unwrap_or(0)
     }
 
-    /// Returns the predicted numbers of a row with their derivatives with respect to the target,
-    /// the axes of the base and the fixtures.
+    /// Returns the predicted numbers of a row with their derivatives with respect to the position
+    /// of the target (or of the point of the second fixture), a small rotation of the base, and the
+    /// numbers of the fixtures.
     pub(crate) fn slopes(self, scene: &Scene<f64>) -> Slopes {
         if self.description().needs == Needs::Carriers {
             self.slopes_of::<ALL_INPUTS>(scene)

@@ -117,7 +117,8 @@ pub(super) fn beware<'a>(found: &Identification, plots: &PlotData) -> Option<Blo
     (!points.is_empty()).then(|| Block::Lines("Warnings:".to_owned(), points))
 }
 
-/// Counts the fitted rows; several targets in one pose are points of it.
+/// States the number of fitted rows; where one pose may have several targets, also the number of
+/// different poses.
 fn measured(found: &Identification) -> String {
     let rows = rows_of(found, |errors| errors.identification);
     if found.several_targets {

@@ -60,7 +60,7 @@ fn counts(study: &MisprintStudy) -> String {
     )
 }
 
-/// Returns the specimens on which everything is tried.
+/// Returns the specimens of the study's first case; empty if it has no case.
 fn main_case<'a>(study: &MisprintStudy, found: &'a ReplicaResults) -> Vec<&'a Replica> {
     study.cases.first().map_or_else(Vec::new, |case| found.of_case(case).collect())
 }

@@ -88,8 +88,8 @@ pub(super) fn unexplained(
     }
     if let Some(size) = result.size_alone() {
         return vec![format!(
-            "Only the size of the residual is significant ({} × the declared σ). Either the declared σ is too small, or a cause \
-             acts that these poses do not locate.",
+            "Only the size of the residual is significant ({} × the declared σ). The declared σ may be too small, \
+             some rows may have gross errors, or a cause may act that these poses do not locate.",
             number(size, 1)
         )];
     }
@@ -128,7 +128,8 @@ pub(super) fn unexplained(
     sentences.push(catalogue + ".");
     match correction(closure) {
         None => sentences.push(
-            "No smooth correction would improve the prediction of poses left out of its fit."
+            "No smooth correction is given: none takes 5 % or more off the error of poses left out of its fit, or the fit \
+             has cautions."
                 .to_owned(),
         ),
         Some(correction) => sentences.extend(corrected(problem, closure, correction)),

@@ -56,9 +56,9 @@ pub struct Cell {
 /// Held-out error over the fits.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct HeldOut {
-    /// Mean over fits and poses.
+    /// Mean error over fits and poses \[mm\].
     pub mean: Option<f64>,
-    /// Rms over fits and poses.
+    /// Rms error over fits and poses \[mm\].
     pub rms: Option<f64>,
     /// Standard deviation of the rms of a fit.
     pub rms_sd: Option<f64>,

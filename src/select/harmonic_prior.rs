@@ -7,7 +7,7 @@ use crate::quantity::Unit;
 
 /// Number of orders from which on the harmonics of a joint count as one periodic error whose
 /// coefficients have a common prior.
-const MIN_GEAR_ORDERS: usize = 12;
+pub(super) const MIN_GEAR_ORDERS: usize = 12;
 
 /// Prior that harmonics of all joints share: 1 σ of the coefficients of each order about 0.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,9 +8,10 @@ use super::row_kind::{RowKind, measured, named, size, spread};
 pub(super) const MAX_MISS: f64 = 0.02;
 /// Multiple of σ that a residual may have whatever the spread is.
 pub(super) const BEYOND_NOISE: f64 = 100.0;
-/// Part of the nominal arm's error beyond which a fit has not fitted what was measured …
+/// Part of the nominal arm's error above which the error of a fit counts as no better.
 const NO_BETTER: f64 = 0.9;
-/// … where its error is also beyond this multiple of σ.
+/// Multiple of the declared σ above which the error of a fit that is no better than the nominal arm
+/// (`NO_BETTER`) is reported.
 const FAR_BEYOND_NOISE: f64 = 1000.0;
 /// Ratio of the spreads of measured and predicted points beyond which they are of two arms.
 const MAX_SIZE_RATIO: f64 = 2.0;

@@ -89,7 +89,7 @@ pub fn joint_map(data: &PlotData) -> Option<Drawing> {
     let caption = format!(
         "Root mean square residual over the poses in which a joint is in one twelfth of its \
          measured range: pale {} mm, deep {} mm; an empty box has no pose. A change along a row \
-         points to an error of that joint.",
+         may come from an error of that joint, or from whatever varies with it over these poses.",
         two_digits(least * 1e3, 4),
         two_digits(most * 1e3, 4)
     );

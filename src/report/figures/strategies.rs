@@ -119,7 +119,8 @@ fn draw_entries(
     Drawing::new((name, title), caption, chart(label, &legend, &[panel]), data)
 }
 
-/// Returns the change by a round, counted from 0.
+/// Returns the label of round `k` (from 0): its number from 1, and which effects it added or
+/// removed.
 fn round_name(closure: &ClosedLoop, k: usize) -> String {
     let before = k.checked_sub(1).map_or(&[][..], |last| closure.rounds[last].effects.as_slice());
     let effects = &closure.rounds[k].effects;

@@ -92,8 +92,8 @@ fn view(data: &PlotData) -> Markup {
             p.under { output {} }
         }
         @if coverage.tried > 0 {
-            p { (number(share, 0)) " % of " (coverage.tried) " positions, uniformly distributed over the joint limits (or measured ranges, \
-                if no limit is declared), lie within " (mm(coverage.near, 0)) " mm of a fitted pose." }
+            p { (number(share, 0)) " % of " (coverage.tried) " end-point positions, of configurations spread evenly over the joint limits (or measured \
+                ranges, if no limit is declared), lie within " (mm(coverage.near, 0)) " mm of a fitted pose." }
         }
     }
 }

@@ -8,9 +8,9 @@ use super::columns::Columns;
 use super::functions::{Known, basis, times};
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
 use crate::model::parameter::ParameterSite;
-use crate::problem::{EffectDeclaration, JointKind};
+use crate::problem::{Effect, EffectDeclaration, JointKind};
 use crate::residual_tests::Covariate;
-use crate::select::harmonic_prior::is_gear_of;
+use crate::select::harmonic_prior::{MIN_GEAR_ORDERS, is_gear_of};
 use crate::select::settings::{GEAR_ORDERS, MAX_NEAR_ORDER, SLOW_LENGTH};
 
 /// Number of values of a command, for each order, from which on a periodic error of many orders is
@@ -75,6 +75,14 @@ impl Columns<'_, '_> {
         };
         for highest in GEAR_ORDERS {
             if known.levels < LEVELS_PER_ORDER * highest as usize {
+                continue;
+            }
+            let is_declared = |order: &u32| {
+                let single = Effect::JointHarmonic { joint: joint + 1, orders: vec![*order] };
+                self.problem.effects.iter().any(|declared| declared.effect.covers(&single))
+            };
+            // Fewer new orders have no common prior.
+            if (1..=highest).filter(|order| !is_declared(order)).count() < MIN_GEAR_ORDERS {
                 continue;
             }
             let hypothesis = Hypothesis {

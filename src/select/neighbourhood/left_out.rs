@@ -50,22 +50,22 @@ impl PartSquares {
         Some((x, DVector::from_iterator(root.ncols(), variances)))
     }
 
-    /// Returns −2 ln p(r) of all parts under priors as in [`Self::left_out`], up to a constant.
+    /// Returns −2 ln p(r) of all parts for noise of a variance φ and priors as in
+    /// [`Self::left_out`], 1 σ of them divided by √φ; up to a constant.
     ///
     /// With W = diag(1/σ²), G = JᵀJ + W, g = Jᵀr + W x₀ and x₀ the present values it is
-    /// ln det G − Σ ln (1/σ²) + x₀ᵀW x₀ − gᵀG⁻¹g.
-    pub fn evidence(&self, priors: &[(f64, Option<f64>)]) -> Option<f64> {
+    /// ln det G − Σ ln (1/σ²) + (x₀ᵀW x₀ − gᵀG⁻¹g)/φ.
+    pub fn evidence(&self, priors: &[(f64, Option<f64>)], variance: f64) -> Option<f64> {
         let (normal, mut along) = self.normal_of_all(priors);
         let lower = lower_factor(normal)?;
         if !lower.solve_lower_triangular_mut(&mut along) {
             return None;
         }
         let ln_determinant = 2.0 * lower.diagonal().map(f64::ln).sum();
-        let of_prior = |&(x, sigma): &(f64, Option<f64>)| {
-            sigma.map_or(0.0, |sigma| 2.0 * sigma.ln() + (x / sigma).powi(2))
-        };
-        let prior: f64 = priors.iter().map(of_prior).sum();
-        Some(ln_determinant + prior - along.norm_squared()).filter(|value| value.is_finite())
+        let widths: f64 = priors.iter().filter_map(|prior| Some(2.0 * prior.1?.ln())).sum();
+        let pulls: f64 = priors.iter().filter_map(|&(x, sigma)| Some((x / sigma?).powi(2))).sum();
+        let squares = (pulls - along.norm_squared()) / variance;
+        Some(ln_determinant + widths + squares).filter(|value| value.is_finite())
     }
 
     fn normal_of_all(&self, priors: &[(f64, Option<f64>)]) -> (DMatrix<f64>, DVector<f64>) {
@@ -130,7 +130,8 @@ mod tests {
             at_zero.dot(&factor.solve(&at_zero)) + ln_determinant
         };
         let squares = PartSquares::new(&columns, &residual, &[]);
-        let evidence = |sigma: f64| squares.evidence(&present.map(|x| (x, Some(sigma)))).unwrap();
+        let evidence =
+            |sigma: f64| squares.evidence(&present.map(|x| (x, Some(sigma))), 1.0).unwrap();
         let expected = density(0.5) - density(2.0);
         assert!((evidence(0.5) - evidence(2.0) - expected).abs() < 1e-6);
     }

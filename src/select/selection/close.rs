@@ -105,7 +105,9 @@ pub fn close_by(
     options.tell(|| Progress::Finishing);
     state.data = &data;
     let (fitted, evidence) = if interrupted {
-        (state.latest.clone().settled(&data, &unstoppable)?, state.evidence.take())
+        let settled = state.latest.clone().settled(&data, &unstoppable)?;
+        let moved = settled.differs_from(&state.latest, &data);
+        (settled, state.evidence.take().filter(|_| !moved))
     } else {
         result?
     };

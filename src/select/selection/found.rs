@@ -26,7 +26,8 @@ pub struct Found {
     pub effect: Effect,
     /// Strongest claim about the effect.
     pub status: Status,
-    /// Claims with their probabilities; `None` where no evidence was evaluated.
+    /// Claims with their probabilities; `None` where no evidence about the effect was evaluated or no
+    /// probable set holds it.
     pub claims: Option<Claims>,
     /// Probability that chance alone gains as much, corrected for the candidates tried.
     pub p_value: f64,
@@ -70,7 +71,12 @@ pub(super) fn found(
             alternatives(evidence, &effect, &parts, MIN_ALTERNATIVE_ODDS)
         });
         let shares = stable.iter().filter(|(part, _)| effect.covers(part)).map(|entry| entry.1);
-        let claims = best.and_then(|(evidence, _)| claims(evidence, &effect));
+        // Evidence about a fit whose searched argument was polished is about the argument before.
+        let claims = best.and_then(|(evidence, set)| {
+            let is_alike = |other: &Effect| other.name_and_place() == effect.name_and_place();
+            let alike = || set.effects().into_iter().find(is_alike);
+            claims(evidence, &effect).or_else(|| claims(evidence, &alike()?))
+        });
         let check = reference_check(fitted, data, &effect);
         let verdict = check.as_ref().map(|check| check.verdict);
         let gear = match &effect {
@@ -79,7 +85,10 @@ pub(super) fn found(
             }
             _ => None,
         };
+        // What was evaluated and is in no probable set has no claim.
+        let is_evaluated = best.is_some() && reconsidered.iter().any(|known| effect.covers(known));
         let law = claims.as_ref().map(|claims| claims.law.1).or(gear);
+        let law = law.or_else(|| is_evaluated.then_some(0.0));
         let is_significant = p_value < rules.leaving_level;
         let status = Status::of(law, rules.stated, (is_significant, verdict));
         Found {

@@ -66,7 +66,11 @@ pub(super) fn estimated_prior(
     let weight = fitted.found.noise_factor.max(1.0).sqrt();
     let priors: Vec<(f64, Option<f64>)> =
         all.map(|(x, sigma)| (x, sigma.map(|sigma| sigma / weight))).collect();
-    let coefficients = coefficients(fitted);
+    // Declared harmonics beyond the orders of the prior keep their own.
+    let coefficients: Vec<(usize, u32)> = coefficients(fitted)
+        .into_iter()
+        .filter(|(_, order)| first.sigma(*order).is_some())
+        .collect();
     let with = |prior: &HarmonicPrior| {
         let mut priors = priors.clone();
         for &(j, order) in &coefficients {
@@ -79,7 +83,7 @@ pub(super) fn estimated_prior(
             let prior = prior.scaled(power.exp2());
             let priors = with(&prior);
             let error = match criterion {
-                ScaleBy::Evidence => squares.evidence(&priors),
+                ScaleBy::Evidence => squares.evidence(&priors, weight.powi(2)),
                 ScaleBy::LeftOutRanges => squares.left_out(&priors),
             };
             Some((error?, prior))
