@@ -73,7 +73,7 @@ pub(super) fn found(
         let shares = stable.iter().filter(|(part, _)| effect.covers(part)).map(|entry| entry.1);
         // Evidence about a fit whose searched argument was polished is about the argument before.
         let claims = best.and_then(|(evidence, set)| {
-            let is_alike = |other: &Effect| other.name_and_place() == effect.name_and_place();
+            let is_alike = |other: &Effect| other.is_but_for_search(&effect);
             let alike = || set.effects().into_iter().find(is_alike);
             claims(evidence, &effect).or_else(|| claims(evidence, &alike()?))
         });

@@ -27,7 +27,8 @@ pub(super) fn polished(
     fitted: &Fitted,
 ) -> Result<Option<Fitted>, IdentifyError> {
     let data = state.data;
-    // On rows that the evidence saw all of, it tried these arguments itself.
+    // On rows that the evidence saw all of, it tried these arguments itself, but for times beyond the
+    // `MAX_SHIFT_TIMES` that are listed.
     if data.rows().len() == data.evidence_rows().len() {
         return Ok(None);
     }

@@ -51,7 +51,8 @@ fn settled_set(
         };
         let open = state.reconsidered(&fitted);
         // Polished arguments stay: they explain all rows, of which the evidence has some.
-        let stays = is_held(best, &open) || is_polished && has_same_laws(best, &open);
+        let stays = is_held(best, &open, Effect::eq)
+            || is_polished && is_held(best, &open, Effect::is_but_for_search);
         if !stays {
             state.report_progress(1, 1);
             let effects = state.effects_of(&fitted, (&evidence, best));
@@ -103,26 +104,21 @@ fn with_estimated_prior(
     Ok(next)
 }
 
-/// Returns true if the effects of a set are those that were added and the set has no further
-/// periodic error.
-fn is_held(set: &HypothesisSet, added: &[Effect]) -> bool {
-    let effects = set.effects();
-    let parts: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
-    effects.len() == parts.len()
-        && parts.iter().all(|part| effects.contains(part))
-        && set.gears().is_empty()
-}
-
-/// Returns true if a set has as many effects of each kind at each place as were added and no further
-/// periodic error: they differ in searched arguments alone.
-fn has_same_laws(set: &HypothesisSet, added: &[Effect]) -> bool {
-    let names = |effects: Vec<Effect>| {
-        let mut names: Vec<String> = effects.iter().map(Effect::name_and_place).collect();
-        names.sort();
-        names
+/// Returns true if the effects of a set are those that were added, by a relation of two effects, and
+/// the set has no further periodic error.
+fn is_held(
+    set: &HypothesisSet,
+    added: &[Effect],
+    is_same: impl Fn(&Effect, &Effect) -> bool,
+) -> bool {
+    let mut unmatched = set.effects();
+    let mut is_matched = |part: Effect| {
+        let place = unmatched.iter().position(|effect| is_same(effect, &part));
+        place.map(|place| unmatched.remove(place)).is_some()
     };
     set.gears().is_empty()
-        && names(set.effects()) == names(added.iter().flat_map(Effect::parts).collect())
+        && added.iter().flat_map(Effect::parts).all(&mut is_matched)
+        && unmatched.is_empty()
 }
 
 /// Returns the evidence with its rival sets evaluated at fits of their own, and the best of these
@@ -136,7 +132,7 @@ fn refitted(
     let open = state.reconsidered(fitted);
     let held = evidence
         .sure(rules.inclusion_threshold)
-        .filter(|best| !best.hypotheses.is_empty() && is_held(best, &open));
+        .filter(|best| !best.hypotheses.is_empty() && is_held(best, &open, Effect::eq));
     let Some(best) = held.cloned() else { return Ok((evidence, None)) };
     let left_out = evidence.left_out.clone();
     let ln_posterior_of = |fitted: &Fitted, functions: &[(Hypothesis, usize)], sigma: f64| {
@@ -190,7 +186,9 @@ fn is_confirmed(
     let evidence = unless_stopped(state.data, || evaluate(fitted, state.data, &open))?;
     let threshold = state.data.rules.inclusion_threshold;
     let best = evidence.as_ref().and_then(|evidence| evidence.sure(threshold));
-    Ok(best.is_some_and(|best| is_held(best, &open) && best.without_law().len() <= functions))
+    Ok(best.is_some_and(|best| {
+        is_held(best, &open, Effect::eq) && best.without_law().len() <= functions
+    }))
 }
 
 /// Returns what `evaluate` returns, an error if the search was stopped meanwhile.
