@@ -55,7 +55,8 @@ impl Covariate {
         }
     }
 
-    fn time(measured: bool) -> Self {
+    /// Returns the measured time, or the order of the rows where it is not measured.
+    pub fn time(measured: bool) -> Self {
         if measured { Self::Time } else { Self::Row }
     }
 

@@ -298,8 +298,13 @@ impl Fitted {
 
     /// Returns the fit with outliers at full weight.
     pub fn with_all_rows(&self) -> Self {
+        self.setting_aside(Vec::new())
+    }
+
+    /// Returns the fit with other rows set aside in its linear neighbourhood.
+    pub fn setting_aside(&self, rows: Vec<usize>) -> Self {
         Self {
-            set_aside: Vec::new(),
+            set_aside: rows,
             around: OnceLock::new(),
             derivatives: Arc::default(),
             ..self.clone()

@@ -131,18 +131,18 @@ pub(in crate::select) fn stability(
     (evidence, best): (&Evidence, &HypothesisSet),
     added: &[Effect],
 ) -> Vec<(Effect, f64)> {
-    if best.effects().is_empty() {
-        return Vec::new();
-    }
     let rows = data.evidence_rows();
-    let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
-    let again = Again::new(fitted, data, &hypotheses, (evidence, best));
     let configurations = number(rows.iter().map(|&row| bits(data.measurements.configuration(row))));
     let count = configurations.iter().max().map_or(0, |last| last + 1);
+    if best.effects().is_empty() || count < 2 {
+        return Vec::new();
+    }
+    let hypotheses = Hypotheses::of(fitted, data, added, &rows, rows.len());
+    let again = Again::new(fitted, data, &hypotheses, (evidence, best));
     let drawn = |seed: u64| {
         let mut order: Vec<usize> = (0..count).collect();
         order.shuffle(&mut ChaCha8Rng::seed_from_u64(data.rules.seed ^ seed));
-        let left_out = &order[..count / SUBSET_PARTS];
+        let left_out = &order[..(count / SUBSET_PARTS).max(1)];
         let is_out = |&pose: &usize| {
             left_out.contains(&configurations[pose]) || evidence.left_out.contains(&pose)
         };

@@ -21,6 +21,8 @@ use crate::select::neighbourhood::{Linearised, tries};
 
 /// Displacement of the target, in σ, up to which commands in contact may differ by noise alone.
 const NOISE_ALONE: f64 = 3.0;
+/// Numbers that the functions of one load take up among those of a hypothesis.
+const VARIANTS_PER_LOAD: usize = 4;
 /// Error \[rad or m\] above which a contact does not determine a command.
 const DECIDES: f64 = 0.02;
 
@@ -28,7 +30,8 @@ const DECIDES: f64 = 0.02;
 pub(super) struct Columns<'a, 'l> {
     pub problem: &'a Problem,
     pub linearised: &'a Linearised<'l>,
-    pub time_measured: bool,
+    /// True if the sides of approach of the poses are known; true if their times are measured.
+    pub coverage: (bool, bool),
     /// True if the harmonics of the problem may have a common prior.
     pub takes_gears: bool,
     /// Number of poses, the first ones, on which evidence is evaluated; functions are predicted at
@@ -50,7 +53,7 @@ impl<'a, 'l> Columns<'a, 'l> {
     pub fn all(
         problem: &'a Problem,
         linearised: &'a Linearised<'l>,
-        (time_measured, takes_gears, weighed): (bool, bool, usize),
+        (coverage, takes_gears, weighed): ((bool, bool), bool, usize),
         effects: &[(Effect, DMatrix<f64>)],
         only: Option<&'a Hypothesis>,
     ) -> (Vec<Candidate>, Vec<Known>, f64) {
@@ -58,7 +61,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         let mut all = Self {
             problem,
             linearised,
-            time_measured,
+            coverage,
             takes_gears,
             weighed,
             only,
@@ -135,12 +138,10 @@ impl<'a, 'l> Columns<'a, 'l> {
     fn effects(&mut self, effects: &[(Effect, DMatrix<f64>)]) {
         let only: Vec<Effect> = effects.iter().map(|(effect, _)| effect.clone()).collect();
         let (tries, _) = tries(&only, self.problem);
-        let approach = self.linearised.poses().iter().any(|pose| pose.setup.approach.is_some());
         for ((effect, columns), tries) in effects.iter().zip(tries) {
             let terms = effect.terms(self.problem);
             let (columns, largest) = even(columns.clone(), &terms, self.weighed);
-            let hypothesis =
-                Hypothesis::of_effect(effect, self.problem, approach, self.time_measured);
+            let hypothesis = Hypothesis::of_effect(effect, self.problem, self.coverage);
             let coefficients = Coefficients {
                 never_negative: terms.iter().map(|term| term.never_negative).collect(),
                 alone: acts_along_axes(&terms),
@@ -166,10 +167,10 @@ impl<'a, 'l> Columns<'a, 'l> {
             let (family, lengths_here) =
                 if moving { ("smooth", &lengths[..]) } else { ("smooth elsewhere", &lengths[..2]) };
             for of in &known {
-                self.smooth(family, site, &[&at], of, lengths_here);
+                self.smooth(family, (site, &[&at]), of, (lengths_here, 0));
             }
-            for of in &loads {
-                self.smooth(family, site, &[&at], of, &lengths[..2]);
+            for (load, of) in &loads {
+                self.smooth(family, (site, &[&at]), of, (&lengths[..2], load * VARIANTS_PER_LOAD));
             }
             if moving {
                 self.surfaces(site, &at, &known);
@@ -234,8 +235,10 @@ impl<'a, 'l> Columns<'a, 'l> {
                     .map(|values| (Covariate::declared(which, self.problem), values)),
             );
         }
-        let time = if self.time_measured { Covariate::Time } else { Covariate::Row };
-        all.push((time, poses.iter().map(|pose| pose.setup.elapsed).collect()));
+        all.push((
+            Covariate::time(self.coverage.1),
+            poses.iter().map(|pose| pose.setup.elapsed).collect(),
+        ));
         for (joint, _) in moving {
             let sides = poses.iter().map(|pose| pose.setup.approach.map(|all| all[joint]));
             all.extend(
@@ -280,9 +283,10 @@ impl<'a, 'l> Columns<'a, 'l> {
         values
     }
 
-    /// Moments of the loads about each joint's axis, and about the axis of its twist α: what a
-    /// compliance there would do, over what an angle does.
-    fn loads(&self) -> Vec<Known> {
+    /// Returns the moments of the loads about each joint's axis, and about the axis of its twist α:
+    /// what a compliance there would do, over what an angle does. Each has a number, counted over all
+    /// joints and both axes, that does not depend on the poses.
+    fn loads(&self) -> Vec<(usize, Known)> {
         let pairs = [
             (JointField::Compliance, JointField::Theta),
             (JointField::LateralX, JointField::Alpha),
@@ -299,9 +303,8 @@ impl<'a, 'l> Columns<'a, 'l> {
             Known::of(Covariate::Load, (0..turns.len() / 3).map(moment).collect(), self.weighed)
                 .filter(|known| known.levels > 3)
         };
-        (0..self.problem.joints.len())
-            .flat_map(|joint| pairs.into_iter().filter_map(move |pair| of(joint, pair)))
-            .collect()
+        let all = (0..self.problem.joints.len()).flat_map(|joint| pairs.map(|pair| (joint, pair)));
+        all.enumerate().filter_map(|(k, (joint, pair))| Some((k, of(joint, pair)?))).collect()
     }
 
     /// Returns true if the search has an effect that is linear in a covariate there; of two values
@@ -325,17 +328,17 @@ impl<'a, 'l> Columns<'a, 'l> {
     }
 
     /// Adds smooth functions of one covariate at some columns that belong together, and a straight
-    /// line unless an effect is that.
+    /// line unless an effect is that. Their numbers among the functions of the hypothesis begin at
+    /// `first`.
     pub(super) fn smooth(
         &mut self,
         family: &str,
-        site: ParameterSite,
-        at: &[&DVector<f64>],
+        (site, at): (ParameterSite, &[&DVector<f64>]),
         of: &Known,
-        lengths: &[f64],
+        (lengths, first): (&[f64], usize),
     ) {
         let hypothesis = Hypothesis::smooth(site, vec![of.covariate.clone()]);
-        let [warped, line] = [lengths.len(), lengths.len() + 1];
+        let [warped, line] = [first + lengths.len(), first + lengths.len() + 1];
         // Of few values the longest alone.
         let told = match of.levels {
             ..3 => 0,
@@ -343,7 +346,7 @@ impl<'a, 'l> Columns<'a, 'l> {
             _ => lengths.len(),
         };
         for (variant, &length) in lengths.iter().take(told).enumerate() {
-            self.add_variant(family, &hypothesis, variant, || {
+            self.add_variant(family, &hypothesis, first + variant, || {
                 times(at, &basis(&of.scaled, length))
             });
         }

@@ -24,9 +24,8 @@ impl Columns<'_, '_> {
             return;
         }
         let (site, at) = (ParameterSite::Shift { axis: 0 }, axes.iter().collect::<Vec<_>>());
-        let lengths = SMOOTH_LENGTHS;
         for of in known {
-            self.smooth("smooth in the measurement", site, &at, of, &lengths);
+            self.smooth("smooth in the measurement", (site, &at), of, (&SMOOTH_LENGTHS, 0));
         }
         let is_time = |of: &&Known| matches!(of.covariate, Covariate::Time | Covariate::Row);
         for of in known.iter().filter(is_time) {
@@ -90,7 +89,7 @@ impl Columns<'_, '_> {
         let is_command =
             |of: &&Known| matches!(of.covariate, Covariate::Command(_) | Covariate::Approach(_));
         for of in known.iter().filter(|of| axes.len() == 3 && !is_command(of)) {
-            self.smooth("smooth at the base", site, &at, of, &SMOOTH_LENGTHS[..2]);
+            self.smooth("smooth at the base", (site, &at), of, (&SMOOTH_LENGTHS[..2], 0));
         }
     }
 
@@ -143,9 +142,9 @@ impl Columns<'_, '_> {
                 for of in
                     known.iter().filter(|known| !matches!(known.covariate, Covariate::Approach(_)))
                 {
-                    self.smooth("smooth in a link", site, &at, of, &SMOOTH_LENGTHS[..2]);
+                    self.smooth("smooth in a link", (site, &at), of, (&SMOOTH_LENGTHS[..2], 0));
                 }
-                let time = if self.time_measured { Covariate::Time } else { Covariate::Row };
+                let time = Covariate::time(self.coverage.1);
                 if let (Some(one), Some(other)) =
                     (of_covariate(&Covariate::Temperature), of_covariate(&time))
                 {

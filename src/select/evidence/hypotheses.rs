@@ -32,6 +32,8 @@ pub(in crate::select) struct Hypotheses<'a> {
     /// Log prior probability of a family of effects.
     pub(super) ln_family: f64,
     covariates: Vec<Known>,
+    /// True if the sides of approach of the poses are known; true if their times are measured.
+    coverage: (bool, bool),
     /// Candidate times of a move of the instrument.
     pub(super) times: Vec<f64>,
 }
@@ -68,12 +70,26 @@ impl<'a> Hypotheses<'a> {
         let new =
             candidates.into_iter().map(|effect| (effect.clone(), linearised.columns(&effect)));
         let effects: Vec<(Effect, DMatrix<f64>)> = known.into_iter().chain(new).collect();
-        let how = (data.measurements.time_measured, data.takes_gears, weighed);
-        let (all, covariates, ln_family) =
-            Columns::all(&fitted.problem, &linearised, how, &effects, None);
+        let coverage = coverage(&linearised, data);
+        let (all, covariates, ln_family) = Columns::all(
+            &fitted.problem,
+            &linearised,
+            (coverage, data.takes_gears, weighed),
+            &effects,
+            None,
+        );
         let times = data.shift_times();
-        let mut hypotheses =
-            Self { linearised, added, unknowns, all, weighed, ln_family, covariates, times };
+        let mut hypotheses = Self {
+            linearised,
+            added,
+            unknowns,
+            all,
+            weighed,
+            ln_family,
+            covariates,
+            coverage,
+            times,
+        };
         let entered = |(effect, columns)| hypotheses.entered(&effect, columns, &fitted.problem);
         let unlisted: Vec<Candidate> = unlisted.into_iter().filter_map(entered).collect();
         hypotheses.all.extend(unlisted);
@@ -106,7 +122,7 @@ impl<'a> Hypotheses<'a> {
             _ => effect.tries(&family.collect::<Vec<_>>(), problem),
         };
         let ln_prior = self.ln_family - tries.ln();
-        let hypothesis = Hypothesis::of_effect(effect, problem, true, true);
+        let hypothesis = Hypothesis::of_effect(effect, problem, self.coverage);
         Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
     }
 
@@ -120,11 +136,12 @@ impl<'a> Hypotheses<'a> {
     ) -> Self {
         let linearised =
             fitted.linearised_with(data, rows, &[], &hypothesis_sites(&fitted.problem));
-        let how = (data.measurements.time_measured, data.takes_gears, weighed);
+        let coverage = coverage(&linearised, data);
+        let how = (coverage, data.takes_gears, weighed);
         let (all, covariates, ln_family) =
             Columns::all(&fitted.problem, &linearised, how, &[], Some(of));
         let (added, unknowns, times) = (Vec::new(), Vec::new(), Vec::new());
-        Self { linearised, added, unknowns, all, weighed, ln_family, covariates, times }
+        Self { linearised, added, unknowns, all, weighed, ln_family, covariates, coverage, times }
     }
 
     /// Returns the function of a hypothesis that a set holds.
@@ -226,5 +243,45 @@ impl<'a> Hypotheses<'a> {
         let mut covariates = self.covariates(hypothesis);
         let (only, None) = (covariates.next()?, covariates.next()) else { return None };
         Some((only.covariate.clone(), site, &only.values, self.linearised.place(site)?))
+    }
+}
+
+/// Returns whether the sides of approach of some poses are known and whether times are measured.
+fn coverage(linearised: &Linearised, data: &Data) -> (bool, bool) {
+    let has_approach = linearised.poses().iter().any(|pose| pose.setup.approach.is_some());
+    (has_approach, data.measurements.time_measured)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::fit::Options;
+    use crate::measurement::Dataset;
+    use crate::select::SelectionRules;
+
+    #[test]
+    fn no_two_functions_of_a_hypothesis_have_one_number() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/honest");
+        let problem = Problem::read(&folder.join("six.toml")).unwrap();
+        let (data, _) = Dataset::read_files(&[folder.join("six-4.csv")], &problem).unwrap();
+        let rules = SelectionRules::DEFAULT;
+        let data = Data::new(&problem, &data, &rules);
+        let fitted = Fitted::new(problem.clone(), &data, &Options::default()).unwrap();
+        let rows = data.evidence_rows();
+        let hypotheses = Hypotheses::of(&fitted, &data, &[], &rows, rows.len());
+        let of_load = |candidate: &&Candidate| {
+            candidate.hypothesis.effect().is_none()
+                && candidate.hypothesis.depends_on == [Covariate::Load]
+        };
+        assert!(hypotheses.all.iter().filter(of_load).count() > 20);
+        for (k, candidate) in hypotheses.all.iter().enumerate() {
+            let is_same = |other: &Candidate| {
+                other.variant == candidate.variant && other.hypothesis == candidate.hypothesis
+            };
+            let first = hypotheses.all.iter().position(is_same);
+            assert_eq!(first, Some(k), "{:?} {}", candidate.hypothesis, candidate.variant);
+        }
     }
 }

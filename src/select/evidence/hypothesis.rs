@@ -123,20 +123,14 @@ pub struct Hypothesis {
 
 impl Hypothesis {
     /// Returns the hypothesis of an effect: its sites and regressors give the site and the
-    /// quantities.
-    pub fn of_effect(
-        effect: &Effect,
-        problem: &Problem,
-        approach_known: bool,
-        time_measured: bool,
-    ) -> Self {
+    /// quantities. `coverage` says whether the sides of approach are known and whether times are
+    /// measured.
+    pub fn of_effect(effect: &Effect, problem: &Problem, coverage: (bool, bool)) -> Self {
         let terms = effect.terms(problem);
         let site = terms.first().map_or(Site::Arm, |term| Site::of(term.site));
         let mut depends_on: Vec<Covariate> = terms
             .iter()
-            .flat_map(|term| {
-                covariates(term.site, &term.regressor, problem, (approach_known, time_measured))
-            })
+            .flat_map(|term| covariates(term.site, &term.regressor, problem, coverage))
             .collect();
         depends_on.sort();
         depends_on.dedup();
@@ -161,6 +155,14 @@ impl Hypothesis {
     /// Returns true if the hypothesis is that a limit of the declared problem is wrong.
     pub(super) fn is_limit(&self) -> bool {
         matches!(self.kind, HypothesisKind::Limit(_))
+    }
+
+    /// Returns the joint, from 0, if the hypothesis is a periodic error of many orders.
+    pub(super) fn gear_joint(&self) -> Option<usize> {
+        match (&self.kind, self.site) {
+            (HypothesisKind::Gear(_), Site::Joint(joint)) => Some(joint),
+            _ => None,
+        }
     }
 
     /// Returns its effect, if its law is one.

@@ -53,10 +53,7 @@ impl Evidence {
 
     /// Returns the probability that a joint, from 1, has a periodic error of many orders.
     pub(in crate::select) fn gear_probability(&self, joint: usize) -> f64 {
-        self.probability(|hypothesis| {
-            matches!(hypothesis.kind, HypothesisKind::Gear(_))
-                && hypothesis.site == Site::Joint(joint - 1)
-        })
+        self.probability(|hypothesis| hypothesis.gear_joint() == Some(joint - 1))
     }
 
     /// Returns the most probable set that has no more members than act with probability `level`,

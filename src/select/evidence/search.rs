@@ -145,8 +145,11 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
                 }
             }
         }
-        let best_known =
-            known.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
+        // A set that cannot grow says nothing of what larger sets of other hypotheses come to; but
+        // periodic errors of many orders are fitted first, and others searched beside them.
+        let is_limit = |set: &&Set| !set.has_wide(blocks) || products.has_gear(&set.members);
+        let can_grow = known.values().filter(is_limit);
+        let best_known = can_grow.map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
         let mut sets: Vec<Set> = next.values().cloned().collect();
         known.extend(next);
         sets.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
@@ -194,7 +197,8 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
 /// Extends the empty set, and the most probable set that holds a periodic error of many orders, by
 /// such errors, as long as the set becomes more probable. Sets with them do not grow otherwise, for
 /// they have many columns; of the errors of several joints each alone may do less well than smaller
-/// functions.
+/// functions. Two errors of one joint, up to a lower and a higher order, make one whose coefficients
+/// fall with the order.
 fn with_gears(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let blocks = products.blocks;
     let gears: Vec<usize> = (0..blocks.len()).filter(|&block| blocks[block].is_gear).collect();

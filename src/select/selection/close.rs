@@ -105,6 +105,7 @@ pub fn close_by(
     options.tell(|| Progress::Finishing);
     state.data = &data;
     let (fitted, evidence) = if interrupted {
+        state.prior = state.prior_of_latest.take();
         let settled = state.latest.clone().settled(&data, &unstoppable)?;
         let moved = settled.differs_from(&state.latest, &data);
         (settled, state.evidence.take().filter(|_| !moved))

@@ -27,9 +27,9 @@ pub(super) fn polished(
     fitted: &Fitted,
 ) -> Result<Option<Fitted>, IdentifyError> {
     let data = state.data;
-    // On rows that the evidence saw all of, it tried these arguments itself, but for times beyond the
-    // `MAX_SHIFT_TIMES` that are listed.
-    if data.rows().len() == data.evidence_rows().len() {
+    // On rows that the evidence saw all of it tried these arguments itself, if it tried all times.
+    let saw_all = data.rows().len() == data.evidence_rows().len();
+    if saw_all && data.times_between_poses().len() <= MAX_SHIFT_TIMES {
         return Ok(None);
     }
     let added = state.added(fitted);

@@ -1,6 +1,8 @@
 //! The search: evidence about a fit, the effects of its most probable set fitted, until the fit
 //! holds the set that the evidence about it calls most probable.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::gears::{ScaleBy, estimated_prior};
 use super::polish::polished;
 use super::state::SearchState;
@@ -41,7 +43,8 @@ fn settled_set(
     let mut fitted = first;
     // Evidence that led to the fit at hand by odds between fits.
     let mut leading: Option<Evidence> = None;
-    let mut has_estimated_prior = false;
+    // Periodic errors of many orders whose coefficients the common prior was estimated from.
+    let mut estimated_from: Vec<Effect> = Vec::new();
     let mut is_polished = false;
     while state.rounds.len() < rules.max_rounds {
         state.report_progress(0, 0);
@@ -61,8 +64,9 @@ fn settled_set(
                 (leading, is_polished) = (None, false);
                 state.record(&next);
                 fitted = next;
-                if !has_estimated_prior && state.added(&fitted).iter().any(is_gear) {
-                    has_estimated_prior = true;
+                let gears: Vec<Effect> = state.added(&fitted).into_iter().filter(is_gear).collect();
+                if gears != estimated_from {
+                    estimated_from = gears;
                     fitted = with_estimated_prior(state, &fitted, ScaleBy::Evidence)?;
                 }
                 continue;
@@ -141,20 +145,32 @@ fn refitted(
         })
     };
     let functions = best.without_law();
-    let Some(reference) = ln_posterior_of(fitted, &functions, fitted.sigma)? else {
-        return Ok((evidence, None));
-    };
     let mut rivals = evidence.exchanged(&best, MAX_RIVALS);
     rivals.truncate(state.paid_fits(fitted) - 1);
     let mut tried: Vec<(HypothesisSet, f64, Fitted)> = Vec::new();
+    // ln posterior of the set held, by the rows set aside.
+    let mut of_held: BTreeMap<BTreeSet<usize>, Option<f64>> = BTreeMap::new();
     let count = rivals.len();
     for (k, rival) in rivals.into_iter().enumerate() {
         state.report_progress(k + 1, count);
         let kept = state.added(fitted).into_iter().filter(|effect| !open.contains(effect));
         let effects: Vec<Effect> = kept.chain(rival.effects()).collect();
         let next = state.fit(fitted, &effects)?;
-        let other = ln_posterior_of(&next, &rival.without_law(), fitted.sigma)?;
-        tried.extend(other.map(|other| (rival, other - reference, next)));
+        // Both are compared on the same rows.
+        let aside: BTreeSet<usize> =
+            fitted.set_aside.iter().chain(&next.set_aside).copied().collect();
+        let of = |fit: &Fitted, functions: &[(Hypothesis, usize)]| {
+            let fit = fit.setting_aside(aside.iter().copied().collect());
+            ln_posterior_of(&fit, functions, fitted.sigma)
+        };
+        let here = match of_held.get(&aside) {
+            Some(known) => *known,
+            None => of(fitted, &functions)?,
+        };
+        if let Some((here, there)) = here.zip(of(&next, &rival.without_law())?) {
+            tried.push((rival, there - here, next));
+        }
+        of_held.insert(aside, here);
     }
     tried.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut ln_odds_of: Vec<(HypothesisSet, f64)> = Vec::new();

@@ -34,8 +34,10 @@ pub(super) struct SearchState<'a> {
     pub declared: Vec<Effect>,
     /// Parameter rules that the problem itself declares.
     declared_rules: Vec<ParameterRule>,
-    /// Common prior of the harmonics, where a joint has many.
+    /// Common prior of the harmonics of the next fit, where a joint has many.
     pub prior: Option<HarmonicPrior>,
+    /// Common prior of the harmonics in the latest fit.
+    pub prior_of_latest: Option<HarmonicPrior>,
     /// Probability of the periodic error of each joint, from 1, when it was taken into the fit.
     pub gear_probability: BTreeMap<usize, f64>,
     pub rounds: Vec<Round>,
@@ -56,6 +58,7 @@ impl<'a> SearchState<'a> {
             declared: first.effects(),
             declared_rules: first.problem.parameters.clone(),
             prior: None,
+            prior_of_latest: None,
             gear_probability: BTreeMap::new(),
             rounds: Vec::new(),
             latest: first.clone(),
@@ -217,6 +220,7 @@ impl<'a> SearchState<'a> {
             held_out: errors.held_out,
         });
         self.latest = fitted.clone();
+        self.prior_of_latest.clone_from(&self.prior);
         self.evidence = None;
     }
 
