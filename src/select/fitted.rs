@@ -16,12 +16,12 @@ use crate::model::{Model, Pose};
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
 /// Factor of σ that takes all weight from an outlier.
-const WITHOUT_WEIGHT: f64 = 1e6;
+const SIGMA_FACTOR_OF_OUTLIERS: f64 = 1e6;
 
 /// Median of |r|² of one, two and three normal coordinates of unit scatter.
-const MEDIAN: [f64; 3] = [0.455, 1.386, 2.366];
+const MEDIAN_OF_SQUARES: [f64; 3] = [0.455, 1.386, 2.366];
 /// Maximum number of concentration steps of the search for outliers.
-const TIMES: usize = 10;
+const MAX_CONCENTRATION_STEPS: usize = 10;
 /// Work of one least-squares solve, in poses × unknowns², above which the outliers of the previous
 /// fit are kept instead of searched again: a search solves about ten times.
 const MAX_OUTLIER_WORK: f64 = 2e8;
@@ -29,7 +29,7 @@ const MAX_OUTLIER_WORK: f64 = 2e8;
 /// early holds for the converged one.
 const MAX_UNSETTLED: f64 = 0.05;
 /// Part of its variance that a pose keeps where it determines a direction alone.
-const DECIDED: f64 = 1e-3;
+const MIN_VARIANCE_OF_POSE: f64 = 1e-3;
 
 /// Problem with its effects, fitted to the identification rows.
 #[derive(Clone)]
@@ -254,7 +254,7 @@ impl Fitted {
     ) -> Linearised<'a> {
         let mut poses = self.poses(data, rows);
         let aside = poses.iter_mut().zip(rows).filter(|(_, row)| self.set_aside.contains(row));
-        aside.for_each(|(pose, _)| pose.sigma *= WITHOUT_WEIGHT);
+        aside.for_each(|(pose, _)| pose.sigma *= SIGMA_FACTOR_OF_OUTLIERS);
         Linearised::new(
             (&self.problem, known),
             &self.model,
@@ -416,7 +416,7 @@ fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     let (rows, subset) = (data.rows(), data.evidence_rows());
     let linearised = fitted.linearised_at(data, &subset, &[]);
     let mut aside = Vec::new();
-    for _ in 0..TIMES {
+    for _ in 0..MAX_CONCENTRATION_STEPS {
         let next = worst(&distances(fitted, &linearised, &aside), allowed(subset.len()));
         if next == aside {
             break;
@@ -427,7 +427,7 @@ fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     let kept: BTreeSet<usize> =
         (0..subset.len()).filter(|k| !aside.contains(k)).map(|k| subset[k]).collect();
     let mut aside: Vec<usize> = (0..rows.len()).filter(|&k| !kept.contains(&rows[k])).collect();
-    for _ in 0..TIMES {
+    for _ in 0..MAX_CONCENTRATION_STEPS {
         let squares = distances(fitted, &linearised, &aside);
         let far = squares.iter().filter(|square| **square > OUTLIER_DISTANCE).count();
         if far > allowed(rows.len()) {
@@ -442,14 +442,17 @@ fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     aside.into_iter().map(|k| rows[k]).collect()
 }
 
-/// |r|² of each pose in units of the others' scatter, in the fit without those `aside`: rᵀ C⁻¹ r with C = 1 − H of a pose in the fit and
-/// 1 + A (AᵀA)⁻¹ Aᵀ of one beside it, over the median of all.
+/// Returns the squared distance of each pose from the fit without the poses `aside`, in units of the
+/// scatter of one coordinate, squared.
+///
+/// The distance is rᵀ C⁻¹ r over the median of all poses, C = 1 − H for a pose in the fit and
+/// 1 + A (AᵀA)⁻¹ Aᵀ for one that was left out.
 fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f64> {
     let (whole, residual) = (linearised.fitted(), linearised.residual());
     let (mut columns, mut here) = (whole.clone(), residual.clone());
     for &pose in aside {
-        columns.rows_mut(3 * pose, 3).unscale_mut(WITHOUT_WEIGHT);
-        here.rows_mut(3 * pose, 3).unscale_mut(WITHOUT_WEIGHT);
+        columns.rows_mut(3 * pose, 3).unscale_mut(SIGMA_FACTOR_OF_OUTLIERS);
+        here.rows_mut(3 * pose, 3).unscale_mut(SIGMA_FACTOR_OF_OUTLIERS);
     }
     let mut is_aside = vec![false; residual.len() / 3];
     for &pose in aside {
@@ -463,9 +466,9 @@ fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f
             (along.rows(3 * pose, 3), left.fixed_rows::<3>(3 * pose).into_owned());
         let hat = Matrix3::from_fn(|i, j| rows_of_pose.row(i).dot(&rows_of_pose.row(j)));
         let covariance = if is_aside[pose] {
-            Matrix3::identity() + hat * WITHOUT_WEIGHT.powi(2)
+            Matrix3::identity() + hat * SIGMA_FACTOR_OF_OUTLIERS.powi(2)
         } else {
-            Matrix3::identity() * (1.0 + DECIDED) - hat
+            Matrix3::identity() * (1.0 + MIN_VARIANCE_OF_POSE) - hat
         };
         covariance.cholesky().map_or(0.0, |factor| r.dot(&factor.solve(&r)))
     };
@@ -474,7 +477,7 @@ fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f
     let mut ratios: Vec<f64> = squares
         .iter()
         .enumerate()
-        .map(|(pose, square)| square / MEDIAN[numbers(pose) - 1])
+        .map(|(pose, square)| square / MEDIAN_OF_SQUARES[numbers(pose) - 1])
         .collect();
     ratios.sort_by(|a, b| b.total_cmp(a));
     // No less than a σ that was declared: beside rounding everything is far off.

@@ -5,11 +5,11 @@ use statrs::function::beta::beta_reg;
 use crate::numeric::bisect;
 
 /// Number of bisections for a noncentrality.
-const HALVINGS: usize = 24;
+const MAX_BISECTIONS: usize = 24;
 /// Number of standard deviations of a Poisson distribution beyond which its terms are left out.
-const FAR: f64 = 9.0;
+const MAX_POISSON_DEVIATIONS: f64 = 9.0;
 /// Largest noncentrality: that of an effect some 30 times its error.
-const MOST: f64 = 1024.0;
+const MAX_NONCENTRALITY: f64 = 1024.0;
 
 /// F test of one candidate in a scan, as a test of the part of the squares gained: Beta(k/2, (ν −
 /// k)/2) without an effect.
@@ -43,7 +43,7 @@ impl ScanTest {
     /// Returns the probability that the candidate is found at a noncentrality λ of the F test.
     pub fn power(&self, noncentrality: f64) -> f64 {
         let mean = 0.5 * noncentrality;
-        let reach = FAR * mean.sqrt() + FAR;
+        let reach = MAX_POISSON_DEVIATIONS * mean.sqrt() + MAX_POISSON_DEVIATIONS;
         let (mut weight, mut j, mut sum) = ((-mean).exp(), 0.0, 0.0);
         while j <= mean + reach {
             if j >= mean - reach {
@@ -63,11 +63,11 @@ impl ScanTest {
     }
 
     /// Returns the noncentrality at which the candidate is found with probability `power`; `None`
-    /// above [`MOST`].
+    /// above [`MAX_NONCENTRALITY`].
     pub fn noncentrality(&self, power: f64) -> Option<f64> {
         let mut most = 32.0;
         while self.power(most) < power {
-            if most >= MOST {
+            if most >= MAX_NONCENTRALITY {
                 return None;
             }
             most *= 2.0;
@@ -78,7 +78,7 @@ impl ScanTest {
 
 /// Returns the middle of the interval in which `is_below` turns false.
 fn halved(is_below: impl Fn(f64) -> bool, range: (f64, f64)) -> f64 {
-    let (low, high) = bisect(is_below, range, HALVINGS);
+    let (low, high) = bisect(is_below, range, MAX_BISECTIONS);
     0.5 * (low + high)
 }
 
@@ -112,7 +112,9 @@ mod tests {
     fn two_degrees_of_freedom_find_nothing_among_many() {
         let test = ScanTest::new(1, 3.0, 0.01, 2000.0);
         assert!(
-            test.is_some_and(|test| test.power(MOST) < 0.1 && test.noncentrality(0.8).is_none()),
+            test.is_some_and(
+                |test| test.power(MAX_NONCENTRALITY) < 0.1 && test.noncentrality(0.8).is_none()
+            ),
             "{test:?}"
         );
         let sure = ScanTest::new(1, 300.0, 0.01, 2000.0).and_then(|test| test.noncentrality(0.8));

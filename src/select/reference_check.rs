@@ -27,7 +27,7 @@ use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::{Effect, PoseView, Problem};
 
 /// Twice the log odds from which on readings decide: 100 to 1.
-const DECIDED: f64 = 9.21;
+const MIN_TWICE_LN_ODDS: f64 = 9.21;
 
 /// Outcome of a reference check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -162,9 +162,9 @@ pub(super) fn reference_check(
     let (told, certainty) =
         points.values().map(|all| told(all, count)).fold(nothing, |a, b| (a.0 + b.0, a.1 + b.1));
     let gain = odds(&found, &spread, (&told, &certainty))?;
-    let verdict = if gain > DECIDED {
+    let verdict = if gain > MIN_TWICE_LN_ODDS {
         ReferenceVerdict::Corroborated
-    } else if gain < -DECIDED {
+    } else if gain < -MIN_TWICE_LN_ODDS {
         ReferenceVerdict::Contradicted
     } else {
         return None;

@@ -53,6 +53,10 @@ pub(super) const LN_ODDS_OF_ANOTHER_ARGUMENT: f64 = 3.0;
 
 // Beam search over sets of hypotheses.
 
+/// Minimum probability of a set in which searched arguments are revised: one to a hundred.
+pub(super) const MIN_REVISED_PROBABILITY: f64 = 0.01;
+/// Sets in which searched arguments are revised at most, the most probable ones.
+pub(super) const MAX_REVISED_SETS: usize = 6;
 /// Hypotheses by which one search extends a set at most.
 pub(super) const MAX_EFFECTS: usize = 4;
 /// Sets of equally many hypotheses that are extended by a further one.

@@ -20,7 +20,7 @@ use super::search::{left_by, search};
 use crate::problem::Effect;
 
 /// Minimum probability of a set whose hypotheses are evaluated again on fewer poses.
-const WORTH_A_DRAW: f64 = 1e-3;
+const MIN_REPEATED_PROBABILITY: f64 = 1e-3;
 
 /// A fit with the probable hypotheses about its residual.
 struct Again<'a> {
@@ -39,8 +39,13 @@ impl<'a> Again<'a> {
         hypotheses: &'a Hypotheses<'a>,
         (evidence, best): (&Evidence, &'a HypothesisSet),
     ) -> Self {
-        let worth =
-            || evidence.sets.iter().filter(|known| known.probability > WORTH_A_DRAW).chain([best]);
+        let worth = || {
+            evidence
+                .sets
+                .iter()
+                .filter(|known| known.probability > MIN_REPEATED_PROBABILITY)
+                .chain([best])
+        };
         let all = || worth().flat_map(|known| known.hypotheses.iter().zip(&known.functions));
         let is_known = |candidate: &Candidate| {
             all().any(|(member, (variant, _))| {

@@ -12,7 +12,7 @@ use crate::least_squares::kernel::products;
 use crate::select::neighbourhood::LinearNeighbourhood;
 
 /// Number of columns from which on a product of tall matrices is computed by rows.
-const MANY: usize = 24;
+const MIN_COLUMNS_BY_ROWS: usize = 24;
 
 /// Columns A of a hypothesis, shape = (3 N, k).
 #[derive(Debug, Clone)]
@@ -221,7 +221,9 @@ impl Block {
     /// transposed.
     pub fn times(&self, (others, transposed): (&DMatrix<f64>, &DMatrix<f64>)) -> DMatrix<f64> {
         match &self.columns {
-            Columns::Dense(columns) if columns.ncols().min(others.ncols()) < MANY => {
+            Columns::Dense(columns)
+                if columns.ncols().min(others.ncols()) < MIN_COLUMNS_BY_ROWS =>
+            {
                 products(others, columns)
             }
             Columns::Dense(columns) => {

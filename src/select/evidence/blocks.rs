@@ -6,7 +6,7 @@ use crate::select::settings::{
 use rayon::prelude::*;
 
 use super::block::Block;
-use super::candidate::{Candidate, TOGETHER};
+use super::candidate::{Candidate, HYPOTHESES_PER_PROJECTION};
 use super::hypotheses::Hypotheses;
 use super::marginal;
 use super::products::{Products, Target};
@@ -37,8 +37,10 @@ pub(super) fn blocks(
         (!data.stop.is_requested())
             .then(|| Candidate::blocks(some, (fitted, &neighbourhood), left_out))
     };
-    let blocks: Vec<Vec<Block>> =
-        candidates.par_chunks(TOGETHER).map(unless_stopped).collect::<Option<_>>()?;
+    let blocks: Vec<Vec<Block>> = candidates
+        .par_chunks(HYPOTHESES_PER_PROJECTION)
+        .map(unless_stopped)
+        .collect::<Option<_>>()?;
     let mut blocks: Vec<Block> = blocks.into_iter().flatten().collect();
     let rows = data.evidence_rows();
     let is_aside = |&(pose, row): &(usize, &usize)| {

@@ -13,7 +13,7 @@ use crate::select::fitted::Fitted;
 use crate::select::neighbourhood::LinearNeighbourhood;
 
 /// Displacement, in units of σ, that stands for zero: sizes have a reciprocal.
-const NOTHING: f64 = 1e-9;
+const SIZE_OF_ZERO: f64 = 1e-9;
 
 /// A hypothesis with its columns and the logarithm of its prior probability.
 #[derive(Clone)]
@@ -28,7 +28,7 @@ pub(super) struct Candidate {
 }
 
 /// Number of hypotheses whose columns are projected together.
-pub(super) const TOGETHER: usize = 32;
+pub(super) const HYPOTHESES_PER_PROJECTION: usize = 32;
 
 impl Candidate {
     /// Returns the blocks of candidates: their columns with everything fitted projected out, some
@@ -76,7 +76,7 @@ pub(super) fn even(
         largest.push(if length > 0.0 {
             most * length / ((3 * weighed) as f64).sqrt()
         } else {
-            NOTHING
+            SIZE_OF_ZERO
         });
         if length > 0.0 {
             column /= length;

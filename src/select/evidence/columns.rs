@@ -20,11 +20,11 @@ use crate::residual_tests::Covariate;
 use crate::select::neighbourhood::{Linearised, tries};
 
 /// Displacement of the target, in σ, up to which commands in contact may differ by noise alone.
-const NOISE_ALONE: f64 = 3.0;
+const MAX_NOISE_DISPLACEMENT: f64 = 3.0;
 /// Numbers that the functions of one load take up among those of a hypothesis.
 const VARIANTS_PER_LOAD: usize = 4;
 /// Error \[rad or m\] above which a contact does not determine a command.
-const DECIDES: f64 = 0.02;
+const MIN_UNDETERMINED_COMMAND: f64 = 0.02;
 
 /// Builder of all hypotheses about a residual.
 pub(super) struct Columns<'a, 'l> {
@@ -277,8 +277,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         let lever = (contacts.iter().map(|&k| square(k)).sum::<f64>()
             / contacts.len().max(1) as f64)
             .sqrt();
-        if NOISE_ALONE < DECIDES * lever {
-            merge(&mut values, contacts, NOISE_ALONE / lever);
+        if MAX_NOISE_DISPLACEMENT < MIN_UNDETERMINED_COMMAND * lever {
+            merge(&mut values, contacts, MAX_NOISE_DISPLACEMENT / lever);
         }
         values
     }

@@ -10,18 +10,15 @@ use super::marginal::Coefficients;
 use super::products::Products;
 use super::search::{Weighted, left_by};
 use crate::problem::{Effect, Problem};
+use crate::select::settings::{MAX_REVISED_SETS, MIN_REVISED_PROBABILITY};
 
-/// Minimum probability of a set whose arguments are refined.
-const WORTH_A_LOOK: f64 = 0.01;
-/// Maximum number of sets whose arguments are refined.
-const MOST: usize = 6;
 /// Number of values on either side.
-const STEPS: i32 = 8;
+const VALUES_EACH_SIDE: i32 = 8;
 /// Ratio of the last of these values to the first: listed arguments are closer; then the distance
 /// between neighbours.
-const FARTHEST: [f64; 2] = [1.4, 1.043];
+const LAST_RATIOS: [f64; 2] = [1.4, 1.043];
 /// Log odds by which another value must be better.
-const BETTER: f64 = 0.5;
+const MIN_LN_ODDS_OF_FINER: f64 = 0.5;
 
 /// Returns effects with arguments between the listed ones that do better in their places in
 /// probable sets.
@@ -36,8 +33,8 @@ pub(super) fn finer(
     let mut found: Vec<Candidate> = Vec::new();
     for set in weighted
         .iter()
-        .filter(|set| set.probability > WORTH_A_LOOK)
-        .take(MOST)
+        .filter(|set| set.probability > MIN_REVISED_PROBABILITY)
+        .take(MAX_REVISED_SETS)
         .filter(|set| !products.has_gear(&set.members))
     {
         for &member in &set.members {
@@ -45,7 +42,7 @@ pub(super) fn finer(
             if candidate
                 .hypothesis
                 .effect()
-                .is_none_or(|effect| effect.scaled(FARTHEST[0]).is_none())
+                .is_none_or(|effect| effect.scaled(LAST_RATIOS[0]).is_none())
             {
                 continue;
             }
@@ -66,9 +63,10 @@ pub(super) fn finer(
             for rest in &rests {
                 let Some(left) = left_by(rest, products) else { continue };
                 let mut best: Option<Candidate> = None;
-                let mut least =
-                    left.gain(member).0 + products.ln_prior(&blocks[member], rest) + BETTER;
-                for farthest in FARTHEST {
+                let mut least = left.gain(member).0
+                    + products.ln_prior(&blocks[member], rest)
+                    + MIN_LN_ODDS_OF_FINER;
+                for farthest in LAST_RATIOS {
                     let near =
                         hypotheses.near(best.as_ref().unwrap_or(candidate), farthest, problem);
                     if target.stop.is_requested() {
@@ -97,9 +95,9 @@ impl Hypotheses<'_> {
     /// Returns a hypothesis with other values of its searched argument that no candidate has.
     fn near(&self, candidate: &Candidate, farthest: f64, problem: &Problem) -> Vec<Candidate> {
         let Some(effect) = candidate.hypothesis.effect() else { return Vec::new() };
-        let factors = (-STEPS..=STEPS)
+        let factors = (-VALUES_EACH_SIDE..=VALUES_EACH_SIDE)
             .filter(|step| *step != 0)
-            .map(|step| farthest.powf(f64::from(step) / f64::from(STEPS)));
+            .map(|step| farthest.powf(f64::from(step) / f64::from(VALUES_EACH_SIDE)));
         let others = factors.filter_map(|factor| effect.scaled(factor));
         let is_new = |effect: &Effect| {
             !self.all.iter().any(|known| known.hypothesis.effect() == Some(effect))

@@ -7,23 +7,23 @@ use nalgebra::{DMatrix, DVector};
 use crate::residual_tests::Covariate;
 
 /// Margin beyond the range on either side, where functions need not be flat.
-const MARGIN: f64 = 0.25;
+const RANGE_MARGIN: f64 = 0.25;
 /// Variance of a basis function, of that of the first, below which it is left out.
-const NEGLIGIBLE: f64 = 1e-3;
+const MIN_BASIS_VARIANCE: f64 = 1e-3;
 /// Minimum variance of a basis function that is not smooth, relative to the first: below, it is
 /// little beside the noise.
-const SLIGHT: f64 = 0.1;
+const MIN_ROUGH_VARIANCE: f64 = 0.1;
 
 /// A row of values wider than so many of the gaps that it may have is none that noise alone makes.
-const WIDEST: f64 = 4.0;
+const MAX_GAPS_OF_NOISE: f64 = 4.0;
 
 /// Centres of single bumps and steps along the range.
-const CENTRES: u32 = 16;
+const SHAPE_CENTRES: u32 = 16;
 /// Widths of single bumps and steps as parts of the range.
-const WIDTHS: [f64; 5] = [0.04, 0.07, 0.12, 0.2, 0.35];
+const SHAPE_WIDTHS: [f64; 5] = [0.04, 0.07, 0.12, 0.2, 0.35];
 /// Steps of a finer search about one, of the centre as parts of the width, and factors of the
 /// width.
-const FINER: ([f64; 9], [f64; 5]) =
+const FINER_SHAPES: ([f64; 9], [f64; 5]) =
     ([-0.6, -0.4, -0.2, -0.1, 0.0, 0.1, 0.2, 0.4, 0.6], [0.7, 0.85, 1.0, 1.2, 1.4]);
 
 /// A single bump exp(−u²/2) or step tanh u with u = (x − centre) / width, x from 0 to 1 over the
@@ -38,9 +38,9 @@ pub(in crate::select) struct Shape {
 impl Shape {
     /// Returns all shapes over the range.
     pub fn all() -> Vec<Self> {
-        let centres = (0..CENTRES).map(|k| (f64::from(k) + 0.5) / f64::from(CENTRES));
+        let centres = (0..SHAPE_CENTRES).map(|k| (f64::from(k) + 0.5) / f64::from(SHAPE_CENTRES));
         let of_centre = |centre| {
-            WIDTHS
+            SHAPE_WIDTHS
                 .into_iter()
                 .flat_map(move |width| [true, false].map(|is_bump| Self { is_bump, centre, width }))
         };
@@ -49,7 +49,7 @@ impl Shape {
 
     /// Returns the shapes about this one.
     pub fn finer(self) -> Vec<Self> {
-        let (steps, factors) = FINER;
+        let (steps, factors) = FINER_SHAPES;
         let at = |step: f64| {
             let centre = self.centre + step * self.width;
             factors.map(|factor| Self { centre, width: self.width * factor, ..self })
@@ -121,7 +121,7 @@ pub(super) fn merge(values: &mut [f64], mut some: Vec<usize>, apart: f64) {
         some.chunk_by(|&a, &b| values[b] - values[a] <= apart).map(<[usize]>::to_vec).collect();
     for row in rows {
         let (first, last) = (values[row[0]], values[row[row.len() - 1]]);
-        if last - first <= WIDEST * apart {
+        if last - first <= MAX_GAPS_OF_NOISE * apart {
             let mean = row.iter().map(|&k| values[k]).sum::<f64>() / row.len() as f64;
             for k in row {
                 values[k] = mean;
@@ -153,23 +153,24 @@ pub(super) fn basis(scaled: &[f64], length: f64) -> DMatrix<f64> {
 pub(super) fn rough_basis(scaled: &[f64], length: f64, levels: usize) -> Option<DMatrix<f64>> {
     // Of the constant alone the mean square is 1 and not a half.
     let of_constant = |k: usize| if k == 0 { 0.5 } else { 1.0 };
-    let variance =
-        |k: usize| of_constant(k) / (1.0 + (PI * k as f64 * length / (1.0 + 2.0 * MARGIN)).powi(2));
-    let count = (0..=levels / 2).find(|&k| variance(k) <= SLIGHT)?;
+    let variance = |k: usize| {
+        of_constant(k) / (1.0 + (PI * k as f64 * length / (1.0 + 2.0 * RANGE_MARGIN)).powi(2))
+    };
+    let count = (0..=levels / 2).find(|&k| variance(k) <= MIN_ROUGH_VARIANCE)?;
     Some(DMatrix::from_fn(scaled.len(), count, |row, k| {
         variance(k).sqrt() * cosine(k, scaled[row])
     }))
 }
 
 fn cosine(k: usize, u: f64) -> f64 {
-    (PI * k as f64 * (u + MARGIN) / (1.0 + 2.0 * MARGIN)).cos()
+    (PI * k as f64 * (u + RANGE_MARGIN) / (1.0 + 2.0 * RANGE_MARGIN)).cos()
 }
 
 /// Deviations along the cosines, down to a negligible variance.
 fn weights(length: f64) -> Vec<f64> {
     let variance =
-        |k: usize| (-0.5 * (PI * k as f64 * length / (1.0 + 2.0 * MARGIN)).powi(2)).exp();
-    let count = (0..usize::MAX).find(|&k| variance(k) <= NEGLIGIBLE).unwrap_or(0);
+        |k: usize| (-0.5 * (PI * k as f64 * length / (1.0 + 2.0 * RANGE_MARGIN)).powi(2)).exp();
+    let count = (0..usize::MAX).find(|&k| variance(k) <= MIN_BASIS_VARIANCE).unwrap_or(0);
     (0..count).map(|k| variance(k).sqrt()).collect()
 }
 
@@ -202,7 +203,7 @@ pub(super) fn products_of(scaled: &[&[f64]], length: f64) -> DMatrix<f64> {
         indices = indices.iter().flat_map(longer).collect();
     }
     let weight = |index: &[usize]| index.iter().map(|&k| weights[k]).product::<f64>();
-    indices.retain(|index| weight(index).powi(2) > NEGLIGIBLE);
+    indices.retain(|index| weight(index).powi(2) > MIN_BASIS_VARIANCE);
     DMatrix::from_fn(scaled[0].len(), indices.len(), |row, j| {
         let index = &indices[j];
         weight(index)

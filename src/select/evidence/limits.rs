@@ -18,7 +18,7 @@ use crate::select::fitted::Fitted;
 use crate::select::neighbourhood::Linearised;
 
 /// Smallest singular value of independent rows of constraints.
-const DEPENDENT: f64 = 1e-9;
+const MIN_SINGULAR_VALUE: f64 = 1e-9;
 
 /// Returns for each limit that holds a fit the hypothesis that it is wrong; all together have the
 /// probability of a family.
@@ -66,8 +66,11 @@ pub(super) fn limits(
     let fitted_columns = linearised.fitted().columns(0, fitted.unknowns.len()).into_owned();
     let active = fitted.active();
     // Of no row there is no decomposition.
-    let directions =
-        if active.is_empty() { None } else { active.clone().pseudo_inverse(DEPENDENT).ok() };
+    let directions = if active.is_empty() {
+        None
+    } else {
+        active.clone().pseudo_inverse(MIN_SINGULAR_VALUE).ok()
+    };
     let directions = directions.unwrap_or_default();
     let constraints =
         found.active_constraints.iter().zip(directions.column_iter()).zip(active.row_iter());

@@ -18,13 +18,13 @@ use crate::numeric::lower_factor;
 
 /// ln f is summed from −3.5 to 3.5, a factor of thirty either way, in steps of a twentieth, or
 /// closer: of half of what the likelihood of ν degrees of freedom is wide, 1/√(2ν).
-const REACH: f64 = 3.5;
-const STEP: f64 = 0.05;
+const MAX_LN_NOISE_FACTOR: f64 = 3.5;
+const MAX_LN_NOISE_STEP: f64 = 0.05;
 /// Smallest step of the grid: no data have more degrees of freedom.
-const LEAST_STEP: f64 = 1e-4;
+const MIN_LN_NOISE_STEP: f64 = 1e-4;
 
 /// Terms that are e⁴⁰ times less probable than the largest add nothing to a sum.
-const NEGLIGIBLE_LN: f64 = 40.0;
+const NEGLIGIBLE_LN_ODDS: f64 = 40.0;
 
 /// Degrees of freedom ν of a residual and the half width of the distribution of ln f.
 #[derive(Debug, Clone, Copy)]
@@ -39,10 +39,10 @@ pub(super) struct Noise {
 impl Noise {
     /// Returns for each factor f of the grid ln of its prior times f^−ν, and 1 / (2 f²).
     pub fn grid(self) -> Vec<(f64, f64)> {
-        let step = STEP.min(0.5 / (2.0 * self.freedom).sqrt()).max(LEAST_STEP);
-        let least = self.least.clamp(-REACH, REACH);
+        let step = MAX_LN_NOISE_STEP.min(0.5 / (2.0 * self.freedom).sqrt()).max(MIN_LN_NOISE_STEP);
+        let least = self.least.clamp(-MAX_LN_NOISE_FACTOR, MAX_LN_NOISE_FACTOR);
         #[expect(clippy::cast_possible_truncation, reason = "few steps")]
-        let steps = (REACH / step).ceil() as i32;
+        let steps = (MAX_LN_NOISE_FACTOR / step).ceil() as i32;
         let at = |number: i32| {
             let ln_f = step * f64::from(number);
             (-(ln_f / self.trust).powi(2).ln_1p() - self.freedom * ln_f, 0.5 * (-2.0 * ln_f).exp())
@@ -63,8 +63,11 @@ pub(super) fn over_noise(squares: f64, grid: &[(f64, f64)]) -> f64 {
 /// Returns ln Σ exp of some terms.
 pub(super) fn ln_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
     let most = terms.clone().fold(f64::NEG_INFINITY, f64::max);
-    let sum: f64 =
-        terms.map(|term| term - most).filter(|term| *term > -NEGLIGIBLE_LN).map(f64::exp).sum();
+    let sum: f64 = terms
+        .map(|term| term - most)
+        .filter(|term| *term > -NEGLIGIBLE_LN_ODDS)
+        .map(f64::exp)
+        .sum();
     if most == f64::NEG_INFINITY { most } else { most + sum.ln() }
 }
 
@@ -270,7 +273,7 @@ fn of_columns(
         tried.push((size, ln));
         if ln > best.1 {
             best = (size, ln);
-        } else if ln < best.1 - NEGLIGIBLE_LN {
+        } else if ln < best.1 - NEGLIGIBLE_LN_ODDS {
             break;
         }
     }

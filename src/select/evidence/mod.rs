@@ -55,7 +55,7 @@ use search::{Weighted, search};
 use waves::Waves;
 
 /// Number of shapes that are refined.
-const FINEST: usize = 4;
+const MAX_REFINED_SHAPES: usize = 4;
 
 /// Returns ln of the marginal likelihood times the prior of the set that a fit holds: the effects
 /// `added` by the search and functions without a law.
@@ -109,7 +109,7 @@ pub(super) fn best_form(
     let best_of = |(k, ..): &(usize, f64, f64)| coarse[*k].0.finer();
     if !coarse.is_empty() {
         let found = gains(&coarse.iter().map(|(_, candidate)| candidate).collect::<Vec<_>>())?;
-        shapes = found.iter().take(FINEST).flat_map(best_of).collect();
+        shapes = found.iter().take(MAX_REFINED_SHAPES).flat_map(best_of).collect();
     }
     let finer = hypotheses.shaped(hypothesis, weighed, &shapes);
     let forms: Vec<&Candidate> =

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use rayon::prelude::*;
 
-use super::candidate::{Candidate, TOGETHER};
+use super::candidate::{Candidate, HYPOTHESES_PER_PROJECTION};
 use super::hypotheses::Hypotheses;
 use super::products::Products;
 use super::search::{Weighted, left_by};
@@ -13,11 +13,7 @@ use super::waves::is_free;
 use crate::problem::Effect;
 use crate::residual_tests::Covariate;
 use crate::select::fitted::Fitted;
-
-/// Minimum probability of a set whose members are replaced.
-const WORTH_A_LOOK: f64 = 0.01;
-/// Maximum number of sets beside which moves are tried.
-const MOST: usize = 6;
+use crate::select::settings::{MAX_REVISED_SETS, MIN_REVISED_PROBABILITY};
 
 /// Returns the move that does best in the place of what follows time in each of some sets: of one
 /// such member, and of all.
@@ -41,7 +37,7 @@ pub(super) fn promising(
         on.iter().any(|covariate| matches!(covariate, Covariate::Time | Covariate::Row))
     };
     let mut rests: BTreeSet<Vec<usize>> = BTreeSet::new();
-    for set in weighted.iter().filter(|set| set.probability > WORTH_A_LOOK) {
+    for set in weighted.iter().filter(|set| set.probability > MIN_REVISED_PROBABILITY) {
         let gone: Vec<usize> = set.members.iter().copied().filter(follows_time).collect();
         for gone in
             gone.iter().map(std::slice::from_ref).chain((gone.len() > 1).then_some(gone.as_slice()))
@@ -49,7 +45,7 @@ pub(super) fn promising(
             let mut rest: Vec<usize> =
                 set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
             rest.sort_unstable();
-            if rests.len() < MOST {
+            if rests.len() < MAX_REVISED_SETS {
                 rests.insert(rest);
             }
         }
@@ -77,7 +73,8 @@ pub(super) fn promising(
             .map(|(k, candidate)| (candidate, odds.iter().map(|of| of[k]).collect()))
             .collect()
     };
-    let all: Vec<(Candidate, Vec<f64>)> = new.par_chunks(TOGETHER).flat_map_iter(odds_of).collect();
+    let all: Vec<(Candidate, Vec<f64>)> =
+        new.par_chunks(HYPOTHESES_PER_PROJECTION).flat_map_iter(odds_of).collect();
     let mut found: Vec<Candidate> = Vec::new();
     for k in 0..left.len() {
         let best =

@@ -15,10 +15,10 @@ use crate::numeric::{inverse_factor, inverse_lower, lower_factor, lower_product}
 use crate::select::neighbourhood::LinearNeighbourhood;
 
 /// Number of hypotheses whose gains are computed together: one product of many columns is fast.
-const TOGETHER: usize = 16;
+const HYPOTHESES_PER_PRODUCT: usize = 16;
 
 /// Size below which Pₖₖ⁻¹ is too close to 1 to determine a member's columns beside the others.
-const LEAST: f64 = 1e-3;
+const MIN_SIZE_OF_MEMBER: f64 = 1e-3;
 
 /// Residual that the hypotheses explain, with its degrees of freedom and the trust in its σ.
 #[derive(Debug, Clone)]
@@ -255,7 +255,7 @@ impl Left<'_, '_> {
     pub fn of_member(&self, k: usize) -> Option<(f64, f64)> {
         let Products { blocks, target, grid, .. } = self.products;
         let (block, size) = (&blocks[self.members[k]], self.sizes[k]);
-        if size < LEAST {
+        if size < MIN_SIZE_OF_MEMBER {
             let others = [&self.members[..k], &self.members[k + 1..]].concat();
             let others =
                 self.products.left(&others, &[&self.sizes[..k], &self.sizes[k + 1..]].concat())?;
@@ -320,7 +320,8 @@ impl Left<'_, '_> {
         let of = |some: &[usize]| {
             if stop.is_requested() { Vec::new() } else { self.gains_together(some) }
         };
-        let gains: Vec<(f64, f64)> = tried.par_chunks(TOGETHER).flat_map_iter(of).collect();
+        let gains: Vec<(f64, f64)> =
+            tried.par_chunks(HYPOTHESES_PER_PRODUCT).flat_map_iter(of).collect();
         if gains.len() == tried.len() { gains } else { Vec::new() }
     }
 

@@ -19,7 +19,7 @@ use crate::problem::{JointKind, Problem};
 use crate::residual_tests::Covariate;
 
 /// Part of the largest size below which a function repeats others.
-const REPEATED: f64 = 1e-3;
+const MIN_NEW_SIZE: f64 = 1e-3;
 
 /// Returns true if gravity acts on an arm without declared masses.
 pub(super) fn weight_is_unknown(problem: &Problem) -> bool {
@@ -77,7 +77,7 @@ impl Columns<'_, '_> {
         let turned = weighed.v_t?.transpose();
         let most = weighed.singular_values.max();
         let kept: Vec<usize> = (0..turned.ncols())
-            .filter(|&k| most > 0.0 && weighed.singular_values[k] > REPEATED * most)
+            .filter(|&k| most > 0.0 && weighed.singular_values[k] > MIN_NEW_SIZE * most)
             .collect();
         let functions = moments * turned.select_columns(&kept);
         let column = |row: usize, k: usize| lever[row] * functions[(row / 3, k)];

@@ -9,16 +9,16 @@ use super::block::Block;
 use super::products::{Left, Products};
 
 /// Maximum coordinate-ascent passes over the sizes of the members of a set.
-const SETTLING: usize = 4;
+const MAX_SETTLING_PASSES: usize = 4;
 /// Number of sets, the most probable ones, whose sizes are settled in the end.
-const LIKELY: usize = 32;
+const MAX_SETTLED_SETS: usize = 32;
 /// Number of sets, the most probable ones, in which a function of several covariates is replaced by
 /// two hypotheses.
-const SPLIT: usize = 3;
+const MAX_SPLIT_SETS: usize = 3;
 /// Maximum number of members of a set of which two are exchanged together.
-const FEW: usize = 6;
+const MAX_PAIRED_MEMBERS: usize = 6;
 /// Maximum number of exchanges in the best set, each in the best set so far.
-const CHANGES: usize = 4;
+const MAX_EXCHANGES: usize = 4;
 
 /// Set of hypotheses with its probability among all sets evaluated.
 #[derive(Debug, Clone)]
@@ -85,7 +85,7 @@ impl Set {
         let mut summed = vec![0.0; members.len()];
         // Beside others that stayed a size stays.
         let mut stale = vec![true; members.len()];
-        for _ in 0..SETTLING {
+        for _ in 0..MAX_SETTLING_PASSES {
             for k in 0..members.len() {
                 if !std::mem::take(&mut stale[k]) {
                     continue;
@@ -178,7 +178,7 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
     with_gears(&mut known, products);
     let mut likely: Vec<&Set> = known.values().collect();
     likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
-    let likely: Vec<Set> = likely.into_iter().take(LIKELY).cloned().collect();
+    let likely: Vec<Set> = likely.into_iter().take(MAX_SETTLED_SETS).cloned().collect();
     let settled: Vec<Set> = likely.into_par_iter().map(|set| set.settled(products)).collect();
     known.extend(settled.into_iter().map(|set| (sorted(&set.members), set)));
     let most = known.values().map(|set| set.ln_posterior).fold(f64::NEG_INFINITY, f64::max);
@@ -242,7 +242,7 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     // hypothesis, and of two.
     let instead: [[&[usize]; 2]; 3] = [[&every, &plain], [&every, &laws], [&laws, &laws]];
     let mut tried: BTreeSet<(Vec<usize>, usize)> = BTreeSet::new();
-    for _ in 0..CHANGES {
+    for _ in 0..MAX_EXCHANGES {
         let mut likely: Vec<&Set> = known.values().filter(|set| !set.has_wide(blocks)).collect();
         likely.sort_by(|a, b| b.ln_posterior.total_cmp(&a.ln_posterior));
         let Some(best) = likely.first().map(|set| set.ln_posterior) else { return };
@@ -256,7 +256,7 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
             .take(1)
             .flat_map(|set| one_or_two(&set.members).into_iter().map(move |gone| (gone, *set)));
         let mut rests: Vec<(Vec<usize>, Vec<usize>, usize)> = Vec::new();
-        for (gone, set) in surfaces.take(SPLIT).chain(of_best) {
+        for (gone, set) in surfaces.take(MAX_SPLIT_SETS).chain(of_best) {
             let rest: Vec<usize> =
                 set.members.iter().copied().filter(|member| !gone.contains(member)).collect();
             let kind = if gone.len() > 1 { 2 } else { usize::from(!gone.iter().any(is_surface)) };
@@ -324,7 +324,7 @@ fn replaced(
 /// Returns each member, and each pair of members where they are few.
 fn one_or_two(members: &[usize]) -> Vec<Vec<usize>> {
     let single = members.iter().map(|&member| vec![member]);
-    let few = if members.len() <= FEW { members } else { &[] };
+    let few = if members.len() <= MAX_PAIRED_MEMBERS { members } else { &[] };
     let pairs = few
         .iter()
         .enumerate()

@@ -15,14 +15,16 @@
 //! short a wave looks like noise to every function that another hypothesis could be, so that it is
 //! looked for beside every explanation.
 
-use crate::select::settings::{LN_ODDS_OF_ANOTHER_ARGUMENT, MAX_WAVE_ORDER};
+use crate::select::settings::{
+    LN_ODDS_OF_ANOTHER_ARGUMENT, MAX_REVISED_SETS, MAX_WAVE_ORDER, MIN_REVISED_PROBABILITY,
+};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::candidate::{Candidate, TOGETHER, order_of};
+use super::candidate::{Candidate, HYPOTHESES_PER_PROJECTION, order_of};
 use super::functions::times;
 use super::hypotheses::Hypotheses;
 use super::hypothesis::{Hypothesis, HypothesisKind, Site};
@@ -35,22 +37,18 @@ use crate::residual_tests::Covariate;
 use crate::select::fitted::Fitted;
 use crate::select::harmonic_prior::is_gear_of;
 
-/// Minimum probability of a set in which waves are searched in the place of its functions.
-const WORTH_A_LOOK: f64 = 0.01;
-/// Maximum number of sets for each joint in which waves are searched.
-const MOST: usize = 6;
 /// Steps between orders of the first and the second scan, as phases \[rad\] from one end of the
 /// joint's range to the other.
-const STEPS: [f64; 2] = [1.0, 0.02];
+const PHASE_STEPS: [f64; 2] = [1.0, 0.02];
 /// Number of orders of the first scan about which a finer scan follows.
-const LOOKED_AT: usize = 3;
+const MAX_REFINED_ORDERS: usize = 3;
 /// Maximum number of orders of a scan: of a joint that turns four times and more the highest are
 /// not scanned.
-const MOST_ORDERS: usize = 8000;
+const MAX_SCANNED_ORDERS: usize = 8000;
 /// Shortest lead of a screw \[m\].
-const SHORTEST_LEAD: f64 = 0.002;
+const MIN_LEAD: f64 = 0.002;
 /// Ratio of consecutive distances from an order over which its likelihood is integrated.
-const WIDER: f64 = 1.3;
+const DISTANCE_RATIO: f64 = 1.3;
 
 /// Returns the joint, from 0, at which a hypothesis is a function of that joint's command or of no
 /// known quantity.
@@ -74,10 +72,10 @@ pub(super) fn is_free(effect: &Effect, problem: &Problem) -> bool {
     !holds_all(problem, &parameters) && !refuses(problem, &parameters)
 }
 
-/// Returns orders from `low` to `high` in steps, at most `MOST_ORDERS`.
+/// Returns orders from `low` to `high` in steps, at most `MAX_SCANNED_ORDERS`.
 fn row(low: f64, high: f64, step: f64) -> Vec<f64> {
     let all = std::iter::successors(Some(low), |order| Some(order + step));
-    all.take_while(|order| *order <= high).take(MOST_ORDERS).collect()
+    all.take_while(|order| *order <= high).take(MAX_SCANNED_ORDERS).collect()
 }
 
 /// Search for waves of any order beside the other hypotheses about a fit.
@@ -110,7 +108,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 continue;
             }
             let left: Vec<Left> = rests.iter().filter_map(|rest| self.beside(rest)).collect();
-            let [step, finer] = STEPS.map(|phase| phase / (high - low));
+            let [step, finer] = PHASE_STEPS.map(|phase| phase / (high - low));
             // A wave of which less than one cycle is seen is none.
             let first = self.gains(joint, &row(TAU / (high - low), highest, step), &left);
             let tens = std::iter::successors(Some(1.0), |digit| Some(digit / 10.0));
@@ -130,7 +128,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                     .map(|(_, order)| order);
                 let taken: Vec<f64> = taken.collect();
                 let mut second = taken.clone();
-                for (order, _) in first.into_iter().take(LOOKED_AT) {
+                for (order, _) in first.into_iter().take(MAX_REFINED_ORDERS) {
                     let near = row(order - step, order + step, finer);
                     second.extend(near.into_iter().map(|order| written(order, digits)));
                     if !slides {
@@ -183,7 +181,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
 
     /// Returns the highest order of a wave of a joint; of one that slides \[rad/m\].
     fn highest(&self, joint: usize) -> f64 {
-        if self.slides(joint) { TAU / SHORTEST_LEAD } else { MAX_WAVE_ORDER }
+        if self.slides(joint) { TAU / MIN_LEAD } else { MAX_WAVE_ORDER }
     }
 
     /// Returns the smallest and largest command of a joint \[rad\], \[m\].
@@ -200,12 +198,12 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         };
         let sliding: Vec<usize> =
             (0..self.fitted.problem.joints.len()).filter(|&joint| self.slides(joint)).collect();
-        for set in weighted.iter().filter(|set| set.probability > WORTH_A_LOOK) {
+        for set in weighted.iter().filter(|set| set.probability > MIN_REVISED_PROBABILITY) {
             let mut whole = set.members.clone();
             whole.sort_unstable();
             for &joint in &sliding {
                 let sets_of_joint = all.entry(joint).or_default();
-                if !sets_of_joint.contains(&whole) && sets_of_joint.len() < MOST {
+                if !sets_of_joint.contains(&whole) && sets_of_joint.len() < MAX_REVISED_SETS {
                     sets_of_joint.push(whole.clone());
                 }
             }
@@ -221,7 +219,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
                 for rest in
                     [without(&|other| other == member), without(&|other| of(other) == Some(joint))]
                 {
-                    if !sets_of_joint.contains(&rest) && sets_of_joint.len() < MOST {
+                    if !sets_of_joint.contains(&rest) && sets_of_joint.len() < MAX_REVISED_SETS {
                         sets_of_joint.push(rest);
                     }
                 }
@@ -253,7 +251,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             let odds = |k: usize| of_sets.iter().map(|odds| odds[k]).collect();
             orders.into_iter().enumerate().map(|(k, order)| (order, odds(k))).collect()
         };
-        let all: Vec<(f64, Vec<f64>)> = orders.par_chunks(TOGETHER).flat_map_iter(of).collect();
+        let all: Vec<(f64, Vec<f64>)> =
+            orders.par_chunks(HYPOTHESES_PER_PROJECTION).flat_map_iter(of).collect();
         let of_set = |k: usize| {
             let mut of_orders: Vec<(f64, f64)> =
                 all.iter().map(|(order, odds)| (*order, odds[k])).collect();
@@ -296,8 +295,9 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     fn spread(&self, joint: usize, order: f64, left: &Left) -> f64 {
         let Some((low, high)) = self.range(joint) else { return 1.0 };
         let range = high - low;
-        let away = std::iter::successors(Some(STEPS[1]), |phase| Some(phase * WIDER))
-            .take_while(|phase| *phase < PI);
+        let away =
+            std::iter::successors(Some(PHASE_STEPS[1]), |phase| Some(phase * DISTANCE_RATIO))
+                .take_while(|phase| *phase < PI);
         let orders = away.flat_map(|phase| [order - phase / range, order + phase / range]);
         let is_looked_for = |order: &f64| (TAU / range..=self.highest(joint)).contains(order);
         let mut orders: Vec<f64> = orders.filter(is_looked_for).chain([order]).collect();
@@ -313,7 +313,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
             0.5 * (weight(pair[0].1) + weight(pair[1].1)) * (pair[1].0 - pair[0].0)
         };
         // An order that no neighbour comes near is told to a step.
-        gains.windows(2).map(between).sum::<f64>().max(STEPS[1] / range)
+        gains.windows(2).map(between).sum::<f64>().max(PHASE_STEPS[1] / range)
     }
 }
 

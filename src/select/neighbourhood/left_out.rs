@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::orthonormal::RANK;
+use super::orthonormal::MIN_INDEPENDENT_LENGTH;
 use crate::numeric::{gram, inverse_factor, lower_factor, solve_positive};
 
 /// Products JᵀJ, Jᵀr, rᵀr and the number of rows of some poses.
@@ -74,8 +74,8 @@ impl PartSquares {
 
     /// The normal equations of some parts with priors.
     ///
-    /// Directions that no pose sees stay where they are: to the diagonal comes (RANK)² of each
-    /// column's length².
+    /// Returns the normal equations with the priors. To the diagonal comes `MIN_INDEPENDENT_LENGTH`²
+    /// of each column's squared length, so that directions that no pose shows stay where they are.
     fn normal(
         &self,
         mut gram: DMatrix<f64>,
@@ -83,7 +83,9 @@ impl PartSquares {
         priors: &[(f64, Option<f64>)],
     ) -> (DMatrix<f64>, DVector<f64>) {
         for j in 0..product.len() {
-            gram[(j, j)] += RANK * RANK * self.whole.gram[(j, j)] + f64::MIN_POSITIVE;
+            gram[(j, j)] +=
+                MIN_INDEPENDENT_LENGTH * MIN_INDEPENDENT_LENGTH * self.whole.gram[(j, j)]
+                    + f64::MIN_POSITIVE;
         }
         for (j, (x, sigma)) in priors.iter().enumerate() {
             let weight = sigma.map_or(0.0, |sigma| sigma.powi(-2));

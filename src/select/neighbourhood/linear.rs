@@ -12,13 +12,13 @@ use crate::numeric::{gram, inverse_factor, product, transposed_narrow_product};
 
 /// Minimum part of a direction's length² outside a block of poses for the other poses to determine
 /// it.
-const LEAST_DECIDED: f64 = 1e-6;
+const MIN_DETERMINED_ELSEWHERE: f64 = 1e-6;
 
 /// Maximum number of columns that are projected out by one direction of the basis after the other.
-const NARROW: usize = 4;
+const MAX_SEQUENTIAL_COLUMNS: usize = 4;
 /// Part of a column from which on one projection leaves only rounding along a basis. For less, two
 /// are enough [Giraud, Langou & Rozložník 2005].
-const MOSTLY: f64 = 0.1;
+const MIN_PART_OF_ONE_PROJECTION: f64 = 0.1;
 
 /// The unknowns of a fit as it ended.
 #[derive(Debug, Clone, Default)]
@@ -264,7 +264,9 @@ impl LinearNeighbourhood {
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
         // Below the data there is nothing at first.
         self.take_off(&mut left, self.rows);
-        let is_short = |k: &usize| left.column(*k).norm() < MOSTLY * columns.column(*k).norm();
+        let is_short = |k: &usize| {
+            left.column(*k).norm() < MIN_PART_OF_ONE_PROJECTION * columns.column(*k).norm()
+        };
         let short: Vec<usize> = (0..columns.ncols()).filter(is_short).collect();
         if !short.is_empty() {
             let mut again = left.select_columns(&short);
@@ -280,7 +282,7 @@ impl LinearNeighbourhood {
     /// Subtracts from columns their components along the basis; their rows from `filled` on are
     /// zero.
     fn take_off(&self, left: &mut DMatrix<f64>, filled: usize) {
-        if left.ncols() > NARROW {
+        if left.ncols() > MAX_SEQUENTIAL_COLUMNS {
             // The narrow side is transposed: this is the product that is fast.
             let along = (left.rows(0, filled).transpose() * self.basis.rows(0, filled)).transpose();
             left.gemm(-1.0, &self.basis, &along, 1.0);
@@ -369,22 +371,25 @@ impl LinearNeighbourhood {
     }
 }
 
-/// Returns true if at least `MOSTLY` of the length of every column is left.
+/// Returns true if at least `MIN_PART_OF_ONE_PROJECTION` of the length of every column is left.
 fn most_is_left(left: &DMatrix<f64>, lengths: &[f64]) -> bool {
-    left.column_iter().zip(lengths).all(|(column, length)| column.norm() >= MOSTLY * length)
+    left.column_iter()
+        .zip(lengths)
+        .all(|(column, length)| column.norm() >= MIN_PART_OF_ONE_PROJECTION * length)
 }
 
 /// Solves with a symmetric matrix of eigenvalues from 0 to 1; the solution is zero along
 /// eigenvalues near 0.
 fn decided(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     if let Some(root) = inverse_factor(&matrix)
-        && root.diagonal().iter().all(|value| (value * value).recip() > LEAST_DECIDED)
+        && root.diagonal().iter().all(|value| (value * value).recip() > MIN_DETERMINED_ELSEWHERE)
     {
         return root.tr_mul(&(&root * right));
     }
     let eigen = matrix.symmetric_eigen();
-    let inverted =
-        eigen.eigenvalues.map(|value| if value > LEAST_DECIDED { value.recip() } else { 0.0 });
+    let inverted = eigen
+        .eigenvalues
+        .map(|value| if value > MIN_DETERMINED_ELSEWHERE { value.recip() } else { 0.0 });
     &eigen.eigenvectors * eigen.eigenvectors.tr_mul(right).component_mul(&inverted)
 }
 

@@ -14,7 +14,7 @@ use crate::problem::{Effect, Problem};
 
 /// Mass at which the place of an added mass is differentiated [kg]: none has no place, so small a
 /// one changes nothing else.
-const TRACE_OF_MASS: f64 = 1e-4;
+const MASS_OF_DERIVATIVE: f64 = 1e-4;
 
 /// A model linearised with every place where effects may enter.
 #[derive(Clone)]
@@ -115,7 +115,7 @@ impl<'a> Linearised<'a> {
             let mut at = x.clone().resize_vertically(first + slots.len(), 0.0);
             for (index, (site, _)) in slots.iter().enumerate() {
                 if matches!(site, ParameterSite::Beam { field: BeamField::AddedMass, .. }) {
-                    at[first + index] = TRACE_OF_MASS;
+                    at[first + index] = MASS_OF_DERIVATIVE;
                 }
             }
             let all: Vec<usize> =

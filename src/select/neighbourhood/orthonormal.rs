@@ -15,7 +15,7 @@ use crate::numeric::{
 ///
 /// Products of columns are exact to some 1e-15 of their lengths, so that what is left of a length²
 /// is known to some 1e-14: below 1e-12, (this part)², it is rounding.
-pub(crate) const RANK: f64 = 1e-6;
+pub(crate) const MIN_INDEPENDENT_LENGTH: f64 = 1e-6;
 
 /// Q = A W with QᵀQ = I for the columns A, and W, shape = (columns, rank): columns that are not
 /// finite, or that those before them take up, have no part in it. `lengths` are those that a column
@@ -80,7 +80,9 @@ pub(super) fn orthonormal_above(
 fn independent(gram: &DMatrix<f64>, norms: &[f64], lengths: &[f64]) -> (Vec<usize>, DMatrix<f64>) {
     let mut kept: Vec<usize> = Vec::new();
     let mut factor: Vec<Vec<f64>> = Vec::new();
-    for j in (0..gram.ncols()).filter(|&j| norms[j] > RANK * lengths[j] && norms[j].is_finite()) {
+    for j in (0..gram.ncols())
+        .filter(|&j| norms[j] > MIN_INDEPENDENT_LENGTH * lengths[j] && norms[j].is_finite())
+    {
         let mut row: Vec<f64> = Vec::with_capacity(kept.len() + 1);
         for (&k, known) in kept.iter().zip(&factor) {
             let along: f64 = known.iter().zip(&row).map(|(a, b)| a * b).sum();
@@ -88,7 +90,7 @@ fn independent(gram: &DMatrix<f64>, norms: &[f64], lengths: &[f64]) -> (Vec<usiz
             row.push(value);
         }
         let left = 1.0 - row.iter().map(|value| value * value).sum::<f64>();
-        if left.max(0.0).sqrt() * norms[j] > RANK * lengths[j] {
+        if left.max(0.0).sqrt() * norms[j] > MIN_INDEPENDENT_LENGTH * lengths[j] {
             row.push(left.sqrt());
             factor.push(row);
             kept.push(j);
@@ -114,8 +116,9 @@ pub(super) fn open(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>>
         }
     }
     let eigen = (rows.transpose() * &rows).symmetric_eigen();
-    let left: Vec<usize> =
-        (0..active.ncols()).filter(|&k| eigen.eigenvalues[k] < RANK * RANK).collect();
+    let left: Vec<usize> = (0..active.ncols())
+        .filter(|&k| eigen.eigenvalues[k] < MIN_INDEPENDENT_LENGTH * MIN_INDEPENDENT_LENGTH)
+        .collect();
     Some(eigen.eigenvectors.select_columns(&left))
 }
 

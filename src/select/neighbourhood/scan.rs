@@ -31,7 +31,7 @@ pub(crate) struct Scan<'a, 'l> {
 }
 
 /// Number of candidates that are projected together.
-const TOGETHER: usize = 48;
+const CANDIDATES_PER_PROJECTION: usize = 48;
 
 /// Candidate with its gain.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,7 +68,8 @@ impl<'a, 'l> Scan<'a, 'l> {
             let mut scores = linear.scores(&finite).into_iter();
             is_finite.into_iter().map(|fine| if fine { scores.next() } else { None }).collect()
         };
-        let all: Vec<Option<Score>> = numbers.par_chunks(TOGETHER).flat_map_iter(scored).collect();
+        let all: Vec<Option<Score>> =
+            numbers.par_chunks(CANDIDATES_PER_PROJECTION).flat_map_iter(scored).collect();
         let mut refused = Vec::new();
         let (mut known, mut scores) = (Vec::new(), Vec::new());
         for (effect, score) in effects.into_iter().zip(all) {

@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::select::reference_check::ReferenceVerdict;
 
 /// Probability of a law from which on it is the most probable one at its place.
-const EVEN: f64 = 0.5;
+const MIN_PROBABLE: f64 = 0.5;
 
 /// Strongest claim about an effect of the extended problem, the strongest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -46,7 +46,7 @@ impl Status {
             _ if witness == Some(ReferenceVerdict::Contradicted) => Self::Contradicted,
             None if is_significant => Self::Found,
             Some(law) if law >= stated => Self::Found,
-            Some(law) if law >= EVEN => Self::Probable,
+            Some(law) if law >= MIN_PROBABLE => Self::Probable,
             _ => Self::Located,
         }
     }
