@@ -23,7 +23,8 @@ use super::statics::{
 };
 use crate::spatial::Frame;
 
-/// Wrenches about the base origin whose virtual work is the change of each coordinate.
+/// Wrenches at the arm's base origin, one for each coordinate of the target's position. Their
+/// virtual work on a motion is the change of that coordinate.
 #[derive(Debug, Clone, Copy, Default)]
 struct VirtualWrench {
     force: PerCoordinate,
@@ -38,7 +39,8 @@ impl VirtualWrench {
         }
     }
 
-    /// Returns the virtual work on the twist of a segment's end.
+    /// Returns the virtual work of the three wrenches on the motion of a segment's end: the change
+    /// of the target's position per unit of the parameter.
     fn work_on(&self, column: &EndTwist) -> Vector3<f64> {
         let each = |i: usize| {
             self.moment[i].dot(&column.rotation) + self.force[i].dot(&column.translation)
@@ -57,7 +59,7 @@ impl LinearisedArm {
         Ok(())
     }
 
-    /// Repeats the sweep until Λ reproduces itself.
+    /// Repeats the adjoint sweep until Λ is its fixed point.
     fn find_influence(&mut self, at: &Vector3<f64>) -> Result<(), StaticsError> {
         self.anderson.restart();
         let mut is_accepted = false;
@@ -78,7 +80,8 @@ impl LinearisedArm {
         if is_accepted { Ok(()) } else { Err(StaticsError::NotSettled) }
     }
 
-    /// Sets the virtual force of each load, f × W.
+    /// Sets the virtual force f × W of each load f, with W the sum of the Λ-weighted axes of all
+    /// sections between base and load.
     fn update_virtual_forces(&mut self) {
         let Self { steps, loads, influence, .. } = self;
         let mut weights = [Vector3::zeros(); 3];
@@ -102,7 +105,8 @@ impl LinearisedArm {
         }
     }
 
-    /// Sweeps from all tips to the base and writes either the image of Λ or the derivatives.
+    /// Sweeps from all tips to the base and writes `result`: either the image of Λ under the sweep
+    /// or the derivatives of the target's position `at` \[m\].
     fn adjoint_sweep(&mut self, at: &Vector3<f64>, result: SweepResult) {
         let Self {
             steps,
@@ -186,7 +190,7 @@ impl LinearisedArm {
     }
 }
 
-/// Result that an adjoint sweep computes.
+/// Quantity that an adjoint sweep writes: the image of Λ, or the derivatives of the position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum SweepResult {
     Influence,
@@ -194,7 +198,8 @@ enum SweepResult {
 }
 
 impl Section {
-    /// Returns the sum of the section's axes, weighted by Λ.
+    /// Returns Σ Λₖ aₖ over the axes aₖ of the section's moments, for each coordinate of the
+    /// target.
     fn weights(&self, influence: &[f64]) -> PerCoordinate {
         let mut weights = [Vector3::zeros(); 3];
         for (axis, influence) in self
@@ -209,8 +214,8 @@ impl Section {
         weights
     }
 
-    /// Adds the change of the section's moment a·(M − r × F) with its place r, and with its axes a
-    /// if they move with the arm.
+    /// Adds to `wrench` the change of the section's moment a·(M − r × F) with its place r, and with
+    /// its axes a if they move with the arm.
     fn add_to(&self, influence: &[f64], wrench: &mut VirtualWrench) {
         let weights = self.weights(influence);
         if self.moment_axes == MomentAxes::Moving {

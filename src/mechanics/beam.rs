@@ -58,12 +58,15 @@ impl<S: Scalar> Deflection<S> {
     }
 }
 
-/// Response to a unit load: geometry only, shared by both bending planes.
+/// Factors of the closed-form response to a unit load. They depend on geometry alone and serve both
+/// bending planes.
 #[derive(Clone, Copy)]
 struct Shape<S> {
-    /// Deflection per force and flexibility \[m³\]; for a spread load per N/m \[m⁴\].
+    /// Deflection per force and flexibility \[m³\]; for an evenly spread load, per N/m and
+    /// flexibility \[m⁴\].
     deflection_of_force: S,
-    /// Slope per force and flexibility \[m²\]; for a spread load \[m³\].
+    /// Slope per force and flexibility \[m²\]; for an evenly spread load, per N/m and flexibility
+    /// \[m³\].
     slope_of_force: S,
     /// Deflection per moment and flexibility \[m²\].
     deflection_of_moment: S,
@@ -204,8 +207,9 @@ impl<S: Scalar> Cantilever<'_, S> {
         }
     }
 
-    /// Adds the strain without load: at x a rotation κ x, an elongation ε x and a deflection κ
-    /// x²/2.
+    /// Adds the deflection by the strain without load, elongation ε and curvature κ: at x a
+    /// displacement ε x along the beam, κ x²/2 (`half_square` = x²/2) across it, and a rotation κ
+    /// x.
     fn superpose_strain(&self, out: &mut Deflection<S>, x: S, half_square: S) {
         let Some(Strain { axial, curvature: [about_y, about_z] }) = self.strain else { return };
         out.displacement.x += axial * x;
@@ -216,8 +220,8 @@ impl<S: Scalar> Cantilever<'_, S> {
     }
 }
 
-/// Adds the deflection by one wrench. A rotation about z is +slope in y, a rotation about y is
-/// −slope in z.
+/// Adds to `out` the deflection by one wrench at the response `shape` of a beam with flexibilities
+/// `k`. A rotation about z is +slope in y, a rotation about y is −slope in z.
 fn superpose<S: Scalar>(
     out: &mut Deflection<S>,
     k: &Flexibility<S>,

@@ -7,7 +7,7 @@ use super::forward::Bend;
 use super::statics::{StaticState, StaticsError, Workspace};
 use crate::problem::PoseView;
 
-/// Minimum number of elements by which a beam is drawn.
+/// Minimum number of straight pieces by which a beam is drawn, so that its curvature shows.
 const MIN_DRAWN_ELEMENTS: usize = 4;
 
 /// Arm as a line from its base to the frame of its target: each joint before and after its

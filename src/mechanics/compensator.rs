@@ -2,8 +2,8 @@
 
 use crate::scalar::Scalar;
 
-/// Smallest length of a spring relative to its longer lever. The pull of a shorter spring has no
-/// direction.
+/// Smallest length of a spring, relative to its longer lever, at which its pull has a direction.
+/// Below it the ends coincide to rounding.
 const MIN_RELATIVE_LENGTH: f64 = 1e-9;
 
 /// Spring between the part before a joint and the link behind it, in the plane across the joint's

@@ -36,7 +36,8 @@ pub(super) struct Element<'a, S> {
     pub weight: Vector3<S>,
     /// Loads of the whole beam.
     pub loads: &'a [LinkLoad<S>],
-    /// Resultant at the tip of everything beyond it: force \[N\], and moment about the tip [N·m].
+    /// Resultant of all loads beyond the element's tip: force \[N\], and moment about the tip
+    /// [N·m], arm base frame.
     pub tip: Wrench<S>,
 }
 
@@ -64,7 +65,8 @@ impl<S: Scalar> Element<'_, S> {
         self.loads.iter().filter(|load| load.element == self.number)
     }
 
-    /// Returns the clamped beam with its loads resolved in `axes`; `points` is reused memory.
+    /// Returns the element as a clamped beam with its loads resolved along `axes`; `points` is
+    /// reused memory.
     fn cantilever<'p>(
         &self,
         axes: &Frame<S>,
@@ -88,8 +90,8 @@ impl<S: Scalar> Element<'_, S> {
         }
     }
 
-    /// Returns the section that carries a load, measured from the element's root, and the rigid
-    /// offset from there to the load \[m\].
+    /// Returns the station of a load, measured along the element from its root \[m\], and the rigid
+    /// offset from that station to the load \[m\].
     fn station_and_offset(&self, load: &LinkLoad<S>) -> (S, Vector3<S>) {
         let x = load.at.x - self.start;
         let part = x.re() / self.length.re();
@@ -119,7 +121,7 @@ impl<S: Scalar> Element<'_, S> {
         tip
     }
 
-    /// Deflects the element, clamped at `root`, by its loads.
+    /// Deflects the element, clamped at the frame `root`, by its loads; `points` is reused memory.
     pub fn bend<'p>(
         &'p self,
         root: &Frame<S>,

@@ -14,20 +14,21 @@ use crate::problem::PoseView;
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
-/// Deflection of the arm in a forward pass.
+/// Way in which a forward pass deflects the arm and what it records.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Bend<'a, S> {
-    /// No deflection; records_events events.
+    /// No deflection; records loads and sections as events.
     Rigid,
-    /// Deflection by these moments; records_events events.
+    /// Deflection by the given moments [N·m]; records loads and sections as events.
     Bent(&'a [S]),
-    /// Deflection by these moments, segment by segment. PerCoordinate segment starts at a frame without
-    /// derivatives, so that the derivatives of its end come from its own parameters. With a
-    /// rotation vector (of value zero), beam elements first rotate by it: their ends then have the
-    /// derivatives with respect to a rotation of their root.
+    /// Deflection by the given moments [N·m], with each segment differentiated by itself.
+    ///
+    /// Each segment starts at a frame without derivatives, so that the derivatives of its end come
+    /// from its parameters alone. With a rotation vector (of value zero), beam elements first
+    /// rotate by it. The derivatives of their ends then include those by a rotation of their root.
     BySegment(&'a [S], Option<&'a Vector3<S>>),
-    /// Deflection by these moments, with forces resolved in the frames of the last undeflected
-    /// pass; records_events no events.
+    /// Deflection by the given moments [N·m], with forces resolved in the frames of the last
+    /// undeflected pass; records no events.
     FirstOrder(&'a [S]),
 }
 
@@ -43,7 +44,7 @@ struct Walk<'a, S> {
 }
 
 impl<S: Scalar> Walk<'_, S> {
-    /// Returns the next N unknown moments; `None` on the undeflected arm.
+    /// Returns the next N of the given moments [N·m]; `None` in a pass without deflection.
     fn moments<const N: usize>(&mut self) -> Option<[S; N]> {
         let first = self.next;
         self.next += N;
@@ -55,7 +56,8 @@ impl<S: Scalar> Walk<'_, S> {
         }
     }
 
-    /// Ends a segment that deflects by the last `unknowns` moments, in a pass segment by segment.
+    /// Ends a segment that the last `unknowns` moments deflect: records its end frame and continues
+    /// from that frame without derivatives. Does nothing in other passes than [`Bend::BySegment`].
     fn cut(
         &mut self,
         segment: Segment,
@@ -74,8 +76,8 @@ impl<S: Scalar> Walk<'_, S> {
         }
     }
 
-    /// Tilts the frame by flexibilities [rad/(N·m)] about x and y. The moments act about the axes
-    /// at half the tilt.
+    /// Rotates the frame by the unknown moments times flexibilities [rad/(N·m)] about x and y. The
+    /// moments act about the axes at half the rotation.
     fn tilt(&mut self, [about_x, about_y]: &[S; 2], segment: Segment, ws: &mut Workspace<S>) {
         let half = self
             .moments()
@@ -111,7 +113,7 @@ impl<S: Scalar> Walk<'_, S> {
         self.frame.translate_z(length * (1.0 - passed));
     }
 
-    /// Records a place where `branches` start besides the next one.
+    /// Records a fork: a frame where `branches` more branches start besides the one that follows.
     fn fork(&self, branches: usize, ws: &mut Workspace<S>) {
         if branches > 0 {
             ws.forks.extend((0..branches).map(|_| self.frame));
@@ -121,7 +123,7 @@ impl<S: Scalar> Walk<'_, S> {
         }
     }
 
-    /// Returns to the last place that has a branch left.
+    /// Returns to the last fork at which a branch is still to be passed.
     fn branch(&mut self, ws: &mut Workspace<S>) {
         self.frame = ws.forks.pop().unwrap_or(self.frame);
         if self.records_events() {
@@ -135,8 +137,8 @@ impl<S: Scalar> Walk<'_, S> {
 }
 
 impl<S: Scalar> Arm<S> {
-    /// Computes the forces of ropes and the forces beyond each link. Only ropes that lean depend on
-    /// the deflection, by the unknowns `state`.
+    /// Computes the forces of hoist ropes and the total force beyond each link. Only ropes that may
+    /// lean depend on the deflection, through the hook positions in `state`.
     ///
     /// With an empty state, leaning ropes are taken as if their hooks were above the base.
     pub(super) fn gather_forces(&self, setup: &PoseView, state: &[S], ws: &mut Workspace<S>) {
@@ -187,7 +189,8 @@ impl<S: Scalar> Arm<S> {
         self.payload_on.unwrap_or_else(|| self.last())
     }
 
-    /// Returns the force of a rope \[N\].
+    /// Returns the force of a rope \[N\], arm base frame; `hook` gives the hook's x and y \[m\] and
+    /// is evaluated only if the rope may lean.
     fn pull(&self, hoist: &Hoist, setup: &PoseView, hook: impl FnOnce() -> [S; 2]) -> Vector3<S> {
         let tension = setup.hoist.copied().unwrap_or(hoist.force);
         match &self.rope {
@@ -196,7 +199,8 @@ impl<S: Scalar> Arm<S> {
         }
     }
 
-    /// Returns the number of unknowns that are positions of hooks.
+    /// Returns the number of unknowns that are coordinates of hooks: two for each rope that may
+    /// lean.
     fn hook_unknowns(&self) -> usize {
         let hoists = || self.joints.iter().filter_map(|joint| joint.beam.as_ref()?.hoist.as_ref());
         self.rope.as_ref().map_or(0, |_| 2 * hoists().count())

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::scalar::Scalar;
 
-/// Moment at which tanh has taken up 76 % of the play [N·m].
+/// Moment scale of the tanh by which a load takes up play [N·m]: at this moment 76 % is taken up.
 const PLAY_MOMENT: f64 = 1.0;
 /// Argument from which on tanh is 1 to rounding: 2 exp(−2x) is below half a unit in the last place.
 const SATURATED_TANH: f64 = 20.0;
@@ -40,7 +40,8 @@ pub struct HoistError<S> {
 }
 
 impl<S: Scalar> Nonlinear<S> {
-    /// Returns the angle under a moment [N·m]; the play counts if the moment `takes_up_play`.
+    /// Returns the angle \[rad\] under a moment [N·m]. The play is included only if the moment
+    /// `takes_up_play`, because the direction of approach is unknown.
     pub(super) fn twist(&self, moment: S, takes_up_play: bool) -> S {
         let cubic = self.cubic * moment * moment * moment;
         if takes_up_play { cubic + self.play * tanh(moment / PLAY_MOMENT) * 0.5 } else { cubic }
@@ -63,7 +64,8 @@ pub struct Strain<S> {
 }
 
 impl<S: Scalar> Strain<S> {
-    /// Adds the strain of one pose: elongation, then curvatures.
+    /// Returns the strain with that of one pose added: elongation, then curvatures about y and z
+    /// [1/m].
     pub(super) fn plus(&self, [axial, y, z]: [f64; 3]) -> Self {
         Self {
             axial: self.axial + axial,
@@ -73,8 +75,9 @@ impl<S: Scalar> Strain<S> {
 }
 
 impl<S: Scalar> HoistError<S> {
-    /// Returns the force \[N\] of a rope with a tension \[N\] in a declared direction; x and y of
-    /// the hook \[m\], arm base frame.
+    /// Returns the force \[N\] of a rope, arm base frame, with the errors of force and lean
+    /// included. `tension` \[N\] and unit `direction` are declared; x and y are the hook's position
+    /// \[m\].
     pub(super) fn pull(
         &self,
         direction: &Vector3<f64>,

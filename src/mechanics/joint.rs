@@ -68,7 +68,7 @@ impl<S: Scalar> Placement<S> {
 /// behind the placement if there is one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Joint<S> {
-    /// Motion by q: rotation, translation or none.
+    /// Motion by the command q: rotation, translation or none.
     pub kind: JointKind,
     /// Constant transform before all others.
     pub placement: Option<Placement<S>>,
@@ -88,7 +88,7 @@ pub struct Joint<S> {
     pub nonlinear: Option<Nonlinear<S>>,
     /// Flexibility about x and y before the joint's rotation [rad/(N·m)].
     pub lateral: Option<[S; 2]>,
-    /// Flexibility 1/EI of the slide, a cantilever of length d + q [1/(N·m²)].
+    /// Bending flexibility 1/EI of the slide, a cantilever of length d + q [1/(N·m²)].
     pub slide: Option<S>,
     /// Spring that takes up part of the moment about `z_i`.
     pub compensator: Option<Compensator<S>>,
@@ -149,12 +149,13 @@ impl Joint<f64> {
 }
 
 impl<S: Scalar> Joint<S> {
-    /// Returns true if the joint deflects about its axis.
+    /// Returns true if the joint rotates about its axis under load.
     pub(super) fn has_twist(&self) -> bool {
         self.flexibility.is_some() || self.nonlinear.is_some()
     }
 
-    /// Returns the angle about the axis under a moment [N·m] about it.
+    /// Returns the rotation about the axis under a moment [N·m] about it \[rad\]. `approach` is the
+    /// direction of approach (±1) if it is recorded.
     pub(super) fn twist(&self, moment: S, approach: Option<f64>) -> S {
         let linear =
             self.flexibility.map_or_else(|| S::from(0.0), |flexibility| flexibility * moment);
@@ -164,8 +165,8 @@ impl<S: Scalar> Joint<S> {
             .map_or(linear, |nonlinear| linear + nonlinear.twist(moment, takes_up_play))
     }
 
-    /// Returns the offset of the joint's coordinate by play, if the direction of approach is known
-    /// \[rad\] or \[m\].
+    /// Returns the offset of the joint's coordinate by play \[rad\] or \[m\]; `None` without play
+    /// or without a recorded direction of approach.
     pub(super) fn play_offset(&self, approach: Option<f64>) -> Option<S> {
         self.nonlinear
             .as_ref()
@@ -173,7 +174,8 @@ impl<S: Scalar> Joint<S> {
             .map(|(nonlinear, approach)| nonlinear.play * (0.5 * approach))
     }
 
-    /// Returns the coordinates in a configuration with `play_offset` added to q and `twist` to the angle.
+    /// Returns the coordinates at the command `q`, with `play_offset` added to q and `twist`
+    /// \[rad\] to the angle.
     pub(super) fn coordinates_with(
         &self,
         q: f64,
@@ -192,14 +194,14 @@ impl<S: Scalar> Joint<S> {
         Coordinates { angle: angle.sin_cos(), offset }
     }
 
-    /// Returns the coordinates in a configuration.
+    /// Returns the coordinates at the command `q`, without deflection and play.
     #[inline]
     pub fn coordinates(&self, q: f64) -> Coordinates<S> {
         let (angle, offset) = self.theta_and_d(q);
         Coordinates { angle: angle.sin_cos(), offset }
     }
 
-    /// Returns θ and d, one of them with q added.
+    /// Returns (θ, d) with q added to θ of a revolute joint or d of a prismatic joint.
     #[inline]
     fn theta_and_d(&self, q: f64) -> (S, S) {
         match self.kind {

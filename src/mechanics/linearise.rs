@@ -9,8 +9,8 @@ use super::workspace::{Event, Workspace};
 use crate::spatial::Frame;
 
 impl LinearisedArm {
-    /// Takes over the structure of a forward pass segment by segment; `parameters` counts those of
-    /// each segment. The derivatives are left at zero.
+    /// Copies the events of a forward pass made segment by segment; `parameters` counts the
+    /// parameters of each segment. All derivatives are left at zero.
     pub(super) fn linearise(&mut self, ws: &Workspace<Dual64>, parameters: &[usize]) {
         self.clear();
         let mut cuts = ws.cuts.iter();
@@ -79,8 +79,8 @@ impl LinearisedArm {
         self.sum_loads();
     }
 
-    /// Sets the derivatives of one direction, from the same pass with derivatives in that
-    /// direction.
+    /// Sets the derivatives of one direction, from the same pass in dual numbers with that
+    /// direction's variables.
     pub(super) fn fill(&mut self, direction: usize, ws: &Workspace<Dual64>) {
         let segments = self.steps.iter().filter_map(|step| match step {
             Step::Segment(segment) => Some(segment),

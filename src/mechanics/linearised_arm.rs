@@ -7,11 +7,11 @@ use nalgebra::Vector3;
 use super::anderson::Anderson;
 use crate::spatial::Frame;
 
-/// One vector for each coordinate of the position.
+/// One vector for each of the three coordinates of the target's position.
 pub(super) type PerCoordinate = [Vector3<f64>; 3];
 
-/// Motion of a segment's end with one parameter: a point r beyond the end moves by rotation × r +
-/// translation.
+/// Motion of a segment's end per unit of one parameter: a point r beyond the end moves by rotation
+/// × r + translation.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct EndTwist {
     /// Rotation vector per unit of the parameter \[rad\].
@@ -29,12 +29,12 @@ pub(super) enum MomentAxes {
     Moving,
 }
 
-/// Element of a forward pass, in order from the base outwards.
+/// Element of the linearised forward pass, in order from the base outwards.
 #[derive(Debug, Clone)]
 pub(super) enum Step {
     /// Force on a rigid part, by its index.
     Load(usize),
-    /// Place of unknown moments.
+    /// Place where the moments are unknowns.
     Section(Section),
     /// Segment of the arm.
     Segment(LinearisedSegment),
@@ -51,15 +51,15 @@ pub(super) enum Step {
 /// axes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct LinearisedSegment {
-    /// Index in a list of all segments.
+    /// Index of the segment in the list of all segments of the arm.
     pub index: usize,
     pub root: Frame<f64>,
     pub tip: Frame<f64>,
     pub rotates: bool,
-    /// Moments that deflect it, and their first direction.
+    /// Indices of the unknown moments that deflect it.
     pub unknowns: Range<usize>,
     pub moment_direction: usize,
-    /// First direction of its parameters, and end of all directions.
+    /// First direction that belongs to a parameter, and number of all directions.
     pub parameter_direction: usize,
     pub directions: usize,
     /// Events of the forward pass that are its loads.
@@ -83,19 +83,20 @@ impl LinearisedSegment {
     }
 }
 
-/// Place where moments are unknown.
+/// Place where moments are unknowns of the equilibrium.
 #[derive(Debug, Clone)]
 pub(super) struct Section {
     pub at: Vector3<f64>,
     pub axes: PerCoordinate,
     pub unknowns: Range<usize>,
     pub moment_axes: MomentAxes,
-    /// Force of all loads beyond, and their moment about the section.
+    /// Sum of the forces of all loads beyond \[N\].
     pub force: Vector3<f64>,
     pub moment: Vector3<f64>,
 }
 
-/// Force at a point, base frame, with the virtual force: the work that moving the point does.
+/// Force at a point, arm base frame, with its virtual force: for each coordinate of the target, its
+/// change when the point moves.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Load {
     pub at: Vector3<f64>,
@@ -122,23 +123,25 @@ impl Sums {
 #[derive(Debug, Clone, Default)]
 pub(super) struct LinearisedArm {
     pub steps: Vec<Step>,
-    /// Number of steps before the target.
+    /// Number of steps between the base and the target's frame.
     pub target: usize,
     pub loads: Vec<Load>,
     pub columns: Vec<EndTwist>,
     pub moves: Vec<Vector3<f64>>,
-    /// Influence Λ, three coordinates of each moment [m/(N·m)], and its image in the last sweep.
+    /// Influence Λ, for each moment the three coordinates of the target [m/(N·m)], and its image in
+    /// the last sweep.
     pub influence: Vec<f64>,
     pub image: Vec<f64>,
     pub anderson: Anderson,
     /// Derivatives of the position with respect to the parameters, by segment and direction.
     pub derivatives: Vec<Vector3<f64>>,
-    /// Number of directions of each segment there.
+    /// Number of directions reserved for each segment in `derivatives`.
     pub stride: usize,
 }
 
 impl LinearisedArm {
-    /// Creates an empty linearisation of `segments` with at most `directions` each.
+    /// Creates an empty linearisation of `parts` segments with at most `directions` directions
+    /// each.
     pub fn new(parts: usize, directions: usize) -> Self {
         Self {
             derivatives: vec![Vector3::zeros(); parts * directions],
@@ -147,8 +150,8 @@ impl LinearisedArm {
         }
     }
 
-    /// Returns the derivative of the position with respect to the parameter in a direction of a
-    /// segment.
+    /// Returns the derivative of the target's position, arm base frame \[m\], with respect to the
+    /// parameter in a direction of the segment with index `part`.
     pub fn derivative(&self, part: usize, direction: usize) -> Vector3<f64> {
         self.derivatives[part * self.stride + direction]
     }
@@ -190,7 +193,7 @@ impl LinearisedArm {
         }));
     }
 
-    /// Appends a segment; the last loads are its own.
+    /// Appends a segment. Its loads are the last of the loads that were added.
     pub fn push_segment(&mut self, mut segment: LinearisedSegment) {
         segment.loads = self.loads.len() - segment.events.len()..self.loads.len();
         (segment.first_column, segment.first_move) = (self.columns.len(), self.moves.len());
@@ -203,7 +206,7 @@ impl LinearisedArm {
         self.steps.push(Step::Segment(segment));
     }
 
-    /// Sums the loads beyond every section, once all steps are there.
+    /// Sums the forces and moments of the loads beyond every section, after all steps were added.
     pub fn sum_loads(&mut self) {
         let mut sums = Sums::default();
         let mut ends = Vec::new();

@@ -7,7 +7,7 @@ use super::imperfection::{AddedMass, Strain};
 use crate::problem;
 use crate::scalar::Scalar;
 
-/// Point mass on a link or a frame.
+/// Point mass that a link or a frame carries.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PointMass {
     /// Size of the mass \[kg\].

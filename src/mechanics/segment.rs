@@ -8,7 +8,8 @@ use super::arm::Arm;
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
-/// Positions of the tilts of a slide, relative to its length: Gauss–Legendre points (1 ∓ 1/√3)/2.
+/// Positions along a slide at which its bending is concentrated, relative to its length:
+/// Gauss–Legendre points (1 ∓ 1/√3)/2.
 pub(super) const SLIDE_TILTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 /// Part of the arm between two frames.
@@ -17,7 +18,7 @@ pub(super) const SLIDE_TILTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134
 pub enum Segment {
     /// Mounting of the base, which tilts.
     Mounting,
-    /// Joint with its α, and with its a if it has no beam.
+    /// Joint with its twist α, and with its length a if it has no beam.
     Joint(usize),
     /// Beam along a joint's a: one segment for every element, all with the same parameters.
     Beam(usize),
@@ -30,7 +31,8 @@ impl Segment {
         if self.is_beam() { 6 } else { 3 }
     }
 
-    /// Returns the direction of the first of `count` moments that deflect the segment together.
+    /// Returns the direction of the first of the `count` moments that deflect the segment at one
+    /// place.
     pub(super) fn moment_direction(self, count: usize) -> usize {
         match (self, count) {
             (Self::Beam(_), _) => 3,
@@ -43,7 +45,7 @@ impl Segment {
         matches!(self, Self::Beam(_))
     }
 
-    /// Returns the index in a list of all segments.
+    /// Returns the index of the segment in the list of all segments of the arm.
     pub(super) fn index(self) -> usize {
         match self {
             Self::Mounting => 0,
@@ -53,7 +55,7 @@ impl Segment {
     }
 }
 
-/// End of a segment.
+/// End of a segment in a forward pass made segment by segment.
 #[derive(Debug, Clone)]
 pub(super) struct Cut<S> {
     /// Frame at the end.
@@ -63,7 +65,7 @@ pub(super) struct Cut<S> {
     pub unknowns: (usize, usize),
 }
 
-/// Returns the directions of all moments of an arm, in their order.
+/// Returns the direction (index within its segment) of every unknown moment of an arm.
 pub(super) fn moment_directions<S: Scalar>(arm: &Arm<S>) -> Vec<usize> {
     let mut directions = Vec::new();
     let mut add = |segment: Segment, count: usize| {

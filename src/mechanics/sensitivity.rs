@@ -11,21 +11,22 @@ use super::statics::{StaticState, StaticsError};
 use super::workspace::Workspace;
 use crate::problem::{Equilibrium, PoseView};
 
-/// Differentiates poses at equilibrium with respect to the parameters of segments, each segment in
-/// its few directions.
+/// Derivatives of poses at equilibrium with respect to the parameters of segments. Direction k
+/// carries the k-th variable of every segment, so that a few passes in dual numbers suffice.
 pub struct Sensitivity {
-    /// Arm for each direction, with the parameter of every segment in that direction seeded.
+    /// One arm for each direction, with that direction's parameter of every segment as dual-number
+    /// variable.
     arms: Vec<Arm<Dual64>>,
     /// Number of parameters of each segment.
     parameters: Vec<usize>,
-    /// Direction of each moment.
+    /// Direction (index within its segment) of each unknown moment.
     directions: Vec<usize>,
     ws: Workspace<Dual64>,
     linearised: LinearisedArm,
 }
 
 impl Sensitivity {
-    /// Returns true if the method applies: loads act on the deflected arm and do not depend on the
+    /// Returns true if the method applies: loads act on the deflected arm and do not depend on its
     /// position.
     pub fn applies_to(arm: &Arm<f64>) -> bool {
         arm.equilibrium == Equilibrium::Deflected && arm.rope.is_none()

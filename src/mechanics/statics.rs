@@ -23,9 +23,11 @@ use crate::spatial::Frame;
 
 pub use super::workspace::Workspace;
 
-/// Maximum number of passes towards a fixed point; beyond it the arm is too soft for its loads.
+/// Maximum number of passes towards a fixed point. An arm that needs more is reported as too soft
+/// for its loads.
 pub(super) const MAX_EQUILIBRIUM_PASSES: usize = 200;
-/// Largest relative change of the moments, or of Λ, at convergence.
+/// Largest change per pass at convergence: of the moments relative to the sum of their magnitudes,
+/// and of Λ relative to its size.
 pub(super) const MAX_RELATIVE_CHANGE: f64 = 1e-13;
 /// Largest relative change of Λ in its last pass that is still accepted: rounding may keep Λ from
 /// settling further, and the derivatives do not change.
@@ -41,7 +43,7 @@ pub enum StaticsError {
     NotSettled,
 }
 
-/// Pose in static equilibrium.
+/// Arm in static equilibrium in one pose.
 #[derive(Debug, Clone, Default)]
 pub struct StaticState {
     /// Frame of the joint `tip`, arm base frame.
@@ -51,7 +53,7 @@ pub struct StaticState {
     pub(super) moments: Vec<f64>,
     /// Influence Λ, shape = (3, moments), row-major [m/(N·m)]; empty until it is computed.
     pub(super) adjoint: Vec<f64>,
-    /// `P_x`, shape = (3, moments), row-major, and `G_x`, column-major.
+    /// Matrices `P_x`, shape = (3, moments), row-major, and `G_x`, column-major.
     position_response: Vec<f64>,
     moment_response: Vec<f64>,
 }
@@ -128,14 +130,15 @@ impl Arm<f64> {
     }
 }
 
-/// Returns (1 − λ) of one frame plus λ of another, point by point; the result is not orthonormal.
+/// Returns (1 − λ) × `one` + λ × `other`, origins and axes alike, with λ = `mixing`; the result is
+/// not orthonormal.
 fn mixed<S: Scalar>(one: &Frame<S>, other: &Frame<S>, mixing: S) -> Frame<S> {
     let mix = |one: &Vector3<S>, other: &Vector3<S>| one + (other - one) * mixing;
     let axes = std::array::from_fn(|i| mix(&one.axes[i], &other.axes[i]));
     Frame { axes, origin: mix(&one.origin, &other.origin) }
 }
 
-/// Differentiates the equilibrium with respect to its moments.
+/// Solver for Λ, the influence of the moments' equations on the target's position at equilibrium.
 #[derive(Debug, Clone)]
 pub struct AdjointSolver {
     arm: Arm<Dual64>,
@@ -267,7 +270,8 @@ impl<S: Scalar> Arm<S> {
         position
     }
 
-    /// Returns the position on the deflected arm; `moments` is reused memory.
+    /// Returns the target's position on the deflected arm with its exact first derivatives, arm
+    /// base frame \[m\]; `moments` is reused memory.
     fn at_rest(
         &self,
         setup: &PoseView,
@@ -296,7 +300,7 @@ impl<S: Scalar> Arm<S> {
         self.equilibrium == Equilibrium::Undeflected
     }
 
-    /// Updates the forces of ropes that lean with the unknowns.
+    /// Updates the forces of ropes that may lean, from the hook positions in the unknowns `state`.
     pub(super) fn update_leaning_ropes(
         &self,
         setup: &PoseView,

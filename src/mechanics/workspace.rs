@@ -12,7 +12,7 @@ use crate::spatial::Frame;
 /// Event of a forward pass, in order from the base outwards.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Event<S> {
-    /// A force \[N\] at a point \[m\].
+    /// Force \[N\] at a point \[m\], arm base frame.
     Load { at: Vector3<S>, force: Vector3<S> },
     /// Tip of a beam element: its three moments are unknown.
     Tip { at: Vector3<S> },
@@ -21,11 +21,11 @@ pub(super) enum Event<S> {
     Axis { at: Vector3<S>, axis: Vector3<S>, pull: Option<S> },
     /// Tilt about two axes: the moments about them are unknown.
     Tilt { at: Vector3<S>, axes: [Vector3<S>; 2] },
-    /// End of a segment, in a pass segment by segment.
+    /// End of a segment; only in a pass made segment by segment.
     Cut,
-    /// Start of this many branches besides the next one.
+    /// Fork at which `branches` more branches start besides the one that follows.
     Fork { branches: usize },
-    /// End of a branch; the next one starts at the last fork that has one left.
+    /// End of a branch; the next one starts at the last fork with a branch still to be passed.
     Branch,
 }
 
@@ -38,14 +38,14 @@ pub struct Workspace<S> {
     /// Position of each hook, x and y in the arm base frame \[m\], if ropes may lean; unknowns
     /// before all moments.
     pub(super) hooks: Vec<[S; 2]>,
-    /// Ends of segments, in a pass segment by segment.
+    /// Ends of segments, recorded by a pass made segment by segment.
     pub(super) cuts: Vec<Cut<S>>,
-    /// Number of events before the frame of the requested joint.
+    /// Number of events recorded before the frame of the requested joint.
     pub(super) passed: usize,
-    /// Frames at which branches are still to start, the last first.
+    /// Frames at which branches are still to be passed, the last one first.
     pub(super) forks: Vec<Frame<S>>,
-    /// Mass \[kg\] and hoist force \[N\] of branches whose fork is still to come; likewise forces
-    /// and moments.
+    /// Mass \[kg\] and hoist force \[N\] of branches that have been summed but not yet added to
+    /// their trunk.
     pub(super) weights: Vec<(S, Vector3<S>)>,
     pub(super) wrenches: Vec<(Vector3<S>, Vector3<S>)>,
     /// Frames behind the mounting and behind each joint in the last pass, if they are kept.
@@ -62,7 +62,7 @@ pub struct Workspace<S> {
     pub(super) trail: Vec<Vector3<S>>,
     pub(super) link_loads: Vec<LinkLoad<S>>,
     pub(super) points: Vec<(S, Wrench<S>)>,
-    /// Acceleration of the passes towards equilibrium.
+    /// Anderson acceleration of the passes towards equilibrium.
     pub(super) anderson: Anderson,
 }
 
@@ -105,7 +105,7 @@ impl Workspace<f64> {
 }
 
 impl<S: Scalar> Workspace<S> {
-    /// Appends a frame of the pass, if frames are kept.
+    /// Appends the frame behind a joint, if the caller asked for all frames.
     #[inline]
     pub(super) fn keep(&mut self, frame: &Frame<S>) {
         if self.keeps_frames {

@@ -11,9 +11,10 @@ use crate::model::parameter::{ArmField, BeamField, ParameterSite};
 pub enum Ablation {
     /// No elasticity: geometry alone.
     Rigid,
-    /// Rotation of joints, bending of slides, and the base.
+    /// Elasticity of joints and of the base: rotation of revolute joints, bending of slides; rigid
+    /// links.
     JointsOnly,
-    /// Stretch, bending and twist of the links.
+    /// Elasticity of the links: stretch, bending and twist; rigid joints and base.
     LinksOnly,
     /// Bending of the links alone.
     BendingOnly,
@@ -26,7 +27,7 @@ impl Ablation {
     pub const EACH: [Self; 5] =
         [Self::Rigid, Self::JointsOnly, Self::LinksOnly, Self::BendingOnly, Self::All];
 
-    /// Returns the name in results.
+    /// Returns the ablation's name as results write it.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Rigid => "rigid",

@@ -12,10 +12,11 @@ use crate::problem::Problem;
 ///
 /// A mimic joint moves by ratio × the correction of its leader.
 pub struct CommandResiduals<'a> {
-    /// Residuals over the commands, followed by the coordinates of mimic joints.
+    /// Residuals as a function of the corrections to all coordinates: the commands, then those of
+    /// the mimic joints.
     joints: PoseResiduals<'a>,
     commands: usize,
-    /// Column of the leader and ratio of each mimic joint.
+    /// Column of the leader's correction, and ratio, of each mimic joint.
     followers: Vec<(usize, f64)>,
 }
 
@@ -34,7 +35,8 @@ impl<'a> CommandResiduals<'a> {
         Self { joints, commands, followers }
     }
 
-    /// Returns the corrections to all coordinates, mimic joints included.
+    /// Returns the corrections to all coordinates for corrections `x` to the commands \[rad\] or
+    /// \[m\]; those of mimic joints follow their leaders.
     fn all_corrections(&self, x: &DVector<f64>) -> DVector<f64> {
         let followers = self.followers.iter().map(|&(leader, ratio)| ratio * x[leader]);
         DVector::from_iterator(

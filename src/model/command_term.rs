@@ -5,7 +5,7 @@ use crate::model::parameter::{
 };
 use crate::problem::{Mimic, Problem};
 
-/// Quantity that a term adds to.
+/// Quantity that a term adds to: a joint coordinate or a beam's strain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TermSite {
     /// Coordinate of a joint.
@@ -43,7 +43,8 @@ impl CommandTerm {
         terms.collect()
     }
 
-    /// Returns the fixed terms and those of the free parameters at the full parameter vector `x`.
+    /// Returns the fixed terms and, after them, the terms of the free parameters at the full
+    /// parameter vector `x`.
     pub fn all(fixed: &[Self], parameters: &[Parameter], x: &[f64]) -> Vec<Self> {
         let free = (0..parameters.len()).filter_map(|k| {
             let site = TermSite::of(parameters[k].site)?;
@@ -55,7 +56,8 @@ impl CommandTerm {
 }
 
 impl TermSite {
-    /// Returns the coordinate of a joint or the strain of a beam at a parameter's site.
+    /// Returns the joint coordinate or the beam strain that a parameter at `site` adds to; `None`
+    /// for every other site.
     fn of(site: ParameterSite) -> Option<Self> {
         match site {
             ParameterSite::Joint { joint, field: JointField::Theta | JointField::D } => {

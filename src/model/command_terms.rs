@@ -9,7 +9,7 @@ use crate::problem::PoseView;
 #[derive(Debug, Clone, Default)]
 pub(super) struct CommandTerms {
     series: Vec<HarmonicSum>,
-    /// Terms that are in no series.
+    /// Terms that no [`HarmonicSum`] contains.
     others: Vec<CommandTerm>,
     configuration: Vec<f64>,
     strains: Vec<[f64; 3]>,

@@ -10,46 +10,46 @@ use crate::problem::{BasePose, PoseView};
 use crate::scalar::{gradient, seeded};
 use crate::spatial::{Frame, rotation_axes};
 
-/// Base frame with the derivatives of its six coordinates, and the columns of these.
+/// Base frame with its derivatives, and the Jacobian column of each of its six coordinates.
 #[derive(Clone)]
 pub(super) struct Base {
     /// Frame of the base, measuring frame.
     pub frame: Frame<f64>,
-    /// Directions in which its translation's coordinates move it, measuring frame.
+    /// Unit vectors along which its translation coordinates x, y and z move it, measuring frame.
     pub directions: [Vector3<f64>; 3],
     /// Derivatives of its axes with respect to its rotation vector.
     rotation_slopes: [Frame<f64>; 3],
-    /// Columns of effects that rotate it about the measuring frame's origin, with the derivative of
-    /// that rotation.
+    /// Jacobian columns of effects that rotate it about the measuring frame's origin, each with the
+    /// derivative of that rotation.
     effect_slopes: Vec<(usize, Frame<f64>)>,
-    /// Columns of translation and rotation vector.
+    /// Jacobian columns of its translation and its rotation vector; `None` for fixed coordinates.
     pub columns: [Option<usize>; 6],
 }
 
-/// Target with the derivatives of its six coordinates, and the columns of these.
+/// Target with its derivatives, and the Jacobian column of each of its six coordinates.
 pub(super) struct Target {
     /// Index of the joint whose frame carries it.
     pub joint: usize,
-    /// Position in that frame \[m\].
+    /// Position in the joint's frame \[m\].
     pub position: Vector3<f64>,
-    /// Axes in that frame.
+    /// Unit vectors of its axes, joint's frame.
     pub axes: [Vector3<f64>; 3],
     /// Derivatives of the axes with respect to its rotation vector.
     rotation_slopes: [Frame<f64>; 3],
-    /// Columns of position and rotation vector.
+    /// Jacobian columns of its position and its rotation vector; `None` for fixed coordinates.
     pub columns: [Option<usize>; 6],
 }
 
-/// Method that differentiates the arm with respect to its parameters.
+/// Method that differentiates the arm with respect to its parameters: rigid kinematics or statics.
 pub(super) enum ArmDerivatives {
-    /// Derivatives of a rigid arm, motion by motion.
+    /// Derivatives of a rigid arm, one elementary motion (rotation or translation) at a time.
     Rigid(Rigid),
     /// Derivatives of an elastic arm, through the statics.
     Elastic(Box<Elastic>),
 }
 
 impl Base {
-    /// Creates the base at a pose in the measuring frame, without columns.
+    /// Creates the base at a pose in the measuring frame, with all its coordinates fixed.
     pub fn new(pose: &BasePose) -> Self {
         Self {
             frame: Frame::from_rotation_vector(pose.translation, &pose.rotation),
@@ -84,7 +84,7 @@ impl Base {
         }
     }
 
-    /// Returns, for each parameter that rotates the base, its column and the derivative of a point
+    /// Returns the column of each parameter that rotates the base, with the derivative of a point
     /// \[m\] that moves with the base, measuring frame.
     pub fn point_slopes<'b>(
         &'b self,
@@ -98,8 +98,8 @@ impl Base {
         rotation_vector.chain(effects)
     }
 
-    /// Returns, for each parameter that rotates the base, its column and the angular velocity ω of
-    /// the axes e, measuring frame: ω = ½ Σ eₖ × deₖ.
+    /// Returns the column of each parameter that rotates the base, with the rotation vector of the
+    /// base per unit of the parameter, measuring frame: ω = ½ Σ eₖ × deₖ for its axes eₖ.
     pub fn angular_velocities(&self) -> impl Iterator<Item = (usize, Vector3<f64>)> + '_ {
         let axes = &self.frame.axes;
         let rotation_vector = self.rotation_columns().map(|(column, slope)| (column, slope.axes));
@@ -119,7 +119,7 @@ impl Base {
 
 impl Target {
     /// Creates the target at a position \[m\] and with a rotation vector \[rad\] in the frame of a
-    /// joint, without columns.
+    /// joint, with all its coordinates fixed.
     pub fn new(joint: usize, position: Vector3<f64>, rotation: &Vector3<f64>) -> Self {
         Self {
             joint,
@@ -159,7 +159,8 @@ impl ArmDerivatives {
     }
 }
 
-/// Returns the angular velocity of axes from their derivatives: ω = ½ Σ eₖ × deₖ.
+/// Returns the rotation vector per unit of a parameter of axes eₖ with derivatives (`slopes`) deₖ:
+/// ω = ½ Σ eₖ × deₖ.
 pub(super) fn angular_velocity(
     axes: &[Vector3<f64>; 3],
     slopes: &[Vector3<f64>; 3],

@@ -15,33 +15,34 @@ use crate::model::parameter::{ArmField, BeamField, JointField, ParameterSite};
 use crate::problem::PoseView;
 use crate::spatial::Frame;
 
-/// Elastic arm, differentiated segment by segment for parameters of one segment, and as a whole for
-/// the others.
+/// Derivatives of an elastic arm: segment by segment for parameters that act on a single segment,
+/// through the whole statics for the others.
 pub(super) struct Elastic {
     segments: Option<SegmentInputs>,
     adjoint: AdjointSolver,
     whole: Vec<WholeArmInput>,
     arm: Arm<f64>,
     state: StaticState,
-    /// Memory for forward passes.
+    /// Memory for forward passes in real numbers.
     real: Workspace<f64>,
     ws: Workspace<Dual64>,
 }
 
-/// Parameters of single segments, with the direction of each in its segment.
+/// Parameters that act on a single segment, with their segment and direction index in it.
 struct SegmentInputs {
     sensitivity: Sensitivity,
     inputs: Vec<(Input, Segment, usize)>,
 }
 
-/// Input of the whole arm, with the arm in which it is seeded.
+/// Input that changes loads, with a copy of the arm in which it is the dual-number variable.
 struct WholeArmInput {
     arm: Arm<Dual64>,
     input: Input,
 }
 
 impl Elastic {
-    /// Creates the derivatives of `arm`, which is that of the model at `x`.
+    /// Creates the derivatives of `arm` with respect to `inputs`. `arm` is that of the model at the
+    /// full parameter vector `x`.
     pub fn new(model: &Model, x: &[f64], arm: Arm<f64>, inputs: Vec<Input>) -> Self {
         let (mut by_segment, mut whole) = (Vec::new(), Vec::new());
         for input in inputs {
@@ -82,8 +83,8 @@ impl Elastic {
         }
     }
 
-    /// Writes the derivatives of a target \[m\] in the frame of the joint `tip`. Returns that
-    /// frame, measuring frame, or `None` without equilibrium.
+    /// Writes the derivatives of a target, given by its position \[m\] in the frame of the joint
+    /// `tip`. Returns the frame of `tip`, measuring frame, or `None` without equilibrium.
     pub fn write(
         &mut self,
         (commanded, setup): (&PoseView, &PoseView),
@@ -119,7 +120,7 @@ impl Elastic {
     }
 }
 
-/// Returns the segment that alone contains an input; `None` if the input changes loads.
+/// Returns the only segment on which an input acts; `None` if the input changes loads.
 fn segment_of(arm: &Arm<f64>, site: ParameterSite) -> Option<Segment> {
     match site {
         ParameterSite::Joint { joint, field: JointField::A }
@@ -135,7 +136,8 @@ fn segment_of(arm: &Arm<f64>, site: ParameterSite) -> Option<Segment> {
     }
 }
 
-/// Returns the arm at `x` with some inputs seeded, no two of which belong to the same segment.
+/// Returns the arm at the full parameter vector `x` with the given inputs as dual-number variables.
+/// No two inputs may belong to the same segment.
 pub(super) fn seed_arm(model: &Model, x: &[f64], inputs: &[&Input]) -> Arm<Dual64> {
     let is_seeded = |k: usize| inputs.iter().any(|input| input.parameter == Some(k));
     let mut arm = model.arm(|k| Dual64::new(x[k], f64::from(u8::from(is_seeded(k)))));

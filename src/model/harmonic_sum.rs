@@ -5,13 +5,15 @@ use multiversion::multiversion;
 use super::command_term::{CommandTerm, TermSite};
 use crate::model::parameter::Regressor;
 
-/// Number of orders that are evaluated together.
+/// Number of consecutive orders that one vector operation evaluates.
 const LANES: usize = 4;
-/// Minimum number of harmonics for which a sum saves time.
+/// Minimum number of harmonics from which a sum by recurrence is faster than separate evaluation
+/// (timed).
 const MIN_HARMONICS: usize = 8;
-/// Minimum average number of sines and cosines in a group of [`LANES`] orders.
+/// Minimum average number of sines and cosines in a group of [`LANES`] orders, below which most
+/// lanes would multiply zeros.
 const MIN_DENSITY: usize = 2;
-/// Largest order in a sum.
+/// Largest order k in a sum; it limits the memory of a sum with few high orders.
 const MAX_ORDER: u32 = 1024;
 
 /// Sum Σ aₖ sin kq + bₖ cos kq over orders k = 1, 2, … of one joint's command q.
@@ -56,14 +58,14 @@ impl HarmonicSum {
         taken
     }
 
-    /// Returns the value in a configuration.
+    /// Returns the value of the sum at the commands `configuration` \[rad\] or \[m\].
     pub fn value(&self, configuration: &[f64]) -> f64 {
         sum(&self.terms, configuration[self.joint].sin_cos())
     }
 }
 
-/// Returns joint, order less one, and 0 for a sine or 1 for a cosine; `None` if the regressor is no
-/// harmonic of integer order.
+/// Returns (joint, order − 1, 0 for a sine or 1 for a cosine); `None` if the regressor is no
+/// harmonic of integer order up to [`MAX_ORDER`].
 fn wave(regressor: &Regressor) -> Option<(usize, usize, usize)> {
     match *regressor {
         Regressor::Sine(joint, order) if (1..=MAX_ORDER).contains(&order) => {
@@ -76,7 +78,7 @@ fn wave(regressor: &Regressor) -> Option<(usize, usize, usize)> {
     }
 }
 
-/// Returns the sum, given sine and cosine of the command; the next orders follow by rotation.
+/// Returns the sum for `first` = (sin q, cos q). Angle-addition formulas give the higher orders.
 #[multiversion(targets("x86_64+avx2"))]
 fn sum(terms: &[[[f64; LANES]; 2]], first: (f64, f64)) -> f64 {
     let rotated = |(sin, cos): (f64, f64), (by_sin, by_cos): (f64, f64)| {

@@ -4,21 +4,21 @@
 use super::Model;
 use crate::model::parameter::{ParameterSite, Regressor, slope_regressor};
 
-/// Scalar of the arm with the columns of the parameters that act on it.
+/// Scalar of the arm with the Jacobian columns of the parameters that act on it.
 #[derive(Debug, Clone)]
 pub(super) struct Input {
     pub site: ParameterSite,
-    /// Parameter that equals this scalar, if it is an unknown.
+    /// Index of the parameter that equals this scalar, if one does and is unknown.
     pub parameter: Option<usize>,
-    /// Column of that parameter.
+    /// Jacobian column of that parameter.
     pub column: Option<usize>,
-    /// Columns of the parameters that add to the scalar, each with the regressor that multiplies
-    /// it.
+    /// Jacobian columns of the parameters that add to the scalar, each with the regressor that
+    /// multiplies it.
     pub regressors: Vec<(usize, Regressor)>,
 }
 
-/// Returns the inputs of the arm at the full parameter vector `x` for some unknowns, whose column
-/// is their place in the list.
+/// Returns the inputs of the arm that the `unknowns` act on, at the full parameter vector `x`.
+/// Column j belongs to the parameter `unknowns[j]`.
 pub(super) fn inputs(model: &Model, x: &[f64], unknowns: &[usize]) -> Vec<Input> {
     let mut inputs: Vec<Input> = Vec::new();
     for (column, &k) in unknowns.iter().enumerate() {

@@ -14,7 +14,7 @@ use crate::spatial::Frame;
 pub(super) struct Instrument {
     /// Relative scale error s.
     pub scale: f64,
-    /// Strain E; `None` if no parameter of it is free.
+    /// Strain E of the measuring frame; `None` counts as zero.
     strain: Option<Matrix3<f64>>,
     /// Axis, regressor and size [m per unit of the regressor] of each displacement d.
     shifts: Vec<(usize, Regressor, f64)>,
@@ -23,7 +23,8 @@ pub(super) struct Instrument {
 }
 
 impl Instrument {
-    /// Returns the instrument with the free parameters at the full parameter vector `x`.
+    /// Returns the instrument with the errors that the free parameters add at the full parameter
+    /// vector `x`.
     pub fn with(&self, parameters: &[Parameter], x: &[f64]) -> Self {
         let mut instrument = self.clone();
         for (k, (parameter, &value)) in parameters.iter().zip(x).enumerate() {
@@ -48,18 +49,19 @@ impl Instrument {
         instrument
     }
 
-    /// Returns axis, regressor and size of each displacement and of each rotation.
+    /// Returns two lists of (axis, regressor, size): displacements, then rotations.
     pub fn terms(&self) -> [&[(usize, Regressor, f64)]; 2] {
         [&self.shifts, &self.rotations]
     }
 
-    /// Returns the strain as its entries, in the order of [`ParameterSite::Strain`].
+    /// Returns the six entries of the strain, in the order of [`ParameterSite::Strain`]; zeros
+    /// without a strain.
     pub fn strain_entries(&self) -> [f64; 6] {
         self.strain.map_or([0.0; 6], |strain| STRAIN_PLACES.map(|place| strain[place]))
     }
 
-    /// Returns the part that moves the arm itself: motions of the bases. Errors of the instrument
-    /// are left out.
+    /// Returns only the motions of the bases, which displace the arm itself, without errors of the
+    /// instrument's readings.
     pub fn without_errors(&self) -> Self {
         let of_bases = |terms: &[(usize, Regressor, f64)]| {
             terms.iter().filter(|(_, regressor, _)| regressor.moves_base()).cloned().collect()
@@ -85,8 +87,8 @@ impl Instrument {
         reading
     }
 
-    /// Returns the derivative of the reading of a position \[m\] with respect to a parameter at an
-    /// instrument's `site`; 0 for other sites.
+    /// Returns the derivative of the reading of a position \[m\] with respect to a parameter at
+    /// `site`, per unit; 0 for sites that are no error of the instrument.
     pub fn slope(
         site: ParameterSite,
         position: &Vector3<f64>,
@@ -101,8 +103,8 @@ impl Instrument {
         }
     }
 
-    /// Returns I + E / (1 + s): the factor from derivatives that contain the scale to those of the
-    /// reading; `None` without a strain.
+    /// Returns I + E / (1 + s). It converts derivatives that already contain the factor 1 + s to
+    /// those of the reading. `None` without a strain.
     pub fn relative_strain(&self) -> Option<Matrix3<f64>> {
         self.strain.map(|strain| Matrix3::identity() + strain / (1.0 + self.scale))
     }
@@ -127,14 +129,14 @@ impl Instrument {
         }
     }
 
-    /// Returns the derivative of the displacements with respect to the command of a joint, counted
-    /// from 0 [m/rad] or \[m/m\].
+    /// Returns the derivative of the sum of displacements with respect to the command of a joint,
+    /// counted from 0 [m/rad] or \[m/m\].
     pub fn command_slope(&self, setup: &PoseView, joint: usize) -> Vector3<f64> {
         sum(&self.shifts, |regressor| regressor.slope(setup, joint))
     }
 }
 
-/// Returns Σ size × value of the regressor, by axis.
+/// Returns Σ size × value(regressor) of the terms of each axis.
 fn sum(terms: &[(usize, Regressor, f64)], value: impl Fn(&Regressor) -> f64) -> Vector3<f64> {
     let mut sum = Vector3::zeros();
     for (axis, regressor, size) in terms {
@@ -146,7 +148,12 @@ fn sum(terms: &[(usize, Regressor, f64)], value: impl Fn(&Regressor) -> f64) -> 
 /// Row and column of each entry of a strain, in the order of [`ParameterSite::Strain`].
 const STRAIN_PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
-/// Returns ∂E by one of its entries, in the order of [`ParameterSite::Strain`].
+/// Returns the derivative of E with respect to one of its entries, in the order of
+/// [`ParameterSite::Strain`].
+/// @1! Residuals of rows with their derivatives, in dual numbers where few variables suffice.
+///
+/// A base or a target moves the position rigidly, and on a rigid arm so does every parameter of a
+/// link. On an elastic arm a parameter also changes the moments of the loads.
 fn unit_strain(entry: usize) -> Matrix3<f64> {
     let mut matrix = Matrix3::zeros();
     if let Some(place) = STRAIN_PLACES.get(entry) {

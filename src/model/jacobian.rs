@@ -28,25 +28,25 @@ pub(super) struct JacobianWriter<'m> {
     model: &'m Model,
     commands: CommandTerms,
     instrument: Instrument,
-    /// Columns of the instrument's errors, with site and regressor.
+    /// Site, regressor and Jacobian column of each unknown error of the instrument.
     instrument_columns: Vec<(ParameterSite, Regressor, usize)>,
-    /// Columns of effects that rotate every base: axis, regressor, column.
+    /// Axis, regressor and Jacobian column of each unknown that rotates every base.
     base_rotations: Vec<(usize, Regressor, usize)>,
     bases: Vec<Base>,
     targets: Vec<Target>,
     fixtures: Vec<FixtureValues<f64>>,
-    /// Columns of the numbers of each fixture.
+    /// Jacobian columns of the numbers of each fixture; `None` for fixed numbers.
     fixture_columns: Vec<[Option<usize>; MAX_NUMBERS]>,
-    /// Derivatives of tilts, if some are measured.
+    /// Derivatives of tilts; `None` if the rows measure no tilt.
     tilts: Option<TiltDerivatives>,
     arm: ArmDerivatives,
-    /// Derivatives of points on the arm, reused from row to row.
+    /// Memory for derivatives of points on the arm, reused from row to row.
     points: Block,
 }
 
 impl<'m> JacobianWriter<'m> {
     /// Creates a writer at the full parameter vector `x`; `unknowns[j]` is the parameter of column
-    /// j. Only an `oriented` writer takes orientations, only a `tilted` one takes tilts.
+    /// j. `oriented` is required for rows with orientations, `tilted` for rows with tilts.
     pub fn new(
         model: &'m Model,
         x: &[f64],
@@ -113,8 +113,8 @@ impl<'m> JacobianWriter<'m> {
         }
     }
 
-    /// Writes the whitened residual of a row and its derivatives into three rows of a block of
-    /// zeros, six with its orientation.
+    /// Writes the whitened residual of a row and its derivatives into a block of zeros, from row
+    /// `row` on: three rows, six if the row has an orientation.
     #[inline]
     pub fn write(&mut self, pose: &Pose, block: &mut Block, row: usize) {
         if pose.observation.is_position() {
@@ -124,8 +124,8 @@ impl<'m> JacobianWriter<'m> {
         }
     }
 
-    /// Writes a row that is not a position: the derivatives of its prediction, times those of the
-    /// target, of the base and of the fixtures.
+    /// Writes the whitened residual and derivatives of a row that measures anything but a position,
+    /// by the chain rule through target, base and fixtures.
     fn write_other(&mut self, pose: &Pose, block: &mut Block, row: usize) {
         let (observation, last_column) = (pose.observation, block.parameters());
         let mut rows = Rows { block, row, scale: -1.0 / pose.sigma };
@@ -184,11 +184,12 @@ impl<'m> JacobianWriter<'m> {
         rows.put(last_column, &(slopes.value - pose.measured));
     }
 
-    /// Writes the derivatives of a row with respect to the arm and the base that move the frames
-    /// which carry its fixtures, and returns those of its prediction; `None` without equilibrium.
+    /// Writes the derivatives of a row with respect to the arm and the base, which move the frames
+    /// that carry its fixtures. Returns the derivatives of its prediction with respect to the
+    /// fixtures' numbers; `None` without equilibrium.
     ///
-    /// Only the motion of the second fixture's point against the frame of the first one counts: the
-    /// point's motion with its own carrier, less its motion as if the first carrier held it.
+    /// Only the motion of the second fixture's point relative to the frame of the first one counts:
+    /// the point's motion with its carrier, less its motion if it were fixed to the first carrier.
     fn write_carriers(
         &mut self,
         pose: &Pose,
@@ -235,7 +236,7 @@ impl<'m> JacobianWriter<'m> {
         Some(by)
     }
 
-    /// Returns the base as effects rotate it in a pose; `None` if none does.
+    /// Returns the base as effects rotate it in a pose; `None` if no effect rotates bases.
     fn rotated(&self, base: &Base, pose: &Pose) -> Option<Base> {
         self.instrument.rotates_bases().then(|| {
             let columns = self
@@ -278,8 +279,8 @@ impl<'m> JacobianWriter<'m> {
     }
 }
 
-/// Writes the derivatives of the target's position with respect to base and target; returns that
-/// position, measuring frame \[m\]. `frame` carries the target.
+/// Writes the derivatives of the target's position with respect to base and target. Returns that
+/// position, measuring frame \[m\]. `frame` carries the target, arm base frame.
 #[inline]
 fn write_placement(
     frame: &Frame<f64>,

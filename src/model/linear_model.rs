@@ -11,20 +11,22 @@ use crate::least_squares::Block;
 use crate::least_squares::kernel::sum_of_squares;
 use crate::model::parameter::Parameter;
 
-/// Relative difference up to which two numbers, or two residual vectors, count as the same.
+/// Largest relative difference at which two numbers, or two residual vectors, count as equal. It is
+/// far above rounding and far below any change of a fit.
 const MAX_RELATIVE_DIFFERENCE: f64 = 1e-9;
 
-/// Whitened residuals of some rows and their derivatives at a point, by the name of the parameter;
-/// three residuals a row.
+/// Whitened residuals of some rows and their derivatives at a point, by parameter name; three
+/// residuals a row.
 ///
 /// A model of the same arm with more effects has the same residuals and derivatives at this point,
-/// because an effect does nothing while its parameters are 0. Only the columns of the new effects
-/// have to be formed. A name stands for the same parameter in both models.
+/// because an effect vanishes while its parameters are 0. Only the columns of the new effects have
+/// to be computed. A name means the same parameter in both models.
 #[derive(Debug, Clone)]
 pub(crate) struct LinearModel {
-    /// Deviation of each parameter from nominal, and its column if it has one.
+    /// Deviation of each parameter from nominal at the point, and its Jacobian column; `None` if it
+    /// was not unknown.
     parameters: BTreeMap<String, (f64, Option<usize>)>,
-    /// 1 σ of each row.
+    /// Standard deviation (1 σ) of each row \[m\] or \[rad\].
     sigma: Vec<f64>,
     jacobian: Arc<DMatrix<f64>>,
     residual: Arc<DVector<f64>>,
@@ -48,8 +50,9 @@ impl LinearModel {
         Self { parameters, sigma, jacobian, residual }
     }
 
-    /// Fills the block of some rows at the full parameter vector `x`: known columns are copied, the
-    /// others and the residual are formed by `write`, which takes their unknowns.
+    /// Fills the block with the residuals and derivatives of some rows at the full parameter vector
+    /// `x`. Stored columns are copied; `write` computes the residual and the columns of the
+    /// unknowns that it is given.
     ///
     /// Returns false, with the block unchanged, if `x` is another point or the rows are others.
     pub fn fill(

@@ -57,7 +57,7 @@ pub use self::{ablation::Ablation, pose::Pose, pose_residuals::PoseResiduals};
 #[derive(Debug, Clone)]
 pub struct Model {
     nominal: Arm<f64>,
-    /// Terms that add to the joints' commands and are not free.
+    /// Terms with fixed coefficients that add to the joints' commands.
     fixed_terms: Vec<CommandTerm>,
     instrument: Instrument,
     bases: Vec<BasePose>,
@@ -66,9 +66,10 @@ pub struct Model {
     target_joints: Vec<usize>,
     /// Orientation of each target in that frame, as a rotation vector \[rad\].
     target_rotations: Vec<Vector3<f64>>,
-    /// Declared values of points, anchors and surfaces; undeclared numbers are 0.
+    /// Declared values of the fixtures (points, anchors, surfaces, cameras, markers); undeclared
+    /// numbers are 0.
     fixtures: Vec<FixtureValues<f64>>,
-    /// Declared fixtures.
+    /// Declarations of the fixtures, in the order of `fixtures`.
     declared: Vec<Fixture>,
     /// Free parameters, in the order of every full parameter vector.
     #[doc(hidden)]
@@ -83,8 +84,8 @@ impl Model {
     /// target per name in `targets`.
     ///
     /// # Errors
-    /// A rule of `[parameters]` or a constraint fits no parameter, or the problem declares targets
-    /// but not all of these.
+    /// A rule of `[parameters]` or a constraint matches no parameter, or a name in
+    /// `targets` is not among the problem's declared targets.
     pub fn new(
         problem: &Problem,
         bases: &[String],
@@ -120,11 +121,11 @@ impl Model {
         })
     }
 
-    /// Returns the model with an additional free parameter at each site, which has no effect at
-    /// zero.
+    /// Returns the model with one more free parameter at each site, which leaves predictions
+    /// unchanged while it is zero.
     ///
-    /// Each site comes with its value without deviations. A declared value of the arm takes
-    /// precedence.
+    /// Each site comes with the value that the quantity has there without deviations. A value that
+    /// the arm declares takes precedence.
     #[must_use]
     pub(crate) fn with_probes(&self, sites: &[(ParameterSite, f64)]) -> Self {
         let mut model = self.clone();
@@ -148,7 +149,8 @@ impl Model {
         model
     }
 
-    /// Returns the model with the springs that these effects declare, which have no force yet.
+    /// Returns the model with the gravity compensators (springs) that these effects declare, with
+    /// zero spring force.
     #[must_use]
     pub(crate) fn with_springs_of(&self, effects: &[Effect]) -> Self {
         let mut model = self.clone();
@@ -182,13 +184,14 @@ impl Model {
         if reach > 0.0 { reach } else { 1.0 }
     }
 
-    /// Returns true if bounds or constraints limit the parameters.
+    /// Returns true if at least one parameter has a bound or a constraint.
     #[doc(hidden)]
     pub fn is_bounded(&self) -> bool {
         !self.constraints.is_empty() || self.parameters.iter().any(Parameter::is_bounded)
     }
 
-    /// Returns the arm with parameter k at deviation `x(k)`; other values are as declared.
+    /// Returns the arm whose parameter k deviates by `x(k)` from nominal; all other quantities are
+    /// as declared.
     #[doc(hidden)]
     pub fn arm<S: Scalar>(&self, x: impl Fn(usize) -> S) -> Arm<S> {
         let mut arm = self.nominal.lift();
@@ -260,7 +263,7 @@ impl Model {
         targets
     }
 
-    /// Returns true if the problem declares a number of a fixture.
+    /// Returns true if the problem declares number `axis` of a fixture.
     pub(crate) fn is_declared(&self, fixture: usize, axis: usize) -> bool {
         self.declared
             .get(fixture)
@@ -268,14 +271,15 @@ impl Model {
             .is_some_and(Option::is_some)
     }
 
-    /// Returns the frame of the arm that carries each fixture of a row: 0 is the base, i that of
-    /// joint i; `None` if it stands in the measuring frame.
+    /// Returns the frame of the arm that carries each of a row's two fixtures: 0 is the base, i the
+    /// frame of joint i. `None` if the fixture is at rest in the measuring frame.
     pub(crate) fn carriers(&self, observation: Observation) -> [Option<usize>; 2] {
         let carrier = |fixture: Option<usize>| self.declared.get(fixture?)?.carrier;
         observation.fixtures().map(carrier)
     }
 
-    /// Returns the point of the second fixture that a row measures, in the fixture's frame \[m\].
+    /// Returns the point of the second fixture (for example a board's corner) that a row measures,
+    /// in the fixture's frame \[m\].
     pub(crate) fn fixture_point(&self, observation: Observation) -> Vector3<f64> {
         let point = || {
             let fixture = self.declared.get(observation.fixtures()[1]?)?;

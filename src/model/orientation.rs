@@ -10,12 +10,12 @@ use crate::least_squares::Block;
 use crate::problem::PoseView;
 use crate::spatial::{Frame, inverse_right_jacobian, rotation_between};
 
-/// Rows of the derivatives of four points: the target and the ends of its three axes, 1 m long.
+/// Number of derivative rows of four points: the target and the ends of its three axes, 1 m long.
 pub(super) const POINT_ROWS: usize = 12;
 
-/// Pose at which an orientation is differentiated.
+/// Everything at which the orientation of one pose is differentiated.
 pub(super) struct Place<'a> {
-    /// Pose as commanded, and with the corrections of its commands.
+    /// Pose with the commands as given, and with the corrections that terms add to them.
     pub setups: (&'a PoseView<'a>, &'a PoseView<'a>),
     /// Base of the arm.
     pub base: &'a Base,
@@ -25,8 +25,8 @@ pub(super) struct Place<'a> {
     pub frame: &'a Frame<f64>,
 }
 
-/// Writes the whitened residual log(R Rₚᵀ) / σ and its derivatives into three rows of a block of
-/// zeros.
+/// Writes the whitened residual log(R Rₚᵀ) / σ of measured R and predicted Rₚ and its derivatives
+/// into three rows of a block of zeros.
 ///
 /// With eₖ the axes of Rₚ and deₖ their derivatives, Rₚ rotates by ω = ½ Σ eₖ × deₖ, and the
 /// residual r changes by −J⁻¹(r) ω ([`inverse_right_jacobian`]).

@@ -25,8 +25,8 @@ pub struct Pose<'a> {
 }
 
 impl Pose<'_> {
-    /// Returns the count of measured numbers: those of the observation, and three of a fitted
-    /// orientation.
+    /// Returns the number of measured scalars: those of the observation, plus three if an
+    /// orientation is fitted.
     pub fn coordinates(&self) -> usize {
         self.observation.coordinates() + if self.orientation.is_some() { 3 } else { 0 }
     }
@@ -35,7 +35,7 @@ impl Pose<'_> {
 /// Measured orientation of a target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredOrientation<'a> {
-    /// Orientation in the measuring frame; `None` for planned poses, which count as measured
+    /// Orientation in the measuring frame; `None` for planned poses, which are treated as measured
     /// without error.
     pub measured: Option<&'a UnitQuaternion<f64>>,
     /// 1 σ about each axis \[rad\].

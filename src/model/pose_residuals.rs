@@ -14,16 +14,16 @@ use super::predictor::{Prediction, Predictor};
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares};
 use crate::observation::Needs;
 
-/// Residuals of a row without and with an orientation.
+/// Number of residuals of a row without an orientation; with one, a row has twice as many.
 const POSITION: usize = 3;
 const POSE: usize = 6;
 
 /// Whitened residuals (measured − predicted) / σ of some rows as a function of some of the
 /// parameters.
 ///
-/// A row has three residuals, 0 behind the numbers that it measures. If any row has an orientation
-/// that is fitted, each has six: the last three are log(R Rₚᵀ) / σ of measured R and predicted Rₚ,
-/// measuring frame, and 0 for rows without an orientation.
+/// A row has three residuals; those beyond the numbers that it measures are 0. If any row has an
+/// orientation that is fitted, each has six: the last three are log(R Rₚᵀ) / σ of measured R and
+/// predicted Rₚ, measuring frame, and 0 for rows without an orientation.
 pub struct PoseResiduals<'a> {
     model: &'a Model,
     poses: Arc<Vec<Pose<'a>>>,
@@ -33,7 +33,7 @@ pub struct PoseResiduals<'a> {
     fixed: DVector<f64>,
     residuals_per_row: usize,
     measures_tilts: bool,
-    /// Derivatives at a point where the residuals may be linearised.
+    /// Jacobian at a point, which is reused if the residuals are linearised there.
     linear_model: Option<&'a LinearModel>,
 }
 
@@ -62,7 +62,7 @@ impl<'a> PoseResiduals<'a> {
         }
     }
 
-    /// Reuses the derivatives of `linear_model` at its point.
+    /// Sets the linear model whose derivatives are reused at its point.
     #[must_use]
     pub(crate) fn with_linear_model(self, linear_model: Option<&'a LinearModel>) -> Self {
         Self { linear_model, ..self }
@@ -77,7 +77,7 @@ impl<'a> PoseResiduals<'a> {
         full
     }
 
-    /// Returns the unknowns' entries of a full parameter vector.
+    /// Returns the entries of a full parameter vector that belong to the unknowns.
     pub fn reduced(&self, full: &DVector<f64>) -> DVector<f64> {
         DVector::from_iterator(self.unknowns.len(), self.unknowns.iter().map(|&k| full[k]))
     }

@@ -44,15 +44,15 @@ impl Model {
             .orientation_errors(&DVector::zeros(0))
     }
 
-    /// Returns measured − predicted of each row by the geometry alone at the full parameter vector
-    /// `x` \[m\] or \[rad\]: nothing deflects, and no effect acts on the arm.
+    /// Returns measured − predicted of each row at the full parameter vector `x` \[m\] or \[rad\],
+    /// with rigid links and joints and without effects on the arm.
     pub(crate) fn geometric_residuals(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let mut predictor = Predictor::rigid(self, x);
         poses.iter().map(|pose| pose.measured - predictor.predict(pose).numbers).collect()
     }
 
-    /// Returns the frames that carry the targets at the full parameter vector `x`, arm base frame;
-    /// `None` without equilibrium.
+    /// Returns the frame that carries the target of each pose at the full parameter vector `x`, arm
+    /// base frame; `None` without equilibrium.
     pub(crate) fn frames(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<Frame<f64>>> {
         #[expect(
             clippy::redundant_closure_for_method_calls,
@@ -74,9 +74,9 @@ impl Model {
         })
     }
 
-    /// Returns the position of the target in each pose at the full parameter vector `x`, measuring
-    /// frame \[m\], whatever the row measures; NaN without equilibrium. Errors of the measurement
-    /// are left out.
+    /// Returns the true position of the target in each pose at the full parameter vector `x`,
+    /// measuring frame \[m\], for every kind of row; NaN without equilibrium. Errors of the
+    /// instrument are left out.
     pub(crate) fn predicted_targets(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let (bases, points) = (self.base_frames(x), self.predicted_targets_in_base(poses, x));
         let position = |(pose, point): (&Pose, Option<Vector3<f64>>)| {
@@ -97,9 +97,8 @@ impl Model {
         })
     }
 
-    /// Returns the positions by the geometry alone at the full parameter vector `x`, as the
-    /// instrument reads them, measuring frame \[m\]: nothing deflects, and no effect acts on the
-    /// arm.
+    /// Returns the positions that the instrument would read at the full parameter vector `x`,
+    /// measuring frame \[m\], with rigid links and joints and without effects on the arm.
     pub(crate) fn geometric_positions(&self, poses: &[Pose], x: &[f64]) -> Vec<Vector3<f64>> {
         let mut predictor = Predictor::rigid(self, x);
         let position = |pose: &Pose| {
@@ -108,8 +107,8 @@ impl Model {
         poses.iter().map(position).collect()
     }
 
-    /// Returns the arm as a line from its base to the target in each pose at the full parameter
-    /// vector `x`, measuring frame \[m\]; `None` without equilibrium.
+    /// Returns the centre line of the arm from its base to the target in each pose at the full
+    /// parameter vector `x`, measuring frame \[m\]; `None` without equilibrium.
     pub(crate) fn centre_lines(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<CentreLine>> {
         let (arm, bases) = (self.arm(|k| x[k]), self.base_frames(x));
         self.map(poses, x, |predictor, pose| {
@@ -124,7 +123,7 @@ impl Model {
         })
     }
 
-    /// Returns the frames that carry the fixtures of each row at the full parameter vector `x`,
+    /// Returns the frames that carry the two fixtures of each row at the full parameter vector `x`,
     /// measuring frame; `None` without equilibrium.
     pub(crate) fn carrier_frames(&self, poses: &[Pose], x: &[f64]) -> Vec<Option<[Frame<f64>; 2]>> {
         #[expect(
@@ -134,9 +133,8 @@ impl Model {
         self.map(poses, x, |predictor, pose| predictor.carriers(pose))
     }
 
-    /// Returns the lengths at the seen points that errors in images stand for, at the full
-    /// parameter vector `x` \[m\]: along u and v, the error over the focal length times the depth.
-    /// Rows of other kinds are left out.
+    /// Converts image errors to lengths at the observed points, at the full parameter vector `x`
+    /// \[m\]: along u and v, error / focal length × depth. Rows of other kinds are left out.
     pub(crate) fn lengths_at_points(
         &self,
         poses: &[Pose],
@@ -162,7 +160,8 @@ impl Model {
         poses.iter().zip(errors).zip(carriers).filter(of_images).filter_map(length).collect()
     }
 
-    /// Evaluates `value` for each pose, in parallel.
+    /// Evaluates `value` for each pose in parallel, with a predictor at the full parameter vector
+    /// `x`.
     fn map<T: Send>(
         &self,
         poses: &[Pose],

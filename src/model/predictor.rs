@@ -17,7 +17,7 @@ pub(super) struct Predictor<'m> {
     model: &'m Model,
     /// Full parameter vector of the predictions.
     x: Vec<f64>,
-    /// Returns true if nothing deflects and no effect acts on the arm.
+    /// True if the prediction uses geometry alone: rigid links and joints, no effects on the arm.
     is_rigid: bool,
     arm: Arm<f64>,
     bases: Vec<Frame<f64>>,
@@ -36,8 +36,9 @@ pub(super) struct Predictor<'m> {
 pub(super) struct Prediction {
     /// Predicted numbers \[m\] or \[rad\], followed by zeros.
     pub numbers: Vector3<f64>,
-    /// Rotation vector from the predicted to the measured orientation, measuring frame \[rad\]; 0
-    /// if none was measured, `None` if the row has no orientation.
+    /// Rotation vector from the predicted to the measured orientation, measuring frame \[rad\]. It
+    /// is 0 for a planned orientation without a measured value; `None` if the row has no
+    /// orientation.
     pub turn: Option<Vector3<f64>>,
 }
 
@@ -61,7 +62,7 @@ impl<'m> Predictor<'m> {
         }
     }
 
-    /// Creates a predictor of the geometry alone: nothing deflects, and no effect acts on the arm.
+    /// Creates a predictor of the geometry alone: rigid links and joints, no effects on the arm.
     pub fn rigid(model: &'m Model, x: &[f64]) -> Self {
         let commands = CommandTerms::new(&model.fixed_terms, &[], &[]);
         Self { is_rigid: true, commands, ..Self::new(model, x) }
@@ -85,7 +86,8 @@ impl<'m> Predictor<'m> {
         Some(state.frame)
     }
 
-    /// Returns the pose with the corrections of its commands.
+    /// Returns the pose with the terms of mimic joints and effects added to its commands and
+    /// strains.
     pub fn setup<'b>(&'b mut self, pose: &'b Pose) -> PoseView<'b> {
         self.commands.apply(&pose.setup)
     }
@@ -95,20 +97,20 @@ impl<'m> Predictor<'m> {
         self.targets[pose.target]
     }
 
-    /// Returns the frame of the base in a pose, measuring frame.
+    /// Returns the frame of the arm's base in a pose, measuring frame.
     #[inline]
     pub fn base(&self, pose: &Pose) -> Frame<f64> {
         self.instrument.base(&self.bases[pose.base], &pose.setup)
     }
 
-    /// Returns the axes of the target in a pose whose target is carried by `frame` in the `base`,
-    /// measuring frame.
+    /// Returns the axes of the target in a pose, measuring frame. `frame` carries the target, arm
+    /// base frame; `base` is the arm's base, measuring frame.
     #[inline]
     pub fn axes(&self, pose: &Pose, base: &Frame<f64>, frame: &Frame<f64>) -> [Vector3<f64>; 3] {
         self.target_axes[pose.target].map(|axis| base.vector(&frame.vector(&axis)))
     }
 
-    /// Returns the predicted row; NaN if the pose has no equilibrium.
+    /// Returns the predicted numbers and orientation of a row; NaN if the pose has no equilibrium.
     #[inline]
     pub fn predict(&mut self, pose: &Pose) -> Prediction {
         let lost = Vector3::from_element(f64::NAN);
@@ -149,7 +151,8 @@ impl<'m> Predictor<'m> {
         Some(Prediction { numbers: observation.predict(&Scene { fixtures, ..scene }), turn })
     }
 
-    /// Returns the frames that carry the fixtures of a row, measuring frame.
+    /// Returns the frames that carry the two fixtures of a row, measuring frame; `None` without
+    /// equilibrium.
     pub fn carriers(&mut self, pose: &Pose) -> Option<[Frame<f64>; 2]> {
         let base = self.base(pose);
         let mut carriers = [Frame::identity(); 2];
@@ -163,7 +166,8 @@ impl<'m> Predictor<'m> {
         Some(carriers)
     }
 
-    /// Returns the axes of the frame whose tilt is measured, arm base frame.
+    /// Returns the axes of the frame whose tilt is measured, arm base frame; `None` without
+    /// equilibrium.
     fn frame_axes(&mut self, pose: &Pose) -> Option<[Vector3<f64>; 3]> {
         let frame = pose.observation.frame();
         let setup = self.commands.apply(&pose.setup);
@@ -177,7 +181,7 @@ impl<'m> Predictor<'m> {
     }
 }
 
-/// Returns the values of the fixtures that a row refers to.
+/// Returns the values of the (at most two) fixtures that a row refers to; the others are default.
 #[inline]
 pub(super) fn fixtures_of(
     observation: Observation,

@@ -15,27 +15,28 @@ use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{PoseView, Tree};
 use crate::spatial::{Frame, rotated_about_x, rotated_about_y, rotated_about_z};
 
-/// Rigid arm, differentiated motion by motion.
+/// Derivatives of a rigid arm, one elementary motion (rotation or translation) at a time.
 pub(super) struct Rigid {
     links: Vec<Link>,
     tree: Tree,
     inputs: Vec<Input>,
-    /// Derivatives of the current pose, from the last link to the first.
+    /// Derivatives of the target in the current pose, link by link, from the last to the first.
     carried: Vec<Carried>,
-    /// Derivatives with respect to the placements of these links, for links that have one.
+    /// Derivatives with respect to the six placement numbers, for those links that have a
+    /// placement.
     placed: Vec<[Vector3<f64>; 6]>,
 }
 
-/// Link with each of its parameters seeded, and the index of the input of each: five motions, and
-/// six numbers of the placement.
+/// Link whose parameters are dual-number variables, with the index of the input of each: five
+/// motions, and six numbers of the placement.
 struct Link {
     joint: Joint<Dual64>,
     inputs: [Option<usize>; 5],
     placing: [Option<usize>; 6],
 }
 
-/// Derivatives of the target with respect to the parameters of a link, each in the frame before its
-/// motion, and the joint's coordinates.
+/// Derivatives of the target with respect to the five motions of a link, each in the frame before
+/// its motion, and the joint's coordinates.
 struct Carried {
     derivatives: [Vector3<f64>; 5],
     coordinates: Coordinates<Dual64>,
@@ -60,8 +61,8 @@ impl Rigid {
         Self { links, tree: arm.tree.clone(), inputs, carried: Vec::new(), placed: Vec::new() }
     }
 
-    /// Writes the derivatives of a target \[m\] in the frame of the joint `tip`; returns that
-    /// frame, measuring frame.
+    /// Writes the derivatives of a target, given by its position \[m\] in the frame of the joint
+    /// `tip`. Returns the frame of `tip`, measuring frame.
     #[inline]
     pub fn write(
         &mut self,
@@ -131,8 +132,8 @@ impl Link {
         }
     }
 
-    /// Carries a point \[m\] from the frame behind the link to the frame before it. Also returns
-    /// its derivatives with respect to α, a, θ, d, β.
+    /// Transforms a point \[m\] from the frame behind the link to the frame before it. Returns
+    /// first its derivatives with respect to α, a, θ, d, β, then the point.
     #[inline]
     fn carry(
         &self,
@@ -149,7 +150,8 @@ impl Link {
         ([by_alpha, by_a, by_theta, by_d, by_beta], point)
     }
 
-    /// Moves `frame` through the link; calls `before` with the frame before each motion.
+    /// Moves `frame` through the link. Calls `before` with the index of each motion and the frame
+    /// before it.
     #[inline]
     fn advance(
         &self,
@@ -171,8 +173,9 @@ impl Link {
     }
 }
 
-/// Carries a point \[m\] from behind a placement to before it. Also returns its derivatives with
-/// respect to x, y, z, roll, pitch, yaw, each in the frame before its motion.
+/// Transforms a point \[m\] from the frame behind a placement to the frame before it. Returns first
+/// its derivatives with respect to x, y, z, roll, pitch, yaw, each in the frame before its motion,
+/// then the point.
 fn carry_through(
     placement: &Placement<Dual64>,
     point: &Vector3<f64>,
@@ -185,7 +188,8 @@ fn carry_through(
     ([x, y, z, by_roll, by_pitch, by_yaw], point + placement.xyz.map(|coordinate| coordinate.re))
 }
 
-/// Moves `frame` through a placement; calls `before` with the frame before each motion.
+/// Moves `frame` through a placement. Calls `before` with the index of each motion and the frame
+/// before it.
 fn place(
     placement: &Placement<Dual64>,
     frame: &mut Frame<f64>,
@@ -202,12 +206,12 @@ fn place(
     frame.rotate_x(real(roll.sin_cos));
 }
 
-/// Returns (sin, cos) without derivatives.
+/// Returns the real parts of (sin, cos).
 fn real((sin, cos): (Dual64, Dual64)) -> (f64, f64) {
     (sin.re, cos.re)
 }
 
-/// Returns the derivative and the value of a vector.
+/// Splits a dual vector into its derivative and its real part.
 #[inline]
 fn derivative(vector: &Vector3<Dual64>) -> (Vector3<f64>, Vector3<f64>) {
     (vector.map(|coordinate| coordinate.eps), vector.map(|coordinate| coordinate.re))

@@ -7,7 +7,7 @@ use crate::least_squares::Block;
 use crate::model::parameter::Waves;
 use crate::problem::PoseView;
 
-/// Three rows of a block.
+/// Three rows of a block that receive the derivatives of one predicted vector.
 pub(super) struct Rows<'a> {
     /// Block that holds the rows.
     pub block: &'a mut Block,
@@ -18,14 +18,15 @@ pub(super) struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// Writes a derivative of the prediction.
+    /// Writes `derivative` of the predicted vector into a column, times `scale`.
     #[inline]
     pub fn put(&mut self, column: usize, derivative: &Vector3<f64>) {
         let out = &mut self.block.column_mut(column)[self.row..self.row + 3];
         out.copy_from_slice((derivative * self.scale).as_slice());
     }
 
-    /// Writes a derivative of the prediction if it has a column.
+    /// Writes the derivative of the predicted vector if there is a column; otherwise it is not
+    /// evaluated.
     #[inline]
     pub fn put_if(&mut self, column: Option<usize>, derivative: impl FnOnce() -> Vector3<f64>) {
         if let Some(column) = column {
@@ -33,13 +34,13 @@ impl Rows<'_> {
         }
     }
 
-    /// Adds to a derivative of the prediction.
+    /// Adds `derivative` of the predicted vector, times `scale`, to a column.
     pub fn add(&mut self, column: usize, derivative: &Vector3<f64>) {
         let out = &mut self.block.column_mut(column)[self.row..self.row + 3];
         out.iter_mut().zip(derivative).for_each(|(out, add)| *out += add * self.scale);
     }
 
-    /// Multiplies all columns by a matrix from the left.
+    /// Multiplies the three rows by a matrix from the left, in all columns.
     pub fn multiply(&mut self, matrix: &Matrix3<f64>) {
         for column in 0..self.block.parameters() {
             let out = &mut self.block.column_mut(column)[self.row..self.row + 3];
@@ -48,7 +49,8 @@ impl Rows<'_> {
         }
     }
 
-    /// Writes the derivative with respect to an input for each parameter that acts on it.
+    /// Writes the column of each parameter that acts on `input`: `derivative` with respect to the
+    /// input times the parameter's regressor in the `commanded` pose.
     #[inline]
     pub fn put_input(&mut self, input: &Input, commanded: &PoseView, derivative: &Vector3<f64>) {
         self.put_if(input.column, || *derivative);
@@ -59,7 +61,8 @@ impl Rows<'_> {
     }
 }
 
-/// Sets all derivatives of points to zero: those of the last row may be of another base.
+/// Sets all entries of the reused block `points` to zero, because the last row may have used
+/// columns of another base.
 pub(super) fn clear(points: &mut Block) {
     for column in 0..points.parameters() {
         points.column_mut(column).fill(0.0);

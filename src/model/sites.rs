@@ -9,7 +9,8 @@ use crate::scalar::Scalar;
 use crate::spatial::rotate;
 use nalgebra::Vector3;
 
-/// Prepares a site for an effect's parameter, whose value without the effect is `nominal`.
+/// Creates the part of the arm that a parameter at `site` needs, if it is absent. The part starts
+/// at `nominal`, where the arm behaves as without it.
 pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64) {
     match site {
         ParameterSite::Joint { joint, field } => {
@@ -65,7 +66,8 @@ pub(super) fn prepare_site(arm: &mut Arm<f64>, site: ParameterSite, nominal: f64
     }
 }
 
-/// Adds the spring of an effect, without force, unless the joint has a spring.
+/// Adds the gravity compensator that an effect declares, with zero spring force, unless the joint
+/// already has one.
 pub(super) fn add_spring(arm: &mut Arm<f64>, effect: &Effect) {
     let argument = |key| effect.argument(key);
     if let Some(joint) = effect.compensated()
@@ -91,7 +93,7 @@ fn weightless() -> Beam<f64> {
     }
 }
 
-/// Rotates gravity by the rotation vector (x, y, 0) \[rad\].
+/// Rotates the gravity vector by the rotation vector (x, y, 0) \[rad\], arm base frame.
 pub(super) fn rotate_gravity<S: Scalar>(arm: &mut Arm<S>, [x, y]: [S; 2]) {
     arm.gravity = rotate(&Vector3::new(x, y, S::from(0.0)), &arm.gravity);
 }

@@ -7,30 +7,32 @@ use crate::laws::{
 };
 use crate::problem::{Equilibrium, Joint, JointKind, Problem};
 
-/// Highest order of a harmonic that is a candidate by itself.
+/// Highest order of a single harmonic (periods per revolution of the joint) among the candidates.
 pub(crate) const HIGHEST_ORDER: u32 = 60;
 
-/// Longest time constant among the candidates, as part of the time measured; a longer one is a
-/// drift.
+/// Longest time constant among the candidates, as a fraction of the duration of the measurement. A
+/// longer one cannot be distinguished from a linear drift.
 const LONGEST_LAG: f64 = 0.6;
-/// Shortest time constant of a lag in times from one pose to the next: between poses nothing lags.
+/// Shortest time constant of a lag, in typical times between two poses. A faster lag has settled
+/// before the next pose.
 const SHORTEST_LAG: f64 = 2.0;
-/// Shortest time constant of a settling as part of the time measured: shorter ones act on few poses.
+/// Shortest settling time among the candidates, as a fraction of the duration of the measurement. A
+/// shorter one affects only a few poses.
 const SHORTEST_SETTLING: f64 = 0.03;
-/// Each time constant over the one before.
+/// Ratio of successive time constants in the grid of candidates.
 const LAG_STEP: f64 = 1.25;
-/// Paths of friction as parts of the range of a joint: over shorter ones it is play, over longer
-/// ones a ratio.
+/// Shortest and longest friction path among the candidates, as fractions of the range of the
+/// joint's commands. A shorter path acts like play, a longer one like a constant ratio.
 const PATHS: (f64, f64) = (0.1, 1.6);
-/// Each path over the one before.
+/// Ratio of successive friction paths in the grid of candidates.
 const PATH_STEP: f64 = 1.4;
 
-/// Effect that may be at work.
+/// Effect that a search may add, with the reason if the data cannot show it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     /// The effect.
     pub effect: Effect,
-    /// Reason why these data cannot show it, if they cannot.
+    /// Reason why these data cannot show it; `None` if they can.
     pub untestable: Option<&'static str>,
 }
 
@@ -59,7 +61,8 @@ pub fn candidates(problem: &Problem, data: &DataCoverage) -> Vec<Candidate> {
 
 type Arguments = Vec<(&'static str, Argument)>;
 
-/// Returns the places of a family on an arm: its arguments without those that are searched.
+/// Returns the places on an arm where the effects of a family act: all its argument lists, without
+/// the argument that the search varies.
 fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
     let mut all: Vec<Arguments> = vec![Vec::new()];
     for &(key, kind) in family.arguments {
@@ -116,7 +119,8 @@ fn places(family: &Family, problem: &Problem) -> Vec<Arguments> {
     all
 }
 
-/// Returns the arguments of a place with each value of the one that is searched or listed.
+/// Returns the arguments of a place, once for each value of the argument that the search varies or
+/// lists.
 fn searched(family: &Family, place: Arguments, data: &DataCoverage) -> Vec<Arguments> {
     let is_open = |kind: ArgumentKind| kind.is_searched() || kind == ArgumentKind::Orders;
     let Some((key, _)) = family.arguments.iter().find(|(_, kind)| is_open(*kind)) else {
@@ -157,8 +161,8 @@ fn searched(family: &Family, place: Arguments, data: &DataCoverage) -> Vec<Argum
 }
 
 impl Effect {
-    /// Returns the reason why these data cannot show a declared law, if they cannot;
-    /// candidates of the catalogue come with their reason.
+    /// Returns the reason why these data cannot show this declared law; `None` if they can, or if
+    /// this is an effect of the catalogue, whose candidates carry their reason.
     pub(crate) fn untestable(
         &self,
         problem: &Problem,
@@ -190,7 +194,8 @@ impl Effect {
             .or_else(|| self.terms(problem).is_empty().then_some("the arm does not have the site"))
     }
 
-    /// Returns true if the arm is one on which the effect is a candidate.
+    /// Returns true if the arm satisfies `only`, the condition under which the effect is a
+    /// candidate.
     fn meets(&self, only: Only, problem: &Problem) -> bool {
         let joint = || problem.joints.get(self.joint()?.checked_sub(1)?);
         let is = |is_it: fn(&Joint) -> bool| joint().is_some_and(is_it);
@@ -212,7 +217,8 @@ impl Effect {
         }
     }
 
-    /// Returns the reason of a need that the data do not meet.
+    /// Returns the reason why the data do not meet `need`; `None` if they do.
+    /// @1! Share of a family's prior probability that one of its members has.
     fn unmet_need(
         &self,
         need: Need,

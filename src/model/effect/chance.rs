@@ -7,17 +7,18 @@ use super::place::slides;
 use crate::laws::{Chance, Effect};
 use crate::problem::{Joint, JointKind, Problem};
 
-/// Chance of all orders between a whole number and the next, over that of a harmonic of that order:
-/// gears have whole numbers of teeth, so that most errors repeat a whole number of times a
-/// revolution; a stage of a gear need not.
+/// Prior probability of all orders between k and k + 1 together, relative to that of order k. Gears
+/// have integer tooth counts, so most errors repeat an integer number of times a revolution; those
+/// of an inner gear stage need not.
 const FRACTIONAL_SHARE: f64 = 0.2;
-/// ln of the longest over the shortest lead of a screw or pitch of a rack: each factor is as
-/// probable as any other.
+/// ln(longest / shortest) lead of a screw or pitch of a rack that is considered. The prior is
+/// uniform in ln(lead).
 const LOG_LEAD_RANGE: f64 = 7.0;
 
 impl Effect {
-    /// Returns how often chance has a try at it: one over its share of its family's chance, whose
-    /// `members` are the candidates.
+    /// Returns the effective number of tries (Bonferroni factor) at the effect: the reciprocal of
+    /// its share of its family's prior probability. `members` are the candidates of the family.
+    /// @1! Conditions other than configurations that a data set records and varies.
     pub(crate) fn tries(&self, members: &[&Self], problem: &Problem) -> f64 {
         match self.family().map_or(Chance::Equal, |family| family.chance) {
             Chance::Equal => members.len().max(1) as f64,

@@ -2,74 +2,76 @@
 
 use nalgebra::Vector3;
 
-/// Which regressors of effects the poses at hand have, and vary.
+/// Regressors of effects that a data set records, with their ranges. They decide which effects it
+/// can show.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DataCoverage {
-    /// Why effects of the temperature cannot be shown; `None` where it is known, beside the one
-    /// that the problem refers to, and changes.
+    /// Reason why temperature effects cannot be shown. `None` if the temperature is recorded and
+    /// varies, and the problem declares its reference temperature.
     pub no_temperature: Option<&'static str>,
-    /// Whether directions of approach are known.
+    /// True if directions of approach are recorded.
     pub approach: bool,
-    /// For each joint, whether it was approached from both sides.
+    /// For each joint, true if it was approached from both sides.
     pub both_sides: Vec<bool>,
     /// Smallest and largest payload \[kg\].
     pub payload: (f64, f64),
-    /// For each joint, the range of its commands \[rad\] or \[m\].
+    /// For each joint, smallest and largest command \[rad\] or \[m\].
     pub ranges: Vec<(f64, f64)>,
-    /// Times between which a station may have moved \[s\], ascending.
+    /// Candidate times at which a station may have moved \[s\], ascending.
     pub times: Vec<f64>,
-    /// Usual time between two poses of a session, and that of the longest session from end to end
-    /// \[s\]; `None` where times were not measured: what was before a pose is not known.
+    /// Typical time between two poses of a session, and duration of the longest session \[s\].
+    /// `None` if no times are recorded, so that the order of the poses is unknown.
     pub clock: Option<(f64, f64)>,
-    /// For each covariate of the problem, whether it is known and changes.
+    /// For each covariate of the problem, true if it is recorded and varies.
     pub covariates: Vec<bool>,
     /// Gravity, arm base frame [m/s²].
     pub gravity: Vector3<f64>,
 }
 
 impl DataCoverage {
-    /// Whether a joint, counted from 0, moves at all.
+    /// Returns true if the commands of a joint, counted from 0, vary.
     pub fn moves(&self, joint: usize) -> bool {
         self.ranges.get(joint).is_some_and(|(low, high)| high > low)
     }
 
-    /// Whether a payload is carried in some poses.
+    /// Returns true if at least one pose has a payload.
     pub fn carries(&self) -> bool {
         self.payload.1 > 0.0
     }
 
-    /// Whether the payload changes.
+    /// Returns true if the payload varies between poses.
     pub fn changes_payload(&self) -> bool {
         self.payload.1 > self.payload.0
     }
 
-    /// Whether loads act at all.
+    /// Returns true if gravity is not zero, so that masses load the arm.
     pub fn weighs(&self) -> bool {
         self.gravity.norm() > 0.0
     }
 }
 
-/// Why an effect that needs the temperature cannot be shown.
+/// Reason why a temperature effect cannot be shown: no temperature is recorded, or it is constant.
 pub const NO_TEMPERATURE: &str = "no temperature that changes";
-/// The same, of a temperature that is measured.
+/// Reason why a temperature effect cannot be shown although the temperature is recorded: the
+/// problem declares no reference.
 pub const NO_REFERENCE: &str = "the problem declares no reference_temperature_C";
-/// Why an effect that remembers what was before a pose cannot be shown.
+/// Reason why an effect that depends on earlier poses (lag, friction, settling) cannot be shown.
 pub(super) const NO_TIMES: &str = "no time_s that tells which pose was before which";
-/// Why an effect of a joint that stands still cannot be shown.
+/// Reason why an effect of a joint whose command is constant cannot be shown.
 pub(super) const STANDS_STILL: &str = "the joint stands still in these poses";
-/// Why an effect of loads cannot be shown.
+/// Reason why an effect of loads cannot be shown: gravity is zero.
 pub(super) const NO_LOADS: &str = "no gravity, so no loads";
 
-/// Which columns some measurements have.
+/// Optional columns that a set of measurements has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[expect(clippy::struct_excessive_bools, reason = "each says whether a column is there")]
 pub struct Columns {
-    /// Temperatures.
+    /// True if temperatures are present.
     pub temperature: bool,
-    /// Directions of approach.
+    /// True if directions of approach are present.
     pub approach: bool,
-    /// Times.
+    /// True if times are present.
     pub time: bool,
-    /// Covariates of the problem.
+    /// True if all covariates of the problem are present.
     pub covariates: bool,
 }

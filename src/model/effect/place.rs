@@ -3,7 +3,7 @@
 use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{Body, Joint, JointKind, Problem};
 
-/// Returns true if a joint, counted from 1, slides.
+/// Returns true if a joint, counted from 1, is prismatic.
 pub(super) fn slides(problem: &Problem, joint: usize) -> bool {
     joint
         .checked_sub(1)
@@ -12,7 +12,8 @@ pub(super) fn slides(problem: &Problem, joint: usize) -> bool {
 }
 
 impl ParameterSite {
-    /// Returns the coordinate of a joint, numbered from 1 as in files: d where it slides, else θ.
+    /// Returns the site of the coordinate that a joint's command moves, joint numbered from 1 as in
+    /// files: d of a prismatic joint, else θ.
     pub fn coordinate(problem: &Problem, joint: usize) -> Self {
         Self::of_joint(
             joint,
@@ -21,11 +22,13 @@ impl ParameterSite {
     }
 }
 
-/// Least moment that sizes of priors are derived from [N·m].
+/// Smallest moment from which sizes of priors are derived [N·m], so that joints with little load
+/// keep a wide prior.
 pub(super) const LEAST_MOMENT: f64 = 10.0;
 
-/// Returns the weight of everything declared beyond a joint, counted from 1, times the length of
-/// the longest branch beyond it [N·m].
+/// Returns an upper estimate of the moment on a joint, counted from 1 [N·m]: weight of everything
+/// declared beyond it times the length of its longest branch.
+/// @1! Prior sizes of effect parameters on an arm.
 pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
     let all = |bodies: &[Body]| bodies.iter().map(|body| body.mass).sum::<f64>();
     let beam =

@@ -4,12 +4,12 @@ use super::place::{LEAST_MOMENT, greatest_moment};
 use crate::laws::{Argument, Effect, Prior};
 use crate::problem::Problem;
 
-/// Coupling of twist and bending where a beam is declared rigid in both [1/(N·m²)].
+/// Prior size of the coupling of twist and bending for a beam declared rigid in both [1/(N·m²)].
 const RIGID_COUPLING: f64 = 1e-2;
 
 impl Effect {
-    /// Returns a prior size on the arm of `problem`, SI; `None` where the arm does not have the
-    /// place.
+    /// Returns the prior size (1 σ, SI) that `prior` gives on the arm of `problem`; `None` if the
+    /// arm lacks the joint, beam or argument that the rule refers to.
     pub(super) fn size(&self, prior: Prior, problem: &Problem) -> Option<f64> {
         let moment = || Some(greatest_moment(problem, self.joint()?).max(LEAST_MOMENT));
         let length = |key: &str| match self.argument(key) {

@@ -6,20 +6,21 @@ use crate::laws::{At, Effect, EffectTerm, JointField, LAW, LawParameter, Quantit
 use crate::model::parameter::{EffectParameter, ParameterSite, Regressor};
 use crate::problem::{JointKind, Problem};
 
-/// Parameter of an effect on an arm.
+/// Parameter of an effect on an arm, with the site where it enters the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
-    /// Name after the dot.
+    /// Part of its name after the dot: `error` of `gear-ratio[3].error`.
     pub name: String,
-    /// Site where it enters.
+    /// Site of the model where it enters.
     pub site: ParameterSite,
-    /// Function of the pose by which it is multiplied there.
+    /// Function of the pose that multiplies the parameter at its site.
     pub regressor: Regressor,
-    /// Value where the effect has no size, SI.
+    /// Value at which the effect vanishes, SI.
     pub nominal: f64,
     /// Size that no realistic effect exceeds by much, SI: 1 σ of its prior.
     pub size: f64,
-    /// True if nature knows no negative values: an effect that needs one is no explanation.
+    /// True if a negative value is physically impossible. An effect whose fit needs one is rejected
+    /// as a cause.
     pub never_negative: bool,
     /// Smallest value that it may have, SI.
     pub lower: f64,
@@ -33,8 +34,8 @@ pub fn parameters(problem: &Problem) -> Vec<EffectParameter> {
 }
 
 impl Effect {
-    /// Returns its parameters with where and how each enters the model of `problem`; those of a
-    /// place that the arm does not have are left out.
+    /// Returns its parameters, each with its site and regressor in the model of `problem`.
+    /// Parameters at a joint or beam that the arm does not have are left out.
     #[doc(hidden)]
     pub fn terms(&self, problem: &Problem) -> Vec<Term> {
         let (slides, covariates) = (problem.slides(), problem.covariate_names());
@@ -79,7 +80,8 @@ impl Effect {
         })
     }
 
-    /// Returns the site of a parameter on this arm.
+    /// Returns the site on the arm of `problem` for a catalogue site; `None` if the arm does not
+    /// have it.
     fn site(&self, at: At, problem: &Problem) -> Option<ParameterSite> {
         let of_joint = |turning, sliding| {
             let joint = self.joint()?.checked_sub(1)?;
@@ -99,7 +101,8 @@ impl Effect {
         })
     }
 
-    /// Returns the index of the joint that carries the link on which the effect acts.
+    /// Returns the index of the joint that carries the link (beam) on which the effect acts; `None`
+    /// if there is none.
     pub(super) fn beam(&self, problem: &Problem) -> Option<usize> {
         let Some(link) = self.link() else { return self.joint()?.checked_sub(1) };
         problem
@@ -108,7 +111,8 @@ impl Effect {
             .position(|joint| joint.beam.as_ref().is_some_and(|beam| beam.name == link))
     }
 
-    /// Returns full names and starts of the parameters inside of its formulas.
+    /// Returns full names and start values of the parameters inside a declared law's formulas;
+    /// empty for other effects.
     fn inner_parameters(&self) -> Vec<(String, f64)> {
         let Self::Law(law) = self else { return Vec::new() };
         let named =
@@ -116,7 +120,7 @@ impl Effect {
         law.parameters().iter().map(named).collect()
     }
 
-    /// Returns its parameters with their full names: `gear-ratio[3].error`.
+    /// Returns its parameters with full names, such as `gear-ratio[3].error`.
     #[doc(hidden)]
     pub fn parameters(&self, problem: &Problem) -> Vec<EffectParameter> {
         let place = self.place();
@@ -135,8 +139,8 @@ impl Effect {
         self.terms(problem).into_iter().map(parameter).collect()
     }
 
-    /// Returns the columns without which it cannot be fitted, if measurements with these columns
-    /// lack them, as a message names them.
+    /// Returns the required column that the measurements lack, phrased for a message; `None` if
+    /// `columns` suffice to fit the effect.
     pub(crate) fn missing_column(
         &self,
         problem: &Problem,
@@ -172,7 +176,7 @@ impl Effect {
 }
 
 impl Problem {
-    /// Returns the names of the covariates, in their order.
+    /// Returns the names of the covariates, in order of declaration.
     pub(crate) fn covariate_names(&self) -> Vec<String> {
         self.data.covariates.iter().map(|covariate| covariate.name.clone()).collect()
     }

@@ -28,8 +28,8 @@ pub struct LinearConstraint {
 }
 
 impl LinearConstraint {
-    /// Returns the constraint on the parameters listed in `kept`, with new indices; `None` if it
-    /// contains another parameter.
+    /// Returns the constraint with indices into `kept`, a list of parameters; `None` if the
+    /// constraint contains a parameter that is not listed.
     pub fn on(&self, kept: &[usize]) -> Option<Self> {
         let place = |&(k, c): &(usize, f64)| Some((kept.iter().position(|&kept| kept == k)?, c));
         let terms = self.terms.iter().map(place).collect::<Option<Vec<_>>>()?;
@@ -145,7 +145,7 @@ fn alternatives(kind: LimitKind) -> &'static str {
     }
 }
 
-/// Formats a limit with nine digits, so that unit conversions do not show.
+/// Formats a limit with nine digits, so that rounding by unit conversions is not visible.
 fn shown(limit: &Limit) -> String {
     let (value, unit) = match limit.kind {
         LimitKind::Angle => (limit.value.to_degrees(), "°"),

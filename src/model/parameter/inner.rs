@@ -5,9 +5,9 @@ use std::sync::Arc;
 use super::Parameter;
 use super::regressor::{Formula, Regressor, Slope};
 
-/// Returns the regressor that multiplies parameter k in the prediction at the full parameter vector
-/// `x`: formulas take the values of the parameters inside of them. `None` for such a parameter
-/// itself, which multiplies nothing.
+/// Returns the regressor that multiplies parameter k in the prediction, with all formula parameters
+/// at their values in the full parameter vector `x`. `None` if k is itself a parameter inside a
+/// formula, which multiplies nothing.
 pub(crate) fn value_regressor(parameters: &[Parameter], x: &[f64], k: usize) -> Option<Regressor> {
     match &parameters[k].regressor {
         Regressor::Inner => None,
@@ -18,8 +18,9 @@ pub(crate) fn value_regressor(parameters: &[Parameter], x: &[f64], k: usize) -> 
     }
 }
 
-/// Returns the regressor of the derivative of the prediction by parameter k at the full parameter
-/// vector `x`: for a parameter inside of formulas the derivative of all terms that use it.
+/// Returns the regressor r for which r(pose) is the derivative of the site's quantity with respect
+/// to parameter k, at the full parameter vector `x`. For a parameter inside formulas, r sums the
+/// derivatives of all terms that use it.
 pub(crate) fn slope_regressor(parameters: &[Parameter], x: &[f64], k: usize) -> Regressor {
     value_regressor(parameters, x, k).unwrap_or_else(|| {
         let name = &parameters[k].name;
@@ -33,8 +34,8 @@ pub(crate) fn slope_regressor(parameters: &[Parameter], x: &[f64], k: usize) -> 
     })
 }
 
-/// Returns a formula with the values that its parameters have at `x`; those that are not free keep
-/// their start.
+/// Returns a formula with the values that its parameters have at the full parameter vector `x`;
+/// parameters that are not free keep their start value.
 fn bound(formula: &Formula, parameters: &[Parameter], x: &[f64]) -> Formula {
     let value = |(name, start): &(String, f64)| {
         let place = parameters.iter().position(|parameter| parameter.name == *name);

@@ -32,7 +32,7 @@ pub struct Parameter {
     pub name: String,
     /// Site in the model.
     pub site: ParameterSite,
-    /// Factor that multiplies the parameter at its site.
+    /// Function of the pose that multiplies the parameter at its site.
     pub regressor: Regressor,
     /// Nominal value, in SI units.
     pub nominal: f64,
@@ -45,22 +45,24 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// Returns the unit of its value.
+    /// Returns the unit of the parameter's value.
     pub fn unit(&self) -> Unit {
         unit(self.site, &self.regressor)
     }
 
-    /// Returns the value at x, in SI units.
+    /// Returns the value at the deviation `x`, in SI units.
     pub fn value(&self, x: f64) -> f64 {
         if self.unit().is_relative() { self.nominal * x.exp() } else { self.nominal + x }
     }
 
-    /// Returns x of a value in SI units; the inverse of [`Parameter::value`].
+    /// Returns the deviation x at which the parameter has a value, in SI units; the inverse of
+    /// [`Parameter::value`].
     pub fn deviation(&self, value: f64) -> f64 {
         if self.unit().is_relative() { (value / self.nominal).ln() } else { value - self.nominal }
     }
 
-    /// Returns the standard error of the value from that of x, in SI units.
+    /// Returns the standard error of the value, in SI units, for a standard error `error` of the
+    /// deviation at `x`.
     pub fn value_error(&self, x: f64, error: f64) -> f64 {
         if self.unit().is_relative() { self.value(x) * error } else { error }
     }

@@ -10,31 +10,33 @@ use crate::problem::{PoseView, Problem, ThermalLag};
 
 /// Function of a pose that multiplies a parameter at its site.
 ///
-/// Joints are counted from 0. Waves of whole orders stand apart from other formulas because sums of
-/// many of them are taken in one pass.
+/// Joints are counted from 0. Harmonics of integer order are variants of their own, because sums of
+/// many of them are evaluated in one pass.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Regressor {
-    /// 1: the parameter is itself the quantity of its site, the same in every pose.
+    /// Factor 1 of a parameter that is itself the quantity of its site (it replaces the nominal
+    /// value).
     Constant,
-    /// 1, for a parameter that adds to the quantity of its site.
+    /// Factor 1 of a parameter that adds to the quantity of its site.
     Unit,
-    /// sin kq of a joint and an order k.
+    /// Function sin kq of a joint's command q and an order k.
     Sine(usize, u32),
-    /// cos kq of a joint and an order k.
+    /// Function cos kq of a joint's command q and an order k.
     Cosine(usize, u32),
-    /// Any other formula.
+    /// Formula other than a harmonic of integer order.
     Formula(Arc<Formula>),
-    /// 0: the parameter multiplies nothing, it stands inside of formulas at its site.
+    /// Marker of a parameter inside formulas: it multiplies nothing (value 0).
     Inner,
-    /// Derivative of formulas by a parameter inside of them.
+    /// Derivative of formulas with respect to a parameter inside them.
     Slope(Arc<Slope>),
 }
 
-/// Derivative of a sum of terms c f(pose; p) by one parameter p inside of the formulas.
+/// Derivative of a sum of terms c f(pose; p) with respect to one parameter p inside the formulas.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slope {
-    /// Coefficient, formula with the values of its parameters, and the index of p among these.
+    /// Coefficient c, formula f with its parameter values, and index of p among f's parameters, for
+    /// each term.
     terms: Vec<(f64, Arc<Formula>, usize)>,
 }
 
@@ -50,22 +52,24 @@ impl Slope {
     }
 }
 
-/// Formula over quantities of a pose, with the values that poses may leave open.
+/// Formula over quantities of a pose, with default values of quantities that a pose does not
+/// record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Formula {
     expression: Expression,
     per: Per,
-    /// Names of the covariates, for printing.
+    /// Names of the covariates, used to print the formula.
     covariates: Vec<String>,
     /// Reference temperature T₀ [°C].
     reference: f64,
-    /// Payload of poses that name none \[kg\].
+    /// Payload of poses that record none \[kg\].
     payload: f64,
-    /// Hoist force of poses that name none \[N\].
+    /// Hoist force of poses that record none \[N\].
     hoist: f64,
-    /// Full names and values of the parameters inside of the formula.
+    /// Full names and values of the parameters inside the formula.
     parameters: Vec<(String, f64)>,
-    /// True if it moves the base itself, and not the readings of the instrument.
+    /// True if the term displaces the base itself, false if it is an error of the instrument's
+    /// readings.
     moves_base: bool,
 }
 
@@ -75,12 +79,12 @@ impl Formula {
         self.reference
     }
 
-    /// Returns the hoist force of poses that name none \[N\].
+    /// Returns the hoist force of poses that record none \[N\].
     pub(crate) fn hoist(&self) -> f64 {
         self.hoist
     }
 
-    /// Returns the value of a quantity in a pose.
+    /// Returns the value of a quantity in a pose, in the quantity's SI unit.
     fn quantity(&self, quantity: Quantity, setup: &PoseView) -> f64 {
         let side = |joint: usize| {
             setup.approach.and_then(|sides| sides.get(joint).copied()).unwrap_or(0.0)
@@ -107,7 +111,7 @@ impl Formula {
         }
     }
 
-    /// Returns the derivative of a quantity by the command of a joint.
+    /// Returns the derivative of a quantity with respect to the command of a joint, counted from 0.
     fn quantity_slope(quantity: Quantity, setup: &PoseView, joint: usize) -> f64 {
         match quantity {
             Quantity::Command(commanded) if commanded == joint => 1.0,
@@ -124,12 +128,12 @@ impl Formula {
         }
     }
 
-    /// Returns full names and values of the parameters inside of the formula.
+    /// Returns full names and values of the parameters inside the formula.
     pub(crate) fn parameters(&self) -> &[(String, f64)] {
         &self.parameters
     }
 
-    /// The same with other parameters.
+    /// Returns the formula with other parameter values.
     pub(super) fn with_parameters(&self, parameters: Vec<(String, f64)>) -> Self {
         Self { parameters, ..self.clone() }
     }
@@ -148,7 +152,8 @@ impl Formula {
         }
     }
 
-    /// Returns the derivative of the value in a pose by a parameter inside, by its index.
+    /// Returns the derivative of the formula's value in a pose with respect to the parameter with
+    /// index `parameter`.
     pub(super) fn parameter_slope(&self, setup: &PoseView, parameter: usize) -> f64 {
         let seeded = |(k, (_, value)): (usize, &(String, f64))| {
             Dual64::new(*value, f64::from(u8::from(k == parameter)))
@@ -160,8 +165,9 @@ impl Formula {
 }
 
 impl Regressor {
-    /// Regressor of a formula on the arm of `problem`, with full names and starts of the parameters
-    /// inside, and whether it moves the base itself.
+    /// Creates the regressor of a formula on the arm of `problem`. `parameters` are full names and
+    /// start values of the parameters inside; `moves_base` is true if the term displaces the base
+    /// itself.
     pub(crate) fn new(
         formula: &Parsed,
         parameters: Vec<(String, f64)>,
@@ -186,10 +192,10 @@ impl Regressor {
         }))
     }
 
-    /// Regressor of a formula as files write it: `sin(2*q3)*T`.
+    /// Parses a formula in the syntax of problem files, such as `sin(2*q3)*T`.
     ///
     /// # Errors
-    /// The text is no formula of this arm; with the column.
+    /// The text is no formula of this arm; the error contains the column.
     pub fn parse(text: &str, problem: &Problem) -> Result<Self, FormulaError> {
         let (slides, covariates) = (problem.slides(), problem.covariate_names());
         let vocabulary =
@@ -197,12 +203,13 @@ impl Regressor {
         Ok(Self::new(&parse(text, &vocabulary)?, Vec::new(), problem, false))
     }
 
-    /// Regressor of the command of a joint, numbered from 1 as in files: q \[rad\] or \[m\].
+    /// Creates the regressor q of a joint's command \[rad\] or \[m\], joint numbered from 1 as in
+    /// files.
     pub fn command(problem: &Problem, joint: usize) -> Self {
         Self::parse(&format!("q{joint}"), problem).unwrap_or(Self::Constant)
     }
 
-    /// Returns the formula's expression, waves among them.
+    /// Returns the regressor as an expression, harmonics included.
     pub fn expression(&self) -> Expression {
         let wave = |function, joint: usize, order: u32| {
             use crate::laws::expression::{Function, Operator};
@@ -221,7 +228,7 @@ impl Regressor {
         }
     }
 
-    /// Returns the formula as files write it.
+    /// Returns the formula in the syntax of problem files.
     pub fn text(&self) -> String {
         let (covariates, parameters) = match self {
             Self::Formula(formula) => {
@@ -234,7 +241,7 @@ impl Regressor {
         self.expression().display(Names { covariates, parameters: &parameters }).to_string()
     }
 
-    /// Returns the quantities that it depends on.
+    /// Returns the quantities of a pose that it depends on.
     pub fn quantities(&self) -> Vec<Quantity> {
         match self {
             Self::Constant | Self::Unit | Self::Inner | Self::Slope(_) => Vec::new(),
@@ -243,12 +250,13 @@ impl Regressor {
         }
     }
 
-    /// Returns true if it moves the base itself, and not the readings of the instrument.
+    /// Returns true if the term displaces the base itself, false if it is an error of the
+    /// instrument's readings.
     pub(crate) fn moves_base(&self) -> bool {
         matches!(self, Self::Formula(formula) if formula.moves_base)
     }
 
-    /// Returns the one quantity that it is, where it is one.
+    /// Returns the quantity that the regressor equals; `None` if it is any other function.
     pub fn as_quantity(&self) -> Option<Quantity> {
         match self {
             Self::Formula(formula) => match formula.expression {
@@ -259,7 +267,8 @@ impl Regressor {
         }
     }
 
-    /// Returns the unit that divides the one of the site in the unit of the coefficient.
+    /// Returns the regressor's unit, by which the site's unit is divided to give the coefficient's
+    /// unit.
     pub(crate) fn per(&self) -> Per {
         match self {
             Self::Formula(formula) => formula.per,
@@ -267,7 +276,7 @@ impl Regressor {
         }
     }
 
-    /// Returns its values in some poses, faster the more of them follow one another.
+    /// Returns its value in each of some poses. Harmonics are faster if many follow one another.
     pub(crate) fn values<'p>(&self, poses: impl Iterator<Item = &'p PoseView<'p>>) -> Vec<f64> {
         let (Self::Formula(formula), Some(Quantity::Lagging { time_constant })) =
             (self, self.as_quantity())
@@ -294,7 +303,7 @@ impl Regressor {
         }
     }
 
-    /// Returns the derivative of its value by the command of a joint, counted from 0.
+    /// Returns the derivative of its value with respect to the command of a joint, counted from 0.
     pub fn slope(&self, setup: &PoseView, joint: usize) -> f64 {
         let order = |order: u32| f64::from(order);
         match self {
@@ -328,22 +337,23 @@ impl Regressor {
     }
 }
 
-/// Orders that a wave may be above the one before it to be had from it by steps: a sine and a
-/// cosine cost more than so many.
+/// Largest order difference to the last harmonic that recurrence bridges. For a larger one, a sine
+/// and a cosine are cheaper.
 const MAX_ORDER_STEPS: u32 = 4;
 
-/// Values of many regressors in one pose: a wave takes its sine and cosine from the one before it
-/// where their orders are near.
+/// Evaluates many regressors in one pose. A harmonic is computed by recurrence from the last one if
+/// its order is at most [`MAX_ORDER_STEPS`] higher.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Waves {
-    /// Joint and order of the last wave, with its sine and cosine.
+    /// Joint and order k of the last harmonic, with its (sin kq, cos kq).
     last: Option<(usize, u32, (f64, f64))>,
-    /// sin q and cos q of that joint, once needed.
+    /// Values (sin q, cos q) of that joint, once they are needed.
     first: Option<(f64, f64)>,
 }
 
 impl Waves {
-    /// Returns the value of a regressor in the pose that all others were evaluated in.
+    /// Returns the value of a regressor in `setup`. All calls on one instance must use the same
+    /// pose.
     #[inline]
     pub fn value(&mut self, regressor: &Regressor, setup: &PoseView) -> f64 {
         match regressor {
@@ -353,7 +363,7 @@ impl Waves {
         }
     }
 
-    /// Returns sin kq and cos kq.
+    /// Returns (sin kq, cos kq) of a joint's command q for the order k.
     fn wave(&mut self, joint: usize, order: u32, setup: &PoseView) -> (f64, f64) {
         let q = setup.configuration[joint];
         let wave = match self.last {

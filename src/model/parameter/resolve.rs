@@ -11,7 +11,8 @@ use crate::quantity::Unit;
 /// Scalar of the model that a rule may free.
 pub(super) struct Candidate {
     pub(super) name: String,
-    /// Name without the session or target in brackets, which patterns may use as well.
+    /// Name without the session or target in brackets, which the patterns of rules may match as
+    /// well.
     plain: String,
     pub(super) site: ParameterSite,
     pub(super) regressor: Regressor,
@@ -20,7 +21,7 @@ pub(super) struct Candidate {
     effect_sigma: Option<f64>,
     /// Bounds of a parameter of an effect, SI.
     limits: (f64, f64),
-    /// True for an undeclared number, which is free unless a rule holds it.
+    /// True for a number that the problem does not declare, which is free unless a rule holds it.
     unknown: bool,
 }
 
@@ -45,9 +46,9 @@ pub struct EffectParameter {
     pub site: ParameterSite,
     /// Factor that multiplies the parameter at its site.
     pub regressor: Regressor,
-    /// Value at which the effect vanishes, or the place of an effect of zero size.
+    /// Value at which the effect vanishes; for a position or time of an effect, its start value.
     pub nominal: f64,
-    /// 1 σ of a prior that allows every realistic size.
+    /// Standard deviation (1 σ) of a prior wide enough for every realistic size, in SI units or ln.
     pub sigma: f64,
     /// Smallest value that it may have, SI.
     pub lower: f64,
@@ -66,7 +67,8 @@ impl EffectParameter {
     }
 }
 
-/// Returns true if the pattern of a rule matches one of the two names of a parameter.
+/// Returns true if the rule's pattern matches the name or the plain name (without brackets) of a
+/// parameter.
 fn names(rule: &ParameterRule, name: &str, plain: &str) -> bool {
     matches(&rule.pattern, name) || matches(&rule.pattern, plain)
 }
@@ -165,7 +167,8 @@ pub fn rule_of<'a>(problem: &'a Problem, parameter: &EffectParameter) -> Option<
         .find(|rule| parameter.is_named(rule) && fits(rule, parameter.unit()))
 }
 
-/// Returns the error of a pattern that matches only effects which the problem does not declare.
+/// Returns the error for a pattern that matches no parameter in `known` but effects which the
+/// problem does not declare; `None` if it matches no effect.
 fn undeclared(problem: &Problem, pattern: &str, known: &[String]) -> Option<InputErrorKind> {
     // The word before the dot or bracket of `hoist-force.error`, `gear-ratio[3].error`.
     let head = |name: &str| name.split(['.', '[']).next().unwrap_or_default().to_owned();
@@ -178,7 +181,7 @@ fn undeclared(problem: &Problem, pattern: &str, known: &[String]) -> Option<Inpu
     Some(InputErrorKind::EffectNotDeclared { effects: effects.join(", "), write })
 }
 
-/// Returns true if the rules of `problem` hold all of these parameters of an undeclared effect.
+/// Returns true if the rules of `problem` hold (fix) all `parameters` of an undeclared effect.
 pub fn holds_all(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     let held = |parameter| {
         rule_of(problem, parameter).is_some_and(|rule| matches!(rule.freedom, Freedom::Fixed))
@@ -186,8 +189,8 @@ pub fn holds_all(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     !parameters.is_empty() && parameters.iter().all(held)
 }
 
-/// Returns true if a rule of `problem` for effects alone would be an error with these parameters,
-/// because it gives no quantity in their unit.
+/// Returns true if a rule of `problem` that matches only effects would be an error for these
+/// parameters, because it gives no quantity in their unit.
 pub fn refuses(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     let none = [String::new()];
     let is_for_arm = |rule| {
@@ -199,8 +202,8 @@ pub fn refuses(problem: &Problem, parameters: &[EffectParameter]) -> bool {
     problem.parameters.iter().any(|rule| misses(rule) && !is_for_arm(rule))
 }
 
-/// Returns every scalar of the model, in a fixed order: joints, their beams, bases, targets,
-/// fixtures, effects.
+/// Returns every scalar of the model that a rule may free, in a fixed order: joints, their beams,
+/// bases, targets, fixtures, effects.
 pub(super) fn candidates(
     problem: &Problem,
     bases: &[String],
@@ -305,8 +308,8 @@ pub(super) fn candidates(
     out
 }
 
-/// Checks that every quantity of a rule fits a parameter that it matches, and that every such
-/// parameter has a quantity, if there are any.
+/// Checks a rule against the candidates that it matches: each quantity must fit the unit of one of
+/// them, and each of them needs a quantity.
 fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), InputError> {
     let Freedom::Free { sigma, min, max } = &rule.freedom else { return Ok(()) };
     let fail = |kind| Err(rule.location.clone().error(kind));
@@ -339,8 +342,8 @@ fn check_kinds(rule: &ParameterRule, candidates: &[Candidate]) -> Result<(), Inp
     Ok(())
 }
 
-/// Returns true if a rule can apply to a quantity of this unit: it holds it, frees it, or gives its
-/// unit.
+/// Returns true if a rule can apply to a parameter of this unit: it holds it, frees it, or gives a
+/// quantity in its unit.
 fn fits(rule: &ParameterRule, unit: Unit) -> bool {
     let Freedom::Free { sigma, min, max } = &rule.freedom else { return true };
     let quantities = [sigma, min, max];

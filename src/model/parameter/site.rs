@@ -40,7 +40,8 @@ pub enum ParameterSite {
         /// Coordinate 0 to 5.
         axis: usize,
     },
-    /// Number of a fixture, in the order of [`FixtureKind::fields`].
+    /// Number of a fixture, such as a coordinate of a point or the focal length of a camera, in the
+    /// order of [`FixtureKind::fields`].
     Fixture {
         /// Index of the fixture.
         fixture: usize,
@@ -54,8 +55,8 @@ pub enum ParameterSite {
         /// Axis 0, 1 or 2.
         axis: usize,
     },
-    /// Rotation of every base about an axis through the measuring frame's origin; always with a
-    /// regressor.
+    /// Rotation of every base about an axis through the measuring frame's origin; its parameter
+    /// always has a regressor.
     Turn {
         /// Axis 0, 1 or 2.
         axis: usize,
@@ -76,7 +77,7 @@ impl ParameterSite {
         Self::Joint { joint: number.wrapping_sub(1), field }
     }
 
-    /// Returns the unit of a parameter without regressor.
+    /// Returns the unit of a parameter at this site if no regressor multiplies it.
     pub fn unit(self) -> Unit {
         match self {
             Self::Joint { field, .. } => match field {
@@ -132,7 +133,7 @@ impl ParameterSite {
         }
     }
 
-    /// Returns true for elasticity and loads, false for geometry.
+    /// Returns true for elastic and load parameters (stiffness, mass, force), false for geometry.
     pub fn is_elastic(self) -> bool {
         match self {
             Self::Joint { field, .. } => {
@@ -155,7 +156,8 @@ impl ParameterSite {
         matches!(self, Self::Target { axis: 3.., .. })
     }
 
-    /// Returns true for the set-up (base, target, place of a fixture), false for the arm and lenses.
+    /// Returns true for the set-up (base, target, position of a fixture), false for the arm and
+    /// lenses.
     pub fn is_placement(self) -> bool {
         match self {
             Self::Fixture { kind, axis, .. } => !kind.has_pose() || axis < 6,
