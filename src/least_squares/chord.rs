@@ -10,9 +10,11 @@ use super::kernel::sum_of_squares;
 use super::{Block, LeastSquares, Linearisation, Triangle};
 use crate::numeric::{gram, inverse_factor};
 
-/// Largest linearisation error ‖ρ‖ / ‖J₀ δ‖ at which derivatives of another point are reused.
+/// Largest relative linearisation error ‖ρ‖ / ‖J₀ δ‖ at which the derivatives of the base point are
+/// reused.
 const MAX_LINEARISATION_ERROR: f64 = 0.01;
-/// Ridge added to the scaled normal matrix R₀ᵀR₀, whose diagonal is 1.
+/// Ridge added to the scaled normal matrix R₀ᵀR₀, whose diagonal is 1, so that its Cholesky factor
+/// exists.
 const NORMAL_RIDGE: f64 = 1e-10;
 
 /// Residuals and derivatives at a base point x₀, reused for linearisations at points nearby.
@@ -26,12 +28,12 @@ const NORMAL_RIDGE: f64 = 1e-10;
 pub(super) struct Base {
     /// Identifier of the data set.
     pub data: u64,
-    /// Unit in which the residuals are counted.
+    /// Unit of the residuals: they are multiples of this many assumed σ.
     unit: f64,
     x: DVector<f64>,
     chunks: Vec<Chunk>,
     triangle: Triangle,
-    /// Formed at the first reuse; `None` inside where reuse is impossible.
+    /// Map for reuse, formed at the first use; contains `None` if reuse is impossible.
     projector: OnceLock<Option<Projector>>,
 }
 
@@ -87,7 +89,7 @@ struct ChunkError {
 }
 
 impl Base {
-    /// Keeps the chunks of all items, linearised at `x`, with their triangular factor.
+    /// Stores the chunks of all items, linearised at `x`, with their triangular factor.
     pub fn new(
         x: &DVector<f64>,
         (data, unit): (u64, f64),

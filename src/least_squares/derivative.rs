@@ -6,24 +6,25 @@ use super::{LeastSquares, jacobian, residual_vector};
 
 /// Largest number of decreasing steps in one extrapolation.
 const MAX_STEPS: usize = 12;
-/// Ratio of successive steps.
+/// Ratio of successive difference steps in one extrapolation.
 const SHRINK: f64 = 1.4;
 /// First steps tried, as fractions of an unknown's typical size.
 const FIRST_STEPS: [f64; 4] = [0.3, 3e-2, 3e-3, 3e-4];
-/// Smallest effect by which an error is divided, as a fraction of the largest effect of all
-/// unknowns.
+/// Smallest denominator of a relative error, as a fraction of the largest ‖F‖ of all unknowns. It
+/// avoids division by the effect of an unknown that moves nothing.
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// Comparison of one column of the Jacobian with differences.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColumnCheck {
-    /// ‖J − F‖ / ‖F‖, or less where ‖F‖ is negligible; F are the differences.
+    /// Relative error ‖J − F‖ / ‖F‖ with the differences F; less where ‖F‖ is negligible.
     pub relative_error: f64,
-    /// Estimated relative error of the differences F themselves; an error below it is no finding.
+    /// Estimated relative error of the differences F themselves. A relative error below it does not
+    /// indicate a wrong derivative.
     pub accuracy: f64,
 }
 
-/// A Jacobian compared with differences, column by column.
+/// Comparison of a Jacobian with differences of the residuals, column by column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JacobianCheck {
     /// One entry per unknown.
@@ -75,7 +76,8 @@ pub fn check_jacobian(
     JacobianCheck { columns }
 }
 
-/// Returns the best extrapolation over several first steps, with its estimated error.
+/// Returns the extrapolated difference of column `j` with the smallest estimated error over several
+/// first steps, and that error. `size` is the unknown's typical size.
 fn extrapolate<P: LeastSquares>(
     problem: &P,
     x: &DVector<f64>,

@@ -10,17 +10,17 @@ use super::singular::SingularValues;
 
 /// Largest scaled singular value, relative to the largest of all, that counts as zero.
 ///
-/// Exactly redundant parameters come out near 1e-15, parameters that good data tell apart above
-/// 1e-5.
+/// Exactly redundant parameters have about 1e-15; parameters that good data distinguish have more
+/// than 1e-5.
 pub const BLIND_BELOW: f64 = 1e-9;
 /// Largest norm of a column, relative to the largest column, that counts as zero.
 const ZERO_COLUMN: f64 = 1e-14;
 /// Smallest share of a combination that makes an unknown a preferred pivot of its description.
 const PIVOT_SHARE: f64 = 0.1;
-/// Entries of a combination below this are rounding errors.
+/// Smallest entry of a combination that is not a rounding error.
 const NEGLIGIBLE: f64 = 1e-6;
-/// Bound on the relative singular values above which full rank is certain without an SVD: twice
-/// [`BLIND_BELOW`], for rounding.
+/// Smallest relative singular value that certifies full rank without an SVD: twice [`BLIND_BELOW`],
+/// to allow for rounding.
 const CERTAIN_FULL_RANK: f64 = 2.0 * BLIND_BELOW;
 /// Relative size of a trailing pivot below which a direction is certainly unidentifiable.
 const CERTAIN_NULL: f64 = 1e-12;
@@ -32,7 +32,7 @@ pub struct Identifiability {
     pub singular_values: Vec<f64>,
     /// Number of singular values that are not zero.
     pub rank: usize,
-    /// Combinations of parameters that change no measurement.
+    /// Combinations of unknowns that change no residual.
     pub unidentifiable: Vec<UnidentifiableCombination>,
     /// Basis of the unidentifiable combinations, orthonormal in the scaled unknowns, shape =
     /// (n − rank, n) [1 / unit of x].
@@ -93,7 +93,8 @@ impl Identifiability {
     }
 }
 
-/// Unidentifiable combinations alone, without the singular values of the identifiable ones.
+/// Unidentifiable combinations of unknowns without the singular values, which take longer to
+/// compute.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Blind {
     /// Basis of the unidentifiable combinations, see [`Identifiability::gauge`].
@@ -122,7 +123,8 @@ impl Blind {
         Self { gauge, visible }
     }
 
-    /// Converts orthonormal rows that span the null space in scaled unknowns.
+    /// Converts orthonormal rows that span the null space in scaled unknowns into the gauge and
+    /// visible shares. `scale` holds the column norms.
     fn of(null: &DMatrix<f64>, scale: &[f64]) -> Self {
         let visible = (0..null.ncols())
             .map(|j| (1.0 - null.column(j).norm_squared()).clamp(0.0, 1.0))
@@ -157,8 +159,8 @@ impl Scaled {
     }
 }
 
-/// Returns orthonormal rows that span the null space of a matrix with unit columns; `None` where
-/// pivoted QR does not decide the rank with certainty.
+/// Returns orthonormal rows that span the null space of a matrix with unit columns; `None` if
+/// pivoted QR cannot decide the rank with certainty.
 fn certain_null(scaled: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = scaled.ncols();
     let qr = scaled.clone().col_piv_qr();
@@ -199,7 +201,8 @@ pub(super) fn complement(basis: &DMatrix<f64>) -> DMatrix<f64> {
     rows
 }
 
-/// Returns the reduced row echelon form of the null space.
+/// Returns the unidentifiable combinations as the reduced row echelon form of the null space
+/// `null`.
 ///
 /// This basis depends on the space alone and has few unknowns in each combination. Pivots are the
 /// first unknowns with a share of at least [`PIVOT_SHARE`], then those above [`NEGLIGIBLE`].

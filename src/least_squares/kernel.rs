@@ -7,11 +7,11 @@
 use multiversion::multiversion;
 use nalgebra::DMatrix;
 
-/// Number of reflectors applied together to one trailing column.
+/// Number of Householder reflectors applied together to one trailing column.
 pub(super) const PANEL: usize = 4;
 /// Number of independent partial sums of a dot product.
 const LANES: usize = 4;
-/// Range of sums of squares that can neither have overflowed nor underflowed.
+/// Sums of squares inside this range have neither overflowed nor underflowed.
 const SAFE_SQUARES: std::ops::Range<f64> = 1e-280..1e280;
 
 /// Returns the Euclidean norm without overflow or underflow.

@@ -38,7 +38,7 @@ pub enum RowsError {
 }
 
 impl LinearRows {
-    /// Returns the rows [A  A x + b] at x.
+    /// Returns the block [A  A x + b] of derivatives and residuals at x.
     pub(super) fn block(&self, x: &DVector<f64>) -> Block {
         let (k, n) = self.matrix.shape();
         let mut block = Block::zeros(k, n);

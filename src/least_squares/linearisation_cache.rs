@@ -17,11 +17,11 @@ const MAX_CACHED: usize = 3;
 #[derive(Debug, Default)]
 pub struct LinearisationCache {
     cached: Mutex<VecDeque<(Key, f64, Triangle)>>,
-    /// Derivatives reused at later points; only for provisional fits.
+    /// Linearisation of all data that later points reuse; `None` unless the fit is provisional.
     base: Option<Mutex<Option<Arc<Base>>>>,
 }
 
-/// Identifier of a linearisation.
+/// Identifier of a linearisation: the data set and the point.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Key {
     /// Identifier of the data set, without the unit of its residuals.
@@ -31,8 +31,8 @@ pub(super) struct Key {
 }
 
 impl LinearisationCache {
-    /// Creates the cache of a provisional fit, which another fit follows or of which little is
-    /// needed. Its steps reuse the derivatives at the start point as long as these predict the
+    /// Creates the cache of a provisional fit: one that another fit follows, or of which only the
+    /// cost is used. Its steps reuse the derivatives at the start point while these predict the
     /// residuals.
     #[must_use]
     pub fn provisional() -> Self {
@@ -72,13 +72,14 @@ impl LinearisationCache {
         })
     }
 
-    /// Returns the derivatives of a data set that are reused at later points.
+    /// Returns the stored linearisation of a data set, which steps of a provisional fit reuse;
+    /// `None` if there is none.
     pub(super) fn base(&self, data: u64) -> Option<Arc<Base>> {
         let base = self.base.as_ref()?;
         locked(base).as_ref().filter(|base| base.data == data).map(Arc::clone)
     }
 
-    /// Stores derivatives for later points.
+    /// Stores a linearisation that later steps reuse; does nothing unless the fit is provisional.
     pub(super) fn set_base(&self, new: Arc<Base>) {
         if let Some(base) = &self.base {
             *locked(base) = Some(new);

@@ -3,8 +3,8 @@
 use super::Block;
 use super::kernel::{norm, sum_of_squares};
 
-/// Loss of an item (a pose): its cost is ½ρ(s²), where s = ‖r‖ is the whitened residual length
-/// \[σ\].
+/// Loss function of an item (a pose). Its cost is ½ρ(s²), where s = ‖r‖ is the whitened residual
+/// length \[σ\].
 ///
 /// Rows of an item are scaled by √ρ′, with ρ′ = dρ/d(s²). The gradient ρ′ Jᵀr is then exact; the
 /// curvature ρ′ JᵀJ neglects ρ″. This is the first-order form of [Triggs et al. 2000, sec. 4.3],
@@ -94,8 +94,8 @@ impl Loss {
         items.flat_map(|item| std::iter::repeat_n(self.weight(norm(item)), item.len())).collect()
     }
 
-    /// Scales the rows of each item by √ρ′ and returns Σ ρ; for [`Loss::Squares`] does nothing and
-    /// returns `None`.
+    /// Scales the rows of each item in `block` by √ρ′ and returns Σ ρ, with `rows` rows per item.
+    /// For [`Loss::Squares`] does nothing and returns `None`.
     pub(super) fn weigh(self, block: &mut Block, rows: usize) -> Option<f64> {
         if self == Self::Squares {
             return None;

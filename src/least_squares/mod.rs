@@ -45,8 +45,8 @@ pub use self::{
     whole::{jacobian, residual_vector},
 };
 
-/// Number of unknowns from which forming and reducing derivatives takes nearly all the time of a
-/// fit.
+/// Smallest number of unknowns at which forming and reducing derivatives takes nearly all the time
+/// of a fit.
 pub(crate) const MANY_UNKNOWNS: usize = 100;
 
 /// Least-squares problem given by the residuals of many small items and their derivatives.
@@ -147,7 +147,8 @@ pub trait Objective {
         by_differences(|x| slopes(self.linearise(x)), x, within)
     }
 
-    /// Returns the plausible size of each unknown, in its unit, where a size is known.
+    /// Returns the plausible size (1 σ of its prior) of each unknown, in its unit; `None` if it has
+    /// none.
     fn plausible_sizes(&self) -> Vec<Option<f64>> {
         vec![None; self.parameters()]
     }

@@ -26,10 +26,11 @@ const ACCELERATION_STEP: f64 = 0.1;
 /// two factors costs as much as absorbing n/2 rows.
 const ROWS_PER_UNKNOWN: usize = 4;
 
-/// Number of chunks whose results exist at the same time.
+/// Maximum number of chunks whose results are in memory at the same time.
 const GROUP_CHUNKS: usize = 64;
 
-/// Largest number of derivatives that a provisional fit keeps for later points: 128 MB.
+/// Maximum number of derivatives (8 bytes each) that a provisional fit stores for later points: 128
+/// MB.
 const MAX_KEPT_DERIVATIVES: usize = 1 << 24;
 
 /// Data problem with optional linear rows, ready for a solver.
@@ -204,7 +205,8 @@ impl<'a, P: LeastSquares> Fit<'a, P> {
         })
     }
 
-    /// Returns residuals and derivatives of all data at x together with their triangular factor.
+    /// Returns residuals and derivatives of all data at x with their triangular factor, to be
+    /// reused as a base point; `key` is (data set, unit of residuals).
     fn base(&self, x: &DVector<f64>, key: (u64, f64)) -> Base {
         let chunk = |index| {
             let mut block = Block::zeros(0, self.problem.parameters());

@@ -7,11 +7,12 @@ use rayon::prelude::*;
 
 use super::kernel::dot;
 
-/// Maximum number of sweeps over all pairs of columns; five are usual.
+/// Maximum number of sweeps over all pairs of columns. Usually five suffice.
 const MAX_SWEEPS: usize = 60;
 /// Number of columns in a group whose rotations one thread performs.
 const GROUP_COLUMNS: usize = 32;
-/// Number of columns from which they are split into groups; fewer are rotated on one thread.
+/// Smallest number of columns that is split into groups for threads; fewer are rotated on one
+/// thread.
 const MIN_PARALLEL_COLUMNS: usize = 4 * GROUP_COLUMNS;
 
 /// Singular value decomposition B = U Σ Vᵀ with the projection Uᵀc of a constant c; in no order.
@@ -194,8 +195,8 @@ impl ColumnGroup {
     }
 }
 
-/// Rotates two columns so that they become orthogonal; returns false if they already are, within
-/// rounding.
+/// Rotates two columns (entries, squared norm, projected constant) so that they become orthogonal.
+/// Returns false if they already are, within rounding.
 #[multiversion(targets("x86_64+avx2"))]
 fn rotate((a, aa, ca): &mut Column, (b, bb, cb): &mut Column) -> bool {
     let product = dot(a, b);

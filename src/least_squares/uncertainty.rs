@@ -6,12 +6,13 @@ use super::Triangle;
 use super::inverse::regular_inverse;
 use super::singular::SingularValues;
 
-/// Weight that turns gauge rows into constraints: the variance along them falls below rounding.
+/// Weight by which gauge rows become constraints: the variance along them falls below rounding.
 pub(super) const CONSTRAINT_WEIGHT: f64 = 1e5;
-/// Scaled singular values below this fraction of the largest carry no information.
+/// Largest scaled singular value, relative to the largest of all, whose direction counts as
+/// undetermined.
 const NO_INFORMATION: f64 = 1e-13;
-/// Smallest ratio of singular values at which the explicit inverse is used; its error is at most
-/// 1e-7.
+/// Smallest ratio of singular values at which the explicit inverse is used, with an error of at
+/// most 1e-7.
 const WELL_CONDITIONED: f64 = 1e-9;
 
 /// Covariance of the unknowns of a fit with the number of unknowns that the data determine.

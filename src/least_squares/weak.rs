@@ -14,10 +14,10 @@ use super::{Block, Linearisation, Objective, Triangle};
 /// deviations of an arm, at most a hundredth of that size, then move no position by more than 0.05
 /// σ.
 pub const WEAK_THRESHOLD: f64 = 5.0;
-/// Weights of a combination below this value are rounding.
+/// Largest weight in a combination that counts as rounding.
 const NEGLIGIBLE_WEIGHT: f64 = 1e-6;
 
-/// Combinations of unknowns that the data determine too weakly for an estimate.
+/// Combinations of unknowns that the data determine too weakly for a reliable estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weak {
     /// Rows that span the combinations, scaled to the strongest column, shape = (combinations, n)

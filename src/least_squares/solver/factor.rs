@@ -13,7 +13,7 @@ use super::spectrum::Spectrum;
 /// A column-pivoted QR of B with unit columns decides whether B has full rank: `|Rₙₙ| >
 /// tolerance·|R₁₁|`. If so, all steps come from it. Otherwise they come from B = U Σ Vᵀ, where
 /// singular values `σ ≤ tolerance·σ₁` are dropped (fewer if some columns are much shorter than the
-/// longest). Combinations that the rows do not determine are then left unchanged.
+/// longest). Combinations of unknowns in the dropped directions do not change.
 #[derive(Debug, Clone)]
 pub struct Factor {
     matrix: DMatrix<f64>,
@@ -87,8 +87,8 @@ impl Factor {
         (self.damped(lambda), lambda)
     }
 
-    /// Returns true if B is an upper triangle so well conditioned that no subset of its columns
-    /// needs pivoting.
+    /// Returns true if B is an upper triangle so well conditioned that any subset of its columns
+    /// can be factorised without pivoting.
     pub(super) fn is_well_conditioned(&self) -> bool {
         *self.well_conditioned.get_or_init(|| match self.pivoted.get() {
             Some(pivoted) => pivoted.as_ref().is_some_and(|pivoted| pivoted.is_unpivoted),

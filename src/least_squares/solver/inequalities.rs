@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::AtBound;
 
-/// Distance at which a row counts as on its limit, relative to the size of its terms and of x.
+/// Distance from its limit, relative to the size of its terms and of x, up to which a row counts as
+/// active (on the limit).
 const AT_LIMIT: f64 = 1e-12;
 /// Violation up to which a row counts as satisfied, relative to the size of its terms.
 const ROUNDING: f64 = 1e-14;

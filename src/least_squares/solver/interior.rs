@@ -9,7 +9,7 @@ use nalgebra::DVector;
 
 use super::Factor;
 
-/// Tolerance on duality gap and feasibility, relative to the scaled problem.
+/// Tolerance on duality gap and feasibility, relative to the scaled problem of unit columns.
 const TOLERANCE: f64 = 1e-11;
 
 /// Half-space g·q ≥ h, with g given as pairs of unknown and coefficient.

@@ -10,13 +10,13 @@ use crate::least_squares::{Linearisation, MANY_UNKNOWNS};
 /// min ‖J p + r‖ subject to ‖D p‖ ≤ Δ, that is `(JᵀJ + λD²) p = −Jᵀr` with λ ≥ 0          [Moré
 /// 1978]
 ///
-/// It works with the n × n factor of J alone. Redundant unknowns are allowed: combinations that the
-/// data do not determine stay unchanged. With many unknowns, steps whose gain differs from the
-/// prediction get a geodesic acceleration [Transtrum & Sethna 2012].
+/// It works with the n × n factor of J alone. Redundant unknowns are allowed: combinations of
+/// unknowns that the data do not determine do not change. With many unknowns, steps whose gain
+/// differs from the prediction get a geodesic acceleration [Transtrum & Sethna 2012].
 #[derive(Debug, Clone, Default)]
 pub struct Unconstrained {
     model: Option<Model>,
-    /// Last step without acceleration.
+    /// Last step without geodesic acceleration.
     unaccelerated: DVector<f64>,
 }
 
@@ -39,7 +39,8 @@ impl Model {
         Self { factor, scale: scale.clone() }
     }
 
-    /// Returns the problem with ½ `acceleration` (Jᵀ r″) added to its gradient.
+    /// Returns the problem with ½ `acceleration` (Jᵀ r″) added to its gradient; `None` if B lacks
+    /// rank.
     pub(super) fn with_acceleration(&self, acceleration: &DVector<f64>) -> Option<Factor> {
         let gradient = 0.5 * acceleration.component_div(&self.scale);
         let shift = self.factor.matrix().tr_solve_upper_triangular(&gradient)?;

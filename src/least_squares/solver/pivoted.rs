@@ -6,7 +6,8 @@ use super::settings::RADIUS_SLACK;
 use crate::least_squares::Triangle;
 use crate::least_squares::inverse::regular_inverse;
 
-/// Maximum number of Newton steps on the secular equation; the singular values follow after that.
+/// Maximum number of Newton steps on the secular equation ‖q(λ)‖ = Δ. If they do not suffice,
+/// singular values are used.
 const MAX_SECULAR_STEPS: usize = 20;
 /// Smallest ratio of singular values at which an upper triangle is used without pivoting.
 const WELL_CONDITIONED: f64 = 1e-8;

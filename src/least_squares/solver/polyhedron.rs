@@ -5,9 +5,10 @@ use nalgebra::{DMatrix, DVector};
 use super::interior::HalfSpace;
 use super::{AtBound, Bounds, Factor, Inequalities};
 
-/// Length below which the independent part of a unit normal counts as zero.
+/// Smallest length of the independent part of a unit normal; a shorter one counts as linearly
+/// dependent.
 const DEPENDENT: f64 = 1e-10;
-/// Relative rounding allowed in the distance to a half-space.
+/// Rounding error allowed in the distance to a half-space, relative to the size of its terms.
 const ROUNDING: f64 = 1e-14;
 
 /// Set of steps lower ≤ q ≤ upper with G q ≥ h; the rows of G have unit length.
@@ -56,7 +57,7 @@ impl Faces {
         rows + self.bounds.iter().zip(&other.bounds).filter(|(a, b)| a != b).count()
     }
 
-    /// Adopts the last face in which `other` differs.
+    /// Copies the state of the last face in which `other` differs into this set.
     pub(super) fn adopt_last_difference(&mut self, other: &Self) {
         if let Some(i) = (0..self.rows.len()).rfind(|&i| self.rows[i] != other.rows[i]) {
             self.rows[i] = other.rows[i];
@@ -107,10 +108,10 @@ impl Polyhedron {
         }
     }
 
-    /// Returns the part of a gradient at q = 0 along the feasible directions.
+    /// Returns the part of a gradient γ at q = 0 along the feasible directions.
     ///
-    /// It is γ − Gᵀμ with μ ≥ 0 over the faces through q = 0, without the faces that the step would
-    /// leave inwards.
+    /// It is γ − Gᵀμ with multipliers μ ≥ 0 over the faces through q = 0, except faces that a
+    /// descent step leaves inwards.
     pub(super) fn projected_gradient(&self, gradient: &DVector<f64>) -> DVector<f64> {
         let (faces, mut projected) = self.active_faces(gradient);
         (0..projected.len())
@@ -248,7 +249,8 @@ impl Polyhedron {
         [side(&self.lower, 1.0), side(&self.upper, -1.0), rows].concat()
     }
 
-    /// Returns the faces within `tolerance` of `q`, relative to the size of q.
+    /// Returns the faces whose distance from `q`, relative to the size of q, is at most
+    /// `tolerance`.
     pub(super) fn faces_near(&self, q: &DVector<f64>, tolerance: f64) -> Faces {
         let distance = tolerance * q.amax().max(f64::MIN_POSITIVE);
         let bound = |j: usize| match q[j] {

@@ -37,7 +37,8 @@ impl<'a> PolyhedronProblem<'a> {
         Self { factor, gradient: factor.gradient(), polyhedron, guess }
     }
 
-    /// Guesses the faces that the unconstrained step `unbounded` violates, if no face is known yet.
+    /// Guesses the active faces, if there is no guess yet: those that the unconstrained step
+    /// `unbounded` violates.
     pub(super) fn guess_faces(&mut self, unbounded: &DVector<f64>) {
         if self.guess.is_empty() {
             self.guess = self.corrected_faces(&self.guess, unbounded, 0.0);
@@ -106,7 +107,8 @@ impl<'a> PolyhedronProblem<'a> {
         None
     }
 
-    /// Returns the faces without those that q should leave and with those that q violates.
+    /// Returns the faces without those whose multiplier has the wrong sign at `q`, and with those
+    /// that q violates.
     fn corrected_faces(&self, faces: &Faces, q: &DVector<f64>, lambda: f64) -> Faces {
         // Multipliers w = Bᵀ(B q + c) + λ q − Gᵀμ must satisfy w ≥ 0 at a lower bound, w ≤ 0 at an
         // upper bound, and μ ≥ 0.

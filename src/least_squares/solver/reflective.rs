@@ -8,7 +8,8 @@ use crate::least_squares::Linearisation;
 
 /// Fraction of the distance to a bound that a step may take.
 const BOUND_FRACTION: f64 = 0.995;
-/// Distance that a start keeps from its bounds, relative to their magnitude (1 at least).
+/// Distance that a start must keep from its bounds, relative to the bound's magnitude or 1,
+/// whichever is larger.
 const START_MARGIN: f64 = 1e-10;
 
 /// Subproblem of the interior reflective step within bounds lo < x < hi [Branch, Coleman & Li
@@ -30,12 +31,13 @@ pub struct Reflective {
 #[derive(Debug, Clone)]
 struct ScaledModel {
     factor: Factor,
-    /// Scale d = √v / D, or 1/D if no bound lies ahead; 0 for a fixed unknown.
+    /// Scale d = √v / D, or 1/D if there is no bound in the direction of descent; 0 for a fixed
+    /// unknown.
     size: DVector<f64>,
     gradient: DVector<f64>,
 }
 
-/// Step p̂ with the change of the model, ½‖B p̂‖² + ĝᵀp̂.
+/// Candidate step p̂ with the change of the quadratic model, ½‖B p̂‖² + ĝᵀp̂.
 struct Candidate {
     scaled: DVector<f64>,
     change: f64,

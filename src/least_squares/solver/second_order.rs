@@ -4,35 +4,37 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::least_squares::Linearisation;
 
-/// Range of the gain ratio (actual over predicted reduction) of a step that is predicted well.
+/// Range of the gain ratio (actual over predicted reduction) of a step that the model predicted
+/// well.
 const GOOD_RATIO: std::ops::RangeInclusive<f64> = 0.5..=1.5;
-/// Range of the gain ratio for an undamped step of the model with S, which is exact near an
-/// optimum.
+/// Narrower range of the gain ratio for undamped steps of the model with the second-order term S,
+/// which is exact near an optimum.
 const GOOD_RATIO_WITH_S: std::ops::RangeInclusive<f64> = 0.9..=1.1;
-/// Number of poorly predicted steps from which steps are accelerated.
+/// Number of poorly predicted steps in a run from which further steps get geodesic acceleration.
 const ACCELERATION_MISSES: usize = 2;
 /// Largest ratio of acceleration to length of an undamped step after which acceleration pauses
 /// until the next poorly predicted step.
 const SMALL_ACCELERATION: f64 = 0.01;
-/// Number of poorly predicted steps after which S is formed, with few unknowns.
+/// Number of poorly predicted steps after which S = Σ rᵢ ∇²rᵢ is formed, if there are few unknowns.
 const FORMATION_MISSES: usize = 15;
 /// Number of poorly predicted steps per unknown after which S is formed, with many unknowns.
 /// Forming S takes about one linearisation per unknown.
 const FORMATION_MISSES_PER_UNKNOWN: f64 = 1.0 / 6.0;
 /// Number of successive slow steps from which the remaining steps are extrapolated. S is then
-/// formed if the remaining steps would cost more than S, or exceed the iteration limit.
+/// formed if those steps would cost more than S, or exceed the iteration limit.
 const SLOW_STEPS: usize = 3;
-/// Number of steps per unknown after which S may be formed again.
+/// Number of steps per unknown that must pass before S is formed again.
 const STEPS_PER_UNKNOWN: f64 = 1.0 / 40.0;
 /// Ratio of the lengths of successive undamped steps above which convergence is slow.
 const SLOW_RATIO: f64 = 0.5;
 /// Maximum number of times that S is formed in one run.
 const MAX_FORMATIONS: usize = 50;
-/// Penalty ρ on leaving active faces, relative to the largest curvature.
+/// Penalty ρ on leaving active faces in the convex model, relative to the largest curvature.
 const FACE_PENALTY: f64 = 1e3;
-/// Damping μ that makes the model convex, relative to its most negative curvature.
+/// Damping μ that makes the model convex, as a multiple of the magnitude of its most negative
+/// curvature.
 const CONVEXITY_MARGIN: f64 = 1.01;
-/// Smallest such damping μ, relative to the largest curvature.
+/// Smallest damping μ that makes the model convex, relative to the largest curvature.
 const MIN_DAMPING: f64 = 1e-10;
 
 /// Decides when steps are accelerated and when second derivatives are used.
@@ -62,14 +64,15 @@ pub(super) struct SecondOrder {
     is_retired: bool,
 }
 
-/// Convex quadratic model of the cost with the terms that were added to make it convex.
+/// Convex quadratic model of the cost, with the damping and penalty that were added to make it
+/// convex.
 #[derive(Debug, Clone)]
 pub(super) struct ConvexModel {
     /// Model in the form of linearised residuals: gradient Rᵀ(Qᵀr), Hessian RᵀR.
     pub linearisation: Linearisation,
-    /// Damping μ of q = D p.
+    /// Damping μ ≥ 0 of the scaled step q = D p.
     damping: f64,
-    /// Penalty rows √ρ N, with the normals N of active faces.
+    /// Penalty rows √ρ N, with the unit normals N of active faces, shape = (faces, n).
     penalty_rows: DMatrix<f64>,
 }
 
@@ -100,12 +103,12 @@ impl SecondOrder {
         self.matrix.take().is_some()
     }
 
-    /// Counts a poorly predicted step, given its gain ratio.
+    /// Counts the step as poorly predicted if its gain `ratio` is outside [`GOOD_RATIO`].
     pub fn count_miss(&mut self, ratio: f64) {
         self.misses += usize::from(!GOOD_RATIO.contains(&ratio));
     }
 
-    /// Resumes acceleration if a step was predicted poorly, given its gain ratio.
+    /// Resumes geodesic acceleration if the gain `ratio` shows that the step was predicted poorly.
     pub fn check_straightness(&mut self, ratio: f64) {
         self.is_straight &= GOOD_RATIO.contains(&ratio);
     }

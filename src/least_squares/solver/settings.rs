@@ -34,5 +34,6 @@ impl Default for Settings {
     }
 }
 
-/// Relative deviation of a step length from the radius that is tolerated [Moré 1978].
+/// Relative deviation of a step length from the radius that is accepted, so that λ needs few
+/// iterations [Moré 1978].
 pub(super) const RADIUS_SLACK: f64 = 0.1;

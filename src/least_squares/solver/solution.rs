@@ -39,7 +39,7 @@ impl Solution {
         Self { cost: objective.cost(&x), termination, at_bound, ..Self::at(x) }
     }
 
-    /// Creates the solution of a run from `start` that has not begun.
+    /// Creates the solution of a run that stops at `start` before its first evaluation.
     pub(super) fn at(start: DVector<f64>) -> Self {
         Self {
             at_bound: vec![None; start.len()],

@@ -2,12 +2,13 @@
 
 use super::Step;
 
-/// Ratio of acceleration to step length towards which the radius grows.
+/// Ratio of geodesic acceleration to step length at which the radius neither grows nor shrinks for
+/// its sake.
 const TARGET_ACCELERATION: f64 = 0.03;
 /// Smallest gain ratio ρ at which the radius grows.
 pub(super) const GOOD_RATIO: f64 = 0.75;
 
-/// Tried step with its reductions relative to the previous cost.
+/// Tried step with its actual and predicted reductions, relative to the previous cost.
 pub(super) struct Trial {
     pub cost: f64,
     pub actual: f64,

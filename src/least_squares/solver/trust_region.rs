@@ -14,9 +14,9 @@ use crate::least_squares::{Linearisation, Objective};
 
 /// Smallest gain ratio ρ at which a step is accepted.
 const MIN_ACCEPTED_RATIO: f64 = 1e-4;
-/// Largest ratio of acceleration to step length at which an accelerated step is used.
+/// Largest ratio of geodesic acceleration to step length at which an accelerated step is used.
 const MAX_ACCELERATION: f64 = 0.75;
-/// Maximum number of accelerated steps tried with decreasing radius.
+/// Maximum number of accelerated steps tried from one point, with decreasing radius.
 const MAX_ACCELERATION_TRIES: usize = 6;
 /// Relative change of the cost that counts as rounding.
 const ROUNDING: f64 = 1e3 * f64::EPSILON;
@@ -38,7 +38,8 @@ pub trait Subproblem {
         settings: &Settings,
     );
 
-    /// Returns component j of the gradient g, or zero if a constraint blocks the descent.
+    /// Returns component `j` of the gradient, or zero if a constraint at `x` blocks descent along
+    /// it; `gradient` is its unconstrained value.
     fn free_gradient(&self, x: &DVector<f64>, j: usize, gradient: f64) -> f64;
 
     /// Removes from a gradient with unit columns (divided by `scale`) the components that
@@ -65,7 +66,7 @@ pub trait Subproblem {
         false
     }
 
-    /// Returns true if steps may be accelerated although no constraint changes them.
+    /// Returns true if steps may be accelerated although no constraint is active.
     fn accelerates_unconstrained(&self) -> bool {
         false
     }
@@ -139,8 +140,8 @@ impl<S: Subproblem> TrustRegion<S> {
         }
     }
 
-    /// Updates the scaling, tests the gradient and stores the linearisation; returns the reason to
-    /// stop, if any.
+    /// Updates the scaling, tests the gradient for convergence and stores the linearisation.
+    /// Returns the reason to stop, if any.
     fn accept_linearisation(
         &mut self,
         x: &DVector<f64>,
