@@ -35,8 +35,8 @@ pub struct ErrorSummary {
     pub max: AxisValues,
     /// Root mean square per axis, and root of the mean squared norm.
     pub rms: AxisValues,
-    /// Mean, largest and root mean squared lengths at the seen points that errors in images stand
-    /// for \[m\]; `None` for other kinds.
+    /// Image errors converted to lengths at the observed points \[m\]: mean, largest and root mean
+    /// square; `None` for other kinds of rows.
     pub at_point: Option<[AxisValues; 3]>,
 }
 
@@ -45,7 +45,7 @@ pub struct ErrorSummary {
 pub struct Errors {
     /// Errors on the identification rows, which are fitted.
     pub identification: ErrorSummary,
-    /// Errors on the held-out rows, which decide nothing.
+    /// Errors on the held-out rows, which are not fitted.
     pub held_out: ErrorSummary,
 }
 
@@ -58,11 +58,12 @@ pub struct OrientationErrors {
     pub registered: Errors,
     /// Errors of the identified arm.
     pub fitted: Errors,
-    /// 1 σ about each axis that the fit took \[rad\].
+    /// Standard deviation (1 σ) about each axis that the fit assumed for orientations \[rad\].
     pub sigma_taken: f64,
 }
 
-/// Summarises the errors of those of `rows` that are of the kind of `observation`.
+/// Summarises the errors of those of `rows` that measure the same kind of quantity as
+/// `observation`.
 pub(super) fn of_kind(
     measurements: &Measurements,
     rows: impl IntoIterator<Item = usize>,
@@ -96,8 +97,8 @@ impl ErrorSummary {
         Self::of_kind(Observation::Position, errors)
     }
 
-    /// Summarises the residuals measured − predicted of `rows`: those of the leading kind of the
-    /// table.
+    /// Summarises the residuals measured − predicted of those of `rows` that are of the leading
+    /// kind of the table.
     pub(crate) fn of_rows(
         table: &Measurements,
         rows: impl IntoIterator<Item = usize>,
@@ -106,7 +107,7 @@ impl ErrorSummary {
         of_kind(table, rows, errors, table.leading())
     }
 
-    /// Adds the lengths at the seen points that these errors in images stand for: `lengths` \[m\].
+    /// Adds the image errors converted to `lengths` at the observed points \[m\].
     pub(super) fn with_lengths(self, lengths: &[Vector3<f64>]) -> Self {
         let Self { mean, max, rms, .. } = Self::of(lengths);
         Self { at_point: Some([mean, max, rms]), ..self }

@@ -36,8 +36,8 @@ use crate::model::Model;
 use crate::model::parameter::Parameter;
 use crate::problem::{ParameterRule, Problem, Robust, RobustLoss, pattern};
 
-/// Identifies the free parameters of `problem` from the identification rows of `data`; held-out
-/// rows decide nothing.
+/// Identifies the free parameters of `problem` from the identification rows of `data`. Held-out
+/// rows do not influence the estimates of the arm.
 ///
 /// # Errors
 /// Returns an error if problem, data, strategy and solver do not fit each other, or if the fit was
@@ -278,8 +278,8 @@ fn fit_rows(
     })
 }
 
-/// Returns the full parameter vector of the registered nominal arm and its errors, and sets the σ
-/// with which the fit starts: from the warm start, or an undeclared one from these errors.
+/// Returns the full parameter vector of the registered nominal arm and its errors. Also sets the σ
+/// with which the fit starts: from the warm start, or from these errors if none is declared.
 fn prepared(
     fitting: &mut Fitting,
     warm_start: Option<&WarmStart>,
@@ -316,9 +316,9 @@ fn fitted_parameters<'a>(fitting: &Fitting<'a>) -> Result<Vec<&'a Parameter>, Id
     Ok(unknowns)
 }
 
-/// Returns the estimates of all parameters, their covariance, and the finding about a fit that did
-/// not converge. Bases and targets of held-out sessions are fitted to their rows with the arm
-/// given.
+/// Returns the estimates of all parameters, their covariance, and the finding if the fit did not
+/// converge. Bases and targets of held-out sessions are fitted to their rows with the arm's
+/// parameters fixed.
 fn estimated(
     fitting: &Fitting,
     end: &mut FitEnd,
@@ -374,7 +374,7 @@ fn rules(problem: &Problem, unknowns: &[&Parameter]) -> Vec<Option<String>> {
     unknowns.iter().map(rule).collect()
 }
 
-/// Reports the reason for which a fit did not converge.
+/// Creates the finding that a fit ended for a `reason` other than convergence.
 fn not_converged_finding(reason: Termination) -> Finding {
     let text = reason.to_string();
     let finding = Finding::new(FindingCode::NotConverged, [reason.as_str().into()], text);

@@ -4,26 +4,28 @@ use crate::fit::checks::outliers::{InfluentialRows, Outlier};
 use crate::fit::outcome::Identification;
 use crate::fit::uncertainty::noise::Noise;
 
-/// Part of the variance left without the rows up to which they are influential in any case. Rows
-/// that one effect alone concerns, such as two with a payload, may be among them.
+/// Ratio of the residual variance without the rows to that with them, below which the rows are
+/// influential even if a misfit remains. Rows that a single effect concerns, such as two with a
+/// payload, may be among them.
 const FAR_BETTER: f64 = 0.01;
-/// Part of the variance left without the rows up to which they are influential if the declared σ
-/// then explains the rest.
+/// Ratio of the residual variance without the rows to that with them, below which the rows are
+/// influential if the declared σ then explains the remaining residual.
 const MOST_OF_IT: f64 = 0.5;
-/// Reciprocal of the largest part of the rows that can be influential; beyond it, the model misses
-/// all.
+/// Reciprocal of the largest share of the rows that can be influential. If more are needed, the
+/// model misses all rows.
 const ONE_IN: usize = 5;
-/// Reciprocal of the part of the rows that is left out in one round, at least one row: a gross
-/// error makes other rows look far off and hides smaller errors.
+/// Reciprocal of the share of the rows that is removed in one round, at least one row. A gross
+/// error makes good rows look like outliers, so few are removed at a time.
 const ONE_A_ROUND_IN: usize = 100;
-/// Part of the variance left after a round above which its rows are no gross errors.
+/// Ratio of the residual variances after and before a round, above which the removed rows are not
+/// gross errors and the search ends.
 const NO_GAIN: f64 = 0.95;
 
-/// Finds the influential rows of the fit `found`; `without` fits the identification rows except
-/// some.
+/// Finds the influential rows of the fit `found`; `without` fits the identification rows except the
+/// given ones.
 ///
-/// The rows farthest off are left out and the others fitted again, until the declared σ explains
-/// the residual or no row is too far off. The search ends at a fit that does not converge.
+/// Rows with the largest residuals are removed and the others fitted again, until the declared σ
+/// explains the residual or no outlier remains. The search ends at a fit that does not converge.
 pub(super) fn influential_rows(
     found: &Identification,
     without: impl Fn(&[usize]) -> Option<Identification>,
@@ -67,7 +69,7 @@ fn explains(fit: &Identification) -> bool {
     fit.noise == Noise::Declared && fit.noise_factor <= 1.0 + 1e-9
 }
 
-/// Returns the variance of the residual of `fit` over that of `other`.
+/// Returns the residual variance of `fit` relative to that of `other`.
 fn part(fit: &Identification, other: &Identification) -> f64 {
     match (fit.reduced_chi2, other.reduced_chi2) {
         (Some(chi2), Some(other)) => chi2 / other,

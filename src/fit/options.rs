@@ -18,27 +18,27 @@ pub struct Options {
     pub strategy: Strategy,
     /// Solver of the fits.
     pub solver: SolverChoice,
-    /// Solver of the caller, used where `solver` is [`SolverChoice::Custom`].
+    /// Solver of the caller, used if `solver` is [`SolverChoice::Custom`].
     pub custom_solver: Option<Arc<dyn CustomSolver>>,
-    /// Receiver of progress.
+    /// Receiver of progress reports; `None` to report nothing.
     pub progress: Option<ProgressSink>,
-    /// Request to stop early: a fit then returns
-    /// [`StageError::Interrupted`](super::StageError::Interrupted), a loop returns what it has
-    /// found by then.
+    /// Request to stop early. A fit then returns
+    /// [`StageError::Interrupted`](super::StageError::Interrupted); a loop returns its results up
+    /// to then.
     pub stop: Option<Stop>,
     /// Names and values \[SI\] from which the fit starts; other parameters start at the registered
     /// nominal arm.
     pub start: Vec<(String, f64)>,
-    /// Maximum number of steps of a fit; `None` for that of the solver.
+    /// Maximum number of steps of a fit; `None` for the solver's default.
     pub max_steps: Option<u64>,
-    /// Effects of the caller (from [`Problem::effect`](crate::problem::Problem::effect)) that trace and loop look for besides those of the
-    /// catalogue. A fit alone does not use them.
+    /// Effects of the caller (from [`Problem::effect`](crate::problem::Problem::effect)) that trace
+    /// and loop search for in addition to the catalogue. A fit alone does not use them.
     pub candidates: Vec<Effect>,
     /// State of an earlier fit of the same data with other effects, from which this one starts.
     pub(crate) warm_start: Option<Arc<WarmStart>>,
     /// True if the fit is provisional: another one follows, and its result is not checked.
     pub(crate) provisional: bool,
-    /// True if further fits look for influential rows.
+    /// True if influential rows are searched for by further fits.
     pub(crate) influential_rows: bool,
 }
 
@@ -62,8 +62,9 @@ impl Options {
         Self { solver: SolverChoice::Custom, custom_solver: Some(solver), ..self }
     }
 
-    /// Looks for influential rows ([`Identification::influential_rows`](super::Identification::influential_rows)) by further fits; a loop
-    /// does so for the problem as declared.
+    /// Enables the search for influential rows
+    /// ([`Identification::influential_rows`](super::Identification::influential_rows)) by further
+    /// fits. A loop searches for them in the problem as declared.
     #[must_use]
     pub fn with_influential_rows(self) -> Self {
         Self { influential_rows: true, ..self }
@@ -94,13 +95,13 @@ impl Options {
         Self { start, ..self }
     }
 
-    /// Sets the effects that trace and loop look for besides those of the catalogue.
+    /// Sets the effects that trace and loop search for in addition to the catalogue.
     #[must_use]
     pub fn with_candidates(self, candidates: Vec<Effect>) -> Self {
         Self { candidates, ..self }
     }
 
-    /// The same, stopped after so many steps.
+    /// Sets the maximum number of steps of a fit; `None` for the solver's default.
     #[must_use]
     pub fn with_max_steps(self, max_steps: impl Into<Option<u64>>) -> Self {
         Self { max_steps: max_steps.into(), ..self }

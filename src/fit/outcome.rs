@@ -20,10 +20,11 @@ use crate::least_squares::{Identifiability, UnidentifiableCombination};
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
 
-/// Absolute correlation from which on a pair of parameters is reported: the variances of their sum
-/// and difference, each in units of its σ, then differ by a factor of 19 and more.
+/// Smallest absolute correlation at which a pair of parameters is reported. The variances of their
+/// sum and difference, each parameter in units of its σ, then differ at least by a factor of 19.
 pub const STRONG_CORRELATION: f64 = 0.9;
-/// Identified part up to which a parameter has no standard error.
+/// Largest identified share at which a parameter has no standard error, because the data do not
+/// determine it.
 const NOTHING_LEARNED: f64 = 1e-6;
 
 /// Free parameter after the fit; SI units.
@@ -31,22 +32,22 @@ const NOTHING_LEARNED: f64 = 1e-6;
 pub struct Estimate {
     /// Name as in the problem file.
     pub name: String,
-    /// Kind of quantity.
+    /// Kind of quantity, which determines the SI unit of the values.
     pub unit: Unit,
     /// Nominal value.
     pub nominal: f64,
     /// Estimated value.
     pub estimate: f64,
-    /// 1 σ of the value. `None` where it was not fitted, rests on a bound, belongs to a combination
-    /// that neither data nor priors determine, or where the data say nothing about it.
+    /// Standard error of the value. `None` if it was not fitted, rests on a bound, belongs to an
+    /// undetermined combination, or if the data do not determine it.
     pub std_error: Option<f64>,
-    /// The bound on which the value rests.
+    /// Bound on which the value rests; `None` if it is inside its bounds.
     pub at_bound: Option<AtBound>,
-    /// Price of this bound.
+    /// Shadow price of the bound on which the value rests.
     #[doc(hidden)]
     pub shadow_price: Option<ShadowPrice>,
-    /// Part of the value that the data determine, 0…1; the rest is decided by prior, bound, or the
-    /// start of the fit along unidentifiable combinations.
+    /// Identified share: part of the value that the data determine, 0…1. The remainder comes from
+    /// prior, bound, or the start of the fit along unidentifiable combinations.
     pub identified: f64,
     /// True if the strategy varied the parameter.
     pub fitted: bool,
@@ -60,7 +61,7 @@ pub struct Identification {
     pub strategy: Strategy,
     /// Solver that was used.
     pub solver: SolverChoice,
-    /// Reason for this solver, where `auto` chose it.
+    /// Reason for the choice of the solver, if `auto` chose it.
     pub solver_reason: Option<&'static str>,
     /// Reason for which the last fit stopped.
     pub termination: Termination,
@@ -83,47 +84,48 @@ pub struct Identification {
     /// Source of the σ of the measurements.
     #[doc(hidden)]
     pub noise: Noise,
-    /// Errors of the registered nominal arm: base and target fitted where they are free.
+    /// Errors of the registered nominal arm, with base and target fitted if they are free.
     pub registered: Errors,
     /// Errors of the identified arm.
     pub fitted: Errors,
     /// Errors of each kind of rows before and after the fit, where there are several kinds; the
     /// first pair is `registered` and `fitted`.
     pub kinds: Vec<(Errors, Errors)>,
-    /// Scatter of the predicted target at each touched point: of the registered nominal arm, of the
-    /// identified arm, and whether all of the point's rows are held out.
+    /// For each touched point, scatter of the predicted target with the registered nominal and with
+    /// the identified arm, and true if all its rows are held out.
     #[doc(hidden)]
     pub spreads: Vec<(PointSpread, PointSpread, bool)>,
     /// Errors of orientation, where it is fitted.
     #[doc(hidden)]
     pub orientation: Option<OrientationErrors>,
-    /// χ² of the identification data over its degrees of freedom; `None` where there are none, or
-    /// where the noise is estimated. A robust loss leaves outliers out.
+    /// Reduced χ² (χ² over its degrees of freedom) of the identification data; `None` without
+    /// degrees of freedom or with estimated noise. A robust loss excludes outliers.
     pub reduced_chi2: Option<f64>,
-    /// Interval in which `reduced_chi2` lies with probability 0.999 if only noise is left; `None`
-    /// where that is `None`.
+    /// Interval in which `reduced_chi2` lies with probability 0.999 if the residual is only noise;
+    /// `None` if `reduced_chi2` is.
     pub chance: Option<(f64, f64)>,
-    /// Noise variance that the fit took over the declared one; 1 where residuals and priors do not
-    /// contradict the declared σ.
+    /// Noise variance that the fit took, relative to the declared one; 1 unless residuals and
+    /// priors contradict the declared σ.
     pub noise_factor: f64,
-    /// 1 σ of a measured coordinate that the fit assumed \[m\] (of a tilt \[rad\]): root mean square
-    /// over the identification rows of the kind that `fitted` is about.
+    /// Standard deviation (1 σ) of a measured coordinate that the fit assumed \[m\] (of a tilt
+    /// \[rad\]): root mean square over the identification rows of the leading kind.
     pub sigma_taken: f64,
-    /// Factor on the declared σ, less than 1 where these are too large.
+    /// Factor on the declared σ, less than 1 if they are too large.
     pub sigma_scale: f64,
-    /// Combinations of `unknowns` that the data determine too weakly, held where they started.
-    /// Their weights are in units of the arm's reach for lengths, 1 rad for angles and a factor of
-    /// 100 for stiffnesses; their singular value is the change of all data along them \[σ\].
+    /// Combinations of `unknowns` that the data determine too weakly, which keep their start
+    /// values. Weights are in units of the arm's reach for lengths, 1 rad for angles and a factor
+    /// of 100 for stiffnesses. The singular value is the change of all data along the combination
+    /// \[σ\].
     pub weak: Vec<UnidentifiableCombination>,
     /// Number of measured coordinates that were fitted.
     pub coordinates: usize,
     /// Names of the fitted parameters, in the order of [`Identification::identifiability`].
     pub unknowns: Vec<String>,
     /// Triangular factor of the whitened Jacobian of the unknowns, without priors, at the
-    /// registered nominal arm, and its analysis once that is asked for.
+    /// registered nominal arm, and its identifiability analysis, computed on first use.
     pub(super) whitened_triangle: (DMatrix<f64>, OnceLock<Identifiability>),
-    /// True if the fit is provisional: another one follows, so it has neither that factor nor the
-    /// findings of the checks.
+    /// True if the fit is provisional: another one follows, so the identifiability and most checks
+    /// are left out.
     pub(crate) provisional: bool,
     /// Noise models of positions and of orientations that the fit took.
     pub(super) noise_models: (NoiseModel, NoiseModel),
@@ -137,13 +139,13 @@ pub struct Identification {
     /// Constraints on whose limits the fit rests, in the order of the file.
     #[doc(hidden)]
     pub active_constraints: Vec<ActiveConstraint>,
-    /// Identification rows whose residual is too long to be noise, in the order of the rows.
+    /// Identification rows whose residual is too large to be noise, in the order of the rows.
     pub outliers: Vec<Outlier>,
-    /// Held-out rows that are farther from the prediction than its σ allows, in the order of the
+    /// Held-out rows whose prediction error is too large for its uncertainty, in the order of the
     /// rows.
     pub held_out_outliers: Vec<Outlier>,
-    /// Rows whose removal removes most of the misfit, if a few do. They are looked for where
-    /// [`Options::with_influential_rows`](crate::fit::Options::with_influential_rows) asks for it,
+    /// Rows whose removal removes most of the misfit, if a few do. Searched for if
+    /// [`Options::with_influential_rows`](crate::fit::Options::with_influential_rows) requests it,
     /// but not with a robust loss.
     #[doc(hidden)]
     pub influential_rows: Option<InfluentialRows>,
@@ -153,7 +155,8 @@ pub struct Identification {
     pub registered_x: DVector<f64>,
     /// Start time of the time-dependent terms \[s\]: that of the first pose.
     pub first_time: f64,
-    /// 1 σ of a coordinate in rows that state none, declared or estimated \[m\].
+    /// Standard deviation (1 σ) of a coordinate in rows that state none, declared or estimated
+    /// \[m\].
     pub sigma: f64,
 }
 
@@ -171,8 +174,8 @@ impl Identification {
         findings.all(|finding| finding.severity() != Severity::Error || is_noise(finding))
     }
 
-    /// Returns the first error among the findings: the reason for which the fit is not to be
-    /// trusted.
+    /// Returns the first error among the findings, which is the reason not to trust the fit; `None`
+    /// if there is none.
     #[doc(hidden)]
     pub fn first_error(&self) -> Option<&Finding> {
         self.findings.iter().find(|finding| finding.severity() == Severity::Error)
@@ -188,8 +191,7 @@ impl Identification {
         self.finding(code).is_some()
     }
 
-    /// Returns the findings that are warnings, without those that reports show in sections of their
-    /// own.
+    /// Returns the findings that are warnings, except those that have their own section in reports.
     pub fn cautions(&self) -> impl Iterator<Item = &Finding> {
         let has_section =
             |code| matches!(code, FindingCode::InfluentialRows | FindingCode::UnsteadyPoint);
@@ -205,7 +207,7 @@ impl Identification {
         found.get_or_init(|| Identifiability::of(triangle))
     }
 
-    /// Returns the sentences of [`cautions`](Self::cautions).
+    /// Returns the texts of [`cautions`](Self::cautions).
     #[doc(hidden)]
     pub fn reasons_to_ask(&self) -> Vec<String> {
         self.cautions().map(ToString::to_string).collect()
@@ -216,8 +218,8 @@ impl Identification {
         self.estimates.iter().find(|estimate| estimate.name == name)
     }
 
-    /// Returns the pairs of [`correlations`](Self::correlations) beyond [`STRONG_CORRELATION`],
-    /// strongest first.
+    /// Returns the pairs of [`correlations`](Self::correlations) whose absolute value is at least
+    /// [`STRONG_CORRELATION`], strongest first.
     #[doc(hidden)]
     pub fn strong_correlations(&self) -> Vec<(String, String, f64)> {
         let all = self.correlations();
@@ -242,7 +244,7 @@ impl Identification {
 }
 
 impl Estimate {
-    /// Creates the estimate of a parameter that no stage has varied.
+    /// Creates the estimate of a parameter that no stage varied, at its nominal value.
     pub(super) fn unfitted(parameter: &Parameter, time_measured: bool) -> Self {
         let unit = match parameter.unit() {
             Unit::Speed if !time_measured => Unit::LengthPerRow,
@@ -262,7 +264,7 @@ impl Estimate {
     }
 }
 
-/// Enters the result of a stage into the estimates of its unknowns and their covariance.
+/// Writes the result of a stage into the estimates of its unknowns and their covariance.
 pub(super) fn enter(
     (estimates, covariance): (&mut [Estimate], &mut Collected),
     stage: &Stage,

@@ -10,8 +10,8 @@ use crate::model::{LinearModel, Model};
 /// effects: registered parameters, noise model, and the linear model at the optimum.
 #[derive(Debug, Clone)]
 pub(crate) struct WarmStart {
-    /// Deviations of the registered nominal arm by parameter name; parameters without an entry have
-    /// none.
+    /// Deviations of the registered nominal arm by parameter name; parameters without an entry do
+    /// not deviate.
     registered: Vec<(String, f64)>,
     /// Errors of the registered nominal arm.
     pub(super) errors: Errors,
@@ -23,7 +23,7 @@ pub(crate) struct WarmStart {
 }
 
 impl WarmStart {
-    /// Adds the Jacobian at the optimum.
+    /// Sets the linear model (Jacobian) at the optimum.
     pub(crate) fn with_linear_model(self, linear_model: Option<LinearModel>) -> Self {
         Self { linear_model, ..self }
     }
@@ -40,7 +40,8 @@ impl WarmStart {
 }
 
 impl Identification {
-    /// Returns the state that the next fit starts from, with the noise model only if `keep_noise`.
+    /// Returns the state from which the next fit starts. The noise model is included only if
+    /// `keep_noise`.
     pub(crate) fn warm_start(&self, keep_noise: bool) -> WarmStart {
         let names = self.estimates.iter().map(|estimate| estimate.name.clone());
         let deviations = names.zip(self.registered_x.iter().copied());

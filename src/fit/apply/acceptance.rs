@@ -18,14 +18,14 @@ const RESAMPLES: usize = 5000;
 const COVERAGE: f64 = 0.95;
 /// Seed of the resamples.
 const SEED: u64 = 9283;
-/// Number of measurements of a pose from which on the spread of their distances is defined.
+/// Smallest number of measurements of a pose for which a repeatability is computed.
 const MIN_CYCLES: usize = 3;
 
 /// Pose accuracy of an arm in held-out poses, before and after identification.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Acceptance {
-    /// Poses; a configuration with its base and target counts once.
+    /// Held-out poses; rows with equal configuration, base and target form one pose.
     pub poses: Vec<AcceptancePose>,
     /// Accuracy of the registered nominal arm.
     pub before: Accuracy,
@@ -37,7 +37,7 @@ pub struct Acceptance {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct AcceptancePose {
-    /// Rows of the pose, ascending.
+    /// Rows of the pose in the measurements, ascending.
     pub rows: Vec<usize>,
     /// Accuracy AP of the nominal arm: distance from the predicted position to the barycentre of
     /// the measured ones \[m\].

@@ -14,21 +14,22 @@ use crate::spatial::Frame;
 
 use crate::fit::stages::stage::StageError;
 
-/// 1 σ of the target position \[m\], beside 1 σ = 1 rad or 1 m of the distance from the seed: the
-/// position decides, the seed breaks ties.
+/// Standard deviation (1 σ) of the desired position \[m\]. The distance from the seed has 1 σ = 1
+/// rad or 1 m, so the position decides and the seed only selects between solutions.
 const POSITION_WEIGHT: f64 = 1e-6;
-/// 1 σ of the target orientation \[rad\], beside the same σ of the distance from the seed.
+/// Standard deviation (1 σ) of the desired orientation \[rad\], chosen like [`POSITION_WEIGHT`].
 const ORIENTATION_WEIGHT: f64 = 1e-6;
-/// Change of a command per pass below which it has settled [rad or m].
+/// Largest change of a command in a pass at which it counts as converged \[rad\] or \[m\].
 const SETTLED: f64 = 1e-10;
-/// Maximum number of passes; a command that has not settled by then is returned with its miss.
+/// Maximum number of passes. A command that has not converged by then is returned with its
+/// remaining error.
 const MAX_PASSES: usize = 20;
-/// Distance within which a target counts as reached \[m\].
+/// Largest distance to the target at which it counts as reached \[m\].
 const REACHED: f64 = 1e-6;
-/// Angle within which the orientation of a target counts as reached \[rad\].
+/// Largest angle to the desired orientation at which it counts as reached \[rad\].
 const REACHED_TURN: f64 = 1e-6;
-/// Number of coordinates of a pose, and of moving joints from which on an arm can reach any pose
-/// inside its workspace.
+/// Number of coordinates of a rigid-body pose, which is also the smallest number of moving joints
+/// that can reach any pose in the workspace.
 const POSE: usize = 6;
 
 /// Joint command for one target.
@@ -38,19 +39,20 @@ pub struct Command {
     pub row: usize,
     /// Configuration, shape = (joints) \[rad\] or \[m\]; the seed's value at fixed joints.
     pub configuration: Vec<f64>,
-    /// Desired − predicted position \[m\].
+    /// Remaining position error, desired − predicted, measuring frame \[m\].
     pub miss: Vector3<f64>,
-    /// Distance to the target with the seed as command \[m\].
+    /// Position error if the seed were commanded \[m\].
     pub seed_miss: f64,
-    /// Rotation vector from the predicted to the desired orientation, measuring frame \[rad\],
-    /// where one is desired.
+    /// Remaining rotation vector from the predicted to the desired orientation, measuring frame
+    /// \[rad\]; `None` if no orientation is desired.
     pub turn: Option<Vector3<f64>>,
-    /// Angle to the desired orientation with the seed as command \[rad\], where one is desired.
+    /// Angle to the desired orientation if the seed were commanded \[rad\]; `None` if none is
+    /// desired.
     pub seed_turn: Option<f64>,
 }
 
 impl Command {
-    /// Returns true if the arm reaches the target.
+    /// Returns true if position and orientation errors are within 1 µm and 1 µrad.
     pub fn is_reached(&self) -> bool {
         is_reached(&self.miss, self.turn.as_ref())
     }
@@ -60,8 +62,8 @@ fn is_reached(miss: &Vector3<f64>, turn: Option<&Vector3<f64>>) -> bool {
     miss.norm() <= REACHED && turn.is_none_or(|turn| turn.norm() <= REACHED_TURN)
 }
 
-/// Returns `rows` with the targets that the nominal arm would have reached by their commands, on
-/// the bases and with the tools of the full parameter vector `x`, measuring frame.
+/// Returns `rows` with the target poses that the nominal arm would reach by their commands,
+/// measuring frame. Bases and tools are those of the full parameter vector `x`.
 ///
 /// A target has an orientation if at least six moving joints lead to it; with fewer, position and
 /// orientation cannot both be reached.
@@ -123,7 +125,7 @@ pub fn seen_in_base(model: &Model, x: &DVector<f64>, targets: &Measurements) -> 
     moved(targets, &bases)
 }
 
-/// Moves positions and orientations by the frame in `bases` of the base of each row.
+/// Transforms positions and orientations by the frame that `bases` holds for the base of each row.
 fn moved(targets: &Measurements, bases: &[Frame<f64>]) -> Measurements {
     let placement = Placement::of(targets);
     let base = |row: usize| &bases[placement.base_of(row)];
@@ -138,16 +140,17 @@ fn moved(targets: &Measurements, bases: &[Frame<f64>]) -> Measurements {
     moved
 }
 
-/// Computes a command for each row of `targets`: the configuration nearest to that of the row, the
-/// seed, that brings the arm with parameters `x` to the position of the row, and to its orientation
-/// where it has one, within the joint limits of `problem`.
+/// Computes a command for each row of `targets`: the configuration nearest to the row's (the seed)
+/// that reaches the row's position, and its orientation if it has one. The arm has the full
+/// parameter vector `x`; commands stay within the joint limits of `problem`.
 ///
-/// Joints that do not lead to the target of a row keep its values. Effects on the measurement, such
-/// as an instrument that drifts, are left out: targets are desired places of the arm.
+/// Joints that do not lead to the target of a row keep the row's values. Effects on the
+/// measurement, such as instrument drift, are left out, because targets are desired positions of
+/// the arm.
 ///
 /// Minimises ‖(desired − predicted(q)) / 1 µm‖² + ‖log(desired predicted(q)ᵀ) / 1 µrad‖² + ‖q −
-/// seed‖² over q by damped Newton steps with dual numbers; slopes leave out that effects such as
-/// harmonics follow the command.
+/// seed‖² over q by damped Newton steps with dual numbers. The derivatives neglect that effects
+/// such as harmonics depend on the command.
 ///
 /// # Errors
 /// Returns an error if the limits of a joint exclude each other.
@@ -228,7 +231,8 @@ pub fn compensate(
 }
 
 /// Computes the command of one pose by Levenberg–Marquardt steps, for targets that Newton steps do
-/// not reach. Effects that follow the command are evaluated at the command of the pass before.
+/// not reach. Effects that depend on the command are evaluated at the command of the previous pass.
+/// `serving` are the joints that may move.
 fn damped(
     problem: &Problem,
     (arm, led): (&Model, &Model),

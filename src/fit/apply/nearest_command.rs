@@ -2,35 +2,37 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Weight of a misfit of 1 m or 1 rad, squared, below that of a distance of 1 rad from the seed.
+/// Weight of the squared distance from the seed [rad² or m²] against the squared misfit [m² or
+/// rad²]. Such a small weight lets the misfit decide.
 const WEIGHT_SQUARED: f64 = 1e-12;
-/// Maximum number of steps; most commands take 4 to 8, near singular poses more.
+/// Maximum number of steps. Most commands take 4 to 8; near singular poses they take more.
 const MAX_STEPS: usize = 1000;
-/// Length of a step at which a command has settled \[rad\] or \[m\].
+/// Largest step at which a command counts as converged \[rad\] or \[m\].
 const SETTLED: f64 = 1e-12;
-/// Damping after the first step that does not help [1/rad²], and where the search ends.
+/// Damping μ after the first rejected step, and the damping at which the search ends; both relative
+/// to the weight of the distance from the seed.
 const DAMPING: (f64, f64) = (0.3, 1e20);
-/// Factors of the damping after a step that does not help, and after one that does.
+/// Factors on the damping μ after a rejected and after an accepted step.
 const FACTORS: (f64, f64) = (30.0, 0.03);
-/// Increase of the cost by rounding that is accepted, relative to it.
+/// Relative increase of the cost that counts as rounding, so that the step is accepted.
 const COST_ROUNDING: f64 = 1e4 * f64::EPSILON;
 
-/// Target of some commands.
+/// Target pose of a command, with the prediction near it.
 pub(super) struct Goal<'a> {
     /// Misfit desired − predicted at commands q, shape = (3 or 6) \[m, rad\]; NaN without equilibrium.
     pub misfit: &'a dyn Fn(&DVector<f64>) -> DVector<f64>,
-    /// Slopes J of the prediction by the coordinates, shape = (3 or 6, commands).
+    /// Derivatives J of the prediction with respect to the commands, shape = (3 or 6, commands).
     pub slopes: &'a dyn Fn(&DVector<f64>) -> DMatrix<f64>,
-    /// Range of each command.
+    /// Lower and upper limit of each command \[rad\] or \[m\].
     pub limits: &'a [(f64, f64)],
 }
 
 impl Goal<'_> {
     /// Returns the commands q that minimise ‖r(q)‖² / 10⁻¹² + ‖q − seed‖² within the limits.
     ///
-    /// A step d minimises ‖r − J d‖² / 10⁻¹² + ‖d − z‖² + μ ‖d‖², z = seed − q:
-    /// d = z / (1 + μ) + Jᵀ λ, (J Jᵀ + 10⁻¹² (1 + μ)) λ = r − J z / (1 + μ), over the commands that
-    /// no limit holds. The damping μ rises when a step does not help.  [Levenberg 1944]
+    /// A step d minimises ‖r − J d‖² / 10⁻¹² + ‖d − z‖² + μ ‖d‖², z = seed − q: d = z / (1 + μ) +
+    /// Jᵀ λ, (J Jᵀ + 10⁻¹² (1 + μ)) λ = r − J z / (1 + μ), over the commands that are on no limit.
+    /// The damping μ rises after a rejected step. [Levenberg 1944]
     pub fn nearest(&self, seed: &DVector<f64>) -> DVector<f64> {
         let cost = |r: &DVector<f64>, q: &DVector<f64>| {
             r.norm_squared() + WEIGHT_SQUARED * (q - seed).norm_squared()

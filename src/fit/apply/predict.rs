@@ -14,7 +14,7 @@ use crate::observation::FixtureValues;
 use crate::problem::{Observation, Problem};
 use crate::spatial::Frame;
 
-/// Residual of a row of a table.
+/// Residual of a row of measurements, with its prediction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Residual {
@@ -25,31 +25,32 @@ pub struct Residual {
     /// Prediction \[m\]: position of the target in the measuring frame, also for contacts with a
     /// point, or a distance.
     pub predicted: Vector3<f64>,
-    /// Measured − predicted position, measuring frame, or distance \[m\]; NaN where the identified
-    /// arm has no equilibrium.
+    /// Measured − predicted position, measuring frame, or distance \[m\]; NaN if the identified arm
+    /// has no equilibrium.
     pub position: Vector3<f64>,
-    /// Residual of the position over 1 σ of a coordinate \[1\].
+    /// Residual `position` divided by 1 σ of a coordinate \[1\].
     pub whitened: Vector3<f64>,
-    /// Rotation vector from the predicted to the measured orientation, measuring frame \[rad\],
-    /// where orientation is fitted.
+    /// Rotation vector from the predicted to the measured orientation, measuring frame \[rad\];
+    /// `None` if orientation is not fitted.
     pub orientation: Option<Vector3<f64>>,
-    /// Residual of the orientation over 1 σ about an axis \[1\].
+    /// Residual `orientation` divided by 1 σ about an axis \[1\].
     pub whitened_orientation: Option<Vector3<f64>>,
-    /// True if the row is too far off to be noise: one of the fit's
-    /// [outliers](Identification::outliers) or
-    /// [held-out outliers](Identification::held_out_outliers).
+    /// True if the residual is too large to be noise: the row is one of the fit's
+    /// [outliers](Identification::outliers) or [held-out
+    /// outliers](Identification::held_out_outliers).
     pub outlier: bool,
 }
 
 impl Residual {
-    /// Returns the length of the whitened residual of position and orientation \[1\].
+    /// Returns the length of the whitened residual vector of position and orientation together
+    /// \[1\].
     pub(crate) fn length(&self) -> f64 {
         self.whitened.norm().hypot(self.whitened_orientation.map_or(0.0, |turn| turn.norm()))
     }
 }
 
 impl Identification {
-    /// Returns the model of the strategy with the bases and targets of a placement.
+    /// Returns the model that the strategy fits, with the bases and targets of a placement.
     pub(crate) fn model(
         &self,
         problem: &Problem,
@@ -155,8 +156,8 @@ impl Identification {
         Ok(Some(model.orientation_residuals(self.poses(rows, Some(1.0)), &self.vector(model)?)))
     }
 
-    /// Returns every row as a pose, its orientation with the σ `turn`; elapsed time starts at the
-    /// first pose of the identification.
+    /// Returns every row as a pose; orientations have 1 σ `turn` \[rad\]. Elapsed time counts from
+    /// the first pose of the identification.
     pub(in crate::fit) fn poses<'a>(
         &self,
         rows: &'a Measurements,
@@ -194,8 +195,8 @@ impl Identification {
     }
 }
 
-/// Returns prediction and residual of a row in the measuring frame; for a contact with a point, of
-/// the position of the target.
+/// Returns prediction and residual of a row in the measuring frame \[m\]. For a contact with a
+/// point, they are those of the target's position.
 pub(in crate::fit) fn in_space(
     rows: &Measurements,
     row: usize,

@@ -21,7 +21,8 @@ use crate::model::{Model, Pose};
 use crate::observation::Needs;
 use crate::problem::{Observation, Problem};
 
-/// Part of a parameter in an undetermined combination beyond which it is not determined.
+/// Largest part of a parameter in undetermined combinations, 0…1, at which the rows count as
+/// determining it.
 const OPEN: f64 = 1e-6;
 
 /// Predictions of an arm for the rows of a table.
@@ -33,24 +34,24 @@ pub struct Prediction {
     /// Predicted orientation of each row, a rotation vector, measuring frame \[rad\], where
     /// orientation is fitted.
     pub orientations: Option<Vec<Vector3<f64>>>,
-    /// Residuals of the rows; `None` where they hold no measurements.
+    /// Residuals of the rows; `None` if the rows contain no measurements.
     pub residuals: Option<Vec<Residual>>,
-    /// Summaries of the errors; `None` where the rows hold no measurements.
+    /// Summaries of the residuals; `None` if the rows contain no measurements.
     #[doc(hidden)]
     pub errors: Option<ErrorsBySession>,
     /// Scatter of the predicted target at each point that the rows touch.
     pub spreads: Vec<PointSpread>,
-    /// Names of the parameters of bases and tools that the estimate lacks; they are fitted to their
-    /// rows with the arm given.
+    /// Names of base and tool parameters that the estimate lacks. They were fitted to these rows,
+    /// with the arm's parameters fixed.
     pub placed: Vec<String>,
-    /// Full parameter vector of the model of these rows.
+    /// Full parameter vector of the model of these rows, with the fitted bases and tools.
     pub x: DVector<f64>,
 }
 
 /// Errors of all rows, and of each session.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorsBySession {
-    /// Errors of all rows of the leading kind.
+    /// Errors of all rows of the leading kind: positions, if the table has any.
     pub all: ErrorSummary,
     /// Errors of each kind of rows, where there are several.
     pub kinds: Vec<ErrorSummary>,
@@ -66,10 +67,10 @@ pub enum PredictError {
     /// Problem and rows do not fit each other.
     #[error("{0}")]
     Input(#[from] InputError),
-    /// The estimate is of another problem, or lacks a parameter that the rows need.
+    /// The estimate belongs to another problem, or lacks a parameter that the rows need.
     #[error(transparent)]
     Estimate(#[from] SavedEstimateError),
-    /// Rows of a new session or tool do not determine where it is.
+    /// Rows of a new session or tool do not determine its pose.
     #[error(
         "{name} is not in the estimate, and its rows do not determine it; measure more poses there"
     )]
@@ -77,7 +78,7 @@ pub enum PredictError {
         /// Name of the parameter.
         name: String,
     },
-    /// There is no estimate, and the rows do not determine where base or tool is.
+    /// There is no estimate, and the rows do not determine the pose of base or tool.
     #[error(
         "the rows do not determine {name}, and there is no estimate to take it from; measure more poses there"
     )]
@@ -91,7 +92,7 @@ pub enum PredictError {
 }
 
 impl ErrorsBySession {
-    /// Summarises the errors measured − predicted of every row \[m\].
+    /// Summarises the errors measured − predicted of `rows` \[m\], in total and by session.
     pub fn of(rows: &Measurements, errors: &[Vector3<f64>]) -> Self {
         let kinds = rows.kinds();
         let of = |chosen: &[usize], errors: &[Vector3<f64>]| {
@@ -114,15 +115,16 @@ impl ErrorsBySession {
     }
 }
 
-/// Predicts `rows` with the arm of `problem` as identified in `estimate`, or with the nominal arm
-/// without one.
+/// Predicts `rows` with the arm of `problem`: as identified in `estimate`, or the nominal arm if
+/// that is `None`.
 ///
-/// A free base or tool that the estimate lacks is fitted to its rows with the arm given, if they
-/// measure enough positions. `split` states which rows are held out, where that is known.
+/// A free base or tool that the estimate lacks is fitted to its rows, with the arm's parameters
+/// fixed, if they measure enough positions. `split` states which rows are held out; `None` if that
+/// is not known.
 ///
 /// # Errors
-/// Returns an error if the estimate is of another problem or lacks a parameter that the rows need,
-/// or if the rows lack a column that an effect needs.
+/// Returns an error if the estimate belongs to another problem or lacks a parameter that the rows
+/// need, or if the rows lack a column that an effect needs.
 pub fn predict(
     problem: &Problem,
     estimate: Option<&SavedEstimate>,
@@ -244,7 +246,8 @@ fn uses(model: &Model, pose: &Pose, k: usize) -> bool {
     }
 }
 
-/// Returns the first of the `missing` parameters without a prior that the poses are too few for.
+/// Returns the first of the `missing` parameters without a prior whose poses measure fewer
+/// coordinates than they have unknowns; `None` if there is none.
 fn too_few(model: &Model, poses: &[Pose], missing: &[usize]) -> Option<usize> {
     let open: Vec<usize> =
         missing.iter().copied().filter(|&k| model.parameters[k].sigma.is_none()).collect();
@@ -294,8 +297,9 @@ fn place(
     }
 }
 
-/// Creates the residuals from the errors measured − predicted \[m\] and the σ of each row, NaN
-/// where it is not known, and from the errors of orientation and their σ \[rad\].
+/// Creates the residuals of every row from position errors \[m\] and `seen` predictions \[m\], and
+/// from orientation errors with their σ \[rad\]. Whitened values are NaN if the σ of a row is not
+/// known.
 fn residuals(
     (errors, seen): (&[Vector3<f64>], &[Vector3<f64>]),
     (sigmas, coordinates): (&[Option<f64>], &[usize]),

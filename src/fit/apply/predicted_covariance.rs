@@ -15,8 +15,8 @@ use crate::problem::Problem;
 pub struct PredictedPosition {
     /// Predicted position, measuring frame \[m\]; NaN where the arm has no equilibrium.
     pub position: Vector3<f64>,
-    /// Covariance J C Jᵀ from the estimates, measuring frame \[m²\], without noise and what the
-    /// model lacks.
+    /// Covariance J C Jᵀ due to the estimates, measuring frame \[m²\]. It contains neither
+    /// measurement noise nor errors of the model.
     pub covariance: Matrix3<f64>,
 }
 

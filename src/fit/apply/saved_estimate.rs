@@ -18,7 +18,7 @@ use crate::problem::item::MAX_MAGNITUDE;
 /// Maximum size of an `estimate.json` [MiB].
 const LARGEST_MIB: u64 = 256;
 
-/// Identified part from which on a parameter counts as determined.
+/// Smallest identified share of a parameter that counts as determined.
 const IDENTIFIED: f64 = 0.99;
 
 /// Identified arm as saved in an `estimate.json`.
@@ -28,11 +28,12 @@ pub struct SavedEstimate {
     pub file: PathBuf,
     /// True if the fit was trusted.
     pub trusted: bool,
-    /// 1 σ of a coordinate from the scatter, where the problem declares none \[m\].
+    /// Standard deviation (1 σ) of a coordinate, estimated from the scatter of the fit \[m\];
+    /// `None` if the problem declares σ.
     pub estimated_sigma: Option<f64>,
     /// Start time of the time-dependent terms \[s\]; older versions did not write it.
     pub first_time: Option<f64>,
-    /// Name of the remainder.json beside it, if one was kept.
+    /// Name of the `remainder.json` in the same folder, if a remainder was fitted and accepted.
     pub remainder: Option<String>,
     /// Uncertainty of predictions as JSON text; older versions did not write it.
     pub prediction: Option<String>,
@@ -48,7 +49,7 @@ struct Entry {
     name: String,
     nominal: f64,
     estimate: f64,
-    /// Standard error; `None` where there is none, or in files of older versions.
+    /// Standard error of the value; `None` if it has none, or in files of older versions.
     std_error: Option<f64>,
     identified: Option<f64>,
 }
@@ -171,7 +172,7 @@ impl SavedEstimate {
         })
     }
 
-    /// Returns the model that was fitted, by [`Strategy::model`].
+    /// Returns the model that was fitted: `declared` as reduced by the saved strategy.
     #[must_use]
     pub(crate) fn model(&self, declared: Model) -> Model {
         self.strategy.model(declared)
@@ -186,11 +187,12 @@ impl SavedEstimate {
         }
     }
 
-    /// Checks that the estimate is of `problem` with model `model`. Bases and tools of sessions
-    /// that the model lacks are ignored.
+    /// Checks that the estimate belongs to `problem` with model `model`. Bases and tools of
+    /// sessions that the model lacks are ignored.
     ///
     /// # Errors
-    /// Returns an error if the estimate is of another problem, or of another declaration of it.
+    /// Returns an error if the estimate belongs to another problem, or to a different version of
+    /// its declaration.
     pub(crate) fn check(&self, problem: &Problem, model: &Model) -> Result<(), SavedEstimateError> {
         let file = || self.file.clone();
         if self.problem != problem.name {
@@ -222,8 +224,8 @@ impl SavedEstimate {
         Ok(())
     }
 
-    /// Returns true if the fitted rows do not determine the pose of a base in its measuring frame,
-    /// as contacts with sockets at unknown places do not.
+    /// Returns true if the fitted rows did not determine the pose of a base in its measuring frame,
+    /// as contacts with sockets at unknown positions do not.
     pub(crate) fn leaves_base_open(&self) -> bool {
         let is_base =
             |entry: &&Entry| entry.name.starts_with("base.") || entry.name.starts_with("base[");
@@ -233,8 +235,8 @@ impl SavedEstimate {
         self.parameters.iter().filter(is_base).any(is_open)
     }
 
-    /// Returns the words in brackets behind `base` or `tool`, in the order of the file; one empty
-    /// word where there are none.
+    /// Returns the names in brackets behind `of` (`base` or `tool`) in parameter names, in the
+    /// order of the file; one empty name if there are no brackets.
     pub(crate) fn words(&self, of: &str) -> Vec<String> {
         let mut words: Vec<String> = Vec::new();
         for entry in &self.parameters {
@@ -251,7 +253,8 @@ impl SavedEstimate {
         if words.is_empty() { vec![String::new()] } else { words }
     }
 
-    /// Returns the estimated value of a parameter \[SI\].
+    /// Returns the estimated value of the parameter `name`, in SI units; `None` if the estimate
+    /// lacks it.
     pub(crate) fn value(&self, name: &str) -> Option<f64> {
         self.parameters.iter().find(|entry| entry.name == name).map(|entry| entry.estimate)
     }

@@ -7,10 +7,10 @@ use super::finding::{Finding, FindingCode};
 use crate::fit::uncertainty::hidden_by_bound::HiddenByBound;
 use crate::least_squares::solver::AtBound;
 
-/// Number of partners that a text names.
+/// Maximum number of parameters that the text of the finding names.
 const MAX_NAMED_PARTNERS: usize = 5;
 
-/// Checks that no bound is met along a direction that the data hardly see.
+/// Checks that no parameter rests on a bound along a direction that the data hardly determine.
 pub(super) struct BoundsAreSeen;
 
 impl Check for BoundsAreSeen {

@@ -17,9 +17,9 @@ use crate::fit::uncertainty::refuted_priors::RefutedPrior;
 use crate::least_squares::Loss;
 use crate::problem::{Observation, Problem};
 
-/// Check of a fit.
+/// Check of a fit that may report findings.
 pub(in crate::fit) trait Check: Sync {
-    /// Returns what there is to report about `fit`; nothing where all is well.
+    /// Returns the findings about `fit`; empty if nothing is wrong.
     fn check(&self, fit: &CheckedFit) -> Vec<Finding>;
 }
 
@@ -39,34 +39,37 @@ pub(in crate::fit) struct CheckedFit<'a> {
     pub outliers: &'a [Outlier],
     /// Held-out rows that are too far from the prediction.
     pub held_out_outliers: &'a [Outlier],
-    /// Fit of all unknowns to the identification rows, with the declared σ and those that it took.
+    /// Stage with all unknowns and identification rows, with the declared σ and those that the fit
+    /// took.
     pub whole: &'a Stage<'a>,
     /// True if the problem or the table declares the σ of positions.
     pub has_declared_noise: bool,
     /// Source of the σ of positions.
     pub noise: Noise,
-    /// Noise variance that the fit took over the declared one.
+    /// Noise variance that the fit took, relative to the declared one.
     pub noise_factor: f64,
     /// 1 σ of a coordinate that the fit took \[m\] or \[rad\].
     pub sigma_taken: f64,
-    /// Covariance of the unknowns of `whole`, 0 where one is held.
+    /// Covariance of the unknowns of `whole`, shape = (unknowns, unknowns); 0 for held unknowns.
     pub covariance: &'a DMatrix<f64>,
     /// Rules of `[parameters]` whose σ the data refute.
     pub refuted_priors: &'a [RefutedPrior],
-    /// Number of different poses and what they are too few for.
+    /// Number of different poses, and the finding if they are too few for the unknowns.
     pub poses: &'a PoseSufficiency,
-    /// Finding about a fit that did not converge.
+    /// Finding that the fit did not converge; `None` if it did.
     pub not_converged: Option<&'a Finding>,
     /// Bounds that hide the uncertainty of other unknowns.
     pub hidden: &'a [HiddenByBound],
     /// Prior widths that the fitted deviations contradict.
     pub prior_sizes: &'a [PriorSize],
-    /// Scatter of the predictions at each touched point: nominal arm, fitted arm, held out or not.
+    /// For each touched point, scatter of the prediction with the nominal and with the fitted arm,
+    /// and true if all its rows are held out.
     pub spreads: &'a [(PointSpread, PointSpread, bool)],
 }
 
 impl CheckedFit<'_> {
-    /// Returns the kinds of identification rows that the arm takes part in, positions first.
+    /// Returns the identification rows grouped by what they measure, positions first; rows that do
+    /// not involve the arm are left out.
     pub fn kinds(&self) -> Vec<RowKind> {
         let kinds = self.fitting.measurements.kinds().into_iter().filter(|kind| kind.is_of_arm());
         kinds.map(|kind| self.kind(kind)).filter(|kind| !kind.rows.is_empty()).collect()
@@ -108,8 +111,8 @@ impl CheckedFit<'_> {
         }
     }
 
-    /// Returns the root mean squared length of the errors of identification rows \[m\] or \[rad\],
-    /// without those that a robust loss sets aside.
+    /// Returns the root mean squared length of the errors of some identification rows \[m\] or
+    /// \[rad\]. Rows that a robust loss treats as outliers do not count.
     pub fn rms(&self, rows: &[usize], errors: &[Vector3<f64>]) -> f64 {
         let is_robust = self.fitting.loss != Loss::Squares;
         let is_set_aside =
@@ -124,8 +127,8 @@ impl CheckedFit<'_> {
     }
 }
 
-/// Checks that there are as many equations as unknowns without a prior, and that bases are
-/// determined.
+/// Checks that the rows measure at least as many coordinates as there are unknowns without a prior,
+/// and that they determine every base.
 pub(super) struct EnoughEquations;
 
 impl Check for EnoughEquations {
@@ -134,7 +137,7 @@ impl Check for EnoughEquations {
     }
 }
 
-/// Checks that the fits converged.
+/// Checks that the fit converged.
 pub(super) struct Convergence;
 
 impl Check for Convergence {

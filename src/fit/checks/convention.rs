@@ -1,4 +1,4 @@
-//! Conventions of orientation that would explain why measured orientations do not fit.
+//! Search for the orientation convention in which measured orientations would fit.
 
 use std::f64::consts::PI;
 
@@ -7,12 +7,13 @@ use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
 use super::checked_fit::CheckedFit;
 use crate::problem::RotationKind;
 
-/// Part of the error as read that a convention which explains the orientations leaves.
+/// Largest error with another convention, relative to the error as read, at which that convention
+/// explains the orientations.
 const EXPLAINED: f64 = 0.2;
-/// Ratio of the errors up to which a convention is named beside the best one.
+/// Largest ratio to the smallest error at which a convention is named in addition to the best one.
 const AS_GOOD: f64 = 1.5;
-/// Axes of rotation in the order of the twelve Euler conventions, R = R₁(r₁) R₂(r₂) R₃(r₃); where
-/// all three differ, each angle stands in the column of its axis.
+/// Axes of rotation of the twelve Euler conventions, R = R₁(r₁) R₂(r₂) R₃(r₃). If all three axes
+/// differ, each angle is in the column of its axis.
 const ORDERS: [[usize; 3]; 12] = [
     [0, 1, 2],
     [0, 2, 1],
@@ -28,11 +29,12 @@ const ORDERS: [[usize; 3]; 12] = [
     [2, 1, 2],
 ];
 
-/// Orientation of a row as it may have been meant.
+/// Function from an orientation as read to the orientations that were possibly meant.
 type Reading = Box<dyn Fn(&UnitQuaternion<f64>) -> Vec<UnitQuaternion<f64>>>;
 
-/// Returns the conventions in which the measured orientations fit the predicted ones, best first,
-/// in words; `rms` is the error as read \[rad\]. A constant rotation of the tool is fitted.
+/// Returns the names of the conventions in which the measured orientations fit the predicted ones,
+/// best first. `rms` is the error in the declared convention \[rad\]. A constant rotation of the
+/// tool is fitted in each case.
 pub(super) fn fitting_conventions(fit: &CheckedFit, rms: f64) -> Vec<String> {
     let fitting = fit.fitting;
     let rows: Vec<usize> = fitting
@@ -63,7 +65,8 @@ pub(super) fn fitting_conventions(fit: &CheckedFit, rms: f64) -> Vec<String> {
     errors.into_iter().filter(|(_, error)| *error <= AS_GOOD * best).map(|(name, _)| name).collect()
 }
 
-/// Returns every reading of an orientation that was read with convention `kind`, with its name.
+/// Returns every alternative convention for orientations that were read with convention `kind`,
+/// with its name.
 fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
     let inverse: Reading = Box::new(|q| vec![q.inverse()]);
     let mut readings = vec![("the inverse rotation".to_owned(), inverse)];
@@ -98,15 +101,15 @@ fn readings(kind: RotationKind) -> Vec<(String, Reading)> {
     readings
 }
 
-/// Returns every order of the components x, y, z, w of a quaternion but the declared one.
+/// Returns every order of the components x, y, z, w of a quaternion except the declared one.
 fn quaternion_orders() -> impl Iterator<Item = [usize; 4]> {
     let places = (0..256_usize).map(|k| [k % 4, k / 4 % 4, k / 16 % 4, k / 64]);
     let is_order = |order: &[usize; 4]| (0..4).all(|place| order.contains(&place));
     places.filter(move |order| is_order(order) && *order != [0, 1, 2, 3])
 }
 
-/// Returns the three numbers that may have been read as the orientation `q` \[rad\]. A rotation
-/// vector longer than half a turn is not told from the shorter one of the same rotation.
+/// Returns the three numbers in the table from which the orientation `q` was read with convention
+/// `kind` \[rad\]. A rotation vector has two possibilities, shorter and longer than half a turn.
 fn angles(kind: RotationKind, q: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
     match kind {
         RotationKind::Vector => {
@@ -127,7 +130,7 @@ fn angles(kind: RotationKind, q: &UnitQuaternion<f64>) -> [Vector3<f64>; 2] {
     }
 }
 
-/// Returns R₁(r₁) R₂(r₂) R₃(r₃) about the axes of an Euler convention.
+/// Returns the rotation R₁(r₁) R₂(r₂) R₃(r₃) about the axes of an Euler convention.
 fn euler(order: [usize; 3], angles: &Vector3<f64>) -> UnitQuaternion<f64> {
     let has_three_axes = order[0] != order[2];
     let turn = |place: usize| {

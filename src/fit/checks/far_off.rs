@@ -1,4 +1,4 @@
-//! Check of the nominal arm: whether it is so far from the measurements that something was misread.
+//! Check of the nominal arm: an error as large as the measured workspace indicates a misread input.
 
 use serde_json::json;
 
@@ -7,10 +7,11 @@ use super::finding::{Finding, FindingCode};
 use super::misreading::{Misreading, misreadings};
 use super::row_kind::{RowKind, measured, named, size};
 
-/// Part of the spread of the measurements by which the registered nominal arm may miss them.
+/// Largest error of the registered nominal arm, relative to the spread of the measurements, that is
+/// not reported.
 const MAX_NOMINAL_MISS: f64 = 0.1;
-/// Spread of contacts, as a part of the arm's size, below which they are in one place: their spread
-/// is then what the arm misses it by.
+/// Smallest spread of contacts, relative to the arm's reach, that is used as a scale. With a
+/// smaller one, all contacts are at one place, and their predicted spread is only the arm's error.
 const ONE_PLACE: f64 = 0.05;
 
 /// Checks that the registered nominal arm is near the measurements.
@@ -31,8 +32,8 @@ impl Check for NominalIsNear {
     }
 }
 
-/// Reports an error `rms` of the nominal arm beside the `spread` of rows of a kind \[m\] or
-/// \[rad\], with what would explain it, each by itself, the best first.
+/// Reports an error `rms` of the nominal arm that is large relative to the `spread` of rows of a
+/// kind \[m\] or \[rad\]. Each of `explanations`, best first, would explain it alone.
 fn far_off(kind: &str, rms: f64, spread: f64, explanations: &[Misreading]) -> Finding {
     let words: Vec<String> = explanations.iter().map(Misreading::to_string).collect();
     let numbers = [kind.into(), rms.into(), spread.into(), json!(words)];

@@ -5,14 +5,14 @@ use std::fmt;
 use serde::ser::{Serialize, SerializeStruct as _, Serializer};
 use serde_json::{Map, Value};
 
-/// Consequence of a finding.
+/// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// Information about fit or data that needs no action.
     Note,
-    /// Circumstance that the user should look at; the fit may be right all the same.
+    /// Circumstance that the user should examine; the fit may still be right.
     Warning,
-    /// Reason for which the fit is not to be trusted: commands end with exit status 1.
+    /// Reason not to trust the fit: commands end with exit status 1.
     Error,
 }
 
@@ -33,13 +33,13 @@ impl Severity {
 pub struct FindingEntry {
     /// Code in JSON files; it never changes its meaning.
     pub code: &'static str,
-    /// Consequence of every finding with this code.
+    /// Severity of every finding with this code.
     pub severity: Severity,
-    /// Names of the numbers that such a finding carries.
+    /// Names of the numbers that a finding with this code carries.
     pub numbers: &'static [&'static str],
     /// Statement that the finding makes, in one sentence.
     pub meaning: &'static str,
-    /// Remedy that is suggested where the check knows no better one.
+    /// Default remedy, used if the check suggests no specific one.
     pub remedy: &'static str,
 }
 
@@ -53,7 +53,7 @@ macro_rules! finding_codes {
         }
 
         impl FindingCode {
-            /// Every code, in the order of `docs/findings.md`.
+            /// All codes, in the order of `docs/findings.md`.
             pub const EACH: &[Self] = &[$(Self::$name),*];
 
             /// Returns the description of the code.
@@ -159,16 +159,17 @@ finding_codes! {
 pub struct Finding {
     /// Code, which determines the severity.
     pub code: FindingCode,
-    /// Numbers and names of the case by the names of [`FindingEntry::numbers`]; SI units.
+    /// Numbers and words of this case, by the names in [`FindingEntry::numbers`]; SI units.
     pub numbers: Vec<(&'static str, Value)>,
-    /// Statement about the case at hand, without the remedy.
+    /// Statement about this case, without the remedy.
     pub text: String,
     /// Suggested remedy.
     pub remedy: String,
 }
 
 impl Finding {
-    /// Creates a finding with the remedy of its code; `numbers` in the order of its entry.
+    /// Creates a finding with the default remedy of its code; `numbers` are in the order of
+    /// [`FindingEntry::numbers`].
     pub(in crate::fit) fn new<const N: usize>(
         code: FindingCode,
         numbers: [Value; N],
@@ -179,29 +180,29 @@ impl Finding {
         Self { code, numbers, text, remedy: entry.remedy.to_owned() }
     }
 
-    /// Replaces the remedy by one for the case at hand.
+    /// Replaces the default remedy by one specific to this case.
     #[must_use]
     pub(in crate::fit) fn with_remedy(self, remedy: String) -> Self {
         Self { remedy, ..self }
     }
 
-    /// Returns the consequence of the finding.
+    /// Returns the severity of the finding.
     pub const fn severity(&self) -> Severity {
         self.code.entry().severity
     }
 
-    /// Returns the number or name that is called `name`.
+    /// Returns the number or word with the name `name`; `None` if the finding has none.
     #[doc(hidden)]
     pub fn value(&self, name: &str) -> Option<&Value> {
         self.numbers.iter().find(|(known, _)| *known == name).map(|(_, value)| value)
     }
 
-    /// Returns the number that is called `name`.
+    /// Returns the number with the name `name`; `None` if it is missing or a word.
     pub fn number(&self, name: &str) -> Option<f64> {
         self.value(name)?.as_f64()
     }
 
-    /// Returns the word that is called `name`.
+    /// Returns the word with the name `name`; `None` if it is missing or a number.
     pub fn word(&self, name: &str) -> Option<&str> {
         self.value(name)?.as_str()
     }

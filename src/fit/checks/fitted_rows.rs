@@ -7,7 +7,7 @@ use super::finding::{Finding, FindingCode};
 use super::outliers::{InfluentialRows, places};
 use super::point_spread::PointSpread;
 
-/// Reports identification rows that are too far off to be noise.
+/// Reports identification rows whose residual is too large to be noise.
 pub(super) struct NoOutliers;
 
 impl Check for NoOutliers {
@@ -32,7 +32,8 @@ pub(in crate::fit) fn influential_finding(found: &InfluentialRows) -> Finding {
     Finding::new(FindingCode::InfluentialRows, numbers, text)
 }
 
-/// Checks that no touched point scatters far more than the others and along one direction.
+/// Checks that no touched point scatters far more than the others along one direction, as a point
+/// that moved does.
 pub(super) struct SteadyPoints;
 
 impl Check for SteadyPoints {

@@ -17,10 +17,10 @@ use crate::measurement::Measurements;
 use crate::numeric::median;
 use crate::observation::kind_named;
 
-/// Ratio of the errors on held-out rows, fitted over nominal, from which on a fit is worse than
-/// none …
+/// Smallest ratio of the held-out error of the fitted arm to that of the nominal arm at which the
+/// fit is reported as worse than none.
 const WORSE: f64 = 1.5;
-/// … where the fitted error is also this multiple of the noise.
+/// Smallest multiple of the noise that the held-out error must also exceed for that report.
 const ABOVE_NOISE: f64 = 5.0;
 
 /// Returns the held-out rows that are farther from the prediction than the σ and the covariance of
@@ -79,8 +79,8 @@ pub(in crate::fit) fn outliers(
     (0..rows.len()).filter_map(outlier).collect()
 }
 
-/// Returns the number of held-out rows that are identification rows again: configuration, position
-/// and session are equal to the bit.
+/// Returns the number of held-out rows that copy an identification row: configuration, position and
+/// session are equal to the bit.
 fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usize]) -> usize {
     let key = |row: usize| -> Vec<u64> {
         let values =
@@ -96,16 +96,16 @@ fn copies(measurements: &Measurements, identification: &[usize], held_out: &[usi
     held_out.iter().filter(|&&row| fitted.contains(&key(row))).count()
 }
 
-/// Number of held-out rows that a text names.
+/// Maximum number of held-out rows that the text of a finding names.
 const MAX_NAMED_ROWS: usize = 5;
 
-/// Returns the number of held-out rows that are identification rows again.
+/// Returns the number of held-out rows that copy an identification row.
 fn copied(fit: &CheckedFit) -> usize {
     let Fitting { measurements, split, .. } = fit.fitting;
     copies(measurements, &split.identification, &split.held_out)
 }
 
-/// Checks that not every held-out row is an identification row again.
+/// Checks that not every held-out row copies an identification row.
 pub(super) struct NotAllCopied;
 
 impl Check for NotAllCopied {
@@ -120,7 +120,7 @@ impl Check for NotAllCopied {
     }
 }
 
-/// Checks that few held-out rows are identification rows again.
+/// Checks that few held-out rows copy an identification row.
 pub(super) struct NotRepeated;
 
 impl Check for NotRepeated {
@@ -137,7 +137,7 @@ impl Check for NotRepeated {
     }
 }
 
-/// Checks that most held-out rows of each kind are near the prediction.
+/// Checks that the prediction error is small for most held-out rows of each kind.
 pub(super) struct HeldOutReached;
 
 impl Check for HeldOutReached {
@@ -167,7 +167,8 @@ impl Check for HeldOutReached {
     }
 }
 
-/// Checks that held-out rows are not met worse than by the registered nominal arm.
+/// Checks that the fitted arm predicts held-out rows not much worse than the registered nominal
+/// arm.
 pub(super) struct BetterThanNominal;
 
 impl Check for BetterThanNominal {
@@ -191,7 +192,7 @@ impl Check for BetterThanNominal {
     }
 }
 
-/// Reports held-out rows that are too far from the prediction to be noise.
+/// Reports held-out rows whose prediction error is too large to be noise.
 pub(super) struct WithoutOutliers;
 
 impl Check for WithoutOutliers {

@@ -1,27 +1,31 @@
-//! Checks of the size of the residual: whether the fitted arm describes the measured one at all.
+//! Checks of the size of the residual: a very large one means that the data are not of this arm.
 
 use super::checked_fit::{Check, CheckedFit};
 use super::finding::{Finding, FindingCode};
 use super::row_kind::{RowKind, measured, named, size, spread};
 
-/// Part of the spread of the measurements that the residual of a fit of the same arm stays below.
+/// Largest residual of a fit, relative to the spread of the measurements, that is not reported.
 pub(super) const MAX_MISS: f64 = 0.02;
-/// Multiple of σ that a residual may have whatever the spread is.
+/// Largest residual of a fit, as a multiple of σ, that is never reported, however small the spread
+/// is.
 pub(super) const BEYOND_NOISE: f64 = 100.0;
-/// Part of the nominal arm's error above which the error of a fit counts as no better.
+/// Smallest ratio of the fitted to the nominal error at which the fit counts as no better than the
+/// nominal arm.
 const NO_BETTER: f64 = 0.9;
-/// Multiple of the declared σ above which the error of a fit that is no better than the nominal arm
-/// (`NO_BETTER`) is reported.
+/// Smallest error, as a multiple of the declared σ, at which a fit that is no better than the
+/// nominal arm is reported.
 const FAR_BEYOND_NOISE: f64 = 1000.0;
-/// Ratio of the spreads of measured and predicted points beyond which they are of two arms.
+/// Largest ratio of the spreads of measured and predicted points, or its inverse, that one arm
+/// explains.
 const MAX_SIZE_RATIO: f64 = 2.0;
-/// Spread below which points say nothing about the size of an arm \[m\], and tilts nothing about
-/// its turns \[rad\].
+/// Smallest spread of points from which the size of an arm is judged \[m\], or of tilts from which
+/// rotations are judged \[rad\].
 pub(super) const MIN_SPREAD: f64 = 0.01;
-/// Number of different poses below which the spread of their points says nothing.
+/// Minimum number of different poses from which the spread of their points is judged.
 const MIN_POSES: usize = 4;
 
-/// Checks that the fitted arm reaches the rows of each kind.
+/// Checks that the residual of the fitted arm is not large relative to the spread of the rows of
+/// each kind.
 pub(super) struct Misfit;
 
 impl Check for Misfit {
@@ -38,7 +42,7 @@ impl Check for Misfit {
     }
 }
 
-/// Checks that the measured positions are of an arm of the nominal size.
+/// Checks that the measured positions spread over a workspace of the nominal arm's size.
 pub(super) struct SizeOfArm;
 
 impl Check for SizeOfArm {
@@ -59,7 +63,8 @@ impl Check for SizeOfArm {
     }
 }
 
-/// Reports a fit whose error `rms` is large against the spread and the σ of rows of a kind.
+/// Reports a fit whose error `rms` is large relative to both the spread and the σ of rows of a
+/// kind; `None` if it is not.
 fn misses(kind: &RowKind, rms: f64) -> Option<Finding> {
     let RowKind { observation, spread, declared_sigma, .. } = *kind;
     let noise = declared_sigma.map_or(0.0, |sigma| BEYOND_NOISE * sigma);
@@ -81,8 +86,9 @@ fn misses(kind: &RowKind, rms: f64) -> Option<Finding> {
     Some(Finding::new(FindingCode::MissesMeasurements, numbers, text).with_remedy(remedy))
 }
 
-/// Reports a fit that meets rows other than positions no better than the nominal arm; `before` and
-/// `after` are the errors of the two. The spread of such rows may say nothing.
+/// Reports a fit that predicts rows other than positions no better than the nominal arm; `before`
+/// and `after` are the errors of nominal and fitted arm. The spread of such rows may carry no
+/// information.
 fn no_better(kind: &RowKind, before: f64, after: f64) -> Option<Finding> {
     let RowKind { observation, declared_sigma, .. } = *kind;
     let is_far = declared_sigma.is_some_and(|sigma| after > FAR_BEYOND_NOISE * sigma);
@@ -101,8 +107,8 @@ fn no_better(kind: &RowKind, before: f64, after: f64) -> Option<Finding> {
     Some(Finding::new(FindingCode::NoBetterThanNominal, numbers, text).with_remedy(remedy))
 }
 
-/// Reports points whose spread `measured` \[m\] is of an arm of another size than the nominal one,
-/// whose points have the spread `expected` \[m\].
+/// Reports measured points whose spread `measured` \[m\] differs much from the spread `expected`
+/// \[m\] of the nominal arm's points, so that they belong to an arm of another size.
 fn other_size(measured: f64, expected: f64) -> Option<Finding> {
     let is_same = (expected / MAX_SIZE_RATIO..=expected * MAX_SIZE_RATIO).contains(&measured);
     let text = format!(

@@ -1,4 +1,4 @@
-//! Misreadings of a table or problem that would explain why the nominal arm is far from its
+//! Search for misread units, signs or orders that would explain why the nominal arm misses its
 //! measurements.
 
 use std::f64::consts::PI;
@@ -11,18 +11,19 @@ use crate::measurement::{Measurements, Split};
 use crate::model::Model;
 use crate::problem::{Joint, JointKind, Problem};
 
-/// Part of the error as read that a misreading which explains it leaves.
+/// Largest error with a misreading corrected, relative to the error as read, at which the
+/// misreading is an explanation.
 const EXPLAINED: f64 = 0.2;
-/// Ratio of the errors up to which a misreading is named beside the best one.
+/// Largest ratio to the smallest error at which a misreading is named in addition to the best one.
 const AS_GOOD: f64 = 1.5;
-/// Error in reaches of the arm beyond which no misreading is tried: millimetres taken for metres
-/// give a factor of 1000.
+/// Largest error, as a multiple of the arm's reach, at which misreadings are tried. Millimetres
+/// read as metres give a factor of 1000.
 const MAX_REACHES: f64 = 1e4;
-/// Maximum number of rows that are looked at.
+/// Maximum number of rows on which misreadings are tried.
 const MAX_ROWS: usize = 200;
-/// Maximum number of moving joints of which every set is tried as reversed.
+/// Maximum number of moving joints of which every subset is tried as reversed.
 const MAX_REVERSED: usize = 7;
-/// Length beyond which a number may be in millimetres \[m\].
+/// Smallest declared length that may be a number of millimetres \[m\].
 const LONG: f64 = 1.0;
 
 /// Misreading: a quantity that may have been declared in the wrong unit, sign or order.
@@ -40,14 +41,14 @@ pub enum Misreading {
     /// Positions are in a left-handed frame: two coordinates are exchanged, or one has the wrong
     /// sign.
     Mirrored,
-    /// Joints that count the other way.
+    /// Joints whose measured angle has the opposite sign.
     Reversed {
-        /// Set of joints; bit k stands for joint k + 1.
+        /// Set of joints: bit k is joint k + 1.
         joints: u64,
     },
     /// The target of `[tool]` is in millimetres, declared as metres.
     TargetInMillimetres,
-    /// Lengths of joints are in millimetres, declared as metres, and so is a target as long.
+    /// Lengths of joints are in millimetres, declared as metres; likewise a target longer than 1 m.
     ArmInMillimetres,
 }
 
@@ -82,18 +83,18 @@ impl fmt::Display for Misreading {
     }
 }
 
-/// Numbers of the joints in a set.
+/// Returns the numbers, counted from 1, of the joints in a set.
 fn numbers_of(joints: u64) -> impl Iterator<Item = usize> {
     (0..64).filter(move |joint| joints >> joint & 1 == 1).map(|joint| joint + 1)
 }
 
 impl Misreading {
-    /// Creates the misreading that these joints, by number, count the other way.
+    /// Creates the misreading that the signs of these joints, counted from 1, are reversed.
     pub fn reversed(joints: &[usize]) -> Self {
         Self::Reversed { joints: joints.iter().map(|joint| 1 << (joint - 1)).sum() }
     }
 
-    /// Returns every misreading that the problem and the columns of its table allow.
+    /// Returns every misreading that is possible for the problem and the columns of its table.
     fn all(problem: &Problem, rows: &Measurements) -> Vec<Self> {
         let turns = |radians| {
             (0..problem.joints.len()).any(|joint| turns_in(problem, rows, joint, radians))
@@ -120,7 +121,8 @@ impl Misreading {
         all
     }
 
-    /// Returns the problem as it should have been written, if the misreading concerns the problem.
+    /// Returns the problem with the misreading corrected; `None` if the misreading concerns the
+    /// table.
     fn rewritten(self, problem: &Problem) -> Option<Problem> {
         let mut problem = problem.clone();
         match self {
@@ -143,7 +145,7 @@ impl Misreading {
         Some(problem)
     }
 
-    /// Changes `rows` to what they should have been read as.
+    /// Corrects the misreading in `rows`.
     fn mend(self, rows: &mut Measurements, problem: &Problem) {
         let (factor, chosen): (f64, &dyn Fn(usize) -> bool) = match self {
             Self::Degrees => (PI / 180.0, &|joint| turns_in(problem, rows, joint, true)),
@@ -166,8 +168,8 @@ impl Misreading {
         }
     }
 
-    /// Returns the root mean squared error of the registered nominal arm with `rows` read this way
-    /// \[m\].
+    /// Returns the root mean squared error of the registered nominal arm with this misreading
+    /// corrected \[m\].
     fn rms(
         self,
         fitting: &Fitting,
@@ -205,8 +207,8 @@ impl Misreading {
     }
 }
 
-/// Returns true if a joint is revolute and its column may be in radians, or else in degrees; both
-/// may be where the unit is not known.
+/// Returns true if a joint is revolute and its column is in radians (if `radians`), else in
+/// degrees. Without a declared unit, both are possible.
 fn turns_in(problem: &Problem, rows: &Measurements, joint: usize, radians: bool) -> bool {
     let turns =
         problem.joints.get(joint).is_some_and(|joint| joint.command_kind() == JointKind::Revolute);
@@ -214,19 +216,20 @@ fn turns_in(problem: &Problem, rows: &Measurements, joint: usize, radians: bool)
     turns && column.is_none_or(|column| (column.unit >= 1.0) == radians)
 }
 
-/// Returns the lengths of a joint \[m\].
+/// Returns the declared lengths of a joint \[m\]: a, d and the translation of its placement.
 fn lengths_of(joint: &mut Joint) -> Vec<&mut f64> {
     let placement = joint.placement.as_mut().map(|placement| placement.xyz.iter_mut());
     [&mut joint.a, &mut joint.d].into_iter().chain(placement.into_iter().flatten()).collect()
 }
 
-/// Returns true if the target of `[tool]` is so far away that it may be in millimetres.
+/// Returns true if the target of `[tool]` is so far from its frame that its coordinates may be in
+/// millimetres.
 fn is_far(problem: &Problem) -> bool {
     problem.targets.is_empty() && problem.tool.target.norm() > LONG
 }
 
-/// Returns the misreadings each of which would explain why the registered nominal arm misses the
-/// measurements by `rms` \[m\], the best first.
+/// Returns the misreadings that explain, each alone, why the registered nominal arm has the error
+/// `rms` \[m\]; best first.
 pub(in crate::fit) fn misreadings(
     fitting: &Fitting,
     problem: &Problem,
@@ -267,8 +270,8 @@ pub(in crate::fit) fn misreadings(
         .collect()
 }
 
-/// Returns the set of two and more joints which, taken to count the other way, leave the smallest
-/// error, with that error; of sets that do about as well, the smallest.
+/// Returns the set of at least two joints whose reversal leaves the smallest error, with that
+/// error. Among sets with about the same error, it is the one with the fewest joints.
 fn several_reversed(
     singles: &[Misreading],
     error: impl Fn(Misreading) -> Option<(Misreading, f64)>,

@@ -1,4 +1,4 @@
-//! Checks of a fit: whether its result can be trusted, and what to look at in the input.
+//! Checks of a fit: is its result trustworthy, and which input should be examined?
 //!
 //! Each check is a type that implements [`checked_fit::Check`]; [`findings`] runs all of them.
 //! `docs/findings.md` lists the codes of their findings.
@@ -25,7 +25,7 @@ pub(super) mod row_kind;
 use checked_fit::{Check, CheckedFit, Convergence, EnoughEquations};
 use finding::Finding;
 
-/// Every check, in the order of the findings; the first error is the reason that commands print.
+/// All checks, in the order of the findings. Commands print the first error as the reason.
 const CHECKS: &[&dyn Check] = &[
     &EnoughEquations,
     &misfit::Misfit,

@@ -1,4 +1,4 @@
-//! Check of the orientations: whether they are of the convention that the table declares.
+//! Check of the orientations: a large error means that the declared convention is wrong.
 
 use serde_json::json;
 
@@ -6,10 +6,10 @@ use super::checked_fit::{Check, CheckedFit};
 use super::convention::fitting_conventions;
 use super::finding::{Finding, FindingCode};
 
-/// Root mean squared error of orientation above which orientations are of another convention or of
-/// another frame \[rad\]: 2°.
+/// Smallest root mean squared error of orientation at which another convention or frame is
+/// suspected \[rad\]: 2°.
 const MAX_TURN: f64 = 0.035;
-/// Multiple of the declared σ that such an error also exceeds.
+/// Multiple of the declared σ of orientation that such an error must also exceed.
 const MIN_SIGMAS: f64 = 20.0;
 
 /// Checks that the fitted orientations are near the measured ones.

@@ -1,4 +1,4 @@
-//! Rows whose residual is too long to be noise.
+//! Rows whose residual is too large to be noise.
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};
@@ -7,7 +7,7 @@ use crate::error::Location;
 use crate::fit::uncertainty::residual_lengths::Lengths;
 use crate::measurement::Measurements;
 
-/// Row whose residual is too long to be noise.
+/// Row whose residual is too large to be noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outlier {
     /// Row of the measurements, counted from 0 over all files.
@@ -16,7 +16,7 @@ pub struct Outlier {
     pub location: Location,
     /// Kind of the row ([`Observation::kind`](crate::problem::Observation::kind)).
     pub kind: &'static str,
-    /// Length of the whitened residual in units of the scatter \[σ\].
+    /// Length of the whitened residual, as a multiple of the scatter (1 σ) of all rows.
     pub distance: f64,
     /// Residual measured − predicted, measuring frame \[m\], for tilts \[rad\]; a single number is
     /// along x.
@@ -35,21 +35,21 @@ impl Outlier {
     }
 }
 
-/// Few rows without which the fit would explain the others far better.
+/// Few rows that cause most of the misfit: without them, the fit explains the others much better.
 #[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct InfluentialRows {
     /// Influential rows, in the order of the table.
     pub rows: Vec<Outlier>,
-    /// χ² over its degrees of freedom of the fit without these rows; `None` if the noise is
-    /// estimated.
+    /// Reduced χ² (χ² over its degrees of freedom) of the fit without these rows; `None` if the
+    /// noise is estimated.
     pub reduced_chi2: Option<f64>,
     /// 1 σ of a coordinate that the fit without these rows takes \[m\], for tilts \[rad\].
     pub sigma_taken: f64,
 }
 
-/// Returns the outliers among `rows`, whose residuals have these lengths and \[m\] `errors`, in the
-/// order of the rows.
+/// Returns the outliers among `rows`, in the order of the rows. `lengths` are their whitened
+/// residual lengths, `errors` their residuals \[m\].
 pub(in crate::fit) fn outliers(
     lengths: &Lengths,
     rows: &[usize],
@@ -63,8 +63,7 @@ pub(in crate::fit) fn outliers(
     rows.iter().enumerate().zip(errors).filter_map(outlier).collect()
 }
 
-/// Returns the places of rows in their files as numbers of a finding: file, line and \[σ\]
-/// distance.
+/// Returns rows as numbers of a finding: file, line and distance \[σ\] of each.
 pub(super) fn places(rows: &[Outlier]) -> Value {
     let place = |row: &Outlier| {
         let Location { file, line, .. } = &row.location;

@@ -6,11 +6,11 @@ use crate::fit::stages::parameter_size::largest;
 use crate::model::parameter::{JointField, Parameter, ParameterSite};
 use crate::quantity::Unit;
 
-/// Deviation in σ of the prior that a parameter of the measured arm stays below: chance exceeds it
-/// once in two million.
+/// Largest deviation of an arm parameter, in σ of its prior, that is not reported. Chance exceeds 5
+/// σ once in two million.
 const MAX_PRIOR_SIGMAS: f64 = 5.0;
 
-/// Checks that no parameter of the arm deviates far beyond its prior; parameters of effects may.
+/// Checks that no arm parameter deviates far beyond its prior. Parameters of effects are exempt.
 pub(super) struct WithinPriors;
 
 impl Check for WithinPriors {
@@ -40,7 +40,7 @@ impl Check for WithinPriors {
     }
 }
 
-/// Checks that no parameter deviates by more than an arm of this size can be off.
+/// Checks that no parameter deviates by more than is possible on an arm of this size.
 pub(super) struct WithinArmSize;
 
 impl Check for WithinArmSize {
@@ -64,7 +64,7 @@ impl Check for WithinArmSize {
     }
 }
 
-/// Returns the parameter of the fit with the largest `ratio` of its deviation x to a limit.
+/// Returns the parameter of the fit for which `ratio`, its deviation x over a limit, is largest.
 fn largest_ratio<'a>(
     fit: &CheckedFit<'a>,
     ratio: impl Fn(&Parameter, f64) -> Option<f64>,

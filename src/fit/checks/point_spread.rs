@@ -8,18 +8,19 @@ use crate::model::{Model, Pose};
 use crate::numeric::median;
 use crate::problem::{Fixture, Observation};
 
-/// Ratio of the scatter at a point to the median of all points from which on the point is unsteady;
-/// points that were not fitted may scatter half as much again as others.
+/// Smallest ratio of the scatter at a point to the median of all points at which the point counts
+/// as unsteady. Points that were not fitted may scatter half as much again as others.
 const UNSTEADY: f64 = 2.5;
-/// Part of the squares along one direction from which on a point is unsteady; isotropic scatter has
-/// a third along each direction.
+/// Smallest share of the squared scatter along one direction at which a point counts as unsteady.
+/// Isotropic scatter has a third along each direction.
 const ONE_WAY: f64 = 0.7;
-/// Minimum number of rows of a point that is compared.
+/// Minimum number of rows of a point whose scatter is compared.
 const MIN_ROWS: usize = 8;
-/// Minimum number of points that are compared.
+/// Minimum number of points whose scatter can be compared.
 const MIN_POINTS: usize = 4;
 
-/// Scatter of the predicted target over the rows at one point, whatever the place of the point.
+/// Scatter of the predicted target over the rows that touch one point, independent of the point's
+/// position.
 #[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointSpread {
@@ -31,13 +32,14 @@ pub struct PointSpread {
     pub mean: f64,
     /// Direction in which the scatter is largest, measuring frame.
     pub along: Vector3<f64>,
-    /// Part of the squares along this direction, 0…1.
+    /// Share of the squared scatter along this direction, 0…1.
     pub share: f64,
 }
 
 impl PointSpread {
     /// Returns the points that scatter far more than the others and along one direction, each with
-    /// its scatter over the median of all. They may have moved or given way, which no arm explains.
+    /// the ratio of its scatter to the median. They may have moved or yielded, which no arm
+    /// explains.
     #[doc(hidden)]
     pub fn unsteady<'a>(spreads: impl IntoIterator<Item = &'a Self>) -> Vec<(&'a Self, f64)> {
         let compared: Vec<&Self> = spreads
@@ -56,7 +58,7 @@ impl PointSpread {
 }
 
 /// Returns the scatter at each point that some of `poses` touch, with the arm at the full parameter
-/// vector `x`; NaN where a pose has no equilibrium.
+/// vector `x`; NaN if a pose has no equilibrium.
 pub(in crate::fit) fn spreads(
     model: &Model,
     fixtures: &[Fixture],
@@ -92,8 +94,8 @@ pub(in crate::fit) fn spreads(
 }
 
 impl Fitting<'_> {
-    /// Returns the scatter of the predicted target at each touched point, with the registered
-    /// nominal arm and with the fitted one, and whether all rows of the point are held out.
+    /// Returns for each touched point the scatter of the predicted target with the registered
+    /// nominal and with the fitted arm, and true if all its rows are held out.
     pub fn spreads(
         &self,
         fixtures: &[Fixture],
@@ -119,8 +121,8 @@ impl Fitting<'_> {
     }
 }
 
-/// Returns the direction in which squares are largest, with its largest component positive, and
-/// their part along it; NaN where the squares are not finite or zero.
+/// Returns the direction in which the sum of squares is largest, with its largest component
+/// positive, and the share along it; NaN if `squares` is zero or not finite.
 fn longest(squares: Matrix3<f64>) -> (Vector3<f64>, f64) {
     let trace = squares.trace();
     if !(trace.is_finite() && trace > 0.0) {

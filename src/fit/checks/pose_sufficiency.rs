@@ -1,4 +1,4 @@
-//! Sufficiency of the poses: whether they measure enough coordinates for the fitted parameters.
+//! Sufficiency of the poses: do they measure enough coordinates for the fitted parameters?
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,14 +12,17 @@ use crate::model::Model;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::problem::{Observation, Problem};
 
-/// Number of coordinates of a rigid body; any number of targets in one pose measure no more of it.
+/// Number of coordinates of a rigid body. Any number of targets on it determine no more in one
+/// pose.
 const BODY: usize = 6;
 
-/// Number of independent coordinates of the identification poses, and what they are too few for.
+/// Number of independent coordinates of the identification poses, and the finding if they are too
+/// few.
 pub(in crate::fit) struct PoseSufficiency {
-    /// Finding about what the poses are too few for, whatever the priors are.
+    /// Finding that the poses are too few for some unknowns, regardless of priors; `None` if they
+    /// suffice.
     pub finding: Option<Finding>,
-    /// Measured coordinates that are independent of each other.
+    /// Number of measured coordinates that are independent of each other.
     pub coordinates: usize,
     /// Number of different poses of the arm among the identification rows; several targets in one
     /// pose count once.
@@ -66,14 +69,16 @@ impl PoseSufficiency {
         Self { finding, coordinates, poses, several_targets }
     }
 
-    /// Returns true if there are enough equations to judge the declared σ.
+    /// Returns true if there are enough independent coordinates, given the number of `parameters`,
+    /// to judge the declared σ.
     pub fn judges_noise(&self, parameters: usize) -> bool {
         let is_short = |finding: &Finding| finding.code == FindingCode::TooFewEquations;
         self.coordinates >= parameters && !self.finding.as_ref().is_some_and(is_short)
     }
 }
 
-/// Reports that `of` has fewer measured coordinates than parameters without a prior.
+/// Reports that `of`, the fit, a base or a tool, has fewer measured coordinates than parameters
+/// without a prior.
 fn too_few(of: String, coordinates: usize, parameters: usize) -> Finding {
     let text = format!(
         "{of}: {coordinates} measured coordinates for {parameters} parameters without a prior (a pose measured again adds none)"
@@ -82,9 +87,11 @@ fn too_few(of: String, coordinates: usize, parameters: usize) -> Finding {
     Finding::new(FindingCode::TooFewEquations, numbers, text)
 }
 
-/// Returns the number of independent coordinates: those of each different point, but at most six
-/// for a pose of the frame that carries them, and those of contacts and distances. The shape of the
-/// targets of a frame counts once more.
+/// Returns the number of independent measured coordinates of `rows`.
+///
+/// Each different point counts, but at most six coordinates for a pose of the frame that carries
+/// the targets. Contacts and distances are added, and the coordinates beyond six of a frame's
+/// targets once, because they determine the targets' relative positions.
 fn coordinates(
     fitting: &Fitting,
     (numbers, of_arm): (&[usize], &[usize]),
@@ -122,8 +129,8 @@ fn label(what: &str, word: &str) -> String {
     if word.is_empty() { what.to_owned() } else { format!("{what}[{word}]") }
 }
 
-/// Reports the first base whose pose the points of `rows` do not determine, considering its
-/// `varied` parameters without a prior.
+/// Reports the first base whose pose the points of `rows` do not determine; only those of its
+/// parameters count that are `varied` and have no prior.
 fn undetermined(
     fitting: &Fitting,
     numbers: &[usize],
@@ -159,11 +166,11 @@ fn undetermined(
     Some(Finding::new(FindingCode::BaseNotDetermined, [of.into(), poses.into()], text))
 }
 
-/// Reports a base, with the targets that no other base of `rows` uses, or a target that has fewer
-/// coordinates in different poses of `rows` than `varied` parameters without a prior.
+/// Reports a base or a target that has fewer coordinates in different poses of `rows` than `varied`
+/// parameters without a prior. Targets that only one base uses count with that base.
 ///
-/// `numbers` are the pose numbers of all rows, `of_row` their numbers of coordinates. With
-/// `judged`, the rows must leave a degree of freedom for their errors.
+/// `numbers` are the pose numbers of all rows, `of_row` their numbers of coordinates. If `judged`,
+/// one more coordinate is required, so that errors of the rows can be judged.
 fn underdetermined(
     (model, placement): (&Model, &Placement),
     (numbers, of_row): (&[usize], &[usize]),

@@ -1,4 +1,4 @@
-//! Checks of the fit against held-out rows, which decide nothing in it but may contradict it.
+//! Checks of the fit against held-out rows, which are not fitted but may contradict the prediction.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -11,13 +11,13 @@ use crate::fit::stages::fitting::Fitting;
 use crate::fit::uncertainty::noise::Noise;
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 
-/// Probability below which the held-out residuals contradict the prediction.
+/// Largest probability of held-out residuals at which they contradict the prediction.
 const IMPROBABLE: f64 = 1e-3;
-/// Maximum number of held-out rows that are tested together: more would only cost time.
+/// Maximum number of held-out rows that are tested together, to limit time.
 const MAX_TESTED_ROWS: usize = 2048;
-/// Number of standard errors from which on a mean difference of held-out errors is no chance.
+/// Smallest number of standard errors at which a mean difference of held-out errors is significant.
 const MIN_DIFFERENCE: f64 = 2.0;
-/// Number of held-out rows from which on a mean difference is judged.
+/// Minimum number of held-out rows from which a mean difference is judged.
 const MIN_ROWS: usize = 6;
 
 /// Checks that the held-out residuals are as large as the fit predicts.
@@ -59,8 +59,9 @@ impl Check for PredictionHolds {
     }
 }
 
-/// Returns the probability that chance exceeds `chi2`, and the χ² that it exceeds with probability
-/// [`IMPROBABLE`]; `noise_dof` are the degrees of freedom from which the noise was estimated.
+/// Returns the probability that a valid prediction exceeds `chi2`, and the χ² that it exceeds with
+/// probability [`IMPROBABLE`]. `noise_dof` are the degrees of freedom from which the noise was
+/// estimated; `None` if it is declared.
 fn upper_tail(chi2: f64, coordinates: usize, noise_dof: Option<f64>) -> Option<(f64, f64)> {
     let k = coordinates as f64;
     if !chi2.is_finite() || coordinates == 0 {
@@ -119,7 +120,7 @@ fn predictive_chi2(
     Some((products[(n, n)] - explained, coordinates))
 }
 
-/// Checks that the fitted arm meets held-out rows no worse than the registered nominal arm.
+/// Checks that the fitted arm predicts held-out rows no worse than the registered nominal arm.
 pub(super) struct NotWorseThanNominal;
 
 impl Check for NotWorseThanNominal {

@@ -1,4 +1,4 @@
-//! Checks of the σ of priors and measurements against what the data say.
+//! Checks of the declared σ of priors and measurements against the data.
 
 use serde_json::json;
 
@@ -7,7 +7,7 @@ use super::finding::{Finding, FindingCode};
 use crate::fit::uncertainty::noise::Noise;
 use crate::fit::uncertainty::refuted_priors::RefutedPrior;
 
-/// Checks that the poses measure as many coordinates as parameters are fitted.
+/// Checks that the poses measure at least as many coordinates as there are fitted parameters.
 pub(super) struct DataDecide;
 
 impl Check for DataDecide {
@@ -65,9 +65,10 @@ impl Check for PriorsHold {
     }
 }
 
-/// Noise variance over the declared one beyond which the residual is no noise: σ 30 times as large.
+/// Largest ratio of the noise variance to the declared one that may be noise: a σ about 30 times
+/// too small.
 const MAX_NOISE_FACTOR: f64 = 1000.0;
-/// Ratios of σ that a σ in metres declared in millimetres brings about.
+/// Ratios of estimated to declared σ that suggest a σ in metres declared as millimetres.
 const UNIT_RATIOS: std::ops::Range<f64> = 600.0..1600.0;
 
 /// Checks that the σ that the fit took is not far above the declared one.

@@ -14,8 +14,8 @@ pub fn check_columns(problem: &Problem, rows: &Measurements) -> Result<(), Input
     not_finite(problem, rows).map_or(Ok(()), Err)
 }
 
-/// Returns the error of the first declared law with a formula that has no finite value in a row,
-/// counted from 1.
+/// Returns the error of the first declared law with a formula that has no finite value in a row;
+/// `None` if all are finite.
 fn not_finite(problem: &Problem, rows: &Measurements) -> Option<InputError> {
     let first = rows.time.iter().copied().fold(f64::INFINITY, f64::min);
     problem.effects.iter().find_map(|EffectDeclaration { effect, location }| {

@@ -1,4 +1,4 @@
-//! Identification rows that measure one kind of thing, and the words for them.
+//! Identification rows that measure the same kind of quantity, and the words for them in texts.
 
 use nalgebra::Vector3;
 
@@ -6,14 +6,15 @@ use crate::fit::stages::placement::Placement;
 use crate::observation::{Observation, kind_named};
 use crate::quantity::Unit;
 
-/// Identification rows that measure one kind of thing; lengths \[m\], angles of tilts \[rad\].
+/// Identification rows that measure the same kind of quantity; lengths are in m, angles of tilts in
+/// rad.
 pub(in crate::fit) struct RowKind {
     pub observation: Observation,
     pub rows: Vec<usize>,
-    /// Root mean squared distance of the measured positions or tilts from their centre; of other
-    /// kinds, of the places where the nominal arm has its target.
+    /// Root mean squared distance of the measured positions or tilts from their centre. For other
+    /// kinds it is that of the target's positions as the nominal arm predicts them.
     pub spread: f64,
-    /// 1 σ of a coordinate as declared, where it is declared.
+    /// Declared standard deviation (1 σ) of a coordinate; `None` if there is none.
     pub declared_sigma: Option<f64>,
     /// 1 σ of a coordinate that the fit took.
     pub taken_sigma: f64,
@@ -40,7 +41,7 @@ pub(super) fn spread(
     (squares / rows.len().max(1) as f64).sqrt()
 }
 
-/// Length from which on errors are written with a power of ten \[m\].
+/// Smallest length that is written with a power of ten \[m\].
 const HUGE: f64 = 1e6;
 
 /// Writes an error with its unit: degrees with one decimal more for tilts \[rad\], millimetres for
@@ -60,12 +61,12 @@ pub(crate) fn rows(kind: &str) -> &'static str {
     kind_named(kind).row.1
 }
 
-/// Returns the noun for what rows of a kind measure.
+/// Returns the noun for the quantity that rows of a kind measure.
 pub(in crate::fit) fn measured(kind: &str) -> &'static str {
     kind_named(kind).measured
 }
 
-/// Returns what to check in a table where the arm misses rows of a kind.
+/// Returns the columns and declarations to check if the arm does not fit rows of a kind.
 pub(in crate::fit) fn named(kind: &str) -> &'static str {
     kind_named(kind).suspects
 }

@@ -1,4 +1,4 @@
-//! Procedure of the paper on the same problem, as a row of the comparison.
+//! Identification procedure of the paper on the same problem, as a row of the comparison.
 
 use std::time::Instant;
 
@@ -11,7 +11,7 @@ use crate::measurement::{Dataset, Measurements};
 use crate::paper::{self, EndPoint, Form, Mdh, Measured, StiffnessStage};
 use crate::problem::{Joint, Problem};
 
-/// Result of the paper's closed forms and iteration for the data.
+/// Result of the paper's closed forms and iteration on the identification rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Baseline {
     /// Form of the equations: as printed, or with the misprints corrected.
@@ -40,7 +40,8 @@ impl Baseline {
         paper_name(self.form, self.stage)
     }
 
-    /// Returns the result in the terms of the paper, with the errors of the `rigid` one.
+    /// Returns the result in the form of the paper's tables; `rigid` is the result with elasticity
+    /// ignored.
     pub(in crate::fit) fn procedure(&self, rigid: Option<&Self>) -> Procedure {
         let ignoring = rigid.map(|rigid| rigid.held_out.clone());
         let paper = Some((self.form, self.stage));

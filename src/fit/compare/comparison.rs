@@ -25,14 +25,14 @@ pub struct Comparison {
     /// One identification per strategy and solver, without strategies that have nothing to vary.
     pub strategies: Vec<Identification>,
     /// Results of the paper's procedure in every form that the data allow, the rigid one first;
-    /// empty where it was not asked for.
+    /// empty if it was not requested.
     pub paper: Vec<Baseline>,
-    /// One joint fit per ablation.
+    /// Ablation and joint fit of the model without the ablated elasticity.
     pub ablations: Vec<(Ablation, Identification)>,
-    /// Results of the joint fit and of every elastic form of the paper's procedure, in the terms of
-    /// the paper; empty where rows measure anything else than positions.
+    /// Results of the joint fit and of every elastic form of the paper's procedure, in the form of
+    /// the paper's tables; empty if rows measure anything but positions.
     pub procedures: Vec<Procedure>,
-    /// Errors before calibration as the paper counts them: of the rigid nominal arm.
+    /// Errors before calibration as the paper defines them: those of the rigid nominal arm.
     pub before: Before,
     /// True if the problem declares the arm of the paper, so that published figures apply.
     pub is_papers_arm: bool,
@@ -43,17 +43,16 @@ pub struct Comparison {
 pub struct Before {
     /// Errors measured − predicted of the held-out poses, measuring frame \[m\].
     pub errors: Vec<Vector3<f64>>,
-    /// True if base or tool were fitted first, since they are free and have no prior.
+    /// True if base or tool were fitted first, because they are free without a prior.
     pub registered: bool,
 }
 
 /// Options of a comparison.
 #[derive(Clone, Default)]
 pub struct CompareOptions {
-    /// True to run the paper's procedure; it always runs where the problem declares the arm of the
-    /// paper.
+    /// True to run the paper's procedure. It always runs if the problem declares the paper's arm.
     pub paper: bool,
-    /// Receiver of progress.
+    /// Receiver of progress reports; `None` to report nothing.
     pub progress: Option<ProgressSink>,
 }
 

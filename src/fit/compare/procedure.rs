@@ -1,4 +1,4 @@
-//! Results in the terms of the paper: its tables 2 and 3 and its figure 13.
+//! Results in the form of the paper: its tables 2 and 3 and its figure 13.
 
 use nalgebra::Vector3;
 
@@ -13,7 +13,7 @@ pub struct TableEntry {
     pub nominal: f64,
     /// Identified value.
     pub identified: f64,
-    /// Part of the value that the data determine, 0…1; `None` where it was not identified.
+    /// Share of the value that the data determine, 0…1; `None` if it was not identified.
     pub seen: Option<f64>,
 }
 
@@ -24,9 +24,10 @@ pub struct Procedure {
     pub paper: Option<(Form, StiffnessStage)>,
     /// Table 2: number and α, a, θ, d, β of each joint in DH form.
     pub geometry: Vec<(usize, [TableEntry; 5])>,
-    /// Errors measured − predicted of the held-out poses afterwards, measuring frame \[m\].
+    /// Errors measured − predicted of the held-out poses after identification, measuring frame
+    /// \[m\].
     pub after: Vec<Vector3<f64>>,
-    /// Errors of the held-out poses with elasticity ignored \[m\]; `None` where nothing is elastic.
+    /// Errors of the held-out poses with elasticity ignored \[m\]; `None` if the arm is rigid.
     pub ignoring: Option<Vec<Vector3<f64>>>,
 }
 

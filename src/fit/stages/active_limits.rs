@@ -9,16 +9,17 @@ use crate::least_squares::solver::AtBound;
 pub(in crate::fit) struct Held {
     /// Index of the constraint in the model.
     pub constraint: usize,
-    /// Limit on which the unknowns are.
+    /// Limit (lower or upper) that is active.
     pub side: AtBound,
     /// Coefficients of the constraint, one per unknown.
     pub row: Vec<f64>,
 }
 
-/// Stacks the rows of `gauge` and of active constraints, scaled to unit length in unknowns that are
-/// scaled by the data.
+/// Returns the rows of `gauge` and of active `constraints`, scaled to unit length in unknowns that
+/// are scaled by the column norms of `triangle`.
 ///
-/// A constraint on a single unknown that is not held acts as a bound: the unknown becomes `held`.
+/// A constraint on a single unknown that is not yet held acts as a bound: the unknown is marked in
+/// `held`.
 pub(in crate::fit) fn confine(
     triangle: &DMatrix<f64>,
     gauge: &DMatrix<f64>,

@@ -4,13 +4,13 @@ use std::collections::VecDeque;
 
 use nalgebra::{DMatrix, DVector};
 
-/// Number of earlier sweeps that the acceleration uses.
+/// Maximum number of earlier sweeps that the acceleration combines.
 const DEPTH: usize = 10;
-/// Relative singular value below which differences of sweeps are rounding.
+/// Relative singular value below which a difference of sweeps counts as rounding and is not used.
 const EXPLAINED: f64 = 1e-8;
-/// Maximum number of power iterations for the contraction.
+/// Maximum number of power iterations that estimate the contraction.
 const POWERS: usize = 2000;
-/// Relative change of the contraction below which the power iteration has settled.
+/// Relative change of the contraction at which the power iteration counts as converged.
 const SETTLED: f64 = 1e-6;
 
 /// Convergence of an alternating fit.
@@ -19,8 +19,9 @@ const SETTLED: f64 = 1e-6;
 pub struct Alternation {
     /// Number of sweeps over all stages.
     pub sweeps: usize,
-    /// Part of the error that a plain sweep leaves near the optimum, measured by the change of the
-    /// predictions; `None` where data and priors do not determine a combination.
+    /// Factor by which a sweep without acceleration multiplies the error near the optimum, measured
+    /// by the change of the predictions; `None` if data and priors leave a combination
+    /// undetermined.
     pub contraction: Option<f64>,
 }
 
@@ -36,7 +37,7 @@ pub(in crate::fit) struct Anderson {
 }
 
 impl Anderson {
-    /// Drops all earlier sweeps.
+    /// Discards all earlier sweeps.
     pub fn restart(&mut self) {
         self.sweeps.clear();
     }
@@ -68,8 +69,8 @@ impl Anderson {
     }
 }
 
-/// Returns the part of ‖R e‖ that a sweep finally leaves of an error e, by power iteration: each of
-/// `stages` minimises ‖R e‖ over its unknowns in turn.
+/// Returns the factor by which a sweep finally multiplies ‖R e‖ of an error e, by power iteration.
+/// Each of `stages` minimises ‖R e‖ over its unknowns in turn.
 ///
 /// `triangle` is the factor R of data and priors.
 pub(in crate::fit) fn contraction(triangle: &DMatrix<f64>, stages: &[Vec<usize>]) -> Option<f64> {

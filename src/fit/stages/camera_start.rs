@@ -9,10 +9,11 @@ use crate::model::{Model, Pose};
 use crate::observation::{FixtureValues, Needs};
 use crate::spatial::Frame;
 
-/// Ratio of the second smallest to the largest singular value of the rotations below which the
-/// views leave the pose of camera and marker open.
+/// Smallest ratio of the second smallest to the largest singular value of the rotation equations at
+/// which the views determine the rotations of camera and marker.
 const MIN_RATIO: f64 = 1e-4;
-/// Count of views with a pose each from which camera and marker are solved together.
+/// Minimum number of views, each with a marker pose, from which camera and marker are solved
+/// together.
 const MIN_VIEWS: usize = 3;
 
 /// View of a marker by a camera in one configuration.
@@ -80,7 +81,7 @@ pub(super) fn poses_from_views(
     known
 }
 
-/// Returns the views in which enough points determine the marker's pose.
+/// Returns the views in which the marker has enough visible points to determine its pose.
 fn views(
     model: &Model,
     poses: &[Pose],
@@ -122,7 +123,7 @@ fn views(
 }
 
 /// Returns the poses of camera and marker from all views of the pair, A C V = M; `None` if the
-/// views leave them open.
+/// views do not determine them.
 ///
 /// For the rotations, (Vᵀ ⊗ A) vec C − vec M = 0 is linear; for the translations,
 /// A t_C − t_M = −t_A − A C t_V.

@@ -8,8 +8,8 @@ use crate::least_squares::solver::{Bounds, Solution};
 /// Solver that a caller gives to the fits of an identification, see
 /// [`Options::with_custom_solver`](crate::fit::Options::with_custom_solver).
 pub trait CustomSolver: Send + Sync {
-    /// Returns true if solutions satisfy the bounds; problems with bounds are refused otherwise,
-    /// and those with a `[[constraint]]` always.
+    /// Returns true if solutions satisfy the bounds. If it returns false, problems with bounds are
+    /// refused. Problems with a `[[constraint]]` are always refused.
     fn keeps_bounds(&self) -> bool {
         false
     }

@@ -23,19 +23,19 @@ use crate::observation::Needs;
 use crate::problem::Observation;
 use crate::quantity::Unit;
 
-/// Maximum number of sweeps of a sequential strategy.
+/// Maximum number of sweeps (one pass over all stages) of a sequential strategy.
 const MAX_SWEEPS: usize = 500;
-/// Relative reduction of the cost per sweep below which a sequential strategy has settled.
+/// Relative reduction of the cost in one sweep at which a sequential strategy counts as converged.
 const SWEEP_SETTLED: f64 = 1e-7;
-/// Maximum number of steps of each stage in a sweep that is repeated: the next stage changes the
-/// optimum anyway.
+/// Maximum number of solver steps of each stage in a sweep that is repeated. More would be wasted,
+/// because the next stage moves the optimum.
 const SWEEP_STEPS: u64 = 2;
 
-/// Change of ν ln(squares) per step below which a provisional fit has converged: a thousandth of
-/// the change that decides about an effect.
+/// Change of ν ln ‖r‖² (ν measured coordinates) per step at which a provisional fit counts as
+/// converged. It is a thousandth of the change that decides on an effect.
 const PROVISIONAL_CHANGE: f64 = 0.01;
-/// Relative reduction of the cost per step below which a fit stops whose σ is tested next; σ is
-/// then known to half of it.
+/// Relative reduction of the cost per step at which a fit stops if its declared σ is tested next.
+/// The σ is then known to half of this.
 const TESTED_NOISE_CHANGE: f64 = 1e-3;
 
 /// Input that all fits of an identification share.
@@ -48,7 +48,7 @@ pub(in crate::fit) struct Fitting<'a> {
     pub held_out_only: HeldOutOnly,
     pub strategy: Strategy,
     pub solver: SolverChoice,
-    /// Solver of the caller, which [`SolverChoice::Custom`] stands for.
+    /// Solver of the caller, required by [`SolverChoice::Custom`].
     pub custom_solver: Option<&'a dyn CustomSolver>,
     /// Loss of the residual of a pose in the stages of the strategy.
     pub loss: Loss,
@@ -56,9 +56,9 @@ pub(in crate::fit) struct Fitting<'a> {
     pub stop: Option<&'a Stop>,
     /// Maximum number of steps of a stage of the strategy.
     pub max_steps: Option<u64>,
-    /// True if the σ is tested before the fit goes on.
+    /// True if the fit may stop early, because its σ is tested before it continues.
     pub to_be_judged: bool,
-    /// 1 σ of a coordinate in rows that state none, declared or assumed \[m\].
+    /// Standard deviation (1 σ) of a coordinate in rows that state none, declared or assumed \[m\].
     pub sigma: f64,
     /// 1 σ of an orientation about each axis, where orientations are fitted \[rad\].
     pub turn_sigma: Option<f64>,
@@ -68,7 +68,7 @@ pub(in crate::fit) struct Fitting<'a> {
     pub turn_noise_model: NoiseModel,
     /// Linearisations that the fits share.
     pub cache: &'a LinearisationCache,
-    /// Derivatives that are known where it may begin.
+    /// Jacobian at the optimum of an earlier fit, reused if this fit starts there.
     pub linear_model: Option<&'a LinearModel>,
 }
 
@@ -79,7 +79,7 @@ pub(in crate::fit) struct FitEnd {
     pub termination: Termination,
     pub iterations: u64,
     pub evaluations: u64,
-    /// Bound on which each unknown rests.
+    /// Active bound of each unknown; `None` if it is inside its bounds.
     pub at_bound: Vec<Option<AtBound>>,
     pub gauge: Gauge,
     /// Convergence of alternating stages.
@@ -87,7 +87,7 @@ pub(in crate::fit) struct FitEnd {
 }
 
 impl FitEnd {
-    /// Creates the result of a fit of `unknowns` unknowns that has not begun.
+    /// Creates the result of a fit of `unknowns` unknowns before its first step, at `start`.
     fn at(start: &DVector<f64>, unknowns: usize) -> Self {
         Self {
             x: start.clone(),
@@ -119,8 +119,8 @@ impl From<StageEnd> for FitEnd {
 }
 
 impl<'a> Fitting<'a> {
-    /// Returns the indices of the chosen parameters, without bases and targets that only held-out
-    /// rows use.
+    /// Returns the indices of the parameters for which `choose` is true, except bases and targets
+    /// that only held-out rows use.
     fn choose(&self, choose: impl Fn(&Parameter) -> bool) -> Vec<usize> {
         let all = self.model.parameters.iter().enumerate();
         all.filter(|&(k, parameter)| !self.held_out_only.parameters[k] && choose(parameter))
@@ -133,7 +133,7 @@ impl<'a> Fitting<'a> {
         self.placement.oriented_poses(self.measurements, rows, (self.sigma, self.turn_sigma))
     }
 
-    /// Returns the same fits with the declared σ.
+    /// Returns the same input with the declared σ instead of those of the noise models.
     pub fn with_declared_noise(&self) -> Self {
         Self {
             noise_model: NoiseModel::DECLARED,
@@ -188,7 +188,8 @@ impl<'a> Fitting<'a> {
         Stage { loss: self.loss, max_steps, cost_tolerance, ..stage }
     }
 
-    /// Creates the stage of everything that the strategy varies, on the identification rows.
+    /// Creates the stage of all parameters that the strategy varies together, on the identification
+    /// rows.
     pub fn whole(&self) -> Stage<'a> {
         let varied =
             |parameter: &Parameter| self.strategy.stages().iter().any(|chosen| chosen(parameter));
@@ -203,8 +204,8 @@ impl<'a> Fitting<'a> {
         (!unknowns.is_empty()).then(|| Stage { counts_fixed: true, ..self.placing(rows, unknowns) })
     }
 
-    /// Returns the error of the first row that cannot be predicted with the nominal arm: its pose
-    /// has no equilibrium, or it sees a point behind a camera.
+    /// Returns the error of the first row that the nominal arm cannot predict: its pose has no
+    /// equilibrium, or a point is behind its camera.
     pub fn unpredictable(&self) -> Option<InputError> {
         let is_of_camera = |row: &usize| {
             let kind = self.measurements.observation(*row).description();
@@ -230,8 +231,8 @@ impl<'a> Fitting<'a> {
             .or_else(|| if of_cameras.is_empty() { None } else { behind() })
     }
 
-    /// Returns the full parameter vector of the nominal arm with bases, targets and fixtures in
-    /// closed form where they are free.
+    /// Returns the full parameter vector of the nominal arm, with free bases, targets and fixtures
+    /// located in closed form.
     fn located(&self) -> DVector<f64> {
         let mut x = DVector::zeros(self.model.parameters.len());
         let mut poses = self.poses(&self.split.identification);
@@ -253,8 +254,8 @@ impl<'a> Fitting<'a> {
         x
     }
 
-    /// Returns the full parameter vector of the registered nominal arm: bases and targets are
-    /// fitted where they are free.
+    /// Returns the full parameter vector of the registered nominal arm, with free bases and targets
+    /// fitted.
     pub fn registered(&self) -> Result<DVector<f64>, StageError> {
         let mut x = self.located();
         let placements = self.choose(|parameter| parameter.site.is_placement());
@@ -267,7 +268,8 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Runs the stages of the strategy from `start`; several are repeated until the cost settles.
+    /// Runs the stages of the strategy from `start`; several stages are repeated in turn until the
+    /// cost converges.
     pub fn run(&self, start: &DVector<f64>) -> Result<FitEnd, StageError> {
         let whole = self.whole();
         let [first, rest @ ..] = self.strategy.stages() else {
@@ -297,7 +299,7 @@ impl<'a> Fitting<'a> {
         Self::gauged(&whole, end)
     }
 
-    /// Repeats accelerated sweeps over the stages of the strategy until the cost settles.
+    /// Repeats accelerated sweeps over the stages of the strategy until the cost converges.
     fn alternate(&self, whole: &Stage, start: &DVector<f64>) -> Result<FitEnd, StageError> {
         let mut end = FitEnd::at(start, whole.unknowns.len());
         let scale = whole
@@ -336,8 +338,8 @@ impl<'a> Fitting<'a> {
         Ok(end)
     }
 
-    /// Runs one sweep over the stages of the strategy, each with at most `steps` steps; returns the
-    /// reason for its end.
+    /// Runs one sweep over the stages of the strategy, each with at most `steps` steps. Returns the
+    /// reason why it ended.
     fn sweep(
         &self,
         whole: &Stage,
@@ -364,15 +366,15 @@ impl<'a> Fitting<'a> {
         Ok(termination)
     }
 
-    /// Adds the combinations that are not determined at the end.
+    /// Adds to `end` the combinations of unknowns that are not determined there.
     fn gauged(whole: &Stage, mut end: FitEnd) -> Result<FitEnd, StageError> {
         let held: Vec<bool> = end.at_bound.iter().map(Option::is_some).collect();
         end.gauge = whole.gauge(&end.x, &held, &whole.held(&end.x)?);
         Ok(end)
     }
 
-    /// Returns the errors on both parts of the data at the full parameter vector `x`, for the
-    /// leading kind of rows.
+    /// Returns the errors of identification and held-out rows of the leading kind at the full
+    /// parameter vector `x`.
     pub fn errors(&self, x: &DVector<f64>) -> Errors {
         self.errors_of(self.measurements.leading(), x)
     }
@@ -393,8 +395,8 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Returns the errors of every kind of rows at the full parameter vectors of the registered
-    /// nominal arm and of the fitted one; nothing where there is only one kind.
+    /// Returns the errors of every kind of rows with the full parameter vectors of the registered
+    /// nominal and of the fitted arm; empty if there is only one kind.
     pub fn errors_by_kind(
         &self,
         registered: &DVector<f64>,
@@ -407,8 +409,9 @@ impl<'a> Fitting<'a> {
         if kinds.len() > 1 { each.collect() } else { Vec::new() }
     }
 
-    /// Returns the errors of orientation on both parts of the data at the full parameter vectors of
-    /// the registered nominal arm and of the fitted one; `None` where orientation is not fitted.
+    /// Returns the orientation errors of identification and held-out rows with the full parameter
+    /// vectors of the registered nominal and of the fitted arm; `None` if orientation is not
+    /// fitted.
     pub fn orientation(
         &self,
         registered: &DVector<f64>,

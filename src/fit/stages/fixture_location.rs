@@ -10,17 +10,20 @@ use crate::problem::FixtureKind;
 use crate::problem::fixture::lean;
 use crate::spatial::plane_normal;
 
-/// Ratio of the spread across a plane to that within it below which points lie in the plane.
+/// Largest ratio of the spread of points normal to a plane to that within it at which they count as
+/// coplanar.
 const IN_A_PLANE: f64 = 1e-3;
-/// Difference of offsets from which on they determine the side of a plane \[m\] …
+/// Smallest difference of measured offsets at which they determine the side of a plane \[m\].
 const OFFSETS_DIFFER: f64 = 1e-4;
-/// … and distance of the arm's base from the plane from which on the base does \[m\].
+/// Smallest distance of the arm's base from a plane at which the base determines the plane's side,
+/// if the offsets do not \[m\].
 const BASE_IS_OFF: f64 = 0.05;
 
-/// Locates fixtures from the `poses` that measure against them, in the full parameter vector `x`.
+/// Locates fixtures in closed form from the `poses` that measure against them and writes their
+/// parameters into the full parameter vector `x`.
 ///
 /// It sets the `chosen` parameters of fixtures that are free without prior and bounds and have no
-/// declared value. Fixtures that no pose touches stay as they are.
+/// declared value. Fixtures that no pose touches keep their values.
 pub(crate) fn locate(
     model: &Model,
     poses: &[Pose],
@@ -70,7 +73,7 @@ pub(crate) fn locate(
     }
 }
 
-/// Sets the poses of cameras and markers of which all six coordinates are free.
+/// Sets the poses of cameras and markers that are free in all six coordinates.
 fn locate_cameras(
     model: &Model,
     poses: &[Pose],
@@ -95,8 +98,9 @@ fn locate_cameras(
     }
 }
 
-/// Returns the parameters of a fixture that fit the contacts best: predicted points with the
-/// measured distances or offsets there \[m\].
+/// Returns the parameters of a fixture that fit its contacts best: pairs of predicted point and
+/// measured distance or offset \[m\]. Points and `base`, the arm's base, are in the measuring
+/// frame. `None` if there are no contacts, or for cameras and markers.
 fn found(
     kind: FixtureKind,
     contacts: &[(Vector3<f64>, f64)],
@@ -193,8 +197,8 @@ fn sphere(contacts: &[(Vector3<f64>, f64)]) -> (Vector3<f64>, f64) {
     (place, radius / contacts.len() as f64)
 }
 
-/// Returns the plane of least spread. Its normal points to the side of larger offsets; where these
-/// do not differ, to the arm's base, or else up.
+/// Returns the plane of least spread as (normal, distance). Its normal points to the side of larger
+/// offsets. If these do not differ, it points to the arm's base, or else up.
 fn plane(contacts: &[(Vector3<f64>, f64)], base: &Vector3<f64>) -> [f64; 4] {
     let n = contacts.len() as f64;
     let middle = centre(contacts);

@@ -7,11 +7,11 @@ use nalgebra::{
 
 use crate::observation::{FixtureValues, slopes_of_pixel};
 
-/// Ratio of the smallest to the largest spread of points below which they lie in a plane.
+/// Largest ratio of the smallest to the largest spread of points at which they count as coplanar.
 const IN_A_PLANE: f64 = 1e-6;
-/// Count of points that determine a pose: in a plane, and in space.
+/// Minimum number of points that determine a pose: coplanar points, and points in space.
 const MIN_POINTS: [usize; 2] = [4, 6];
-/// Count of Gauss–Newton steps of the refinement.
+/// Number of Gauss–Newton steps that refine the linear pose.
 const REFINEMENT_STEPS: usize = 10;
 
 /// Returns the pose of a marker in the camera's frame from its points and their pixels, by the
@@ -27,8 +27,8 @@ pub(super) fn marker_in_camera(
     refined(start, &places, &slopes)
 }
 
-/// Returns the pose by the direct linear transform: in axes of least spread, the columns of the
-/// matrix (r₁ r₂ t), or (r₁ r₂ r₃ t) for points in space, up to scale.
+/// Returns the pose by the direct linear transform. In the principal axes of the points, it solves
+/// for the columns of (r₁ r₂ t), or (r₁ r₂ r₃ t) for points in space, up to scale.
 fn linear_pose(places: &[Vector3<f64>], slopes: &[[f64; 2]]) -> Option<Isometry3<f64>> {
     let middle = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
     let spread: Matrix3<f64> =
@@ -81,8 +81,8 @@ fn linear_pose(places: &[Vector3<f64>], slopes: &[[f64; 2]]) -> Option<Isometry3
         .then(|| Isometry3::from_parts(Translation3::from(shift), rotation.into()))
 }
 
-/// Returns the pose with the least squared errors of the slopes, by Gauss–Newton steps from
-/// `start`; `None` if a point lies behind the camera.
+/// Returns the pose with the smallest squared error of the image coordinates (`slopes`: x/z, y/z),
+/// by Gauss–Newton steps from `pose`; `None` if a point is behind the camera.
 fn refined(
     mut pose: Isometry3<f64>,
     places: &[Vector3<f64>],
@@ -115,7 +115,7 @@ fn refined(
     in_front.then_some(pose)
 }
 
-/// Returns the rotation matrix nearest to a matrix.
+/// Returns the rotation matrix nearest to `matrix` in the Frobenius norm.
 pub(super) fn nearest_rotation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
     let svd = matrix.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Matrix3::identity() };

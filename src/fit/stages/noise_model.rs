@@ -1,10 +1,10 @@
-//! Noise model: the σ of each row that a fit takes.
+//! Noise model: from the declared σ of each row to the one that a fit takes.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
-/// Probability below which a declared σ counts as contradicted.
+/// Probability, under the declared σ, of a residual so extreme that the σ counts as contradicted.
 pub(in crate::fit) const IMPROBABLE: f64 = 1e-3;
-/// Smallest σ that a fit takes \[m\]: predicted positions are exact only to rounding.
+/// Smallest σ that a fit takes \[m\], because predicted positions are exact only to rounding.
 pub(in crate::fit) const LEAST_NOISE: f64 = 1e-9;
 
 /// Noise model √((scale σ)² + e²) of a row with declared σ.
@@ -13,15 +13,16 @@ pub(in crate::fit) struct NoiseModel {
     /// Factor on the declared σ: 1, less where it is too large, more where rows of several kinds
     /// scatter more than declared.
     pub scale: f64,
-    /// 1 σ of the error e of the model, beside the noise \[m\].
+    /// Standard deviation (1 σ) e of the model's error, which is added to the noise in quadrature
+    /// \[m\].
     pub model_error: f64,
 }
 
 impl NoiseModel {
-    /// Model that takes every σ as declared.
+    /// Noise model that takes every σ as declared.
     pub const DECLARED: Self = Self { scale: 1.0, model_error: 0.0 };
 
-    /// Returns the σ that the model takes for a declared one \[m\].
+    /// Returns the σ \[m\] that the fit takes for a declared one.
     pub fn of(self, sigma: f64) -> f64 {
         if self == Self::DECLARED { sigma } else { (self.scale * sigma).hypot(self.model_error) }
     }
@@ -55,7 +56,7 @@ impl NoiseModel {
     }
 }
 
-/// Returns the value that 2 ln of a likelihood ratio with one degree of freedom exceeds with
+/// Returns the critical value of a likelihood-ratio statistic 2 ln λ with one degree of freedom at
 /// probability 0.001.
 pub(in crate::fit) fn by_chance() -> f64 {
     ChiSquared::new(1.0)

@@ -1,19 +1,20 @@
-//! Plausible and largest deviations of parameters.
+//! Plausible and largest possible deviations of parameters.
 
 use crate::model::Model;
 use crate::model::parameter::{Parameter, ParameterSite};
 use crate::quantity::Unit;
 
-/// Plausible deviation of an angle \[rad\]: it moves points by their distance from the axis.
+/// Plausible deviation of an angle \[rad\], at which points move by their distance from the axis.
 const ANGLE: f64 = 1.0;
 /// Plausible deviation of the logarithm of a stiffness or rigidity: ln 100.
 const LN_STIFFNESS: f64 = 4.605_170_185_988_092;
-/// Largest deviation of an angle \[rad\]: beyond half a turn it equals another one within.
+/// Largest deviation of an angle \[rad\]. Beyond half a turn, an angle equals a smaller one of the
+/// other sign.
 const HALF_TURN: f64 = std::f64::consts::PI;
 
 /// Returns the plausible deviation of a parameter without a prior: the reach of the arm for a
 /// length, 1 rad for an angle, a factor of 100 for a stiffness. Returns `None` for parameters with
-/// a prior, positions of bases and fixtures, which may be anywhere, and other units.
+/// a prior, for positions of bases and fixtures, which are arbitrary, and for other units.
 pub(in crate::fit) fn plausible(model: &Model, parameter: &Parameter) -> Option<f64> {
     if parameter.sigma.is_some()
         || matches!(
@@ -30,9 +31,9 @@ pub(in crate::fit) fn plausible(model: &Model, parameter: &Parameter) -> Option<
     }
 }
 
-/// Returns the deviation that no parameter of the arm exceeds: the reach of the arm for a length,
-/// half a turn for an angle, a factor of 100 for a stiffness. Returns `None` for bases, fixtures,
-/// orientations of targets, and other units.
+/// Returns the largest possible deviation of a parameter of the arm: the reach of the arm for a
+/// length, half a turn for an angle, a factor of 100 for a stiffness. Returns `None` for bases,
+/// fixtures, orientations of targets, and other units.
 pub(in crate::fit) fn largest(model: &Model, parameter: &Parameter) -> Option<f64> {
     match (parameter.site, parameter.unit()) {
         (

@@ -9,7 +9,8 @@ use crate::model::parameter::ParameterSite;
 use crate::model::{MeasuredOrientation, Model, Pose};
 use crate::problem::Problem;
 
-/// 1 σ of a coordinate that is assumed where none is declared and none estimated yet \[m\].
+/// Standard deviation (1 σ) of a coordinate that is assumed until one is estimated, if none is
+/// declared \[m\].
 pub(in crate::fit) const UNKNOWN_SIGMA: f64 = 1e-3;
 
 /// Assignment of the rows of a table to bases and targets.
@@ -54,7 +55,7 @@ impl Placement {
         if rows.is_empty() { whole } else { (squares.sum::<f64>() / rows.len() as f64).sqrt() }
     }
 
-    /// Returns `rows` as poses; `sigma` \[m\] is that of rows that state none.
+    /// Returns `rows` as poses; `sigma` \[m\] applies to rows that state none.
     pub fn poses<'a>(
         &self,
         measurements: &'a Measurements,
@@ -75,8 +76,8 @@ impl Placement {
             .collect()
     }
 
-    /// Returns `rows` as poses with their measured orientations, where the σ `turn` of these is
-    /// given \[rad\].
+    /// Returns `rows` as poses with their measured orientations, if the σ `turn` of these is given
+    /// \[rad\].
     pub fn oriented_poses<'a>(
         &self,
         measurements: &'a Measurements,
@@ -110,8 +111,8 @@ impl Placement {
     /// Finds the parameters of bases, targets and fixtures that only held-out rows use, and those
     /// rows.
     ///
-    /// These parameters say nothing about the arm: they are fitted on their held-out rows, with the
-    /// arm given.
+    /// They do not depend on the arm's parameters, so they are fitted to their held-out rows, with
+    /// the arm's parameters fixed.
     pub(in crate::fit) fn held_out_only(
         &self,
         model: &Model,
@@ -158,7 +159,7 @@ impl Placement {
 /// Bases, targets and fixtures that only held-out rows use.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::fit) struct HeldOutOnly {
-    /// True if each parameter of the model belongs to one of these.
+    /// True for each parameter of the model that belongs to one of these.
     pub parameters: Vec<bool>,
     /// Held-out rows that use one of these.
     pub rows: Vec<usize>,

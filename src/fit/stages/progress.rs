@@ -13,7 +13,7 @@ use crate::problem::Effect;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Progress {
-    /// Step of a fit that was tried.
+    /// A fit tried a step.
     Step {
         /// Number of steps tried in the current fit.
         iteration: u64,
@@ -24,7 +24,7 @@ pub enum Progress {
         /// Cost ½‖r‖² after the step.
         cost: f64,
     },
-    /// Round of a loop that evaluates candidates, or starts another of its fits.
+    /// A round of a loop evaluates candidates, or starts another of its fits.
     Round {
         /// Number of the round, from 1.
         round: usize,
@@ -32,10 +32,10 @@ pub enum Progress {
         effects: Vec<Effect>,
         /// Number of the fit that starts, from 1; 0 while candidates are evaluated.
         fit: usize,
-        /// Number of fits of the round, as far as it is known.
+        /// Number of fits of the round that are planned so far.
         fits: usize,
     },
-    /// Loop that adds no more effects and computes the claims about those it has.
+    /// The loop adds no more effects and computes the claims about those that it has.
     Finishing,
 }
 

@@ -6,7 +6,8 @@ use crate::model::parameter::{Parameter, ParameterSite};
 use crate::model::{Model, Pose};
 use crate::spatial::{Frame, rotate};
 
-/// Ratio of the second to the first squared spread of points below which they lie on a line.
+/// Largest ratio of the second to the first squared spread of points at which they count as
+/// collinear.
 const ON_A_LINE: f64 = 1e-12;
 
 /// Registers bases and targets that are free in all components, without priors and bounds, in the
@@ -14,7 +15,7 @@ const ON_A_LINE: f64 = 1e-12;
 ///
 /// A base becomes the best rigid motion from the arm's base frame to the measured positions of
 /// `poses`; then the orientation of a target becomes the best one. Bases and targets that no pose
-/// uses stay as they are.
+/// uses keep their values.
 ///
 /// min over R, t of Σ ‖y − R p − t‖²: the unit quaternion of R is the eigenvector of a symmetric 4
 /// × 4 matrix  [Horn 1987].
@@ -71,13 +72,14 @@ pub fn register(model: &Model, poses: &[Pose], x: &mut DVector<f64>) {
     turn_targets(model, &oriented, x, turns);
 }
 
-/// Returns the axes of the measured orientation of a pose.
+/// Returns the axes of the measured orientation of a pose, measuring frame; `None` if there is
+/// none.
 fn axes(pose: &Pose) -> Option<[Vector3<f64>; 3]> {
     pose.orientation?.axes()
 }
 
-/// Registers the orientations of the targets for which `turns` is true, from poses with the last
-/// frame of the arm in its base frame.
+/// Registers in `x` the orientations of the targets for which `turns` is true. Each pose comes with
+/// the frame that carries its target, arm base frame.
 fn turn_targets(
     model: &Model,
     poses: &[(&Pose, Frame<f64>)],
@@ -130,8 +132,8 @@ fn mean_turn(
 }
 
 /// Returns the rotation vector \[rad\] and translation \[m\] that best move the first points of the
-/// pairs to the second ones. Where the points lie on a line, which leaves the rotation about it
-/// open, the rotation is the `nominal` one.
+/// pairs to the second ones. If the points are collinear, which leaves the rotation about their
+/// line undetermined, the rotation is `nominal`.
 fn rigid_motion(
     pairs: &[(Vector3<f64>, Vector3<f64>)],
     nominal: &Vector3<f64>,

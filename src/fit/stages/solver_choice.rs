@@ -7,8 +7,8 @@ use crate::model::Model;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum SolverChoice {
-    /// Bounded Levenberg–Marquardt where there are bounds or constraints, plain otherwise;
-    /// `docs/solvers.md` says why.
+    /// Bounded Levenberg–Marquardt if there are bounds or constraints, plain otherwise;
+    /// `docs/solvers.md` explains why.
     #[default]
     Auto,
     /// Levenberg–Marquardt without bounds.
@@ -17,12 +17,13 @@ pub enum SolverChoice {
     GaussNewton,
     /// The paper's iteration by a truncated pseudo-inverse [Chen2021, eq. 45]: undamped.
     PseudoInverse,
-    /// Levenberg–Marquardt within the bounds of `[parameters]` and every `[[constraint]]`: faces
-    /// that hold are guessed and corrected.
+    /// Levenberg–Marquardt within the bounds of `[parameters]` and every `[[constraint]]`, by an
+    /// active-set method.
     Bounded,
     /// Levenberg–Marquardt within bounds and constraints, each step by an interior-point method.
     InteriorPoint,
-    /// Levenberg–Marquardt within bounds by reflections [Branch, Coleman & Li 1999].
+    /// Levenberg–Marquardt within bounds, with steps reflected at bounds [Branch, Coleman & Li
+    /// 1999].
     Reflective,
     /// Levenberg–Marquardt whose steps are moved to the nearest point within bounds.
     Clamped,
@@ -32,7 +33,7 @@ pub enum SolverChoice {
 }
 
 impl SolverChoice {
-    /// Every choice by name, `auto` first.
+    /// All choices by name, `auto` first.
     #[doc(hidden)]
     pub const CHOICES: [Self; 8] = [
         Self::Auto,
@@ -44,7 +45,7 @@ impl SolverChoice {
         Self::Reflective,
         Self::Clamped,
     ];
-    /// Every solver, without `auto`.
+    /// All solvers, without `auto`.
     #[doc(hidden)]
     pub const EACH: [Self; Self::CHOICES.len() - 1] = {
         let mut each = [Self::Auto; Self::CHOICES.len() - 1];
@@ -56,7 +57,7 @@ impl SolverChoice {
         each
     };
 
-    /// Names of the choices.
+    /// Names of the choices, in the order of [`SolverChoice::CHOICES`].
     pub(crate) const NAMES: [&str; Self::CHOICES.len()] = {
         let mut names = [""; Self::CHOICES.len()];
         let mut k = 0;
@@ -67,7 +68,7 @@ impl SolverChoice {
         names
     };
 
-    /// Returns the name in results, files and arguments, and a short description.
+    /// Returns the name in results, files and arguments, with a short description.
     const fn words(self) -> (&'static str, &'static str) {
         match self {
             Self::Auto => {
@@ -108,7 +109,7 @@ impl SolverChoice {
         self.words().1
     }
 
-    /// Returns the method by which the solver keeps bounds; `None` where it does not.
+    /// Returns the method by which the solver keeps bounds; `None` if it cannot.
     #[doc(hidden)]
     pub fn within(self) -> Option<BoundMethod> {
         match self {
@@ -134,7 +135,7 @@ impl SolverChoice {
         }
     }
 
-    /// Returns the solver that is used for `model`: `auto` becomes one of the others.
+    /// Returns the solver that is used for `model`; `auto` is replaced by a specific solver.
     #[must_use]
     #[doc(hidden)]
     pub fn decide(self, model: &Model) -> Self {
@@ -145,7 +146,8 @@ impl SolverChoice {
         }
     }
 
-    /// Returns the reason for the solver of [`decide`](Self::decide), where the choice is `auto`.
+    /// Returns the reason for the solver of [`decide`](Self::decide); `None` unless the choice is
+    /// `auto`.
     #[doc(hidden)]
     pub fn reason(self, model: &Model) -> Option<&'static str> {
         match self {

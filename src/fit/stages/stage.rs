@@ -22,8 +22,8 @@ use crate::model::parameter::Parameter;
 use crate::model::{LinearModel, Model, Pose, PoseResiduals};
 use crate::problem::PoseView;
 
-/// Relative reduction of the cost below which a stage has converged. It is above the rounding of
-/// predicted positions in units of their noise, and far below what changes an estimate noticeably.
+/// Relative reduction of the cost at which a stage has converged. It is above the rounding of
+/// predicted positions in units of their noise, and far below a noticeable change of an estimate.
 pub const COST_TOLERANCE: f64 = 1e-11;
 
 /// Error of a stage that cannot be set up, or was stopped.
@@ -41,7 +41,7 @@ pub enum StageError {
         "no values of the parameters satisfy all bounds of [parameters] and all of [[constraint]]"
     )]
     Infeasible,
-    /// The rows of the priors do not fit the unknowns.
+    /// The rows of the priors do not match the unknowns.
     #[error(transparent)]
     Rows(#[from] RowsError),
     /// The fit was interrupted.
@@ -52,7 +52,7 @@ pub enum StageError {
 /// Input of one least-squares fit.
 pub(in crate::fit) struct Stage<'a> {
     pub model: &'a Model,
-    /// Poses with the σ that the fit takes.
+    /// Poses with the σ that the fit assumes.
     pub poses: Arc<Vec<Pose<'a>>>,
     /// Declared 1 σ of a coordinate of each pose \[m\].
     pub declared: Vec<f64>,
@@ -61,7 +61,7 @@ pub(in crate::fit) struct Stage<'a> {
     /// Indices of the parameters that vary.
     pub unknowns: Vec<usize>,
     pub solver: SolverChoice,
-    /// Solver of the caller, which [`SolverChoice::Custom`] stands for.
+    /// Solver of the caller, required by [`SolverChoice::Custom`].
     pub custom_solver: Option<&'a dyn CustomSolver>,
     /// Maximum number of steps of the solver.
     pub max_steps: u64,
@@ -69,11 +69,12 @@ pub(in crate::fit) struct Stage<'a> {
     pub cost_tolerance: f64,
     /// Loss of the residual of a pose.
     pub loss: Loss,
-    /// True if constraints count that involve free parameters which do not vary here.
+    /// True to apply constraints that also involve free parameters which do not vary in this stage.
     pub counts_fixed: bool,
     /// Linearisations shared by fits of the same data.
     pub cache: &'a LinearisationCache,
-    /// Derivatives that are known at some point of a fit of the identification rows.
+    /// Jacobian at the optimum of an earlier fit of the identification rows, reused if this stage
+    /// starts there.
     pub linear_model: Option<&'a LinearModel>,
     pub progress: Option<&'a ProgressSink>,
     pub stop: Option<&'a Stop>,
@@ -81,26 +82,26 @@ pub(in crate::fit) struct Stage<'a> {
 
 /// Result of a stage.
 pub(in crate::fit) struct StageEnd {
-    /// Full parameter vector.
+    /// Full parameter vector at the end of the stage.
     pub x: DVector<f64>,
     pub solution: Solution,
     pub gauge: Gauge,
 }
 
-/// Combinations of the unknowns of a stage that data and priors determine not at all or too weakly;
-/// they are held where they start.
+/// Combinations of the unknowns of a stage that data and priors leave undetermined or determine too
+/// weakly. They keep their start values.
 #[derive(Debug, Clone, Default)]
 pub(in crate::fit) struct Gauge {
     /// Rows that span the combinations, shape = (combinations, unknowns).
     pub rows: DMatrix<f64>,
     /// Part of each unknown outside the combinations, 0…1.
     pub visible: Vec<f64>,
-    /// Combinations that are determined too weakly, each by itself.
+    /// Combinations that are determined too weakly, one by one.
     pub weak: Vec<UnidentifiableCombination>,
 }
 
 impl<'a> Stage<'a> {
-    /// Creates a stage of least squares with the σ of the poses and the limits of every solver.
+    /// Creates a stage with squared loss, the σ of the poses and the default limits of the solver.
     pub fn new(
         model: &'a Model,
         poses: Vec<Pose<'a>>,
@@ -137,8 +138,8 @@ impl<'a> Stage<'a> {
         self.poses.iter().map(Pose::coordinates).sum()
     }
 
-    /// Returns the number of residual rows of each pose: three, or six with its orientation; rows
-    /// without a measurement are 0.
+    /// Returns the number of residual rows of each pose: three, or six with its orientation; unused
+    /// rows are 0.
     pub fn coordinates(&self) -> usize {
         if self.declared_turn.is_some() { 6 } else { 3 }
     }
@@ -164,7 +165,7 @@ impl<'a> Stage<'a> {
         self.cached(&residuals, at, loss).linearise(&residuals.reduced(at))
     }
 
-    /// Creates the objective of these poses; it shares linearisations with equal stages.
+    /// Creates the objective of these poses. Stages with equal data share its linearisations.
     fn cached<'b>(
         &'b self,
         residuals: &'b PoseResiduals<'a>,
@@ -174,13 +175,13 @@ impl<'a> Stage<'a> {
         Fit::new(residuals).with_loss(loss).with_cache(self.cache, self.digest(at), self.unit())
     }
 
-    /// Returns 1 σ of the first pose, the unit in which linearisations are remembered.
+    /// Returns 1 σ of the first pose \[m\], the unit of cached linearisations.
     fn unit(&self) -> f64 {
         self.poses.first().map_or(1.0, |pose| pose.sigma)
     }
 
-    /// Returns a digest of the data, the unknowns, and the parameters that stay as in `at`; it does
-    /// not depend on the unit of the residuals.
+    /// Returns a hash of the data, the unknowns, and the values in `at` of parameters that do not
+    /// vary. It does not depend on the unit of the residuals.
     fn digest(&self, at: &DVector<f64>) -> u64 {
         let (mut digest, unit) = (DefaultHasher::new(), self.unit());
         let mut others = at.clone();
@@ -265,8 +266,8 @@ impl<'a> Stage<'a> {
         Ok(inside && self.constraints(at)?.1.contain(&self.reduced(at)))
     }
 
-    /// Finds the combinations of the unknowns not `held` that data, priors and `active` constraints
-    /// do not determine at `at`.
+    /// Finds the combinations of the unknowns that data, priors and `active` constraints do not
+    /// determine at `at`; unknowns marked in `held` are left out.
     pub fn gauge(&self, at: &DVector<f64>, held: &[bool], active: &[Held]) -> Gauge {
         let n = self.unknowns.len();
         if self.parameters().all(|parameter| parameter.sigma.is_some()) {
@@ -316,10 +317,10 @@ impl<'a> Stage<'a> {
 
     /// Minimises the cost from the full parameter vector `start`.
     ///
-    /// Combinations that are unidentifiable or weak at the start are held there; one that becomes
-    /// weak on the way is held where it is then. A combination that is unidentifiable at the start
-    /// may be determined at the end, also by a bound or a constraint: the fit then goes on with it
-    /// free.
+    /// Combinations that are unidentifiable or weak at the start keep their start values; one that
+    /// becomes weak later keeps the value that it has then. If a combination that is unidentifiable
+    /// at the start is determined at the end, also by a bound or a constraint, the fit continues
+    /// with it free.
     ///
     /// # Errors
     /// Returns an error if no values satisfy bounds and constraints, or if the fit was interrupted.
@@ -362,7 +363,8 @@ impl<'a> Stage<'a> {
         }
     }
 
-    /// Minimises the cost from the unknowns `begin`, with the combinations of `gauge` as in `hold`.
+    /// Minimises the cost from the unknowns `begin`; combinations of `gauge` keep their values in
+    /// `hold`.
     fn solve(
         &self,
         residuals: &PoseResiduals<'a>,
@@ -432,7 +434,7 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// Returns the solver of the caller, if it is the chosen one.
+    /// Returns the solver of the caller if [`SolverChoice::Custom`] is chosen, else `None`.
     fn custom(&self) -> Option<&'a dyn CustomSolver> {
         self.custom_solver.filter(|_| self.solver == SolverChoice::Custom)
     }
@@ -460,7 +462,7 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// Returns the triangular factor of `triangle` with `rows` below it.
+/// Returns the triangular factor of `triangle` stacked on `rows`.
 fn below(triangle: &DMatrix<f64>, rows: &DMatrix<f64>) -> DMatrix<f64> {
     let n = triangle.ncols();
     let mut stack =

@@ -10,7 +10,8 @@ pub enum Strategy {
     /// Fits everything at once.
     #[default]
     Joint,
-    /// Fits stiffness, then geometry [Chen2021, sec. 3.3], and repeats that until it settles.
+    /// Fits stiffness, then geometry [Chen2021, sec. 3.3], and repeats both until the cost
+    /// converges.
     Sequential,
     /// Fits stiffness, then geometry, once, in the order of the paper.
     OneSweep,
@@ -23,7 +24,7 @@ pub enum Strategy {
 }
 
 impl Strategy {
-    /// Every strategy, the default first.
+    /// All strategies, the default first.
     #[doc(hidden)]
     pub const EACH: [Self; 6] = [
         Self::Joint,
@@ -45,7 +46,7 @@ impl Strategy {
         names
     };
 
-    /// Returns the name in results, files and arguments, and a short description.
+    /// Returns the name in results, files and arguments, with a short description.
     const fn words(self) -> (&'static str, &'static str) {
         match self {
             Self::Joint => ("joint", "Everything at once"),
@@ -74,15 +75,16 @@ impl Strategy {
         self.words().1
     }
 
-    /// Returns the model that is fitted: as declared, or without elasticity and its parameters.
+    /// Returns the model that is fitted: `declared`, or `declared` without elasticity and its
+    /// parameters.
     #[must_use]
     #[doc(hidden)]
     pub fn model(self, declared: Model) -> Model {
         if self == Self::Rigid { declared.ablated(Ablation::Rigid) } else { declared }
     }
 
-    /// Returns the stages of one sweep, each as a predicate of the parameters that vary; bases and
-    /// targets vary in every stage.
+    /// Returns the stages of one sweep. Each is a predicate that selects the parameters to vary;
+    /// bases and targets vary in every stage.
     pub(crate) fn stages(self) -> &'static [fn(&Parameter) -> bool] {
         const ALL: fn(&Parameter) -> bool = |_| true;
         const STIFFNESS: fn(&Parameter) -> bool = |p| p.site.is_elastic() || p.site.is_placement();

@@ -6,25 +6,26 @@ use super::stage::Stage;
 use crate::least_squares::{Block, CHUNK_ITEMS, LeastSquares as _};
 use crate::model::Pose;
 
-/// Part of the squares of the derivatives along the strongest direction below which a direction is
-/// not moved: what rounding leaves of eigenvalues.
+/// Largest sum of squared derivatives along a direction, relative to that along the strongest one,
+/// that is only rounding. The direction then counts as not moved.
 const NOT_MOVED: f64 = 1e-15;
-/// Number of poses that are looked at first: most arms move in every direction there.
+/// Number of poses that are examined first. On most arms they already move in every direction, so
+/// that the others need not be examined.
 const FIRST_POSES: usize = 32;
 
 /// Orthonormal directions of the measuring frame in which no unknown moves any pose. Coordinates
-/// along them tell nothing about the unknowns, and count in no degrees of freedom.
+/// along them do not depend on the unknowns, and do not count as degrees of freedom.
 #[derive(Debug, Clone, Default)]
 pub(in crate::fit) struct Unmoved(Vec<Vector3<f64>>);
 
 impl Unmoved {
-    /// Number of directions.
+    /// Returns the number of directions.
     pub fn count(&self) -> usize {
         self.0.len()
     }
 
-    /// Returns the squares of whitened residuals along the directions, three numbers first of
-    /// `per_pose` for each pose.
+    /// Returns the sum of squares of whitened residuals along the directions. Each pose has
+    /// `per_pose` residuals, of which the first three are a position.
     pub fn squares(&self, residuals: &[f64], per_pose: usize) -> f64 {
         let along = |residual: Vector3<f64>| -> f64 {
             self.0.iter().map(|direction| direction.dot(&residual).powi(2)).sum()
@@ -33,15 +34,15 @@ impl Unmoved {
         poses.map(|r| along(Vector3::new(r[0], r[1], r[2]))).sum()
     }
 
-    /// Returns the part of a residual that the unknowns may move.
+    /// Returns a residual without its components along the directions.
     pub fn moved_part(&self, residual: Vector3<f64>) -> Vector3<f64> {
         self.0.iter().fold(residual, |left, direction| left - direction * direction.dot(&residual))
     }
 }
 
 impl Stage<'_> {
-    /// Finds the directions in which no unknown moves any pose at the full parameter vector `at`;
-    /// none where rows measure anything else than positions, or nothing varies.
+    /// Finds the directions in which no unknown moves any pose at the full parameter vector `at`.
+    /// There are none if rows measure anything but positions, or if nothing varies.
     pub fn unmoved(&self, at: &DVector<f64>) -> Unmoved {
         let is_position =
             |pose: &Pose| pose.observation.is_position() && pose.orientation.is_none();

@@ -15,13 +15,13 @@ pub struct ActiveConstraint {
     pub constraint: usize,
     /// Limit in words, such as `ln A.EI − ln B.EI ≥ 0`.
     pub words: String,
-    /// Side of the limit.
+    /// Lower or upper limit on which the fit rests.
     pub side: AtBound,
-    /// Shadow price for the limit moved out by one of its unit.
+    /// Shadow price of moving the limit outwards by one of its unit.
     pub shadow_price: ShadowPrice,
     /// Unit of the terms; stiffnesses and rigidities enter by their logarithms.
     pub unit: Unit,
-    /// Place in the problem file.
+    /// Location in the problem file.
     pub location: Location,
 }
 

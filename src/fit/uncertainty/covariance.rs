@@ -7,11 +7,11 @@ use crate::model::Model;
 /// Covariance of the estimates, consistent with their standard errors: it includes priors, active
 /// constraints, the weights of a robust loss and the noise that the fit took.
 ///
-/// Unidentifiable combinations are held where the fit started: their parameters have a variance
-/// here, but no standard error. Parameters of sessions or targets that only held-out rows use are
-/// fitted with the arm given, so their covariance with all others is 0. An unknown that rests on a
-/// bound along a direction that the data hardly see has the variance of its distance from that
-/// bound.
+/// Unidentifiable combinations keep their start values: their parameters have a variance here, but
+/// no standard error. Parameters of sessions or targets that only held-out rows use are fitted with
+/// the arm's parameters fixed, so their covariance with all others is 0. An unknown that rests on a
+/// bound along a direction that the data hardly determine has the variance of its distance from
+/// that bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Covariance {
     /// Indices of the parameters among the estimates, ascending: those that were fitted and have a
@@ -40,8 +40,9 @@ impl Collected {
         Self(DMatrix::zeros(parameters, parameters))
     }
 
-    /// Enters the covariance C of the unknowns of one stage, given by their indices in the model,
-    /// at the full parameter vector `x`. Of the values it is S C S with S = diag(∂value/∂x).
+    /// Writes the covariance C of the unknowns of one stage, which are given by their indices in
+    /// the model. At the full parameter vector `x`, the covariance of the values is S C S with S =
+    /// diag(∂value/∂x).
     pub fn enter(
         &mut self,
         model: &Model,

@@ -1,9 +1,9 @@
 //! Uncertainty that a bound hides: partners of an unknown that rests on a bound.
 //!
-//! Where the data hardly see a combination of unknowns, a bound on one of them seems to decide the
-//! others: with the unknown held at its bound they have small standard errors. The bound says no
-//! more than on which side the unknown lies. Along the valley of the cost, x + s u, the unknown is
-//! inside its bound by u ≥ 0, and the posterior of u is
+//! If the data hardly determine a combination of unknowns, a bound on one of them seems to decide
+//! the others: with the unknown held at its bound they have small standard errors. The bound only
+//! restricts the side on which the unknown lies. Along the valley of the cost, x + s u, the unknown
+//! is inside its bound by u ≥ 0, and the posterior of u is
 //!
 //! p(u) ∝ exp(−μ u − ½ h u²) on 0 ≤ u ≤ w
 //!
@@ -16,15 +16,15 @@ use crate::fit::stages::stage::Stage;
 use crate::least_squares::Triangle;
 use crate::least_squares::solver::AtBound;
 
-/// Ratio of the deviation along the valley to the standard error with the unknown held at its
-/// bound, from which on the bound hides the uncertainty of a partner: nine tenths of its variance
-/// and more.
+/// Smallest ratio of a partner's deviation along the valley to its standard error with the unknown
+/// held at the bound, at which the bound hides its uncertainty. At 3, the valley has nine tenths of
+/// the variance.
 const MIN_HIDDEN_RATIO: f64 = 3.0;
-/// Weight that turns rows of held combinations into constraints.
+/// Weight by which rows of held combinations become constraints in the least-squares problem.
 const HARD: f64 = 1e5;
 /// Exponent beyond which the posterior of u counts as zero.
 const MAX_EXPONENT: f64 = 40.0;
-/// Intervals of the quadrature over u; even, for Simpson's rule.
+/// Number of intervals of the quadrature over u; even, for Simpson's rule.
 const INTERVALS: u32 = 400;
 
 /// Valley of the cost that leads from a bound into the interior.
@@ -34,13 +34,13 @@ pub(in crate::fit) struct HiddenByBound {
     pub unknown: usize,
     /// Bound on which it rests.
     pub side: AtBound,
-    /// √(E u²), the deviation of the unknown from its bound \[unit of x\]; infinite where neither
-    /// data nor bounds limit it.
+    /// Deviation √(E u²) of the unknown from its bound \[unit of x\]; infinite if neither data nor
+    /// other bounds limit it.
     pub deviation: f64,
     /// Direction s of the valley in all unknowns: 1 for the unknown itself, if its bound is a lower
     /// one, and −1 otherwise.
     pub direction: DVector<f64>,
-    /// Indices of the partners whose uncertainty the bound hides.
+    /// Indices of the partners: unknowns whose uncertainty the bound hides.
     pub partners: Vec<usize>,
 }
 

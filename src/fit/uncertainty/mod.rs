@@ -1,4 +1,4 @@
-//! Uncertainty of a fit: noise model, covariance, prior widths, shadow prices.
+//! Uncertainty of a fit: noise model, covariance, estimated prior sizes, shadow prices.
 
 pub(super) mod active_constraint;
 pub(super) mod covariance;

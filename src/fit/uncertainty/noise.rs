@@ -1,5 +1,5 @@
-//! Search for the σ that a fit takes: the declared one, or the one of the largest restricted
-//! likelihood where residuals and priors contradict the declared one.
+//! Search for the σ that a fit takes: the declared one, or the restricted maximum likelihood
+//! estimate if residuals and priors contradict the declared one.
 
 use nalgebra::DVector;
 
@@ -15,20 +15,20 @@ use crate::least_squares::{
 use crate::model::Pose;
 use crate::problem::Observation;
 
-/// Relative change of an undeclared σ below which its search has settled.
+/// Relative change of an estimated σ at which its search has converged, if none is declared.
 const NOISE_SETTLED: f64 = 1e-3;
-/// Relative change of a contradicted σ below which its search has settled; standard errors are not
-/// needed more exactly.
+/// Relative change of an estimated σ at which its search has converged, if the declared one is
+/// contradicted. Standard errors need no more accuracy.
 const SCALE_SETTLED: f64 = 0.01;
-/// Number of steps after which a declared σ is tested first, where everything is fitted at once. If
-/// it is contradicted, the optimum under it is not needed.
+/// Number of steps after which a declared σ is tested first in a joint fit. If it is contradicted,
+/// the optimum under it is not needed.
 const FIRST_STEPS: u64 = 30;
 /// Maximum number of fits in the search for σ.
 const MAX_NOISE_FITS: usize = 20;
-/// Noise models of positions and orientations that take the declared σ.
+/// Noise models of positions and of orientations that take the declared σ.
 const AS_DECLARED: (NoiseModel, NoiseModel) = (NoiseModel::DECLARED, NoiseModel::DECLARED);
-/// Multiple of the value of [`by_chance`] beyond which 2 ln of the likelihood ratio leaves no doubt
-/// that a declared σ is wrong.
+/// Multiple of the critical value [`by_chance`] of the likelihood-ratio statistic at which a
+/// declared σ is certainly wrong.
 const BEYOND_DOUBT: f64 = 10.0;
 
 /// Source of the σ of the measurements.
@@ -40,16 +40,16 @@ pub enum Noise {
     Declared,
     /// Estimated from the scatter about the fit: 1 σ per coordinate \[m\].
     Estimated(f64),
-    /// Neither declared nor estimated, since the fit has no degrees of freedom.
+    /// Neither declared nor estimated, because the fit has no degrees of freedom.
     Unknown,
 }
 
-/// Runs the strategy until its σ has settled: at the declared one, at the one of the largest
-/// restricted likelihood where residuals and priors contradict that, or, where none is declared, at
-/// the scatter about the fit. `judged` is true if the poses suffice to contradict a σ.
+/// Runs the strategy until its σ has converged. The σ is the declared one, or the restricted
+/// maximum likelihood estimate if residuals and priors contradict it, or the scatter about the fit
+/// if none is declared. `judged` is true if the poses suffice to contradict a σ.
 ///
-/// A fit may start with the σ that an earlier one took, as long as that contradicts the declared
-/// one beyond doubt.
+/// A fit may start with the σ of an earlier one, as long as that certainly contradicts the declared
+/// one.
 pub(in crate::fit) fn fitted(
     fitting: &mut Fitting,
     start: &DVector<f64>,
@@ -129,8 +129,8 @@ pub(in crate::fit) fn fitted(
     }
 }
 
-/// Returns true if the noise variance of a stage, r times the declared one, contradicts that beyond
-/// doubt. With ν degrees of freedom, 2 ln of the likelihood ratio is ν (r − 1 − ln r).
+/// Returns true if the noise variance of a stage, r times the declared one, certainly contradicts
+/// the declared one. With ν degrees of freedom, 2 ln of the likelihood ratio is ν (r − 1 − ln r).
 fn is_beyond_doubt(stage: &Stage) -> bool {
     let ratios = stage
         .poses
@@ -142,11 +142,11 @@ fn is_beyond_doubt(stage: &Stage) -> bool {
     freedom * (ratio - 1.0 - ratio.ln()) > BEYOND_DOUBT * by_chance()
 }
 
-/// Returns the next noise models of positions and orientations, or `None` where the `assumed` ones
-/// are kept. Poses that a robust loss sets aside do not count.
+/// Returns the next noise models of positions and orientations, or `None` if the `assumed` ones are
+/// kept. Poses that a robust loss treats as outliers do not count.
 ///
-/// The declared σ is contradicted where 2 ln of the likelihood ratio exceeds what chance gives
-/// (χ²₁) with probability 0.001.
+/// The declared σ is contradicted if 2 ln of the likelihood ratio exceeds its critical value (χ²₁)
+/// at probability 0.001.
 fn contradicted(
     stage: &Stage,
     end: &FitEnd,
@@ -210,8 +210,8 @@ fn contradicted(
     Ok((next != assumed).then_some(next))
 }
 
-/// Returns the mean squares of the whitened residuals of positions and of orientations, each over
-/// that of all; both are 1 where only positions are fitted.
+/// Returns the mean squares of the whitened residuals of positions and of orientations, each
+/// relative to that of all. Both are 1 if only positions are fitted.
 fn shares(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f64; 2] {
     if coordinates == 3 {
         return [1.0; 2];
@@ -226,8 +226,8 @@ fn shares(whitened: &DVector<f64>, coordinates: usize, counts: [usize; 2]) -> [f
     if all > 0.0 { [position / all, turn / all] } else { [1.0; 2] }
 }
 
-/// Returns the noise variance that a stage took over the declared one, and 1 σ of the rows of
-/// `kind` that it took. Known distances between points keep their σ and do not count.
+/// Returns the noise variance that a stage took, relative to the declared one, and 1 σ of the rows
+/// of `kind` that it took. Known distances between points keep their σ and do not count.
 pub(in crate::fit) fn taken(stage: &Stage, kind: Observation) -> (f64, f64) {
     let rows =
         stage.poses.iter().zip(&stage.declared).filter(|(pose, _)| pose.observation.is_of_arm());
@@ -241,7 +241,7 @@ pub(in crate::fit) fn taken(stage: &Stage, kind: Observation) -> (f64, f64) {
     )
 }
 
-/// Returns the root mean square of the σ of some rows.
+/// Returns the root mean square of several σ.
 pub(in crate::fit) fn together(sigmas: impl ExactSizeIterator<Item = f64>) -> f64 {
     let n = sigmas.len().max(1) as f64;
     (sigmas.map(|sigma| sigma * sigma).sum::<f64>() / n).sqrt()

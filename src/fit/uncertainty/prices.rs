@@ -9,11 +9,11 @@ use crate::least_squares::solver::{AtBound, Factor};
 use crate::least_squares::{Fit, LinearRows, Objective as _};
 use crate::model::parameter::Parameter;
 
-/// Relative length of the independent part of a constraint normal below which it is dependent.
+/// Relative length of the independent part of a constraint normal below which it counts as linearly
+/// dependent.
 const DEPENDENT: f64 = 1e-10;
 
-/// Prices of the bounds of the unknowns, `None` where an unknown rests on none, and of active
-/// constraints.
+/// Shadow prices of bounds (`None` for an unknown that rests on none) and of active constraints.
 #[derive(Debug, Clone, Default)]
 pub(in crate::fit) struct Prices {
     pub bounds: Vec<Option<ShadowPrice>>,
@@ -24,10 +24,10 @@ impl Stage<'_> {
     /// Computes the prices of bounds and active constraints at the full parameter vector `at`.
     ///
     /// At a minimum g = Aᵀμ + w, with the gradient g, rows A of active constraints and w of bounds:
-    /// μ ≥ 0 at a lower limit, ≤ 0 at an upper one, w likewise.
+    /// μ ≥ 0 at a lower limit and μ ≤ 0 at an upper one; the same signs hold for w.
     ///
     /// # Errors
-    /// Priors do not fit the unknowns.
+    /// The rows of the priors do not match the unknowns.
     pub fn prices(
         &self,
         at: &DVector<f64>,

@@ -1,4 +1,4 @@
-//! Prior widths of the geometry, estimated from the deviations that a fit found.
+//! Prior widths (σ) of the geometry, estimated from the deviations that a fit found.
 //!
 //! Linearised about the fit, the likelihood of the geometry x is a Gaussian with information A and
 //! vector b = A x̂. With prior σ multiplied by r, one factor for all parameters of a kind, the
@@ -11,15 +11,17 @@ use crate::fit::stages::noise_model::by_chance;
 use crate::model::parameter::{JointField, Parameter, ParameterSite, Regressor};
 use crate::quantity::Unit;
 
-/// Minimum number of parameters of a kind from which its width is estimated.
+/// Minimum number of parameters of a kind from which their common prior width is estimated.
 const MIN_COUNT: usize = 4;
-/// Minimum number of parameters of a kind that the data determine, counted in parts.
+/// Minimum sum of identified shares of the parameters of a kind from which their width is
+/// estimated.
 const MIN_DETERMINED: f64 = 3.0;
-/// Ratio of the estimated to the declared σ, or its inverse, from which on it is reported.
+/// Smallest ratio of the estimated to the declared σ, or of the declared to the estimated one, that
+/// is reported.
 const MIN_RATIO: f64 = 2.0;
-/// Maximum number of steps of the search.
+/// Maximum number of steps of the search for the widths.
 const MAX_STEPS: usize = 500;
-/// Change of every ln r below which the search has settled.
+/// Largest change of every ln r at which the search has converged.
 const SETTLED: f64 = 1e-4;
 
 /// Prior width of one kind of geometry at all joints, estimated from the data.
@@ -31,11 +33,11 @@ pub struct PriorSize {
     pub pattern: String,
     /// Kind of quantity: angle or length.
     pub unit: Unit,
-    /// Number of parameters.
+    /// Number of parameters of the kind.
     pub count: usize,
     /// Declared 1 σ \[SI\].
     pub declared: f64,
-    /// 1 σ of the largest evidence \[SI\].
+    /// Estimated 1 σ, which maximises the evidence \[SI\].
     pub found: f64,
 }
 
@@ -45,18 +47,18 @@ struct GeometryLikelihood {
     vector: DVector<f64>,
 }
 
-/// Kind of parameters, and their places in the [`GeometryLikelihood`].
+/// Parameters of one kind, with their indices in the [`GeometryLikelihood`].
 struct Group {
     field: JointField,
     sigma: f64,
     places: Vec<usize>,
 }
 
-/// Returns the widths that the data contradict: those that raise the evidence beyond what chance
-/// gives, and differ by at least a factor of [`MIN_RATIO`].
+/// Returns the prior widths that the data contradict: the estimate raises the evidence
+/// significantly and differs at least by a factor of [`MIN_RATIO`].
 ///
-/// `unknowns` have the values `x` and the `covariance`, 0 where one is held. Angles and lengths of
-/// joints with one declared σ count, if there are enough of a kind.
+/// `unknowns` have the values `x` and the `covariance`, which is 0 for held ones. Angles and
+/// lengths of joints with one declared σ count, if there are enough of a kind.
 pub(in crate::fit) fn prior_sizes(
     unknowns: &[&Parameter],
     x: &[f64],
@@ -100,7 +102,7 @@ pub(in crate::fit) fn prior_sizes(
     (0..groups.len()).filter(contradicted).map(size).collect()
 }
 
-/// Returns the kinds with enough parameters that all have one declared σ.
+/// Returns the kinds with enough parameters whose declared σ are all equal.
 fn groups(seen: &[(usize, JointField, f64)]) -> Vec<Group> {
     let fields = JointField::GEOMETRY.into_iter().chain(JointField::PLACEMENT);
     let group = |field: JointField| {
@@ -155,8 +157,8 @@ impl GeometryLikelihood {
         Some(0.5 * mean.dot(&self.vector) + half - priors)
     }
 
-    /// Returns the factors of the largest evidence, where that of the kind `held` stays 1, and the
-    /// number of parameters of each kind that the data determine.
+    /// Returns the factors r that maximise the evidence, with r = 1 for the group `held`, and for
+    /// each group the sum of identified shares.
     fn widths(&self, groups: &[Group], held: Option<usize>) -> (Vec<f64>, Vec<f64>) {
         let mut factors = vec![1.0; groups.len()];
         let mut decided = vec![0.0; groups.len()];
@@ -186,7 +188,8 @@ mod tests {
     use super::*;
     use crate::random::{normal, stream};
 
-    /// Eight joints whose angles deviate by about `size` and are seen to 1 % of it.
+    /// Returns the findings for eight joints whose angles deviate by about `size` and are
+    /// determined to 1 % of it.
     fn found(size: f64, declared: f64) -> Vec<PriorSize> {
         let mut random = stream(7, 0);
         let parameter = |joint, field: JointField| Parameter {

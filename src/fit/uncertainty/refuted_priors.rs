@@ -15,20 +15,21 @@ use crate::fit::stages::noise_model::by_chance;
 use crate::fit::stages::stage::Stage;
 use crate::least_squares::Loss;
 
-/// Factors by which the σ of a rule is widened.
+/// Factors by which the σ of a rule is widened in turn.
 const FACTORS: [f64; 8] = [3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4];
-/// Ratio of the noise variances, with the wider σ over as declared, above which the prior is not
-/// the reason for the misfit.
+/// Largest ratio of the noise variances with the wider and with the declared prior at which the
+/// prior is the reason for the misfit.
 const MAX_VARIANCE_RATIO: f64 = 0.25;
-/// Noise variance over that declared, with wider priors, above which priors explain nothing.
+/// Largest noise variance with wider priors, relative to the declared one, at which priors explain
+/// the misfit.
 const MAX_VARIANCE: f64 = 1000.0;
-/// Multiple of the gain in 2 ln L that chance gives once in 1000, above which a prior is refuted.
+/// Multiple of the critical gain in 2 ln L (probability 0.001) at which a prior is refuted.
 const BEYOND_DOUBT: f64 = 10.0;
-/// Ratio of the noise variance taken to that declared, below which no prior is questioned.
+/// Smallest ratio of the noise variance taken to the declared one at which priors are tested.
 const MIN_NOISE_FACTOR: f64 = 4.0;
-/// Number of noise variances at which the evidence is compared.
+/// Number of trial noise variances at which the evidence is compared.
 const VARIANCES: u32 = 24;
-/// Number of unknowns above which priors are not questioned: the work grows with its cube.
+/// Largest number of unknowns for which priors are tested, because the work grows with its cube.
 const MAX_UNKNOWNS: usize = 150;
 /// Precision of unknowns without a prior, relative to that of the data.
 const NO_PRIOR: f64 = 1e-12;
@@ -40,16 +41,16 @@ pub(in crate::fit) struct RefutedPrior {
     pub rule: String,
     /// Factor by which its σ is too narrow.
     pub factor: f64,
-    /// Ratio of the σ of the residual, with wider priors over as declared.
+    /// Ratio of the σ of the residual with wider priors to that with the declared ones.
     pub sigma_ratio: f64,
 }
 
 /// Finds the rules whose σ the data refute, the most improbable first.
 ///
 /// `stage` holds all unknowns and identification rows with declared σ, `at` is the full parameter
-/// vector of the fit, `held` marks unknowns that rest on bounds, `rules` names the rule of each
-/// unknown with a prior, and `noise_factor` is the ratio of the noise variance taken to that
-/// declared.
+/// vector of the fit, and `held` marks unknowns that rest on bounds. `rules` names the rule of each
+/// unknown with a prior. `noise_factor` is the ratio of the noise variance taken to the declared
+/// one.
 pub(in crate::fit) fn refuted_priors(
     stage: &Stage,
     at: &DVector<f64>,
@@ -111,7 +112,7 @@ pub(in crate::fit) fn refuted_priors(
     order.into_iter().map(refuted).collect()
 }
 
-/// Most probable noise variance of some priors, and −2 ln L there.
+/// Noise variance of largest evidence under given priors, and −2 ln L there.
 #[derive(Debug, Clone, Copy)]
 struct Best {
     variance: f64,
@@ -128,7 +129,7 @@ struct Evidence {
     squares: f64,
     /// Number m of measured coordinates.
     coordinates: f64,
-    /// Places of the free unknowns.
+    /// Indices of the free unknowns.
     free: Vec<usize>,
     /// Largest noise variance that is tried.
     max_variance: f64,
@@ -154,8 +155,8 @@ impl Evidence {
         }
     }
 
-    /// Returns the noise variance from 1, the declared one, upwards with the largest evidence under
-    /// priors of these σ.
+    /// Returns the noise variance with the largest evidence under priors of these σ, at least 1
+    /// (the declared one).
     fn best(&self, sigmas: &[Option<f64>]) -> Option<Best> {
         let step = self.max_variance.ln() / f64::from(VARIANCES - 1);
         let variances = (0..VARIANCES).map(|k| (f64::from(k) * step).exp());
@@ -163,7 +164,8 @@ impl Evidence {
         variances.filter_map(of).min_by(|a, b| a.deviance.total_cmp(&b.deviance))
     }
 
-    /// Returns −2 ln L for priors of these σ and a noise variance.
+    /// Returns −2 ln L for priors of these σ and a noise variance; `None` if the matrix is
+    /// singular.
     fn deviance(&self, sigmas: &[Option<f64>], variance: f64) -> Option<f64> {
         let n = self.free.len();
         let precision = |i: usize| match sigmas[self.free[i]] {

@@ -1,4 +1,4 @@
-//! Lengths of whitened residuals, and those that are too long to be noise.
+//! Lengths of whitened residuals, and outliers among them.
 
 use std::collections::BTreeMap;
 
@@ -11,11 +11,11 @@ use crate::least_squares::residual_vector;
 use crate::model::Pose;
 use crate::numeric::median;
 
-/// Probability that noise alone makes any of the poses an outlier.
+/// Probability that at least one of the poses is an outlier although there is only noise.
 const BY_CHANCE: f64 = 0.01;
 
-/// Returns the median length of residuals with `coordinates` of σ 1, √ of the median of χ², and the
-/// length that any of `count` exceeds by chance with probability 0.01  [Bonferroni].
+/// Returns two lengths \[σ\] for residuals of `coordinates` coordinates: the median √χ², and the
+/// one that any of `count` residuals exceeds with probability 0.01 \[Bonferroni\].
 pub(in crate::fit) fn chance(count: usize, coordinates: usize) -> Option<(f64, f64)> {
     let squares = ChiSquared::new(coordinates as f64).ok()?;
     Some((
@@ -35,45 +35,46 @@ pub(in crate::fit) fn chances(coordinates: &[usize]) -> Vec<(f64, f64)> {
     coordinates.iter().map(of).collect()
 }
 
-/// Returns the median of the lengths of whitened residuals, each over its median by chance. Lengths
+/// Returns the median of the ratios of whitened residual lengths to their expected median. Lengths
 /// that are not finite do not count.
 pub(in crate::fit) fn scatter(lengths: &[f64], chances: &[(f64, f64)]) -> f64 {
     let ratios = lengths.iter().zip(chances).map(|(length, (typical, _))| length / typical);
     median(ratios.filter(|ratio| ratio.is_finite())).unwrap_or(0.0)
 }
 
-/// Returns whether each of the lengths of whitened residuals, with these numbers of coordinates, is
-/// too long to be noise. The scatter is their median, but at least 1 σ.
+/// Returns for each whitened residual length whether it is an outlier, given the numbers of
+/// `coordinates`. The scatter is the median of the lengths, but at least 1 σ.
 pub(in crate::fit) fn outlying(lengths: &[f64], coordinates: &[usize]) -> Vec<bool> {
     let chances = chances(coordinates);
     let scatter = scatter(lengths, &chances).max(1.0);
     lengths.iter().zip(&chances).map(|(length, (_, limit))| *length > limit * scatter).collect()
 }
 
-/// Lengths of the whitened residuals of some poses, and their limits.
+/// Lengths of the whitened residuals of some poses, and their outlier limits.
 #[derive(Debug, Clone)]
 pub(in crate::fit) struct Lengths {
     /// Length ‖r‖ of each pose in units of its declared σ.
     pub values: Vec<f64>,
     /// Length ‖r‖ of each pose in units of the σ that the fit took.
     pub weighed: Vec<f64>,
-    /// 1 σ of the scatter in units of the assumed one.
+    /// Standard deviation (1 σ) of the scatter, relative to the assumed one.
     pub scatter: f64,
-    /// Length of each pose in units of the scatter beyond which it is an outlier.
+    /// Length of each pose, relative to the scatter, above which it is an outlier.
     limits: Vec<f64>,
 }
 
 impl Lengths {
-    /// Computes the lengths of a stage at the full parameter vector `at`. `freedom` is the part of
-    /// its coordinates that is left to scatter, 0…1; `declared` is the part of the declared σ that
-    /// the fit took to be noise, where any σ was declared. Parts of residuals along `unmoved`
-    /// directions do not count.
+    /// Computes the lengths of a stage at the full parameter vector `at`.
     ///
-    /// A pose is an outlier where P(χ²ₖ > s²) < 0.01 / N, with s = ‖r‖ / scatter, k measured
-    /// numbers and N poses \[Bonferroni\]. The scatter is the median of ‖r‖ / √(median of χ²ₖ),
-    /// 1.538 of positions, which gross errors hardly move, over √`freedom`; under a declared σ it
-    /// is no less than that part of it. So a model that misses some effect everywhere does not turn
-    /// every pose into an outlier.
+    /// `freedom` is the share of its coordinates that are degrees of freedom, 0…1. `declared` is
+    /// the ratio of the noise σ that the fit took to the declared one, if one was declared.
+    /// Components of residuals along `unmoved` directions do not count.
+    ///
+    /// A pose is an outlier if P(χ²ₖ > s²) < 0.01 / N, with s = ‖r‖ / scatter, k measured numbers
+    /// and N poses \[Bonferroni\]. The scatter is the median of ‖r‖ / √(median of χ²ₖ) over
+    /// √`freedom`, which gross errors hardly change; √(median of χ²₃) is 1.538. With a declared σ
+    /// it is at least `declared`. A model that misses some effect everywhere therefore does not
+    /// turn every pose into an outlier.
     pub fn of(
         stage: &Stage,
         at: &DVector<f64>,
@@ -111,7 +112,8 @@ impl Lengths {
         Self { values, weighed, scatter: scatter.max(least), limits }
     }
 
-    /// Returns the length of a residual in units of the scatter if it is an outlier.
+    /// Returns the length of the residual of pose `place`, relative to the scatter, if it is an
+    /// outlier.
     pub fn outlying(&self, place: usize) -> Option<f64> {
         let (length, limit) = (self.values[place], self.limits[place]);
         (self.scatter > 0.0 && length > limit * self.scatter).then(|| length / self.scatter)

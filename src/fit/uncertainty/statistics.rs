@@ -13,7 +13,8 @@ use crate::fit::uncertainty::residual_lengths::Lengths;
 use crate::least_squares::{Blind, Loss, Uncertainty};
 use crate::model::Pose;
 
-/// Part in unidentifiable combinations beyond which an unknown has no standard error.
+/// Largest part of an unknown in unidentifiable combinations, 0…1, at which it has a standard
+/// error.
 const PARTLY_BLIND: f64 = 1e-3;
 
 /// Statistics of the unknowns of a fit.
@@ -24,14 +25,14 @@ pub(in crate::fit) struct Statistics {
     /// True if data and priors determine each unknown: it rests on no bound and takes part in no
     /// unidentifiable combination.
     pub known: Vec<bool>,
-    /// Part of each unknown that the data determine, 0…1; 1 without a prior in a provisional fit.
+    /// Identified share of each unknown, 0…1; 1 for unknowns without a prior in a provisional fit.
     pub identified: Vec<f64>,
     /// Covariance of the unknowns, shape = (unknowns, unknowns); 0 for unknowns that are held.
     pub covariance: DMatrix<f64>,
-    /// χ² against the declared σ over its degrees of freedom, `None` where there are none; a robust
-    /// loss leaves outliers out.
+    /// Reduced χ² against the declared σ; `None` without degrees of freedom. A robust loss excludes
+    /// outliers.
     pub reduced_chi2: Option<f64>,
-    /// Interval in which chance keeps `reduced_chi2` with probability 0.999.
+    /// Interval in which `reduced_chi2` lies with probability 0.999 if the residual is only noise.
     pub chance: Option<(f64, f64)>,
     /// Active constraints.
     pub constraints: Vec<Held>,
@@ -44,15 +45,15 @@ pub(in crate::fit) struct Statistics {
 }
 
 impl Statistics {
-    /// Computes the statistics of a stage that ended at `end`; `noise_model` is what the fit took
-    /// for the declared σ, `None` where none is declared.
+    /// Computes the statistics of a stage that ended at `end`; `noise_model` converts the declared
+    /// σ to the one that the fit took; `None` if none is declared.
     ///
     /// With a robust loss the covariance is that of the weighted Jacobian, times
     /// [`Loss::variance_factor`]. Active constraints confine it to the directions that they leave
     /// open.
     ///
     /// # Errors
-    /// Constraints make no sense.
+    /// A constraint is not finite, or the priors do not match the unknowns.
     pub fn of(
         stage: &Stage,
         end: &FitEnd,
@@ -154,7 +155,8 @@ impl Statistics {
     }
 }
 
-/// Returns the interval in which chance keeps χ² / ν with probability 0.999.
+/// Returns the interval in which χ² / ν of pure noise lies with probability 0.999, with ν =
+/// `freedom`.
 fn chance(freedom: f64) -> Option<(f64, f64)> {
     let distribution = ChiSquared::new(freedom).ok().filter(|_| freedom > 0.5)?;
     let bound = |p: f64| distribution.inverse_cdf(p) / freedom;
