@@ -117,7 +117,7 @@ impl Dataset {
 
 impl DatasetBuilder {
     /// Sets the measured orientations of the target, measuring frame; they are fitted if the
-    /// problem has an `orientation_sigma`.
+    /// problem declares an `orientation_sigma`.
     #[must_use]
     pub fn orientation(mut self, orientations: Vec<UnitQuaternion<f64>>) -> Self {
         self.orientations = Some(orientations);
@@ -189,7 +189,7 @@ impl DatasetBuilder {
         self
     }
 
-    /// Sets the rows that are not fitted and judge the fit, counted from 0, in any order.
+    /// Sets the rows, counted from 0, in any order, that are not fitted but used to judge the fit.
     #[must_use]
     pub fn held_out(mut self, rows: impl IntoIterator<Item = usize>) -> Self {
         self.held_out = rows.into_iter().collect();
@@ -199,7 +199,7 @@ impl DatasetBuilder {
     /// Builds the data set after checking that all arrays agree.
     ///
     /// # Errors
-    /// The first array that does not agree with the others.
+    /// Returns an error about the first array that does not agree with the others.
     pub fn build(self) -> Result<Dataset, DatasetError> {
         let rows = self.configurations.len();
         let mut held_out = vec![false; rows];
@@ -216,7 +216,7 @@ impl DatasetBuilder {
     /// Builds the measurements without a split.
     ///
     /// # Errors
-    /// The first array that does not agree with the others.
+    /// Returns an error about the first array that does not agree with the others.
     #[doc(hidden)]
     pub fn measurements(self) -> Result<Measurements, DatasetError> {
         let rows = self.configurations.len();
@@ -309,7 +309,7 @@ fn covariates(rows_of_values: &[Vec<f64>], rows: usize) -> Result<Vec<f64>, Data
     Ok(rows_of_values.concat())
 }
 
-/// Checks that all directions are −1, 0 or +1.
+/// Checks that all directions of approach are −1, 0 or +1, and returns them.
 fn directions(values: Vec<f64>, joints: usize) -> Result<Vec<f64>, DatasetError> {
     match values.iter().position(|value| ![-1.0, 0.0, 1.0].contains(value)) {
         Some(place) => {

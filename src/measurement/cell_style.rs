@@ -1,6 +1,6 @@
 //! Format of the cells of a table.
 
-/// Format of the cells of a table.
+/// Format of a table's cells: separators, decimal mark.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CellStyle {
     pub delimiter: char,

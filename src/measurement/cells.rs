@@ -4,7 +4,7 @@ use super::columns::Column;
 use super::table::{Table, shortened};
 use crate::error::{InputError, InputErrorKind, TableErrorKind};
 
-/// Returns a number above zero \[SI\].
+/// Reads a number from the current row's cell of `column`, which must be above zero \[SI\].
 pub(super) fn above_zero(table: &Table, column: &Column) -> Result<f64, InputError> {
     let value = table.number(column.place)?;
     // A tiny length in millimetres may underflow to 0 in metres.
@@ -16,7 +16,7 @@ pub(super) fn above_zero(table: &Table, column: &Column) -> Result<f64, InputErr
     }
 }
 
-/// Returns a number that is not below zero \[SI\].
+/// Reads a number from the current row's cell of `column`, which must not be negative \[SI\].
 pub(super) fn not_negative(table: &Table, column: &Column) -> Result<f64, InputError> {
     let value = table.number(column.place)?;
     if value < 0.0 {
@@ -26,7 +26,7 @@ pub(super) fn not_negative(table: &Table, column: &Column) -> Result<f64, InputE
     }
 }
 
-/// Returns a direction: −1, 0 or +1.
+/// Reads a direction of approach from the current row's cell of `column`: −1, 0 or +1.
 pub(super) fn direction(table: &Table, column: &Column) -> Result<f64, InputError> {
     let value = table.number(column.place)?;
     if [-1.0, 0.0, 1.0].contains(&value) {
@@ -36,7 +36,8 @@ pub(super) fn direction(table: &Table, column: &Column) -> Result<f64, InputErro
     }
 }
 
-/// Returns true for the word `validation` and false for `identification`.
+/// Returns true if the current row's cell in column `place` is the word `validation`, and false if
+/// it is `identification`.
 pub(super) fn is_validation(table: &Table, place: usize) -> Result<bool, InputError> {
     match table.word(place)? {
         "validation" => Ok(true),

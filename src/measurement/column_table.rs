@@ -10,8 +10,8 @@ use crate::error::{InputError, Location, TableErrorKind};
 /// Size of the text that is generated at a time [bytes].
 const CHUNK_BYTES: usize = 1 << 15;
 
-/// A table in memory: what a file of measurements holds, with the names that its columns have
-/// there. Its rows go by the lines that they would have in a file: the first one is on line 2.
+/// Table of measurements in memory, with the column names that a file would have. Messages name a
+/// row by the line that it would have in a file; the first row is on line 2.
 ///
 /// ```
 /// use std::path::Path;

@@ -14,16 +14,16 @@ use crate::observation::{Content, Field, Kind, kinds};
 use crate::problem::{ColumnRule, HeldOut, JointSource, Problem};
 use crate::quantity::Unit;
 
-/// Maximum number of unknown columns that get a suggestion.
+/// Maximum number of unknown columns for which a warning suggests a similar name.
 const MAX_SUGGESTIONS: usize = 100;
 
-/// Column that is read.
+/// Column whose values are read.
 #[derive(Clone, Copy)]
 pub(super) struct Column {
     pub role: Role,
-    /// Index in the row, from 0.
+    /// Index of the column in a row, counted from 0.
     pub place: usize,
-    /// Conversion to the SI unit.
+    /// Conversion of a cell's number to the SI unit.
     pub to_si: fn(f64) -> f64,
 }
 
@@ -33,15 +33,15 @@ pub(super) struct Columns {
     pub read: Vec<Column>,
     /// Index of the column that marks held-out rows.
     pub marked: Option<usize>,
-    /// Role of the file's name, which then is the value of every row.
+    /// Role that the file's name fills in every row; `None` if the name is not used.
     pub file: Option<Role>,
-    /// Flexcal's name of each column of the table.
+    /// Name of each column of the table in flexcal's vocabulary.
     names: Vec<String>,
 }
 
 impl Columns {
-    /// Finds the columns in a header; unknown columns give warnings. Positions and the column of
-    /// held-out rows are required if the poses are `measured`.
+    /// Finds the columns in a header. Unknown columns cause warnings. If the poses are `measured`,
+    /// columns of positions and of held-out rows are required.
     #[expect(clippy::too_many_lines, reason = "one column after the other, by what it may mean")]
     pub fn find(
         table: &Table,
@@ -319,14 +319,14 @@ impl Columns {
         Ok(())
     }
 
-    /// Returns true if rows may measure something other than positions.
+    /// Returns true if rows may measure quantities other than positions.
     pub fn observes(&self) -> bool {
         let is_other = |role: &Role| matches!(role, Role::Field(_)) && !POSITION.contains(role);
         self.read.iter().map(|column| &column.role).chain(&self.file).any(is_other)
     }
 
-    /// Returns the first of the `chosen` columns that lacks a declaration in the problem, and that
-    /// declaration.
+    /// Returns the first of the `chosen` columns that lacks a declaration in the problem, and the
+    /// section that would declare it.
     pub fn undeclared(
         &self,
         problem: &Problem,
@@ -351,7 +351,7 @@ impl Columns {
         self.file == Some(POINT) || others().filter_map(first_measured).any(is_filled)
     }
 
-    /// Returns the index of the column of a role.
+    /// Returns the index in a row of the column with a role.
     pub fn place(&self, role: Role) -> Option<usize> {
         let index = self.read.binary_search_by_key(&role, |column| column.role).ok()?;
         self.read.get(index).map(|column| column.place)
@@ -368,7 +368,8 @@ impl Columns {
         table.text(column.place).ok().filter(|word| !word.is_empty())
     }
 
-    /// Returns whether the orientation is complete as angles and as a quaternion.
+    /// Returns two flags: whether all columns of an orientation exist as angles, and as a
+    /// quaternion.
     pub fn orientations(&self) -> (bool, bool) {
         let is_complete =
             |count: usize, role: fn(usize) -> Role| (0..count).all(|axis| self.has(role(axis)));
@@ -397,8 +398,8 @@ fn display_name(name: &str, theirs: Option<&String>) -> String {
     name.to_owned() + &theirs.unwrap_or_default()
 }
 
-/// Returns the error for a missing column. If a rule of the map gave its name to another column,
-/// the rule is the cause.
+/// Returns the error for a missing column `name`. If a rule of `[data.columns]` assigned that name
+/// to another column, the message states the rule as the cause.
 fn blame_rule(error: InputError, (rule, name): (&ColumnRule, &str)) -> InputError {
     match *error.kind {
         InputErrorKind::Table(TableErrorKind::MissingColumn { write, .. }) => rule

@@ -6,7 +6,7 @@ use super::{ColumnTable, Measurements, Split};
 use crate::error::{InputError, Warning};
 use crate::problem::Problem;
 
-/// Measured poses, and which of them are fitted and which only judge.
+/// Measured poses with their split into fitted rows and held-out rows, which only judge the fit.
 ///
 /// ```
 /// use flexcal::measurement::Dataset;
@@ -37,8 +37,9 @@ impl Dataset {
     /// Splits measurements as the problem declares (`held_out` of `[data]`, or the column `split`).
     ///
     /// # Errors
-    /// A part of the split is empty, the held-out session does not exist, no split is declared, or
-    /// an unknown point, anchor or surface has too few rows to contribute information.
+    /// Returns an error if a part of the split is empty, the held-out session does not exist, or no
+    /// split is declared. Also if an unknown point, anchor or surface has too few rows to
+    /// contribute information.
     #[doc(hidden)]
     pub fn from_measurements(
         problem: &Problem,

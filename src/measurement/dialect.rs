@@ -119,7 +119,7 @@ pub(super) struct NormalizedText<R> {
     skipped: usize,
     comment: Option<Vec<u8>>,
     spaces: bool,
-    /// True if the text passes unchanged.
+    /// True if the text passes through unchanged.
     is_unchanged: bool,
     /// Text that is ready for the caller.
     ready: Vec<u8>,
@@ -145,7 +145,7 @@ impl<R: Read> NormalizedText<R> {
         }
     }
 
-    /// Prepares the next line; at the end of the text nothing is prepared.
+    /// Normalises the next line into `ready`; leaves it empty at the end of the text.
     fn next_line(&mut self) -> Result<()> {
         (self.ready, self.given) = (Vec::new(), 0);
         let mut chunk = [0; 4096];
@@ -184,7 +184,7 @@ impl<R: Read> NormalizedText<R> {
 }
 
 impl<R: std::io::BufRead> NormalizedText<Lines<R>> {
-    /// Marks the start of a record.
+    /// Marks the start of a record, from which its length is counted.
     pub fn start_record(&mut self) {
         self.lines.start_record();
     }

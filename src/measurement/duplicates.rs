@@ -5,9 +5,9 @@ use std::collections::HashMap;
 use super::Measurements;
 use crate::error::{Warning, WarningKind};
 
-/// Maximum number of copies named in the warning after the first.
+/// Maximum number of copies that the warning names in addition to the first.
 const MAX_NAMED_COPIES: usize = 3;
-/// Resolution in units of σ below which equal readings are unlikely to occur by chance.
+/// Resolution of the readings, in units of σ, below which equal readings are unlikely to be chance.
 const FINE_RESOLUTION: f64 = 0.1;
 /// Resolution below which equal readings are unlikely if σ is unknown \[m\].
 const FINE_RESOLUTION_WITHOUT_SIGMA: f64 = 1e-6;
@@ -51,8 +51,8 @@ impl Measurements {
         Some(Warning { location: self.location(row), kind })
     }
 
-    /// Returns the resolution of the measured positions \[m\], or `None` if they have no common
-    /// one.
+    /// Returns the coarsest step of which all measured coordinates are multiples \[m\]; `None` if
+    /// they have no common one.
     fn step(&self) -> Option<f64> {
         let numbers = || self.positions.iter().flatten();
         let is_whole = |step: f64| {
@@ -61,8 +61,8 @@ impl Measurements {
         RESOLUTIONS.into_iter().find(|step| is_whole(*step))
     }
 
-    /// Returns the bits of everything measured in a row. A measured time is included if `by_time`
-    /// is set.
+    /// Returns the bit patterns of everything measured in a row, by which rows are compared. A
+    /// measured time is included if `by_time` is true.
     fn bits(&self, row: usize, by_time: bool) -> Vec<u64> {
         let columns =
             [&self.sigma, &self.payload, &self.hoist, &self.temperature].into_iter().flatten();

@@ -15,19 +15,19 @@ use crate::quantity::Unit;
 /// Maximum number of rows without a partner that a warning lists.
 const MAX_LISTED_ROWS: usize = 10;
 
-/// Rows of the joint table with their keys.
+/// Rows of the joint table, with the keys by which they are paired with rows of positions.
 pub(super) struct JoinedLog {
     rule: JoinRule,
     location: Location,
     header: Vec<String>,
-    /// Flexcal's names of the columns.
+    /// Names of the joint table's columns in flexcal's vocabulary.
     names: Vec<String>,
     style: CellStyle,
     rows: Vec<LogRow>,
     of_name: HashMap<String, usize>,
     /// Row indices in the order of their times, for a join by time.
     by_time: Vec<usize>,
-    /// Columns of the current table that are appended from the log.
+    /// Indices of the joint table's columns that are appended to the current table.
     appended: Vec<usize>,
     /// Column of the key in the current table, and its conversion to seconds.
     key: Option<Key>,
@@ -150,7 +150,7 @@ impl JoinedLog {
     /// Prepares a table of positions: appends the columns that only the joint table has.
     ///
     /// # Errors
-    /// The table lacks the key column.
+    /// Returns an error if the table lacks the key column.
     pub fn extend(&mut self, table: &mut Table, dialect: &Dialect) -> Result<(), InputError> {
         let names: Vec<String> =
             Names::map_present(table, dialect).into_iter().map(str::to_owned).collect();
@@ -166,10 +166,11 @@ impl JoinedLog {
         Ok(())
     }
 
-    /// Appends the cells of the partner to the current row; returns false if it has none.
+    /// Appends the cells of the paired joint row to the current row of positions; returns false if
+    /// there is none.
     ///
     /// # Errors
-    /// The key cell of the row is empty or invalid.
+    /// Returns an error if the key cell of the row is empty or invalid.
     pub fn complete(&mut self, table: &mut Table) -> Result<bool, InputError> {
         let partner = match (self.rule, self.key) {
             (JoinRule::Name, Some(key)) => self.of_name.get(table.name(key.place)?).copied(),
@@ -190,7 +191,8 @@ impl JoinedLog {
         Ok(true)
     }
 
-    /// Returns the row nearest to a time \[s\], if it is within the tolerance \[s\].
+    /// Returns the index of the joint row nearest to a time \[s\], if it is within the tolerance
+    /// \[s\].
     fn nearest(&self, time: f64, tolerance: f64) -> Option<usize> {
         let time_of = |&row: &usize| self.rows.get(row).map_or(f64::NAN, |row| row.time);
         let after = self.by_time.partition_point(|row| time_of(row) < time);
@@ -210,11 +212,11 @@ impl JoinedLog {
         files
     }
 
-    /// Returns warnings about rows without a partner. A log that is joined by time has more rows
-    /// than positions, so its unused rows are not listed.
+    /// Returns warnings about rows without a partner. A joint table that is joined by time usually
+    /// has more rows than there are positions, so its unused rows are not reported.
     ///
     /// # Errors
-    /// No row has a partner.
+    /// Returns an error if no row has a partner.
     pub fn warnings(&self) -> Result<Vec<Warning>, InputError> {
         if self.paired == 0 && self.requested > 0 {
             return Err(self.location.clone().error(TableErrorKind::NothingJoined));

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::Labels;
 use crate::error::one_line;
 
-/// Words of rows; each distinct word is stored once.
+/// Collector of one word per row, which stores each distinct word once.
 #[derive(Default)]
 pub(super) struct LabelsBuilder {
     pub labels: Labels,
@@ -25,7 +25,8 @@ impl LabelsBuilder {
     }
 }
 
-/// Names of poses: numbers if all are numbers, otherwise words; incomplete if a row has none.
+/// Names of poses: numbers if all names are numbers, otherwise words; incomplete if a row has no
+/// name.
 pub(super) enum PoseNames {
     Numbers(Vec<f64>),
     Words(LabelsBuilder),
@@ -38,7 +39,7 @@ impl PoseNames {
         if exists { Self::Numbers(Vec::new()) } else { Self::Incomplete }
     }
 
-    /// Appends the name of the next row.
+    /// Appends the name of the next row; `None` if its cell is empty.
     pub fn push(&mut self, name: Option<&str>) {
         let number =
             name.and_then(|name| name.parse().ok()).filter(|number: &f64| number.is_finite());
@@ -57,7 +58,7 @@ impl PoseNames {
         }
     }
 
-    /// Returns the numbers or the words.
+    /// Returns the names as numbers or as words; neither if the column is incomplete.
     pub fn finish(self) -> (Option<Vec<f64>>, Option<Labels>) {
         match self {
             Self::Numbers(numbers) => (Some(numbers), None),
@@ -67,7 +68,7 @@ impl PoseNames {
     }
 }
 
-/// Returns the names of files without extension; files with equal names keep their folders.
+/// Returns the names of files without extension. Files with equal names keep their folders.
 pub(super) fn stems(files: &[PathBuf]) -> Vec<String> {
     let stem = |file: &PathBuf| {
         file.file_stem().map_or_else(String::new, |stem| one_line(&stem.to_string_lossy()))

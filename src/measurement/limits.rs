@@ -4,11 +4,12 @@ use super::Measurements;
 use crate::error::{Warning, WarningKind};
 use crate::problem::{JointKind, Problem};
 
-/// Tolerance of a limit for rounding \[rad\] or \[m\].
+/// Excess over a joint limit that counts as rounding \[rad\] or \[m\].
 const LIMIT_TOLERANCE: f64 = 1e-6;
-/// Number of turns from zero above which a warning asks for the unit.
+/// Number of turns from zero at which a warning suggests that a column in radians is in degrees.
 const MANY_TURNS: f64 = 2.0;
-/// Temperature above which a warning asks for the unit [°C]; a cold room in kelvins is above it.
+/// Highest plausible temperature [°C]. Above it, a warning suggests kelvins; a cold room in kelvins
+/// exceeds it.
 const MAX_PLAUSIBLE_TEMPERATURE: f64 = 200.0;
 
 /// Column with the commands of a joint.
@@ -41,7 +42,8 @@ impl Commands<'_> {
 }
 
 impl Measurements {
-    /// Returns a warning at the lowest temperature if all of them are implausibly high.
+    /// Returns a warning, located at the lowest temperature, if all temperatures are implausibly
+    /// high.
     pub(super) fn kelvins(&self) -> Option<Warning> {
         let (row, &least) = self
             .temperature
@@ -54,7 +56,8 @@ impl Measurements {
             .then(|| Warning { location, kind: WarningKind::Kelvins { least: format!("{least}") } })
     }
 
-    /// Returns a warning at the largest angle if a column in radians exceeds [`MANY_TURNS`].
+    /// Returns a warning, located at the largest angle, if a column in radians exceeds
+    /// [`MANY_TURNS`] turns.
     pub(super) fn many_turns(&self, problem: &Problem, columns: &[Commands]) -> Option<Warning> {
         let is_angle = |column: &&Commands| {
             column.unit() == "rad"
@@ -81,8 +84,8 @@ impl Measurements {
         (turns > MANY_TURNS).then_some(Warning { location, kind })
     }
 
-    /// Returns a warning for each joint commanded beyond its declared range, at the row farthest
-    /// beyond.
+    /// Returns a warning for each joint that is commanded beyond its declared range, located at the
+    /// row with the largest excess.
     pub(super) fn beyond_limits(&self, problem: &Problem, columns: &[Commands]) -> Vec<Warning> {
         let warning = |column: &Commands| {
             let (min, max) = problem.joints.get(column.joint)?.limits;

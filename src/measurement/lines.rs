@@ -19,7 +19,7 @@ impl<R: BufRead> Lines<R> {
         Self { inner, last: b'\n', record_bytes: 0 }
     }
 
-    /// Marks the start of a record.
+    /// Marks the start of a record, from which its length is counted.
     pub fn start_record(&mut self) {
         self.record_bytes = 0;
     }

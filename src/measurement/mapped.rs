@@ -4,14 +4,14 @@ use super::table::Table;
 use crate::error::{InputError, TableErrorKind};
 use crate::problem::{ColumnRule, ColumnSelector, Dialect};
 
-/// Names of a table's columns.
+/// Names of a table's columns, as in the table and in flexcal's vocabulary.
 pub(super) struct Names<'a> {
-    /// Flexcal's name of each column with the rule that assigns it; the table's name without a
-    /// rule.
+    /// Name of each column in flexcal's vocabulary with the rule that assigns it; the table's name
+    /// if no rule applies.
     pub of_place: Vec<(&'a str, Option<&'a ColumnRule>)>,
-    /// Rule for the name of the file.
+    /// Rule of `[data.columns]` that uses the name of the file.
     pub of_file: Option<&'a ColumnRule>,
-    /// True if the map was applied.
+    /// True if the rules of `[data.columns]` were applied.
     pub mapped: bool,
     /// First rule without a column, if the map was not applied because the table has flexcal's
     /// names.
@@ -66,7 +66,8 @@ impl<'a> Names<'a> {
         Ok(Self { of_place, of_file, mapped: true, unused: None })
     }
 
-    /// Applies those rules of the map whose column exists; other tables hold the other columns.
+    /// Returns the names that rules of `[data.columns]` assign to existing columns of this table.
+    /// Rules without a column are skipped, because another table may have it.
     pub fn map_present(table: &'a Table, dialect: &'a Dialect) -> Vec<&'a str> {
         let theirs = |header: &String| ColumnSelector::Name(header.clone());
         let ours = |header: &'a String| {
@@ -81,8 +82,8 @@ impl<'a> Names<'a> {
         self.of_place.iter().map(|(name, _)| *name)
     }
 
-    /// Returns the columns with their places, mapped ones first: where another column has a name
-    /// that the map assigns, the map wins. The name of the file comes last.
+    /// Returns (index, name, rule) of the columns, those with a rule first, so that a rule wins if
+    /// another column has the same name. The name of the file comes last.
     pub fn mapped_first(&self) -> Vec<(usize, &'a str, Option<&'a ColumnRule>)> {
         let file = self.of_file.map(|rule| (rule.ours.as_str(), Some(rule)));
         let columns = self.of_place.iter().chain(&file).enumerate();
@@ -93,7 +94,8 @@ impl<'a> Names<'a> {
     }
 }
 
-/// Returns the place of the column called `name`, if there is one.
+/// Returns the index of the column named `name`; `None` if there is none. Two such columns are an
+/// error of `rule`.
 fn only_place(rule: &ColumnRule, name: &str, table: &Table) -> Result<Option<usize>, InputError> {
     let mut places =
         (0..).zip(&table.header).filter(|(_, header)| *header == name).map(|(place, _)| place);

@@ -8,22 +8,22 @@ use crate::error::{InputErrorKind, TableErrorKind, WarningKind, nearest};
 use crate::problem::{Joint, JointKind, Problem};
 use crate::quantity::Unit;
 
-/// Meaning of a column's name.
+/// Meaning of a column's name: a role with its unit, or none.
 pub(super) enum Meaning {
     Read(Role, fn(f64) -> f64),
     Ignored(WarningKind),
-    /// The name has no meaning here.
+    /// Name without a meaning in this problem.
     Unknown,
 }
 
-/// Assignment of the numbers in column names to joints.
+/// Assignment of the numbers in column names (`q2`) to joints.
 pub(super) struct Numbering {
-    /// Joint of each number; number 1 is element 0.
+    /// Index of the joint of each number; number 1 is element 0.
     joints: Vec<usize>,
 }
 
 impl Numbering {
-    /// Chooses the numbering: by joint number, or by place among the moving joints.
+    /// Chooses the numbering: by joint number, or by position among the moving joints.
     pub fn detect<'a>(names: impl Iterator<Item = &'a str>, problem: &Problem) -> Self {
         let numbers: Vec<usize> =
             names.filter_map(|name| numbered(split_unit(name).0, "q")).collect();
@@ -48,7 +48,7 @@ impl Numbering {
         self.joints.iter().position(|&index| index == joint).unwrap_or(joint) + 1
     }
 
-    /// Returns the column that an unknown name probably means, among those missing in the table.
+    /// Suggests the column that an unknown name probably means, out of those missing in the table.
     pub fn meant(&self, name: &str, present: &BTreeSet<&str>, problem: &Problem) -> Option<String> {
         let moving = || {
             problem
@@ -152,7 +152,8 @@ impl Numbering {
     }
 }
 
-/// Checks that the file's name can have this role, which must be a word.
+/// Checks that the name of a file may fill this role; only roles whose values are words can be
+/// filled so.
 pub(super) fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
     match role {
         Role::Session | Role::Target | POINT => Ok(role),
@@ -160,11 +161,11 @@ pub(super) fn word_of_row(role: Role) -> Result<Role, InputErrorKind> {
     }
 }
 
-/// Conversion of a column `time` without a unit, which must hold dates.
+/// Conversion of a column `time` without a unit. Its cells must be dates, so numbers become NaN.
 pub(super) const DATE_CONVERSION: fn(f64) -> f64 = |_| f64::NAN;
 
-/// Returns the meaning of a column named after a joint: `shoulder_pan_joint_rad`. Ambiguous joint
-/// names, and those that equal other columns, are not considered.
+/// Returns the meaning of a column named after a joint, such as `shoulder_pan_joint_rad`. Ambiguous
+/// joint names and names of other columns are not considered.
 fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputErrorKind>> {
     let base = split_unit(name).0;
     let other =
@@ -199,7 +200,7 @@ fn by_joint_name(name: &str, problem: &Problem) -> Option<Result<Meaning, InputE
     }
 }
 
-/// Returns true if results depend on the column; names of poses and orientations have no effect on
+/// Returns true if results depend on the column with the name `meant`. Names of poses do not affect
 /// the fit.
 pub(super) fn affects_results(meant: &str) -> bool {
     let base = split_unit(meant).0;
@@ -216,12 +217,12 @@ pub(super) fn unit_of(joint: JointKind) -> Option<Unit> {
     }
 }
 
-/// Splits `q1_deg` into `q1` and `deg`.
+/// Splits a column name into base and unit suffix: `q1_deg` into `q1` and `deg`.
 pub(super) fn split_unit(name: &str) -> (&str, Option<&str>) {
     name.split_once('_').map_or((name, None), |(base, suffix)| (base, Some(suffix)))
 }
 
-/// Returns the number in `q12`.
+/// Returns the number after `prefix` in a column name: 12 in `q12`.
 fn numbered(name: &str, prefix: &str) -> Option<usize> {
     let number = name.strip_prefix(prefix)?;
     if number.bytes().all(|byte| byte.is_ascii_digit()) { number.parse().ok() } else { None }

@@ -85,26 +85,26 @@ pub struct Measurements {
     /// Measured numbers of each row, padded with zeros \[m\] or \[rad\]: positions in the measuring
     /// frame, distances or tilts; 0 for a contact.
     pub positions: Vec<Vector3<f64>>,
-    /// True if the positions were measured; false for poses still to be measured.
+    /// True if the positions were measured; false for planned poses.
     pub position_measured: bool,
     /// Unit of the positions in the first file in SI (1/1000 for millimetres), or `None` without a
     /// file.
     pub position_unit: Option<f64>,
-    /// Measured orientations of the target in the measuring frame, if all of their columns exist;
+    /// Measured orientations of the target in the measuring frame; `None` if a column is missing,
     /// NaN in a row without one.
     pub orientations: Option<Vec<UnitQuaternion<f64>>>,
     /// Standard deviation of each coordinate \[m\] from the column `sigma_mm` or the kind of the
     /// row; NaN if unknown.
     pub sigma: Option<Vec<f64>>,
-    /// Payload of each row \[kg\].
+    /// Payload of each row \[kg\]; `None` without a column.
     pub payload: Option<Vec<f64>>,
-    /// Hoist force of each row \[N\].
+    /// Hoist force of each row \[N\]; `None` without a column.
     pub hoist: Option<Vec<f64>>,
-    /// Temperature of each row [°C].
+    /// Temperature of each row [°C]; `None` without a column.
     pub temperature: Option<Vec<f64>>,
     /// Time of each row \[s\]; the row number without a column.
     pub time: Vec<f64>,
-    /// True if `time` was measured, false if it is the row number.
+    /// True if `time` was recorded, false if it is the row number.
     pub time_measured: bool,
     /// Direction from which each joint approached, −1, 0 or +1, shape = (rows, joints); 0 for
     /// joints without a column.
@@ -125,13 +125,13 @@ pub struct Measurements {
     pub target: Option<Labels>,
     /// True for rows marked `validation` in the column that the problem names, or else in `split`.
     pub marked_held_out: Option<Vec<bool>>,
-    /// Columns of the commands in the first file, one per joint; empty without a file.
+    /// Columns of the commands in the first file, one per moving joint; empty without a file.
     #[doc(hidden)]
     pub command_columns: Vec<CommandColumn>,
     /// Warnings about the files, for reports.
     pub warnings: Vec<Warning>,
-    /// Order in which the rows were measured. It is computed at first use, so rows may change only
-    /// before that or in a copy.
+    /// Chronological order of the rows. It is computed at first use, so rows may change only before
+    /// that or in a copy.
     #[doc(hidden)]
     pub order: RowOrder,
 }
@@ -156,7 +156,7 @@ pub struct NestReading {
     pub sigma: Option<f64>,
 }
 
-/// Column of a joint's commands as written in a table.
+/// Column of a joint's commands in a table.
 #[doc(hidden)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommandColumn {
@@ -164,11 +164,11 @@ pub struct CommandColumn {
     pub joint: usize,
     /// Name of the column in the table.
     pub name: String,
-    /// Unit in SI: π/180 for degrees.
+    /// Unit in SI, for example π/180 for degrees.
     pub unit: f64,
 }
 
-/// Words of rows, stored as indices into the distinct words in order of appearance.
+/// One word per row, stored as an index into the distinct words in order of appearance.
 #[doc(hidden)]
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Labels {
@@ -178,7 +178,7 @@ pub struct Labels {
     pub of_row: Vec<usize>,
 }
 
-/// Collects the words of the rows in order.
+/// Collects the words of the rows, in row order.
 impl<W: AsRef<str>> FromIterator<W> for Labels {
     fn from_iter<I: IntoIterator<Item = W>>(words: I) -> Self {
         let mut labels = Self::default();
@@ -265,7 +265,7 @@ impl Measurements {
         self.setup(row, self.first_time()).to_owned()
     }
 
-    /// Returns the conditions of all rows without their past, which the other rows contain.
+    /// Returns the conditions of all rows without their past: the earlier poses are the other rows.
     pub(crate) fn conditions_without_past(&self) -> Vec<PoseConditions> {
         let first = self.first_time();
         let alone =
@@ -320,7 +320,8 @@ impl Measurements {
         Some(Self { configurations, other_configurations: Some(current), ..self.clone() })
     }
 
-    /// Returns the given rows in the given order; unused words are kept.
+    /// Returns a copy with the given rows in the given order. Labels keep words that no longer
+    /// occur.
     #[must_use]
     pub fn select(&self, rows: &[usize]) -> Self {
         let pick = |column: &[f64]| rows.iter().map(|&row| column[row]).collect::<Vec<f64>>();

@@ -15,16 +15,16 @@ use crate::problem::fixture::unknown;
 use crate::problem::frame::frame;
 use crate::problem::{Fixture, KnownDistance, Observation, Problem};
 
-/// Quantity that a row measures.
+/// Quantity that a row measures, with its numbers.
 pub(super) struct Observed {
     pub observation: Observation,
     /// True if its numbers have been measured.
     pub measured: bool,
 }
 
-/// Returns what the current row measures, in the order of [`Observation`]. A table of positions has
-/// one position per row. `in_point` is the point that the whole file measures. A position that is
-/// `missing` gives no observation.
+/// Returns the quantities that the current row measures, in the order of [`Observation`]. A table
+/// of positions has one position per row. `in_point` is the point that the whole file touches. A
+/// position that is `missing` gives no observation.
 pub(super) fn of_row(
     table: &Table,
     columns: &Columns,
@@ -83,7 +83,7 @@ struct Cell<'a> {
     field: &'static Field,
     /// Index of its column; `None` if the name of the file is its value.
     place: Option<usize>,
-    /// Name of the file.
+    /// Name of the file without extension.
     stem: &'a str,
 }
 
@@ -129,15 +129,15 @@ fn of_kind(
         .map(|observation| Observed { observation, measured: is_measured }))
 }
 
-/// Returns the frame that a cell names: `base`, a joint by its name, or `joint3`; without a column
-/// the tool's frame.
+/// Returns the frame that a cell names: `base`, a joint by its name, or `joint3`. Without a column
+/// it is the frame of the tool.
 fn frame_of(table: &Table, place: Option<usize>, problem: &Problem) -> Result<usize, InputError> {
     let Some(place) = place else { return Ok(problem.tool.joint + 1) };
     frame(table.name(place)?, &problem.joints, problem.tool.joint)
         .map_err(|kind| table.cell_error(place, kind))
 }
 
-/// Returns the number in a cell, which counts the points of a marker from 0.
+/// Returns the number in a cell that selects a point of a marker, counted from 0.
 fn point(
     table: &Table,
     place: usize,
@@ -219,8 +219,8 @@ pub(super) fn check_target(
     })
 }
 
-/// Appends a row for each known distance between points and sets the standard deviation of every
-/// row.
+/// Appends a row for each known distance between points, and completes the standard deviation of
+/// every row.
 pub(super) fn add_known_distances(
     measurements: &mut Measurements,
     problem: &Problem,
@@ -329,7 +329,8 @@ impl Measurements {
         }
     }
 
-    /// Returns the rows in which the arm takes part, without known distances between points.
+    /// Returns the rows whose prediction depends on the arm, without known distances between
+    /// points.
     #[must_use]
     pub(crate) fn arm_rows(self) -> Self {
         let rows: Vec<usize> =

@@ -24,12 +24,12 @@ impl PartialEq for RowOrder {
     }
 }
 
-/// Chronological order of the rows: for each row the place of its session's first row and of
-/// itself.
+/// Chronological order of the rows. Each row has the position in that order of its session's first
+/// row, and its own.
 #[derive(Debug)]
 struct Chronology {
     places: Vec<(u32, u32)>,
-    /// Columns in chronological order; `None` if the table has that order.
+    /// Columns in chronological order; `None` if the table already has that order.
     sorted: Option<Past>,
 }
 

@@ -4,10 +4,10 @@ use nalgebra::{Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use crate::problem::RotationKind;
 
-/// Tolerance of the norm of a quaternion for rounding.
+/// Largest deviation of a quaternion's norm from 1 that counts as rounding.
 const NORM_TOLERANCE: f64 = 0.01;
 
-/// Cells of an orientation.
+/// Cells of one row from which its orientation is computed.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Cells {
     /// Angles rx, ry, rz \[rad\].
@@ -17,7 +17,7 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Returns the orientation from the three angles.
+    /// Returns the orientation from the three angles, in the convention `kind`.
     pub fn of_angles(&self, kind: RotationKind) -> UnitQuaternion<f64> {
         let [x, y, z] = self.angles.into();
         let (x, y, z) = (

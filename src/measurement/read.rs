@@ -99,7 +99,7 @@ impl Measurements {
 struct Tables<'a> {
     files: &'a [PathBuf],
     problem: &'a Problem,
-    /// True if the poses have been measured.
+    /// True if the table must contain measurements, false for planned poses.
     measured: bool,
     warnings: Vec<Warning>,
     builder: Option<RowsBuilder>,
@@ -219,7 +219,7 @@ impl<'a> Tables<'a> {
     }
 }
 
-/// Rows without a measurement.
+/// Counter of rows that were left out because they contain no measurement.
 #[derive(Default)]
 struct LeftOut {
     rows: usize,
@@ -262,7 +262,7 @@ fn is_missing(missing: &Missing, table: &Table, columns: &Columns) -> bool {
     }
 }
 
-/// Returns the columns of commands.
+/// Returns the columns of joint commands among `columns`, with their names.
 fn commands(columns: &[(Column, String)]) -> Vec<Commands<'_>> {
     let joints = columns.iter().filter_map(|(column, name)| match column.role {
         Role::Joint(joint) => Some(Commands { joint, name, to_si: column.to_si }),
@@ -271,8 +271,8 @@ fn commands(columns: &[(Column, String)]) -> Vec<Commands<'_>> {
     joints.collect()
 }
 
-/// Returns the error of a data file: `named` at the line of the problem that names it, or `given`
-/// for a file of the command line.
+/// Returns the error of a data file. It is `named`, at the line of the problem that names the file,
+/// or `given` for a file from the command line.
 fn file_error(
     (file, files): (&Path, &[PathBuf]),
     problem: &Problem,

@@ -6,15 +6,15 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::Measurements;
 use crate::problem::{Effect, JointKind, Observation, Problem};
 
-/// Tolerance of equal angles \[rad\].
+/// Difference up to which angles count as equal: 0.01° \[rad\].
 const ANGLE_STEP: f64 = 0.01 * std::f64::consts::PI / 180.0;
-/// Tolerance of equal lengths \[m\].
+/// Difference up to which lengths count as equal \[m\].
 const LENGTH_STEP: f64 = 1e-4;
-/// Tolerance of equal payloads and hoist forces, as a fraction of the largest.
+/// Difference up to which payloads and hoist forces count as equal, as a fraction of the largest.
 const LOAD_STEP: f64 = 0.01;
-/// Tolerance of equal temperatures \[K\].
+/// Difference up to which temperatures count as equal \[K\].
 const TEMPERATURE_STEP: f64 = 1.0;
-/// Tolerance of words and directions, which are whole numbers.
+/// Difference below which integer codes of words and directions count as equal.
 const WORD_STEP: f64 = 0.5;
 
 impl Measurements {
@@ -54,8 +54,8 @@ impl Measurements {
         self.numbers(problem, true)
     }
 
-    /// Returns the number of each row's pose regardless of the target: rows of several targets can
-    /// show one pose of the arm.
+    /// Returns the number of each row's pose of the arm, regardless of the target: rows of several
+    /// targets can show one pose.
     pub(crate) fn arm_pose_numbers(&self, problem: &Problem) -> Vec<usize> {
         self.numbers(problem, false)
     }
@@ -119,7 +119,7 @@ pub(crate) fn count_distinct(numbers: &[usize], rows: impl IntoIterator<Item = u
     rows.into_iter().map(|row| numbers[row]).collect::<BTreeSet<_>>().len()
 }
 
-/// Values of all rows and the tolerance within which they agree.
+/// Values of all rows and the difference up to which they count as equal.
 struct Column {
     values: Vec<f64>,
     step: f64,

@@ -4,13 +4,13 @@ use crate::observation::{Content, Kind, fields, kinds};
 use crate::problem::Problem;
 use crate::quantity::Unit;
 
-/// Role of a column; joints and axes count from 0.
+/// Role of a column, the quantity that it contains; joints and axes count from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Role {
     Joint(usize),
     /// Encoder reading of a joint.
     Reading(usize),
-    /// Column of this name of a kind of rows.
+    /// Column with this name, which belongs to a kind of rows.
     Field(&'static str),
     Sigma,
     Payload,
@@ -24,7 +24,7 @@ pub(super) enum Role {
     Session,
     Target,
     Pose,
-    /// Fixed point measured by a row without the arm.
+    /// Fixed point that a row measures without the arm.
     Nest,
     /// Covariate declared in `[data.covariates]`.
     Covariate(usize),
@@ -32,11 +32,11 @@ pub(super) enum Role {
 
 /// Roles of the coordinates of a measured position.
 pub(super) const POSITION: [Role; 3] = [Role::Field("x"), Role::Field("y"), Role::Field("z")];
-/// Role of the column that names a point, which the name of a file may replace.
+/// Role of the column that names the touched point. The name of a file may replace the column.
 pub(super) const POINT: Role = Role::Field("point");
 
-/// Returns true if the problem declares what rows of a kind are measured against; a kind without
-/// fixtures needs its standard deviation.
+/// Returns true if the problem declares the fixtures that rows of a kind are measured against, or
+/// the standard deviation for a kind without fixtures.
 pub(super) fn is_declared(kind: &Kind, problem: &Problem) -> bool {
     let is_fixture = |word: &str| problem.fixtures.iter().any(|known| known.kind.word() == word);
     let mut fixtures =
@@ -55,8 +55,11 @@ impl Role {
         kinds().any(|kind| kind.field(name).is_some() && is_declared(kind, problem))
     }
 
-    /// Returns the missing declaration if a column of this name has no meaning in this problem.
-    /// Columns of fixtures announce a kind of rows; so do the numbers of a kind without fixtures.
+    /// Returns the section that would have to declare something for a column with this name to have
+    /// a meaning. `None` if nothing is missing.
+    ///
+    /// The name is that of a fixture column of a kind of rows, or of a number of a kind without
+    /// fixtures.
     pub fn undeclared(name: &str, problem: &Problem) -> Option<&'static str> {
         let announces = |kind: &&Kind| {
             let has_fixture = kind.fields.iter().any(|field| field.content == Content::Fixture);
@@ -70,7 +73,7 @@ impl Role {
         (!is_declared(kind, problem)).then_some(kind.declared_by)
     }
 
-    /// Returns true if the column holds measured values or what they refer to, false for
+    /// Returns true if the column contains measured values or names of fixtures, false for
     /// configurations and conditions.
     pub fn is_observed(self) -> bool {
         matches!(self, Self::Field(_)) || self.is_orientation()

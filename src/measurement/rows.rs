@@ -1,4 +1,4 @@
-//! Measurements under construction, row by row.
+//! Builder of measurements, which appends row by row.
 
 use std::path::PathBuf;
 
@@ -23,15 +23,15 @@ pub(super) struct RowsBuilder {
     session: LabelsBuilder,
     target: LabelsBuilder,
     poses: PoseNames,
-    /// True if readings are the configurations.
+    /// True if encoder readings, not commands, are the configurations.
     uses_readings: bool,
-    /// True if rows may measure something other than positions.
+    /// True if rows may measure quantities other than positions.
     mixed: bool,
     /// True if rows name one of several declared targets.
     names_targets: bool,
-    /// Convention of rx, ry and rz.
+    /// Convention of the orientation angles rx, ry and rz.
     rotation: RotationKind,
-    /// Names of the files without extension, which may be the value of a column.
+    /// Names of the files without extension, which may replace a column.
     stems: Vec<String>,
     /// Columns of the first file with their names.
     columns: Vec<(Column, String)>,
@@ -112,8 +112,9 @@ impl RowsBuilder {
         self.stems.get(file).map_or("", String::as_str)
     }
 
-    /// Checks that a file has the columns of the first one. The column `pose` is optional, and so
-    /// are the columns of observations and targets if rows measure different quantities.
+    /// Checks that a file has the same columns as the first one. The column `pose` is optional. If
+    /// rows measure different quantities, the columns of observations and targets are optional,
+    /// too.
     pub fn same_columns(&self, table: &Table, columns: &Columns) -> Result<(), InputError> {
         let differ = |name: &str, has| {
             let other = self.measurements.files.first().cloned().unwrap_or_default();
@@ -308,7 +309,7 @@ impl RowsBuilder {
     }
 }
 
-/// Sets an existing element of a list.
+/// Sets element `place` of a list, if it exists.
 fn set(list: &mut [f64], place: usize, value: f64) {
     if let Some(element) = list.get_mut(place) {
         *element = value;
@@ -321,7 +322,7 @@ fn push(list: &mut Option<Vec<f64>>, value: f64) {
     }
 }
 
-/// Returns true if a table has as many commands as readings of joints.
+/// Returns true if a table has both commands and encoder readings of all joints.
 fn both_joints(columns: &Columns) -> bool {
     let count = |reading: bool| {
         let of_joint = |column: &&Column| matches!(column.role, Role::Joint(_) | Role::Reading(_));

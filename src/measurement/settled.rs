@@ -7,11 +7,12 @@ use crate::error::{InputError, TableErrorKind, Warning, WarningKind};
 use crate::quantity::Unit;
 
 impl Columns {
-    /// Keeps a column `time` without a unit if its first cell is a date; otherwise ignores it with
-    /// a warning.
+    /// Decides on a column `time` without a unit. It is kept if its first cell is a date, otherwise
+    /// ignored with a warning.
     ///
     /// # Errors
-    /// `[data.columns]` maps the column to `time`, and its first cell is no time.
+    /// Returns an error if `[data.columns]` maps the column to `time`, and its first cell is
+    /// neither a time nor a number.
     pub fn settle_time(
         &mut self,
         table: &Table,

@@ -13,7 +13,7 @@ use crate::problem::{HeldOut, Observation, Problem};
 pub struct Split {
     /// Rows used for fitting and for choosing effects.
     pub identification: Vec<usize>,
-    /// Rows used for neither.
+    /// Rows that take no part in fitting or in choosing effects.
     pub held_out: Vec<usize>,
 }
 
@@ -76,7 +76,7 @@ fn with_known_distances(mut held_out: Vec<bool>, measurements: &Measurements) ->
     held_out
 }
 
-/// Marks the rows of one session.
+/// Returns true for the rows of one session, which are held out.
 fn of_session(session: &str, measurements: &Measurements) -> Result<Vec<bool>, InputErrorKind> {
     let labels = &measurements.session;
     match labels.names.iter().position(|name| name == session) {
@@ -88,7 +88,8 @@ fn of_session(session: &str, measurements: &Measurements) -> Result<Vec<bool>, I
     }
 }
 
-/// Marks random configurations until their rows reach the fraction.
+/// Returns true for rows of randomly chosen configurations, until their number reaches the
+/// fraction; these rows are held out.
 fn random_fraction(
     fraction: f64,
     seed: u64,

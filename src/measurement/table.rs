@@ -39,7 +39,7 @@ pub(super) struct Table {
     style: CellStyle,
     /// Format of the appended cells of another table, and the number of cells before them.
     appended: Option<(CellStyle, usize)>,
-    /// File and line of the appended cells of the current row.
+    /// File and line from which the appended cells of the current row come.
     partner: Option<(PathBuf, usize)>,
 }
 
@@ -168,7 +168,7 @@ impl Table {
         Ok(found)
     }
 
-    /// Returns the line of the reader.
+    /// Returns the number of the next line to read.
     fn next_line(&self) -> usize {
         usize::try_from(self.reader.position().line()).unwrap_or(usize::MAX)
     }
@@ -184,18 +184,19 @@ impl Table {
             .map_or(self.style, |(style, _)| style)
     }
 
-    /// Returns the cells of the row.
+    /// Returns the cells of the current row.
     pub fn cells(&self) -> &ByteRecord {
         &self.record
     }
 
-    /// Adds columns of another table, whose cells are appended row by row.
+    /// Appends columns of another table to the header; [`append_cells`](Self::append_cells) fills
+    /// them row by row.
     pub fn extend_header(&mut self, names: Vec<String>, style: CellStyle) {
         self.appended = Some((style, self.header.len()));
         self.header.extend(names);
     }
 
-    /// Appends cells of another table to the row; `partner` is their file and line.
+    /// Appends cells of another table to the current row, which come from the given file and line.
     pub fn append_cells<'a>(
         &mut self,
         cells: impl Iterator<Item = &'a [u8]>,
@@ -205,7 +206,7 @@ impl Table {
         self.partner = Some((file.to_owned(), line));
     }
 
-    /// Returns the line of the row, counted from 1.
+    /// Returns the line of the current row, counted from 1.
     pub fn line(&self) -> usize {
         self.line
     }
@@ -214,14 +215,14 @@ impl Table {
         self.record.get(place).unwrap_or_default().trim_ascii()
     }
 
-    /// Returns a cell of the row as text without surrounding white space.
+    /// Returns a cell of the current row as text without surrounding white space.
     pub fn text(&self, place: usize) -> Result<&str, InputError> {
         std::str::from_utf8(self.cell(place))
             .map(unescape_cell)
             .map_err(|_| self.cell_error(place, InputErrorKind::NotUtf8))
     }
 
-    /// Returns a cell of the row as a word that is not empty.
+    /// Returns a cell of the current row as a word that is not empty.
     pub fn word(&self, place: usize) -> Result<&str, InputError> {
         let word = self.text(place)?;
         if word.is_empty() {
@@ -231,7 +232,7 @@ impl Table {
         }
     }
 
-    /// Returns a cell of the row as a word without invisible characters.
+    /// Returns a cell of the current row as a word without invisible characters.
     pub fn name(&self, place: usize) -> Result<&str, InputError> {
         let word = self.word(place)?;
         match word.chars().find(|&character| is_hidden(character)) {
@@ -242,7 +243,7 @@ impl Table {
         }
     }
 
-    /// Returns a cell of the row as a finite number.
+    /// Returns a cell of the current row as a finite number.
     pub fn number(&self, place: usize) -> Result<f64, InputError> {
         let word = self.word(place)?;
         let value = || shortened(word);
@@ -264,8 +265,8 @@ impl Table {
         }
     }
 
-    /// Returns a cell of the row as a time: a number with a unit \[s\], or a date and time \[s
-    /// since 1970\].
+    /// Returns a cell of the current row as a time: a number with a unit \[s\], or a date and time
+    /// \[s since 1970\].
     pub fn time(&self, place: usize, to_si: fn(f64) -> f64) -> Result<f64, InputError> {
         let word = self.word(place)?;
         match date_time(word) {
@@ -282,7 +283,7 @@ impl Table {
         }
     }
 
-    /// Returns true if a cell of the row is a date and time.
+    /// Returns true if a cell of the current row is a date and time.
     pub fn is_date(&self, place: usize) -> bool {
         self.text(place).is_ok_and(|word| date_time(word).is_some())
     }
@@ -292,25 +293,25 @@ impl Table {
         self.header.get(place).map_or("", String::as_str)
     }
 
-    /// Returns an error in a cell of the row.
+    /// Creates an error about a cell of the current row.
     pub fn cell_error(&self, place: usize, kind: impl Into<InputErrorKind>) -> InputError {
         let name = self.name_of(place);
         self.location(Some(place)).with_key(format!("column {}", shortened(name))).error(kind)
     }
 
-    /// Returns the place of a column in the header line.
+    /// Returns the location of a column in the header line, for errors.
     pub fn column(&self, name: &str) -> Location {
         Location::file(&self.file)
             .at_line(self.header_line)
             .with_key(format!("column {}", shortened(name)))
     }
 
-    /// Returns an error about the whole row.
+    /// Creates an error about the whole current row.
     pub fn error(&self, kind: impl Into<InputErrorKind>) -> InputError {
         self.location(None).error(kind)
     }
 
-    /// Returns the place of the row, with its text and one marked cell.
+    /// Returns the location of the current row, with its text and, if given, the cell to mark.
     fn location(&self, place: Option<usize>) -> Location {
         let (mut text, mut span) = (String::new(), None);
         for (index, cell) in self.record.iter().enumerate() {
@@ -332,7 +333,7 @@ impl Table {
     }
 }
 
-/// Returns at most 40 characters of a text.
+/// Returns the first 40 characters of a text, with a mark if it is longer.
 pub(super) fn shortened(text: &str) -> String {
     crate::error::shortened(text, 40)
 }

@@ -6,7 +6,7 @@ use crate::quantity::Unit;
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
-/// Largest count of numbers that describe a fixture.
+/// Largest number of values that describe a fixture (a camera with its lens distortion).
 pub(crate) const MAX_NUMBERS: usize = 15;
 
 /// Kind of a fixture, which determines its numbers.
@@ -15,7 +15,7 @@ pub(crate) const MAX_NUMBERS: usize = 15;
 pub enum FixtureKind {
     /// Point that the target touches, such as a socket: x, y, z \[m\].
     Point,
-    /// Point that distances are measured to: x, y, z \[m\].
+    /// Point from which distances are measured: x, y, z \[m\].
     Anchor,
     /// Plane n·x = d: rx, ry \[rad\], d \[m\], with n of
     /// [`plane_normal`](crate::spatial::plane_normal).
@@ -25,15 +25,17 @@ pub enum FixtureKind {
     /// Pinhole camera: position \[m\] and rotation vector \[rad\] in the frame that carries it,
     /// focal lengths and centre \[px\], distortion.
     Camera,
-    /// Camera with an equidistant lens: the same numbers with another distortion.
+    /// Camera with an equidistant (fisheye) lens: the numbers of a pinhole camera with another
+    /// distortion model.
     Fisheye,
-    /// Object with points that cameras see: position \[m\] and rotation vector \[rad\] in the
+    /// Object with points that cameras observe: position \[m\] and rotation vector \[rad\] in the
     /// frame that carries it.
     Marker,
 }
 
 impl FixtureKind {
-    /// Returns the word that names its table, its column and its parameters.
+    /// Returns the word that names the kind's table in a problem file, its column and its
+    /// parameters.
     pub fn word(self) -> &'static str {
         match self {
             Self::Point => "point",
@@ -49,7 +51,7 @@ impl FixtureKind {
         matches!(self, Self::Camera | Self::Fisheye | Self::Marker)
     }
 
-    /// Returns the names of its numbers, as they follow the dot in the name of a parameter.
+    /// Returns the names of its numbers, which are the last part of parameter names.
     pub fn fields(self) -> &'static [&'static str] {
         match self {
             Self::Point | Self::Anchor => &["x", "y", "z"],
@@ -66,7 +68,7 @@ impl FixtureKind {
         }
     }
 
-    /// Returns the keys of the problem file that declare one of its numbers.
+    /// Returns the keys of the problem file that declare number `axis` of the fixture.
     pub fn declared_by(self, axis: usize) -> &'static str {
         match (self, axis) {
             (Self::Plane, _) => "normal and at_m",
@@ -76,7 +78,7 @@ impl FixtureKind {
         }
     }
 
-    /// Returns the unit of one of its numbers.
+    /// Returns the unit of number `axis` of the fixture.
     pub fn unit(self, axis: usize) -> Unit {
         match (self, axis) {
             (Self::Plane, 0 | 1) => Unit::Angle,
@@ -116,7 +118,7 @@ impl FixtureValues<f64> {
 }
 
 impl<S: Scalar> FixtureValues<S> {
-    /// Returns its position \[m\]: of a sphere the centre. A plane has none.
+    /// Returns its position \[m\], for a sphere the centre. Not meaningful for a plane.
     pub fn position(&self) -> Vector3<S> {
         let [x, y, z, ..] = self.numbers;
         Vector3::new(x, y, z)

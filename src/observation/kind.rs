@@ -1,4 +1,4 @@
-//! Description of a kind of rows, which tables, results and messages follow.
+//! Description of a kind of rows (sensor type), which tables, results and messages use.
 
 use crate::quantity::Unit;
 
@@ -7,17 +7,17 @@ use crate::quantity::Unit;
 pub struct Kind {
     /// Name in files, results and messages.
     pub name: &'static str,
-    /// Count of numbers that a row measures, at most three.
+    /// Number of scalars that a row measures, at most three.
     pub numbers: usize,
-    /// Unit of these numbers: a length, an angle or pixels.
+    /// Unit of these scalars: a length, an angle or pixels.
     pub unit: Unit,
-    /// Parts of the scene that predict a row.
+    /// Parts of the scene from which a row is predicted.
     pub needs: Needs,
-    /// Columns of a row: first those that name what it is measured against, then its numbers.
+    /// Columns of a row: first those that name its fixtures or frame, then its measured numbers.
     pub fields: &'static [Field],
     /// Declaration in `problem.toml` that gives the columns their meaning; empty if none is needed.
     pub declared_by: &'static str,
-    /// Noun for the numbers that a row lacks, in messages.
+    /// Noun for the numbers that an unmeasured row lacks, in messages.
     pub lacking: &'static str,
     /// Group and columns of the residuals in tables of results.
     pub residuals: (&'static str, &'static [&'static str]),
@@ -27,7 +27,7 @@ pub struct Kind {
     pub row: (&'static str, &'static str),
     /// Plural noun for the measured quantities, in messages.
     pub measured: &'static str,
-    /// Entries of the table to check if the model misses all rows of this kind.
+    /// Columns and declarations to check if the model misfits all rows of this kind.
     pub suspects: &'static str,
 }
 
@@ -47,9 +47,9 @@ pub struct Field {
 /// Type of the cells of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Content {
-    /// Name of a fixture, declared in the table of the column's name.
+    /// Name of a fixture; the table with the column's name declares it.
     Fixture,
-    /// Number of a point of the fixture before it, from 0.
+    /// Number of a point of the fixture in the preceding column, counted from 0.
     Index,
     /// Name of a frame of the arm; the tool's frame if the cell is empty.
     Frame,
@@ -59,16 +59,16 @@ pub enum Content {
     Positive(Unit),
 }
 
-/// Parts of a [`Scene`](super::Scene) that predict a row.
+/// Parts of a [`Scene`](super::Scene) from which a row is predicted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Needs {
-    /// Fixtures alone: the arm's configuration has no part in the prediction.
+    /// Fixtures alone: the prediction does not depend on the arm's configuration.
     Fixtures,
     /// Target, base and fixtures.
     Target,
     /// Frame of the arm and gravity.
     Frame,
-    /// Fixtures, the frames that carry them, and a point of the second one.
+    /// Fixtures, the frames that carry them, and a point of the second fixture.
     Carriers,
 }
 
@@ -78,7 +78,7 @@ impl Kind {
         self.fields.iter().find(|field| field.name == name)
     }
 
-    /// Returns the columns that name what a row is measured against.
+    /// Returns the columns that name the fixtures or the frame of a row.
     pub fn references(&self) -> impl Iterator<Item = &'static Field> + use<> {
         self.fields.iter().filter(|field| field.unit().is_none())
     }

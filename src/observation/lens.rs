@@ -1,4 +1,4 @@
-//! Lenses of cameras: bending of rays and its inverse.
+//! Lenses of cameras: distortion and its inverse.
 
 use nalgebra::{Matrix2, Vector2};
 use num_dual::DualSVec64;
@@ -6,14 +6,15 @@ use num_dual::DualSVec64;
 use super::{FixtureKind, FixtureValues};
 use crate::scalar::{Scalar, gradient, seeded};
 
-/// Smallest squared sine of the angle between a ray and the optical axis for which the angle is
-/// computed; below it, the ratio of angle and tangent is 1.
+/// Smallest squared slope (tangent squared) of a ray relative to the optical axis for which its
+/// angle is computed. Below it, angle and tangent are equal to rounding.
 const MIN_SQUARED_SLOPE: f64 = 1e-20;
 
-/// Count of Newton steps that invert the distortion.
+/// Number of Newton steps that invert the distortion.
 const NEWTON_STEPS: usize = 20;
 
-/// Returns the slopes (x′, y′) of a ray with slopes (x, y) behind the lens, with r² = x² + y².
+/// Returns the distorted slopes (x′, y′) of a ray that enters the lens with slopes (x, y) = (X/Z,
+/// Y/Z), with r² = x² + y².
 ///
 /// Pinhole [Brown 1971; Conrady 1919]: x′ = x (1 + k₁r² + k₂r⁴ + k₃r⁶) + 2 p₁xy + p₂(r² + 2x²),
 /// y′ = y (1 + k₁r² + k₂r⁴ + k₃r⁶) + p₁(r² + 2y²) + 2 p₂xy. Equidistant lens

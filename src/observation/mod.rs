@@ -1,9 +1,9 @@
-//! Kinds of measured rows: for each one file with its columns, units and words, and its prediction,
+//! Kinds of measured rows: one file each, with its columns, units and words, and its prediction,
 //! generic over the scalar.
 //!
-//! A new sensor takes a file with a `KIND` and a `predict`, and a line in the table below. What a
-//! prediction may use is a [`Scene`]; the model fills it in, and follows its derivatives back to
-//! the free parameters.
+//! A new sensor needs a file with a `KIND` and a `predict`, and a line in the table below. A
+//! prediction uses only a [`Scene`], which the model fills in. The model then propagates its
+//! derivatives to the free parameters.
 
 mod distance;
 mod fixture;
@@ -42,14 +42,15 @@ pub struct Slopes {
     pub by_fixtures: [SMatrix<f64, 3, MAX_NUMBERS>; 2],
 }
 
-/// Count of inputs before those of the fixtures: position of the target 3, rotation of the base 3.
+/// Number of scalars before those of the fixtures: position of the target 3, rotation of the base
+/// 3.
 const INPUTS_BEFORE_FIXTURES: usize = 6;
-/// Count of inputs of a prediction with two fixtures of at most four numbers.
+/// Number of input scalars of a prediction with two fixtures of at most four numbers.
 const INPUTS: usize = INPUTS_BEFORE_FIXTURES + 8;
-/// Count of inputs of a prediction with two fixtures of any kind.
+/// Number of input scalars of a prediction with two fixtures of any kind.
 const ALL_INPUTS: usize = INPUTS_BEFORE_FIXTURES + 2 * MAX_NUMBERS;
 
-/// Declares [`Observation`] and hands each variant on to the file of its kind.
+/// Declares [`Observation`] and forwards each variant to the file of its kind.
 macro_rules! observations {
     ($($(#[$doc:meta])* $variant:ident $(($($index:ident: $type:ty),+))? => $kind:ident,)+) => {
         /// Quantity measured by a row. Fixtures are counted in the order of
@@ -59,7 +60,7 @@ macro_rules! observations {
             $($(#[$doc])* $variant $(($($type),+))?,)+
         }
 
-        /// Every kind of rows, in the order of [`Observation`].
+        /// All kinds of rows, in the order of [`Observation`].
         const KINDS: &[&Kind] = &[$(&$kind::KIND),+];
 
         impl Observation {
@@ -84,7 +85,7 @@ macro_rules! observations {
                 None
             }
 
-            /// Returns the indices that the variant carries.
+            /// Returns the indices that the variant contains, in order; `None` for missing ones.
             fn indices(self) -> [Option<usize>; 3] {
                 match self {
                     $(Self::$variant $(($($index),+))? => padded(&[$($($index as usize),+)?]),)+
@@ -107,14 +108,14 @@ observations! {
     /// Tilts of the x and the y axis of a frame against the horizontal. Frame 0 is the arm's base,
     /// frame i that of joint i.
     Tilt(frame: usize) => tilt,
-    /// Known distance between two points, without the arm. Two narrow indices take the space of
-    /// one.
+    /// Known distance between two points, independent of the arm. The narrow integers keep the enum
+    /// small.
     Between(first: u32, second: u32) => known_distance,
     /// Pixel of a numbered point of a marker in the image of a camera.
     Pixel(camera: u32, marker: u32, point: u32) => pixel,
 }
 
-/// Returns some indices as a list of three.
+/// Returns up to three indices, padded with `None`.
 fn padded(indices: &[usize]) -> [Option<usize>; 3] {
     std::array::from_fn(|k| indices.get(k).copied())
 }
@@ -124,7 +125,7 @@ pub(crate) fn kind_named(name: &str) -> &'static Kind {
     kinds().find(|kind| kind.name == name).unwrap_or(&position::KIND)
 }
 
-/// Returns every kind of rows, in the order of [`Observation`].
+/// Returns all kinds of rows, in the order of [`Observation`].
 pub(crate) fn kinds() -> impl Iterator<Item = &'static Kind> {
     KINDS.iter().copied()
 }
@@ -135,13 +136,13 @@ pub(crate) fn fields() -> impl Iterator<Item = &'static Field> {
 }
 
 impl Observation {
-    /// Returns the columns that name what the row is measured against, with the index of each.
+    /// Returns the columns that name the row's fixtures or frame, each with its index.
     pub(crate) fn references(self) -> impl Iterator<Item = (&'static Field, usize)> {
         let fields = self.description().references();
         fields.zip(self.indices()).filter_map(|(field, index)| Some((field, index?)))
     }
 
-    /// Returns the count of numbers that a row measures, without an orientation.
+    /// Returns the number of scalars that a row measures, without an orientation.
     pub fn coordinates(self) -> usize {
         self.description().numbers
     }
@@ -172,7 +173,7 @@ impl Observation {
         self.indices()[2]
     }
 
-    /// Returns numbers that differ for any two observations that differ.
+    /// Returns a sort key: numbers that are equal for equal observations only.
     pub(crate) fn key(self) -> [usize; 4] {
         let kind = kinds().take_while(|kind| kind.name != self.kind()).count();
         let [first, second, third] = self.indices().map(|index| index.map_or(0, |index| index + 1));
@@ -184,8 +185,8 @@ impl Observation {
         self.is_of_arm() && self.description().unit == Unit::Length
     }
 
-    /// Returns true if the spread of the measured numbers shows how much the arm moves: distances
-    /// to fixtures do not, positions and tilts do.
+    /// Returns true if the spread of the measured numbers shows how far the arm moves. This holds
+    /// for positions and tilts, but not for distances to fixtures.
     pub(crate) fn is_measured_directly(self) -> bool {
         self.is_position() || self.description().needs != Needs::Target
     }
@@ -195,13 +196,13 @@ impl Observation {
         self == Self::Position
     }
 
-    /// Returns true if the target touches a point. The residual is resolved in the axes of the
-    /// arm's base: then it does not depend on where arm and point stand together.
+    /// Returns true if the target touches a point. Its residual is resolved in the axes of the
+    /// arm's base, so that it does not depend on the pose of arm and point together.
     pub fn is_point(self) -> bool {
         matches!(self, Self::Point(_))
     }
 
-    /// Returns true if the arm's configuration has a part in the prediction.
+    /// Returns true if the prediction depends on the arm's configuration.
     pub fn is_of_arm(self) -> bool {
         self.description().needs != Needs::Fixtures
     }

@@ -6,10 +6,10 @@ use super::FixtureValues;
 use crate::scalar::Scalar;
 use crate::spatial::Frame;
 
-/// Quantities that predict a row: measuring frame, except where stated.
+/// Quantities from which a row is predicted, in the measuring frame unless stated otherwise.
 #[derive(Debug, Clone, Copy)]
 pub struct Scene<S> {
-    /// Position of the target \[m\]; for positions as the instrument reads it.
+    /// Position of the target \[m\]. For position rows it is the reading of the instrument.
     pub target: Vector3<S>,
     /// Axes of the arm's base.
     pub base: [Vector3<S>; 3],
@@ -40,7 +40,8 @@ impl<S: Scalar> Default for Scene<S> {
     }
 }
 
-/// Squared length added under the root, so that a length of 0 has a derivative \[m²\].
+/// Squared length that is added under the square root, so that a length of 0 has a derivative
+/// \[m²\].
 const MIN_SQUARED_LENGTH: f64 = 1e-24;
 
 /// Returns the length of a vector, with a derivative of 0 at length 0.

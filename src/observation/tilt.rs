@@ -25,7 +25,7 @@ pub(super) const KIND: Kind = Kind {
     suspects: "the names in the column frame",
 };
 
-/// Smallest squared cosine of a tilt, so that a tilt of a right angle has a derivative.
+/// Smallest squared cosine of a tilt in the derivative, so that a tilt of 90° has one.
 const MIN_SQUARED_COSINE: f64 = 1e-18;
 
 /// Predicts the angles τ of the frame's x and y axes above the horizontal \[rad\]: sin τ = a·u for

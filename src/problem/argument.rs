@@ -6,16 +6,17 @@ use crate::error::{InputError, InputErrorKind};
 use crate::laws::{Argument, ArgumentKind, quoted};
 use crate::quantity::Unit;
 
-/// Most orders of one effect.
+/// Maximum number of harmonic orders of one effect.
 const MAX_ORDERS: usize = 100;
-/// Highest order of a wave: beyond it commands to a hundredth of a degree determine no phase.
+/// Highest order of a wave. At higher orders, commands known to a hundredth of a degree determine
+/// no phase.
 pub(crate) const HIGHEST_ORDER: f64 = 1e4;
 
 /// Reader of the arguments of one effect, one after the other.
 pub(crate) struct Reader<'s, 'a, 'i> {
     pub section: Section<'a, 'i>,
     joints: &'s [Joint],
-    /// The joint that was read last.
+    /// Number of the joint that was read last.
     last: Option<usize>,
 }
 
@@ -24,10 +25,11 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         Self { section, joints, last: None }
     }
 
-    /// Reads the argument of a kind behind its key, which ends in the unit where it has one.
+    /// Reads the argument with a `key`, which ends in the suffix of its unit if it has one.
     ///
     /// # Errors
-    /// The argument is missing, or the arm has no such place.
+    /// Returns an error if the argument is missing, or if the arm lacks the joint, beam or
+    /// covariate that it names.
     pub fn read(&mut self, key: &str, kind: ArgumentKind) -> Result<Argument, InputError> {
         let turns = |kind| kind == JointKind::Revolute;
         match kind {
@@ -76,7 +78,7 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         Ok(joint)
     }
 
-    /// Reads the number of a joint that takes a command and is of a kind.
+    /// Reads the number of a joint that takes a command and whose kind satisfies `is_it`.
     fn joint_of(
         &mut self,
         key: &str,
@@ -100,7 +102,7 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         Ok(Argument::Joint(joint))
     }
 
-    /// Reads a joint that takes a command, or else `base = true`.
+    /// Reads the place where an effect is mounted: a joint that takes a command, or `base = true`.
     fn mount(&mut self, key: &str) -> Result<Argument, InputError> {
         match self.section.get("base") {
             Some(item) if !item.boolean()? || self.section.peek(key).is_some() => {
@@ -111,7 +113,7 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         }
     }
 
-    /// Reads the name of a covariate; whether there is one is checked when the data are read.
+    /// Reads the name of a covariate. Its existence is checked when the data are read.
     fn covariate(&mut self, key: &str) -> Result<Argument, InputError> {
         let item = self
             .section
@@ -132,7 +134,7 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         }
     }
 
-    /// Reads orders of harmonics, at least one, each once.
+    /// Reads the orders of harmonics: at least one, without duplicates.
     fn orders(&mut self, key: &str) -> Result<Argument, InputError> {
         let item = self.section.require(key, &format!("{key} = [1], the harmonics"))?;
         let mut orders = Vec::new();
@@ -151,7 +153,7 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
         Ok(Argument::Orders(orders))
     }
 
-    /// Reads the order of a wave, above zero: cycles a revolution.
+    /// Reads the order of a wave in cycles per revolution, which must be above zero.
     fn order(&mut self, key: &str) -> Result<Argument, InputError> {
         let item = self.section.require(key, &format!("{key} = 7.5, cycles a revolution"))?;
         let order = item.number()?;
@@ -178,7 +180,8 @@ impl<'s, 'a, 'i> Reader<'s, 'a, 'i> {
             .ok_or_else(|| self.section.missing(base, unit.alternatives(base)))
     }
 
-    /// Reads an end of a spring, x and y in the plane across the axis, off the axis.
+    /// Reads the end point of a spring: x and y in the plane normal to the joint's axis, not on the
+    /// axis.
     fn point(&mut self, key: &str) -> Result<Argument, InputError> {
         let base = without_suffix(key, Unit::Length);
         let Some((item, suffix)) = self.section.quantity(base, Unit::Length)? else {
@@ -208,7 +211,7 @@ fn without_suffix(key: &str, unit: Unit) -> &str {
 }
 
 impl ArgumentKind {
-    /// Returns an argument of this kind that the arm of `problem` may have, as TOML writes it.
+    /// Returns an example argument of this kind for the arm of `problem`, in TOML syntax.
     pub(super) fn example(self, problem: &Problem) -> String {
         let joints = &problem.joints;
         let moving = || {

@@ -10,8 +10,8 @@ use super::{
 use crate::error::{InputError, InputErrorKind, Warning};
 use crate::quantity::Unit;
 
-/// Reads all `[[joint]]` tables, at least one. The flag is true if they use the standard DH form.
-/// Implausible values are added to `warnings`.
+/// Reads all `[[joint]]` tables, at least one. The returned flag is true if they use the standard
+/// DH form. Implausible values are added to `warnings`.
 pub(super) fn joints(
     root: &mut Section<'_, '_>,
     warnings: &mut Vec<Warning>,
@@ -224,7 +224,8 @@ fn hoist(mut section: Section<'_, '_>) -> Result<Hoist, InputError> {
     Ok(Hoist { at, force, direction })
 }
 
-/// Reads point masses; `base` is the key of their position.
+/// Reads the point masses under `key`; `base` is the key of a mass's position without its unit
+/// suffix.
 fn bodies(
     section: &mut Section<'_, '_>,
     key: &str,
@@ -249,7 +250,7 @@ fn bodies(
     Ok(bodies)
 }
 
-/// Reads an optional stiffness or rigidity, which must be above zero.
+/// Reads an optional stiffness or rigidity, which must be above zero \[SI\].
 fn stiff(section: &mut Section<'_, '_>, base: &str, unit: Unit) -> Result<Option<f64>, InputError> {
     section.positive(base, unit, |value| InputErrorKind::StiffnessNotPositive { value })
 }

@@ -1,4 +1,4 @@
-//! Reader of `[[camera]]` and `[[marker]]`: cameras and what they see.
+//! Reader of `[[camera]]` and `[[marker]]`: cameras and the markers that they observe.
 
 use nalgebra::Vector3;
 

@@ -82,8 +82,8 @@ impl PoseView<'_> {
 }
 
 impl PoseConditions {
-    /// Appends this pose to the past of the next one. All poses of a past must have a temperature
-    /// or none; the same holds for approach directions.
+    /// Appends this pose to the past of the next one. Either all poses of a past have a temperature
+    /// or none has; the same holds for approach directions.
     pub(crate) fn append_to(&self, past: &mut Past) {
         past.times.push(self.time);
         past.temperatures.extend(self.temperature);
@@ -108,7 +108,7 @@ impl PoseConditions {
     }
 }
 
-/// Ranges from which poses are drawn uniformly and independently.
+/// Ranges of configurations and conditions from which poses are drawn uniformly and independently.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PoseRanges {
     /// Range of each joint, shape = (joints) \[rad\] or \[m\]; ranges of fixed joints are ignored.

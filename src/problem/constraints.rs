@@ -14,7 +14,7 @@ pub struct Constraint {
     pub at_least: Option<Limit>,
     /// Upper limit of the sum.
     pub at_most: Option<Limit>,
-    /// Place in the file, for errors.
+    /// Location in the file, for errors.
     pub location: Location,
 }
 
@@ -25,7 +25,7 @@ pub struct ConstraintTerm {
     pub name: String,
     /// Coefficient of the parameter, not zero.
     pub coefficient: f64,
-    /// Place in the file, for errors.
+    /// Location in the file, for errors.
     pub location: Location,
 }
 
@@ -36,7 +36,7 @@ pub struct Limit {
     pub value: f64,
     /// Kind of quantity that the constraint adds up.
     pub kind: LimitKind,
-    /// Place in the file, for errors.
+    /// Location in the file, for errors.
     pub location: Location,
 }
 

@@ -28,7 +28,8 @@ pub struct Data {
     /// Standard deviations of other kinds of rows by their name \[m\] or \[rad\]. Tilts are not
     /// read without one.
     pub kind_sigmas: BTreeMap<&'static str, f64>,
-    /// Rows that take no part in fitting or choosing effects; `None` if the file does not say.
+    /// Selection of rows that take no part in fitting or choosing effects; `None` if the file
+    /// states none.
     pub held_out: Option<HeldOut>,
     /// Reference temperature T₀ [°C].
     pub reference_temperature: Option<f64>,
@@ -93,7 +94,7 @@ impl Data {
 
 impl Problem {
     /// Returns the declared standard deviation of a number that a row measures \[m\], \[rad\] or
-    /// \[px\].
+    /// \[px\], also if a camera declares it.
     pub(crate) fn sigma_of(&self, observation: Observation) -> Option<f64> {
         let mut fixtures = observation.fixtures().into_iter().flatten();
         let of_fixture = fixtures.find_map(|fixture| self.fixtures.get(fixture)?.sigma);

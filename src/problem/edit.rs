@@ -1,4 +1,4 @@
-//! Edits of the text of a problem file; all else stays as written, comments included.
+//! Edits of the text of a problem file. Everything else, including comments, is unchanged.
 
 use std::path::PathBuf;
 
@@ -8,13 +8,14 @@ use toml_edit::{
 
 use super::{Argument, Effect};
 
-/// Replaces the `declared` effects of the text by the `closed` ones, each with comments.
+/// Replaces the `declared` effects of the text by the `closed` ones (declared and found), each with
+/// comments.
 ///
-/// The `closed` effects begin with the declared ones in their order, to which at most harmonics are
-/// added. `files` are the measurements and the joint tables.
+/// The `closed` effects begin with the declared ones in their order, possibly with more harmonics.
+/// `files` are the new names of measurements and joint tables.
 ///
 /// # Errors
-/// The text is not TOML.
+/// Returns an error if the text is not TOML.
 pub(crate) fn with_effects(
     text: &str,
     declared: &[Effect],
@@ -38,7 +39,7 @@ pub(crate) fn with_effects(
     Ok(document.to_string())
 }
 
-/// Replaces the names of the data files.
+/// Replaces the list of data files in a table.
 fn name_files(data: &mut dyn TableLike, files: &[PathBuf]) {
     let slashes = |file: &PathBuf| file.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
     let mut names = Value::Array(files.iter().map(slashes).collect());
@@ -51,7 +52,7 @@ fn name_files(data: &mut dyn TableLike, files: &[PathBuf]) {
     }
 }
 
-/// Appends an effect below its comments.
+/// Appends an effect to the document, below its comments.
 fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     let lines: String = comments.iter().flat_map(|line| ["# ", line, "\n"]).collect();
     if let Some(Item::Value(Value::Array(known))) = document.get_mut("effect") {
@@ -76,7 +77,7 @@ fn add(document: &mut DocumentMut, effect: &Effect, comments: &[String]) {
     }
 }
 
-/// Returns the last position in the file of the tables of an item.
+/// Returns the last position in the document of the tables of an item.
 fn last_position(item: &Item) -> isize {
     let of_table = |table: &Table| {
         let below = table.iter().map(|(_, item)| last_position(item)).max();
@@ -89,7 +90,7 @@ fn last_position(item: &Item) -> isize {
     }
 }
 
-/// Replaces the arguments of the effect that was declared as number `k`.
+/// Replaces the arguments of the declared effect with index `k` by those of `effect`.
 fn replace(document: &mut DocumentMut, k: usize, effect: &Effect) {
     let declared: Option<&mut dyn TableLike> = match document.get_mut("effect") {
         Some(Item::ArrayOfTables(tables)) => {
@@ -106,7 +107,7 @@ fn replace(document: &mut DocumentMut, k: usize, effect: &Effect) {
     }
 }
 
-/// Returns the arguments of an effect, `true` if it has none.
+/// Returns the arguments of an effect as a TOML value; `true` if it has none.
 fn arguments(effect: &Effect) -> Value {
     let arguments = effect.arguments();
     if arguments.is_empty() {
@@ -119,11 +120,11 @@ fn arguments(effect: &Effect) -> Value {
     Value::InlineTable(arguments.into_iter().filter_map(value).collect())
 }
 
-/// Adds rules to the end of `[parameters]`: the pattern of each with its 1 σ \[rad\]; `comment`
-/// stands above the first.
+/// Adds rules to the end of `[parameters]`: pairs of pattern and 1 σ \[rad\]; `comment` precedes
+/// the first.
 ///
 /// # Errors
-/// The text is not TOML.
+/// Returns an error if the text is not TOML.
 pub(crate) fn with_rules(
     text: &str,
     rules: &[(String, f64)],
@@ -149,11 +150,11 @@ pub(crate) fn with_rules(
     Ok(document.to_string())
 }
 
-/// Returns the `text` of a closed problem that declares the remainder in `file`, beside it; without
-/// a file it declares none.
+/// Returns the `text` of a closed problem with a `[remainder]` that names `file`, in the same
+/// folder. Without a file, an existing declaration is removed.
 ///
 /// # Errors
-/// The text is not TOML.
+/// Returns an error if the text is not TOML.
 pub fn with_remainder(text: &str, file: Option<&str>) -> Result<String, TomlError> {
     let mut document: DocumentMut = text.parse()?;
     document.remove("remainder");

@@ -5,20 +5,21 @@ use crate::error::{InputErrorKind, Location};
 pub(crate) use crate::laws::NAMES;
 use crate::laws::{At, Effect, FAMILIES, JointField, LAW, Only, declaration};
 
-/// One `[[effect]]` and its place in the file.
+/// Declared `[[effect]]` with its location in the file.
 #[derive(Debug, Clone)]
 pub struct EffectDeclaration {
-    /// The effect.
+    /// Effect with its arguments.
     pub effect: Effect,
-    /// Its place, for errors.
+    /// Location in the file, for errors.
     pub location: Location,
 }
 
-/// Declaration of a law.
+/// Example of the declaration of a law.
 const LAW_EXAMPLE: &str =
     "law = { name = \"wobble\", at = \"joint1\", terms = [\"sin(2*q1)\"], sigma_deg = 0.05 }";
 
-/// Returns a declaration of the effect of that name on an arm: `gear-ratio = { joint = 1 }`.
+/// Returns an example declaration of the effect called `name` on this arm, such as `gear-ratio = {
+/// joint = 1 }`.
 pub(crate) fn example(name: &str, problem: &Problem) -> String {
     if name == LAW {
         return LAW_EXAMPLE.to_owned();
@@ -31,8 +32,8 @@ pub(crate) fn example(name: &str, problem: &Problem) -> String {
 }
 
 impl Effect {
-    /// Returns the reason why it could never act on this arm: the declared model has it already, or
-    /// has nothing for it to act on.
+    /// Returns the reason why the effect cannot act on this arm; `None` if it can. Either the
+    /// declared model contains it already, or the arm or data lack what it acts on.
     pub(crate) fn refusal(
         &self,
         statics: Statics,
@@ -53,7 +54,8 @@ impl Effect {
         })
     }
 
-    /// Returns the mistake of a condition of the arm that is not met.
+    /// Returns the error of a condition on the arm that the effect requires; `None` if the arm
+    /// meets it.
     fn unmet(&self, only: Only, statics: Statics, joints: &[Joint]) -> Option<InputErrorKind> {
         match only {
             Only::Link => {
@@ -72,14 +74,15 @@ impl Effect {
         }
     }
 
-    /// Returns true if it makes a joint, from 1, turn by a moment about its axis.
+    /// Returns true if the effect lets a joint, counted from 1, rotate under a moment about its
+    /// axis.
     pub(super) fn gives_way(&self, joint: usize) -> bool {
         self.joint() == Some(joint) && self.acts_at(At::Joint(JointField::Compliance))
     }
 }
 
 impl Problem {
-    /// Returns for each joint whether it slides.
+    /// Returns true for each prismatic joint.
     pub(crate) fn slides(&self) -> Vec<bool> {
         self.joints.iter().map(|joint| joint.kind == JointKind::Prismatic).collect()
     }

@@ -1,4 +1,4 @@
-//! The tables `[[effect]]`: one effect each, with its arguments.
+//! Reader of the tables `[[effect]]`: one effect each, with its arguments.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use super::{Data, Effect, EffectDeclaration, Joint, Problem, Statics};
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::laws::{Argument, FAMILIES, LAW, NAMES};
 
-/// Every `[[effect]]`.
+/// Reads all `[[effect]]` tables.
 pub(super) fn read(
     root: &mut Section<'_, '_>,
     joints: &[Joint],
@@ -39,7 +39,7 @@ pub(super) fn read(
     Ok(effects)
 }
 
-/// Refuses what could never act on this arm.
+/// Returns an error if an effect could never act on this arm.
 pub(super) fn check(
     effects: &[EffectDeclaration],
     statics: Statics,
@@ -50,7 +50,7 @@ pub(super) fn check(
     check_compensators(effects, joints)
 }
 
-/// Refuses one that could never act, whatever else is declared.
+/// Returns an error if an effect could never act on this arm, regardless of other effects.
 fn check_alone(
     EffectDeclaration { effect, location }: &EffectDeclaration,
     statics: Statics,
@@ -60,8 +60,8 @@ fn check_alone(
     effect.refusal(statics, joints, data).map_or(Ok(()), |kind| Err(location.clone().error(kind)))
 }
 
-/// Refuses a compensator where nothing gives way about the joint's axis, and a second one of one
-/// joint.
+/// Returns an error for a gravity compensator at a joint that does not rotate under a moment, and
+/// for a second compensator of a joint.
 fn check_compensators(effects: &[EffectDeclaration], joints: &[Joint]) -> Result<(), InputError> {
     for (k, EffectDeclaration { effect, location }) in effects.iter().enumerate() {
         let Some(joint) = effect.compensated() else { continue };
@@ -80,8 +80,8 @@ fn check_compensators(effects: &[EffectDeclaration], joints: &[Joint]) -> Result
     Ok(())
 }
 
-/// Whether a joint, counted from 1, turns by a moment about its axis: it has a stiffness, or one of
-/// these effects makes it compliant.
+/// Returns true if a joint, counted from 1, rotates under a moment about its axis: it has a
+/// stiffness, or one of `effects` makes it compliant.
 pub(crate) fn gives_way<'e>(
     joint: usize,
     joints: &[Joint],
@@ -91,8 +91,8 @@ pub(crate) fn gives_way<'e>(
     stiff || effects.any(|effect| effect.gives_way(joint))
 }
 
-/// One effect written as in a problem file, its `[[effect]]` left out: `gear-ratio = { joint = 3
-/// }`; `hoist-force` alone stands for `hoist-force = true`.
+/// Parses one effect as in a problem file, without its `[[effect]]`: `gear-ratio = { joint = 3 }`.
+/// A name alone, such as `hoist-force`, is short for `hoist-force = true`.
 pub(super) fn parse(
     text: &str,
     named: &Path,
@@ -146,7 +146,7 @@ fn declared(
     if name == LAW { law::read(item.section()?, joints, data) } else { effect(name, item, joints) }
 }
 
-/// Reads an effect of the catalogue; `true` stands for no arguments.
+/// Reads an effect of the catalogue; the value `true` means no arguments.
 pub(crate) fn effect(
     name: &str,
     item: &Item<'_, '_>,

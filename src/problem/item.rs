@@ -95,8 +95,8 @@ impl<'a, 'i> Item<'a, 'i> {
         self.location().error(kind)
     }
 
-    /// Returns the error for a lower limit (this value) above the upper limit `upper`. The message
-    /// quotes both entries.
+    /// Returns the error that this value, a lower limit, is above the upper limit `upper`. The
+    /// message quotes both entries.
     pub fn above(&self, upper: &Self) -> InputError {
         let written = |item: &Self| {
             item.document
@@ -180,7 +180,8 @@ impl<'a, 'i> Item<'a, 'i> {
             .ok_or_else(|| self.error(InputErrorKind::TooLarge { value: number, most: 1000 }))
     }
 
-    /// Returns an error if `found` exceeds the maximum `most`; `what` names the counted items.
+    /// Returns an error if the number `found` exceeds the maximum `most`; `what` names the counted
+    /// items in the message.
     pub fn check_count(
         &self,
         what: &'static str,
@@ -214,7 +215,8 @@ impl<'a, 'i> Item<'a, 'i> {
         self.value.as_str().ok_or_else(|| self.wrong_type("text in quotes"))
     }
 
-    /// Returns the elements of a list; their keys count from 1.
+    /// Returns the elements of a list; their keys are numbers from 1. `expected` describes the list
+    /// in the error.
     pub fn list(&self, expected: &'static str) -> Result<Vec<Self>, InputError> {
         let array = self.value.as_array().ok_or_else(|| self.wrong_type(expected))?;
         let element = |(index, value): (usize, &'a Spanned<DeValue<'i>>)| Self {

@@ -59,7 +59,7 @@ impl Joint {
     }
 }
 
-/// Transform `xyz_m` and `rpy_deg` of a fixed joint in URDF convention: Txyz Rz(yaw) Ry(pitch)
+/// Transform `xyz_m` and `rpy_deg` of a fixed joint, in URDF convention: Txyz Rz(yaw) Ry(pitch)
 /// Rx(roll).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {

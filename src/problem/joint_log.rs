@@ -21,11 +21,11 @@ pub struct JointLog {
 /// Rule that pairs the rows of two tables.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum JoinRule {
-    /// Rows with the same word in the column `pose`.
+    /// Pairs rows with the same word in the column `pose`.
     Name,
-    /// The k-th row of one table with the k-th row of the other.
+    /// Pairs the k-th row of one table with the k-th row of the other.
     Order,
-    /// Rows nearest in time, at most `tolerance` apart \[s\].
+    /// Pairs each row with the one nearest in time, at most `tolerance` apart \[s\].
     Time {
         /// Maximum time between two paired rows \[s\].
         tolerance: f64,

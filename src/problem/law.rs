@@ -1,4 +1,4 @@
-//! Declared laws: `law = { name, at, terms, sigma_…, parameters }`.
+//! Reader of declared laws: `law = { name, at, terms, sigma_…, parameters }`.
 
 use super::item::Item;
 use super::section::Section;
@@ -8,14 +8,14 @@ use crate::laws::expression::{FormulaError, Vocabulary};
 use crate::laws::{At, BeamField, Effect, Law, LawParameter, LawPrior, LawSite, Quantity};
 use crate::quantity::Unit;
 
-/// Most terms of one law.
+/// Maximum number of terms of one law.
 const MAX_TERMS: usize = 50;
-/// Most parameters inside of the formulas of one law.
+/// Maximum number of parameters inside the formulas of one law.
 const MAX_PARAMETERS: usize = 20;
-/// Keys of a law that are no parameters; the prior has the suffix of its unit besides.
+/// Keys of a law other than the prior, whose key has a unit suffix.
 const KEYS: [&str; 3] = ["name", "at", "terms"];
 
-/// Reads a law that acts on an arm with these joints, where the data have these covariates.
+/// Reads a law for an arm with these joints and data with these covariates.
 pub(super) fn read(
     mut section: Section<'_, '_>,
     joints: &[Joint],
@@ -58,7 +58,8 @@ pub(super) fn read(
     Ok(Effect::Law(law))
 }
 
-/// Refuses a site at which the model has no room for the formulas.
+/// Returns an error if the law cannot act at its place: a fixed joint has no command, and a beam's
+/// strain must not depend on joint commands.
 fn check(law: &Law, at: &Item, joints: &[Joint]) -> Result<(), InputError> {
     let joint = law.joint();
     let declared = joint.and_then(|joint| joints.get(joint.wrapping_sub(1)));
@@ -79,7 +80,8 @@ fn check(law: &Law, at: &Item, joints: &[Joint]) -> Result<(), InputError> {
     }
 }
 
-/// Returns a name that is a word, which no pattern or bracket can be mistaken for.
+/// Returns a name that consists of word characters, so that it cannot be confused with a pattern or
+/// bracket. `noun` describes it in the error.
 fn word(item: &Item, text: &str, noun: &'static str) -> Result<String, InputError> {
     let is_word = text.chars().all(|c| c.is_alphanumeric() || c == '_' || c == '-');
     if is_word {
@@ -114,7 +116,7 @@ fn prior(section: &mut Section<'_, '_>, unit: Unit) -> Result<Option<LawPrior>, 
     }
 }
 
-/// Reads the parameters inside of the formulas: every table `k = { start, min, max, sigma }`.
+/// Reads the parameters inside the formulas: every table `k = { start, min, max, sigma }`.
 fn parameters(section: &mut Section<'_, '_>) -> Result<Vec<LawParameter>, InputError> {
     let mut parameters = Vec::new();
     for (key, item) in section.entries() {
@@ -155,7 +157,7 @@ fn parameters(section: &mut Section<'_, '_>) -> Result<Vec<LawParameter>, InputE
     Ok(parameters)
 }
 
-/// Reads the formulas, each with its place.
+/// Reads the formulas, each with its location.
 fn formulas<'a, 'i>(terms: &Item<'a, 'i>) -> Result<Vec<(Item<'a, 'i>, &'a str)>, InputError> {
     let elements = terms.list("a list of formulas in quotes")?;
     terms.check_count("terms", elements.len(), MAX_TERMS)?;
@@ -169,7 +171,7 @@ fn formulas<'a, 'i>(terms: &Item<'a, 'i>) -> Result<Vec<(Item<'a, 'i>, &'a str)>
     elements.into_iter().map(read).collect()
 }
 
-/// Returns the error of a formula at the place of the word that is meant.
+/// Returns the error of a formula, located at the part of the text that caused it.
 fn mistake(item: &Item, text: &str, error: FormulaError) -> InputError {
     let FormulaError { column, span, mistake } = error;
     let kind = InputErrorKind::Formula { column, mistake: mistake.to_string() };

@@ -85,7 +85,7 @@ pub struct Problem {
     pub title: String,
     /// Gravity in the arm's base frame [m/s²].
     pub gravity: Vector3<f64>,
-    /// Settings of the static loads.
+    /// Settings of the statics: shape in which loads act, and beam elements.
     #[doc(hidden)]
     pub statics: Statics,
     /// Joints from the base outwards, branch by branch. Joint `i` of the file is element `i − 1`.
@@ -100,7 +100,7 @@ pub struct Problem {
     /// Pose of the arm's base in the measuring frame.
     #[doc(hidden)]
     pub base: BasePose,
-    /// Links at both ends of the arm, if the problem was made from a URDF.
+    /// Names of the URDF links at both ends of the arm, if the problem was made from a URDF.
     #[doc(hidden)]
     pub urdf: Option<UrdfEnds>,
     /// Effects declared by the model.
@@ -126,7 +126,7 @@ pub struct Problem {
     pub robust: Option<Robust>,
     /// Warnings about implausible values of the arm.
     pub warnings: Vec<Warning>,
-    /// Correction of what no law explains, if one is declared.
+    /// Remainder (smooth correction of errors that no law explains), if one is declared.
     #[doc(hidden)]
     pub remainder: Option<RemainderDeclaration>,
 }
@@ -205,17 +205,17 @@ impl Problem {
     }
 }
 
-/// Section `[statics]`: settings of the static loads.
+/// Section `[statics]`: shape of the arm in which loads act, and discretisation of beams.
 #[doc(hidden)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Statics {
-    /// Arm shape in which the loads act.
+    /// Shape of the arm in which the loads act.
     pub equilibrium: Equilibrium,
     /// Number of closed-form elements per beam, at least 1.
     pub beam_elements: usize,
 }
 
-/// Arm shape in which the loads act.
+/// Shape of the arm in which the loads act.
 #[doc(hidden)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]

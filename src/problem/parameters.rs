@@ -5,10 +5,11 @@ use super::section::Section;
 use crate::error::{InputError, InputErrorKind, Location};
 use crate::quantity::Unit;
 
-/// Rule of `[parameters]`: a pattern of names and what holds for the matching parameters.
+/// Rule of `[parameters]`: a pattern of names, and freedom, prior and bounds of the matching
+/// parameters.
 #[derive(Debug, Clone)]
 pub struct ParameterRule {
-    /// Parameter name in which `*` stands for any run of characters.
+    /// Pattern of parameter names, in which `*` matches any run of characters.
     pub pattern: String,
     /// Freedom of the matching parameters.
     pub freedom: Freedom,
@@ -48,7 +49,7 @@ pub struct Quantities {
     pub relative: Option<f64>,
 }
 
-/// Maximum number of rules.
+/// Maximum number of rules in `[parameters]`.
 const MAX_RULES: usize = 2000;
 
 /// Maximum length of a pattern [bytes], which bounds the work of matching all parameters.

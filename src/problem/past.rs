@@ -98,8 +98,8 @@ impl fmt::Debug for LazyPast<'_> {
     }
 }
 
-/// Number of time constants or distances after which the past has no influence: exp(−36) is below
-/// double precision.
+/// Number of time constants or friction distances after which the past has no influence, because
+/// exp(−36) is below double precision.
 const MAX_MEMORY: f64 = 36.0;
 
 impl Past<&[f64]> {
@@ -160,8 +160,8 @@ impl Past<&[f64]> {
     }
 }
 
-/// Integrates a lagging temperature over the poses of a session in order; each call continues from
-/// the previous pose.
+/// Integrator of a lagged temperature over the poses of a session in order; each call continues
+/// from the previous pose.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ThermalLag {
     time_constant: f64,

@@ -1,6 +1,6 @@
 //! Patterns of parameter names.
 
-/// Returns true if `name` matches `pattern`, in which `*` stands for any run of characters.
+/// Returns true if `name` matches `pattern`, in which `*` matches any run of characters.
 pub(crate) fn matches(pattern: &str, name: &str) -> bool {
     let mut parts = pattern.split('*');
     let Some(mut rest) = parts.next().and_then(|first| name.strip_prefix(first)) else {

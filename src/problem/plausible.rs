@@ -7,7 +7,7 @@ use super::{Joint, JointKind, Problem};
 use crate::error::{Location, Warning, WarningKind};
 use crate::quantity::rounded_right_angle;
 
-/// Maximum plausible length of a row of the joint table \[m\].
+/// Largest plausible length in the joint table \[m\]. Longer ones are probably in millimetres.
 const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 /// Minimum number of rows in which the form of a table can be recognised.
 const MIN_ROWS: usize = 3;
@@ -43,8 +43,8 @@ pub(super) fn joint(section: &Section<'_, '_>) -> Vec<Warning> {
     warnings
 }
 
-/// Returns a warning if a table without the key `dh` has the zeros of a standard DH table: none in
-/// α of the first row, and both in α and a of the last.
+/// Returns a warning if a joint table without the key `dh` has the zeros of a standard DH table: α
+/// of the first row is not zero, and both α and a of the last row are.
 pub(super) fn form(joints: &[Joint]) -> Option<Warning> {
     let (first, last) = (joints.first()?, joints.last()?);
     let is_standard = joints.len() >= MIN_ROWS

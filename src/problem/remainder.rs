@@ -1,22 +1,22 @@
-//! `[remainder]`: a correction that was fitted beside the parameters.
+//! Reader of `[remainder]`: a correction that was fitted in addition to the parameters.
 
 use std::path::{Path, PathBuf};
 
 use super::section::Section;
 use crate::error::{InputError, Location};
 
-/// `[remainder]`.
+/// Section `[remainder]`: file of a fitted correction and its use.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RemainderDeclaration {
-    /// The remainder.json, already resolved against the problem's folder.
+    /// Path of the `remainder.json`, resolved against the problem's folder.
     pub file: PathBuf,
-    /// False where the file says `use = false`: predictions are left uncorrected.
+    /// False if the file says `use = false`, so that predictions are not corrected.
     pub is_used: bool,
-    /// Place of the file's name, for errors.
+    /// Location of the file's name, for errors.
     pub location: Location,
 }
 
-/// Reads the section, if it is there.
+/// Reads the section; returns `None` if it is absent.
 pub(super) fn read(root: &mut Section<'_, '_>) -> Result<Option<RemainderDeclaration>, InputError> {
     let problem = root.location().file;
     let Some(mut section) = root.section("remainder")? else { return Ok(None) };

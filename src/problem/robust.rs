@@ -1,9 +1,9 @@
-//! Reader of `[robust]`: loss of large residuals.
+//! Reader of `[robust]`: loss that limits the influence of large residuals.
 
 use super::section::Section;
 use crate::error::{InputError, InputErrorKind};
 
-/// Section `[robust]`: robust loss.
+/// Section `[robust]`: robust loss of the residual of a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Robust {
     /// Loss function of a residual.

@@ -93,7 +93,7 @@ impl<'a, 'i> Section<'a, 'i> {
         self.get(key).map(|item| item.text()).transpose()
     }
 
-    /// Returns the meaning of an optional word; `words[k]` stands for `meanings[k]`.
+    /// Returns the meaning of an optional word: `meanings[k]` if the value is `words[k]`.
     pub fn word<T: Copy>(
         &mut self,
         key: &str,
@@ -233,7 +233,7 @@ impl<'a, 'i> Item<'a, 'i> {
         Ok(self.section_of(table))
     }
 
-    /// Returns a section with the place of this item and another table.
+    /// Returns another table as a section with the location of this item.
     pub fn section_of(&self, table: &'a DeTable<'i>) -> Section<'a, 'i> {
         Section::new(self.document, self.key.clone(), self.span.clone(), table)
     }

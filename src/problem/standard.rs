@@ -8,8 +8,8 @@ use crate::spatial::Frame;
 /// Converts rows of standard DH, T = Rz(θ+q) Tz(d) Tx(a) Rx(α), to joints of modified DH.
 ///
 /// a and α of a row become those of the next joint, where Rx(α) Tx(a) = Tx(a) Rx(α) come first.
-/// Those of the last row belong to an added fixed joint. Bodies keep their places, and their frames
-/// are those previous a and α.
+/// Those of the last row belong to an added fixed joint. Bodies keep their physical positions;
+/// their coordinates change, because a body's frame no longer includes the row's a and α.
 pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
     let mut joints = Vec::with_capacity(rows.len() + 1);
     // Values of a and α in the previous row.
@@ -53,7 +53,7 @@ pub(super) fn modified(rows: Vec<Joint>) -> Vec<Joint> {
     joints
 }
 
-/// Returns the transform Tx(a) Rx(α).
+/// Returns the transform Tx(a) Rx(α) of a link.
 fn link((a, alpha): (f64, f64)) -> Frame<f64> {
     Frame::from_xyz_rpy(&Vector3::new(a, 0.0, 0.0), &Vector3::new(alpha, 0.0, 0.0))
 }

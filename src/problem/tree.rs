@@ -9,14 +9,15 @@ use crate::error::{InputError, InputErrorKind};
 /// Joints are listed branch by branch: all descendants of a joint follow it directly.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Tree {
-    /// Index after the last descendant of each joint; empty for a chain.
+    /// For each joint, the index after its last descendant; empty for a chain.
     ends: Vec<usize>,
-    /// Number of children after the first, of the base and then of each joint; empty for a chain.
+    /// For the base and then each joint, the number of children beyond the first; empty for a
+    /// chain.
     extra_children: Vec<usize>,
 }
 
 impl Tree {
-    /// Returns the tree of joints that each name their parent.
+    /// Creates the tree from the parents that the joints declare.
     pub fn from_joints(joints: &[Joint]) -> Self {
         let is_chain =
             joints.iter().enumerate().all(|(index, joint)| joint.parent == index.checked_sub(1));
