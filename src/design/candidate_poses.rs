@@ -11,23 +11,23 @@ use crate::measurement::{Labels, Measurements};
 use crate::problem::{JointKind, PoseRanges, Problem};
 use crate::random;
 
-/// Step of commanded angles [°].
+/// Resolution to which commanded angles are rounded [°].
 const ANGLE_STEP: f64 = 1e-4;
-/// Step of commanded lengths \[m\].
+/// Resolution to which commanded lengths are rounded \[m\].
 const LENGTH_STEP: f64 = 1e-6;
-/// Offset of the random stream of temperatures and covariates, which leaves the poses unchanged if
-/// these are added.
+/// Offset of the random stream of temperatures and covariates. A separate stream leaves the drawn
+/// poses unchanged if these quantities are added.
 const SETTINGS_STREAM: u64 = 1 << 32;
-/// Step of commanded forces \[N\] and temperatures [°C].
+/// Resolution to which commanded forces \[N\] and temperatures [°C] are rounded.
 const SETTING_STEP: f64 = 0.1;
 
-/// Frequency of poses at the ends of the ranges.
+/// Frequency of poses at the limits of the ranges.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Extremes {
     /// Every quantity is uniform within its range.
     No,
-    /// Every quantity is at one of its ends with probability one half.
+    /// Every quantity is at one of its limits with probability one half.
     Often,
 }
 
@@ -49,8 +49,8 @@ impl PoseRanges {
         Ok(Self { joints, ..Self::default() })
     }
 
-    /// Draws `count` poses. A larger count leaves the first poses unchanged. Quantities are
-    /// independent, targets alternate, and positions are zero.
+    /// Draws `count` poses from the ranges; positions are zero. A larger count leaves the first
+    /// poses unchanged. Quantities are independent, and targets alternate from row to row.
     #[doc(hidden)]
     pub fn draw(
         &self,
@@ -89,8 +89,8 @@ impl PoseRanges {
     }
 
     /// Returns each row of `poses` followed by `count` variations of it. A variation changes each
-    /// quantity with probability one half by up to `reach` times its range, and sometimes payload
-    /// or approach side.
+    /// quantity with probability one half by up to `reach` times its range, and sometimes changes
+    /// payload or approach side.
     pub(super) fn vary(
         &self,
         problem: &Problem,
@@ -139,24 +139,24 @@ impl PoseRanges {
     }
 }
 
-/// Pose before rounding to command steps.
+/// Drawn pose before rounding to command steps.
 #[derive(Clone)]
 struct Draft {
     /// Joint coordinates \[rad\] or \[m\].
     joints: Vec<f64>,
-    /// Position in the list of payloads, 0…1.
+    /// Position in the list of payloads, from 0 (first) to 1 (last).
     choice: f64,
     hoist: Option<f64>,
     temperature: Option<f64>,
     covariates: Vec<f64>,
-    /// True for each joint that approaches from above.
+    /// True for each joint that approaches its command from above.
     sides: Vec<bool>,
     /// Index of the measured target.
     target: usize,
 }
 
 impl Draft {
-    /// Recovers the draft of a row that was drawn from these ranges.
+    /// Recovers the unrounded draft of a row that was drawn from these ranges.
     fn of(ranges: &PoseRanges, poses: &Measurements, row: usize) -> Self {
         let in_row = |column: &Option<Vec<f64>>| column.as_ref().map(|values| values[row]);
         let index = in_row(&poses.payload).and_then(|mass| {
@@ -179,7 +179,7 @@ impl Draft {
     }
 }
 
-/// Table of poses in command steps.
+/// Table under construction of poses rounded to command steps.
 struct PoseTable<'a> {
     ranges: &'a PoseRanges,
     joints: usize,

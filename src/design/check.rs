@@ -14,11 +14,11 @@ use crate::select::{Detection, detectable};
 
 /// Number of poses at which predictions are evaluated.
 const PREDICTION_POSES: usize = 500;
-/// Length of the series that shows the benefit of more poses.
+/// Number of poses in the series that shows the benefit of additional poses.
 const SERIES_LENGTH: usize = 384;
-/// Minimum and maximum number of arms drawn from the priors.
+/// Smallest and largest number of arms drawn from the priors.
 const ARMS: (usize, usize) = (16, 200);
-/// Number of poses over all drawn arms, within the limits of [`ARMS`].
+/// Target for arms × poses, from which the number of arms follows within [`ARMS`].
 const ARM_POSES: usize = 20_000;
 /// Random stream of the drawn poses.
 const POSES: u64 = 0;
@@ -29,7 +29,7 @@ const ORDER: u64 = 11;
 /// Random stream of the drawn arms.
 const ARM: u64 = 12;
 
-/// Poses whose measurements are forecast.
+/// Poses whose results are forecast.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum CheckedPoses {
@@ -74,15 +74,15 @@ pub struct Check {
     /// Kind of measurement that has this noise: the first kind in the table that is a length
     /// ([`Observation::kind`]).
     pub noise_of: &'static str,
-    /// Forecasts for the first n poses of a series of such poses.
+    /// Forecasts for the first n poses of a longer series that continues the checked poses.
     pub(crate) growth: Growth,
     /// Effects of the catalogue that the poses would show, with their smallest detectable sizes.
     pub(crate) detection: Detection,
     /// Number of measured coordinates.
     pub coordinates: usize,
-    /// Number of measured coordinates over poses that differ from each other.
+    /// Number of measured coordinates, counting each distinct pose once.
     pub distinct: usize,
-    /// Number of poses that differ from each other.
+    /// Number of distinct poses.
     pub different: usize,
     /// Number of free parameters without a prior.
     pub without_prior: usize,
@@ -173,7 +173,7 @@ pub fn check(problem: &Problem, checked: &CheckedPoses, seed: u64) -> Result<Che
     })
 }
 
-/// Gives drawn poses the sessions and targets of a table, in the same proportions.
+/// Assigns sessions and targets to drawn poses, in the proportions of a table.
 fn measured_as(table: &Measurements, drawn: Measurements) -> Measurements {
     let spread = |words: &Labels| Labels {
         names: words.names.clone(),
@@ -188,7 +188,7 @@ fn measured_as(table: &Measurements, drawn: Measurements) -> Measurements {
 }
 
 impl Check {
-    /// Returns true if the poses determine all combinations that poses of their kind can, and
+    /// Returns true if the poses determine all combinations that such poses can determine, and
     /// measure at least as many coordinates as there are parameters without a prior.
     pub fn suffices(&self) -> bool {
         self.forecast.undetermined <= self.growth.undetermined
@@ -214,13 +214,14 @@ pub fn predictable_rows(data: &Dataset) -> Vec<usize> {
     split.held_out.iter().copied().filter(is_predictable).collect()
 }
 
-/// Returns the poses whose sensitivity is finite.
+/// Returns the sensitivity without the poses that have no equilibrium.
 fn finite(sensitivity: &Sensitivity) -> Sensitivity {
     let rows = (0..sensitivity.len()).filter(|&row| sensitivity.is_finite(row));
     sensitivity.select(&rows.collect::<Vec<_>>())
 }
 
-/// Returns √3 σ, from the mean σ² of the rows of one kind.
+/// Returns √3 σ \[m\], the root mean square length of a position error, with the mean σ² of the
+/// rows of one kind.
 fn noise(problem: &Problem, table: &Measurements, kind: Observation) -> f64 {
     let declared = problem.sigma_of(kind).unwrap_or(1.0);
     let is_of_kind = |row: &usize| table.observation(*row).kind() == kind.kind();

@@ -4,8 +4,8 @@ use std::collections::HashSet;
 
 use crate::measurement::Measurements;
 
-/// Returns the number of coordinates that some rows of a table measure; a position has
-/// `of_position`.
+/// Returns the number of coordinates that some rows of a table measure. A position counts
+/// `of_position`: three, or six with its orientation.
 pub(super) fn coordinates(
     table: &Measurements,
     of_position: usize,

@@ -4,7 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::model::parameter::Parameter;
 
-/// Share of the prior in the information on a combination from which the prior determines it.
+/// Smallest share of the prior in the information on a combination at which the prior, not the
+/// data, determines it.
 const PRIOR_DOMINATED: f64 = 0.5;
 
 /// Optimality criterion: a size, to be minimised, of the covariance C of the parameters (priors
@@ -17,7 +18,8 @@ const PRIOR_DOMINATED: f64 = 0.5;
 pub enum Criterion {
     /// Determinant of C, the volume of the confidence ellipsoid; independent of units.
     D,
-    /// Product Π C_kk, from the geometric mean of the standard errors; independent of units.
+    /// Product Π C_kk of the variances; its root is the geometric mean of the standard errors.
+    /// Independent of units.
     S,
     /// Sum Σ C_kk / C̄_kk, the mean variance relative to the covariance C̄ of as many average
     /// candidates.
@@ -105,8 +107,8 @@ impl Criterion {
 }
 
 impl ScaledCriterion {
-    /// Returns the logarithm of the measure for information M, per parameter for a determinant or
-    /// product; infinite if M is singular.
+    /// Returns the logarithm of the measure for information M, divided by the number of parameters
+    /// for a determinant or product; infinite if M is singular.
     pub fn value(&self, information: &DMatrix<f64>) -> f64 {
         let Some(cholesky) = information.clone().cholesky() else { return f64::INFINITY };
         match &self.measure {

@@ -20,7 +20,7 @@ pub enum DesignError {
     /// No pose was requested, or a table has none.
     #[error("no pose to plan or to check")]
     NoPoses,
-    /// There are fewer candidates than poses.
+    /// There are fewer candidates with an equilibrium than poses requested.
     #[error("{poses} poses: there are only {candidates} candidates")]
     TooFewCandidates {
         /// Number of poses requested.
@@ -40,7 +40,7 @@ pub enum DesignError {
         /// Description of the effect.
         effect: String,
     },
-    /// An effect depends on time, so that no choice of poses shows it.
+    /// An effect depends on time, so that the choice of poses cannot show it.
     #[error("the effect depends on the time of measurement, not on the poses: {effect}")]
     FollowsTime {
         /// Description of the effect.
@@ -51,7 +51,7 @@ pub enum DesignError {
         "the nominal arm has no equilibrium under its loads in any pose; check stiffnesses and masses"
     )]
     NoEquilibrium,
-    /// No pose informs on a free parameter.
+    /// The measurements of these poses depend on no free parameter.
     #[error(
         "no free parameter moves the target in any pose; check lengths, ranges and their units"
     )]

@@ -8,12 +8,13 @@ use super::sensitivity::Sensitivity;
 use crate::least_squares::Identifiability;
 use crate::model::parameter::Parameter;
 
-/// Fraction of the information of average poses that is added to every plan, so that plans with too
-/// few poses are comparable.
+/// Information of average poses that is added to every plan, as a fraction. It keeps plans with too
+/// few poses regular, so that they can be compared.
 const RIDGE: f64 = 1e-6;
-/// Scaled information that fixes combinations that neither candidates nor priors determine.
+/// Information added along combinations that neither candidates nor priors determine, so that they
+/// count as fixed; scaled unknowns.
 const FIXING_INFORMATION: f64 = 1e4;
-/// Smallest decrease of the logarithm of the criterion that continues with another sweep.
+/// Smallest decrease of the logarithm of the criterion after which another sweep follows.
 const MIN_GAIN: f64 = 1e-6;
 /// Maximum number of sweeps.
 const MAX_SWEEPS: usize = 50;
@@ -34,7 +35,7 @@ pub struct Exchange {
     criterion: ScaledCriterion,
 }
 
-/// Set of poses that no single exchange improves.
+/// Set of poses that exchanging any single pose does not improve.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ExchangeResult {
     /// Indices of the candidates, in ascending order.
@@ -51,8 +52,8 @@ impl ExchangeResult {
 }
 
 impl Exchange {
-    /// Prepares the exchange of `poses` poses in addition to the poses `given`, which are measured
-    /// anyway.
+    /// Prepares the exchange of `poses` poses, in addition to the poses `given`, which are measured
+    /// in any case.
     ///
     /// Returns `None` if the information is not finite, because a candidate has no equilibrium.
     pub fn new(

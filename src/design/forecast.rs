@@ -8,12 +8,12 @@ use crate::least_squares::{Identifiability, Uncertainty};
 use crate::model::parameter::Parameter;
 use crate::quantity::Unit;
 
-/// Share in undetermined combinations above which a parameter has no standard error.
+/// Share of a parameter in undetermined combinations above which it has no standard error.
 const UNDETERMINED_SHARE: f64 = 1e-3;
 /// Identified share below which a parameter has no standard error.
 const MIN_IDENTIFIED: f64 = 1e-6;
 
-/// Forecast for one parameter.
+/// Expected result for one parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpectedParameter {
     /// Name as in the problem file.
@@ -35,7 +35,7 @@ pub struct ExpectedParameter {
     pub is_placement: bool,
 }
 
-/// Forecast of the identification of all free parameters from a set of poses.
+/// Expected result of the identification of all free parameters from a set of poses.
 #[derive(Debug, Clone)]
 pub struct Forecast {
     /// Number of poses of the forecast.
@@ -44,7 +44,8 @@ pub struct Forecast {
     pub identifiability: Identifiability,
     /// Forecast for every free parameter.
     pub expected: Vec<ExpectedParameter>,
-    /// Covariance of x with fixed unidentifiable combinations, shape = (parameters, parameters).
+    /// Covariance of the deviations x, with unidentifiable combinations held fixed, shape =
+    /// (parameters, parameters).
     pub covariance: DMatrix<f64>,
     /// Number of combinations that neither measurements nor priors determine.
     pub undetermined: usize,
@@ -62,10 +63,11 @@ pub struct Prediction {
 }
 
 impl Forecast {
-    /// Share from the data at which a parameter counts as well identified.
+    /// Smallest identified share at which a parameter counts as well identified.
     pub(crate) const WELL_IDENTIFIED: f64 = 0.9;
 
-    /// Forecasts measurements with the given `sensitivity` and the priors of `parameters`.
+    /// Forecasts the identification from measurements with the given `sensitivity` and from the
+    /// priors of `parameters`.
     #[doc(hidden)]
     pub fn new(parameters: &[Parameter], sensitivity: &Sensitivity) -> Self {
         let triangle = sensitivity.triangle();
@@ -102,12 +104,12 @@ impl Forecast {
         }
     }
 
-    /// Replaces the standard errors by root mean squares over the arms in `arms`, which differ from
-    /// the nominal one.
+    /// Replaces the standard errors by their root mean squares over the arms with sensitivities
+    /// `arms`, which differ from the nominal one.
     ///
     /// If a combination is unidentifiable at the nominal arm and has a wide prior, it is confounded
     /// with other parameters at other arms. Errors are then larger than the linearisation at the
-    /// nominal arm says.
+    /// nominal arm predicts.
     #[must_use]
     pub(crate) fn over(mut self, parameters: &[Parameter], arms: &[Sensitivity]) -> Self {
         if arms.is_empty() {

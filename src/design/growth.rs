@@ -1,11 +1,11 @@
-//! Benefit of more poses of the same kind.
+//! Benefit of additional poses of the same kind.
 
 use rayon::prelude::*;
 
 use super::{Forecast, Prediction, Sensitivity};
 use crate::model::parameter::Parameter;
 
-/// Numbers of poses that are evaluated.
+/// Numbers of poses at which the series is evaluated.
 const POSE_COUNTS: [usize; 14] = [4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384];
 
 /// Forecasts for the first n poses of a series, for increasing n.
@@ -17,8 +17,8 @@ pub struct Growth {
     pub attainable_rank: usize,
     /// Number of combinations that stay undetermined with all poses.
     pub undetermined: usize,
-    /// Smallest number of poses that determine all attainable combinations and predict positions as
-    /// accurately as one measurement (rms); `None` if the series is too short.
+    /// Smallest number of poses that determine all attainable combinations, and for which
+    /// predictions are as accurate as one measurement (rms). `None` if the series is too short.
     pub enough: Option<usize>,
 }
 
@@ -38,12 +38,12 @@ pub struct GrowthStep {
 }
 
 impl Growth {
-    /// Forecasts the poses of `series` in their order.
+    /// Forecasts the first n poses of `series`, for increasing n.
     ///
     /// Predictions are evaluated at the poses `workspace` (in metres). `noise` is the root mean
-    /// square length of the error of one measured position \[m\], `extra` a further number of poses
-    /// to evaluate. The attainable combinations are those that the series and the poses `elsewhere`
-    /// determine together.
+    /// square length of the error of one measured position \[m\], `extra` an additional number of
+    /// poses to evaluate. The attainable combinations are those that the series and the poses
+    /// `elsewhere` determine together.
     pub fn new(
         parameters: &[Parameter],
         series: &Sensitivity,

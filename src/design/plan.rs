@@ -15,7 +15,7 @@ use crate::numeric::median;
 use crate::problem::{PoseRanges, Problem};
 use crate::random;
 
-/// Number of candidates drawn from ranges: uniformly, and with emphasis on the ends.
+/// Number of candidates drawn from ranges: uniformly, and with emphasis on the limits.
 pub(super) const DRAWN_CANDIDATES: [usize; 2] = [500, 2000];
 /// Number of exchanges, each started from random poses.
 const STARTS: usize = 8;
@@ -30,7 +30,7 @@ const ROUND_CANDIDATES: usize = 2500;
 pub(super) const RANDOM_SETS: usize = 75;
 /// Random stream of the uniform candidates.
 pub(super) const UNIFORM_STREAM: u64 = 0;
-/// Random stream of the candidates with emphasis on the ends.
+/// Random stream of the candidates with emphasis on the limits of the ranges.
 const EXTREMES_STREAM: u64 = 1;
 /// First random stream of the refinement rounds.
 const REFINEMENT_STREAM: u64 = 2;
@@ -61,7 +61,7 @@ pub struct PlanOptions<'a> {
     /// Region for the target; `None` is unlimited.
     #[doc(hidden)]
     pub workspace: Option<&'a Workspace>,
-    /// Callback after every sweep, called from several threads.
+    /// Callback after every sweep; several threads call it.
     #[doc(hidden)]
     pub progress: Option<&'a (dyn Fn(PlanProgress) + Sync)>,
 }
@@ -80,9 +80,9 @@ pub struct PlanProgress {
 /// Planned poses with their forecast.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// Planned poses; rows of the table of candidates in its order, if there is one.
+    /// Planned poses; in the order of the table if the candidates are its rows.
     pub poses: Measurements,
-    /// Number of given rows that are measured anyway, without known distances between points.
+    /// Number of given rows that are measured in any case, without known distances between points.
     pub given: usize,
     /// Number of candidates that were tried.
     pub candidates: usize,
@@ -94,11 +94,11 @@ pub struct Plan {
     pub planned: Forecast,
     /// Number of combinations of parameters that all candidates together determine without priors.
     pub attainable_rank: usize,
-    /// Smallest number of planned poses that can determine all of them.
+    /// Smallest number of planned poses that can determine all attainable combinations.
     pub least_poses: usize,
     /// Number of coordinates that given and planned poses measure together.
     pub coordinates: usize,
-    /// Forecasts for the given poses with as many random ones, for each random set.
+    /// Forecast for each random set: the given poses with as many random poses as are planned.
     pub random: Vec<Forecast>,
     /// True if the plan determines all combinations that all candidates can, and measures at least
     /// as many coordinates as there are parameters without a prior.
@@ -108,8 +108,8 @@ pub struct Plan {
 /// Chooses poses by exchange from several starts. The result depends on the seed, not on the number
 /// of threads.
 ///
-/// Within ranges, candidates are drawn first and then varied ever closer to the best poses. Poses
-/// in `given` are measured anyway.
+/// With ranges, candidates are drawn first and then varied around the best poses, ever closer to
+/// them. Poses in `given` are measured in any case.
 ///
 /// # Errors
 /// Returns an error if there are fewer candidates than poses, or if the problem lacks a
@@ -254,8 +254,8 @@ fn attainable_rank(
     (total, total.saturating_sub(before).div_ceil(candidates.coordinates))
 }
 
-/// Returns the given rows and the known distances of the candidates that the given rows lack;
-/// `None` if there are neither.
+/// Returns the given rows with those known distances of the candidates that they lack; `None` if
+/// there are neither.
 fn with_known_distances(
     given: Option<&Measurements>,
     candidates: &Candidates,
@@ -274,7 +274,7 @@ fn with_known_distances(
     }
 }
 
-/// Returns the number of fixture unknowns without a prior that none of these rows informs on; a
+/// Returns the number of fixture unknowns without a prior on which none of these rows depends. A
 /// fixture that is not used need not be located.
 fn untouched(parameters: &[Parameter], rows: &[Option<&Sensitivity>]) -> usize {
     let is_informed =
@@ -382,9 +382,8 @@ impl Plan {
             .collect()
     }
 
-    /// Returns the factor by which the standard errors of the plan are smaller than those of random
-    /// poses, the geometric mean over these parameters; `None` if there are none that both
-    /// determine.
+    /// Returns the ratio of the standard errors of random poses to those of the plan, as the
+    /// geometric mean over these parameters. `None` if no parameter has both.
     #[doc(hidden)]
     pub fn gain(&self, parameters: &[usize]) -> Option<f64> {
         let ratios: Vec<f64> = parameters
@@ -397,7 +396,7 @@ impl Plan {
     }
 }
 
-/// Returns `count` random numbers out of 0..`available` (all of them if there are fewer), in random
+/// Returns `count` random numbers from 0..`available` (all of them if there are fewer), in random
 /// order.
 pub(super) fn choose(available: usize, count: usize, seed: u64, stream: u64) -> Vec<usize> {
     shuffled(available, count, &mut random::stream(seed, stream))

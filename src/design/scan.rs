@@ -8,9 +8,9 @@ use rayon::prelude::*;
 use super::criterion::{Measure, ScaledCriterion, block};
 use crate::numeric::bisect;
 
-/// Number of candidates that are multiplied together.
+/// Number of candidates whose products are computed in one matrix product.
 const BLOCK_CANDIDATES: usize = 256;
-/// Number of bisections for the largest eigenvalue.
+/// Number of bisections that locate the largest eigenvalue.
 const EIGENVALUE_BISECTIONS: usize = 50;
 
 /// Information without one of the poses, prepared for trying candidates in its place.
@@ -63,8 +63,8 @@ impl<'a> CandidateScan<'a> {
         Some(Self { criterion, covariance, value: criterion.value(information), state })
     }
 
-    /// Returns the candidate with the lowest value below `limit` and that value, among the
-    /// candidates that `may` be taken; the first of equal ones.
+    /// Returns the index and value of the candidate with the lowest criterion value below `limit`,
+    /// out of those for which `may` is true; the first if several are equal.
     ///
     /// `candidates` holds Jᵀ of all candidates, shape = (unknowns, coordinates · candidates).
     pub fn best(
@@ -149,7 +149,8 @@ impl<'a> CandidateScan<'a> {
         best
     }
 
-    /// Returns the mean logarithm of the wanted variances.
+    /// Returns the mean logarithm of the variances of the wanted unknowns after the candidate is
+    /// added.
     fn product<const R: usize>(&self, w: &DMatrixView<f64>, s: &Square<R>) -> f64 {
         let Some(inverse) = s.try_inverse() else { return f64::INFINITY };
         let (mut logarithm, mut product) = (0.0, 1.0);

@@ -21,8 +21,8 @@ pub struct Sensitivity {
 }
 
 impl Sensitivity {
-    /// Computes the sensitivity of `poses` at the full parameter vector `at`; measured values do
-    /// not matter.
+    /// Computes the sensitivity of `poses` at the full parameter vector `at`; it does not depend on
+    /// measured values.
     pub fn of(model: &Model, poses: &[Pose], at: &DVector<f64>) -> Self {
         let n = model.parameters.len();
         let residuals = PoseResiduals::new(model, poses.to_vec(), (0..n).collect(), at.clone());
@@ -79,7 +79,7 @@ impl Sensitivity {
         Self { rows, coordinates: of_pose }
     }
 
-    /// Returns the sensitivity of these poses followed by those of `other`.
+    /// Returns the sensitivity of these poses followed by that of the poses of `other`.
     #[must_use]
     pub fn and(&self, other: &Self) -> Self {
         let (columns, n) = (self.rows.ncols(), self.rows.nrows());

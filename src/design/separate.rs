@@ -9,7 +9,7 @@ use crate::numeric::median;
 use crate::problem::{Effect, EffectDeclaration, Problem};
 use crate::select::{Separation, separation};
 
-/// Two effects to separate, with a problem that declares both.
+/// Two effects whose parameters are to be distinguished, with a problem that declares both.
 #[derive(Debug, Clone)]
 pub struct EffectPair {
     /// Both effects of the pair.
@@ -49,8 +49,8 @@ impl EffectPair {
     }
 
     /// Returns the criterion: the errors of the parameters of both effects, with all other free
-    /// parameters estimated. If these errors are small, the effects are separated. Parameters
-    /// without a size, such as the position of a mass, do not count.
+    /// parameters estimated. The smaller these errors, the better the data distinguish the effects.
+    /// Parameters without a size, such as the position of a mass, do not count.
     ///
     /// # Errors
     /// Returns the errors of [`Site::new`], or an error if rules of `[parameters]` fix both
@@ -77,7 +77,7 @@ impl EffectPair {
     }
 }
 
-/// Separation of two effects by a plan and by random poses.
+/// How well a plan and random poses distinguish two effects.
 #[derive(Debug, Clone)]
 pub struct PairSeparation {
     /// Both effects of the pair.
@@ -133,7 +133,8 @@ pub fn separate(
 }
 
 impl PairSeparation {
-    /// Returns the median of a quantity over the random sets; infinite if most of them lack it.
+    /// Returns the median over the random sets of the quantity that `of` returns; infinite if most
+    /// of them lack it.
     pub fn random(&self, of: impl Fn(&Separation) -> Option<f64>) -> f64 {
         let values = self.random.iter().map(|separation| of(separation).unwrap_or(f64::INFINITY));
         median(values).unwrap_or(f64::NAN)

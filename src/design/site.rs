@@ -14,12 +14,12 @@ use crate::model::{MeasuredOrientation, Model, Pose};
 use crate::problem::{Observation, Problem};
 use crate::random;
 
-/// Mass assumed for a declared `unmodelled-mass`; without a mass its position would not matter
-/// \[kg\].
+/// Mass assumed for a declared `unmodelled-mass` \[kg\]. With a mass of 0, its position would have
+/// no influence.
 const PROBE_MASS: f64 = 1.0;
 
-/// Returns true if a row of a table locates its fixture. Planned rows do so only if the arm touches
-/// the fixture, so that no number must be measured.
+/// Returns true if a row of a table helps to locate its fixture. A planned row does so only by
+/// contact, which requires no measured number.
 fn locates(observation: Observation, table: &Measurements) -> bool {
     let mut fields = observation.description().measured_fields();
     table.position_measured || observation.is_position() || fields.all(|field| !field.required)
@@ -33,7 +33,8 @@ pub struct Site<'a> {
     problem: &'a Problem,
     bases: Vec<String>,
     targets: Vec<String>,
-    /// Full parameter vector at which unknown fixtures are where the nominal arm touches them.
+    /// Full parameter vector of the nominal arm, with unknown fixtures at the points where that arm
+    /// touches them.
     nominal: DVector<f64>,
 }
 
@@ -94,7 +95,7 @@ impl<'a> Site<'a> {
     }
 
     /// Returns the sensitivity of the poses of a table at the nominal arm. `unit` \[m\] replaces σ,
-    /// if given. Unknown sessions and targets are taken as the first of the site.
+    /// if given. Unknown sessions and targets are treated as the first of the site.
     pub fn sensitivity(&self, table: &Measurements, unit: Option<f64>) -> Sensitivity {
         let is_mass =
             |site| matches!(site, ParameterSite::Beam { field: BeamField::AddedMass, .. });

@@ -2,13 +2,13 @@
 
 use nalgebra::Vector3;
 
-/// Box and half-spaces that the nominal target must stay in, frame of the arm's base. Other parts
-/// of the arm are not checked.
+/// Box and half-spaces in which the nominal target must stay, arm base frame. Other parts of the
+/// arm are not checked.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Workspace {
     /// Opposite corners of the box, minimum first \[m\].
     pub corners: Option<[Vector3<f64>; 2]>,
-    /// Planes beyond which the target stays: n·p ≥ d with a unit normal n and d \[m\].
+    /// Half-spaces in which the target must stay: n·p ≥ d with a unit normal n and d \[m\].
     pub planes: Vec<(Vector3<f64>, f64)>,
 }
 

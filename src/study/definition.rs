@@ -9,8 +9,8 @@ use crate::model::parameter::Parameter;
 use crate::problem::Problem;
 use crate::rig::Truth;
 
-/// Number of repetitions in a part. Statistics are summed over parts, so another number changes
-/// their rounding.
+/// Number of repetitions in a part. Statistics are summed part by part, so another number would
+/// change their rounding.
 const PART_REPETITIONS: usize = 50;
 
 /// Monte Carlo study as declared in `STUDY.toml`.
@@ -28,7 +28,7 @@ pub struct Study {
     pub parameters: Vec<Parameter>,
     /// Distribution of true arms and poses, without noise.
     pub truth: Truth,
-    /// True if values of declared effects that the truth does not give are drawn from their priors.
+    /// True if values of declared effects are drawn from their priors unless the truth states them.
     pub draws_effects: bool,
     /// Source of the simulated measurements.
     pub source: Source,
@@ -92,7 +92,7 @@ impl Study {
 }
 
 impl Source {
-    /// Returns the word in files.
+    /// Returns the word for the source in files.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Model => "model",
@@ -101,8 +101,8 @@ impl Source {
     }
 }
 
-/// Share of the parts for one machine: every n-th part, so that each machine has parts of every
-/// cell.
+/// Share of the parts that one machine computes: every n-th part, so that each machine has parts of
+/// every cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     index: usize,

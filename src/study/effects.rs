@@ -12,8 +12,8 @@ use crate::rig::{Cause, TrueEffect, Truth, standard_normals};
 pub(super) struct Strengths(Vec<(String, f64)>);
 
 impl Strengths {
-    /// Determines the true values: given by the truth, drawn from the prior if the study draws
-    /// effects, or nominal (no effect).
+    /// Determines the true values of one repetition: as stated in the truth, drawn from the prior
+    /// if the study draws effects, or nominal (no effect).
     pub fn draw(study: &Study, seed: u64) -> Self {
         let parameters: Vec<_> = study
             .problem
@@ -44,8 +44,8 @@ impl Strengths {
         self.0.iter().find(|(parameter, _)| parameter == name).map(|(_, value)| *value)
     }
 
-    /// Returns the declared effects, with their true values, that the rig must add to those of the
-    /// truth.
+    /// Returns the declared effects, with their true values, that the rig must simulate in addition
+    /// to those of the truth.
     pub fn for_rig(&self, study: &Study) -> Vec<TrueEffect> {
         let given = given(&study.truth, &study.problem);
         let effect = |effect: &Effect| {
@@ -95,8 +95,8 @@ fn given(truth: &Truth, problem: &Problem) -> Vec<(String, f64)> {
     truth.effects.iter().flat_map(of).collect::<Vec<_>>()
 }
 
-/// Checks that the poses of a study can show every declared effect. If the model measures, it also
-/// checks that every effect of the truth is declared.
+/// Checks that the poses of a study can show every declared effect. If the fitted model is the
+/// source, it also checks that every effect of the truth is declared.
 ///
 /// `undeclared` creates the error for an effect that is not declared.
 pub(super) fn check(

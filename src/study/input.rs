@@ -6,7 +6,7 @@ use crate::error::{InputError, InputErrorKind, StudyErrorKind};
 use crate::problem::Problem;
 use crate::problem::item::{Document, Item};
 
-/// Largest number of poses, held-out poses and repetitions.
+/// Largest number of poses, held-out poses or repetitions that a file may state.
 const MAX_COUNT: u64 = 1_000_000;
 
 /// Reads the problem that a study names; returns it with its text and its file.

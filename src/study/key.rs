@@ -1,4 +1,4 @@
-//! Digest of the inputs of a finished part.
+//! Digest of the inputs on which a finished part depends.
 
 use std::fmt::Write as _;
 

@@ -162,8 +162,8 @@ fn truth(
     Ok(truth)
 }
 
-/// Returns the prior of a parameter as a rule for drawing its true value; fixed parameters stay
-/// nominal.
+/// Returns the prior of a parameter as a rule by which its true value is drawn; fixed parameters
+/// keep the nominal value.
 fn prior(rule: &ParameterRule) -> RandomRule {
     let pattern = rule.pattern.clone();
     match &rule.freedom {
@@ -211,7 +211,7 @@ fn solver(item: &Item<'_, '_>, model: &Model) -> Result<SolverChoice, InputError
     Ok(solver)
 }
 
-/// Reads one of a few words and returns its meaning.
+/// Reads one of the `allowed` words and returns the entry of `meanings` at the same index.
 fn word<T: Copy>(
     item: &Item<'_, '_>,
     allowed: &'static [&'static str],

@@ -10,7 +10,7 @@ use super::key::key;
 use super::tally::Tally;
 use crate::files::{StagedFile, read_text};
 
-/// Number of digits of the key that form the file name of a part.
+/// Number of hexadecimal digits of the key that form the file name of a part.
 const NAME_DIGITS: usize = 16;
 
 /// Folder of finished parts, which several machines may share.
@@ -96,7 +96,7 @@ impl Store {
         write().map_err(|source| StoreError::Unwritable { path: path.clone(), source })
     }
 
-    /// Returns a part if it is finished.
+    /// Returns the stored part; `None` if it is not finished.
     pub(super) fn find(
         &self,
         study: &Study,

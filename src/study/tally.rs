@@ -63,7 +63,7 @@ impl Moments {
 /// Statistics of one parameter over many fits: deviations x in \[rad\], \[m\], or of ln(value).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct ParameterTally {
-    /// Errors, estimate − truth.
+    /// Errors of the estimates, estimate − truth.
     pub error: Moments,
     /// Standard errors that the fits report.
     pub std_error: Moments,
@@ -90,7 +90,7 @@ pub struct Tally {
     pub parameters: Vec<ParameterTally>,
 }
 
-/// Outcome of one fit.
+/// Outcome of one fit: failed, or its results.
 pub(super) enum Score {
     /// Reason for which the fit is not trusted.
     Failed(&'static str),
@@ -103,7 +103,7 @@ pub(super) struct Fitted {
     pub held_out_rms: f64,
     pub reduced_chi2: Option<f64>,
     pub iterations: u64,
-    /// Score of each free parameter; `None` if the truth is not known.
+    /// Error of each free parameter; `None` if its truth is not known.
     pub parameters: Vec<Option<ParameterScore>>,
 }
 

@@ -2,7 +2,7 @@
 
 use crate::problem::{Joint, Problem};
 
-/// Mistake in the model of the arm, while the formulas are correct.
+/// Wrong assumption about the arm, with correct formulas.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum AlternativeModel {

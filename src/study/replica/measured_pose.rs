@@ -20,7 +20,8 @@ impl MeasuredPose {
         Measured { setup: self.conditions.view(), position: self.position }
     }
 
-    /// Multiplies payload and hoist force; a load that the pose does not give is taken from `arm`.
+    /// Returns the pose with payload and hoist force multiplied by the given factors. A load that
+    /// the pose does not state is taken from `arm`.
     pub fn under(&self, (payload, hoist): (f64, f64), arm: &Problem) -> Self {
         let declared =
             arm.joints.iter().find_map(|joint| Some(joint.beam.as_ref()?.hoist.as_ref()?.force));

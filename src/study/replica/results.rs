@@ -13,11 +13,11 @@ pub type HeldOutError = Option<ErrorSummary>;
 pub struct Replica {
     /// Case that the specimen belongs to.
     pub case: Case,
-    /// Factor of the declared flexibilities.
+    /// Factor by which the declared flexibilities of this specimen are multiplied.
     pub scale: f64,
     /// Errors of the nominal arm without elasticity.
     pub before: ErrorSummary,
-    /// Errors of eq. 45 without elasticity.
+    /// Errors after the iteration of eq. 45 with elasticity ignored.
     pub rigid: HeldOutError,
     /// Errors of each reading with the four sources of stiffness: true, as declared, from
     /// positions, from load differences.
@@ -93,12 +93,12 @@ impl Replica {
         *self.by_alternative.get(index)?
     }
 
-    /// Returns the ratio of a mean error to that of the rigid fit.
+    /// Returns the ratio of the mean error of a procedure to that of the rigid fit.
     pub fn ratio(&self, error: HeldOutError) -> Option<f64> {
         Some(error?.mean.norm / self.rigid?.mean.norm)
     }
 
-    /// Returns the ratio of a largest error to that of the rigid fit.
+    /// Returns the ratio of the largest error of a procedure to that of the rigid fit.
     pub fn largest_ratio(&self, error: HeldOutError) -> Option<f64> {
         Some(error?.max.norm / self.rigid?.max.norm)
     }

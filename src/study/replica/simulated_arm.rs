@@ -10,7 +10,8 @@ use crate::paper::{Form, Options, StiffnessStage};
 use crate::problem::{PoseConditions, Problem};
 use crate::rig::{Draw, NoEquilibrium, Rig, Row, draw};
 
-/// Relative tolerance of the error that the rigid fit leaves.
+/// Relative tolerance to which the flexibility is scaled, measured by the error that the rigid fit
+/// leaves.
 const SCALE_TOLERANCE: f64 = 1e-4;
 /// Maximum number of flexibility scales tried for a specimen.
 const MAX_SCALE_TRIES: usize = 40;
@@ -28,7 +29,7 @@ pub struct SimulatedArm {
     pub held_out: Vec<MeasuredPose>,
     /// Poses for identification, first load.
     pub identification: Vec<MeasuredPose>,
-    /// The identification poses under the second load.
+    /// The identification poses, measured a second time under the second load.
     pub second_load: Vec<MeasuredPose>,
 }
 

@@ -26,7 +26,8 @@ pub struct MisprintStudy {
     pub identification: usize,
     /// Number of held-out poses.
     pub held_out: usize,
-    /// Mean error that the rigid fit leaves at the held-out poses of every specimen \[m\].
+    /// Mean error of the rigid fit at the held-out poses, to which every specimen's flexibility is
+    /// scaled \[m\].
     pub rigid_leaves: f64,
     /// Cases of the study; the first one is identified by every procedure.
     pub cases: Vec<Case>,
@@ -44,7 +45,8 @@ pub struct Case {
 }
 
 impl Case {
-    /// Returns the name in results: the ratio of links to joints, or that there is one load.
+    /// Returns the name in results: the ratio of link to joint flexibility, or that all poses have
+    /// one load.
     pub fn name(&self) -> String {
         if self.load.is_some() {
             "one load".to_owned()
