@@ -77,7 +77,7 @@ impl FolderRecord {
         self.lines.iter().map(|line| line.name.as_str())
     }
 
-    /// Adds a line for `text`, which a command is about to write to the file `name`.
+    /// Adds a record for `text`, which a command is about to write to the file `name`.
     pub fn add(&mut self, command: &str, name: &str, text: &str) {
         let (digest, command, name) =
             (hexadecimal(Sha256::digest(text).as_slice()), command.to_owned(), name.to_owned());

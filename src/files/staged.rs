@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-/// File that is completely on the disk but does not have its name yet.
+/// File whose contents are completely on the disk, but which does not have its name yet.
 ///
-/// On Linux the file has no name at all until [`commit`](Self::commit), so a killed process leaves
-/// nothing behind. A process that is killed while it replaces an existing file can leave a
+/// On Linux the file has no name at all until [`commit`](Self::commit), so that a killed process
+/// leaves nothing behind. A process that is killed while it replaces an existing file can leave a
 /// temporary name; the next replacement in that folder removes it.
 #[derive(Debug)]
 pub struct StagedFile {
@@ -25,13 +25,14 @@ enum Storage {
 }
 
 impl StagedFile {
-    /// Writes `text` for `path` and waits until the disk holds it. Creates the folder if needed.
+    /// Writes `text` to a staged file for `path` and waits until the disk holds it. Creates the
+    /// folder if needed.
     ///
     /// An existing file keeps its permissions. A new file gets the default permissions of the
     /// process.
     ///
     /// # Errors
-    /// The folder or the file cannot be created or written.
+    /// Returns an error if the folder or the file cannot be created or written.
     pub fn new(path: &Path, text: &str) -> io::Result<Self> {
         let folder = folder_of(path);
         fs::create_dir_all(folder)?;

@@ -66,7 +66,7 @@ pub(crate) fn mean_interval(
     Interval { value, low: quantile_of_means(tail), high: quantile_of_means(1.0 - tail) }
 }
 
-/// Returns z with Φ(z) = `probability`, limited to four standard deviations.
+/// Returns z with Φ(z) = `probability` for the normal distribution Φ, limited to ±4.
 fn quantile(probability: f64) -> f64 {
     const LIMIT: f64 = 4.0;
     if probability > 0.0 && probability < 1.0 {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DMatrixViewMut, DVector};
 
-/// Number of rows up to which a triangular solve or inverse proceeds column by column.
+/// Largest number of rows for which a triangular solve or inverse proceeds column by column.
 const MAX_UNBLOCKED_ROWS: usize = 24;
 /// Number of columns that are factored together.
 const PANEL: usize = 64;

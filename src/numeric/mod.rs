@@ -13,8 +13,8 @@ pub(crate) use product::{
     zeros,
 };
 
-/// Returns the median of some values, or `None` if there are none; an even number has the mean of
-/// its two middle values.
+/// Returns the median of some values, or `None` if there are none. For an even number of values it
+/// is the mean of the two middle ones.
 pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     let mut sorted: Vec<f64> = values.into_iter().collect();
     sorted.sort_by(f64::total_cmp);
@@ -22,7 +22,7 @@ pub(crate) fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     Some(if sorted.len() % 2 == 1 { upper } else { 0.5 * (sorted[sorted.len() / 2 - 1] + upper) })
 }
 
-/// Returns the smallest and the largest of some values that are finite; infinities for none.
+/// Returns the smallest and the largest of the finite values; (∞, −∞) if there are none.
 pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let finite = values.into_iter().filter(|value| value.is_finite());
     finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
@@ -30,7 +30,8 @@ pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     })
 }
 
-/// Halves the interval `halvings` times and returns the part in which `is_below` turns false.
+/// Halves the interval `halvings` times and returns the part in which `is_below` changes from true
+/// to false.
 pub(crate) fn bisect(
     is_below: impl Fn(f64) -> bool,
     (mut low, mut high): (f64, f64),

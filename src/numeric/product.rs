@@ -4,24 +4,25 @@
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, Dyn, MatrixView};
 use rayon::prelude::*;
 
-/// Number of result columns that one thread forms at a time; each block packs the other factor
-/// again.
+/// Number of result columns that one thread computes at a time. For each block, the matrix product
+/// repacks the left factor.
 const BLOCK_COLUMNS: usize = 96;
-/// Number of columns of a narrow result that one thread forms at a time; nothing is packed.
+/// Number of columns of a narrow result that one thread computes at a time, without packing.
 const NARROW_BLOCK_COLUMNS: usize = 8;
-/// Number of columns up to which a product is formed by axpy and dot operations, because packing
-/// would not pay.
+/// Largest number of columns for which a product is computed by axpy and dot operations; packing
+/// the factors would take longer.
 const NARROW: usize = 5;
-/// Number of rows that one thread processes at a time if the result is narrow.
+/// Number of rows that one thread processes at a time if the result has few columns.
 const BLOCK_ROWS: usize = 1024;
-/// Number of entries from which a product replaces its factor in place instead of in new memory.
+/// Smallest number of entries for which a product overwrites its factor instead of allocating
+/// memory.
 const MIN_IN_PLACE: usize = 1 << 20;
 /// Number of columns of a tall matrix that one thread transposes at a time.
 const TRANSPOSED_COLUMNS: usize = 24;
-/// Number of multiplications from which a product is formed in parallel.
+/// Smallest number of multiplications for which a product is computed in parallel.
 const MIN_PARALLEL_WORK: usize = 1 << 20;
 
-/// Returns the product A B, formed in parallel.
+/// Returns the product A B, computed in parallel.
 pub(crate) fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     if b.ncols() <= NARROW && a.len() * b.ncols() >= MIN_PARALLEL_WORK {
         return narrow_product(a, b);
@@ -173,7 +174,7 @@ pub(crate) fn transposed_narrow_product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> D
     out.transpose()
 }
 
-/// Returns AᵀA; the upper triangle is formed and mirrored.
+/// Returns AᵀA; only the upper triangle is computed, then mirrored.
 pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, n) = a.shape();
     if rows * n * n < MIN_PARALLEL_WORK || rows <= NARROW {
@@ -202,7 +203,7 @@ pub(crate) fn gram(a: &DMatrix<f64>) -> DMatrix<f64> {
     out
 }
 
-/// Returns LᵀL for a square lower triangle L; the upper half is formed and mirrored.
+/// Returns LᵀL for a square lower triangle L; only the upper half is computed, then mirrored.
 pub(crate) fn gram_of_lower(lower: &DMatrix<f64>) -> DMatrix<f64> {
     let n = lower.nrows();
     if n * n * n < MIN_PARALLEL_WORK {

@@ -9,7 +9,7 @@ use super::parameters::Parameters;
 use super::{Elastic, geometric};
 use crate::problem::{PoseView, Problem};
 
-/// Quantities of one pose that the paper defines, at geometry E.
+/// End point of one pose in the notation of the paper: rigid frames and deflections, at geometry E.
 #[derive(Debug, Clone)]
 pub struct EndPoint {
     /// Frames of the rigid arm.

@@ -139,12 +139,12 @@ impl Reading {
         self.forms[misprint as usize]
     }
 
-    /// Returns true if one misprint is kept.
+    /// Returns true if a misprint is kept, so that its formula has the printed form.
     pub fn keeps(&self, misprint: Misprint) -> bool {
         self.form(misprint) == Form::Printed
     }
 
-    /// Returns the reading with another form of one misprint.
+    /// Returns the reading with the given form for one misprint.
     #[must_use]
     pub fn with(mut self, misprint: Misprint, form: Form) -> Self {
         self.forms[misprint as usize] = form;

@@ -26,7 +26,7 @@ impl Mdh {
         Self { alpha: joint.alpha, a: joint.a, theta: joint.theta, d: joint.d, beta: joint.beta }
     }
 
-    /// Returns the five values in the order of `e_i` = [Δα Δa Δθ Δd Δβ].
+    /// Returns mutable references to the five values, in the order of `e_i` = [Δα Δa Δθ Δd Δβ].
     pub fn fields_mut(&mut self) -> [&mut f64; 5] {
         [&mut self.alpha, &mut self.a, &mut self.theta, &mut self.d, &mut self.beta]
     }
@@ -47,8 +47,8 @@ impl Mdh {
         rotation(Vector3::x() * self.alpha) * translation(Vector3::x() * self.a)
     }
 
-    /// Returns `T_i2` = Rz(θ) Tz(d) Ry(β), the transform from the tip of the link [Chen2021, eq.
-    /// 20].
+    /// Returns `T_i2` = Rz(θ) Tz(d) Ry(β), the transform from the tip of the link to frame i
+    /// [Chen2021, eq. 20].
     pub fn from_tip(&self) -> Matrix4<f64> {
         rotation(Vector3::z() * self.theta)
             * translation(Vector3::z() * self.d)

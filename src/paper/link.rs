@@ -18,7 +18,7 @@ pub struct LinkFlexibility {
     pub twist: f64,
 }
 
-/// Numerators of eq. 4 and 6: deflections of the tip for unit flexibility, link frame.
+/// Numerators of eq. 4 and 6: tip deflections times rigidity, link frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LinkTerms {
     /// Elongation EA Δx [N·m].
@@ -29,8 +29,8 @@ pub struct LinkTerms {
     pub bend_z: (f64, f64),
     /// Twist `GI_p` Δφ [N·m²].
     pub twist: f64,
-    /// True for a link of eq. 4, which carries loads between its ends (link B); false for one of
-    /// eq. 6 (link A).
+    /// True for a link that carries loads between its ends (link B, eq. 4); false otherwise (link
+    /// A, eq. 6).
     pub carries: bool,
 }
 
@@ -133,7 +133,8 @@ impl LinkTerms {
 }
 
 impl Plane {
-    /// Returns EI times deflection and slope of the tip; `lever` is the factor of the tip force.
+    /// Returns EI times deflection and EI times slope of the tip in one plane. `l` is the length
+    /// \[m\], `lever` the factor of the tip force.
     fn tip_deflection(&self, l: f64, lever: f64, points: &[PointLoad]) -> (f64, f64) {
         let (force, moment) = self.tip;
         let mut deflection =

@@ -26,7 +26,7 @@ pub struct PointLoad {
     pub station: f64,
     /// Force and moment at s, link frame.
     pub wrench: Wrench,
-    /// True for the hoist.
+    /// True for the force of the hoist, false for a weight.
     pub hoist: bool,
 }
 
@@ -64,7 +64,7 @@ pub struct Loads {
     pub joints: Vec<JointLoads>,
 }
 
-/// Force \[N\] at a point of the arm \[m\], base frame.
+/// Force \[N\] at a point \[m\] of the arm, base frame, marked as weight or hoist.
 struct Load {
     at: Vector3<f64>,
     force: Vector3<f64>,
@@ -131,8 +131,8 @@ fn carried(
         .collect()
 }
 
-/// Returns a force at `at` as a load on the link axis. A load beyond an end acts at that end, with
-/// its moment.
+/// Returns a force at a point `at` of the link frame as a load on the link's axis. A load beyond an
+/// end acts at that end, with its moment.
 fn point_load(at: Vector3<f64>, length: f64, force: Vector3<f64>, hoist: bool) -> PointLoad {
     let station = at.x.clamp(length.min(0.0), length.max(0.0));
     let offset = at - Vector3::x() * station;

@@ -64,7 +64,8 @@ impl Parameters {
         Self { geometry, joints: vec![0.0; n], links: vec![LinkFlexibility::default(); n] }
     }
 
-    /// Returns no geometry and one flexibility of 1.
+    /// Returns parameters without geometry in which the flexibility `which` is 1 and all others are
+    /// 0.
     pub(super) fn unit(joints: usize, which: Flexibility) -> Self {
         let mut out = Self {
             geometry: Vec::new(),

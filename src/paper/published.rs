@@ -3,7 +3,7 @@
 use super::kinematics::Mdh;
 use crate::problem::Problem;
 
-/// Tolerance of the comparison with tabulated parameters [m, rad].
+/// Largest difference from a tabulated parameter that counts as equal [m, rad].
 const TOLERANCE: f64 = 1e-9;
 
 /// Nominal α \[°\], a \[m\], θ \[°\], d \[m\], β \[°\] of each joint, with the α₂ of table 1

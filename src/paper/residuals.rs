@@ -43,7 +43,7 @@ impl<'a> GeometryResiduals<'a> {
         Self { problem, poses, parameters, unknowns, reading }
     }
 
-    /// Returns the parameters for errors `x` of the unknowns.
+    /// Returns the parameters with the unknowns changed by the errors `x`.
     pub fn at(&self, x: &DVector<f64>) -> Parameters {
         let mut parameters = self.parameters.clone();
         for (&index, x) in self.unknowns.iter().zip(x) {

@@ -30,8 +30,8 @@ impl StiffnessStage {
     pub const EACH: [Self; 4] =
         [Self::Rigid, Self::Nominal, Self::Positions, Self::LoadDifferences];
 
-    /// Fraction of the largest singular value up to which combinations keep their nominal value.
-    /// The columns of the elastic Jacobian are multiplied by the nominal flexibilities.
+    /// Fraction of the largest singular value up to which combinations of flexibilities keep their
+    /// nominal value. The columns of the elastic Jacobian are scaled by the nominal flexibilities.
     pub const TOLERANCE: f64 = 1e-2;
 
     /// Returns the name in results.

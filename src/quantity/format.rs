@@ -1,12 +1,12 @@
 //! Formats of numbers in texts and tables.
 
-/// Magnitude from which on numbers have a power of ten.
+/// Smallest magnitude that is written with a power of ten.
 const HUGE: f64 = 1e12;
-/// Least p-value that is written out: a smaller one says more about the assumed distribution than
-/// about the data.
+/// Smallest p-value that is written out. A smaller one depends more on the assumed distribution
+/// than on the data.
 const LEAST_P: f64 = 1e-16;
 
-/// Returns the decimals that show `error` with two significant digits, at most `most`.
+/// Returns the number of decimals that shows `error` with two significant digits, at most `most`.
 pub(crate) fn decimals(error: f64, most: usize) -> usize {
     if error <= 0.0 || !error.is_finite() {
         return most;
@@ -31,8 +31,8 @@ pub(crate) fn about_three_digits(value: f64) -> String {
     number(value, (decimals(value, 4) + 1).min(4))
 }
 
-/// Formats `value` with `decimals`, never as "-0"; huge values as `1.234e300`, and values that are
-/// not finite as "–".
+/// Formats `value` with `decimals` decimals, never as "-0"; huge values as `1.234e300`, and values
+/// that are not finite as "–".
 pub(crate) fn number(value: f64, decimals: usize) -> String {
     match value.abs() {
         size if size < HUGE => fixed(value, decimals),
@@ -41,8 +41,8 @@ pub(crate) fn number(value: f64, decimals: usize) -> String {
     }
 }
 
-/// Formats `value` with `decimals` for tables that programs read, never as "-0"; empty if it is not
-/// finite.
+/// Formats `value` with `decimals` decimals for tables that programs read, never as "-0"; empty if
+/// it is not finite.
 pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return String::new();
@@ -59,12 +59,12 @@ pub(crate) fn counted(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
-/// Formats a length \[m\] in mm with `decimals`.
+/// Formats a length \[m\] in mm with `decimals` decimals.
 pub(crate) fn mm(length: f64, decimals: usize) -> String {
     number(length * 1e3, decimals)
 }
 
-/// Formats a value by `words`, or returns "–" if there is none.
+/// Formats a value by `words`; returns "–" for `None`.
 pub(crate) fn or_dash<T>(value: Option<T>, words: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| "–".to_owned(), words)
 }

@@ -2,13 +2,15 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
-/// Range of the number of decimals at which an angle may be a rounded right angle. More decimals
-/// mean an error below a microradian.
+/// Numbers of decimals with which an angle may be a rounded right angle. With more decimals,
+/// rounding is below a microradian and is ignored.
 const ROUNDED_DECIMALS: std::ops::RangeInclusive<usize> = 2..=5;
-/// Minimum number of decimals of a rounded 45° angle, because `0.79` may be exact.
+/// Minimum number of decimals of a rounded 45° angle, because a number with fewer, such as `0.79`,
+/// may be exact.
 const MIN_DECIMALS_OF_45_DEGREES: usize = 4;
 
-/// Returns the multiple of 90° or 45° that a rounded angle stands for: π/2 for `1.5708` or `1.57`.
+/// Returns the multiple of 90° or 45° from which a written angle was rounded: π/2 for `1.5708` or
+/// `1.57`. `None` if there is none.
 pub(crate) fn rounded_right_angle(written: &str) -> Option<f64> {
     let (_, decimals) = written.split_once('.')?;
     let value: f64 = written.parse().ok()?;

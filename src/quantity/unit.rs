@@ -62,7 +62,7 @@ pub enum Unit {
     LengthPerUnit,
     /// Length per table row, used when no time was measured [m/row].
     LengthPerRow,
-    /// Small dimensionless ratio (rad/rad or m/m), displayed in ‰.
+    /// Ratio of equal units (rad/rad or m/m) that is small, displayed in ‰.
     Ratio,
     /// Dimensionless number of order 1.
     Number,
@@ -240,8 +240,8 @@ impl Unit {
         self.row().symbol
     }
 
-    /// Returns true if parameters of this unit deviate by ln(value / nominal): stiffnesses and
-    /// rigidities.
+    /// Returns true if parameters with this unit are estimated as ln(value / nominal): stiffnesses
+    /// and rigidities.
     #[doc(hidden)]
     pub fn is_relative(self) -> bool {
         matches!(self, Self::TorsionalStiffness | Self::AxialRigidity | Self::FlexuralRigidity)
@@ -266,7 +266,7 @@ impl Unit {
         }
     }
 
-    /// Returns the unit in which files state a deviation from a value of this unit.
+    /// Returns the unit in which files state a deviation from a nominal value with this unit.
     pub(crate) fn deviation_unit(self) -> Self {
         if self.is_relative() { Self::Ratio } else { self }
     }
@@ -311,7 +311,7 @@ impl Unit {
         }
     }
 
-    /// Returns every suffix that can occur in arms and measurements.
+    /// Returns every suffix that can occur in declarations of arms and in measurements.
     pub(crate) fn all_suffixes() -> impl Iterator<Item = &'static str> {
         let units = [
             Self::Angle,

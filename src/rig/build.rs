@@ -8,7 +8,7 @@ use super::effect::TrueEffect;
 use crate::problem::{Effect, Joint, JointKind, Placement, PoseConditions};
 use crate::spatial::rotate;
 
-/// Catalogue effect with its true values.
+/// Effect of the catalogue with its true parameter values, SI units.
 pub(super) type EffectValues<'a> = (&'a Effect, &'a [f64]);
 
 impl Rig {
@@ -78,7 +78,7 @@ impl Rig {
         self.effect_values().fold(self.arm.gravity, turn)
     }
 
-    /// Returns the hinge between the floor and the base.
+    /// Returns the hinge between the ground and the arm's base.
     fn base_hinge(&self) -> Hinge {
         let mut hinge = Hinge::default();
         for effect in self.effect_values() {
@@ -89,8 +89,8 @@ impl Rig {
         hinge
     }
 
-    /// Returns the hinges of a joint: the lateral one before its rotation, and the one about its z
-    /// axis.
+    /// Returns two hinges of a joint: the lateral one before its rotation, and the one about its z
+    /// axis. `number` counts from 1.
     fn joint_hinges(
         &self,
         joint: &Joint,
@@ -141,7 +141,7 @@ impl Rig {
         })
     }
 
-    /// Returns the payload with its error \[kg\].
+    /// Returns the true payload of a pose: the commanded one with its error \[kg\].
     fn payload(&self, conditions: &PoseConditions) -> f64 {
         let declared = conditions.payload.unwrap_or(self.arm.tool.payload_mass);
         let add = |payload: f64, effect: EffectValues<'_>| match effect {

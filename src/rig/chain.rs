@@ -32,8 +32,8 @@ impl Hinge {
         *self == Self::default()
     }
 
-    /// Returns the deformation under a force \[N\] and a moment [N·m], both in the axes of the
-    /// hinge.
+    /// Returns the deformation of the hinge under a force \[N\] and a moment [N·m], both in the
+    /// axes of the hinge.
     pub fn deformation(&self, force: &Vector3<f64>, moment: &Vector3<f64>) -> Motion {
         let mut rotation = self.free_rotation + self.compliance.component_mul(moment);
         rotation += Vector3::new(
@@ -47,7 +47,7 @@ impl Hinge {
     }
 }
 
-/// Deformation of a hinge.
+/// Deformation of a hinge: rotation and elongation.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Motion {
     /// Rotation vector of the deformation \[rad\].
@@ -56,15 +56,15 @@ pub(super) struct Motion {
     pub stretch: f64,
 }
 
-/// Spring across a hinge: it pulls a point of the piece behind the hinge towards a point before it;
-/// x and y of the hinge.
+/// Spring across a hinge. It pulls a point of the piece behind the hinge towards a point before it;
+/// coordinates are x and y of the hinge.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Spring {
     /// Index of the piece behind the hinge.
     pub piece: usize,
     /// Anchor before the hinge \[m\].
     pub anchor: Vector2<f64>,
-    /// Attachment behind the hinge, at zero rotation \[m\].
+    /// Attachment point behind the hinge, at zero rotation \[m\].
     pub end: Vector2<f64>,
     /// Length at which the tension equals the preload \[m\].
     pub free_length: f64,
@@ -75,8 +75,8 @@ pub(super) struct Spring {
 }
 
 impl Spring {
-    /// Returns the moment about z on the piece behind the hinge [N·m] after a rotation by `angle`
-    /// \[rad\].
+    /// Returns the moment about z on the piece behind the hinge [N·m], when the hinge is rotated by
+    /// `angle` \[rad\].
     pub fn moment(&self, angle: f64) -> f64 {
         let end = Rotation2::new(angle) * self.end;
         let span = self.anchor - end;
@@ -96,7 +96,8 @@ pub(super) struct Piece {
 /// Frame that is fixed to a piece.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PieceFrame {
-    /// Index of the piece, lower than that of any piece mounted here; `None` is the base.
+    /// Index of the piece, which is lower than that of any piece mounted on this frame; `None` is
+    /// the base.
     pub piece: Option<usize>,
     /// Frame relative to the hinge of the piece, or to the base.
     pub frame: Frame<f64>,
@@ -149,7 +150,7 @@ pub(super) struct Chain {
     pub springs: Vec<Spring>,
     /// Index of the piece to which the next elements are added.
     last: usize,
-    /// Present end of that piece, relative to its hinge.
+    /// Current end of that piece, relative to its hinge.
     end: Frame<f64>,
 }
 
@@ -161,12 +162,12 @@ impl Chain {
         Self { pieces, loads: Vec::new(), springs: Vec::new(), last: 0, end: Frame::identity() }
     }
 
-    /// Returns the present end of the chain, relative to its last hinge, for changes.
+    /// Returns the current end of the chain, relative to its last hinge, for modification.
     pub fn end(&mut self) -> &mut Frame<f64> {
         &mut self.end
     }
 
-    /// Returns the present end of the chain as a frame on its piece.
+    /// Returns the current end of the chain as a frame on its piece.
     pub fn end_frame(&self) -> PieceFrame {
         PieceFrame { piece: Some(self.last), frame: self.end }
     }
@@ -190,7 +191,7 @@ impl Chain {
         self.springs.extend(springs.map(|spring| Spring { piece, ..spring }));
     }
 
-    /// Adds a load at a point \[m\] relative to the present end of the chain.
+    /// Adds a load at a point \[m\] relative to the current end of the chain.
     pub fn load(&mut self, point: &Vector3<f64>, force: Force) {
         self.loads.push(Load { piece: self.last, at: self.end.point(point), force });
     }

@@ -115,7 +115,8 @@ impl Rig {
     }
 }
 
-/// Returns the friction state z of a joint (index from 0) after the sequence of poses [Dahl 1968].
+/// Returns the friction state z ∈ [−1, 1] of a joint (index from 0) after the earlier poses of the
+/// session. `distance` is the friction path \[rad\] or \[m\] [Dahl 1968].
 fn friction(conditions: &PoseConditions, joint: usize, distance: f64) -> f64 {
     let past = &conditions.past;
     let joints = conditions.configuration.len();

@@ -15,15 +15,16 @@ use crate::spatial::{Frame, plane_normal};
 
 /// Maximum number of start configurations from which a contact is searched.
 const MAX_STARTS: usize = 200;
-/// Maximum number of Newton steps of one search.
+/// Maximum number of Newton steps from one start configuration.
 const MAX_STEPS: usize = 40;
-/// Distance at which a contact counts as reached \[m\].
+/// Largest gap between target and fixture at which a contact counts as reached \[m\].
 const CONTACT_TOLERANCE: f64 = 1e-9;
-/// Difference step of a joint coordinate \[rad\] or \[m\].
+/// Step of the numerical derivative with respect to a joint coordinate \[rad\] or \[m\].
 const DIFFERENCE: f64 = 1e-6;
 /// Largest change of a joint coordinate in one Newton step \[rad\] or \[m\].
 const MAX_STEP: f64 = 0.3;
-/// Ratio of singular values below which a direction is left unchanged.
+/// Smallest ratio of singular values at which a direction of joint space is moved; the others keep
+/// their values.
 const RANK_TOLERANCE: f64 = 1e-3;
 
 impl Rig {
@@ -68,9 +69,9 @@ impl Rig {
     }
 
     /// Measures a row. For a contact, it first moves the joints until the target touches the
-    /// fixture, offset by the noise of the row.
+    /// fixture, with the row's noise as remaining offset.
     ///
-    /// Returns `None` if no configuration in contact was found within the ranges.
+    /// Returns `None` if no configuration in contact was found within the joint ranges.
     pub(super) fn measure(
         &self,
         row: &mut Row,
@@ -123,8 +124,8 @@ impl Rig {
         Ok(None)
     }
 
-    /// Moves the joints by Newton's method until the gap closes. Returns true if it closed within
-    /// the ranges.
+    /// Moves the joints by Newton's method until `gap` \[m\] is zero. Returns true if that
+    /// succeeded within the joint ranges.
     fn move_to_contact(
         &self,
         conditions: &mut PoseConditions,

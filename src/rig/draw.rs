@@ -13,20 +13,20 @@ use crate::problem::pattern::matches;
 use crate::problem::{HeldOut, Joint, JointKind, Observation, Past, PoseConditions, Problem};
 use crate::random::{normal, stream};
 
-/// Stream of the parameter deviations. Each quantity has a separate stream, so that more numbers of
-/// one kind do not shift another.
+/// Random stream of the parameter deviations. Each quantity has a separate stream, so that drawing
+/// more numbers of one kind does not change the others.
 const DEVIATIONS: u64 = 0;
-/// Stream of the poses.
+/// Random stream of the poses.
 const POSES: u64 = 1;
-/// Stream of the position noise.
+/// Random stream of the position noise.
 const NOISE: u64 = 2;
-/// Stream of the held-out selection.
+/// Random stream of the choice of held-out rows.
 const SPLIT: u64 = 3;
-/// Stream of the effect values.
+/// Random stream of the effect values.
 const EFFECTS: u64 = 4;
-/// Stream of the orientation noise.
+/// Random stream of the orientation noise.
 const TURNS: u64 = 5;
-/// First of the streams of contact searches, one stream per pose.
+/// First random stream of contact searches; each pose has one stream.
 const CONTACTS: u64 = 1000;
 
 /// Simulated measurement of one pose.
@@ -250,7 +250,8 @@ pub(super) fn between(random: &mut ChaCha8Rng, (from, to): (f64, f64)) -> f64 {
     from + (to - from) * random.random::<f64>()
 }
 
-/// Returns the arm with its true parameters: given, else drawn, else nominal values.
+/// Returns the arm with its true parameters. A value given in the truth precedes a drawn one, and a
+/// drawn one the nominal value.
 fn true_arm(
     problem: &Problem,
     truth: &Truth,

@@ -35,7 +35,7 @@ pub struct TrueEffect {
     values: Vec<f64>,
 }
 
-/// Error of a wrong number of values.
+/// Error of an effect with the wrong number of values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the effect takes {expected} values, not {found}")]
 pub struct ValueCount {
@@ -67,7 +67,7 @@ impl TrueEffect {
         &self.values
     }
 
-    /// Returns the names of the values in the order of the law, with the suffix of their SI unit.
+    /// Returns the names of the values, in the order of the law, with the suffix of their SI unit.
     pub fn keys(cause: &Cause, joints: &[Joint]) -> Vec<String> {
         keys(cause, joints)
             .into_iter()
@@ -85,7 +85,7 @@ impl TrueEffect {
     }
 }
 
-/// Returns names and units of the values of a cause, in the order of the law in FORMAT.
+/// Returns names and units of the values of a cause, in the order that docs/truth.md states.
 pub(super) fn keys(cause: &Cause, joints: &[Joint]) -> Vec<(String, Unit)> {
     let slides = |joint: &usize| {
         joints.get(joint - 1).is_some_and(|joint| joint.kind == JointKind::Prismatic)

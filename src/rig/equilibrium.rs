@@ -5,18 +5,18 @@ use nalgebra::Vector3;
 use super::chain::{Chain, Load, Motion, PieceFrame};
 use crate::spatial::Frame;
 
-/// Sum of all hinge changes below which the equilibrium is reached [rad, m].
+/// Largest sum of the changes of all hinges in a pass at which the equilibrium is reached [rad, m].
 const TOLERANCE: f64 = 1e-12;
-/// Maximum number of passes; after it the arm counts as too flexible for its loads.
+/// Maximum number of passes. If they do not suffice, the arm counts as too flexible for its loads.
 const MAX_PASSES: usize = 2000;
-/// Smallest fraction of a pass that is applied.
+/// Smallest fraction of a pass that is applied after an overshoot.
 const MIN_STEP: f64 = 1.0 / 64.0;
 
 /// Chain in static equilibrium, base frame.
 pub(super) struct Equilibrium {
     /// Frames at half the deformation of every hinge, in which its load is resolved.
     hinges: Vec<Frame<f64>>,
-    /// Frames of the pieces.
+    /// Frames of the pieces, base frame.
     pieces: Vec<Frame<f64>>,
     motions: Vec<Motion>,
     /// Total force \[N\] that each piece carries, and its moment about the origin of the base frame
@@ -27,7 +27,7 @@ pub(super) struct Equilibrium {
 impl Equilibrium {
     /// Finds the equilibrium of a chain; returns `None` if the iteration does not converge.
     ///
-    /// Each pass computes the loads on the present chain and deforms every hinge accordingly. If a
+    /// Each pass computes the loads on the deformed chain and deforms every hinge accordingly. If a
     /// pass overshoots, as with an arm that hangs from flexible joints, it is undone and applied in
     /// part.
     pub fn find(chain: &Chain) -> Option<Self> {

@@ -47,7 +47,7 @@ impl Rig {
         self.span(&weight, joint, number, joint.a.abs() - from, conditions, chain);
     }
 
-    /// Adds a part of a link that is `reach` \[m\] long, with its share of the link's segments.
+    /// Adds a part of a link, `reach` \[m\] long, divided into its share of the link's segments.
     fn span(
         &self,
         weight: &Vector3<f64>,

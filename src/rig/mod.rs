@@ -69,7 +69,7 @@ pub struct NoEquilibrium;
 
 impl Rig {
     /// Creates a rig from an arm with its true parameters and the effects that act on it. Base,
-    /// tool, targets, gravity and T₀ are those of `arm`.
+    /// tool, targets, gravity and the reference temperature T₀ are those of `arm`.
     pub fn new(arm: Problem, effects: Vec<TrueEffect>) -> Self {
         Self { arm, effects, segments: SEGMENTS }
     }
@@ -140,7 +140,8 @@ impl Rig {
         if is_finite { Ok((position, orientation)) } else { Err(NoEquilibrium) }
     }
 
-    /// Returns the frame of the floor, moved by covariates and station moves, measuring frame.
+    /// Returns the frame on which the base is mounted, measuring frame, moved by effects of
+    /// covariates and station moves.
     fn mounted(&self, conditions: &PoseConditions) -> Frame<f64> {
         let (mut turn, mut moved) = (Vector3::zeros(), Vector3::zeros());
         for effect in self.effect_values() {
@@ -160,7 +161,8 @@ impl Rig {
         Frame::from_rotation_vector(moved, &turn)
     }
 
-    /// Returns the position that the tracker reads for a true position \[m\].
+    /// Returns the position that the tracker reads for a true position, with the errors of the
+    /// instrument, measuring frame \[m\].
     fn track(&self, position: Vector3<f64>, conditions: &PoseConditions) -> Vector3<f64> {
         let mut scale = 1.0;
         let mut moved = Vector3::zeros();

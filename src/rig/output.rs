@@ -122,7 +122,7 @@ impl Simulation {
         kinds().filter(|kind| self.rows.iter().any(|row| row.observation.kind() == kind.name))
     }
 
-    /// Adds the measured values, in the columns of all kinds of measurement in the table.
+    /// Appends the measured values to `cells`, in the columns of all kinds of rows in the table.
     fn observed(&self, row: &Row, cells: &mut Vec<String>) {
         for kind in self.kinds() {
             let is_of_kind = row.observation.kind() == kind.name;

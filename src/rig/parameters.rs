@@ -28,8 +28,8 @@ pub(super) fn spread(unit: Unit, nominal: f64, sigma: f64, normal: f64) -> f64 {
     if unit.is_relative() { nominal * (sigma * normal).exp() } else { nominal + sigma * normal }
 }
 
-/// Calls `set` for every parameter, in the order of the file format, with its name, its unit and a
-/// value that may be changed.
+/// Calls `set` for every parameter, in a fixed order, with its name, its unit and its value, which
+/// may be changed.
 pub(super) fn visit(problem: &mut Problem, mut set: impl FnMut(String, Unit, &mut f64)) {
     use Unit::{Angle, AxialRigidity, FlexuralRigidity, Length, TorsionalStiffness};
     for (index, joint) in problem.joints.iter_mut().enumerate() {
@@ -102,7 +102,7 @@ pub(super) fn visit(problem: &mut Problem, mut set: impl FnMut(String, Unit, &mu
     visit_fixtures(&mut problem.fixtures, set);
 }
 
-/// Calls `set` for every unknown of the fixtures, which also come last.
+/// Calls `set` for every unknown number of the fixtures, like [`visit`], which calls it last.
 fn visit_fixtures(fixtures: &mut [Fixture], mut set: impl FnMut(String, Unit, &mut f64)) {
     for Fixture { name, kind, known, .. } in fixtures {
         for (axis, (field, number)) in kind.fields().iter().zip(known).enumerate() {

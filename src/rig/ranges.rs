@@ -13,16 +13,16 @@ const DEFAULT_HELD_OUT: f64 = 0.3;
 /// Time between poses if the file gives none \[s\].
 const DEFAULT_TIME_STEP: f64 = 60.0;
 
-/// Names of other quantities of the section, which no joint may use.
+/// Names of other quantities in the section, which no joint name may equal.
 const RESERVED: [&str; 4] = ["payload", "hoist", "temperature", "time_step"];
 
-/// Contents of the section `[poses]`.
+/// Contents of the section `[poses]`: ranges of the poses and choice of the rows.
 pub(super) struct Poses {
     pub ranges: PoseRanges,
     /// Range of the time between poses \[s\].
     pub time_step: (f64, f64),
     pub held_out: HeldOutRows,
-    /// Number of rows that measure positions before the other kinds.
+    /// Number of first rows that measure positions; rows of other kinds follow.
     pub positions: usize,
     /// Frames whose tilts are measured.
     pub tilts: Vec<usize>,
@@ -49,7 +49,8 @@ pub(super) fn read(mut section: Section<'_, '_>, problem: &Problem) -> Result<Po
     Ok(Poses { ranges, time_step, held_out, positions, tilts })
 }
 
-/// Reads `q1_deg = [from, to]`, or the same under the name of the joint if no other joint has it.
+/// Reads `q1_deg = [from, to]`, or a key with the joint's name in place of `q1` if the name is
+/// unique.
 fn joint_range(
     section: &mut Section<'_, '_>,
     number: usize,

@@ -38,7 +38,8 @@ impl Truth {
         truth(&Document { file: file.to_owned(), text: Arc::from(text) }, problem)
     }
 
-    /// Reads the sections of a truth, except `[noise]`, from another document; the noise is zero.
+    /// Reads the sections of a truth, except `[noise]`, from another document such as a study. The
+    /// noise is zero.
     pub(crate) fn of_sections(
         root: &mut Section<'_, '_>,
         problem: &Problem,
@@ -80,7 +81,7 @@ fn truth(document: &Document, problem: &Problem) -> Result<Truth, InputError> {
     Ok(Truth { noise_sigma, kind_sigmas, orientation_sigma, ..truth })
 }
 
-/// Reads the sections of a truth without noise.
+/// Reads the sections of a truth except `[noise]`.
 fn sections(root: &mut Section<'_, '_>, problem: &Problem) -> Result<Truth, InputError> {
     let nominal = parameters::nominal(problem);
     let parameters = match root.section("parameters")? {
@@ -159,15 +160,15 @@ const POSITION: &str = "position";
 /// Contents of the section `[noise]`.
 #[derive(Default)]
 struct Noise {
-    /// Given standard deviations by the name of the kind of rows \[m\] or \[rad\].
+    /// Standard deviations that the section states, by kind of rows \[m\] or \[rad\].
     given: BTreeMap<&'static str, f64>,
     /// Standard deviation of an orientation \[rad\], if given.
     turn: Option<f64>,
-    /// Error to report if positions, or contacts without a given σ, are measured.
+    /// Error to report if the truth measures positions, or contacts without a stated σ.
     missing: Option<InputError>,
 }
 
-/// Reads the section; contacts have the σ of positions by default.
+/// Reads the section. The default σ of contacts is that of positions.
 fn noise(mut section: Section<'_, '_>) -> Result<Noise, InputError> {
     let mut given = BTreeMap::new();
     for kind in kinds().filter(|kind| kind.needs != Needs::Fixtures) {

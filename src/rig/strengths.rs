@@ -8,7 +8,7 @@ use crate::problem::item::Item;
 use crate::problem::section::Section;
 use crate::problem::{Effect, PoseRanges, Problem};
 
-/// Key of an effect outside the catalogue.
+/// Key of an effect that is not in the catalogue.
 const OUTSIDE: &str = "outside";
 
 /// Reads every table `[[effect]]` of a truth.
@@ -94,7 +94,8 @@ fn located_effect(
         .map_err(|_| item.error(InputErrorKind::NoStrength { write: write() }))
 }
 
-/// Returns the key that declares the effect: a known name, or the first entry that is not a value.
+/// Returns the key that declares the effect, with its value: a known name, or else the first entry
+/// that is a table.
 fn declaration<'a, 'i>(section: &Section<'a, 'i>) -> Result<(&'a str, Item<'a, 'i>), InputError> {
     let entries = section.entries();
     let is_effect = |(name, item): &(&str, Item<'_, '_>)| {

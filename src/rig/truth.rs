@@ -7,8 +7,8 @@ use crate::observation::{Observation, kinds};
 use crate::problem::{Fixture, PoseRanges};
 use crate::quantity::Unit;
 
-/// Difference of the true arm from the declared one, and the poses in which it is measured
-/// (`TRUTH.toml`).
+/// Description of a true arm (`TRUTH.toml`): how it differs from the declared one, and the poses in
+/// which it is measured.
 #[derive(Debug, Clone)]
 pub struct Truth {
     /// Given true values, `[parameters]`.
@@ -25,17 +25,17 @@ pub struct Truth {
     pub noise_sigma: f64,
     /// Standard deviations of rows of other kinds by the name of the kind \[m\] or \[rad\].
     pub kind_sigmas: BTreeMap<&'static str, f64>,
-    /// Number of rows that measure positions before the other kinds, if there are fixtures to
-    /// measure against.
+    /// Number of first rows that measure positions if there are fixtures; rows that measure against
+    /// the fixtures follow.
     pub positions: usize,
-    /// Frames whose tilts are measured in turn after the fixtures: 0 is the base of the arm, i that
-    /// of joint i.
+    /// Frames whose tilts are measured in turn, after the fixtures: 0 is the base of the arm, i the
+    /// frame of joint i.
     pub tilts: Vec<usize>,
     /// Standard deviation of a measured orientation about each axis \[rad\], if orientations are
     /// measured.
     pub orientation_sigma: Option<f64>,
-    /// Ranges of the poses, `[poses]`; a payload, hoist or temperature without a range has no
-    /// column.
+    /// Ranges of the poses, `[poses]`. A payload, hoist force or temperature without a range has no
+    /// column in the measurements.
     pub poses: PoseRanges,
     /// Range of the time between poses \[s\], `[poses]`.
     pub time_step: (f64, f64),
@@ -51,8 +51,8 @@ pub struct Truth {
 pub struct Deviation {
     /// Name as in the problem file, for example `joint2.alpha`.
     pub name: String,
-    /// Difference from the nominal value \[rad\] or \[m\]; factor of the nominal value for a
-    /// stiffness or rigidity.
+    /// Deviation from the nominal value: difference \[rad\] or \[m\], or factor for a stiffness or
+    /// rigidity.
     pub value: f64,
 }
 
@@ -73,7 +73,7 @@ pub struct RandomRule {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum HeldOutRows {
-    /// Share of the rows; at least one row, and never all.
+    /// Share of the rows, rounded to at least one row and fewer than all.
     Share(f64),
     /// All rows but this many.
     AllBut(usize),
@@ -88,8 +88,8 @@ impl Truth {
             .any(|(effect, _)| effect.has_memory())
     }
 
-    /// Returns the kind of measurement of each row: positions first, then fixtures and tilted
-    /// frames in turn; positions only if there are none of these.
+    /// Returns the quantity that each of `rows` rows measures: positions first, then fixtures and
+    /// tilted frames in turn. Without fixtures and tilts, all rows measure positions.
     pub(super) fn observations(&self, fixtures: &[Fixture], rows: usize) -> Vec<Observation> {
         let observation = |(index, fixture): (usize, &Fixture)| {
             let mut kinds = kinds().filter(|kind| kind.references().count() == 1);
@@ -106,8 +106,9 @@ impl Truth {
         (0..rows).map(of_row).collect()
     }
 
-    /// Returns the number of successive rows of one target: with fixtures one row for each fixture
-    /// and tilted frame, so that each target is measured against all of them, else one.
+    /// Returns the number of successive rows with one target. With fixtures, it is one row for each
+    /// fixture and tilted frame, so that each target is measured against all of them; otherwise it
+    /// is one.
     pub(super) fn rows_per_target(&self, fixtures: &[Fixture]) -> usize {
         if fixtures.is_empty() { 1 } else { fixtures.len() + self.tilts.len() }
     }

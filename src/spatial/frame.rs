@@ -24,7 +24,7 @@ impl<S: Scalar> Default for Frame<S> {
 }
 
 impl<S: Scalar> Frame<S> {
-    /// Creates the reference frame.
+    /// Creates the identity: the reference frame itself.
     pub fn identity() -> Self {
         let (zero, one) = (S::from(0.0), S::from(1.0));
         Self {
@@ -100,7 +100,7 @@ impl<S: Scalar> Frame<S> {
         self.axes[0] * vector.x + self.axes[1] * vector.y + self.axes[2] * vector.z
     }
 
-    /// Returns `frame`, given in this frame, in the reference frame.
+    /// Returns `frame`, which is given relative to this frame, relative to the reference frame.
     #[must_use]
     pub fn compose(&self, frame: &Self) -> Self {
         Self { axes: frame.axes.map(|axis| self.vector(&axis)), origin: self.point(&frame.origin) }
@@ -113,7 +113,7 @@ impl<S: Scalar> Frame<S> {
         Self { axes: self.axes.each_ref().map(constant), origin: constant(&self.origin) }
     }
 
-    /// Returns this frame's coordinates of a vector given in the reference frame.
+    /// Returns the components, in this frame's axes, of a vector given in the reference frame.
     pub fn resolve(&self, vector: &Vector3<S>) -> Vector3<S> {
         Vector3::new(self.axes[0].dot(vector), self.axes[1].dot(vector), self.axes[2].dot(vector))
     }

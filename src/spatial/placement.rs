@@ -28,7 +28,7 @@ impl Frame<f64> {
         Vector3::new(roll, (-x.z).atan2(level), yaw)
     }
 
-    /// Returns the reference frame in this frame.
+    /// Returns the inverse transform: the reference frame relative to this frame.
     #[must_use]
     pub fn inverse(&self) -> Self {
         let axes = [0, 1, 2].map(|k| self.axes.map(|axis| axis[k]).into());

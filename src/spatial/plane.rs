@@ -5,12 +5,13 @@ use nalgebra::Vector3;
 use super::rotate;
 use crate::scalar::Scalar;
 
-/// Largest angle between a normal and ẑ, beyond which the opposite normal is parameterised \[rad\].
+/// Largest angle between a normal and ẑ for which the normal is parameterised directly \[rad\];
+/// beyond it, the opposite normal is.
 pub const MAX_NORMAL_TILT: f64 = 0.75 * std::f64::consts::PI;
 
 /// Returns the normal of a plane from its first two numbers \[rad\]: exp(\[(rx, ry, 0)\]×) ẑ. This
-/// is singular at −ẑ; for rx above 3π/4 the normal is −exp(\[(rx − π, ry, 0)\]×) ẑ, which is not.
-/// Both agree for ry = 0.
+/// form is singular at −ẑ. For rx above 3π/4 the normal is therefore −exp(\[(rx − π, ry, 0)\]×) ẑ,
+/// which is regular there. Both forms agree for ry = 0.
 pub fn plane_normal<S: Scalar>(rx: S, ry: S) -> Vector3<S> {
     let of = |rx: S| {
         let zero = S::from(0.0);

@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::scalar::Scalar;
 
-/// Squared angle below which the exponential uses its power series, exact to rounding there
-/// \[rad²\].
+/// Squared angle below which the exponential map uses its power series \[rad²\], which is exact to
+/// rounding there.
 const SERIES_BELOW: f64 = 0.01;
 
 /// Rotates `vector` by the rotation vector `w` \[rad\]: exp(`[w]×`) v.

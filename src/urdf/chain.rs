@@ -32,7 +32,7 @@ pub(super) struct Stage {
     pub step: Frame<f64>,
     /// Axis frame in the URDF's frame of the joint.
     pub axis: Frame<f64>,
-    /// Stage whose command it follows, and the factor.
+    /// Stage whose command a mimic joint follows, and the factor.
     pub mimic: Option<(usize, f64)>,
     /// Offset of a mimic joint \[rad\] or \[m\].
     pub addend: f64,
@@ -136,8 +136,8 @@ impl<'a> Chain<'a> {
         Ok(())
     }
 
-    /// Returns the joint of the chain that a joint finally follows, with factor and offset; `None`
-    /// if no joint of the chain leads it, so that it takes its own command.
+    /// Returns the joint of the chain whose command a joint follows, directly or through other
+    /// mimic joints, with factor and offset. `None` if the joint takes a command itself.
     fn leader(&self, index: usize) -> Result<(Option<(usize, f64)>, f64), InputError> {
         let (mut factor, mut addend, mut at) = (1.0, 0.0, index);
         let mut last = (None, 0.0);
@@ -171,7 +171,7 @@ impl<'a> Chain<'a> {
     }
 }
 
-/// Returns a frame whose z is along `axis`, by the smallest rotation.
+/// Returns a frame whose z axis is along `axis`, by the smallest rotation from the identity.
 fn axis_frame(axis: &Vector3<f64>) -> Frame<f64> {
     let horizontal = axis.x.hypot(axis.y);
     let mut frame = Frame::identity();
@@ -197,7 +197,8 @@ pub(super) fn moved(frame: &Frame<f64>, joint: &Joint, q: f64) -> Frame<f64> {
     frame
 }
 
-/// Returns the joint above each link and that joint's parent link.
+/// Returns, for each link, the joint that has it as child and that joint's parent link; `None` for
+/// the root.
 fn parents(robot: &Robot) -> Result<Vec<Option<(usize, usize)>>, InputError> {
     let mut above: Vec<Option<(usize, usize)>> = vec![None; robot.links.len()];
     let link =
@@ -239,7 +240,8 @@ fn root(robot: &Robot, above: &[Option<(usize, usize)>]) -> Result<usize, InputE
     }
 }
 
-/// Returns the only link below `base` that is no joint's parent.
+/// Returns the only link below `base` that is no joint's parent. `above` holds the result of
+/// [`parents`].
 fn leaf(robot: &Robot, above: &[Option<(usize, usize)>], base: usize) -> Result<usize, InputError> {
     let is_parent = |link: usize| robot.joints.iter().any(|joint| joint.parent == link);
     // Number of moving joints from the base to a link below it.

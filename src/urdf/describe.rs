@@ -18,8 +18,8 @@ use crate::problem::quoted;
 use crate::problem::read::FORBIDDEN_IN_FOLDER_NAMES;
 use crate::spatial::Frame;
 
-/// Values below this are rounding errors, also of right angles written with eleven decimals \[rad\]
-/// or \[m\].
+/// Largest magnitude that counts as a rounding error of zero \[rad\] or \[m\]. Right angles written
+/// with eleven decimals have such errors.
 const ROUNDING: f64 = 1e-11;
 /// Default standard deviation of a measured coordinate, typical of a laser tracker in a workshop
 /// \[mm\].
@@ -29,7 +29,7 @@ pub const HELD_OUT: f64 = 0.3;
 /// Maximum length of a problem's name taken from the robot's [characters].
 const MAX_NAME_CHARS: usize = 60;
 
-/// Range of a joint without limits: `check` and `plan` draw poses from it.
+/// Text with the range of a joint without limits, from which `check` and `plan` draw poses.
 const CONTINUOUS_RANGE: &str = "# A joint without limits: poses are planned within one turn.\n\
      min_deg = -180\nmax_deg = 180\n";
 
@@ -44,7 +44,7 @@ pub struct Description {
     pub notes: Vec<String>,
 }
 
-/// Table `[[joint]]` to be written.
+/// Table `[[joint]]` of the problem that is written.
 #[derive(Default)]
 struct Row {
     name: String,
@@ -77,7 +77,8 @@ pub fn describe(chain: &Chain) -> Result<Description, InputError> {
     Ok(Description { name, text, notes })
 }
 
-/// Returns `name`, changed if a joint of the URDF has it: columns are named after joints.
+/// Returns `name`, changed if a joint of the URDF has the same name, because columns are named
+/// after joints.
 fn avoid_joint_names(chain: &Chain, name: &str) -> String {
     let taken = chain.robot.joints.iter().any(|joint| joint.name == name);
     if taken { format!("{name} frame") } else { name.to_owned() }
@@ -167,7 +168,7 @@ fn rows(chain: &Chain, notes: &mut Vec<String>) -> Vec<Row> {
     rows
 }
 
-/// Returns `frame` after a row with q = 0.
+/// Returns `frame` transformed by a row at q = 0.
 fn advanced(frame: &Frame<f64>, row: &Row) -> Frame<f64> {
     let mut frame = row.placement.as_ref().map_or(*frame, |placement| frame.compose(placement));
     let [alpha, a, theta, d, beta] = row.numbers;
@@ -179,7 +180,7 @@ fn advanced(frame: &Frame<f64>, row: &Row) -> Frame<f64> {
     frame
 }
 
-/// Returns a valid folder name.
+/// Returns the robot's name as a valid folder name.
 fn name(robot: &str) -> String {
     let fit: String = robot
         .chars()
@@ -215,7 +216,7 @@ fn list(values: &Vector3<f64>, text: impl Fn(f64) -> String) -> String {
     format!("[{}]", values.iter().map(|value| text(*value)).collect::<Vec<_>>().join(", "))
 }
 
-/// Writes everything up to `[parameters]`; writing to a text cannot fail.
+/// Writes the problem up to the section `[parameters]`.
 fn arm(chain: &Chain, name: &str, rows: &[Row]) -> String {
     let (base, tip) = chain.ends();
     let file = chain.robot.file().file_name().unwrap_or_default().to_string_lossy().into_owned();

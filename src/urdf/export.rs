@@ -1,4 +1,4 @@
-//! Export of identified geometry into the origins of a URDF; all other bytes stay unchanged.
+//! Export of identified geometry into the origins of a URDF. All other bytes are unchanged.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -12,11 +12,12 @@ use crate::mechanics::Arm;
 use crate::problem::{JointKind, Problem};
 use crate::spatial::Frame;
 
-/// Tolerance between the nominal arms of problem and URDF \[rad\] or \[m\].
+/// Largest difference between the nominal arms of problem and URDF that counts as equal \[rad\] or
+/// \[m\].
 const NOMINAL_TOLERANCE: f64 = 1e-6;
-/// Maximum transform after the chain's last origin that may be dropped \[rad\] or \[m\].
+/// Largest transform after the chain's last origin that may be dropped \[rad\] or \[m\].
 const MAX_DROPPED: f64 = 1e-10;
-/// Minimum displacement for which an origin is rewritten \[rad\] or \[m\].
+/// Smallest displacement for which an origin is rewritten \[rad\] or \[m\].
 const MIN_DISPLACEMENT: f64 = 1e-12;
 
 /// URDF with identified origins.
@@ -38,9 +39,9 @@ pub struct MovedOrigin {
     pub xyz: Vector3<f64>,
     /// Roll, pitch and yaw \[rad\], as written to the file.
     pub rpy: Vector3<f64>,
-    /// Distance that it moved \[m\].
+    /// Distance by which it moved \[m\].
     pub distance: f64,
-    /// Angle that it turned \[rad\].
+    /// Angle by which it turned \[rad\].
     pub angle: f64,
 }
 
@@ -188,7 +189,8 @@ struct Patches<'a> {
 }
 
 impl Patches<'_> {
-    /// Returns the frame after some fixed joints and writes out their rounded angles.
+    /// Returns the transform through some fixed joints, and writes their origins as the file will
+    /// round them.
     fn through(&mut self, joints: &[usize]) -> Frame<f64> {
         let mut frame = Frame::identity();
         for &index in joints {

@@ -12,9 +12,10 @@ use crate::problem::{
 };
 use crate::random::stream;
 
-/// Minimum fraction of a Jacobian column that must be independent of the earlier ones.
+/// Smallest part of a Jacobian column, relative to its norm, that must be independent of the chosen
+/// columns.
 const MIN_INDEPENDENT_FRACTION: f64 = 1e-3;
-/// Sampled range of a joint without limits \[rad\], or of a prismatic joint \[m\].
+/// Largest sampled range of a joint without limits, from −3 to 3 \[rad\] or \[m\].
 const MAX_SAMPLED_ANGLE: f64 = 3.0;
 const MAX_SAMPLED_TRAVEL: f64 = 0.5;
 
@@ -69,7 +70,8 @@ pub(super) fn distinguishable_parameters(problem: &Problem) -> Result<Vec<String
     Ok(chosen.iter().filter_map(|&k| Some(model.parameters.get(k)?.name.clone())).collect())
 }
 
-/// Returns the priority of a parameter; equal priorities follow the order of the arm.
+/// Returns the rank of a parameter in the order of choice, lowest first; equal ranks follow the
+/// order of the arm.
 fn priority(parameter: &Parameter) -> usize {
     let field = parameter.name.rsplit('.').next().unwrap_or_default();
     let fields = ["alpha", "a", "theta", "d", "beta"];

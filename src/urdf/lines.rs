@@ -4,9 +4,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use crate::spatial::Frame;
 
-/// Sine of the angle below which axes count as parallel.
+/// Largest sine of the angle between axes that count as parallel.
 const MAX_PARALLEL_SINE: f64 = 0.1;
-/// Distance below which a direction is undefined \[m\].
+/// Smallest distance between two points that defines a direction \[m\].
 const MIN_DISTANCE: f64 = 1e-12;
 
 /// Transform Rz(θ₀) Tz(d₀) Ry(β) Rx(α) Tx(a) Rz(θ) Tz(d) between two axes: the first two factors

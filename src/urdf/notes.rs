@@ -10,7 +10,7 @@ const MAX_PLAUSIBLE_ANGLE: f64 = TAU + 0.01;
 /// Maximum plausible length of an origin \[m\]; no joint of an arm is farther from the previous one.
 const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 
-/// Returns the notes about a chain and about joints beside it.
+/// Returns the notes about a chain and about joints outside it.
 pub(super) fn of_chain(chain: &Chain) -> Vec<String> {
     let joints: Vec<&Joint> =
         chain.joints.iter().filter_map(|&index| chain.robot.joints.get(index)).collect();
@@ -59,7 +59,7 @@ fn unlimited_slide(joint: &Joint) -> Option<String> {
     })
 }
 
-/// Returns a note about angles that were read as multiples of 45°.
+/// Returns a note if angles were read as multiples of 45° from their rounded decimals.
 fn right_angles(origins: &[&Joint]) -> Option<String> {
     let mut values: Vec<String> = Vec::new();
     let mut joints = Vec::new();

@@ -56,9 +56,10 @@ pub(super) struct Joint {
     pub limits: (f64, f64),
     /// Limits that are ignored because the lower one is above the upper one.
     pub reversed_limits: Option<(f64, f64)>,
-    /// Index of the joint that it follows, factor and offset.
+    /// Index of the joint that a mimic joint follows, factor and offset; `None` for other joints.
     pub mimic: Option<(usize, f64, f64)>,
-    /// Error of a `<mimic>` that cannot be followed; it matters only if the chain needs the joint.
+    /// Error of a `<mimic>` that names no joint or is invalid. It is reported only if the chain
+    /// needs the joint.
     pub broken_mimic: Option<(Location, UrdfErrorKind)>,
     /// Byte range of its element in the text.
     pub span: Range<usize>,
@@ -70,7 +71,7 @@ pub(super) struct Origin {
     pub xyz: Vector3<f64>,
     /// Roll, pitch, yaw as written \[rad\].
     pub written: Vector3<f64>,
-    /// Roll, pitch, yaw with rounded right angles restored \[rad\]: π/2 for 1.5708.
+    /// Roll, pitch, yaw with rounded right angles restored, π/2 for 1.5708 \[rad\].
     pub meant: Vector3<f64>,
     /// Byte ranges of the element and its attribute values, if present.
     pub element: Option<Range<usize>>,
@@ -160,7 +161,7 @@ impl Reader<'_> {
         self.fail_at(node.range(), kind)
     }
 
-    /// Returns an error at the first line of a part of the text.
+    /// Returns an error at the first line of `span`, a byte range of the text.
     fn fail_at<T>(&self, span: Range<usize>, kind: UrdfErrorKind) -> Result<T, InputError> {
         let line = self
             .source

@@ -6,9 +6,9 @@ use super::chain::{Chain, moved};
 use super::read::Kind;
 use crate::spatial::Frame;
 
-/// Mass carried by a stage of the chain.
+/// Mass of a link in the chain or attached to it, with the stage that carries it.
 pub(super) struct Weight {
-    /// Stage after which the link follows.
+    /// Index of the stage after which the link follows.
     pub stage: usize,
     pub name: String,
     /// Mass of the link \[kg\].
@@ -17,8 +17,8 @@ pub(super) struct Weight {
     pub at: Vector3<f64>,
 }
 
-/// Returns all links with a mass after a joint of the chain, and the joints outside the chain that
-/// move some of them.
+/// Returns all links with a mass after the first joint of the chain, and the names of joints
+/// outside the chain that move some of them.
 pub(super) fn weights(chain: &Chain) -> (Vec<Weight>, Vec<String>) {
     let robot = chain.robot;
     let (mut weights, mut beside) = (Vec::new(), Vec::new());

@@ -10,7 +10,7 @@ use crate::problem::{JointKind, Problem};
 use crate::spatial::Frame;
 use nalgebra::Vector3;
 
-/// Recipient of the file, which determines its form.
+/// Program for which the file is written, which determines its form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum YamlFormat {
@@ -20,7 +20,7 @@ pub enum YamlFormat {
     Ros,
 }
 
-/// Origin of a joint whose axis is the z of its frame, relative to the previous frame.
+/// Origin of a joint relative to the previous frame. The joint's axis is the z axis of its frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JointOrigin {
     /// Name of the joint, or of the link after it.
@@ -35,7 +35,7 @@ pub struct JointOrigin {
 ///
 /// For ROS the frames are those of the problem, and a last origin leads to the tip. For Universal
 /// Robots they are those of the manufacturer's description, from base_link_inertia to wrist_3_link.
-/// Zero positions are those of the problem.
+/// Joint angles of zero are those of the problem.
 ///
 /// # Errors
 /// The form is Universal Robots' and the arm does not have it.
