@@ -1,4 +1,4 @@
-//! Result of `accept`: acceptance.json.
+//! Result of the command `accept`: acceptance.json.
 
 use std::path::PathBuf;
 
@@ -14,10 +14,10 @@ use crate::numeric::range;
 use crate::problem::{HeldOut, Problem};
 use crate::quantity::format::number;
 
-/// Inputs of a record, and facts that no file holds.
+/// Input files of an acceptance record, and facts that the caller provides.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct AcceptanceRecord {
-    /// Each input file with its SHA-256, `None` if it cannot be read again.
+    /// Each input file with its SHA-256; `None` if it cannot be read a second time.
     pub inputs: Vec<(PathBuf, Option<String>)>,
     /// Commit of the repository that holds the problem.
     pub commit: Option<String>,
@@ -25,7 +25,7 @@ pub struct AcceptanceRecord {
     pub instrument: Option<String>,
 }
 
-/// Accuracy of the held-out poses, counted after ISO 9283, with the conditions of the measurement.
+/// Accuracy in the held-out poses after ISO 9283, with the conditions of the measurement.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct AcceptanceResult {
     pub problem: String,
@@ -33,7 +33,7 @@ pub struct AcceptanceResult {
     pub flexcal: &'static str,
     /// Commit of the repository of the problem.
     pub commit: Option<String>,
-    /// SHA-256 of all declarations that predictions depend on.
+    /// SHA-256 digest of all declarations on which predictions depend.
     pub arm_digest: String,
     pub inputs: Vec<Input>,
     pub instrument: Option<String>,
@@ -66,7 +66,7 @@ impl Document for AcceptanceResult {
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Input {
     pub file: String,
-    /// Null if the file cannot be read again.
+    /// SHA-256 of the file; null if the file cannot be read a second time.
     pub sha256: Option<String>,
 }
 
@@ -82,7 +82,7 @@ pub struct Condition {
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct PoseAccuracy {
     pub mean_mm: f64,
-    /// Bootstrap interval of the mean, 95 %.
+    /// Bootstrap interval of the mean (95 %).
     pub interval_95_mm: [f64; 2],
     pub rms_mm: f64,
     pub max_mm: f64,

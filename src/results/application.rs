@@ -19,7 +19,8 @@ use crate::urdf::{Chain, Description};
 /// Errors of predictions against measurements.
 #[derive(Debug, Default, Serialize, JsonSchema)]
 pub struct PredictionErrors {
-    /// Errors of all rows of the first kind; absent if the rows hold no measurements.
+    /// Errors of all rows of the leading kind (positions, if there are any); absent if the rows
+    /// contain no measurements.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub all: Option<Summary>,
     /// Errors of each kind of rows, if there are several.
@@ -65,7 +66,8 @@ impl PredictionErrors {
         }
     }
 
-    /// Returns the errors with their bounds, and the share of `residuals` within them.
+    /// Returns the errors with their bounds, and with the share of `residuals` that lie within
+    /// them.
     #[must_use]
     pub fn with_bounds(self, residuals: &[Residual], bounds: &Bounds) -> Self {
         let lengths = residuals.iter().map(|residual| residual.position.norm());
@@ -74,19 +76,19 @@ impl PredictionErrors {
     }
 }
 
-/// Commands that bring the arm to targets. Means are over the targets that are reached.
+/// Commands by which the arm reaches targets. Means are over the targets that are reached.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct CompensationResult {
     pub problem: String,
     pub targets: usize,
     pub reached: usize,
-    /// Predicted mean distance with the commands of the file.
+    /// Mean predicted distance to the targets with the commands of the file.
     pub mean_miss_before_mm: Option<f64>,
-    /// Predicted mean distance with the commands found.
+    /// Mean predicted distance to the targets with the commands found.
     pub mean_miss_mm: Option<f64>,
     pub mean_turn_before_deg: Option<f64>,
     pub mean_turn_deg: Option<f64>,
-    /// Rows of the targets that cannot be reached, from 1.
+    /// Rows of the targets that cannot be reached, counted from 1.
     pub unreached: Vec<usize>,
     #[serde(flatten)]
     pub bounds: Option<BoundSummary>,
@@ -96,7 +98,7 @@ impl Document for CompensationResult {
     const FORMAT: &'static str = "flexcal-compensate";
 }
 
-/// Problem made from a URDF.
+/// Problem that was made from a URDF.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct InitResult {
     pub problem: String,
@@ -144,7 +146,7 @@ impl CompensationResult {
 }
 
 impl InitResult {
-    /// Collects what was made of a chain, written to `file`.
+    /// Collects the result of converting a chain into `description`, which was written to `file`.
     pub fn new(chain: &Chain, description: &Description, file: &Path) -> Self {
         let (base, tip) = chain.ends();
         Self {

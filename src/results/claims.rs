@@ -1,4 +1,4 @@
-//! Hypotheses about a residual, and what is claimed of them with which probability.
+//! Hypotheses about the cause of a residual, and claims about the cause with their probabilities.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -8,10 +8,10 @@ use crate::problem::Effect;
 use crate::residual_tests::Covariate;
 use crate::select::{self, HypothesisKind, Trace};
 
-/// Hypothesis: a law at a place, or a function of unknown law.
+/// Hypothesis about a cause: an effect with its law, or a function of unknown law at a place.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Hypothesis {
-    /// Effect, if the law is one of the catalogue.
+    /// Effect of the catalogue; null for a function of unknown law.
     #[schemars(with = "Option<EffectKeys>")]
     pub effect: Option<Effect>,
     /// Name of the effect, or of the kind of function.
@@ -22,7 +22,7 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
-    /// Names a hypothesis about the traced data.
+    /// Converts a hypothesis about the traced data, with names for its place and law.
     pub(super) fn new(hypothesis: &select::Hypothesis, trace: &Trace) -> Self {
         Self {
             effect: hypothesis.effect().cloned(),
@@ -34,7 +34,7 @@ impl Hypothesis {
     }
 }
 
-/// Claim with its probability.
+/// Claim with its posterior probability.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Claim<T> {
     pub value: T,
@@ -44,18 +44,18 @@ pub struct Claim<T> {
 /// Claims about a cause, from the weakest to the strongest.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct Claims {
-    /// Claim that something acts at this place.
+    /// Claim that a cause acts at this place.
     pub place: Claim<String>,
-    /// Claim that it depends on these quantities and no others.
+    /// Claim that the cause depends on exactly these quantities.
     pub depends_on: Claim<Vec<String>>,
-    /// Claim that this is its law, and no function of unknown law acts there; null if none is
-    /// known.
+    /// Claim that this is the cause's law, and that no function of unknown law acts at the place.
+    /// The claim is null if no law is known.
     pub law: Claim<Option<String>>,
     pub description: String,
 }
 
 impl Claims {
-    /// Names the claims about the traced data.
+    /// Converts claims about the traced data, with names for places and laws.
     pub(super) fn new(claims: &select::Claims, trace: &Trace) -> Self {
         let select::Claims { place, depends_on, law } = claims;
         let name = law.0.effect().map(|effect| effect.name().to_owned());

@@ -1,4 +1,4 @@
-//! Result of `loop`: loop.json.
+//! Result of the command `loop`: loop.json.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -17,7 +17,7 @@ use crate::remainder::Fitted;
 use crate::residual_tests::Covariate;
 use crate::select::{self, ClosedLoop, HypothesisKind, ReferenceVerdict, Status, Trace, Verdict};
 
-/// Place of structure that only the residual tests see.
+/// Place of structure that only the residual tests detect.
 const NOWHERE: &str = "nowhere in particular";
 
 /// Result of the search for missing effects.
@@ -25,13 +25,13 @@ const NOWHERE: &str = "nowhere in particular";
 pub struct LoopResult {
     pub problem: String,
     pub verdict: Verdict,
-    /// Present and true if the search was stopped before its end.
+    /// True if the search was stopped before its end; otherwise absent.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub interrupted: bool,
     pub trusted: bool,
     /// True if the residual of the last fit could be tested for structure.
     pub tested: bool,
-    /// Errors of the nominal arm, with base and tool fitted where they are free.
+    /// Errors of the nominal arm, with base and tool fitted if they are free.
     pub registered: Errors,
     /// Fit of the declared problem.
     pub before: Fit,
@@ -47,15 +47,15 @@ pub struct LoopResult {
     pub held_out_gain_px: Option<Gain>,
     /// Effects of the extended problem that were not declared.
     pub effects: Vec<FoundEffect>,
-    /// Remainder beside the effects; `after` is with it.
+    /// Remainder that was fitted in addition to the effects; `after` includes it.
     pub remainder: Option<Remainder>,
     /// Strongest structure whose law is unknown.
     pub unexplained: Option<Structure>,
-    /// Rows with gross errors, which took no part in the choice of effects.
+    /// Rows with gross errors, which were excluded from the choice of effects.
     pub set_aside: Vec<Row>,
-    /// Further structure whose law is unknown, most probable first.
+    /// Other structure whose law is unknown, most probable first.
     pub further: Vec<Structure>,
-    /// Common prior of the harmonics of all joints.
+    /// Common prior of the harmonics of all joints, order by order.
     pub harmonic_prior: Option<Vec<OrderPrior>>,
     /// Rounds of the search.
     pub steps: Vec<Step>,
@@ -96,22 +96,22 @@ pub struct FoundEffect {
     #[serde(flatten)]
     pub effect: NamedEffect,
     pub status: Status,
-    /// Null if no evidence was evaluated.
+    /// Claims about the cause; null if no evidence was evaluated.
     pub claims: Option<Claims>,
-    /// Share of refits without a fifth of the configurations that name the effect.
+    /// Share of refits, each on random 80 % of the configurations, that find the effect again.
     pub stability: Option<f64>,
-    /// Verdict of data outside the fit.
+    /// Verdict of measurements that are independent of the fit.
     pub witness: Option<Witness>,
-    /// Probability that noise alone gains as much, corrected for all candidates.
+    /// Probability that noise alone gains as much, corrected for the number of candidates.
     pub p_value: f64,
     pub parameters: Vec<ParameterValue>,
-    /// Effects that these data cannot tell from it, most probable first.
+    /// Effects that these data cannot distinguish from it, most probable first.
     pub alternatives: Vec<NamedEffect>,
     /// Held-out errors after the first round with the effect.
     pub held_out_after: Summary,
 }
 
-/// Verdict of data that took no part in the fit.
+/// Verdict of measurements that are independent of the fit, such as readings of fixed points.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Witness {
     pub data: String,
@@ -130,34 +130,34 @@ pub struct ParameterValue {
     pub std_error: Option<f64>,
 }
 
-/// Structure whose law is unknown.
+/// Structure in the residual whose law is unknown.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Structure {
-    /// Place of the error.
+    /// Place where the error acts.
     #[serde(rename = "where")]
     pub place: String,
     pub depends_on: Vec<String>,
     /// Kind of function, for example `smooth`, `sag`, `wandering` or `limit`; null if only the
-    /// residual tests see the structure.
+    /// residual tests detect the structure.
     pub law: Option<String>,
-    /// Limit of the declared problem that is wrong, or that hides a cause.
+    /// Limit of the declared problem (bound or prior) that is wrong, or that hides a cause.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit: Option<String>,
     pub claims: Option<Claims>,
-    /// Upper limit of the probability that noise alone makes the structure.
+    /// Upper limit of the probability that noise alone causes the structure.
     pub p_value: f64,
     pub held_out_with_empirical_correction: Option<Summary>,
     pub correction: Option<Correction>,
 }
 
-/// Smooth correction of the structure, without a law.
+/// Smooth empirical correction of the structure.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Correction {
-    /// Range of each input, SI units; beyond it the correction keeps its last value.
+    /// Range of each input, SI units. Beyond it the correction is constant.
     pub ranges: Vec<(String, (f64, f64))>,
     /// Number of held-out rows outside these ranges.
     pub held_out_beyond: usize,
-    /// Rms error of poses left out in turn, without and with the correction.
+    /// Rms error of poses, each left out of the fit in turn, without and with the correction.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_validated_rms_mm: Option<[f64; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -166,14 +166,14 @@ pub struct Correction {
     pub cross_validated_rms_px: Option<[f64; 2]>,
 }
 
-/// Row of a file.
+/// Row of a measurement file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Row {
     pub file: String,
     pub line: Option<usize>,
 }
 
-/// Prior of the harmonics of one order.
+/// Prior of the harmonics of one order, the same for all joints.
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct OrderPrior {
     pub order: u32,
@@ -190,7 +190,7 @@ pub struct Step {
 }
 
 impl LoopResult {
-    /// Collects the result of a loop.
+    /// Collects the result of a finished or interrupted loop.
     pub fn new(problem: &Problem, closure: &ClosedLoop) -> Self {
         let (before, held_out) = (&closure.before, &closure.after.fitted.held_out);
         let gain = {
@@ -230,7 +230,7 @@ impl LoopResult {
         }
     }
 
-    /// Returns the result with the remainder that was kept beside the effects, if one was.
+    /// Returns the result with the remainder, if one was accepted in addition to the effects.
     #[must_use]
     pub(crate) fn with_remainder(mut self, closure: &ClosedLoop, fitted: &Fitted) -> Self {
         if let Some(corrected) = &fitted.residuals {
@@ -240,7 +240,7 @@ impl LoopResult {
         self
     }
 
-    /// Iterates over the effects with a status.
+    /// Iterates over the effects with the given status.
     pub(crate) fn with_status(&self, status: Status) -> impl Iterator<Item = &FoundEffect> {
         self.effects.iter().filter(move |found| found.status == status)
     }
@@ -256,8 +256,8 @@ impl LoopResult {
         Some((test, test.statistic?))
     }
 
-    /// Returns the size of the residual over the declared σ, if its size alone is significant and
-    /// no structure is seen in it.
+    /// Returns the ratio of residual to declared σ, if only the size of the residual is significant
+    /// and no structure is detected in it.
     pub(crate) fn size_alone(&self) -> Option<f64> {
         let (size, chi2) = self.size_test()?;
         let failed = self.checks_after.iter().filter(|test| test.structure && test.failed);
@@ -268,14 +268,14 @@ impl LoopResult {
         (is_alone && is_nowhere).then(|| chi2.sqrt())
     }
 
-    /// Returns the size of the residual over the declared σ, if it is significantly smaller.
+    /// Returns the ratio of residual to declared σ, if it is significantly less than 1.
     pub(crate) fn overstated_sigma(&self) -> Option<f64> {
         let (size, chi2) = self.size_test()?;
         let (low, _) = size.bounds?;
         (chi2 < low).then(|| chi2.max(0.0).sqrt())
     }
 
-    /// Returns the decrease of the mean held-out error, in mm or ° as its key says.
+    /// Returns the decrease of the mean held-out error, in the unit of its key: mm, ° or px.
     pub(crate) fn gain(&self) -> Option<Gain> {
         self.held_out_gain_mm.or(self.held_out_gain_deg).or(self.held_out_gain_px)
     }
@@ -315,13 +315,13 @@ impl FoundEffect {
         }
     }
 
-    /// Returns true for a cause that acts by itself but whose law is not sure.
+    /// Returns true for a cause that is significant alone but whose law is uncertain.
     pub fn is_doubted(&self) -> bool {
         matches!(self.status, Status::Probable | Status::Located) && !self.is_only_with_others()
     }
 
-    /// Returns true if the effect is in the model only together with others: no evidence was
-    /// evaluated for it, and by itself it is not significant.
+    /// Returns true if the effect is significant only together with others: no evidence was
+    /// evaluated for it, and alone it is not significant.
     pub fn is_only_with_others(&self) -> bool {
         self.claims.is_none() && self.status == Status::Located
     }
@@ -338,7 +338,8 @@ impl ParameterValue {
         }
     }
 
-    /// Returns the amplitude of a sine and a cosine of one order, taken as uncorrelated.
+    /// Returns the amplitude of a sine and a cosine of one order, whose errors are treated as
+    /// uncorrelated.
     pub(crate) fn amplitude(pair: &[Self]) -> Self {
         let (sine, cosine) = (&pair[0], &pair[1]);
         let amplitude = sine.estimate.hypot(cosine.estimate);

@@ -1,4 +1,4 @@
-//! Result of `compare`: compare.json.
+//! Result of the command `compare`: compare.json.
 
 use nalgebra::Vector3;
 use schemars::JsonSchema;
@@ -16,13 +16,13 @@ use crate::problem::Problem;
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ComparisonResult {
     pub problem: String,
-    /// Errors of the nominal arm, with base and tool fitted where they are free.
+    /// Errors of the nominal arm, with base and tool fitted if they are free.
     pub registered: Errors,
-    /// Every strategy with every solver; the paper's procedures last.
+    /// Results of every strategy with every solver; the paper's procedures last.
     pub rows: Vec<ComparedFit>,
     /// Fits of the joint strategy with parts of the elasticity left out.
     pub ablations: Vec<AblatedFit>,
-    /// Results in the terms of Chen et al. (2021).
+    /// Results in the form of the tables of Chen et al. (2021).
     pub procedures: Vec<Procedure>,
 }
 
@@ -47,10 +47,10 @@ pub struct ComparedFit {
     pub condition_number: Option<f64>,
 }
 
-/// Fit with a part of the elasticity.
+/// Fit with part of the elasticity left out.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct AblatedFit {
-    /// Part that is kept.
+    /// Part of the elasticity that is kept.
     pub elasticity: &'static str,
     /// Number of fitted parameters.
     pub parameters: usize,
@@ -78,17 +78,17 @@ pub struct JointGeometry {
     pub beta_deg: GeometryValue,
 }
 
-/// Nominal and identified value.
+/// Nominal and identified value of a geometric parameter.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct GeometryValue {
     pub nominal: f64,
     pub identified: f64,
     pub change: f64,
-    /// Share of the information that comes from the data; null if the value was not identified.
+    /// Share of the value that the data determine, 0 to 1; null if the value was not identified.
     pub seen: Option<f64>,
 }
 
-/// Errors of the held-out poses.
+/// Errors of the held-out poses, before and after identification.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct HeldOutErrors {
     /// True if base and tool of the nominal arm had to be fitted first.

@@ -1,4 +1,4 @@
-//! Results of `check` and `plan`: check.json and plan.json.
+//! Results of the commands `check` and `plan`: check.json and plan.json.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -11,27 +11,29 @@ use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
 use crate::select::{self, Separation, Side};
 
-/// Forecast of what measurements at some poses will tell.
+/// Forecast of the results of measurements at some poses.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct CheckResult {
     pub problem: String,
     pub poses: usize,
     pub sufficient: bool,
     pub rank: usize,
-    /// Rank with all poses of the series.
+    /// Number of parameter combinations that a long series of such poses determines.
     pub attainable_rank: usize,
     #[serde(flatten)]
     pub conditioning: Conditioning,
     pub parameters: Vec<ExpectedParameter>,
     pub unidentified: Vec<Combination>,
-    /// Rms length of the error of one measured position; null if no length is measured.
+    /// Root mean square length of the error of one measured position; null if no length is
+    /// measured.
     pub noise_mm: Option<f64>,
     pub prediction: JudgedPrediction,
     /// Forecast for fewer and for more such poses.
     pub growth: Vec<GrowthStep>,
-    /// Least number of poses that identify all and predict as accurately as one measurement.
+    /// Smallest number of poses that identify all parameters and predict as accurately as one
+    /// measurement.
     pub enough: Option<usize>,
-    /// Size from which on each effect would be found.
+    /// Smallest size of each effect that would be found.
     pub detectable: Detectable,
 }
 
@@ -39,7 +41,7 @@ impl Document for CheckResult {
     const FORMAT: &'static str = "flexcal-check";
 }
 
-/// Planned poses and what they promise.
+/// Planned poses and the accuracy that they are expected to give.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct PlanResult {
     pub problem: String,
@@ -55,19 +57,20 @@ pub struct PlanResult {
     pub starts: Vec<f64>,
     /// Logarithm of the criterion of the plan.
     pub value: f64,
-    /// Geometric mean of `random_std_error` / `std_error` over the parameters in `gain_over`.
+    /// Ratio of the standard errors of random poses to those of the plan: geometric mean of
+    /// `random_std_error` / `std_error` over the parameters in `gain_over`.
     pub gain: Option<f64>,
     pub gain_over: Vec<String>,
     pub rank: usize,
-    /// Rank with all candidates.
+    /// Number of parameter combinations that all candidates together determine.
     pub attainable_rank: usize,
-    /// Number of poses without which that rank cannot be reached.
+    /// Smallest number of poses that can reach that rank.
     pub least_poses: usize,
     #[serde(flatten)]
     pub conditioning: Conditioning,
     pub parameters: Vec<PlannedParameter>,
     pub unidentified: Vec<Combination>,
-    /// Separation of two effects by the plan.
+    /// How well the plan distinguishes two effects; absent for other plans.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separation: Option<SeparationResult>,
 }
@@ -84,7 +87,8 @@ pub struct ExpectedParameter {
     pub nominal: f64,
     pub prior_sigma: Option<f64>,
     pub std_error: Option<f64>,
-    /// Share of the information that will come from the data, over arms drawn from the priors.
+    /// Expected identified share, 0 to 1: part of the value that the data will determine, over arms
+    /// drawn from the priors.
     pub identified: f64,
     pub identified_at_nominal: f64,
 }
@@ -101,19 +105,20 @@ pub struct PlannedParameter {
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct PredictionError {
     pub median_mm: f64,
-    /// Error that 95 % of the positions do not exceed.
+    /// 95 % quantile of the expected error over the positions.
     pub most_mm: f64,
     pub rms_mm: f64,
 }
 
-/// Expected error of predicted positions, and the poses for which it is expected.
+/// Expected error of predicted positions, with the poses at which it is evaluated.
 #[derive(Debug, Clone, Copy, Serialize, JsonSchema)]
 pub struct JudgedPrediction {
-    /// `ranges`, `held-out` or `same`.
+    /// Poses at which the prediction is evaluated: `ranges` (drawn from ranges), `held-out`
+    /// (held-out rows) or `same` (the checked poses).
     pub judged_in: &'static str,
     #[serde(flatten)]
     pub error: PredictionError,
-    /// Expected rms of measured − predicted.
+    /// Expected root mean square of measured − predicted, with the noise of a measurement.
     pub held_out_rms_mm: Option<f64>,
 }
 
@@ -122,27 +127,27 @@ pub struct JudgedPrediction {
 pub struct GrowthStep {
     pub poses: usize,
     pub rank: usize,
-    /// Number of combinations of parameters without a prior that stay unidentified.
+    /// Number of parameter combinations that remain undetermined.
     pub open: usize,
-    /// Number of parameters identified to 90 % or more.
+    /// Number of parameters with an identified share of 90 % or more.
     pub well_identified: usize,
     #[serde(flatten)]
     pub error: PredictionError,
 }
 
-/// Sizes from which on effects would be found, SI units.
+/// Smallest sizes of effects that would be found, SI units.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Detectable {
     /// Probability with which an effect of that size is found.
     pub power: f64,
     pub level: f64,
-    /// True if the poses have no times, so that equal steps were assumed.
+    /// True if the poses have no times, so that equal time steps were assumed.
     pub times_assumed: bool,
     pub effects: Vec<DetectableEffect>,
     pub untestable: Vec<Untestable>,
 }
 
-/// Effect with the sizes of its parameters.
+/// Effect with the detectable sizes of its parameters.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct DetectableEffect {
     #[serde(flatten)]
@@ -151,22 +156,22 @@ pub struct DetectableEffect {
     pub sizes: Vec<DetectableSize>,
 }
 
-/// Size of parameters of one unit.
+/// Detectable size of the parameters of an effect that have one unit.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct DetectableSize {
     pub parameters: Vec<String>,
     pub unit: &'static str,
     pub prior_sigma: f64,
-    /// Size that is found in the least visible direction.
+    /// Smallest size that is found even in the least visible combination of the parameters.
     pub found_from: Option<f64>,
-    /// Size that is found in the most visible direction.
+    /// Smallest size that is found in the most visible combination of the parameters.
     pub found_from_at_best: Option<f64>,
 }
 
-/// Separation of two effects by poses.
+/// How well poses distinguish two effects.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct SeparationResult {
-    /// Largest principal angle between the two.
+    /// Largest principal angle between the displacements by the two effects.
     pub angle_deg: Option<f64>,
     pub random_angle_deg: Option<f64>,
     pub effects: [SeparatedEffect; 2],
@@ -184,13 +189,13 @@ pub struct SeparatedEffect {
     pub unit: Unit,
     /// 1 σ of the prior of the parameters.
     pub prior_sigma: f64,
-    /// Size from which on the effect is found.
+    /// Smallest size at which the effect is found.
     pub found_from: Option<f64>,
     pub random_found_from: Option<f64>,
-    /// Size from which on the other effect is ruled out in its place.
+    /// Smallest size at which the other effect is ruled out as an explanation.
     pub told_from: Option<f64>,
     pub random_told_from: Option<f64>,
-    /// Size for which the p-values are given.
+    /// Size of the effect to which the p-values apply.
     pub size: f64,
     pub p_value: f64,
     pub random_p_value: f64,
@@ -237,7 +242,7 @@ impl CheckResult {
 }
 
 impl PlanResult {
-    /// Collects the result of a plan; `separated` if it separates two effects.
+    /// Collects the result of a plan; `separated` is given if it distinguishes two effects.
     pub fn new(
         problem: &Problem,
         criterion: &Criterion,
@@ -324,7 +329,7 @@ impl Detectable {
 }
 
 impl SeparationResult {
-    /// Collects how well a plan separates two effects.
+    /// Collects how well a plan distinguishes two effects.
     pub fn new(separated: &PairSeparation) -> Self {
         let angle = |separation: &Separation| separation.angle;
         let random = Some(separated.random(angle)).filter(|angle| angle.is_finite());

@@ -6,13 +6,13 @@ use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// Version of the result formats. It rises when a key is removed or changes its meaning.
+/// Version of the result formats. It increases when a key is removed or changes its meaning.
 pub const FORMAT_VERSION: u32 = 2;
 
 /// Name and version of the program that writes the results.
 pub const PROGRAM: &str = concat!("flexcal ", env!("CARGO_PKG_VERSION"));
 
-/// Result that is written as JSON in a format of its own.
+/// Result that is written as a JSON document with its own format name and schema.
 pub trait Document: Serialize + JsonSchema + Sized {
     /// Name of the format, for example `flexcal-loop`.
     const FORMAT: &'static str;
@@ -50,7 +50,7 @@ struct Format {
     version: u32,
 }
 
-/// Result with its head.
+/// Result with its format and program, as written to a file.
 #[derive(Serialize, JsonSchema)]
 struct File<T> {
     format: Format,
@@ -60,7 +60,7 @@ struct File<T> {
     content: T,
 }
 
-/// Lets every number be null, since numbers that are not finite are written so, and removes
+/// Allows every number to be null, because numbers that are not finite are written as null. Removes
 /// annotations of Rust types such as `"format": "double"`.
 fn adapted(schema: &mut Schema) {
     schema.remove("format");

@@ -1,4 +1,4 @@
-//! Effects as results name them.
+//! Effects in result files: names, arguments and descriptions.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -6,16 +6,16 @@ use serde::Serialize;
 use crate::problem::Effect;
 use crate::select::Trace;
 
-/// Effect with its arguments, as in problem.toml: `{"effect": "gear-ratio", "joint": 3}`.
+/// Effect with its arguments, in the form of problem.toml: `{"effect": "gear-ratio", "joint": 3}`.
 #[derive(JsonSchema)]
 #[schemars(rename = "Effect")]
 #[expect(dead_code, reason = "stands for the serialised effect in schemas")]
 pub(super) struct EffectKeys {
-    /// Name in problem.toml; its arguments are further keys.
+    /// Name in problem.toml; its arguments are additional keys.
     effect: String,
 }
 
-/// Effect, with words for it.
+/// Effect with a description in words.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct NamedEffect {
     #[serde(flatten)]
@@ -28,7 +28,7 @@ pub struct NamedEffect {
 }
 
 impl NamedEffect {
-    /// Describes an effect with the quantities that the traced data have.
+    /// Describes an effect in words that suit the recorded quantities of the traced data.
     pub fn new(effect: &Effect, trace: &Trace) -> Self {
         Self {
             description: trace.describe(effect),
@@ -48,14 +48,14 @@ pub struct Untestable {
 }
 
 impl Untestable {
-    /// Joins parts of one effect that have the same reason.
+    /// Lists effects, where parts of one effect with the same reason form one entry.
     pub(super) fn all(effects: &[(Effect, &'static str)]) -> Vec<Self> {
         let entry = |(effect, reason)| Self { effect, reason };
         joined(effects.iter().cloned()).into_iter().map(entry).collect()
     }
 }
 
-/// Joins effects that are parts of one, such as the harmonics of a joint, if they share a reason.
+/// Merges effects that are parts of one, such as the harmonics of a joint, if they share a reason.
 /// The order is that of their first parts.
 pub(crate) fn joined<R: Copy + PartialEq>(
     effects: impl IntoIterator<Item = (Effect, R)>,

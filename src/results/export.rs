@@ -1,4 +1,5 @@
-//! Result of `export`: moved origins, errors, and what the file cannot hold.
+//! Result of the command `export`: moved origins, errors, and the parts of the model that the file
+//! cannot represent.
 
 use std::path::Path;
 
@@ -23,7 +24,7 @@ pub struct ExportResult {
     /// Origins that moved in a URDF.
     pub origins: Option<Vec<Origin>>,
     pub held_out: Option<ExportedErrors>,
-    /// Parts of the model that the file cannot hold.
+    /// Parts of the model that the file cannot represent.
     pub not_held: Vec<String>,
 }
 
@@ -41,7 +42,7 @@ pub struct Origin {
     pub turned_deg: f64,
 }
 
-/// Errors on held-out rows of the whole model and of its rigid geometry.
+/// Errors on held-out rows, of the whole model and of its rigid geometry alone.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ExportedErrors {
     pub whole: Summary,
@@ -76,9 +77,9 @@ impl ExportResult {
 }
 
 impl ExportedErrors {
-    /// Computes the errors on the held-out rows of `data` of the first kind in the table. `x` are
-    /// the identified deviations in the order of the model's parameters; `saved` is the estimate
-    /// that they come from, if it was read from a file.
+    /// Computes the errors on the held-out rows of `data` of the leading kind (positions, if there
+    /// are any). `x` is the model's full parameter vector; `saved` is the estimate from which it
+    /// was read, if any.
     pub fn of(
         model: &Model,
         x: &DVector<f64>,
@@ -101,7 +102,7 @@ impl ExportedErrors {
     }
 }
 
-/// Lists the parts of the model beyond the geometry of the chain.
+/// Lists the parts of the model other than the geometry of the chain.
 fn left_out(problem: &Problem, model: &Model) -> Vec<String> {
     let mut left_out: Vec<String> = Vec::new();
     for (number, joint) in (1..).zip(&problem.joints) {

@@ -1,4 +1,4 @@
-//! Result of `identify`: estimate.json.
+//! Result of the command `identify`: estimate.json.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ use crate::remainder::Fitted;
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct IdentificationResult {
     pub problem: String,
-    /// SHA-256 of all declarations that predictions depend on.
+    /// SHA-256 digest of all declarations on which predictions depend.
     pub arm_digest: String,
     pub strategy: &'static str,
     pub solver: &'static str,
@@ -35,7 +35,7 @@ pub struct IdentificationResult {
     pub iterations: u64,
     pub alternation: Option<Alternation>,
     pub seconds: f64,
-    /// Errors of the nominal arm, with base and tool fitted where they are free.
+    /// Errors of the nominal arm, with base and tool fitted if they are free.
     pub registered: Errors,
     #[serde(flatten)]
     pub fitted: Errors,
@@ -48,12 +48,14 @@ pub struct IdentificationResult {
     pub reduced_chi2: Option<f64>,
     /// Start time of the time-dependent effects.
     pub first_time_s: f64,
-    /// 1 σ of a coordinate estimated from the residuals, if the problem declares none.
+    /// Standard deviation (1 σ) of a coordinate, estimated from the residuals; null if the problem
+    /// declares σ.
     pub estimated_sigma_mm: Option<f64>,
-    /// Interval of `reduced_chi2` for noise alone, with probability 0.999.
+    /// Interval that contains `reduced_chi2` with probability 0.999 if the residual is only noise.
     pub chance: Option<(f64, f64)>,
     pub noise_factor: f64,
-    /// 1 σ of a coordinate in the fit; null unless the rows measure lengths.
+    /// Standard deviation (1 σ) of a coordinate that the fit assumed; null unless the rows measure
+    /// lengths.
     pub sigma_taken_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma_taken_deg: Option<f64>,
@@ -67,8 +69,8 @@ pub struct IdentificationResult {
     pub unidentified: Vec<Combination>,
     /// Combinations that the data determine too weakly to be estimated.
     pub weak: Vec<Combination>,
-    /// Posterior covariance of all free parameters in the order of `parameters`. Without the
-    /// uncertainty of predictions: null where one of the two has no standard error.
+    /// Posterior covariance of all free parameters, in the order of `parameters`. If predictions
+    /// have no uncertainty, entries of a parameter without a standard error are null.
     #[schemars(with = "Vec<Vec<Option<f64>>>")]
     pub covariance: Vec<Box<RawValue>>,
     pub correlations: Vec<Correlation>,
@@ -79,7 +81,7 @@ pub struct IdentificationResult {
     /// Findings of the checks of the fit.
     #[schemars(with = "Vec<FindingKeys>")]
     pub findings: Vec<Finding>,
-    /// Remainder that corrects predictions; errors of the identified arm are with it.
+    /// Remainder that corrects predictions; errors of the identified arm include it.
     pub remainder: Option<Remainder>,
     /// Uncertainty of predictions without a remainder, in the form of remainder.json.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -96,7 +98,7 @@ pub(super) struct FindingKeys {
     code: String,
     /// `error`, `warning` or `note`.
     severity: String,
-    /// Numbers and names of the case, SI units.
+    /// Numbers and words of this case, SI units.
     numbers: BTreeMap<String, serde_json::Value>,
     text: String,
     remedy: String,
@@ -106,11 +108,11 @@ impl Document for IdentificationResult {
     const FORMAT: &'static str = "flexcal-estimate";
 }
 
-/// Accelerated sweeps of the sequential strategy.
+/// Convergence of the sequential strategy, which alternates between stages.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Alternation {
     pub sweeps: u64,
-    /// Factor by which one sweep alone would reduce the error near the optimum.
+    /// Factor by which one sweep without acceleration multiplies the error near the optimum.
     pub contraction: Option<f64>,
 }
 
@@ -118,12 +120,12 @@ pub struct Alternation {
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Conditioning {
     pub condition_number: f64,
-    /// Indices O1 to O5.
+    /// Observability indices O1 to O5 [Sun & Hollerbach 2008].
     pub observability: BTreeMap<&'static str, f64>,
 }
 
 impl Conditioning {
-    /// Computes the indices for this number of measured coordinates.
+    /// Computes the indices for a number of measured `coordinates`.
     pub(super) fn new(found: &Identifiability, coordinates: usize) -> Self {
         let names = ["O1", "O2", "O3", "O4", "O5"];
         let observability = names.into_iter().zip(found.observability(coordinates)).collect();
@@ -139,20 +141,20 @@ pub struct Parameter {
     pub nominal: f64,
     pub estimate: f64,
     pub std_error: Option<f64>,
-    /// Bound at which the estimate lies, `lower` or `upper`.
+    /// Bound on which the estimate rests, `lower` or `upper`.
     pub at_bound: Option<&'static str>,
     pub shadow_price: Option<Price>,
-    /// Share of the information that comes from the data, 0 to 1.
+    /// Identified share, 0 to 1: part of the value that the data determine.
     pub identified: f64,
     pub fitted: bool,
 }
 
-/// Cost of an active limit.
+/// Shadow price of an active limit.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Price {
     /// Lagrange multiplier of the limit.
     pub multiplier: f64,
-    /// Decrease of the rms residual if the limit moved out by one `per`.
+    /// Decrease of the root mean square residual if the limit is moved outwards by one `per`.
     pub rms_mm: f64,
     pub per: &'static str,
 }
@@ -186,11 +188,11 @@ pub struct Correlation {
     pub correlation: f64,
 }
 
-/// Constraint that limits the estimates.
+/// Constraint on whose limit the estimates rest.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Constraint {
     pub constraint: String,
-    /// Active side, `at_least` or `at_most`.
+    /// Active limit, `at_least` or `at_most`.
     pub side: &'static str,
     pub line: Option<usize>,
     pub shadow_price: Price,
@@ -209,7 +211,7 @@ pub struct OutlierRow {
     pub error_deg: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error_px: Option<f64>,
-    /// Length of the whitened residual over the scatter of all rows.
+    /// Length of the whitened residual, as a multiple of the scatter of all rows.
     pub sigmas: f64,
 }
 
@@ -235,7 +237,7 @@ pub struct Spread {
     pub mean_mm: f64,
     /// Direction of the largest spread, measuring frame.
     pub along: [f64; 3],
-    /// Share of the squared spread in that direction.
+    /// Share of the squared spread along that direction.
     pub share: f64,
 }
 
@@ -321,8 +323,8 @@ impl IdentificationResult {
         }
     }
 
-    /// Returns the result with what predictions need: the posterior covariance, the uncertainty of
-    /// predictions, and the remainder if one is kept.
+    /// Returns the result with everything that predictions need: posterior covariance, uncertainty
+    /// of predictions, and the remainder if one was accepted.
     #[must_use]
     #[doc(hidden)]
     pub fn with_predictions(self, found: &Identification, fitted: &Fitted) -> Self {
@@ -411,7 +413,7 @@ fn side(bound: AtBound, [lower, upper]: [&'static str; 2]) -> &'static str {
     if bound == AtBound::Lower { lower } else { upper }
 }
 
-/// Returns the rows of the covariance, each as JSON text on a line of its own.
+/// Returns the rows of the covariance matrix, each as one line of JSON text.
 fn covariance(found: &Identification) -> Vec<Box<RawValue>> {
     let n = found.estimates.len();
     let has_error = |k: usize| found.estimates[k].std_error.is_some();

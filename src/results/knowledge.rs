@@ -1,4 +1,4 @@
-//! What the data tell of parameters and of their combinations.
+//! How well the data determine parameters and their combinations.
 
 use std::collections::BTreeMap;
 
@@ -10,34 +10,34 @@ use crate::model::parameter::Regressor;
 use crate::problem::Problem;
 use crate::quantity::Unit;
 
-/// Share of information from the data above which a parameter is well identified.
+/// Identified share above which a parameter is well identified.
 const WELL: f64 = 0.9;
-/// Share of information from the data above which a parameter is identified in part.
+/// Identified share above which a parameter is identified in part.
 const IN_PART: f64 = 0.1;
-/// Share of information from the data up to which a parameter is not identified at all.
+/// Identified share up to which a parameter is not identified at all.
 const NONE: f64 = 1e-6;
-/// Most coefficients of the harmonics of one joint that are listed one by one.
+/// Maximum number of harmonic coefficients of one joint that are listed one by one.
 pub(crate) const MAX_COEFFICIENTS: usize = 8;
-/// Harmonics of a joint that are listed if there are more.
+/// Number of largest harmonics of a joint that are listed if it has more coefficients.
 pub(crate) const SHOWN_HARMONICS: usize = 4;
 
-/// What the data tell of a parameter.
+/// How well the data determine a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Knowledge {
-    /// The estimate lies at a bound.
+    /// The estimate rests on a bound.
     AtBound(AtBound),
     /// The parameter was not fitted.
     NotFitted,
     /// The data determine the parameter.
     Well,
-    /// The data determine the parameter with a standard error that no calibration can accept: 1°,
-    /// 10 mm, or half the value of a stiffness.
+    /// The data determine the parameter, but with a standard error too large for a calibration:
+    /// above 1°, 10 mm, or half the value of a stiffness.
     Vaguely,
-    /// The data determine the parameter together with its prior.
+    /// The data and the prior together determine the parameter.
     InPart,
-    /// Its prior, or a choice, determines nearly all of the parameter.
+    /// The prior, or the start value, determines nearly all of the parameter.
     Hardly,
-    /// The data tell nothing of the parameter.
+    /// The data contain no information on the parameter.
     NotAtAll,
 }
 
@@ -60,13 +60,13 @@ impl Knowledge {
         matches!(self, Self::Well | Self::Vaguely)
     }
 
-    /// Returns true if the parameter is not free to follow the data.
+    /// Returns true if the parameter was not fitted or rests on a bound.
     pub fn is_held(self) -> bool {
         matches!(self, Self::AtBound(_) | Self::NotFitted)
     }
 }
 
-/// Returns true if the standard error exceeds what a calibration can accept.
+/// Returns true if the standard error is too large for a calibration.
 fn is_vague(estimate: &Estimate) -> bool {
     let limit = match estimate.unit {
         Unit::Angle => 1.0_f64.to_radians(),
@@ -79,17 +79,19 @@ fn is_vague(estimate: &Estimate) -> bool {
     estimate.std_error.is_none_or(|error| error > limit)
 }
 
-/// Reference that measurements without a tracker lack.
+/// Reference that measurements without a tracker may lack.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MissingReference {
-    /// No row refers to a known place in the measuring frame.
+    /// No row refers to a known position in the measuring frame.
     Place,
-    /// No length is known.
+    /// No row refers to a known length.
     Length,
 }
 
 impl MissingReference {
-    /// Names what contacts and distances leave open because a reference is missing.
+    /// Returns the missing references that explain undetermined `combinations` of the unknowns: the
+    /// pose of the whole arm is undetermined without a known position, its size without a known
+    /// length.
     pub fn all(combinations: &[UnidentifiableCombination], unknowns: &[String]) -> Vec<Self> {
         let begins = |name: &str, words: &[&str]| words.iter().any(|word| name.starts_with(word));
         let field = |name: &'_ str| name.rsplit('.').next().unwrap_or_default().to_owned();
@@ -125,12 +127,12 @@ impl MissingReference {
     }
 }
 
-/// Harmonics of joints with more coefficients than are listed one by one: joint (from 1) and order
-/// of each coefficient, and the largest orders of each of these joints.
+/// Harmonics of joints that have too many coefficients to list one by one. Contains joint (from 1)
+/// and order of each coefficient, and the largest orders of each of these joints.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ManyHarmonics {
     coefficients: BTreeMap<String, (usize, u32)>,
-    /// Orders of the largest amplitudes, and the number of smaller ones, by joint.
+    /// For each joint, the orders of the largest amplitudes and the number of smaller harmonics.
     largest: BTreeMap<usize, (Vec<u32>, usize)>,
 }
 

@@ -1,7 +1,7 @@
 //! Results as data: one struct for every JSON file that flexcal writes.
 //!
 //! Every file begins with its `format` and the `program` ([`Document`]); docs/schema/ has the JSON
-//! Schema of each. Sentences, reports and the Python package state what these structs hold.
+//! Schema of each. Texts, reports and the Python package use these structs.
 
 #![allow(clippy::struct_field_names, reason = "fields are keys of the files, units included")]
 #![expect(
@@ -75,7 +75,7 @@ pub use self::{
     tables::{Column, commands_csv, poses_csv, residual_columns, study_csv, study_parameters_csv},
 };
 
-/// Name of every format with its JSON Schema.
+/// Returns the name of every format with its JSON Schema.
 #[doc(hidden)]
 pub fn schemas() -> Vec<(&'static str, String)> {
     macro_rules! schemas {

@@ -12,27 +12,27 @@ use crate::remainder::{Bounds, Fitted};
 /// Name of the file that holds a remainder.
 pub const REMAINDER_FILE: &str = "remainder.json";
 
-/// Remainder that corrects predictions.
+/// Remainder (smooth correction of errors that no law explains) that corrects predictions.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Remainder {
-    /// File beside this one; null if the problem declares the remainder.
+    /// Name of its file in the same folder; null if the problem declares the remainder.
     pub file: Option<&'static str>,
     /// Joints whose errors the remainder describes.
     pub sites: Vec<String>,
     /// Quantities on which these errors depend.
     pub inputs: Vec<String>,
-    /// Mean error of configurations left out, without the remainder.
+    /// Mean error of configurations left out of the fit, without the remainder.
     pub left_out_without_mm: Option<f64>,
-    /// Mean error of configurations left out, with the remainder.
+    /// Mean error of configurations left out of the fit, with the remainder.
     pub left_out_mm: Option<f64>,
-    /// Mean gain of the configurations left out over its standard error.
+    /// Mean gain at configurations left out of the fit, divided by its standard error.
     pub gain_over_std_error: Option<f64>,
     pub identification_without: Summary,
     pub held_out_without: Summary,
 }
 
 impl Remainder {
-    /// Summarises the remainder that was kept; `found` has the errors without it.
+    /// Summarises the remainder if one was accepted; `found` holds the errors without it.
     pub(super) fn new(found: &Identification, fitted: &Fitted) -> Option<Self> {
         let remainder = fitted.remainder.as_ref()?;
         let joints = remainder.joints().into_iter();
@@ -49,12 +49,12 @@ impl Remainder {
     }
 }
 
-/// Bounds of the errors of predictions.
+/// Summary of the bounds on prediction errors.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct BoundSummary {
-    /// Expected root mean square error, with the noise of a measurement.
+    /// Expected root mean square of measured − predicted, with the noise of a measurement.
     pub expected_error_mm: f64,
-    /// Probability with which a bound holds.
+    /// Probability that an error stays below its bound.
     pub level: f64,
     pub mean_bound_mm: f64,
 }
@@ -75,8 +75,8 @@ pub(super) fn prediction(fitted: &Fitted) -> Option<Box<RawValue>> {
     RawValue::from_string(fitted.alone.to_json().trim_end().to_owned()).ok()
 }
 
-/// Returns the rows of the posterior covariance of all free parameters in the order of the
-/// estimates, SI, each as JSON text on a line of its own; 0 where a parameter was held.
+/// Returns the rows of the posterior covariance of all free parameters, SI, each as one line of
+/// JSON text. They are in the order of the estimates; entries of held parameters are 0.
 pub(super) fn covariance(found: &Identification, fitted: &Fitted) -> Vec<Box<RawValue>> {
     let n = found.estimates.len();
     let (names, posterior) = fitted.alone.parameter_covariance();

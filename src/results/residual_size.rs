@@ -1,31 +1,34 @@
-//! Size of the residual of a fit against the declared noise.
+//! Size of the residual of a fit, compared with the declared noise.
 
 use crate::fit::{FindingCode, Identification, Noise};
 
-/// Relative difference of the scatter from the declared σ² below which the fit keeps that σ.
+/// Largest relative difference between the fit's variance and the declared σ² at which they count
+/// as equal.
 const SAME_NOISE: f64 = 1e-9;
 
-/// Judgement of the size of a residual.
+/// Verdict on the size of a residual, with its numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ResidualSize {
-    /// No σ is declared; the scatter of the residual is the estimate of it [m] or \[rad\].
+    /// No σ is declared. The value is the σ estimated from the residual \[m\] or \[rad\].
     Undeclared(f64),
-    /// No σ is declared, and no degree of freedom is left to estimate it.
+    /// No σ is declared, and there are no degrees of freedom to estimate it.
     Unknown,
-    /// Too few different poses to judge the declared σ, or the model.
+    /// There are too few different poses to judge the declared σ or the model.
     TooFewPoses,
-    /// Too few measurements to judge the declared σ.
+    /// There are too few measurements to judge the declared σ.
     TooFewRows,
-    /// χ²/ν is within the interval for noise alone.
+    /// χ²/ν, the value, is inside its interval for noise alone.
     Expected(f64),
-    /// χ²/ν is outside of that interval, without clear evidence for another σ.
+    /// χ²/ν, the value, is outside its interval for noise alone, without clear evidence for another
+    /// σ.
     Unclear(f64),
-    /// Residuals and priors contradict the declared σ; the fit takes another one.
+    /// Residuals and priors contradict the declared σ, and the fit takes another one. The value is
+    /// χ²/ν.
     Contradicted(f64),
 }
 
 impl ResidualSize {
-    /// Judges the residual of a fit.
+    /// Judges the size of the residual of a fit.
     pub fn of(found: &Identification) -> Self {
         let too_few =
             found.has(FindingCode::PriorsDecide) || found.has(FindingCode::TooFewEquations);
@@ -48,7 +51,7 @@ fn is_contradicted(found: &Identification) -> bool {
     found.noise == Noise::Declared && (found.noise_factor - 1.0).abs() > SAME_NOISE
 }
 
-/// Returns true if a fit leaves more than the declared noise explains.
+/// Returns true if the residual is larger than the declared noise explains.
 pub fn exceeds_noise(found: &Identification) -> bool {
     let is_large = |(chi2, (_, high)): (f64, (f64, f64))| chi2 > high;
     let by_chi2 = || found.reduced_chi2.zip(found.chance).is_some_and(is_large);

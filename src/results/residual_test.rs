@@ -5,19 +5,19 @@ use serde::Serialize;
 
 use crate::residual_tests::{self, Covariate, Findings};
 
-/// Test of the residual.
+/// Test of the residual for size or structure.
 #[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 pub struct ResidualTest {
     /// Name of the test.
     pub check: &'static str,
-    /// Quantity in whose order, or on which, the test looks for dependence.
+    /// Quantity on which the test looks for dependence, or in whose order; null if there is none.
     pub about: Option<String>,
-    /// True if a failure means structure that an effect could explain.
+    /// True if a failure indicates structure that an effect could explain.
     pub structure: bool,
     pub failed: bool,
     /// Value of the statistic; null if the test could not be made.
     pub statistic: Option<f64>,
-    /// Interval of the statistic for noise alone, at the level of the test.
+    /// Interval of the statistic if only noise is left, at the level of the test.
     pub bounds: Option<(f64, f64)>,
     pub p_value: Option<f64>,
     pub words: String,

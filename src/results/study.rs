@@ -1,4 +1,4 @@
-//! Results of `study`: study.json and misprints.json.
+//! Results of the command `study`: study.json and misprints.json.
 
 use std::collections::BTreeMap;
 
@@ -13,12 +13,13 @@ use crate::study::{
     Results, Study,
 };
 
-/// Many fits to simulated measurements whose truth is known. SI units unless a key names another.
+/// Results of many fits to simulated measurements with known truth. SI units unless a key names
+/// another.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct StudyResult {
     pub study: String,
     pub problem: String,
-    /// Source of the measurements.
+    /// Source of the simulated measurements.
     pub data: &'static str,
     pub seed: u64,
     pub repetitions: usize,
@@ -30,7 +31,7 @@ impl Document for StudyResult {
     const FORMAT: &'static str = "flexcal-study";
 }
 
-/// Fits under one condition.
+/// Results of the fits under one condition.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Cell {
     pub position_sigma_mm: f64,
@@ -40,10 +41,10 @@ pub struct Cell {
     pub fits: u64,
     pub failed: u64,
     pub failure_rate: f64,
-    /// Number of fits that are not to be trusted, by reason.
+    /// Number of fits that are not trusted, by reason.
     pub failures: BTreeMap<String, u64>,
     pub held_out_mm: HeldOut,
-    /// Mean over the fits.
+    /// Mean reduced χ² over the fits.
     pub reduced_chi2: Option<f64>,
     /// Share of estimates within 1.96 standard errors of the truth.
     pub coverage: Option<f64>,
@@ -53,19 +54,19 @@ pub struct Cell {
     pub parameters: Vec<StudiedParameter>,
 }
 
-/// Held-out error over the fits.
+/// Held-out errors over the fits of a cell.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct HeldOut {
     /// Mean error over fits and poses \[mm\].
     pub mean: Option<f64>,
     /// Rms error over fits and poses \[mm\].
     pub rms: Option<f64>,
-    /// Standard deviation of the rms of a fit.
+    /// Standard deviation, over fits, of the root mean square error.
     pub rms_sd: Option<f64>,
     pub rms_max: Option<f64>,
 }
 
-/// Largest bias of any parameter over the spread of its estimates.
+/// Largest ratio of bias to spread of the estimates, over all parameters.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct LargestBias {
     pub parameter: String,
@@ -107,7 +108,7 @@ impl Document for MisprintResult {
     const FORMAT: &'static str = "flexcal-misprints";
 }
 
-/// Largest change of the end point by a misprint.
+/// Largest change of the end point's position by a misprint.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct MisprintSize {
     pub misprint: &'static str,
@@ -125,7 +126,7 @@ pub struct StudiedCase {
     pub specimens: Vec<Specimen>,
 }
 
-/// Held-out errors of one specimen; null where an iteration does not converge.
+/// Held-out errors of one specimen; null if an iteration did not converge.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Specimen {
     pub scale: f64,

@@ -15,7 +15,7 @@ pub struct Axes {
     pub norm: f64,
 }
 
-/// Error summary of the rows of one kind. The keys of the sizes name their unit.
+/// Error summary of the rows of one kind. The keys of the errors contain their unit.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
     /// Kind of the rows; absent for measured positions.
@@ -42,7 +42,7 @@ pub enum Sizes {
         max_deg: Axes,
         rms_deg: Axes,
     },
-    /// Errors in an image, and the lengths at the seen points that they stand for.
+    /// Image errors, with their lengths at the observed points.
     Pixels {
         mean_px: Axes,
         max_px: Axes,
@@ -111,7 +111,8 @@ impl Errors {
         }
     }
 
-    /// Creates both summaries of angles, where the kind of the rows does not say so.
+    /// Creates both summaries for errors that are angles, if the kind of rows does not determine
+    /// that.
     pub(super) fn of_angles(errors: &fit::Errors) -> Self {
         let of = |errors: &ErrorSummary| Summary {
             kind: None,
@@ -122,7 +123,7 @@ impl Errors {
     }
 }
 
-/// Errors of the rows of one kind, of the registered nominal arm and of the fitted arm.
+/// Errors of the rows of one kind, for the registered nominal arm and for the fitted arm.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, JsonSchema)]
 pub struct KindErrors {
     pub registered: Errors,
@@ -141,20 +142,21 @@ impl KindErrors {
     }
 }
 
-/// Splits a value \[m\], \[rad\] or \[px\] between the keys `…_mm`, `…_deg` and `…_px`, converted to
-/// their unit.
+/// Returns a value \[m\], \[rad\] or \[px\] in the entry for `…_mm`, `…_deg` or `…_px`, converted
+/// to that unit; the others are `None`.
 pub(super) fn by_unit(unit: Unit, value: f64) -> (Option<f64>, Option<f64>, Option<f64>) {
     let value = value * unit.in_tables().factor;
     let only = |wanted: Unit| (unit == wanted).then_some(value);
     (only(Unit::Length), only(Unit::Angle), only(Unit::Pixel))
 }
 
-/// Returns the number of rows of all kinds in one part of the data.
+/// Returns the number of rows of all kinds in one part of the data (identification or held out).
 pub(crate) fn rows_in(found: &Identification, part: fn(&fit::Errors) -> ErrorSummary) -> usize {
     measured_kinds(found, part).map(|of| of.n).sum()
 }
 
-/// Iterates over the kinds of rows in one part of the data, without known distances.
+/// Iterates over the kinds of rows in one part of the data (identification or held out), without
+/// known distances.
 pub(crate) fn measured_kinds(
     found: &Identification,
     part: fn(&fit::Errors) -> ErrorSummary,

@@ -1,4 +1,4 @@
-//! Result of `trace`: trace.json.
+//! Result of the command `trace`: trace.json.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -13,7 +13,7 @@ use crate::fit::{ErrorSummary, Finding};
 use crate::problem::{Effect, Problem};
 use crate::select::{self, TellingPose, Trace};
 
-/// Least probability of a hypothesis set in trace.json.
+/// Smallest probability of a hypothesis set that is written to trace.json.
 const LEAST_PROBABILITY: f64 = 0.01;
 
 /// Effects that the residual of a fit points to.
@@ -24,21 +24,23 @@ pub struct TraceResult {
     #[serde(flatten)]
     pub errors: Errors,
     pub reduced_chi2: Option<f64>,
-    /// True if the tests see structure that an effect could explain.
+    /// True if the residual tests detect structure that an effect could explain.
     pub structured: bool,
     pub checks: Vec<ResidualTest>,
-    /// Number of candidates tried, orders and times counted.
+    /// Number of candidates tried; each order or time constant counts.
     pub tried: usize,
-    /// Corrected p-value below which a candidate is significant.
+    /// Largest corrected p-value at which a candidate is significant.
     pub level: f64,
     /// Candidate effects, best first.
     pub ranking: Vec<Candidate>,
-    /// Hypothesis sets, most probable first; the empty set is noise alone.
+    /// Sets of hypotheses that may explain the residual together, most probable first. The empty
+    /// set means noise alone.
     pub explanations: Vec<HypothesisSet>,
     /// Claims about the most probable set.
     pub claims: Vec<Claims>,
     pub untestable: Vec<Untestable>,
-    /// Effects that the fitted parameters absorb completely.
+    /// Effects that the fitted parameters can reproduce completely, so that they cannot be
+    /// detected.
     #[schemars(with = "Vec<EffectKeys>")]
     pub absorbed: Vec<Effect>,
     /// Findings of the checks of the fit.
@@ -50,50 +52,51 @@ impl Document for TraceResult {
     const FORMAT: &'static str = "flexcal-trace";
 }
 
-/// Candidate effect of the ranking.
+/// Candidate effect in the ranking.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Candidate {
     #[serde(flatten)]
     pub effect: NamedEffect,
-    /// Probability that noise alone does as well, corrected for the candidates tried.
+    /// Probability that noise alone gains as much, corrected for the number of candidates.
     pub p_value: f64,
     pub f: f64,
-    /// Degrees of freedom of the numerator of `f`.
+    /// Degrees of freedom of the numerator of the F statistic `f`.
     pub freedom: usize,
-    /// Expected decrease of the rms error of the identification poses.
+    /// Expected decrease of the root mean square error of the identification poses.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_gain_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_gain_deg: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_gain_px: Option<f64>,
-    /// Decrease of the rms error of poses left out in turn.
+    /// Decrease of the root mean square error of poses, each left out of the fit in turn.
     pub cross_validated_gain_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_validated_gain_deg: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_validated_gain_px: Option<f64>,
-    /// Effects confounded with it.
+    /// Effects that are confounded with it on these poses.
     pub alike: Vec<Confounded>,
-    /// Pose that would tell the effect from the first confounded one.
+    /// Pose that would distinguish the effect from the first confounded one.
     pub told_apart: Option<ToldApart>,
 }
 
-/// Effect that is hard to tell from a candidate on these poses.
+/// Effect that these poses hardly distinguish from a candidate.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Confounded {
     #[serde(flatten)]
     pub effect: NamedEffect,
-    /// Largest principal angle between the two: 0 for identical, 90 for unrelated effects.
+    /// Largest principal angle between the displacements by the two effects: 0 for identical, 90
+    /// for unrelated effects.
     pub angle_deg: f64,
 }
 
-/// Pose at which two effects differ.
+/// Pose at which the predictions with two effects differ most.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ToldApart {
     #[schemars(with = "EffectKeys")]
     pub from: Effect,
-    /// Configuration, rad or m.
+    /// Configuration at which the effects differ \[rad\] or \[m\].
     pub q: Vec<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<String>,
@@ -110,7 +113,7 @@ pub struct ToldApart {
     pub difference_px: Option<f64>,
 }
 
-/// Set of hypotheses that act together.
+/// Set of hypotheses that explain the residual together, with its probability.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct HypothesisSet {
     pub probability: f64,
@@ -163,19 +166,19 @@ impl TraceResult {
 }
 
 impl ToldApart {
-    /// Returns the difference in the unit of the errors.
+    /// Returns the difference of the predictions in the unit of the errors: mm, ° or px.
     pub fn difference(&self) -> Option<f64> {
         self.difference_mm.or(self.difference_deg).or(self.difference_px)
     }
 }
 
 impl Candidate {
-    /// Returns the expected gain in the unit of the errors.
+    /// Returns the expected gain in the unit of the errors: mm, ° or px.
     pub fn expected_gain(&self) -> Option<f64> {
         self.expected_gain_mm.or(self.expected_gain_deg).or(self.expected_gain_px)
     }
 
-    /// Returns the gain of poses left out in the unit of the errors.
+    /// Returns the cross-validated gain in the unit of the errors: mm, ° or px.
     pub fn cross_validated_gain(&self) -> Option<f64> {
         let angle = self.cross_validated_gain_deg;
         self.cross_validated_gain_mm.or(angle).or(self.cross_validated_gain_px)

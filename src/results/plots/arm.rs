@@ -1,4 +1,5 @@
-//! Arm and measurements behind a figure: errors of each pose, and sensitivities to a coordinate.
+//! Arm and measurements from which figures are drawn: errors of each pose, and sensitivities to a
+//! coordinate.
 
 use nalgebra::{DVector, Vector3};
 
@@ -9,8 +10,8 @@ use crate::model::parameter::ParameterSite;
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::Problem;
 
-/// Smallest sensitivity of a pose to a coordinate, relative to the largest, at which the pose is
-/// shown as a measurement of it.
+/// Smallest sensitivity of a pose to a coordinate, relative to the largest of all poses, at which a
+/// figure shows the pose.
 pub const MIN_LEVER: f64 = 0.1;
 
 /// Measurements with their split and placement.
@@ -20,7 +21,7 @@ pub struct Poses<'a> {
     pub placement: Placement,
 }
 
-/// Arm at a parameter vector.
+/// Arm with its full parameter vector.
 #[derive(Debug, Clone)]
 pub struct Arm {
     pub model: Model,
@@ -72,7 +73,8 @@ impl<'a> Poses<'a> {
         self.placement.position_errors(&arm.model, &arm.x, self.measurements, rows)
     }
 
-    /// Returns the levers ∂p/∂(coordinate) of all rows for each parameter site [m/rad] or [m/m].
+    /// Returns the levers of all rows: derivatives of the target's position with respect to the
+    /// quantity at each parameter site \[m/rad\] or \[m/m\].
     pub fn levers(&self, arm: &Arm, sites: &[ParameterSite]) -> Vec<Vec<Vector3<f64>>> {
         let (first, count) = (arm.x.len(), sites.len());
         if sites.is_empty() {

@@ -5,7 +5,7 @@ use super::pose::sample;
 use crate::fit::Identification;
 use crate::problem::Problem;
 
-/// Number of poses over which contributions are averaged.
+/// Maximum number of poses over which contributions are averaged.
 const MAX_POSES: usize = 200;
 /// Contribution of a parameter, or of an effect with all its parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,8 +14,8 @@ pub struct Contribution {
     pub name: String,
     /// True for an effect.
     pub is_effect: bool,
-    /// Root mean square displacement of predicted positions if it returns to its nominal value and
-    /// everything else stays unchanged \[m\].
+    /// Root mean square displacement of predicted positions if the parameter or effect is reset to
+    /// nominal and everything else is unchanged \[m\].
     pub moved: f64,
 }
 

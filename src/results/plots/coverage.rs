@@ -7,28 +7,28 @@ use crate::model::Pose;
 use crate::numeric::range;
 use crate::problem::{JointKind, Problem};
 
-/// Number of configurations that are tried.
+/// Number of configurations at which coverage is tested.
 const TRIED: u32 = 800;
-/// Distance to a fitted pose within which a position is covered, as a fraction of the workspace
-/// diagonal.
+/// Largest distance to a fitted pose at which a position counts as covered, as a fraction of the
+/// workspace diagonal.
 const COVERED_DISTANCE: f64 = 0.1;
-/// Base of the van der Corput sequence of each joint in turn.
+/// Bases of the van der Corput sequences, one for each joint in turn.
 const PRIMES: [u32; 10] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29];
 
 /// Coverage of the workspace by fitted poses.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Coverage {
-    /// Positions in reach of the arm without a fitted pose near, measuring frame of the first
-    /// session \[m\].
+    /// Reachable positions without a fitted pose nearby, measuring frame of the first session
+    /// \[m\].
     pub uncovered: Vec<Vector3<f64>>,
-    /// Number of positions tried.
+    /// Number of tested positions.
     pub tried: usize,
-    /// Distance to a fitted pose within which a position is covered \[m\].
+    /// Largest distance to a fitted pose at which a position counts as covered \[m\].
     pub near: f64,
 }
 
-/// Returns the radical inverse of k: its digits in `base` mirrored at the point. For k = 1, 2, …
-/// the values fill 0…1 uniformly (van der Corput sequence).
+/// Returns the radical inverse of k: its digits in `base`, mirrored at the radix point. For k = 1,
+/// 2, … the values fill 0…1 uniformly (van der Corput sequence).
 fn radical_inverse(mut k: u32, base: u32) -> f64 {
     let (mut sum, mut part) = (0.0, 1.0);
     while k > 0 {

@@ -22,7 +22,7 @@ use crate::residual_tests::Findings;
 use crate::results::tables::{CommandedJoint, commanded_joints};
 use crate::select::{ClosedLoop, Found, examine};
 
-/// Maximum number of poses that a page holds individually.
+/// Maximum number of poses that a report page contains individually.
 const MAX_POSES: usize = 600;
 
 /// Stage of the calibration of an arm.
@@ -31,13 +31,14 @@ const MAX_POSES: usize = 600;
 pub enum Stage {
     /// Nominal arm, with base and target fitted if these are free.
     Registered,
-    /// Nominal rigid arm in the measured frames, which \[Chen2021\] calls before.
+    /// Nominal rigid arm, with base and target fitted if these are free; \[Chen2021\] calls it
+    /// before calibration.
     Before,
-    /// Arm with identified geometry and a rigid model.
+    /// Arm with identified geometry, identified with elasticity ignored.
     Ignoring,
     /// Arm with identified geometry and elasticity.
     Elastic,
-    /// Identified arm without a statement on elasticity.
+    /// Identified arm, if the report does not distinguish elasticity.
     Identified,
     /// Arm identified with the effects that the loop found.
     Closed,
@@ -52,7 +53,7 @@ pub struct StageErrors {
     pub errors: Vec<Vector3<f64>>,
 }
 
-/// Data of all figures of one report, with the tests of the residual.
+/// Data of all figures of one report, with the residual tests.
 #[derive(Debug, Clone)]
 pub struct PlotData {
     /// Errors at each stage, from nominal to best.
@@ -64,7 +65,7 @@ pub struct PlotData {
     /// Rows that figures may draw, in ascending order: all rows whose target has a position, or a
     /// sample of them with the largest residuals.
     pub shown: Vec<usize>,
-    /// Number of rows that each row of `shown` represents.
+    /// Number of rows that each row of `shown` represents, as the weight of a sample.
     pub stand_for: Vec<f64>,
     /// Joints that take a command.
     pub commands: Vec<CommandedJoint>,
@@ -112,8 +113,8 @@ impl PlotData {
         Ok(Self::of(problem, &poses, stages, (&fitted, identification), findings))
     }
 
-    /// Collects the data of a comparison: its joint fit, and the stages that the paper calls before
-    /// and ignoring elasticity.
+    /// Collects the data of a comparison: its joint fit, and the stages that the paper calls
+    /// "before" and "ignoring elasticity".
     ///
     /// # Errors
     /// Returns an error if problem and data do not match.
@@ -258,7 +259,7 @@ impl PlotData {
         }
     }
 
-    /// Returns the number of rows that figures could draw.
+    /// Returns the number of rows whose target has a position, which figures could draw.
     pub(crate) fn placed(&self) -> usize {
         self.residuals.iter().filter(|residual| residual.has_place()).count()
     }

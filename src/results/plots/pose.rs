@@ -1,4 +1,4 @@
-//! Residual of a pose, and the choice of poses that a figure draws.
+//! Residual of a pose, and selection of the poses that a figure draws.
 
 use nalgebra::Vector3;
 
@@ -7,19 +7,19 @@ use crate::problem::Observation;
 /// Pose with its residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseError {
-    /// File and line of its row, without the folder if the file names are distinct.
+    /// File and line of its row, without the folder if the file names are unique.
     pub place: String,
-    /// Commands or readings of its joints, 0 for fixed ones \[rad\] or \[m\].
+    /// Joint commands, or encoder readings, shape = (joints) \[rad\] or \[m\]; 0 for fixed joints.
     pub configuration: Vec<f64>,
     /// True for a held-out pose.
     pub held_out: bool,
     /// Kind of measurement of the row.
     pub observation: Observation,
-    /// Measured position, or the predicted target of the best arm in a row without a position,
-    /// measuring frame \[m\].
+    /// Measured position, measuring frame \[m\]. For a row without a position, the target's
+    /// position as the best arm predicts it.
     pub position: Vector3<f64>,
-    /// Residual measured − predicted, measuring frame \[m\]; a single value along x, tilts in
-    /// \[rad\].
+    /// Residual measured − predicted of the best arm, measuring frame \[m\]. A single value is
+    /// along x, tilts are in \[rad\].
     pub error: Vector3<f64>,
     /// Residual of the nominal arm, with base and tool fitted if they are free \[m\].
     pub before: Vector3<f64>,
@@ -30,13 +30,14 @@ pub struct PoseError {
 }
 
 impl PoseError {
-    /// Returns true if the residual is a length at a position of the target.
+    /// Returns true if the residual is a length, so that it can be drawn at the target's position.
     pub fn has_place(&self) -> bool {
         self.observation.measures_length()
     }
 }
 
-/// Ratio of the sample size to the number of rows that are included for their large value.
+/// Ratio of the sample size to the number of rows that are included because of their large
+/// residual.
 const SAMPLE_PER_LARGEST: usize = 10;
 
 /// Returns at most `limit` of some rows in ascending order: those with the largest `size`, and an
@@ -45,9 +46,9 @@ pub fn sample(rows: &[usize], limit: usize, size: impl Fn(usize) -> f64) -> Vec<
     weighted_sample(rows, limit, size).into_iter().map(|(row, _)| row).collect()
 }
 
-/// Returns a sample like [`sample`], each row with the number of rows that it represents: 1 for the
-/// largest, the inverse sampling fraction for the others. Weighted sums over the sample estimate
-/// sums over all rows [Horvitz & Thompson 1952].
+/// Returns a sample like [`sample`], each row with the number of rows that it represents. That is 1
+/// for the rows with the largest residuals, and the inverse sampling fraction for the others.
+/// Weighted sums over the sample estimate sums over all rows [Horvitz & Thompson 1952].
 pub fn weighted_sample(
     rows: &[usize],
     limit: usize,

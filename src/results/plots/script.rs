@@ -1,4 +1,4 @@
-//! Data of the script of a page: poses with their residuals, and centre lines of the arm.
+//! Data for the script of a report page: poses with their residuals, and centre lines of the arm.
 
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -8,15 +8,15 @@ use super::data::PlotData;
 use crate::model::CentreLine;
 use crate::results::tables::CommandedJoint;
 
-/// Data of the script of a page.
+/// Data for the script of a report page.
 #[derive(Debug, Serialize)]
 pub struct ScriptData {
     /// Name, unit and index of each joint that takes a command.
     joints: Vec<(String, String, usize)>,
     poses: Vec<Entry>,
-    /// Regressors of the effects found: label, and rows with their values.
+    /// Regressors of the effects found: label, and row numbers with their values.
     traced: Vec<(String, Vec<(usize, f64)>)>,
-    /// Positions without a fitted pose near \[mm\].
+    /// Positions without a fitted pose nearby \[mm\].
     uncovered: Vec<[f64; 3]>,
 }
 
@@ -26,10 +26,10 @@ struct Entry {
     row: usize,
     place: String,
     held_out: bool,
-    /// Kind of measurement, if it is no position.
+    /// Kind of measurement; absent for positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     kind: Option<&'static str>,
-    /// Number of poses that it represents, if not all are included.
+    /// Number of poses that it represents; absent if all are included.
     #[serde(skip_serializing_if = "Option::is_none")]
     n: Option<f64>,
     q: Vec<f64>,
@@ -62,7 +62,7 @@ fn rigid(arm: &CentreLine) -> Vec<i64> {
     arm.rigid.iter().flat_map(|at| [at.x, at.y, at.z]).map(rounded).collect()
 }
 
-/// Returns the deflections of these points \[mm\].
+/// Returns the deflections of the points of the centre line \[mm\].
 fn deflections(arm: &CentreLine) -> Vec<f64> {
     arm.bent
         .iter()
@@ -72,7 +72,7 @@ fn deflections(arm: &CentreLine) -> Vec<f64> {
 }
 
 impl ScriptData {
-    /// Collects the poses of a page.
+    /// Collects the poses that a page shows.
     pub fn of(data: &PlotData) -> Self {
         let joint = |command: &CommandedJoint| (command.name(), command.symbol(), command.joint);
         let entry = |((&row, &count), arm): ((&usize, &f64), &Option<CentreLine>)| {

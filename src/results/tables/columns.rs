@@ -14,7 +14,7 @@ use crate::problem::fixture::reference_cells;
 use crate::quantity::TableUnit;
 use crate::quantity::format::fixed;
 
-/// Cells of a column.
+/// Values of a column, one per row.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Column {
@@ -22,8 +22,8 @@ pub enum Column {
     Words(Labels),
     /// Non-negative integers of the rows.
     Counts(Vec<usize>),
-    /// Numbers, NaN for rows without one, and their decimals in texts; `None` for as many as
-    /// needed.
+    /// Numbers, NaN for rows without one, and the number of decimals in texts; `None` writes as
+    /// many as needed.
     Numbers(Vec<f64>, Option<usize>),
     /// Truth values of the rows.
     Flags(Vec<bool>),
@@ -51,7 +51,8 @@ pub(super) fn to_csv(columns: &Columns, rows: usize) -> String {
     csv(header, (0..rows).map(|row| columns.iter().map(|(_, column)| column.cell(row)).collect()))
 }
 
-/// Returns the columns that name the picked rows: file, line, pose, session, target and fixtures.
+/// Returns the columns that identify the picked rows: file, line, pose, session, target and
+/// fixtures.
 pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) -> Columns {
     let of_row = |of: &dyn Fn(usize) -> usize| picked.iter().map(|&row| of(row)).collect();
     let labels = |all: &Labels| {
@@ -99,13 +100,13 @@ pub(super) fn names(problem: &Problem, rows: &Measurements, picked: &[usize]) ->
     columns
 }
 
-/// Word of a group of columns, with the vector and the rotation vector of a residual.
+/// Group of columns: its name, the residual vector, and the rotation vector if there is one.
 type Part<'a> =
     (&'static str, fn(&Residual) -> Vector3<f64>, &'a dyn Fn(&Residual) -> Option<Vector3<f64>>);
 
-/// Returns the table of residuals: columns that name the row, predicted values and residuals in mm
-/// and ° of everything that some row measures, `whitened` (length in units of σ), `outlier` and
-/// `held_out`.
+/// Returns the table of residuals. Its columns identify the row and give predicted values and
+/// residuals in mm and ° of every kind of rows. Further columns are `whitened` (length in units of
+/// σ), `outlier` and `held_out`.
 pub fn residual_columns(problem: &Problem, rows: &Measurements, residuals: &[Residual]) -> Columns {
     let picked: Vec<usize> = residuals.iter().map(|residual| residual.row).collect();
     let mut columns = names(problem, rows, &picked);

@@ -1,4 +1,4 @@
-//! Joints that take a command, and the words of rows, in tables for other programs.
+//! Joints that take a command, and labels of rows, for tables that other programs read.
 
 use crate::measurement::{Labels, Measurements};
 use crate::problem::{Joint, JointKind, Problem};
@@ -19,7 +19,7 @@ impl CommandedJoint {
         format!("q{}", self.joint + 1)
     }
 
-    /// Returns the readable unit, ° or mm.
+    /// Returns the unit in which the command is displayed, ° or mm.
     pub(crate) fn symbol(self) -> String {
         self.unit.display(1.0).symbol
     }
@@ -45,12 +45,12 @@ pub(crate) fn commanded_joints(problem: &Problem) -> Vec<CommandedJoint> {
     problem.joints.iter().map(Joint::command_kind).enumerate().filter_map(command).collect()
 }
 
-/// Returns the sessions of the rows, if any has a name.
+/// Returns the sessions of the rows; `None` if no session has a name.
 pub(crate) fn sessions(rows: &Measurements) -> Option<&Labels> {
     Some(&rows.session).filter(|session| session.names.iter().any(|name| !name.is_empty()))
 }
 
-/// Returns the word of a row.
+/// Returns the label of a row.
 pub(crate) fn word(labels: &Labels, row: usize) -> String {
     labels.names[labels.of_row[row]].clone()
 }

@@ -11,7 +11,7 @@ use crate::quantity::format::fixed;
 
 /// Returns poses as CSV with the columns of measurements, except the positions.
 ///
-/// If the problem names a column that marks held-out rows, it marks every pose for identification.
+/// If the problem names a column that marks held-out rows, every pose is marked as identification.
 pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     let (joints, session) = (commanded_joints(problem), sessions(poses));
     let split = match &problem.data.held_out {
@@ -67,7 +67,8 @@ pub fn poses_csv(problem: &Problem, poses: &Measurements) -> String {
     csv(columns.iter().map(|(name, _)| name.clone()).collect(), lines)
 }
 
-/// Returns the declared 1 σ of each row \[mm\]; empty for rows that measure no length.
+/// Returns the declared 1 σ of each row \[mm\], empty for rows that measure no length; `None` if no
+/// row declares one.
 fn sigmas(poses: &Measurements) -> Option<Vec<String>> {
     let cell = |(row, sigma): (usize, &f64)| {
         let is_length = poses.observation(row).description().unit == Unit::Length;

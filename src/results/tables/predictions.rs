@@ -40,7 +40,7 @@ pub fn predictions_csv(
 }
 
 /// Returns the columns of the uncertainty of predictions: 1 σ along each axis, the bound of the
-/// error, and whether the pose lies outside of what was measured.
+/// error, and whether the pose is outside the measured range.
 fn uncertainty(bounds: &Bounds) -> Columns {
     let numbers = |of: &dyn Fn(usize) -> f64| {
         Column::Numbers((0..bounds.poses.len()).map(|pose| of(pose) * 1e3).collect(), Some(4))
@@ -56,7 +56,7 @@ fn uncertainty(bounds: &Bounds) -> Columns {
     columns
 }
 
-/// Decimals of commands, to a nanometre or a nanoradian.
+/// Number of decimals of commands in mm and °.
 const DECIMALS: usize = 9;
 
 /// Returns index, column name and factor from SI of each commanded joint, as in the table of
@@ -78,8 +78,9 @@ fn degrees(angle: Option<f64>) -> String {
     angle.map_or_else(String::new, |angle| fixed(angle.to_degrees(), 6))
 }
 
-/// Returns commands as CSV: q of every moving joint (empty if the target is out of reach) with the
-/// names and units of the table of targets, desired pose and conditions, and predicted distances.
+/// Returns commands as CSV, with the names and units of the table of targets: q of every moving
+/// joint (empty if the target is out of reach), desired pose and conditions, and predicted
+/// distances.
 pub fn commands_csv(
     problem: &Problem,
     targets: &Measurements,

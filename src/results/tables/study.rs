@@ -32,8 +32,8 @@ pub fn study_csv(study: &Study, results: &Results) -> String {
     csv(study, results, header, |cell, _| line(cell))
 }
 
-/// Returns `parameters.csv` with a line for each parameter of each cell; the unit `relative` stands
-/// for ln(value).
+/// Returns `parameters.csv` with a line for each parameter of each cell; the unit `relative` means
+/// ln(value).
 pub fn study_parameters_csv(study: &Study, results: &Results) -> String {
     let header = "parameter,unit,fits,bias,spread,rms_error,with_std_error,std_error,coverage";
     csv(study, results, header, |cell, _| {
@@ -65,12 +65,13 @@ pub fn study_timing_csv(study: &Study, results: &Results) -> String {
     })
 }
 
-/// Formats a number by the shortest text that is read back as the same; empty for `None`.
+/// Formats a number as the shortest text that reads back as the same number; empty for `None`.
 fn plain(value: Option<f64>) -> String {
     value.map(|value| value.to_string()).unwrap_or_default()
 }
 
-/// Returns a table with the columns of `header` behind those that name the cell, numbered from 1.
+/// Returns a table with the columns of `header` after those that identify the cell; cells are
+/// numbered from 1.
 fn csv(
     study: &Study,
     results: &Results,

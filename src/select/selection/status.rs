@@ -5,21 +5,21 @@ use serde::Serialize;
 
 use crate::select::reference_check::ReferenceVerdict;
 
-/// Probability of a law from which on it is the most probable one at its place.
+/// Smallest probability at which a law is more probable than all others together.
 const MIN_PROBABLE: f64 = 0.5;
 
 /// Strongest claim about an effect of the extended problem, the strongest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
-    /// The effect acts; the probability of its law is at least
+    /// An effect with this law acts: the probability of the law is at least
     /// [`stated`](crate::select::SelectionRules::stated).
     Found,
-    /// Its law is more probable than all others together.
+    /// The probability of its law is above one half, but below that of `found`.
     Probable,
-    /// At most the place is known; the law is one candidate.
+    /// At most the place of the cause is established; the law is one of several candidates.
     Located,
-    /// Data outside the fit contradict the effect.
+    /// Measurements that are independent of the fit contradict the effect.
     Contradicted,
 }
 
@@ -35,8 +35,9 @@ impl Status {
         }
     }
 
-    /// Returns the status of an effect: `law` is the probability of its law, `None` where no evidence
-    /// was evaluated, and `stated` the probability from which on a law is named as found.
+    /// Returns the status of an effect. `law` is the probability of its law, `None` if no evidence
+    /// was evaluated; then it is found if significant. `stated` is the smallest probability of a
+    /// found law. `witness` is the verdict of independent measurements.
     pub(super) fn of(
         law: Option<f64>,
         stated: f64,
@@ -58,9 +59,9 @@ impl Status {
 pub enum Verdict {
     /// No effect was found and the residual shows no structure.
     NothingFound,
-    /// Effects with status `found` alone leave a residual that passes the tests.
+    /// The effects with status `found` alone leave a residual that passes the tests.
     Explained,
-    /// Structure is left, or no effect is sure.
+    /// Structure remains in the residual, or no effect has the status `found`.
     Unexplained,
 }
 
@@ -77,8 +78,8 @@ impl Verdict {
 }
 
 impl Verdict {
-    /// Returns the verdict on effects of these statuses: `is_noise` says whether the fit with all of
-    /// them leaves noise, `is_noise_with_found` whether the fit with the found ones alone does.
+    /// Returns the verdict on effects with these statuses. `is_noise` is true if the fit with all
+    /// of them leaves only noise, `is_noise_with_found` if the fit with the found ones alone does.
     pub(super) fn of(statuses: &[Status], is_noise: bool, is_noise_with_found: bool) -> Self {
         match statuses {
             [] if is_noise => Self::NothingFound,

@@ -1,4 +1,4 @@
-//! Quantities along the axes of the figure of an effect.
+//! Axes of the figure of an effect: quantity, label and unit.
 
 use crate::problem::{JointKind, Problem};
 use crate::quantity::Unit;
@@ -6,7 +6,7 @@ use crate::quantity::Unit;
 /// Number of degrees in a radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-/// Quantity along an axis, with its unit and the factor from SI.
+/// Quantity along an axis, with its label and the factor from SI to the displayed unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
     /// Label with the unit, for example `temperature [°C]`.
@@ -33,13 +33,13 @@ impl Quantity {
         Self::new(format!("temperature that lags by {time_constant} s [°C]"), 1.0)
     }
 
-    /// Returns the axis of elapsed times up to `longest` \[s\].
+    /// Returns the axis of elapsed time, in a unit that suits times up to `longest` \[s\].
     pub(super) fn elapsed(longest: f64) -> Self {
         let (unit, factor) = if longest > 7200.0 { ("h", 1.0 / 3600.0) } else { ("s", 1.0) };
         Self::new(format!("time since the first pose [{unit}]"), factor)
     }
 
-    /// Returns the axis of the error of a coordinate.
+    /// Returns the axis of the error of a coordinate called `of`.
     pub(super) fn error(of: &str, unit: Unit) -> Self {
         match unit {
             Unit::Length => Self::new(format!("error of {of} [mm]"), 1e3),

@@ -11,10 +11,10 @@ use crate::numeric::range;
 use crate::problem::{Effect, Problem};
 use crate::results::plots::arm::{Arm, MIN_LEVER, Poses};
 
-/// Number of steps of a curve.
+/// Number of intervals by which a curve is drawn.
 const CURVE_STEPS: u32 = 160;
 
-/// Fit of a model that declares the effects, evaluated in every row.
+/// Fit of a model that declares the effects, with its residual and levers in every row.
 #[derive(Clone, Copy)]
 pub struct EffectFit<'a> {
     /// Arm of the fit.
@@ -25,7 +25,7 @@ pub struct EffectFit<'a> {
     pub levers: &'a [Vec<Vector3<f64>>],
 }
 
-/// Returns the site of every joint coordinate.
+/// Returns the parameter site of every joint's coordinate.
 pub fn coordinates(problem: &Problem) -> Vec<ParameterSite> {
     let field =
         |joint: usize| if slides(problem, joint) { JointField::D } else { JointField::Theta };
@@ -34,7 +34,8 @@ pub fn coordinates(problem: &Problem) -> Vec<ParameterSite> {
         .collect()
 }
 
-/// Computes the figure data of an effect from the fit of `problem`, which declares it.
+/// Computes the figure data of an effect from the fit of `problem`, which declares it; `None` if no
+/// pose depends on the effect.
 pub fn of(
     effect: &Effect,
     problem: &Problem,

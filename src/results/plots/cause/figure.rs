@@ -5,9 +5,9 @@ use super::axis::Quantity;
 /// Partial residual of one pose, SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// Value of the regressor.
+    /// Value of the regressor in this pose, SI.
     pub x: f64,
-    /// Partial residual of one pose at one value of the regressor, SI.
+    /// Partial residual of this pose, SI.
     pub y: f64,
     /// True for a held-out pose.
     pub held_out: bool,
@@ -15,7 +15,7 @@ pub struct Point {
     pub row: Option<usize>,
 }
 
-/// Partial residuals over the regressor of an effect, with the fitted law.
+/// Figure data of an effect: partial residuals over its regressor, with the fitted law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
     /// Description of the effect.
@@ -24,10 +24,10 @@ pub struct Cause {
     pub across: Quantity,
     /// Quantity on the vertical axis.
     pub up: Quantity,
-    /// Poses that inform on the effect, in the order of the rows.
+    /// Poses that depend on the effect, in the order of the rows.
     pub points: Vec<Point>,
     /// Points of the fitted law.
     pub curve: Vec<(f64, f64)>,
-    /// Explanation of a dot in the caption.
+    /// Sentence of the caption that explains what a dot shows.
     pub(crate) reading: &'static str,
 }

@@ -1,4 +1,4 @@
-//! Terms of an effect evaluated in every pose.
+//! Terms of an effect, evaluated in every pose.
 
 use nalgebra::Vector3;
 
@@ -7,22 +7,22 @@ use crate::laws::Quantity as Known;
 use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::{PoseView, Problem};
 
-/// Poses with the displacement by an effect.
+/// Poses with the displacement that an effect causes in each.
 pub struct Rows<'a> {
     pub poses: Vec<PoseView<'a>>,
-    /// Displacement by the effect in each row \[m\].
+    /// Displacement of the target by the effect in each row \[m\].
     pub displacements: Vec<Vector3<f64>>,
-    /// Regressor and value of each term.
+    /// Regressor and fitted value of each term.
     pub terms: Vec<(Regressor, f64)>,
     /// Site of each term.
     pub sites: Vec<ParameterSite>,
 }
 
-/// Ordinate of a fitted law at a value of the regressor.
+/// Function from a value of the regressor to the ordinate of the fitted law.
 pub type Law<'a> = Box<dyn Fn(f64) -> f64 + 'a>;
 
 impl Rows<'_> {
-    /// Returns the site of all terms, where it is one.
+    /// Returns the common site of all terms; `None` if they have several.
     pub fn site(&self) -> Option<ParameterSite> {
         let (first, others) = self.sites.split_first()?;
         others.iter().all(|site| site == first).then_some(*first)
@@ -33,7 +33,7 @@ impl Rows<'_> {
         self.terms.iter().all(|(regressor, _)| !regressor.is_constant())
     }
 
-    /// Returns the quantities that the terms follow, each once.
+    /// Returns the quantities on which the terms depend, without duplicates.
     pub fn quantities(&self) -> Vec<Known> {
         let mut found = Vec::new();
         for quantity in self.terms.iter().flat_map(|(regressor, _)| regressor.quantities()) {
@@ -44,12 +44,12 @@ impl Rows<'_> {
         found
     }
 
-    /// Returns Σ value · regressor.
+    /// Returns Σ value × regressor over the terms in a pose.
     pub fn driven(&self, pose: &PoseView) -> f64 {
         self.terms.iter().map(|(regressor, value)| value * regressor.value(pose)).sum()
     }
 
-    /// Returns the axis of a formula with its unit.
+    /// Returns the axis label of a formula, with its unit.
     pub fn label(regressor: &Regressor) -> String {
         match regressor.as_quantity() {
             Some(Known::Friction { joint, .. }) => {
@@ -59,8 +59,8 @@ impl Rows<'_> {
         }
     }
 
-    /// Returns the axis of one quantity, its values, and Σ value · regressor over it; `None` where no
-    /// pose can be made of a value of the quantity alone.
+    /// Returns the axis of one quantity, its value in each pose, and Σ value × regressor as a
+    /// function of it. `None` if the value of the quantity alone does not determine the regressors.
     pub fn over_quantity<'r>(
         &'r self,
         quantity: Known,
@@ -118,12 +118,13 @@ impl Rows<'_> {
         })
     }
 
-    /// Returns true if every term is multiplied by a quantity itself.
+    /// Returns true if every term's regressor is the quantity itself.
     pub fn is_each(&self, quantity: Known) -> bool {
         self.terms.iter().all(|(regressor, _)| regressor.as_quantity() == Some(quantity))
     }
 
-    /// Returns the effect's displacement over its size in each row; none where that is 0.
+    /// Returns the effect's displacement in each row divided by the row's `sizes` entry; zero if
+    /// that is 0.
     pub fn over(&self, sizes: impl Iterator<Item = f64>) -> Vec<Vector3<f64>> {
         let lever = |(lever_at_pose, size): (&Vector3<f64>, f64)| {
             if size == 0.0 { Vector3::zeros() } else { lever_at_pose / size }

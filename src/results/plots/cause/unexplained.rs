@@ -10,8 +10,8 @@ use crate::residual_tests::Covariate;
 use crate::results::plots::arm::MIN_LEVER;
 use crate::select::{PartialResidual, Unexplained};
 
-/// Returns the empirical correction of unexplained structure, less its mean; `None` if it does not
-/// depend on a single covariate or the order of the rows.
+/// Returns the figure data of the empirical correction of unexplained structure, less its mean.
+/// `None` unless the correction depends on a single covariate or on the order of the rows.
 pub fn unexplained(structure: &Unexplained, problem: &Problem, split: &Split) -> Option<Cause> {
     let correction = structure.correction.as_ref()?.curve.as_ref()?;
     let mut curve: Vec<(f64, f64)> =

@@ -1,4 +1,4 @@
-//! Axes and law of the figure of an effect, by the site at which the effect acts.
+//! Axes and law of the figure of an effect, which depend on the site at which the effect acts.
 
 use nalgebra::Vector3;
 
@@ -17,21 +17,22 @@ const ALONG: &str = "Each dot is the residual of one pose along the displacement
 const SIZE: &str = "Each dot is the size of the effect from one pose alone, with all other parameters as fitted. Poses with \
                     little sensitivity to it are omitted.";
 
-/// Partial residuals of an effect before the selection of poses.
+/// Axes, law and levers of an effect's figure, before poses are selected.
 pub struct View<'a> {
     pub across: Quantity,
-    /// Vertical axis for the largest value \[SI\].
+    /// Function from the largest ordinate \[SI\] to the vertical axis.
     pub up: Box<dyn Fn(f64) -> Quantity + 'a>,
     /// Value of the regressor in each row.
     pub x: Vec<f64>,
-    /// Displacement by one unit of the ordinate in each row \[m\].
+    /// Displacement of the target per unit of the ordinate in each row \[m\].
     pub levers: Vec<Vector3<f64>>,
     /// Fitted law: the ordinate at a value of the regressor.
     pub law: Box<dyn Fn(f64) -> f64 + 'a>,
     pub reading: &'static str,
 }
 
-/// Returns the least-squares change of a coordinate for a displacement.
+/// Returns the least-squares change of a coordinate, given by its `lever` (displacement per unit),
+/// for a `displacement` \[m\].
 pub fn along(lever: &Vector3<f64>, displacement: &Vector3<f64>) -> f64 {
     lever.dot(displacement) / lever.norm_squared()
 }
@@ -91,7 +92,7 @@ pub fn at_joint<'a>(
     Some(View { across, up, x, levers: levers.clone(), law, reading: COORDINATE })
 }
 
-/// Returns the view of an effect that is no error of a joint's coordinate.
+/// Returns the view of an effect that does not change a joint's coordinate.
 pub fn beyond_joints<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> View<'a> {
     at_link(found, problem, rows)
         .or_else(|| of_time(problem, rows))
@@ -110,7 +111,8 @@ pub fn beyond_joints<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> V
         })
 }
 
-/// Returns the view of a strain of a link that follows one temperature.
+/// Returns the view of an effect that strains a link as a function of one temperature; `None` for
+/// other effects.
 fn at_link<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
     let is_strain = |site: &ParameterSite| matches!(site, ParameterSite::Beam { field, .. } if field.is_strain());
     let &[quantity] = rows.quantities().as_slice() else { return None };
@@ -140,8 +142,8 @@ fn at_link<'a>(found: &Effect, problem: &Problem, rows: &'a Rows) -> Option<View
     })
 }
 
-/// Returns the view of a displacement of the measuring frame by a function of time: every pose moves
-/// in one direction.
+/// Returns the view of an effect that displaces the measuring frame as a function of time; `None`
+/// for other effects. Every pose moves in the same direction.
 fn of_time<'a>(problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
     let is_shift = |site: &ParameterSite| matches!(site, ParameterSite::Shift { .. });
     let &[quantity @ (Known::Elapsed | Known::Time)] = rows.quantities().as_slice() else {
@@ -171,7 +173,7 @@ fn of_time<'a>(problem: &Problem, rows: &'a Rows) -> Option<View<'a>> {
     })
 }
 
-/// Returns the view of a mass that is added to payloads.
+/// Returns the view of an effect that adds a mass to payloads; `None` for other effects.
 fn of_payload<'a>(rows: &'a Rows) -> Option<View<'a>> {
     if rows.site()? != ParameterSite::Arm(ArmField::Payload) {
         return None;
