@@ -77,7 +77,7 @@ impl EffectPair {
     }
 }
 
-/// How well a plan and random poses distinguish two effects.
+/// Comparison of a plan and random sets of poses: how well each distinguishes two effects.
 #[derive(Debug, Clone)]
 pub struct PairSeparation {
     /// Both effects of the pair.

@@ -1,4 +1,4 @@
-//! Record of `accept`, to be signed: accuracy before and after, conditions and inputs.
+//! Record of the command `accept`, to be signed: accuracy before and after, conditions and inputs.
 
 use super::document::{Block, Headline, Table};
 use super::errors::NOMINAL;
@@ -8,13 +8,13 @@ use crate::problem::Problem;
 use crate::quantity::format::{about_three_digits, counted, number};
 use crate::results::{AcceptanceResult, PoseAccuracy};
 
-/// Cycles in each pose that ISO 9283 requires.
+/// Number of cycles in each pose that ISO 9283 requires.
 const CYCLES: usize = 30;
 
-/// Scope of the figures.
+/// Sentence on the scope of the reported errors.
 const SCOPE: &str = "These are errors of predicted positions. The accuracy that a controller reaches with corrected commands is not judged.";
 
-/// Returns the accuracy in brief, ending in a line break.
+/// Returns a summary of the accuracy as text, ending in a line break.
 pub fn acceptance_text(problem: &Problem, result: &AcceptanceResult) -> String {
     let poses = counted(result.poses, "held-out pose");
     let mut blocks = vec![Block::lines(format!("{}\n{poses}; {}", problem.title, result.protocol))];
@@ -22,7 +22,7 @@ pub fn acceptance_text(problem: &Problem, result: &AcceptanceResult) -> String {
     text(&blocks)
 }
 
-/// Returns the page to sign.
+/// Returns the page with the record to be signed.
 pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
     let head = Headline {
         unit: "mm",

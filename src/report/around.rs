@@ -48,7 +48,7 @@ pub(super) fn around<'a>(found: &Identification) -> Vec<Block<'a>> {
     blocks
 }
 
-/// Returns a sentence for each point with a far larger spread than the others.
+/// Returns a sentence for each point whose spread is far larger than that of the others.
 pub(super) fn unsteady<'a>(all: impl IntoIterator<Item = &'a PointSpread>) -> Vec<String> {
     let sentence = |(spread, times): (&PointSpread, f64)| {
         let [x, y, z] =

@@ -1,4 +1,4 @@
-//! Result of `identify` on one screen.
+//! Result of the command `identify` on one screen.
 
 use super::around::unsteady;
 use super::document::Block;
@@ -12,8 +12,8 @@ use crate::problem::Problem;
 use crate::quantity::format::{counted, number};
 use crate::results::Knowledge;
 
-/// Returns a fit on one screen of this many columns, ending in a line break: errors, size of the
-/// residual, parameters and remarks.
+/// Returns a summary of a fit for one screen, ending in a line break: errors, size of the residual,
+/// parameters and remarks. Lines have at most `columns` characters.
 pub fn estimate_brief(problem: &Problem, found: &Identification, columns: usize) -> String {
     let mut blocks = vec![
         headline(problem, found),
@@ -30,7 +30,7 @@ pub fn tells_little(found: &Identification) -> bool {
     !found.estimates.iter().any(|estimate| Knowledge::of(estimate).is_identified())
 }
 
-/// Counts the parameters by how well they are identified.
+/// Counts the parameters by how well the data determine them.
 fn parameters(estimates: &[Estimate]) -> String {
     let count = |is: fn(Knowledge) -> bool| {
         estimates.iter().filter(|estimate| is(Knowledge::of(estimate))).count()
@@ -49,7 +49,7 @@ fn parameters(estimates: &[Estimate]) -> String {
     )
 }
 
-/// Lists remarks that the tables of the whole text explain.
+/// Lists remarks that the full text explains.
 fn worth_a_look(found: &Identification) -> Vec<String> {
     let mut points = Vec::new();
     if let Some(orientation) = &found.orientation {

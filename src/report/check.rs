@@ -1,4 +1,4 @@
-//! Text of `check`: what measurements at some poses will tell.
+//! Text of the command `check`: the expected result of measurements at some poses.
 
 use super::detection;
 use super::document::{Block, Column, Table};
@@ -53,7 +53,7 @@ pub fn check_text(problem: &Problem, check: &Check) -> String {
     text(&blocks)
 }
 
-/// Difference of two shares from which on both are shown.
+/// Smallest difference of two identified shares at which both are shown.
 const SHOWN_DIFFERENCE: f64 = 0.05;
 
 /// Returns true if a parameter is confounded with others at the nominal arm, but identified at arms
@@ -63,7 +63,7 @@ fn is_confounded_at_nominal(expected: &ExpectedParameter) -> bool {
     nominal < Forecast::WELL_IDENTIFIED && expected.identified - nominal > SHOWN_DIFFERENCE
 }
 
-/// Formats the share of information that the data will give.
+/// Formats the expected identified share of a parameter.
 fn share(expected: &ExpectedParameter) -> String {
     let percent = |share: f64| format!("{:3.0}", share * 100.0);
     let share = percent(expected.identified);
@@ -74,7 +74,7 @@ fn share(expected: &ExpectedParameter) -> String {
     }
 }
 
-/// States in one line why poses do not suffice.
+/// States in one line why the poses do not suffice.
 pub fn why_not_sufficient(check: &Check) -> String {
     let (forecast, different) = (&check.forecast, check.different);
     let (of, parameters) = (forecast.poses, check.without_prior);

@@ -1,4 +1,4 @@
-//! Texts of `loop`: one screen, all of it on the terminal, and the report.
+//! Texts of the command `loop`: summary for one screen, full text for the terminal, and report.
 
 use std::fmt::Write as _;
 
@@ -22,20 +22,21 @@ use crate::results::{
 };
 use crate::select::ClosedLoop;
 
-/// Alternatives that a text names; the page names twice as many.
+/// Maximum number of alternatives that a text names; the page names twice as many.
 const SHOWN_ALTERNATIVES: usize = 4;
-/// Candidates of the ranking that a report shows.
+/// Maximum number of candidates of the ranking that a report shows.
 const SHOWN_CANDIDATES: usize = 8;
-/// Rows that are named of those that took no part.
+/// Maximum number of excluded rows that a text names.
 const SHOWN_ROWS: usize = 3;
-/// Limits of the declared problem that are named.
+/// Maximum number of limits of the declared problem that a text names.
 const SHOWN_LIMITS: usize = 3;
-/// Lines of a screen, less those that say where results are and what to do next.
+/// Number of lines of a screen, less those for file names and next steps.
 const SCREEN_LINES: usize = 22;
-/// Arm with the effects of the extended problem.
+/// Name of the arm with the effects of the extended problem.
 const EXTENDED: &str = "with what was found";
 
-/// Returns the outcome on one screen of this many columns, ending in a line break.
+/// Returns a summary of the outcome for one screen, ending in a line break. Lines have at most
+/// `columns` characters.
 pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> String {
     let result = &LoopResult::new(problem, closure);
     let text = |blocks: &[Block]| text_within(blocks, columns);
@@ -73,7 +74,8 @@ pub fn loop_brief(problem: &Problem, closure: &ClosedLoop, columns: usize) -> St
     text(&blocks) + &more + &end
 }
 
-/// Returns the cause with its size ± 1 σ, its probability and what it is not told from.
+/// Returns a found effect as a list item: value ± 1 σ, probability of its law, and effects that the
+/// data cannot distinguish from it.
 fn cause(found: &FoundEffect) -> Point {
     let values = effect::values(&found.effect.effect, &found.parameters);
     let mut facts: Vec<String> = values.iter().map(|value| without_effect(value)).collect();
@@ -98,7 +100,8 @@ fn without_effect(value: &str) -> String {
     value.replacen(name, parameter, 1)
 }
 
-/// Returns title, rows, verdict, and what to know before the causes are read.
+/// Returns the beginning of the text: title, rows, verdict, and cautions that matter for the
+/// causes.
 fn head<'a>(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let mut blocks = vec![
         Block::Text(format!("{}\n{}", problem.title, both_parts(&closure.before.fit))),
@@ -108,8 +111,8 @@ fn head<'a>(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Vec
     blocks
 }
 
-/// Returns what to know first: declarations that are missing, influential rows, cautions, and rows
-/// set aside.
+/// Returns cautions that matter for the causes: missing declarations, influential rows, findings,
+/// and excluded rows.
 fn to_know<'a>(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let declare = to_declare(problem, closure, result).into_iter().map(Block::Note);
     let mut blocks: Vec<Block> = declare.collect();
@@ -119,7 +122,7 @@ fn to_know<'a>(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> 
     blocks
 }
 
-/// Names rows that took no part in the choice of effects.
+/// Names the rows that were excluded from the choice of effects.
 fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
     let rows = &result.set_aside;
     let treatment = if problem.robust.is_some() {
@@ -139,7 +142,7 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
     (!rows.is_empty()).then_some(Block::Text(words))
 }
 
-/// Returns the outcome as text, ending in a line break.
+/// Returns the full outcome as text, ending in a line break.
 pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     let result = &LoopResult::new(problem, closure);
     let mut blocks = head(problem, closure, result);
@@ -161,7 +164,7 @@ pub fn loop_text(problem: &Problem, closure: &ClosedLoop) -> String {
     text(&blocks)
 }
 
-/// Returns the report of `loop`.
+/// Returns the report of the command `loop`.
 pub fn loop_report(problem: &Problem, closure: &ClosedLoop, plots: &PlotData) -> Report {
     let result = LoopResult::new(problem, closure);
     report(problem, "closed loop", &blocks(problem, closure, &result, plots))
@@ -268,8 +271,8 @@ fn headline(problem: &Problem, closure: &ClosedLoop, result: &LoopResult) -> Hea
     Headline { states, unit, of, facts }
 }
 
-/// Returns reasons for doubt: a fit that is not to be trusted, and limits for which an effect may
-/// stand.
+/// Returns reasons for doubt: a fit that is not trusted, and active limits for which an effect may
+/// only compensate.
 fn cautions<'a>(closure: &ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     let (before, after) = (&closure.before.fit, &closure.after);
     let untrusted = (!result.trusted).then(|| format!("Warning: {}.", why_not_trusted(after)));
@@ -316,7 +319,7 @@ fn errors(closure: &ClosedLoop, result: &LoopResult) -> Table {
     Table { minor: vec![3, 4], ..Table::new(&header, rows, &[0, 1]) }
 }
 
-/// Returns the gain on held-out rows, if effects were found and it is a number.
+/// Returns the gain on held-out rows, if effects were found and the gain is finite.
 fn known_gain(result: &LoopResult) -> Option<Gain> {
     result.gain().filter(|gain| !result.effects.is_empty() && gain.mean.is_finite())
 }
@@ -349,7 +352,7 @@ fn gained(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
     (!words.is_empty()).then(|| words.join(" "))
 }
 
-/// States what is left, and where it is shown.
+/// States what structure remains and where it is shown.
 fn remains(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
     let failed = findings::failed(&closure.findings).len();
     let places = if result.size_alone().is_none() { places(result) } else { Vec::new() };
@@ -361,7 +364,7 @@ fn remains(closure: &ClosedLoop, result: &LoopResult) -> Option<String> {
         .then(|| format!("What remains: {}; -v lists it, report.html shows it.", parts.join(", ")))
 }
 
-/// States the gain and how the figures are to be read.
+/// States the gain and explains how to read the figures.
 fn gain(closure: &ClosedLoop, result: &LoopResult) -> Block<'static> {
     let (before, after) = (&closure.before, &closure.after);
     let another = findings::another_size(&before.findings, before.fit.reduced_chi2)
@@ -467,7 +470,7 @@ fn rounds<'a>(closure: &'a ClosedLoop, result: &LoopResult) -> Vec<Block<'a>> {
     ]
 }
 
-/// Returns the status of each effect with its grounds.
+/// Returns the status of each effect with the evidence for it.
 fn sureness<'a>(closure: &ClosedLoop, result: &LoopResult) -> Option<Block<'a>> {
     let share = |part: f64| format!("{} %", number(part * 100.0, 0));
     let law = |found: &FoundEffect| {

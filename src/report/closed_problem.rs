@@ -11,11 +11,12 @@ use crate::quantity::format::p_value;
 use crate::results::ParameterValue;
 use crate::select::{ClosedLoop, Found, Status};
 
-/// Adds the found effects to the `text` of `problem`, and names its data `files` (measurements,
-/// then the joint table) as seen from the folder of the new text. All else stays as written, comments included.
+/// Adds the found effects to the `text` of `problem` and replaces its data `files` (measurements,
+/// then the joint table), relative to the folder of the new text. Everything else, including
+/// comments, is unchanged.
 ///
 /// # Errors
-/// The text is not TOML.
+/// Returns an error if the text is not TOML.
 pub fn closed_problem(
     text: &str,
     problem: &Problem,
@@ -48,7 +49,7 @@ pub fn closed_problem(
     }
 }
 
-/// Returns comments on an effect that was found: p-value, status and values.
+/// Returns comments on a found effect: p-value, status and values.
 fn comments(found: &Found, closure: &ClosedLoop) -> Vec<String> {
     let doubt = match (found.status, &found.claims) {
         (Status::Found, _) => "",

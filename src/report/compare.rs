@@ -1,4 +1,5 @@
-//! Texts of `compare`: every strategy, solver and ablation, and the paper's tables 2 and 3.
+//! Texts of the command `compare`: every strategy, solver and ablation, and the paper's tables 2
+//! and 3.
 
 use super::document::{Block, Column, Headline, Table, code};
 use super::errors::{both_parts, header, held_out_rows, noun, unit};
@@ -14,7 +15,7 @@ use crate::problem::Problem;
 use crate::quantity::format::{counted, number, or_dash};
 use crate::results::{ComparedFit, PlotData, Summary};
 
-/// Fit with its name in a table.
+/// Result of a fit with its name in a table.
 type NamedFit = (String, ComparedFit);
 
 /// Returns the comparison as text, ending in a line break.
@@ -44,7 +45,7 @@ fn of_positions(found: &Identification) -> bool {
     noun(found) == "pose"
 }
 
-/// Returns tables 2 and 3 of the paper from each procedure.
+/// Returns tables 2 and 3 of the paper with the results of each procedure.
 fn in_the_papers_shape(comparison: &Comparison) -> Vec<Block<'_>> {
     let tables = |procedure| {
         [
@@ -56,7 +57,7 @@ fn in_the_papers_shape(comparison: &Comparison) -> Vec<Block<'_>> {
     comparison.procedures.iter().flat_map(tables).collect()
 }
 
-/// Returns the report of `compare`.
+/// Returns the report of the command `compare`.
 pub fn comparison_report(problem: &Problem, comparison: &Comparison, plots: &PlotData) -> Report {
     report(problem, "comparison", &blocks(problem, comparison, plots))
 }
@@ -146,8 +147,8 @@ fn parts(comparison: &Comparison, is_timed: bool) -> Table {
     side_by_side(comparison, "elasticity", &named, is_timed)
 }
 
-/// Returns the table of some fits: with times, which differ from run to run, or else with more
-/// errors.
+/// Returns the table of some fits. If `is_timed`, it contains times, which differ from run to run;
+/// otherwise it contains more errors.
 fn side_by_side(
     comparison: &Comparison,
     first: &'static str,

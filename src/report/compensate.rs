@@ -1,4 +1,4 @@
-//! Text and table of `compensate`.
+//! Text of the command `compensate`.
 
 use std::fmt::Write as _;
 

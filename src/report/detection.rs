@@ -6,7 +6,7 @@ use super::forecast::size as shown;
 use crate::problem::Effect;
 use crate::select::{Detectable, Detection, Size};
 
-/// Effects of a family on one screen.
+/// Maximum number of effects of a family that a text lists.
 const SHOWN_EFFECTS: usize = 3;
 
 /// Returns the least visible effects of each family, and those that stay invisible.
@@ -60,7 +60,7 @@ pub(super) fn blocks<'a>(detection: &Detection) -> Vec<Block<'a>> {
     blocks
 }
 
-/// Returns rows of a family: the least visible effect at each place, least visible first.
+/// Returns table rows of a family: for each place its least visible effect, in order of visibility.
 fn hardest(shown: &[&Detectable], family: &str) -> Vec<Vec<String>> {
     let mut members: Vec<(&Detectable, f64)> = Vec::new();
     for effect in shown.iter().filter(|effect| effect.effect.name() == family) {

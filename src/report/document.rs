@@ -1,12 +1,13 @@
-//! Report as a list of blocks, which are shown on terminals, as Markdown and as a page.
+//! Report as a list of blocks, which are rendered for terminals, as Markdown and as a page.
 //!
-//! Texts mark [`code`]. Only the page shows figures and folds; [`Block::Page`] and [`Block::Words`]
-//! hold blocks for one kind of output alone.
+//! Texts mark code with [`code`]. Only the page shows figures and folded sections; [`Block::Page`]
+//! and [`Block::Words`] restrict blocks to one kind of output.
 
 use super::figures::Drawing;
 use crate::results::PlotData;
 
-/// Marks around code in texts: control characters, which titles do not contain and terminals drop.
+/// Marks before and after code in texts: control characters, which titles do not contain and
+/// terminals remove.
 pub(super) const CODE: (char, char) = ('\u{2}', '\u{3}');
 
 /// Block of a report.
@@ -18,7 +19,7 @@ pub(super) enum Block<'a> {
     Text(String),
     /// Paragraph with a warning.
     Note(String),
-    /// Lines with fixed line breaks, and points below them.
+    /// Lines with fixed line breaks, followed by list items.
     Lines(String, Vec<String>),
     /// Bullet list with details.
     List(Vec<Point>),
@@ -28,27 +29,27 @@ pub(super) enum Block<'a> {
     Table(Table),
     /// Labelled lines to fill in by hand; on the page alone.
     Blanks(Vec<&'static str>),
-    /// Outcome at a glance; on the page alone.
+    /// Summary of the outcome; on the page alone.
     Headline(Headline),
     /// Figures side by side; on the page alone.
     Figures(Vec<Drawing>),
     /// List of all drawn poses; on the page alone.
     Poses(&'a PlotData),
-    /// Title and blocks that the page shows on demand, and where to find them on paper; on the page
-    /// alone.
+    /// Title and blocks of a section that the page unfolds on request, and a sentence that refers a
+    /// printed page to them; on the page alone.
     Folded(String, Vec<Block<'a>>, String),
     /// Blocks on the page alone.
     Page(Vec<Block<'a>>),
-    /// Blocks everywhere but on the page.
+    /// Blocks for every output except the page.
     Words(Vec<Block<'a>>),
 }
 
-/// Point of a list.
+/// Item of a list, with details below it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Point {
     pub text: String,
     pub details: Vec<String>,
-    /// Outcome, if the point is a test.
+    /// Outcome of a test, if the item is one.
     pub mark: Option<Mark>,
 }
 
@@ -66,9 +67,9 @@ pub(super) struct Table {
     pub header: Vec<&'static str>,
     pub rows: Vec<Vec<String>>,
     pub left: Vec<usize>,
-    /// Notes on how to read it: below it on terminals, above it on the page.
+    /// Notes that explain the table: below it on terminals, above it on the page.
     pub notes: Vec<String>,
-    /// Indices of columns that a narrow page leaves out.
+    /// Indices of columns that a narrow page omits.
     pub minor: Vec<usize>,
     /// Last column of bars, on the page alone.
     pub bars: Option<(&'static str, Vec<Bar>)>,
@@ -93,28 +94,28 @@ impl<'a, T> Column<'a, T> {
         Self { is_left: true, ..Self::number(name, cell) }
     }
 
-    /// Leaves the column out on narrow pages.
+    /// Marks the column as one that narrow pages omit.
     pub fn minor(self) -> Self {
         Self { is_minor: true, ..self }
     }
 }
 
-/// Change of a parameter in units of its standard error.
+/// Change of a parameter from nominal in units of its standard error, drawn as a bar.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Bar {
     pub change: Option<f64>,
-    /// Active bound: 0 for the lower one, 1 for the upper one.
+    /// Active bound: 0 for the lower one, 1 for the upper one; `None` if none is active.
     pub bound: Option<f64>,
 }
 
-/// Outcome at a glance.
+/// Summary of the outcome with the errors of successive states of the arm.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Headline {
     /// States of the arm in order, each with its error.
     pub states: Vec<(&'static str, String)>,
     /// Unit of the errors.
     pub unit: &'static str,
-    /// Rows to which the errors belong.
+    /// Description of the rows to which the errors belong.
     pub of: String,
     pub facts: Vec<(&'static str, String)>,
 }
@@ -171,12 +172,13 @@ impl Table {
     }
 }
 
-/// Marks words as code.
+/// Encloses words in code marks.
 pub(super) fn code(words: &str) -> String {
     format!("{}{words}{}", CODE.0, CODE.1)
 }
 
-/// Returns the first `most` words, and a note with the number of others and their file.
+/// Returns the first `most` words, and a note with the number of omitted ones and the `file` that
+/// contains them.
 pub(super) fn first_of(
     words: impl IntoIterator<Item = String>,
     most: usize,
@@ -187,7 +189,7 @@ pub(super) fn first_of(
     shown
 }
 
-/// Joins the first `most` words and counts the others: "a, b and 3 more".
+/// Joins the first `most` words by `between` and counts the others: "a, b and 3 more".
 pub(super) fn named(words: impl IntoIterator<Item = String>, most: usize, between: &str) -> String {
     let (shown, more) = some_of(words, most);
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };

@@ -1,4 +1,4 @@
-//! Effects in words: values of their parameters, and many effects in few lines.
+//! Effects in words: values of their parameters, and compact lists of many effects.
 
 use super::document::{Point, code};
 use crate::laws::ArgumentKind;
@@ -6,11 +6,11 @@ use crate::problem::Effect;
 use crate::quantity::format::{decimals, number};
 use crate::results::{MAX_COEFFICIENTS, ParameterValue, SHOWN_HARMONICS, joined};
 
-/// Most decimals of a value.
+/// Maximum number of decimals of a value.
 const MOST: usize = 6;
 
-/// Lists the parameters of an effect with their values; of many harmonics the amplitudes of the
-/// largest.
+/// Lists the parameters of an effect with their values. For many harmonics, it lists the amplitudes
+/// of the largest.
 pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<String> {
     let line = |name: &str, parameter: &ParameterValue| format!("{name} = {}", value(parameter));
     let orders = effect.harmonic_orders().unwrap_or_default();
@@ -31,7 +31,7 @@ pub(super) fn values(effect: &Effect, parameters: &[ParameterValue]) -> Vec<Stri
     highest.chain((lower > 0).then(|| format!("{lower} smaller ones in loop.json"))).collect()
 }
 
-/// Returns a value with its standard error in a readable unit: `4.12 ± 0.05 µrad/(m·K)`.
+/// Returns a value with its standard error in a convenient unit: `4.12 ± 0.05 µrad/(m·K)`.
 fn value(parameter: &ParameterValue) -> String {
     let unit = parameter.unit.display(parameter.estimate);
     let scaled = parameter.estimate * unit.factor;
@@ -44,7 +44,7 @@ fn value(parameter: &ParameterValue) -> String {
     }
 }
 
-/// Returns a point for each group of effects, with its reason.
+/// Returns a list item for each group of effects, with the group's reason.
 pub(super) fn reasons<'a>(effects: impl IntoIterator<Item = (Effect, &'a str)>) -> Vec<Point> {
     grouped(effects)
         .into_iter()
@@ -60,7 +60,7 @@ pub(super) fn listed<'a>(effects: impl IntoIterator<Item = &'a Effect>) -> Vec<S
         .collect()
 }
 
-/// Groups effects by family and reason, each group in words: "`backlash` at joints 1, 2, 3".
+/// Groups effects by family and reason, and describes each group: "`backlash` at joints 1, 2, 3".
 fn grouped<R: Copy + PartialEq>(
     effects: impl IntoIterator<Item = (Effect, R)>,
 ) -> Vec<(String, R)> {
@@ -79,7 +79,7 @@ fn grouped<R: Copy + PartialEq>(
     groups.into_iter().map(|(members, reason)| (group(&members), reason)).collect()
 }
 
-/// Names effects with many time constants or distances by their places alone.
+/// Describes effects with many time constants or distances by their places alone.
 fn of_places(members: &[Effect]) -> String {
     let mut places: Vec<String> = Vec::new();
     for place in members

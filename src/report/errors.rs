@@ -9,12 +9,12 @@ use crate::results::measured_kinds;
 /// Name of the arm before identification.
 pub(super) const NOMINAL: &str = "nominal arm, base and tool fitted";
 
-/// Returns the header of errors of a kind of rows, with their unit.
+/// Returns the table header for errors of a kind of rows, with the unit.
 pub(super) fn measure(of: &ErrorSummary) -> &'static str {
     kind_named(of.kind).error_label
 }
 
-/// Formats an error with four decimals, in mm or °.
+/// Formats an error with four decimals, in the unit of its kind (mm or °).
 pub(super) fn shown(of: &ErrorSummary, value: f64) -> String {
     number(of.in_unit(value), 4)
 }
@@ -29,7 +29,7 @@ pub(super) fn with_unit(of: &ErrorSummary, value: f64) -> String {
     format!("{} {}", shown(of, value), unit(of))
 }
 
-/// Formats an error with about three significant digits, in mm or °.
+/// Formats an error with about three significant digits, in the unit of its kind (mm or °).
 pub(super) fn brief(of: &ErrorSummary, value: f64) -> String {
     about_three_digits(of.in_unit(value))
 }
@@ -39,7 +39,7 @@ pub(super) fn unit(of: &ErrorSummary) -> &'static str {
     of.unit().in_tables().symbol
 }
 
-/// Returns the header for errors in the unit of their kind: the one in mm, in ° or in px.
+/// Returns the header for the unit of the errors' kind: mm, ° or px.
 pub(super) fn header(of: &ErrorSummary, [mm, degrees, px]: [&'static str; 3]) -> &'static str {
     match of.unit() {
         Unit::Angle => degrees,
@@ -73,12 +73,12 @@ pub(super) fn both_parts(found: &Identification) -> String {
     format!("{} to identify, {held_out} held out", rows_of(found, |errors| errors.identification))
 }
 
-/// Counts the held-out rows of the first kind: "50 held-out poses".
+/// Counts the held-out rows of the leading kind: "50 held-out poses".
 pub(super) fn held_out_rows(found: &Identification) -> String {
     counted_rows(found, &found.fitted.held_out, "held-out ")
 }
 
-/// Counts rows of a kind, with an adjective that ends in a space.
+/// Counts rows of a kind; `adjective` precedes the noun and ends in a space.
 fn counted_rows(found: &Identification, of: &ErrorSummary, adjective: &str) -> String {
     let (one, many) = match kind_named(of.kind).row {
         words if words.0 != "pose" => words,
@@ -89,14 +89,14 @@ fn counted_rows(found: &Identification, of: &ErrorSummary, adjective: &str) -> S
     format!("{} {adjective}{}", of.n, if of.n == 1 { one } else { many })
 }
 
-/// Returns the noun for one row of the data, of whatever kind.
+/// Returns the noun for one row of the data.
 pub(super) fn noun(found: &Identification) -> &'static str {
     let positions = found.kinds.is_empty() && found.fitted.identification.kind == "position";
     if positions { "pose" } else { "row" }
 }
 
-/// Names for each arm the poses without an equilibrium, over which no mean exists; `None` if all
-/// errors are known.
+/// Names for each arm the poses without an equilibrium, because of which its mean errors do not
+/// exist; `None` if there are none.
 pub(super) fn unpredicted(arms: &[(&str, &Errors)]) -> Option<String> {
     let mut parts = Vec::new();
     for (arm, errors) in arms {

@@ -1,4 +1,5 @@
-//! Text of `export`: moved origins, errors, and what the file cannot hold.
+//! Text of the command `export`: moved origins, errors, and the parts of the model that the file
+//! cannot represent.
 
 use super::document::{Block, Table};
 use super::render::text;
@@ -6,11 +7,12 @@ use crate::fit::rows_of_kind;
 use crate::quantity::format::number;
 use crate::results::{ExportResult, ExportedErrors, Origin, Summary};
 
-/// Advice for a geometry whose error is larger without the rest of the model.
+/// Advice if the exported geometry alone has larger errors than the whole model.
 const ADVICE: &str = "If the controller uses geometry alone, a geometry fitted alone may be better: identify the problem without its effects (and \
                      with --strategy rigid if joints or links are compliant), export it, and compare the errors.";
 
-/// Factor of the mean error from which on a geometry fitted alone may be better.
+/// Ratio of the mean errors of geometry alone to the whole model, above which a geometry fitted
+/// alone may be better.
 const MUCH_LARGER: f64 = 1.1;
 
 /// Returns the result as text.

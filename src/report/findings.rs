@@ -9,7 +9,7 @@ pub(super) fn failed(findings: &Findings) -> Vec<String> {
     findings.tests.iter().filter(|check| check.failed()).map(ToString::to_string).collect()
 }
 
-/// States why the tests have another χ²/ν than the fit, if both differ in the shown digits.
+/// States why the tests have a χ²/ν different from the fit's, if both differ in the shown digits.
 pub(super) fn another_size(findings: &Findings, chi2: Option<f64>) -> Option<String> {
     let size = findings
         .tests
@@ -34,8 +34,8 @@ fn point(check: &ResidualTest) -> Point {
     Point { text: check.to_string(), mark: Some(mark), ..Point::default() }
 }
 
-/// Lists the tests: failed, passed, then those that could not be made. Quantities without
-/// dependence share one line.
+/// Lists the tests: failed ones, passed ones, then those that could not be made. All covariates
+/// without dependence share one line.
 pub(super) fn all(findings: &Findings) -> Vec<Point> {
     let of = |mark: Mark| {
         findings
@@ -62,7 +62,7 @@ pub(super) fn each(findings: &Findings) -> Vec<Point> {
     findings.tests.iter().map(point).collect()
 }
 
-/// Returns the tests: in brief in texts, one by one on the page.
+/// Returns the tests as blocks: a summary in texts, one by one on the page.
 pub(super) fn blocks<'a>(findings: &Findings) -> Vec<Block<'a>> {
     let (brief, page) = (Block::List(all(findings)), Block::List(each(findings)));
     vec![Block::Words(vec![brief]), Block::Page(vec![page])]

@@ -1,4 +1,4 @@
-//! Expected standard errors in words, and their assumptions.
+//! Expected standard errors in words, with the assumptions behind them.
 
 use super::document::Block;
 use crate::design::ExpectedParameter;
@@ -6,11 +6,11 @@ use crate::problem::{HeldOut, Problem};
 use crate::quantity::Display;
 use crate::quantity::format::{counted, decimals, number, or_dash, two_digits};
 
-/// Most decimals of a value.
+/// Maximum number of decimals of a value.
 const MAX_DECIMALS: usize = 6;
 
-/// Formats nominal value and some errors \[SI\] of a parameter in a readable unit; returns cells
-/// and unit.
+/// Formats nominal value and some errors \[SI\] of a parameter in a convenient unit; returns the
+/// cells and the unit.
 pub(super) fn cells(expected: &ExpectedParameter, errors: &[Option<f64>]) -> (Vec<String>, String) {
     let unit = expected.unit.display(expected.nominal);
     let digits = errors
@@ -25,8 +25,8 @@ pub(super) fn cells(expected: &ExpectedParameter, errors: &[Option<f64>]) -> (Ve
     (cells, unit.symbol)
 }
 
-/// States the assumptions of forecasts: that all of `fitted` poses are fitted, and the place of the
-/// target.
+/// States the assumptions of forecasts: that all of `fitted` poses are fitted, and where the target
+/// is.
 pub(super) fn assumptions<'a>(
     problem: &Problem,
     expected: &[ExpectedParameter],

@@ -1,4 +1,4 @@
-//! Texts of `identify`: all of it on the terminal, and the report on one fit.
+//! Texts of the command `identify`: full text for the terminal, and report on one fit.
 
 use super::around::around;
 use super::document::{Block, Headline, Table};
@@ -16,10 +16,10 @@ use crate::problem::Problem;
 use crate::quantity::format::{counted, mm, number};
 use crate::results::{PlotData, rows_in};
 
-/// File that holds the whole result.
+/// Name of the file with the complete result.
 const FILE: &str = "estimate.json";
 
-/// Returns the result as text, ending in a line break.
+/// Returns the full result as text, ending in a line break.
 pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
     let mut blocks = vec![
         headline(problem, found),
@@ -36,7 +36,7 @@ pub fn estimate_text(problem: &Problem, found: &Identification) -> String {
     text(&blocks)
 }
 
-/// Returns the report of `identify`.
+/// Returns the report of the command `identify`.
 pub fn identification_report(
     problem: &Problem,
     found: &Identification,
@@ -71,7 +71,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     blocks
 }
 
-/// States in one line why a fit is not to be trusted.
+/// States in one line why a fit is not trusted.
 pub fn why_not_trusted(found: &Identification) -> String {
     match found.first_error() {
         Some(reason) => format!("the fit is not to be trusted: {reason}"),
@@ -79,13 +79,13 @@ pub fn why_not_trusted(found: &Identification) -> String {
     }
 }
 
-/// States in three lines what was fitted to what, and how the fit ended.
+/// States in three lines which parameters were fitted to which rows, and how the fit ended.
 pub(super) fn headline<'a>(problem: &Problem, found: &Identification) -> Block<'a> {
     let seconds = found.seconds;
     Block::lines(format!("{}\n{}, {seconds:.3} s", problem.title, fitted(found, "\n")))
 }
 
-/// States what was fitted to what, and how the fit ended.
+/// States which parameters were fitted to which rows, and how the fit ended.
 pub(super) fn counts(found: &Identification) -> String {
     let warning = if found.is_trusted() {
         String::new()
@@ -95,7 +95,7 @@ pub(super) fn counts(found: &Identification) -> String {
     format!("{}.{warning}", fitted(found, "; "))
 }
 
-/// States counts, strategy and solver, and behind `separator` how the fit ended.
+/// States counts, strategy and solver, and after `separator` how the fit ended.
 fn fitted(found: &Identification, separator: &str) -> String {
     let reason = found.solver_reason.map(|reason| format!(" (auto: {reason})")).unwrap_or_default();
     format!(
@@ -110,15 +110,15 @@ fn fitted(found: &Identification, separator: &str) -> String {
     )
 }
 
-/// Lists the warnings of the terminal, except that a fit is not to be trusted.
+/// Lists the warnings that the terminal shows, except that a fit is not trusted.
 pub(super) fn beware<'a>(found: &Identification, plots: &PlotData) -> Option<Block<'a>> {
     let points: Vec<String> =
         plots.warnings.iter().map(ToString::to_string).chain(found.reasons_to_ask()).collect();
     (!points.is_empty()).then(|| Block::Lines("Warnings:".to_owned(), points))
 }
 
-/// States the number of fitted rows; where one pose may have several targets, also the number of
-/// different poses.
+/// States the number of fitted rows, and the number of different poses if one pose may have several
+/// targets.
 fn measured(found: &Identification) -> String {
     let rows = rows_of(found, |errors| errors.identification);
     if found.several_targets {
@@ -177,7 +177,8 @@ fn orientation<'a>(found: &Identification) -> Option<Block<'a>> {
     Some(Block::Table(Table::new(&["orientation, °", "", "mean", "rms", "max"], rows, &[0, 1])))
 }
 
-/// States the lengths at the seen points that held-out errors in images stand for.
+/// States the lengths at the observed points that correspond to held-out image errors; `None` for
+/// other kinds of rows.
 fn at_points(held_out: &ErrorSummary) -> Option<String> {
     let [mean, max, rms] = held_out.at_point?.map(|sizes| number(sizes.norm * 1e3, 4));
     Some(format!(
@@ -185,12 +186,12 @@ fn at_points(held_out: &ErrorSummary) -> Option<String> {
     ))
 }
 
-/// Names the poses without an equilibrium in an identification.
+/// Names the poses without an equilibrium in an identification; `None` if there are none.
 pub(super) fn no_errors(found: &Identification) -> Option<String> {
     unpredicted(&[("the nominal arm", &found.registered), ("the arm as identified", &found.fitted)])
 }
 
-/// Returns the blocks on residual, parameters and identifiability; `file` holds what is left out.
+/// Returns the blocks on residual, parameters and identifiability; `file` contains what they omit.
 pub(super) fn remainder<'a>(
     problem: &Problem,
     found: &'a Identification,
@@ -220,7 +221,7 @@ fn limits<'a>(found: &Identification) -> Vec<Block<'a>> {
     active_limits(found).into_iter().chain(alternation(found)).collect()
 }
 
-/// Returns the blocks on identifiability, with figures.
+/// Returns the blocks on identifiability, with figures; `file` contains what they omit.
 pub(super) fn all_told<'a>(found: &Identification, plots: &PlotData, file: &str) -> Vec<Block<'a>> {
     let figures =
         [figures::correlation(&plots.correlations), figures::spectrum(found.identifiability())];
@@ -229,7 +230,7 @@ pub(super) fn all_told<'a>(found: &Identification, plots: &PlotData, file: &str)
     blocks
 }
 
-/// Returns the blocks on identifiability, in words.
+/// Returns the blocks on identifiability without figures; `file` contains what they omit.
 fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
     let mut blocks = vec![
         conditioning(found.identifiability(), found.unknowns.len(), found.coordinates),
@@ -241,7 +242,7 @@ fn told<'a>(found: &Identification, file: &str) -> Vec<Block<'a>> {
     blocks
 }
 
-/// States in one line which of joint commands and joint readings fits better.
+/// States in one line whether joint commands or joint readings fit better.
 pub fn joint_sources_text(sources: &JointSources) -> String {
     let JointSources { used, commanded, read } = *sources;
     let better = sources.better();
@@ -261,7 +262,7 @@ pub fn joint_sources_text(sources: &JointSources) -> String {
 /// Name of the arm before identification, in a headline.
 pub(super) const BEFORE: &str = "nominal arm";
 
-/// Formats a mean error for a headline.
+/// Formats the mean error for a headline.
 pub(super) fn mean(of: &ErrorSummary) -> String {
     brief(of, of.mean.norm)
 }

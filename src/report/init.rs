@@ -1,4 +1,4 @@
-//! Text of `init`: the problem that was made, and the next steps.
+//! Text of the command `init`: the problem that was made, and the next steps.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use super::shell::shell_word;
 use crate::urdf::{Chain, Description, HELD_OUT, SIGMA_MM};
 
-/// Returns what was made, and the next steps.
+/// Returns a description of the problem that was made, and the next steps.
 pub fn init_text(chain: &Chain, description: &Description, folder: &Path) -> String {
     let (base, tip) = chain.ends();
     let joints = chain.joint_names();

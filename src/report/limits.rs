@@ -1,4 +1,4 @@
-//! Sentences of `identify` on active limits and on alternating stages.
+//! Sentences of the command `identify` on active limits and on alternating stages.
 
 use super::document::Block;
 use crate::fit::{ActiveConstraint, Alternation, Estimate, Identification, ShadowPrice};
@@ -6,7 +6,7 @@ use crate::least_squares::solver::AtBound;
 use crate::quantity::Unit;
 use crate::quantity::format::{decimals, number, two_digits};
 
-/// Lists active bounds and constraints with their costs, if there are any.
+/// Lists active bounds and constraints with their shadow prices, if there are any.
 pub(super) fn active_limits<'a>(found: &Identification) -> Option<Block<'a>> {
     let line = |name: &str, price: ShadowPrice, unit: Unit| {
         let (fall, per) = price.in_mm(unit);

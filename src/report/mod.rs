@@ -1,7 +1,7 @@
 //! Texts, pages and tables of results.
 //!
-//! Each command has a file that puts its result into blocks (`document`). `render` shows blocks on
-//! terminals, as Markdown and as a page; `figures` draws the figures of pages.
+//! Each command has a file that converts its result to blocks (`document`). `render` shows blocks
+//! on terminals, as Markdown and as a page; `figures` draws the figures of pages.
 
 mod acceptance;
 mod around;

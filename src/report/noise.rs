@@ -1,4 +1,5 @@
-//! Sentences about the size of the residual against the declared σ, outliers and influential rows.
+//! Sentences about outliers, influential rows, and the size of the residual relative to the
+//! declared σ.
 
 use std::path::Path;
 
@@ -9,14 +10,14 @@ use crate::problem::Problem;
 use crate::quantity::format::{counted, decimals, mm, number};
 use crate::results::{ResidualSize, rows_in};
 
-/// Outliers on one screen.
+/// Maximum number of outliers that a text lists.
 const SHOWN_OUTLIERS: usize = 20;
-/// Influential rows that are named.
+/// Maximum number of influential rows that a text names.
 const SHOWN_INFLUENTIAL: usize = 3;
-/// File that holds all of them.
+/// Name of the file that contains all of them.
 const FILE: &str = "estimate.json";
 
-/// States the size of the residual against the declared noise.
+/// States the size of the residual relative to the declared noise.
 pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
     match ResidualSize::of(found) {
         ResidualSize::Undeclared(sigma) => format!(
@@ -57,7 +58,7 @@ pub(super) fn noise(problem: &Problem, found: &Identification) -> String {
     }
 }
 
-/// States the interval of χ²/ν for noise alone.
+/// States the interval of χ²/ν that noise alone gives.
 pub(super) fn expected(found: &Identification) -> String {
     match found.chance {
         Some((low, high)) => format!(
@@ -69,7 +70,7 @@ pub(super) fn expected(found: &Identification) -> String {
     }
 }
 
-/// States the σ that the fit took where residuals and priors contradict the declared one.
+/// States the σ that the fit took, if residuals and priors contradict the declared one.
 fn other_sigma(problem: &Problem, found: &Identification) -> String {
     let errors = &found.fitted.identification;
     let sigma = problem.data.position_sigma.filter(|_| errors.kind == "position");
@@ -153,7 +154,7 @@ pub(super) fn carried<'a>(found: &Identification) -> Option<Block<'a>> {
     )))
 }
 
-/// Says what to do about influential rows of the problem in a file, in one line.
+/// States in one line what to do about influential rows; `problem` is the problem's file.
 pub fn show_influential_rows(found: &Identification, problem: &Path) -> Option<String> {
     let rows = found.influential_rows.as_ref()?.rows.iter();
     let rows = named(rows.map(|row| row.location.to_string()), SHOWN_INFLUENTIAL, ", ");
@@ -163,7 +164,7 @@ pub fn show_influential_rows(found: &Identification, problem: &Path) -> Option<S
     ))
 }
 
-/// Returns the size of the residual as a fact of a headline.
+/// Returns the size of the residual as an entry of a headline, with the label `term`.
 pub(super) fn size(term: &'static str, found: &Identification) -> (&'static str, String) {
     let size = match (found.noise, found.reduced_chi2) {
         (Noise::Declared, Some(chi2)) => format!("χ²/ν {}", short(chi2)),

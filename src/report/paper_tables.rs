@@ -6,7 +6,7 @@ use crate::paper::published::{BEFORE, Published, WITH_ELASTICITY, WITHOUT_ELASTI
 use crate::paper::{Form, StiffnessStage};
 use crate::quantity::format::{mm, number, or_dash};
 
-/// Share of information from the data below which a parameter is marked.
+/// Identified share below which a parameter is marked.
 const MARKED_BELOW: f64 = 0.9;
 
 /// Header of the parameters of a joint in table 2.
@@ -30,8 +30,8 @@ pub(super) fn title(procedure: &Procedure) -> String {
     format!("The paper's closed forms and eq. 45, {form}, {stage} ({})", procedure.name())
 }
 
-/// Returns table 2: nominal value, identified value and change of the geometry of each joint, in
-/// brackets if the data determine it only in combination with others.
+/// Returns table 2: nominal value, identified value and change of each joint's geometry. Brackets
+/// mark values that the data determine only in combination with others.
 pub(super) fn table_2(procedure: &Procedure) -> Table {
     let show = |place: usize, value: f64| {
         if place.is_multiple_of(2) { number(value.to_degrees(), 3) } else { mm(value, 2) }
@@ -58,8 +58,8 @@ pub(super) fn table_2(procedure: &Procedure) -> Table {
         .noted(&["( ): determined by these data only in combination with others, or hardly; –: not identified, or fixed"])
 }
 
-/// Returns table 3: errors of the held-out poses before, with elasticity and ignoring it, with the
-/// reductions, and the published figures for the paper's arm.
+/// Returns table 3: errors of the held-out poses before identification, with elasticity and with
+/// elasticity ignored, and their reductions. For the paper's arm, the published errors are added.
 pub(super) fn table_3(comparison: &Comparison, procedure: &Procedure) -> Table {
     let before = ErrorSummary::of(&comparison.before.errors);
     let (after, ignoring) =
@@ -105,7 +105,7 @@ pub(super) fn table_3(comparison: &Comparison, procedure: &Procedure) -> Table {
     Table::new(&header, rows, &[0, 1]).noted(&notes)
 }
 
-/// Kind of error in table 3: its word, the computed and the published values.
+/// Kind of error in table 3: its name, and functions that return computed and published values.
 type Kind = (&'static str, fn(&ErrorSummary) -> &AxisValues, fn(&Published) -> [f64; 4]);
 const KINDS: [Kind; 2] = [
     ("max", |errors| &errors.max, |errors| errors.max),
@@ -116,7 +116,7 @@ fn on(values: &AxisValues, axis: usize) -> f64 {
     [values.x, values.y, values.z, values.norm][axis]
 }
 
-/// Formats a value \[mm\], and each later value with its reduction.
+/// Formats a value before \[mm\], and each later value with its reduction in percent.
 fn reduced(before: f64, after: [Option<f64>; 2]) -> Vec<String> {
     let pair = |after: f64| [number(after, 4), number(100.0 * (1.0 - after / before), 2)];
     std::iter::once(number(before, 4)).chain(after.into_iter().flatten().flat_map(pair)).collect()

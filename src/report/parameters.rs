@@ -8,15 +8,15 @@ use crate::problem::Problem;
 use crate::quantity::format::{decimals, number, or_dash, two_digits};
 use crate::results::{Knowledge, ManyHarmonics, MissingReference};
 
-/// Decimals of a value without a standard error.
+/// Number of decimals of a value without a standard error.
 const DEFAULT_DECIMALS: usize = 4;
-/// Most decimals of a value.
+/// Maximum number of decimals of a value.
 const MAX_DECIMALS: usize = 6;
-/// Least absolute weight of a term that is named in an unidentifiable combination.
+/// Smallest absolute weight at which a term of an unidentifiable combination is named.
 const MIN_WEIGHT: f64 = 0.02;
-/// Most terms of an unidentifiable combination that are named.
+/// Maximum number of terms of an unidentifiable combination that are named.
 const MAX_TERMS: usize = 8;
-/// Most combinations and correlations that a text lists.
+/// Maximum number of combinations and of correlations that a text lists.
 const MAX_LISTED: usize = 12;
 /// Header of the table of parameters.
 const HEADER: [&str; 7] =
@@ -25,8 +25,8 @@ const HEADER: [&str; 7] =
 /// Row of the table of parameters with its bar.
 type Line = (Vec<String>, Bar);
 
-/// Returns the table of all free parameters. Of many harmonics of a joint it shows the largest; the
-/// others are in `file`, and folded on the page.
+/// Returns the table of all free parameters. If a joint has many harmonics, it shows the largest;
+/// the others are in `file`, and folded on the page.
 pub(super) fn parameters<'a>(
     problem: &Problem,
     found: &Identification,
@@ -81,8 +81,8 @@ pub(super) fn parameters<'a>(
     blocks
 }
 
-/// Names the sizes of priors that the estimated deviations suggest where they contradict the
-/// declared ones.
+/// States the prior sizes that the estimated deviations suggest, if they contradict the declared
+/// ones.
 fn sizes(sizes: &[PriorSize]) -> Option<String> {
     let rule = |size: &PriorSize| {
         let unit = size.unit.display(size.declared);
@@ -124,7 +124,7 @@ fn bar(estimate: &Estimate) -> Bar {
     }
 }
 
-/// Returns the share of information from the data, with a word for it.
+/// Returns the identified share of a parameter, with a word for it.
 fn identified(estimate: &Estimate) -> String {
     let share = format!("{:3.0} %", estimate.identified * 100.0);
     match Knowledge::of(estimate) {
@@ -139,7 +139,8 @@ fn identified(estimate: &Estimate) -> String {
     }
 }
 
-/// Lists the combinations of parameters that no measurement determines; `file` holds them all.
+/// Lists the combinations of parameters that no measurement determines; `file` contains all of
+/// them.
 pub(super) fn unidentifiable<'a>(
     found: &Identifiability,
     unknowns: &[String],
@@ -200,7 +201,7 @@ pub(super) fn weak<'a>(found: &Identification, file: &str) -> Option<Block<'a>> 
     (count > 0).then_some(Block::Lines(words, points))
 }
 
-/// Lists on the page the combinations that [`unidentifiable`] leaves out.
+/// Lists on the page the combinations that [`unidentifiable`] omits.
 pub(super) fn more_unidentifiable<'a>(found: &Identification, file: &str) -> Option<Block<'a>> {
     let unidentifiable = found.identifiability().unidentifiable.iter().skip(MAX_LISTED);
     let words: Vec<String> =
@@ -247,7 +248,7 @@ pub(super) fn correlated(found: &Identification) -> Vec<(String, String, f64)> {
     found.strong_correlations().into_iter().filter(|(a, b, _)| !tied(a, b)).collect()
 }
 
-/// Lists pairs of correlated parameters; `file` holds them all.
+/// Lists pairs of correlated parameters; `file` contains all of them.
 pub(super) fn correlations<'a>(found: &Identification, file: &str) -> Block<'a> {
     let pairs = correlated(found).into_iter().map(|(a, b, correlation)| {
         let sign = if correlation < 0.0 { '−' } else { '+' };

@@ -1,4 +1,5 @@
-//! Text of `plan`: the poses to measure and what they promise.
+//! Text of the command `plan`: the poses to measure and the accuracy that they are expected to
+//! give.
 
 use super::document::{Block, Table};
 use super::forecast::{assumptions, cells};
@@ -9,7 +10,8 @@ use crate::design::{Criterion, PairSeparation, Plan};
 use crate::problem::Problem;
 use crate::quantity::format::{counted, number, or_dash};
 
-/// States that the poses are too few to determine all that such poses can, if they are.
+/// States that the poses are too few to determine everything that such poses can determine; `None`
+/// if they suffice.
 fn too_few<'a>(plan: &Plan) -> Option<Block<'a>> {
     let Plan { attainable_rank, least_poses, .. } = *plan;
     let (rank, poses) = (plan.planned.identifiability.rank, plan.poses.len());
@@ -30,7 +32,8 @@ fn too_few<'a>(plan: &Plan) -> Option<Block<'a>> {
     })
 }
 
-/// Returns the plan as text, ending in a line break; `separated` if it separates two effects.
+/// Returns the plan as text, ending in a line break; `separated` is given if it distinguishes two
+/// effects.
 pub fn plan_text(
     problem: &Problem,
     criterion: &Criterion,

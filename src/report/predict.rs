@@ -1,4 +1,4 @@
-//! Text and table of `predict`.
+//! Text of the command `predict`.
 
 use std::fmt::Write as _;
 
@@ -12,7 +12,7 @@ use crate::problem::Problem;
 use crate::quantity::format::counted;
 use crate::remainder::Bounds;
 
-/// Returns the prediction for an arm as text.
+/// Returns the predictions as text; `arm` describes the arm that was used.
 pub fn prediction_text(
     problem: &Problem,
     arm: &str,

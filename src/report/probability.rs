@@ -1,6 +1,6 @@
 //! Probabilities in words.
 
-/// Probability from which on a law, or a cause at a place, is more probable than not.
+/// Smallest probability at which a law, or a cause at a place, is more probable than not.
 pub(super) const EVEN: f64 = 0.5;
 
 /// Returns a probability in percent.

@@ -1,4 +1,4 @@
-//! What is said of a remainder and of bounds.
+//! Sentences about a remainder and about bounds of prediction errors.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,8 @@ use crate::fit::{Identification, Residual};
 use crate::quantity::format::{counted, number};
 use crate::remainder::{Bounds, Fitted, Gain};
 
-/// Returns one sentence on the search for a remainder; `found` has the errors without it.
+/// Returns one sentence on the result of the search for a remainder; `found` holds the errors
+/// without it.
 pub fn remainder_text(found: &Identification, fitted: &Fitted) -> String {
     let Some(gain) = fitted.gain.filter(|_| !fitted.is_declared) else {
         return match &fitted.residuals {
@@ -47,8 +48,8 @@ pub fn remainder_text(found: &Identification, fitted: &Fitted) -> String {
     }
 }
 
-/// Returns the expected error and its bound in words, and the share of measured rows within their
-/// bounds.
+/// Returns the expected error and its bound in words. If there are `residuals`, adds the share of
+/// rows within their bounds.
 pub(super) fn bounded(bounds: &Bounds, residuals: Option<&[Residual]>) -> String {
     let mut words = format!(
         "Expected error {} mm rms; the {} % bound is {} mm on average",

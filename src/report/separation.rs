@@ -1,4 +1,4 @@
-//! Separation of two effects by planned poses, in words.
+//! Distinction of two effects by planned poses, in words.
 
 use super::document::{Block, Table};
 use super::forecast::size as shown;
@@ -6,7 +6,7 @@ use crate::design::PairSeparation;
 use crate::quantity::format::{number, or_dash, p_value};
 use crate::results::SeparationResult;
 
-/// Returns the table of the two effects, random poses beside planned ones.
+/// Returns the table of the two effects, for planned and for random poses.
 pub(super) fn blocks<'a>(separated: &PairSeparation) -> Vec<Block<'a>> {
     let result = SeparationResult::new(separated);
     let angle = |angle: Option<f64>| or_dash(angle, |angle| number(angle, 1));

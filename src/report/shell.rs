@@ -1,4 +1,4 @@
-//! Words of commands to copy.
+//! Quoting of words in commands that the user may copy.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Text of `trace`: the effects that the residual of a fit points to.
+//! Text of the command `trace`: the effects that the residual of a fit points to.
 
 use std::fmt::Write as _;
 
@@ -19,11 +19,11 @@ use crate::results::{
 use crate::results::{CommandedJoint, commanded_joints};
 use crate::select::Trace;
 
-/// Candidates on one screen.
+/// Maximum number of candidates that a text lists.
 const SHOWN_CANDIDATES: usize = 6;
-/// Hypothesis sets on one screen.
+/// Maximum number of hypothesis sets that a text lists.
 const SHOWN_SETS: usize = 4;
-/// Confounded effects that are named of a candidate.
+/// Maximum number of confounded effects that are named for a candidate.
 const SHOWN_CONFOUNDED: usize = 3;
 
 /// Returns the trace as text, ending in a line break.
@@ -109,8 +109,8 @@ pub(super) fn claimed(claims: &Claims) -> String {
     format!("acts at {} {}{inputs}; {words}", place.value, percent(place.probability))
 }
 
-/// Lists at most `most` significant candidates and how to read them; `where_all` says where all of
-/// them are.
+/// Lists at most `most` significant candidates and explains how to read them; `where_all` states
+/// where all of them are listed.
 pub(super) fn ranking<'a>(
     problem: &Problem,
     result: &TraceResult,

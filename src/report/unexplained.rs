@@ -1,4 +1,4 @@
-//! Sentences of `loop` about structure whose law is not known.
+//! Sentences of the command `loop` about structure whose law is unknown.
 
 use std::fmt::Write as _;
 
@@ -13,20 +13,20 @@ use crate::residual_tests::Covariate;
 use crate::results::{LoopResult, Structure, Summary};
 use crate::select::{ClosedLoop, Correction, HELD_FIXED, REFUSED};
 
-/// Returns the correction of structure without a law, if there is one.
+/// Returns the empirical correction of structure without a law, if there is one.
 pub(super) fn correction(closure: &ClosedLoop) -> Option<&Correction> {
     closure.unexplained.iter().find_map(|left| left.correction.as_ref())
 }
 
-/// Returns the reason for which an effect was not tried. A rule that holds its parameters fixed
-/// comes before a missing reference temperature, which would not free them.
+/// Returns the reason why an effect was not tried. A rule that fixes its parameters precedes a
+/// missing reference temperature, which would not free them.
 fn untried(problem: &Problem, (effect, reason): &(Effect, &'static str)) -> &'static str {
     let is_held = *reason == NO_REFERENCE && holds_all(problem, &effect.parameters(problem));
     if is_held { HELD_FIXED } else { reason }
 }
 
-/// Lists what the problem should declare before the causes are read: a reference temperature,
-/// masses, σ, or a limit moved out.
+/// Lists what the problem should declare before the causes are interpreted: a reference
+/// temperature, masses, σ, or a wider limit.
 pub(super) fn to_declare(
     problem: &Problem,
     closure: &ClosedLoop,
@@ -66,7 +66,7 @@ pub(super) fn to_declare(
     declarations
 }
 
-/// Returns the places of structure without a law, each once.
+/// Returns the places of structure without a law, without duplicates.
 pub(super) fn places(result: &LoopResult) -> Vec<&str> {
     let mut places: Vec<&str> = Vec::new();
     for left in result.structures() {
@@ -77,7 +77,7 @@ pub(super) fn places(result: &LoopResult) -> Vec<&str> {
     places
 }
 
-/// Describes structure whose law is not known, sentence by sentence.
+/// Describes structure whose law is unknown, sentence by sentence.
 pub(super) fn unexplained(
     problem: &Problem,
     closure: &ClosedLoop,
@@ -137,12 +137,13 @@ pub(super) fn unexplained(
     sentences
 }
 
-/// Returns true if the structure is sag under weight that is not declared.
+/// Returns true if the structure is sag under a weight that is not declared.
 fn is_sag(left: &Structure) -> bool {
     left.law.as_deref() == Some("sag")
 }
 
-/// Iterates over limits of the declared problem that are wrong with a probability above one half.
+/// Iterates over limits of the declared problem that are wrong with a probability above one half,
+/// with that probability.
 fn wrong_limits(result: &LoopResult) -> impl Iterator<Item = (&str, f64)> {
     let limit =
         |left: &'_ Structure| left.claims.as_ref().map_or(0.0, |claims| claims.law.probability);
@@ -152,7 +153,7 @@ fn wrong_limits(result: &LoopResult) -> impl Iterator<Item = (&str, f64)> {
         .filter(|(_, probability)| *probability >= EVEN)
 }
 
-/// Describes the place and the inputs of one structure.
+/// Describes the place and the inputs (quantities that it depends on) of one structure.
 fn located(left: &Structure) -> String {
     let (place, inputs) = (&left.place, left.depends_on.join(", "));
     let Some(claims) = &left.claims else {
@@ -182,7 +183,7 @@ fn located(left: &Structure) -> String {
     )
 }
 
-/// States the gain of a correction and the range in which it holds.
+/// States the gain of a correction and the input range in which it is valid.
 fn corrected(problem: &Problem, closure: &ClosedLoop, correction: &Correction) -> Vec<String> {
     let Correction { ranges, beyond, cross_validated: (without, with), held_out, .. } = correction;
     let ([mean, rms, _], unit) = Summary::of(held_out).norms();

@@ -1,5 +1,5 @@
 //! Sentences about the outcome of a loop: its verdict, and the title of each cause. They claim no
-//! more than the status of a cause allows.
+//! more than a cause's status allows.
 
 use super::document::code;
 use super::probability::{EVEN, percent};
@@ -7,7 +7,7 @@ use crate::quantity::format::{counted, number};
 use crate::results::{FoundEffect, LoopResult, MAX_COEFFICIENTS, NamedEffect};
 use crate::select::{Status, Verdict};
 
-/// Probability of a law below which it is not named even as a candidate.
+/// Smallest probability at which a law is named as a candidate.
 const LEAST_CANDIDATE: f64 = 0.005;
 
 /// States after how many rounds a search ended early.
@@ -19,7 +19,7 @@ pub fn interrupted(rounds: usize) -> String {
     format!("interrupted {rounds}: there may be more to find")
 }
 
-/// States the outcome in one to three sentences; `takes_less` says that the fit took a smaller σ
+/// States the outcome in one to three sentences. `takes_less` is true if the fit took a smaller σ
 /// than the declared one.
 pub(super) fn verdict(result: &LoopResult, takes_less: bool) -> String {
     let rounds = result.steps.len();
@@ -49,7 +49,7 @@ pub(super) fn counts(result: &LoopResult) -> String {
     }
 }
 
-/// Iterates over the effects that stand for a cause by themselves.
+/// Iterates over the effects that are causes of their own accord, not only together with others.
 pub(super) fn causes(result: &LoopResult) -> impl Iterator<Item = &FoundEffect> {
     result.effects.iter().filter(|found| !found.is_only_with_others())
 }
@@ -98,7 +98,7 @@ fn outcome(result: &LoopResult, takes_less: bool) -> String {
     }
 }
 
-/// States what was found, in a sentence without its end.
+/// States which effects were found, without the full stop.
 fn found(result: &LoopResult) -> String {
     let found: Vec<&FoundEffect> = result.with_status(Status::Found).collect();
     let doubted: Vec<&FoundEffect> = causes(result).filter(|cause| cause.is_doubted()).collect();
@@ -127,8 +127,7 @@ fn found(result: &LoopResult) -> String {
     }
 }
 
-/// States that nothing was found although the residual is smaller than the declared σ by this
-/// ratio.
+/// States that nothing was found, although the ratio of residual to declared σ is less than 1.
 fn nothing_below(ratio: f64, takes_less: bool) -> String {
     let consequence = if takes_less {
         ", which is too large; causes are judged by the scatter of the residual instead"
@@ -141,7 +140,7 @@ fn nothing_below(ratio: f64, takes_less: bool) -> String {
     )
 }
 
-/// Describes an effect, followed by its declaration unless that lists many orders.
+/// Describes an effect, followed by its declaration unless that contains many orders.
 pub(super) fn declared(effect: &NamedEffect) -> String {
     match effect.effect.harmonic_orders() {
         Some(orders) if orders.len() > MAX_COEFFICIENTS => effect.description.clone(),
@@ -149,13 +148,13 @@ pub(super) fn declared(effect: &NamedEffect) -> String {
     }
 }
 
-/// Returns the title of a cause: its status, what the status allows to claim, and the line that
+/// Returns the title of a cause: its status, the claim that the status allows, and the line that
 /// declares it.
 pub(super) fn title(found: &FoundEffect) -> String {
     claim(found, &declared(&found.effect))
 }
 
-/// States the status of an effect and what the status allows to claim; `words` describe the effect.
+/// States the status of an effect and the claim that it allows; `words` describe the effect.
 fn claim(found: &FoundEffect, words: &str) -> String {
     let status = found.status.as_str();
     match (found.status, &found.claims) {
@@ -173,7 +172,8 @@ fn claim(found: &FoundEffect, words: &str) -> String {
     }
 }
 
-/// Returns what may be claimed of a cause whose law is not known.
+/// Returns the claim about a cause whose law is unknown: `place` with its probability `at`, and the
+/// law's probability.
 fn located((place, at): (&str, f64), law: f64, words: &str) -> String {
     let unknown = if at >= EVEN {
         format!("{place} ({}), law not known", percent(at))
@@ -186,7 +186,8 @@ fn located((place, at): (&str, f64), law: f64, words: &str) -> String {
     }
 }
 
-/// Names the effect that stands in the model for a cause whose title names no law.
+/// Names the effect that the model uses for a cause whose title names no law; `None` if the title
+/// names one.
 pub(super) fn stand_in(found: &FoundEffect) -> Option<String> {
     let law = found.claims.as_ref()?.law.probability;
     (law < LEAST_CANDIDATE && found.status != Status::Contradicted)

@@ -4,20 +4,22 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _, FisherSnedecor, Gamma
 
 use crate::numeric::bisect;
 
-/// Draws that must reach a value for their share to be its probability; else the tail is that of a
-/// gamma distribution.
+/// Minimum number of draws that must reach a value for their share to estimate its probability.
+/// With fewer, the tail is that of a fitted gamma distribution.
 const ENOUGH: usize = 10;
-/// Least skewness of the gamma distribution; with less it is normal.
+/// Smallest skewness of the fitted gamma distribution. At smaller skewness it equals a normal
+/// distribution, and its shape parameter 4 / skewness² would become too large.
 const LEAST_SKEWNESS: f64 = 0.02;
-/// Values of A² beyond this have the same p-value: the fitted curve of [Stephens 1986] ends.
+/// Largest A² for which the p-value is computed; larger values get the same p-value. The fitted
+/// curve of [Stephens 1986] ends there.
 const LARGEST: f64 = 150.0;
 
-/// Null distribution of a test statistic; large values are improbable.
+/// Null distribution of a test statistic. Large values of the statistic are improbable.
 #[derive(Debug, Clone)]
 pub(super) enum Chance {
     /// `scale` times a variable with the χ² distribution.
     ChiSquared { distribution: ChiSquared, scale: f64 },
-    /// The largest of `of` variables with the F distribution, by Bonferroni's inequality.
+    /// Largest of `of` variables with the F distribution, by Bonferroni's inequality.
     Fisher { distribution: FisherSnedecor, of: f64 },
     /// Anderson and Darling's A² of normal variables with mean and variance estimated.
     AndersonDarling,
@@ -26,7 +28,8 @@ pub(super) enum Chance {
 }
 
 impl Chance {
-    /// Probability of `statistic` or more; 1 where there is none.
+    /// Returns the probability of `statistic` or a larger value under the null hypothesis; 1 if the
+    /// statistic is NaN.
     pub fn p_value(&self, statistic: f64) -> f64 {
         if statistic.is_nan() {
             return 1.0;
@@ -40,7 +43,7 @@ impl Chance {
         p.clamp(f64::MIN_POSITIVE, 1.0)
     }
 
-    /// The value that is reached with probability `level`.
+    /// Returns the critical value that the statistic reaches with probability `level`.
     pub fn upper(&self, level: f64) -> f64 {
         match self {
             Self::ChiSquared { distribution, scale } => {
@@ -52,8 +55,8 @@ impl Chance {
         }
     }
 
-    /// The value below which a χ² falls with probability `level`; 0 for others, of which only large
-    /// values mean anything.
+    /// Returns the value below which a χ² statistic falls with probability `level`; 0 for other
+    /// statistics, of which only large values are significant.
     pub fn lower(&self, level: f64) -> f64 {
         match self {
             Self::ChiSquared { distribution, scale } => scale * distribution.inverse_cdf(level),
@@ -64,23 +67,24 @@ impl Chance {
 
 /// Values of a statistic drawn under the null hypothesis.
 ///
-/// The p-value is (1 + number of draws that reach the statistic) / (1 + draws), a valid one for any
-/// number of draws; where fewer than ten do, that of a gamma distribution with the draws' mean,
-/// variance and skewness (Pearson's type III), which reaches far beyond 1 / draws [Winkler et al.
-/// 2016, NeuroImage 141, 502-516].
+/// The p-value is (1 + number of draws that reach the statistic) / (1 + draws), which is valid for
+/// any number of draws. If fewer than ten reach it, the p-value is that of a gamma distribution
+/// with the draws' mean, variance and skewness (Pearson's type III), which extends far beyond 1 /
+/// draws [Winkler et al. 2016, NeuroImage 141, 502-516].
 #[derive(Debug, Clone)]
 pub(super) struct Drawn {
     /// Drawn values, ascending.
     values: Vec<f64>,
     /// Gamma distribution of shape k and scale 1 that describes the upper tail.
     tail: Gamma,
-    /// Statistic at 0 of that distribution, and its unit.
+    /// Offset and unit that convert a value of that distribution to the statistic: origin + unit ×
+    /// value.
     origin: f64,
     unit: f64,
 }
 
 impl Drawn {
-    /// Creates the distribution from draws; `None` where all draws are equal.
+    /// Creates the distribution from draws; `None` if all draws are equal.
     pub fn of(mut values: Vec<f64>) -> Option<Self> {
         values.sort_by(f64::total_cmp);
         let n = values.len() as f64;
@@ -126,7 +130,8 @@ impl Drawn {
     }
 }
 
-/// Probability of Anderson and Darling's A² or more [Stephens 1986, table 4.9].
+/// Returns the probability of Anderson and Darling's A² or a larger value under normality [Stephens
+/// 1986, table 4.9].
 fn anderson_darling_p(statistic: f64) -> f64 {
     let a = statistic.clamp(0.0, LARGEST);
     let curve = |c0: f64, c1: f64, c2: f64| (c0 + c1 * a + c2 * a * a).exp();
@@ -138,7 +143,7 @@ fn anderson_darling_p(statistic: f64) -> f64 {
     }
 }
 
-/// The value that is reached with probability `level`, by bisection.
+/// Returns the A² that is reached with probability `level` under normality, by bisection.
 fn anderson_darling_upper(level: f64) -> f64 {
     bisect(|statistic| anderson_darling_p(statistic) > level, (0.0, LARGEST), 60).1
 }

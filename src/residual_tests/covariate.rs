@@ -1,4 +1,4 @@
-//! Known quantities of every pose on which a residual may depend.
+//! Quantities that are recorded for every pose and on which a residual may depend.
 
 use std::fmt;
 use std::sync::Arc;
@@ -6,12 +6,12 @@ use std::sync::Arc;
 use crate::laws::Quantity;
 use crate::problem::Problem;
 
-/// Known quantity of every pose on which a residual may depend; joints are counted from 0. Its
-/// `Display` is the name in files.
+/// Quantity that is recorded for every pose and on which a residual may depend; joints are counted
+/// from 0. Its `Display` is the name in files.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Covariate {
-    /// Command q of a joint \[rad\] or, where it slides, \[m\].
+    /// Command q of a joint \[rad\], or \[m\] for a prismatic joint.
     Command(usize),
     /// Temperature of the pose [°C].
     Temperature,
@@ -21,7 +21,7 @@ pub enum Covariate {
     Hoist,
     /// Time since the first pose \[s\].
     Time,
-    /// Number of the row, used where no time was measured.
+    /// Number of the row, used if no time was recorded.
     Row,
     /// Side from which a joint approached the pose, −1 to 1.
     Approach(usize),
@@ -29,13 +29,14 @@ pub enum Covariate {
     Load,
     /// Measured position of the target.
     Position,
-    /// Covariate that the user declares, by the name of its column, in its unit.
+    /// Covariate that the user declares, by the name of its column, in the column's unit.
     Own(Arc<str>),
 }
 
 impl Covariate {
-    /// Returns the covariates that a quantity follows; without measured times the order of the rows
-    /// stands for them, and without directions of approach the commands do.
+    /// Returns the covariates on which `quantity` depends. `known` states whether times and
+    /// directions of approach are recorded. Without times, the row number replaces the time;
+    /// without directions, the commands replace them.
     pub fn of(quantity: Quantity, problem: &Problem, known: (bool, bool)) -> Vec<Self> {
         let (approach_known, time_measured) = known;
         match quantity {
@@ -55,12 +56,12 @@ impl Covariate {
         }
     }
 
-    /// Returns the measured time, or the order of the rows where it is not measured.
+    /// Returns the time if it is recorded (`measured`), else the row number.
     pub fn time(measured: bool) -> Self {
         if measured { Self::Time } else { Self::Row }
     }
 
-    /// Returns the covariate that the user declared under this number, from 0.
+    /// Returns the covariate that the problem declares with index `which`.
     pub fn declared(which: usize, problem: &Problem) -> Self {
         Self::Own(problem.data.covariates.get(which).map_or("", |covariate| &covariate.name).into())
     }

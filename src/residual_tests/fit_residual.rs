@@ -5,16 +5,16 @@ use nalgebra::{DMatrix, DVector};
 use super::covariate::Covariate;
 use super::outcome::Untestable;
 
-/// Root mean square residual, in units of a declared σ, below which a residual is rounding error and
-/// is not tested.
+/// Root mean square residual, in units of the declared σ, below which it counts as rounding error
+/// and is not tested.
 pub(crate) const ROUNDING: f64 = 1e-3;
 
 /// Values of a covariate, one for each pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CovariateValues {
-    /// Quantity of which these are the values.
+    /// Quantity that the values measure.
     pub covariate: Covariate,
-    /// Value in each pose, any unit.
+    /// Value in each pose, in any unit.
     pub values: Vec<f64>,
 }
 
@@ -22,22 +22,23 @@ pub struct CovariateValues {
 #[derive(Debug, Clone, Copy)]
 pub struct FitResidual<'a> {
     /// Whitened residuals (measured − predicted) / σ, measuring frame, pose after pose, shape = (3
-    /// N); 0 behind the last of the numbers that a pose measures.
+    /// N). Entries beyond the numbers that a pose measures are 0.
     pub residual: &'a DVector<f64>,
-    /// Q, shape = (3 N, p): H = Q Qᵀ takes data to fitted values.
+    /// Matrix Q, shape = (3 N, p): H = Q Qᵀ maps data to fitted values.
     ///
-    /// The data's rows of the thin orthonormal factor of [J; prior rows]: with priors, H has
-    /// eigenvalues between 0 and 1.
+    /// It consists of the data's rows of the thin orthonormal factor of [J; prior rows]. With
+    /// priors, H has eigenvalues between 0 and 1.
     pub fitted: &'a DMatrix<f64>,
-    /// Number of measured coordinates of each pose, 1…3; empty where all poses measure three.
+    /// Number of measured coordinates of each pose, 1…3; empty if all poses measure three.
     pub coordinates: &'a [usize],
-    /// True if σ was declared; a σ estimated from the residuals says nothing about their size.
+    /// True if σ was declared. A σ estimated from the residuals cannot be tested against their
+    /// size.
     pub sigma_is_declared: bool,
-    /// Time of each pose, any unit and origin.
+    /// Time of each pose, in any unit and from any origin.
     pub time: &'a [f64],
     /// Session of each pose, as a number.
     pub session: &'a [usize],
-    /// Setup of each pose, as a number: poses with the same one are repeats, for which the model
+    /// Identifier of each pose's setup. Poses with equal setup are repeats, for which the model
     /// predicts the same position.
     pub setup: &'a [usize],
     /// Covariates whose influence on the residuals is tested.
@@ -50,7 +51,7 @@ impl FitResidual<'_> {
         self.coordinates.get(pose).copied().unwrap_or(3)
     }
 
-    /// Checks that sizes agree and values are finite.
+    /// Returns an error if sizes do not agree or a value is not finite.
     pub(super) fn testable(&self) -> Result<(), Untestable> {
         let rows = self.residual.len();
         let poses = rows / 3;
@@ -69,7 +70,8 @@ impl FitResidual<'_> {
         }
     }
 
-    /// Returns an error if the residual is so far below a declared σ that it is rounding.
+    /// Returns an error if the residual is so much smaller than the declared σ that it is rounding
+    /// error.
     pub(super) fn above_rounding(&self) -> Result<(), Untestable> {
         let size = self.residual.norm_squared() / self.residual.len().max(1) as f64;
         let is_rounding = self.sigma_is_declared && size < ROUNDING.powi(2);

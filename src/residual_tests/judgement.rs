@@ -1,28 +1,29 @@
-//! Decision over all residual tests together.
+//! Decision over all residual tests together, with a correction for multiple tests.
 
 use super::chance::Chance;
 use super::outcome::{Findings, Outcome, ResidualTest, Test, Untestable};
 
-/// A test and its result before the correction for multiple tests.
+/// Test with its result before the correction for multiple tests.
 pub(super) struct Tried {
     /// Test that was made.
     pub test: Test,
-    /// Statistic with its null distribution, or the reason why there is none.
+    /// Statistic with its null distribution, or the reason why the test cannot be made.
     pub trial: Result<Trial, Untestable>,
 }
 
-/// A statistic with its null distribution.
+/// Value of a statistic with its null distribution.
 pub(super) struct Trial {
     /// Value of the statistic.
     pub statistic: f64,
     /// Null distribution of the statistic.
     pub chance: Chance,
-    /// Increasing function that converts the statistic to the number that is shown.
+    /// Increasing function that converts the statistic to the number displayed.
     pub shown: fn(f64) -> f64,
 }
 
-/// Holm's procedure: the smallest of m p-values fails below α / m, the next below α / (m − 1),
-/// until one does not [Holm 1979].
+/// Judges the tests by Holm's procedure: the smallest of m p-values fails below α / m, the next one
+/// below α / (m − 1), until one does not [Holm 1979]. α is `family_level`; `outliers` are stored in
+/// the result.
 pub(super) fn judge(tried: Vec<Tried>, family_level: f64, outliers: Vec<usize>) -> Findings {
     let p_value = |tried: &Tried| {
         tried.trial.as_ref().ok().map(|trial| trial.chance.p_value(trial.statistic))

@@ -9,20 +9,22 @@ use super::fit_residual::FitResidual;
 use super::outcome::Untestable;
 use crate::numeric::{gram, lower_factor, multiply_by_upper};
 
-/// Minimum residual degrees of freedom of a test.
+/// Minimum number of residual degrees of freedom for any test.
 const LEAST_FREEDOM: f64 = 4.0;
-/// Smallest part of the length² of a direction that the kept poses must have for the fit without the
-/// other poses to be defined.
+/// Smallest share of a direction's squared length in the kept poses at which the fit without the
+/// other poses is defined.
 const LEAST_DECIDED: f64 = 1e-6;
-/// Minimum part of its variance that a direction of a pose must keep to be studentised.
+/// Smallest share of its variance that a direction of a pose must keep in the residual to be
+/// studentised. With less, the fit always meets the measurement along it.
 const LEAST_LEFT: f64 = 1e-4;
-/// Minimum part of a direction that must be decided by priors to count as such.
+/// Smallest share of a fitted direction that priors determine at which the priors' contribution to
+/// the residuals is counted.
 const LEAST_PRIOR: f64 = 1e-6;
-/// Value added to a diagonal so that a Cholesky factor exists despite rounding.
+/// Value added to a diagonal so that a Cholesky factor exists in spite of rounding.
 const ROUNDING: f64 = 1e-10;
-/// Number of poses whose rows of Q are transposed at a time, for cache use.
+/// Number of poses whose rows of Q are transposed together, chosen for the processor cache.
 const TOGETHER: usize = 32;
-/// Number of directions above which a Cholesky factor replaces the eigenvectors: it takes less
+/// Number of directions above which a Cholesky factor replaces eigenvectors, because it takes less
 /// time.
 const MANY: usize = 100;
 
@@ -37,7 +39,7 @@ pub(super) struct Leverage<'a> {
     pub freedom: f64,
     /// tr (I − H)², ν without priors.
     pub squared_freedom: f64,
-    /// (I − H)ᵦᵦ^(−½) of each pose b.
+    /// Matrix (I − H)_bb^(−½) of each pose b, shape = (3, 3).
     pub whiteners: Vec<Matrix3<f64>>,
     /// Number of measured coordinates of each pose.
     pub coordinates: Vec<usize>,
@@ -63,8 +65,8 @@ impl<'a> Leverage<'a> {
         Ok(Self { fitted, gram, freedom, squared_freedom, whiteners, coordinates })
     }
 
-    /// Returns a root of I − QᵀQ, shape = (p, k): the k directions along which priors add to the
-    /// residuals.
+    /// Returns a matrix S with S Sᵀ = I − QᵀQ, shape = (p, k), for the k directions along which
+    /// priors contribute to the residuals.
     pub fn prior_root(&self) -> DMatrix<f64> {
         let p = self.gram.nrows();
         let mut left = DMatrix::identity(p, p) - &self.gram;
@@ -77,10 +79,10 @@ impl<'a> Leverage<'a> {
         lower_factor(left.clone()).unwrap_or_else(|| root_of_priors(left))
     }
 
-    /// Returns (I − H)ᵦᵦ^(−½) rᵦ of each pose b: residuals of unit covariance if the noise has it
-    /// [Cook and Weisberg 1982].
+    /// Returns (I − H)_bb^(−½) r_b of each pose b: residuals with unit covariance if the noise has
+    /// unit covariance [Cook and Weisberg 1982].
     ///
-    /// Directions of a pose that the fit always meets become zero.
+    /// Directions of a pose along which the fit always meets the measurement become zero.
     pub fn studentise(&self, residual: &[f64]) -> Vec<Vector3<f64>> {
         let mut poses = residual.as_chunks().0.to_vec();
         self.studentise_in_place(&mut poses);
@@ -112,12 +114,13 @@ fn by_poses<T: Send>(
     parts.into_iter().flatten().collect()
 }
 
-/// Returns AᵦᵀBᵦ of the three columns of one pose.
+/// Returns A_bᵀ B_b, with A_b and B_b the three columns of pose b in both matrices.
 fn products(a: &DMatrix<f64>, b: &DMatrix<f64>, pose: usize) -> Matrix3<f64> {
     Matrix3::from_fn(|i, j| a.column(3 * pose + i).dot(&b.column(3 * pose + j)))
 }
 
-/// Returns a root of I − QᵀQ with a column for each direction that priors help to decide.
+/// Returns a root of I − QᵀQ (`left`) with a column for each direction that priors help to
+/// determine.
 fn root_of_priors(left: DMatrix<f64>) -> DMatrix<f64> {
     let p = left.nrows();
     if left.trace() <= LEAST_PRIOR {
@@ -139,7 +142,7 @@ fn inverse_root(matrix: Matrix3<f64>) -> Matrix3<f64> {
     eigen.eigenvectors * Matrix3::from_diagonal(&roots) * eigen.eigenvectors.transpose()
 }
 
-/// Some of the poses, and the residual of a linear fit to them alone.
+/// Subset of the poses with the residual of a linear fit to them alone.
 #[derive(Debug, Clone)]
 pub(super) struct Kept<'a> {
     /// Numbers of the kept poses, ascending.
@@ -151,17 +154,17 @@ pub(super) struct Kept<'a> {
 }
 
 impl<'a> Kept<'a> {
-    /// Keeps all poses.
+    /// Creates the subset of all poses, with the residual as given.
     pub fn all(fit: &FitResidual, leverage: Leverage<'a>) -> Self {
         let residual = fit.residual.clone();
         Self { poses: (0..residual.len() / 3).collect(), residual, leverage }
     }
 
-    /// Keeps all poses but those marked `out`; `None` where the kept ones do not determine the fit.
+    /// Refits without the poses marked `out`; `None` if the others do not determine the fit.
     ///
-    /// With Q_A and Q_B the rows of the kept and the others, and M = I − Q_BᵀQ_B = L Lᵀ, it leaves
-    /// r_A + Q_A M⁻¹ Q_Bᵀ r_B, and Q_A L⁻ᵀ takes the place of Q [Cook and Weisberg 1982, section
-    /// 3.6].
+    /// With Q_A and Q_B the rows of the kept and of the other poses, and M = I − Q_BᵀQ_B = L Lᵀ,
+    /// the residual is r_A + Q_A M⁻¹ Q_Bᵀ r_B, and Q_A L⁻ᵀ replaces Q [Cook and Weisberg 1982,
+    /// section 3.6].
     pub fn without(fit: &FitResidual, out: &[bool]) -> Option<Self> {
         let p = fit.fitted.ncols();
         let (gone, poses): (Vec<usize>, Vec<usize>) = (0..out.len()).partition(|&pose| out[pose]);
@@ -188,16 +191,16 @@ impl<'a> Kept<'a> {
     }
 }
 
-/// Sum of squares of the other poses in the fit without one pose.
+/// Sum of squared residuals of all other poses in the fit without one pose.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Others {
     /// Sum of squared residuals of the other poses.
     pub squares: f64,
-    /// Degrees of freedom of that sum.
+    /// Degrees of freedom of that sum of squares.
     pub freedom: f64,
 }
 
-/// Returns the sum of squares of the others for each pose that is left out in turn.
+/// For each pose b, returns the sum of squares of the other poses in the fit without b.
 ///
 /// The rows of pose b are Q_b; with D = (I − H_bb)⁻¹, a = D r_b and W = Q_b QᵀQ Q_bᵀ, as in
 /// [`Kept::without`],

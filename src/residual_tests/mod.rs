@@ -1,9 +1,9 @@
-//! Statistical tests of the residual of a fit: is structure left that an effect could explain? Each
-//! test states its bounds under noise alone.
+//! Statistical tests of the residual of a fit: does it contain structure that an effect could
+//! explain? Each test states the bounds of its statistic under noise alone.
 //!
 //! A fitted residual r = (I − H) ε is neither independent nor of equal variance from pose to pose.
-//! So the residual of each pose is studentised by its leverage. Null distributions of the tests of
-//! order and dependence come from permuted residuals that are fitted again.
+//! Therefore the residual of each pose is studentised by its leverage. Null distributions of the
+//! tests of order and dependence come from permuted residuals that are fitted again.
 //!
 //! - `fit_residual`, `leverage`: the input, studentised residuals, fits without some poses. -
 //! `size`, `outliers`, `statistic`: size and distribution of the residuals, order, dependence on

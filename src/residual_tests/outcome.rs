@@ -5,13 +5,13 @@ use std::fmt;
 use super::covariate::Covariate;
 use crate::error::Location;
 
-/// An order of the poses.
+/// Order in which poses are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Sequence {
-    /// By measured time, within each session.
+    /// Order by recorded time, within each session.
     Time,
-    /// As rows of the files, within each session.
+    /// Order of the rows in the files, within each session.
     Rows,
 }
 
@@ -21,15 +21,15 @@ pub enum Sequence {
 pub enum Test {
     /// Size against the declared σ; statistic: χ² / ν.
     ReducedChiSquared,
-    /// Size against the scatter of repeats; statistic: the ratio of both variances, F.
+    /// Size against the scatter of repeated poses; statistic: ratio F of both variances.
     LackOfFit,
-    /// Runs of equal sign in some order; statistic: share of steps from pose to pose at which a
-    /// coordinate keeps its sign.
+    /// Runs of equal sign in an order of the poses; statistic: share of steps from pose to pose at
+    /// which a coordinate keeps its sign.
     Runs {
         /// Order of the poses.
         sequence: Sequence,
     },
-    /// Autocorrelation in some order; statistic: Ljung and Box's Q.
+    /// Autocorrelation in an order of the poses; statistic: Ljung and Box's Q.
     LjungBox {
         /// Order of the poses.
         sequence: Sequence,
@@ -39,13 +39,13 @@ pub enum Test {
         /// Covariate whose influence is tested.
         covariate: Covariate,
     },
-    /// Poses too far off to be noise; statistic: the largest distance in units of the others'
-    /// scatter.
+    /// Poses whose residual is too large to be noise; statistic: the largest distance in units of
+    /// the other poses' scatter.
     Outliers {
-        /// The pose that is farthest off.
+        /// Pose with the largest distance; `None` if there is none.
         worst: Option<usize>,
     },
-    /// Normal distribution; statistic: Anderson and Darling's A².
+    /// Normality of the residual coordinates; statistic: Anderson and Darling's A².
     Normality,
 }
 
@@ -53,13 +53,13 @@ pub enum Test {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Untestable {
-    /// The fit leaves (nearly) no degrees of freedom.
+    /// The fit leaves too few degrees of freedom.
     #[error("the fit leaves too few degrees of freedom")]
     NoFreedom,
-    /// Too few poses in any session.
+    /// No session has enough poses.
     #[error("too few poses")]
     TooFewPoses,
-    /// The covariate has the same value everywhere.
+    /// The covariate has the same value in all poses.
     #[error("it is the same at every pose")]
     Constant,
     /// The problem declares no σ.
@@ -90,20 +90,20 @@ pub struct Outcome {
     /// A statistic above the upper bound fails. One below the lower bound (of χ² / ν alone; else 0)
     /// shows an overstated σ.
     pub bounds: (f64, f64),
-    /// p-value of the statistic, for this test by itself.
+    /// Uncorrected p-value of the statistic, for this test alone.
     pub p_value: f64,
     /// True if the test failed after correction for all tests.
     pub failed: bool,
 }
 
-/// One test; its `Display` is a sentence for people.
+/// Test with its result; its `Display` is a sentence for users.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResidualTest {
     /// Test that was made.
     pub test: Test,
     /// Result, or the reason why the test cannot be made.
     pub outcome: Result<Outcome, Untestable>,
-    /// Row of the worst outlier in the test of outliers, where it is known.
+    /// Row of the worst outlier in the test of outliers, if it is known.
     pub row: Option<Location>,
 }
 
@@ -121,7 +121,8 @@ impl ResidualTest {
         }
     }
 
-    /// Returns the covariate that the test is about: of a test of order, time or row.
+    /// Returns the covariate whose influence is tested; for a test of order it is time or row
+    /// number.
     pub fn about(&self) -> Option<Covariate> {
         match &self.test {
             Test::Dependence { covariate } => Some(covariate.clone()),
@@ -135,7 +136,7 @@ impl ResidualTest {
         }
     }
 
-    /// Returns true if a failure means structure that an effect could explain.
+    /// Returns true if a failure of the test indicates structure that an effect could explain.
     pub fn is_structure(&self) -> bool {
         !matches!(self.test, Test::Outliers { .. } | Test::Normality)
     }
@@ -149,7 +150,7 @@ impl ResidualTest {
 /// Results of all tests of a residual.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Findings {
-    /// Every test, those that cannot be made included.
+    /// All tests, including those that cannot be made.
     pub tests: Vec<ResidualTest>,
     /// Poses that were left out as outliers, counted from 0.
     pub outliers: Vec<usize>,
@@ -161,7 +162,7 @@ impl Findings {
         self.strongest().is_some()
     }
 
-    /// Returns the failed test of structure with the smallest p-value.
+    /// Returns the failed test of structure with the smallest p-value; `None` if none failed.
     pub fn strongest(&self) -> Option<&ResidualTest> {
         let p_value = |test: &ResidualTest| {
             test.outcome.as_ref().map_or(f64::INFINITY, |outcome| outcome.p_value)
@@ -170,8 +171,8 @@ impl Findings {
         failed.min_by(|a, b| p_value(a).total_cmp(&p_value(b)))
     }
 
-    /// Returns the residual in units of the declared σ if only its size is beyond chance; `None`
-    /// otherwise.
+    /// Returns the ratio of residual to declared σ if only the size of the residual is significant;
+    /// `None` otherwise.
     pub fn size_alone(&self) -> Option<f64> {
         let mut failed = self.tests.iter().filter(|test| test.is_structure() && test.failed());
         let (Some(only), None) = (failed.next(), failed.next()) else { return None };
@@ -183,8 +184,8 @@ impl Findings {
         }
     }
 
-    /// Returns the residual in units of the declared σ if it is smaller than noise of that σ;
-    /// `None` otherwise.
+    /// Returns the ratio of residual to declared σ if it is significantly less than 1; `None`
+    /// otherwise.
     pub fn overstated_sigma(&self) -> Option<f64> {
         let size = self.tests.iter().filter(|test| test.test == Test::ReducedChiSquared);
         let mut sizes = size.filter_map(|test| test.outcome.as_ref().ok());

@@ -1,4 +1,4 @@
-//! Poses that are too far off to be noise.
+//! Search for outliers: poses whose residual is too large to be noise.
 
 use nalgebra::{DVector, Vector3};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
@@ -9,27 +9,28 @@ use super::judgement::{Trial, Tried};
 use super::leverage::{Kept, Leverage, Others, each_left_out};
 use super::outcome::{Test, Untestable};
 
-/// Number of poses for each pose left out in one round, at least one. Large outliers pull the fit
-/// off others and hide smaller ones.
+/// Reciprocal of the share of poses that is left out in one round, at least one pose. Large
+/// outliers distort the fit and hide smaller ones, so few are removed at a time.
 const ONE_A_ROUND_IN: usize = 100;
-/// Smallest number of poses for each outlier: where more are far off, they are no outliers.
+/// Reciprocal of the largest share of poses that can be outliers. If more have large residuals, the
+/// noise itself has heavy tails.
 const ONE_IN: usize = 5;
 
 /// Result of a search for outliers.
 pub(super) struct Found<'a> {
-    /// Returns the test of the pose that is farthest off.
+    /// Test of the pose with the largest distance.
     pub tried: Tried,
-    /// The poses without the outliers; `None` where there are none.
+    /// Fit to the poses without the outliers; `None` if there are no outliers.
     pub kept: Option<Kept<'a>>,
 }
 
-/// Leaves out poses that are too far off, the farthest first.
+/// Finds outliers and refits without them, the farthest first.
 ///
-/// Of pose b with studentised residual e_b, F = |e_b|² / k s² with its k numbers, where s² is the
-/// variance of what a fit without b leaves of its ν degrees of freedom: it has the F distribution
-/// with k and ν of them, whatever σ is (nearly so with priors). The pose is too far off where N
-/// P(F) ≤ `level` [Cook and Weisberg 1982, section 2.2; Bonferroni]. Where more than one pose in
-/// five is, the rest stays in: that is no outlier, but what the noise is like.
+/// For pose b with studentised residual e_b and k measured numbers, F = |e_b|² / (k s²). The
+/// variance s² is that of the fit without b, with ν degrees of freedom. F has the F distribution
+/// with k and ν degrees of freedom for any σ (approximately so with priors). A pose is an outlier
+/// if N P(F) ≤ `level` [Cook and Weisberg 1982, section 2.2; Bonferroni]. At most one pose in five
+/// can be an outlier; beyond that, the noise has heavy tails, and the remaining poses stay in.
 pub(super) fn find<'a>(fit: &FitResidual<'a>, leverage: &Leverage, level: f64) -> Found<'a> {
     let poses = fit.residual.len() / 3;
     let mut distances = distances(leverage, fit.residual);
@@ -61,13 +62,13 @@ pub(super) fn find<'a>(fit: &FitResidual<'a>, leverage: &Leverage, level: f64) -
     Found { tried, kept }
 }
 
-/// F statistic of a pose and its distribution.
+/// F statistic of a pose with its null distribution.
 struct Distance {
     ratio: f64,
     distribution: FisherSnedecor,
 }
 
-/// Returns the F statistic of each pose; `None` where the other poses leave no degrees of freedom.
+/// Returns the F statistic of each pose; `None` if the other poses leave no degrees of freedom.
 fn distances(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Option<Distance>> {
     let rounding = f64::EPSILON * residual.norm_squared();
     let distance = |((residual, others), &numbers): ((Vector3<f64>, Others), &usize)| {
@@ -89,7 +90,7 @@ fn distances(leverage: &Leverage, residual: &DVector<f64>) -> Vec<Option<Distanc
         .collect()
 }
 
-/// The test of the pose that is farthest off.
+/// Returns the test of the pose with the largest distance.
 fn test(distances: &[Option<Distance>]) -> Tried {
     let testable = distances
         .iter()
@@ -103,8 +104,7 @@ fn test(distances: &[Option<Distance>]) -> Tried {
     Tried { test: Test::Outliers { worst: Some(worst) }, trial: Ok(trial) }
 }
 
-/// Returns the poses that are too far off, the farthest first, at most as many as one round leaves
-/// out.
+/// Returns the poses that are outliers, the farthest first, at most as many as one round removes.
 fn too_far(distances: &[Option<Distance>], level: f64) -> Vec<usize> {
     let count = distances.len();
     let far = |(number, distance): (usize, &Option<Distance>)| {

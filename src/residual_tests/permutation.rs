@@ -12,29 +12,31 @@ use super::leverage::Leverage;
 use super::statistic::{Sample, Statistic};
 use crate::numeric::{subtract_product, transposed_product};
 
-/// Number of permutation draws, fewer where their product with Q takes more than `WORK`
-/// multiplications; p-values below 1 % then come from the fitted tail.
+/// Maximum number of permutation draws. Fewer are made if their product with Q takes more than
+/// `WORK` multiplications; p-values below 1 % then come from the fitted tail.
 const DRAWS: usize = 1999;
 const FEWEST: usize = 999;
 const WORK: u64 = 1 << 32;
-/// Number of draws that are fitted together; fewer where they have more than `NUMBERS` numbers. Q
-/// is read once for all of them.
+/// Maximum number of draws that are fitted together, so that Q is read once for all of them. Fewer
+/// are fitted together if they contain more than `NUMBERS` numbers.
 const TOGETHER: usize = 96;
 const FEWEST_TOGETHER: usize = 16;
 const NUMBERS: usize = 1 << 21;
 
-/// Returns the null distribution of each statistic; `None` where it cannot vary.
+/// Returns the null distribution of each statistic; `None` if the statistic is constant.
 ///
-/// A draw permutes the studentised poses e, takes the fit away again and studentises anew:
+/// A draw permutes the studentised residuals e of the poses, removes their fit and studentises
+/// again:
 ///
 /// r* = ε* − Q (Qᵀε* + S^½ z),  ε* = permuted e,  S = I − QᵀQ                        [Freedman and
 /// Lane 1983]
 ///
-/// The last term is what true parameters, scattered about their nominal values as the priors say,
-/// leave of themselves (z standard normal): with it, r* has the covariance I − H of r under priors,
-/// too; without priors S = 0. A permutation needs no distribution of the noise but that it be the
-/// same at every pose, and no σ: without priors the p-values are the same in any unit. All
-/// statistics share the draws; each draw has its own random numbers, whatever the threads.
+/// The term S^½ z, with z standard normal, represents true parameters that scatter about their
+/// nominal values as the priors state. It gives r* the covariance I − H under priors, too; without
+/// priors S = 0. Permutation only assumes that all poses have the same noise distribution; it needs
+/// no σ. Without priors, the p-values do not depend on the unit of the residuals. All statistics
+/// share the draws. Each draw has a separate random stream, so that results do not depend on the
+/// number of threads.
 pub(super) fn chances(
     leverage: &Leverage,
     studentised: &[Vector3<f64>],

@@ -11,15 +11,15 @@ use super::judgement::{Trial, Tried};
 use super::leverage::Kept;
 use super::outcome::{Test, Untestable};
 
-/// Minimum number of coordinates for the test of normality.
+/// Minimum number of residual coordinates for the test of normality.
 const LEAST_COORDINATES: usize = 8;
-/// Distance that probabilities keep from 0 and 1.
+/// Smallest distance of a probability from 0 and 1, so that its logarithm is finite.
 const EXTREME: f64 = 1e-300;
 
-/// χ² / ν of the residuals against the declared σ, with ν = 3 N − tr H.
+/// Tests χ² / ν of the residuals against the declared σ, with ν = 3 N − tr H.
 ///
-/// Without priors ‖r‖² has the χ² distribution with ν degrees of freedom. With priors, a fit that
-/// the truth leaves as the priors say has residuals of covariance I − H, and ‖r‖² is close to g χ²
+/// Without priors ‖r‖² has the χ² distribution with ν degrees of freedom. With priors, residuals
+/// have covariance I − H if true parameters scatter as the priors state. ‖r‖² is then close to g χ²
 /// with ν / g degrees of freedom, g = tr (I − H)² / ν, which has the same mean and variance
 /// [Satterthwaite 1946].
 pub(super) fn reduced_chi_squared(fit: &FitResidual, kept: &Kept) -> Tried {
@@ -38,8 +38,8 @@ pub(super) fn reduced_chi_squared(fit: &FitResidual, kept: &Kept) -> Tried {
     Tried { test: Test::ReducedChiSquared, trial }
 }
 
-/// Variance of the residuals beside that of repeats about their mean, which no model explains
-/// [Draper and Smith 1998, ch. 2].
+/// Tests the variance of the residuals against that of repeated measurements about their mean,
+/// which no model explains [Draper and Smith 1998, ch. 2].
 ///
 /// F = ((‖r‖² − P) / (ν − νₚ)) / (P / νₚ),  P = Σ |r − r̄ of the same setup|²,  νₚ = 3 Σ (repeats −
 /// 1)
@@ -73,13 +73,15 @@ fn ratio(fit: &FitResidual, kept: &Kept) -> Result<Trial, Untestable> {
     Ok(Trial { statistic, chance: Chance::Fisher { distribution, of: 1.0 }, shown: |value| value })
 }
 
-/// Anderson and Darling's test on all studentised coordinates, mean and variance estimated.
+/// Tests all studentised coordinates for normality by Anderson and Darling's test, with estimated
+/// mean and variance.
 ///
-/// A² = −n − (1/n) Σᵢ (2i − 1) [ln Φ(z₍ᵢ₎) + ln Φ(−z₍ₙ₊₁₋ᵢ₎)], times 1 + 0.75/n + 2.25/n²
-/// [Stephens 1986, in D'Agostino and Stephens, Goodness-of-Fit Techniques, section 4.8.5]
+/// A² = −n − (1/n) Σᵢ (2i − 1) [ln Φ(z₍ᵢ₎) + ln Φ(−z₍ₙ₊₁₋ᵢ₎)], times 1 + 0.75/n + 2.25/n² [Stephens
+/// 1986, in D'Agostino and Stephens, Goodness-of-Fit Techniques, section 4.8.5]
 ///
-/// The fit mixes the noise of many poses in each residual, which makes it more normal than the
-/// noise; so few poses hide heavy tails, but do not make them up.
+/// The fit mixes the noise of many poses in each residual, which makes residuals more normal than
+/// the noise. With few poses the test may therefore miss heavy tails, but it does not report false
+/// ones.
 pub(super) fn anderson_darling(studentised: &[Vector3<f64>]) -> Tried {
     let mut values: Vec<f64> =
         studentised.iter().flatten().copied().filter(|value| *value != 0.0).collect();

@@ -7,19 +7,19 @@ use nalgebra::{Matrix3, Vector3};
 use super::fit_residual::FitResidual;
 use super::outcome::{Sequence, Untestable};
 
-/// Minimum number of poses for tests of order and dependence.
+/// Minimum number of poses for tests of order and of dependence.
 const LEAST_POSES: usize = 5;
-/// Maximum number of lags of the autocorrelation, and poses of a session for each lag [Hyndman and
-/// Athanasopoulos 2018, section 5.4].
+/// Maximum number of lags of the autocorrelation; a session needs this many poses for each lag
+/// [Hyndman and Athanasopoulos 2018, section 5.4].
 const MOST_LAGS: usize = 10;
 const POSES_PER_LAG: usize = 5;
-/// Number of poses that are copied together before they are used: reads from scattered memory then
+/// Number of poses that are copied to contiguous memory before use, so that slow memory reads
 /// overlap.
 const FETCHED: usize = 64;
-/// Range of a covariate, relative to its values, below which it counts as constant.
+/// Range of a covariate, relative to its values, up to which it counts as constant.
 const ROUNDING: f64 = 1e-12;
 
-/// Studentised residuals, centred.
+/// Studentised residuals, with their mean subtracted.
 #[derive(Debug)]
 pub(super) struct Sample<'a> {
     /// Centred residual y of each pose, with Σ y = 0.
@@ -69,15 +69,15 @@ impl Statistic {
     }
 }
 
-/// Poses of each session in some order; nothing is compared across sessions.
+/// Poses of each session in an order; poses of different sessions are not compared.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Order {
     sessions: Vec<Vec<usize>>,
     lags: usize,
 }
 
-/// Returns the poses `kept` (renumbered from 0) in the order of time, and in that of the rows where
-/// it differs.
+/// Returns the poses `kept` (renumbered from 0) in the order of time, and also in the order of the
+/// rows if that differs.
 pub(super) fn sequences(
     fit: &FitResidual,
     kept: &[usize],
@@ -135,12 +135,12 @@ impl Order {
         f64::from(kept) / f64::from(steps.max(1))
     }
 
-    /// Q = 3 n (n + 2) Σₖ ρₖ² / nₖ,  ρₖ = Σ yₜ·yₜ₊ₖ / Σ |yₜ|²                        [Ljung and Box
-    /// 1978]
+    /// Returns Ljung and Box's Q = 3 n (n + 2) Σₖ ρₖ² / nₖ,  ρₖ = Σ yₜ·yₜ₊ₖ / Σ |yₜ|²
+    /// [Ljung and Box 1978]
     ///
-    /// over lags k of which there are nₖ pairs among n poses, sessions pooled; the scalar products
-    /// add the autocovariances of the three coordinates, hence the 3. About χ² with as many degrees
-    /// of freedom as lags.
+    /// The sum is over lags k with nₖ pairs among n poses, all sessions together. The scalar
+    /// products add the autocovariances of the three coordinates, hence the factor 3. Q is
+    /// approximately χ² with as many degrees of freedom as lags.
     pub fn ljung_box(&self, sample: &Sample) -> f64 {
         let n = sample.centred.len() as f64;
         let variance = sample.squares.trace();
@@ -160,28 +160,31 @@ impl Order {
     }
 }
 
-/// Squared distance correlation of the mean residual with a covariate.
+/// Squared distance correlation of the mean residual with a covariate, computed by cumulative sums.
 ///
 /// ρ² = − Σᵢⱼ |xᵢ − xⱼ| yᵢ·yⱼ / (‖K‖ ‖Σ y yᵀ‖) = 2 Σₖ (x₍ₖ₊₁₎ − x₍ₖ₎) |Cₖ|² / (‖K‖ ‖Σ y yᵀ‖)
 ///
 /// with K the doubly centred distances of the covariate x, y the centred residuals and Cₖ their sum
 /// over the k poses with the smallest x. It is the distance correlation of [Székely, Rizzo and
 /// Bakirov 2007] with squared distances between residuals instead of plain ones, which is the
-/// martingale difference correlation of [Shao and Zhang 2014]: 0 (for many poses) exactly where the
-/// mean residual is the same at every x, and no more than 1. An effect that the model lacks moves
-/// the mean; noise that is larger at some x does not. The second form takes as many steps as there
-/// are poses, so that all poses of a long campaign count, not only some.
+/// martingale difference correlation of [Shao and Zhang 2014]: between 0 and 1, and 0 (for many
+/// poses) exactly if the mean residual is the same at every x. An effect that the model lacks moves
+/// the mean; noise that is larger at some x does not. The second form takes time proportional to
+/// the number of poses, so that all poses of a long campaign can be used.
 #[derive(Debug, Clone)]
 pub(super) struct Cumulative {
-    /// Poses by ascending x.
+    /// Indices of the poses in ascending order of x.
     order: Vec<usize>,
-    /// 2 (x₍ₖ₊₁₎ − x₍ₖ₎) / ‖K‖.
+    /// Weights 2 (x₍ₖ₊₁₎ − x₍ₖ₎) / ‖K‖.
     weights: Vec<f64>,
 }
 
 impl Cumulative {
-    /// Creates the statistic from the values at the poses `kept`, renumbered from 0; `values` must
-    /// have `all` entries.
+    /// Creates the statistic from the covariate's values in the poses `kept`, which are renumbered
+    /// from 0.
+    ///
+    /// # Errors
+    /// Returns an error if `values` does not have `all` entries, or if the covariate is constant.
     pub fn of(values: &[f64], all: usize, kept: &[usize]) -> Result<Self, Untestable> {
         if values.len() != all {
             return Err(Untestable::SizeMismatch);
@@ -206,7 +209,7 @@ impl Cumulative {
         Ok(Self { order, weights })
     }
 
-    /// Returns ρ² of a sample.
+    /// Returns the squared distance correlation ρ² of a sample.
     pub fn correlation(&self, sample: &Sample) -> f64 {
         let mut sum = Vector3::zeros();
         let mut total = 0.0;
@@ -223,8 +226,8 @@ impl Cumulative {
     }
 }
 
-/// ‖K‖ of ascending values, Kᵢⱼ = dᵢⱼ − d̄ᵢ − d̄ⱼ + d̄ with d the distances: ‖K‖² = Σ d² − 2 n Σ
-/// d̄ᵢ² + n² d̄².
+/// Returns the norm ‖K‖ for ascending values, Kᵢⱼ = dᵢⱼ − d̄ᵢ − d̄ⱼ + d̄ with d the distances: ‖K‖²
+/// = Σ d² − 2 n Σ d̄ᵢ² + n² d̄².
 fn centred_norm(sorted: &[f64]) -> f64 {
     let n = sorted.len() as f64;
     let sum: f64 = sorted.iter().sum();

@@ -11,14 +11,13 @@ use super::permutation;
 use super::size;
 use super::statistic::{Cumulative, Sample, Statistic, sequences};
 
-/// Tests the residual of a fit. `level` is the probability that noise alone makes any test fail;
-/// `seed` seeds the permutations.
+/// Tests the residual of a fit. `level` is the probability that noise alone makes at least one test
+/// fail; `seed` seeds the permutations.
 ///
 /// The tests come in a fixed order: χ², lack of fit, runs and Ljung–Box in the order of time (and
-/// of the rows, where that is another), each covariate, outliers, normality. Outliers are left out
-/// of all but these last two, with their pull on the fit undone. The judgement is Holm's over all
-/// tests at that level; outliers and normality take part in it, but are not
-/// structure, since no effect explains them.
+/// of the rows, if that differs), each covariate, outliers, normality. All tests except the last
+/// two use the fit without outliers. Holm's procedure judges all tests together at that level.
+/// Outliers and normality take part in it, but are not structure, because no effect explains them.
 pub fn test_residual(fit: &FitResidual, level: f64, seed: u64) -> Findings {
     let poses = fit.residual.len() / 3;
     let leverage = match fit
@@ -68,8 +67,8 @@ fn permuted(fit: &FitResidual, kept: &Kept, seed: u64) -> Vec<Tried> {
     tried.collect()
 }
 
-/// Returns the statistics of order and dependence on some of the poses, or the reasons why there
-/// are none.
+/// Returns the statistics of order and dependence on some of the poses, or the reasons why they
+/// cannot be computed.
 fn statistics(fit: &FitResidual, poses: &[usize]) -> Vec<(Test, Result<Statistic, Untestable>)> {
     let mut all = Vec::new();
     for (sequence, order) in sequences(fit, poses) {
@@ -87,7 +86,7 @@ fn statistics(fit: &FitResidual, poses: &[usize]) -> Vec<(Test, Result<Statistic
     all
 }
 
-/// Returns every test with the same reason why it cannot be made.
+/// Returns all tests, each with the same reason why it cannot be made.
 fn all_untestable(fit: &FitResidual, why: &Untestable) -> Vec<Tried> {
     let sequence = Sequence::Time;
     let mut tests = vec![

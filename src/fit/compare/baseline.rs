@@ -28,7 +28,7 @@ pub struct Baseline {
     pub iterations: u64,
     /// Number of evaluations of the residual.
     pub evaluations: u64,
-    /// Duration \[s\].
+    /// Duration of the iteration \[s\].
     pub seconds: f64,
     /// Reason for which the iteration stopped.
     pub termination: Termination,

@@ -3,14 +3,14 @@
 use super::svg::{Colour, MUTED};
 use crate::quantity::format::number;
 
-/// Fraction of the values that always lies within the axis.
+/// Fraction of the values, the inner ones, that the axis always includes.
 const INNER_FRACTION: f64 = 0.95;
-/// Ratio of the largest value to the inner ones above which values are left outside the axis. Among
-/// a hundred thousand values, noise alone gives 2.3.
+/// Ratio of the largest value to the inner ones, above which outlying values are left outside the
+/// axis. Noise alone gives 2.3 for a hundred thousand values.
 const OUTLIER_RATIO: f64 = 2.5;
-/// Ratio of the axis limit to the inner values if values are left outside.
+/// Ratio of the axis limit to the largest inner value, if outlying values are left outside.
 const INNER_MARGIN: f64 = 1.8;
-/// Tick values within a decade, from many to few.
+/// Tick values within a decade; the sets are in order of decreasing number.
 const STEPS: [&[f64]; 4] =
     [&[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0], &[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
 
@@ -28,7 +28,7 @@ pub struct Axis {
     pub is_numeric: bool,
 }
 
-/// Value of an axis with its text.
+/// Tick of an axis: value and text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tick {
     pub at: f64,
@@ -37,7 +37,7 @@ pub struct Tick {
 }
 
 impl Axis {
-    /// Creates an axis with about `count` numbers.
+    /// Creates a linear axis with about `count` numbers.
     pub fn linear(range: (f64, f64), label: &str, count: usize) -> Self {
         let (low, high) = widened(range);
         // That many numbers divide the axis into one part more.
@@ -90,7 +90,7 @@ impl Axis {
     }
 }
 
-/// Returns `step` times a power of ten as text: `0.05`, `30`, or `10⁻⁶`.
+/// Returns 10^`exponent` × `step` as text: `0.05`, `30`, or `10⁻⁶`.
 fn power(exponent: f64, step: f64) -> String {
     if (-4.0..5.0).contains(&exponent) {
         let digits = whole(-exponent) + usize::from(step.fract() > 0.0 && exponent < 1.0);
@@ -115,7 +115,7 @@ fn whole(value: f64) -> usize {
     whole
 }
 
-/// Returns the least of 1, 2, 5 or 10 times a power of ten that is not below a value.
+/// Returns the smallest of 1, 2, 5 or 10 times a power of ten that is at least `value`.
 fn round_step(value: f64) -> f64 {
     let power = 10.0_f64.powf(value.log10().floor());
     let steps = [1.0, 2.0, 5.0].map(|factor| factor * power);
@@ -137,8 +137,8 @@ pub fn with_margin((low, high): (f64, f64), fraction: f64) -> (f64, f64) {
     (low - margin, high + margin)
 }
 
-/// Returns the limit of an axis about zero: the largest absolute value, or, with outliers, a
-/// multiple of the inner values.
+/// Returns the limit of an axis symmetric about zero: the largest absolute value, or, with
+/// outliers, a multiple of the inner values.
 pub fn axis_limit(values: impl IntoIterator<Item = f64>) -> f64 {
     let mut sizes: Vec<f64> =
         values.into_iter().map(f64::abs).filter(|size| size.is_finite()).collect();

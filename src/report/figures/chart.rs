@@ -5,11 +5,11 @@ use super::svg::{Anchor, Colour, FAINT, GRID, INK, MUTED, Paint, Svg, TEXT, WARM
 
 /// Width of a figure in displayed pixels.
 pub const WIDTH: f64 = 480.0;
-/// Space left of the area of a panel in displayed pixels.
+/// Space left of a panel's area in displayed pixels.
 pub const LEFT: f64 = 62.0;
-/// Space right of the area of a panel in displayed pixels.
+/// Space right of a panel's area in displayed pixels.
 pub const RIGHT: f64 = 12.0;
-/// Space above the area of a panel in displayed pixels.
+/// Space above a panel's area in displayed pixels.
 const ABOVE: f64 = 8.0;
 /// Height of the legend in displayed pixels.
 const LEGEND: f64 = 20.0;
@@ -49,7 +49,8 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Creates the dot of a pose in a row of the measurements, if it is one.
+    /// Creates the dot of a pose. If it is a row of the measurements, the page's script can find
+    /// it.
     pub fn dot(at: At, radius: f64, paint: Paint, row: Option<usize>) -> Self {
         Self::Dot { at, radius, paint, row }
     }
@@ -67,7 +68,8 @@ impl Shape {
         Self::area(from, to, Paint::fill(colour).faded(BAND_OPACITY))
     }
 
-    /// Creates text that starts some pixels right of a position, or ends some pixels left of it.
+    /// Creates text that starts `right` pixels right of a position; if `right` is negative, it ends
+    /// that far left of it.
     pub fn text(at: At, right: f64, text: impl Into<String>, colour: Colour) -> Self {
         let anchor = if right < 0.0 { Anchor::End } else { Anchor::Start };
         Self::Text { at, shift: (right, 0.0), text: text.into(), colour, anchor }
@@ -110,19 +112,19 @@ impl Panel {
         self
     }
 
-    /// Adds a line over the whole width at a height.
+    /// Adds a horizontal line across the panel at the ordinate `y`.
     pub fn with_level(self, y: f64) -> Self {
         let (left, right) = self.x.range;
         self.with([Shape::line([(left, y), (right, y)], Paint::line(FAINT, 1.0))])
     }
 
-    /// Adds a line over the whole height at a value.
+    /// Adds a vertical line across the panel at the abscissa `x`.
     pub fn with_reference(self, x: f64, colour: Colour) -> Self {
         let (bottom, top) = self.y.range;
         self.with([Shape::line([(x, bottom), (x, top)], Paint::line(colour, 1.0))])
     }
 
-    /// Writes the number of values beyond the axes at the top, if there are any.
+    /// Writes the number of values outside the axes at the top, if there are any.
     pub fn noting_beyond(self, count: usize, anchor: Anchor) -> Self {
         let (x, shift) = match anchor {
             Anchor::Start => (self.x.range.0, 6.0),
@@ -146,7 +148,7 @@ impl Panel {
         ABOVE + self.height + self.below()
     }
 
-    /// Draws the panel below a height of the figure.
+    /// Draws the panel at distance `top` from the top of the figure.
     fn draw(&self, svg: &mut Svg, top: f64) {
         let (left, right) = (self.sides.0, WIDTH - self.sides.1);
         let (top, bottom) = (top + ABOVE, top + ABOVE + self.height);
@@ -204,11 +206,11 @@ pub enum Mark {
     Line,
     Bar,
     Band,
-    /// Line of a length in displayed pixels.
+    /// Line of the given length in displayed pixels, as a scale.
     Scale(f64),
 }
 
-/// Name, colour and mark of an entry of the legend.
+/// Entry of the legend: name, colour and mark.
 pub type Entry<'a> = (&'a str, Colour, Mark);
 
 /// Returns the legend of fitted and held-out poses.
@@ -216,7 +218,8 @@ pub fn poses_legend() -> Vec<Entry<'static>> {
     vec![("fitted pose", FAINT, Mark::Dot), ("held-out pose", INK, Mark::Dot)]
 }
 
-/// Draws panels below each other under a legend; `label` describes the figure for screen readers.
+/// Draws panels one below the other under a legend; `label` describes the figure for screen
+/// readers.
 pub fn chart(label: &str, legend: &[Entry], panels: &[Panel]) -> String {
     let mut svg = Svg::default();
     let mut top = if legend.is_empty() { 0.0 } else { LEGEND };

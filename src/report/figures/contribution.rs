@@ -5,7 +5,7 @@ use crate::results::Contribution;
 
 /// Maximum number of bars.
 const MAX_BARS: usize = 20;
-/// Maximum number of decades that the bars span.
+/// Maximum number of decades of the logarithmic scale.
 const MAX_DECADES: f64 = 4.0;
 
 /// Draws the largest contributions as bars on a logarithmic scale; half of the bars are reserved

@@ -9,12 +9,13 @@ use crate::fit::Correlations;
 const MAX_PARAMETERS: usize = 20;
 /// Minimum and maximum width for names in pixels.
 const NAME_WIDTH: (f64, f64) = (118.0, 230.0);
-/// Ratio of the width of a letter to its height.
+/// Ratio of a letter's width to its height, by which the width of names is estimated.
 const LETTER_WIDTH: f64 = 0.62;
 /// Smallest absolute correlation that is coloured.
 const MIN_CORRELATION: f64 = 0.05;
 
-/// Returns the paint of a correlation; `None` for a small or undefined one, which stays blank.
+/// Returns the colour of a correlation; `None` for a small or undefined one, whose cell stays
+/// blank.
 fn shade(value: f64) -> Option<Paint> {
     let colour = if value < 0.0 { WARM } else { ACCENT };
     // Few distinct colours keep the file small.

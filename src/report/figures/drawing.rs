@@ -11,7 +11,7 @@ pub struct Drawing {
     pub name: String,
     /// Title of the figure.
     pub title: String,
-    /// Explanation of the figure.
+    /// Caption that explains the figure.
     pub caption: String,
     /// Drawing as SVG text.
     pub svg: String,
@@ -30,7 +30,7 @@ impl Drawing {
     }
 }
 
-/// Returns the data of a figure as CSV text.
+/// Returns the plotted data as CSV text.
 pub fn sheet<'a>(
     header: impl IntoIterator<Item = &'a str>,
     rows: impl IntoIterator<Item = Vec<String>>,
@@ -38,7 +38,8 @@ pub fn sheet<'a>(
     csv(header.into_iter().map(str::to_owned).collect(), rows)
 }
 
-/// Returns data of poses as CSV text: file and line, true if held out, and further columns.
+/// Returns plotted data of poses as CSV text: file and line, held out or not, and the given
+/// columns.
 pub fn pose_sheet<'a>(
     columns: &[&str],
     rows: impl IntoIterator<Item = (&'a PoseError, Vec<f64>)>,

@@ -16,13 +16,14 @@ fn law_at(curve: &[(f64, f64)], x: f64) -> f64 {
     }
 }
 
-/// Draws an effect that the loop found, with its number.
+/// Draws the figure of an effect that the loop found as number `number`; `shown` are the rows to
+/// draw.
 pub fn effect(cause: &Cause, number: usize, shown: &[usize]) -> Drawing {
     let lead = "Found by the loop; the line is the fitted law.";
     draw(cause, shown, (&format!("effect-{number}"), "fitted law", lead))
 }
 
-/// Draws structure that no effect explains.
+/// Draws the figure of structure that no effect explains; `shown` are the rows to draw.
 pub fn unexplained(trend: &Cause, shown: &[usize]) -> Drawing {
     let lead = "No effect explains this; the line is the empirical correction. Its mean over this \
                 range is subtracted from line and dots, since base and geometry absorb a constant.";

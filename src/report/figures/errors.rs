@@ -8,8 +8,8 @@ use crate::results::{Stage, StageErrors, procedure_stages};
 
 /// Maximum number of poses in the figure.
 const MAX_POSES: usize = 90;
-/// Error, as a fraction of the median error of the best stage, below which values are drawn at the
-/// lower edge.
+/// Smallest error that is drawn at its value, as a fraction of the best stage's median; smaller
+/// ones are drawn at the lower edge.
 const FLOOR: f64 = 0.03;
 
 /// Returns the name of a stage in the legend.

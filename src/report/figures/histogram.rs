@@ -4,9 +4,9 @@ use super::prelude::*;
 use crate::numeric::median;
 
 /// Smallest half-width of the axis \[σ\]. The axis spans four times the scatter of most residuals
-/// if that is more; values beyond it are counted in the outermost bars.
+/// if that is more; values outside it are counted in the outermost bars.
 const MIN_HALF_WIDTH: f64 = 5.0;
-/// Number of values from which on bars are half as wide.
+/// Number of values above which bars are half as wide.
 const MANY_VALUES: usize = 150;
 
 /// Returns the residual coordinates of a row in units of σ.

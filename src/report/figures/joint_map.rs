@@ -1,9 +1,9 @@
-//! Residual by ranges of each joint.
+//! Residual as a function of each joint's command, in ranges.
 
 use super::prelude::*;
 use crate::results::CommandedJoint;
 
-/// Number of ranges of a joint.
+/// Number of ranges into which a joint's commands are divided.
 const RANGES: usize = 12;
 
 /// Range of a joint with its ends and the root mean square residual of the poses in it \[m\].
@@ -13,7 +13,7 @@ struct JointRange {
     count: usize,
 }
 
-/// Returns the ranges of a joint in ascending order; none for a joint that does not move.
+/// Returns the ranges of a joint in ascending order; empty for a joint that does not move.
 fn joint_ranges(data: &PlotData, joint: usize) -> Vec<JointRange> {
     let poses = || data.residuals.iter().filter(|pose| pose.has_place());
     let poses = || poses().filter(|pose| pose.error.norm().is_finite());
@@ -42,7 +42,7 @@ fn joint_ranges(data: &PlotData, joint: usize) -> Vec<JointRange> {
     sums.into_iter().enumerate().map(part).collect()
 }
 
-/// Draws a row per joint and a box per range, darker for a larger residual.
+/// Draws a row for each joint and a box for each range, darker for a larger residual.
 pub fn joint_map(data: &PlotData) -> Option<Drawing> {
     let joints: Vec<(CommandedJoint, Vec<JointRange>)> = data
         .commands

@@ -4,10 +4,10 @@ use super::prelude::*;
 
 /// Maximum number of poses in the figure.
 const MAX_POSES: usize = 300;
-/// Time span from which on times are given in hours \[s\].
+/// Smallest time span that is labelled in hours \[s\].
 const HOURS_FROM: f64 = 7200.0;
 
-/// Draws the residual coordinates of positions in the order of time, with a band of ±2 σ.
+/// Draws the residual coordinates of positions in order of time, with a band of ±2 σ.
 pub fn order(data: &PlotData) -> Option<Drawing> {
     let is_fitted = |row: &usize| data.is_position(*row) && !data.residuals[*row].held_out;
     let is_finite = |row: &usize| data.size(*row).is_finite();

@@ -3,7 +3,8 @@
 use super::prelude::*;
 use crate::least_squares::Identifiability;
 
-/// Relative singular value below which points are drawn at the lower edge.
+/// Smallest relative singular value that is drawn at its value; smaller ones are drawn at the lower
+/// edge.
 const MIN_VALUE: f64 = 1e-17;
 
 /// Draws the singular values of the scaled Jacobian in descending order.

@@ -5,10 +5,10 @@ use crate::fit::{Comparison, Errors};
 use crate::problem::Effect;
 use crate::select::{ClosedLoop, Round};
 
-/// Difference of two logarithms of errors below which both are the best.
+/// Difference of the logarithms of two errors up to which they count as equal.
 const TIE: f64 = 1e-4;
 
-/// Row of the figure.
+/// Row of the figure: name and mean errors of one fit or group of fits.
 struct Entry {
     strategy: String,
     name: String,
@@ -63,7 +63,7 @@ pub fn ablations(comparison: &Comparison) -> Option<Drawing> {
     (entries.len() > 1).then(|| draw_entries("ablations", titles, caption, &entries))
 }
 
-/// Draws the errors after each round of a loop, with the effects it added.
+/// Draws the errors after each round of a loop, with the effects that it added.
 pub fn rounds(closure: &ClosedLoop) -> Option<Drawing> {
     let after = |(k, round): (usize, &Round)| {
         let errors = Errors { identification: round.identification, held_out: round.held_out };
@@ -77,7 +77,8 @@ pub fn rounds(closure: &ClosedLoop) -> Option<Drawing> {
     (entries.len() > 1).then(|| draw_entries("rounds", titles, caption, &entries))
 }
 
-/// Draws the mean errors of entries with a title, and a label for screen readers.
+/// Draws the mean errors of entries as a figure with a title; `label` describes it for screen
+/// readers.
 fn draw_entries(
     name: &str,
     (title, label): (&str, &str),

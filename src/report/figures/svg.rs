@@ -6,7 +6,8 @@ use maud::html;
 
 use crate::error::is_hidden;
 
-/// Colour in hexadecimal notation. Style sheets find it by this text and replace it in dark themes.
+/// Colour in hexadecimal notation. Style sheets find colours by this text and replace them in dark
+/// themes.
 pub type Colour = &'static str;
 
 /// Colour of important lines and text, and of held-out poses.
@@ -17,9 +18,9 @@ pub const MUTED: Colour = "#59636E";
 pub const FAINT: Colour = "#A3ADB8";
 /// Colour of the grid.
 pub const GRID: Colour = "#E4E8EC";
-/// Accent colour: the best result, a law, or pure noise.
+/// Accent colour, used for the best result, a law, or pure noise.
 pub const ACCENT: Colour = "#0B6BCB";
-/// Opposite of the accent: negative values and failures.
+/// Colour opposed to the accent, used for negative values and failures.
 pub const WARM: Colour = "#C2521B";
 
 /// Text size in displayed pixels.
@@ -45,7 +46,8 @@ impl Paint {
         Self { width: Some(width), ..Self::fill(colour) }
     }
 
-    /// Returns the translucent paint; few distinct opacities keep files small.
+    /// Returns the paint with an opacity. The opacity is rounded, because few distinct values keep
+    /// files small.
     pub fn faded(self, opacity: f64) -> Self {
         Self { opacity: (opacity * 50.0).round() / 50.0, ..self }
     }
@@ -99,7 +101,7 @@ impl Svg {
         let _ = write!(self.0, "<polyline points=\"{points}\"{}/>", paint.attributes());
     }
 
-    /// Writes text of a size whose middle height is at a position.
+    /// Writes text at a position, vertically centred there.
     pub fn text(
         &mut self,
         text: &str,
@@ -115,7 +117,7 @@ impl Svg {
         self.write(text, &format!("x=\"{}\" y=\"{}\"{size}", short(x), short(y)), colour, anchor);
     }
 
-    /// Writes text upwards whose middle is at a position.
+    /// Writes upward text, centred at a position.
     pub fn text_upwards(&mut self, text: &str, (x, y): (f64, f64), colour: Colour) {
         let place = format!("transform=\"translate({},{}) rotate(-90)\"", short(x), short(y));
         self.write(text, &place, colour, Anchor::Middle);
@@ -132,7 +134,8 @@ impl Svg {
             write!(self.0, "<text {place} dy=\"0.35em\"{anchor} fill=\"{colour}\">{text}</text>");
     }
 
-    /// Returns the drawing of a size as SVG text; `label` describes it for screen readers.
+    /// Returns the drawing as SVG text with a width and height; `label` describes it for screen
+    /// readers.
     pub fn finish(self, (width, height): (f64, f64), label: &str) -> String {
         let (width, label) = (width + MARGIN, escaped(label));
         format!(

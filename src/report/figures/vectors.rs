@@ -5,7 +5,7 @@ use super::prelude::*;
 
 /// Maximum number of poses in the figure.
 const MAX_POSES: usize = 400;
-/// Length of a long residual vector as a fraction of the width.
+/// Length of a large residual vector on the drawing, as a fraction of its width.
 const VECTOR_LENGTH: f64 = 0.09;
 /// Minimum and maximum height of a view in displayed pixels.
 const HEIGHTS: (f64, f64) = (150.0, 330.0);
@@ -105,7 +105,7 @@ fn centred((low, high): (f64, f64), width: f64) -> (f64, f64) {
     (middle - 0.5 * width, middle + 0.5 * width)
 }
 
-/// Returns the share of a shift from a value within a range that stays in the range.
+/// Returns the share of a shift that can be applied to a value before it leaves a range, 0…1.
 fn share_inside(from: f64, shift: f64, (low, high): (f64, f64)) -> f64 {
     let edge = if shift > 0.0 { high } else { low };
     let is_inside = (low..=high).contains(&(from + shift));

@@ -12,13 +12,13 @@ use crate::problem::Problem;
 use crate::report::document::{Bar, Block, CODE, Headline, Mark, Point, Table};
 use crate::report::figures::Drawing;
 
-/// Half-width of a bar in standard errors; larger changes end at its edge.
+/// Half-width of a bar in standard errors. Larger changes end at its edge.
 const BAR_SIGMAS: f64 = 10.0;
 
 /// Scripts of the page: interaction, and the three-dimensional view of the arm.
 const SCRIPTS: [&str; 2] = [include_str!("page.js"), include_str!("view.js")];
 
-/// Report for people, in two formats.
+/// Report in two formats, with its figures.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Report {
@@ -30,7 +30,7 @@ pub struct Report {
     pub figures: Vec<(String, String)>,
 }
 
-/// Renders the report of some blocks; `kind` names what was done.
+/// Renders blocks as a report; `kind` names the command or analysis in the title.
 pub(in crate::report) fn report(problem: &Problem, kind: &str, blocks: &[Block]) -> Report {
     let title = if problem.title.is_empty() { &problem.name } else { &problem.title };
     let mut figures = Vec::new();
@@ -157,7 +157,7 @@ fn list_item(point: &Point) -> Markup {
     }
 }
 
-/// Renders the errors of all states, and facts.
+/// Renders the summary of an outcome: errors of all states, and facts.
 fn headline(headline: &Headline) -> Markup {
     html! {
         @let last = headline.states.len().saturating_sub(1);

@@ -84,8 +84,8 @@ fn escaped(words: &str) -> String {
     text
 }
 
-/// Appends text in which Markdown finds no code, emphasis, tag, entity, link, image, URL or
-/// heading.
+/// Appends text, escaped so that Markdown finds no code, emphasis, tag, entity, link, image, URL or
+/// heading in it.
 fn plain(text: &mut String, words: &str) {
     let words: Vec<char> = words.chars().filter(|&c| c == '\n' || !is_hidden(c)).collect();
     let is_followed_by =

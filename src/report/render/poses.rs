@@ -9,7 +9,8 @@ use crate::results::{PlotData, ScriptData};
 /// Number of poses in the table of the largest residuals.
 const LISTED_POSES: usize = 12;
 
-/// Returns the data of the script as JSON that cannot end the element that holds it.
+/// Returns the data of the script as JSON, escaped so that it cannot end the HTML element that
+/// contains it.
 fn script_data(data: &PlotData) -> String {
     serde_json::to_string(&ScriptData::of(data))
         .unwrap_or_default()
@@ -40,7 +41,7 @@ pub(super) fn section(data: &PlotData) -> Markup {
     }
 }
 
-/// Returns a sentence on rows without positions; empty if all rows measure positions.
+/// Returns a sentence about rows without positions; empty if all rows measure positions.
 fn without_positions(data: &PlotData) -> String {
     if data.residuals.iter().all(|residual| residual.observation.is_position()) {
         return String::new();
@@ -98,7 +99,7 @@ fn view(data: &PlotData) -> Markup {
     }
 }
 
-/// Renders two range inputs for each joint.
+/// Renders two range inputs (lower and upper limit) for each joint.
 fn ranges(data: &PlotData) -> Markup {
     html! {
         div.brush id="brush" hidden {

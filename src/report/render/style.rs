@@ -35,7 +35,7 @@ fn themes() -> String {
     text
 }
 
-/// Returns rules that replace the colours in the drawings.
+/// Returns rules that replace the colours in the drawings by `colour(name, dark value)`.
 fn replaced_colours(colour: impl Fn(&'static str, &'static str) -> String) -> String {
     let mut text = String::new();
     for (light, name, dark) in COLOURS {
@@ -53,8 +53,8 @@ pub(super) fn sheet() -> String {
     format!("{}{LAYOUT}{}", themes(), replaced_colours(|name, _| format!("var(--{name})")))
 }
 
-/// Returns a figure as a separate file: with a background, and with dark colours for viewers that
-/// support styles.
+/// Returns a figure as a separate SVG file, with a background, and with dark colours for viewers
+/// that support styles.
 pub(super) fn standalone(svg: &str) -> String {
     let style = format!(
         "<style>@media screen and (prefers-color-scheme:dark){{\n[fill=\"{LIGHT_PAPER}\"]{{fill:{DARK_PAPER}}}\n{}}}</style>",

@@ -12,7 +12,7 @@ pub(in crate::report) fn text(blocks: &[Block]) -> String {
     text_within(blocks, WIDTH)
 }
 
-/// Renders blocks as text with running text wrapped to at most `columns` columns.
+/// Renders blocks as text; running text is wrapped to at most `columns` characters.
 pub(in crate::report) fn text_within(blocks: &[Block], columns: usize) -> String {
     let width = columns.min(WIDTH);
     let mut text = String::new();
@@ -106,7 +106,7 @@ fn plain(words: &str) -> String {
     words.chars().filter(|c| !c.is_control() || *c == '\n').collect()
 }
 
-/// Renders a table without lines around it.
+/// Renders a table without ruled lines.
 fn table(table: &Table) -> String {
     let mut shown = comfy_table::Table::new();
     let rows = table.rows.iter().map(|row| row.iter().map(|cell| plain(cell)).collect::<Vec<_>>());
