@@ -58,12 +58,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(diagnostic::judged(&found, common.quiet))
 }
 
-/// Returns the digest of a file; `None` for a pipe, which cannot be read again.
+/// Returns the SHA-256 digest of a file; `None` for a pipe, which cannot be read a second time.
 fn sha256(file: &Path) -> Option<String> {
     file.is_file().then(|| fs::read(file).ok()).flatten().map(|bytes| digest(&bytes))
 }
 
-/// Returns the commit at HEAD of the git repository around a file.
+/// Returns the commit at HEAD of the git repository that contains a file; `None` if there is none.
 fn commit(file: &Path) -> Option<String> {
     let whole = file.canonicalize().ok()?;
     let git =

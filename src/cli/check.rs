@@ -36,7 +36,7 @@ pub struct Arguments {
     source: Source,
 }
 
-/// Check without valid poses.
+/// Error of arguments that name no valid poses.
 #[derive(Debug, thiserror::Error)]
 enum PosesError {
     #[error(
@@ -49,7 +49,7 @@ enum PosesError {
     Twice,
 }
 
-/// Runs the check, writes `check.json`, and prints what to expect.
+/// Runs the check, writes `check.json`, and prints the expected results.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let problem = Problem::read(common.problem())?;
@@ -78,7 +78,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(Outcome::NotTrusted)
 }
 
-/// Returns the poses that the arguments name.
+/// Returns the poses that the arguments name, drawn or read.
 fn judged(arguments: &Arguments, problem: &Problem) -> Result<CheckedPoses, Box<dyn Error>> {
     let Arguments { common, poses, source } = arguments;
     let poses = poses.map(|poses| poses as usize);

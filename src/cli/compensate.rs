@@ -52,7 +52,7 @@ enum Frame {
     Base,
 }
 
-/// Missing table of targets.
+/// Error of missing targets: no table of targets is named.
 #[derive(Debug, thiserror::Error)]
 #[error("no targets; name them with --data")]
 struct NoTargets;

@@ -4,10 +4,10 @@ use std::fmt;
 
 use flexcal::fit::{COST_TOLERANCE, Progress};
 
-/// Number of remaining steps beyond which no time left is stated.
+/// Largest number of remaining steps for which a remaining time is stated.
 const FORESEEN: f64 = 200.0;
 
-/// Progress of the work; times in seconds since its start.
+/// Progress of a fit or loop; times are in seconds since its start.
 #[derive(Debug, Default)]
 pub struct Course {
     round: Option<Round>,
@@ -17,7 +17,8 @@ pub struct Course {
     now: f64,
     /// Start time of the current fit.
     fit_begun: Option<f64>,
-    /// Number of finished fits, the one before the first round included, and their total time.
+    /// Number of finished fits, including the one before the first round, and their total time
+    /// \[s\].
     fits_done: (f64, f64),
 }
 
@@ -28,7 +29,7 @@ struct Round {
     last: Option<String>,
     fit: usize,
     fits: usize,
-    /// Expected end of the round.
+    /// Expected end of the current round \[s\]; `None` while unknown.
     end: Option<f64>,
 }
 
@@ -40,9 +41,9 @@ struct Step {
     cost: f64,
     /// Decrease of the cost by the last successful step.
     gain: Option<f64>,
-    /// End time of the first step of the solver.
+    /// Number of the solver's first timed step, and its end time \[s\].
     begun: (u64, f64),
-    /// Expected remaining time of the solver.
+    /// Expected remaining time of the solver \[s\].
     left: Option<f64>,
 }
 
@@ -94,8 +95,8 @@ impl Course {
 }
 
 impl Step {
-    /// Updates the state for the next step. The time left covers the steps until gains vanish that
-    /// fall at the rate of the last two.
+    /// Updates the state after a step. The remaining time assumes that gains decrease at the rate
+    /// of the last two, until they vanish.
     fn next(self, iteration: u64, cost: f64, now: f64) -> Self {
         let gain = self.cost - cost;
         let each = (now - self.begun.1) / (iteration - self.begun.0) as f64;
@@ -141,7 +142,7 @@ impl fmt::Display for Course {
     }
 }
 
-/// Formats the time left, if there is any.
+/// Formats the remaining time, if it is known; `of` names the work.
 fn about(f: &mut fmt::Formatter<'_>, left: Option<f64>, of: &str) -> fmt::Result {
     match left {
         Some(left) if left >= 90.0 => write!(f, ", about {:.0} min left of the {of}", left / 60.0),

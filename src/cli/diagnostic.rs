@@ -14,7 +14,7 @@ use flexcal::report;
 
 use super::outcome::Outcome;
 
-/// Width of messages, large enough for one line.
+/// Width of messages [characters], large enough that no line is wrapped.
 const WIDTH: usize = 1000;
 
 /// Prints an error to standard error.
@@ -28,13 +28,14 @@ pub fn print(error: &(dyn Error + 'static)) {
     );
 }
 
-/// Adds the argument that avoids a mistake in the input.
+/// Returns advice on the argument that would avoid an error in the input, if there is one.
 fn with_argument(error: &InputError) -> Option<String> {
     matches!(*error.kind, InputErrorKind::Table(TableErrorKind::NoDataFiles))
         .then(|| format!("{error} or with --data"))
 }
 
-/// Describes an error of a design by the arguments that cause it.
+/// Returns the message for an error of a design in terms of the arguments that caused it, if there
+/// is one.
 fn by_arguments(error: &DesignError) -> Option<String> {
     match error {
         DesignError::NoRange(_) => Some(format!(
@@ -62,8 +63,8 @@ pub fn warn(message: &str) {
     show(Level::WARNING, message, None);
 }
 
-/// Returns the outcome of a command that made a fit, and prints its warnings. The reason for exit
-/// status 1 is printed even if the command is quiet.
+/// Prints the warnings of a fit and returns the outcome of the command that made it. The reason for
+/// exit status 1 is printed even if the command is `quiet`.
 pub fn judged(fit: &Identification, quiet: bool) -> Outcome {
     if !fit.is_trusted() {
         warn(&report::why_not_trusted(fit));

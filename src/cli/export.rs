@@ -86,7 +86,8 @@ enum Format {
     C,
 }
 
-/// Writes the identified geometry, and prints what the file cannot hold.
+/// Writes the identified geometry, and prints the parts of the model that the file cannot
+/// represent.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let flags = &arguments.flags;
     let problem = Problem::read(&arguments.problem)?;

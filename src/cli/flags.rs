@@ -27,12 +27,13 @@ pub struct Flags {
 }
 
 impl Flags {
-    /// Returns true if the output is for people.
+    /// Returns true if the output is text for people: neither JSON nor quiet.
     pub fn talks(&self) -> bool {
         !self.json && !self.quiet
     }
 
-    /// Prints a result as JSON or as text.
+    /// Prints a result: the text `json` if JSON is requested, else the text that `words` returns;
+    /// nothing if quiet.
     pub fn tell(&self, json: &str, words: impl FnOnce() -> String) -> Result<(), WriteError> {
         match (self.json, self.quiet) {
             (true, _) => output::print_json(json),
@@ -53,8 +54,8 @@ impl Flags {
         self.out.clone().unwrap_or_else(|| Path::new("out").join(name))
     }
 
-    /// Claims the results called `names` of the problem or study `name`, for a `command` that reads
-    /// `inputs`.
+    /// Claims file names for the results of a `command` that reads `inputs`. `name` is the problem
+    /// or study, `names` are the files.
     pub fn claim(
         &self,
         command: &'static str,

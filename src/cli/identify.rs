@@ -41,7 +41,8 @@ pub struct Arguments {
     verbose: bool,
 }
 
-/// Words of an argument, each with what it stands for.
+/// Returns a parser of an argument that accepts one word for each value; `summary` describes the
+/// words in help.
 fn words<T: Copy + Send + Sync + 'static, const N: usize>(
     each: [T; N],
     name: fn(T) -> &'static str,
@@ -56,7 +57,7 @@ fn words<T: Copy + Send + Sync + 'static, const N: usize>(
 }
 
 /// Identifies, writes `estimate.json`, `residuals.csv`, `report.md` and `report.html`, and prints
-/// what it came to.
+/// the result.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let mut names = vec!["estimate.json", "residuals.csv", REPORT[0], REPORT[1]];

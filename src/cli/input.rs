@@ -1,4 +1,4 @@
-//! Arguments that most commands take, and the input that they name.
+//! Arguments that most commands take, and the input files that they name.
 
 use std::error::Error;
 use std::ops::Deref;
@@ -36,7 +36,7 @@ impl Deref for Common {
     }
 }
 
-/// Problem, data, and claimed results.
+/// Problem with its data, and the results that the command may write.
 pub struct Input {
     pub problem: Problem,
     pub data: Dataset,
@@ -61,7 +61,7 @@ impl Common {
         split(self.named.as_deref(), &self.data).0
     }
 
-    /// Formats the problem, and the named measurement files, as arguments of another command.
+    /// Formats the problem, and the named measurement files, as arguments of a suggested command.
     pub fn named(&self) -> String {
         let data: Vec<String> =
             self.data().iter().map(|file| format!(" {}", shell_word(file))).collect();
@@ -75,7 +75,7 @@ impl Common {
         split(self.named.as_deref(), &self.data).1
     }
 
-    /// Claims the results called `names` for a `command`, then reads the problem and its
+    /// Claims the file names `names` for results of a `command`, then reads the problem and its
     /// measurements.
     pub fn read(&self, command: &'static str, names: &[&str]) -> Result<Input, Box<dyn Error>> {
         let problem = Problem::read(self.problem())?;
@@ -116,7 +116,8 @@ impl Common {
         }
     }
 
-    /// Claims the results called `names` for a `command` that reads problem, data and `others`.
+    /// Claims the file names `names` for results of a `command` that reads the problem, its data
+    /// and the files `others`.
     pub fn results(
         &self,
         command: &'static str,
@@ -142,8 +143,8 @@ impl Common {
         if problem.is_dir() { problem.join("problem.toml") } else { problem.to_owned() }
     }
 
-    /// Returns the name of the results; a `problem.closed.toml` has another one than the problem
-    /// from which it was made.
+    /// Returns the name of the results' folder. A `problem.closed.toml` has a name different from
+    /// that of the problem from which it was made.
     fn results_name(&self, problem: &Problem) -> String {
         let file = self.problem_file();
         let variant = file.file_stem().and_then(|stem| stem.to_str()?.strip_prefix("problem."));

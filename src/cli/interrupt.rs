@@ -11,10 +11,10 @@ pub const STATUS: u8 = 130;
 /// Lock that is held while files take their names.
 static WRITING: Mutex<()> = Mutex::new(());
 
-/// Returns the request that the first interrupt makes. The second one ends the process at once, but
-/// not while files take their names.
+/// Returns the stop request that the first interrupt makes. The second interrupt ends the process
+/// at once, except while files take their names.
 ///
-/// Interrupts that are ignored, or handled by the host program, stay so.
+/// Interrupts that were ignored, or handled by a host program, before the call remain so.
 pub fn stop() -> Stop {
     static STOP: OnceLock<Stop> = OnceLock::new();
     let stop = STOP.get_or_init(|| {

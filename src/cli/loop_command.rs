@@ -36,8 +36,8 @@ pub struct Arguments {
     verbose: bool,
 }
 
-/// Closes the loop, writes `loop.json`, `problem.closed.toml`, `residuals.csv` and both reports,
-/// and prints the story.
+/// Runs the loop, writes `loop.json`, `problem.closed.toml`, `residuals.csv` and both reports, and
+/// prints the result.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let common = &arguments.common;
     let (problem, text) = Problem::read_with_text(common.problem())?;
@@ -109,8 +109,9 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(if closure.interrupted { Outcome::Interrupted } else { outcome })
 }
 
-/// Remainder beside the effects of the closed problem, whose text is `closed`; `None` where the
-/// text declares another arm than was fitted, as without an effect that data contradict.
+/// Fits a remainder in addition to the effects of the closed problem with text `closed`. Returns
+/// `None` if the text declares a different arm than was fitted, for example because an effect that
+/// data contradict was removed.
 fn fitted(
     problem: &Problem,
     closed: &str,
@@ -124,7 +125,7 @@ fn fitted(
     Ok(remainder::fit(&closure.after, &closure.closed, data)?)
 }
 
-/// Data file that a closed problem cannot name.
+/// Error of a data file that a closed problem cannot name.
 #[derive(Debug, thiserror::Error)]
 enum NoName {
     #[error("{}: loop names its data in problem.closed.toml, and this is no file that can be read again; save it as one", file.display())]
@@ -133,7 +134,8 @@ enum NoName {
     NotUtf8 { file: PathBuf },
 }
 
-/// Checks that a closed problem can name a file, which pipes and standard input cannot offer again.
+/// Checks that a closed problem can name a file. Pipes and standard input cannot be read a second
+/// time.
 fn nameable(file: &Path) -> Result<(), NoName> {
     let name = || file.to_owned();
     match file.canonicalize() {
@@ -150,7 +152,8 @@ fn nameable(file: &Path) -> Result<(), NoName> {
     }
 }
 
-/// Returns a file as seen from a folder, as an absolute path if no relative one exists.
+/// Returns the path of a file relative to a folder, or its absolute path if there is no relative
+/// one.
 fn seen_from(folder: &Path, file: &Path) -> io::Result<PathBuf> {
     let (folder, file) = (folder.canonicalize()?, file.canonicalize()?);
     Ok(pathdiff::diff_paths(&file, folder).unwrap_or(file))

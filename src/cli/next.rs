@@ -1,4 +1,4 @@
-//! The command that fits a result best as the next one.
+//! Suggestion of the next command after a result.
 
 use std::path::Path;
 
@@ -12,10 +12,11 @@ use super::input::Common;
 use super::output::Results;
 use super::plan;
 
-/// Poses that a plan proposes to tell two effects apart.
+/// Number of poses that a suggested plan has to distinguish two effects.
 const SEPARATING_POSES: usize = 12;
 
-/// Names the command after a fit of which `is_structured` says whether its residual has structure.
+/// Returns the command to run after a fit. `is_structured` is true if the residual has structure;
+/// `estimate` is the file written.
 pub fn after_fit(
     common: &Common,
     found: &Identification,
@@ -67,7 +68,7 @@ pub fn after_fit(
     }
 }
 
-/// Names the command after a loop, which wrote its `results`.
+/// Returns the command to run after a loop, which wrote its `results`.
 pub fn after_loop(
     common: &Common,
     problem: &Problem,
@@ -117,7 +118,7 @@ pub fn after_loop(
     }
 }
 
-/// Names the command after a trace.
+/// Returns the command to run after a trace.
 pub fn after_trace(common: &Common, result: &TraceResult) -> String {
     let is_pointed =
         result.ranking.first().is_some_and(|candidate| candidate.p_value < result.level);

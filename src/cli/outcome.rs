@@ -1,12 +1,12 @@
 //! Outcome of a command, which decides its exit status.
 
-/// Outcome of a command.
+/// Outcome of a command: success, or a reason for exit status 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// The command is done: exit status 0.
     Done,
-    /// The fit is not to be trusted: exit status 1.
+    /// The fit is not trusted: exit status 1.
     NotTrusted,
-    /// The results are of work that ended early: exit status 1.
+    /// The command was interrupted and wrote incomplete results: exit status 1.
     Interrupted,
 }

@@ -14,7 +14,7 @@ use super::{diagnostic, interrupt};
 pub const REPORT: [&str; 2] = ["report.md", "report.html"];
 const FIGURES: &str = "figures";
 
-/// Result that cannot be written.
+/// Error of results that cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     #[error("cannot write {}: {source}", path.display())]
@@ -32,8 +32,8 @@ pub enum WriteError {
     Foreign { path: PathBuf },
 }
 
-/// Results of a command. They may replace files that flexcal wrote in their folder, except files
-/// that the command reads.
+/// Results of a command, as file names in a folder. They may replace files that flexcal wrote
+/// there, except files that the command reads.
 pub struct Results {
     pub folder: PathBuf,
     command: &'static str,
@@ -46,8 +46,9 @@ pub struct Results {
 }
 
 impl Results {
-    /// Claims the results of `command` called `names` in `folder`, if no other file is in their
-    /// way. [`write`](Self::write) may write more files.
+    /// Reserves the files `names` in `folder` for results of `command`. Fails if they would replace
+    /// a file that flexcal did not write or that the command reads. [`write`](Self::write) may
+    /// write more files.
     pub fn claim(
         command: &'static str,
         folder: PathBuf,
@@ -65,14 +66,14 @@ impl Results {
         Ok(claimed)
     }
 
-    /// Returns the existing files with names of figures, which a new page may replace.
+    /// Returns the existing files whose names are those of figures; a new page may replace them.
     fn figures(&self) -> Vec<String> {
         let Ok(entries) = fs::read_dir(self.folder.join(FIGURES)) else { return Vec::new() };
         let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
         names.filter(|name| is_figure(name)).map(|name| format!("{FIGURES}/{name}")).collect()
     }
 
-    /// States where the results are.
+    /// Returns a sentence that states where the results are.
     pub fn written(&self) -> String {
         // Some names are claimed for files that are not always written.
         let is_there = |name: &&String| self.path(name).exists();
@@ -85,13 +86,14 @@ impl Results {
         self.folder.join(name)
     }
 
-    /// Writes texts by name, each whole or not at all, after all of them are on the disk.
+    /// Writes texts to named files after all of them are on the disk, so that each file is complete
+    /// or absent.
     pub fn write(&self, texts: &[(&str, &str)]) -> Result<(), WriteError> {
         self.keep(texts, |_| false)
     }
 
     /// Writes texts and a report: `report.md`, `report.html` and its figures, which replace those
-    /// of an older page.
+    /// of an earlier report.
     pub fn write_report(&self, texts: &[(&str, &str)], report: &Report) -> Result<(), WriteError> {
         let drawn: Vec<(String, &str)> = report
             .figures
@@ -109,8 +111,8 @@ impl Results {
     }
 
     /// Writes all files or none, as far as file systems allow: obstacles are found before the first
-    /// file takes its place. Removes recorded files that `is_older` selects, and earlier files of
-    /// the same command that it does not write now.
+    /// file takes its name. Removes recorded files for which `is_older` is true, and earlier files
+    /// of the same command that it does not write now.
     fn keep(
         &self,
         texts: &[(&str, &str)],
@@ -161,7 +163,8 @@ impl Results {
         Ok(())
     }
 
-    /// Returns the first file that another command wrote, with that command; reports come first.
+    /// Returns the first file that another command wrote, with the name of that command; reports
+    /// come first.
     fn others(&self, record: &FolderRecord, texts: &[(&str, &str)]) -> Option<(String, String)> {
         let other = |&(name, _): &(&str, &str)| {
             let writer =
@@ -183,7 +186,7 @@ impl Results {
             .map_err(|source| WriteError::Io { path: FolderRecord::file(&self.folder), source })
     }
 
-    /// Checks that a result may take its name.
+    /// Checks that a result may take the file name `name`.
     fn check(&self, record: &FolderRecord, name: &str) -> Result<(), WriteError> {
         let path = self.path(name);
         let why = |why| Err(WriteError::InTheWay { path: path.clone(), why });
@@ -216,7 +219,8 @@ impl Results {
     }
 }
 
-/// Returns the columns of the terminal on standard output, unlimited if there is none.
+/// Returns the number of columns of the terminal on standard output; unlimited if there is no
+/// terminal.
 pub fn columns() -> usize {
     terminal_size::terminal_size_of(io::stdout())
         .map_or(usize::MAX, |(width, _)| usize::from(width.0).max(40))

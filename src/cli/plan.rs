@@ -85,7 +85,7 @@ fn workspace(arguments: &Arguments) -> Result<Option<Workspace>, WorkspaceError>
     Ok(said.then_some(Workspace { corners: room, planes }))
 }
 
-/// Workspace arguments that are invalid.
+/// Error of workspace arguments that are invalid.
 #[derive(Debug, thiserror::Error)]
 enum WorkspaceError {
     #[error(
@@ -123,7 +123,8 @@ impl From<CriterionArgument> for Criterion {
     }
 }
 
-/// Makes the plan, writes `plan.csv` and `plan.json`, and prints what the plan promises.
+/// Makes the plan, writes `plan.csv` and `plan.json`, and prints the accuracy that it is expected
+/// to give.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (common, source) = (&arguments.common, &arguments.source);
     let declared = Problem::read(common.problem())?;
@@ -194,7 +195,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(Outcome::NotTrusted)
 }
 
-/// Returns the two effects to separate, if they are named.
+/// Returns the two effects that the plan should distinguish, if `named` contains them.
 pub(super) fn pair(
     named: &[String],
     problem: &Problem,

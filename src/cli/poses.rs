@@ -1,4 +1,4 @@
-//! Source of poses that are still to be measured.
+//! Source of poses that are to be measured.
 
 use std::path::PathBuf;
 
@@ -27,7 +27,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// Returns the files that are named.
+    /// Returns the files that the arguments name.
     pub fn files(&self) -> Vec<PathBuf> {
         let truth = self
             .truth

@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::course::Course;
 
-/// Time before which no progress is shown.
+/// Time after the start before which no progress is shown.
 const PATIENCE: Duration = Duration::from_millis(500);
 /// Time between two refreshes of the line.
 const TICK: Duration = Duration::from_millis(200);
@@ -28,7 +28,7 @@ impl Line {
         Self::until(None)
     }
 
-    /// Creates a line of work that `stop` ends early.
+    /// Creates a line for work that the request `stop` ends early.
     fn until(stop: impl Into<Option<Stop>>) -> Arc<Self> {
         let bar = ProgressBar::new_spinner();
         let shown = ProgressStyle::with_template("{spinner} {elapsed} {wide_msg}");
@@ -42,8 +42,8 @@ impl Line {
         })
     }
 
-    /// Runs work that reports to a line of progress if that is `shown`, and clears the line
-    /// afterwards.
+    /// Runs `work` with a line of progress if `shown`, and clears the line afterwards. The request
+    /// `stop` ends the work early.
     pub fn during<T>(
         shown: bool,
         stop: impl Into<Option<Stop>>,
@@ -57,7 +57,7 @@ impl Line {
         done
     }
 
-    /// Returns the sink to which the library reports.
+    /// Returns the sink to which the library reports its progress.
     fn sink(self: &Arc<Self>) -> ProgressSink {
         let line = Arc::clone(self);
         Arc::new(move |progress| line.show(&progress))
@@ -73,7 +73,7 @@ impl Line {
         });
     }
 
-    /// Shows a message, unless the work has just begun.
+    /// Shows a message, unless the work began less than [`PATIENCE`] ago.
     pub fn say(&self, message: impl FnOnce() -> String) {
         if self.begun.elapsed() > PATIENCE && !self.bar.is_hidden() {
             self.ticking.call_once(|| self.bar.enable_steady_tick(TICK));
@@ -88,11 +88,11 @@ impl Line {
     }
 }
 
-/// Bar of the finished fits of a study, with the time left.
+/// Progress bar of the finished fits of a study, with the remaining time.
 pub struct FitBar(ProgressBar);
 
 impl FitBar {
-    /// Creates a bar of `fits` fits, of which `kept` are finished already.
+    /// Creates a bar of `fits` fits, of which `kept` were finished in an earlier run.
     pub fn new(fits: u64, kept: u64) -> Self {
         let bar = ProgressBar::new(fits);
         let shown = "{wide_bar} {human_pos} of {human_len} fits, {eta} left";

@@ -1,4 +1,4 @@
-//! Which correction predictions of a problem take.
+//! Choice of the correction that predictions of a problem use.
 
 use std::path::Path;
 
@@ -6,15 +6,15 @@ use flexcal::fit::SavedEstimate;
 use flexcal::problem::Problem;
 use flexcal::remainder::{Correction, SavedRemainderError};
 
-/// Reads the remainder that a problem declares and uses.
+/// Reads the remainder that a problem declares and uses; `None` if there is none.
 pub fn declared(problem: &Problem) -> Result<Option<Correction>, SavedRemainderError> {
     let used = problem.remainder.as_ref().filter(|declared| declared.is_used);
     used.map(|declared| read(problem, &declared.file)).transpose()
 }
 
-/// Reads what predictions with `estimate` are corrected by: the remainder of the problem, or else
-/// of the estimate, or else no more than their uncertainty; nothing where the estimate does not
-/// hold that.
+/// Reads the correction for predictions with `estimate`: the remainder of the problem, or else that
+/// of the estimate, or else only the uncertainty of predictions. Returns `None` if the estimate
+/// does not contain the uncertainty.
 pub fn of_estimate(
     problem: &Problem,
     estimate: &SavedEstimate,
@@ -37,7 +37,7 @@ fn read(problem: &Problem, file: &Path) -> Result<Correction, SavedRemainderErro
     Ok(correction)
 }
 
-/// A probability of bounds, between 0 and 1.
+/// Parses the probability of a bound, which is between 0 and 1.
 pub fn level(text: &str) -> Result<f64, String> {
     let level = text.parse::<f64>().ok().filter(|level| 0.0 < *level && *level < 1.0);
     level.ok_or_else(|| "a probability between 0 and 1 is needed, such as 0.95".to_owned())

@@ -75,7 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(Outcome::Done)
 }
 
-/// Reads the conditions and the target of each row of the tables.
+/// Reads the conditions of each row of the tables, with the name of its target.
 fn poses_of(
     arguments: &Arguments,
     problem: &Problem,

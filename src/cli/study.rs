@@ -70,14 +70,15 @@ struct Common {
     flags: Flags,
 }
 
-/// File that `--done` names.
+/// File that the argument `--done` names, written when the study is finished.
 struct Sentinel<'a>(&'a Path);
 
 impl<'a> Sentinel<'a> {
-    /// Content of the file.
+    /// Contents of the file.
     const TEXT: &'static str = "flexcal study: done\n";
 
-    /// Removes the file at `path` until the work is done. Errors if `--done` did not write it.
+    /// Removes an existing file at `path` until the work is done. Returns an error if `--done` did
+    /// not write it.
     fn claim(path: &'a Path) -> Result<Self, WriteError> {
         let io = |source| WriteError::Io { path: path.to_owned(), source };
         if path.symlink_metadata().is_ok() {
@@ -98,30 +99,30 @@ impl<'a> Sentinel<'a> {
     }
 }
 
-/// Missing folder of shares.
+/// Error of a missing folder of shares.
 #[derive(Debug, thiserror::Error)]
 #[error("--from {}: no such folder", folder.display())]
 struct NoFolder {
     folder: PathBuf,
 }
 
-/// Names of the results.
+/// Names of the files that the command may write.
 const NAMES: [&str; 4] = ["study.json", "parameters.csv", "timing.csv", "study.csv"];
 
 impl Common {
-    /// Claims the results of a study.
+    /// Claims the file names for the results of a study.
     fn results(&self, study: &Study) -> Result<Results, WriteError> {
         self.claim(&study.name, &study.files, &NAMES)
     }
 
-    /// Claims the results `names` of the study `name`, which reads `files`.
+    /// Claims the file names `names` for results of the study `name`, which reads `files`.
     fn claim(&self, name: &str, files: &[PathBuf], names: &[&str]) -> Result<Results, WriteError> {
         self.flags.claim("study", name, files.to_vec(), names)
     }
 }
 
-/// Makes the open fits, or merges shares; then writes `study.csv`, `study.json`, `parameters.csv`,
-/// `timing.csv` and prints the table.
+/// Computes the unfinished fits, or merges shares; then writes `study.csv`, `study.json`,
+/// `parameters.csv`, `timing.csv` and prints the table.
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     if let Some(Merge::Merge { common, from }) = &arguments.merge {
         let study = Study::read(&common.study)?;
@@ -145,7 +146,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     Ok(outcome)
 }
 
-/// Makes the fits of a study, or of a share of it.
+/// Computes the unfinished fits of a study, or of a share of it.
 fn work(common: &Common, shard: Option<Shard>) -> Result<Outcome, Box<dyn Error>> {
     let study = match Request::read(&common.study)? {
         Request::Fits(study) => *study,

@@ -15,7 +15,7 @@ use super::urdf::UrdfErrorKind;
 /// Kind of an input error.
 ///
 /// The message of each variant states the cause and the remedy. [`Location`](super::Location) holds
-/// the place.
+/// file and line.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the message of each variant says what it stands for")]

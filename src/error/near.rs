@@ -5,10 +5,11 @@ use strsim::{damerau_levenshtein, normalized_damerau_levenshtein};
 /// Minimum similarity of a suggested word: 1 for the same word, 0 for no common letter.
 const MIN_SIMILARITY: f64 = 0.6;
 
-/// Maximum length of a word that gets a suggestion [bytes]; no known word is that long.
+/// Maximum length of a word for which a suggestion is searched [bytes]; known words are shorter.
 const MAX_SUGGESTION_BYTES: usize = 80;
 
-/// Returns the known word most similar to `word`, if one is similar enough; the first of equals.
+/// Returns the known word most similar to `word`, if its similarity is at least [`MIN_SIMILARITY`];
+/// the first of equally similar ones.
 pub(crate) fn nearest<T: AsRef<str>>(word: &str, known: impl IntoIterator<Item = T>) -> Option<T> {
     if word.len() > MAX_SUGGESTION_BYTES {
         return None;
@@ -37,12 +38,12 @@ pub(super) fn meant<T: AsRef<str>>(word: &str, known: impl IntoIterator<Item = T
     question(nearest(word, known).as_ref().map(AsRef::as_ref))
 }
 
-/// Returns ` (is it …?)` if a similar word was found, otherwise an empty text.
+/// Returns ` (is it …?)` with a similar word and its noun; an empty text for `None`.
 pub(super) fn instead(noun: &str, near: Option<&str>) -> String {
     near.map_or_else(String::new, |near| format!(" (is it {noun}{near}?)"))
 }
 
-/// Returns ` (did you mean …?)` for a suggestion, otherwise an empty text.
+/// Returns ` (did you mean …?)` for a suggested word; an empty text for `None`.
 pub(super) fn question(meant: Option<&str>) -> String {
     meant.map_or_else(String::new, |meant| format!(" (did you mean {meant}?)"))
 }

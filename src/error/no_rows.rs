@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-/// Reason why one part of the split is empty.
+/// Reason why one part of the split (identification or held-out rows) is empty.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NoRows {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::shortened;
 
-/// Returns the plural ending for a count.
+/// Returns the plural ending `s` unless `count` is 1.
 pub(super) fn plural(count: usize) -> &'static str {
     if count == 1 { "" } else { "s" }
 }
@@ -14,7 +14,7 @@ pub(super) fn near(text: &str) -> String {
     if text.is_empty() { String::new() } else { format!(", near `{text}`") }
 }
 
-/// Returns which of two files has a column.
+/// States which of two files has a column: the present one if `has`, else `other`.
 pub(super) fn difference(other: &Path, has: bool) -> String {
     let says = if has { "has this column, this file does not" } else { "does not have it" };
     format!("{} {says}", other.display())
@@ -27,7 +27,7 @@ pub(super) fn in_quotes(names: &[String]) -> String {
     list("there are", &names, "its header is empty")
 }
 
-/// Returns `verb` followed by the names, or `none` without names.
+/// Returns `verb` followed by the names, or the text `none` if there are no names.
 pub(super) fn list(verb: &str, names: &[String], none: &str) -> String {
     if names.is_empty() { none.to_owned() } else { format!("{verb} {}", names.join(", ")) }
 }

@@ -112,7 +112,7 @@ fn covariate(meant: Option<&str>) -> &'static str {
     if meant.is_none() { " (name it in [data.covariates] if the arm may depend on it)" } else { "" }
 }
 
-/// Returns the rows after the first in words.
+/// Names the other rows that a warning concerns; `rows` is their number.
 fn listed(rows: usize, others: &[String]) -> String {
     let left = rows.saturating_sub(1 + others.len());
     let left = if left > 0 { format!(" and {left} more") } else { String::new() };

@@ -1,4 +1,4 @@
-//! Poses with the answers of this library, for the test of the generated code.
+//! Poses with the results of this library, by which the generated code is tested.
 
 use nalgebra::{DVector, UnitQuaternion, Vector3};
 use rand::RngExt as _;
@@ -12,36 +12,37 @@ use crate::random::stream;
 use crate::remainder::{self, Correction};
 use crate::spatial::rotation_axes;
 
-/// Seed of the poses.
+/// Seed of the random poses.
 const SEED: u64 = 0x6578_706f_7274;
-/// Range of commands without limits, to both sides \[rad\] and \[m\].
+/// Half-width of the range of commands without limits, \[rad\] and \[m\].
 const WIDE: (f64, f64) = (3.0, 0.5);
-/// Range of the temperature about the reference, to both sides \[K\].
+/// Half-width of the range of temperatures about the reference \[K\].
 const TEMPERATURES: f64 = 10.0;
-/// Range of the hoist force over the declared one, to both sides.
+/// Half-width of the range of the hoist force about the declared one, as a fraction of it.
 const HOIST_SHARE: f64 = 0.1;
-/// Largest time of a pose after the first \[s\].
+/// Longest time of a pose after the first one \[s\].
 const LAST_TIME: f64 = 3600.0;
 
-/// Poses of a test, with what this library answers.
+/// Poses of a test, with the results that this library computes for them.
 #[derive(Debug, Clone)]
 pub struct Answers {
     /// Names of the bases, in the order of the generated code.
     pub bases: Vec<String>,
     /// Names of the targets.
     pub targets: Vec<String>,
-    /// Numbers of each pose, in the order of the test program.
+    /// Input and output numbers of each pose, in the order that the test program reads.
     pub rows: Vec<Vec<f64>>,
 }
 
-/// Draws `count` poses within the limits of the joints and predicts them with the identified arm;
-/// for the first `commands` poses it also computes the command that brings the arm to where the
-/// nominal arm would have been. Poses without equilibrium are left out.
+/// Draws `count` poses within the limits of the joints and predicts them with the identified arm.
+/// For the first `commands` poses it also computes the command by which the arm reaches the nominal
+/// arm's position. Poses without equilibrium are left out.
 ///
-/// Returns the answers, and the model and full parameter vector for their bases and targets.
+/// Returns the answers, with the model and full parameter vector for their bases and targets.
 ///
 /// # Errors
-/// The estimate is of another problem, or a joint's limits exclude each other.
+/// Returns an error if the estimate belongs to another problem, or if a joint's limits exclude each
+/// other.
 pub fn answers(
     problem: &Problem,
     estimate: &SavedEstimate,
@@ -117,12 +118,13 @@ pub fn answers(
     Ok((Answers { bases, targets, rows: numbers }, model, x))
 }
 
-/// Returns the axes of a rotation vector.
+/// Returns the nine components of the axes of a rotation vector \[rad\], axis by axis.
 fn columns(turn: &Vector3<f64>) -> Vec<f64> {
     rotation_axes(turn).iter().flat_map(|axis| axis.iter().copied()).collect()
 }
 
-/// Draws poses over all bases, targets and conditions that matter.
+/// Draws random poses over all bases and targets, and over those conditions on which predictions
+/// depend.
 pub(super) fn random_rows(
     problem: &Problem,
     estimate: &SavedEstimate,

@@ -25,26 +25,26 @@ pub enum ExportError {
         /// The number.
         value: f64,
     },
-    /// Hardly any pose reaches the workspace.
+    /// Too few of the poses drawn are inside the workspace.
     #[error(
         "{found} of {draws} poses within the joint limits are inside of the workspace; widen it"
     )]
     Unreachable {
-        /// Number of poses inside.
+        /// Number of poses inside the workspace.
         found: usize,
         /// Number of poses drawn.
         draws: usize,
     },
-    /// Problem and poses do not fit each other.
+    /// Problem and poses do not match.
     #[error(transparent)]
     Input(#[from] InputError),
     /// Poses of the test cannot be predicted.
     #[error(transparent)]
     Predict(#[from] PredictError),
-    /// Poses of the test do not fit together.
+    /// Poses of the test do not form a valid data set.
     #[error(transparent)]
     Poses(#[from] DatasetError),
-    /// The estimate is of another problem.
+    /// The estimate belongs to another problem.
     #[error(transparent)]
     Estimate(#[from] SavedEstimateError),
     /// Commands of the test cannot be computed.

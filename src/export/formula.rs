@@ -1,4 +1,4 @@
-//! Numbers and formulas of laws as C.
+//! Generator of C constants and C expressions for formulas of laws.
 
 use std::fmt::Write as _;
 
@@ -7,10 +7,10 @@ use crate::laws::Quantity;
 use crate::laws::expression::{Expression, Function, Operator};
 use crate::model::parameter::Regressor;
 
-/// Numbers of a table on one line.
+/// Number of table entries written on one line.
 const NUMBERS_PER_LINE: usize = 6;
 
-/// Returns the definitions of the functions that `code` calls and C lacks.
+/// Returns the definitions of those functions that `code` calls and that C lacks.
 pub(super) fn helpers(code: &str) -> String {
     let functions = include_str!("c/helpers.c").split_inclusive("}\n\n");
     let name =
@@ -27,7 +27,7 @@ pub(super) fn real(number: f64) -> String {
     format!("R({number:?})")
 }
 
-/// Writes a table of numbers.
+/// Writes a table of numbers as a C array called `name`.
 pub(super) fn array(text: &mut String, name: &str, values: &[f64]) {
     let _ = writeln!(text, "static const real {name}[{}] = {{", values.len().max(1));
     if values.is_empty() {
@@ -40,8 +40,8 @@ pub(super) fn array(text: &mut String, name: &str, values: &[f64]) {
     text.push_str("};\n");
 }
 
-/// Returns the value of a regressor in a pose; the parameters inside of it stand in the table from
-/// `first` on.
+/// Returns the C expression for the value of a regressor in a pose. The parameters inside its
+/// formula are in the table of numbers from index `first` on.
 pub(super) fn formula(regressor: &Regressor, first: usize) -> Result<String, ExportError> {
     let Some(expression) = super::numbers::expression(regressor) else {
         return Ok("R(1.0)".to_owned());
@@ -61,7 +61,7 @@ struct Printer {
 }
 
 impl Printer {
-    /// Returns the text of an expression; `None` if it depends on earlier poses.
+    /// Returns the C text of an expression; `None` if it depends on earlier poses.
     fn print(&self, expression: &Expression) -> Option<String> {
         Some(match expression {
             Expression::Number(number) => real(*number),

@@ -1,4 +1,4 @@
-//! Numbers of a model in one list, with their names: the tables of the generated code.
+//! Numbers of a model in one list, with their names: the parameter table of the generated code.
 
 use crate::laws::expression::Expression;
 use crate::mechanics::{Angle, Beam, Joint, PointMass};
@@ -6,7 +6,7 @@ use crate::model::parameter::Regressor;
 use crate::model::{ModelParts, PartSite};
 use crate::spatial::Frame;
 
-/// Numbers of a joint: name in the code and unit, in the order of [`of_joint`].
+/// Name and unit of each number of a joint, in the order of [`of_joint`].
 pub(super) const JOINT: &[(&str, &str)] = &[
     ("X", "m"),
     ("Y", "m"),
@@ -38,7 +38,7 @@ pub(super) const JOINT: &[(&str, &str)] = &[
     ("RATE", "N/m"),
     ("PRELOAD", "N"),
 ];
-/// Numbers of a beam, in the order of [`of_beam`].
+/// Name and unit of each number of a beam, in the order of [`of_beam`].
 pub(super) const BEAM: &[(&str, &str)] = &[
     ("MASS", "kg"),
     ("AXIAL", "1/N"),
@@ -51,9 +51,9 @@ pub(super) const BEAM: &[(&str, &str)] = &[
     ("STRAIN_Y", "1/m"),
     ("STRAIN_Z", "1/m"),
 ];
-/// Numbers of a point mass.
+/// Name and unit of each number of a point mass.
 pub(super) const LOAD: &[(&str, &str)] = &[("MASS", "kg"), ("X", "m"), ("Y", "m"), ("Z", "m")];
-/// Numbers of a hoist.
+/// Name and unit of each number of a hoist.
 pub(super) const HOIST: &[(&str, &str)] = &[
     ("X", "m"),
     ("Y", "m"),
@@ -63,7 +63,7 @@ pub(super) const HOIST: &[(&str, &str)] = &[
     ("DIRECTION_Y", "1"),
     ("DIRECTION_Z", "1"),
 ];
-/// Numbers of a frame.
+/// Name and unit of each number of a frame.
 pub(super) const FRAME: &[(&str, &str)] = &[
     ("XX", "1"),
     ("XY", "1"),
@@ -79,13 +79,13 @@ pub(super) const FRAME: &[(&str, &str)] = &[
     ("Z", "m"),
 ];
 
-/// Numbers of a model in the order of the generated table.
+/// Numbers of a model, in the order of the generated table.
 #[derive(Debug, Default)]
 pub(super) struct Numbers {
     pub values: Vec<f64>,
-    /// Meaning of each number.
+    /// Comment that describes each number.
     pub comments: Vec<String>,
-    /// Name and first index of each group.
+    /// Name of each group of numbers, and index of its first number.
     pub groups: Vec<(&'static str, usize)>,
 }
 
@@ -178,7 +178,7 @@ impl Numbers {
     }
 }
 
-/// Returns a site in words.
+/// Describes a site in words, for a comment.
 fn site(site: PartSite) -> String {
     let of = |is_error: bool| if is_error { "readings" } else { "base" };
     match site {
@@ -189,7 +189,8 @@ fn site(site: PartSite) -> String {
     }
 }
 
-/// Returns names and values of the parameters inside of a regressor's formula.
+/// Returns full names and values of the parameters inside a regressor's formula; empty if there are
+/// none.
 pub(super) fn inner(regressor: &Regressor) -> &[(String, f64)] {
     match regressor {
         Regressor::Formula(formula) => formula.parameters(),
@@ -197,7 +198,7 @@ pub(super) fn inner(regressor: &Regressor) -> &[(String, f64)] {
     }
 }
 
-/// Returns the expression of a regressor; `None` if it multiplies by 1.
+/// Returns the expression of a regressor; `None` if it is the constant 1.
 pub(super) fn expression(regressor: &Regressor) -> Option<Expression> {
     (!matches!(regressor, Regressor::Unit | Regressor::Constant)).then(|| regressor.expression())
 }

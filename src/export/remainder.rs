@@ -1,4 +1,4 @@
-//! Tables of a remainder as C.
+//! Generator of the tables of a remainder in C.
 
 use std::fmt::Write as _;
 
@@ -7,13 +7,14 @@ use nalgebra::DVector;
 use super::formula::{array, real};
 use crate::remainder::{CorrectionTables, InputSource, InputTable, SiteTable};
 
-/// Half the step of a parameter's difference, over its prior σ.
+/// Half the step of a central difference with respect to a parameter, as a fraction of its prior σ.
 const PARAMETER_STEP: f64 = 1e-3;
-/// Half the step of the difference along the parameters' change beside a remainder, over that
-/// change.
+/// Half the step of a central difference along the change of the parameters that was fitted
+/// together with a remainder, as a fraction of that change.
 const DELTA_STEP: f64 = 0.05;
 
-/// Writes the tables of a remainder. `numbers` returns the numbers of the model at a parameter vector.
+/// Writes the tables of a remainder as C. `numbers` returns the model's table of numbers at a full
+/// parameter vector.
 pub(super) fn remainder(
     tables: &CorrectionTables,
     x: &DVector<f64>,

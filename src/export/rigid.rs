@@ -1,4 +1,4 @@
-//! Best rigid geometry of a workspace: the pose-independent part of a whole model.
+//! Rigid geometry that approximates a whole model best in a workspace.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -12,38 +12,41 @@ use crate::problem::{Joint, JointKind, PoseView, Problem};
 use crate::remainder::Correction;
 use crate::spatial::Frame;
 
-/// Poses that the geometry is fitted to, and as many others that judge it.
+/// Number of poses to which the geometry is fitted, and number of other poses that judge it.
 const POSES: usize = 300;
-/// Poses that are drawn for each one inside of the workspace.
+/// Maximum number of drawn poses for each one needed inside the workspace.
 const DRAWS: usize = 40;
-/// Distance from the target of two more points, which hold its orientation \[m\].
+/// Distance of two additional points from the target, by which its orientation is fitted \[m\].
 const LEVER: f64 = 0.1;
-/// Step of differences by a parameter \[rad\] or \[m\].
+/// Step of numerical derivatives with respect to a geometric parameter \[rad\] or \[m\].
 const STEP: f64 = 1e-6;
-/// Passes of Gauss–Newton; the problem is nearly linear.
+/// Number of Gauss–Newton passes. Few suffice, because the problem is nearly linear.
 const PASSES: usize = 5;
-/// Ridge over the largest squared singular value: directions below it keep their values.
+/// Ridge relative to the largest squared singular value. Directions with smaller singular values
+/// keep their identified values.
 const RIDGE: f64 = 1e-10;
 
-/// Rigid arm that comes nearest to a whole model in a workspace.
+/// Rigid arm that approximates a whole model best in a workspace.
 #[derive(Debug, Clone)]
 pub struct RigidFit {
     /// Arm with the fitted geometry.
     pub arm: Arm<f64>,
-    /// Distance of the identified geometry from the whole model, in poses that took no part.
+    /// Errors of the identified geometry alone relative to the whole model, in poses that were not
+    /// fitted.
     pub identified: ErrorSummary,
-    /// Distance of the fitted geometry from the whole model in these poses.
+    /// Errors of the fitted geometry relative to the whole model, in the same poses.
     pub best: ErrorSummary,
 }
 
-/// Fits α, a, θ, d and β of all joints to the positions and orientations of the whole model in
-/// poses drawn within the limits of the joints and a workspace.
+/// Fits α, a, θ, d and β of all joints to the positions and orientations that the whole model
+/// predicts, in poses drawn within the joint limits and a workspace.
 ///
-/// Minimises Σ ‖p − p̂(x)‖² over the target and two points beside it; directions that no pose
-/// determines keep their identified values. Base and target stay.
+/// Minimises Σ ‖p − p̂(x)‖² over the target and two points near it. Directions that no pose
+/// determines keep their identified values; base and target are fixed.
 ///
 /// # Errors
-/// The estimate is of another problem, or too few poses reach the workspace.
+/// Returns an error if the estimate belongs to another problem, or if too few poses reach the
+/// workspace.
 pub fn best_rigid(
     problem: &Problem,
     estimate: &SavedEstimate,
@@ -129,8 +132,8 @@ pub fn best_rigid(
     Ok(RigidFit { identified: judged(&identified), best: judged(&arm), arm })
 }
 
-/// Returns measured − predicted of the positions in `poses` by a rigid arm on the bases and with the
-/// targets of the full parameter vector `x`, measuring frame \[m\].
+/// Returns measured − predicted of the positions in `poses`, measuring frame \[m\], predicted by a
+/// rigid arm. Bases and targets are those of `model` at the full parameter vector `x`.
 pub fn rigid_errors(
     problem: &Problem,
     (model, x): (&Model, &DVector<f64>),
@@ -145,8 +148,8 @@ pub fn rigid_errors(
     poses.iter().map(of_pose).collect()
 }
 
-/// Returns the frame that carries the target of a pose on a rigid arm; mimic joints follow their
-/// leaders.
+/// Returns the frame that carries the target of a pose on a rigid arm, arm base frame; mimic joints
+/// follow their leaders.
 fn rigid_frame(problem: &Problem, model: &Model, arm: &Arm<f64>, pose: &Pose) -> Frame<f64> {
     let commands = pose.setup.configuration;
     let led = |(joint, q): (&Joint, &f64)| {
@@ -157,7 +160,7 @@ fn rigid_frame(problem: &Problem, model: &Model, arm: &Arm<f64>, pose: &Pose) ->
     arm.rigid_frame(&setup, model.target_joint(pose.target))
 }
 
-/// Adds to α, a, θ, d or β of a joint.
+/// Adds `by` to the geometric parameter `field` of a joint: 0 to 4 for α, a, θ, d, β.
 fn change(arm: &mut Arm<f64>, joint: usize, field: usize, by: f64) {
     let joint = &mut arm.joints[joint];
     match field {

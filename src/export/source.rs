@@ -1,4 +1,4 @@
-//! Source text: tables and formulas around the templates.
+//! Assembly of the C source: templates with generated tables and formulas.
 
 use std::fmt::Write as _;
 
@@ -14,7 +14,7 @@ use crate::model::{Model, ModelParts, PartSite};
 use crate::problem::{Equilibrium, JointKind, Problem};
 use crate::remainder::Correction;
 
-/// Generated files.
+/// Text of the generated C files.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Sources {
     /// Text of `flexcal_model.h`.
@@ -112,7 +112,7 @@ pub fn sources(
     Ok(Sources { header, model: text, test })
 }
 
-/// Returns a name that cannot end a comment.
+/// Returns a name without characters that would end a C comment.
 fn plain(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_graphic() && !"*\\".contains(c) { c } else { '_' }).collect()
 }
@@ -230,7 +230,7 @@ fn bits(flags: &[bool]) -> String {
     flags.iter().map(|&flag| usize::from(flag).to_string()).collect::<Vec<_>>().join(", ")
 }
 
-/// Writes the numbers of the model, each with its meaning.
+/// Writes the numbers of the model, each with a comment.
 fn table(text: &mut String, numbers: &Numbers) {
     text.push_str("\n/* Offsets within the numbers of the model. */\nenum {\n");
     for (prefix, fields) in [("J", JOINT), ("B", BEAM), ("L", LOAD), ("H", HOIST), ("F", FRAME)] {
@@ -257,7 +257,7 @@ fn table(text: &mut String, numbers: &Numbers) {
     text.push_str("};\n\n");
 }
 
-/// Writes the function that evaluates laws and effects of a pose.
+/// Writes the C function that evaluates the terms of laws and effects in a pose.
 fn terms(parts: &ModelParts, numbers: &Numbers) -> Result<String, ExportError> {
     let mut text = include_str!("c/terms.c").to_owned();
     let mut at = numbers.groups.last().map_or(0, |group| group.1);

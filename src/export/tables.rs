@@ -10,9 +10,9 @@ use crate::problem::{JointKind, Problem};
 use crate::spatial::Frame;
 use crate::urdf::{YamlFormat, joint_origins, yaml_key};
 
-/// Sine of the angle between two axes below which they count as parallel.
+/// Largest sine of the angle between two axes that count as parallel.
 const PARALLEL: f64 = 1e-12;
-/// Offset along an axis from which near-parallel axes are pointed out \[m\].
+/// Smallest offset along an axis at which a comment points out nearly parallel axes \[m\].
 const FAR: f64 = 10.0;
 
 /// Returns the geometry as YAML in the form of the problem:
@@ -83,8 +83,8 @@ pub fn standard_dh(problem: &Problem, arm: &Arm<f64>) -> Result<String, ExportEr
     Ok(text)
 }
 
-/// Returns θ, d, a and α of a transform between two axes, and the rotation about and shift along
-/// the second axis that remain: C = Rz(θ) Tz(d) Tx(a) Rx(α) · rest.
+/// Returns θ, d, a and α of a transform C between two axes, and the remaining transform, a rotation
+/// about and a shift along the second axis: C = Rz(θ) Tz(d) Tx(a) Rx(α) · remaining.
 fn standard(link: &Frame<f64>) -> ([f64; 4], Frame<f64>) {
     let (z, p) = (link.axes[2], link.origin);
     let mut sine = z.xy().norm();

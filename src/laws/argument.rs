@@ -1,13 +1,13 @@
-//! Arguments of effects, as files write them.
+//! Arguments of effects, in the syntax of files.
 
 use serde::Serialize;
 
-/// Part of the arm that moves with a covariate: a joint, from 1, or the base.
+/// Part of the arm that a covariate displaces: a joint, counted from 1, or the base.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mount {
-    /// A joint that takes a command.
+    /// Joint that takes a command.
     Joint(usize),
-    /// The base.
+    /// Base of the arm.
     Base,
 }
 
@@ -15,7 +15,7 @@ pub enum Mount {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FreeLength(pub f64);
 
-/// Kind of an argument: the values it may have on an arm.
+/// Kind of an argument, which determines its valid values on an arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ArgumentKind {
@@ -27,42 +27,43 @@ pub enum ArgumentKind {
     TurningJoint,
     /// Number of a prismatic joint that takes a command.
     SlidingJoint,
-    /// Number of a joint before which there is a link.
+    /// Number of a joint that has a link before it.
     LinkedJoint,
-    /// Number of a revolute joint that gives way about its axis.
+    /// Number of a revolute joint that is compliant about its axis.
     RelievedJoint,
-    /// Number of a joint that takes a command, other than the one of the argument before.
+    /// Number of a joint that takes a command and differs from the joint of the preceding argument.
     OtherJoint,
-    /// A joint that takes a command, or the base.
+    /// Joint that takes a command, or the base.
     Mount,
     /// Name of a beam.
     Beam,
     /// Name of a covariate of the problem.
     Covariate,
-    /// Whole orders of harmonics.
+    /// Integer orders of harmonics.
     Orders,
-    /// Order of a wave, cycles a revolution.
+    /// Order of a wave \[cycles per revolution\].
     Order,
-    /// A time \[s\].
+    /// Time \[s\].
     Time,
-    /// A time above zero \[s\].
+    /// Duration, above zero \[s\].
     Duration,
-    /// A path of a joint above zero \[rad\].
+    /// Path of a joint, above zero \[rad\].
     Distance,
-    /// A point of the plane across a joint's axis \[m\].
+    /// Point in the plane normal to a joint's axis \[m\].
     Point,
-    /// A length, 0 or more \[m\].
+    /// Length, not negative \[m\].
     FreeLength,
 }
 
 impl ArgumentKind {
-    /// Returns true if the value is searched: effects that differ in nothing else are one effect
-    /// whose value is not yet found.
+    /// Returns true if the search determines the value. Effects that differ only in it count as one
+    /// effect with an undetermined value.
     pub fn is_searched(self) -> bool {
         matches!(self, Self::Order | Self::Time | Self::Duration | Self::Distance)
     }
 
-    /// Returns true if values between those of the candidates can be told apart.
+    /// Returns true if the data can distinguish values between those of the candidates, so that the
+    /// value can be refined.
     pub fn is_scalable(self) -> bool {
         matches!(self, Self::Duration | Self::Distance)
     }
@@ -79,19 +80,19 @@ pub enum Argument {
     Orders(Vec<u32>),
     /// Name of a beam or of a declared law.
     Name(String),
-    /// A time \[s\], a path \[rad\], or the order of a wave.
+    /// Time \[s\], path \[rad\], or order of a wave.
     Number(f64),
-    /// A point of a plane \[m\].
+    /// Point in a plane \[m\].
     Point([f64; 2]),
-    /// A length that is no part of the place \[m\].
+    /// Length that is not part of the effect's place \[m\].
     Length(f64),
-    /// The base, `true`.
+    /// The base, written as `true`.
     Base(bool),
-    /// Text that is no part of the place.
+    /// Text that is not part of the effect's place.
     Text(String),
-    /// Formulas.
+    /// List of formulas.
     Texts(Vec<String>),
-    /// Named numbers.
+    /// Numbers with names.
     #[serde(serialize_with = "as_map")]
     Numbers(Vec<(&'static str, f64)>),
 }
@@ -104,7 +105,7 @@ fn as_map<S: serde::Serializer>(
 }
 
 impl Argument {
-    /// Returns the value as TOML writes it.
+    /// Returns the value in TOML syntax.
     pub fn toml(&self) -> String {
         let list = |all: Vec<String>| format!("[{}]", all.join(", "));
         match self {
@@ -125,7 +126,8 @@ impl Argument {
         }
     }
 
-    /// Returns its part of the place of an effect, which parameters carry in brackets.
+    /// Returns the argument's part of the effect's place, which parameter names contain in
+    /// brackets; `None` if it has none.
     pub(crate) fn place(&self) -> Option<String> {
         match self {
             Self::Joint(joint) => Some(joint.to_string()),
@@ -137,21 +139,21 @@ impl Argument {
     }
 }
 
-/// Returns a name in quotes as TOML writes it, with a backslash before quotes and backslashes.
+/// Returns a name in quotes in TOML syntax, with a backslash before quotes and backslashes.
 pub(crate) fn quoted(name: &str) -> String {
     format!("\"{}\"", name.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
-/// Returns a number as TOML writes a float.
+/// Returns a number as a float in TOML syntax.
 fn float(number: f64) -> String {
     if number.fract() == 0.0 { format!("{number:.1}") } else { number.to_string() }
 }
 
-/// Type of a field of an effect, which is read from and written as an argument.
+/// Type of an effect's field that is read from and written as an argument.
 pub(super) trait Field: Sized {
-    /// Returns the argument with its key, by that of the field.
+    /// Returns the field as an argument, with the key that files use.
     fn argument(&self, key: &'static str) -> (&'static str, Argument);
-    /// Returns the value of an argument of this type.
+    /// Returns the field's value from an argument; `None` if that has another type.
     fn of(argument: &Argument) -> Option<Self>;
 }
 

@@ -1,16 +1,16 @@
-//! The catalogue of effects: one entry a family, from which everything else follows.
+//! Catalogue of effects. It has one entry for each family, from which everything else follows.
 //!
-//! An entry reads `Variant "name-in-files" { field: Type = Kind as "key" } => Family { … }`. Formulas
-//! are those of [`expression`](super::expression); `{joint}` stands for the argument `joint`. θ is
-//! the joint's command, M the moment that the outboard loads exert at the place, T the temperature
-//! above the reference. At zero every effect does nothing.
+//! An entry reads `Variant "name-in-files" { field: Type = Kind as "key" } => Family { … }`.
+//! Formulas are those of [`expression`](super::expression); `{joint}` stands for the argument
+//! `joint`. θ is the joint's command, M the moment that the outboard loads exert at the place, T
+//! the temperature above the reference. Every effect vanishes if its parameters are zero.
 
 use super::argument::{Argument, ArgumentKind, Field, FreeLength, Mount};
 use super::family::{At, Chance, Family, Need, Only, Prior, Search, TermEntry};
 use super::law::{LAW, Law};
 use super::site::{ArmField, BeamField, JointField};
 
-/// Returns the key of an argument: the name of its field, or the one behind `as`.
+/// Returns the key of an argument: the name of its field, or the text after `as`.
 macro_rules! key {
     ($field:ident) => {
         stringify!($field)
@@ -20,21 +20,21 @@ macro_rules! key {
     };
 }
 
-/// Makes [`Effect`] and [`FAMILIES`] from the entries of the catalogue.
+/// Defines [`Effect`] and [`FAMILIES`] from the entries of the catalogue.
 macro_rules! catalogue {
     ($(
         $(#[$doc:meta])*
         $variant:ident $name:literal $({ $($field:ident: $type:ty = $kind:ident $(as $key:literal)?),+ })?
         => $family:expr;
     )+) => {
-        /// Effect with its arguments; joints are numbered from 1 as in files, links go by the name
-        /// of their beam.
+        /// Effect with its arguments. Joints are numbered from 1 as in files, links are identified
+        /// by the name of their beam.
         #[derive(Debug, Clone, PartialEq)]
         #[non_exhaustive]
         #[expect(missing_docs, reason = "arguments carry the names of the file format")]
         pub enum Effect {
             $($(#[$doc])* $variant $({ $($field: $type),+ })?,)+
-            /// Declared law, or one that the search for effects wrote down.
+            /// Declared law, or a law that the search for effects composed.
             Law(Law),
         }
 
@@ -48,14 +48,14 @@ macro_rules! catalogue {
         /// Names of effects in files: the families, and declared laws.
         pub(crate) const NAMES: &[&str] = &[$($name,)+ LAW];
 
-        /// Place of each family in [`FAMILIES`].
+        /// Index of each family in [`FAMILIES`].
         #[derive(Clone, Copy)]
         enum Index {
             $($variant),+
         }
 
         impl Effect {
-            /// Returns the family; `None` for a declared law.
+            /// Returns the family of the effect; `None` for a declared law.
             #[doc(hidden)]
             pub fn family(&self) -> Option<&'static Family> {
                 let index = match self {
@@ -76,8 +76,8 @@ macro_rules! catalogue {
                 }
             }
 
-            /// Returns the effect of a family with these arguments, by their keys; `None` where one
-            /// is missing or of another kind.
+            /// Creates the effect of the family `name` from its arguments by key; `None` if one is
+            /// missing or of another kind.
             pub(crate) fn build(name: &str, argument: impl Fn(&str) -> Option<Argument>) -> Option<Self> {
                 match name {
                     $($name => Some(Self::$variant $({
@@ -90,21 +90,22 @@ macro_rules! catalogue {
     };
 }
 
-/// Prior of an angle or length that repeats or drifts [rad, m].
+/// Prior σ of an angle or length that repeats or drifts \[rad\] or \[m\].
 const SMALL: f64 = 1e-3;
-/// Prior of a relative error.
+/// Prior σ of a relative error.
 const PERCENT: f64 = 0.01;
-/// Prior of a displacement of the instrument \[m\].
+/// Prior σ of a displacement of the instrument's readings \[m\].
 const SHIFTED: f64 = 5e-3;
-/// Prior of a displacement \[m\] and turn \[rad\] of an instrument that was knocked or set down again.
+/// Prior σ of the displacement \[m\] and rotation \[rad\] of an instrument that was knocked or set
+/// up again.
 const MOVED: f64 = 1e-2;
-/// Prior of a flexibility 1/EI [1/(N·m²)].
+/// Prior σ of a bending flexibility 1/EI [1/(N·m²)].
 const FLEXIBLE: f64 = 1e-2;
-/// Angle that no joint exceeds under the greatest conceivable moment \[rad\].
+/// Largest plausible rotation of a joint under the largest plausible moment \[rad\].
 const MAX_TURN: f64 = 0.1;
 
 catalogue! {
-    /// A joint declared rigid turns by Δθ = c `M_z`.
+    /// Compliance of a joint that is declared rigid: Δθ = c `M_z`.
     JointCompliance "joint-compliance" { joint: usize = AnyJoint } => Family {
         terms: &[TermEntry::at(At::Joint(JointField::Compliance), "compliance", 1e-3).never_negative()],
         says: "joint {joint} gives way about its axis",
@@ -112,7 +113,7 @@ catalogue! {
         needs: &[Need::Loads],
         ..Family::PLAIN
     };
-    /// Δθ = Σₖ aₖ sin kθ + bₖ cos kθ.
+    /// Harmonics of integer order of a joint's command: Δθ = Σₖ aₖ sin kθ + bₖ cos kθ.
     JointHarmonic "joint-harmonic" { joint: usize = MovingJoint, orders: Vec<u32> = Orders } => Family {
         terms: &[
             TermEntry::driven(At::Coordinate, "sin{orders}", "sin({orders}*q{joint})", SMALL),
@@ -125,7 +126,7 @@ catalogue! {
         chance: Chance::Orders,
         ..Family::PLAIN
     };
-    /// Δθ = a sin kθ + b cos kθ of an order k that need be no whole number: a stage of a gear.
+    /// Wave of any order k, such as the error of an inner gear stage: Δθ = a sin kθ + b cos kθ.
     JointWave "joint-wave" { joint: usize = MovingJoint, order: f64 = Order } => Family {
         terms: &[
             TermEntry::driven(At::Coordinate, "sin", "sin({order}*q{joint})", SMALL),
@@ -136,29 +137,30 @@ catalogue! {
         chance: Chance::Waves,
         ..Family::PLAIN
     };
-    /// Δθ = ε θ.
+    /// Error of the transmission ratio: Δθ = ε θ.
     GearRatio "gear-ratio" { joint: usize = MovingJoint } => Family {
         terms: &[TermEntry::driven(At::Coordinate, "error", "q{joint}", PERCENT)],
         says: "transmission ratio of joint {joint} is off",
         needs: &[Need::Moves("joint")],
         ..Family::PLAIN
     };
-    /// Δθ = (b/2)·approach; without directions of approach the moment decides.
+    /// Play b of a joint: Δθ = (b/2)·approach. Without recorded directions of approach, the moment
+    /// takes it up.
     Backlash "backlash" { joint: usize = MovingJoint } => Family {
         terms: &[TermEntry::at(At::JointOrSlide(JointField::Play, JointField::SlidingPlay), "width", 0.01)],
         says: "play in joint {joint}",
         needs: &[Need::Play],
         ..Family::PLAIN
     };
-    /// Play that opens with the payload m: Δθ = (w m / 2)·approach.
+    /// Play proportional to the payload m: Δθ = (w m / 2)·approach.
     PayloadBacklash "payload-backlash" { joint: usize = MovingJoint } => Family {
         terms: &[TermEntry::driven(At::Coordinate, "width", "0.5*payload*approach{joint}", 0.01)],
         says: "play in joint {joint} that opens with the payload",
         needs: &[Need::PayloadFromBothSides],
         ..Family::PLAIN
     };
-    /// Friction holds the joint back on the path it came, Δθ = h z with dz/dθ = (g − z)/s, g = ±1
-    /// the side from which it comes \[Dahl 1968\].
+    /// Friction hysteresis: Δθ = h z with dz/dθ = (g − z)/s, where g = ±1 is the side from which
+    /// the joint comes \[Dahl 1968\].
     JointHysteresis "joint-hysteresis" { joint: usize = TurningJoint, distance: f64 = Distance as "distance_rad" } => Family {
         terms: &[TermEntry::driven(At::Coordinate, "amplitude", "friction(q{joint}, {distance_rad})", SMALL)],
         says: "friction pulls joint {joint} back the way on which it came",
@@ -166,14 +168,14 @@ catalogue! {
         search: Search::Distances,
         ..Family::PLAIN
     };
-    /// Δθ = c₃ `M_z`³ beyond the linear torsion.
+    /// Cubic term of a joint's torsion: Δθ = c₃ `M_z`³.
     JointNonlinearStiffness "joint-nonlinear-stiffness" { joint: usize = AnyJoint } => Family {
         terms: &[TermEntry::at(At::Joint(JointField::Cubic), "cubic", 0.0).prior(Prior::OfCubedMoment(MAX_TURN))],
         says: "stiffness of joint {joint} changes with its load",
         needs: &[Need::Loads],
         ..Family::PLAIN
     };
-    /// Bearings tilt by (`c_x` `M_x`, `c_y` `M_y`, 0) before the joint turns.
+    /// Tilt of a joint's bearings, (`c_x` `M_x`, `c_y` `M_y`, 0), before the joint's rotation.
     JointLateralCompliance "joint-lateral-compliance" { joint: usize = AnyJoint } => Family {
         terms: &[
             TermEntry::at(At::Joint(JointField::LateralX), "about_x", 1e-3).never_negative(),
@@ -184,8 +186,8 @@ catalogue! {
         needs: &[Need::Loads],
         ..Family::PLAIN
     };
-    /// A spring from an anchor before the joint to a lever on the link behind it pulls the two
-    /// together: with a moment about the axis.
+    /// Gravity compensator: a spring between an anchor before the joint and a lever on the link
+    /// behind it, which exerts a moment about the axis.
     GravityCompensator "gravity-compensator" {
         joint: usize = RelievedJoint,
         anchor: [f64; 2] = Point as "anchor_m",
@@ -200,14 +202,14 @@ catalogue! {
         search: Search::Declared,
         ..Family::PLAIN
     };
-    /// Δθ = k (T − T₀).
+    /// Thermal drift of a joint's zero: Δθ = k (T − T₀).
     JointThermalDrift "joint-thermal-drift" { joint: usize = MovingJoint } => Family {
         terms: &[TermEntry::driven(At::Coordinate, "rate", "T", SMALL)],
         says: "zero of joint {joint} drifts with temperature",
         needs: &[Need::Temperature],
         ..Family::PLAIN
     };
-    /// Δθ = k (T̃ − T₀) with a temperature that lags, dT̃/dt = (T − T̃)/τ.
+    /// Thermal drift with a lagged temperature T̃: Δθ = k (T̃ − T₀), dT̃/dt = (T − T̃)/τ.
     JointThermalDriftLag "joint-thermal-drift-lag" { joint: usize = MovingJoint, time_constant: f64 = Duration as "time_constant_s" } => Family {
         terms: &[TermEntry::driven(At::Coordinate, "rate", "lag(T, {time_constant_s})", SMALL)],
         says: "zero of joint {joint} drifts with a temperature that lags by {time_constant_s} s",
@@ -215,14 +217,14 @@ catalogue! {
         search: Search::TimeConstants,
         ..Family::PLAIN
     };
-    /// Δθ of one joint = k q of another.
+    /// Coupling of joints: Δθ of one joint = k q of another.
     JointCoupling "joint-coupling" { joint: usize = MovingJoint, from: usize = OtherJoint } => Family {
         terms: &[TermEntry::driven(At::Coordinate, "factor", "q{from}", PERCENT)],
         says: "joint {from} moves joint {joint} along",
         needs: &[Need::Moves("from")],
         ..Family::PLAIN
     };
-    /// Flexibility 1/EI of a link declared rigid.
+    /// Bending flexibility 1/EI of a link that is declared rigid.
     LinkBending "link-bending" { joint: usize = LinkedJoint } => Family {
         terms: &[TermEntry::at(At::Beam(BeamField::Flexibility), "flexibility", FLEXIBLE).never_negative()],
         says: "the link before joint {joint} bends",
@@ -230,14 +232,16 @@ catalogue! {
         needs: &[Need::Loads],
         ..Family::PLAIN
     };
-    /// Flexibility 1/EI of the slide of a prismatic joint, a cantilever as long as it is out.
+    /// Bending flexibility 1/EI of the slide of a prismatic joint, a cantilever as long as it is
+    /// extended.
     SlideBending "slide-bending" { joint: usize = SlidingJoint } => Family {
         terms: &[TermEntry::at(At::Joint(JointField::SlideFlexibility), "flexibility", FLEXIBLE).never_negative()],
         says: "the slide of joint {joint} bends",
         needs: &[Need::Moves("joint"), Need::Loads],
         ..Family::PLAIN
     };
-    /// Torsional moments bend a beam by (`k_y`, `k_z`), and bending moments twist it by as much.
+    /// Coupling of twist and bending of a beam: torsional moments bend it by (`k_y`, `k_z`), and
+    /// bending moments twist it by the same coefficients.
     TwistBending "twist-bending" { link: String = Beam } => Family {
         terms: &[
             TermEntry::at(At::Beam(BeamField::CouplingY), "about_y", 0.0).prior(Prior::TwistCoupling { about_z: false }),
@@ -247,7 +251,7 @@ catalogue! {
         needs: &[Need::Loads],
         ..Family::PLAIN
     };
-    /// Curvature (`k_y`, `k_z`)·(T − T₀) along a beam.
+    /// Thermal bending of a beam: curvature (`k_y`, `k_z`)·(T − T₀).
     LinkThermalBending "link-thermal-bending" { link: String = Beam } => Family {
         terms: &[
             TermEntry::driven(At::Beam(BeamField::BowY), "about_y", "T", SMALL),
@@ -257,14 +261,14 @@ catalogue! {
         needs: &[Need::Temperature],
         ..Family::PLAIN
     };
-    /// Strain α (T − T₀) of a beam.
+    /// Thermal expansion of a beam: strain α (T − T₀).
     LinkThermalExpansion "link-thermal-expansion" { link: String = Beam } => Family {
         terms: &[TermEntry::driven(At::Beam(BeamField::Stretch), "strain", "T", SMALL)],
         says: "link {link} grows with temperature",
         needs: &[Need::Temperature],
         ..Family::PLAIN
     };
-    /// Curvature (`k_y`, `k_z`)·(T̃ − T₀) along a beam whose temperature lags.
+    /// Thermal bending of a beam with a lagged temperature T̃: curvature (`k_y`, `k_z`)·(T̃ − T₀).
     LinkThermalBendingLag "link-thermal-bending-lag" { link: String = Beam, time_constant: f64 = Duration as "time_constant_s" } => Family {
         terms: &[
             TermEntry::driven(At::Beam(BeamField::BowY), "about_y", "lag(T, {time_constant_s})", SMALL),
@@ -275,7 +279,7 @@ catalogue! {
         search: Search::TimeConstants,
         ..Family::PLAIN
     };
-    /// Strain α (T̃ − T₀) of a beam whose temperature lags.
+    /// Thermal expansion of a beam with a lagged temperature T̃: strain α (T̃ − T₀).
     LinkThermalExpansionLag "link-thermal-expansion-lag" { link: String = Beam, time_constant: f64 = Duration as "time_constant_s" } => Family {
         terms: &[TermEntry::driven(At::Beam(BeamField::Stretch), "strain", "lag(T, {time_constant_s})", SMALL)],
         says: "link {link} grows with a temperature that lags by {time_constant_s} s",
@@ -283,7 +287,7 @@ catalogue! {
         search: Search::TimeConstants,
         ..Family::PLAIN
     };
-    /// A mass m at s along a beam.
+    /// Undeclared point mass m on a beam, at the distance s from its root.
     UnmodelledMass "unmodelled-mass" { link: String = Beam } => Family {
         terms: &[
             TermEntry::at(At::Beam(BeamField::AddedMass), "mass", 5.0).never_negative(),
@@ -293,21 +297,22 @@ catalogue! {
         needs: &[Need::Loads],
         ..Family::PLAIN
     };
-    /// The payload is heavier by m whenever one is carried.
+    /// Error m of the payload's mass, in all poses with a payload.
     PayloadMass "payload-mass" => Family {
         terms: &[TermEntry::at(At::Arm(ArmField::Payload), "mass", 2.0)],
         says: "payloads are heavier than declared",
         needs: &[Need::Payload],
         ..Family::PLAIN
     };
-    /// The rope pulls with F (1 + k).
+    /// Relative error k of the hoist's force: F (1 + k).
     HoistForce "hoist-force" => Family {
         terms: &[TermEntry::at(At::Arm(ArmField::HoistForce), "error", 0.3)],
         says: "the hoist pulls with another force",
         only: &[Only::Hoisted],
         ..Family::PLAIN
     };
-    /// The rope leans: direction ∝ that declared + (`t_x` + k x, `t_y` + k y, 0), hook at x, y.
+    /// Lean of the hoist's rope: direction ∝ declared one + (`t_x` + k x, `t_y` + k y, 0), with the
+    /// hook at x, y.
     HoistDirection "hoist-direction" => Family {
         terms: &[
             TermEntry::at(At::Arm(ArmField::HoistLeanX), "lean_x", 0.1),
@@ -318,7 +323,8 @@ catalogue! {
         only: &[Only::Hoisted],
         ..Family::PLAIN
     };
-    /// The base turns by (`C_x` `M_x`, `C_y` `M_y`, 0) under the moments at the base.
+    /// Compliance of the base: it rotates by (`C_x` `M_x`, `C_y` `M_y`, 0) under the moments at the
+    /// base.
     BaseCompliance "base-compliance" => Family {
         terms: &[
             TermEntry::at(At::Arm(ArmField::MountingX), "about_x", 1e-4).never_negative(),
@@ -328,7 +334,7 @@ catalogue! {
         needs: &[Need::Loads],
         ..Family::PLAIN
     };
-    /// Gravity is turned by (`r_x`, `r_y`, 0).
+    /// Error of the gravity direction: gravity is rotated by (`r_x`, `r_y`, 0).
     GravityDirection "gravity-direction" => Family {
         terms: &[
             TermEntry::at(At::Arm(ArmField::GravityX), "about_x", 0.1),
@@ -338,7 +344,7 @@ catalogue! {
         needs: &[Need::Loads],
         ..Family::PLAIN
     };
-    /// λ from 0, loads on the rigid arm, to 1, loads on the bent arm.
+    /// Mixing factor λ between loads on the undeflected arm (0) and loads on the deflected arm (1).
     DeflectedEquilibrium "deflected-equilibrium" => Family {
         terms: &[TermEntry::at(At::Arm(ArmField::Mixing), "lambda", 1.0).never_negative()],
         says: "the loads act on the bent arm",
@@ -346,14 +352,15 @@ catalogue! {
         needs: &[Need::Loads],
         ..Family::PLAIN
     };
-    /// Measured positions are scaled by 1 + s.
+    /// Scale error of the instrument: measured positions are multiplied by 1 + s.
     TrackerScale "tracker-scale" => Family {
         terms: &[TermEntry::at(At::Scale, "error", PERCENT)],
         says: "the scale of the measurement is off",
         ..Family::PLAIN
     };
-    /// Positions are measured as p + E p, E upper triangular: scales and squareness of the axes, as
-    /// usual for coordinate measuring machines; a rotation more is the base's.
+    /// Scale and squareness errors of the instrument's axes: positions are measured as p + E p with
+    /// E upper triangular, as usual for coordinate measuring machines. A rotation of the axes
+    /// belongs to the base.
     FrameStrain "frame-strain" => Family {
         terms: &[
             TermEntry::at(At::Strain(0), "xx", PERCENT),
@@ -366,7 +373,7 @@ catalogue! {
         says: "axes of the measuring frame are off in scale or not square",
         ..Family::PLAIN
     };
-    /// Measured positions move by v (t − `t_first`).
+    /// Drift of the instrument: measured positions move by v (t − `t_first`).
     TrackerDrift "tracker-drift" => Family {
         terms: &[
             TermEntry::driven(At::Shift(0), "x", "t", 1e-5),
@@ -377,7 +384,7 @@ catalogue! {
         needs: &[Need::Times],
         ..Family::PLAIN
     };
-    /// Measured positions are moved by d from a time on.
+    /// Shift of the instrument: measured positions are displaced by d from a time on.
     StationShift "station-shift" { at_time: f64 = Time as "at_time_s" } => Family {
         terms: &[
             TermEntry::driven(At::Shift(0), "x", "step(time - {at_time_s})", SHIFTED),
@@ -389,8 +396,8 @@ catalogue! {
         search: Search::Times,
         ..Family::PLAIN
     };
-    /// Measured positions are turned by (`r_x`, `r_y`, `r_z`) about the measuring frame's origin and
-    /// moved by d from a time on.
+    /// Move of the instrument: from a time on, measured positions are rotated by (`r_x`, `r_y`,
+    /// `r_z`) about the measuring frame's origin and displaced by d.
     StationMove "station-move" { at_time: f64 = Time as "at_time_s" } => Family {
         terms: &[
             TermEntry::driven(At::Shift(0), "x", "step(time - {at_time_s})", MOVED),
@@ -405,7 +412,7 @@ catalogue! {
         search: Search::Declared,
         ..Family::PLAIN
     };
-    /// Measured positions move by d (1 − exp(−(t − `t_first`)/τ)).
+    /// Settling of the instrument: measured positions move by d (1 − exp(−(t − `t_first`)/τ)).
     TrackerSettling "tracker-settling" { time_constant: f64 = Duration as "time_constant_s" } => Family {
         terms: &[
             TermEntry::driven(At::Shift(0), "x", "-expm1(-t/{time_constant_s})", SHIFTED),
@@ -417,7 +424,8 @@ catalogue! {
         search: Search::SettlingTimes,
         ..Family::PLAIN
     };
-    /// Δθ of a joint, or a small motion of the base, in proportion to a covariate of the problem.
+    /// Displacement of a joint's coordinate, or small motion of the base, proportional to a
+    /// covariate of the problem.
     Covariate "covariate" { joint: Mount = Mount, of: String = Covariate } => Family {
         terms: &[
             TermEntry::driven(At::Coordinate, "rate", "{of:formula}", f64::INFINITY),

@@ -1,4 +1,4 @@
-//! Properties of effects, as they follow from the data of their laws.
+//! Properties of effects that follow from the data of their laws.
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
@@ -13,7 +13,7 @@ use super::term::EffectTerm;
 use super::text::filled;
 
 impl Effect {
-    /// Returns the name in files.
+    /// Returns the name of the effect in files.
     pub fn name(&self) -> &'static str {
         self.family().map_or(LAW, |family| family.name)
     }
@@ -26,8 +26,8 @@ impl Effect {
         }
     }
 
-    /// Returns the place, which parameters carry in brackets: a joint's number, a link, a time, the
-    /// name of a law; empty for the whole.
+    /// Returns the place of the effect, which parameter names contain in brackets: a joint's
+    /// number, a link, a time, the name of a law. Empty if it acts on the whole arm or measurement.
     #[doc(hidden)]
     pub fn place(&self) -> String {
         if let Self::Law(law) = self {
@@ -37,7 +37,7 @@ impl Effect {
         places.collect::<Vec<_>>().join(",")
     }
 
-    /// Returns the declaration as a problem file has it: `gear-ratio = { joint = 3 }`.
+    /// Returns the declaration in the syntax of a problem file: `gear-ratio = { joint = 3 }`.
     #[doc(hidden)]
     pub fn declaration(&self) -> String {
         let arguments: Vec<_> =
@@ -72,7 +72,7 @@ impl Effect {
         }
     }
 
-    /// Returns the name of the covariate that the effect follows.
+    /// Returns the name of the covariate on which the effect depends; `None` if there is none.
     pub(crate) fn covariate(&self) -> Option<String> {
         let (key, _) = self.key_of(|kind| kind == ArgumentKind::Covariate)?;
         match self.argument(key)? {
@@ -81,13 +81,13 @@ impl Effect {
         }
     }
 
-    /// Returns key and kind of the first argument of some kind.
+    /// Returns key and kind of the first argument whose kind satisfies `is_it`.
     fn key_of(&self, is_it: impl Fn(ArgumentKind) -> bool) -> Option<(&'static str, ArgumentKind)> {
         self.family()?.arguments.iter().find(|(_, kind)| is_it(*kind)).copied()
     }
 
-    /// Returns the parameters with formulas in the words of `vocabulary`; none whose formula uses
-    /// another word.
+    /// Returns the parameters with their formulas, parsed with the words of `vocabulary`.
+    /// Parameters whose formula uses another word are left out.
     pub(crate) fn entries(&self, vocabulary: &Vocabulary) -> Vec<EffectTerm> {
         let family = match self {
             Self::Law(law) => return law.entries(),
@@ -131,7 +131,8 @@ impl Effect {
         }
     }
 
-    /// Returns the parameters on an arm of any joints and covariates.
+    /// Returns the parameters without reference to a particular arm: any joint and covariate is
+    /// accepted.
     fn loose_entries(&self) -> Vec<EffectTerm> {
         let covariates: Vec<String> = self.covariate().into_iter().collect();
         let slides = [false; MAX_JOINTS];
@@ -142,7 +143,7 @@ impl Effect {
         })
     }
 
-    /// Returns the quantities that multiply its parameters, each once.
+    /// Returns the quantities that multiply its parameters, without duplicates.
     pub(crate) fn quantities(&self) -> Vec<Quantity> {
         let mut found = Vec::new();
         for formula in self.loose_entries().into_iter().filter_map(|entry| entry.formula) {
@@ -159,7 +160,7 @@ impl Effect {
         self.quantities().into_iter().any(is_it)
     }
 
-    /// Returns true if it acts at a site.
+    /// Returns true if a parameter of the effect acts at the site `at`.
     pub(crate) fn acts_at(&self, at: At) -> bool {
         match self {
             Self::Law(law) => law.at() == at,
@@ -169,35 +170,36 @@ impl Effect {
         }
     }
 
-    /// Returns true if it follows the temperature.
+    /// Returns true if the effect depends on the temperature.
     pub(crate) fn is_thermal(&self) -> bool {
         self.follows(Quantity::is_thermal)
     }
 
-    /// Returns true if it depends on the side from which joints come.
+    /// Returns true if the effect depends on directions of approach.
     pub(crate) fn has_sides(&self) -> bool {
         self.acts_at(At::JointOrSlide(JointField::Play, JointField::SlidingPlay))
             || self.follows(Quantity::has_sides)
     }
 
-    /// Returns true if it follows time, or the order of the poses, rather than quantities for which
-    /// poses can be chosen.
+    /// Returns true if the effect depends on time or the order of the poses, rather than on
+    /// quantities that a choice of poses can vary.
     pub(crate) fn follows_time(&self) -> bool {
         self.follows(Quantity::follows_time)
     }
 
-    /// Returns true if it depends on the poses measured before.
+    /// Returns true if the effect depends on earlier poses.
     pub(crate) fn has_memory(&self) -> bool {
         self.follows(Quantity::has_memory)
     }
 
-    /// Returns the joint, from 1, whose load a spring takes off.
+    /// Returns the joint, counted from 1, that a gravity compensator relieves; `None` for other
+    /// effects.
     pub(crate) fn compensated(&self) -> Option<usize> {
         self.acts_at(At::Joint(JointField::SpringRate)).then(|| self.joint()).flatten()
     }
 
-    /// Returns the joint at which the effect is a function of one command alone, and the joint
-    /// commanded, both from 1.
+    /// Returns (joint, commanded joint), both counted from 1, if the effect changes a joint as a
+    /// function of one command alone.
     pub(crate) fn function_of(&self) -> Option<(usize, usize)> {
         let joint = self.joint()?;
         let entries = self.loose_entries();
@@ -210,8 +212,8 @@ impl Effect {
         }
     }
 
-    /// Returns order and joint, from 1, of each wave sin kq or cos kq that adds to the coordinate of
-    /// that joint itself.
+    /// Returns joint (counted from 1) and order of each wave sin kq or cos kq that adds to the
+    /// coordinate of that joint itself.
     pub(crate) fn waves(&self) -> Vec<(usize, f64)> {
         let Some((joint, from)) = self.function_of() else { return Vec::new() };
         let wave = |entry: EffectTerm| {
@@ -223,7 +225,7 @@ impl Effect {
         orders.into_iter().map(|order| (joint, order)).collect()
     }
 
-    /// Returns a whole order that this and another effect give the same joint.
+    /// Returns an integer order that both effects have at the same joint, if there is one.
     pub(crate) fn shared_order(&self, other: &Self) -> Option<u32> {
         let waves = other.waves();
         let shared = self.waves().into_iter().find(|wave| waves.contains(wave))?.1;
@@ -235,7 +237,7 @@ impl Effect {
         (shared.fract() == 0.0).then_some(shared as u32)
     }
 
-    /// Returns the effect in words for people.
+    /// Returns the description of the effect in words.
     pub fn describe(&self) -> String {
         if let Self::Law(law) = self {
             law.describe()
@@ -247,8 +249,8 @@ impl Effect {
         }
     }
 
-    /// Returns the same where times may not have been measured: the order of the rows stands for
-    /// them then, counted from 1.
+    /// Returns the description of the effect. If times were not measured, it refers to row numbers,
+    /// counted from 1, instead.
     pub(crate) fn describe_in(&self, time_measured: bool) -> String {
         match self.family() {
             Some(family) if !time_measured && !family.says_by_row.is_empty() => {
@@ -258,7 +260,7 @@ impl Effect {
         }
     }
 
-    /// Returns name and place for people, without an argument that is searched.
+    /// Returns the description of family and place, without the argument that is searched.
     #[doc(hidden)]
     pub fn name_and_place(&self) -> String {
         if let Self::Law(law) = self {
@@ -271,12 +273,12 @@ impl Effect {
         if place.is_empty() { self.name().to_owned() } else { format!("{} {place}", self.name()) }
     }
 
-    /// Returns the key of the argument that is searched.
+    /// Returns the key of the argument that the search determines; `None` if there is none.
     fn searched(&self) -> Option<&'static str> {
         self.key_of(ArgumentKind::is_searched).map(|(key, _)| key)
     }
 
-    /// Returns kind and value of the argument that is searched: a time, an order, a path.
+    /// Returns kind and value of the argument that the search determines: a time, an order, a path.
     pub(crate) fn searched_value(&self) -> Option<(ArgumentKind, f64)> {
         let (key, kind) = self.key_of(ArgumentKind::is_searched)?;
         match self.argument(key)? {
@@ -285,7 +287,8 @@ impl Effect {
         }
     }
 
-    /// Returns the other joint, from 1, that moves the joint at which the effect acts.
+    /// Returns the other joint, counted from 1, whose command moves the joint at which the effect
+    /// acts; `None` if there is none.
     pub(crate) fn other_joint(&self) -> Option<usize> {
         let (key, _) = self.key_of(|kind| kind == ArgumentKind::OtherJoint)?;
         match self.argument(key)? {
@@ -294,13 +297,14 @@ impl Effect {
         }
     }
 
-    /// Returns true if an argument is searched, as a time: effects that [`Self::name_and_place`]
-    /// calls the same are one effect.
+    /// Returns true if the search determines an argument, such as a time. Effects with equal
+    /// [`Self::name_and_place`] then count as one.
     pub(crate) fn is_searched(&self) -> bool {
         self.searched().is_some()
     }
 
-    /// Returns true if it is the same effect, whatever the value of the argument that is searched.
+    /// Returns true if both effects are equal except for the value of the argument that the search
+    /// determines.
     pub(crate) fn is_but_for_search(&self, other: &Self) -> bool {
         let is_alike = || {
             std::mem::discriminant(self) == std::mem::discriminant(other)
@@ -309,15 +313,15 @@ impl Effect {
         self == other || (self.is_searched() && is_alike())
     }
 
-    /// Returns the same with its searched argument multiplied, to three digits; `None` where values
-    /// between those of the candidates cannot be told apart.
+    /// Returns the effect with its searched argument multiplied by `factor`, rounded to three
+    /// digits. `None` if the data cannot distinguish values between the candidates.
     pub(crate) fn scaled(&self, factor: f64) -> Option<Self> {
         let (key, _) = self.key_of(ArgumentKind::is_scalable)?;
         let Some(Argument::Number(number)) = self.argument(key) else { return None };
         self.with(key, &Argument::Number(to_three_digits(factor * number)?))
     }
 
-    /// Returns the same with another value of an argument.
+    /// Returns the effect with another value of the argument `key`.
     fn with(&self, key: &str, value: &Argument) -> Option<Self> {
         let arguments = self.arguments();
         Self::build(self.name(), |wanted| {
@@ -330,12 +334,12 @@ impl Effect {
         })
     }
 
-    /// Returns the orders of a harmonic.
+    /// Returns the orders of a harmonic; `None` for other effects.
     pub(crate) fn harmonic_orders(&self) -> Option<Vec<u32>> {
         self.orders().map(|(_, orders)| orders)
     }
 
-    /// Returns the orders of a harmonic, and their key.
+    /// Returns the orders of a harmonic, and their key; `None` for other effects.
     fn orders(&self) -> Option<(&'static str, Vec<u32>)> {
         let (key, _) = self.key_of(|kind| kind == ArgumentKind::Orders)?;
         match self.argument(key)? {
@@ -344,22 +348,23 @@ impl Effect {
         }
     }
 
-    /// Returns the parts that are tested one by one: a harmonic order by order.
+    /// Returns the parts of the effect that are tested separately: the single orders of a harmonic,
+    /// or the effect itself.
     pub(crate) fn parts(&self) -> Vec<Self> {
         let Some((key, orders)) = self.orders() else { return vec![self.clone()] };
         let one = |order: u32| self.with(key, &Argument::Orders(vec![order]));
         orders.into_iter().filter_map(one).collect()
     }
 
-    /// Returns the orders of both where they differ in nothing else.
+    /// Returns the orders of both effects, with their key, if the effects differ only in them.
     fn alike(&self, other: &Self) -> Option<(&'static str, Vec<u32>, Vec<u32>)> {
         let ((key, orders), (_, more)) = (self.orders()?, other.orders()?);
         let same = self.with(key, &Argument::Orders(more.clone()))? == *other;
         same.then_some((key, orders, more))
     }
 
-    /// Returns the one effect that is this and another: harmonics of one joint; `None` where they
-    /// are two.
+    /// Returns one effect that contains both: the harmonics of one joint. `None` if they are
+    /// different effects.
     pub(crate) fn joined(&self, other: &Self) -> Option<Self> {
         let (key, mut orders, more) = self.alike(other)?;
         let added: Vec<u32> = more.into_iter().filter(|order| !orders.contains(order)).collect();
@@ -368,7 +373,7 @@ impl Effect {
         self.with(key, &Argument::Orders(orders))
     }
 
-    /// Returns true if it holds all of another: a harmonic of more orders.
+    /// Returns true if the effect contains the other one, as a harmonic with more orders does.
     #[doc(hidden)]
     pub fn covers(&self, other: &Self) -> bool {
         match self.alike(other) {
@@ -378,10 +383,11 @@ impl Effect {
     }
 }
 
-/// Greatest number of joints that properties of effects are derived for.
+/// Number of joints assumed when properties of effects are derived without an arm; more than any
+/// arm has.
 const MAX_JOINTS: usize = 1000;
 
-/// Returns `name = { key = value }`; without arguments `name = true`.
+/// Returns `name = { key = value }`, or `name = true` without arguments.
 pub(crate) fn declaration(name: &str, arguments: &[(&str, String)]) -> String {
     let all: Vec<String> =
         arguments.iter().map(|(key, value)| format!("{key} = {value}")).collect();
@@ -391,7 +397,7 @@ pub(crate) fn declaration(name: &str, arguments: &[(&str, String)]) -> String {
     }
 }
 
-/// Returns a searched number to three digits; `None` where nothing is left.
+/// Returns a searched number rounded to three digits; `None` if the result is zero or not finite.
 pub(crate) fn to_three_digits(number: f64) -> Option<f64> {
     let step = 10_f64.powf(number.log10().floor() - 2.0);
     let rounded = (number / step).round() * step;
@@ -400,7 +406,7 @@ pub(crate) fn to_three_digits(number: f64) -> Option<f64> {
     (written > 0.0).then_some(written)
 }
 
-/// `{"effect": "gear-ratio", "joint": 3}`.
+/// Serialises the effect with its arguments as keys: `{"effect": "gear-ratio", "joint": 3}`.
 impl Serialize for Effect {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let arguments = self.arguments();

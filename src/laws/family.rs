@@ -3,9 +3,10 @@
 use super::argument::ArgumentKind;
 use super::site::{ArmField, BeamField, JointField};
 
-/// Family of effects: the law of an effect, with the place and numbers of one left open.
+/// Family of effects: the law of an effect, with place and numbers left open.
 ///
-/// Texts take arguments in braces by their keys: `"sin({orders}*q{joint})"`.
+/// Texts contain keys of arguments in braces, which are replaced by their values:
+/// `"sin({orders}*q{joint})"`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct Family {
@@ -13,27 +14,28 @@ pub struct Family {
     pub name: &'static str,
     /// Keys and kinds of the arguments, in the order of files.
     pub arguments: &'static [(&'static str, ArgumentKind)],
-    /// Parameters. Where a formula or name holds a list argument, one of each for every element.
+    /// Parameters. If a formula or name contains a list argument, there is one parameter for each
+    /// element.
     pub terms: &'static [TermEntry],
-    /// The effect in words for people: "transmission ratio of joint {joint} is off".
+    /// Description of the effect in words: "transmission ratio of joint {joint} is off".
     pub says: &'static str,
-    /// The same where the order of the rows, counted from 1, stands for times that were not
-    /// measured; empty: the same.
+    /// Description if times were not measured, with row numbers, counted from 1, instead of times;
+    /// empty if it is the same.
     pub says_by_row: &'static str,
-    /// The same of the base instead of a joint.
+    /// Description if the effect acts on the base instead of a joint.
     pub says_of_base: &'static str,
-    /// Arms and places at which the effect can be.
+    /// Conditions on the arm under which the effect is a candidate.
     pub only: &'static [Only],
     /// Conditions under which data can show the effect; the first unmet one is the reason given.
     pub needs: &'static [Need],
     /// Values of arguments that are candidates of the search for effects.
     pub search: Search,
-    /// Share of the family's chance that falls to one of its members.
+    /// Rule for the share of the family's prior probability that one member has.
     pub chance: Chance,
 }
 
 impl Family {
-    /// Family without arguments, terms or conditions.
+    /// Family without arguments, terms or conditions, from which the others are built.
     pub const PLAIN: Self = Self {
         name: "",
         arguments: &[],
@@ -52,72 +54,74 @@ impl Family {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct TermEntry {
-    /// Name after the dot.
+    /// Part of its name after the dot.
     pub name: &'static str,
-    /// Where it enters.
+    /// Site of the model where it enters.
     pub at: At,
-    /// Formula that multiplies it there; empty: it is itself the quantity of its site.
+    /// Formula that multiplies it there; empty if it is itself the quantity of its site.
     pub formula: &'static str,
     /// Size that no realistic effect exceeds by much: 1 σ of its prior.
     pub prior: Prior,
-    /// Value where the effect has no size, as a prior size; `None`: 0.
+    /// Value at which the effect vanishes, as a prior size; `None` for 0.
     pub nominal: Option<Prior>,
-    /// True if nature knows no negative values: an effect that needs one is no explanation.
+    /// True if a negative value is physically impossible. An effect whose fit needs one is rejected
+    /// as a cause.
     pub never_negative: bool,
 }
 
 impl TermEntry {
-    /// Parameter that is itself the quantity of its site, with 1 σ of its prior \[SI\].
+    /// Creates a parameter that is itself the quantity of its site; `size` is 1 σ of its prior
+    /// \[SI\].
     pub const fn at(at: At, name: &'static str, size: f64) -> Self {
         Self::driven(at, name, "", size)
     }
 
-    /// Parameter that is multiplied by a formula, with 1 σ of its prior \[SI\].
+    /// Creates a parameter that is multiplied by a formula; `size` is 1 σ of its prior \[SI\].
     pub const fn driven(at: At, name: &'static str, formula: &'static str, size: f64) -> Self {
         let prior = Prior::Size(size);
         Self { name, at, formula, prior, nominal: None, never_negative: false }
     }
 
-    /// The same with another prior.
+    /// Replaces the prior of the parameter.
     #[must_use]
     pub const fn prior(self, prior: Prior) -> Self {
         Self { prior, ..self }
     }
 
-    /// The same with another value of no effect.
+    /// Replaces the value at which the effect vanishes.
     #[must_use]
     pub const fn nominal(self, nominal: Prior) -> Self {
         Self { nominal: Some(nominal), ..self }
     }
 
-    /// The same, never negative.
+    /// Marks the parameter as one that cannot be negative.
     #[must_use]
     pub const fn never_negative(self) -> Self {
         Self { never_negative: true, ..self }
     }
 }
 
-/// Site of a parameter at the place that the effect names.
+/// Site of a parameter, relative to the place that the effect names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum At {
-    /// Coordinate of the joint: θ, or d where it slides.
+    /// Coordinate of the joint that its command moves: θ, or d of a prismatic joint.
     Coordinate,
     /// Field of the joint.
     Joint(JointField),
-    /// Field of the joint where it turns, another one where it slides.
+    /// Field of the joint: the first one for a revolute, the second one for a prismatic joint.
     JointOrSlide(JointField, JointField),
-    /// Field of the link's beam, or of the link before the joint.
+    /// Field of the link's beam, or of the beam before the joint.
     Beam(BeamField),
     /// Field of the arm as a whole.
     Arm(ArmField),
     /// Displacement of every measured position along an axis of the measuring frame, 0 to 2.
     Shift(usize),
-    /// Turn of the instrument about an axis of the measuring frame, 0 to 2.
+    /// Rotation of the instrument about an axis of the measuring frame, 0 to 2.
     Turn(usize),
     /// Displacement of the base along an axis of the measuring frame, 0 to 2.
     BaseShift(usize),
-    /// Turn of the base about an axis of the measuring frame, 0 to 2.
+    /// Rotation of the base about an axis of the measuring frame, 0 to 2.
     BaseTurn(usize),
     /// Relative error of every measured coordinate.
     Scale,
@@ -125,20 +129,21 @@ pub enum At {
     Strain(usize),
 }
 
-/// Size of a parameter on an arm, SI.
+/// Rule for the prior size (1 σ) of a parameter on an arm, SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Prior {
-    /// The same on every arm; infinite where no size is too great.
+    /// Size that is the same on every arm; infinite if any size is plausible.
     Size(f64),
-    /// Coefficient at which the cube of the greatest conceivable moment turns the joint by an angle
-    /// \[rad\].
+    /// Coefficient c₃ at which the cube of the largest plausible moment rotates the joint by this
+    /// angle \[rad\].
     OfCubedMoment(f64),
-    /// Rate of a spring that takes off all of the greatest conceivable moment.
+    /// Rate of a spring that balances the largest plausible moment.
     SpringRate,
-    /// Preload of a spring that takes off all of the greatest conceivable moment.
+    /// Preload of a spring that balances the largest plausible moment.
     SpringPreload,
-    /// Largest coupling of twist with bending about y or z with which no load gains energy.
+    /// Largest coupling of twist with bending about y or z at which the strain energy stays
+    /// positive.
     TwistCoupling {
         /// True for bending about z.
         about_z: bool,
@@ -147,19 +152,20 @@ pub enum Prior {
     HalfLength,
 }
 
-/// Condition of an arm on which an effect can be.
+/// Condition on the arm for an effect. If it is not met, the effect is no candidate, or its
+/// declaration is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Only {
-    /// The joint turns and takes a command; where it does not, the effect is no candidate.
+    /// The joint is revolute and takes a command; otherwise the effect is no candidate.
     Turning,
-    /// The joint takes a command; where it does not, the effect is no candidate.
+    /// The joint takes a command; otherwise the effect is no candidate.
     Commanded,
-    /// The joint has no stiffness; where it has one, the effect is no candidate.
+    /// The joint has no stiffness; otherwise the effect is no candidate.
     RigidJoint,
-    /// The link has a length; without one the effect is refused.
+    /// The link has a length; otherwise the effect is refused.
     Link,
-    /// The link does not bend; where it does, the effect is no candidate.
+    /// The link does not bend; otherwise the effect is no candidate.
     RigidLink,
     /// Loads act on the rigid arm; otherwise the effect is refused.
     Undeflected,
@@ -167,58 +173,58 @@ pub enum Only {
     Hoisted,
 }
 
-/// Condition of the data without which an effect cannot be shown.
+/// Condition on the data without which they cannot show an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Need {
-    /// Gravity.
+    /// Gravity is not zero.
     Loads,
-    /// A joint that moves, by the key of the argument that names it.
+    /// The joint named by the argument with this key moves.
     Moves(&'static str),
-    /// A temperature that is known beside its reference and changes.
+    /// The temperature is recorded and varies, and its reference is declared.
     Temperature,
-    /// Measured times, which say which pose was before which.
+    /// Times are recorded, so that the order of the poses is known.
     Clock,
-    /// Enough poses before and after some time.
+    /// There are enough poses before and after some time.
     Times,
-    /// A payload in some poses, and gravity.
+    /// Some poses have a payload, and gravity is not zero.
     Payload,
-    /// A payload that changes, and approaches from both sides.
+    /// The payload varies, and joints approach from both sides.
     PayloadFromBothSides,
-    /// Approaches from both sides, or a moment where no side is known.
+    /// The joint approaches from both sides, or, without recorded sides, has a moment.
     Play,
-    /// A covariate that changes.
+    /// The covariate is recorded and varies.
     Covariate,
 }
 
-/// Values of a searched or listed argument that are candidates.
+/// Values of the searched or listed argument that become candidates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Search {
-    /// One candidate at each place; nothing else is open.
+    /// One candidate at each place; the effect has no searched argument.
     Places,
-    /// No candidate: declared effects alone, or a separate search.
+    /// No candidates: the effect is only declared, or found by a separate search.
     Declared,
-    /// Each whole order up to 60.
+    /// Each integer order up to 60.
     Orders,
-    /// Each time at which something may have happened.
+    /// Each time at which an event may have happened.
     Times,
-    /// Time constants from twice the time between poses to a part of a session.
+    /// Time constants from twice the typical time between poses to a fraction of a session.
     TimeConstants,
-    /// Time constants as parts of the time measured.
+    /// Time constants that are fractions of the measured duration.
     SettlingTimes,
-    /// Paths as parts of the range of the joint.
+    /// Paths that are fractions of the range of the joint.
     Distances,
 }
 
-/// Share of a family's chance that falls to one of its members.
+/// Rule for the share of a family's prior probability that one of its members has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Chance {
-    /// The same for every candidate.
+    /// Equal share for every candidate.
     Equal,
-    /// The smaller the higher the order of a harmonic.
+    /// Share that decreases with the order of a harmonic.
     Orders,
-    /// The smaller the higher the order of a wave.
+    /// Share that decreases with the order of a wave.
     Waves,
 }

@@ -10,10 +10,10 @@ use super::term::EffectTerm;
 /// Name of declared laws in files.
 pub(crate) const LAW: &str = "law";
 
-/// Law that the user declares or that a search writes down: Δ = Σ cₖ fₖ at one site.
+/// Law that the user declares or that a search composes: Δ = Σ cₖ fₖ at one site.
 ///
-/// Each term is a coefficient times a formula; formulas may share named parameters, which are fitted
-/// beside the coefficients.
+/// Each term is a coefficient times a formula. Formulas may share named parameters, which are
+/// fitted together with the coefficients.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Law {
     name: String,
@@ -29,50 +29,50 @@ pub struct Law {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LawPlace {
-    /// A joint, from 1.
+    /// Joint, counted from 1.
     Joint(usize),
-    /// A link, by the name of its beam.
+    /// Link, by the name of its beam.
     Link(String),
-    /// The base or the measurement.
+    /// Base or measurement.
     Whole,
 }
 
 /// Gaussian prior of the coefficients of a law about 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LawPrior {
-    /// 1 σ \[SI\].
+    /// Standard deviation (1 σ) \[SI\].
     pub sigma: f64,
-    /// Key in files, `sigma_deg` for instance.
+    /// Key in files, for example `sigma_deg`.
     pub key: String,
-    /// 1 σ in the unit of that key.
+    /// Standard deviation (1 σ) in the unit of that key.
     pub written: f64,
 }
 
-/// Site of a law: a place with the quantity of it that the law adds to.
+/// Site of a law: a place, and the quantity there to which the law adds.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct LawSite {
-    /// The place.
+    /// Place on the arm.
     pub place: LawPlace,
-    /// The quantity.
+    /// Quantity of the place to which the law adds.
     pub at: At,
 }
 
 impl LawSite {
-    /// Returns the number, from 1, of the joint.
+    /// Returns the number, counted from 1, of the joint; `None` for other places.
     pub fn joint(&self) -> Option<usize> {
         if let LawPlace::Joint(joint) = self.place { Some(joint) } else { None }
     }
 
-    /// Coordinate of a joint, from 1, before it acts.
+    /// Creates the site of the coordinate that a joint's command moves; `number` counts from 1.
     pub fn of_joint(number: usize) -> Self {
         Self { place: LawPlace::Joint(number), at: At::Coordinate }
     }
 
-    /// Site written in a file: `joint3`, `A.curvature_y`, `base.rx`, `measurement.x`; joints may
-    /// also go by a name.
+    /// Parses a site as in files: `joint3`, `A.curvature_y`, `base.rx`, `measurement.x`. Names of
+    /// joints are also accepted.
     ///
     /// # Errors
-    /// The reason why a law cannot act there.
+    /// Returns the reason why a law cannot act there.
     pub fn parse(
         text: &str,
         joints: usize,
@@ -134,11 +134,11 @@ impl LawSite {
 }
 
 impl Law {
-    /// Law called `name` at a site, with formulas in the words of `vocabulary`, parameters in them,
-    /// and the prior of the coefficients.
+    /// Creates the law called `name` at a site. `terms` are formulas in the words of `vocabulary`,
+    /// `parameters` those inside the formulas, and `prior` that of the coefficients.
     ///
     /// # Errors
-    /// The number of the first formula with a mistake, from 0, and the mistake.
+    /// Returns the number of the first wrong formula, counted from 0, and the mistake in it.
     pub fn new(
         name: &str,
         site: LawSite,
@@ -169,27 +169,28 @@ impl Law {
         })
     }
 
-    /// Returns the name.
+    /// Returns the name of the law.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Returns the quantity that the law adds to.
+    /// Returns the quantity to which the law adds.
     pub fn at(&self) -> At {
         self.at
     }
 
-    /// Returns the number, from 1, of the joint.
+    /// Returns the number, counted from 1, of the joint at which the law acts; `None` if there is
+    /// none.
     pub fn joint(&self) -> Option<usize> {
         if let LawPlace::Joint(joint) = self.place { Some(joint) } else { None }
     }
 
-    /// Returns the name of the link.
+    /// Returns the name of the link on which the law acts; `None` if there is none.
     pub fn link(&self) -> Option<&str> {
         if let LawPlace::Link(link) = &self.place { Some(link) } else { None }
     }
 
-    /// Returns the named parameters inside of the formulas.
+    /// Returns the named parameters inside the formulas.
     pub fn parameters(&self) -> &[LawParameter] {
         &self.parameters
     }
@@ -201,7 +202,7 @@ impl Law {
         self.terms.iter().any(uses)
     }
 
-    /// Returns the formulas with their names.
+    /// Returns the formulas as text, with the names of covariates and parameters.
     pub fn formulas(&self) -> Vec<String> {
         let parameters: Vec<String> =
             self.parameters.iter().map(|parameter| parameter.name.clone()).collect();
@@ -209,7 +210,7 @@ impl Law {
         self.terms.iter().map(|term| term.expression.display(names).to_string()).collect()
     }
 
-    /// Returns the site as files write it.
+    /// Returns the site in the syntax of files.
     pub fn site(&self) -> String {
         const AXES: [&str; 3] = ["x", "y", "z"];
         let field = match self.at {
@@ -228,7 +229,7 @@ impl Law {
         }
     }
 
-    /// Returns the law in words for people.
+    /// Returns the description of the law in words.
     pub(super) fn describe(&self) -> String {
         format!("{} at {}: {}", self.name, self.site(), self.formulas().join(", "))
     }
@@ -252,7 +253,7 @@ impl Law {
         arguments
     }
 
-    /// Returns the coefficients, named from 1, and the parameters inside of the formulas.
+    /// Returns the coefficients, named from 1, and the parameters inside the formulas.
     pub(super) fn entries(&self) -> Vec<EffectTerm> {
         let plain = |name, prior| EffectTerm {
             name,

@@ -1,10 +1,10 @@
 //! Laws as data: sites, formulas, families of effects, and the catalogue of families.
 //!
-//! A law multiplies parameters by formulas of what is known of a pose, and adds the products to a
-//! quantity of the arm, its base, or the measurement. `catalogue` has one entry a family; a
-//! [`Law`] is declared in a problem file. Everything that the program knows of an effect follows
-//! from these data: its parameters and their units, the columns it needs, the candidates of a
-//! search, words, and file syntax.
+//! A law multiplies parameters by formulas of recorded quantities of a pose, and adds the products
+//! to a quantity of the arm, its base, or the measurement. `catalogue` has one entry for each
+//! family; a [`Law`] is declared in a problem file. Everything about an effect follows from these
+//! data: its parameters and their units, the columns it needs, the candidates of a search, words,
+//! and file syntax.
 
 mod argument;
 mod catalogue;

@@ -1,16 +1,16 @@
-//! Parameters inside of formulas.
+//! Parameters inside formulas.
 
-/// Named parameter inside of the formulas of a law.
+/// Named parameter inside the formulas of a law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LawParameter {
     /// Name in formulas.
     pub name: String,
     /// Value at which the fit starts, SI.
     pub start: f64,
-    /// Smallest value.
+    /// Smallest value, SI; `None` for no limit.
     pub min: Option<f64>,
-    /// Greatest value.
+    /// Largest value, SI; `None` for no limit.
     pub max: Option<f64>,
-    /// 1 σ of a prior about the start.
+    /// Standard deviation (1 σ) of a Gaussian prior about the start value; `None` for no prior.
     pub sigma: Option<f64>,
 }

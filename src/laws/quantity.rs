@@ -1,4 +1,4 @@
-//! Quantities that are known of every pose: the variables of formulas.
+//! Quantities that are recorded for every pose: the variables of formulas.
 
 /// Variable of a formula; joints are counted from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -6,7 +6,7 @@
 pub enum Quantity {
     /// Command q of a joint \[rad\] or \[m\], written `q3`.
     Command(usize),
-    /// Temperature above the reference \[K\], written `T`; 0 where no temperature is known.
+    /// Temperature above the reference \[K\], written `T`; 0 if no temperature is recorded.
     Warming,
     /// Temperature above the reference \[K\] of a body that follows the air with a first-order lag,
     /// dT̃/dt = (T − T̃)/τ, written `lag(T, 300)`.
@@ -14,51 +14,54 @@ pub enum Quantity {
         /// Time constant τ \[s\].
         time_constant: f64,
     },
-    /// Share of its friction that holds a joint back on the path it came, −1 to 1, written
-    /// `friction(q3, 0.8)` ([`Past::friction_state`](crate::problem::Past::friction_state)). \[Dahl 1968\]
+    /// Friction state of a joint: share of its friction that opposes its approach, −1 to 1, written
+    /// `friction(q3, 0.8)` ([`Past::friction_state`](crate::problem::Past::friction_state)). \[Dahl
+    /// 1968\]
     Friction {
-        /// The joint.
+        /// Index of the joint.
         joint: usize,
-        /// Distance over which the friction turns over \[rad\] or \[m\].
+        /// Distance over which the friction reverses \[rad\] or \[m\].
         distance: f64,
     },
     /// Time since the first pose of the session \[s\], written `t`.
     Elapsed,
-    /// Time as in the table \[s\], or the row counted from 1 where no time was measured, written
-    /// `time`.
+    /// Time as in the table \[s\], written `time`; the row number, counted from 1, if no time is
+    /// recorded.
     Time,
-    /// Payload \[kg\], written `payload`; the declared one where a pose names none.
+    /// Payload \[kg\], written `payload`; the declared one in a pose that records none.
     Payload,
-    /// Hoist force \[N\], written `hoist`; the declared one where a pose names none.
+    /// Hoist force \[N\], written `hoist`; the declared one in a pose that records none.
     Hoist,
-    /// Direction from which a joint came, −1, 0 or +1, written `approach3`; 0 where unknown.
+    /// Direction from which a joint approached, −1, 0 or +1, written `approach3`; 0 if not
+    /// recorded.
     Approach(usize),
-    /// Covariate of the problem, counted from 0, in its unit; written as its column.
+    /// Covariate of the problem, counted from 0, in its unit; written as the name of its column.
     Covariate(usize),
 }
 
 impl Quantity {
-    /// Returns true if the value depends on the poses measured before.
+    /// Returns true if the value depends on earlier poses.
     pub fn has_memory(self) -> bool {
         matches!(self, Self::Lagging { .. } | Self::Friction { .. })
     }
 
-    /// Returns true if the value follows the temperature.
+    /// Returns true if the value depends on the temperature.
     pub fn is_thermal(self) -> bool {
         matches!(self, Self::Warming | Self::Lagging { .. })
     }
 
-    /// Returns true if the value depends on the side from which a joint comes.
+    /// Returns true if the value depends on the direction from which a joint approached.
     pub fn has_sides(self) -> bool {
         matches!(self, Self::Approach(_) | Self::Friction { .. })
     }
 
-    /// Returns true if the value follows the time or the order of the poses.
+    /// Returns true if the value depends on the time or the order of the poses.
     pub fn follows_time(self) -> bool {
         matches!(self, Self::Elapsed | Self::Time) || self.has_memory()
     }
 
-    /// Returns the joint, counted from 0, whose command changes the value.
+    /// Returns the joint, counted from 0, whose command determines the value; `None` if there is
+    /// none.
     pub fn commanded_joint(self) -> Option<usize> {
         match self {
             Self::Command(joint) | Self::Friction { joint, .. } => Some(joint),
@@ -66,7 +69,7 @@ impl Quantity {
         }
     }
 
-    /// Returns the joint, counted from 0, that the quantity belongs to.
+    /// Returns the joint, counted from 0, to which the quantity belongs; `None` if there is none.
     pub fn joint(self) -> Option<usize> {
         match self {
             Self::Approach(joint) => Some(joint),

@@ -1,7 +1,7 @@
-//! Fields of the arm that laws act on.
+//! Fields of joints, beams and the arm to which laws add.
 
-/// Field of a joint that may be free: first the letters of [Chen2021, eq. 1], then the fields of
-/// effects.
+/// Field of a joint that may be free: first the parameters of [Chen2021, eq. 1], then the fields
+/// that effects change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[expect(missing_docs, reason = "letters need no words")]
 #[non_exhaustive]
@@ -12,7 +12,7 @@ pub enum JointField {
     D,
     Beta,
     Stiffness,
-    /// Addition to the compliance 1/k [rad/(N·m)].
+    /// Compliance in addition to the declared 1/k [rad/(N·m)].
     Compliance,
     /// Angle per cube of the moment [rad/(N·m)³].
     Cubic,
@@ -41,13 +41,13 @@ pub enum JointField {
     Yaw,
 }
 
-/// Field of a beam that may be free: rigidities, then the fields of effects.
+/// Field of a beam that may be free: rigidities, then the fields that effects change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum BeamField {
     /// Axial rigidity EA \[N\].
     Axial,
-    /// Bending rigidity EI about y and z, equal in nominal [N·m²].
+    /// Bending rigidity EI about both y and z, which are nominally equal [N·m²].
     Bending,
     /// Bending rigidity `EI_y` [N·m²].
     BendingY,
@@ -55,9 +55,9 @@ pub enum BeamField {
     BendingZ,
     /// Torsional rigidity GJ [N·m²].
     Twist,
-    /// Logarithm of the ratio of EI about z to the EI common to y and z.
+    /// Logarithm of the ratio of EI about z to the common EI of y and z.
     Anisotropy,
-    /// Addition to 1/EI about y and z [1/(N·m²)].
+    /// Flexibility in addition to the declared 1/EI about y and z [1/(N·m²)].
     Flexibility,
     /// Coupling of twist with bending about y [1/(N·m²)].
     CouplingY,
@@ -71,7 +71,7 @@ pub enum BeamField {
     Stretch,
     /// Point mass on the beam's axis \[kg\].
     AddedMass,
-    /// Position of that mass, from the root \[m\].
+    /// Position of the added mass, from the beam's root \[m\].
     AddedAt,
 }
 
@@ -79,7 +79,7 @@ pub enum BeamField {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ArmField {
-    /// Addition to the mass of every payload \[kg\].
+    /// Mass in addition to that of every payload \[kg\].
     Payload,
     /// Relative error of the hoist's force.
     HoistForce,
@@ -87,7 +87,7 @@ pub enum ArmField {
     HoistLeanX,
     /// Lean of the hoist's direction along y.
     HoistLeanY,
-    /// Derivative of that lean with respect to the hook's position [1/m].
+    /// Derivative of the lean of the hoist's direction with respect to the hook's position [1/m].
     HoistTrolley,
     /// Flexibility of the base about x [rad/(N·m)].
     MountingX,
@@ -116,7 +116,8 @@ impl JointField {
     pub const PLACEMENT: [Self; 6] =
         [Self::X, Self::Y, Self::Z, Self::Roll, Self::Pitch, Self::Yaw];
 
-    /// Returns the index in a placement: x, y, z, roll, pitch, yaw.
+    /// Returns the index of the field in a placement (x, y, z, roll, pitch, yaw); `None` for other
+    /// fields.
     pub fn placement(self) -> Option<usize> {
         Self::PLACEMENT.iter().position(|&field| field == self)
     }

@@ -4,21 +4,21 @@ use super::expression::Parsed;
 use super::family::{At, Prior};
 use super::parameter::LawParameter;
 
-/// Parameter of an effect before it is placed on an arm.
+/// Parameter of an effect before it is resolved on an arm.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EffectTerm {
-    /// Name after the dot.
+    /// Part of its name after the dot.
     pub name: String,
-    /// Where it enters.
+    /// Site of the model where it enters.
     pub at: At,
-    /// Formula that multiplies it there; `None`: it is itself the quantity of its site.
+    /// Formula that multiplies it there; `None` if it is itself the quantity of its site.
     pub formula: Option<Parsed>,
-    /// 1 σ of its prior.
+    /// Rule for 1 σ of its prior.
     pub prior: Prior,
-    /// Value where the effect has no size; `None`: 0.
+    /// Value at which the effect vanishes; `None` for 0.
     pub nominal: Option<Prior>,
-    /// True if nature knows no negative values.
+    /// True if a negative value is physically impossible.
     pub never_negative: bool,
-    /// The parameter inside of formulas that it is, with its bounds.
+    /// Parameter inside formulas that this is, with its bounds; `None` for a coefficient.
     pub inner: Option<LawParameter>,
 }

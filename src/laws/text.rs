@@ -1,4 +1,4 @@
-//! Texts of the catalogue with arguments filled in.
+//! Texts of the catalogue, filled in with arguments.
 
 use std::f64::consts::TAU;
 
@@ -6,7 +6,7 @@ use super::argument::Argument;
 
 /// Returns a text with `{key}` and `{key:form}` replaced by arguments.
 ///
-/// Forms: `row` rounds a time up to a row, `cycles` lists orders with their noun, `degrees` and
+/// The form `row` rounds a time up to a row, `cycles` lists orders with their noun, `degrees` and
 /// `millimetres` are the period of a wave. A covariate name is quoted in formulas alone: a word as
 /// it is, others in backquotes.
 pub(super) fn filled(text: &str, arguments: &[(&str, Argument)]) -> String {
@@ -40,7 +40,7 @@ fn shown(argument: &Argument, form: &str) -> String {
     }
 }
 
-/// Returns ascending orders in words; three and more in a row as "1 to 5".
+/// Returns ascending orders in words; three or more consecutive ones as "1 to 5".
 fn listed(orders: &[u32]) -> String {
     let runs = orders.chunk_by(|a, b| a + 1 == *b).flat_map(|run| match run {
         [first, _, .., last] => vec![format!("{first} to {last}")],

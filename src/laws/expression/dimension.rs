@@ -9,39 +9,39 @@ const SYMBOLS: [&str; BASES] = ["rad", "m", "K", "kg", "s", "N", "units of the c
 
 /// Unit of an expression as powers of base units.
 ///
-/// Literal numbers and named parameters may stand for quantities with a unit, so that a product with
-/// one of them is `flexible`: it may have any unit.
+/// Literal numbers and named parameters may have any unit, so a product with one of them is
+/// `flexible`: its unit is not determined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Dimension {
     powers: [i32; BASES],
     flexible: bool,
 }
 
-/// Unit of a formula, by which the coefficient of a term divides that of its site.
+/// Unit of a formula, by which a site's unit is divided to give the unit of the term's coefficient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Per {
-    /// No unit, or one that no table names.
+    /// No unit, or a unit that files cannot name.
     #[default]
     Number,
-    /// \[rad\]
+    /// Angle \[rad\].
     Angle,
-    /// \[m\]
+    /// Length \[m\].
     Length,
-    /// \[K\]
+    /// Temperature difference \[K\].
     Kelvin,
-    /// \[kg\]
+    /// Mass \[kg\].
     Mass,
-    /// \[s\]
+    /// Time \[s\].
     Second,
-    /// The unit of a covariate.
+    /// Unit of a covariate.
     Covariate,
 }
 
 impl Dimension {
-    /// A number without unit.
+    /// Unit of a number without unit.
     pub(super) const PLAIN: Self = Self { powers: [0; BASES], flexible: false };
-    /// A literal or a parameter.
+    /// Unit of a literal or parameter, which may be any.
     pub(super) const FLEXIBLE: Self = Self { powers: [0; BASES], flexible: true };
     pub(super) const ANGLE: Self = Self::base(0);
     pub(super) const LENGTH: Self = Self::base(1);
@@ -57,7 +57,7 @@ impl Dimension {
         Self { powers, flexible: false }
     }
 
-    /// Returns the base unit that a coefficient is given per.
+    /// Returns the unit by which the coefficient of a formula with this unit is divided.
     pub fn per(self) -> Per {
         let is = |of: Self| self.powers == of.powers;
         let known = [
@@ -71,12 +71,13 @@ impl Dimension {
         known.into_iter().find(|(of, _)| is(*of)).map_or(Per::Number, |(_, per)| per)
     }
 
-    /// Returns true if it has no unit but an angle, or may have none.
+    /// Returns true if the expression may be the argument of a function: it has no unit, an angle,
+    /// or an undetermined one.
     pub(super) fn is_plain(self) -> bool {
         self.flexible || self.powers[1..].iter().all(|power| *power == 0)
     }
 
-    /// Returns the unit of a product or quotient.
+    /// Returns the unit of a product (`sign` = 1) or quotient (`sign` = −1).
     pub(super) fn product(self, other: Self, sign: i32) -> Self {
         let powers = std::array::from_fn(|k| {
             self.powers[k].saturating_add(sign.saturating_mul(other.powers[k]))
@@ -84,7 +85,7 @@ impl Dimension {
         Self { powers, flexible: self.flexible || other.flexible }
     }
 
-    /// Returns the unit of a power.
+    /// Returns the unit of a power; `exponent` is `None` if it is not a literal number.
     #[expect(clippy::cast_possible_truncation, reason = "a whole number up to 64")]
     pub(super) fn power(self, exponent: Option<f64>) -> Self {
         match exponent {
@@ -96,7 +97,7 @@ impl Dimension {
         }
     }
 
-    /// Returns the unit of a sum, or nothing where the operands have different ones.
+    /// Returns the unit of a sum, or `None` if the operands have different units.
     pub(super) fn sum(self, other: Self) -> Option<Self> {
         match (self.flexible, other.flexible) {
             (false, false) => (self.powers[1..] == other.powers[1..]).then_some(self),
@@ -120,7 +121,7 @@ impl Dimension {
         if parts.is_empty() { "a number".to_owned() } else { parts.join("·") }
     }
 
-    /// Returns the unit of two operands under an operator, or nothing where they do not fit.
+    /// Returns the unit of two operands under an operator, or `None` if their units do not match.
     pub(super) fn under(
         operator: Operator,
         left: Self,

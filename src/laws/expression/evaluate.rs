@@ -5,12 +5,12 @@ use crate::laws::quantity::Quantity;
 use crate::scalar::Scalar;
 
 impl Expression {
-    /// Returns the value for quantities `at` and named `parameters`.
+    /// Returns the value of the expression for quantities `at` and named `parameters`.
     ///
-    /// Dual numbers carry derivatives through. Where a derivative has two sides, at 0 of `abs`,
-    /// `sign` and `step`, or is infinite, at 0 of `sqrt` and of a power below 1, it counts as 0; of
-    /// equal operands of `min` and `max` the first one's counts. A value outside of the domain of a
-    /// function is NaN or infinite.
+    /// Dual numbers propagate derivatives. A derivative that is one-sided (`abs`, `sign` and `step`
+    /// at 0) or infinite (`sqrt` and powers below 1 at 0) counts as 0. For equal operands of `min`
+    /// and `max`, the derivative of the first one is used. A value outside the domain of a function
+    /// is NaN or infinite.
     pub fn evaluate<S: Scalar>(&self, at: &impl Fn(Quantity) -> S, parameters: &[S]) -> S {
         match self {
             Self::Number(number) => S::from(*number),
@@ -71,7 +71,7 @@ impl Operator {
     }
 }
 
-/// Highest whole exponent that is taken by products.
+/// Largest integer exponent that is computed by multiplications.
 const MAX_WHOLE_EXPONENT: f64 = 64.0;
 
 /// Returns x to a power that is a literal number.
@@ -88,9 +88,9 @@ fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }
 }
 
-/// Returns tanh x, with a derivative of 0 where x is so great that its exponential overflows.
+/// Returns tanh x, with a derivative of 0 if x is so large that its exponential overflows.
 fn tanh<S: Scalar>(x: S) -> S {
-    /// tanh differs from ±1 by less than rounding beyond it.
+    /// Smallest argument at which tanh equals ±1 to rounding.
     const SATURATED: f64 = 20.0;
     if x.re().abs() > SATURATED { S::from(sign(x.re())) } else { x.tanh() }
 }

@@ -4,15 +4,15 @@ use std::fmt;
 
 use thiserror::Error;
 
-/// Mistake in a formula and the part of the text that is meant.
+/// Mistake in a formula, with the part of the text that caused it.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("column {}: {mistake}", .column)]
 pub struct FormulaError {
     /// First character of that part, counted from 1.
     pub column: usize,
-    /// The part as bytes of the formula.
+    /// Byte range of that part in the formula.
     pub span: std::ops::Range<usize>,
-    /// The mistake.
+    /// Kind of the mistake, with details.
     pub mistake: Mistake,
 }
 
@@ -20,58 +20,58 @@ pub struct FormulaError {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum Mistake {
-    /// Something else should stand there.
+    /// A word or sign is not allowed at this position.
     #[error("expected {expected}, found {found}")]
     Unexpected {
-        /// The kinds of words that may stand there.
+        /// Kinds of words that are allowed there.
         expected: &'static str,
-        /// The word or sign in the text.
+        /// Word or sign in the text.
         found: String,
     },
     /// A word that is neither quantity, function nor parameter.
     #[error("unknown word {word}{}; a parameter of the formula takes {word} = {{ start = … }}", meant(.near.as_deref()))]
     UnknownWord {
-        /// The word.
+        /// Unknown word.
         word: String,
-        /// The known word that it is most like.
+        /// Most similar known word, if there is one.
         near: Option<String>,
     },
     /// A name in front of parentheses that is no function.
     #[error("unknown function {word}{}", meant(.near.as_deref()))]
     UnknownFunction {
-        /// The name.
+        /// Unknown name.
         word: String,
-        /// The known function that it is most like.
+        /// Most similar known function, if there is one.
         near: Option<String>,
     },
     /// A joint that the arm does not have.
     #[error("{word} names no joint; the arm has {joints}, counted from 1")]
     NoJoint {
-        /// The word.
+        /// Word in the text, such as `q9`.
         word: String,
-        /// Number of joints.
+        /// Number of joints of the arm.
         joints: usize,
     },
     /// A function with the wrong number of arguments.
     #[error("{function} takes {takes} argument{}, found {found}", if *.takes == 1 { "" } else { "s" })]
     Arguments {
-        /// The function.
+        /// Name of the function.
         function: &'static str,
         /// Number of arguments that it takes.
         takes: usize,
         /// Number of arguments in the text.
         found: usize,
     },
-    /// An argument that has to be a literal number or a certain quantity.
+    /// An argument is not the literal number or the quantity that the function requires.
     #[error("write {write}")]
     Form {
-        /// The form as it should be written.
+        /// Form in which it should be written.
         write: &'static str,
     },
     /// A number that cannot be represented.
     #[error("{number} is no finite number")]
     NotFinite {
-        /// The number as written.
+        /// Number as written in the text.
         number: String,
     },
     /// A sum or comparison of different kinds of quantities.
@@ -82,33 +82,33 @@ pub enum Mistake {
         /// Unit on the right.
         right: String,
     },
-    /// A function of a quantity with a unit.
+    /// A function is applied to a quantity with a unit.
     #[error("{function} takes an angle or a number without unit, found {unit}; divide by a number")]
     HasUnit {
-        /// The function.
+        /// Name of the function.
         function: &'static str,
-        /// Unit of its argument.
+        /// Unit of the function's argument.
         unit: String,
     },
-    /// Quantities that formulas do not have yet.
+    /// A quantity is not supported in formulas.
     #[error("{word}: {reason}")]
     Unsupported {
-        /// The word.
+        /// Word in the text.
         word: String,
-        /// The reason.
+        /// Reason why it is not supported.
         reason: &'static str,
     },
     /// A formula that is too long or too deeply nested.
     #[error("a formula takes at most {most} {of}")]
     TooLarge {
-        /// The limit.
+        /// Limit that is exceeded.
         most: usize,
-        /// The thing that is limited.
+        /// Noun for the quantity that is limited.
         of: &'static str,
     },
 }
 
-/// Returns ` (did you mean …?)` if a known word is near.
+/// Returns ` (did you mean …?)` with a similar known word; an empty text for `None`.
 fn meant(near: Option<&str>) -> impl fmt::Display {
     near.map_or_else(String::new, |near| format!(" (did you mean {near}?)"))
 }

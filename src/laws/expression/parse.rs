@@ -9,31 +9,31 @@ use super::vocabulary::Vocabulary;
 use crate::error::nearest;
 use crate::laws::quantity::Quantity;
 
-/// Longest formula [characters].
+/// Maximum length of a formula [characters].
 const MAX_LENGTH: usize = 2000;
-/// Deepest nesting of parentheses, signs and powers.
+/// Maximum nesting depth of parentheses, signs and powers.
 const MAX_DEPTH: usize = 60;
 
 /// Expression with its unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parsed {
-    /// The expression.
+    /// Parsed expression.
     pub expression: Expression,
-    /// Its unit.
+    /// Unit of the expression.
     pub dimension: Dimension,
 }
 
-/// Part of an expression that has been read, with its place in the text.
+/// Part of an expression that has been parsed, with its byte range in the text.
 struct Part {
     expression: Expression,
     dimension: Dimension,
     span: Range<usize>,
 }
 
-/// Reads a formula: sums, products, powers and functions of the words of `vocabulary`.
+/// Parses a formula: sums, products, powers and functions of the words of `vocabulary`.
 ///
 /// # Errors
-/// The text is no formula, uses an unknown word, or mixes units; with the column.
+/// The text is no formula, uses an unknown word, or mixes units; the error contains the column.
 pub fn parse(text: &str, vocabulary: &Vocabulary) -> Result<Parsed, FormulaError> {
     let mut parser = Parser { text, at: 0, depth: 0, vocabulary };
     if text.chars().count() > MAX_LENGTH {
@@ -50,7 +50,7 @@ pub fn parse(text: &str, vocabulary: &Vocabulary) -> Result<Parsed, FormulaError
 
 struct Parser<'a> {
     text: &'a str,
-    /// Next byte.
+    /// Index of the next byte.
     at: usize,
     depth: usize,
     vocabulary: &'a Vocabulary<'a>,
@@ -66,7 +66,7 @@ impl<'a> Parser<'a> {
         self.text.get(self.at..).unwrap_or_default()
     }
 
-    /// Returns the next character that is no space.
+    /// Returns the next character that is not a space, without consuming it.
     fn peek(&mut self) -> Option<char> {
         let rest = self.rest();
         self.at += rest.len() - rest.trim_start().len();
@@ -133,7 +133,8 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Moves past an operator of a chain.
+    /// Consumes an operator and counts it in `chained`. Returns an error if a chain of operators is
+    /// too long.
     fn chain(&mut self, chained: &mut usize) -> Result<(), FormulaError> {
         *chained += 1;
         if *chained > MAX_DEPTH {
@@ -239,7 +240,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Reads the name of a covariate in backquotes.
+    /// Parses the name of a covariate in backquotes.
     fn quoted(&mut self) -> Result<Part, FormulaError> {
         let start = self.at;
         let inner = self.rest().get(1..).unwrap_or_default();
@@ -333,7 +334,7 @@ impl<'a> Parser<'a> {
         if slides { Dimension::LENGTH } else { Dimension::ANGLE }
     }
 
-    /// Reads the arguments of a function behind its name.
+    /// Parses the arguments of a function; its name, at `span`, has been consumed.
     fn call(&mut self, name: &str, span: Range<usize>) -> Result<Part, FormulaError> {
         self.take('(');
         let mut arguments = Vec::new();
@@ -419,7 +420,7 @@ fn covariate(index: usize, span: Range<usize>) -> Part {
     Part { expression, dimension: Dimension::COVARIATE, span }
 }
 
-/// Returns the number behind a prefix, if the word is the prefix and a number.
+/// Returns the number after `prefix` in a word such as `q12`; `None` if the word has another form.
 fn numbered(word: &str, prefix: &str) -> Option<usize> {
     let digits = word.strip_prefix(prefix)?;
     let is_number = !digits.is_empty() && digits.chars().all(|c| c.is_ascii_digit());

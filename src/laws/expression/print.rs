@@ -14,20 +14,20 @@ pub struct Names<'a> {
     pub parameters: &'a [String],
 }
 
-/// An expression with the names of its covariates and parameters.
+/// Expression with the names of its covariates and parameters, for printing.
 struct Named<'a> {
     expression: &'a Expression,
     names: Names<'a>,
 }
 
 impl Expression {
-    /// Returns the text with these names, which reads as the same expression.
+    /// Returns the expression as text with these names. Parsing the text gives an equal expression.
     pub fn display<'a>(&'a self, names: Names<'a>) -> impl fmt::Display + 'a {
         Named { expression: self, names }
     }
 
-    /// Returns the binding strength: 1 sum, 2 product, 3 sign, 4 power, 5 whatever needs no
-    /// parentheses.
+    /// Returns the binding strength: 1 sum, 2 product, 3 sign, 4 power, 5 for everything that needs
+    /// no parentheses.
     fn strength(&self) -> u8 {
         match self {
             Self::Binary(Operator::Add | Operator::Subtract, _) => 1,
@@ -113,7 +113,7 @@ impl Named<'_> {
     }
 }
 
-/// Returns true if a name can stand in a formula without quotes.
+/// Returns true if a name can be written in a formula without quotes.
 fn is_word(name: &str) -> bool {
     name.starts_with(|c: char| c.is_alphabetic() || c == '_')
         && name.chars().all(|c| c.is_alphanumeric() || c == '_')

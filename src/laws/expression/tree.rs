@@ -6,17 +6,17 @@ use crate::laws::quantity::Quantity;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Expression {
-    /// A literal number, SI.
+    /// Literal number, SI.
     Number(f64),
-    /// A quantity of the pose.
+    /// Quantity of the pose.
     Quantity(Quantity),
-    /// A named parameter, by its index in the list of names.
+    /// Named parameter, by its index in the list of parameter names.
     Parameter(usize),
-    /// −a.
+    /// Negation −a.
     Negative(Box<Self>),
     /// Two operands and the operator between them.
     Binary(Operator, Box<[Self; 2]>),
-    /// A function of one argument.
+    /// Function of one argument.
     Call(Function, Box<Self>),
 }
 
@@ -24,21 +24,21 @@ pub enum Expression {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Operator {
-    /// a + b.
+    /// Sum a + b.
     Add,
-    /// a − b.
+    /// Difference a − b.
     Subtract,
-    /// a b.
+    /// Product a b.
     Multiply,
-    /// a / b.
+    /// Quotient a / b.
     Divide,
-    /// a to the power of b.
+    /// Power, a to the power of b.
     Power,
     /// Angle of the point (b, a) \[rad\], −π to π.
     Atan2,
-    /// The smaller of a and b.
+    /// Minimum of a and b.
     Minimum,
-    /// The greater of a and b.
+    /// Maximum of a and b.
     Maximum,
 }
 
@@ -46,15 +46,15 @@ pub enum Operator {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Function {
-    /// Sine.
+    /// Sine of an angle.
     Sin,
-    /// Cosine.
+    /// Cosine of an angle.
     Cos,
-    /// Tangent.
+    /// Tangent of an angle.
     Tan,
-    /// Exponential.
+    /// Exponential function.
     Exp,
-    /// exp(x) − 1, exact for small x.
+    /// Function exp(x) − 1, exact for small x.
     Expm1,
     /// Natural logarithm.
     Log,
@@ -62,13 +62,13 @@ pub enum Function {
     Sqrt,
     /// Absolute value; its derivative at 0 counts as 0.
     Abs,
-    /// −1, 0 or 1.
+    /// Sign −1, 0 or 1.
     Sign,
     /// Hyperbolic tangent.
     Tanh,
-    /// 1 from 0 on, 0 below.
+    /// Unit step: 1 for arguments from 0 on, else 0.
     Step,
-    /// Uniform cubic B-spline over the intervals 0…4; its shifts by whole numbers add up to 1.
+    /// Uniform cubic B-spline over the intervals 0…4. Its shifts by integers add up to 1.
     Spline,
 }
 
@@ -107,7 +107,7 @@ impl Expression {
         Self::Binary(operator, Box::new([left, right]))
     }
 
-    /// Calls `visit` for every node, parents first.
+    /// Calls `visit` for every node of the tree, parents before children.
     pub fn visit(&self, visit: &mut impl FnMut(&Self)) {
         visit(self);
         match self {
@@ -117,7 +117,7 @@ impl Expression {
         }
     }
 
-    /// Returns the quantities that occur, each once, in the order of the text.
+    /// Returns the quantities that occur, without duplicates, in the order of the text.
     pub fn quantities(&self) -> Vec<Quantity> {
         let mut found = Vec::new();
         self.visit(&mut |node| {
@@ -130,14 +130,15 @@ impl Expression {
         found
     }
 
-    /// Returns true if a named parameter occurs, by its index.
+    /// Returns true if the parameter with this index occurs.
     pub fn uses(&self, parameter: usize) -> bool {
         let mut found = false;
         self.visit(&mut |node| found |= *node == Self::Parameter(parameter));
         found
     }
 
-    /// Returns joint (from 0), order k and whether it is a cosine, of sin kq or cos kq.
+    /// Returns (joint from 0, order k, true for a cosine) if the expression is sin kq or cos kq;
+    /// else `None`.
     pub fn wave(&self) -> Option<(usize, f64, bool)> {
         let Self::Call(function @ (Function::Sin | Function::Cos), argument) = self else {
             return None;
@@ -155,14 +156,15 @@ impl Expression {
         }
     }
 
-    /// Returns joint, whole order and whether it is a cosine, like [`wave`](Self::wave).
+    /// Returns joint, order and true for a cosine, like [`wave`](Self::wave), if the order is an
+    /// integer.
     pub fn whole_wave(&self) -> Option<(usize, u32, bool)> {
         let (joint, order, cosine) = self.wave()?;
         Some((joint, whole(order)?, cosine))
     }
 }
 
-/// Returns a number as a whole one from 1 on, if it is one.
+/// Returns a number as an integer, if it is one and at least 1.
 fn whole(number: f64) -> Option<u32> {
     let is_whole = number.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&number);
     #[expect(

@@ -2,24 +2,25 @@
 
 use super::tree::{Function, Operator};
 
-/// Words of a problem that formulas may use beside the built-in ones.
+/// Words of a problem that formulas may use in addition to the built-in ones.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Vocabulary<'a> {
-    /// For each joint, whether it slides.
+    /// True for each prismatic joint.
     pub slides: &'a [bool],
     /// Names of joints with their indices from 0.
     pub joints: &'a [(String, usize)],
     /// Names of the covariates of the problem.
     pub covariates: &'a [String],
-    /// Names of the parameters inside of the formula.
+    /// Names of the parameters inside the formula.
     pub parameters: &'a [String],
 }
 
 impl Vocabulary<'_> {
-    /// Quantities that are one word, as formulas write them.
+    /// Quantities whose name is one word, in the syntax of formulas.
     pub const QUANTITIES: [&'static str; 5] = ["T", "t", "time", "payload", "hoist"];
 
-    /// Returns true if a word is a quantity, a function or a number of formulas on any arm.
+    /// Returns true if a word has a meaning in formulas on any arm: a quantity, a function or a
+    /// constant.
     pub fn is_reserved(word: &str) -> bool {
         let is_numbered = ["q", "approach", "M"].into_iter().any(|prefix| {
             let digits = word.strip_prefix(prefix).unwrap_or_default();

@@ -28,8 +28,8 @@ pub enum StepMethod {
     /// feasible point. The solver has converged when the gradient vanishes along all feasible
     /// directions.
     ActiveSet,
-    /// The same step by Clarabel's interior-point method, with the radius ‖D p‖ ≤ Δ as a
-    /// second-order cone.
+    /// Step of the active-set problem, computed by Clarabel's interior-point method, with the
+    /// radius ‖D p‖ ≤ Δ as a second-order cone.
     InteriorPoint,
     /// Unconstrained step clamped to the bounds; a baseline for comparisons.
     ///

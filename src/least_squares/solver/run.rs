@@ -89,7 +89,7 @@ pub enum BoundMethod {
     /// Damped steps in the polyhedron of the constraints by an active-set method.
     #[default]
     ActiveSet,
-    /// The same steps by Clarabel's interior-point method.
+    /// Damped steps in the polyhedron of the constraints by Clarabel's interior-point method.
     InteriorPoint,
     /// Interior reflective steps [Branch, Coleman & Li 1999]; ignores inequalities.
     Reflective,

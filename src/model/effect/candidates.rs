@@ -30,7 +30,7 @@ const PATH_STEP: f64 = 1.4;
 /// Effect that a search may add, with the reason if the data cannot show it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// The effect.
+    /// Effect that the search may add, with its site and its law.
     pub effect: Effect,
     /// Reason why these data cannot show it; `None` if they can.
     pub untestable: Option<&'static str>,
