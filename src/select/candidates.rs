@@ -5,16 +5,18 @@ use crate::model::effect::{self, Candidate};
 use crate::model::parameter::{holds_all, refuses};
 use crate::problem::{Effect, Problem};
 
-/// Reason of an effect that the rules of the problem hold at zero.
+/// Reason why an effect is not tried: the rules of the problem fix its parameters at zero.
 pub const HELD_FIXED: &str = "[parameters] holds it fixed";
 
-/// Reason of an effect that the problem could not declare under its rules.
+/// Reason why an effect is not tried: a rule of the problem that matches it gives a quantity in
+/// another unit.
 pub const REFUSED: &str = "a rule of [parameters] speaks of it in another unit";
 
-/// Reason of an effect whose derivative is not finite in these poses.
+/// Reason why an effect is not tried: its derivative is not finite in these poses.
 pub const NOT_FINITE: &str = "its derivative is not a finite number in these poses";
 
-/// Effects that are not declared: those that the data can show, and the others with the reason.
+/// Catalogue effects that the problem does not declare: those that the data can show, and the
+/// others with the reason.
 pub(super) struct Candidates {
     pub testable: Vec<Effect>,
     pub untestable: Vec<(Effect, &'static str)>,
@@ -45,7 +47,7 @@ impl Candidates {
     }
 }
 
-/// Returns effects with one more; harmonics of one joint become one effect.
+/// Returns the effects with one more. A harmonic of a joint that has one is merged into it.
 pub(super) fn joined(effects: &[Effect], new: &Effect) -> Vec<Effect> {
     let mut all = effects.to_vec();
     match all.iter_mut().find_map(|known| Some((known.joined(new)?, known))) {

@@ -16,21 +16,22 @@ use crate::problem::{Effect, JointKind, Problem};
 use crate::residual_tests::Covariate;
 use crate::residual_tests::CovariateValues;
 
-/// Measurements, their split, and the settings of a search.
+/// Identification rows of a data set with the settings of a search.
 #[derive(Debug, Clone)]
 pub(super) struct Data<'a> {
-    /// Data set that is fitted again.
+    /// Complete data set, to which problems with more effects are fitted.
     pub dataset: &'a Dataset,
     pub measurements: &'a Measurements,
     pub split: &'a Split,
     pub rules: &'a SelectionRules,
-    /// Number of the conditions of each identification row; rows with equal numbers are repeats.
+    /// Identifier of the conditions of each identification row. Rows with equal identifiers are
+    /// repeats.
     pub setup: Vec<usize>,
-    /// Block of each identification row; repeats share one.
+    /// Cross-validation block of each identification row; repeats are in one block.
     pub block: Vec<usize>,
-    /// Effects that the search considers besides those of the catalogue.
+    /// Effects that the search considers in addition to those of the catalogue.
     pub candidates: &'a [Effect],
-    /// True if the harmonics of the problem may have a common prior.
+    /// True if the harmonics of all joints may have a common prior.
     pub takes_gears: bool,
     /// Request to stop the search early.
     pub stop: Stop,
@@ -64,7 +65,7 @@ impl<'a> Data<'a> {
         }
     }
 
-    /// Adds effects that the search considers.
+    /// Adds effects that the search considers in addition to the catalogue.
     pub fn with_candidates(self, candidates: &'a [Effect]) -> Self {
         Self { candidates, ..self }
     }
@@ -84,8 +85,8 @@ impl<'a> Data<'a> {
         self.rows().iter().map(|&row| column[row]).collect()
     }
 
-    /// Returns the identification rows on which evidence is evaluated: at most
-    /// `evidence_poses`, taken evenly.
+    /// Returns the identification rows on which evidence is evaluated: at most `evidence_poses`,
+    /// evenly spaced in the order of the table.
     pub fn evidence_rows(&self) -> Vec<usize> {
         let rows = self.rows();
         let taken = rows.len().min(self.rules.evidence_poses);
@@ -102,7 +103,8 @@ impl<'a> Data<'a> {
         self.rows().iter().map(|&row| self.measurements.session.of_row[row]).collect()
     }
 
-    /// Returns the columns of the identification poses, their ranges, and which of them vary.
+    /// Returns which optional columns the identification rows have, with their ranges and which of
+    /// them vary.
     pub fn conditions(&self, problem: &Problem) -> DataCoverage {
         fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
@@ -142,7 +144,8 @@ impl<'a> Data<'a> {
         }
     }
 
-    /// Returns the covariates that the user declares, one value for each identification row.
+    /// Returns the covariates that the problem declares, each with its value in every
+    /// identification row.
     fn own_covariates(&self) -> impl Iterator<Item = Vec<f64>> {
         let count =
             self.rows().first().map_or(0, |&row| self.measurements.covariates_of(row).len());
@@ -151,16 +154,16 @@ impl<'a> Data<'a> {
         })
     }
 
-    /// Returns the candidate times of a station shift, at most `shift_times` of
-    /// [`Self::times_between_poses`], taken evenly.
+    /// Returns the candidate times of a station shift: at most `MAX_SHIFT_TIMES` of
+    /// [`Self::times_between_poses`], evenly chosen.
     pub fn shift_times(&self) -> Vec<f64> {
         let all = self.times_between_poses();
         let every = all.len().div_ceil(MAX_SHIFT_TIMES).max(1);
         all.into_iter().step_by(every).collect()
     }
 
-    /// Returns times about half way between consecutive poses that leave `least_side` poses on either
-    /// side, ascending, in few digits \[s\].
+    /// Returns times approximately half way between consecutive poses \[s\], ascending, written
+    /// with few digits. Each leaves at least `MIN_POSES_BESIDE_SHIFT` poses on either side.
     pub fn times_between_poses(&self) -> Vec<f64> {
         let mut times = self.time();
         times.sort_by(f64::total_cmp);
@@ -170,7 +173,8 @@ impl<'a> Data<'a> {
         (side..count).take_while(|k| k + side <= count).filter_map(between).collect()
     }
 
-    /// Returns everything that the residual may depend on, one value for each identification row.
+    /// Returns all quantities on which the residual may depend, each with its value in every
+    /// identification row.
     pub fn covariates(&self, problem: &Problem) -> Vec<CovariateValues> {
         let measurements = self.measurements;
         let moving = problem
@@ -210,7 +214,7 @@ impl<'a> Data<'a> {
     }
 }
 
-/// Returns the conditions of one row, to the bit.
+/// Returns the bit patterns of the conditions of one row; equal patterns mean repeats.
 fn conditions_of(measurements: &Measurements, row: usize) -> Vec<u64> {
     let mut key = bits(measurements.configuration(row));
     let n = measurements.joints;
@@ -234,7 +238,7 @@ pub(super) fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
-/// Returns the number of each key in order of first appearance.
+/// Returns an identifier for each key: equal keys have equal numbers, in order of first appearance.
 pub(super) fn number<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
     let mut known = BTreeMap::new();
     keys.map(|key| {
@@ -244,8 +248,8 @@ pub(super) fn number<K: Ord>(keys: impl Iterator<Item = K>) -> Vec<usize> {
     .collect()
 }
 
-/// Returns a number about half way between two, in no more decimals than it takes to be within a
-/// twentieth of their distance of the middle.
+/// Returns a number near the middle of two numbers, written with few decimals: within a twentieth
+/// of their distance from the middle.
 fn half_way(low: f64, high: f64) -> f64 {
     let middle = 0.5 * (low + high);
     let unit = 10.0_f64.powf(((high - low) / 10.0).log10().floor());

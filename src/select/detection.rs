@@ -17,67 +17,68 @@ use crate::model::parameter::unit;
 use crate::problem::{Effect, Problem};
 use crate::quantity::Unit;
 
-/// Sizes from which on measurements in some poses would show each effect of the catalogue.
+/// Smallest sizes at which measurements in some poses would show each effect of the catalogue.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detection {
-    /// Probability with which an effect of the stated size is found.
+    /// Probability that an effect of the stated size is found (power of the test).
     pub power: f64,
-    /// Probability that chance points to any effect.
+    /// Probability of a false alarm: that noise makes any effect significant.
     pub level: f64,
     /// Candidates that these poses can test, in the order of the catalogue.
     pub effects: Vec<Detectable>,
-    /// Candidates that they cannot test, with the reason.
+    /// Candidates that these poses cannot test, with the reason.
     pub untestable: Vec<(Effect, &'static str)>,
-    /// True if the poses have no times yet and are taken to be measured a minute apart.
+    /// True if the poses have no times; they are then assumed to be measured a minute apart.
     pub times_assumed: bool,
 }
 
-/// Sizes from which on an effect is found.
+/// Smallest sizes at which an effect is found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detectable {
-    /// Effect in question.
+    /// Effect whose detectable size is computed.
     pub effect: Effect,
-    /// Sizes of its parameters, those of one unit together.
+    /// Sizes of its parameters; parameters with the same unit form one entry.
     pub sizes: Vec<Size>,
 }
 
-/// Size from which on some parameters of an effect, all others at zero, are found.
+/// Smallest size at which some parameters of an effect are found, all others being zero.
 ///
-/// The size of one parameter is its absolute value, that of several their length √(Σ p²): for a
-/// harmonic its amplitude.
+/// The size of one parameter is its absolute value. The size of several is their norm √(Σ p²),
+/// which for a harmonic is its amplitude.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Size {
     /// Names of the parameters, such as `joint-harmonic[3].sin1`.
     pub parameters: Vec<String>,
     /// Unit of the parameters.
     pub unit: Unit,
-    /// 1 σ of the catalogue's prior, SI: realistic effects are not much larger.
+    /// Standard deviation (1 σ) of the catalogue's prior, SI. Realistic effects are not much
+    /// larger.
     pub prior: f64,
-    /// Size in the direction (phase, axis) that is hardest to see, SI; `None` where the fitted
-    /// parameters absorb it or leave hardly any degree of freedom.
+    /// Size in the direction (phase, axis) that is hardest to detect, SI. `None` if the fitted
+    /// parameters can reproduce it completely, or if hardly any degrees of freedom remain.
     pub worst: Option<f64>,
-    /// Size in the direction that is easiest to see, SI.
+    /// Size in the direction (phase, axis) that is easiest to detect, SI.
     pub best: Option<f64>,
 }
 
 impl Size {
-    /// Returns true if effects as large as the prior are found in some direction.
+    /// Returns true if effects as large as the prior σ are found in at least one direction.
     pub fn is_within_prior(&self) -> bool {
         self.best.is_some_and(|best| best <= self.prior)
     }
 }
 
-/// Computes the size from which on a scan of the catalogue would find each effect, were `poses`
-/// measured.
+/// Computes the smallest size at which a scan of the catalogue would find each effect, if `poses`
+/// were measured.
 ///
-/// LinearNeighbourhood about the nominal arm. With the columns C of an effect's parameters p,
-/// everything free projected out as a fit with priors does, an effect of size p has the
-/// noncentrality λ = pᵀ CᵀC p; it is found if F on k and ν − k degrees of freedom is beyond level /
-/// tries. Poses without a time are taken to be a minute apart; of rows that are measured already no
-/// more than the order is known then.
+/// The computation is linear about the nominal arm. Let C be the columns of an effect's parameters
+/// p, with the free parameters projected out as a fit with priors does. An effect of size p has the
+/// noncentrality λ = pᵀ CᵀC p. It is found if F on k and ν − k degrees of freedom is significant at
+/// level / tries. Poses without a time are assumed to be a minute apart; then only the order of
+/// rows that are already measured is known.
 ///
 /// # Errors
-/// Rules of `[parameters]` do not fit the arm.
+/// Returns an error if rules of `[parameters]` do not match the arm.
 pub fn detectable(problem: &Problem, poses: &Measurements) -> Result<Detection, InputError> {
     let is_known = poses.time_measured || poses.position_measured;
     let poses = if is_known { poses.clone() } else { timed(poses) };
@@ -99,7 +100,7 @@ pub fn detectable(problem: &Problem, poses: &Measurements) -> Result<Detection, 
     })
 }
 
-/// Returns the poses with assumed times.
+/// Returns the poses with assumed times if they have none.
 pub(super) fn timed(poses: &Measurements) -> Measurements {
     let mut poses = poses.clone();
     if !poses.time_measured {
@@ -119,8 +120,8 @@ pub(super) fn candidates(problem: &Problem, poses: &Measurements) -> Candidates 
     )
 }
 
-/// Calls `with` with the nominal arm linearised at these poses, and its neighbourhood with all
-/// parameters fitted and no residual.
+/// Calls `with` with the nominal arm linearised at these poses, and with its linear neighbourhood:
+/// all free parameters fitted, residual zero.
 pub(super) fn with_linear<T>(
     problem: &Problem,
     poses: &Measurements,
@@ -155,8 +156,8 @@ pub(super) fn with_linear<T>(
     Ok(with(&linearised, &linear))
 }
 
-/// Returns the sizes of an effect for the units of its parameters; parameters whose zero means
-/// nothing, as the place of a mass, are left out.
+/// Returns the detectable sizes of an effect, one for each unit of its parameters. Parameters that
+/// do not vanish with the effect, such as the position of a mass, are left out.
 pub(super) fn sizes(
     problem: &Problem,
     linearised: &Linearised,

@@ -1,4 +1,4 @@
-//! A fitted problem and its linear neighbourhood.
+//! Fit of a problem, with its linear neighbourhood.
 
 use crate::select::settings::{MAX_OUTLIER_SHARE, OUTLIER_DISTANCE};
 use std::collections::BTreeSet;
@@ -15,20 +15,21 @@ use crate::model::parameter::{BeamField, ParameterSite};
 use crate::model::{Model, Pose};
 use crate::problem::{Effect, EffectDeclaration, Problem};
 
-/// Factor of σ that takes all weight from an outlier.
+/// Factor on σ by which an outlier gets practically no weight.
 const SIGMA_FACTOR_OF_OUTLIERS: f64 = 1e6;
 
-/// Median of |r|² of one, two and three normal coordinates of unit scatter.
+/// Median of |r|² for one, two and three normal coordinates with unit variance.
 const MEDIAN_OF_SQUARES: [f64; 3] = [0.455, 1.386, 2.366];
-/// Maximum number of concentration steps of the search for outliers.
+/// Maximum number of concentration steps of the search for outliers (least trimmed squares).
 const MAX_CONCENTRATION_STEPS: usize = 10;
-/// Work of one least-squares solve, in poses × unknowns², above which the outliers of the previous
-/// fit are kept instead of searched again: a search solves about ten times.
+/// Largest work of one least-squares solve, in poses × unknowns², at which outliers are searched
+/// again. Otherwise those of the previous fit are kept, because a search takes about ten solves.
 const MAX_OUTLIER_WORK: f64 = 2e8;
-/// Root mean square change of the residuals, in σ, up to which evidence about a fit that was stopped
-/// early holds for the converged one.
+/// Largest root mean square change of the residuals, in units of σ, at which evidence about a fit
+/// that was stopped early remains valid for the converged one.
 const MAX_UNSETTLED: f64 = 0.05;
-/// Part of its variance that a pose keeps where it determines a direction alone.
+/// Smallest share of its variance that the residual of a pose keeps along a direction that the pose
+/// alone determines.
 const MIN_VARIANCE_OF_POSE: f64 = 1e-3;
 
 /// Problem with its effects, fitted to the identification rows.
@@ -37,17 +38,17 @@ pub(super) struct Fitted {
     pub problem: Problem,
     pub model: Model,
     pub found: Identification,
-    /// Numbers of the parameters that were fitted and rest on no bound.
+    /// Indices of the parameters that were fitted and rest on no bound.
     pub unknowns: Vec<usize>,
     /// Coefficients of the active constraints, shape = (constraints, unknowns).
     active: DMatrix<f64>,
-    /// 1 σ of a coordinate in rows without a declared σ \[m\].
+    /// Standard deviation (1 σ) of a coordinate in rows without a declared σ \[m\].
     pub sigma: f64,
-    /// Rows that take no part in the evidence: outliers.
+    /// Rows that are excluded from the evidence: outliers.
     pub set_aside: Vec<usize>,
     /// Linear neighbourhood at the identification rows, computed on first use.
     around: OnceLock<Arc<LinearNeighbourhood>>,
-    /// Derivatives there that were computed last.
+    /// Derivatives at the fit that were computed last.
     derivatives: Arc<Mutex<Option<Arc<Derivatives>>>>,
 }
 
@@ -58,8 +59,8 @@ impl Fitted {
         Self::of(problem, data, found)
     }
 
-    /// Fits another problem to the same rows. A fit of too much work to search for outliers again
-    /// sets aside the rows that this fit set aside.
+    /// Fits another problem to the same rows. If a search for outliers would take too long, the
+    /// outliers of this fit are kept.
     pub fn next(
         &self,
         problem: Problem,
@@ -70,7 +71,7 @@ impl Fitted {
         Self::with_outliers_of(Some(self), problem, data, found)
     }
 
-    /// Wraps a problem that was fitted to the identification rows before.
+    /// Creates the fitted problem from an existing fit to the identification rows.
     pub fn of(problem: Problem, data: &Data, found: Identification) -> Result<Self, IdentifyError> {
         Self::with_outliers_of(None, problem, data, found)
     }
@@ -132,7 +133,7 @@ impl Fitted {
         Ok(fitted)
     }
 
-    /// Continues the fit until it converges, if it was stopped before or is provisional.
+    /// Continues the fit until it converges, if it was stopped early or is provisional.
     pub fn settled(self, data: &Data, options: &Options) -> Result<Self, IdentifyError> {
         if self.found.termination.converged() && !self.found.provisional {
             return Ok(self);
@@ -146,7 +147,7 @@ impl Fitted {
     }
 
     /// Returns true if the residuals of another fit of the same effects differ by more than
-    /// `MAX_UNSETTLED` σ in root mean square.
+    /// [`MAX_UNSETTLED`] σ in root mean square.
     pub fn differs_from(&self, other: &Self, data: &Data) -> bool {
         let [here, there] = [self, other].map(|fitted| fitted.errors(data, data.rows()));
         let squares: f64 = here.iter().zip(&there).map(|(a, b)| (a - b).norm_squared()).sum();
@@ -160,7 +161,7 @@ impl Fitted {
         Options { start: values.collect(), influential_rows: false, ..options.clone() }
     }
 
-    /// Returns such options with the state that the next fit reuses: the registered nominal arm,
+    /// Returns options for the next fit with the state that it reuses: the registered nominal arm,
     /// the derivatives at the optimum and, if the fits are `alike`, the noise scale.
     pub fn succeeding(&self, options: &Options, alike: bool) -> Options {
         let derivatives = self.derivatives.lock().unwrap_or_else(PoisonError::into_inner).clone();
@@ -198,7 +199,7 @@ impl Fitted {
         poses
     }
 
-    /// Rows of the active constraints, shape = (constraints, unknowns).
+    /// Returns the rows of the active constraints, shape = (constraints, unknowns).
     pub fn active(&self) -> &DMatrix<f64> {
         &self.active
     }
@@ -208,11 +209,11 @@ impl Fitted {
         self.model.residuals(self.poses(data, rows), &self.found.x)
     }
 
-    /// Returns the model linearised at the fit in the identification rows, with every site at which
+    /// Returns the model linearised at the fit in the identification rows, with the sites at which
     /// `effects` enter.
     ///
-    /// Of many unknowns the derivatives are kept for who asks next; `data` are those that were
-    /// fitted.
+    /// With many unknowns, the derivatives are cached for the next call. `data` must be those that
+    /// were fitted.
     pub fn linearised<'a>(&'a self, data: &Data<'a>, effects: &[Effect]) -> Linearised<'a> {
         if self.unknowns.len() < MANY_UNKNOWNS {
             return self.linearised_at(data, data.rows(), effects);
@@ -234,7 +235,8 @@ impl Fitted {
         self.linearised_with(data, rows, effects, &[])
     }
 
-    /// Returns the model linearised at the fit with further sites.
+    /// Returns the model linearised at the fit in some rows, with the sites of `effects` and the
+    /// sites `slots`.
     pub fn linearised_with<'a>(
         &'a self,
         data: &Data<'a>,
@@ -265,7 +267,7 @@ impl Fitted {
         )
     }
 
-    /// Returns the fit in its linear neighbourhood.
+    /// Returns the linear neighbourhood of the fit.
     pub fn neighbourhood(&self, linearised: &Linearised) -> LinearNeighbourhood {
         self.neighbourhood_without(linearised, &[])
     }
@@ -279,8 +281,8 @@ impl Fitted {
         Arc::clone(self.around.get_or_init(|| new))
     }
 
-    /// Returns true if this fit predicts blocks of poses that are left out better than another fit
-    /// of the same rows, beyond chance: t test over the blocks at 2.5 %, one-sided.
+    /// Returns true if this fit predicts left-out blocks of poses significantly better than another
+    /// fit of the same rows: one-sided t test over the blocks at 2.5 %.
     pub fn predicts_better_than(&self, other: &Self, data: &Data) -> bool {
         let squares = |fitted: &Self| {
             let fit = fitted.with_all_rows().around(data);
@@ -296,12 +298,12 @@ impl Fitted {
         quantile.is_ok_and(|t| mean > t.inverse_cdf(0.975) * (variance / count).sqrt())
     }
 
-    /// Returns the fit with outliers at full weight.
+    /// Returns the fit with no rows excluded as outliers.
     pub fn with_all_rows(&self) -> Self {
         self.setting_aside(Vec::new())
     }
 
-    /// Returns the fit with other rows set aside in its linear neighbourhood.
+    /// Returns the fit with other rows excluded, in its linear neighbourhood.
     pub fn setting_aside(&self, rows: Vec<usize>) -> Self {
         Self {
             set_aside: rows,
@@ -311,8 +313,8 @@ impl Fitted {
         }
     }
 
-    /// Returns the linear neighbourhood with priors weighted as in the fit, which may have taken a
-    /// σ larger than the declared one.
+    /// Returns the linear neighbourhood with priors weighted as in the fit, whose σ may be larger
+    /// than the declared one.
     pub fn neighbourhood_as_fitted(&self, linearised: Linearised) -> LinearNeighbourhood {
         let unknowns =
             self.unknowns_without(&linearised, &[], self.found.noise_factor.max(1.0).sqrt());
@@ -321,7 +323,7 @@ impl Fitted {
         LinearNeighbourhood::in_place_of(columns, residual, &unknowns, empty)
     }
 
-    /// Returns the unknowns but those `without`; 1 σ of their priors is divided by `weight`.
+    /// Returns the unknowns except those in `without`; 1 σ of their priors is divided by `weight`.
     fn unknowns_without(
         &self,
         linearised: &Linearised,
@@ -373,7 +375,7 @@ impl Fitted {
         )
     }
 
-    /// Returns the numbers of an effect's parameters among the unknowns.
+    /// Returns the indices of an effect's parameters among the unknowns.
     pub fn unknowns_of(&self, effect: &Effect) -> Vec<usize> {
         let parameters = self.parameters_of(effect);
         parameters
@@ -382,7 +384,7 @@ impl Fitted {
             .collect()
     }
 
-    /// Returns the numbers of an effect's parameters in the model.
+    /// Returns the indices of an effect's parameters in the model.
     pub fn parameters_of(&self, effect: &Effect) -> Vec<usize> {
         let parameters = effect.parameters(&self.problem);
         let is_own = |&k: &usize| {
@@ -392,12 +394,12 @@ impl Fitted {
     }
 }
 
-/// Returns the identification rows whose residual is no noise of the others' size, in the linear
-/// neighbourhood of the fit without them.
+/// Returns the identification rows that are outliers, in the linear neighbourhood of the fit
+/// without them.
 ///
-/// As many rows as may be outliers, those farthest off, are left out until they stay the same, as
-/// in one start of the trimmed squares of [Rousseeuw and Van Driessen 2006]; then those beyond
-/// `OUTLIER_DISTANCE` alone are left out.
+/// The rows with the largest residuals, as many as may be outliers, are left out repeatedly until
+/// they stay the same, as in one start of least trimmed squares [Rousseeuw and Van Driessen 2006].
+/// Then only rows beyond `OUTLIER_DISTANCE` are left out.
 fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     #[expect(
         clippy::cast_possible_truncation,
@@ -442,11 +444,11 @@ fn outliers(fitted: &Fitted, data: &Data) -> Vec<usize> {
     aside.into_iter().map(|k| rows[k]).collect()
 }
 
-/// Returns the squared distance of each pose from the fit without the poses `aside`, in units of the
-/// scatter of one coordinate, squared.
+/// Returns the squared distance of each pose from the fit without the poses `aside`, in units of
+/// the variance of one coordinate.
 ///
-/// The distance is rᵀ C⁻¹ r over the median of all poses, C = 1 − H for a pose in the fit and
-/// 1 + A (AᵀA)⁻¹ Aᵀ for one that was left out.
+/// The distance is rᵀ C⁻¹ r over the median of all poses, with C = 1 − H for a pose in the fit and
+/// C = 1 + A (AᵀA)⁻¹ Aᵀ for one that was left out.
 fn distances(fitted: &Fitted, linearised: &Linearised, aside: &[usize]) -> Vec<f64> {
     let (whole, residual) = (linearised.fitted(), linearised.residual());
     let (mut columns, mut here) = (whole.clone(), residual.clone());

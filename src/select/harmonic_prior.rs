@@ -1,23 +1,24 @@
-//! Prior that the harmonics of all joints share, for joints with a periodic error of many orders.
+//! Common prior of the harmonics of all joints, used if a joint has a periodic error with many
+//! orders.
 
 use crate::model::effect;
 use crate::model::parameter::{Regressor, rule_of};
 use crate::problem::{Effect, Freedom, JointKind, ParameterRule, Problem, Quantities};
 use crate::quantity::Unit;
 
-/// Number of orders from which on the harmonics of a joint count as one periodic error whose
+/// Smallest number of orders at which the harmonics of a joint count as one periodic error whose
 /// coefficients have a common prior.
 pub(super) const MIN_GEAR_ORDERS: usize = 12;
 
-/// Prior that harmonics of all joints share: 1 σ of the coefficients of each order about 0.
+/// Common prior of the harmonics of all joints: for each order, 1 σ of its coefficients about 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HarmonicPrior {
-    /// Orders, ascending, and σ \[rad\].
+    /// Orders, ascending, with σ \[rad\].
     pub by_order: Vec<(u32, f64)>,
 }
 
 impl HarmonicPrior {
-    /// Returns the parameter patterns that declare the prior in a problem, and σ \[rad\].
+    /// Returns the prior as rules of `[parameters]`: pattern and σ \[rad\].
     pub fn rules(&self) -> impl Iterator<Item = (String, f64)> {
         let of = |(order, sigma)| {
             ["sin", "cos"].map(|wave| (format!("joint-harmonic.{wave}{order}"), sigma))
@@ -37,7 +38,7 @@ impl HarmonicPrior {
         }
     }
 
-    /// Returns σ of an order \[rad\].
+    /// Returns σ of an order \[rad\]; `None` if the prior lacks it.
     pub(super) fn sigma(&self, order: u32) -> Option<f64> {
         let place = self.by_order.binary_search_by_key(&order, |entry| entry.0).ok()?;
         self.by_order.get(place).map(|entry| entry.1)
@@ -59,18 +60,18 @@ impl HarmonicPrior {
     }
 }
 
-/// Returns true if an effect is a periodic error of many orders, whose coefficients have a common
+/// Returns true if an effect is a periodic error with many orders, whose coefficients have a common
 /// prior.
 pub(super) fn is_gear(effect: &Effect) -> bool {
     matches!(effect, Effect::JointHarmonic { orders, .. } if orders.len() >= MIN_GEAR_ORDERS)
 }
 
-/// Returns true if an effect is the periodic error of many orders of a joint, from 1.
+/// Returns true if an effect is the periodic error with many orders of a joint, counted from 1.
 pub(super) fn is_gear_of(effect: &Effect, joint: usize) -> bool {
     is_gear(effect) && matches!(effect, Effect::JointHarmonic { joint: of, .. } if *of == joint)
 }
 
-/// Returns the order of a harmonic regressor.
+/// Returns the order of a regressor that is a harmonic; `None` for others.
 pub(super) fn order_of(regressor: &Regressor) -> Option<u32> {
     match *regressor {
         Regressor::Sine(_, order) | Regressor::Cosine(_, order) => Some(order),
@@ -78,8 +79,8 @@ pub(super) fn order_of(regressor: &Regressor) -> Option<u32> {
     }
 }
 
-/// Returns true if one prior in angles can hold the harmonics of a problem and those of one revolute
-/// joint besides: no declared harmonic is of a sliding joint, and no rule speaks of any harmonic.
+/// Returns true if a prior on angles can apply to all harmonics. No declared harmonic may belong to
+/// a prismatic joint, no rule may match a harmonic, and at least one joint must be revolute.
 pub(super) fn takes_common_prior(problem: &Problem) -> bool {
     let joints = (1..=problem.joints.len())
         .filter(|&joint| problem.joints[joint - 1].command_kind() == JointKind::Revolute);

@@ -1,12 +1,10 @@
-//! Effects that a model lacks, found from the residual of its fit.
+//! Search for effects that a model lacks, from the residual of its fit.
 //!
-//! - [`trace`]: score screening, every candidate of the catalogue scored in the linear
-//!   neighbourhood of a fit and ranked.
-//! - [`detectable`]: the same screening before anything is measured: from what size on it would
-//!   find each effect.
-//! - [`close`]: model selection, rounds of fit, screening, adding, testing again.
-//! - [`Unexplained`]: structure that no effect explains, its place, and a smooth correction without
-//!   a cause.
+//! - [`trace`]: score screening, which scores every candidate of the catalogue in the linear
+//!   neighbourhood of a fit and ranks them. - [`detectable`]: the same screening before
+//!   measurement: the smallest size at which it would find each effect. - [`close`]: model
+//!   selection in rounds of fitting, screening, adding effects and testing. - [`Unexplained`]:
+//!   structure that no effect explains, its place, and a smooth empirical correction.
 
 mod candidates;
 

@@ -1,34 +1,34 @@
-//! Power of the scan of the catalogue.
+//! Statistical power of the scan of the catalogue.
 
 use statrs::function::beta::beta_reg;
 
 use crate::numeric::bisect;
 
-/// Number of bisections for a noncentrality.
+/// Number of bisections that locate a noncentrality.
 const MAX_BISECTIONS: usize = 24;
-/// Number of standard deviations of a Poisson distribution beyond which its terms are left out.
+/// Number of standard deviations of a Poisson distribution beyond which its terms are neglected.
 const MAX_POISSON_DEVIATIONS: f64 = 9.0;
-/// Largest noncentrality: that of an effect some 30 times its error.
+/// Largest noncentrality that is considered, that of an effect 30 times its standard error.
 const MAX_NONCENTRALITY: f64 = 1024.0;
 
-/// F test of one candidate in a scan, as a test of the part of the squares gained: Beta(k/2, (ν −
-/// k)/2) without an effect.
+/// F test of one candidate in a scan, in terms of the share of the sum of squares that it gains.
+/// Without an effect, the share follows Beta(k/2, (ν − k)/2).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ScanTest {
     /// Half of the number of new directions, k / 2.
     new: f64,
     /// Half of the residual degrees of freedom, (ν − k) / 2.
     left: f64,
-    /// Part that the candidate must gain.
+    /// Smallest share that the candidate must gain to be found.
     threshold: f64,
 }
 
 impl ScanTest {
     /// Creates the test of a candidate with `k` new directions and ν = `freedom` degrees of freedom
-    /// at `level` / `tries`. Returns `None` if no degree of freedom would remain.
+    /// at `level` / `tries`. Returns `None` if no degrees of freedom would remain.
     ///
-    /// The part must be beyond chance at level / tries, and better than nothing by the information
-    /// criterion ν ln(1 − part) + k ln ν + 2 ln(tries).
+    /// The share must be significant at level / tries, and must improve the information criterion ν
+    /// ln(1 − share) + k ln ν + 2 ln(tries).
     pub fn new(k: usize, freedom: f64, level: f64, tries: f64) -> Option<Self> {
         let (new, left) = (k as f64 / 2.0, (freedom - k as f64) / 2.0);
         if k == 0 || left < 0.5 {
@@ -55,8 +55,7 @@ impl ScanTest {
         sum
     }
 
-    /// Returns the p-value at the gain that a noncentrality gives on average, for one candidate
-    /// alone.
+    /// Returns the uncorrected p-value at the mean gain for a noncentrality.
     pub fn expected_p(&self, noncentrality: f64) -> f64 {
         let gained = 2.0 * self.new + noncentrality;
         beta_reg(self.left, self.new, 2.0 * self.left / (2.0 * self.left + gained))
@@ -76,7 +75,7 @@ impl ScanTest {
     }
 }
 
-/// Returns the middle of the interval in which `is_below` turns false.
+/// Returns the midpoint of the interval in which `is_below` changes from true to false.
 fn halved(is_below: impl Fn(f64) -> bool, range: (f64, f64)) -> f64 {
     let (low, high) = bisect(is_below, range, MAX_BISECTIONS);
     0.5 * (low + high)

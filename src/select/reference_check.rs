@@ -1,5 +1,4 @@
-//! Check of an effect of the instrument against data that took no part in the fit: readings of
-//! fixed points.
+//! Check of an effect of the instrument against readings of fixed points, which were not fitted.
 //!
 //! An instrument that moved by d f(t) and turned by ω f(t) moves a fixed point p with it: z = p +
 //! (d + ω × p) f(t) + noise of σ, the true place unknown and p near it. With θ = (d, ω), or d
@@ -13,7 +12,7 @@
 //!
 //! 2 θ̂ᵀv − θ̂ᵀM θ̂ + gᵀK⁻¹g − ln det K,
 //!
-//! which decides where the odds are 100 to 1 either way.
+//! which decides if the odds are 100 to 1 either way.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,38 +25,38 @@ use crate::measurement::NestReading;
 use crate::model::parameter::{ParameterSite, Regressor};
 use crate::problem::{Effect, PoseView, Problem};
 
-/// Twice the log odds from which on readings decide: 100 to 1.
+/// Twice the log odds at which readings decide: 100 to 1.
 const MIN_TWICE_LN_ODDS: f64 = 9.21;
 
 /// Outcome of a reference check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReferenceVerdict {
-    /// The instrument moved as the effect says.
+    /// The readings show the motion that the effect describes.
     Corroborated,
-    /// The instrument did not move so.
+    /// The readings do not show that motion.
     Contradicted,
 }
 
-/// Check of an effect against data that took no part in the fit.
+/// Check of an effect against data that were not fitted.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReferenceCheck {
-    /// Data of the check, in words.
+    /// Description of the data of the check.
     pub data: String,
     /// Outcome of the check.
     pub verdict: ReferenceVerdict,
 }
 
-/// A reading of a fixed point.
+/// Reading of a fixed point.
 struct Reading {
-    /// Reading z of the point, measuring frame \[m\].
+    /// Measured position z of the point, measuring frame \[m\].
     seen: Vector3<f64>,
-    /// Factor f(t) of the motion at the time of the reading.
+    /// Value f(t) of the motion's time function at the reading.
     moved: f64,
     /// Weight 1/σ² of a coordinate [1/m²].
     weight: f64,
 }
 
-/// Returns v and M of one point for 3 parameters, d, or 6, d and ω.
+/// Returns v and M of one point for 3 parameters (d) or 6 (d and ω); see the module's equations.
 fn told(readings: &[Reading], parameters: usize) -> (DVector<f64>, DMatrix<f64>) {
     let all: f64 = readings.iter().map(|reading| reading.weight).sum();
     let place =
@@ -81,7 +80,7 @@ fn told(readings: &[Reading], parameters: usize) -> (DVector<f64>, DMatrix<f64>)
     (moves.tr_mul(&sum), moves.tr_mul(&moves) * certainty)
 }
 
-/// Returns twice the log odds of θ ∼ N(θ̂, C) against θ = 0; `None` where no point was read at
+/// Returns twice the log odds of θ ∼ N(θ̂, C) against θ = 0; `None` if no point was read at
 /// different f.
 fn odds(
     found: &DVector<f64>,
@@ -106,7 +105,7 @@ fn odds(
     Some(2.0 * found.dot(told) - found.dot(&known) + left.dot(&inner.solve(&left)) - ln_determinant)
 }
 
-/// Returns the function of time by which an effect moves and turns the instrument; `None` for other
+/// Returns the function of time f(t) by which an effect moves the instrument; `None` for other
 /// effects.
 fn course(effect: &Effect, problem: &Problem) -> Option<Regressor> {
     let mut terms = effect.terms(problem).into_iter();
@@ -123,7 +122,7 @@ fn course(effect: &Effect, problem: &Problem) -> Option<Regressor> {
 }
 
 /// Checks an effect of the instrument against readings of fixed points; `None` for other effects,
-/// and where the readings do not decide.
+/// and if the readings do not decide.
 pub(super) fn reference_check(
     fitted: &Fitted,
     data: &Data,

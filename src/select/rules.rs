@@ -2,37 +2,38 @@
 
 use crate::fit::IdentifyError;
 
-/// Settings of the search for what a problem lacks.
+/// Settings of the search for effects that a problem lacks.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct SelectionRules {
-    /// Probability that noise alone makes any residual test fail, and of a false alarm of the
-    /// ranking. One false alarm in a hundred data sets is rare enough to be looked into.
+    /// Probability that noise alone makes at least one residual test fail, and of a false alarm of
+    /// the ranking. One false alarm in a hundred data sets is rare enough to be examined.
     pub level: f64,
-    /// Corrected p-value of the F test above which an effect without evidence is not claimed.
+    /// Corrected p-value of the F test above which an effect without evidence is not reported as
+    /// found.
     pub leaving_level: f64,
-    /// Probability from which on there are at least as many effects as a set has: the loop fits the
-    /// most probable such set. One half is the threshold of the single model that predicts best
-    /// [Barbieri and Berger 2004].
+    /// Smallest probability that there are at least as many effects as a set has, at which the loop
+    /// fits the set. One half selects the single model that predicts best [Barbieri and Berger
+    /// 2004].
     pub inclusion_threshold: f64,
-    /// Probability from which on an error without a law is stated as located.
+    /// Smallest probability at which an error without a law is reported as located.
     pub located: f64,
-    /// Probability of a law from which on an effect is named as found.
+    /// Smallest probability of a law at which an effect is reported as found.
     pub stated: f64,
-    /// Poses, taken evenly, on which evidence is evaluated at most: its work and memory grow with
-    /// them. Fits and tests take all poses.
+    /// Maximum number of poses, evenly chosen, on which evidence is evaluated, because its work and
+    /// memory grow with them. Fits and tests use all poses.
     pub evidence_poses: usize,
-    /// Work of the fits between two evaluations of the evidence, in poses × unknowns² of all of them
-    /// together. Rival sets are fitted, and intermediate fits take steps, as far as it reaches.
+    /// Work of all fits between two evaluations of the evidence, in poses × unknowns². It limits
+    /// how many rival sets are fitted and how many steps intermediate fits take.
     pub fit_work: f64,
-    /// Rounds after which the search ends.
+    /// Maximum number of rounds of the search.
     pub max_rounds: usize,
     /// Seed of all random choices: blocks, permutations, resamples, subsets of poses.
     pub seed: u64,
 }
 
 impl SelectionRules {
-    /// The settings that the commands use.
+    /// Default settings, which the commands use.
     pub const DEFAULT: Self = Self {
         level: 0.01,
         leaving_level: 0.05,
@@ -48,7 +49,7 @@ impl SelectionRules {
     /// Checks that every setting is in its range.
     ///
     /// # Errors
-    /// The first setting that is not.
+    /// Returns an error about the first setting that is not.
     #[doc(hidden)]
     pub fn check(&self) -> Result<(), IdentifyError> {
         let is_probability = |value: f64| value > 0.0 && value < 1.0;

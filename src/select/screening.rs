@@ -1,4 +1,4 @@
-//! Ranking of the catalogue by the residual of one fit.
+//! Ranking of the catalogue's effects by the residual of one fit.
 
 use super::candidates::{Candidates, NOT_FINITE};
 use super::data::Data;
@@ -13,10 +13,10 @@ use crate::problem::{Effect, Problem};
 use crate::residual_tests::{Findings, FitResidual, Test, test_residual};
 use crate::select::settings::{CONFOUNDED_ANGLE, MAX_COMPARED, MAX_RANKED};
 
-/// Candidate of the ranking.
+/// Candidate of the ranking, with its test and expected gain.
 #[derive(Debug, Clone)]
 pub struct Ranked {
-    /// Effect in question.
+    /// Effect that the candidate would add to the model.
     pub effect: Effect,
     /// p-value of the F test, corrected for the candidates tried.
     pub p_value: f64,
@@ -24,60 +24,64 @@ pub struct Ranked {
     pub f: (f64, usize),
     /// Expected reduction of the root mean squared error on the identification poses \[m\].
     pub gain: f64,
-    /// Reduction of that error on identification poses left out in turn \[m\]; `None` where it was
-    /// not computed.
+    /// Reduction of the root mean squared error of identification poses, each left out of the fit
+    /// in turn \[m\]; `None` if it was not computed.
     pub cross_validated: Option<f64>,
-    /// Confounded effects of the ranking, with the largest principal angle between them \[rad\].
+    /// Effects of the ranking that are confounded with it, with the largest principal angle to each
+    /// \[rad\].
     pub alike: Vec<(Effect, f64)>,
-    /// Pose that would separate it from the first of those.
+    /// Pose that would distinguish it from the first confounded effect.
     pub telling_pose: Option<TellingPose>,
 }
 
-/// Result of `trace`: what the residual of the fit of the declared problem points to.
+/// Result of `trace`: effects that the residual of the declared problem's fit points to.
 #[derive(Debug, Clone)]
 pub struct Trace {
     /// Fit of the declared problem.
     pub fit: Identification,
     /// Tests of its residual.
     pub findings: Findings,
-    /// Candidates by what they explain, best first; the best of each family at each place.
+    /// Candidates in order of the evidence for them, best first; only the best of each family at
+    /// each place.
     pub ranking: Vec<Ranked>,
-    /// Number of candidates that were tried, orders and times counted.
+    /// Number of candidates that were tried; each order or time counts.
     pub tried: usize,
-    /// Level that a corrected p must be below to stand out.
+    /// Largest corrected p-value at which a candidate is significant.
     pub level: f64,
-    /// Candidates that these data cannot show, and why.
+    /// Candidates that these data cannot show, with the reason.
     pub untestable: Vec<(Effect, &'static str)>,
-    /// Candidates that the fitted parameters absorb: nothing is left to show them.
+    /// Candidates that the fitted parameters can reproduce completely, so that they cannot be
+    /// detected.
     pub absorbed: Vec<Effect>,
-    /// Evidence for sets of hypotheses; `None` where only the ranking was asked for, or the
-    /// residual is not finite.
+    /// Evidence for sets of hypotheses; `None` if only the ranking was requested, or the residual
+    /// is not finite.
     pub evidence: Option<Evidence>,
     /// Settings of the search.
     pub rules: SelectionRules,
-    /// True if times were measured; otherwise the order of the rows replaces them.
+    /// True if times were measured; otherwise row numbers replace them.
     pub time_measured: bool,
 }
 
 impl Trace {
-    /// Describes an effect in these data, in words.
+    /// Describes an effect in words, in terms of the quantities that these data record.
     pub fn describe(&self, effect: &Effect) -> String {
         effect.describe_in(self.time_measured)
     }
 }
 
-/// Traces the residual of `problem`, from the identification rows alone; changes nothing.
+/// Ranks the effects that the residual of `problem` points to, from the identification rows alone.
+/// Changes nothing.
 ///
 /// # Errors
-/// Problem, data and options do not fit each other.
+/// Returns an error if problem, data and options do not match.
 pub fn trace(problem: &Problem, data: &Dataset, options: &Options) -> Result<Trace, IdentifyError> {
     trace_by(problem, data, options, &SelectionRules::DEFAULT)
 }
 
-/// Traces the residual by other settings.
+/// Ranks effects like [`trace`], with other settings.
 ///
 /// # Errors
-/// Problem, data and options do not fit each other.
+/// Returns an error if problem, data and options do not match.
 pub fn trace_by(
     problem: &Problem,
     data: &Dataset,
@@ -91,7 +95,7 @@ pub fn trace_by(
     Ok(Trace { evidence: evaluate(&fitted, &data, &[]), ..trace_fit(&fitted, &data) })
 }
 
-/// Ranks the catalogue by the residual of a fit.
+/// Ranks the catalogue's effects by the residual of a fit.
 pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
     let rules = data.rules;
     let Candidates { testable, mut untestable } = Candidates::of(&fitted.problem, data);
@@ -172,7 +176,7 @@ pub(super) fn trace_fit(fitted: &Fitted, data: &Data) -> Trace {
 /// Tests the residual of a fit of `problem` at the identification rows.
 ///
 /// # Errors
-/// Problem, data and fit do not belong together.
+/// Returns an error if problem, data and fit do not match.
 pub fn examine(
     problem: &Problem,
     data: &Dataset,

@@ -1,4 +1,4 @@
-//! Separation of two effects by poses that are not measured yet.
+//! Distinction of two effects by poses that are not measured yet.
 
 use super::candidates::Candidates;
 use super::detection::{Size, candidates, sizes, timed, with_linear};
@@ -10,30 +10,32 @@ use crate::measurement::Measurements;
 use crate::problem::{Effect, Problem};
 use crate::select::settings::POWER;
 
-/// Separation of two effects by some poses.
+/// How well some poses distinguish two effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Separation {
-    /// Largest principal angle \[rad\] between what the two do once all parameters have been
-    /// fitted: 0 the same, π/2 nothing in common; `None` where one of them does nothing.
+    /// Largest principal angle \[rad\] between the displacements by the two effects, with all free
+    /// parameters projected out: 0 if they are equal, π/2 if they are orthogonal. `None` if one of
+    /// them has no effect.
     pub angle: Option<f64>,
-    /// The first effect beside the second, and the second beside the first.
+    /// Detectability of the first effect given the second, and of the second given the first.
     pub sides: [Side; 2],
 }
 
-/// One of two effects beside the other.
+/// Detectability of one of two effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Side {
-    /// Size from which on a scan of the whole catalogue finds it, for its parameters of the first
-    /// one's unit.
+    /// Smallest size at which a scan of the whole catalogue finds it, for its parameters with the
+    /// unit of the first one.
     pub found: Size,
-    /// Size from which on the other effect in its place is ruled out, at the level of the loop.
+    /// Smallest size at which the other effect is ruled out as an explanation, at the level of the
+    /// loop.
     pub told: Size,
     test: Option<ScanTest>,
 }
 
 impl Side {
-    /// Returns the expected p-value of the effect beside the other at a size \[SI\] in the
-    /// direction that is hardest to separate; 1 where nothing separates them.
+    /// Returns the expected p-value of the effect, given the other one, at a size \[SI\] in the
+    /// direction that is hardest to distinguish; 1 if nothing distinguishes them.
     pub fn expected_p(&self, size: f64) -> f64 {
         let told =
             self.test.and_then(|test| Some((test, test.noncentrality(POWER)?, self.told.worst?)));
@@ -41,11 +43,11 @@ impl Side {
     }
 }
 
-/// Computes how well `poses` would separate two effects, linear about the nominal arm as in
+/// Computes how well `poses` would distinguish two effects, linear about the nominal arm as in
 /// [`super::detectable`].
 ///
 /// # Errors
-/// Rules of `[parameters]` do not fit the arm.
+/// Returns an error if rules of `[parameters]` do not match the arm.
 pub fn separation(
     problem: &Problem,
     poses: &Measurements,
@@ -84,7 +86,7 @@ pub fn separation(
     })
 }
 
-/// Returns the size of the parameters of an effect that are named first.
+/// Returns the size of those parameters of an effect that are listed first.
 fn first(sizes: Vec<Size>) -> Size {
     let none = Size {
         parameters: Vec::new(),

@@ -1,4 +1,4 @@
-//! Pose that would separate two effects that the measured poses hardly separate.
+//! Search for a pose that would distinguish two effects that the measured poses hardly distinguish.
 
 use crate::select::settings::MAX_SEPARATING_POSES;
 use nalgebra::{DMatrix, DVector};
@@ -10,29 +10,28 @@ use super::neighbourhood::{LinearNeighbourhood, Linearised};
 use crate::measurement::Measurements;
 use crate::problem::Effect;
 
-/// A pose that tells two effects apart.
+/// Pose that would distinguish two effects.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TellingPose {
-    /// Effect from which the pose separates.
+    /// Effect from which the pose would distinguish.
     pub other: Effect,
     /// Configuration within the measured ranges, shape = (joints) \[rad\] or \[m\].
     pub configuration: Vec<f64>,
-    /// Target that is measured, where the data have such a column.
+    /// Target that is measured, if the data name targets.
     pub target: Option<String>,
-    /// Payload \[kg\], hoist force \[N\] and temperature [°C] there, where the data have such a
-    /// column.
+    /// Payload in the pose \[kg\]; `None` if the data have no such column.
     pub payload: Option<f64>,
-    /// Force of the hoist in the pose \[N\].
+    /// Hoist force in the pose \[N\]; `None` if the data have no such column.
     pub hoist: Option<f64>,
-    /// Temperature in the pose [°C].
+    /// Temperature in the pose [°C]; `None` if the data have no such column.
     pub temperature: Option<f64>,
-    /// Distance between what the arm does with the one effect and with the other, each fitted to
-    /// the measured poses \[m\].
+    /// Distance between the predictions with the one and with the other effect, each fitted to the
+    /// measured poses \[m\].
     pub difference: f64,
 }
 
-/// Poses within the measured ranges: every quantity of a pose from some identification row, each
-/// from another.
+/// Returns random poses within the measured ranges: each quantity of a pose has the value of a
+/// randomly chosen identification row.
 pub(super) fn shuffled(data: &Data) -> Measurements {
     let mut rng = ChaCha8Rng::seed_from_u64(data.rules.seed);
     let (rows, count) = (data.rows(), MAX_SEPARATING_POSES);
@@ -58,8 +57,8 @@ pub(super) fn shuffled(data: &Data) -> Measurements {
     poses
 }
 
-/// The pose of `poses`, linearised `there`, where the fits with the one effect and with the other
-/// differ most.
+/// Returns the one of `poses`, linearised as `there`, at which the fits with the one and with the
+/// other effect differ most.
 pub(super) fn telling_pose(
     fit: &LinearNeighbourhood,
     [here, there]: [&Linearised; 2],

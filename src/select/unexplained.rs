@@ -1,4 +1,5 @@
-//! Structure without a law: its site, its quantities, and the gain of a correction.
+//! Structure without a law: its site, the quantities on which it depends, and the gain of an
+//! empirical correction.
 
 use crate::select::settings::MAX_CORRECTED_ERROR;
 use nalgebra::DVector;
@@ -17,69 +18,72 @@ use crate::residual_tests::Findings;
 /// Structure in the residual that no effect explains.
 #[derive(Debug, Clone)]
 pub struct Unexplained {
-    /// Site of the structure; `None` where no site is known.
+    /// Site of the structure; `None` if it is not known.
     pub site: Option<Site>,
     /// Quantities on which it depends.
     pub depends_on: Vec<Covariate>,
-    /// Upper limit of the probability that noise alone makes it, for all hypotheses together.
+    /// Upper limit of the probability that noise alone causes the structure, for all hypotheses
+    /// together.
     pub p_value: f64,
-    /// Claims with their probabilities; `None` where only the residual tests see the structure.
+    /// Claims with their probabilities; `None` if only the residual tests detect the structure.
     pub claims: Option<Claims>,
-    /// Gain of an empirical correction; `None` where it takes less than 5 % off the error of poses
-    /// left out, or the fit has cautions.
+    /// Empirical correction; `None` if it reduces the error of left-out poses by less than 5 %, or
+    /// if the fit has cautions.
     pub correction: Option<Correction>,
 }
 
-/// A smooth correction of one part's error as a function of what it depends on.
+/// Smooth empirical correction of an error at one site, as a function of the quantities on which it
+/// depends.
 #[derive(Debug, Clone)]
 pub struct Correction {
-    /// Range of each covariate that the identification poses cover, in its unit: beyond it the
-    /// correction keeps its last value.
+    /// Range of each covariate over the identification poses, in its unit. Beyond it the correction
+    /// is constant.
     pub ranges: Vec<(Covariate, (f64, f64))>,
-    /// Held-out poses beyond it.
+    /// Number of held-out poses beyond these ranges.
     pub beyond: usize,
-    /// Root mean squared error of identification poses left out in turn, before and with the
+    /// Root mean squared error of identification poses, each left out in turn, without and with the
     /// correction \[m\].
     pub cross_validated: (f64, f64),
     /// Error on held-out poses with the correction.
     pub held_out: ErrorSummary,
-    /// Curve of the correction where it is a function of one covariate at one coordinate.
+    /// Curve of the correction, if it is a function of one covariate at one coordinate.
     pub curve: Option<Curve>,
 }
 
-/// A correction as a function of one covariate.
+/// Correction as a function of one covariate, with partial residuals.
 #[derive(Debug, Clone)]
 pub struct Curve {
     /// Covariate of the curve.
     pub covariate: Covariate,
-    /// Unit of the coordinate that it is added to: an angle or a length.
+    /// Unit of the corrected coordinate: an angle or a length.
     pub unit: Unit,
-    /// Correction and partial residual of each identification pose, by the covariate.
+    /// Correction and partial residual of each identification pose, in order of the covariate.
     pub points: Vec<PartialResidual>,
 }
 
-/// Partial residual of one pose: the correction there plus what the corrected fit leaves along the
-/// lever.
+/// Partial residual of one pose: the correction there plus the component along the lever that the
+/// corrected fit leaves.
 ///
-/// f(x) + l·r / |l|²   with the pose's lever l = ∂p/∂(coordinate) and its residual r once
-/// everything is fitted anew.
+/// f(x) + l·r / |l|²   with the pose's lever l = ∂p/∂(coordinate) and its residual r after the
+/// corrected fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PartialResidual {
     /// Value of the covariate, in its unit.
     pub covariate: f64,
     /// Value of the correction there \[rad\] or \[m\].
     pub correction: f64,
-    /// Error of the coordinate by this pose alone \[rad\] or \[m\].
+    /// Error of the coordinate according to this pose alone \[rad\] or \[m\].
     pub value: f64,
-    /// Length |l| of the lever [m/rad] or [m/m]: poses with a short lever carry little information.
+    /// Length |l| of the lever \[m/rad\] or \[m/m\]. Poses with a short lever carry little
+    /// information.
     pub lever: f64,
 }
 
-/// Returns the structure without a law, the most probable first, with the correction of the first.
+/// Returns the structure without a law, the most probable first; the first one has its correction.
 ///
-/// All functions of the best set are stated if there are at least as many hypotheses with
-/// probability `located`. Otherwise those are stated at whose site some function acts with that
-/// probability, one for each site.
+/// All functions of the best set are reported if at least that many hypotheses act with probability
+/// `located`. Otherwise those are reported at whose site a function acts with that probability, one
+/// for each site.
 pub(super) fn without_law(
     fitted: &Fitted,
     data: &Data,
@@ -116,7 +120,8 @@ pub(super) fn without_law(
     all.into_iter().map(|(_, found)| found).collect()
 }
 
-/// Returns the structure that the residual tests see without a site or quantity.
+/// Returns the structure that the residual tests detect, without a site or quantity; `None` if they
+/// detect none.
 pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
     if !findings.is_structured() {
         return None;
@@ -131,8 +136,8 @@ pub(super) fn nowhere(findings: &Findings) -> Option<Unexplained> {
     })
 }
 
-/// Applies the most probable function of a hypothesis to the held-out poses; `None` where poses
-/// left out gain too little.
+/// Applies the most probable function of a hypothesis to the held-out poses; `None` if left-out
+/// poses gain too little.
 fn correction(
     fitted: &Fitted,
     data: &Data,
@@ -189,8 +194,8 @@ fn correction(
     })
 }
 
-/// Returns a correction as a function of one covariate, from its effect on the residual and from
-/// what it leaves.
+/// Returns a correction as a function of one covariate, from its displacement of the poses
+/// (`function`) and the remaining residual (`left`).
 fn curve(
     hypotheses: &Hypotheses,
     hypothesis: &Hypothesis,

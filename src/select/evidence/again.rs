@@ -19,15 +19,16 @@ use super::products::{Products, Target};
 use super::search::{left_by, search};
 use crate::problem::Effect;
 
-/// Minimum probability of a set whose hypotheses are evaluated again on fewer poses.
+/// Smallest probability of a set whose hypotheses are considered again without some poses.
 const MIN_REPEATED_PROBABILITY: f64 = 1e-3;
 
-/// A fit with the probable hypotheses about its residual.
+/// Fit with the probable hypotheses about its residual, which are evaluated again without some
+/// poses.
 struct Again<'a> {
     fitted: &'a Fitted,
     data: &'a Data<'a>,
     hypotheses: &'a Hypotheses<'a>,
-    /// Numbers of the probable hypotheses among all.
+    /// Indices of the probable hypotheses in the list of all hypotheses.
     probable: Vec<usize>,
     best: &'a HypothesisSet,
 }
@@ -61,7 +62,8 @@ impl<'a> Again<'a> {
         self.probable.iter().map(|&k| &self.hypotheses.all[k]).collect()
     }
 
-    /// Returns the places, among the probable hypotheses, of members of the best set.
+    /// Returns the positions, in the list of probable hypotheses, of those members of the best set
+    /// for which `of` is true.
     fn members(&self, of: impl Fn(&Hypothesis) -> bool) -> Vec<usize> {
         let candidates = self.probable_candidates();
         let is_held = |k: &usize| {
@@ -77,7 +79,7 @@ impl<'a> Again<'a> {
         blocks(self.fitted, self.data, self.hypotheses, &self.probable_candidates(), left_out)
     }
 
-    /// Returns the most probable hypotheses about the other poses.
+    /// Returns the most probable set of hypotheses for the data without the poses `left_out`.
     fn most_probable(&self, left_out: &[usize]) -> Option<Vec<&Hypothesis>> {
         let (blocks, target) = self.blocks(left_out)?;
         let present = self.members(|known| known.effect().is_some());
@@ -86,8 +88,8 @@ impl<'a> Again<'a> {
         Some(most.members.into_iter().map(|k| &candidates[k].hypothesis).collect())
     }
 
-    /// Returns the pose whose squared residual an effect of the best set lowers most, beside all
-    /// other members.
+    /// Returns the pose whose squared residual decreases most when `effect` is added to all other
+    /// members of the best set.
     fn single_influential_pose(&self, effect: &Effect, left_out: &[usize]) -> Option<usize> {
         let (blocks, target) = self.blocks(left_out)?;
         let products = Products::new(&blocks, &target);
@@ -103,8 +105,8 @@ impl<'a> Again<'a> {
     }
 }
 
-/// Returns a pose that alone supports an effect with a searched argument: without it the most
-/// probable set has nothing at that site.
+/// Returns a pose that alone supports an effect with a searched argument: without the pose, the
+/// most probable set has no hypothesis at the effect's site. `None` if there is none.
 pub(super) fn carried_by_one(
     fitted: &Fitted,
     data: &Data,
@@ -128,8 +130,9 @@ pub(super) fn carried_by_one(
     searched.into_iter().find_map(alone)
 }
 
-/// Returns for each effect of a set the part of random subsets of the configurations, a fifth left
-/// out, whose most probable set holds it; linear about the fit to all.
+/// Returns how stable each effect of a set is: the share of random subsets (80 % of the
+/// configurations) whose most probable set contains it. Computed in the linear neighbourhood of the
+/// fit to all poses.
 pub(in crate::select) fn stability(
     fitted: &Fitted,
     data: &Data,

@@ -11,21 +11,24 @@ use super::marginal::{Coefficients, Normal, of_block};
 use crate::least_squares::kernel::products;
 use crate::select::neighbourhood::LinearNeighbourhood;
 
-/// Number of columns from which on a product of tall matrices is computed by rows.
+/// Smallest number of columns for which a product of tall matrices is computed row by row, which is
+/// then faster.
 const MIN_COLUMNS_BY_ROWS: usize = 24;
 
-/// Columns A of a hypothesis, shape = (3 N, k).
+/// Columns A of a hypothesis: derivatives of the whitened residuals with respect to its
+/// coefficients, shape = (3 N, k).
 #[derive(Debug, Clone)]
 pub(super) enum Design {
-    /// Columns written out.
+    /// Columns stored as a full matrix.
     Dense(DMatrix<f64>),
-    /// For each lever, shape = (3 N), one column for each group of poses: the lever there, 0
-    /// elsewhere. Levers are orthogonal in every pose, so that AᵀA is diagonal.
+    /// Sparse columns. For each lever, shape = (3 N), there is one column for each group of poses:
+    /// equal to the lever in the group, 0 elsewhere. The levers are orthogonal in every pose, so
+    /// that AᵀA is diagonal.
     Grouped { levers: DMatrix<f64>, groups: Vec<Option<usize>> },
 }
 
 impl Design {
-    /// Creates one column for every pose along one lever.
+    /// Creates one column for every pose, along one lever.
     pub fn per_pose(lever: &DVector<f64>) -> Self {
         let levers = DMatrix::from_columns(std::slice::from_ref(lever));
         Self::Grouped { levers, groups: (0..lever.len() / 3).map(Some).collect() }
@@ -44,8 +47,8 @@ impl Design {
         }
     }
 
-    /// Scales all columns together to root mean square 1 over the first poses; `None` where they
-    /// are zero there.
+    /// Scales all columns by one factor to root mean square 1 over the first `poses` poses; `None`
+    /// if they are zero there.
     pub fn scaled(mut self, poses: usize) -> Option<Self> {
         let first = self.values().rows(0, 3 * poses);
         let size = (first.norm_squared() / first.nrows().max(1) as f64).sqrt();
@@ -62,7 +65,7 @@ impl Design {
         self
     }
 
-    /// Returns all columns.
+    /// Returns all columns as a full matrix, shape = (3 N, k).
     pub fn columns(&self) -> Cow<'_, DMatrix<f64>> {
         match self {
             Self::Dense(columns) => Cow::Borrowed(columns),
@@ -80,7 +83,7 @@ fn count(groups: &[Option<usize>]) -> usize {
     groups.iter().flatten().max().map_or(0, |last| last + 1)
 }
 
-/// Returns M A of row vectors M, summed over the poses of each group, shape = (rows of M, k).
+/// Returns the product M A of row vectors M with grouped columns A, shape = (rows of M, k).
 fn along(rows: &DMatrix<f64>, levers: &DMatrix<f64>, groups: &[Option<usize>]) -> DMatrix<f64> {
     let count = count(groups);
     let mut all = DMatrix::zeros(rows.nrows(), levers.ncols() * count);
@@ -95,7 +98,7 @@ fn along(rows: &DMatrix<f64>, levers: &DMatrix<f64>, groups: &[Option<usize>]) -
     all
 }
 
-/// Returns AᵀA and Aᵀr of grouped columns, everything fitted projected out.
+/// Returns AᵀA and Aᵀr of grouped columns, with the fitted parameters projected out.
 fn grouped(levers: &DMatrix<f64>, groups: &[Option<usize>], fit: &LinearNeighbourhood) -> Normal {
     let squares = levers.map(|value| value * value);
     let diagonal = along(&DMatrix::repeat(1, squares.nrows(), 1.0), &squares, groups).transpose();
@@ -109,28 +112,28 @@ fn grouped(levers: &DMatrix<f64>, groups: &[Option<usize>], fit: &LinearNeighbou
     normal.whole_if_less_work()
 }
 
-/// Columns of one hypothesis with everything fitted projected out, and the logarithm of its prior
-/// probability.
+/// Columns of one hypothesis, with the fitted parameters projected out, and the logarithm of its
+/// prior probability.
 #[derive(Debug, Clone)]
 pub(super) struct Block {
     columns: Columns,
-    /// Products AᵀA and Aᵀr.
+    /// Products AᵀA and Aᵀr of the projected columns.
     normal: Normal,
     pub ln_prior: f64,
     coefficients: Coefficients,
     /// True for a function of several covariates.
     pub is_surface: bool,
-    /// True for a periodic error of many orders.
+    /// True for a periodic error with many orders under one prior.
     pub is_gear: bool,
-    /// Family of its effect; `None` for a function without a law.
+    /// Name of its effect's family; `None` for a function without a law.
     pub family: Option<String>,
 }
 
 #[derive(Debug, Clone)]
 enum Columns {
-    /// Everything fitted projected out.
+    /// Columns with the fitted parameters projected out.
     Dense(Arc<DMatrix<f64>>),
-    /// Columns before the projection.
+    /// Grouped columns before the projection.
     Grouped { levers: DMatrix<f64>, groups: Vec<Option<usize>> },
 }
 
@@ -146,8 +149,8 @@ impl Block {
         Self::all(vec![(design, ln_prior, coefficients)], fit).remove(0)
     }
 
-    /// Creates blocks from several designs of root mean square 1, projected together: a product of
-    /// many columns is fast.
+    /// Creates blocks from several designs of root mean square 1. Their columns are projected
+    /// together, because one product of many columns is faster.
     pub fn all(designs: Vec<(Design, f64, Coefficients)>, fit: &LinearNeighbourhood) -> Vec<Self> {
         let dense = designs.iter().filter_map(|(design, ..)| {
             if let Design::Dense(columns) = design { Some(columns) } else { None }
@@ -189,19 +192,19 @@ impl Block {
         designs.into_iter().map(of).collect()
     }
 
-    /// Returns true if the block is that of an effect.
+    /// Returns true if the hypothesis is an effect, which has a law.
     pub fn is_law(&self) -> bool {
         self.family.is_some()
     }
 
-    /// Returns true if a set with this block cannot grow: it has more than `MAX_WIDE_COLUMNS`
-    /// columns for single poses.
+    /// Returns true if a set with this block is not extended: it is a periodic error, or has more
+    /// than `MAX_WIDE_COLUMNS` columns that belong to single poses.
     pub fn is_wide(&self) -> bool {
         self.is_gear
             || matches!(&self.columns, Columns::Grouped { levers, groups } if levers.ncols() * count(groups) > MAX_WIDE_COLUMNS)
     }
 
-    /// Returns A with everything fitted projected out.
+    /// Returns A with the fitted parameters projected out.
     pub fn columns(&self, fit: &LinearNeighbourhood) -> Arc<DMatrix<f64>> {
         match &self.columns {
             Columns::Dense(columns) => Arc::clone(columns),
@@ -217,8 +220,8 @@ impl Block {
         self.normal.product()
     }
 
-    /// Returns MᵀA of other columns M with everything fitted projected out; M is also given
-    /// transposed.
+    /// Returns MᵀA with other columns M, from which the fitted parameters are projected out. M is
+    /// given together with its transpose.
     pub fn times(&self, (others, transposed): (&DMatrix<f64>, &DMatrix<f64>)) -> DMatrix<f64> {
         match &self.columns {
             Columns::Dense(columns)
@@ -235,9 +238,10 @@ impl Block {
         }
     }
 
-    /// Returns ln p(r | set and block) − ln p(r | set) and the most probable size. The set takes Z
-    /// r off the residual and Z A off the columns; `None` for the empty set. `left` holds the
-    /// squares that the set leaves and their degrees of freedom.
+    /// Returns ln p(r | set and block) − ln p(r | set), and the most probable size of the block.
+    ///
+    /// `set` holds Z A and Z r, by which the set reduces columns and residual; `None` for the empty
+    /// set. `left` is the sum of squares that the set leaves, with its degrees of freedom.
     pub fn gain(
         &self,
         set: Option<(&DMatrix<f64>, &DVector<f64>)>,
@@ -251,8 +255,8 @@ impl Block {
         (with - without, size)
     }
 
-    /// Returns ln p(r | block) up to a constant, and the most probable size, of columns and a
-    /// residual of which `normal` and `left` are what others leave.
+    /// Returns ln p(r | block), up to a constant, and the most probable size. `normal` and `left`
+    /// belong to the columns and the residual after the other members of the set.
     pub fn over_sizes(&self, normal: &Normal, left: (f64, f64), grid: &[(f64, f64)]) -> (f64, f64) {
         of_block(normal, left, grid, (&DISPLACEMENTS, &self.coefficients))
     }

@@ -16,8 +16,9 @@ use crate::problem::Effect;
 use crate::select::data::Data;
 use crate::select::fitted::Fitted;
 
-/// Returns the blocks of hypotheses and the residual, everything fitted projected out and some
-/// poses left out; `None` where the residual is not finite or the search was stopped.
+/// Returns the blocks of `candidates` and the residual that they are to explain, with the fitted
+/// parameters projected out and some poses left out. `None` if the residual is not finite or the
+/// search was stopped.
 pub(super) fn blocks(
     fitted: &Fitted,
     data: &Data,

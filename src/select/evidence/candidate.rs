@@ -12,26 +12,27 @@ use crate::problem::Effect;
 use crate::select::fitted::Fitted;
 use crate::select::neighbourhood::LinearNeighbourhood;
 
-/// Displacement, in units of σ, that stands for zero: sizes have a reciprocal.
+/// Displacement, in units of σ, that replaces zero as the largest plausible one, because sizes have
+/// a reciprocal.
 const SIZE_OF_ZERO: f64 = 1e-9;
 
-/// A hypothesis with its columns and the logarithm of its prior probability.
+/// Hypothesis with its columns and the logarithm of its prior probability.
 #[derive(Clone)]
 pub(super) struct Candidate {
     pub hypothesis: Hypothesis,
-    /// Number of the function among those of that hypothesis, from 0.
+    /// Index among the functions of that hypothesis, which differ for example in smoothness.
     pub variant: usize,
-    /// Columns of root mean square 1 all together.
+    /// Columns, scaled together to root mean square 1.
     pub design: Design,
     pub ln_prior: f64,
     pub coefficients: Coefficients,
 }
 
-/// Number of hypotheses whose columns are projected together.
+/// Number of hypotheses whose columns are projected in one matrix product.
 pub(super) const HYPOTHESES_PER_PROJECTION: usize = 32;
 
 impl Candidate {
-    /// Returns the blocks of candidates: their columns with everything fitted projected out, some
+    /// Returns the blocks of candidates: columns with the fitted parameters projected out, and some
     /// poses left out.
     pub fn blocks(
         all: &[&Self],
@@ -56,14 +57,14 @@ impl Candidate {
     }
 }
 
-/// Returns the joint, from 0, and the order of a wave of any order.
+/// Returns joint (from 0) and order of a wave; `None` for other effects.
 pub(super) fn order_of(effect: &Effect) -> Option<(usize, f64)> {
     if let Effect::JointWave { joint, order } = effect { Some((joint - 1, *order)) } else { None }
 }
 
-/// Scales the columns of an effect at the first `weighed` poses to one length. Also returns the
-/// root mean square displacements, in units of σ, that the largest plausible values of its
-/// parameters cause.
+/// Scales the columns of an effect to equal length over the first `weighed` poses. Also returns,
+/// for each parameter, the root mean square displacement, in units of σ, that its largest plausible
+/// value causes.
 pub(super) fn even(
     mut columns: DMatrix<f64>,
     terms: &[Term],

@@ -19,37 +19,40 @@ use crate::problem::{Effect, JointKind, Observation, Problem};
 use crate::residual_tests::Covariate;
 use crate::select::neighbourhood::{Linearised, tries};
 
-/// Displacement of the target, in σ, up to which commands in contact may differ by noise alone.
+/// Displacement of the target, in units of σ, up to which commands that touch the same point may
+/// differ by noise alone.
 const MAX_NOISE_DISPLACEMENT: f64 = 3.0;
-/// Numbers that the functions of one load take up among those of a hypothesis.
+/// Number of variant indices reserved for the functions of each load.
 const VARIANTS_PER_LOAD: usize = 4;
-/// Error \[rad or m\] above which a contact does not determine a command.
+/// Command error \[rad\] or \[m\] above which a contact does not determine the command.
 const MIN_UNDETERMINED_COMMAND: f64 = 0.02;
 
-/// Builder of all hypotheses about a residual.
+/// Builder of all hypotheses about a residual, with their columns.
 pub(super) struct Columns<'a, 'l> {
     pub problem: &'a Problem,
     pub linearised: &'a Linearised<'l>,
-    /// True if the sides of approach of the poses are known; true if their times are measured.
+    /// Two flags: directions of approach are recorded; times are recorded.
     pub coverage: (bool, bool),
-    /// True if the harmonics of the problem may have a common prior.
+    /// True if the harmonics of all joints may have a common prior.
     pub takes_gears: bool,
-    /// Number of poses, the first ones, on which evidence is evaluated; functions are predicted at
-    /// the others.
+    /// Number of first poses on which evidence is evaluated; functions are only predicted at the
+    /// others.
     pub weighed: usize,
-    /// Hypothesis whose functions alone are wanted.
+    /// Only hypothesis whose functions are built; `None` builds all.
     only: Option<&'a Hypothesis>,
     pub candidates: Vec<Candidate>,
-    /// Family of each candidate and its share of the family's probability.
+    /// For each candidate, its family and its share of the family's prior probability.
     shares: Vec<(String, f64)>,
-    /// Covariates of the functions.
+    /// Covariates on which the functions depend.
     pub covariates: Vec<Known>,
 }
 
 impl<'a, 'l> Columns<'a, 'l> {
-    /// Returns effects with their columns and functions without a law, or those of one hypothesis
-    /// alone; the covariates of those functions; and ln of the prior probability of a family of
-    /// effects.
+    /// Builds the candidates: effects with their columns, and functions without a law. With `only`,
+    /// it builds the functions of that hypothesis alone.
+    ///
+    /// Returns the candidates, the covariates of the functions, and ln of the prior probability of
+    /// one family of effects.
     pub fn all(
         problem: &'a Problem,
         linearised: &'a Linearised<'l>,
@@ -120,7 +123,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// Adds one of the functions of a hypothesis under a number that does not depend on the others.
+    /// Adds one of the functions of a hypothesis under the fixed index `variant`, so that the index
+    /// does not depend on which functions exist.
     pub(super) fn add_variant(
         &mut self,
         family: &str,
@@ -190,7 +194,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         self.covariates.extend(known);
     }
 
-    /// Returns true if a site is the coordinate that a joint moves.
+    /// Returns true if a site is the coordinate that a joint's command moves.
     fn moving(&self, site: ParameterSite) -> bool {
         let ParameterSite::Joint { joint, field } = site else { return false };
         match self.problem.joints[joint].kind {
@@ -200,7 +204,7 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// Returns the known quantities of every pose that vary.
+    /// Returns the recorded quantities that vary, with their values in every pose.
     fn known(&self) -> Vec<Known> {
         let poses = self.linearised.poses();
         let mut all: Vec<(Covariate, Vec<f64>)> = Vec::new();
@@ -250,11 +254,11 @@ impl<'a, 'l> Columns<'a, 'l> {
             .collect()
     }
 
-    /// Returns the command of a joint in every pose as functions see it.
+    /// Returns the command of a joint in every pose, as functions of the command use it.
     ///
-    /// In contact the noise is in the command, not in what is measured: a joint without which the
-    /// target cannot come to its point has, beside each point, values that noise alone sets apart,
-    /// and a function of those is one of the noise. They are taken for one value.
+    /// In contacts the noise is in the command, not in the measured quantity. If the target cannot
+    /// reach the point without the joint, the joint's commands at one point differ by noise alone.
+    /// A function of them would fit the noise, so they are replaced by their mean.
     pub(super) fn command(&self, joint: usize) -> Vec<f64> {
         let poses = self.linearised.poses();
         let mut values: Vec<f64> =
@@ -283,9 +287,10 @@ impl<'a, 'l> Columns<'a, 'l> {
         values
     }
 
-    /// Returns the moments of the loads about each joint's axis, and about the axis of its twist α:
-    /// what a compliance there would do, over what an angle does. Each has a number, counted over all
-    /// joints and both axes, that does not depend on the poses.
+    /// Returns the moment of the loads about each joint's axis and about its α axis, in every pose.
+    /// It is computed as the displacement by a compliance there divided by the displacement by an
+    /// angle. Each moment has an index over all joints and both axes, which does not depend on the
+    /// poses.
     fn loads(&self) -> Vec<(usize, Known)> {
         let pairs = [
             (JointField::Compliance, JointField::Theta),
@@ -307,8 +312,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         all.enumerate().filter_map(|(k, (joint, pair))| Some((k, of(joint, pair)?))).collect()
     }
 
-    /// Returns true if the search has an effect that is linear in a covariate there; of two values
-    /// every effect is.
+    /// Returns true if the search has an effect at `site` that is linear in the covariate. If the
+    /// covariate has only two values, every function of it is linear.
     fn has_law(&self, site: ParameterSite, of: &Known) -> bool {
         let is_line = |term: &Term| {
             let is_linear = matches!(
@@ -327,9 +332,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         self.candidates.iter().any(acts)
     }
 
-    /// Adds smooth functions of one covariate at some columns that belong together, and a straight
-    /// line unless an effect is that. Their numbers among the functions of the hypothesis begin at
-    /// `first`.
+    /// Adds smooth functions of one covariate along the columns `at`, one for each length, and a
+    /// straight line unless an effect is one. Their variant indices begin at `first`.
     pub(super) fn smooth(
         &mut self,
         family: &str,
@@ -372,8 +376,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// Adds functions of two covariates: of two commands, of a direction and another quantity, of
-    /// temperature and time.
+    /// Adds functions of two covariates: of two commands, of a direction of approach and another
+    /// quantity, or of temperature and time.
     fn surfaces(&mut self, site: ParameterSite, at: &DVector<f64>, known: &[Known]) {
         for (k, one) in known.iter().enumerate() {
             for other in &known[k + 1..] {
@@ -384,8 +388,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         }
     }
 
-    /// Adds functions of a joint's command that grow from zero with a quantity that is no command:
-    /// a gear that warms, a payload held out.
+    /// Adds functions of a joint's command whose amplitude is proportional to another quantity,
+    /// such as a gear error that grows with temperature or payload.
     fn scaled_by(&mut self, site: ParameterSite, at: &DVector<f64>, known: &[Known]) {
         let ParameterSite::Joint { joint, .. } = site else { return };
         let Some(command) =
@@ -419,8 +423,8 @@ impl<'a, 'l> Columns<'a, 'l> {
         });
     }
 
-    /// Returns the candidates with their prior probabilities: odds of one to two for each further
-    /// hypothesis, equal probabilities for families, and shares within a family.
+    /// Returns the candidates with their prior probabilities. Each further hypothesis has odds of 1
+    /// to 2; families have the probabilities of their weights, divided into shares within a family.
     fn weighted(self) -> (Vec<Candidate>, Vec<Known>, f64) {
         let mut families: Vec<(&str, f64, f64)> = Vec::new();
         for ((family, share), candidate) in self.shares.iter().zip(&self.candidates) {

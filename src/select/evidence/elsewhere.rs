@@ -15,7 +15,7 @@ use crate::select::data::{bits, number};
 use crate::select::settings::{ROUGH_LENGTHS, SLOW_LENGTH, SMOOTH_LENGTHS};
 
 impl Columns<'_, '_> {
-    /// Adds functions of one covariate, and of the position, that move every measured position.
+    /// Adds functions of one covariate, and of the position, that displace every measured position.
     pub(super) fn measurement(&mut self, known: &[Known]) {
         let axes: Vec<DVector<f64>> = (0..3)
             .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
@@ -63,7 +63,8 @@ impl Columns<'_, '_> {
         self.covariates.extend(coordinates);
     }
 
-    /// Adds an instrument that wanders in time, or in which one reading errs as the last did.
+    /// Adds errors of the instrument that wander in time: each reading's error is close to the
+    /// previous one's.
     pub(super) fn wandering(&mut self, site: ParameterSite, at: &[&DVector<f64>], of: &Known) {
         let hypothesis = Hypothesis {
             kind: HypothesisKind::Wandering,
@@ -80,8 +81,8 @@ impl Columns<'_, '_> {
         }
     }
 
-    /// Adds leans of the base as functions of quantities that are no commands: its floor warms,
-    /// creeps or gives way.
+    /// Adds rotations of the base as smooth functions of quantities other than commands, such as
+    /// its floor's temperature, time or load.
     pub(super) fn base(&mut self, known: &[Known]) {
         let axes: Vec<DVector<f64>> =
             (0..3).filter_map(|axis| self.linearised.place(ParameterSite::Turn { axis })).collect();
@@ -93,7 +94,7 @@ impl Columns<'_, '_> {
         }
     }
 
-    /// Adds another value in every configuration, shared by all positions measured in it.
+    /// Adds a free displacement of every configuration, shared by all positions measured in it.
     pub(super) fn repeats(&mut self) {
         let axes: Vec<DVector<f64>> = (0..3)
             .filter_map(|axis| self.linearised.place(ParameterSite::Shift { axis }))
@@ -117,7 +118,8 @@ impl Columns<'_, '_> {
         self.add_design("per pose", 1.0, hypothesis, design);
     }
 
-    /// Adds curvature and strain of beams by other functions of temperature than a multiple.
+    /// Adds curvature and strain of beams as smooth functions of temperature and other quantities,
+    /// in addition to the linear laws.
     pub(super) fn warming(&mut self, known: &[Known]) {
         if self.problem.data.reference_temperature.is_none() {
             return;

@@ -1,6 +1,9 @@
-//! Values of a searched argument between those that are listed, as a time constant: about the
-//! effects that explanations hold, the value that does best beside the rest becomes a hypothesis
-//! like all others. A strong effect of a value hardly off would else leave structure.
+//! Search for values of a searched argument, such as a time constant, between those of the listed
+//! candidates.
+//!
+//! For each effect in a probable set, the value that explains the residual best together with the
+//! other members becomes a candidate. Otherwise a strong effect with a slightly wrong value would
+//! leave structure.
 
 use super::block::{Block, Design};
 use super::candidate::{Candidate, even};
@@ -12,16 +15,16 @@ use super::search::{Weighted, left_by};
 use crate::problem::{Effect, Problem};
 use crate::select::settings::{MAX_REVISED_SETS, MIN_REVISED_PROBABILITY};
 
-/// Number of values on either side.
+/// Number of trial values on either side of the present one.
 const VALUES_EACH_SIDE: i32 = 8;
-/// Ratio of the last of these values to the first: listed arguments are closer; then the distance
-/// between neighbours.
+/// Ratio of the farthest trial value to the present one, in the first and in the second pass. The
+/// first exceeds the spacing of listed values; the second is the spacing of the first pass.
 const LAST_RATIOS: [f64; 2] = [1.4, 1.043];
-/// Log odds by which another value must be better.
+/// Log odds by which another value must be better than the listed one.
 const MIN_LN_ODDS_OF_FINER: f64 = 0.5;
 
-/// Returns effects with arguments between the listed ones that do better in their places in
-/// probable sets.
+/// Returns effects with argument values between the listed ones that are more probable than the
+/// members of probable sets that they would replace.
 pub(super) fn finer(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],
@@ -92,7 +95,8 @@ pub(super) fn finer(
 }
 
 impl Hypotheses<'_> {
-    /// Returns a hypothesis with other values of its searched argument that no candidate has.
+    /// Returns the candidate with other values of its searched argument, up to the ratio
+    /// `farthest`, that no candidate has yet.
     fn near(&self, candidate: &Candidate, farthest: f64, problem: &Problem) -> Vec<Candidate> {
         let Some(effect) = candidate.hypothesis.effect() else { return Vec::new() };
         let factors = (-VALUES_EACH_SIDE..=VALUES_EACH_SIDE)
@@ -105,7 +109,7 @@ impl Hypotheses<'_> {
         others.filter(is_new).filter_map(|effect| self.like(candidate, effect, problem)).collect()
     }
 
-    /// Returns a hypothesis with an effect of another argument.
+    /// Returns the candidate with another effect, which differs in the value of its argument.
     fn like(&self, candidate: &Candidate, effect: Effect, problem: &Problem) -> Option<Candidate> {
         let columns = self.linearised.columns(&effect);
         let (columns, largest) = even(columns, &effect.terms(problem), self.weighed);

@@ -1,4 +1,4 @@
-//! Functions of what is known of a pose, as sums of a few columns.
+//! Functions of recorded quantities of a pose, as sums of a few basis functions.
 
 use std::f64::consts::PI;
 
@@ -6,27 +6,30 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::residual_tests::Covariate;
 
-/// Margin beyond the range on either side, where functions need not be flat.
+/// Margin on either side of the covariate's range, as a fraction of it, by which the cosine basis
+/// is extended, so that functions need not be flat at the ends.
 const RANGE_MARGIN: f64 = 0.25;
-/// Variance of a basis function, of that of the first, below which it is left out.
+/// Smallest prior variance of a smooth basis function, relative to the first one, at which it is
+/// kept.
 const MIN_BASIS_VARIANCE: f64 = 1e-3;
-/// Minimum variance of a basis function that is not smooth, relative to the first: below, it is
-/// little beside the noise.
+/// Smallest prior variance of a rough (exponential covariance) basis function, relative to the
+/// first one, at which it is kept. Smaller ones are negligible relative to the noise.
 const MIN_ROUGH_VARIANCE: f64 = 0.1;
 
-/// A row of values wider than so many of the gaps that it may have is none that noise alone makes.
+/// Largest width of a cluster of values, as a multiple of the largest gap that noise may cause,
+/// that noise alone may cause.
 const MAX_GAPS_OF_NOISE: f64 = 4.0;
 
-/// Centres of single bumps and steps along the range.
+/// Number of trial centres of single bumps and steps along the range.
 const SHAPE_CENTRES: u32 = 16;
-/// Widths of single bumps and steps as parts of the range.
+/// Trial widths of single bumps and steps, as fractions of the range.
 const SHAPE_WIDTHS: [f64; 5] = [0.04, 0.07, 0.12, 0.2, 0.35];
-/// Steps of a finer search about one, of the centre as parts of the width, and factors of the
+/// Refinement about a shape: shifts of the centre as fractions of the width, and factors on the
 /// width.
 const FINER_SHAPES: ([f64; 9], [f64; 5]) =
     ([-0.6, -0.4, -0.2, -0.1, 0.0, 0.1, 0.2, 0.4, 0.6], [0.7, 0.85, 1.0, 1.2, 1.4]);
 
-/// A single bump exp(−u²/2) or step tanh u with u = (x − centre) / width, x from 0 to 1 over the
+/// Single bump exp(−u²/2) or step tanh u with u = (x − centre) / width; x runs from 0 to 1 over the
 /// range.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::select) struct Shape {
@@ -36,7 +39,7 @@ pub(in crate::select) struct Shape {
 }
 
 impl Shape {
-    /// Returns all shapes over the range.
+    /// Returns all trial shapes over the range.
     pub fn all() -> Vec<Self> {
         let centres = (0..SHAPE_CENTRES).map(|k| (f64::from(k) + 0.5) / f64::from(SHAPE_CENTRES));
         let of_centre = |centre| {
@@ -47,7 +50,7 @@ impl Shape {
         centres.flat_map(of_centre).collect()
     }
 
-    /// Returns the shapes about this one.
+    /// Returns trial shapes near this one.
     pub fn finer(self) -> Vec<Self> {
         let (steps, factors) = FINER_SHAPES;
         let at = |step: f64| {
@@ -63,21 +66,21 @@ impl Shape {
     }
 }
 
-/// A covariate at every pose.
+/// Covariate with its value in every pose.
 pub(super) struct Known {
     pub covariate: Covariate,
     /// Values in every pose.
     pub values: Vec<f64>,
-    /// From 0 to 1 over the range; beyond it the nearer end.
+    /// Values scaled so that the range is 0 to 1; values outside are clamped to the nearer end.
     pub scaled: Vec<f64>,
     /// Range over the poses on which evidence is evaluated.
     pub range: (f64, f64),
-    /// Different values among them.
+    /// Number of different values in those poses.
     pub levels: usize,
 }
 
 impl Known {
-    /// Returns the value at which its size is zero, if that is known; a temperature counts from
+    /// Returns the value at which the quantity is zero, if it is defined; for a temperature it is
     /// `reference` \[°C\].
     pub(super) fn zero(&self, reference: Option<f64>) -> Option<f64> {
         match self.covariate {
@@ -87,8 +90,9 @@ impl Known {
         }
     }
 
-    /// Returns true if functions of a command may grow with its size: it varies by half its largest
-    /// size, and its zero is known.
+    /// Returns true if the amplitude of functions of a command may be proportional to this
+    /// quantity: it is a temperature, load or declared covariate, and varies at least by half its
+    /// largest distance from zero.
     pub(super) fn is_size(&self, reference: Option<f64>) -> bool {
         use Covariate::{Hoist, Own, Payload, Temperature};
         let (low, high) = self.range;
@@ -97,7 +101,8 @@ impl Known {
             && self.zero(reference).is_none_or(varies)
     }
 
-    /// A covariate that varies over the first `weighed` poses.
+    /// Creates a covariate from its values; `None` if it does not vary over the first `weighed`
+    /// poses.
     pub fn of(covariate: Covariate, values: Vec<f64>, weighed: usize) -> Option<Self> {
         let low = values[..weighed].iter().copied().fold(f64::INFINITY, f64::min);
         let high = values[..weighed].iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -113,8 +118,8 @@ impl Known {
     }
 }
 
-/// Brings those of some values that lie in a row, each no further than `apart` from the next, to
-/// their mean: where the row is wider than noise alone makes one, its values differ.
+/// Replaces clusters of the values with indices `some` by their means. In a cluster, successive
+/// values differ by at most `apart`. Clusters wider than noise alone explains are left unchanged.
 pub(super) fn merge(values: &mut [f64], mut some: Vec<usize>, apart: f64) {
     some.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     let rows: Vec<Vec<usize>> =
@@ -130,7 +135,7 @@ pub(super) fn merge(values: &mut [f64], mut some: Vec<usize>, apart: f64) {
     }
 }
 
-/// Returns true if functions of these two covariates are hypotheses.
+/// Returns true if functions of both covariates together are hypotheses of the search.
 pub(super) fn goes_with(one: &Covariate, other: &Covariate) -> bool {
     use Covariate::{Approach, Command, Row, Temperature, Time};
     match (one, other) {
@@ -140,16 +145,17 @@ pub(super) fn goes_with(one: &Covariate, other: &Covariate) -> bool {
     }
 }
 
-/// Cosines over the range and its margin, each with the deviation that a Gaussian process of
-/// squared-exponential covariance with that length has along it [Solin & Särkkä 2020]; shape =
-/// (poses, functions).
+/// Returns cosines over the range and its margin as columns, each scaled to the standard deviation
+/// that a Gaussian process has along it. The process has squared-exponential covariance with the
+/// given length [Solin & Särkkä 2020]; shape = (poses, functions).
 pub(super) fn basis(scaled: &[f64], length: f64) -> DMatrix<f64> {
     let weights = weights(length);
     DMatrix::from_fn(scaled.len(), weights.len(), |row, k| weights[k] * cosine(k, scaled[row]))
 }
 
-/// Returns a basis of functions of exponential covariance exp(−|Δ|/length): a station that wanders,
-/// noise in which one reading follows the last.
+/// Returns basis functions of a Gaussian process with exponential covariance exp(−|Δ|/length),
+/// which describes a station that wanders and noise that is correlated from reading to reading.
+/// `None` if too many functions would be needed for the number of `levels`.
 pub(super) fn rough_basis(scaled: &[f64], length: f64, levels: usize) -> Option<DMatrix<f64>> {
     // Of the constant alone the mean square is 1 and not a half.
     let of_constant = |k: usize| if k == 0 { 0.5 } else { 1.0 };
@@ -166,7 +172,7 @@ fn cosine(k: usize, u: f64) -> f64 {
     (PI * k as f64 * (u + RANGE_MARGIN) / (1.0 + 2.0 * RANGE_MARGIN)).cos()
 }
 
-/// Deviations along the cosines, down to a negligible variance.
+/// Returns the prior standard deviations along the cosines, down to [`MIN_BASIS_VARIANCE`].
 fn weights(length: f64) -> Vec<f64> {
     let variance =
         |k: usize| (-0.5 * (PI * k as f64 * length / (1.0 + 2.0 * RANGE_MARGIN)).powi(2)).exp();
@@ -174,8 +180,9 @@ fn weights(length: f64) -> Vec<f64> {
     (0..count).map(|k| variance(k).sqrt()).collect()
 }
 
-/// Functions of one covariate that change evenly with the size of another: those of the basis times
-/// that size; where its zero is not known, beside those of the basis.
+/// Returns functions of one covariate whose amplitude is proportional to another quantity (`size`):
+/// basis functions times the quantity. If its `zero` is not known, the basis functions alone are
+/// included, too.
 pub(super) fn growing(
     scaled: &[f64],
     size: &Known,
@@ -192,7 +199,7 @@ pub(super) fn growing(
     })
 }
 
-/// Products of cosines, one of each covariate.
+/// Returns products of cosines, one factor for each covariate, as columns.
 pub(super) fn products_of(scaled: &[&[f64]], length: f64) -> DMatrix<f64> {
     let weights = weights(length);
     let mut indices: Vec<Vec<usize>> = vec![Vec::new()];
@@ -211,7 +218,7 @@ pub(super) fn products_of(scaled: &[&[f64]], length: f64) -> DMatrix<f64> {
     })
 }
 
-/// Columns times functions of the pose: every column with every function, shape = (3 N, columns ·
+/// Returns the product of every column with every function of the pose, shape = (3 N, columns ·
 /// functions).
 pub(super) fn times(at: &[&DVector<f64>], functions: &DMatrix<f64>) -> DMatrix<f64> {
     let k = functions.ncols();

@@ -1,4 +1,4 @@
-//! All hypotheses about what a fit leaves, with their columns at some poses.
+//! All hypotheses about the residual of a fit, with their columns at some poses.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,28 +19,28 @@ use crate::select::data::Data;
 use crate::select::fitted::Fitted;
 use crate::select::neighbourhood::Linearised;
 
-/// A fit linearised at some rows, with every hypothesis.
+/// Fit linearised at some rows, with all hypotheses about its residual.
 pub(in crate::select) struct Hypotheses<'a> {
     pub linearised: Linearised<'a>,
-    /// Effects that are taken out of the fit, part by part.
+    /// Effects that are removed from the fit and evaluated as hypotheses, part by part.
     pub added: Vec<Effect>,
-    /// Places of their columns among those of the fit.
+    /// Indices of their columns among those of the fit.
     pub unknowns: Vec<usize>,
     pub(super) all: Vec<Candidate>,
-    /// Number of poses, the first ones, on which evidence is evaluated.
+    /// Number of first poses on which evidence is evaluated.
     pub(super) weighed: usize,
     /// Log prior probability of a family of effects.
     pub(super) ln_family: f64,
     covariates: Vec<Known>,
-    /// True if the sides of approach of the poses are known; true if their times are measured.
+    /// Two flags: directions of approach are recorded; times are recorded.
     coverage: (bool, bool),
-    /// Candidate times of a move of the instrument.
+    /// Candidate times at which the instrument may have moved.
     pub(super) times: Vec<f64>,
 }
 
 impl<'a> Hypotheses<'a> {
-    /// Creates the hypotheses about what the fit without the effects `added` leaves of the first
-    /// `weighed` of some rows.
+    /// Creates the hypotheses about the residual that the fit without the effects `added` leaves.
+    /// The first `weighed` of the `rows` count for the evidence.
     pub fn of(
         fitted: &'a Fitted,
         data: &Data<'a>,
@@ -102,7 +102,8 @@ impl<'a> Hypotheses<'a> {
         hypotheses
     }
 
-    /// Returns the hypothesis of an effect that no list has, with its columns.
+    /// Returns the candidate for an effect whose argument no list contains, such as a wave or a
+    /// move, with its columns.
     pub(super) fn entered(
         &self,
         effect: &Effect,
@@ -126,7 +127,7 @@ impl<'a> Hypotheses<'a> {
         Some(Candidate { hypothesis, variant: 0, design, ln_prior, coefficients })
     }
 
-    /// Creates the functions of one hypothesis alone, about what the whole fit leaves.
+    /// Creates the functions of one hypothesis alone, about the residual of the whole fit.
     pub fn only(
         fitted: &'a Fitted,
         data: &Data<'a>,
@@ -144,7 +145,7 @@ impl<'a> Hypotheses<'a> {
         Self { linearised, added, unknowns, all, weighed, ln_family, covariates, coverage, times }
     }
 
-    /// Returns the function of a hypothesis that a set holds.
+    /// Returns the candidate for a hypothesis of a set, with the function that the set contains.
     pub(super) fn candidate(
         &self,
         explanation: &HypothesisSet,
@@ -157,8 +158,8 @@ impl<'a> Hypotheses<'a> {
             .find(|candidate| candidate.variant == variant && candidate.hypothesis == *hypothesis)
     }
 
-    /// Returns the columns of a function that a set holds, at all poses, shape = (3 N, k): smooth,
-    /// or of one shape.
+    /// Returns the columns, at all poses, of a function that a set contains, shape = (3 N, k): the
+    /// smooth function, or the single `shape` if one is given.
     pub fn form(
         &self,
         explanation: &HypothesisSet,
@@ -172,8 +173,8 @@ impl<'a> Hypotheses<'a> {
         Some(candidate.design.columns().into_owned())
     }
 
-    /// Returns single bumps and steps in the place of a function of one covariate at one
-    /// coordinate, all together as probable as the function.
+    /// Returns candidates with single bumps and steps that may replace a function of one covariate
+    /// at one coordinate. All of them together are as probable a priori as the function.
     pub(super) fn shaped(
         &self,
         hypothesis: &Hypothesis,
@@ -206,7 +207,7 @@ impl<'a> Hypotheses<'a> {
         shapes.iter().filter_map(one).collect()
     }
 
-    /// Returns the values of a covariate at every pose.
+    /// Returns the values of a covariate in every pose, if it varies.
     pub(super) fn known(&self, covariate: &Covariate) -> Option<&Known> {
         self.covariates.iter().find(|known| known.covariate == *covariate)
     }
@@ -221,7 +222,8 @@ impl<'a> Hypotheses<'a> {
         self.covariates(hypothesis).map(|known| (known.covariate.clone(), known.range)).collect()
     }
 
-    /// Returns for each pose from number `first` on whether it is within those ranges.
+    /// Returns, for each pose from index `first` on, true if its covariates are within those
+    /// ranges.
     pub fn reached(&self, hypothesis: &Hypothesis, first: usize) -> Vec<bool> {
         let within = |known: &Known, pose: usize| {
             (known.range.0..=known.range.1).contains(&known.values[pose])
@@ -232,8 +234,8 @@ impl<'a> Hypotheses<'a> {
             .collect()
     }
 
-    /// Returns the values of the only covariate of a function at one coordinate of a joint, and the
-    /// lever of that coordinate; `None` for other functions.
+    /// Returns covariate, site, values and lever of a function of a single covariate at one joint
+    /// coordinate; `None` for other functions.
     pub fn coordinate(
         &self,
         hypothesis: &Hypothesis,
@@ -246,7 +248,7 @@ impl<'a> Hypotheses<'a> {
     }
 }
 
-/// Returns whether the sides of approach of some poses are known and whether times are measured.
+/// Returns two flags: directions of approach of some poses are recorded; times are recorded.
 fn coverage(linearised: &Linearised, data: &Data) -> (bool, bool) {
     let has_approach = linearised.poses().iter().any(|pose| pose.setup.approach.is_some());
     (has_approach, data.measurements.time_measured)

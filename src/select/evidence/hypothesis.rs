@@ -1,4 +1,4 @@
-//! Hypotheses about a residual: effects, and functions without a law.
+//! Hypotheses about the cause of a residual: effects, and functions without a law.
 
 use std::fmt;
 
@@ -6,20 +6,20 @@ use crate::model::parameter::{ArmField, JointField, ParameterSite, Regressor};
 use crate::problem::{Effect, Problem};
 use crate::residual_tests::Covariate;
 
-/// Site of an error: a part of the arm or of its measurement. Joints are counted from 0. Its
+/// Site of an error: a part of the arm or of the measurement. Joints are counted from 0. Its
 /// `Display` is the name in files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Site {
-    /// Joint, from 0.
+    /// Joint, counted from 0.
     Joint(usize),
-    /// Link before a joint, from 0.
+    /// Link before a joint, counted from 0.
     LinkBefore(usize),
-    /// Base, or what it stands on.
+    /// Base, or the ground below it.
     Base,
     /// Payload at the tool.
     Payload,
-    /// Hoist that carries weight.
+    /// Hoist that carries part of the weight.
     Hoist,
     /// Arm as a whole.
     Arm,
@@ -72,34 +72,36 @@ impl fmt::Display for Site {
     }
 }
 
-/// Form of an error as a function of its quantities.
+/// Law of an error, or the kind of function if its law is unknown.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum HypothesisKind {
-    /// Law of an effect.
+    /// Effect with a law.
     Effect(Effect),
     /// Smooth function without a law.
     Smooth,
-    /// Function that repeats about so many times a turn of the joint, its height and phase changing
-    /// slowly.
+    /// Function with approximately this number of periods per turn of the joint, whose amplitude
+    /// and phase change slowly.
     NearHarmonic(u32),
-    /// Periodic error of a joint: all harmonics up to this order, their coefficients under one prior.
+    /// Periodic error of a joint: all harmonics up to this order, with one prior on their
+    /// coefficients.
     Gear(u32),
-    /// Another value in every pose: no known quantity predicts it.
+    /// Free value in every pose, which no recorded quantity predicts.
     PerPose,
-    /// Error that wanders in time: near its last value, and not smooth, as noise in which one
-    /// reading follows the last.
+    /// Error that wanders in time: close to its previous value, but not smooth, like noise that is
+    /// correlated from reading to reading.
     Wandering,
     /// Displacement linear in the position.
     Linear,
     /// Deflection under the weight of links whose masses are not declared.
     Sag,
-    /// Wrong limit of the declared problem that holds the fit; its words.
+    /// Limit (bound or constraint) of the declared problem that is wrong although the fit rests on
+    /// it; contains its description.
     Limit(String),
 }
 
 impl HypothesisKind {
-    /// Returns true if the law is the same whatever the value of its searched argument.
+    /// Returns true if both have the same law, regardless of the value of a searched argument.
     pub(super) fn is_of(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Effect(effect), Self::Effect(other)) => effect.is_but_for_search(other),
@@ -108,23 +110,22 @@ impl HypothesisKind {
     }
 }
 
-/// One hypothesis about a residual.
+/// Hypothesis about the cause of a residual: a law or function at a site.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hypothesis {
-    /// Law of the error, or its form.
+    /// Law of the error, or kind of function.
     pub kind: HypothesisKind,
     /// Site at which the error acts.
     pub site: Site,
-    /// Coordinate of the site, where the error is one of a single coordinate.
+    /// Coordinate of the site, if the error is one of a single coordinate.
     pub coordinate: Option<ParameterSite>,
     /// Quantities on which it depends, ascending.
     pub depends_on: Vec<Covariate>,
 }
 
 impl Hypothesis {
-    /// Returns the hypothesis of an effect: its sites and regressors give the site and the
-    /// quantities. `coverage` says whether the sides of approach are known and whether times are
-    /// measured.
+    /// Creates the hypothesis of an effect; its terms determine the site and the quantities.
+    /// `coverage` states whether directions of approach and times are recorded.
     pub fn of_effect(effect: &Effect, problem: &Problem, coverage: (bool, bool)) -> Self {
         let terms = effect.terms(problem);
         let site = terms.first().map_or(Site::Arm, |term| Site::of(term.site));
@@ -137,7 +138,7 @@ impl Hypothesis {
         Self { kind: HypothesisKind::Effect(effect.clone()), site, coordinate: None, depends_on }
     }
 
-    /// Returns a smooth function of some covariates at a site.
+    /// Creates the hypothesis of a smooth function of some covariates at a site.
     pub(super) fn smooth(site: ParameterSite, depends_on: Vec<Covariate>) -> Self {
         Self {
             kind: HypothesisKind::Smooth,
@@ -165,7 +166,7 @@ impl Hypothesis {
         }
     }
 
-    /// Returns its effect, if its law is one.
+    /// Returns the effect of the hypothesis; `None` for a function without a law.
     pub fn effect(&self) -> Option<&Effect> {
         match &self.kind {
             HypothesisKind::Effect(effect) => Some(effect),
@@ -174,8 +175,8 @@ impl Hypothesis {
     }
 }
 
-/// Returns the covariates that a parameter depends on, by its regressor or by the physics of its
-/// site.
+/// Returns the covariates on which a parameter's effect depends, through its regressor or the
+/// physics of its site. `known` states whether directions of approach and times are recorded.
 fn covariates(
     site: ParameterSite,
     regressor: &Regressor,

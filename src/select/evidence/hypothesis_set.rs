@@ -6,22 +6,22 @@ use crate::problem::Effect;
 /// Hypotheses that act together, with their probability.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HypothesisSet {
-    /// Members of the set; empty: the residual is noise.
+    /// Members of the set; empty if the residual is only noise.
     pub hypotheses: Vec<Hypothesis>,
     /// Probability among all sets that were evaluated.
     pub probability: f64,
-    /// Number of the function of each member, and 1 σ of its coefficients.
+    /// For each member, index of its function, and 1 σ of the function's coefficients.
     pub(super) functions: Vec<(usize, f64)>,
 }
 
 impl HypothesisSet {
-    /// Returns the effects of the set.
+    /// Returns those effects that are members of the set.
     pub fn effects(&self) -> Vec<Effect> {
         self.hypotheses.iter().filter_map(Hypothesis::effect).cloned().collect()
     }
 
-    /// Returns the gear hypotheses of the set: the joint, from 1, the highest order, and 1 σ of the
-    /// coefficients in root mean square displacements of all columns together.
+    /// Returns the periodic errors of the set: joint (from 1), highest order, and 1 σ of the
+    /// coefficients, given as root mean square displacement of all columns together in units of σ.
     pub(in crate::select) fn gears(&self) -> Vec<(usize, u32, f64)> {
         let gear =
             |(member, (_, size)): (&Hypothesis, &(usize, f64))| match (&member.kind, member.site) {
@@ -33,7 +33,7 @@ impl HypothesisSet {
         self.hypotheses.iter().zip(&self.functions).filter_map(gear).collect()
     }
 
-    /// Returns the functions without a law, each with its number among those of its hypothesis.
+    /// Returns the functions without a law, each with its index among those of its hypothesis.
     pub(in crate::select) fn without_law(&self) -> Vec<(Hypothesis, usize)> {
         let all = self
             .hypotheses

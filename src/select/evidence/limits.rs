@@ -1,11 +1,11 @@
-//! Limits of the declared problem that hold a fit back: where one is wrong, what it holds back
-//! looks like an effect.
+//! Limits (bounds and constraints) of the declared problem on which a fit rests. If one is wrong,
+//! the misfit that it causes looks like an effect.
 //!
-//! Freed, a parameter p at its bound moves the poses along ∂r/∂p. Of active constraints with rows A
-//! the i-th, freed alone, lets the unknowns move along A⁺eᵢ, and the poses along J A⁺eᵢ; along what
-//! A leaves open they are fitted, so that units decide nothing. Rows that depend on others are
-//! freed together. How far a limit may be off is told by the priors: of a freed parameter by its σ
-//! from the bound on.
+//! If a bound is removed, its parameter p displaces the poses along ∂r/∂p. If the i-th of the
+//! active constraints with rows A is removed, the unknowns move along A⁺eᵢ and the poses along J
+//! A⁺eᵢ. Along the directions that A leaves free the unknowns are fitted, so units do not matter.
+//! Rows that depend linearly on others are removed together. The priors state how wrong a limit may
+//! be: a removed bound by the σ of its parameter.
 
 use crate::select::settings::MAX_PLAUSIBLE;
 use nalgebra::DMatrix;
@@ -17,11 +17,11 @@ use super::marginal::Coefficients;
 use crate::select::fitted::Fitted;
 use crate::select::neighbourhood::Linearised;
 
-/// Smallest singular value of independent rows of constraints.
+/// Smallest singular value at which rows of constraints count as independent.
 const MIN_SINGULAR_VALUE: f64 = 1e-9;
 
-/// Returns for each limit that holds a fit the hypothesis that it is wrong; all together have the
-/// probability of a family.
+/// Returns, for each limit on which the fit rests, the hypothesis that it is wrong. All of them
+/// together have the prior probability of one family.
 pub(super) fn limits(
     fitted: &Fitted,
     linearised: &Linearised,

@@ -1,43 +1,43 @@
-//! The marginal likelihood of a linear model with unknown noise: how probable a residual is under
-//! some columns.
+//! Marginal likelihood of a linear model with unknown noise: the probability density of a residual,
+//! given columns that may explain it.
 //!
 //! r = A β + ε with β ~ N(0, c² f² I) and ε ~ N(0, f² I), all in units of the declared σ. With G =
-//! AᵀA = V diag(w) Vᵀ and b = Aᵀr the coefficients are integrated out in closed form,
+//! AᵀA = V diag(w) Vᵀ and b = Aᵀr, the coefficients are integrated out in closed form,
 //!
 //! S(c) = rᵀr − Σ c² (Vᵀb)² / (1 + c² w),     ln p(r | c, f) = −½ Σ ln(1 + c² w) − ν ln f − S / (2
-//! f²) + const,
+//! f²) + const.
 //!
-//! and the size c of the columns (their root mean square displacement in units of σ) and the factor
-//! f of the noise are summed over a grid. c runs over what positions can show, from a third of σ to
-//! a hundred of it; ln f has a Cauchy distribution about 0: mostly a declared σ is right to a
-//! tenth, and where it is not, it may be far off.
+//! The size c of the columns (their root mean square displacement in units of σ) and the noise
+//! factor f are summed over a grid. c covers the range that positions can show, from a third of σ
+//! to a hundred σ. ln f has a Cauchy prior about 0: a declared σ is mostly right to a tenth, but
+//! may also be very wrong.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::numeric::lower_factor;
 
-/// ln f is summed from −3.5 to 3.5, a factor of thirty either way, in steps of a twentieth, or
-/// closer: of half of what the likelihood of ν degrees of freedom is wide, 1/√(2ν).
+/// Half-width of the grid of ln f, a factor of 33 in either direction. Its step is
+/// [`MAX_LN_NOISE_STEP`], or less: half the width 1/√(2ν) of the likelihood with ν degrees of
+/// freedom.
 const MAX_LN_NOISE_FACTOR: f64 = 3.5;
 const MAX_LN_NOISE_STEP: f64 = 0.05;
-/// Smallest step of the grid: no data have more degrees of freedom.
+/// Smallest step of the grid, which limits its size; no data set has so many degrees of freedom.
 const MIN_LN_NOISE_STEP: f64 = 1e-4;
 
-/// Terms that are e⁴⁰ times less probable than the largest add nothing to a sum.
+/// Log odds to the largest term of a sum beyond which a term is negligible (e⁴⁰).
 const NEGLIGIBLE_LN_ODDS: f64 = 40.0;
 
-/// Degrees of freedom ν of a residual and the half width of the distribution of ln f.
+/// Degrees of freedom ν of a residual, and half-width (`trust`) of the Cauchy prior on ln f.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Noise {
     pub freedom: f64,
     pub trust: f64,
-    /// Smallest ln f: that of a declared σ, for a smaller error is no effect that such an
-    /// instrument can show.
+    /// Smallest ln f, 0 for a declared σ: an instrument with that σ cannot show smaller effects.
     pub least: f64,
 }
 
 impl Noise {
-    /// Returns for each factor f of the grid ln of its prior times f^−ν, and 1 / (2 f²).
+    /// Returns, for each noise factor f of the grid, ln of its prior times f^−ν, and 1 / (2 f²).
     pub fn grid(self) -> Vec<(f64, f64)> {
         let step = MAX_LN_NOISE_STEP.min(0.5 / (2.0 * self.freedom).sqrt()).max(MIN_LN_NOISE_STEP);
         let least = self.least.clamp(-MAX_LN_NOISE_FACTOR, MAX_LN_NOISE_FACTOR);
@@ -54,8 +54,8 @@ impl Noise {
     }
 }
 
-/// Returns ln of the likelihood of ν squares of sum S, summed over the noise factor f; up to a
-/// constant.
+/// Returns ln of the likelihood of a residual with sum of squares S, summed over the noise factor
+/// f, up to a constant. `grid` is that of [`Noise::grid`].
 pub(super) fn over_noise(squares: f64, grid: &[(f64, f64)]) -> f64 {
     ln_sum(grid.iter().map(|(ln_weight, half)| ln_weight - half * squares))
 }
@@ -71,13 +71,13 @@ pub(super) fn ln_sum(terms: impl Iterator<Item = f64> + Clone) -> f64 {
     if most == f64::NEG_INFINITY { most } else { most + sum.ln() }
 }
 
-/// Products of columns A with themselves and with a residual r: G = AᵀA and b = Aᵀr.
+/// Products of columns A with themselves and with the residual r: G = AᵀA and b = Aᵀr.
 #[derive(Debug, Clone)]
 pub(super) enum Normal {
-    /// Matrix G, shape = (k, k), and b.
+    /// Full matrix G, shape = (k, k), and b.
     Dense { gram: DMatrix<f64>, product: DVector<f64> },
-    /// G = D − LᵀL with D diagonal and few rows in L, shape = (few, k): columns for every pose,
-    /// projected.
+    /// Matrix G = D − LᵀL with D diagonal and L with few rows, shape = (few, k), and b. Arises for
+    /// one column per pose after projection.
     LessFew { diagonal: DVector<f64>, less: DMatrix<f64>, product: DVector<f64> },
 }
 
@@ -89,8 +89,8 @@ impl Normal {
         }
     }
 
-    /// Returns the products beside a set that takes Z A = `along` off the columns and `taken` = Z r
-    /// off the residual.
+    /// Returns the products after the residual and the columns were reduced by a set: by Z A =
+    /// `along` and Z r = `taken`.
     pub fn beside(&self, along: &DMatrix<f64>, taken: &DVector<f64>) -> Self {
         match self {
             Self::Dense { gram, product } => {
@@ -110,7 +110,7 @@ impl Normal {
         }
     }
 
-    /// Writes G out where L has so many rows that this is less work for every size.
+    /// Computes G as a full matrix if L has so many rows that this takes less work.
     pub fn whole_if_less_work(self) -> Self {
         match self {
             Self::LessFew { diagonal, less, product } if 2 * less.nrows() > less.ncols() => {
@@ -165,27 +165,28 @@ fn with_prior(gram: &DMatrix<f64>, precision: f64) -> DMatrix<f64> {
     inner
 }
 
-/// Returns ln Π c dⱼ, a few factors at a time so that their product stays in range.
+/// Returns ln Π c dⱼ. It multiplies a few factors at a time, so that their product does not
+/// overflow.
 fn ln_product(diagonal: &DVector<f64>, size: f64) -> f64 {
     let all: Vec<f64> = diagonal.iter().map(|entry| entry * size).collect();
     all.chunks(16).map(|some| some.iter().product::<f64>().ln()).sum()
 }
 
-/// Prior knowledge about the coefficients of a block.
+/// Prior on the coefficients of a block.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Coefficients {
-    /// True for coefficients that are never negative; empty: none.
+    /// True for coefficients that cannot be negative; empty if there are none.
     pub never_negative: Vec<bool>,
-    /// True if each coefficient may act without the others.
+    /// True if each coefficient may differ from zero without the others.
     pub alone: bool,
-    /// Root mean square displacement, in units of σ, of the largest plausible value of each
-    /// coefficient; empty: any.
+    /// Root mean square displacement, in units of σ, by the largest plausible value of each
+    /// coefficient; empty if any value is plausible.
     pub largest: Vec<f64>,
 }
 
 impl Coefficients {
-    /// Returns the sizes that are plausible for some coefficients; larger ones are replaced by the
-    /// largest plausible one.
+    /// Returns the trial `sizes` for the coefficients `of`, with those above the largest plausible
+    /// size replaced by it. `column` is the root mean square of the columns.
     fn plausible(&self, sizes: &[f64], of: impl Iterator<Item = usize>, column: f64) -> Vec<f64> {
         let largest = of
             .filter_map(|j| self.largest.get(j))
@@ -197,11 +198,11 @@ impl Coefficients {
 }
 
 /// Returns ln p(r | block) summed over sizes, and the most probable size of all columns together,
-/// for a residual of squares S.
+/// for a residual with sum of squares S.
 ///
-/// Where its k columns may be at work one without the others, all together and each alone have the
-/// same chance 1/(k + 1): otherwise what one column of two explains would be held by another effect
-/// of that one column, for its prior is the narrower.
+/// If each of its k columns may act without the others, all together and each alone have the same
+/// prior probability 1/(k + 1). Otherwise an effect with a single column would be preferred,
+/// because its prior is narrower.
 pub(super) fn of_block(
     normal: &Normal,
     left: (f64, f64),
@@ -236,10 +237,10 @@ pub(super) fn of_block(
     (ln_sum(all.iter().copied()) - (all.len() as f64).ln(), size)
 }
 
-/// Returns the same for all columns together, without single columns.
+/// Returns ln p(r | block) and the most probable size, for all columns together only.
 ///
-/// Of a parameter that is `never_negative` the prior is the half β ≥ 0 of its normal distribution:
-/// with the estimate m and its standard error s the likelihood changes by 2 Φ(m / s).
+/// The prior of a `never_negative` parameter is the half β ≥ 0 of its normal distribution. With the
+/// estimate m and its standard error s, this changes the likelihood by the factor 2 Φ(m / s).
 fn of_columns(
     normal: &Normal,
     (squares, freedom): (f64, f64),
@@ -280,7 +281,7 @@ fn of_columns(
     (ln_sum(tried.iter().map(|(_, ln)| *ln)) - (sizes.len() as f64).ln(), best.0)
 }
 
-/// Returns Σ ln 2 Φ(m / s) over the coefficients that are never negative; columns are derivatives
+/// Returns Σ ln 2 Φ(m / s) over the coefficients that cannot be negative. Columns are derivatives
 /// of the residual, so m = − (G + 1/c²)⁻¹ b.
 fn signs(
     covariance: &DMatrix<f64>,
@@ -302,7 +303,8 @@ mod tests {
 
     const SIZES: [f64; 6] = [0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
 
-    /// ln p(r | columns) − ln p(r) of r = 5 A₁ and noise, A of two columns or of the first alone.
+    /// Returns ln p(r | columns) − ln p(r) for r = 5 A₁ plus noise, with `count` columns, one or
+    /// two.
     fn gain(count: usize, coefficients: &Coefficients) -> f64 {
         let column = |j: usize, i: usize| {
             ((12.9898 + 3.77 * j as f64) * i as f64 + 0.5).sin() * 2.0_f64.sqrt()

@@ -1,13 +1,15 @@
 //! Evidence for sets of hypotheses about a residual: effects, functions without a law, several
 //! together, or none.
 //!
-//! Every hypothesis is a block of columns in the linear neighbourhood of a fit, with everything
-//! fitted projected out. One closed-form marginal likelihood ([`marginal`]) compares sets of them;
-//! the prior gives every family the same chance and every further member of a set the odds of one
-//! to two and its share of its family. An effect is a law; beside it stands, in the same sum, what
-//! knows no law: smooth functions of the same covariates at the same part, functions of two
-//! covariates, harmonics whose height and phase change, another value in every pose. So a law is
-//! probable only where it is better than what needs none.
+//! Every hypothesis is a block of columns in the linear neighbourhood of a fit, with the fitted
+//! parameters projected out. One closed-form marginal likelihood ([`marginal`]) compares sets of
+//! them. The prior gives each family its weight, each further member of a set odds of 1 to 2, and
+//! each member its share of its family.
+//!
+//! Effects (laws) compete with functions without a law: smooth functions of the same covariates at
+//! the same part, functions of two covariates, harmonics with changing amplitude and phase, and a
+//! free value in every pose. A law is therefore probable only if it explains the residual better
+//! than functions that need none.
 
 mod again;
 mod block;
@@ -54,16 +56,16 @@ use products::{Known, Products};
 use search::{Weighted, search};
 use waves::Waves;
 
-/// Number of shapes that are refined.
+/// Number of best shapes (bumps and steps) that are refined.
 const MAX_REFINED_SHAPES: usize = 4;
 
-/// Returns ln of the marginal likelihood times the prior of the set that a fit holds: the effects
-/// `added` by the search and functions without a law.
+/// Returns ln of the marginal likelihood times the prior of the set that a fit contains: the
+/// effects `added` by the search and functions without a law.
 ///
-/// The fit is linear about its own optimum: sets whose effects are strong are compared by this,
-/// each at a fit of its own. A fit divides its residual by a σ of its own; the density is that of
-/// the residual over the common `sigma` \[m\], of ν degrees of freedom: ln p(r/σ') = ln p(r/σ) − ν
-/// ln (σ/σ').
+/// The fit is linear about its own optimum. Sets with strong effects are compared by this value,
+/// each at a fit of its own set. Each fit scales its residual by its own σ′; the density is that of
+/// the residual over the common `sigma` σ \[m\], with ν degrees of freedom: ln p(r/σ′) = ln p(r/σ)
+/// − ν ln (σ/σ′).
 pub(super) fn ln_posterior(
     fitted: &Fitted,
     data: &Data,
@@ -86,8 +88,8 @@ pub(super) fn ln_posterior(
     )
 }
 
-/// Returns the most probable form of a function without a law beside what the fit holds, and 1 σ of
-/// its coefficients: one of `hypotheses`, smooth where it has no shape.
+/// Returns the most probable form of a function without a law in addition to the effects of the
+/// fit: a bump or step, or `None` for the smooth function. Also returns 1 σ of its coefficients.
 pub(super) fn best_form(
     fitted: &Fitted,
     data: &Data,
@@ -122,11 +124,11 @@ pub(super) fn best_form(
     Some((k.checked_sub(1).map(|shaped| finer[shaped].0), size))
 }
 
-/// Evaluates the evidence about the residual of a fit, the effects `added` by the search taken out
-/// of it. A pose that alone supports an effect is left out.
+/// Evaluates the evidence about the residual of a fit, with the effects `added` by the search
+/// removed from it. Poses that alone support an effect are left out.
 ///
-/// Returns `None` if the residual is not finite, as that of a pose without equilibrium, or the
-/// search was stopped.
+/// Returns `None` if the residual is not finite (a pose without equilibrium), or if the search was
+/// stopped.
 pub(super) fn evaluate(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option<Evidence> {
     let mut left_out = Vec::new();
     loop {
@@ -138,7 +140,7 @@ pub(super) fn evaluate(fitted: &Fitted, data: &Data, added: &[Effect]) -> Option
     }
 }
 
-/// Evaluates the evidence without some poses; also returns the hypotheses.
+/// Evaluates the evidence without the poses `left_out`; also returns the hypotheses.
 fn weighed_without<'a>(
     fitted: &'a Fitted,
     data: &Data<'a>,
@@ -243,8 +245,8 @@ fn weighed_without<'a>(
     Some((evidence, hypotheses))
 }
 
-/// Returns for each member of a set the other effects that do best in its place, one of a family at
-/// each site, if at least half as well.
+/// Returns, for each member of a set, the effects that would replace it best, at most one of a
+/// family at each site. They must gain at least half as much as the member.
 fn stand_ins(
     best: &HypothesisSet,
     hypotheses: &Hypotheses,

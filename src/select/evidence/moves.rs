@@ -1,5 +1,5 @@
-//! Times at which the instrument may have moved and turned, searched where probable sets hold
-//! something that follows time.
+//! Times at which the instrument may have moved and rotated. They are searched if probable sets
+//! contain a hypothesis that depends on time.
 
 use std::collections::BTreeSet;
 
@@ -15,8 +15,8 @@ use crate::residual_tests::Covariate;
 use crate::select::fitted::Fitted;
 use crate::select::settings::{MAX_REVISED_SETS, MIN_REVISED_PROBABILITY};
 
-/// Returns the move that does best in the place of what follows time in each of some sets: of one
-/// such member, and of all.
+/// Returns, for each of some sets, the station move that best replaces its time-dependent members:
+/// one of them, or all together.
 pub(super) fn promising(
     hypotheses: &Hypotheses,
     weighted: &[Weighted],

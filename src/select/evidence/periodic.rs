@@ -1,5 +1,5 @@
-//! Functions without a law of one coordinate of a joint that are not smooth: another value in every
-//! pose, harmonics that change slowly, and periodic errors of many orders.
+//! Functions without a law of one joint coordinate that are not smooth: a free value in every pose,
+//! harmonics with slowly changing amplitude, and periodic errors with many orders.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,12 +13,12 @@ use crate::residual_tests::Covariate;
 use crate::select::harmonic_prior::{MIN_GEAR_ORDERS, is_gear_of};
 use crate::select::settings::{GEAR_ORDERS, MAX_NEAR_ORDER, SLOW_LENGTH};
 
-/// Number of values of a command, for each order, from which on a periodic error of many orders is
-/// told from any other function: twice the number of its coefficients.
+/// Number of different commands, for each order, at which a periodic error can be distinguished
+/// from any other function. It is twice the number of coefficients.
 const LEVELS_PER_ORDER: usize = 4;
 
 impl Columns<'_, '_> {
-    /// Adds another value in every pose.
+    /// Adds a free value of the coordinate in every pose.
     pub(super) fn per_pose(&mut self, site: ParameterSite, at: &DVector<f64>) {
         let hypothesis = Hypothesis {
             kind: HypothesisKind::PerPose,
@@ -29,8 +29,8 @@ impl Columns<'_, '_> {
         self.add_design("per pose", 1.0, hypothesis, || Design::per_pose(at));
     }
 
-    /// Adds harmonics whose height and phase change slowly: orders that are no whole numbers, and
-    /// sums of neighbouring ones.
+    /// Adds harmonics with slowly changing amplitude and phase. They include non-integer orders and
+    /// sums of neighbouring orders.
     pub(super) fn near_harmonics(&mut self, site: ParameterSite, at: &DVector<f64>, joint: usize) {
         if self.problem.joints[joint].command_kind() != JointKind::Revolute {
             return;
@@ -63,7 +63,8 @@ impl Columns<'_, '_> {
     }
 
     /// Adds periodic errors of a joint with many orders under one prior, one hypothesis for each
-    /// highest order, unless the fit holds one or the command takes too few values.
+    /// highest order. Adds none if the fit contains one, or if the command has too few different
+    /// values.
     pub(super) fn gears(&mut self, site: ParameterSite, at: &DVector<f64>, joint: usize) {
         let held = |declared: &EffectDeclaration| is_gear_of(&declared.effect, joint + 1);
         if !self.takes_gears || self.problem.effects.iter().any(held) {

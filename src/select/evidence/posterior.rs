@@ -5,31 +5,33 @@ use super::hypothesis_set::HypothesisSet;
 use crate::problem::Effect;
 use crate::residual_tests::Covariate;
 
-/// Probability below which a set is dropped: thousands of them add up to nothing.
+/// Smallest probability of a set that is kept. Even thousands of less probable sets are negligible
+/// together.
 pub(super) const NEGLIGIBLE: f64 = 1e-10;
 /// All sets of hypotheses that were evaluated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
     /// Sets, the most probable first.
     pub sets: Vec<HypothesisSet>,
-    /// Members of the accepted set, each with an effect that does best in its place.
+    /// Pairs of a member of the accepted set and an effect that may replace it.
     pub(super) stand_ins: Vec<(Hypothesis, Hypothesis)>,
-    /// Poses that were left out of the evidence: each alone would have supported an effect.
+    /// Poses that were left out of the evidence, because each alone supported an effect.
     pub(in crate::select) left_out: Vec<usize>,
 }
 
-/// Claims about a hypothesis, from the least to the most.
+/// Claims about a hypothesis with their probabilities, from the weakest to the strongest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Claims {
-    /// Site, and the probability that something acts there.
+    /// Site of the error, and the probability that an error acts there.
     pub place: (Site, f64),
-    /// Quantities, and the probability that the error at the site depends on them.
+    /// Quantities, and the probability that the error at the site depends on exactly these.
     pub depends_on: (Vec<Covariate>, f64),
-    /// Hypothesis, and the probability that its law acts at the site and no function without a law.
+    /// Hypothesis, and the probability that its law acts at the site without an additional
+    /// function.
     pub law: (Hypothesis, f64),
 }
 
-/// Returns the odds against a probability, at most even.
+/// Returns the odds (1 − p) / p against a probability p, limited to 1.
 pub(in crate::select) fn odds_against(probability: f64) -> f64 {
     ((1.0 - probability).max(NEGLIGIBLE) / probability.max(NEGLIGIBLE)).min(1.0)
 }
@@ -40,7 +42,7 @@ impl Evidence {
         self.sets.first().map_or(&[], |best| &best.hypotheses)
     }
 
-    /// Returns the probability that some hypothesis of a kind acts.
+    /// Returns the probability that at least one hypothesis acts for which `of` is true.
     pub fn probability(&self, of: impl Fn(&Hypothesis) -> bool) -> f64 {
         let holds = |explanation: &&HypothesisSet| explanation.hypotheses.iter().any(&of);
         self.sets
@@ -51,34 +53,35 @@ impl Evidence {
             .min(1.0)
     }
 
-    /// Returns the probability that a joint, from 1, has a periodic error of many orders.
+    /// Returns the probability that a joint, counted from 1, has a periodic error with many orders.
     pub(in crate::select) fn gear_probability(&self, joint: usize) -> f64 {
         self.probability(|hypothesis| hypothesis.gear_joint() == Some(joint - 1))
     }
 
-    /// Returns the most probable set that has no more members than act with probability `level`,
-    /// whichever they are.
+    /// Returns the most probable set whose number of members is supported: at least that many
+    /// hypotheses act with probability `level`.
     pub fn sure(&self, level: f64) -> Option<&HypothesisSet> {
         self.sets.iter().find(|explanation| self.as_many(explanation) >= level)
     }
 
-    /// Returns the probability that at least as many hypotheses act as a set has.
+    /// Returns the probability that at least as many hypotheses act as a set has members.
     pub(in crate::select) fn as_many(&self, as_in: &HypothesisSet) -> f64 {
         let holds =
             |explanation: &&HypothesisSet| explanation.hypotheses.len() >= as_in.hypotheses.len();
         self.sets.iter().filter(holds).map(|explanation| explanation.probability).sum()
     }
 
-    /// Returns an upper limit of the probability that fewer hypotheses and noise make such
-    /// evidence: a ratio of likelihoods exceeds B at most once in B times [Ville 1939].
+    /// Returns an upper limit of the probability that noise and fewer hypotheses cause such
+    /// evidence. A likelihood ratio exceeds B at most with probability 1/B [Ville 1939].
     pub fn chance(&self, best: &HypothesisSet) -> f64 {
         let is_fewer = |known: &&HypothesisSet| known.hypotheses.len() < best.hypotheses.len();
         let fewer: f64 = self.sets.iter().filter(is_fewer).map(|known| known.probability).sum();
         odds_against(1.0 - fewer)
     }
 
-    /// Returns sets with an effect in the place of another member of `best`: the most probable
-    /// ones, and those that do best in the place of each. Limits that are wrong have no rivals.
+    /// Returns sets in which an effect replaces one member of `best`: at most `most` of the most
+    /// probable ones, and those with the best replacement of each member. Wrong limits are not
+    /// replaced.
     pub(in crate::select) fn exchanged(
         &self,
         best: &HypothesisSet,
@@ -114,7 +117,8 @@ impl Evidence {
         all
     }
 
-    /// Replaces the odds of some sets by ln odds to `best` at fits of their own.
+    /// Replaces the odds of some sets by their ln odds to `best`, each computed at a fit of that
+    /// set.
     pub(in crate::select) fn corrected(
         mut self,
         best: &HypothesisSet,
@@ -143,8 +147,8 @@ impl Evidence {
         self
     }
 
-    /// Returns effects that may stand in the place of one that a model holds, each at least
-    /// `beside` times as probable, best first.
+    /// Returns effects that may replace `effect` in a model with the effects `held`, best first.
+    /// Each is at least `beside` times as probable as `effect`.
     pub fn alternatives(&self, effect: &Effect, held: &[Effect], beside: f64) -> Vec<Effect> {
         // Of very many effects in a model most are in no explanation: nothing else need be looked
         // at.
@@ -191,7 +195,7 @@ impl Evidence {
         instead.into_iter().map(|(effect, _)| effect).collect()
     }
 
-    /// Returns the claims about an effect; `None` where no set holds it.
+    /// Returns the claims about an effect; `None` if no set contains it.
     pub fn claims_of(&self, effect: &Effect) -> Option<Claims> {
         let mut all = self.sets.iter().flat_map(|explanation| &explanation.hypotheses);
         all.find(|hypothesis| hypothesis.effect() == Some(effect))
@@ -200,8 +204,8 @@ impl Evidence {
 
     /// Returns the claims about a hypothesis.
     ///
-    /// Another value of its searched argument counts for it, unless the most probable set holds
-    /// both.
+    /// A hypothesis with another value of its searched argument counts as the same, unless the most
+    /// probable set contains both.
     pub fn claims(&self, of: &Hypothesis) -> Claims {
         let most = self.sets.iter().map(|known| &known.hypotheses).find(|known| known.contains(of));
         let is_beside =

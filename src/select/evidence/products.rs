@@ -1,5 +1,5 @@
 //! Products of the columns of hypotheses with one another and with the residual. The evidence of a
-//! set needs these alone; each is computed on first use and kept.
+//! set needs nothing else. Each product is computed on first use and cached.
 
 use std::cell::OnceCell;
 use std::sync::{Arc, OnceLock};
@@ -14,60 +14,61 @@ use crate::fit::Stop;
 use crate::numeric::{inverse_factor, inverse_lower, lower_factor, lower_product};
 use crate::select::neighbourhood::LinearNeighbourhood;
 
-/// Number of hypotheses whose gains are computed together: one product of many columns is fast.
+/// Number of hypotheses whose gains are computed in one matrix product.
 const HYPOTHESES_PER_PRODUCT: usize = 16;
 
-/// Size below which Pₖₖ⁻¹ is too close to 1 to determine a member's columns beside the others.
+/// Smallest size at which a member's columns, given the others, follow from Pₖₖ⁻¹ (see
+/// [`Left::of_member`]). Below it, Pₖₖ⁻¹ is 1 to rounding.
 const MIN_SIZE_OF_MEMBER: f64 = 1e-3;
 
-/// Residual that the hypotheses explain, with its degrees of freedom and the trust in its σ.
+/// Residual that the hypotheses are to explain, with its degrees of freedom and the prior on its σ.
 #[derive(Debug, Clone)]
 pub(super) struct Target {
     pub fit: LinearNeighbourhood,
     pub noise: Noise,
-    /// Log factor of the prior of a further effect of a family that the set holds.
+    /// Log factor on the prior of a further effect whose family the set already contains.
     pub alike: f64,
     /// Request to stop the search early.
     pub stop: Stop,
 }
 
-/// Columns of hypotheses, the residual they explain, and their products.
+/// Columns of hypotheses, the residual, and their products.
 pub(super) struct Products<'a> {
     pub blocks: &'a [Block],
     pub target: &'a Target,
-    /// Sum of squares rᵀr, everything fitted projected out.
+    /// Sum of squares rᵀr, with the fitted parameters projected out.
     pub squares: f64,
     /// Grid of noise factors.
     grid: Vec<(f64, f64)>,
     known: Known,
 }
 
-/// Results about some hypotheses and one target that stay true when further hypotheses are
-/// appended.
+/// Cached results about some hypotheses and one residual. They remain valid when more hypotheses
+/// are appended.
 #[derive(Default)]
 pub(super) struct Known {
-    /// Products, by the number of the hypothesis.
+    /// Products of each hypothesis, by its index.
     members: Vec<OnceLock<Member>>,
-    /// Number of hypotheses after each extension, 0 first.
+    /// Number of hypotheses after each extension of the list, 0 first.
     came: Vec<usize>,
-    /// Gains of hypotheses beside a set.
+    /// Gains of hypotheses in addition to a set.
     gains: Recalled<Beside, Vec<(f64, f64)>>,
-    /// Sizes and log posterior of settled sets.
+    /// Converged sizes and log posterior of sets.
     settled: Recalled<AtSizes, (Vec<f64>, f64)>,
 }
 
-/// Key of a set: its members and their sizes, in order.
+/// Key of a set: its members with the bit patterns of their sizes, in order.
 type AtSizes = Vec<(usize, u64)>;
-/// Key of gains: a set and the hypotheses tried beside it.
+/// Key of gains: a set, and the hypotheses tried in addition to it.
 type Beside = (AtSizes, Vec<usize>);
 
 fn at_sizes(members: &[usize], sizes: &[f64]) -> AtSizes {
     members.iter().copied().zip(sizes.iter().map(|size| size.to_bits())).collect()
 }
 
-/// Hypothesis that is a member of some set.
+/// Hypothesis that is a member of at least one set, with its cached products.
 pub(super) struct Member {
-    /// A, everything fitted projected out.
+    /// Columns A with the fitted parameters projected out.
     columns: Arc<DMatrix<f64>>,
     /// Transpose Aᵀ.
     transposed: DMatrix<f64>,
@@ -80,7 +81,7 @@ impl<'a> Products<'a> {
         Self::knowing(Known::default(), blocks, target)
     }
 
-    /// Creates the products from results about the first of these hypotheses.
+    /// Creates the products for `blocks`, reusing cached results about the first of them.
     pub fn knowing(mut known: Known, blocks: &'a [Block], target: &'a Target) -> Self {
         let squares = target.fit.residual().norm_squared();
         for member in known.members.iter_mut().filter_map(OnceLock::get_mut) {
@@ -94,22 +95,22 @@ impl<'a> Products<'a> {
         Self { blocks, target, squares, grid: target.noise.grid(), known }
     }
 
-    /// Returns the cached results.
+    /// Returns the cached results, for reuse with more hypotheses.
     pub fn into_known(self) -> Known {
         self.known
     }
 
-    /// Returns ln of the density of a residual of such squares, up to a constant.
+    /// Returns ln of the density of a residual with this sum of squares, up to a constant.
     pub fn over_noise(&self, squares: f64) -> f64 {
         over_noise(squares, &self.grid)
     }
 
-    /// Returns true if some of these hypotheses is a periodic error of many orders.
+    /// Returns true if at least one of these hypotheses is a periodic error with many orders.
     pub fn has_gear(&self, members: &[usize]) -> bool {
         members.iter().any(|&member| self.blocks[member].is_gear)
     }
 
-    /// Returns ln of the prior probability of a hypothesis beside others.
+    /// Returns ln of the prior probability of a hypothesis in a set that contains the `others`.
     pub fn ln_prior(&self, block: &Block, others: &[usize]) -> f64 {
         let is_alike =
             block.is_law() && others.iter().any(|&other| self.blocks[other].family == block.family);
@@ -128,15 +129,15 @@ impl<'a> Products<'a> {
         self.known.members[block].get_or_init(|| new)
     }
 
-    /// AᵀC of a member of a set and another hypothesis.
+    /// Returns the product AᵀC of a set member's columns A and another hypothesis' columns C.
     fn product(&self, member: usize, other: usize) -> &DMatrix<f64> {
         let member = self.member(member);
         member.products[other]
             .get_or_init(|| self.blocks[other].times((&member.columns, &member.transposed)))
     }
 
-    /// Returns the gain of each tried hypothesis beside a set at some sizes, and its most probable
-    /// size; empty if the search was stopped or the set leaves nothing.
+    /// Returns, for each tried hypothesis, the gain in ln p(r) in addition to a set with given
+    /// sizes, and its most probable size. Empty if the search was stopped or the set is degenerate.
     pub fn gains(&self, members: &[usize], sizes: &[f64], tried: &[usize]) -> Vec<(f64, f64)> {
         let left = OnceCell::new();
         let mut all: Vec<Option<(f64, f64)>> = vec![None; tried.len()];
@@ -165,7 +166,8 @@ impl<'a> Products<'a> {
         all.into_iter().collect::<Option<_>>().unwrap_or_default()
     }
 
-    /// Returns the settled sizes of a set and ln of its posterior, cached.
+    /// Returns the converged sizes of a set and ln of its posterior; calls `settle` if they are not
+    /// cached.
     pub fn settled(
         &self,
         (members, sizes): (&[usize], &[f64]),
@@ -174,7 +176,7 @@ impl<'a> Products<'a> {
         self.known.settled.recall(&at_sizes(members, sizes), settle)
     }
 
-    /// Returns what a set leaves of the residual at some sizes.
+    /// Returns the residual problem that a set with given sizes leaves.
     pub fn left(&self, members: &[usize], sizes: &[f64]) -> Option<Left<'_, 'a>> {
         let mut scales = Vec::new();
         let mut begins = Vec::new();
@@ -219,24 +221,25 @@ impl<'a> Products<'a> {
     }
 }
 
-/// Remainder of the residual beside a set. With A of its members, D of their sizes, 1 + D AᵀA D = L
-/// Lᵀ and Z = L⁻¹D Aᵀ it leaves CᵀC − (Z C)ᵀ(Z C) and Cᵀr − (Z C)ᵀ(Z r) of further columns C.
+/// Residual problem that a set leaves. With A the columns of its members, D their sizes, 1 + D AᵀA
+/// D = L Lᵀ and Z = L⁻¹D Aᵀ, it leaves CᵀC − (Z C)ᵀ(Z C) and Cᵀr − (Z C)ᵀ(Z r) of further columns
+/// C.
 pub(super) struct Left<'p, 'a> {
     products: &'p Products<'a>,
     members: Vec<usize>,
     sizes: Vec<f64>,
-    /// First column of each member among all.
+    /// Index of the first column of each member among all columns.
     begins: Vec<usize>,
     /// Matrix L⁻¹D.
     within: DMatrix<f64>,
     /// Vector Z r.
     taken: DVector<f64>,
     squares: f64,
-    /// Log density of the remainder.
+    /// Log density of the residual that the set leaves.
     without: f64,
     /// Log determinant of L.
     ln_determinant: f64,
-    /// Matrix Z, computed when columns of other hypotheses are asked for.
+    /// Matrix Z, computed when columns of other hypotheses are first needed.
     reach: OnceLock<DMatrix<f64>>,
 }
 
@@ -246,12 +249,12 @@ impl Left<'_, '_> {
         self.without - self.ln_determinant
     }
 
-    /// Returns ln p(r | set) with the size of the k-th member summed over, and its most probable
-    /// size beside the others.
+    /// Returns ln p(r | set) summed over the size of the k-th member, and its most probable size
+    /// given the others.
     ///
-    /// With P = (1 + D AᵀA D)⁻¹, t = P D Aᵀr and c the size of k: beside the others its columns
-    /// have G = (Pₖₖ⁻¹ − 1)/c² and b = Pₖₖ⁻¹tₖ/c; without it the set leaves tₖᵀPₖₖ⁻¹tₖ more
-    /// squares, and its determinant is det(1 + D AᵀA D) det Pₖₖ.
+    /// Let P = (1 + D AᵀA D)⁻¹, t = P D Aᵀr and c the size of member k. Given the others, its
+    /// columns have G = (Pₖₖ⁻¹ − 1)/c² and b = Pₖₖ⁻¹tₖ/c. Without it, the set leaves tₖᵀPₖₖ⁻¹tₖ
+    /// more squares, and its determinant is det(1 + D AᵀA D) det Pₖₖ.
     pub fn of_member(&self, k: usize) -> Option<(f64, f64)> {
         let Products { blocks, target, grid, .. } = self.products;
         let (block, size) = (&blocks[self.members[k]], self.sizes[k]);
@@ -278,7 +281,7 @@ impl Left<'_, '_> {
         Some((ln_summed - self.ln_determinant - ln_determinant, size))
     }
 
-    /// Returns the remainder of the residual, everything fitted projected out.
+    /// Returns the residual that the set leaves, with the fitted parameters projected out.
     pub fn residual(&self) -> DVector<f64> {
         let mut left = self.products.target.fit.residual().clone();
         let along = self.within.tr_mul(&self.taken);
@@ -291,7 +294,7 @@ impl Left<'_, '_> {
         left
     }
 
-    /// Returns Z.
+    /// Returns the matrix Z, which reduces columns and residuals by the set.
     fn reach(&self) -> &DMatrix<f64> {
         self.reach.get_or_init(|| {
             let mut all =
@@ -309,7 +312,8 @@ impl Left<'_, '_> {
         })
     }
 
-    /// Returns ln p(r | set and a hypothesis) − ln p(r | set) and its most probable size.
+    /// Returns ln p(r | set and a hypothesis) − ln p(r | set), and the hypothesis' most probable
+    /// size.
     pub fn gain(&self, block: usize) -> (f64, f64) {
         self.gains_together(&[block])[0]
     }
@@ -347,7 +351,7 @@ impl Left<'_, '_> {
         )
     }
 
-    /// Returns the gains of hypotheses that are not among the blocks, with their priors.
+    /// Returns the gains, with the priors added, of hypotheses that are not in the list of blocks.
     pub fn odds_of(&self, blocks: &[Block]) -> Vec<f64> {
         let columns: Vec<Arc<DMatrix<f64>>> =
             blocks.iter().map(|block| block.columns(&self.products.target.fit)).collect();
@@ -364,8 +368,8 @@ impl Left<'_, '_> {
             .collect()
     }
 
-    /// Returns the gains of hypotheses of whose columns C, side by side, the set takes Z C =
-    /// `along`.
+    /// Returns the gains of hypotheses with columns C (side by side), which the set reduces by Z C
+    /// = `along`.
     fn gains_along<'b>(
         &self,
         blocks: impl Iterator<Item = &'b Block>,

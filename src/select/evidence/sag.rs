@@ -1,13 +1,13 @@
-//! Sag under weight that nobody declared.
+//! Sag under a weight that the problem does not declare.
 //!
-//! A body of mass m with its centre at s in the frame of link k has about the axis z of joint j ≤ k
-//! the moment
+//! A body of mass m with its centre at s in the frame of link k exerts about the axis z of joint j
+//! ≤ k the moment
 //!
 //! M = z · ((o_k + R_k s − o_j) × m g),
 //!
-//! linear in (m, m s). What gives way there by c M moves the arm by a sum of four known functions
-//! of the configuration for each link outboard of the joint, whatever the masses are: no law of the
-//! catalogue, for it takes masses, and yet no free function.
+//! linear in (m, m s). A compliance c at the joint displaces the arm by c M. For each link outboard
+//! of the joint this is a combination of four known functions of the configuration, for any masses.
+//! It is therefore neither a law of the catalogue, which needs masses, nor a free function.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -18,7 +18,7 @@ use crate::model::parameter::{JointField, ParameterSite};
 use crate::problem::{JointKind, Problem};
 use crate::residual_tests::Covariate;
 
-/// Part of the largest size below which a function repeats others.
+/// Smallest independent part of a function, relative to its largest size, at which it is kept.
 const MIN_NEW_SIZE: f64 = 1e-3;
 
 /// Returns true if gravity acts on an arm without declared masses.
@@ -29,7 +29,7 @@ pub(super) fn weight_is_unknown(problem: &Problem) -> bool {
 }
 
 impl Columns<'_, '_> {
-    /// Sag of each joint that turns, and of all of them.
+    /// Adds the sag of each revolute joint, and of all of them together.
     pub(super) fn sag(&mut self) {
         if !weight_is_unknown(self.problem) {
             return;
@@ -63,8 +63,8 @@ impl Columns<'_, '_> {
         }
     }
 
-    /// The lever of a joint times the moments about it, shape = (3 N, functions); `None` where
-    /// gravity has none.
+    /// Returns the lever of a joint times the moments about it, shape = (3 N, functions); `None` if
+    /// gravity exerts no moment about it.
     fn sags(&self, joint: usize, lever: &DVector<f64>) -> Option<DMatrix<f64>> {
         let moments = moments(
             self.problem,
@@ -85,8 +85,9 @@ impl Columns<'_, '_> {
     }
 }
 
-/// Moments about the axis of `joint` of 1 kg at the origin of each link that stands on it and of
-/// what 1 kg there gains by moving by a link's length along x, y and z, shape = (N, functions).
+/// Returns, as columns, moments about the axis of `joint`, shape = (N, functions). For each link
+/// that the joint carries they are the moment of 1 kg at its origin, and its changes if the mass
+/// moves by the link's length along x, y and z.
 fn moments<'a>(
     problem: &Problem,
     joint: usize,

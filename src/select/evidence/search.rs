@@ -8,24 +8,24 @@ use rayon::prelude::*;
 use super::block::Block;
 use super::products::{Left, Products};
 
-/// Maximum coordinate-ascent passes over the sizes of the members of a set.
+/// Maximum number of coordinate-ascent passes over the sizes of the members of a set.
 const MAX_SETTLING_PASSES: usize = 4;
-/// Number of sets, the most probable ones, whose sizes are settled in the end.
+/// Number of most probable sets whose sizes are made to converge at the end.
 const MAX_SETTLED_SETS: usize = 32;
-/// Number of sets, the most probable ones, in which a function of several covariates is replaced by
-/// two hypotheses.
+/// Number of most probable sets in which a function of several covariates is replaced by two
+/// hypotheses.
 const MAX_SPLIT_SETS: usize = 3;
-/// Maximum number of members of a set of which two are exchanged together.
+/// Largest number of members of a set at which pairs of members are replaced together.
 const MAX_PAIRED_MEMBERS: usize = 6;
-/// Maximum number of exchanges in the best set, each in the best set so far.
+/// Maximum number of replacements in the best set, each in the best set found so far.
 const MAX_EXCHANGES: usize = 4;
 
 /// Set of hypotheses with its probability among all sets evaluated.
 #[derive(Debug, Clone)]
 pub(super) struct Weighted {
-    /// Numbers of the hypotheses, in the order in which they were taken.
+    /// Indices of the hypotheses, in the order in which they were added.
     pub members: Vec<usize>,
-    /// The most probable size of each: 1 σ of its coefficients.
+    /// Most probable size of each member: 1 σ of its coefficients.
     pub sizes: Vec<f64>,
     pub probability: f64,
 }
@@ -39,7 +39,7 @@ struct Set {
 }
 
 impl Set {
-    /// Returns the set with one more hypothesis of this gain and size.
+    /// Returns the set with one more hypothesis, given its gain and most probable size.
     fn with(&self, block: usize, (gain, size): (f64, f64), products: &Products) -> Self {
         Self {
             members: [self.members.as_slice(), &[block]].concat(),
@@ -50,23 +50,24 @@ impl Set {
         }
     }
 
-    /// Returns true if a member has more than `MAX_WIDE_COLUMNS` columns for single poses, so that
-    /// the set cannot grow.
+    /// Returns true if a member is a periodic error or has more than `MAX_WIDE_COLUMNS` columns
+    /// that belong to single poses, so that the set is not extended.
     fn has_wide(&self, blocks: &[Block]) -> bool {
         self.members.iter().any(|&member| blocks[member].is_wide())
     }
 
-    /// Returns the set with the size of each member settled beside all others, and its posterior at
-    /// these sizes.
+    /// Returns the set with the converged size of each member, given all others, and its posterior
+    /// at these sizes.
     ///
-    /// Sizes are in units of the noise, which includes effects that are not explained yet: members
-    /// that were taken first would be held too tightly. ln p(r | set) = l + Σ (ln p(r | the others,
-    /// k) − l), l at the sizes of all, that of k summed over.
+    /// Sizes are relative to the noise, which includes effects that are not explained yet. Without
+    /// this step, members that were added first would have too small a size. ln p(r | set) = l + Σ
+    /// (ln p(r | the others, k) − l), with l at the sizes of all members, and the size of k summed
+    /// over.
     fn settled(self, products: &Products) -> Self {
         if self.has_wide(products.blocks) { self } else { self.settled_whole(products) }
     }
 
-    /// Returns the set settled however many columns its members have.
+    /// Returns the set with converged sizes, regardless of how many columns its members have.
     fn settled_whole(mut self, products: &Products) -> Self {
         if self.members.len() < 2 {
             return self;
@@ -78,7 +79,7 @@ impl Set {
         self
     }
 
-    /// Returns the settled sizes of the members and ln of the posterior at these.
+    /// Returns the converged sizes of the members and ln of the posterior at them.
     fn at_rest(&self, products: &Products) -> Option<(Vec<f64>, f64)> {
         let (members, mut sizes) = (&self.members, self.sizes.clone());
         let mut all = products.left(members, &sizes)?;
@@ -109,11 +110,10 @@ impl Set {
     }
 }
 
-/// Returns all sets that were evaluated, the most probable first; the empty set stands for noise
-/// alone.
+/// Returns all sets that were evaluated, the most probable first. The empty set means noise alone.
 ///
-/// The search starts from the empty set and from the set `present`, whole and without one of its
-/// members. A stopped search returns some sets only.
+/// The search starts from the empty set, from the set `present`, and from `present` without each of
+/// its members. If it is stopped, it returns only some sets.
 pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
     let Products { blocks, .. } = *products;
     let mut known: BTreeMap<Vec<usize>, Set> = BTreeMap::new();
@@ -194,11 +194,12 @@ pub(super) fn search(products: &Products, present: &[usize]) -> Vec<Weighted> {
     all
 }
 
-/// Extends the empty set, and the most probable set that holds a periodic error of many orders, by
-/// such errors, as long as the set becomes more probable. Sets with them do not grow otherwise, for
-/// they have many columns; of the errors of several joints each alone may do less well than smaller
-/// functions. Two errors of one joint, up to a lower and a higher order, make one whose coefficients
-/// fall with the order.
+/// Extends the empty set, and the most probable set with a periodic error, by periodic errors as
+/// long as the set becomes more probable.
+///
+/// Sets with periodic errors are not extended otherwise, because they have many columns. Each of
+/// several such errors alone may gain less than smaller functions. Two errors of one joint, with a
+/// lower and a higher highest order, together describe coefficients that decrease with the order.
 fn with_gears(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let blocks = products.blocks;
     let gears: Vec<usize> = (0..blocks.len()).filter(|&block| blocks[block].is_gear).collect();
@@ -217,7 +218,7 @@ fn with_gears(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     }
 }
 
-/// Returns a set extended by each of some hypotheses.
+/// Returns the set extended by each of the `tried` hypotheses.
 fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
     let new: Vec<usize> =
         tried.iter().copied().filter(|block| !set.members.contains(block)).collect();
@@ -225,12 +226,12 @@ fn extended(set: &Set, tried: &[usize], products: &Products) -> Vec<Set> {
     new.into_iter().zip(gains).map(|(block, gain)| set.with(block, gain, products)).collect()
 }
 
-/// Adds sets that steps by one further hypothesis lead to only past sets that explain less: likely
-/// sets without their function of several covariates, the best one without one or two of its
-/// members, with another in their place, and with two others there. So two things that act beside
-/// one another are found where a third, or a function of several covariates, does for both as well
-/// as one hypothesis can, or a third with a function beside it. In the place of two members effects
-/// alone are tried: any function does for two better than for one.
+/// Adds sets that the stepwise search misses because the steps to them pass sets that explain less.
+///
+/// In probable sets, it removes the function of several covariates; in the best set, each member
+/// and each pair of members. It then tries one and two other hypotheses in their place. So it finds
+/// two causes that a third hypothesis, or a function of several covariates, explains almost as well
+/// alone. Two members are replaced by effects only, because free functions would always gain.
 fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     let Products { blocks, .. } = *products;
     let every: Vec<usize> = (0..blocks.len()).collect();
@@ -287,8 +288,8 @@ fn changed(known: &mut BTreeMap<Vec<usize>, Set>, products: &Products) {
     }
 }
 
-/// Returns the rest of a set without the members `gone`, and with one and two others in their
-/// place, those above the log posterior `least`.
+/// Returns the set of the members `rest`, and `rest` with one and with two other hypotheses in
+/// place of the members `gone`, if their log posterior is above `least`.
 fn replaced(
     (rest, gone): (&[usize], &[usize]),
     [first, second]: [&[usize]; 2],
@@ -321,7 +322,7 @@ fn replaced(
     std::iter::once(rest).chain(settled).chain(probable).collect()
 }
 
-/// Returns each member, and each pair of members where they are few.
+/// Returns each member, and each pair of members if there are at most [`MAX_PAIRED_MEMBERS`].
 fn one_or_two(members: &[usize]) -> Vec<Vec<usize>> {
     let single = members.iter().map(|&member| vec![member]);
     let few = if members.len() <= MAX_PAIRED_MEMBERS { members } else { &[] };
@@ -332,13 +333,13 @@ fn one_or_two(members: &[usize]) -> Vec<Vec<usize>> {
     single.chain(pairs).collect()
 }
 
-/// Returns ln p(r | all blocks) plus ln of their prior.
+/// Returns ln p(r | all blocks together) plus ln of their prior.
 pub(super) fn ln_posterior(products: &Products) -> Option<f64> {
     let all: Vec<usize> = (0..products.blocks.len()).collect();
     Some(assembled(&all, products)?.ln_posterior + products.over_noise(products.squares))
 }
 
-/// Returns what a set with these members leaves at their most probable sizes.
+/// Returns the residual problem that a set with these members leaves at their most probable sizes.
 pub(super) fn left_by<'p, 'a>(
     members: &[usize],
     products: &'p Products<'a>,
@@ -347,8 +348,8 @@ pub(super) fn left_by<'p, 'a>(
     products.left(&set.members, &set.sizes)
 }
 
-/// Returns for each tried hypothesis the gain beside some others, its prior included, and its most
-/// probable size.
+/// Returns, for each tried hypothesis, the gain in addition to the `others`, prior included, and
+/// its most probable size.
 pub(super) fn gains_beside(
     others: &[usize],
     tried: &[usize],
@@ -361,7 +362,7 @@ pub(super) fn gains_beside(
     tried.iter().zip(left.gains(tried)).map(gain).collect()
 }
 
-/// A set with these members, one after the other.
+/// Creates a set with these members, adding one after the other.
 fn assembled(members: &[usize], products: &Products) -> Option<Set> {
     let mut set = Set { members: Vec::new(), sizes: Vec::new(), ln_posterior: 0.0 };
     for &member in members {
@@ -388,7 +389,7 @@ mod tests {
     use crate::select::evidence::products::Target;
     use crate::select::neighbourhood::{LinearNeighbourhood, Unknowns};
 
-    /// Numbers without pattern, of root mean square 1 about.
+    /// Returns a matrix of deterministic numbers without pattern, with root mean square about 1.
     fn matrix(rows: usize, columns: usize, seed: f64) -> DMatrix<f64> {
         DMatrix::from_fn(rows, columns, |i, j| {
             let value =
@@ -397,7 +398,8 @@ mod tests {
         })
     }
 
-    /// Two strong effects and a third, each of two columns, in a residual with noise.
+    /// Returns blocks and residual with two strong effects and a third, each of two columns, and
+    /// noise.
     fn three(names: [usize; 3]) -> (Vec<Block>, Target) {
         let columns: Vec<DMatrix<f64>> =
             (0..3).map(|k| matrix(90, 2, 7.0 * f64::from(k))).collect();

@@ -1,11 +1,12 @@
-//! Parameter sites of the hypotheses.
+//! Parameter sites at which the hypotheses need derivatives.
 
 use super::hypothesis::Site;
 use crate::model::effect::Term;
 use crate::model::parameter::{BeamField, JointField, ParameterSite, Regressor};
 use crate::problem::Problem;
 
-/// Returns the parameter sites whose columns the hypotheses need besides those of the effects.
+/// Returns the parameter sites whose columns the hypotheses need in addition to those of the
+/// effects.
 pub(super) fn hypothesis_sites(problem: &Problem) -> Vec<ParameterSite> {
     let mut sites: Vec<ParameterSite> = geometry_sites(problem).collect();
     sites.extend(
@@ -30,8 +31,9 @@ pub(super) fn geometry_sites(problem: &Problem) -> impl Iterator<Item = Paramete
     })
 }
 
-/// Returns true if each parameter of an effect acts about an axis of the arm, so that one of them
-/// alone may be at work: two compliances do, a shift of the measurement or a harmonic does not.
+/// Returns true if each parameter of an effect acts about its own axis of the arm, so that one of
+/// them may act without the others. This holds for two compliances, but not for a shift of the
+/// measurement or a harmonic.
 pub(super) fn acts_along_axes(terms: &[Term]) -> bool {
     let is_axis = |term: &Term| {
         term.regressor == Regressor::Constant

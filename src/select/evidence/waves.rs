@@ -1,19 +1,20 @@
-//! Waves whose order is no whole number, as of a stage of a gear: looked for where an explanation
-//! holds a function of a joint's own command, at that joint.
+//! Search for waves of non-integer order, such as errors of an inner gear stage. It is made at a
+//! joint if a probable set contains a function of that joint's command.
 //!
-//! Orders have no end and neighbours hardly differ, so that no list holds them: along a fine row of
-//! orders the one that does best beside the rest of such an explanation becomes a hypothesis like
-//! all others. It stands for every order about it, integrated out:
+//! The possible orders are unbounded and neighbouring ones hardly differ, so no list can contain
+//! them. A fine grid of orders is scanned, and the best order in addition to the other members of
+//! the set becomes a hypothesis. It represents all orders near it, over which the likelihood is
+//! integrated:
 //!
 //! chance · Σ exp(gain(k) − gain(best)) Δk,
 //!
-//! with the chance of all orders in a unit together, that harmonics are beside it. So where data
-//! cannot tell an order from a whole number the harmonic is the more probable one, by as much as it
-//! is the more common and no surer.
+//! where chance is the prior probability of all orders between k and k + 1 together, relative to
+//! that of a harmonic. If the data cannot distinguish an order from an integer, the harmonic is
+//! therefore more probable.
 //!
-//! A joint that slides errs with its screw or rack: sin kq with q in m, of order k = 2π/lead. So
-//! short a wave looks like noise to every function that another hypothesis could be, so that it is
-//! looked for beside every explanation.
+//! A prismatic joint errs with its screw or rack: sin kq with q in m, of order k = 2π/lead. Such a
+//! short wave looks like noise to every other function, so it is searched for in addition to every
+//! probable set.
 
 use crate::select::settings::{
     LN_ODDS_OF_ANOTHER_ARGUMENT, MAX_REVISED_SETS, MAX_WAVE_ORDER, MIN_REVISED_PROBABILITY,
@@ -37,21 +38,21 @@ use crate::residual_tests::Covariate;
 use crate::select::fitted::Fitted;
 use crate::select::harmonic_prior::is_gear_of;
 
-/// Steps between orders of the first and the second scan, as phases \[rad\] from one end of the
-/// joint's range to the other.
+/// Steps between orders of the first and of the second scan, as phase differences \[rad\] over the
+/// joint's range.
 const PHASE_STEPS: [f64; 2] = [1.0, 0.02];
-/// Number of orders of the first scan about which a finer scan follows.
+/// Number of best orders of the first scan that a finer scan refines.
 const MAX_REFINED_ORDERS: usize = 3;
-/// Maximum number of orders of a scan: of a joint that turns four times and more the highest are
-/// not scanned.
+/// Maximum number of orders in a scan. If a joint turns more than four times, the highest orders
+/// are not scanned.
 const MAX_SCANNED_ORDERS: usize = 8000;
-/// Shortest lead of a screw \[m\].
+/// Shortest lead of a screw that is searched for \[m\].
 const MIN_LEAD: f64 = 0.002;
-/// Ratio of consecutive distances from an order over which its likelihood is integrated.
+/// Ratio of successive distances from an order in the grid over which its likelihood is integrated.
 const DISTANCE_RATIO: f64 = 1.3;
 
-/// Returns the joint, from 0, at which a hypothesis is a function of that joint's command or of no
-/// known quantity.
+/// Returns the joint, counted from 0, whose error is a function of its own command according to the
+/// hypothesis, or has a free value in every pose; `None` for other hypotheses.
 fn own_function(of: &Hypothesis, problem: &Problem) -> Option<usize> {
     let Site::Joint(joint) = of.site else { return None };
     let at_coordinate = of.coordinate == Some(ParameterSite::coordinate(problem, joint + 1));
@@ -66,19 +67,19 @@ fn own_function(of: &Hypothesis, problem: &Problem) -> Option<usize> {
     is_own.then_some(joint)
 }
 
-/// Returns true if the rules of the problem allow an effect.
+/// Returns true if the rules of the problem neither fix nor reject the parameters of an effect.
 pub(super) fn is_free(effect: &Effect, problem: &Problem) -> bool {
     let parameters = effect.parameters(problem);
     !holds_all(problem, &parameters) && !refuses(problem, &parameters)
 }
 
-/// Returns orders from `low` to `high` in steps, at most `MAX_SCANNED_ORDERS`.
+/// Returns orders from `low` to `high` in equal steps, at most [`MAX_SCANNED_ORDERS`].
 fn row(low: f64, high: f64, step: f64) -> Vec<f64> {
     let all = std::iter::successors(Some(low), |order| Some(order + step));
     all.take_while(|order| *order <= high).take(MAX_SCANNED_ORDERS).collect()
 }
 
-/// Search for waves of any order beside the other hypotheses about a fit.
+/// Search for waves of any order, in addition to the other hypotheses about a fit.
 #[derive(Clone, Copy)]
 pub(super) struct Waves<'w, 'h, 'a> {
     pub hypotheses: &'w Hypotheses<'h>,
@@ -89,8 +90,8 @@ pub(super) struct Waves<'w, 'h, 'a> {
 }
 
 impl<'w, 'a> Waves<'w, '_, 'a> {
-    /// Returns waves of any order, and harmonics of unlisted orders, that may stand in the place of
-    /// functions in probable sets.
+    /// Returns waves of any order, and harmonics of unlisted orders, that may replace functions in
+    /// probable sets.
     pub fn promising(&self, weighted: &[Weighted]) -> Vec<Candidate> {
         let mut found: Vec<Candidate> = Vec::new();
         for (joint, rests) in self.places(weighted) {
@@ -157,8 +158,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         found
     }
 
-    /// Returns for the waves among some hypotheses, by number, ln of the factor by which their
-    /// prior grows as each stands for all orders about its own.
+    /// Returns, for each wave among some hypotheses, its index and ln of the factor on its prior:
+    /// each wave represents all orders near its order.
     pub fn spreads(&self, numbers: &[usize], effects: &[&Effect]) -> Vec<(usize, f64)> {
         let one = |(&number, effect): (&usize, &&Effect)| {
             let (joint, order) = order_of(effect)?;
@@ -169,28 +170,31 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         numbers.iter().zip(effects).filter_map(one).collect()
     }
 
-    /// Returns what some hypotheses leave of the residual.
+    /// Returns the residual problem that some hypotheses leave.
     fn beside(&self, rest: &[usize]) -> Option<Left<'w, 'a>> {
         left_by(rest, self.products)
     }
 
-    /// Returns true if a joint slides.
+    /// Returns true if a joint, counted from 0, is prismatic.
     fn slides(&self, joint: usize) -> bool {
         self.fitted.problem.joints[joint].command_kind() == JointKind::Prismatic
     }
 
-    /// Returns the highest order of a wave of a joint; of one that slides \[rad/m\].
+    /// Returns the highest order of a wave that is searched for at a joint [cycles per revolution],
+    /// for a prismatic joint \[rad/m\].
     fn highest(&self, joint: usize) -> f64 {
         if self.slides(joint) { TAU / MIN_LEAD } else { MAX_WAVE_ORDER }
     }
 
-    /// Returns the smallest and largest command of a joint \[rad\], \[m\].
+    /// Returns the smallest and largest command of a joint \[rad\] or \[m\]; `None` if it does not
+    /// move.
     fn range(&self, joint: usize) -> Option<(f64, f64)> {
         self.hypotheses.known(&Covariate::Command(joint)).map(|entry| entry.range)
     }
 
-    /// Returns for each joint, from 0, the sets in which a wave may stand: probable sets without
-    /// one function of the joint's command, and without any; for sliding joints each set, too.
+    /// Returns, for each joint (from 0), the sets to which a wave may be added. They are probable
+    /// sets without one function of the joint's command, and without all of them; for prismatic
+    /// joints also the whole sets.
     fn places(&self, weighted: &[Weighted]) -> BTreeMap<usize, Vec<Vec<usize>>> {
         let mut all: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
         let of = |member: usize| {
@@ -228,8 +232,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         all
     }
 
-    /// Returns, for each of some sets, the orders with the log odds of such a wave to the set
-    /// alone, best first.
+    /// Returns, for each of some sets, the orders with the log odds of the set with such a wave to
+    /// the set alone, best first.
     fn gains(&self, joint: usize, orders: &[f64], left: &[Left]) -> Vec<Vec<(f64, f64)>> {
         let problem = &self.fitted.problem;
         let of = |orders: &[f64]| {
@@ -262,9 +266,9 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         (0..left.len()).map(of_set).collect()
     }
 
-    /// Returns the best order that is no whole number, unless one taken before does as well; and
-    /// unlisted harmonics that do as well as the best. `gains` has orders with their log odds, best
-    /// first.
+    /// Returns the wave with the best non-integer order, unless an order in `taken` is about as
+    /// good, and unlisted harmonics that are about as good as the best. `gains` contains orders
+    /// with their log odds, best first.
     fn another(&self, joint: usize, gains: &[(f64, f64)], taken: &[f64]) -> Vec<Effect> {
         let Some(&(_, most)) = gains.first().filter(|(_, most)| *most > 0.0) else {
             return Vec::new();
@@ -291,7 +295,8 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         all
     }
 
-    /// Returns the width of the likelihood about an order, in orders, by the trapezoid rule.
+    /// Returns the width of the likelihood about an order [orders], relative to its maximum, by the
+    /// trapezoid rule.
     fn spread(&self, joint: usize, order: f64, left: &Left) -> f64 {
         let Some((low, high)) = self.range(joint) else { return 1.0 };
         let range = high - low;
@@ -317,13 +322,13 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
     }
 }
 
-/// Rounds an order to so many decimals.
+/// Rounds an order to a number of decimals.
 fn written(order: f64, digits: usize) -> f64 {
     format!("{order:.digits$}").parse().unwrap_or(order)
 }
 
 impl Hypotheses<'_> {
-    /// Returns the hypothesis of an effect that is a wave of the command of its joint.
+    /// Returns the candidate for an effect that is a wave of its joint's command.
     fn function_of(&self, effect: &Effect, problem: &Problem) -> Option<Candidate> {
         let (joint, order) = match effect {
             Effect::JointHarmonic { joint, orders } => (joint - 1, f64::from(*orders.first()?)),

@@ -1,4 +1,5 @@
-//! Parts of the data predicted from the rest, for many priors: normal equations of each part.
+//! Prediction of parts of the data from the other parts, for many trial priors, by normal equations
+//! of each part.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -6,7 +7,7 @@ use rayon::prelude::*;
 use super::orthonormal::MIN_INDEPENDENT_LENGTH;
 use crate::numeric::{gram, inverse_factor, lower_factor, solve_positive};
 
-/// Products JᵀJ, Jᵀr, rᵀr and the number of rows of some poses.
+/// Products JᵀJ, Jᵀr and rᵀr over some poses, with their number of rows.
 struct Squares {
     gram: DMatrix<f64>,
     product: DVector<f64>,
@@ -22,23 +23,23 @@ impl Squares {
     }
 }
 
-/// Sums over all poses of a fit and over the parts that are left out in turn.
+/// Sums over all poses of a fit, and over the parts that are left out in turn.
 pub(in crate::select) struct PartSquares {
     whole: Squares,
     parts: Vec<Squares>,
 }
 
 impl PartSquares {
-    /// Creates the sums from columns, shape = (3 N, n), and the residual; `parts` are numbers of
-    /// poses.
+    /// Creates the sums from columns, shape = (3 N, n), and the residual; `parts` contain pose
+    /// indices.
     pub fn new(columns: &DMatrix<f64>, residual: &DVector<f64>, parts: &[Vec<usize>]) -> Self {
         let every: Vec<usize> = (0..residual.len() / 3).collect();
         let parts = parts.par_iter().map(|poses| Squares::of(columns, residual, poses)).collect();
         Self { whole: Squares::of(columns, residual, &every), parts }
     }
 
-    /// Returns the values of the unknowns fitted to all parts and their variances, priors as in
-    /// [`Self::left_out`].
+    /// Returns the values of the unknowns fitted to all parts, and their variances; priors are as
+    /// in [`Self::left_out`].
     pub fn posterior(&self, priors: &[(f64, Option<f64>)]) -> Option<(DVector<f64>, DVector<f64>)> {
         let (normal, pull) = self.normal_of_all(priors);
         let root = inverse_factor(&normal)?;
@@ -50,11 +51,11 @@ impl PartSquares {
         Some((x, DVector::from_iterator(root.ncols(), variances)))
     }
 
-    /// Returns −2 ln p(r) of all parts for noise of a variance φ and priors as in
-    /// [`Self::left_out`], 1 σ of them divided by √φ; up to a constant.
+    /// Returns −2 ln p(r) of all parts for noise of variance φ, up to a constant. Priors are as in
+    /// [`Self::left_out`], with 1 σ divided by √φ.
     ///
-    /// With W = diag(1/σ²), G = JᵀJ + W, g = Jᵀr + W x₀ and x₀ the present values it is
-    /// ln det G − Σ ln (1/σ²) + (x₀ᵀW x₀ − gᵀG⁻¹g)/φ.
+    /// With W = diag(1/σ²), G = JᵀJ + W, g = Jᵀr + W x₀ and x₀ the present values, it is ln det G −
+    /// Σ ln (1/σ²) + (x₀ᵀW x₀ − gᵀG⁻¹g)/φ.
     pub fn evidence(&self, priors: &[(f64, Option<f64>)], variance: f64) -> Option<f64> {
         let (normal, mut along) = self.normal_of_all(priors);
         let lower = lower_factor(normal)?;
@@ -72,10 +73,10 @@ impl PartSquares {
         self.normal(self.whole.gram.clone(), self.whole.product.clone(), priors)
     }
 
-    /// The normal equations of some parts with priors.
+    /// Returns the normal equations of some parts with the priors added.
     ///
-    /// Returns the normal equations with the priors. To the diagonal comes `MIN_INDEPENDENT_LENGTH`²
-    /// of each column's squared length, so that directions that no pose shows stay where they are.
+    /// `MIN_INDEPENDENT_LENGTH`² of each column's squared length is added to the diagonal, so that
+    /// directions that no pose determines do not change.
     fn normal(
         &self,
         mut gram: DMatrix<f64>,
@@ -95,9 +96,9 @@ impl PartSquares {
         (gram, product)
     }
 
-    /// Σ rows · ln(mean square) of the parts, each predicted from the others; the first unknowns
-    /// have these values and 1 σ of their priors about 0. `None` where the others do not decide the
-    /// fit.
+    /// Returns Σ rows · ln(mean square) over the parts, each predicted from the others; `None` if
+    /// the others do not determine the fit. `priors` holds value and 1 σ (about 0) of the first
+    /// unknowns.
     pub fn left_out(&self, priors: &[(f64, Option<f64>)]) -> Option<f64> {
         let predicted = |part: &Squares| {
             let (gram, product) =

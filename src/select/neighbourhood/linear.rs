@@ -1,5 +1,5 @@
-//! A fit in its linear neighbourhood: what its residual can still give to columns that were not
-//! fitted, and what each fitted parameter gives it.
+//! Linear neighbourhood of a fit: the gain by columns that were not fitted, and the loss without
+//! parameters that were.
 
 use std::borrow::Cow;
 
@@ -10,55 +10,55 @@ use super::orthonormal::{held, lengthened, orthonormal, orthonormal_above};
 use super::score::{Score, Sums};
 use crate::numeric::{gram, inverse_factor, product, transposed_narrow_product};
 
-/// Minimum part of a direction's length² outside a block of poses for the other poses to determine
-/// it.
+/// Smallest share of a direction's squared length outside a block of poses at which the other poses
+/// determine it.
 const MIN_DETERMINED_ELSEWHERE: f64 = 1e-6;
 
-/// Maximum number of columns that are projected out by one direction of the basis after the other.
+/// Largest number of columns that are projected one basis direction at a time.
 const MAX_SEQUENTIAL_COLUMNS: usize = 4;
-/// Part of a column from which on one projection leaves only rounding along a basis. For less, two
-/// are enough [Giraud, Langou & Rozložník 2005].
+/// Smallest remaining share of a column's length at which one projection suffices. Below it, a
+/// second projection removes the rounding errors [Giraud, Langou & Rozložník 2005].
 const MIN_PART_OF_ONE_PROJECTION: f64 = 0.1;
 
-/// The unknowns of a fit as it ended.
+/// Unknowns of a fit at its end, with their priors and active constraints.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Unknowns {
     /// Values, as deviations from nominal.
     pub x: Vec<f64>,
-    /// 1 σ of their priors.
+    /// Standard deviation (1 σ) of the prior of each unknown; `None` without a prior.
     pub priors: Vec<Option<f64>>,
-    /// Rows of the constraints that hold them, shape = (constraints, unknowns); may be narrower,
-    /// the rest being 0.
+    /// Rows of the active constraints, shape = (constraints, unknowns). If there are fewer columns,
+    /// the missing ones are 0.
     pub active: DMatrix<f64>,
 }
 
-/// Residual r and fitted columns A = [J; P] of N poses, with a row P for each prior below the
-/// data's 3 N.
+/// Linear neighbourhood of a fit with residual r and columns A = [J; P] for N poses; each prior
+/// adds a row of P below the 3 N data rows.
 ///
-/// All is kept in an orthonormal basis Q = A T of what was fitted, T of shape (unknowns, rank): the
+/// It is stored by an orthonormal basis Q = A T of the columns, T of shape (unknowns, rank). The
 /// covariance of the unknowns is T Tᵀ, the step to their common optimum − T Qᵀr. Unknowns that
-/// columns before them take up wholly have no part in T and stay where they are.
+/// depend linearly on earlier columns have zero rows in T and keep their values.
 #[derive(Debug)]
 pub(crate) struct LinearNeighbourhood {
-    /// Returns the whitened residual at the optimum, priors below.
+    /// Whitened residual at the optimum, with the priors' rows below.
     residual: DVector<f64>,
-    /// Q, shape = (3 N + priors, rank).
+    /// Basis Q, shape = (3 N + priors, rank).
     basis: DMatrix<f64>,
     /// Matrix T, shape = (unknowns, rank).
     root: DMatrix<f64>,
     /// Values of the unknowns at the optimum.
     optimum: DVector<f64>,
-    /// From where the derivatives were taken to the optimum.
+    /// Step from the point of the derivatives to the optimum.
     step: DVector<f64>,
-    /// Number of rows that are data.
+    /// Number of rows that belong to data.
     rows: usize,
-    /// Number of these rows that are 0 because nothing is measured there.
+    /// Number of data rows that are 0, because poses measure fewer than three numbers.
     empty: usize,
     /// Sums of squares, with priors and of the data alone, and degrees of freedom of the data.
     sums: Sums,
 }
 
-/// Clones on every core: most of the time is that of new memory.
+/// Copies the matrices in parallel, because allocating memory takes most of the time.
 impl Clone for LinearNeighbourhood {
     fn clone(&self) -> Self {
         Self {
@@ -74,8 +74,8 @@ impl Clone for LinearNeighbourhood {
 
 impl LinearNeighbourhood {
     /// Creates the neighbourhood from the Jacobian ∂r/∂x, shape = (3 N, n), and the residual r of a
-    /// fit that ended at the unknowns given; `empty` rows are 0 since poses measure fewer numbers
-    /// than three.
+    /// fit that ended at `unknowns`. `empty` is the number of rows that are 0, because poses
+    /// measure fewer than three numbers.
     pub fn new(
         jacobian: &DMatrix<f64>,
         residual: &DVector<f64>,
@@ -85,7 +85,7 @@ impl LinearNeighbourhood {
         Self::of(Cow::Borrowed(jacobian), residual.clone(), unknowns, empty)
     }
 
-    /// Creates the neighbourhood in the memory of a Jacobian that nobody else needs.
+    /// Creates the neighbourhood like [`new`](Self::new), but reuses the memory of the Jacobian.
     pub fn in_place_of(
         jacobian: DMatrix<f64>,
         residual: DVector<f64>,
@@ -129,7 +129,7 @@ impl LinearNeighbourhood {
         fit
     }
 
-    /// Fits the directions of the basis from `first` on.
+    /// Moves to the optimum along the basis directions from index `first` on.
     fn settle(&mut self, first: usize) {
         let new = self.basis.columns_range(first..);
         let along = new.tr_mul(&self.residual);
@@ -143,9 +143,9 @@ impl LinearNeighbourhood {
         self.sums = Sums::of(&self.residual, self.rows, before - taken);
     }
 
-    /// Returns three matrices for columns of the data: their components along the basis, the
-    /// orthonormal directions that they add, and these directions in terms of what the basis leaves
-    /// of the columns.
+    /// Decomposes columns of the data. Returns their components along the basis, the new
+    /// orthonormal directions that they add, and the transformation of the remaining columns to
+    /// these directions.
     fn directions(&self, columns: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
         let lengths: Vec<f64> = columns.column_iter().map(|column| column.norm()).collect();
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
@@ -162,8 +162,8 @@ impl LinearNeighbourhood {
         (along, new, within)
     }
 
-    /// Adds columns of the data, shape = (3 N, k) or as long as the basis, with unknowns behind the
-    /// others; returns the new orthonormal directions.
+    /// Adds columns of the data, shape = (3 N, k) or as long as the basis, whose unknowns are
+    /// appended. Returns the new orthonormal directions.
     pub fn add(&mut self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let (first, n, k) = (self.basis.ncols(), self.root.nrows(), columns.ncols());
         let (along, new, within) = self.directions(columns);
@@ -180,15 +180,15 @@ impl LinearNeighbourhood {
         new
     }
 
-    /// Returns the fit with further columns.
+    /// Returns the neighbourhood with more columns fitted.
     pub fn with(&self, columns: &DMatrix<f64>) -> Self {
         let mut with = self.clone();
         with.add(columns);
         with
     }
 
-    /// Returns the fit with further columns of the data, shape = (3 N, k), whose coefficients have
-    /// a prior of 1 σ about 0.
+    /// Returns the neighbourhood with more columns of the data fitted, shape = (3 N, k), whose
+    /// coefficients have a prior with 1 σ = `sigma` about 0.
     pub fn with_priors(&self, columns: &DMatrix<f64>, sigma: f64) -> Self {
         let (rows, k) = (self.basis.nrows(), columns.ncols());
         let mut columns = columns.clone().resize_vertically(rows + k, 0.0);
@@ -215,12 +215,12 @@ impl LinearNeighbourhood {
         self.rows
     }
 
-    /// Returns Q, the data's rows of the orthonormal factor: H = Q Qᵀ.
+    /// Returns the data rows of Q, so that H = Q Qᵀ is the hat matrix.
     pub fn fitted(&self) -> DMatrix<f64> {
         self.basis.rows(0, self.rows).into_owned()
     }
 
-    /// Returns Q and the whitened residuals of the data without a copy.
+    /// Returns the data rows of Q and of the whitened residual, without copying.
     pub fn into_fitted(self) -> (DMatrix<f64>, DVector<f64>) {
         (
             self.basis.resize_vertically(self.rows, 0.0),
@@ -228,22 +228,23 @@ impl LinearNeighbourhood {
         )
     }
 
-    /// Returns the step from the point of the derivatives to the optimum, unknowns of added columns
-    /// last.
+    /// Returns the step from the point of the derivatives to the optimum; unknowns of added columns
+    /// are last.
     pub fn step(&self) -> &DVector<f64> {
         &self.step
     }
 
-    /// Returns the expected degrees of freedom if the priors are true: rows, priors included, less
-    /// rank.
+    /// Returns the expected degrees of freedom if the priors are true: number of rows, priors
+    /// included, less the rank.
     pub fn expected_freedom(&self) -> f64 {
         (self.basis.nrows() - self.empty - self.basis.ncols()) as f64
     }
 
-    /// Returns U and − S⁻ᵀ x of some unknowns x; `None` where the fit does not tell them from others.
+    /// Returns U and − S⁻ᵀ x for some unknowns x; `None` if the fit cannot distinguish them from
+    /// others.
     ///
-    /// With T_x their rows of T and T_xᵀ = U S its QR factors, only these unknowns fit the directions
-    /// Q U, and take − S⁻ᵀ x off the residual along them.
+    /// With T_x their rows of T and T_xᵀ = U S its QR factors, only these unknowns fit the
+    /// directions Q U, along which they reduce the residual by − S⁻ᵀ x.
     fn share_within(&self, unknowns: &[usize]) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let rows = self.root.select_rows(unknowns).transpose();
         // U = T_xᵀ W with W = S⁻¹.
@@ -252,14 +253,14 @@ impl LinearNeighbourhood {
         (turned.ncols() == unknowns.len()).then(|| (turned, -within.tr_mul(&x)))
     }
 
-    /// Returns the increase of the sum of squares without some unknowns; `None` where the fit does
-    /// not tell them from others.
+    /// Returns the increase of the sum of squares if some unknowns are not fitted; `None` if the
+    /// fit cannot distinguish them from others.
     pub fn loss_without(&self, unknowns: &[usize]) -> Option<f64> {
         self.share_within(unknowns).map(|(_, part)| part.norm_squared())
     }
 
-    /// Returns columns of the data, shape = (3 N, k), with everything fitted projected out, shape =
-    /// (3 N + priors, k).
+    /// Returns columns of the data, shape = (3 N, k), with the fitted parameters projected out,
+    /// shape = (3 N + priors, k).
     pub fn left_of(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let mut left = columns.clone().resize_vertically(self.residual.len(), 0.0);
         // Below the data there is nothing at first.
@@ -279,8 +280,8 @@ impl LinearNeighbourhood {
         left
     }
 
-    /// Subtracts from columns their components along the basis; their rows from `filled` on are
-    /// zero.
+    /// Subtracts from columns their components along the basis. Rows from `filled` on are zero on
+    /// entry.
     fn take_off(&self, left: &mut DMatrix<f64>, filled: usize) {
         if left.ncols() > MAX_SEQUENTIAL_COLUMNS {
             // The narrow side is transposed: this is the product that is fast.
@@ -295,17 +296,17 @@ impl LinearNeighbourhood {
         }
     }
 
-    /// Whitened residual at the optimum, priors below.
+    /// Returns the whitened residual at the optimum, with the priors' rows below.
     pub fn residual(&self) -> &DVector<f64> {
         &self.residual
     }
 
-    /// Returns the score of columns, shape = (3 N, k).
+    /// Returns the score of columns that were not fitted, shape = (3 N, k).
     pub fn score(&self, columns: &DMatrix<f64>) -> Score {
         self.projected(columns, &self.basis.rows(0, self.rows).tr_mul(columns))
     }
 
-    /// Returns the scores of several sets of columns, multiplied together.
+    /// Returns the scores of several sets of columns, computed in one matrix product.
     pub fn scores(&self, sets: &[DMatrix<f64>]) -> Vec<Score> {
         if sets.is_empty() {
             return Vec::new();
@@ -322,7 +323,7 @@ impl LinearNeighbourhood {
         sets.iter().map(&mut next).collect()
     }
 
-    /// Returns the score of columns that have Qᵀ C along what was fitted.
+    /// Returns the score of columns C, given `along` = QᵀC.
     fn projected(&self, columns: &DMatrix<f64>, along: &DMatrix<f64>) -> Score {
         let gram = columns.tr_mul(columns) - along.tr_mul(along);
         let product = columns.tr_mul(&self.residual.rows(0, self.rows));
@@ -333,8 +334,8 @@ impl LinearNeighbourhood {
         }
     }
 
-    /// Returns the largest principal angle \[rad\] between what two sets of columns add to the fit;
-    /// `None` where one of them adds nothing.
+    /// Returns the largest principal angle \[rad\] between two sets of columns, with the fitted
+    /// parameters projected out; `None` if one of them adds nothing to the fit.
     pub fn angle(&self, one: &DMatrix<f64>, other: &DMatrix<f64>) -> Option<f64> {
         let (a, b) = (self.directions(one).1, self.directions(other).1);
         if a.is_empty() || b.is_empty() {
@@ -344,17 +345,18 @@ impl LinearNeighbourhood {
         cosines.iter().copied().reduce(f64::min).map(|cosine| cosine.clamp(0.0, 1.0).acos())
     }
 
-    /// Returns the sum of squared residuals of poses that are left out, block by block, from the
-    /// fit without them.
+    /// Returns the sum of squared residuals of poses that are left out, block by block, predicted
+    /// by the fit without them.
     ///
     /// `block` holds the block of each pose. A left-out residual is (I − H_bb)⁻¹ r_b, by Woodbury's
-    /// identity r_b + Q_b (I − Q_bᵀQ_b)⁻¹ Q_bᵀ r_b. A direction that a block alone decides is left
-    /// as it was fitted.
+    /// identity r_b + Q_b (I − Q_bᵀQ_b)⁻¹ Q_bᵀ r_b. Along a direction that the block alone
+    /// determines, the fitted value is kept.
     pub fn cross_validate(&self, block: &[usize]) -> Option<f64> {
         self.left_out_squares(block).map(|sums| sums.iter().sum())
     }
 
-    /// Returns that sum for each block.
+    /// Returns the sum of squared left-out residuals for each block; see
+    /// [`cross_validate`](Self::cross_validate).
     pub fn left_out_squares(&self, block: &[usize]) -> Option<Vec<f64>> {
         let blocks = block.iter().max().map_or(0, |last| last + 1);
         let n = self.basis.ncols();
@@ -371,14 +373,15 @@ impl LinearNeighbourhood {
     }
 }
 
-/// Returns true if at least `MIN_PART_OF_ONE_PROJECTION` of the length of every column is left.
+/// Returns true if at least [`MIN_PART_OF_ONE_PROJECTION`] of the length of every column remains
+/// after a projection.
 fn most_is_left(left: &DMatrix<f64>, lengths: &[f64]) -> bool {
     left.column_iter()
         .zip(lengths)
         .all(|(column, length)| column.norm() >= MIN_PART_OF_ONE_PROJECTION * length)
 }
 
-/// Solves with a symmetric matrix of eigenvalues from 0 to 1; the solution is zero along
+/// Solves a system with a symmetric matrix with eigenvalues from 0 to 1. The solution is zero along
 /// eigenvalues near 0.
 fn decided(matrix: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     if let Some(root) = inverse_factor(&matrix)

@@ -1,5 +1,5 @@
-//! Columns of every effect without a fit of it: the derivative at the place where it enters, times
-//! what it is multiplied by.
+//! Columns of every effect without fitting it: the derivative at the effect's site, times its
+//! regressor.
 
 use std::sync::Arc;
 
@@ -12,11 +12,11 @@ use crate::model::parameter::{BeamField, Parameter, ParameterSite, Regressor};
 use crate::model::{LinearModel, Model, Pose, PoseResiduals};
 use crate::problem::{Effect, Problem};
 
-/// Mass at which the place of an added mass is differentiated [kg]: none has no place, so small a
-/// one changes nothing else.
+/// Mass at which the derivative by the position of an added mass is taken \[kg\]. Without a mass
+/// the position has no influence; so small a mass changes nothing else.
 const MASS_OF_DERIVATIVE: f64 = 1e-4;
 
-/// A model linearised with every place where effects may enter.
+/// Model linearised at some poses, with derivatives at every site where effects may enter.
 #[derive(Clone)]
 pub(crate) struct Linearised<'a> {
     problem: &'a Problem,
@@ -24,24 +24,24 @@ pub(crate) struct Linearised<'a> {
     derivatives: Arc<Derivatives>,
 }
 
-/// Derivatives and residual of a model in some poses.
+/// Derivatives and residual of a model in some poses, which later linearisations reuse.
 #[derive(Debug, Clone)]
 pub(in crate::select) struct Derivatives {
-    /// Columns of the fitted parameters, and of what is relaxed behind them, shape = (3 N, n).
+    /// Columns of the fitted parameters, followed by those of relaxed parameters, shape = (3 N, n).
     fitted: Arc<DMatrix<f64>>,
     residual: Arc<DVector<f64>>,
-    /// 1 σ of each pose \[m\].
+    /// Standard deviation (1 σ) of each pose \[m\].
     sigma: Vec<f64>,
-    /// σ of the priors of what the problem holds equal and may differ here.
+    /// Prior σ of relaxed parameters: those that the problem holds equal and that may differ here.
     relaxed: Vec<Option<f64>>,
-    /// Columns of places by their number, those of `fitted` counted first.
+    /// Site of each additional column, with its index; the columns of `fitted` are counted first.
     places: Vec<(ParameterSite, usize)>,
     others: Vec<Arc<DVector<f64>>>,
 }
 
 impl Derivatives {
-    /// Returns the derivatives of the fitted parameters as a fit reuses them that begins at the
-    /// full parameter vector `x`.
+    /// Returns the derivatives of the fitted parameters as a linear model, which a fit that starts
+    /// at the full parameter vector `x` reuses.
     pub fn linear_model(
         &self,
         at: (&[Parameter], &DVector<f64>),
@@ -62,7 +62,7 @@ impl Derivatives {
         }
     }
 
-    /// Further columns of places.
+    /// Appends columns of additional sites.
     fn extend(&mut self, slots: &[(ParameterSite, f64)], columns: DMatrixView<f64>) {
         let first = self.fitted.ncols() + self.others.len();
         self.places.extend(slots.iter().enumerate().map(|(k, &(site, _))| (site, first + k)));
@@ -71,8 +71,8 @@ impl Derivatives {
 }
 
 impl<'a> Linearised<'a> {
-    /// Linearises `model` about its full parameter vector `x` with the parameters `unknowns`
-    /// fitted, for the effects and sites given. Derivatives in `known` are reused.
+    /// Linearises `model` about its full parameter vector `x`, with the parameters `unknowns`
+    /// fitted, at the sites of `effects` and at `places`. Derivatives in `known` are reused.
     pub fn new(
         (problem, known): (&'a Problem, Option<Arc<Derivatives>>),
         model: &Model,
@@ -167,7 +167,7 @@ impl<'a> Linearised<'a> {
         Self { problem, poses, derivatives: Arc::new(derivatives) }
     }
 
-    /// Returns the derivatives for reuse.
+    /// Returns the derivatives for reuse by another linearisation.
     pub fn derivatives(&self) -> Arc<Derivatives> {
         Arc::clone(&self.derivatives)
     }
@@ -188,24 +188,24 @@ impl<'a> Linearised<'a> {
         rest
     }
 
-    /// Returns the columns of the fitted parameters and of what is relaxed beside them, shape = (3
-    /// N, n).
+    /// Returns the columns of the fitted parameters, followed by those of relaxed parameters, shape
+    /// = (3 N, n).
     pub fn fitted(&self) -> &DMatrix<f64> {
         &self.derivatives.fitted
     }
 
-    /// Returns the columns and the whitened residual; copies only where they are shared.
+    /// Returns those columns and the whitened residual, copied only if they are shared.
     pub fn into_fitted(self) -> (DMatrix<f64>, DVector<f64>) {
         let Derivatives { fitted, residual, .. } = Arc::unwrap_or_clone(self.derivatives);
         (Arc::unwrap_or_clone(fitted), Arc::unwrap_or_clone(residual))
     }
 
-    /// Returns σ of the priors of what is relaxed, in the order of its columns.
+    /// Returns the prior σ of the relaxed parameters, in the order of their columns.
     pub fn relaxed(&self) -> &[Option<f64>] {
         &self.derivatives.relaxed
     }
 
-    /// Returns the columns of other parameters of the model about its full parameter vector `x`,
+    /// Returns the columns of other parameters of a model about its full parameter vector `x`,
     /// shape = (3 N, parameters).
     pub fn of_parameters(
         &self,
@@ -218,17 +218,18 @@ impl<'a> Linearised<'a> {
         jacobian_and_residual(&residuals, &residuals.reduced(x)).0
     }
 
-    /// Returns the whitened residual, 3 N.
+    /// Returns the whitened residual, length 3 N.
     pub fn residual(&self) -> &DVector<f64> {
         &self.derivatives.residual
     }
 
-    /// Returns the number of rows that are 0 because their poses measure fewer numbers than three.
+    /// Returns the number of residual rows that are 0, because their poses measure fewer than three
+    /// numbers.
     pub fn empty(&self) -> usize {
         self.poses.iter().map(|pose| 3 - pose.observation.coordinates()).sum()
     }
 
-    /// Returns the poses.
+    /// Returns the poses about which the model is linearised.
     pub fn poses(&self) -> &[Pose<'a>] {
         &self.poses
     }
@@ -238,7 +239,7 @@ impl<'a> Linearised<'a> {
         self.columns_of(&Driven::of(self, std::slice::from_ref(effect)), 0)
     }
 
-    /// Returns the columns of one of some effects.
+    /// Returns the columns of the effect with this index in `driven`.
     pub fn columns_of(&self, driven: &Driven, effect: usize) -> DMatrix<f64> {
         let terms = driven.terms.get(effect).map_or(&[][..], Vec::as_slice);
         let mut columns = DMatrix::zeros(self.derivatives.fitted.nrows(), terms.len());
@@ -252,35 +253,35 @@ impl<'a> Linearised<'a> {
         columns
     }
 
-    /// Returns the problem.
+    /// Returns the problem that was linearised.
     pub fn problem(&self) -> &'a Problem {
         self.problem
     }
 
-    /// Returns for each of an effect's parameters whether it is never negative.
+    /// Returns, for each of an effect's parameters, true if it cannot be negative.
     pub fn never_negative(&self, effect: &Effect) -> Vec<bool> {
         effect.terms(self.problem).iter().map(|term| term.never_negative).collect()
     }
 
-    /// Returns the column of a site, 3 N; `None` where no effect enters there.
+    /// Returns the column of a site, length 3 N; `None` if no effect enters there.
     pub fn place(&self, site: ParameterSite) -> Option<DVector<f64>> {
         let &(_, place) = self.derivatives.places.iter().find(|(known, _)| *known == site)?;
         Some(self.derivatives.column(place).into_owned())
     }
 }
 
-/// Effects by where they enter and what they are multiplied by there in every pose, each regressor
-/// evaluated once.
+/// Effects with the site and regressor of each of their terms. Each regressor is evaluated once in
+/// every pose.
 pub(crate) struct Driven {
-    /// Column of the site, if it has one, and number of the regressor, for each term of each
-    /// effect.
+    /// For each term of each effect: index of its site's column, if it has one, and index of its
+    /// regressor.
     terms: Vec<Vec<(Option<usize>, usize)>>,
     /// Values of each regressor in every pose.
     values: Vec<Vec<f64>>,
 }
 
 impl Driven {
-    /// Creates the regressors of effects in the poses of a linearised model.
+    /// Evaluates the regressors of effects in the poses of a linearised model.
     pub fn of(linearised: &Linearised, effects: &[Effect]) -> Self {
         let mut regressors: Vec<Regressor> = Vec::new();
         let mut term = |Term { site, regressor, .. }: Term| {

@@ -1,10 +1,8 @@
-//! The linear neighbourhood of a fit, in which candidates are judged without being fitted.
+//! Linear neighbourhood of a fit, in which candidates are judged without being fitted.
 //!
-//! - [`Linearised`]: the model with a column for every place where an effect may enter;
-//!   [`LinearNeighbourhood`]: a fit in it.
-//! - [`Score`], [`Sums`], [`Gain`]: what columns would take off the residual, and how probable that
-//!   is by chance.
-//! - [`Scan`]: all candidates against one fit.
+//! - [`Linearised`]: the model with a column for every site where an effect may enter;
+//!   [`LinearNeighbourhood`]: a fit in it. - [`Score`], [`Sums`], [`Gain`]: reduction of the
+//!   residual by columns, and its p-value. - [`Scan`]: all candidates against one fit.
 
 mod left_out;
 mod linear;

@@ -1,4 +1,4 @@
-//! Orthonormal bases of columns, and the one rule that says how many directions they have.
+//! Orthonormal bases of columns, with one rule for their rank.
 
 use std::borrow::Cow;
 
@@ -10,19 +10,19 @@ use crate::numeric::{
     product_with_upper_padded, zeros,
 };
 
-/// A column is a direction of its own where those before it leave more than this part of its
-/// length.
+/// Smallest share of a column's length, outside the span of earlier columns, at which it counts as
+/// linearly independent.
 ///
-/// Products of columns are exact to some 1e-15 of their lengths, so that what is left of a length²
-/// is known to some 1e-14: below 1e-12, (this part)², it is rounding.
+/// Products of columns are exact to about 1e-15 of their lengths, so a remaining squared length is
+/// known to about 1e-14. Below 1e-12, the square of this share, it is rounding.
 pub(crate) const MIN_INDEPENDENT_LENGTH: f64 = 1e-6;
 
-/// Q = A W with QᵀQ = I for the columns A, and W, shape = (columns, rank): columns that are not
-/// finite, or that those before them take up, have no part in it. `lengths` are those that a column
-/// had before others were projected out.
+/// Returns Q = A W with QᵀQ = I for the columns A, and W, shape = (columns, rank). Columns that are
+/// not finite or depend linearly on earlier ones have zero rows in W. `lengths` are the columns'
+/// lengths before earlier projections.
 ///
-/// By Cholesky factors of the Gram matrix, twice [Yamamoto et al. 2015], of the columns that are
-/// directions of their own.
+/// It uses Cholesky factors of the Gram matrix of the independent columns, twice [Yamamoto et al.
+/// 2015].
 pub(super) fn orthonormal(
     columns: &DMatrix<f64>,
     lengths: Option<&[f64]>,
@@ -30,8 +30,8 @@ pub(super) fn orthonormal(
     orthonormal_above(Cow::Borrowed(columns), &[], lengths)
 }
 
-/// Returns the basis of columns with rows `below` them of one entry each, its column and its value;
-/// computed in place of columns that nobody else needs.
+/// Returns Q and W for columns with additional rows `below` them, each with one entry, given by its
+/// column and value. Columns that are not shared are overwritten.
 pub(super) fn orthonormal_above(
     columns: Cow<DMatrix<f64>>,
     below: &[(usize, f64)],
@@ -75,8 +75,8 @@ pub(super) fn orthonormal_above(
     (basis, within)
 }
 
-/// Columns that are directions of their own, of those with the Gram matrix given, and the Cholesky
-/// factor of theirs, scaled to length one.
+/// Returns the indices of linearly independent columns, given the Gram matrix of all, and the
+/// Cholesky factor of their Gram matrix, scaled to unit length.
 fn independent(gram: &DMatrix<f64>, norms: &[f64], lengths: &[f64]) -> (Vec<usize>, DMatrix<f64>) {
     let mut kept: Vec<usize> = Vec::new();
     let mut factor: Vec<Vec<f64>> = Vec::new();
@@ -101,8 +101,8 @@ fn independent(gram: &DMatrix<f64>, norms: &[f64], lengths: &[f64]) -> (Vec<usiz
     (kept, lower)
 }
 
-/// Z with A D⁻¹ Z = 0 and ZᵀZ = I for the rows A of active constraints, shape = (constraints, n),
-/// and the scale D of the unknowns; `None` where nothing holds them.
+/// Returns Z with A D⁻¹ Z = 0 and ZᵀZ = I, for the rows A of active constraints, shape =
+/// (constraints, n), and the scale D of the unknowns. `None` if there are no constraints.
 pub(super) fn open(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>> {
     let mut rows =
         DMatrix::from_fn(active.nrows(), active.ncols(), |i, j| active[(i, j)] / scale[j]);
@@ -122,8 +122,8 @@ pub(super) fn open(active: &DMatrix<f64>, scale: &[f64]) -> Option<DMatrix<f64>>
     Some(eigen.eigenvectors.select_columns(&left))
 }
 
-/// Returns Q and T of columns with rows `below` them of one entry each, within the directions that
-/// the constraints `active` leave open.
+/// Returns Q and T for the Jacobian with rows `below` it, each with one entry, restricted to the
+/// directions that the constraints `active` leave free.
 pub(super) fn held(
     jacobian: &DMatrix<f64>,
     below: &[(usize, f64)],
@@ -142,7 +142,7 @@ pub(super) fn held(
     (basis, root)
 }
 
-/// Returns a matrix with `more` rows of zeros below it.
+/// Returns a matrix with `more` rows of zeros appended.
 pub(super) fn lengthened(matrix: &DMatrix<f64>, more: usize) -> DMatrix<f64> {
     let (rows, n) = matrix.shape();
     let mut long = zeros(rows + more, n);

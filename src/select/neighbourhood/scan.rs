@@ -12,42 +12,43 @@ use super::linearised::{Driven, Linearised};
 use super::score::{Gain, Score, Sums};
 use crate::problem::{Effect, Problem};
 
-/// Candidates with their scores.
+/// All candidates with their scores against one fit.
 pub(crate) struct Scan<'a, 'l> {
     linearised: &'l Linearised<'a>,
     pub linear: Arc<LinearNeighbourhood>,
     /// Candidates that were scored.
     pub effects: Vec<Effect>,
     driven: Driven,
-    /// Candidates with a derivative that is not finite.
+    /// Candidates that cannot be scored, because a derivative is not finite.
     pub refused: Vec<Effect>,
     scores: Vec<Score>,
-    /// Number of tries within its family that each candidate counts for.
+    /// Effective number of tries (Bonferroni factor within its family) of each candidate.
     tries: Vec<f64>,
     /// Number of families.
     families: usize,
-    /// True for parameters of each candidate that are never negative.
+    /// True for parameters of each candidate that cannot be negative.
     never_negative: Vec<Vec<bool>>,
 }
 
-/// Number of candidates that are projected together.
+/// Number of candidates whose columns are projected in one matrix product.
 const CANDIDATES_PER_PROJECTION: usize = 48;
 
 /// Candidate with its gain.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Tried {
-    /// Index in the scan's list.
+    /// Index of the candidate in the scan's list.
     pub index: usize,
     pub gain: Gain,
-    /// The information criterion with 2 ln(tries) for the search; negative is better than nothing.
+    /// Information criterion with the penalty 2 ln(tries) for the search; negative if the candidate
+    /// is better than none.
     pub criterion: f64,
-    /// p times the tries in its family and the number of families: Holm's first step with a weight
-    /// for each candidate.
+    /// Corrected p-value: p times the tries in its family times the number of families (Holm's
+    /// first step, weighted).
     pub corrected: f64,
 }
 
 impl<'a, 'l> Scan<'a, 'l> {
-    /// Scores `effects` against the fit that `linear` describes.
+    /// Scores `effects` against the fit with the linear neighbourhood `linear`.
     pub fn new(
         linearised: &'l Linearised<'a>,
         linear: Arc<LinearNeighbourhood>,
@@ -97,7 +98,7 @@ impl<'a, 'l> Scan<'a, 'l> {
         }
     }
 
-    /// Returns the candidates that the fit does not absorb and that are possible, best first.
+    /// Returns the candidates that are detectable and physically possible, best first.
     pub fn ranking(&self) -> Vec<Tried> {
         let sums = self.linear.sums();
         let tried = |(index, score): (usize, &Score)| {
@@ -112,7 +113,7 @@ impl<'a, 'l> Scan<'a, 'l> {
         all
     }
 
-    /// Returns true unless a candidate is a negative compliance or mass beyond doubt.
+    /// Returns false if a candidate is certainly a negative compliance or mass.
     fn is_possible(&self, index: usize, score: &Score, sums: Sums) -> bool {
         let never_negative = &self.never_negative[index];
         if !never_negative.contains(&true) {
@@ -125,7 +126,7 @@ impl<'a, 'l> Scan<'a, 'l> {
         score.estimates().into_iter().zip(never_negative).all(fine)
     }
 
-    /// Returns the candidates that the fit absorbs.
+    /// Returns the candidates that the fitted parameters can reproduce completely.
     pub fn absorbed(&self) -> Vec<&Effect> {
         let gone = |(effect, score): (_, &Score)| (score.rank() == 0).then_some(effect);
         self.effects.iter().zip(&self.scores).filter_map(gone).collect()
@@ -136,8 +137,8 @@ impl<'a, 'l> Scan<'a, 'l> {
         self.linearised.columns_of(&self.driven, index)
     }
 
-    /// Returns the largest principal angle \[rad\] between what two candidates add to the fit;
-    /// `None` where one of them adds nothing.
+    /// Returns the largest principal angle \[rad\] between two candidates, with the fitted
+    /// parameters projected out; `None` if one of them adds nothing.
     pub fn angle(&self, one: usize, other: usize) -> Option<f64> {
         self.linear.angle(&self.columns(one), &self.columns(other))
     }

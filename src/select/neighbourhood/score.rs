@@ -5,14 +5,15 @@ use crate::select::settings::MIN_NEW_LENGTH;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
 
-/// Score of columns that were not fitted: their products with everything fitted projected out.
+/// Score of columns C that were not fitted: products of C̃, the columns with the fitted parameters
+/// projected out.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Score {
-    /// Gram matrix C̃ᵀC̃ of the columns with everything fitted projected out.
+    /// Gram matrix C̃ᵀC̃ of the projected columns.
     pub gram: DMatrix<f64>,
     /// Product C̃ᵀr with the residual.
     pub product: DVector<f64>,
-    /// ‖C‖² of each column before the projection.
+    /// Squared length ‖C‖² of each column before the projection.
     pub lengths: Vec<f64>,
 }
 
@@ -32,40 +33,42 @@ pub(crate) struct Sums {
 pub(crate) struct Gain {
     /// Reduction of the sum of squares.
     pub squares: f64,
-    /// Number of new directions.
+    /// Number of new directions k, the degrees of freedom of the numerator.
     pub freedom: usize,
     /// F statistic of the gain.
     pub f: f64,
-    /// Probability of as large an F by chance, for one candidate alone.
+    /// Probability of an F at least as large under noise alone, uncorrected for other candidates.
     pub p: f64,
-    /// Change of ν ln(squares) + k ln ν: an information criterion without regard to how many
-    /// candidates there are.
+    /// Information criterion: change of ν ln(squares) + k ln ν, without correction for the number
+    /// of candidates.
     pub criterion: f64,
 }
 
 impl Sums {
-    /// Creates the sums of a residual, priors below its first `rows`, with `data_freedom` degrees
-    /// of freedom in the data.
+    /// Creates the sums of a residual, whose first `rows` rows are data and the others priors, with
+    /// `data_freedom` degrees of freedom of the data.
     pub fn of(residual: &DVector<f64>, rows: usize, data_freedom: f64) -> Self {
         let data_squares = residual.rows(0, rows).norm_squared();
         Self { squares: residual.norm_squared(), data_squares, data_freedom }
     }
 
-    /// Returns the degrees of freedom of the whole sum of squares at the scatter of the data.
+    /// Returns the degrees of freedom of the whole sum of squares, estimated from the scatter of
+    /// the data.
     ///
-    /// With true priors it has 3 N, with priors far wider than the deviations 3 N − tr H: the
-    /// data's scatter decides.
+    /// If the priors are true, they are 3 N. If the priors are far wider than the deviations, they
+    /// are 3 N − tr H.
     pub fn freedom(&self) -> f64 {
         self.data_freedom * self.squares / self.data_squares.max(f64::MIN_POSITIVE)
     }
 
-    /// Returns the gain by columns with this score; `None` where they add nothing.
+    /// Returns the gain by columns with this score; `None` if they add nothing.
     pub fn gain(&self, score: &Score) -> Option<Gain> {
         let (squares, freedom) = score.reduction()?;
         self.gain_of(squares, freedom)
     }
 
-    /// Returns the gain of a reduction of the sum of squares by so many new directions.
+    /// Returns the gain for a reduction of the sum of squares by `squares` with `freedom` new
+    /// directions; `None` if no degrees of freedom remain.
     pub fn gain_of(&self, squares: f64, freedom: usize) -> Option<Gain> {
         let degrees = self.freedom();
         let total = self.squares.max(ROUNDING.powi(2) * degrees);
@@ -102,12 +105,13 @@ impl Score {
             .collect()
     }
 
-    /// Returns the number of new directions of the columns.
+    /// Returns the number of new directions that the columns add.
     pub fn rank(&self) -> usize {
         self.seen().len()
     }
 
-    /// Returns bᵀ G⁺ b and the rank of G; `None` where nothing new is left of the columns.
+    /// Returns bᵀ G⁺ b and the rank of G; `None` if the fitted parameters reproduce the columns
+    /// completely.
     fn reduction(&self) -> Option<(f64, usize)> {
         let seen = self.seen();
         let sum = seen.iter().map(|(value, _, along)| along * along / value).sum();
@@ -118,8 +122,8 @@ impl Score {
         self.lengths.iter().map(|length| if *length > 0.0 { length.sqrt() } else { 1.0 }).collect()
     }
 
-    /// Returns eigenvalues and eigenvectors of G for columns of length one, with bᵀ along each;
-    /// directions that the fit absorbs are left out.
+    /// Returns eigenvalue and eigenvector of G for unit-length columns, with bᵀ along each;
+    /// directions that the fitted parameters reproduce are left out.
     fn seen(&self) -> Vec<(f64, DVector<f64>, f64)> {
         let (k, scale) = (self.lengths.len(), self.scale());
         let product = DVector::from_fn(k, |i, _| self.product[i] / scale[i]);

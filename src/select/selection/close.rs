@@ -1,4 +1,5 @@
-//! The loop: the declared problem fitted, what it lacks searched, the result stated.
+//! The loop: fits the declared problem, searches the effects that it lacks, and collects the
+//! result.
 
 use std::collections::BTreeSet;
 
@@ -21,56 +22,55 @@ use crate::select::rules::SelectionRules;
 use crate::select::screening::{Trace, check_fit, trace_fit};
 use crate::select::unexplained::{self, Unexplained};
 
-/// Result of the loop: from the declared problem to the extended one.
+/// Result of the loop, from the declared to the extended problem.
 #[derive(Debug, Clone)]
 pub struct ClosedLoop {
     /// Outcome of the loop.
     pub verdict: Verdict,
-    /// True if the loop was stopped before the search ended: more effects may be there.
+    /// True if the loop was stopped before the search ended, so that there may be more effects.
     pub interrupted: bool,
-    /// The fit of the declared problem, its residual tests, and what its residual points to.
+    /// Fit of the declared problem, its residual tests, and the ranking of effects.
     pub before: Trace,
-    /// The fit with every effect that was found.
+    /// Fit with all effects that were found.
     pub after: Identification,
     /// Errors with the effects of status [`Status::Found`] alone.
     pub with_found: Errors,
-    /// Residual tests of that fit.
+    /// Residual tests of the fit `after`.
     pub findings: Findings,
-    /// Extended problem: the declared one with the effects that were found.
+    /// Extended problem: the declared one with the found effects declared.
     pub closed: Problem,
     /// Effects in the order in which they were found.
     pub effects: Vec<Found>,
     /// Result of each round.
     pub rounds: Vec<Round>,
-    /// Common prior of the harmonics in the extended problem, where a joint has many.
+    /// Common prior of the harmonics in the extended problem, if a joint has many orders.
     pub harmonic_prior: Option<HarmonicPrior>,
     /// Structure without a law, the most probable first.
     pub unexplained: Vec<Unexplained>,
-    /// Mean reduction of the error on held-out poses \[m\].
+    /// Mean reduction of the error on held-out poses, with its confidence interval \[m\].
     pub gain: Interval,
-    /// Identification rows too far off to be noise: they took no part in the choice of effects.
+    /// Identification rows with gross errors, which were excluded from the choice of effects.
     pub set_aside: Vec<Location>,
     /// Settings of the search.
     pub rules: SelectionRules,
 }
 
 impl ClosedLoop {
-    /// Returns the error on held-out poses once an effect was in the model, where more was added
-    /// after it.
+    /// Returns the held-out error after the round that added an effect, if later rounds added more.
     pub fn held_out_once(&self, found: &Found) -> Option<ErrorSummary> {
         Some(found.held_out_after).filter(|then| *then != self.after.fitted.held_out)
     }
 }
 
-/// Finds what `problem` lacks from the identification rows alone; held-out rows only measure the
-/// outcome.
+/// Finds the effects that `problem` lacks, from the identification rows alone; held-out rows only
+/// measure the result.
 ///
-/// Stopped by [`Options::stop`], it leaves the round under way and finishes with what the rounds
-/// before came to.
+/// If [`Options::stop`] stops it, it abandons the current round and returns the result of the
+/// earlier rounds.
 ///
 /// # Errors
-/// Problem, data and options do not fit each other, or it was stopped before the problem as
-/// declared was fitted.
+/// Returns an error if problem, data and options do not match, or if it was stopped before the
+/// declared problem was fitted.
 pub fn close(
     problem: &Problem,
     data: &Dataset,
@@ -79,10 +79,10 @@ pub fn close(
     close_by(problem, data, options, &SelectionRules::DEFAULT)
 }
 
-/// Closes the loop by other settings.
+/// Runs the loop like [`close`], with other settings.
 ///
 /// # Errors
-/// As of [`close`].
+/// Returns the errors of [`close`].
 pub fn close_by(
     problem: &Problem,
     data: &Dataset,

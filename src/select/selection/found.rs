@@ -1,4 +1,4 @@
-//! Claims, tests and alternatives of each effect that the search added.
+//! Claims, tests and alternatives for each effect that the search added.
 
 use crate::select::settings::MIN_ALTERNATIVE_ODDS;
 use std::collections::BTreeMap;
@@ -16,37 +16,38 @@ use crate::select::harmonic_prior::is_gear;
 use crate::select::neighbourhood::tries;
 use crate::select::reference_check::{ReferenceCheck, reference_check};
 
-/// Orders of one harmonic from which on the claim is that some of them act, not each.
+/// Smallest number of orders of one harmonic at which the claim is that some of them act, not that
+/// each does.
 const SEVERAL_ORDERS: usize = 3;
 
-/// An effect that the loop added.
+/// Effect that the loop added, with its status and tests.
 #[derive(Debug, Clone)]
 pub struct Found {
-    /// Effect in question.
+    /// Effect that was added to the model.
     pub effect: Effect,
     /// Strongest claim about the effect.
     pub status: Status,
-    /// Claims with their probabilities; `None` where no evidence about the effect was evaluated or no
-    /// probable set holds it.
+    /// Claims with their probabilities; `None` if no evidence about the effect was evaluated, or no
+    /// probable set contains it.
     pub claims: Option<Claims>,
     /// Probability that chance alone gains as much, corrected for the candidates tried.
     pub p_value: f64,
     /// Estimates of its parameters.
     pub estimates: Vec<Estimate>,
-    /// Effects that these data cannot tell from it, best first.
+    /// Effects that these data cannot distinguish from it, best first.
     pub alternatives: Vec<Effect>,
-    /// Part of the fits to random subsets of the configurations that name it; `None` where no
-    /// evidence was evaluated.
+    /// Share of refits on random 80 % of the configurations that find the effect again; `None` if
+    /// no evidence was evaluated.
     pub stability: Option<f64>,
-    /// Test against data that took no part in the fit; `None` where no such data bear on it.
+    /// Check against data that were not fitted; `None` if no such data concern the effect.
     pub reference_check: Option<ReferenceCheck>,
-    /// Error on held-out poses after the first round whose effects include it and were all kept to
-    /// the end; that of the final fit where no round is such.
+    /// Held-out error after the first round that contains it and whose effects all remained until
+    /// the end. If there is no such round, that of the final fit.
     pub held_out_after: ErrorSummary,
 }
 
-/// Returns every effect that a fit holds beside the declared ones, with what is known of it.
-/// `is_trusted` is false where the fit has cautions: then no effect is more than probable.
+/// Returns every effect that a fit contains in addition to the declared ones, with its tests. If
+/// the fit has cautions (`is_trusted` is false), no effect is more than probable.
 pub(super) fn found(
     state: &SearchState,
     fitted: &Fitted,
@@ -110,9 +111,9 @@ pub(super) fn found(
     added.iter().cloned().zip(p_values).map(one).collect()
 }
 
-/// Returns for each effect of a fit the p-value of the F test of the fit against the one without it,
-/// times the number of candidates that the search tried; for a harmonic of few orders the smallest
-/// of its orders.
+/// Returns, for each effect of a fit, the p-value of the F test of the fit against the fit without
+/// it, times the number of candidates tried. For a harmonic of few orders it is the smallest of its
+/// orders.
 fn p_values(state: &SearchState, fitted: &Fitted, effects: &[Effect]) -> Vec<f64> {
     let fit = fitted.around(state.data);
     let tested: Vec<Vec<Effect>> = effects
@@ -140,8 +141,8 @@ fn p_values(state: &SearchState, fitted: &Fitted, effects: &[Effect]) -> Vec<f64
     tested.iter().map(|parts| by_part.by_ref().take(parts.len()).fold(1.0, f64::min)).collect()
 }
 
-/// Returns the claims of an effect: of a few orders of a harmonic those of the least probable order,
-/// of several those of the most probable one.
+/// Returns the claims about an effect. For a harmonic of few orders they are those of the least
+/// probable order, for one of several orders those of the most probable one.
 fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
     let parts = effect.parts();
     let claims =
@@ -154,8 +155,7 @@ fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
     }
 }
 
-/// Returns effects that may stand in the place of another, of a family at one place the most
-/// probable.
+/// Returns effects that may replace `effect`, only the most probable of each family at a place.
 fn alternatives(evidence: &Evidence, effect: &Effect, held: &[Effect], beside: f64) -> Vec<Effect> {
     let mut by_place: BTreeMap<String, usize> = BTreeMap::new();
     let mut found: Vec<Effect> = Vec::new();

@@ -1,15 +1,16 @@
 //! Common prior of the harmonics of joints with a periodic error of many orders.
 //!
-//! Where a joint covers part of its turn, harmonics of neighbouring orders hardly differ there.
-//! Estimated without a prior they cancel where poses were measured and part beyond. With every
-//! order in the model and one Gaussian prior on the coefficients, predictions go to zero where
+//! If a joint covers only part of a turn, harmonics of neighbouring orders hardly differ there.
+//! Estimated without a prior, they cancel at the measured poses and diverge elsewhere. With all
+//! orders in the model and one Gaussian prior on the coefficients, predictions tend to zero where
 //! nothing was measured.
 //!
-//! Joints of one arm have gears of a kind, which err at like orders. So σₖ = s hₖ is common to all
-//! joints: the spectrum hₖ is that of the coefficients of all joints, smoothed over neighbouring
-//! orders. The scale s of the largest evidence leaves least to other hypotheses, so that the search
-//! uses it; the extended problem has the scale that predicts best when whole parts of a joint's
-//! range are left out, which is smaller where the errors are no exact harmonics.
+//! The joints of one arm have similar gears, whose errors have similar orders. Therefore σₖ = s hₖ
+//! is common to all joints. The spectrum hₖ is that of the coefficients of all joints, smoothed
+//! over neighbouring orders. The search uses the scale s of the largest evidence, which leaves the
+//! least residual to other hypotheses. The extended problem has the scale that predicts best when
+//! parts of a joint's range are left out. That scale is smaller if the errors are not exact
+//! harmonics.
 
 use crate::problem::Problem;
 use crate::select::data::Data;
@@ -17,21 +18,22 @@ use crate::select::fitted::Fitted;
 use crate::select::harmonic_prior::{HarmonicPrior, order_of};
 use crate::select::neighbourhood::PartSquares;
 
-/// Passes of the estimate of the spectrum: σₖ from the coefficients, then the coefficients under σₖ.
-/// More passes hardly change it.
+/// Number of passes of the spectrum's estimate: σₖ from the coefficients, then the coefficients
+/// under σₖ. More passes hardly change it.
 const SPECTRUM_PASSES: usize = 2;
-/// Parts of each joint's range that are left out in turn to find the scale of the prior.
+/// Number of parts of each joint's range that are left out in turn to find the scale of the prior.
 const RANGE_PARTS: usize = 5;
-/// Scales of the prior that are tried, as powers of two of the scale at which the evidence put it;
-/// then half and quarter powers about the best.
+/// Trial scales of the prior, as powers of two of the current scale; half and quarter powers about
+/// the best one follow.
 const SCALE_POWERS: std::ops::RangeInclusive<i32> = -8..=4;
-/// Standard deviation, in orders, of the kernel that smooths σₖ: a joint that covers part of its
-/// turn tells no finer.
+/// Standard deviation of the kernel that smooths σₖ [orders]. A joint that covers part of a turn
+/// cannot resolve finer.
 const SPECTRUM_WIDTH: f64 = 1.5;
-/// Weight of the mean square of all coefficients in the σₖ² of an order, in coefficients.
+/// Weight of the mean square of all coefficients in the σₖ² of one order, as an equivalent number
+/// of coefficients.
 const COMMON_COEFFICIENTS: f64 = 4.0;
 
-/// Returns the places of the coefficients of harmonics among the unknowns, and their orders.
+/// Returns the indices of harmonic coefficients among the unknowns, with their orders.
 fn coefficients(fitted: &Fitted) -> Vec<(usize, u32)> {
     let order = |j: usize| order_of(&fitted.model.parameters[fitted.unknowns[j]].regressor);
     (0..fitted.unknowns.len()).filter_map(|j| Some((j, order(j)?))).collect()
@@ -40,14 +42,14 @@ fn coefficients(fitted: &Fitted) -> Vec<(usize, u32)> {
 /// Criterion by which the scale of the prior is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ScaleBy {
-    /// Largest evidence.
+    /// Maximises the evidence.
     Evidence,
-    /// Best prediction of parts of the joints' ranges that are left out.
+    /// Predicts left-out parts of the joints' ranges best.
     LeftOutRanges,
 }
 
-/// Returns the prior whose spectrum the coefficients of a fit under the prior `first` show, at the
-/// best scale by a criterion, in the linear neighbourhood of the fit.
+/// Returns the prior whose spectrum is estimated from the coefficients of a fit under the prior
+/// `first`. The scale is best by a criterion, in the linear neighbourhood of the fit.
 pub(super) fn estimated_prior(
     fitted: &Fitted,
     data: &Data,
@@ -111,10 +113,11 @@ pub(super) fn estimated_prior(
     shaped.filter(|shaped| shaped.0 < flat.0).unwrap_or(flat).1
 }
 
-/// Returns σₖ of every order from expected squares of the coefficients of all joints.
+/// Returns σₖ of every order from expected squared coefficients of all joints.
 ///
 /// σₖ² ∝ (Σ w c² + m c̄²) / (Σ w + m), w = exp(−(k' − k)² / (2 width²)), with m =
-/// `COMMON_COEFFICIENTS` and c̄² the mean square; scaled to the mean square that the prior had.
+/// `COMMON_COEFFICIENTS` and c̄² the mean square. The result is scaled to the mean square of the
+/// prior.
 fn smoothed(prior: &HarmonicPrior, expected: &[(u32, f64)]) -> HarmonicPrior {
     let count = expected.len().max(1) as f64;
     let mean = expected.iter().map(|entry| entry.1).sum::<f64>() / count;
@@ -141,8 +144,8 @@ fn smoothed(prior: &HarmonicPrior, expected: &[(u32, f64)]) -> HarmonicPrior {
     if before > 0.0 && after > 0.0 { shaped.scaled(before / after) } else { prior.clone() }
 }
 
-/// Returns the identification poses in each of `RANGE_PARTS` parts of the range of each joint that
-/// moves, equally many in each part.
+/// Returns the indices of identification poses in each of [`RANGE_PARTS`] parts of the range of
+/// each moving joint; the parts contain equal numbers of poses.
 fn parts_of_ranges(problem: &Problem, data: &Data) -> Vec<Vec<usize>> {
     let (rows, conditions) = (data.rows(), data.conditions(problem));
     let coordinate = |pose: usize, joint: usize| data.measurements.configuration(rows[pose])[joint];

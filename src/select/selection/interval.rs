@@ -1,4 +1,4 @@
-//! Interval of the gain on held-out poses.
+//! Confidence interval of the gain on held-out poses.
 
 use crate::select::settings::{INTERVAL_LEVEL, RESAMPLES};
 use std::collections::BTreeMap;
@@ -8,8 +8,8 @@ use nalgebra::Vector3;
 use super::super::data::{Data, bits};
 use crate::numeric::{Interval, mean_interval};
 
-/// Returns the mean reduction of the error on held-out rows of the kind in which errors are stated,
-/// \[m\] or \[rad\], with a bootstrap interval over configurations.
+/// Returns the mean reduction of the error on held-out rows of the leading kind, \[m\] or \[rad\],
+/// with a bootstrap interval over configurations.
 pub(super) fn gain(data: &Data, before: &[Vector3<f64>], after: &[Vector3<f64>]) -> Interval {
     let (rows, kind) = (&data.split.held_out, data.measurements.leading().kind());
     let mut groups: BTreeMap<Vec<u64>, Vec<f64>> = BTreeMap::new();

@@ -1,9 +1,9 @@
-//! The loop: one search for the effects that a problem lacks, by the evidence about its fits.
+//! The loop: search for the effects that a problem lacks, by the evidence about its fits.
 //!
-//! - `search`: evidence about a fit, its most probable set fitted, until both agree; `state`: the
-//!   fits made so far; `gears`: common prior of harmonics; `polish`: searched arguments on all rows.
-//! - `close`: the loop from the declared problem to its result; `found`, `status`, `interval`: what
-//!   is said of each effect, the verdict, and the gain on held-out poses.
+//! - `search`: evaluates the evidence about a fit and fits the most probable set, until both agree;
+//!   `state`: the fits made so far; `gears`: common prior of harmonics; `polish`: searched
+//!   arguments on all rows. - `close`: the loop from the declared problem to its result; `found`,
+//!   `status`, `interval`: claims about each effect, the verdict, and the gain on held-out poses.
 
 mod close;
 mod found;

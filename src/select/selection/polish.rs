@@ -1,5 +1,5 @@
-//! Searched arguments of the added effects on all rows: times between poses that the evidence did
-//! not see, and time constants, distances and orders between those that are listed.
+//! Refinement of searched arguments of the added effects on all rows: times between poses that the
+//! evidence did not use, and time constants, distances and orders between the listed ones.
 
 use nalgebra::DMatrix;
 
@@ -11,17 +11,17 @@ use crate::select::fitted::Fitted;
 use crate::select::neighbourhood::{LinearNeighbourhood, Score};
 use crate::select::settings::{LN_ODDS_OF_ANOTHER_ARGUMENT, MAX_SHIFT_TIMES};
 
-/// Maximum number of moves of one argument to the best of its neighbours.
+/// Maximum number of moves of one argument to the best of its neighbouring values.
 const MAX_POLISHING_PASSES: usize = 8;
-/// Factors of a time constant, distance or order that are tried in its place.
+/// Trial factors on a time constant, distance or order.
 const FACTORS: [f64; 10] = [0.8, 0.86, 0.91, 0.95, 0.98, 1.02, 1.05, 1.1, 1.16, 1.25];
 
-/// Returns the fit with the searched argument of each effect exchanged for the one that explains all
-/// identification rows best in the linear neighbourhood, where that is beyond doubt better; `None`
-/// where no argument is.
+/// Returns the fit with refined arguments. Each searched argument is replaced by the one that
+/// explains all identification rows best in the linear neighbourhood, if that is clearly better;
+/// `None` if none is.
 ///
 /// # Errors
-/// The fit fails, or the search was stopped.
+/// Returns an error if the fit fails or the search was stopped.
 pub(super) fn polished(
     state: &SearchState,
     fitted: &Fitted,
@@ -41,8 +41,8 @@ pub(super) fn polished(
     if effects == added { Ok(None) } else { state.fit(fitted, &effects).map(Some) }
 }
 
-/// Returns the effect with the argument that explains all rows best, `None` where its present one is
-/// not beyond doubt worse. The argument moves from neighbour to neighbour, at most
+/// Returns the effect with the argument that explains all rows best, `None` unless that is clearly
+/// better than the present one. The argument moves from neighbour to neighbour, at most
 /// `MAX_POLISHING_PASSES` times.
 fn better_argument(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<Effect> {
     let sums = fitted.around(data).sums();
@@ -72,8 +72,8 @@ fn better_argument(fitted: &Fitted, data: &Data, effect: &Effect) -> Option<Effe
     (best.0 > gain_of_present + LN_ODDS_OF_ANOTHER_ARGUMENT).then_some(best.1)
 }
 
-/// Returns the effect with other searched arguments: times between the poses up to the neighbouring
-/// listed times, or multiples.
+/// Returns the effect with neighbouring arguments: times between poses up to the neighbouring
+/// listed times, or multiples of the present value.
 fn nearby(data: &Data, effect: &Effect) -> Vec<Effect> {
     let time = match effect {
         Effect::StationShift { at_time } | Effect::StationMove { at_time } => *at_time,

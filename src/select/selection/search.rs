@@ -1,5 +1,5 @@
-//! The search: evidence about a fit, the effects of its most probable set fitted, until the fit
-//! holds the set that the evidence about it calls most probable.
+//! Search loop: evaluates the evidence about a fit and fits the effects of its most probable set,
+//! until the fit contains exactly these effects.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,13 +14,14 @@ use crate::select::fitted::Fitted;
 use crate::select::harmonic_prior::is_gear;
 use crate::select::settings::MAX_RIVALS;
 
-/// Runs the search from the fit of the declared problem. Returns the final fit, converged, and the
-/// evidence about it, `None` where its residual is not finite or the fit moved since. Evidence about
-/// a fit with periodic errors of many orders is evaluated under the prior of the largest evidence,
-/// the final fit has the prior that predicts best.
+/// Runs the search from the fit of the declared problem.
+///
+/// Returns the final, converged fit and the evidence about it; `None` if its residual is not finite
+/// or the fit changed since. With periodic errors of many orders, evidence is evaluated under the
+/// prior of the largest evidence, and the final fit has the prior that predicts best.
 ///
 /// # Errors
-/// A fit fails, or the search was stopped.
+/// Returns an error if a fit fails or the search was stopped.
 pub(super) fn search(
     state: &mut SearchState,
     first: Fitted,
@@ -95,7 +96,7 @@ fn settled_set(
     Ok((fitted, evidence))
 }
 
-/// Returns the fit repeated with the common prior of the harmonics that its coefficients show.
+/// Repeats the fit with the common prior of the harmonics estimated from its coefficients.
 fn with_estimated_prior(
     state: &mut SearchState,
     fitted: &Fitted,
@@ -108,8 +109,8 @@ fn with_estimated_prior(
     Ok(next)
 }
 
-/// Returns true if the effects of a set are those that were added, by a relation of two effects, and
-/// the set has no further periodic error.
+/// Returns true if the effects of a set are the `added` ones, compared by `is_same`, and the set
+/// contains no further periodic error.
 fn is_held(
     set: &HypothesisSet,
     added: &[Effect],
@@ -125,8 +126,8 @@ fn is_held(
         && unmatched.is_empty()
 }
 
-/// Returns the evidence with its rival sets evaluated at fits of their own, and the best of these
-/// fits where it is more probable than the one given.
+/// Returns the evidence with its rival sets evaluated at fits of these sets, and the best of these
+/// fits if it is more probable than the given one.
 fn refitted(
     state: &SearchState,
     fitted: &Fitted,
@@ -191,8 +192,8 @@ fn refitted(
     Ok((evidence.corrected(&best, &ln_odds_of), better))
 }
 
-/// Returns true if the most probable set about a fit holds its effects and at most so many functions
-/// without a law.
+/// Returns true if the most probable set about a fit contains its effects and at most `functions`
+/// functions without a law.
 fn is_confirmed(
     state: &SearchState,
     fitted: &Fitted,
@@ -207,7 +208,7 @@ fn is_confirmed(
     }))
 }
 
-/// Returns what `evaluate` returns, an error if the search was stopped meanwhile.
+/// Returns the result of `evaluate`, or an error if the search was stopped in the meantime.
 fn unless_stopped<T>(data: &Data, evaluate: impl FnOnce() -> T) -> Result<T, IdentifyError> {
     let value = evaluate();
     if data.stop.is_requested() { Err(IdentifyError::interrupted()) } else { Ok(value) }

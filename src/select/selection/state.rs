@@ -1,4 +1,4 @@
-//! State of one search: the fits made so far and how a set of effects is fitted.
+//! State of one search: the fits made so far, and how a set of effects is fitted.
 
 use std::collections::BTreeMap;
 
@@ -12,17 +12,18 @@ use crate::select::fitted::Fitted;
 use crate::select::harmonic_prior::{HarmonicPrior, is_gear};
 use crate::select::settings::MAX_RECONSIDERED;
 
-/// Steps of a fit on the way to the final one, for each fit of its size that `fit_work` pays for.
+/// Number of steps of an intermediate fit for each fit of its size that the budget `fit_work`
+/// allows.
 const STEPS_PER_PAID_FIT: u64 = 4;
 
-/// One round of the loop.
+/// Result of one round of the loop.
 #[derive(Debug, Clone)]
 pub struct Round {
-    /// Effects in the model after it.
+    /// Effects in the model after the round.
     pub effects: Vec<Effect>,
     /// Error on the identification poses.
     pub identification: ErrorSummary,
-    /// Error on held-out poses, which decided nothing.
+    /// Error on held-out poses, which had no influence on the choice of effects.
     pub held_out: ErrorSummary,
 }
 
@@ -30,22 +31,23 @@ pub struct Round {
 pub(super) struct SearchState<'a> {
     pub data: &'a Data<'a>,
     pub options: &'a Options,
-    /// Effects that the problem itself declares; they stay.
+    /// Effects that the problem itself declares; the search keeps them.
     pub declared: Vec<Effect>,
     /// Parameter rules that the problem itself declares.
     declared_rules: Vec<ParameterRule>,
-    /// Common prior of the harmonics of the next fit, where a joint has many.
+    /// Common prior of the harmonics of the next fit, if a joint has many orders.
     pub prior: Option<HarmonicPrior>,
     /// Common prior of the harmonics in the latest fit.
     pub prior_of_latest: Option<HarmonicPrior>,
-    /// Probability of the periodic error of each joint, from 1, when it was taken into the fit.
+    /// Probability of each joint's periodic error when it was added to the fit; joints count from
+    /// 1.
     pub gear_probability: BTreeMap<usize, f64>,
     pub rounds: Vec<Round>,
-    /// Fit of the latest round; of the declared problem before the first.
+    /// Fit of the latest round; before the first round, that of the declared problem.
     pub latest: Fitted,
-    /// Evidence about the latest fit, once it was evaluated.
+    /// Evidence about the latest fit, if it was evaluated.
     pub evidence: Option<Evidence>,
-    /// Sets of effects that were fitted.
+    /// Sets of effects that were fitted so far.
     fitted_sets: Vec<Vec<Effect>>,
 }
 
@@ -67,14 +69,15 @@ impl<'a> SearchState<'a> {
         }
     }
 
-    /// Reports progress: the current round begins fit number `fit` of `fits`; 0 while it evaluates
+    /// Reports that the current round begins fit number `fit` of `fits`; 0 while it evaluates
     /// evidence.
     pub fn report_progress(&self, fit: usize, fits: usize) {
         let (round, effects) = (self.rounds.len() + 1, || self.added(&self.latest));
         self.options.tell(|| Progress::Round { round, effects: effects(), fit, fits });
     }
 
-    /// Returns the effects of a fit that the search added; harmonics of one joint are one effect.
+    /// Returns those effects of a fit that the search added; harmonics of one joint form one
+    /// effect.
     pub fn added(&self, fitted: &Fitted) -> Vec<Effect> {
         let declared: Vec<Effect> = self.declared.iter().flat_map(Effect::parts).collect();
         let parts = fitted.effects().into_iter().flat_map(|effect| effect.parts());
@@ -83,9 +86,9 @@ impl<'a> SearchState<'a> {
             .fold(Vec::new(), |effects, part| joined(&effects, &part))
     }
 
-    /// Returns the added effects that evidence takes out of the fit and evaluates again. Periodic
-    /// errors of many orders stay in the fit; so do all effects where they are more than
-    /// `max_reconsidered`.
+    /// Returns the added effects that the evidence removes from the fit and evaluates again.
+    /// Periodic errors with many orders stay in the fit; if there are more than `MAX_RECONSIDERED`
+    /// effects, all stay.
     pub fn reconsidered(&self, fitted: &Fitted) -> Vec<Effect> {
         let effects: Vec<Effect> =
             self.added(fitted).into_iter().filter(|effect| !is_gear(effect)).collect();
@@ -99,10 +102,10 @@ impl<'a> SearchState<'a> {
         self.added(fitted).into_iter().filter(|effect| !open.contains(effect)).collect()
     }
 
-    /// Evaluates the evidence about a fit; `None` where its residual is not finite.
+    /// Evaluates the evidence about a fit; `None` if its residual is not finite.
     ///
     /// # Errors
-    /// The search was stopped.
+    /// Returns an error if the search was stopped.
     pub fn evaluate(&mut self, fitted: &Fitted) -> Result<Option<Evidence>, IdentifyError> {
         let evidence = evaluate(fitted, self.data, &self.reconsidered(fitted));
         if self.data.stop.is_requested() {
@@ -112,7 +115,8 @@ impl<'a> SearchState<'a> {
         Ok(evidence)
     }
 
-    /// Returns how many fits with as many unknowns as this one `fit_work` pays for, at least one.
+    /// Returns the number of fits, with as many unknowns as this one, that the budget `fit_work`
+    /// allows; at least one.
     pub fn paid_fits(&self, fitted: &Fitted) -> usize {
         self.paid_fits_of(fitted.unknowns.len())
     }
@@ -124,13 +128,13 @@ impl<'a> SearchState<'a> {
         count.max(1)
     }
 
-    /// Returns the declared effects with others.
+    /// Returns the declared effects followed by the `added` ones.
     pub fn with_declared(&self, added: &[Effect]) -> Vec<Effect> {
         added.iter().fold(self.declared.clone(), |effects, effect| joined(&effects, effect))
     }
 
-    /// Returns the problem of a fit with the declared effects and these others, under the common
-    /// prior of the harmonics where a joint has many.
+    /// Returns the problem with the declared and the `added` effects, with the common prior of the
+    /// harmonics if a joint has many orders.
     pub fn problem(&self, fitted: &Fitted, added: &[Effect]) -> Problem {
         let mut problem = fitted.with_effects(&self.with_declared(added));
         problem.parameters.clone_from(&self.declared_rules);
@@ -142,11 +146,11 @@ impl<'a> SearchState<'a> {
         problem
     }
 
-    /// Fits the declared problem with these effects, from where another fit ended, in as many steps
-    /// as `fit_work` pays for.
+    /// Fits the declared problem with the `added` effects, starting from the end of another fit.
+    /// The number of steps is limited by `fit_work`.
     ///
     /// # Errors
-    /// The fit fails or was stopped.
+    /// Returns an error if the fit fails or was stopped.
     pub fn fit(&self, from: &Fitted, added: &[Effect]) -> Result<Fitted, IdentifyError> {
         let problem = self.problem(from, added);
         let parameters = |effects: &[Effect]| -> usize {
@@ -166,9 +170,9 @@ impl<'a> SearchState<'a> {
         from.next(problem, self.data, &options)
     }
 
-    /// Returns the effects of a hypothesis set as the next fit holds them: its laws, its periodic
-    /// errors of many orders, and the effects that stay in the fit. Sets the common prior of the
-    /// harmonics where the set brings the first or a longer periodic error.
+    /// Returns the effects of a hypothesis set for the next fit: its laws, its periodic errors with
+    /// many orders, and the effects that stay in the fit. Sets the common prior of the harmonics if
+    /// the set contains the first or a longer periodic error.
     pub fn effects_of(
         &mut self,
         fitted: &Fitted,
@@ -192,8 +196,8 @@ impl<'a> SearchState<'a> {
         effects
     }
 
-    /// Returns 1 σ \[rad\] of the coefficients of a periodic error of `highest` orders that together
-    /// displace by `size` times the noise in root mean square.
+    /// Returns 1 σ \[rad\] of the coefficients of a periodic error with `highest` orders whose root
+    /// mean square displacement is `size` times the noise.
     fn coefficient_sigma(&self, fitted: &Fitted, joint: usize, highest: u32, size: f64) -> f64 {
         let rows = self.data.evidence_rows();
         let site = ParameterSite::coordinate(&fitted.problem, joint);
@@ -203,7 +207,7 @@ impl<'a> SearchState<'a> {
         if squares > 0.0 { size / squares.sqrt() } else { size }
     }
 
-    /// Gives orders up to `highest` that have no prior yet a σ \[rad\].
+    /// Adds orders up to `highest` to the prior, with σ \[rad\], if it lacks them.
     fn extend_prior(&mut self, highest: u32, sigma: f64) {
         let prior = self.prior.get_or_insert_with(|| HarmonicPrior { by_order: Vec::new() });
         let first = prior.by_order.last().map_or(1, |(order, _)| order + 1);
@@ -211,7 +215,7 @@ impl<'a> SearchState<'a> {
         *prior = prior.scaled(1.0);
     }
 
-    /// Records a fit as a round.
+    /// Records a fit as the result of a round.
     pub fn record(&mut self, fitted: &Fitted) {
         let errors = fitted.found.fitted;
         self.rounds.push(Round {
@@ -224,7 +228,7 @@ impl<'a> SearchState<'a> {
         self.evidence = None;
     }
 
-    /// Returns true if the effects of a fit were not fitted together before, and remembers them.
+    /// Returns true if the effects of a fit were not fitted together before, and records them.
     pub fn is_new(&mut self, fitted: &Fitted) -> bool {
         let effects = fitted.effects();
         let is_same = |known: &Vec<Effect>| {
