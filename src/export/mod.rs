@@ -1,9 +1,9 @@
 //! Export of an identified arm: C code that predicts poses and corrects commands, and tables of its
 //! best rigid geometry.
 //!
-//! The physics stands in hand-written templates (`c/`), which follow [`crate::mechanics`],
+//! Hand-written C templates (`c/`) contain the physics and follow [`crate::mechanics`],
 //! [`crate::model`] and [`crate::remainder`] equation by equation. Tables and formulas of laws are
-//! generated. The test program compares the code with this library.
+//! generated. The exported test program compares the C code with this library.
 
 mod answers;
 mod error;

@@ -1,4 +1,5 @@
-//! Corrections applied to other rows: predictions with their uncertainty, and commands.
+//! Applies corrections to rows that were not fitted: predictions with their uncertainty, and
+//! corrected commands.
 
 use nalgebra::{DVector, Vector3};
 
@@ -9,28 +10,28 @@ use crate::measurement::{Measurements, Split};
 use crate::model::Model;
 use crate::problem::Problem;
 
-/// Corrections of commands have settled when a pass changes them by less \[m\].
+/// Largest change of the corrections \[m\] in one pass at which the commands have converged; far
+/// below the accuracy of any arm.
 const SETTLED: f64 = 1e-11;
-/// Passes after which a command that does not settle is taken as it is: its miss says how good it
-/// is.
+/// Maximum number of passes. A command that has not converged by then is returned as it is; its
+/// `miss` states how far it is off.
 const MAX_PASSES: usize = 12;
 
-/// What a corrected arm makes of some rows.
+/// Prediction of rows by an arm with its correction.
 #[derive(Debug, Clone)]
 pub struct CorrectedPrediction {
-    /// Positions with their corrections, residuals and errors.
+    /// Corrected positions, with residuals and errors if the rows were measured.
     pub prediction: Prediction,
     /// Correction and uncertainty of each row.
     pub poses: Vec<CorrectedPose>,
 }
 
-/// Predicts `rows` with the arm identified in `estimate` and its correction, as [`fit::predict`].
+/// Predicts `rows` as [`fit::predict`] does, and adds the correction to the positions.
 ///
-/// Bases and tools of sessions that the estimate lacks are fitted to what the correction leaves of
-/// their rows.
+/// Bases and tools of sessions that the estimate lacks are fitted to the corrected rows.
 ///
 /// # Errors
-/// As [`fit::predict`].
+/// Returns the errors of [`fit::predict`].
 pub fn predict(
     problem: &Problem,
     estimate: &SavedEstimate,
@@ -60,7 +61,9 @@ pub fn predict(
     Ok(CorrectedPrediction { prediction, poses: corrected })
 }
 
-/// The same rows as measured of an arm without these shifts.
+/// Returns the rows with `shifts` \[m\] subtracted from their measured positions: what an arm
+/// without these errors would have measured. A shift with NaN, from an arm without equilibrium, is
+/// skipped.
 fn shifted(rows: &Measurements, shifts: &[Vector3<f64>]) -> Measurements {
     let mut rows = rows.clone();
     let of_rows = rows.positions.iter_mut().zip(shifts);
@@ -73,15 +76,15 @@ fn shifted(rows: &Measurements, shifts: &[Vector3<f64>]) -> Measurements {
     rows
 }
 
-/// Commands that bring the corrected arm to `targets`, as [`fit::compensate`], each with its
-/// uncertainty.
+/// Computes the commands that bring the corrected arm to `targets`, as [`fit::compensate`] does for
+/// the arm without correction. Each is returned with the uncertainty of its position.
 ///
-/// Newton's method on the corrected model: the correction is taken at the command found so far,
-/// until it settles. Its slope is some thousandths of the arm's, so that each pass gains about two
-/// digits.
+/// In each pass the correction is evaluated at the commands of the previous pass and subtracted
+/// from the targets, until it no longer changes. The derivative of the correction is some
+/// thousandths of the derivative of the position. Each pass therefore gains two or more digits.
 ///
 /// # Errors
-/// As [`fit::compensate`].
+/// Returns the errors of [`fit::compensate`].
 pub fn compensate(
     problem: &Problem,
     model: &Model,

@@ -1,17 +1,19 @@
-//! Blocks of neighbouring configurations, to be left out together.
+//! Blocks of neighbouring configurations, which are left out together to test predictions far from
+//! the data.
 
 use rand::seq::SliceRandom as _;
 
 use super::rows::{Inputs, Rows};
 use crate::random::stream;
 
-/// Seed of the first centres of blocks.
+/// Seed of the random choice of initial block centres.
 const SEED: u64 = 0x0062_6c6f_636b;
-/// Passes of Lloyd's method.
+/// Maximum number of passes of Lloyd's method (k-means), each of which assigns rows and moves the
+/// centres.
 const MAX_PASSES: usize = 30;
 
-/// Number of the block of each row: at most `count` clusters of (sin q, cos q), and of standardised
-/// values of other inputs, by k-means.                                             [Lloyd 1982]
+/// Returns the index of each row's block. Blocks are at most `count` clusters by k-means, in (sin
+/// q, cos q) of angles and standardised values of other inputs. [Lloyd 1982]
 pub(super) fn blocks(rows: &Rows, inputs: &Inputs, count: usize) -> Vec<usize> {
     let points: Vec<Vec<f64>> =
         (0..rows.len()).map(|row| point(rows.inputs_of(row), inputs)).collect();
@@ -54,7 +56,7 @@ fn point(inputs: &[f64], kinds: &Inputs) -> Vec<f64> {
     .collect()
 }
 
-/// Place of the centre nearest to a point.
+/// Returns the index of the centre nearest to a point.
 fn nearest(point: &[f64], centres: &[Vec<f64>]) -> usize {
     let distance = |centre: &Vec<f64>| -> f64 {
         centre.iter().zip(point).map(|(a, b)| (a - b) * (a - b)).sum()

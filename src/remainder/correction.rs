@@ -13,60 +13,63 @@ use crate::fit::Identification;
 use crate::model::{Model, Pose};
 use crate::problem::{PoseView, Problem};
 
-/// Share of a remainder below which a pose counts as extrapolated.
+/// Share of the correction that is applied, 0 to 1, below which a pose counts as extrapolated.
 const MIN_SHARE: f64 = 0.5;
-/// Part of the range of a command by which a pose may lie outside of it.
+/// Margin on either side of an input's measured range, as a fraction of the range, within which a
+/// pose is not extrapolated.
 const RANGE_MARGIN: f64 = 0.02;
-/// Poses that are corrected together: their features take some 10 MB.
+/// Number of poses corrected at a time, which limits the matrix of features to about 10 MB.
 const CHUNK: usize = 400;
 
-/// Correction of the positions that an identified arm predicts, with the uncertainty of what is
-/// predicted.
+/// Correction of the positions that an identified arm predicts, with their uncertainty.
 ///
-/// At a pose it is w(q) (J δ + Σⱼ Aⱼ eⱼ(q)): the parameters' change δ beside the remainder, and an
-/// error eⱼ of each joint, carried by the columns Aⱼ of the arm's Jacobian. The share w falls to 0
-/// where no measured pose is near. Without a remainder the correction is 0.
+/// At a pose with inputs q, the correction is w(q) (J δ + Σⱼ Aⱼ eⱼ(q)). δ is the change of the
+/// parameters when they are fitted together with the remainder, and J the Jacobian of the position.
+/// eⱼ is the error of joint j, and Aⱼ the derivative of the position with respect to it. The share
+/// w falls to 0 far from all measured poses. Without a remainder the correction is 0.
 #[derive(Debug, Clone)]
 pub struct Correction {
-    /// Name of the problem and digest of the declared arm.
+    /// Name of the problem, and digest of the declared arm, that the correction was fitted to.
     pub(super) problem: String,
     pub(super) arm_digest: String,
-    /// 1 σ of rows for which the table has none \[m\].
+    /// 1 σ of the noise of rows for which the table gives none \[m\].
     pub(super) sigma: f64,
     pub(super) layout: Layout,
-    /// Free parameters, in the order of the posterior's columns.
+    /// Free parameters, in the order of the posterior's parameter columns.
     pub(super) parameters: Vec<Linearised>,
     pub(super) posterior: Posterior,
-    /// Scores of the rows fitted, left out.
+    /// Ratios of error to expected error of training rows that were left out.
     pub(crate) scores: Scores,
 }
 
-/// A free parameter that a correction was linearised about.
+/// Free parameter, with the value about which the arm was linearised.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Linearised {
     pub name: String,
-    /// Deviation from nominal at the fit.
+    /// Deviation of the estimate from the nominal value, SI.
     pub deviation: f64,
-    /// Estimated value \[SI\].
+    /// Estimated value, SI.
     pub estimate: f64,
 }
 
 /// Correction of one predicted position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CorrectedPose {
-    /// What is added to the position that the identified arm predicts, measuring frame \[m\].
+    /// Vector that is added to the predicted position, measuring frame \[m\].
     pub shift: Vector3<f64>,
-    /// 1 σ of measured − predicted along each axis \[m\].
+    /// 1 σ of measured − predicted along each axis \[m\], including the noise of the measurement.
     pub sigma: Vector3<f64>,
-    /// Expected root mean square length of measured − predicted \[m\]; [`Scores::quantile`] times
-    /// this is a bound.
+    /// Expected root mean square of the error length ‖measured − predicted‖ \[m\]. Its product with
+    /// [`Scores::quantile`] is an error bound.
     pub size: f64,
-    /// True where the pose lies outside of what was measured.
+    /// True if the pose lies outside the measured range, or too far from measured poses to apply
+    /// half of the correction.
     pub is_extrapolated: bool,
 }
 
 impl Correction {
-    /// Correction of the arm identified in `found`, whose free parameters are `unknowns`.
+    /// Creates the correction of the arm identified in `found`, whose free parameters have the
+    /// indices `unknowns`.
     pub(super) fn new(
         found: &Identification,
         problem: &Problem,
@@ -94,32 +97,33 @@ impl Correction {
         }
     }
 
-    /// True if joints are corrected: if a remainder is applied.
+    /// Returns true if the correction contains a remainder, so that positions change.
     pub(crate) fn has_remainder(&self) -> bool {
         self.posterior.hyper.sites() > 0
     }
 
-    /// Joints whose errors the remainder describes, counted from 0.
+    /// Returns the indices of the joints whose coordinate errors the remainder describes, counted
+    /// from 0.
     pub(crate) fn joints(&self) -> Vec<usize> {
         let coordinates = self.layout.sites.iter().filter(|of| of.kind == SiteKind::Coordinate);
         coordinates.map(|site| site.joint).collect()
     }
 
-    /// Names of the quantities on which the joints' errors depend: `q1`, …, `temperature`,
-    /// `payload`, `hoist`.
+    /// Returns the names of the quantities on which the joints' errors depend: `q1`, …,
+    /// `temperature`, `payload`, `hoist`.
     pub(crate) fn inputs(&self) -> Vec<String> {
         self.layout.inputs.sources.iter().map(|source| source.name()).collect()
     }
 
-    /// Names of the free parameters and the posterior covariance of their deviations from nominal,
-    /// shape = (parameters, parameters).
+    /// Returns the names of the free parameters, and the posterior covariance of their deviations
+    /// from nominal, shape = (parameters, parameters).
     pub(crate) fn parameter_covariance(&self) -> (Vec<&str>, DMatrix<f64>) {
         let names = self.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
         (names, self.posterior.parameter_covariance())
     }
 
-    /// Corrections of `poses`, with the arm at the full parameter vector `x` of `model`; NaN where
-    /// a pose has no equilibrium.
+    /// Returns the corrections of `poses`, with the arm at the full parameter vector `x` of
+    /// `model`. They are NaN for poses without equilibrium.
     pub(crate) fn at(
         &self,
         problem: &Problem,
@@ -185,7 +189,8 @@ impl Correction {
         self.posterior.at(rows).into_iter().enumerate().map(one).collect()
     }
 
-    /// True if an input lies outside of the range that was measured, or is not stated.
+    /// Returns true if an input lies outside its measured range by more than the margin. An input
+    /// that the pose does not state counts as inside.
     fn is_outside(&self, setup: &PoseView) -> bool {
         let inputs = &self.layout.inputs;
         inputs.sources.iter().zip(&inputs.ranges).any(|(source, &(low, high))| {

@@ -1,4 +1,5 @@
-//! Cross-validation of few configurations, with hyperparameters that did not see them.
+//! Cross-validation for few configurations: each fold is predicted with hyperparameters fitted to
+//! the other folds.
 
 use super::hyperparameter_search::search_near;
 use super::posterior::Training;
@@ -6,14 +7,15 @@ use super::scores::{LeftOutError, left_out_errors};
 use super::search::Minimum;
 use super::training_rows::TrainingRows;
 
-/// Maximum configurations that are cross-validated with other hyperparameters in each fold. With
-/// more of them the hyperparameters, some 25, no longer follow single configurations.
+/// Maximum number of configurations for which every fold gets its own hyperparameters. With more
+/// configurations, the about 25 hyperparameters hardly depend on any one of them.
 pub(super) const MAX_CONFIGURATIONS: usize = 100;
-/// Maximum folds.
+/// Maximum number of folds.
 const FOLDS: usize = 10;
 
-/// Errors of each row predicted from the other folds, with the parameters alone and with a
-/// remainder; `near` is the optimum of all rows. `None` where rounding spoils a factorisation.
+/// Returns the error of each row predicted from the other folds: first with the parameters alone,
+/// then with a remainder. `near` is the optimum of the hyperparameters on all rows. Returns `None`
+/// if a matrix is not positive definite because of rounding.
 pub(super) fn cross_validated(
     training: &TrainingRows,
     near: &Minimum,

@@ -1,4 +1,5 @@
-//! Fits a remainder beside the parameters of an identification, and decides whether it is kept.
+//! Fits a remainder together with the parameters of an identification, and decides whether to keep
+//! it.
 
 use std::collections::HashSet;
 
@@ -13,32 +14,34 @@ use crate::measurement::Dataset;
 use crate::model::Model;
 use crate::problem::{Observation, Problem};
 
-/// Minimum configurations from which errors of predictions are judged.
+/// Minimum number of configurations for which the uncertainty of predictions is estimated.
 const MIN_CONFIGURATIONS: usize = 10;
-/// Maximum rows that a correction is fitted to.
+/// Maximum number of rows to which a correction is fitted.
 const MAX_ROWS: usize = 10_000;
-/// What left-out configurations say of the predictions of an identified arm.
+/// Uncertainty of an identified arm's predictions, with and without a remainder, from
+/// configurations that were left out.
 #[derive(Debug, Clone)]
 pub struct Fitted {
-    /// The identified arm itself, with the uncertainty of its predictions.
+    /// Identified arm without a remainder, with the uncertainty of its predictions.
     pub alone: Correction,
-    /// The arm corrected by a remainder, if that is kept.
+    /// Identified arm with a remainder; `None` if the remainder is not kept.
     pub remainder: Option<Correction>,
-    /// What a remainder gains on configurations left out, whether it is kept or not.
+    /// Gain in accuracy by the remainder on left-out configurations, whether it is kept or not.
     #[doc(hidden)]
     pub gain: Option<Gain>,
-    /// What the corrected arm leaves of all rows, where a remainder is kept.
+    /// Residuals of all rows with the corrected arm; `None` if no remainder is kept.
     #[doc(hidden)]
     pub residuals: Option<CorrectedResiduals>,
-    /// True if the remainder was read from a file that the problem declares.
+    /// True if the remainder was read from a file that the problem names.
     pub is_declared: bool,
 }
 
 impl Fitted {
-    /// The same predictions with a remainder that the problem declares.
+    /// Returns the same result with a remainder that the problem declares instead of the fitted
+    /// one.
     ///
     /// # Errors
-    /// Problem and data are not those identified.
+    /// Returns an error if `problem` and `data` are not those that were identified.
     pub(crate) fn with_declared(
         self,
         remainder: Correction,
@@ -50,14 +53,14 @@ impl Fitted {
     }
 }
 
-/// Fits a remainder to the identification rows of `data` that are no outliers, beside the
-/// parameters of `found`, and keeps it if configurations left out gain by more than three standard
-/// errors.
+/// Fits a remainder and the parameters of `found` to the identification rows of `data` that are no
+/// outliers. The remainder is kept if it predicts left-out configurations significantly better
+/// ([`Gain::is_significant`]).
 ///
-/// Returns `None` for data that do not consist of positions, or have fewer than ten configurations.
+/// Returns `None` if some rows measure no position, or there are fewer than ten configurations.
 ///
 /// # Errors
-/// Problem and data are not those identified.
+/// Returns an error if `problem` and `data` are not those that were identified.
 pub fn fit(
     found: &Identification,
     problem: &Problem,
@@ -66,10 +69,11 @@ pub fn fit(
     fitted((found, problem), data, true)
 }
 
-/// Uncertainty of the predictions of `found` without a remainder, as [`fit`].
+/// Estimates the uncertainty of the predictions of `found` without fitting a remainder. The
+/// conditions on the data are those of [`fit`].
 ///
 /// # Errors
-/// As [`fit`].
+/// Returns the errors of [`fit`].
 pub fn uncertainty(
     found: &Identification,
     problem: &Problem,
@@ -97,7 +101,8 @@ fn fitted(
     Ok(Some(Fitted { alone, remainder, gain: judged.gain, residuals, is_declared: false }))
 }
 
-/// Linearises the rows of an identification; `None` if a remainder and bounds cannot be fitted.
+/// Linearises the rows of an identification. Returns `None` if they do not suffice to estimate the
+/// uncertainty of predictions.
 fn training_rows(
     found: &Identification,
     problem: &Problem,
@@ -132,8 +137,8 @@ fn training_rows(
     (is_usable && enough).then_some(training)
 }
 
-/// Identification rows that are no outliers, evenly spaced ones where they are very many;
-/// `None` where some measure no position.
+/// Returns the identification rows that are no outliers; above [`MAX_ROWS`], every n-th of them.
+/// Returns `None` if some measure no position.
 fn fitted_rows(found: &Identification, data: &Dataset) -> Option<Vec<usize>> {
     let outliers: HashSet<usize> = found.outliers.iter().map(|outlier| outlier.row).collect();
     let rows = data.split.identification.iter().copied().filter(|row| !outliers.contains(row));

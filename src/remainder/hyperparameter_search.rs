@@ -8,20 +8,20 @@ use super::rows::Rows;
 use super::search::{Minimum, minimise};
 use super::training_rows::TrainingRows;
 
-/// Maximum rows from which hyperparameters are searched, and then refined: the time grows with
-/// their cube.
+/// Maximum number of rows in the search of the hyperparameters, and in the refinement after it. The
+/// time grows with the cube of this number.
 const MAX_SEARCH_ROWS: [usize; 2] = [120, 400];
-/// Lengths ℓᵤ and ℓᵥ from which hyperparameters are searched: each start reaches another optimum on
-/// some of the arms measured.
+/// Initial lengths ℓᵤ and ℓᵥ, in rad or standard deviations, of the searches. For each start there
+/// is a measured arm on which it reaches the best optimum.
 const STARTS: [[f64; 2]; 3] = [[1.0, 1.0], [0.15, 0.15], [0.1, 3.0]];
-/// Maximum steps of the search from each start, and of the refinement.
+/// Maximum number of steps of the search from each start, and of the refinement.
 const MAX_STEPS: [usize; 2] = [60, 20];
 
-/// Hyperparameters at a maximum of the marginal likelihood.
+/// Hyperparameters at a local maximum of the marginal likelihood.
 pub(super) struct Searched {
     pub hyper: Hyperparameters,
     pub minimum: Minimum,
-    /// Rise of the logarithm of the likelihood over noise alone.
+    /// Increase of the logarithm of the marginal likelihood over that of noise alone.
     pub evidence: f64,
 }
 
@@ -31,8 +31,8 @@ fn likelihood<'a>(training: &'a TrainingRows, rows: &'a Rows) -> MarginalLikelih
     MarginalLikelihood::new(rows, &training.prior, shares_noise, training.size)
 }
 
-/// Searches a local maximum of the marginal likelihood: on few of the rows from every start, taken
-/// where rows left out are predicted best, refined on more rows.
+/// Searches a local maximum of the marginal likelihood. The search runs on few rows from every
+/// start; the optimum that predicts left-out rows best is then refined on more rows.
 pub(super) fn search(training: &TrainingRows) -> Option<Searched> {
     let [few, more] =
         MAX_SEARCH_ROWS.map(|count| training.rows.select(&training.some_rows(count, 0)));
@@ -54,7 +54,7 @@ pub(super) fn search(training: &TrainingRows) -> Option<Searched> {
     Some(Searched { hyper, minimum, evidence })
 }
 
-/// Maximum of the likelihood of `rows` near one that was found on `count` others.
+/// Returns the optimum for `rows` near the optimum `near`, which was found on `count` other rows.
 fn refine(training: &TrainingRows, rows: &Rows, near: &Minimum, count: usize) -> Option<Minimum> {
     let refined = likelihood(training, rows);
     let inverse = &near.inverse * (count as f64 / rows.len() as f64);
@@ -62,7 +62,7 @@ fn refine(training: &TrainingRows, rows: &Rows, near: &Minimum, count: usize) ->
     minimise(value, (near.at.clone(), Some(inverse)), &refined.bounds(), MAX_STEPS[1])
 }
 
-/// Hyperparameters of part of the rows, near the optimum of all of them.
+/// Returns the hyperparameters fitted to a part of the rows, starting near the optimum of all rows.
 pub(super) fn search_near(
     training: &TrainingRows,
     rows: &Rows,
@@ -72,7 +72,7 @@ pub(super) fn search_near(
     Some(likelihood(training, rows).hyperparameters(&minimum.at))
 }
 
-/// Mean error of rows predicted without their configuration \[m\].
+/// Returns the mean error length of rows that are predicted without their configuration \[m\].
 fn left_out_error(training: &TrainingRows, rows: &Rows, hyper: &Hyperparameters) -> Option<f64> {
     let centres: Vec<usize> = (0..rows.len()).collect();
     let inputs = &training.layout.inputs;

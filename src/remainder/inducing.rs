@@ -1,36 +1,38 @@
-//! Inducing variables: values of the remainder about which its functions are expanded.
+//! Inducing variables: the values of the remainder on which its Gaussian processes are conditioned
+//! instead of on all rows.
 
 use nalgebra::DMatrix;
 
 use super::kernel::{Hyperparameters, covariance, matern, squared_distance};
 use super::rows::{AXES, Inputs, Rows};
 
-/// Knots of a function per length ℓᵤ.
+/// Number of knots of a joint's function uⱼ per length ℓᵤ.
 const KNOTS_PER_LENGTH: f64 = 2.0;
-/// Maximum knots of the function of one site.
+/// Maximum number of knots of one site's function uⱼ.
 const MAX_KNOTS: usize = 90;
 
-/// Values that carry the remainder: of its effect on the target at some rows, and of the functions
-/// uⱼ of single joints at knots.
+/// Inducing variables: the remainder's shift of the position at some rows, and the values of the
+/// functions uⱼ of single joints at knots.
 #[derive(Debug, Clone)]
 pub(super) struct Inducing {
-    /// Rows with three values each; their residuals and Jacobians are not used.
+    /// Rows at which the shift of the position (three coordinates) is an inducing variable. Their
+    /// residuals and Jacobians are not used.
     pub centres: Rows,
-    /// Values of functions of single joints.
+    /// Knots of the functions uⱼ of single joints.
     pub knots: Vec<Knot>,
 }
 
-/// Value of the function uⱼ of a site.
+/// Inducing variable: the value of a site's function uⱼ at one value of its input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Knot {
     pub site: usize,
-    /// Input of the site in its standardised unit.
+    /// Value of the site's input: \[rad\] for angles, otherwise in standard deviations.
     pub at: f64,
 }
 
 impl Inducing {
-    /// Inducing variables at `centres`, places among the rows; functions of single joints get knots
-    /// over the range of the rows as well, unless all rows are centres.
+    /// Creates the inducing variables at the rows with the indices `centres`. Unless these are all
+    /// rows, functions of single joints also get knots over the range of the rows.
     pub fn new(rows: &Rows, centres: &[usize], hyper: &Hyperparameters, inputs: &Inputs) -> Self {
         let is_exact = hyper.sites() == 0 || centres.len() == rows.len();
         let centres = rows.select(if hyper.sites() == 0 { &[] } else { centres });
@@ -54,12 +56,13 @@ impl Inducing {
         Self { centres, knots: knots.collect() }
     }
 
-    /// Number of inducing variables.
+    /// Returns the number of inducing variables.
     pub fn len(&self) -> usize {
         AXES * self.centres.len() + self.knots.len()
     }
 
-    /// Covariance of the remainder at `rows` with the inducing variables, shape = (3 rows, len).
+    /// Returns the covariance of the remainder at `rows` with the inducing variables, shape = (3
+    /// rows, len).
     pub fn cross(&self, hyper: &Hyperparameters, inputs: &Inputs, rows: &Rows) -> DMatrix<f64> {
         let width = AXES * self.centres.len();
         let cross = covariance(hyper, inputs, rows, &self.centres);
@@ -81,7 +84,7 @@ impl Inducing {
         cross
     }
 
-    /// Covariance of the inducing variables.
+    /// Returns the covariance matrix of the inducing variables, shape = (len, len).
     pub fn covariance(&self, hyper: &Hyperparameters, inputs: &Inputs) -> DMatrix<f64> {
         let first = AXES * self.centres.len();
         let mut whole = self.cross(hyper, inputs, &self.centres).resize_vertically(self.len(), 0.0);
@@ -98,12 +101,14 @@ impl Inducing {
     }
 }
 
-/// Place of the input that is the command of a site.
+/// Returns the index of the input that is the command of the site's joint; `None` if the site has
+/// no function of its own command.
 fn input_of(inputs: &Inputs, site: usize) -> Option<usize> {
     inputs.sites[site].single
 }
 
-/// Covariance of the function of a single joint between a knot and a value of its input \[m²\].
+/// Returns the covariance of a site's function uⱼ at a knot with the same function at `value`
+/// \[m²\].
 fn single_covariance(hyper: &Hyperparameters, inputs: &Inputs, knot: &Knot, value: f64) -> f64 {
     let is_angle = input_of(inputs, knot.site).is_some_and(|input| inputs.angles[input]);
     let squared = squared_distance(is_angle, value - knot.at);

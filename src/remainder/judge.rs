@@ -1,4 +1,5 @@
-//! Conditions parameters with and without a remainder on the training rows, and judges both.
+//! Conditions the parameters on the training rows, with and without a remainder, and tests both on
+//! left-out rows.
 
 use super::blocks::blocks;
 use super::cross_validation::{MAX_CONFIGURATIONS, cross_validated};
@@ -10,28 +11,30 @@ use super::rows::AXES;
 use super::scores::{LeftOutError, Scores, left_out_errors};
 use super::training_rows::TrainingRows;
 
-/// Minimum configurations to which a remainder is fitted.
+/// Minimum number of configurations to which a remainder is fitted.
 const MIN_CONFIGURATIONS_FOR_REMAINDER: usize = 20;
-/// Number of blocks of neighbouring configurations that are left out.
+/// Number of blocks of neighbouring configurations, each of which is left out once.
 const BLOCKS: usize = 10;
-/// Minimum configurations of a block on average.
+/// Minimum mean number of configurations in a block; with few configurations there are fewer
+/// blocks.
 const MIN_BLOCK: usize = 3;
 
-/// Posterior with the scores of its training rows, left out.
+/// Posterior distribution, with the scores of training rows that were left out.
 pub(super) struct Conditioned {
     pub posterior: Posterior,
     pub scores: Scores,
 }
 
-/// Predictions with and without a remainder.
+/// Posterior with the parameters alone, and with a remainder in addition.
 pub(super) struct Judged {
     pub alone: Conditioned,
-    /// Predictions with the remainder if it is kept.
+    /// Posterior with a remainder; `None` if the remainder is not kept.
     pub remainder: Option<Conditioned>,
     pub gain: Option<Gain>,
 }
 
-/// Predictions with and without a remainder; `None` where rounding spoils a factorisation.
+/// Conditions on the training rows with the parameters alone and, if wanted, with a remainder.
+/// Returns `None` if a matrix is not positive definite because of rounding.
 pub(super) fn judge(training: &TrainingRows, is_remainder_wanted: bool) -> Option<Judged> {
     let count = BLOCKS.min(training.configurations.len() / MIN_BLOCK).max(2);
     let block = blocks(&training.rows, &training.layout.inputs, count);
@@ -85,8 +88,8 @@ pub(super) fn judge(training: &TrainingRows, is_remainder_wanted: bool) -> Optio
     Some(Judged { remainder, gain: Some(gain), ..without })
 }
 
-/// Factor of the bounds that accounts for hyperparameters that few configurations determine:
-/// √(m / (m − k)) of m coordinates and k hyperparameters.
+/// Returns the factor by which error bounds grow because hyperparameters were fitted to the same
+/// rows. It is √(m / (m − k)), with m coordinates and k hyperparameters.
 fn inflation(configurations: usize, hyperparameters: usize) -> f64 {
     let coordinates = (AXES * configurations) as f64;
     (coordinates / (coordinates - hyperparameters as f64).max(1.0)).sqrt()

@@ -1,5 +1,5 @@
-//! Covariance of the remainder between poses: Matérn 5/2 processes of joint errors, carried to the
-//! target by the arm's Jacobian.
+//! Covariance of the remainder between poses. Matérn 5/2 processes describe joint errors, and the
+//! arm's Jacobian maps these to the measured position.
 
 use nalgebra::{DMatrix, Matrix3};
 use rayon::prelude::*;
@@ -8,30 +8,32 @@ use super::rows::{AXES, Inputs, Rows};
 
 /// Hyperparameters of the remainder.
 ///
-/// The error of site j is uⱼ(qⱼ) + vⱼ(q), with uⱼ ~ GP(0, a²ᵤⱼ k(·/ℓᵤⱼ)) a function of the joint's
-/// own command and vⱼ ~ GP(0, a²ᵥⱼ k(·/ℓᵥ)) a function of all inputs, each with a length in ℓᵥ; k is
-/// the Matérn 5/2 correlation. Measurements add σ² for each coordinate and σ_c² that rows of one
-/// configuration share.
+/// The error at the coordinate of joint j is uⱼ(qⱼ) + vⱼ(q). uⱼ ~ GP(0, a²ᵤⱼ k(·/ℓᵤⱼ)) is a
+/// function of the joint's own command. vⱼ ~ GP(0, a²ᵥⱼ k(·/ℓᵥ)) is a function of all inputs, with
+/// one length ℓᵥ for each input. k is the Matérn 5/2 correlation. The measurement adds noise of
+/// variance σ² to each coordinate, and noise of variance σ_c² that rows of one configuration share.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Hyperparameters {
-    /// aᵤⱼ of each site: 1 σ of its effect on the target \[m\].
+    /// Amplitude aᵤⱼ of each site: 1 σ of uⱼ's effect on the position \[m\].
     pub single: Vec<f64>,
-    /// aᵥⱼ of each site, likewise \[m\].
+    /// Amplitude aᵥⱼ of each site: 1 σ of vⱼ's effect on the position \[m\].
     pub joint: Vec<f64>,
-    /// a of the constant of each site, likewise \[m\].
+    /// 1 σ of the effect of each site's constant error on the position \[m\].
     pub constant: Vec<f64>,
-    /// ℓᵤⱼ of each site: \[rad\] for revolute joints, standard deviations of other inputs.
+    /// Length ℓᵤⱼ of each site: \[rad\] for revolute joints, in standard deviations of the input
+    /// for others.
     pub single_lengths: Vec<f64>,
-    /// ℓᵥ of each input, in the same units.
+    /// Length ℓᵥ of each input: \[rad\] for angles, in standard deviations of the input for others.
     pub joint_lengths: Vec<f64>,
-    /// σ \[m\].
+    /// 1 σ of the independent noise of each coordinate \[m\].
     pub noise: f64,
-    /// σ_c \[m\]; 0 where no configuration is measured twice.
+    /// 1 σ of the noise σ_c that rows of one configuration share \[m\]; 0 if no configuration is
+    /// repeated.
     pub shared_noise: f64,
 }
 
 impl Hyperparameters {
-    /// Hyperparameters of a model without a remainder.
+    /// Creates the hyperparameters of a model that has parameters and noise, but no remainder.
     pub fn without_remainder(noise: f64, shared_noise: f64) -> Self {
         Self {
             single: Vec::new(),
@@ -44,24 +46,26 @@ impl Hyperparameters {
         }
     }
 
-    /// Number of sites that err; 0 without a remainder.
+    /// Returns the number of sites at which joint errors are modelled; 0 without a remainder.
     pub fn sites(&self) -> usize {
         self.single.len()
     }
 
-    /// Prior variance of the error at a site \[m²\].
+    /// Returns the prior variance of the error at a site, as motion of the position \[m²\].
     pub fn site_variance(&self, site: usize) -> f64 {
         [self.single[site], self.joint[site], self.constant[site]].iter().map(|a| a * a).sum()
     }
 
-    /// Variance of the noise of one coordinate of a row with this relative σ \[m²\].
+    /// Returns the noise variance of one coordinate of a row \[m²\]; `relative_sigma` is the row's
+    /// σ in units of the default σ.
     pub fn noise_variance_of(&self, relative_sigma: f64) -> f64 {
         (self.noise * relative_sigma).powi(2) + self.shared_noise.powi(2)
     }
 }
 
-/// Matérn 5/2 correlation at the squared scaled distance d², (1 + √5 d + 5/3 d²) exp(−√5 d), and
-/// its derivative with respect to −½ d², both  [Rasmussen & Williams 2006, eq. 4.17]
+/// Returns the Matérn 5/2 correlation (1 + √5 d + 5/3 d²) exp(−√5 d) at `squared` = d², and its
+/// derivative with respect to −½ d². d is a distance in units of the length ℓ. [Rasmussen &
+/// Williams 2006, eq. 4.17]
 #[inline]
 pub(super) fn matern(squared: f64) -> (f64, f64) {
     let scaled = (5.0 * squared).sqrt();
@@ -70,8 +74,8 @@ pub(super) fn matern(squared: f64) -> (f64, f64) {
     (correlation, 5.0 / 3.0 * (1.0 + scaled) * decay)
 }
 
-/// Coordinates in which squared distances of inputs are sums of squares, shape = (2 inputs, rows):
-/// (cos q, sin q) of angles, (x, 0) of standardised values.
+/// Maps each input to two coordinates whose squared differences add up to the squared distance,
+/// shape = (2 inputs, rows). Angles become (cos q, sin q), other inputs (x, 0).
 pub(super) fn embedded(inputs: &Inputs, rows: &Rows) -> DMatrix<f64> {
     DMatrix::from_fn(2 * inputs.angles.len(), rows.len(), |k, row| {
         let value = rows.inputs[(k / 2, row)];
@@ -84,13 +88,13 @@ pub(super) fn embedded(inputs: &Inputs, rows: &Rows) -> DMatrix<f64> {
     })
 }
 
-/// Squared distance between two values of an input: (2 sin Δ/2)² of angles, Δ² of standardised
-/// values of others.
+/// Returns the squared distance between two values of an input that differ by Δ: the chord (2 sin
+/// Δ/2)² of angles, Δ² of other inputs.
 pub(super) fn squared_distance(is_angle: bool, difference: f64) -> f64 {
     if is_angle { (2.0 * (0.5 * difference).sin()).powi(2) } else { difference * difference }
 }
 
-/// Squared distance of two rows in each input: (2 sin Δ/2)² of angles, Δ² of standardised values.
+/// Returns the squared distance between two rows in each input, from coordinates by [`embedded`].
 #[inline]
 pub(super) fn squared_distances<'a>(
     first: &'a [f64],
@@ -100,19 +104,19 @@ pub(super) fn squared_distances<'a>(
     pairs.map(|(a, b)| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2))
 }
 
-/// Covariances of the errors of the sites at two poses \[m²\].
+/// Covariances of the site errors between two poses \[m²\].
 pub(super) struct SiteCovariance<'a> {
     inputs: &'a Inputs,
-    /// a²ᵤⱼ and ℓᵤⱼ⁻² of each site.
+    /// Variance a²ᵤⱼ and inverse squared length ℓᵤⱼ⁻² of each site.
     single: Vec<(f64, f64)>,
-    /// a²ᵥⱼ of each site, and that of its constant.
+    /// Variance a²ᵥⱼ of each site, and the variance of its constant error.
     joint: Vec<(f64, f64)>,
-    /// ℓᵥ⁻² of each input.
+    /// Inverse squared length ℓᵥ⁻² of each input.
     joint_scales: Vec<f64>,
 }
 
 impl<'a> SiteCovariance<'a> {
-    /// Prepares the covariance of inputs of these kinds.
+    /// Precomputes variances and inverse squared lengths from the hyperparameters.
     pub fn new(hyper: &Hyperparameters, inputs: &'a Inputs) -> Self {
         let single = hyper.single.iter().zip(&hyper.single_lengths);
         let joint = hyper.joint.iter().zip(&hyper.constant);
@@ -124,8 +128,8 @@ impl<'a> SiteCovariance<'a> {
         }
     }
 
-    /// Writes the covariance of each site's error at two poses with these embedded inputs; `squares`
-    /// receives the squared distance in each input.
+    /// Writes to `out` the covariance of each site's error between two poses, given by their inputs
+    /// from [`embedded`]. `squares` receives the squared distance in each input.
     #[inline]
     pub fn write(&self, first: &[f64], second: &[f64], squares: &mut [f64], out: &mut [f64]) {
         let mut sum = 0.0;
@@ -145,7 +149,8 @@ impl<'a> SiteCovariance<'a> {
     }
 }
 
-/// Covariance of the remainder at the rows `left` and `right`, shape = (3 left, 3 right) \[m²\].
+/// Returns the covariance of the remainder between the rows `left` and `right`, shape = (3 left, 3
+/// right) \[m²\].
 pub(super) fn covariance(
     hyper: &Hyperparameters,
     inputs: &Inputs,
@@ -183,8 +188,8 @@ pub(super) fn covariance(
     out
 }
 
-/// Carries covariances of the sites to the target: calls `enter` with each pair of axes and
-/// Σ A₁ₐ c A₂ᵦ over the sites.
+/// Maps covariances c of the site errors to the position. For each pair of axes a and b it calls
+/// `enter` with Σ A₁ₐ c A₂ᵦ, summed over the sites. A₁ and A₂ are the site columns of the two rows.
 #[inline]
 pub(super) fn carry(
     sites: &[f64],
@@ -202,7 +207,7 @@ pub(super) fn carry(
     }
 }
 
-/// Prior covariance of the remainder at one pose, shape = (3, 3) \[m²\].
+/// Returns the prior covariance of the remainder at one pose, shape = (3, 3) \[m²\].
 pub(super) fn variance(hyper: &Hyperparameters, rows: &Rows, pose: usize) -> Matrix3<f64> {
     Matrix3::from_fn(|a, b| {
         (0..hyper.sites())

@@ -1,4 +1,4 @@
-//! Marginal likelihood of the hyperparameters, with the free parameters integrated out.
+//! Marginal likelihood of the hyperparameters: the free parameters of the arm are integrated out.
 
 use std::ops::Range;
 
@@ -10,47 +10,51 @@ use super::prior::ParameterPrior;
 use super::rows::{AXES, Inputs, Rows, SiteFunctions, Source};
 use crate::numeric::{gram, gram_of_lower, inverse_lower, lower_factor, product};
 
-/// 1 σ of the mean of ln ℓ in a family about 0: lengths of 0.05 to 20 rad lie within two of them.
+/// 1 σ of the prior of the mean of ln ℓ, about 0, in each family of lengths. Two σ span lengths
+/// from 0.05 to 20 rad or standard deviations.
 const LENGTH_SPREAD: f64 = 1.5;
-/// 1 σ of each ln ℓ about the mean of its family.
+/// 1 σ of the prior of each ln ℓ about the mean of its family.
 const LENGTH_DIFFERENCE: f64 = 0.15;
-/// 1 σ of ln a about the logarithm of the residual's size.
+/// 1 σ of the prior of ln a, about ln(root mean square residual).
 const AMPLITUDE_SPREAD: f64 = 3.0;
-/// Bounds of ln ℓ, ln 0.02 and ln 8.
+/// Bounds of ln ℓ: ln 0.02 and ln 8.
 const LENGTH_BOUNDS: (f64, f64) = (-3.912_023, 2.079_441_5);
-/// Bounds of ln a about the logarithm of the residual's size.
+/// Bounds of ln a relative to ln(root mean square residual).
 const AMPLITUDE_BOUNDS: (f64, f64) = (-7.0, 2.0);
-/// Bounds of ln σ and of ln σ_c about the logarithm of the residual's size.
+/// Bounds of ln σ and ln σ_c relative to ln(root mean square residual).
 pub(super) const NOISE_BOUNDS: (f64, f64) = (-4.0, 2.0);
-/// Shares of the residual's size from which the search of σ and σ_c starts.
+/// Initial values of σ and σ_c in the search, as fractions of the root mean square residual.
 pub(super) const NOISE_STARTS: [f64; 2] = [0.7, 0.3];
 
-/// Negative logarithm of the marginal likelihood and of the priors on hyperparameters, as a
-/// function of their logarithms.
+/// Negative logarithm of marginal likelihood times hyperparameter priors, as a function of the
+/// logarithms of the hyperparameters.
 ///
-/// r = J δ + f + ε with δ ~ N(m, S), f ~ GP(0, K_f), ε ~ N(0, N): with y = r − J m, C = K_f + N and
-/// K = C + J S Jᵀ it is ½ yᵀK⁻¹y + ½ ln det K. J S Jᵀ is never formed: with H = I + S½JᵀC⁻¹J S½,
-/// K⁻¹ = C⁻¹ − C⁻¹J S½ H⁻¹ S½JᵀC⁻¹ and det K = det C det H.
+/// The model is r = J δ + f + ε with δ ~ N(m, S), f ~ GP(0, K_f) and ε ~ N(0, N). With y = r − J m,
+/// C = K_f + N and K = C + J S Jᵀ, the value is ½ yᵀK⁻¹y + ½ ln det K.
+///
+/// J S Jᵀ is never formed. With H = I + S½JᵀC⁻¹J S½, K⁻¹ = C⁻¹ − C⁻¹J S½ H⁻¹ S½JᵀC⁻¹ and det K =
+/// det C det H.
 pub(super) struct MarginalLikelihood<'a> {
     rows: &'a Rows,
     inputs: &'a Inputs,
-    /// r − J m.
+    /// Vector y = r − J m: residuals at the mean of the parameters' prior.
     target: DVector<f64>,
-    /// J S½.
+    /// Scaled Jacobian J S½.
     scaled: DMatrix<f64>,
-    /// Functions and sites that each amplitude scales: all constants share one.
+    /// For each amplitude, the kind of function and the sites that it scales. All constants share
+    /// one amplitude.
     amplitudes: Vec<(Function, Vec<usize>)>,
-    /// Sites with a function of one input.
+    /// Indices of the sites that have a function uⱼ of their own command.
     singles: Vec<usize>,
-    /// True where rows of one configuration may share noise.
+    /// True if noise that rows of one configuration share is estimated.
     shares_noise: bool,
-    /// Logarithm of the root mean square of a residual's length \[ln m\].
+    /// Logarithm of the root mean square length of a residual in m.
     size: f64,
-    /// Squared distances in each input from a row (first index) to itself and the rows behind it.
+    /// Squared distances in each input from a row (first index) to itself and to all later rows.
     distances: Vec<Vec<f64>>,
 }
 
-/// Kind of a function of a site.
+/// Kind of error function at a site: of its own command, of all inputs, or constant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Function {
     Single,
@@ -58,16 +62,17 @@ enum Function {
     Constant,
 }
 
-/// Covariance of the sites at pairs of one row and the rows from it on.
+/// Correlations between one row and itself and all later rows.
 struct PairColumn {
-    /// Correlations of the single functions of each site and their slopes, site by site.
+    /// For each pair and site, the correlation of uⱼ and its derivative with respect to ln ℓᵤⱼ.
     single: Vec<(f64, f64)>,
-    /// Correlation of the joint functions and its slope.
+    /// For each pair, the correlation of vⱼ and its derivative with respect to −½ d², with d the
+    /// scaled distance.
     joint: Vec<(f64, f64)>,
 }
 
 impl<'a> MarginalLikelihood<'a> {
-    /// Prepares the likelihood of these rows.
+    /// Creates the likelihood of `rows`. `size` is the root mean square length of a residual \[m\].
     pub fn new(
         (rows, inputs): (&'a Rows, &'a Inputs),
         prior: &ParameterPrior,
@@ -96,24 +101,25 @@ impl<'a> MarginalLikelihood<'a> {
         Self { rows, inputs, target, scaled, amplitudes, singles, shares_noise, size, distances }
     }
 
-    /// Number of hyperparameters: amplitudes of both families, their lengths, σ, σ_c.
+    /// Returns the number of hyperparameters: the amplitudes, the lengths ℓᵤ and ℓᵥ, σ and, if
+    /// noise is shared, σ_c.
     pub fn len(&self) -> usize {
         self.joint_lengths().end + 1 + usize::from(self.shares_noise)
     }
 
-    /// Places of the lengths ℓᵤ.
+    /// Returns the indices of the lengths ℓᵤ among the hyperparameters.
     fn single_lengths(&self) -> Range<usize> {
         self.amplitudes.len()..self.amplitudes.len() + self.singles.len()
     }
 
-    /// Places of the lengths ℓᵥ.
+    /// Returns the indices of the lengths ℓᵥ among the hyperparameters.
     fn joint_lengths(&self) -> Range<usize> {
         let first = self.single_lengths().end;
         first..first + self.inputs.angles.len()
     }
 
-    /// Places of lengths that are about equal: those ℓᵤ, those ℓᵥ of commands, and each ℓᵥ of a
-    /// condition by itself.
+    /// Returns families of hyperparameter indices whose lengths are expected to be similar. All ℓᵤ
+    /// form one family, all ℓᵥ of commands another, and each ℓᵥ of a condition one of its own.
     fn length_families(&self) -> Vec<Range<usize>> {
         let Range { start, end } = self.joint_lengths();
         let is_command = |source: &&Source| matches!(source, Source::Command(_));
@@ -122,7 +128,7 @@ impl<'a> MarginalLikelihood<'a> {
         commands.chain((conditions..end).map(|k| k..k + 1)).collect()
     }
 
-    /// Logarithms of hyperparameters to start from, with these lengths ℓᵤ and ℓᵥ.
+    /// Returns the logarithms of initial hyperparameters; `lengths` are the initial ℓᵤ and ℓᵥ.
     pub fn start(&self, lengths: [f64; 2]) -> DVector<f64> {
         let amplitude = self.size - 0.5 * (self.amplitudes.len() as f64).ln();
         DVector::from_fn(self.len(), |k, _| match k {
@@ -133,7 +139,7 @@ impl<'a> MarginalLikelihood<'a> {
         })
     }
 
-    /// Bounds of the logarithms.
+    /// Returns lower and upper bound of the logarithm of each hyperparameter.
     pub fn bounds(&self) -> Vec<(f64, f64)> {
         let about = |(low, high)| (self.size + low, self.size + high);
         let bound = |k| match k {
@@ -144,7 +150,7 @@ impl<'a> MarginalLikelihood<'a> {
         (0..self.len()).map(bound).collect()
     }
 
-    /// Hyperparameters from their logarithms.
+    /// Converts the logarithms to hyperparameters.
     pub fn hyperparameters(&self, logarithms: &DVector<f64>) -> Hyperparameters {
         let (sites, noise) = (self.inputs.sites.len(), self.joint_lengths().end);
         let mut hyper = Hyperparameters {
@@ -172,7 +178,8 @@ impl<'a> MarginalLikelihood<'a> {
         hyper
     }
 
-    /// Value and gradient; `None` where the covariance is not positive definite.
+    /// Returns the value and the gradient with respect to the logarithms; `None` if the covariance
+    /// is not positive definite.
     pub fn value_and_gradient(&self, logarithms: &DVector<f64>) -> Option<(f64, DVector<f64>)> {
         let hyper = self.hyperparameters(logarithms);
         let (mut matrix, pairs) = self.covariance(&hyper);
@@ -213,7 +220,8 @@ impl<'a> MarginalLikelihood<'a> {
         value.is_finite().then_some((value, gradient))
     }
 
-    /// Lower half of K_f, and the correlations of its pairs.
+    /// Returns the lower half of the covariance K_f \[m²\], and the correlations of all pairs of
+    /// rows.
     fn covariance(&self, hyper: &Hyperparameters) -> (DMatrix<f64>, Vec<PairColumn>) {
         let (n, width) = (self.rows.len(), self.inputs.angles.len());
         let sites = self.inputs.sites.len();
@@ -253,7 +261,8 @@ impl<'a> MarginalLikelihood<'a> {
         (matrix, pairs)
     }
 
-    /// Adds N: σ² on the diagonal, σ_c² between rows of one configuration along each axis.
+    /// Adds the noise covariance N to `matrix`: σ² on the diagonal, and σ_c² between rows of one
+    /// configuration along the same axis.
     fn add_noise(&self, hyper: &Hyperparameters, matrix: &mut DMatrix<f64>) {
         let (alone, shared) = (hyper.noise.powi(2), hyper.shared_noise.powi(2));
         for row in 0..self.rows.len() {
@@ -267,8 +276,8 @@ impl<'a> MarginalLikelihood<'a> {
         }
     }
 
-    /// Calls `visit` with each pair of coordinates that share noise, in both orders, and with each
-    /// coordinate itself.
+    /// Calls `visit` with the indices of each pair of coordinates that share noise, in both orders,
+    /// and of each coordinate with itself.
     fn each_shared(&self, mut visit: impl FnMut(usize, usize)) {
         for group in self.rows.configurations() {
             for &first in &group {
@@ -281,7 +290,8 @@ impl<'a> MarginalLikelihood<'a> {
         }
     }
 
-    /// ½ tr(M ∂C/∂h) of a symmetric M for each logarithm h.
+    /// Returns ½ tr(M ∂C/∂h) for each hyperparameter's logarithm h, with the symmetric matrix M =
+    /// `weight`.
     fn gradient(
         &self,
         hyper: &Hyperparameters,

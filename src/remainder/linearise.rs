@@ -1,4 +1,5 @@
-//! Rows of measurements from a model and its full parameter vector.
+//! Linearises the model at measured rows, to give the residuals and derivatives that a remainder is
+//! fitted to.
 
 use std::collections::HashMap;
 
@@ -13,29 +14,33 @@ use crate::model::parameter::{JointField, ParameterSite};
 use crate::model::{Model, Pose, PoseResiduals};
 use crate::problem::{Joint, JointKind, Problem};
 
-/// A joint whose lever is below this share of the largest is no site.
+/// Smallest root mean square derivative of the position with respect to a joint, as a fraction of
+/// the largest, at which the joint is a site.
 const MIN_LEVER: f64 = 1e-3;
-/// Share of its mean above which the spread of a condition counts as variation.
+/// Smallest ratio of a condition's standard deviation to its mean at which it counts as varying.
 const MIN_SPREAD: f64 = 1e-6;
-/// 1 σ of the target's motion by a parameter without a prior \[m\]: far beyond any plausible error.
+/// 1 σ of the motion of the position that a parameter without a declared prior may cause \[m\]. It
+/// exceeds any plausible error, so that data decide.
 const WIDE_MOTION: f64 = 0.3;
-/// Largest 1 σ of a parameter without a prior, in its unit.
+/// Largest prior 1 σ of a parameter without a declared prior, in the SI unit of the parameter.
 const MAX_SPREAD: f64 = 1e3;
 
-/// Model of a problem linearised about a full parameter vector.
+/// Model of a problem, to be linearised about a full parameter vector.
 pub(super) struct Linearisation<'a> {
     pub problem: &'a Problem,
     pub model: &'a Model,
     /// Full parameter vector.
     pub x: &'a DVector<f64>,
-    /// Parameters that have a column in the Jacobian.
+    /// Indices of the parameters that have a column in the Jacobian.
     pub unknowns: Vec<usize>,
-    /// 1 σ of rows for which the table has none \[m\]: the unit of [`Rows::relative_sigma`].
+    /// 1 σ of the noise of rows for which the table gives none \[m\]; the unit of
+    /// [`Rows::relative_sigma`].
     pub sigma: f64,
 }
 
 impl Linearisation<'_> {
-    /// Rows of `poses`; NaN where the arm has no equilibrium.
+    /// Returns the linearised rows of `poses`; their residuals are NaN for poses without
+    /// equilibrium.
     pub fn rows(&self, layout: &Layout, poses: Vec<Pose>) -> Rows {
         let relative_sigma = poses.iter().map(|pose| pose.sigma / self.sigma).collect();
         let poses: Vec<Pose> = poses.into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
@@ -53,7 +58,8 @@ impl Linearisation<'_> {
         Rows { residual, jacobian: -slopes, sites, inputs, configuration, relative_sigma }
     }
 
-    /// Columns of the sites at `poses`, over their levers, shape = (sites, 3 poses).
+    /// Returns the derivatives of the position with respect to each site's error, divided by the
+    /// site's lever, shape = (sites, 3 poses).
     fn site_columns(&self, sites: &[Site], poses: &[Pose]) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(sites.len(), AXES * poses.len());
         let of_kind = |kind| -> Vec<(usize, usize)> {
@@ -80,8 +86,8 @@ impl Linearisation<'_> {
         out
     }
 
-    /// Slopes of positions by additional compliances of `joints` at 0, shape = (3 poses, joints)
-    /// \[N·m²/rad\].
+    /// Returns the derivatives of positions with respect to compliances added to `joints`, at 0,
+    /// shape = (3 poses, joints) \[N·m²/rad\].
     fn compliance_jacobian(&self, joints: &[usize], poses: &[Pose]) -> DMatrix<f64> {
         if joints.is_empty() {
             return DMatrix::zeros(AXES * poses.len(), 0);
@@ -98,7 +104,8 @@ impl Linearisation<'_> {
         -slopes
     }
 
-    /// Sites and inputs of the arm in these poses.
+    /// Determines the sites at which the arm may err in these poses, and the inputs on which the
+    /// errors may depend.
     pub fn layout(&self, poses: &[Pose]) -> Layout {
         let joints = commanded(self.problem);
         let sites = |kind| joints.iter().map(move |&joint| Site { joint, kind, lever: 1.0 });
@@ -145,7 +152,8 @@ impl Linearisation<'_> {
         Layout { sites, inputs }
     }
 
-    /// Sites with their levers; those that hardly move the target are left out.
+    /// Sets the lever of each site, the root mean square derivative of the position over `poses`.
+    /// Sites that hardly move the position are left out.
     fn with_levers(&self, sites: Vec<Site>, poses: &[Pose]) -> Vec<Site> {
         let columns = self.site_columns(&sites, poses);
         let count = poses.len().max(1) as f64;
@@ -158,7 +166,8 @@ impl Linearisation<'_> {
     }
 }
 
-/// Number of the configuration of each pose: equal where session and all commands are.
+/// Returns the index of each pose's configuration. It is equal for poses with the same session and
+/// the same commands.
 fn configurations(poses: &[Pose]) -> Vec<usize> {
     let mut known = HashMap::new();
     let key = |pose: &Pose| -> Vec<u64> {
@@ -174,16 +183,17 @@ fn configurations(poses: &[Pose]) -> Vec<usize> {
         .collect()
 }
 
-/// Joints that take a command.
+/// Returns the indices of the joints that take a command.
 fn commanded(problem: &Problem) -> Vec<usize> {
     let joints = problem.joints.iter().map(Joint::command_kind).enumerate();
     joints.filter(|(_, kind)| *kind != JointKind::Fixed).map(|(joint, _)| joint).collect()
 }
 
-/// Prior of the parameters `unknowns` about the full parameter vector `x`.
+/// Returns the prior of the parameters `unknowns`, as deviations from the full parameter vector
+/// `x`.
 ///
-/// A parameter without a declared prior moves the target by up to 0.3 m (1 σ, root mean square over
-/// `rows`).
+/// A parameter without a declared prior gets a σ that moves the position by 0.3 m (root mean square
+/// over `rows`), or a σ of [`MAX_SPREAD`] if that is smaller.
 pub(super) fn prior(
     model: &Model,
     x: &DVector<f64>,
@@ -202,8 +212,8 @@ pub(super) fn prior(
     }
 }
 
-/// Rows of a table as poses; `sigma` \[m\] is that of rows for which the table has none, and time counts
-/// from `first_time` \[s\].
+/// Returns rows of a table as poses. `sigma` \[m\] is used for rows for which the table gives none,
+/// and elapsed time counts from `first_time` \[s\].
 pub(super) fn timed_poses<'a>(
     table: &'a Measurements,
     rows: &[usize],

@@ -1,9 +1,10 @@
-//! Remainder: what no law explains, as Gaussian processes at the joints, and the uncertainty of
-//! predictions.
+//! Remainder: the smooth error that no law explains, modelled by Gaussian processes at the joints;
+//! and the uncertainty of predictions.
 //!
-//! [`fit`] conditions the processes on the rows of an identification, beside its parameters, and
-//! keeps them if configurations left out gain. A [`Correction`] is what comes of it: it is saved as
-//! `remainder.json`, and [`predict`] and [`compensate`] apply it to other poses.
+//! [`fit`] conditions the processes and the parameters on the rows of an identification. It keeps
+//! the processes if left-out configurations are then predicted better. The result is a
+//! [`Correction`]. It is saved as `remainder.json`, and [`predict`] and [`compensate`] apply it to
+//! other poses.
 
 mod apply;
 mod blocks;

@@ -1,4 +1,5 @@
-//! Marginal likelihood of noise alone: parameters integrated out, no remainder.
+//! Marginal likelihood of a model with noise but without a remainder; the parameters are integrated
+//! out.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,23 +9,24 @@ use super::rows::{AXES, Rows};
 use super::search::minimise;
 use crate::numeric::{gram, lower_factor};
 
-/// Step of ln σ and ln σ_c over which slopes are taken.
+/// Step of ln σ and ln σ_c in central differences.
 const STEP: f64 = 1e-4;
-/// Maximum steps of the search.
+/// Maximum number of steps of the search.
 const MAX_STEPS: usize = 60;
 
-/// Sums over the rows from which the likelihood follows at any σ and σ_c.
+/// Sums over the rows from which the likelihood is computed at any σ and σ_c.
 ///
-/// The rows of a configuration have the covariance C = σ² D + σ_c² 1 1ᵀ along each axis, so that
-/// C⁻¹ = σ⁻² (W − ρ w wᵀ) with W = D⁻¹, w = W 1 and ρ = σ_c² / (σ² + σ_c² Σ w).
+/// The noise of one configuration's rows has the covariance C = σ² D + σ_c² 1 1ᵀ along each axis. D
+/// is diagonal, with the squared relative σ of the rows. Its inverse is C⁻¹ = σ⁻² (W − ρ w wᵀ),
+/// with W = D⁻¹, w = W 1 and ρ = σ_c² / (σ² + σ_c² Σ w).
 struct NoiseLikelihood {
-    /// (J S½, y)ᵀ W (J S½, y).
+    /// Product (J S½, y)ᵀ W (J S½, y), with y the residuals at the prior's mean.
     gram: DMatrix<f64>,
-    /// wᵀ (J S½, y) of each configuration and axis, one a row.
+    /// Sum wᵀ (J S½, y); one row for each configuration and axis.
     sums: DMatrix<f64>,
-    /// Σ w of each row of `sums`.
+    /// Sum Σ w for each row of `sums`.
     weights: Vec<f64>,
-    /// Number of coordinates, and Σ ln D over them.
+    /// Number of coordinates, and the sum of ln D over them.
     coordinates: f64,
     log_relative: f64,
 }
@@ -62,7 +64,8 @@ impl NoiseLikelihood {
         }
     }
 
-    /// Negative logarithm of the likelihood at (ln σ, ln σ_c), or at ln σ without shared noise.
+    /// Returns the negative logarithm of the likelihood at (ln σ, ln σ_c), or at (ln σ) if no noise
+    /// is shared.
     fn value(&self, logarithms: &DVector<f64>) -> Option<f64> {
         let variance = (2.0 * logarithms[0]).exp();
         let shared = logarithms.get(1).map_or(0.0, |shared| (2.0 * shared).exp());
@@ -88,7 +91,8 @@ impl NoiseLikelihood {
     }
 }
 
-/// Returns the largest logarithm of the marginal likelihood of `rows` with noise alone.
+/// Returns the largest logarithm of the marginal likelihood of `rows` over σ and σ_c, without a
+/// remainder. `size` is the root mean square residual \[m\].
 pub(super) fn evidence_of_noise(
     rows: &Rows,
     prior: &ParameterPrior,

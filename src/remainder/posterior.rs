@@ -1,4 +1,4 @@
-//! Posterior of parameters and remainder: a linear model in features of the rows.
+//! Posterior of parameters and remainder, computed as a linear model with Gaussian weights.
 
 use std::collections::HashMap;
 
@@ -11,59 +11,64 @@ use super::prior::ParameterPrior;
 use super::rows::{AXES, Inputs, Rows};
 use crate::numeric::{gram, inverse_lower, lower_factor, product, product_with_upper};
 
-/// Share of its variance that is added to each inducing variable, against rounding.
+/// Fraction of its variance that is added to each inducing variable, so that the covariance remains
+/// positive definite despite rounding.
 const JITTER: f64 = 1e-9;
 
-/// Gaussian posterior of the remainder's inducing variables z and of the parameters.
+/// Gaussian posterior of the inducing variables z and of the parameters.
 ///
-/// With the covariance K_z = L Lᵀ, a row has the features φ = (k(x, z) L⁻ᵀ, J S½), standard normal
-/// weights w before and N(ŵ, A⁻¹) after, A = I + ΦᵀN⁻¹Φ. Where all rows are centres this is the
-/// Gaussian process itself; with fewer it is its fully independent training conditional
-/// approximation, whose N also holds what the features leave of K [Snelson & Ghahramani 2006].
+/// With the covariance K_z = L Lᵀ of z, a row has the features φ = (k(x, z) L⁻ᵀ, J S½). The weights
+/// w of the features are standard normal a priori. A posteriori they are N(ŵ, A⁻¹) with A = I +
+/// ΦᵀN⁻¹Φ.
+///
+/// If all rows are centres, this is the exact Gaussian process. With fewer it is the fully
+/// independent training conditional approximation. N then also contains the part of K that the
+/// features do not represent. [Snelson & Ghahramani 2006]
 #[derive(Debug, Clone)]
 pub(super) struct Posterior {
     pub hyper: Hyperparameters,
     pub inputs: Inputs,
     pub prior: ParameterPrior,
-    /// Values about which the functions are expanded.
+    /// Inducing variables z.
     pub inducing: Inducing,
-    /// L⁻¹.
+    /// Inverse L⁻¹ of the factor of K_z.
     inverse: DMatrix<f64>,
-    /// Lower factor of A, and its inverse.
+    /// Lower triangular factor of A, and its inverse.
     pub factor: DMatrix<f64>,
     inverse_factor: DMatrix<f64>,
-    /// ŵ.
+    /// Posterior mean ŵ of the weights.
     pub weights: DVector<f64>,
 }
 
-/// Posterior of the correction of one row.
+/// Posterior distribution of one row's correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RowPosterior {
-    /// Mean of measured − predicted by the fit \[m\].
+    /// Mean of measured − predicted position, with the parameters at their fitted values in the
+    /// prediction \[m\].
     pub mean: Vector3<f64>,
-    /// Its covariance, noise left out \[m²\].
+    /// Covariance of the correction, without measurement noise \[m²\].
     pub covariance: Matrix3<f64>,
-    /// Prior variance of the remainder there, its trace \[m²\].
+    /// Trace of the remainder's prior covariance at the row \[m²\].
     pub prior: f64,
 }
 
-/// A row as predicted from the others.
+/// Prediction of a row from the other rows.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct LeftOut {
-    /// Measured − predicted \[m\].
+    /// Measured − predicted position \[m\].
     pub error: Vector3<f64>,
-    /// Covariance of the error, noise included \[m²\].
+    /// Covariance of the error, including measurement noise \[m²\].
     pub covariance: Matrix3<f64>,
 }
 
-/// A posterior with what its training rows need to be left out again.
+/// Posterior, with the matrices from which training rows can be left out in closed form.
 pub(super) struct Training {
     pub posterior: Posterior,
-    /// Features of the rows, their noise taken off: N^(−½) Φ.
+    /// Features of the training rows, whitened by their noise: N^(−½) Φ.
     whitened: DMatrix<f64>,
-    /// N^(−½) y.
+    /// Residuals of the training rows, whitened by their noise: N^(−½) y.
     target: DVector<f64>,
-    /// Rows of each configuration with the factor of their noise.
+    /// Rows of each configuration, with the lower factor of their noise covariance.
     groups: Vec<(Vec<usize>, DMatrix<f64>)>,
 }
 
@@ -72,14 +77,14 @@ fn coordinates(rows: &[usize]) -> Vec<usize> {
 }
 
 impl Posterior {
-    /// Features of rows, shape = (3 rows, features).
+    /// Returns the features of rows, shape = (3 rows, features).
     fn features(&self, rows: &Rows) -> DMatrix<f64> {
         features(&self.hyper, &self.inputs, (&self.inducing, &self.inverse), &self.prior, rows)
     }
 
-    /// Posterior restored from the factor of its precision, from the weights of the inducing
-    /// variables and from the change of the parameters; `None` where the covariance of the
-    /// inducing variables is not positive definite.
+    /// Restores a posterior from the factor of A, the kernel weights c of the inducing variables,
+    /// and the change of the parameters. Returns `None` if the covariance of the inducing variables
+    /// is not positive definite.
     pub fn restored(
         (hyper, inputs): (Hyperparameters, Inputs),
         (inducing, prior): (Inducing, ParameterPrior),
@@ -94,19 +99,19 @@ impl Posterior {
         Some(Self { hyper, inputs, prior, inducing, inverse, factor, inverse_factor, weights })
     }
 
-    /// Weights c of the inducing variables: the remainder's mean at x is k(x, z) c.
+    /// Returns the kernel weights c, with which the mean of the remainder at x is k(x, z) c.
     pub fn kernel_weights(&self) -> DVector<f64> {
         self.inverse.tr_mul(&self.weights.rows(0, self.inducing.len()))
     }
 
-    /// Change of each parameter beside the remainder: m + S½ ŵ.
+    /// Returns the change m + S½ ŵ of each parameter when it is fitted together with the remainder.
     pub fn parameters(&self) -> DVector<f64> {
         let first = self.weights.len() - self.prior.mean.len();
         let change = self.weights.rows_range(first..).component_mul(&self.prior.spread);
         &self.prior.mean + change
     }
 
-    /// Posterior covariance of the parameters.
+    /// Returns the posterior covariance of the parameters, SI.
     pub fn parameter_covariance(&self) -> DMatrix<f64> {
         let (weights, parameters) = (self.factor.nrows(), self.prior.mean.len());
         let columns = self.inverse_factor.columns(weights - parameters, parameters);
@@ -114,8 +119,8 @@ impl Posterior {
         gram(&scaled)
     }
 
-    /// Returns E, with which data explain tr (k(x, z), J S½) E (k(x, z), J S½)ᵀ of the
-    /// prior variance of the remainder, covariance of the parameters taken off.
+    /// Returns the matrix E with tr(F E Fᵀ) = prior − posterior variance of a row's correction. F
+    /// is (k(x, z), J S½) at the row, and the prior variance is that of the remainder alone.
     pub fn explained(&self) -> DMatrix<f64> {
         let kernel = self.inducing.len();
         let precision = gram(&self.inverse_factor);
@@ -127,7 +132,8 @@ impl Posterior {
         product(&outer.transpose(), &product(&middle, &outer))
     }
 
-    /// Posterior of the correction at rows whose Jacobian has the columns of the prior.
+    /// Returns the posterior of the correction at `rows`, whose Jacobians have one column for each
+    /// parameter of the prior.
     pub fn at(&self, rows: &Rows) -> Vec<RowPosterior> {
         let features = self.features(rows);
         let mean = &features * &self.weights + &rows.jacobian * &self.prior.mean;
@@ -148,7 +154,7 @@ impl Posterior {
         (0..rows.len()).into_par_iter().map(one).collect()
     }
 
-    /// Rows that took no part, as predicted.
+    /// Predicts rows that were not used for training.
     pub fn left_out(&self, rows: &Rows) -> Vec<LeftOut> {
         let one = |(row, predicted): (usize, RowPosterior)| {
             let noise = self.hyper.noise_variance_of(rows.relative_sigma[row]);
@@ -162,7 +168,7 @@ impl Posterior {
     }
 }
 
-/// Factor L of the covariance of the inducing variables.
+/// Returns the lower factor L of the covariance of the inducing variables.
 fn inducing_factor(
     hyper: &Hyperparameters,
     inputs: &Inputs,
@@ -190,8 +196,8 @@ fn features(
 }
 
 impl Training {
-    /// Conditions on `rows`, with functions expanded about `centres`, places among the rows, and
-    /// about knots; `None` where rounding makes a matrix lose its definiteness.
+    /// Conditions on `rows`, with inducing variables at the rows with the indices `centres` and at
+    /// knots. Returns `None` if a matrix is not positive definite because of rounding.
     pub fn of(
         (rows, inputs): (&Rows, &Inputs),
         prior: &ParameterPrior,
@@ -239,9 +245,9 @@ impl Training {
         Some(Self { posterior, whitened, target, groups })
     }
 
-    /// The rows `judged`, each predicted without the rows of its part, in closed form; `part` numbers
-    /// the part of every row, and rows of one configuration share it. `None` where rounding spoils a
-    /// factor.
+    /// Predicts each row of `judged` without the rows of its part, in closed form. `part` is the
+    /// index of every row's part; rows of one configuration must share it. Returns `None` if a
+    /// matrix is not positive definite because of rounding.
     pub fn without_each(&self, part: &[usize], judged: &[usize]) -> Option<Vec<LeftOut>> {
         let mut parts = vec![Vec::new(); part.iter().max().map_or(0, |last| last + 1)];
         for group in &self.groups {
@@ -304,11 +310,12 @@ impl Training {
         Some(judged.iter().map(|&row| out[row]).collect())
     }
 
-    /// Predicts whitened coordinates `judged` without the coordinates `left_out`, which contain
-    /// them and whose S = Φ L⁻ᵀ is `spread`.
+    /// Predicts the whitened coordinates `judged` without the coordinates `left_out`, which contain
+    /// them. `spread` is their S = Φ L⁻ᵀ.
     ///
-    /// e_b = [K⁻¹]_bb⁻¹ [K⁻¹y]_b and V_b = [K⁻¹]_bb⁻¹ of the coordinates b that are left out
-    /// [Rasmussen & Williams 2006, section 5.4.2]. With A = L Lᵀ, [K⁻¹]_bb = I − S Sᵀ.
+    /// For the left-out coordinates b, the errors are e_b = [K⁻¹]_bb⁻¹ [K⁻¹y]_b, with the
+    /// covariance V_b = [K⁻¹]_bb⁻¹. [Rasmussen & Williams 2006, section 5.4.2] With A = L Lᵀ,
+    /// [K⁻¹]_bb = I − S Sᵀ.
     fn without_small(
         &self,
         left_out: &[usize],
@@ -331,8 +338,8 @@ impl Training {
         })
     }
 
-    /// The same of more coordinates than features, with the precision A of the weights:
-    /// V_b = I + Φ_b (A − Φ_bᵀΦ_b)⁻¹ Φ_bᵀ.
+    /// Predicts like [`Self::without_small`], but is faster if more coordinates than features are
+    /// left out. `whole` is the precision A of the weights, and V_b = I + Φ_b (A − Φ_bᵀΦ_b)⁻¹ Φ_bᵀ.
     fn without_large(
         &self,
         left_out: &[usize],
@@ -352,26 +359,26 @@ impl Training {
     }
 }
 
-/// Rows of one configuration and the covariance of their noise.
+/// Rows of one configuration, and the lower factor of their noise covariance.
 type Group = (Vec<usize>, DMatrix<f64>);
 
-/// Whitened coordinates predicted without themselves.
+/// Errors of whitened coordinates that were predicted without themselves, and their covariance.
 struct Deleted {
     error: DVector<f64>,
-    /// c and R of the covariance c I + RᵀR of the errors.
+    /// Number c and matrix R that give the covariance c I + RᵀR of the errors.
     identity: f64,
     root: DMatrix<f64>,
 }
 
 impl Deleted {
-    /// Covariance of `count` errors from `first` on.
+    /// Returns the covariance of `count` errors from index `first` on.
     fn covariance(&self, first: usize, count: usize) -> DMatrix<f64> {
         let root = self.root.columns(first, count);
         DMatrix::identity(count, count) * self.identity + root.tr_mul(&root)
     }
 }
 
-/// A⁻¹ b from the lower factor of A.
+/// Returns A⁻¹ b, where `factor` is the lower factor of A and `right` is b.
 fn solved(factor: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     let mut solution = right.clone();
     factor.solve_lower_triangular_mut(&mut solution);
@@ -379,7 +386,8 @@ fn solved(factor: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
     solution
 }
 
-/// Noise of the rows of one configuration, and what their features leave of the remainder's prior.
+/// Returns the noise covariance of one configuration's rows, plus the part of the remainder's prior
+/// covariance that their features do not represent \[m²\].
 fn noise(
     hyper: &Hyperparameters,
     rows: &Rows,

@@ -1,4 +1,4 @@
-//! What a corrected arm leaves of the rows that it was identified from, and of held-out rows.
+//! Residuals of a corrected arm, on the rows that it was identified from and on held-out rows.
 
 use std::collections::HashSet;
 
@@ -13,7 +13,8 @@ use crate::model::Model;
 use crate::problem::Problem;
 use crate::spatial::Frame;
 
-/// Singular values below this share of the largest are no direction of a base or tool.
+/// Smallest singular value, as a fraction of the largest, that counts as a direction in which bases
+/// and tools can move.
 const RANK_TOLERANCE: f64 = 1e-9;
 
 /// Residuals of a corrected arm.
@@ -21,17 +22,17 @@ const RANK_TOLERANCE: f64 = 1e-9;
 pub struct CorrectedResiduals {
     /// Residual of each row, in the order of the rows.
     pub rows: Vec<Residual>,
-    /// Errors of both parts of the data, of the kind of rows that errors are told of.
+    /// Errors of identification and held-out rows; in tables with several kinds of rows, those of
+    /// the leading kind.
     pub errors: Errors,
 }
 
-/// What `found`, corrected, leaves of every row of `data`.
+/// Returns the residuals of all rows of `data` with the arm of `found` and its correction.
 ///
-/// Bases, tools and points that only held-out rows use are fitted to these rows again, to first
-/// order.
+/// Bases, tools and points of held-out rows alone are refitted to these rows, to first order.
 ///
 /// # Errors
-/// Problem and data are not those identified.
+/// Returns an error if `problem` and `data` are not those that were identified.
 pub fn residuals(
     found: &Identification,
     problem: &Problem,
@@ -84,8 +85,8 @@ pub fn residuals(
     Ok(CorrectedResiduals { rows, errors })
 }
 
-/// Turns the corrections of contacts with points, which are along the axes of the arm's base, into
-/// the measuring frame.
+/// Rotates the shifts of rows that touch a point from the axes of the arm's base to the measuring
+/// frame. Other shifts already are in the measuring frame.
 pub(super) fn in_measuring_frame(
     table: &Measurements,
     bases: &[Frame<f64>],
@@ -98,7 +99,8 @@ pub(super) fn in_measuring_frame(
     }
 }
 
-/// Fitted bases and tools that are no parameters of the correction.
+/// Returns the parameters of fitted bases and tools that are not among the parameters of the
+/// correction.
 fn placed(found: &Identification, model: &Model, correction: &Correction) -> Vec<usize> {
     let known: HashSet<&str> =
         correction.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
@@ -113,8 +115,8 @@ fn placed(found: &Identification, model: &Model, correction: &Correction) -> Vec
         .collect()
 }
 
-/// Adds to the shifts what bases and tools with this Jacobian make up for, in the least-squares
-/// sense, of what is left of these residuals.
+/// Refits bases and tools to the residuals that remain after the shifts, by linear least squares,
+/// and adds their motion to the shifts. `jacobian` holds their derivatives.
 fn refit(shifts: &mut [Vector3<f64>], residuals: &[Vector3<f64>], jacobian: &DMatrix<f64>) {
     let is_used = |row: &usize| jacobian.rows(AXES * row, AXES).amax() > 0.0;
     let used: Vec<usize> = (0..residuals.len()).filter(is_used).collect();

@@ -1,4 +1,5 @@
-//! Measured rows linearised about a fit: residuals, Jacobians of parameters and of sites, inputs.
+//! Measured rows linearised about a fit: residuals, inputs, and derivatives with respect to
+//! parameters and joint errors.
 
 use std::collections::HashMap;
 
@@ -7,39 +8,43 @@ use serde::{Deserialize, Serialize};
 
 use crate::problem::PoseView;
 
-/// Coordinates of a position.
+/// Number of coordinates of a position.
 pub(super) const AXES: usize = 3;
 
-/// Sites at which an arm may err, and the quantities on which these errors may depend.
+/// Sites at which the arm may err, and the inputs on which these errors may depend.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Layout {
     pub sites: Vec<Site>,
-    /// Inputs of the functions.
+    /// Inputs of the error functions.
     pub inputs: Inputs,
 }
 
-/// Place of an error that the remainder describes.
+/// Site: the joint, and its quantity, at which the remainder models an error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Site {
     /// Joint, counted from 0.
     pub joint: usize,
     pub kind: SiteKind,
-    /// Unit of the site's columns: root mean square of the target's slope over the rows fitted,
-    /// \[m/rad\] or \[1\] for a coordinate. Compliances share the largest of theirs \[N·m²/rad\].
+    /// Lever: root mean square over the fitted rows of the position's derivative with respect to
+    /// the site's quantity. Errors times the lever are motions in m.
+    ///
+    /// The unit is \[m/rad\] for a revolute joint, \[1\] for a prismatic one and \[N·m²/rad\] for
+    /// compliances, which share the largest of their levers.
     pub lever: f64,
 }
 
-/// Quantity of a joint that errs.
+/// Quantity of a joint that may be in error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum SiteKind {
-    /// Coordinate of the joint: a function of its command and one of all inputs.
+    /// Coordinate of the joint. Its error is a function of its own command plus a function of all
+    /// inputs.
     Coordinate,
-    /// Compliance of the joint: a constant.
+    /// Compliance of the joint. Its error is a constant.
     Compliance,
 }
 
-/// Quantity on which errors depend.
+/// Quantity of a pose on which joint errors may depend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Source {
     /// Command of a joint, counted from 0.
@@ -53,10 +58,10 @@ pub(super) enum Source {
 }
 
 impl Source {
-    /// Conditions other than commands.
+    /// Inputs that are conditions of a pose, not commands.
     pub const CONDITIONS: [Self; 3] = [Self::Temperature, Self::Payload, Self::Hoist];
 
-    /// Value at a pose; `None` where the pose does not state it.
+    /// Returns the value at a pose; `None` if the pose does not state it.
     pub fn value(self, setup: &PoseView) -> Option<f64> {
         match self {
             Self::Command(joint) => setup.configuration.get(joint).copied(),
@@ -66,7 +71,7 @@ impl Source {
         }
     }
 
-    /// Name in files: `q1`, …, `temperature`, `payload`, `hoist`.
+    /// Returns the name in files: `q1`, …, `temperature`, `payload`, `hoist`.
     pub fn name(self) -> String {
         match self {
             Self::Command(joint) => format!("q{}", joint + 1),
@@ -76,7 +81,7 @@ impl Source {
         }
     }
 
-    /// Reads a name in a file.
+    /// Parses a name from a file; `None` if it is unknown.
     pub fn parse(name: &str) -> Option<Self> {
         if let Some(condition) = Self::CONDITIONS.into_iter().find(|of| of.name() == name) {
             return Some(condition);
@@ -86,33 +91,36 @@ impl Source {
     }
 }
 
-/// Functions whose sum is the error of a site.
+/// Functions that add up to the error at a site.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SiteFunctions {
-    /// Input of the function uⱼ of one input, if there is one.
+    /// Index of the input of the function uⱼ of the joint's own command; `None` without such a
+    /// function.
     pub single: Option<usize>,
-    /// True for a function vⱼ of all inputs.
+    /// True if the error includes a function vⱼ of all inputs.
     pub joint: bool,
-    /// True for a constant.
+    /// True if the error includes a constant.
     pub constant: bool,
 }
 
 /// Inputs of the remainder: the commands of the moving joints, and conditions that vary.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Inputs {
-    /// Functions of each site.
+    /// Error functions at each site.
     pub sites: Vec<SiteFunctions>,
     pub sources: Vec<Source>,
-    /// True for an angle, whose distances are chords.
+    /// For each input, true if it is an angle. Distances between angles are chords, so that q and q
+    /// + 2π coincide.
     pub angles: Vec<bool>,
-    /// Offset and unit of each input: 0 and 1 for angles, mean and standard deviation for others.
+    /// Offset and unit that standardise each input: 0 and 1 for angles, mean and standard deviation
+    /// for others.
     pub standard: Vec<(f64, f64)>,
-    /// Smallest and largest value in the rows fitted, in the unit of the source.
+    /// Smallest and largest value of each input in the fitted rows, before standardisation.
     pub ranges: Vec<(f64, f64)>,
 }
 
 impl Inputs {
-    /// Functions of the errors at these sites.
+    /// Returns the error functions at each site, for the given inputs.
     pub fn functions(sites: &[Site], sources: &[Source]) -> Vec<SiteFunctions> {
         let functions = |site: &Site| {
             let is_coordinate = site.kind == SiteKind::Coordinate;
@@ -128,42 +136,45 @@ impl Inputs {
     }
 }
 
-/// Rows of positions linearised about a fit; three coordinates a row.
+/// Rows that measure positions, linearised about a fit; each row has three coordinates.
 #[derive(Debug, Clone)]
 pub(super) struct Rows {
     /// Measured − predicted position, shape = (3 rows) \[m\].
     pub residual: DVector<f64>,
-    /// ∂p/∂x of the free parameters, shape = (3 rows, parameters).
+    /// Derivatives ∂p/∂x of the position with respect to the free parameters, shape = (3 rows,
+    /// parameters).
     pub jacobian: DMatrix<f64>,
-    /// Slope of the position by each site's quantity over its lever, shape = (sites, 3 rows).
+    /// Derivatives of the position with respect to each site's quantity, divided by the site's
+    /// lever, shape = (sites, 3 rows).
     pub sites: DMatrix<f64>,
     /// Standardised inputs, shape = (inputs, rows).
     pub inputs: DMatrix<f64>,
-    /// Number of the configuration of each row: rows of one session in one configuration share it.
+    /// Index of each row's configuration. Rows with the same session and the same commands share
+    /// it.
     pub configuration: Vec<usize>,
-    /// 1 σ of each row over that of the others \[1\].
+    /// 1 σ of each row's noise, divided by the σ of rows for which the table gives none.
     pub relative_sigma: Vec<f64>,
 }
 
 impl Rows {
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.configuration.len()
     }
 
-    /// Inputs of a row.
+    /// Returns the standardised inputs of a row.
     pub fn inputs_of(&self, row: usize) -> &[f64] {
         let n = self.inputs.nrows();
         &self.inputs.as_slice()[n * row..n * (row + 1)]
     }
 
-    /// Site columns of a coordinate of a row.
+    /// Returns the derivatives of one coordinate of the position with respect to all sites.
     pub fn sites_of(&self, coordinate: usize) -> &[f64] {
         let n = self.sites.nrows();
         &self.sites.as_slice()[n * coordinate..n * (coordinate + 1)]
     }
 
-    /// Some of the rows.
+    /// Returns the rows with the given indices.
     pub fn select(&self, rows: &[usize]) -> Self {
         let coordinates: Vec<usize> =
             rows.iter().flat_map(|&row| (0..AXES).map(move |axis| AXES * row + axis)).collect();
@@ -177,7 +188,8 @@ impl Rows {
         }
     }
 
-    /// Places of the rows of each configuration, in the order in which configurations appear.
+    /// Returns the row indices of each configuration, in the order in which the configurations
+    /// first appear.
     pub fn configurations(&self) -> Vec<Vec<usize>> {
         let mut place = HashMap::new();
         let mut groups: Vec<Vec<usize>> = Vec::new();

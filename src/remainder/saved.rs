@@ -1,4 +1,4 @@
-//! remainder.json: a correction as a file.
+//! Reads and writes `remainder.json`, a saved correction.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -17,16 +17,16 @@ use super::scores::Scores;
 use crate::files::read_limited;
 use crate::problem::Problem;
 
-/// Largest remainder.json that is read \[MiB\].
+/// Largest size of a `remainder.json` that is read \[MiB\].
 const LARGEST_MIB: u64 = 256;
-/// Name and version of the format.
+/// Name and version of the file format.
 const FORMAT: (&str, u32) = ("flexcal-remainder", 2);
-/// What the file holds.
+/// Value of the key `kind`: the only kind of correction that this version reads.
 const KIND: &str = "gaussian-process-at-joints";
-/// Correlation function of all processes.
+/// Value of the key `kernel`: the correlation function of all processes.
 const KERNEL: &str = "matern-5/2";
 
-/// A remainder.json that cannot be used.
+/// Reason why a `remainder.json` cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SavedRemainderError {
@@ -53,39 +53,41 @@ struct SavedSite {
     /// Joint, counted from 1.
     joint: usize,
     kind: SiteKind,
-    /// Unit of the site's columns [m/rad], [1] or [N·m²/rad].
+    /// Lever of the site: [m/rad] for a revolute joint, [1] for a prismatic one, [N·m²/rad] for
+    /// compliances.
     lever: f64,
-    /// 1 σ of the error that follows the joint's command, as motion of the target.
+    /// 1 σ of the error that is a function of the joint's own command, as motion of the position.
     single_amplitude_m: f64,
-    /// Length ℓ of that function, in the unit of the joint's input.
+    /// Length ℓᵤ of that function: rad for angles, standard deviations for other inputs.
     single_length: f64,
-    /// 1 σ of the error that follows all inputs, likewise.
+    /// 1 σ of the error that is a function of all inputs, as motion of the position.
     joint_amplitude_m: f64,
-    /// 1 σ of a constant, likewise.
+    /// 1 σ of the constant error, as motion of the position.
     constant_amplitude_m: f64,
 }
 
 #[derive(Serialize, Deserialize)]
 struct Input {
-    /// `q1`, …, `temperature`, `payload` or `hoist`.
+    /// Name of the input: `q1`, …, `temperature`, `payload` or `hoist`.
     name: String,
     is_angle: bool,
     offset: f64,
     unit: f64,
     min: f64,
     max: f64,
-    /// Length ℓ of the functions of all inputs along this one, in its unit.
+    /// Length ℓᵥ along this input of the functions of all inputs: rad for angles, standard
+    /// deviations for others.
     joint_length: f64,
 }
 
 #[derive(Serialize, Deserialize)]
 struct Parameter {
     name: String,
-    /// Value about which the arm is linearised, SI.
+    /// Estimated value about which the arm is linearised, SI.
     estimate: f64,
-    /// The same as a deviation from nominal.
+    /// Deviation of that value from nominal, SI.
     deviation: f64,
-    /// Change of the deviation beside the remainder.
+    /// Change of the parameter when it is fitted together with the remainder, SI.
     change: f64,
     prior_mean: f64,
     prior_sigma: f64,
@@ -113,32 +115,33 @@ struct Document {
     sigma_m: f64,
     parameters: Vec<Parameter>,
     scores: ScoreLists,
-    /// Standardised inputs of each centre.
+    /// Standardised inputs of each centre, one array per centre.
     centres: Vec<Box<RawValue>>,
-    /// Site columns of each centre: three coordinates, each with one number for every site.
+    /// Derivatives with respect to the sites at each centre: for each of three coordinates, one
+    /// number per site.
     columns: Vec<Box<RawValue>>,
-    /// Weights of the three coordinates of each centre.
+    /// Kernel weights of each centre, three coordinates per array.
     weights: Vec<Box<RawValue>>,
-    /// Site, counted from 1, standardised input and weight of each value of a function of one input.
+    /// Knots: number of the site, counted from 1, standardised input, and kernel weight.
     #[serde(default)]
     knots: Vec<(usize, f64, f64)>,
-    /// Lower triangle L, row by row, of the precision L Lᵀ of the standardised weights and of the
-    /// parameters.
+    /// Lower triangular factor L, row by row, of the precision A = L Lᵀ of the feature weights.
     covariance_factor: Vec<Box<RawValue>>,
 }
 
-/// Numbers as one line of JSON.
+/// Formats numbers as a JSON array on one line.
 fn line(numbers: &[f64]) -> Option<Box<RawValue>> {
     to_raw_value(numbers).ok()
 }
 
-/// A number with seven digits: variances follow from the factor to as many.
+/// Rounds a number to seven significant digits, which the variances computed from the factor do not
+/// need to exceed.
 fn shortened(number: f64) -> f64 {
     format!("{number:.6e}").parse().unwrap_or(number)
 }
 
 impl Correction {
-    /// The correction as JSON text, ending in a line break.
+    /// Returns the correction as JSON text that ends in a line break.
     #[doc(hidden)]
     pub fn to_json(&self) -> String {
         let Posterior { hyper, prior, inducing: Inducing { centres, knots }, factor, .. } =
@@ -213,10 +216,10 @@ impl Correction {
         text
     }
 
-    /// Reads a remainder.json.
+    /// Reads a `remainder.json`.
     ///
     /// # Errors
-    /// The file cannot be read or is no remainder.json.
+    /// Returns an error if the file cannot be read or is not a `remainder.json` of this version.
     pub fn read(file: &Path) -> Result<Self, SavedRemainderError> {
         let unreadable = |source| SavedRemainderError::Unreadable { file: file.to_owned(), source };
         let bytes = read_limited(file, LARGEST_MIB << 20).map_err(unreadable)?;
@@ -225,10 +228,10 @@ impl Correction {
         Self::parse(&text, file)
     }
 
-    /// Reads the text of a remainder.json; `file` names it in messages.
+    /// Parses the text of a `remainder.json`; `file` is its path for error messages.
     ///
     /// # Errors
-    /// As [`read`](Self::read).
+    /// Returns the errors of [`read`](Self::read).
     #[doc(hidden)]
     pub fn parse(text: &str, file: &Path) -> Result<Self, SavedRemainderError> {
         let syntax = |source| SavedRemainderError::Syntax { file: file.to_owned(), source };
@@ -334,10 +337,10 @@ impl Correction {
         })
     }
 
-    /// Checks that the correction belongs to `problem`; `file` names it in messages.
+    /// Checks that the correction belongs to `problem`; `file` is its path for error messages.
     ///
     /// # Errors
-    /// It was fitted to another problem, or to the same one declared otherwise.
+    /// Returns an error if it was fitted to another problem, or to another declaration of this one.
     #[doc(hidden)]
     pub fn check(&self, problem: &Problem, file: &Path) -> Result<(), SavedRemainderError> {
         let file = || file.to_owned();

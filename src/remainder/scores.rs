@@ -1,4 +1,4 @@
-//! Errors of rows that were left out, and what they say of further rows.
+//! Errors of rows that were left out, and the error bounds of predictions that follow from them.
 
 use std::f64::consts::TAU;
 
@@ -9,14 +9,14 @@ use super::kernel::{Hyperparameters, variance};
 use super::posterior::LeftOut;
 use super::rows::{AXES, Rows};
 
-/// Most scores that are kept: quantiles up to 1 − 1/1000 stay exact.
+/// Maximum number of scores kept; quantiles up to 1 − 1/1000 remain exact.
 const MAX_SCORES: usize = 1000;
 
-/// Share of a correction that is applied: 1 where data decide the remainder, 0 where they say
-/// nothing of it.
+/// Returns the share of a correction that is applied: 1 if the data determine the remainder, 0 if
+/// they do not.
 ///
-/// `explained` is the variance that is left of the correction, `prior` that of the remainder before
-/// any data, both as traces \[m²\].
+/// `left` is the posterior variance of the correction and `prior` the prior variance of the
+/// remainder, both as traces \[m²\].
 pub(super) fn fade(left: f64, prior: f64) -> f64 {
     if prior > 0.0 { 1.0 - (left / prior).clamp(0.0, 1.0) } else { 0.0 }
 }
@@ -24,16 +24,17 @@ pub(super) fn fade(left: f64, prior: f64) -> f64 {
 /// Error of a row that was predicted without its configuration or its block.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct LeftOutError {
-    /// Length of measured − predicted \[m\].
+    /// Error length ‖measured − predicted‖ \[m\].
     pub length: f64,
-    /// Length over the size that the variance leads to expect \[1\].
+    /// Score: error length divided by its expected root mean square.
     pub score: f64,
-    /// Logarithm of the predictive density \[ln m⁻³\].
+    /// Logarithm of the predictive density of the measured position \[ln m⁻³\].
     pub density: f64,
 }
 
-/// Errors of a faded correction, from rows predicted by the parameters `alone` and `with` the
-/// remainder that has these hyperparameters.
+/// Computes the errors of left-out rows if only the applied share of each correction is added.
+/// `alone` are predictions with the parameters alone, `with` those with the remainder of these
+/// hyperparameters.
 pub(super) fn left_out_errors(
     hyper: &Hyperparameters,
     rows: &Rows,
@@ -58,7 +59,7 @@ pub(super) fn left_out_errors(
     alone.iter().zip(with).enumerate().map(one).collect()
 }
 
-/// Logarithm of the density of a normal distribution with mean 0; NaN where the covariance is not
+/// Returns the logarithm of a normal density with mean 0 at `error`; NaN if the covariance is not
 /// positive definite.
 fn log_density(error: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
     let Some(factor) = covariance.cholesky() else { return f64::NAN };
@@ -66,39 +67,42 @@ fn log_density(error: &Vector3<f64>, covariance: &Matrix3<f64>) -> f64 {
     -0.5 * (square + covariance.determinant().ln() + AXES as f64 * TAU.ln())
 }
 
-/// Size of an error from the trace of its covariance and from what fading leaves out \[m\].
+/// Returns the expected error length \[m\], from the trace of the error covariance \[m²\] and the
+/// length of the part of the correction that is not applied \[m\].
 pub(super) fn expected_size(variance: f64, missed: f64) -> f64 {
     (variance + missed * missed).sqrt()
 }
 
-/// Scores of rows left out, in ascending order: their quantiles turn an expected size into a bound.
+/// Scores of left-out rows, in ascending order. A quantile of the scores times an expected error
+/// length is an error bound.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scores {
-    /// Number of configurations.
+    /// Number of configurations that were left out.
     pub(super) configurations: usize,
-    /// Each configuration left out by itself.
+    /// Scores of rows whose configuration was left out.
     pub(super) single: Vec<f64>,
-    /// Blocks of neighbouring configurations left out.
+    /// Scores of rows whose block of neighbouring configurations was left out.
     pub(super) blocks: Vec<f64>,
 }
 
 impl Scores {
-    /// Sorts scores, and thins many of them to evenly spaced quantiles.
+    /// Sorts the scores. Above [`MAX_SCORES`], only evenly spaced quantiles are kept.
     pub(super) fn new(configurations: usize, single: Vec<f64>, blocks: Vec<f64>) -> Self {
         Self { configurations, single: thinned(single), blocks: thinned(blocks) }
     }
 
-    /// Multiplies all scores.
+    /// Multiplies all scores by `factor`.
     pub(super) fn scale(&mut self, factor: f64) {
         self.single.iter_mut().chain(&mut self.blocks).for_each(|score| *score *= factor);
     }
 
-    /// Factor from the expected size of an error to a bound that holds with probability `level`:
-    /// the larger of both quantiles of rank level (G + 1) of G configurations, interpolated.
-    /// [Lei, G'Sell, Rinaldo, Tibshirani & Wasserman 2018]
+    /// Returns the ratio of error bound to expected error length at which the bound holds with
+    /// probability `level`.
     ///
-    /// A rank beyond G extends the largest score as the lengths of normal errors in three
-    /// coordinates would.
+    /// With G configurations it is the quantile of rank level (G + 1), interpolated. The larger one
+    /// of single configurations and blocks is taken. [Lei, G'Sell, Rinaldo, Tibshirani & Wasserman
+    /// 2018] For ranks beyond G, the largest score is extrapolated with the distribution of the
+    /// length of a normal vector in three dimensions.
     pub fn quantile(&self, level: f64) -> f64 {
         let count = self.configurations.max(1) as f64;
         let part = level * (count + 1.0) / count;
@@ -120,12 +124,12 @@ impl Scores {
     }
 }
 
-/// Length of a normal error in three coordinates, over its σ, that holds with probability `level`.
+/// Returns the quantile of the length of a standard normal vector in three dimensions.
 fn length(level: f64) -> f64 {
     ChiSquared::new(AXES as f64).map_or(1.0, |squares| squares.inverse_cdf(level).sqrt())
 }
 
-/// Sorts finite scores and keeps at most [`MAX_SCORES`] evenly spaced ones.
+/// Sorts the finite scores and keeps at most [`MAX_SCORES`] evenly spaced ones.
 fn thinned(mut scores: Vec<f64>) -> Vec<f64> {
     scores.retain(|score| score.is_finite());
     scores.sort_by(f64::total_cmp);

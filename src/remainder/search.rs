@@ -1,31 +1,36 @@
-//! Minimisation within a box by BFGS, for functions whose value and gradient come together.
+//! Minimisation within bounds by the BFGS method, for functions that compute value and gradient
+//! together.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Change of the value below which a step is the last one.
+/// Change of the function value in one step below which the search has converged.
 const SETTLED: f64 = 5e-3;
-/// Longest step of a variable: hyperparameters are logarithms.
+/// Largest change of a variable in one step. The variables are logarithms, so this is a factor e²
+/// in a hyperparameter.
 const MAX_STEP: f64 = 2.0;
-/// Part of the expected decrease that a step has to reach                      [Armijo 1966]
+/// Smallest decrease that a step must reach, as a fraction of the decrease that the gradient
+/// predicts. [Armijo 1966]
 const SUFFICIENT: f64 = 1e-4;
-/// Halvings of a step before the search gives up.
+/// Maximum number of times that a step is halved before the search stops.
 const MAX_HALVINGS: usize = 12;
 
-/// Minimum that a search has reached.
+/// Minimum that a search has found.
 #[derive(Debug, Clone)]
 pub(super) struct Minimum {
     pub at: DVector<f64>,
     pub value: f64,
-    /// Estimate of the inverse Hessian, from which a search of a similar function may start.
+    /// Estimate of the inverse Hessian, from which the search for a similar function's minimum may
+    /// start.
     pub inverse: DMatrix<f64>,
 }
 
-/// Returns the minimum of `function` that a descent from `start` within `bounds` reaches in at most
-/// `max_steps` steps; `None` where the function has no value at the start.
+/// Minimises `function` by at most `max_steps` descent steps within `bounds`. Returns `None` if the
+/// function has no value at the start.
 ///
-/// The start is a point, and an estimate of the inverse Hessian there if one is known.
-/// Variables at a bound towards which the function falls are held there for the step. Each step
-/// evaluates value and gradient at once, because both need one factorisation.
+/// `start` is the initial point; `inverse` is an estimate of the inverse Hessian there, if one
+/// exists. A variable at a bound is held there for one step if the function decreases beyond the
+/// bound. Each step evaluates value and gradient together, because both need the same
+/// factorisation.
 pub(super) fn minimise(
     function: impl Fn(&DVector<f64>) -> Option<(f64, DVector<f64>)>,
     (start, inverse): (DVector<f64>, Option<DMatrix<f64>>),

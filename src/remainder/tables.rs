@@ -1,4 +1,4 @@
-//! Tables of a correction, from which other programs compute the same shifts.
+//! Tables of a correction, from which exported programs compute the same shifts as this library.
 
 use nalgebra::DVector;
 
@@ -11,19 +11,20 @@ use crate::model::Model;
 /// Site at which an arm errs: the coordinate or the compliance of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SiteTable {
-    /// Index of the joint.
+    /// Index of the joint, counted from 0.
     pub joint: usize,
-    /// True for the compliance of the joint.
+    /// True if the error is in the compliance of the joint, false if it is in its coordinate.
     pub is_compliance: bool,
-    /// Unit of the slope of the position \[m/rad\], \[1\] or \[N·m²/rad\].
+    /// Lever that divides the derivative of the position: \[m/rad\], \[1\] or \[N·m²/rad\].
     pub lever: f64,
-    /// Variances of the errors that follow its own command, all inputs, and none \[m²\].
+    /// Variances \[m²\] of the error as a function of the joint's own command, as a function of all
+    /// inputs, and as a constant.
     pub variances: [f64; 3],
-    /// Index of the input that is its own command, and 1/ℓ² of the error that follows it.
+    /// Index of the input that is the joint's own command, and 1/ℓᵤ² of the function of it.
     pub single: Option<(usize, f64)>,
 }
 
-/// Quantity of a pose on which errors depend.
+/// Quantity of a pose on which joint errors depend.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum InputSource {
     /// Command of a joint, counted from 0.
@@ -36,43 +37,44 @@ pub enum InputSource {
     Hoist,
 }
 
-/// Input of the errors.
+/// Input of the error functions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InputTable {
-    /// Quantity of a pose.
+    /// Quantity of a pose that is the input.
     pub source: InputSource,
-    /// True if distances are chords of angles.
+    /// True if the input is an angle, so that distances are chords.
     pub is_angle: bool,
-    /// Offset and unit of the standardised input.
+    /// Offset and unit that standardise the input.
     pub standard: (f64, f64),
-    /// 1/ℓ² of the errors that follow all inputs.
+    /// Inverse squared length 1/ℓᵥ² along this input of the functions of all inputs.
     pub scale: f64,
 }
 
-/// Tables of the shift w (k(x, centres) c + J δ), with w = 1 − left / prior:
-/// prior − left = tr Φ E Φᵀ, Φ = (k(x, centres), J S½).
+/// Tables of the shift w (k(x, centres) c + J δ). The applied share is w = 1 − posterior / prior
+/// variance, with prior − posterior = tr(Φ E Φᵀ) and Φ = (k(x, centres), J S½).
 #[derive(Debug, Clone, PartialEq)]
 pub struct CorrectionTables {
-    /// Sites that err.
+    /// Sites at which the arm errs.
     pub sites: Vec<SiteTable>,
-    /// Quantities on which their errors depend.
+    /// Inputs on which the errors depend.
     pub inputs: Vec<InputTable>,
     /// Standardised inputs of each centre.
     pub centres: Vec<Vec<f64>>,
-    /// Site columns of each centre: three coordinates, each with one number for every site.
+    /// Derivatives with respect to the sites at each centre: for each of three coordinates, one
+    /// number per site.
     pub slopes: Vec<Vec<f64>>,
-    /// Knots of the errors that follow one input: index of the site, and standardised input.
+    /// Knots of the functions of a joint's own command: index of the site, and standardised input.
     pub knots: Vec<(usize, f64)>,
-    /// Weights c: three of each centre, then one of each knot.
+    /// Kernel weights c: three for each centre, then one for each knot.
     pub weights: Vec<f64>,
-    /// Index in the model, change δ and S½ of each parameter.
+    /// Index in the model, change δ and prior standard deviation S½ of each parameter.
     pub parameters: Vec<(usize, f64, f64)>,
-    /// Lower triangle of E, row by row.
+    /// Lower triangle of the matrix E, row by row.
     pub explained: Vec<f64>,
 }
 
 impl Correction {
-    /// Returns the joints whose compliances err, counted from 0.
+    /// Returns the indices of the joints whose compliances err, counted from 0.
     pub fn compliant_joints(&self) -> Vec<usize> {
         let sites = self.layout.sites.iter().filter(|site| site.kind == SiteKind::Compliance);
         sites.map(|site| site.joint).collect()

@@ -1,5 +1,5 @@
-//! Tests of the processes on synthetic rows: a covariance is positive, a gradient is a slope,
-//! leaving out in closed form is fitting again.
+//! Tests of the processes on synthetic rows. The covariance must be positive, the gradient must
+//! equal finite differences, and leaving out in closed form must equal fitting again.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -9,10 +9,10 @@ use super::posterior::Training;
 use super::prior::ParameterPrior;
 use super::rows::{AXES, Inputs, Rows, SiteFunctions, Source};
 
-/// Number of configurations, of which the first is measured twice.
+/// Number of configurations; the first is measured twice.
 const CONFIGURATIONS: usize = 14;
 
-/// A number in −1…1 that looks random.
+/// Returns a pseudo-random number between −1 and 1.
 fn noise(k: usize) -> f64 {
     ((12.9898 * k as f64).sin() * 43758.5453).rem_euclid(2.0) - 1.0
 }
@@ -30,7 +30,7 @@ fn inputs() -> Inputs {
     }
 }
 
-/// Rows of two sites, three inputs and two parameters.
+/// Creates rows with two sites, three inputs and two parameters.
 fn rows() -> Rows {
     let count = CONFIGURATIONS + 1;
     let configuration: Vec<usize> = (0..count).map(|row| row.saturating_sub(1)).collect();

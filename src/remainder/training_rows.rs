@@ -1,4 +1,4 @@
-//! Rows that a remainder is trained on, linearised about an identification.
+//! Training rows of a remainder, linearised about an identification.
 
 use rand::seq::SliceRandom as _;
 
@@ -7,33 +7,35 @@ use super::prior::ParameterPrior;
 use super::rows::{AXES, Layout, Rows};
 use crate::random::stream;
 
-/// Minimum share of σ² in the variance of a residual, against a rank that is lost by rounding.
+/// Smallest variance σ² within configurations, as a fraction of the residuals' variance; it keeps
+/// the noise covariance invertible.
 const MIN_NOISE_SHARE: f64 = 1e-4;
-/// Maximum rows up to which the processes are exact: all rows are centres.
+/// Maximum number of rows for which the processes are exact, with every row a centre.
 const MAX_EXACT_ROWS: usize = 500;
-/// Maximum rows that the functions are expanded about if not all are, beside knots.
+/// Maximum number of rows that are centres above [`MAX_EXACT_ROWS`]; knots come in addition.
 const MAX_CENTRES: usize = 150;
-/// Maximum rows that are left out to judge predictions.
+/// Maximum number of rows that are left out to test predictions.
 const MAX_JUDGED_ROWS: usize = 1000;
-/// Seed of the rows for hyperparameters, of the centres, and of the folds.
+/// Seed of the random choice of the rows for hyperparameters, of the centres, and of the folds.
 const SEED: u64 = 0x7265_6d61_696e;
 
-/// Training rows of an identification.
+/// Training rows of an identification, with the prior of its parameters.
 pub(super) struct TrainingRows {
     pub layout: Layout,
-    /// Places of the free parameters that move these rows.
+    /// Indices of the free parameters that affect these rows.
     pub unknowns: Vec<usize>,
     pub rows: Rows,
     pub prior: ParameterPrior,
     /// Root mean square length of a residual \[m\].
     pub size: f64,
     pub configurations: Vec<Vec<usize>>,
-    /// Rows that are left out to judge predictions: all, or those of some configurations.
+    /// Indices of the rows that are left out to test predictions: all, or those of some
+    /// configurations.
     pub judged: Vec<usize>,
 }
 
 impl TrainingRows {
-    /// Divides rows into configurations, and chooses those that are left out to judge predictions.
+    /// Groups the rows by configuration, and chooses those that are left out to test predictions.
     pub fn new(
         (layout, unknowns): (Layout, Vec<usize>),
         rows: Rows,
@@ -47,8 +49,8 @@ impl TrainingRows {
         training
     }
 
-    /// Some rows of whole configurations, at most `count` of them unless one configuration has
-    /// more.
+    /// Returns at most `count` rows at random, in whole configurations; more only if a single
+    /// configuration has more. `number` selects the random stream.
     pub fn some_rows(&self, count: usize, number: u64) -> Vec<usize> {
         if self.rows.len() <= count {
             return (0..self.rows.len()).collect();
@@ -66,8 +68,8 @@ impl TrainingRows {
         picked
     }
 
-    /// Divides the configurations into at most `count` folds at random. Returns the rows of each
-    /// fold and the other rows.
+    /// Divides the configurations into at most `count` random folds. Returns, for each fold, its
+    /// rows and all other rows.
     pub fn folds(&self, count: usize) -> Vec<(Vec<usize>, Vec<usize>)> {
         let mut configurations = self.configurations.clone();
         configurations.shuffle(&mut stream(SEED, 2));
@@ -82,18 +84,19 @@ impl TrainingRows {
         (0..count).map(divided).collect()
     }
 
-    /// Number of rows that the functions are expanded about.
+    /// Returns the maximum number of rows that are centres of the processes.
     pub fn centres(&self) -> usize {
         if self.rows.len() <= MAX_EXACT_ROWS { MAX_EXACT_ROWS } else { MAX_CENTRES }
     }
 
-    /// True where rows of one configuration may share noise: a tenth of them repeats one.
+    /// Returns true if noise shared by rows of one configuration can be estimated: more than a
+    /// tenth of the rows repeat a configuration.
     pub fn shares_noise(&self) -> bool {
         10 * self.configurations.len() < 9 * self.rows.len()
     }
 
-    /// Noise of predictions without a remainder: σ² from the scatter within configurations, σ_c²
-    /// from what their means scatter beyond that.
+    /// Estimates the noise of predictions without a remainder. σ² is the variance within
+    /// configurations, and σ_c² the variance of all residuals minus σ².
     pub fn noise(&self) -> Hyperparameters {
         let coordinate = |row: usize, axis: usize| self.rows.residual[AXES * row + axis];
         let coordinates = (AXES * self.rows.len()) as f64;
