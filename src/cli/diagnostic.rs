@@ -14,7 +14,7 @@ use flexcal::report;
 
 use super::outcome::Outcome;
 
-/// Width of messages [characters], large enough that no line is wrapped.
+/// Width of messages \[characters\], large enough that no line is wrapped.
 const WIDTH: usize = 1000;
 
 /// Prints an error to standard error.

@@ -94,7 +94,7 @@ pub struct PairSeparation {
 /// `options.criterion` is not used.
 ///
 /// # Errors
-/// Returns the errors of [`plan`].
+/// Returns the errors of [`plan()`].
 pub fn separate(
     pair: &EffectPair,
     candidates: &Candidates,

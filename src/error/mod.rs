@@ -157,7 +157,7 @@ impl fmt::Display for Warning {
     }
 }
 
-/// Maximum length of a displayed key [characters].
+/// Maximum length of a displayed key \[characters\].
 const MAX_KEY_CHARS: usize = 200;
 
 /// Returns the first `max_chars` characters of a text, followed by an ellipsis if more follow.

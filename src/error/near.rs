@@ -5,7 +5,7 @@ use strsim::{damerau_levenshtein, normalized_damerau_levenshtein};
 /// Minimum similarity of a suggested word: 1 for the same word, 0 for no common letter.
 const MIN_SIMILARITY: f64 = 0.6;
 
-/// Maximum length of a word for which a suggestion is searched [bytes]; known words are shorter.
+/// Maximum length of a word for which a suggestion is searched \[bytes\]; known words are shorter.
 const MAX_SUGGESTION_BYTES: usize = 80;
 
 /// Returns the known word most similar to `word`, if its similarity is at least [`MIN_SIMILARITY`];

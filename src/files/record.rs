@@ -10,7 +10,7 @@ use super::{StagedFile, read_limited};
 
 /// Name of the record file.
 const RECORD_NAME: &str = ".flexcal";
-/// Maximum size of a record that is read [bytes].
+/// Maximum size of a record that is read \[bytes\].
 const MAX_RECORD_BYTES: u64 = 1 << 20;
 
 /// Record of the files written to a folder, stored there as `.flexcal`: one line of digest, command

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::Labels;
 use crate::error::{InputError, Location, TableErrorKind};
 
-/// Size of the text that is generated at a time [bytes].
+/// Size of the text that is generated at a time \[bytes\].
 const CHUNK_BYTES: usize = 1 << 15;
 
 /// Table of measurements in memory, with the column names that a file would have. Messages name a

@@ -6,7 +6,7 @@ use super::lines::Lines;
 use crate::error::BYTE_ORDER_MARK_UTF8;
 use crate::problem::{ColumnSelector, Delimiter, Dialect};
 
-/// Size of the beginning of a table in which the header is searched [bytes].
+/// Size of the beginning of a table in which the header is searched \[bytes\].
 pub(super) const HEADER_SEARCH_BYTES: u64 = 1 << 16;
 /// Maximum number of lines in which the header is searched.
 const MAX_HEADER_LINES: usize = 100;

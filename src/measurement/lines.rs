@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, Error, ErrorKind, Read, Result};
 
-/// Maximum size of a record [KiB].
+/// Maximum size of a record \[KiB\].
 pub(super) const MAX_RECORD_KIB: u64 = 1024;
 
 /// Reader that converts CRLF and CR to LF and adds a final LF. It refuses records that are too

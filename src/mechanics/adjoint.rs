@@ -1,6 +1,6 @@
 //! Adjoint sweep: derivatives of the position at equilibrium, by virtual work.
 //!
-//! Λ is the influence of the moments' equations (see [`super::statics`]). PerCoordinate coordinate of p +
+//! Λ is the influence of the moments' equations (see [`super::statics`]). Each coordinate of p +
 //! Λ·(G − x) changes with the place of every load, section and segment. The sweep runs from the
 //! target to the base and keeps, for each of the three coordinates, the wrench whose virtual work
 //! equals that change. A load f at r adds the force f × W, where W is the sum of the Λ-weighted

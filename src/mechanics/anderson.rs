@@ -34,11 +34,6 @@ pub(super) struct Anderson {
 
 impl Anderson {
     /// Discards all earlier passes, because the fixed-point problem changes.
-    /// @1! Euler–Bernoulli cantilever in closed form, in three dimensions.
-    ///
-    /// Root frame: x along the beam, tip at x = L. Each load is a wrench at a station or spread
-    /// evenly, and deflections superpose. L may be negative (the link runs along −x). Rigidities
-    /// then take the sign of L, and every formula stays as it is.
     pub fn restart(&mut self) {
         (self.used, self.passes) = (0, 0);
     }

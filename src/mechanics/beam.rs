@@ -1,6 +1,6 @@
 //! Euler–Bernoulli cantilever in closed form, in three dimensions.
 //!
-//! Root frame: x along the beam, tip at x = L. PerCoordinate load is a wrench at a station or spread evenly,
+//! Root frame: x along the beam, tip at x = L. Each load is a wrench at a station or spread evenly,
 //! and deflections superpose. L may be negative (the link runs along −x). Rigidities then take the
 //! sign of L, and every formula stays as it is.
 

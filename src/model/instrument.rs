@@ -150,10 +150,6 @@ const STRAIN_PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 
 
 /// Returns the derivative of E with respect to one of its entries, in the order of
 /// [`ParameterSite::Strain`].
-/// @1! Residuals of rows with their derivatives, in dual numbers where few variables suffice.
-///
-/// A base or a target moves the position rigidly, and on a rigid arm so does every parameter of a
-/// link. On an elastic arm a parameter also changes the moments of the loads.
 fn unit_strain(entry: usize) -> Matrix3<f64> {
     let mut matrix = Matrix3::zeros();
     if let Some(place) = STRAIN_PLACES.get(entry) {

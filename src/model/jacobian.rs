@@ -1,8 +1,7 @@
-//! Residuals of rows with their derivatives, by dual numbers where the structure of the arm keeps
-//! them small.
+//! Residuals of rows with their derivatives, in dual numbers where few variables suffice.
 //!
 //! A base or a target moves the position rigidly, and on a rigid arm so does every parameter of a
-//! link. On an elastic arm the loads move too.
+//! link. On an elastic arm a parameter also changes the moments of the loads.
 
 use nalgebra::{Matrix3, Vector3};
 

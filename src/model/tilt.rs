@@ -15,21 +15,6 @@ use crate::problem::PoseView;
 pub(super) struct TiltDerivatives {
     arm: Arm<f64>,
     /// Arm in dual numbers with zero derivatives.
-    /// @1! Adjoint sweep: derivatives of the position at equilibrium, by virtual work.
-    ///
-    /// Λ is the influence of the moments' equations (see [`super::statics`]). Each coordinate of p
-    /// + Λ·(G − x) changes with the place of every load, section and segment. The sweep runs from
-    /// the target to the base and keeps, for each of the three coordinates, the wrench whose
-    /// virtual work equals that change. A load f at r adds the force f × W, where W is the sum of
-    /// the Λ-weighted axes of all sections between base and load. A section adds the change of its
-    /// moment with its place and axes. The derivative of a segment is the work of the wrench on the
-    /// segment's twist; the spring of a joint adds the change of its moment. For the moments
-    /// themselves this derivative is Λ again. Λ is therefore a fixed point of the sweep, reached by
-    /// the same contraction as the equilibrium.
-    ///
-    /// Where branches meet, their wrenches add up. A branch without the target carries the virtual
-    /// forces of its loads alone: its masses bend the trunk and so move the target of another
-    /// branch.
     unseeded: Arm<Dual64>,
     inputs: Vec<(Input, Arm<Dual64>)>,
     state: StaticState,

@@ -12,7 +12,7 @@ use toml::de::{DeInteger, DeString, DeTable, DeValue};
 use crate::error::{BYTE_ORDER_MARKS, InputError, InputErrorKind, Location, is_hidden, lines};
 use crate::files::read_limited;
 
-/// Maximum size of a TOML file that is read [MiB].
+/// Maximum size of a TOML file that is read \[MiB\].
 const MAX_TEXT_MIB: u64 = 4;
 /// Maximum magnitude of an input number; its square is still finite.
 pub(crate) const MAX_MAGNITUDE: f64 = 1e150;

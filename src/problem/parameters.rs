@@ -52,7 +52,7 @@ pub struct Quantities {
 /// Maximum number of rules in `[parameters]`.
 const MAX_RULES: usize = 2000;
 
-/// Maximum length of a pattern [bytes], which bounds the work of matching all parameters.
+/// Maximum length of a pattern \[bytes\], which bounds the work of matching all parameters.
 const MAX_PATTERN_BYTES: usize = 500;
 
 const KINDS: [Unit; 4] = [Unit::Angle, Unit::Length, Unit::Pixel, Unit::Ratio];

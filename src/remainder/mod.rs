@@ -1,7 +1,7 @@
 //! Remainder: the smooth error that no law explains, modelled by Gaussian processes at the joints;
 //! and the uncertainty of predictions.
 //!
-//! [`fit`] conditions the processes and the parameters on the rows of an identification. It keeps
+//! [`fit()`] conditions the processes and the parameters on the rows of an identification. It keeps
 //! the processes if left-out configurations are then predicted better. The result is a
 //! [`Correction`]. It is saved as `remainder.json`, and [`predict`] and [`compensate`] apply it to
 //! other poses.

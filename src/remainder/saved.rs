@@ -53,7 +53,7 @@ struct SavedSite {
     /// Joint, counted from 1.
     joint: usize,
     kind: SiteKind,
-    /// Lever of the site: [m/rad] for a revolute joint, [1] for a prismatic one, [N·m²/rad] for
+    /// Lever of the site: [m/rad] for a revolute joint, \[1\] for a prismatic one, [N·m²/rad] for
     /// compliances.
     lever: f64,
     /// 1 σ of the error that is a function of the joint's own command, as motion of the position.

@@ -1,4 +1,4 @@
-//! Tables 2 and 3 of [Chen2021] from any procedure.
+//! Tables 2 and 3 of \[Chen2021\] from any procedure.
 
 use super::document::Table;
 use crate::fit::{AxisValues, Comparison, ErrorSummary, Procedure, TableEntry};

@@ -1,4 +1,4 @@
-//! Text and report of a study of the misprints of [Chen2021].
+//! Text and report of a study of the misprints of \[Chen2021\].
 
 use super::document::{Block, Headline, Table};
 use super::figures;

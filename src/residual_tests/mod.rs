@@ -5,10 +5,11 @@
 //! Therefore the residual of each pose is studentised by its leverage. Null distributions of the
 //! tests of order and dependence come from permuted residuals that are fitted again.
 //!
-//! - `fit_residual`, `leverage`: the input, studentised residuals, fits without some poses. -
-//! `size`, `outliers`, `statistic`: size and distribution of the residuals, order, dependence on
-//! covariates. - `chance`, `permutation`: null distributions. `judgement`, `outcome`: decision over
-//! all tests, and sentences.
+//! - `fit_residual`, `leverage`: the input, studentised residuals, and fits without some poses.
+//! - `size`, `outliers`, `statistic`: size and distribution of the residuals, order, and dependence
+//!   on covariates.
+//! - `chance`, `permutation`: null distributions.
+//! - `judgement`, `outcome`: decision over all tests, and its wording.
 
 mod chance;
 mod covariate;

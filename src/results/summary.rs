@@ -72,7 +72,7 @@ impl Summary {
 }
 
 impl Sizes {
-    /// Converts sizes in `unit` [m], \[rad\] or \[px\] to mm, ° or px.
+    /// Converts sizes in `unit` \[m\], \[rad\] or \[px\] to mm, ° or px.
     fn of(errors: &ErrorSummary, unit: Unit) -> Self {
         let axes = |values: &AxisValues, factor: f64| {
             let [x, y, z, norm] =

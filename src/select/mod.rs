@@ -1,10 +1,12 @@
 //! Search for effects that a model lacks, from the residual of its fit.
 //!
 //! - [`trace`]: score screening, which scores every candidate of the catalogue in the linear
-//!   neighbourhood of a fit and ranks them. - [`detectable`]: the same screening before
-//!   measurement: the smallest size at which it would find each effect. - [`close`]: model
-//!   selection in rounds of fitting, screening, adding effects and testing. - [`Unexplained`]:
-//!   structure that no effect explains, its place, and a smooth empirical correction.
+//!   neighbourhood of a fit and ranks the candidates.
+//! - [`detectable`]: the same screening before measurement; computes the smallest size at which it
+//!   would find each effect.
+//! - [`close`]: model selection in rounds of fitting, screening, adding effects and testing.
+//! - [`Unexplained`]: structure that no effect explains, its place, and a smooth empirical
+//!   correction.
 
 mod candidates;
 

@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1e-11;
 pub const SIGMA_MM: f64 = 0.05;
 /// Default fraction of held-out poses.
 pub const HELD_OUT: f64 = 0.3;
-/// Maximum length of a problem's name taken from the robot's [characters].
+/// Maximum length of a problem's name taken from the robot's \[characters\].
 const MAX_NAME_CHARS: usize = 60;
 
 /// Text with the range of a joint without limits, from which `check` and `plan` draw poses.

@@ -15,7 +15,7 @@ use crate::model::{Model, Pose};
 use crate::problem::Problem;
 use crate::problem::item::MAX_MAGNITUDE;
 
-/// Maximum size of an `estimate.json` [MiB].
+/// Maximum size of an `estimate.json` \[MiB\].
 const LARGEST_MIB: u64 = 256;
 
 /// Smallest identified share of a parameter that counts as determined.

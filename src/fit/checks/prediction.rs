@@ -79,7 +79,7 @@ fn upper_tail(chi2: f64, coordinates: usize, noise_dof: Option<f64>) -> Option<(
 /// Returns χ² = rᵀ(I + J C Jᵀ)⁻¹ r of the positions of `rows`, whitened by the σ that the fit took,
 /// and its number of coordinates.
 ///
-/// With N = JᵀJ and v = Jᵀr it is r·r − vᵀ C (I + N C)⁻¹ v  [Woodbury], with the unknowns in units
+/// With N = JᵀJ and v = Jᵀr it is r·r − vᵀ C (I + N C)⁻¹ v, by the Woodbury identity, with the unknowns in units
 /// of their standard errors.
 fn predictive_chi2(
     fitting: &Fitting,

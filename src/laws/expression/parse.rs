@@ -9,7 +9,7 @@ use super::vocabulary::Vocabulary;
 use crate::error::nearest;
 use crate::laws::quantity::Quantity;
 
-/// Maximum length of a formula [characters].
+/// Maximum length of a formula \[characters\].
 const MAX_LENGTH: usize = 2000;
 /// Maximum nesting depth of parentheses, signs and powers.
 const MAX_DEPTH: usize = 60;

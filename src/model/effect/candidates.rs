@@ -218,7 +218,6 @@ impl Effect {
     }
 
     /// Returns the reason why the data do not meet `need`; `None` if they do.
-    /// @1! Share of a family's prior probability that one of its members has.
     fn unmet_need(
         &self,
         need: Need,

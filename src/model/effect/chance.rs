@@ -1,4 +1,4 @@
-//! Share of the chance of a family that falls to one of its members.
+//! Share of a family's prior probability that one of its members has.
 
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
@@ -18,7 +18,6 @@ const LOG_LEAD_RANGE: f64 = 7.0;
 impl Effect {
     /// Returns the effective number of tries (Bonferroni factor) at the effect: the reciprocal of
     /// its share of its family's prior probability. `members` are the candidates of the family.
-    /// @1! Conditions other than configurations that a data set records and varies.
     pub(crate) fn tries(&self, members: &[&Self], problem: &Problem) -> f64 {
         match self.family().map_or(Chance::Equal, |family| family.chance) {
             Chance::Equal => members.len().max(1) as f64,

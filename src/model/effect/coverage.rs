@@ -1,4 +1,4 @@
-//! What the data know about the poses besides their configurations.
+//! Conditions other than configurations that a data set records and varies.
 
 use nalgebra::Vector3;
 

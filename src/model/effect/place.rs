@@ -28,7 +28,6 @@ pub(super) const LEAST_MOMENT: f64 = 10.0;
 
 /// Returns an upper estimate of the moment on a joint, counted from 1 [N·m]: weight of everything
 /// declared beyond it times the length of its longest branch.
-/// @1! Prior sizes of effect parameters on an arm.
 pub(super) fn greatest_moment(problem: &Problem, joint: usize) -> f64 {
     let all = |bodies: &[Body]| bodies.iter().map(|body| body.mass).sum::<f64>();
     let beam =

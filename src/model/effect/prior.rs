@@ -1,4 +1,4 @@
-//! Sizes of parameters on an arm.
+//! Prior sizes of effect parameters on an arm.
 
 use super::place::{LEAST_MOMENT, greatest_moment};
 use crate::laws::{Argument, Effect, Prior};

@@ -18,7 +18,7 @@ struct Entry {
 }
 
 /// Draws held-out and identification error of every strategy with every solver, and of the
-/// procedure of [Chen2021].
+/// procedure of \[Chen2021\].
 pub fn strategies(comparison: &Comparison) -> Drawing {
     let mut entries: Vec<Entry> = Vec::new();
     for outcome in &comparison.strategies {

@@ -295,7 +295,7 @@ impl<'w, 'a> Waves<'w, '_, 'a> {
         all
     }
 
-    /// Returns the width of the likelihood about an order [orders], relative to its maximum, by the
+    /// Returns the width of the likelihood about an order \[orders\], relative to its maximum, by the
     /// trapezoid rule.
     fn spread(&self, joint: usize, order: f64, left: &Left) -> f64 {
         let Some((low, high)) = self.range(joint) else { return 1.0 };

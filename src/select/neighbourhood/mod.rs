@@ -1,8 +1,10 @@
-//! Linear neighbourhood of a fit, in which candidates are judged without being fitted.
+//! Linear neighbourhood of a fit, in which candidates are tested without being fitted.
 //!
-//! - [`Linearised`]: the model with a column for every site where an effect may enter;
-//!   [`LinearNeighbourhood`]: a fit in it. - [`Score`], [`Sums`], [`Gain`]: reduction of the
-//!   residual by columns, and its p-value. - [`Scan`]: all candidates against one fit.
+//! - [`Linearised`]: the model with a column for every site where an effect may enter.
+//! - [`LinearNeighbourhood`]: a fit of this linearised model.
+//! - `Score`, `Sums`, `Gain`: reduction of the squared residual by additional columns, and its
+//!   p-value.
+//! - `Scan`: tests of all candidates against one fit.
 
 mod left_out;
 mod linear;

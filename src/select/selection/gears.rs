@@ -26,7 +26,7 @@ const RANGE_PARTS: usize = 5;
 /// Trial scales of the prior, as powers of two of the current scale; half and quarter powers about
 /// the best one follow.
 const SCALE_POWERS: std::ops::RangeInclusive<i32> = -8..=4;
-/// Standard deviation of the kernel that smooths σₖ [orders]. A joint that covers part of a turn
+/// Standard deviation of the kernel that smooths σₖ \[orders\]. A joint that covers part of a turn
 /// cannot resolve finer.
 const SPECTRUM_WIDTH: f64 = 1.5;
 /// Weight of the mean square of all coefficients in the σₖ² of one order, as an equivalent number

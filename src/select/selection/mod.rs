@@ -1,9 +1,13 @@
-//! The loop: search for the effects that a problem lacks, by the evidence about its fits.
+//! Loop of model selection: searches the effects that a problem lacks, by the evidence of its fits.
 //!
-//! - `search`: evaluates the evidence about a fit and fits the most probable set, until both agree;
-//!   `state`: the fits made so far; `gears`: common prior of harmonics; `polish`: searched
-//!   arguments on all rows. - `close`: the loop from the declared problem to its result; `found`,
-//!   `status`, `interval`: claims about each effect, the verdict, and the gain on held-out poses.
+//! - `search`: alternates between evaluating the evidence about a fit and fitting the most probable
+//!   set, until both agree.
+//! - `state`: the fits made so far.
+//! - `gears`: the common prior of harmonics.
+//! - `polish`: refines searched arguments on all rows.
+//! - `close`: runs the loop from the declared problem to its result.
+//! - `found`, `status`, `interval`: the claims about each effect, the verdict, and the gain on
+//!   held-out poses.
 
 mod close;
 mod found;

@@ -1,4 +1,4 @@
-//! Alternative models: mistaken assumptions that might explain the errors reported in [Chen2021].
+//! Alternative models: mistaken assumptions that might explain the errors reported in \[Chen2021\].
 
 use crate::problem::{Joint, Problem};
 

@@ -1,4 +1,4 @@
-//! Procedure of [Chen2021] on measured poses, and its errors at held-out poses.
+//! Procedure of \[Chen2021\] on measured poses, and its errors at held-out poses.
 
 use super::measured_pose::MeasuredPose;
 use crate::fit::{ErrorSummary, IdentifyError};
@@ -22,7 +22,7 @@ pub enum ReplicaError {
     Dataset(#[from] DatasetError),
 }
 
-/// Applies the procedure of [Chen2021] to some poses.
+/// Applies the procedure of \[Chen2021\] to some poses.
 pub(super) fn identify_as_published(
     problem: &Problem,
     poses: &[MeasuredPose],
@@ -32,7 +32,7 @@ pub(super) fn identify_as_published(
     Ok(paper::identify(problem, &poses, options)?)
 }
 
-/// Returns the position errors at some poses that the closed forms of [Chen2021] predict.
+/// Returns the position errors at some poses that the closed forms of \[Chen2021\] predict.
 pub(super) fn position_errors(
     problem: &Problem,
     poses: &[MeasuredPose],

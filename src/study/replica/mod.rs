@@ -1,4 +1,4 @@
-//! Replicas of the experiment of [Chen2021] with known truth: the cost of each misprint, and
+//! Replicas of the experiment of \[Chen2021\] with known truth: the cost of each misprint, and
 //! possible causes of the reported 2.14 mm.
 //!
 //! A [`MisprintStudy`] (`MISPRINTS.toml`, see `docs/paper.md`) draws specimens of the arm on the

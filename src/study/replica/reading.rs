@@ -1,4 +1,4 @@
-//! Readings of the formulas of [Chen2021] that the study compares.
+//! Readings of the formulas of \[Chen2021\] that the study compares.
 
 use crate::paper::{Form, Misprint, Reading};
 

@@ -1,4 +1,4 @@
-//! Specimens of the arm of [Chen2021], measured on the virtual test rig.
+//! Specimens of the arm of \[Chen2021\], measured on the virtual test rig.
 
 use nalgebra::Vector3;
 
