@@ -307,6 +307,12 @@ fn damaged_and_foreign_parts_are_not_used() {
         message.contains("belongs to other inputs") && message.contains(&one.display().to_string()),
         "{message}"
     );
+    let cell = fs::read_to_string(&other).unwrap();
+    fs::write(&other, cell.replacen("\"mean\": ", "\"mean\": 1", 1)).unwrap();
+    fs::remove_file(&one).unwrap();
+    let message = pending(&study, &store, Shard::WHOLE).unwrap_err().to_string();
+    assert!(message.contains("tally: changed since flexcal wrote it"), "{message}");
+    fs::write(&other, cell).unwrap();
     fs::write(&one, "{").unwrap();
     let assert = bench.flexcal(&["study", "STUDY.toml", "--out", "out"]).code(2);
     assert!(text(&assert.get_output().stderr).contains("damaged"));

@@ -9,7 +9,8 @@ from . import _core
 from ._forward import Forward
 from ._progress import Told, told
 from ._results import Check, ClosedLoop, Identification, Plan, Trace
-from ._tables import Data, Path, source, warn
+from ._restored import Spec
+from ._tables import Data, Path, Source, count, source, warn
 
 Strategy: TypeAlias = Literal["joint", "sequential", "sequential-one-sweep", "geometry-only", "stiffness-only", "rigid"]
 Solver: TypeAlias = Literal[
@@ -23,6 +24,10 @@ Solver: TypeAlias = Literal[
     "clamped",
 ]
 Criterion: TypeAlias = Literal["S", "A", "D", "E"]
+
+MOST_POSES = 10_000
+"""Poses that a check or a plan takes at most, as on the command line."""
+MOST_SEED = 2**64 - 1
 
 TEXT = "<text>"
 """What messages call a problem in memory."""
@@ -114,6 +119,9 @@ class Problem(Forward):
     def __repr__(self) -> str:
         return f"<flexcal.Problem {self.name!r}>"
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return _parsed, (self._core.text, str(self._core.file), self._core.notes)
+
     def identify(
         self,
         data: Data | None = None,
@@ -141,9 +149,11 @@ class Problem(Forward):
         InputError
             A mistake in the measurements; problem, data, strategy and solver do not fit each other.
         """
-        read = self._data(data)
+        given = self._given_data(data)
+        read = self._read(given)
         with told(progress) as step:
-            result = Identification(self._core.identify(read, strategy, solver, step), self)
+            core = self._core.identify(read, strategy, solver, step)
+        result = Identification(core, self, Spec("identify", self, given, strategy, solver))
         result._warn(stacklevel=2)
         return result
 
@@ -152,17 +162,19 @@ class Problem(Forward):
 
         Parameters are those of :meth:`identify`.
         """
-        read = self._data(data)
+        given = self._given_data(data)
+        read = self._read(given)
         with told(progress) as step:
-            result = ClosedLoop(self._core.close(read, step), self)
+            result = ClosedLoop(self._core.close(read, step), self, Spec("loop", self, given))
         result._warn(stacklevel=2)
         return result
 
     def trace(self, data: Data | None = None, *, progress: Told = False) -> Trace:
         """Ranks the effects that the residual points to; changes nothing. Parameters are those of :meth:`identify`."""
-        read = self._data(data)
+        given = self._given_data(data)
+        read = self._read(given)
         with told(progress) as step:
-            result = Trace(self._core.trace(read, step), self)
+            result = Trace(self._core.trace(read, step), self, Spec("trace", self, given))
         result.fit._warn(stacklevel=2)
         return result
 
@@ -190,6 +202,8 @@ class Problem(Forward):
         seed
             Of every random number.
         """
+        poses = None if poses is None else count("poses", poses, 1, MOST_POSES)
+        seed = count("seed", seed, 0, MOST_SEED)
         if data is not None and candidates is not None:
             raise TypeError("data and candidates both name poses; keep one of the two")
         table = self._given(candidates)
@@ -231,11 +245,15 @@ class Problem(Forward):
         seed
             Of every random number.
         """
+        poses, seed = count("poses", poses, 1, MOST_POSES), count("seed", seed, 0, MOST_SEED)
         given, table = self._given(data), self._given(candidates)
         return Plan(_core.plan(self._core, poses, given, table, criterion, separate, truth, seed))
 
-    def _data(self, data: Data | None) -> _core.Data:
-        read = self._core.data(self.files if data is None else source(data))
+    def _given_data(self, data: Data | None) -> Source:
+        return self.files if data is None else source(data)
+
+    def _read(self, given: Source) -> _core.Data:
+        read = self._core.data(given)
         warn(read.warnings, stacklevel=3)
         return read
 
@@ -246,3 +264,10 @@ class Problem(Forward):
         poses = self._core.poses(table)  # type: ignore[arg-type]
         warn(poses.warnings, stacklevel=4)
         return poses
+
+
+def _parsed(text: str, file: str, notes: list[str]) -> Problem:
+    """A problem from its pickle."""
+    problem = Problem.__new__(Problem)
+    problem._hold(_core.Problem.parse(text, file, notes))
+    return problem

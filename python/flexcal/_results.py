@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import pathlib
 import tempfile
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _html
 from ._forward import Forward
+from ._restored import Restored, Spec, said
 from ._tables import Path, table, warn
 
 if TYPE_CHECKING:
@@ -22,6 +23,34 @@ if TYPE_CHECKING:
     from ._problem import Problem
 
 Array = npt.NDArray[np.float64]
+T = TypeVar("T")
+
+
+class _once(Generic[T]):
+    """A property that is computed once and cannot be changed: tables are given as copies, arrays are read-only."""
+
+    def __init__(self, function: Callable[[Any], T]) -> None:
+        self._function = function
+        self.__doc__ = function.__doc__
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = f"_once_{name}"
+
+    def __get__(self, result: Any, owner: type | None = None) -> T:
+        if result is None:
+            return self  # type: ignore[return-value]
+        kept = result.__dict__
+        if self._name not in kept:
+            value = self._function(result)
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+            kept[self._name] = value
+        value = kept[self._name]
+        copy = getattr(value, "copy", None)
+        return copy() if copy is not None and hasattr(value, "columns") else value  # type: ignore[no-any-return]
+
+    def __set__(self, result: Any, value: object) -> None:
+        raise AttributeError(f"{self._name.removeprefix('_once_')}: results cannot be changed")
 
 
 class _Result:
@@ -29,22 +58,37 @@ class _Result:
 
     _core: Any
 
+    def __setattr__(self, name: str, value: object) -> None:
+        if not name.startswith("_"):
+            raise AttributeError(f"{name}: results cannot be changed")
+        super().__setattr__(name, value)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"said": said(self._core)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._core = Restored(state["said"], None)
+
     def summary(self) -> str:
         """What the command line prints (``identify`` and ``loop`` with ``-v``), as text."""
         return str(self._core.summary())
 
     def to_json(self) -> str:
         """The file that the command line writes (``estimate.json``, ``loop.json`` …), to the byte but for the time taken."""
-        return str(self._core.json())
+        return self._json
 
     def to_dict(self) -> dict[str, Any]:
         """The same as a dict; docs/results.md explains every field. SI units, except where a key says otherwise."""
-        return dict(self._document)
-
-    @cached_property
-    def _document(self) -> dict[str, Any]:
-        document: dict[str, Any] = json.loads(self._core.json())
+        document: dict[str, Any] = json.loads(self._json)
         return document
+
+    @_once
+    def _json(self) -> str:
+        return str(self._core.json())
+
+    @_once
+    def _document(self) -> dict[str, Any]:
+        return self.to_dict()
 
     def __str__(self) -> str:
         return self.summary()
@@ -58,8 +102,20 @@ class _Fit(_Result):
 
     _fit: _core.Identification
     _problem: Problem
+    _spec: Spec
 
-    @cached_property
+    def __getstate__(self) -> dict[str, Any]:
+        return {"said": said(self._core), "fit": said(self._fit), "problem": self._problem, "spec": self._spec}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self._problem, self._spec = state["problem"], state["spec"]
+        self._core = Restored(state["said"], self._spec)
+        self._fit = self._fit_of(state["fit"])
+
+    def _fit_of(self, words: dict[str, Any]) -> Any:
+        return Restored(words, self._spec)
+
+    @_once
     def parameters(self) -> pd.DataFrame:
         """The free parameters, a row each, by their names; SI.
 
@@ -69,14 +125,26 @@ class _Fit(_Result):
         """
         return _parameters(json.loads(self._fit.json())["parameters"])
 
-    @cached_property
+    @_once
     def covariance(self) -> Array:
         """Covariance of the estimates, shape (parameters, parameters), in the order of ``parameters``; SI, entry (i, j) in the
         product of both units. NaN where one of the two has no standard error."""
         n = len(self.parameters)
         return np.frombuffer(self._fit.covariance(), dtype=np.float64).reshape(n, n)
 
-    @cached_property
+    @_once
+    def correlation(self) -> pd.DataFrame:
+        """Correlation of the estimates by the names of the parameters, from -1 to 1; NaN where there is no covariance."""
+        import pandas as pd
+
+        covariance = self.covariance
+        sigma = np.sqrt(np.diag(covariance))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            values = covariance / np.outer(sigma, sigma)
+        names = self.parameters.index
+        return pd.DataFrame(values, index=names, columns=names)
+
+    @_once
     def residuals(self) -> pd.DataFrame:
         """What the fit leaves, a row for each row of the data, in their order.
 
@@ -88,7 +156,7 @@ class _Fit(_Result):
         """
         return _residuals(self._fit.residuals())
 
-    @cached_property
+    @_once
     def errors(self) -> pd.DataFrame:
         """Errors before and after, on the rows fitted and on those held out [mm]: mean, root mean square and largest distance."""
         return _errors(self._document)
@@ -119,7 +187,7 @@ class _Fit(_Result):
         """The problem that was fitted."""
         return self._problem
 
-    @cached_property
+    @_once
     def _report(self) -> tuple[str, str, dict[str, str]]:
         markdown, page, figures = self._core.report()
         return markdown, page, {name.removesuffix(".svg"): text for name, text in figures}
@@ -147,12 +215,18 @@ class _Fit(_Result):
 class Identification(_Fit, Forward):
     """An identified arm."""
 
-    def __init__(self, core: _core.Identification, problem: Problem) -> None:
+    def __init__(self, core: _core.Identification, problem: Problem, spec: Spec) -> None:
         self._core = core
         self._fit = core
         self._problem = problem
+        self._spec = spec
         self._forward = core
         self._reader = problem._core
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        self._forward = self._fit
+        self._reader = self._problem._core
 
     def export_urdf(self, urdf: Path) -> Export:
         """The URDF that the problem came from, with the origins of its chain as they were identified.
@@ -172,10 +246,14 @@ class ClosedLoop(_Fit):
     """The loop from the declared problem to one that leaves nothing to find; ``parameters``, ``covariance`` and ``residuals`` are
     those of the last fit, with everything that was found."""
 
-    def __init__(self, core: _core.ClosedLoop, problem: Problem) -> None:
+    def __init__(self, core: _core.ClosedLoop, problem: Problem, spec: Spec) -> None:
         self._core = core
         self._fit = core.after()
         self._problem = problem
+        self._spec = spec
+
+    def _fit_of(self, words: dict[str, Any]) -> Any:
+        return Restored(words, self._spec.part("after"))
 
     @property
     def verdict(self) -> str:
@@ -183,7 +261,7 @@ class ClosedLoop(_Fit):
         effect is sure) or ``"nothing-found"``."""
         return str(self._document["verdict"])
 
-    @cached_property
+    @_once
     def effects(self) -> pd.DataFrame:
         """What was found, a row each, in that order.
 
@@ -196,20 +274,20 @@ class ClosedLoop(_Fit):
     @property
     def unexplained(self) -> dict[str, Any] | None:
         """Structure whose law is not known: its place, what it depends on; None if none is left."""
-        found: dict[str, Any] | None = self._document["unexplained"]
+        found: dict[str, Any] | None = self.to_dict()["unexplained"]
         return found
 
-    @cached_property
+    @_once
     def before(self) -> Identification:
         """The fit of the problem as declared."""
-        return Identification(self._core.before(), self._problem)
+        return Identification(self._core.before(), self._problem, self._spec.part("before"))
 
-    @cached_property
+    @_once
     def after(self) -> Identification:
         """The fit with everything that was found; it predicts."""
-        return Identification(self._core.after(), self.closed_problem)
+        return Identification(self._core.after(), self.closed_problem, self._spec.part("after"))
 
-    @cached_property
+    @_once
     def closed_problem(self) -> Problem:
         """The problem with what was found declared: an input like any other."""
         from ._problem import Problem
@@ -223,10 +301,21 @@ class ClosedLoop(_Fit):
 class Trace(_Result):
     """Which effects the residual of a fit points to."""
 
-    def __init__(self, core: _core.Trace, problem: Problem) -> None:
+    def __init__(self, core: _core.Trace, problem: Problem, spec: Spec) -> None:
         self._core = core
-        self.fit = Identification(core.fit(), problem)
+        self._identified = Identification(core.fit(), problem, spec.part("fit"))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return super().__getstate__() | {"fit": self._identified}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        self._identified = state["fit"]
+
+    @property
+    def fit(self) -> Identification:
         """The fit of the problem as declared."""
+        return self._identified
 
     @property
     def parameters(self) -> pd.DataFrame:
@@ -243,7 +332,7 @@ class Trace(_Result):
         """As :attr:`Identification.residuals`, of the problem as declared."""
         return self.fit.residuals
 
-    @cached_property
+    @_once
     def ranking(self) -> pd.DataFrame:
         """Candidates, best first: ``effect``, ``description``, ``p_value`` (corrected for the candidates tried) and
         ``expected_gain_mm`` (off the rms error of the poses fitted; none where these are tilts)."""
@@ -275,7 +364,7 @@ class Export(_Result):
             whole.write_bytes(self.text.encode())
             whole.replace(file)
 
-    @cached_property
+    @_once
     def origins(self) -> pd.DataFrame:
         """The origins that have moved, by their joints: ``x_m`` …, ``roll_rad`` … as written, ``moved_mm``, ``turned_deg``."""
         import pandas as pd
@@ -285,7 +374,7 @@ class Export(_Result):
         rows = [[*own["xyz_m"], *own["rpy_rad"], own["moved_mm"], own["turned_deg"]] for own in entries]
         return pd.DataFrame(rows, columns=names, index=pd.Index([own["joint"] for own in entries], name="joint"))
 
-    @cached_property
+    @_once
     def errors(self) -> pd.DataFrame:
         """Errors on the held-out rows [mm]: of the ``whole`` model, and of the ``rigid`` geometry that the file holds."""
         import pandas as pd
@@ -318,7 +407,7 @@ class Check(_Result):
         reason: str | None = self._core.why_not_sufficient
         return reason
 
-    @cached_property
+    @_once
     def parameters(self) -> pd.DataFrame:
         """The free parameters by their names, with the standard error to expect; SI."""
         return _named(self._document["parameters"])
@@ -333,7 +422,7 @@ class Plan(_Result):
     def __init__(self, core: _core.Plan) -> None:
         self._core = core
 
-    @cached_property
+    @_once
     def poses(self) -> pd.DataFrame:
         """The poses, with the columns of measurements but for the positions (``q1_deg`` …): measure them, add ``x_mm``, ``y_mm``,
         ``z_mm``, and identify."""
@@ -344,7 +433,7 @@ class Plan(_Result):
         """Whether the poses decide every parameter as far as poses can."""
         return bool(self._core.suffices)
 
-    @cached_property
+    @_once
     def parameters(self) -> pd.DataFrame:
         """The free parameters by their names, with the standard error to expect, planned and at random; SI."""
         return _named(self._document["parameters"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import operator
 import os
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -61,7 +62,7 @@ def configurations(q: Any, units: Sequence[str | None], columns: Mapping[str, An
         if columns:
             raise TypeError("columns go into the table of poses itself")
         return source(q), Shape(single=False, every_joint=False)
-    values = np.asarray(q, dtype=np.float64)
+    values = _plain("q", q, "q").astype(np.float64)
     single = values.ndim == 1
     values = np.atleast_2d(values)
     moving = [unit for unit in units if unit is not None]
@@ -127,7 +128,7 @@ def _split(name: str, values: Any) -> Iterator[tuple[str, Column]]:
     if getattr(values, "ndim", None) != 2 and not _is_nested(values):
         yield name, _column(name, values)
         return
-    array = np.asarray(values)
+    array = _plain(f"column {name}", values, "data")
     base, _, unit = name.partition("_")
     suffix = f"_{unit}" if unit else ""
     if base == "xyz" and array.shape[1] == 3:
@@ -155,14 +156,45 @@ def _column(name: str, values: Any) -> Column:
     if module == "pandas":
         import pandas as pd
 
+        if pd.api.types.is_bool_dtype(values.dtype) or pd.api.types.is_complex_dtype(values.dtype):
+            raise _no_numbers(f"column {name}", str(values.dtype), "data")
         if pd.api.types.is_numeric_dtype(values.dtype):
             return _numbers(values.to_numpy(dtype=np.float64, na_value=np.nan))
         return _words(values)
-    array = np.asarray(values)
+    array = _plain(f"column {name}", values, "data")
     if array.ndim != 1:
         message = f"column {name}: shape {array.shape}; a column has one value a row"
         raise InputError(message, file="data", key=f"column {name}")
-    return _numbers(array) if array.dtype.kind in "fiub" else _words(array)
+    return _numbers(array) if array.dtype.kind in "fiu" else _words(array)
+
+
+def _plain(key: str, values: Any, file: str) -> npt.NDArray[Any]:
+    """An array without a mask, of numbers or words."""
+    mask = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else np.zeros(0, dtype=np.bool_)
+    if mask.any():
+        row = int(np.argwhere(mask)[0][0])
+        message = f"{key}: row {row} is masked, {int(mask.sum())} in all; leave such rows out, or fill them"
+        raise InputError(message, file=file, line=row + 2, key=key)
+    array = np.asarray(values)
+    if array.dtype.kind in "bc":
+        raise _no_numbers(key, str(array.dtype), file)
+    return array
+
+
+def _no_numbers(key: str, dtype: str, file: str) -> InputError:
+    message = f"{key}: values of type {dtype} are neither numbers nor words; convert them first"
+    return InputError(message, file=file, key=key)
+
+
+def count(key: str, value: Any, least: int, most: int) -> int:
+    """A whole number within limits, of an argument."""
+    try:
+        number = None if isinstance(value, (bool, np.bool_)) else operator.index(value)
+    except TypeError:
+        number = None
+    if number is None or not least <= number <= most:
+        raise InputError(f"{key}: {value!r} is not a whole number from {least} to {most}", key=key)
+    return number
 
 
 def _numbers(values: Any) -> Column:
@@ -179,7 +211,9 @@ def _words(values: Any) -> Column:
 def _of_polars(values: Any) -> Column:
     import polars as pl
 
-    if values.dtype.is_numeric() or values.dtype == pl.Boolean:
+    if values.dtype == pl.Boolean:
+        raise _no_numbers(f"column {values.name}", "Boolean", "data")
+    if values.dtype.is_numeric():
         return _numbers(values.cast(pl.Float64).to_numpy())
     text = values.cast(pl.String)
     words = text.drop_nulls().unique(maintain_order=True)

@@ -8,6 +8,7 @@ mod data;
 mod design;
 mod error;
 mod outcome;
+mod pool;
 mod problem;
 mod residuals;
 mod supervise;
@@ -36,6 +37,6 @@ mod _core {
 
 /// Runs the command line: the program's name and its arguments; the exit status.
 #[pyfunction]
-fn command_line(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
-    py.detach(|| flexcal::cli::run(arguments))
+fn command_line(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<u8> {
+    pool::detached(py, || flexcal::cli::run(arguments))
 }

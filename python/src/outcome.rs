@@ -15,6 +15,7 @@ use pyo3::types::PyDict;
 use crate::array::{Array, derivatives, numbers, points};
 use crate::data::Poses;
 use crate::error::raised;
+use crate::pool::detached;
 use crate::residuals;
 use crate::urdf::Export;
 
@@ -50,28 +51,28 @@ pub struct Trace {
 impl Identification {
     /// Returns estimate.json, with the uncertainty of predictions.
     fn json(&self, py: Python<'_>) -> PyResult<String> {
-        py.detach(|| {
+        detached(py, || {
             let mut result = IdentificationResult::new(&self.problem, &self.found);
             let fitted = flexcal::remainder::uncertainty(&self.found, &self.problem, &self.data)?;
             if let Some(fitted) = fitted {
                 result = result.with_predictions(&self.found, &fitted);
             }
             Ok(result.to_json())
-        })
+        })?
         .map_err(|error: fit::IdentifyError| raised(&error))
     }
 
     /// What the command line prints.
-    fn summary(&self, py: Python<'_>) -> String {
-        py.detach(|| report::estimate_text(&self.problem, &self.found))
+    fn summary(&self, py: Python<'_>) -> PyResult<String> {
+        detached(py, || report::estimate_text(&self.problem, &self.found))
     }
 
     /// Pages and figures.
     fn report(&self, py: Python<'_>) -> PyResult<Pages> {
-        py.detach(|| {
+        detached(py, || {
             let shown = PlotData::of_identification(&self.problem, &self.data, &self.found)?;
             Ok(pages(report::identification_report(&self.problem, &self.found, &shown)))
-        })
+        })?
         .map_err(|error: fit::IdentifyError| raised(&error))
     }
 
@@ -103,25 +104,26 @@ impl Identification {
 
     /// Columns of the residual table.
     fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let found = py.detach(|| self.found.residuals(&self.problem, &self.data));
+        let found = detached(py, || self.found.residuals(&self.problem, &self.data))?;
         residuals::table(py, &self.problem, &self.data, &found.map_err(|error| raised(&error))?)
     }
 
     /// Positions of the identified arm, shape = (poses, 3), measuring frame [m].
     fn predict<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
-        let found = py.detach(|| self.found.predict(&self.problem, &poses.rows));
+        let found = detached(py, || self.found.predict(&self.problem, &poses.rows))?;
         Ok(points(py, &found.map_err(|error| raised(&error))?))
     }
 
     /// The URDF that the problem came from, with the origins that were identified.
     fn export_urdf(&self, py: Python<'_>, urdf: PathBuf) -> PyResult<Export> {
-        py.detach(|| Export::new(&urdf, &self.problem, &self.data, &self.found))
+        detached(py, || Export::new(&urdf, &self.problem, &self.data, &self.found))?
             .map_err(|error| raised(&error))
     }
 
     /// ∂p/∂q of the identified arm, shape = (poses, 3, joints).
     fn jacobian<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
-        let found = py.detach(|| fit::jacobian(&self.problem, Some(&self.found), &poses.rows));
+        let jacobian = || fit::jacobian(&self.problem, Some(&self.found), &poses.rows);
+        let found = detached(py, jacobian)?;
         Ok(derivatives(py, &found.map_err(|error| raised(&error))?))
     }
 }
@@ -129,21 +131,21 @@ impl Identification {
 #[pymethods]
 impl ClosedLoop {
     /// loop.json.
-    fn json(&self, py: Python<'_>) -> String {
-        py.detach(|| LoopResult::new(&self.problem, &self.closure).to_json())
+    fn json(&self, py: Python<'_>) -> PyResult<String> {
+        detached(py, || LoopResult::new(&self.problem, &self.closure).to_json())
     }
 
     /// What the command line prints.
-    fn summary(&self, py: Python<'_>) -> String {
-        py.detach(|| report::loop_text(&self.problem, &self.closure))
+    fn summary(&self, py: Python<'_>) -> PyResult<String> {
+        detached(py, || report::loop_text(&self.problem, &self.closure))
     }
 
     /// Pages and figures.
     fn report(&self, py: Python<'_>) -> PyResult<Pages> {
-        py.detach(|| {
+        detached(py, || {
             let shown = PlotData::of_loop(&self.problem, &self.data, &self.closure)?;
             Ok(pages(report::loop_report(&self.problem, &self.closure, &shown)))
-        })
+        })?
         .map_err(|error: fit::IdentifyError| raised(&error))
     }
 
@@ -173,13 +175,13 @@ impl ClosedLoop {
 #[pymethods]
 impl Trace {
     /// trace.json.
-    fn json(&self, py: Python<'_>) -> String {
-        py.detach(|| TraceResult::new(&self.problem, &self.found).to_json())
+    fn json(&self, py: Python<'_>) -> PyResult<String> {
+        detached(py, || TraceResult::new(&self.problem, &self.found).to_json())
     }
 
     /// What the command line prints.
-    fn summary(&self, py: Python<'_>) -> String {
-        py.detach(|| report::trace_text(&self.problem, &self.found))
+    fn summary(&self, py: Python<'_>) -> PyResult<String> {
+        detached(py, || report::trace_text(&self.problem, &self.found))
     }
 
     /// The fit of the declared problem.

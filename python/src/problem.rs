@@ -15,6 +15,7 @@ use crate::array::{Array, derivatives, points};
 use crate::data::{Data, Poses, Source};
 use crate::error::{of_argument, raised};
 use crate::outcome::{ClosedLoop, Identification, Trace};
+use crate::pool::detached;
 use crate::supervise::supervised;
 
 /// An arm, what is free of it, and where its measurements are.
@@ -40,10 +41,11 @@ impl Problem {
     /// Reads a problem from its text; `file` names it in messages, and data files are looked for
     /// beside it.
     #[staticmethod]
-    fn parse(text: &str, file: PathBuf) -> PyResult<Self> {
+    #[pyo3(signature = (text, file, notes=Vec::new()))]
+    fn parse(text: &str, file: PathBuf, notes: Vec<String>) -> PyResult<Self> {
         let problem =
             flexcal::problem::Problem::parse(text, &file).map_err(|error| raised(&error))?;
-        Ok(Self { declared: Arc::new(problem), text: Arc::from(text), notes: Vec::new() })
+        Ok(Self { declared: Arc::new(problem), text: Arc::from(text), notes })
     }
 
     /// The chain between two links of a URDF; `file` names the problem in messages, and data files
@@ -58,7 +60,7 @@ impl Problem {
         let described =
             Robot::read(&urdf).and_then(|robot| describe(&Chain::new(&robot, base, tip)?));
         let Description { text, notes, .. } = described.map_err(|error| raised(&error))?;
-        Ok(Self { notes, ..Self::parse(&text, file)? })
+        Self::parse(&text, file, notes)
     }
 
     /// Its name.
@@ -77,6 +79,12 @@ impl Problem {
     #[getter]
     fn text(&self) -> &str {
         &self.text
+    }
+
+    /// File that messages name, beside which its data files are looked for.
+    #[getter]
+    fn file(&self) -> PathBuf {
+        self.declared.data.location.file.clone()
     }
 
     /// Measurement files that it names.
@@ -99,13 +107,13 @@ impl Problem {
     /// Reads measurements.
     fn data(&self, py: Python<'_>, source: Source) -> PyResult<Data> {
         let input = source.owned()?;
-        py.detach(|| Data::read(input, &self.declared)).map_err(|error| raised(&error))
+        detached(py, || Data::read(input, &self.declared))?.map_err(|error| raised(&error))
     }
 
     /// Reads poses, measured or not.
     fn poses(&self, py: Python<'_>, source: Source) -> PyResult<Poses> {
         let input = source.owned()?;
-        py.detach(|| Poses::read(input, &self.declared)).map_err(|error| raised(&error))
+        detached(py, || Poses::read(input, &self.declared))?.map_err(|error| raised(&error))
     }
 
     /// Fits the free parameters.
@@ -175,19 +183,19 @@ impl Problem {
 
     /// Positions of the nominal arm, shape = (poses, 3), measuring frame [m].
     fn predict<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
-        let found = py.detach(|| {
+        let found = detached(py, || {
             let placement = Placement::of(&poses.rows);
             let model = Model::new(&self.declared, &placement.bases, &placement.targets)?;
             let rows: Vec<usize> = (0..poses.rows.len()).collect();
             let x = DVector::zeros(model.parameters.len());
             Ok(model.predict(placement.poses(&poses.rows, &rows, 1.0), &x))
-        });
+        })?;
         Ok(points(py, &found.map_err(|error: flexcal::error::InputError| raised(&error))?))
     }
 
     /// ∂p/∂q of the nominal arm, shape = (poses, 3, joints).
     fn jacobian<'py>(&self, py: Python<'py>, poses: &Poses) -> PyResult<Array<'py>> {
-        let found = py.detach(|| fit::jacobian(&self.declared, None, &poses.rows));
+        let found = detached(py, || fit::jacobian(&self.declared, None, &poses.rows))?;
         Ok(derivatives(py, &found.map_err(|error| raised(&error))?))
     }
 }

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::array::{integers, numbers};
+use crate::pool::detached;
 
 /// The columns of residuals.csv, in their order: numbers, or codes and words.
 pub fn table<'py>(
@@ -17,7 +18,8 @@ pub fn table<'py>(
     residuals: &[Residual],
 ) -> PyResult<Bound<'py, PyDict>> {
     let columns = PyDict::new(py);
-    for (name, column) in py.detach(|| residual_columns(problem, &data.measurements, residuals)) {
+    let found = detached(py, || residual_columns(problem, &data.measurements, residuals))?;
+    for (name, column) in found {
         match column {
             Column::Words(labels) => {
                 columns.set_item(name, (integers(py, labels.of_row.into_iter()), labels.names))?;

@@ -13,10 +13,10 @@ use flexcal::fit::{Progress, ProgressSink};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
+use crate::pool::{STACK, pool};
+
 /// How long a signal waits at most.
 const PATIENCE: Duration = Duration::from_millis(50);
-/// As much as a main thread has [bytes].
-const STACK: usize = 8 << 20;
 
 /// What the thread says.
 enum Event<T> {
@@ -40,6 +40,7 @@ pub fn supervised<T: Send + 'static>(
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(ProgressSink) -> T + Send + 'static,
 ) -> PyResult<T> {
+    let pool = pool()?;
     let (sender, receiver) = channel();
     let abandoned = Arc::new(AtomicBool::new(false));
     let sink: ProgressSink = {
@@ -56,7 +57,7 @@ pub fn supervised<T: Send + 'static>(
         })
     };
     let body = move || {
-        let ended = catch_unwind(AssertUnwindSafe(|| work(sink)));
+        let ended = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(sink))));
         let _ = sender.send(Event::Ended(ended));
     };
     thread::Builder::new().stack_size(STACK).spawn(body)?;

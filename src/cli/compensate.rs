@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use flexcal::error::InputErrorKind;
 use flexcal::fit;
-use flexcal::fit::SavedEstimate;
 use flexcal::measurement::Measurements;
 use flexcal::model::Model;
 use flexcal::problem::Problem;
@@ -15,6 +14,7 @@ use flexcal::report::{self, shell_word};
 use flexcal::results::{CompensationResult, Document as _, commands_csv};
 
 use super::diagnostic;
+use super::estimate::Trust;
 use super::input::Common;
 use super::outcome::Outcome;
 
@@ -41,6 +41,8 @@ pub struct Arguments {
     /// Probability with which the bound of an error holds
     #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::level)]
     level: f64,
+    #[command(flatten)]
+    trust: Trust,
 }
 
 /// Frame of the targets.
@@ -85,7 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     }
     let placement = fit::Placement::of(&targets);
     let model = Model::new(&problem, &placement.bases, &placement.targets)?;
-    let estimate = SavedEstimate::read(&arguments.estimate)?;
+    let estimate = arguments.trust.read(&arguments.estimate)?;
     let model = estimate.model(model);
     let (x, trusted) = (estimate.vector(&problem, &model)?, estimate.trusted);
     if !trusted {

@@ -16,6 +16,7 @@ use flexcal::results::{Document as _, ExportResult, ExportedErrors, Summary};
 use flexcal::urdf::{Chain, Robot, YamlFormat, export, joint_origins, yaml};
 
 use super::diagnostic;
+use super::estimate::Trust;
 use super::flags::Flags;
 use super::outcome::Outcome;
 use super::output::Results;
@@ -68,6 +69,8 @@ pub struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 100, requires = "format")]
     test_commands: usize,
     #[command(flatten)]
+    trust: Trust,
+    #[command(flatten)]
     flags: Flags,
 }
 
@@ -91,7 +94,7 @@ enum Format {
 pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let flags = &arguments.flags;
     let problem = Problem::read(&arguments.problem)?;
-    let estimates = SavedEstimate::read(&arguments.estimate)?;
+    let estimates = arguments.trust.read(&arguments.estimate)?;
     if matches!(arguments.format, Some(Format::C)) {
         return write_c(arguments, &problem, &estimates);
     }

@@ -125,6 +125,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let file = kept.filter(|_| arguments.remainder).map(Correction::to_json);
     let mut texts = vec![("estimate.json", json.as_str()), ("residuals.csv", residuals.as_str())];
     texts.extend(file.as_ref().map(|text| (REMAINDER_FILE, text.as_str())));
+    interrupt::begin_writing();
     results.write_report(&texts, &told)?;
     let sources = sources.as_ref().map(report::joint_sources_text);
     common.tell(&json, || {

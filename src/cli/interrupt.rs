@@ -1,30 +1,89 @@
-//! Interrupts from the keyboard (SIGINT, Ctrl-C) during commands that can end early.
+//! Interrupts from the keyboard (SIGINT, Ctrl-C) and requests to end (SIGTERM, SIGHUP).
 
 use std::process::exit;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::thread;
+use std::time::Duration;
 
 use flexcal::fit::Stop;
 
 /// Exit status after an interrupt with nothing written: 128 + SIGINT, as in shells.
 pub const STATUS: u8 = 130;
+/// Time after an interrupt in which a command may finish by itself, so that it ends within 2 s.
+/// Builds with debug assertions take several times as long.
+const PATIENCE: Duration =
+    Duration::from_millis(if cfg!(debug_assertions) { 20_000 } else { 1_700 });
+
+/// Work that replaces the rest of a command whose time is over; it returns the exit status.
+type LastWork = Box<dyn FnOnce() -> u8 + Send>;
 
 /// Lock that is held while files take their names.
 static WRITING: Mutex<()> = Mutex::new(());
+/// True while a command watches for the request to stop.
+static IS_WATCHED: AtomicBool = AtomicBool::new(false);
+/// State of the running command.
+static STATE: Mutex<State> = Mutex::new(State::Running(None));
+
+/// State of the running command, which decides what ends the process.
+enum State {
+    /// It works, and may be ended once its time is over, after the last work.
+    Running(Option<LastWork>),
+    /// It writes its results, which takes little time.
+    Writing,
+    /// Its time is over, and the process is about to end.
+    Over,
+}
 
 /// Returns the stop request that the first interrupt makes. The second interrupt ends the process
 /// at once, except while files take their names.
 ///
 /// Interrupts that were ignored, or handled by a host program, before the call remain so.
 pub fn stop() -> Stop {
+    IS_WATCHED.store(true, Ordering::Relaxed);
+    install()
+}
+
+/// Sets the work of the running command for the case that its time after an interrupt is over.
+pub fn at_deadline(work: impl FnOnce() -> u8 + Send + 'static) {
+    *locked(&STATE) = State::Running(Some(Box::new(work)));
+}
+
+/// Declares that the command writes its results, after which it ends by itself. Does not return if
+/// its time is over already.
+pub fn begin_writing() {
+    let is_over = {
+        let mut state = locked(&STATE);
+        let is_over = matches!(*state, State::Over);
+        if !is_over {
+            *state = State::Writing;
+        }
+        is_over
+    };
+    while is_over {
+        thread::park();
+    }
+}
+
+/// Prevents interrupts from ending the process while the returned guard is held.
+pub fn unbroken() -> MutexGuard<'static, ()> {
+    install();
+    locked(&WRITING)
+}
+
+/// Installs the handler once and returns the request that it makes.
+fn install() -> Stop {
     static STOP: OnceLock<Stop> = OnceLock::new();
     let stop = STOP.get_or_init(|| {
         let stop = Stop::default();
         let asked = stop.clone();
         let handler = move || {
-            if asked.request() {
-                let _files = unbroken();
+            let is_repeated = asked.request();
+            if is_repeated || !IS_WATCHED.load(Ordering::Relaxed) {
+                let _files = locked(&WRITING);
                 exit(i32::from(STATUS));
             }
+            thread::spawn(end_in_time);
         };
         // Where there is a handler already, its program decides.
         let _ = ctrlc::try_set_handler(handler);
@@ -33,7 +92,30 @@ pub fn stop() -> Stop {
     stop.clone()
 }
 
-/// Prevents interrupts from ending the process while the returned guard is held.
-pub fn unbroken() -> MutexGuard<'static, ()> {
-    WRITING.lock().unwrap_or_else(PoisonError::into_inner)
+/// Ends the process if the command has not ended by itself in time.
+fn end_in_time() {
+    thread::sleep(PATIENCE);
+    let work = {
+        let mut state = locked(&STATE);
+        if matches!(*state, State::Writing) {
+            return;
+        }
+        match std::mem::replace(&mut *state, State::Over) {
+            State::Running(work) => work,
+            State::Writing | State::Over => None,
+        }
+    };
+    let status = work.map_or_else(
+        || {
+            super::diagnostic::warn("interrupted before there was a result");
+            STATUS
+        },
+        |work| work(),
+    );
+    let _files = locked(&WRITING);
+    exit(i32::from(status));
+}
+
+fn locked<T>(mutex: &'static Mutex<T>) -> MutexGuard<'static, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

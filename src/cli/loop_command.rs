@@ -2,10 +2,9 @@
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::{fs, io};
 
 use clap::Args;
-use flexcal::fit::Options;
+use flexcal::fit::{Options, ProgressSink};
 use flexcal::measurement::Dataset;
 use flexcal::problem::{self, Problem};
 use flexcal::remainder::{self, Correction, Fitted};
@@ -15,8 +14,9 @@ use flexcal::select::{self, ClosedLoop};
 
 use super::input::Common;
 use super::outcome::Outcome;
-use super::output::{REPORT, WriteError};
+use super::output::REPORT;
 use super::progress::Line;
+use super::unfinished::Unfinished;
 use super::{diagnostic, interrupt, next, output};
 
 /// Arguments of `flexcal loop`.
@@ -49,17 +49,17 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     common.say_if_nothing_is_free(&problem);
     common.say_of_orientation(&problem, &mut data);
     let stop = interrupt::stop();
+    let unfinished = Unfinished::new(&text, &problem, common.files(&problem), &results);
     let options = Options::default().with_influential_rows().with_stop(stop.clone());
-    let close = |sink| select::close(&problem, &data, &options.with_progress(sink));
-    let closure = Line::during(common.talks(), stop, close)?;
-    fs::create_dir_all(&results.folder)
-        .map_err(|source| WriteError::Io { path: results.folder.clone(), source })?;
-    let relative = |files: &[PathBuf]| -> io::Result<Vec<PathBuf>> {
-        files.iter().map(|file| seen_from(&results.folder, file)).collect()
+    let close = |sink: Option<ProgressSink>| {
+        let sink = unfinished.watching(sink);
+        select::close(&problem, &data, &options.with_progress(sink))
     };
-    let files = relative(common.files(&problem))?;
-    let joint_files =
-        relative(problem.data.joint_log.as_ref().map_or(&[], |log| log.files.as_slice()))?;
+    let last_work = unfinished.clone();
+    interrupt::at_deadline(move || last_work.write());
+    let closure = Line::during(common.talks(), stop, close)?;
+    let results = if closure.interrupted { unfinished.keeping_finished()? } else { results };
+    let [files, joint_files] = unfinished.files_from(&results.folder)?;
     let shown = PlotData::of_loop(&problem, &data, &closure)?;
     let closed = report::closed_problem(&text, &problem, &closure, [&files, &joint_files])?;
     let fitted = fitted(&problem, &closed, &closure, &data)?;
@@ -92,6 +92,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         )
     });
     let told = report::loop_report(&problem, &closure, &shown);
+    interrupt::begin_writing();
     results.write_report(&texts, &told)?;
     common.tell(&json, || {
         let told = if arguments.verbose {
@@ -150,11 +151,4 @@ fn nameable(file: &Path) -> Result<(), NoName> {
         }
         _ => Err(NoName::Passing { file: name() }),
     }
-}
-
-/// Returns the path of a file relative to a folder, or its absolute path if there is no relative
-/// one.
-fn seen_from(folder: &Path, file: &Path) -> io::Result<PathBuf> {
-    let (folder, file) = (folder.canonicalize()?, file.canonicalize()?);
-    Ok(pathdiff::diff_paths(&file, folder).unwrap_or(file))
 }

@@ -9,6 +9,7 @@ mod compensate;
 mod completions;
 mod course;
 mod diagnostic;
+mod estimate;
 mod export;
 mod flags;
 mod identify;
@@ -27,7 +28,9 @@ mod progress;
 mod remainder;
 mod simulate;
 mod study;
+mod threads;
 mod trace;
+mod unfinished;
 
 use std::ffi::OsString;
 
@@ -102,6 +105,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             return if error.use_stderr() { 2 } else { 0 };
         }
     };
+    if let Err(error) = threads::check() {
+        diagnostic::print(&error);
+        return 2;
+    }
     let outcome = match cli.command {
         Command::Init(arguments) => init::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),

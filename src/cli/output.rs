@@ -3,9 +3,10 @@
 use std::fs;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
+use std::time::Duration;
 
 use flexcal::error::{escape_hidden, is_hidden};
-use flexcal::files::{FolderRecord, StagedFile, same_file};
+use flexcal::files::{FolderLock, FolderRecord, StagedFile, same_file};
 use flexcal::report::{Report, is_figure};
 
 use super::{diagnostic, interrupt};
@@ -13,12 +14,20 @@ use super::{diagnostic, interrupt};
 /// Names of the files of a report.
 pub const REPORT: [&str; 2] = ["report.md", "report.html"];
 const FIGURES: &str = "figures";
+/// Time for which a command waits while another one writes to the same folder.
+const MAX_WAIT: Duration = Duration::from_secs(10);
 
 /// Error of results that cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     #[error("cannot write {}: {source}", path.display())]
     Io { path: PathBuf, source: io::Error },
+    #[error(
+        "{}: another flexcal has been writing there for {} s; wait for its end, or name another folder with --out",
+        folder.display(),
+        MAX_WAIT.as_secs()
+    )]
+    Busy { folder: PathBuf },
     #[error("cannot write {}: {why}", path.display())]
     InTheWay { path: PathBuf, why: &'static str },
     #[error(
@@ -34,6 +43,7 @@ pub enum WriteError {
 
 /// Results of a command, as file names in a folder. They may replace files that flexcal wrote
 /// there, except files that the command reads.
+#[derive(Clone)]
 pub struct Results {
     pub folder: PathBuf,
     command: &'static str,
@@ -58,6 +68,7 @@ impl Results {
     ) -> Result<Self, WriteError> {
         let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
         let claimed = Self { folder, command, names, inputs, force, quiet };
+        let _lock = claimed.lock()?;
         let record = claimed.record()?;
         claimed.names.iter().try_for_each(|name| claimed.check(&record, name))?;
         if claimed.names.iter().any(|name| name == REPORT[0]) {
@@ -79,6 +90,19 @@ impl Results {
         let is_there = |name: &&String| self.path(name).exists();
         let names: Vec<&str> = self.names.iter().filter(is_there).map(String::as_str).collect();
         format!("\nWritten to {}: {}\n", self.folder.display(), names.join(", "))
+    }
+
+    /// Returns true if this command wrote the file `name`, and it is unchanged.
+    pub fn is_recorded(&self, name: &str) -> bool {
+        self.record().is_ok_and(|record| record.writer(&self.folder, name) == Some(self.command))
+    }
+
+    /// Returns the same results in the folder `name` below this one, in which no other file may be
+    /// in their way.
+    pub fn below(&self, name: &str) -> Result<Self, WriteError> {
+        let names: Vec<&str> = self.names.iter().map(String::as_str).collect();
+        let (folder, flags) = (self.folder.join(name), (self.force, self.quiet));
+        Self::claim(self.command, folder, self.inputs.clone(), &names, flags)
     }
 
     /// Returns the path of a result.
@@ -118,6 +142,9 @@ impl Results {
         texts: &[(&str, &str)],
         is_older: impl Fn(&str) -> bool,
     ) -> Result<(), WriteError> {
+        fs::create_dir_all(&self.folder)
+            .map_err(|source| WriteError::Io { path: self.folder.clone(), source })?;
+        let _lock = self.lock()?;
         let mut record = self.record()?;
         texts.iter().try_for_each(|(name, _)| self.check(&record, name))?;
         let others = self.others(&record, texts);
@@ -173,6 +200,12 @@ impl Results {
         };
         let report = texts.iter().find(|(name, _)| *name == REPORT[0]);
         report.and_then(other).or_else(|| texts.iter().find_map(other))
+    }
+
+    /// Locks the folder, so that no other flexcal writes there meanwhile.
+    fn lock(&self) -> Result<FolderLock, WriteError> {
+        let busy = |_| WriteError::Busy { folder: self.folder.clone() };
+        FolderLock::take(&self.folder, MAX_WAIT).map_err(busy)
     }
 
     fn record(&self) -> Result<FolderRecord, WriteError> {

@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use clap::Args;
-use flexcal::fit::{self, SavedEstimate};
+use flexcal::fit;
 use flexcal::measurement::{Measurements, Split};
 use flexcal::problem::{HeldOut, Problem};
 use flexcal::remainder::{self, Bounds, CorrectedPrediction};
@@ -12,6 +12,7 @@ use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, PredictionErrors, predictions_csv, residuals_csv};
 
 use super::diagnostic;
+use super::estimate::Trust;
 use super::input::Common;
 use super::outcome::Outcome;
 
@@ -37,6 +38,8 @@ pub struct Arguments {
     /// Probability with which the bound of an error holds
     #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = super::remainder::level)]
     level: f64,
+    #[command(flatten)]
+    trust: Trust,
 }
 
 /// Names of the files that the command may write.
@@ -50,7 +53,8 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let (rows, warnings) = Measurements::read_poses(common.files(&problem), &problem)?;
     let rows = rows.arm_rows();
     common.warn(&warnings);
-    let estimate = arguments.estimate.as_deref().map(SavedEstimate::read).transpose()?;
+    let read = |file| arguments.trust.read(file);
+    let estimate = arguments.estimate.as_deref().map(read).transpose()?;
     let trusted = estimate.as_ref().is_none_or(|estimate| estimate.trusted);
     if !trusted {
         diagnostic::warn("the estimate is not to be trusted, so the predictions are not either");

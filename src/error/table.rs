@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use super::near::{instead, meant, question};
 use super::phrases::{difference, in_quotes};
+use super::warning::nearest_in_time;
 
 /// Kind of error in a table of measurements; [`Location`](super::Location) holds the place.
 #[derive(Debug, Clone, PartialEq, Error)]
@@ -28,9 +29,10 @@ pub enum TableErrorKind {
     #[error(
         "no row of the measurements has a partner in the joint table; check the column of the \
          join (pose or time) and \
-         tolerance_s"
+         tolerance_s{}",
+        nearest_in_time(gap.as_deref())
     )]
-    NothingJoined,
+    NothingJoined { gap: Option<String> },
     #[error("no rows below the header")]
     NoRowsBelowHeader,
     #[error("an Excel workbook; save its sheet as CSV")]
@@ -102,6 +104,11 @@ pub enum TableErrorKind {
     EmptyCell,
     #[error("\"{value}\" is not a number")]
     NotANumber { value: String },
+    #[error(
+        "\"{value}\" is a unit, not a number; remove the line of units below the header, because \
+         the names of the columns hold the units"
+    )]
+    UnitRow { value: String },
     #[error("{value} is not a direction; write -1, 0 or 1")]
     NotADirection { value: f64 },
     #[error("\"{word}\" is neither identification nor validation")]

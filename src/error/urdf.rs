@@ -17,8 +17,16 @@ pub enum UrdfErrorKind {
          limit; remove it"
     )]
     DocumentType,
-    #[error("not a URDF: its outermost element is <{found}>, not <robot>")]
+    #[error("not a URDF: its outermost element is <{found}>, not <robot>{}", conversion(found))]
     NotARobot { found: String },
+    #[error(
+        "{what}, not a URDF; export the arm as a URDF, or write its problem.toml by hand (docs/own_arm.md)"
+    )]
+    OtherFormat { what: &'static str },
+    #[error("<origin> has both rpy and quat_xyzw; keep one of the two")]
+    TwoRotations,
+    #[error("quat_xyzw \"{text}\" is not a rotation, because its squares do not add up to 1")]
+    NotAQuaternion { text: String },
     #[error("a xacro file, not a URDF; expand it first: xacro FILE.xacro > FILE.urdf")]
     Xacro,
     #[error("<{element}> has no attribute {attribute}")]
@@ -37,7 +45,7 @@ pub enum UrdfErrorKind {
     NoAxis,
     #[error(
         "a joint of type \"{kind}\" is not supported; supported types: revolute, continuous, \
-         prismatic, fixed"
+         prismatic, fixed; choose a chain without it with --base and --tip"
     )]
     Kind { kind: String },
     #[error("no link is called \"{name}\"{}; the links are {}", meant(name, known), listed(known))]
@@ -89,6 +97,19 @@ pub enum UrdfErrorKind {
     NoRoom { joint: String, off: String },
     #[error("not an arm with the joint layout of Universal Robots: {why}")]
     NotUr { why: String },
+}
+
+/// Returns how to convert a file with this outermost element to a URDF.
+fn conversion(found: &str) -> &'static str {
+    match found {
+        "mujoco" => {
+            "; a MuJoCo model (MJCF): convert it first, for example with the Python package \
+             mjcf-urdf-simple-converter"
+        }
+        "sdf" => "; an SDFormat model (SDF): convert it first, for example with sdf2urdf of pysdf",
+        "COLLADA" => "; a mesh (COLLADA): give the URDF that refers to it",
+        _ => "",
+    }
 }
 
 /// Maximum number of names in a list.

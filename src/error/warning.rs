@@ -22,10 +22,12 @@ pub enum WarningKind {
     #[error("columns that [data.columns] does not name are ignored: {}", names.join(", "))]
     Unmapped { names: Vec<String> },
     #[error(
-        "{rows} row{} without a partner in the other table, the first here{}; left out",
-        plural(*rows), listed(*rows, others)
+        "{rows} row{} without a partner in the other table, the first here{}; left out{}",
+        plural(*rows), listed(*rows, others), nearest_in_time(gap.as_deref())
     )]
-    WithoutPartner { rows: usize, others: Vec<String> },
+    WithoutPartner { rows: usize, others: Vec<String>, gap: Option<String> },
+    #[error("not UTF-8 text; read as Windows-1252 (Latin-1), so check accented letters and signs")]
+    ReadAsWindows1252,
     #[error("{rows} row{} without a measurement, the first here; left out", plural(*rows))]
     RowsMissing { rows: usize },
     #[error("the search for effects uses positions only, not orientations")]
@@ -110,6 +112,16 @@ fn additional_rows(rows: usize) -> String {
 /// Returns the hint for a column that does not resemble a known one.
 fn covariate(meant: Option<&str>) -> &'static str {
     if meant.is_none() { " (name it in [data.covariates] if the arm may depend on it)" } else { "" }
+}
+
+/// Returns the hint for rows whose nearest partner in time is too far.
+pub(super) fn nearest_in_time(gap: Option<&str>) -> String {
+    gap.map_or_else(String::new, |gap| {
+        format!(
+            " (the nearest row of the joint table is typically {gap} away; check whether both \
+             clocks agree, and tolerance_s)"
+        )
+    })
 }
 
 /// Names the other rows that a warning concerns; `rows` is their number.

@@ -1,14 +1,19 @@
 //! Access to files: reads with a size limit, atomic writes, a record of written files, and CSV
 //! text.
 
+mod lock;
 mod record;
+mod sealed;
 mod staged;
 
 use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::Path;
 
+pub use lock::FolderLock;
 pub use record::{FolderRecord, digest};
+pub use sealed::Changes;
+pub(crate) use sealed::{DIGEST_KEY, changed_key, sealed};
 pub(crate) use staged::StagedFile;
 
 /// Reads a file of at most `max_bytes` bytes.

@@ -63,6 +63,7 @@ impl Columns {
         let mut columns = Self { read: Vec::new(), marked: None, file: None, names: ours };
         let (mut unknown, mut mistyped, mut unmapped) = (Vec::new(), None, Vec::new());
         let (mut shifted, mut hidden) = (None, None);
+        let is_result_table = named.iter().any(is_unmistakable_result);
         for (place, name, rule) in named.mapped_first() {
             let location = || rule.map_or_else(|| table.column(name), |rule| rule.location.clone());
             let error = |kind: InputErrorKind| location().error(kind);
@@ -119,6 +120,7 @@ impl Columns {
                     let meant = numbering.meant(name, &present, problem);
                     return Err(error(TableErrorKind::UnknownMeaning { meant }.into()));
                 }
+                Meaning::Ignored(_) | Meaning::Unknown if is_result_table && is_result(name) => {}
                 Meaning::Ignored(kind) => warnings.push(Warning { location: location(), kind }),
                 Meaning::Unknown if foreign => {
                     unknown.push(name);
@@ -385,6 +387,35 @@ impl Columns {
         self.file == Some(role)
             || self.read.binary_search_by_key(&role, |column| column.role).is_ok()
     }
+}
+
+/// Returns true for a column that only tables of flexcal's results have.
+fn is_unmistakable_result(name: &str) -> bool {
+    let is_bound = name
+        .strip_prefix("bound")
+        .and_then(|rest| rest.strip_suffix("_mm"))
+        .is_some_and(|level| level.starts_with(|digit: char| digit.is_ascii_digit()));
+    let starts = ["predicted_", "residual_", "miss_"];
+    is_bound || starts.iter().any(|start| name.starts_with(start))
+}
+
+/// Returns true for a column that flexcal writes beside its results and does not read.
+fn is_result(name: &str) -> bool {
+    let others = [
+        "file",
+        "line",
+        "whitened",
+        "outlier",
+        "held_out",
+        "reached",
+        "sigma_x_mm",
+        "sigma_y_mm",
+        "sigma_z_mm",
+        "extrapolated",
+        "turn_deg",
+        "turn_before_deg",
+    ];
+    is_unmistakable_result(name) || others.contains(&name)
 }
 
 /// Returns true if a cell of the current row is not empty.

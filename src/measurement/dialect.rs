@@ -2,7 +2,9 @@
 
 use std::io::{Read, Result};
 
+use super::latin::decoded;
 use super::lines::Lines;
+use super::meaning::is_numbered_or_position;
 use crate::error::BYTE_ORDER_MARK_UTF8;
 use crate::problem::{ColumnSelector, Delimiter, Dialect};
 
@@ -13,25 +15,46 @@ const MAX_HEADER_LINES: usize = 100;
 /// Delimiter that replaces a run of spaces.
 const TAB: u8 = b'\t';
 
+/// Marks that programs put before a header line, as before a comment.
+const HEADER_MARKS: [&str; 3] = ["//", "#", "%"];
+/// Minimum number of known names in a line that is recognised as the header by them.
+const MIN_KNOWN_NAMES: usize = 2;
+
 /// Delimiter of a table and position of its header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Layout {
     pub delimiter: Delimiter,
     /// Number of lines before the header.
     pub skipped: usize,
+    /// Number of bytes before the first name of the header: a comment mark with white space.
+    pub mark_bytes: usize,
 }
 
 impl Layout {
     /// Finds the layout of a table from its `beginning`.
     ///
-    /// The header is the line with most names of the map; without a map it is the first line with
-    /// content. The delimiter is the most frequent of `,` `;` and tab in the header, otherwise
-    /// spaces.
+    /// The header is the line with most names of the map, otherwise the first line with at least
+    /// [`MIN_KNOWN_NAMES`] names of flexcal, otherwise the first line with content. A line behind a
+    /// comment mark is the header only if no other line holds known names. The delimiter is that of
+    /// a line `sep=`, or the most frequent of `,` `;` and tab in the header, otherwise spaces.
     pub fn detect(beginning: &[u8], dialect: &Dialect) -> Self {
-        let text = String::from_utf8_lossy(
-            beginning.strip_prefix(BYTE_ORDER_MARK_UTF8).unwrap_or(beginning),
-        );
+        let text = decoded(beginning.strip_prefix(BYTE_ORDER_MARK_UTF8).unwrap_or(beginning));
         let text = text.replace("\r\n", "\n").replace('\r', "\n");
+        let mut lines: Vec<(usize, &str)> = text
+            .split('\n')
+            .enumerate()
+            .take(MAX_HEADER_LINES)
+            .filter(|(_, line)| !line.trim().is_empty())
+            .collect();
+        let excel = lines.first().and_then(|(_, line)| excel_delimiter(line));
+        if excel.is_some() {
+            lines.remove(0);
+        }
+        let declared = excel.or(dialect.delimiter);
+        let delimiter_of = |line: &str| match declared {
+            Some(declared) if !is_separated_otherwise(line, declared) => declared,
+            _ => most_frequent_delimiter(line),
+        };
         let names: Vec<&str> = dialect
             .columns
             .iter()
@@ -40,34 +63,57 @@ impl Layout {
                 ColumnSelector::Place(_) | ColumnSelector::File => None,
             })
             .collect();
+        // Returns the numbers of names of the map and of known names in a line.
+        let names_in = |line: &str| {
+            let cells = cells(line, delimiter_of(line));
+            let mapped = names.iter().filter(|name| cells.iter().any(|cell| cell == *name)).count();
+            let ours = cells.iter().filter(|cell| is_numbered_or_position(cell)).count();
+            (mapped, mapped + ours)
+        };
         let is_comment = |line: &str| {
             dialect.comment.as_ref().is_some_and(|mark| line.trim_start().starts_with(mark))
         };
-        let lines = text.split('\n').enumerate().take(MAX_HEADER_LINES);
         let candidates: Vec<(usize, &str)> =
-            lines.filter(|(_, line)| !line.trim().is_empty() && !is_comment(line)).collect();
-        let delimiter_of = |line: &str| match dialect.delimiter {
-            Some(declared) if !is_separated_otherwise(line, declared) => declared,
-            _ => most_frequent_delimiter(line),
-        };
-        let names_in = |line: &str| {
-            let cells = cells(line, delimiter_of(line));
-            names.iter().filter(|name| cells.iter().any(|cell| cell == *name)).count()
-        };
+            lines.iter().copied().filter(|(_, line)| !is_comment(line)).collect();
         // The iterator is reversed so that the first of equals wins.
         let counted = candidates
             .iter()
             .rev()
-            .map(|&candidate| (names_in(candidate.1), candidate))
+            .map(|&candidate| (names_in(candidate.1).0, candidate))
             .filter(|(count, _)| *count > 0);
         let named = counted.max_by_key(|(count, _)| *count).map(|(_, line)| line);
-        match (named, candidates.first()) {
-            (Some((skipped, line)), _) => Self { delimiter: delimiter_of(line), skipped },
-            // Empty and comment lines are skipped anyway.
-            (None, Some((_, line))) => Self { delimiter: delimiter_of(line), skipped: 0 },
-            (None, None) => {
-                Self { delimiter: dialect.delimiter.unwrap_or(Delimiter::Byte(b',')), skipped: 0 }
-            }
+        let has_names = |line: &str| names_in(line).1 >= MIN_KNOWN_NAMES;
+        let is_marked = |line: &str| mark_bytes(line, dialect.comment.as_deref()).is_some();
+        let first_unmarked = || candidates.iter().copied().find(|(_, line)| !is_marked(line));
+        let has_known =
+            || candidates.iter().copied().find(|(_, line)| has_names(line) && !is_marked(line));
+        // Returns the bytes of the mark in front of the names of a line.
+        let mark_before_names = |line: &str| {
+            let mark_bytes = mark_bytes(line, dialect.comment.as_deref())?;
+            has_names(line.get(mark_bytes..)?).then_some(mark_bytes)
+        };
+        let marked = || lines.iter().copied().find(|(_, line)| mark_before_names(line).is_some());
+        let header = named
+            .filter(|(_, line)| has_names(line) && !is_marked(line))
+            .or_else(has_known)
+            .or_else(marked)
+            .or(named)
+            .or_else(first_unmarked)
+            .or(candidates.first().copied());
+        let Some((line_index, line)) = header else {
+            let delimiter = declared.unwrap_or(Delimiter::Byte(b','));
+            return Self { delimiter, skipped: 0, mark_bytes: 0 };
+        };
+        let mark_bytes = mark_before_names(line).unwrap_or(0);
+        // Empty and comment lines are skipped anyway.
+        let is_first = named.is_none()
+            && excel.is_none()
+            && mark_bytes == 0
+            && candidates.first().is_some_and(|(first, _)| *first == line_index);
+        Self {
+            delimiter: delimiter_of(line.get(mark_bytes..).unwrap_or_default()),
+            skipped: if is_first { 0 } else { line_index },
+            mark_bytes,
         }
     }
 
@@ -78,6 +124,28 @@ impl Layout {
             Delimiter::Spaces => TAB,
         }
     }
+}
+
+/// Returns the delimiter that a line `sep=;` of Excel declares.
+fn excel_delimiter(line: &str) -> Option<Delimiter> {
+    let delimiter = line.trim_end().strip_prefix("sep=").unwrap_or_default();
+    match (delimiter.as_bytes(), line.trim_end_matches([' ', '"'])) {
+        (&[byte], _) => Some(Delimiter::Byte(byte)),
+        (_, "sep=\t") => Some(Delimiter::Byte(TAB)),
+        _ => None,
+    }
+}
+
+/// Returns the number of bytes up to the content of a line that begins with the declared `comment`
+/// mark or with one of [`HEADER_MARKS`].
+fn mark_bytes(line: &str, comment: Option<&str>) -> Option<usize> {
+    let start = line.len() - line.trim_start().len();
+    let text = line.trim_start();
+    let mark = comment.into_iter().chain(HEADER_MARKS).find(|mark| text.starts_with(mark))?;
+    let content = text.get(mark.len()..)?.trim_start_matches(['/', '#', '%', ' ']);
+    // A mark alone in its cell is the name of a column.
+    let is_cell = content.starts_with([',', ';', '\t']);
+    (!is_cell).then_some(start + text.len() - content.len())
 }
 
 /// Returns true if commas separate a header line and the declared delimiter does not occur in it, as
@@ -117,6 +185,8 @@ pub(super) struct NormalizedText<R> {
     pub lines: R,
     /// Number of lines before the header that are still unread.
     skipped: usize,
+    /// Number of bytes of the mark before the header; 0 once the header is read.
+    mark_bytes: usize,
     comment: Option<Vec<u8>>,
     spaces: bool,
     /// True if the text passes through unchanged.
@@ -135,9 +205,13 @@ impl<R: Read> NormalizedText<R> {
         Self {
             lines,
             skipped: layout.skipped,
+            mark_bytes: layout.mark_bytes,
             comment: comment.map(|mark| mark.as_bytes().to_vec()),
             spaces,
-            is_unchanged: layout.skipped == 0 && comment.is_none() && !spaces,
+            is_unchanged: layout.skipped == 0
+                && layout.mark_bytes == 0
+                && comment.is_none()
+                && !spaces,
             ready: Vec::new(),
             given: 0,
             unread: Vec::new(),
@@ -163,10 +237,17 @@ impl<R: Read> NormalizedText<R> {
                 read => self.unread.extend_from_slice(chunk.get(..read).unwrap_or_default()),
             }
         };
-        let line: Vec<u8> = self.unread.drain(..end).collect();
+        let mut line: Vec<u8> = self.unread.drain(..end).collect();
+        let is_marked_header = self.skipped == 0 && self.mark_bytes > 0;
+        if is_marked_header {
+            let bom = line.starts_with(BYTE_ORDER_MARK_UTF8);
+            let bom = if bom { BYTE_ORDER_MARK_UTF8.len() } else { 0 };
+            line.drain(..(bom + self.mark_bytes).min(line.len()));
+            self.mark_bytes = 0;
+        }
         let text = line.strip_prefix(BYTE_ORDER_MARK_UTF8).unwrap_or(&line).trim_ascii();
         let is_comment = self.comment.as_ref().is_some_and(|mark| text.starts_with(mark));
-        if self.skipped > 0 || is_comment {
+        if self.skipped > 0 || (is_comment && !is_marked_header) {
             self.skipped = self.skipped.saturating_sub(1);
             self.ready = if line.is_empty() { Vec::new() } else { vec![b'\n'] };
         } else if self.spaces {
@@ -225,7 +306,7 @@ mod tests {
         ] {
             assert_eq!(
                 Layout::detect(text.as_bytes(), &Dialect::default()),
-                Layout { delimiter, skipped },
+                Layout { delimiter, skipped, mark_bytes: 0 },
                 "{text:?}"
             );
         }
@@ -243,7 +324,7 @@ mod tests {
         let text = "day 1, tool b\nb,c\na;b;c\n1;2;3\n";
         assert_eq!(
             Layout::detect(text.as_bytes(), &dialect),
-            Layout { delimiter: Delimiter::Byte(b';'), skipped: 2 }
+            Layout { delimiter: Delimiter::Byte(b';'), skipped: 2, mark_bytes: 0 }
         );
     }
 
@@ -252,7 +333,7 @@ mod tests {
         let dialect = Dialect { comment: Some("//".to_owned()), ..Dialect::default() };
         let text = "// a \"b\n  x   y\n\n// c\n 1  2 \n3\t4";
         let layout = Layout::detect(text.as_bytes(), &dialect);
-        assert_eq!(layout, Layout { delimiter: Delimiter::Spaces, skipped: 0 });
+        assert_eq!(layout, Layout { delimiter: Delimiter::Spaces, skipped: 0, mark_bytes: 0 });
         let mut plain = String::new();
         NormalizedText::new(text.as_bytes(), layout, dialect.comment.as_deref())
             .read_to_string(&mut plain)

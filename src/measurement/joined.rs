@@ -35,6 +35,9 @@ pub(super) struct JoinedLog {
     requested: usize,
     unpaired: Vec<Location>,
     paired: usize,
+    decoding_warnings: Vec<Warning>,
+    /// Times from rows without a partner to the nearest row of the log, for a join by time \[s\].
+    gaps: Vec<f64>,
 }
 
 /// Column that pairs rows, and its conversion to seconds if it holds times.
@@ -74,6 +77,8 @@ impl JoinedLog {
             requested: 0,
             unpaired: Vec::new(),
             paired: 0,
+            decoding_warnings: Vec::new(),
+            gaps: Vec::new(),
         };
         for file in &log.files {
             let kind = InputErrorKind::DataFileMissing { path: file.clone() };
@@ -122,6 +127,7 @@ impl JoinedLog {
             let (file, line, cells) = (table.file.clone(), table.line(), table.cells().clone());
             self.rows.push(LogRow { file, line, cells, time, is_used: false });
         }
+        self.decoding_warnings.extend(table.decoding_warning());
         Ok(())
     }
 
@@ -175,7 +181,9 @@ impl JoinedLog {
         let partner = match (self.rule, self.key) {
             (JoinRule::Name, Some(key)) => self.of_name.get(table.name(key.place)?).copied(),
             (JoinRule::Time { tolerance }, Some(key)) => {
-                self.nearest(table.time(key.place, key.to_si)?, tolerance)
+                let nearest = self.nearest(table.time(key.place, key.to_si)?);
+                self.gaps.extend(nearest.map(|(_, gap)| gap).filter(|gap| *gap > tolerance));
+                nearest.filter(|(_, gap)| *gap <= tolerance).map(|(row, _)| row)
             }
             _ => Some(self.requested).filter(|&row| row < self.rows.len()),
         };
@@ -191,9 +199,8 @@ impl JoinedLog {
         Ok(true)
     }
 
-    /// Returns the index of the joint row nearest to a time \[s\], if it is within the tolerance
-    /// \[s\].
-    fn nearest(&self, time: f64, tolerance: f64) -> Option<usize> {
+    /// Returns the row nearest to a time \[s\], and how far it is from it \[s\].
+    fn nearest(&self, time: f64) -> Option<(usize, f64)> {
         let time_of = |&row: &usize| self.rows.get(row).map_or(f64::NAN, |row| row.time);
         let after = self.by_time.partition_point(|row| time_of(row) < time);
         let around = [after.checked_sub(1), Some(after)].into_iter().flatten();
@@ -201,8 +208,16 @@ impl JoinedLog {
         let distance = |row: &usize| (time_of(row) - time).abs();
         candidates
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-            .copied()
-            .filter(|row| distance(row) <= tolerance)
+            .map(|row| (*row, distance(row)))
+    }
+
+    /// Returns the usual time from a row without a partner to the nearest row of the log in words;
+    /// `None` for other joins.
+    fn gap(&self) -> Option<String> {
+        let mut gaps = self.gaps.clone();
+        gaps.sort_by(f64::total_cmp);
+        let median = gaps.get(gaps.len() / 2)?;
+        Some(format!("{median:.1} s"))
     }
 
     /// Returns the files of the joint table.
@@ -219,19 +234,25 @@ impl JoinedLog {
     /// Returns an error if no row has a partner.
     pub fn warnings(&self) -> Result<Vec<Warning>, InputError> {
         if self.paired == 0 && self.requested > 0 {
-            return Err(self.location.clone().error(TableErrorKind::NothingJoined));
+            return Err(self
+                .location
+                .clone()
+                .error(TableErrorKind::NothingJoined { gap: self.gap() }));
         }
         let unused = self.rows.iter().filter(|row| !row.is_used);
         let unused: Vec<Location> = match self.rule {
             JoinRule::Time { .. } => Vec::new(),
             _ => unused.map(|row| Location::file(&row.file).at_line(row.line)).collect(),
         };
-        let warning = |rows: &[Location]| {
+        let warning = |rows: &[Location], gap: Option<String>| {
             let location = rows.first()?.clone();
             let listed = rows.iter().skip(1).take(MAX_LISTED_ROWS).map(ToString::to_string);
-            let kind = WarningKind::WithoutPartner { rows: rows.len(), others: listed.collect() };
+            let others = listed.collect();
+            let kind = WarningKind::WithoutPartner { rows: rows.len(), others, gap };
             Some(Warning { location, kind })
         };
-        Ok([warning(&self.unpaired), warning(&unused)].into_iter().flatten().collect())
+        let unpaired =
+            [warning(&self.unpaired, self.gap()), warning(&unused, None)].into_iter().flatten();
+        Ok(self.decoding_warnings.iter().cloned().chain(unpaired).collect())
     }
 }

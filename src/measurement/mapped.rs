@@ -43,6 +43,12 @@ impl<'a> Names<'a> {
             let unused = unused.filter(|rule| rule.theirs != ColumnSelector::File);
             return Ok(Self { of_place, of_file, mapped: false, unused });
         }
+        let is_given_otherwise = |rule: &ColumnRule| {
+            rules.iter().any(|other| {
+                other.ours == rule.ours
+                    && matches!(&other.theirs, ColumnSelector::Name(name) if has(name))
+            })
+        };
         for rule in rules {
             let place = match &rule.theirs {
                 ColumnSelector::File => continue,
@@ -52,7 +58,7 @@ impl<'a> Names<'a> {
                 ColumnSelector::Name(name) => only_place(rule, name, table)?,
             };
             let Some(entry) = place.and_then(|place| of_place.get_mut(place)) else {
-                if has(&rule.ours) {
+                if has(&rule.ours) || is_given_otherwise(rule) {
                     continue;
                 }
                 return Err(no_such(rule, table));

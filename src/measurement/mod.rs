@@ -21,6 +21,7 @@ mod duplicates;
 mod joined;
 #[deny(clippy::indexing_slicing)]
 mod labels;
+mod latin;
 mod limits;
 #[deny(clippy::indexing_slicing)]
 mod lines;

@@ -176,6 +176,7 @@ impl<'a> Tables<'a> {
                 break;
             }
         }
+        self.warnings.extend(table.decoding_warning());
         if let Some(log) = &log
             && rows.row_count() == before
         {

@@ -8,11 +8,12 @@ use csv::{ByteRecord, Reader, ReaderBuilder};
 
 use super::cell_style::CellStyle;
 use super::dialect::{HEADER_SEARCH_BYTES, Layout, NormalizedText};
+use super::latin::decoded_record;
 use super::lines::{Lines, MAX_RECORD_KIB};
 use super::time::date_time;
 use crate::error::{
-    BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, TableErrorKind, is_hidden,
-    lines,
+    BYTE_ORDER_MARKS, Excerpt, InputError, InputErrorKind, Location, TableErrorKind, Warning,
+    WarningKind, is_hidden, lines,
 };
 use crate::files::{open, unescape_cell};
 use crate::problem::Dialect;
@@ -41,6 +42,8 @@ pub(super) struct Table {
     appended: Option<(CellStyle, usize)>,
     /// File and line from which the appended cells of the current row come.
     partner: Option<(PathBuf, usize)>,
+    /// First line that was decoded from Windows-1252.
+    decoded_line: Option<usize>,
 }
 
 impl Table {
@@ -91,6 +94,7 @@ impl Table {
             },
             appended: None,
             partner: None,
+            decoded_line: None,
         };
         if !table.advance()? {
             return Err(Location::file(file).at_line(1).error(TableErrorKind::EmptyTable));
@@ -164,8 +168,20 @@ impl Table {
                     .at_line(first)
                     .error(TableErrorKind::OpenQuote));
             }
+            if !self.record.as_slice().is_ascii()
+                && let Some(record) = decoded_record(&self.record)
+            {
+                self.record = record;
+                self.decoded_line.get_or_insert(self.line);
+            }
         }
         Ok(found)
+    }
+
+    /// Returns a warning if lines were decoded from Windows-1252.
+    pub fn decoding_warning(&self) -> Option<Warning> {
+        let location = Location::file(&self.file).at_line(self.decoded_line?);
+        Some(Warning { location, kind: WarningKind::ReadAsWindows1252 })
     }
 
     /// Returns the number of the next line to read.
@@ -261,8 +277,19 @@ impl Table {
             Err(_) if word.contains(',') && !decimal_comma => {
                 Err(self.cell_error(place, TableErrorKind::DecimalComma { value: value() }))
             }
+            Err(_) if self.is_unit_below_header(word) => {
+                Err(self.cell_error(place, TableErrorKind::UnitRow { value: value() }))
+            }
             Err(_) => Err(self.cell_error(place, TableErrorKind::NotANumber { value: value() })),
         }
+    }
+
+    /// Returns true if the word is a unit in the row below the header.
+    fn is_unit_below_header(&self, word: &str) -> bool {
+        let unit = word.trim_matches(['[', ']', '(', ')', ' ']);
+        self.line == self.header_line + 1
+            && ["deg", "°", "rad", "mm", "m", "s", "kg", "N", "C", "°C", "degree", "degrees"]
+                .contains(&unit)
     }
 
     /// Returns a cell of the current row as a time: a number with a unit \[s\], or a date and time

@@ -1,9 +1,22 @@
 //! Parsers of dates and times.
 
-/// Parses a date and time of ISO 8601 or day first (`31.05.2024 14:03:20`) and returns the seconds
-/// since 1970-01-01T00:00 UTC.
+/// Parses a date and time of ISO 8601, day first (`31.05.2024 14:03:20`) or with slashes behind the
+/// year (`2024/05/31 14:03:20`) and returns the seconds since 1970-01-01T00:00 UTC.
+///
+/// `05/06/2024` is not accepted, because day and month may stand in either order.
 pub(super) fn date_time(text: &str) -> Option<f64> {
-    iso_8601(text).or_else(|| iso_8601(&iso_from_day_first(text.trim())?))
+    iso_8601(text)
+        .or_else(|| iso_8601(&iso_from_day_first(text.trim())?))
+        .or_else(|| iso_8601(&iso_from_slashes(text.trim())?))
+}
+
+/// Rewrites `2024/5/31 14:03` as `2024-05-31 14:03`.
+fn iso_from_slashes(text: &str) -> Option<String> {
+    let (date, clock) = text.split_once([' ', 'T'])?;
+    let [year, month, day] = date.split('/').collect::<Vec<_>>()[..] else { return None };
+    let is_short = |word: &str| !word.is_empty() && word.len() <= 2;
+    (year.len() == 4 && is_short(month) && is_short(day))
+        .then(|| format!("{year}-{month:0>2}-{day:0>2} {}", clock.trim_start()))
 }
 
 /// Rewrites `31.05.2024 14:03` as `2024-05-31 14:03`; day, month and hour may have one digit.
@@ -131,6 +144,7 @@ mod tests {
             ("31.05.2024 14:03:20,25", "2024-05-31T14:03:20.25"),
             ("1.2.2024 9:05", "2024-02-01T09:05"),
             ("31.05.2024 14:03:20+02:00", "2024-05-31T14:03:20+02:00"),
+            ("2024/5/31 14:03:20", "2024-05-31T14:03:20"),
         ] {
             assert_eq!(date_time(text), iso_8601(iso), "{text}");
             assert!(date_time(text).is_some(), "{text}");

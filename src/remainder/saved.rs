@@ -14,7 +14,7 @@ use super::posterior::Posterior;
 use super::prior::ParameterPrior;
 use super::rows::{AXES, Inputs, Layout, Rows, Site, SiteKind, Source};
 use super::scores::Scores;
-use crate::files::read_limited;
+use crate::files::{Changes, changed_key, read_limited, sealed};
 use crate::problem::Problem;
 
 /// Largest size of a `remainder.json` that is read \[MiB\].
@@ -36,6 +36,8 @@ pub enum SavedRemainderError {
     Syntax { file: PathBuf, source: serde_json::Error },
     #[error("{}: not a remainder.json of this version: {what}", file.display())]
     Format { file: PathBuf, what: &'static str },
+    #[error("{}: {key}: changed since flexcal wrote it; fit it again with flexcal identify --remainder, or take it as it is with --trust", file.display())]
+    Changed { file: PathBuf, key: String },
     #[error("{}: is the remainder of problem {found}, not of {expected}", file.display())]
     OtherProblem { file: PathBuf, found: String, expected: String },
     #[error("{}: was fitted to another declared arm (a fixed value, a mass, gravity or an effect has changed since); fit it again with flexcal identify --remainder", file.display())]
@@ -144,6 +146,11 @@ impl Correction {
     /// Returns the correction as JSON text that ends in a line break.
     #[doc(hidden)]
     pub fn to_json(&self) -> String {
+        sealed(&self.to_text())
+    }
+
+    /// Returns the correction as JSON text, ending in a line break.
+    pub(crate) fn to_text(&self) -> String {
         let Posterior { hyper, prior, inducing: Inducing { centres, knots }, factor, .. } =
             &self.posterior;
         let change = self.posterior.parameters();
@@ -219,13 +226,19 @@ impl Correction {
     /// Reads a `remainder.json`.
     ///
     /// # Errors
-    /// Returns an error if the file cannot be read or is not a `remainder.json` of this version.
-    pub fn read(file: &Path) -> Result<Self, SavedRemainderError> {
+    /// The file cannot be read, is no remainder.json, or was changed and `changes` are refused.
+    pub fn read(file: &Path, changes: Changes) -> Result<Self, SavedRemainderError> {
         let unreadable = |source| SavedRemainderError::Unreadable { file: file.to_owned(), source };
         let bytes = read_limited(file, LARGEST_MIB << 20).map_err(unreadable)?;
         let text = String::from_utf8(bytes)
             .map_err(|_| unreadable(io::Error::from(io::ErrorKind::InvalidData)))?;
-        Self::parse(&text, file)
+        let correction = Self::parse(&text, file)?;
+        match changed_key(&text) {
+            Ok(Some(key)) if changes == Changes::Refused => {
+                Err(SavedRemainderError::Changed { file: file.to_owned(), key })
+            }
+            _ => Ok(correction),
+        }
     }
 
     /// Parses the text of a `remainder.json`; `file` is its path for error messages.

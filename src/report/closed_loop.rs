@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::document::{Block, Column, Headline, Point, Table, code, named, some_of};
+use super::document::{Block, Column, Headline, Point, Table, code, first_of, named, some_of};
 use super::errors::{NOMINAL, both_parts, header, held_out_rows, measure, rows_of, unpredicted};
 use super::figures;
 use super::identify::{
@@ -137,7 +137,7 @@ fn set_aside<'a>(problem: &Problem, result: &LoopResult) -> Option<Block<'a>> {
     let words = format!(
         "{} with gross errors took no part in the choice of effects: {}. {treatment}.",
         counted(rows.len(), "pose"),
-        named(rows.iter().map(location), SHOWN_ROWS, ", ")
+        first_of(rows.iter().map(location), SHOWN_ROWS, "loop.json").join(", ")
     );
     (!rows.is_empty()).then_some(Block::Text(words))
 }

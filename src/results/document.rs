@@ -6,6 +6,8 @@ use schemars::{JsonSchema, Schema};
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use crate::files::{DIGEST_KEY, sealed};
+
 /// Version of the result formats. It increases when a key is removed or changes its meaning.
 pub const FORMAT_VERSION: u32 = 2;
 
@@ -17,6 +19,10 @@ pub trait Document: Serialize + JsonSchema + Sized {
     /// Name of the format, for example `flexcal-loop`.
     const FORMAT: &'static str;
 
+    /// True if flexcal reads the files back. Their texts end in a digest of each key, so that
+    /// changes are noticed.
+    const IS_READ_BACK: bool = false;
+
     /// Returns the JSON text of the result, ending in a line break: `format` and `program` first,
     /// then its own keys. Numbers that are not finite are written as null.
     fn to_json(&self) -> String {
@@ -24,7 +30,7 @@ pub trait Document: Serialize + JsonSchema + Sized {
         let file = File { format, program: PROGRAM, content: self };
         let mut text = serde_json::to_string_pretty(&file).unwrap_or_default();
         text.push('\n');
-        text
+        if Self::IS_READ_BACK { sealed(&text) } else { text }
     }
 
     /// Returns the JSON Schema (draft 2020-12) of the format, ending in a line break.
@@ -36,6 +42,16 @@ pub trait Document: Serialize + JsonSchema + Sized {
         schema.insert("title".to_owned(), Self::FORMAT.into());
         if let Some(format) = schema.pointer_mut("/$defs/Format/properties") {
             *format = json!({ "name": { "const": Self::FORMAT }, "version": { "const": FORMAT_VERSION } });
+        }
+        if Self::IS_READ_BACK
+            && let Some(Value::Object(properties)) = schema.get_mut("properties")
+        {
+            let digests = json!({
+                "description": "Digest of the value of each other key.",
+                "type": "object",
+                "additionalProperties": { "type": "string" }
+            });
+            properties.insert(DIGEST_KEY.to_owned(), digests);
         }
         let mut text = serde_json::to_string_pretty(&schema).unwrap_or_default();
         text.push('\n');

@@ -106,6 +106,7 @@ pub(super) struct FindingKeys {
 
 impl Document for IdentificationResult {
     const FORMAT: &'static str = "flexcal-estimate";
+    const IS_READ_BACK: bool = true;
 }
 
 /// Convergence of the sequential strategy, which alternates between stages.

@@ -72,7 +72,7 @@ impl BoundSummary {
 
 /// Returns the uncertainty of predictions without a remainder as JSON text.
 pub(super) fn prediction(fitted: &Fitted) -> Option<Box<RawValue>> {
-    RawValue::from_string(fitted.alone.to_json().trim_end().to_owned()).ok()
+    RawValue::from_string(fitted.alone.to_text().trim_end().to_owned()).ok()
 }
 
 /// Returns the rows of the posterior covariance of all free parameters, SI, each as one line of

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::definition::{Cell, Part, Study};
 use super::key::key;
 use super::tally::Tally;
-use crate::files::{StagedFile, read_text};
+use crate::files::{StagedFile, changed_key, read_text, sealed};
 
 /// Number of hexadecimal digits of the key that form the file name of a part.
 const NAME_DIGITS: usize = 16;
@@ -29,6 +29,8 @@ pub enum StoreError {
     Unreadable { path: PathBuf, source: io::Error },
     #[error("{}: damaged ({source}); delete it and its fits are done again", path.display())]
     Damaged { path: PathBuf, source: serde_json::Error },
+    #[error("{}: {key}: changed since flexcal wrote it; delete it and its fits are done again", path.display())]
+    Changed { path: PathBuf, key: String },
     #[error("the study has no cell {cell}; it has {cells}, counted from 0")]
     NoSuchCell { cell: usize, cells: usize },
     #[error("{}: belongs to other inputs; delete it and its fits are done again", path.display())]
@@ -91,7 +93,7 @@ impl Store {
     pub(super) fn keep(&self, finished: &FinishedPart) -> Result<(), StoreError> {
         let path = self.path(&finished.key);
         let write = || -> io::Result<()> {
-            StagedFile::new(&path, &serde_json::to_string_pretty(finished)?)?.commit()
+            StagedFile::new(&path, &sealed(&serde_json::to_string_pretty(finished)?))?.commit()
         };
         write().map_err(|source| StoreError::Unwritable { path: path.clone(), source })
     }
@@ -113,7 +115,11 @@ impl Store {
             Ok(finished) => finished,
             Err(source) => return Err(StoreError::Damaged { path, source }),
         };
-        if finished.key == key { Ok(Some(finished)) } else { Err(StoreError::Foreign { path }) }
+        match changed_key(&text) {
+            Ok(Some(key)) => Err(StoreError::Changed { path, key }),
+            _ if finished.key == key => Ok(Some(finished)),
+            _ => Err(StoreError::Foreign { path }),
+        }
     }
 
     fn path(&self, key: &str) -> PathBuf {

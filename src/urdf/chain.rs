@@ -9,6 +9,8 @@ use crate::spatial::Frame;
 
 /// Maximum number of joints in a chain: the maximum of a problem, less a fixed joint at each end.
 const MAX_JOINTS: usize = 98;
+/// Minimum number of moving joints of a leaf that is chosen among several.
+const MIN_PLAIN_JOINTS: usize = 4;
 
 /// Joints of a robot from one link to another.
 pub struct Chain<'a> {
@@ -21,6 +23,8 @@ pub struct Chain<'a> {
     pub(super) stages: Vec<Stage>,
     /// Frame of the tip in the last axis frame.
     pub(super) end: Frame<f64>,
+    /// Other leaves with their moving joints, where the tip was chosen among several.
+    pub(super) other_leaves: Vec<String>,
 }
 
 /// Moving joint of the chain. Its axis frame is the joint's frame before motion, turned so that z
@@ -40,7 +44,8 @@ pub(super) struct Stage {
 
 impl<'a> Chain<'a> {
     /// Finds the chain from `base` to `tip`. The defaults are the root and the only leaf below the
-    /// base.
+    /// base, or the leaf that is plainly meant: every other one has at most half as many moving
+    /// joints.
     ///
     /// # Errors
     /// The links form no tree, several roots or leaves are possible, a joint type is unsupported,
@@ -55,8 +60,8 @@ impl<'a> Chain<'a> {
             Some(name) => robot.link(name)?,
             None => root(robot, &above)?,
         };
-        let tip = match tip {
-            Some(name) => robot.link(name)?,
+        let (tip, other_leaves) = match tip {
+            Some(name) => (robot.link(name)?, Vec::new()),
             None => leaf(robot, &above, base)?,
         };
         let name =
@@ -80,8 +85,15 @@ impl<'a> Chain<'a> {
                 robot.error(UrdfErrorKind::TooManyJoints { found: joints.len(), most: MAX_JOINTS })
             );
         }
-        let mut chain =
-            Self { robot, base, tip, joints, stages: Vec::new(), end: Frame::identity() };
+        let mut chain = Self {
+            robot,
+            base,
+            tip,
+            joints,
+            stages: Vec::new(),
+            end: Frame::identity(),
+            other_leaves,
+        };
         chain.walk()?;
         if chain.stages.is_empty() {
             return Err(
@@ -240,9 +252,13 @@ fn root(robot: &Robot, above: &[Option<(usize, usize)>]) -> Result<usize, InputE
     }
 }
 
-/// Returns the only link below `base` that is no joint's parent. `above` holds the result of
-/// [`parents`].
-fn leaf(robot: &Robot, above: &[Option<(usize, usize)>], base: usize) -> Result<usize, InputError> {
+/// Returns the only link below `base` that is no joint's parent, or the one that is plainly meant
+/// with the others in words.
+fn leaf(
+    robot: &Robot,
+    above: &[Option<(usize, usize)>],
+    base: usize,
+) -> Result<(usize, Vec<String>), InputError> {
     let is_parent = |link: usize| robot.joints.iter().any(|joint| joint.parent == link);
     // Number of moving joints from the base to a link below it.
     let depth = |link: usize| {
@@ -259,13 +275,19 @@ fn leaf(robot: &Robot, above: &[Option<(usize, usize)>], base: usize) -> Result<
     let mut leaves: Vec<(usize, usize)> =
         ends.filter_map(|link| Some((depth(link)?, link))).collect();
     if let [(_, leaf)] = *leaves.as_slice() {
-        return Ok(leaf);
+        return Ok((leaf, Vec::new()));
     }
     leaves.sort_by_key(|&(moving, link)| (usize::MAX - moving, link));
     let named = |(moving, link): &(usize, usize)| {
         let plural = if *moving == 1 { "" } else { "s" };
         Some(format!("{} ({moving} moving joint{plural})", robot.links.get(*link)?.name))
     };
+    if let [(most, leaf), (second, _), ..] = *leaves.as_slice()
+        && most >= MIN_PLAIN_JOINTS
+        && 2 * second <= most
+    {
+        return Ok((leaf, leaves.iter().skip(1).filter_map(named).collect()));
+    }
     let base = robot.links.get(base).map_or(String::new(), |link| link.name.clone());
     Err(robot
         .error(UrdfErrorKind::Leaves { base, leaves: leaves.iter().filter_map(named).collect() }))

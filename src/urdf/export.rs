@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 use super::chain::{Chain, moved};
 use super::read::Origin;
@@ -229,7 +229,11 @@ impl Patches<'_> {
             }
         };
         let (first, more) = patch("xyz", shifted, &xyz, &origin.xyz_value);
-        let (second, also) = patch("rpy", turned, &rpy, &origin.rpy_value);
+        let (second, also) = match &origin.quaternion_value {
+            Some(at) if turned => (Some((at.clone(), quaternion(&rpy))), String::new()),
+            Some(_) => (None, String::new()),
+            None => patch("rpy", turned, &rpy, &origin.rpy_value),
+        };
         self.text.extend([first, second].into_iter().flatten());
         let more = format!("{more}{also}");
         if !more.is_empty() {
@@ -285,6 +289,13 @@ fn nearest(rpy: &Vector3<f64>, old: &Vector3<f64>) -> Vector3<f64> {
     };
     let [first, second] = [*rpy, Vector3::new(rpy.x + half, half - rpy.y, rpy.z + half)].map(near);
     if (first - old).norm() <= (second - old).norm() { first } else { second }
+}
+
+/// Returns x, y, z, w of the rotation by roll, pitch and yaw.
+fn quaternion(rpy: &Vector3<f64>) -> String {
+    let rotation = UnitQuaternion::from_euler_angles(rpy.x, rpy.y, rpy.z);
+    let [x, y, z, w] = [rotation.i, rotation.j, rotation.k, rotation.w];
+    [x, y, z, w].map(|number| number.to_string()).join(" ")
 }
 
 /// Returns three numbers, rounded to 10⁻¹³.

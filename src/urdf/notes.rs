@@ -14,7 +14,8 @@ const MAX_PLAUSIBLE_LENGTH: f64 = 20.0;
 pub(super) fn of_chain(chain: &Chain) -> Vec<String> {
     let joints: Vec<&Joint> =
         chain.joints.iter().filter_map(|&index| chain.robot.joints.get(index)).collect();
-    let mut notes: Vec<String> = right_angles(&joints).into_iter().collect();
+    let mut notes: Vec<String> = chosen_tip(chain).into_iter().collect();
+    notes.extend(right_angles(&joints));
     notes.extend(joints.iter().filter_map(|joint| degrees(joint)));
     notes.extend(joints.iter().filter_map(|joint| millimetres(joint)));
     notes.extend(joints.iter().filter_map(|joint| unlimited_slide(joint)));
@@ -28,6 +29,18 @@ pub(super) fn of_chain(chain: &Chain) -> Vec<String> {
         ))
     }));
     notes
+}
+
+/// Returns a note if the tip was chosen among several links.
+fn chosen_tip(chain: &Chain) -> Option<String> {
+    let others = &chain.other_leaves;
+    (!others.is_empty()).then(|| {
+        format!(
+            "tip {} taken, which has by far the most moving joints; others are {}, chosen with --tip",
+            chain.ends().1,
+            others.join(", ")
+        )
+    })
 }
 
 /// Returns a note if an angle of an origin is more than one turn.

@@ -1,9 +1,10 @@
 //! Reader of links and joints from the text of a URDF.
 
+use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 use std::path::Path;
 
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use roxmltree::{Document as Xml, Node};
 
 use super::number::numbers;
@@ -11,6 +12,12 @@ use crate::error::{InputError, InputErrorKind, Location, UrdfErrorKind, is_hidde
 use crate::problem::item::Document;
 use crate::quantity::rounded_right_angle;
 use crate::spatial::Frame;
+
+/// Maximum deviation of a quaternion's norm from 1 by the rounding of its numbers.
+const MAX_QUATERNION_NORM_ERROR: f64 = 1e-3;
+/// Maximum deviation of an angle from a right angle by the rounding of a quaternion with seven
+/// decimals \[rad\].
+const MAX_QUATERNION_ROUNDING: f64 = 2e-7;
 
 /// Numbers with their byte range in the text.
 type Placed<const N: usize> = ([f64; N], Range<usize>);
@@ -77,6 +84,7 @@ pub(super) struct Origin {
     pub element: Option<Range<usize>>,
     pub xyz_value: Option<Range<usize>>,
     pub rpy_value: Option<Range<usize>>,
+    pub quaternion_value: Option<Range<usize>>,
 }
 
 impl Origin {
@@ -107,6 +115,11 @@ impl Robot {
 
     fn from_document(source: Document) -> Result<Self, InputError> {
         let text = source.text.clone();
+        if let Some(what) = other_format(&text) {
+            return Err(Location::file(&source.file)
+                .at_line(1)
+                .error(UrdfErrorKind::OtherFormat { what }));
+        }
         let xml = Xml::parse(&text).map_err(|error| {
             let location = Location::file(&source.file).at_line(error.pos().row as usize);
             location.error(match error {
@@ -150,6 +163,28 @@ impl Robot {
         };
         self.links.iter().position(|link| link.name == name).ok_or_else(unknown)
     }
+}
+
+/// Returns the right angle that rounding of a quaternion changed to `angle`, or the angle itself.
+fn right_angle_of_quaternion(angle: f64) -> f64 {
+    let right = (angle / FRAC_PI_2).round() * FRAC_PI_2;
+    if (angle - right).abs() < MAX_QUATERNION_ROUNDING { right } else { angle }
+}
+
+/// Returns what a text is that is not XML; `None` for XML and unknown formats.
+fn other_format(text: &str) -> Option<&'static str> {
+    let start = text.trim_start();
+    let formats = [
+        ("#usda", "a USD scene"),
+        ("PXR-USDC", "a USD scene"),
+        ("PK\u{3}\u{4}", "a ZIP archive"),
+        ("{", "a JSON file"),
+        ("solid ", "a mesh (STL)"),
+        ("ISO-10303-21", "a STEP file"),
+        ("%YAML", "a YAML file"),
+        ("---", "a YAML file"),
+    ];
+    formats.into_iter().find(|(mark, _)| start.starts_with(mark)).map(|(_, what)| what)
 }
 
 struct Reader<'a> {
@@ -384,6 +419,22 @@ impl Reader<'_> {
                 .map(|(word, value)| rounded_right_angle(word).unwrap_or(value))
                 .collect();
             origin.meant = Vector3::from_iterator(meant);
+        }
+        if let Some((quaternion, span)) = self.numbers::<4>(node, "quat_xyzw")? {
+            if origin.rpy_value.is_some() {
+                return self.fail(node, UrdfErrorKind::TwoRotations);
+            }
+            let [x, y, z, w] = quaternion;
+            let quaternion = Quaternion::new(w, x, y, z);
+            if (quaternion.norm() - 1.0).abs() > MAX_QUATERNION_NORM_ERROR {
+                let text = shortened(node.attribute("quat_xyzw").unwrap_or_default(), 80);
+                return self.fail_at(span, UrdfErrorKind::NotAQuaternion { text });
+            }
+            let mut frame = Frame::identity();
+            frame.rotate(&UnitQuaternion::from_quaternion(quaternion).scaled_axis());
+            origin.written = frame.roll_pitch_yaw();
+            origin.meant = origin.written.map(right_angle_of_quaternion);
+            origin.quaternion_value = Some(span);
         }
         Ok(origin)
     }

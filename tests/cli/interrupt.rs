@@ -70,10 +70,14 @@ impl Terminal {
     }
 
     fn interrupt(&self) {
+        self.signal("INT");
+    }
+
+    fn signal(&self, signal: &str) {
         let pid = self.shown.split_once("pid=").unwrap().1.split('.').next().unwrap();
         assert!(
             Command::new("sh")
-                .args(["-c", &format!("kill -INT {pid}")])
+                .args(["-c", &format!("kill -{signal} {pid}")])
                 .status()
                 .unwrap()
                 .success()
@@ -134,4 +138,31 @@ fn an_interrupted_loop_tells_what_it_has_found() {
     assert_eq!(status, Some(130), "{shown}");
     assert!(shown.contains("interrupted before there was a result"), "{shown}");
     assert!(!folder.join("early").exists());
+}
+
+#[test]
+fn an_interrupted_loop_replaces_no_finished_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    measured(folder);
+    // A finished loop of few poses.
+    let table = fs::read_to_string(folder.join("data.csv")).unwrap();
+    let few: Vec<&str> = table.lines().take(1).chain(table.lines().skip(POSES - 29)).collect();
+    fs::write(folder.join("few.csv"), few.join("\n") + "\n").unwrap();
+    let mut first = assert_cmd::Command::new(cargo_bin!("flexcal"));
+    first.current_dir(folder).args(["loop", ".", "--data", "few.csv", "--out", "out", "--quiet"]);
+    first.assert().success();
+    let finished = fs::read_to_string(folder.join("out/loop.json")).unwrap();
+    for signal in ["INT", "TERM"] {
+        let mut run = Terminal::run(folder, "loop . --data data.csv --out out");
+        run.wait_for("round 2, 1 effect (last link-thermal-bending)");
+        run.signal(signal);
+        let (status, shown) = run.end();
+        assert_eq!(status, Some(1), "{signal}: {shown}");
+        assert_eq!(fs::read_to_string(folder.join("out/loop.json")).unwrap(), finished);
+        let closed = folder.join("out/interrupted/problem.closed.toml");
+        let found = fs::read_to_string(closed).unwrap();
+        assert!(found.contains("link-thermal-bending"), "{found}");
+        assert!(shown.contains("holds a finished loop, which stays"), "{shown}");
+    }
 }

@@ -3,6 +3,7 @@
 use std::fs;
 
 use assert_cmd::Command;
+use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
 use super::{Bench, text};
@@ -76,4 +77,85 @@ fn figures_of_an_older_page_go_and_other_files_stay() {
     write("effect-1.svg");
     let error = text(&flexcal("identify").code(2).get_output().stderr);
     assert!(error.contains("figures/effect-1.svg is there and not as flexcal wrote it"), "{error}");
+}
+
+#[test]
+fn runs_into_one_folder_at_once_leave_one_whole_result() {
+    let bench = Bench::new();
+    for _ in 0..3 {
+        let started: Vec<_> = (0..6)
+            .map(|_| {
+                std::process::Command::new(cargo_bin!("flexcal"))
+                    .current_dir(bench.path(""))
+                    .args(["identify", "problem.toml", "--data", "a-none.csv", "--out", "same"])
+                    .arg("--quiet")
+                    .spawn()
+                    .unwrap()
+            })
+            .collect();
+        for mut run in started {
+            assert!(run.wait().unwrap().success());
+        }
+        bench.identify(&["--quiet", "--out", "same"]).success();
+    }
+}
+
+#[test]
+fn an_estimate_that_was_changed_is_refused_or_said() {
+    let bench = Bench::new();
+    bench.identify(&["--quiet", "--out", "out"]).success();
+    let predict = |more: &[&str]| {
+        let mut flexcal = Command::new(cargo_bin!("flexcal"));
+        flexcal.current_dir(bench.path("")).args([
+            "predict",
+            "problem.toml",
+            "--data",
+            "a-none.csv",
+        ]);
+        flexcal.args(["--estimate", "out/estimate.json", "--out", "predicted"]).args(more).assert()
+    };
+    predict(&[]).success();
+    let text_of = |name: &str| fs::read_to_string(bench.path(name)).unwrap();
+    let whole = text_of("out/estimate.json");
+    let json: Value = serde_json::from_str(&whole).unwrap();
+    let estimate = json["parameters"][0]["estimate"].to_string();
+    let from = format!("\"estimate\": {estimate}");
+    assert!(whole.contains(&from));
+    fs::write(bench.path("out/estimate.json"), whole.replacen(&from, "\"estimate\": 0.125", 1))
+        .unwrap();
+    let assert = predict(&[]).code(2);
+    let said = text(&assert.get_output().stderr);
+    assert!(
+        said.contains("out/estimate.json: parameters: changed since flexcal wrote it"),
+        "{said}"
+    );
+    let said = text(&predict(&["--trust"]).success().get_output().stderr);
+    assert!(
+        said.contains("out/estimate.json: parameters: changed") && said.contains("all the same"),
+        "{said}"
+    );
+    for (from, to, words) in [
+        (
+            "\"version\": 2",
+            "\"version\": 9",
+            "format: version 9, and this program reads versions up to 2",
+        ),
+        ("flexcal-estimate", "flexcal-loop", "format: a file of flexcal-loop"),
+    ] {
+        fs::write(bench.path("out/estimate.json"), whole.replacen(from, to, 1)).unwrap();
+        let said = text(&predict(&[]).code(2).get_output().stderr);
+        assert!(said.contains(words), "{said}");
+    }
+}
+
+#[test]
+fn an_impossible_number_of_threads_is_refused_at_once() {
+    let bench = Bench::new();
+    for threads in ["100000", "-1", "many"] {
+        let mut flexcal = Command::new(cargo_bin!("flexcal"));
+        flexcal.current_dir(bench.path("")).env("RAYON_NUM_THREADS", threads);
+        let assert = flexcal.args(["identify", "problem.toml"]).assert().code(2);
+        let said = text(&assert.get_output().stderr);
+        assert!(said.contains(&format!("RAYON_NUM_THREADS={threads}: a whole number")), "{said}");
+    }
 }

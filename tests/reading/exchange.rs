@@ -150,6 +150,96 @@ fn a_joint_log_is_joined_by_name_order_or_time() {
     assert!(wrong.contains("controller.csv:2: column A1: \"x\" is not a number"), "{wrong}");
     let none = joined("by = 'name'", &tracker.replace("\nP", "\nQ"), log).unwrap_err().to_string();
     assert!(none.contains("no row of the measurements has a partner"), "{none}");
+    let late = log.replace("\n10,", "\n50,").replace("\n30,", "\n70,");
+    let late = joined("by = 'time', tolerance_s = 0.25", tracker, &late).unwrap_err().to_string();
+    assert!(late.contains("typically 10.2 s away; check whether both clocks agree"), "{late}");
     let twice = joined("by = 'name'", tracker, &log.replace("P2", "P1")).unwrap_err().to_string();
     assert!(twice.contains("controller.csv:3: column Point: the pose P1 is already on line 2"));
+}
+
+/// Reads a tracker table with a joint log whose columns have other names and another format.
+#[test]
+fn the_two_tables_of_a_join_may_name_their_columns_differently() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("tracker.csv");
+    fs::write(&file, "Zeit;X;Y;Z\n31.05.2024 14:03:20,1;1000,5;2;3\n31.05.2024 14:03:30;4;5;6\n")
+        .unwrap();
+    let log = "Timestamp,A1,A2\n2024-05-31T14:03:20,10.5,1\n2024-05-31T14:03:30,20.25,2\n";
+    fs::write(folder.path().join("controller.csv"), log).unwrap();
+    let text = format!(
+        "{ARM}[data]\nfiles = ['tracker.csv']\njoints = {{ files = ['controller.csv'], by = 'time' }}\n\
+         [data.columns]\n'Zeit' = 'time'\n'X' = 'x_mm'\n'Y' = 'y_mm'\n'Z' = 'z_mm'\n\
+         'Timestamp' = 'time'\n'A1' = 'q1_deg'\n'A2' = 'q2_deg'\n[data.format]\ndecimal = ','\n"
+    );
+    let problem = Problem::parse(&text, &folder.path().join("problem.toml")).unwrap();
+    let (rows, warnings) = Measurements::read(&[file], &problem).unwrap();
+    assert_eq!((rows.len(), words(&warnings).as_str()), (2, ""));
+    assert!((rows.positions[0].x - 1.0005).abs() < 1e-12);
+    assert!((rows.configuration(1)[0].to_degrees() - 20.25).abs() < 1e-9);
+    assert!((rows.time[1] - rows.time[0] - 9.9).abs() < 1e-6);
+}
+
+#[test]
+fn tables_in_latin_1_are_read_and_said() {
+    let map = "'Winkel 1 (°)' = 'q1_deg'\n'Winkel 2 (°)' = 'q2_deg'\n'X' = 'x_mm'\n'Y' = 'y_mm'\n'Z' = 'z_mm'\n\
+               'Prüfer' = 'session'\n[data.format]\ndecimal = ','\n";
+    let problem = problem(&format!("{ARM}[data.columns]\n{map}"));
+    let text = "Winkel 1 (°);Winkel 2 (°);X;Y;Z;Prüfer\n1,5;2;3;4;5;Müller\n";
+    let latin: Vec<u8> = text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("rows.csv");
+    fs::write(&file, latin).unwrap();
+    let (rows, warnings) = Measurements::read(std::slice::from_ref(&file), &problem).unwrap();
+    assert_eq!((rows.len(), rows.session.names.as_slice()), (1, &["Müller".to_owned()][..]));
+    let said = words(&warnings);
+    assert!(said.contains("rows.csv:1: not UTF-8 text; read as Windows-1252"), "{said}");
+    fs::write(&file, text).unwrap();
+    assert_eq!(words(&Measurements::read(&[file], &problem).unwrap().1), "");
+}
+
+#[test]
+fn a_header_may_stand_behind_a_comment_mark_or_a_line_of_excel() {
+    let rows = "q1_deg,q2_deg,x_mm,y_mm,z_mm";
+    let values = "1.5,2,3,4,5\n";
+    let commented = "[data.format]\ncomment = '//'\n";
+    for (format, text) in [
+        ("", format!("# made today\n# {rows}\n{values}")),
+        ("", format!("//{rows}\n{values}")),
+        ("", format!("% {}\n{}", rows.replace(',', " "), values.replace(',', " "))),
+        (commented, format!("// SpatialAnalyzer\n// Units: mm\n// {rows}\n// A\n{values}// B\n")),
+        ("", format!("\u{feff}# {rows}\n{values}")),
+        (
+            "[data.format]\ndecimal = ','\n",
+            format!("sep=;\n{rows}\n{values}")
+                .replace(',', ";")
+                .replace('.', ",")
+                .replace("sep=;\r", "sep=;"),
+        ),
+    ] {
+        let problem = problem(&format!("{ARM}{format}"));
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("rows.csv");
+        fs::write(&file, &text).unwrap();
+        let (rows, warnings) = Measurements::read(&[file], &problem).expect(&text);
+        assert_eq!((rows.len(), words(&warnings).as_str()), (1, ""), "{text}");
+        assert!((rows.configuration(0)[0].to_degrees() - 1.5).abs() < 1e-9, "{text}");
+    }
+    // A commented-out header does not hide the one below.
+    let (rows, _) =
+        read("", "# x_mm,y_mm,z_mm,q1_deg,q2_deg\nq1_deg,q2_deg,x_mm,y_mm,z_mm\n1,2,3,4,5\n", true)
+            .unwrap();
+    assert!((rows.positions[0].x - 3e-3).abs() < 1e-12);
+    let units = read("", "q1_deg,q2_deg,x_mm,y_mm,z_mm\ndeg,deg,mm,mm,mm\n1,2,3,4,5\n", true);
+    let error = units.unwrap_err().to_string();
+    assert!(error.contains("rows.csv:2: column q1_deg: \"deg\" is a unit"), "{error}");
+}
+
+#[test]
+fn columns_of_results_are_passed_over_in_silence() {
+    let result = "file,line,q1_deg,q2_deg,x_mm,y_mm,z_mm,predicted_x_mm,sigma_x_mm,bound95_mm,extrapolated,reached\n\
+                  a.csv,2,1,2,3,4,5,3,0.1,0.2,false,true\n";
+    assert_eq!(words(&read("", result, true).unwrap().1), "");
+    let other = "q1_deg,q2_deg,x_mm,y_mm,z_mm,line,reached\n1,2,3,4,5,6,true\n";
+    let said = words(&read("", other, true).unwrap().1);
+    assert!(said.contains("column line: unknown") && said.contains("column reached"), "{said}");
 }

@@ -263,3 +263,76 @@ fn a_joint_follows_the_nearest_joint_of_the_chain() {
     assert!((origin - (elbow + last * Vector3::new(0.1, 0.1, 0.0))).norm() < 1e-9, "{origin}");
     assert!((x - last * Vector3::x()).norm() < 1e-9, "{x}");
 }
+
+/// Two revolute joints, the second one turned, and a fixed tip.
+fn turned(rotation: &str) -> String {
+    format!(
+        "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><link name=\"c\"/><link name=\"d\"/>\
+         <joint name=\"j1\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/><origin xyz=\"0 0 0.3\"/><axis xyz=\"0 0 1\"/>\
+         <limit lower=\"-1\" upper=\"1\"/></joint>\
+         <joint name=\"j2\" type=\"revolute\"><parent link=\"b\"/><child link=\"c\"/><origin xyz=\"0.2 0.1 0\" {rotation}/>\
+         <axis xyz=\"0 1 0\"/><limit lower=\"-1\" upper=\"1\"/></joint>\
+         <joint name=\"j3\" type=\"fixed\"><parent link=\"c\"/><child link=\"d\"/><origin xyz=\"0.1 0.2 0.3\"/></joint></robot>"
+    )
+}
+
+#[test]
+fn a_rotation_may_be_a_quaternion() {
+    let tip = |text: &str| {
+        let robot = Robot::parse(text, Path::new("r.urdf")).unwrap();
+        let described = describe(&Chain::new(&robot, None, None).unwrap()).unwrap();
+        let mut problem = Problem::parse(&described.text, Path::new("problem.toml")).unwrap();
+        problem.parameters.clear();
+        let moving = |joint: &flexcal::problem::Joint| joint.kind != JointKind::Fixed;
+        let mut commands = [0.4, -0.7].into_iter();
+        let q: Vec<f64> = problem
+            .joints
+            .iter()
+            .map(|joint| if moving(joint) { commands.next().unwrap() } else { 0.0 })
+            .collect();
+        tips(&problem, &[q], &DVector::zeros(0))[0]
+    };
+    for (rpy, quaternion) in [
+        ("1.5707963267948966 0 0", "0.7071068 0 0 0.7071068"),
+        ("0 1.5707963267948966 0", "0 0.70710678118654752 0 0.70710678118654752"),
+        (
+            "0.3 -0.4 0.5",
+            "0.19050591331489203 -0.15409707606385747 0.2685154702459379 0.9315905916115894",
+        ),
+    ] {
+        let expected = tip(&turned(&format!("rpy=\"{rpy}\"")));
+        let found = tip(&turned(&format!("quat_xyzw=\"{quaternion}\"")));
+        let off: f64 = expected.iter().zip(&found).map(|(a, b)| (a - b).norm()).sum();
+        assert!(off < 1e-12, "{rpy}: {off:e}");
+    }
+}
+
+#[test]
+fn the_tip_is_guessed_where_one_link_is_plainly_meant() {
+    let arm = |beside: &str| {
+        let joints: String = (1..=5)
+            .map(|k| {
+                format!(
+                    "<link name=\"l{k}\"/><joint name=\"j{k}\" type=\"continuous\"><parent link=\"l{}\"/><child link=\"l{k}\"/>\
+                     <origin xyz=\"0.1 0 0.2\" rpy=\"0 {} 0\"/><axis xyz=\"0 0 1\"/></joint>",
+                    k - 1,
+                    0.3 * f64::from(k)
+                )
+            })
+            .collect();
+        format!("<robot name=\"r\"><link name=\"l0\"/>{joints}{beside}</robot>")
+    };
+    let side = |parent: &str| {
+        format!(
+            "<link name=\"side\"/><joint name=\"s\" type=\"fixed\"><parent link=\"{parent}\"/><child link=\"side\"/></joint>"
+        )
+    };
+    let text = arm(&side("l1"));
+    let robot = Robot::parse(&text, Path::new("r.urdf")).unwrap();
+    let notes = describe(&Chain::new(&robot, None, None).unwrap()).unwrap().notes.join("\n");
+    assert!(notes.contains("tip l5 taken") && notes.contains("side (1 moving joint)"), "{notes}");
+    let text = arm(&side("l4"));
+    let robot = Robot::parse(&text, Path::new("r.urdf")).unwrap();
+    let error = Chain::new(&robot, None, None).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("l5 (5 moving joints), side (4 moving joints)"), "{error}");
+}

@@ -9,12 +9,14 @@ use serde::Deserialize;
 use serde_json::value::RawValue;
 
 use crate::error::one_line;
-use crate::files::read_limited;
+use crate::files::{Changes, changed_key, read_limited};
 use crate::fit::Strategy;
 use crate::model::{Model, Pose};
 use crate::problem::Problem;
 use crate::problem::item::MAX_MAGNITUDE;
 
+/// Name of the format and newest version that is read.
+const FORMAT: (&str, u32) = ("flexcal-estimate", 2);
 /// Maximum size of an `estimate.json` \[MiB\].
 const LARGEST_MIB: u64 = 256;
 
@@ -26,6 +28,10 @@ const IDENTIFIED: f64 = 0.99;
 pub struct SavedEstimate {
     /// Path of the file.
     pub file: PathBuf,
+    /// Treatment of files that belong to the estimate and were changed.
+    pub changes: Changes,
+    /// Key of the file that was changed since flexcal wrote it, if changes are accepted.
+    pub changed_key: Option<String>,
     /// True if the fit was trusted.
     pub trusted: bool,
     /// Standard deviation (1 σ) of a coordinate, estimated from the scatter of the fit \[m\];
@@ -55,7 +61,15 @@ struct Entry {
 }
 
 #[derive(Debug, Deserialize)]
+struct Format {
+    name: String,
+    version: u32,
+}
+
+#[derive(Debug, Deserialize)]
 struct Document {
+    /// Absent in files of older versions.
+    format: Option<Format>,
     problem: String,
     arm_digest: Option<String>,
     strategy: Option<String>,
@@ -81,6 +95,12 @@ pub enum SavedEstimateError {
     Unreadable { file: PathBuf, source: io::Error },
     #[error("{}: not an estimate.json: {source}", file.display())]
     Syntax { file: PathBuf, source: serde_json::Error },
+    #[error("{}: format: a file of {name}, not an estimate.json", file.display())]
+    OtherFormat { file: PathBuf, name: String },
+    #[error("{}: format: version {version}, and this program reads versions up to {}; use a newer flexcal, or identify again", file.display(), FORMAT.1)]
+    NewerFormat { file: PathBuf, version: u32 },
+    #[error("{}: {key}: changed since flexcal wrote it; identify again, or take it as it is with --trust", file.display())]
+    Changed { file: PathBuf, key: String },
     #[error("{}: has no estimate of {name}; identify the same problem and sessions", file.display())]
     Missing { file: PathBuf, name: String },
     #[error("{}: identifies problem {found}, not {expected}", file.display())]
@@ -105,9 +125,17 @@ impl SavedEstimate {
     /// Reads an `estimate.json`.
     ///
     /// # Errors
-    /// Returns an error if the file cannot be read, is no `estimate.json`, or has a parameter twice
-    /// or with a value that is too large.
+    /// Returns an error if the file cannot be read, is no `estimate.json`, has a parameter twice or
+    /// with a value that is too large, or was changed since flexcal wrote it.
     pub fn read(file: &Path) -> Result<Self, SavedEstimateError> {
+        Self::read_with(file, Changes::Refused)
+    }
+
+    /// Reads an `estimate.json`, whose `changes` may be accepted.
+    ///
+    /// # Errors
+    /// Returns the errors of [`read`](Self::read).
+    pub(crate) fn read_with(file: &Path, changes: Changes) -> Result<Self, SavedEstimateError> {
         let named = || file.to_owned();
         let bytes =
             read_limited(file, LARGEST_MIB << 20).map_err(|source| match source.kind() {
@@ -116,7 +144,7 @@ impl SavedEstimate {
             })?;
         let text =
             String::from_utf8(bytes).map_err(|_| SavedEstimateError::NotUtf8 { file: named() })?;
-        Self::parse(&text, file)
+        Self::parse_with(&text, file, changes)
     }
 
     /// Parses the text of an `estimate.json`; `file` names it in messages.
@@ -125,8 +153,13 @@ impl SavedEstimate {
     /// Returns the errors of [`read`](Self::read).
     #[doc(hidden)]
     pub fn parse(text: &str, file: &Path) -> Result<Self, SavedEstimateError> {
+        Self::parse_with(text, file, Changes::Refused)
+    }
+
+    fn parse_with(text: &str, file: &Path, changes: Changes) -> Result<Self, SavedEstimateError> {
         let file = file.to_owned();
         let Document {
+            format,
             problem,
             arm_digest,
             strategy,
@@ -140,6 +173,14 @@ impl SavedEstimate {
             Ok(document) => document,
             Err(source) => return Err(SavedEstimateError::Syntax { file, source }),
         };
+        if let Some(Format { name, version }) = format {
+            if name != FORMAT.0 {
+                return Err(SavedEstimateError::OtherFormat { file, name: one_line(&name) });
+            }
+            if version > FORMAT.1 {
+                return Err(SavedEstimateError::NewerFormat { file, version });
+            }
+        }
         let problem = one_line(&problem);
         for entry in &mut parameters {
             entry.name = one_line(&entry.name);
@@ -153,6 +194,14 @@ impl SavedEstimate {
                 return Err(SavedEstimateError::MagnitudeTooLarge { file, name: name.clone() });
             }
         }
+        // After the other errors, which say more.
+        let changed_key = match changed_key(text) {
+            Ok(key) => key.map(|key| one_line(&key)),
+            Err(source) => return Err(SavedEstimateError::Syntax { file, source }),
+        };
+        if let (Some(key), Changes::Refused) = (&changed_key, changes) {
+            return Err(SavedEstimateError::Changed { file, key: key.clone() });
+        }
         let estimated_sigma =
             estimated_sigma_mm.map(|sigma: f64| sigma * 1e-3).filter(|sigma| *sigma > 0.0);
         let named =
@@ -160,6 +209,8 @@ impl SavedEstimate {
         let strategy = named.unwrap_or_default();
         Ok(Self {
             file,
+            changes,
+            changed_key,
             trusted,
             estimated_sigma,
             first_time: first_time_s,

@@ -1,0 +1,33 @@
+//! Argument of commands that apply an estimate, and the reader of its file.
+
+use std::path::Path;
+
+use clap::Args;
+use flexcal::files::Changes;
+use flexcal::fit::{SavedEstimate, SavedEstimateError};
+
+use super::diagnostic;
+
+/// Treatment of an estimate that was changed.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct Trust {
+    /// Take an estimate.json, and the remainder.json beside it, that were changed since flexcal
+    /// wrote them
+    #[arg(long)]
+    trust: bool,
+}
+
+impl Trust {
+    /// Reads an estimate. If changes are accepted, a warning names the first key that was changed.
+    pub fn read(self, file: &Path) -> Result<SavedEstimate, SavedEstimateError> {
+        let changes = if self.trust { Changes::Accepted } else { Changes::Refused };
+        let estimate = SavedEstimate::read_with(file, changes)?;
+        if let Some(key) = &estimate.changed_key {
+            diagnostic::warn(&format!(
+                "{}: {key}: changed since flexcal wrote it; used all the same",
+                file.display()
+            ));
+        }
+        Ok(estimate)
+    }
+}

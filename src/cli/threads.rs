@@ -1,0 +1,28 @@
+//! Number of threads, as the environment asks for it.
+
+use std::env;
+
+/// Variable with the number of threads.
+const VARIABLE: &str = "RAYON_NUM_THREADS";
+/// Maximum number of threads; more of them only wait for one another.
+pub const MAX_THREADS: usize = 1024;
+
+/// Number of threads that is not possible.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{VARIABLE}={text}: a whole number from 0 (as many as processors) to {MAX_THREADS} is needed; correct it or unset it"
+)]
+pub struct BadThreads {
+    text: String,
+}
+
+/// Checks the number of threads before the first one starts.
+pub fn check() -> Result<(), BadThreads> {
+    let Some(text) = env::var_os(VARIABLE) else { return Ok(()) };
+    let text = text.to_string_lossy().into_owned();
+    match text.trim().parse::<usize>() {
+        _ if text.is_empty() => Ok(()),
+        Ok(threads) if threads <= MAX_THREADS => Ok(()),
+        _ => Err(BadThreads { text }),
+    }
+}

@@ -1,0 +1,138 @@
+//! Results of a loop that was interrupted.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use flexcal::fit::{Progress, ProgressSink};
+use flexcal::problem::{Effect, Problem, edit};
+use flexcal::report::shell_word;
+use serde_json::Value;
+
+use super::output::{Results, WriteError};
+use super::{diagnostic, interrupt};
+
+/// Folder, below that of the results, for an interrupted loop beside a finished one.
+const FOLDER: &str = "interrupted";
+/// Name of the file with the effects that were found.
+const CLOSED_PROBLEM: &str = "problem.closed.toml";
+/// Exit status of an interrupted loop that has written something.
+const STATUS: u8 = 1;
+
+/// Loop under way: what an interrupt leaves of it if it cannot end in time.
+#[derive(Clone)]
+pub struct Unfinished {
+    /// Text of the problem file.
+    text: String,
+    declared: Vec<Effect>,
+    /// Measurement files and joint tables.
+    files: [Vec<PathBuf>; 2],
+    results: Results,
+    /// Effects that the finished rounds have added.
+    added: Arc<Mutex<Vec<Effect>>>,
+}
+
+impl Unfinished {
+    /// Creates the record of a loop that is about to start.
+    pub fn new(text: &str, problem: &Problem, files: &[PathBuf], results: &Results) -> Self {
+        let joint_files = problem.data.joint_log.as_ref().map(|log| log.files.clone());
+        Self {
+            text: text.to_owned(),
+            declared: problem.effects.iter().map(|declared| declared.effect.clone()).collect(),
+            files: [files.to_vec(), joint_files.unwrap_or_default()],
+            results: results.clone(),
+            added: Arc::default(),
+        }
+    }
+
+    /// Returns a sink that records the effects of finished rounds and passes progress on.
+    pub fn watching(&self, shown: Option<ProgressSink>) -> ProgressSink {
+        let added = Arc::clone(&self.added);
+        Arc::new(move |progress: Progress| {
+            if let Progress::Round { effects, .. } = &progress {
+                added.lock().unwrap_or_else(PoisonError::into_inner).clone_from(effects);
+            }
+            if let Some(shown) = &shown {
+                shown(progress);
+            }
+        })
+    }
+
+    /// Returns the results, in a folder below if a finished loop is in theirs.
+    pub fn keeping_finished(&self) -> Result<Results, WriteError> {
+        if !self.results.is_recorded("loop.json") || !is_finished(&self.results.path("loop.json")) {
+            return Ok(self.results.clone());
+        }
+        let below = self.results.below(FOLDER)?;
+        diagnostic::warn(&format!(
+            "{} holds a finished loop, which stays; the interrupted one is in {}",
+            self.results.folder.display(),
+            below.folder.display()
+        ));
+        Ok(below)
+    }
+
+    /// Returns the measurement files and the joint tables as seen from a folder, which is created.
+    pub fn files_from(&self, folder: &Path) -> Result<[Vec<PathBuf>; 2], WriteError> {
+        let of = |files: &[PathBuf]| -> io::Result<Vec<PathBuf>> {
+            fs::create_dir_all(folder)?;
+            files.iter().map(|file| seen_from(folder, file)).collect()
+        };
+        let [files, joint_files] = &self.files;
+        let unseen = |source| WriteError::Io { path: folder.to_owned(), source };
+        Ok([of(files).map_err(unseen)?, of(joint_files).map_err(unseen)?])
+    }
+
+    /// Writes the problem with the effects of the finished rounds, says so, and returns the exit
+    /// status.
+    pub fn write(self) -> u8 {
+        let added = self.added.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if added.is_empty() {
+            diagnostic::warn("interrupted before the first round was done: nothing is written");
+            return interrupt::STATUS;
+        }
+        match self.declare(&added) {
+            Ok(file) => {
+                diagnostic::warn(&format!(
+                    "interrupted: {} declares the effects of the finished rounds; flexcal loop {} searches on",
+                    file.display(),
+                    shell_word(&file)
+                ));
+                STATUS
+            }
+            Err(error) => {
+                diagnostic::print(error.as_ref());
+                interrupt::STATUS
+            }
+        }
+    }
+
+    /// Writes the problem with these effects declared, and returns its file.
+    fn declare(&self, added: &[Effect]) -> Result<PathBuf, Box<dyn std::error::Error>> {
+        let results = self.keeping_finished()?;
+        let [files, joint_files] = self.files_from(&results.folder)?;
+        let declared = self.declared.iter().map(|effect| (effect.clone(), Vec::new()));
+        let comment = "Found by flexcal loop before it was interrupted.".to_owned();
+        let found = added.iter().filter(|effect| !self.declared.contains(effect));
+        let found = found.map(|effect| (effect.clone(), vec![comment.clone()]));
+        let effects: Vec<_> = declared.chain(found).collect();
+        let text =
+            edit::with_effects(&self.text, &self.declared, &effects, [&files, &joint_files])?;
+        results.write(&[(CLOSED_PROBLEM, &text)])?;
+        Ok(results.path(CLOSED_PROBLEM))
+    }
+}
+
+/// Returns true if a loop.json is of a loop that was not interrupted.
+fn is_finished(file: &Path) -> bool {
+    let result: Option<Value> =
+        fs::read_to_string(file).ok().and_then(|text| serde_json::from_str(&text).ok());
+    result.is_some_and(|result| result.get("interrupted") == Some(&Value::Bool(false)))
+}
+
+/// Returns a file as seen from a folder, as an absolute path if no relative one exists.
+fn seen_from(folder: &Path, file: &Path) -> io::Result<PathBuf> {
+    let (folder, file) = (folder.canonicalize()?, file.canonicalize()?);
+    Ok(pathdiff::diff_paths(&file, folder).unwrap_or(file))
+}

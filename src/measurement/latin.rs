@@ -1,0 +1,94 @@
+//! Text in Windows-1252, the extension of Latin-1 that spreadsheets and instruments still write.
+
+use std::borrow::Cow;
+
+use csv::ByteRecord;
+
+use crate::error::BYTE_ORDER_MARKS;
+
+/// Characters of the bytes 0x80 to 0x9f that occur in text; the others are taken for binary data.
+const MARKS: [(u8, char); 9] = [
+    (0x80, '€'),
+    (0x85, '…'),
+    (0x91, '‘'),
+    (0x92, '’'),
+    (0x93, '“'),
+    (0x94, '”'),
+    (0x96, '–'),
+    (0x97, '—'),
+    (0x99, '™'),
+];
+/// Signs of the bytes 0xa0 to 0xbf that occur in the names of columns and in words.
+const SIGNS: &str = "\u{a0}§ª«°±²³´µ·¹º»¼½¾¿";
+/// First byte of the letters.
+const FIRST_LETTER: u8 = 0xc0;
+/// Bytes above [`FIRST_LETTER`] that hardly occur in text: Ð × Þ ð ÷ þ ÿ.
+const RARE: [u8; 7] = [0xd0, 0xd7, 0xde, 0xf0, 0xf7, 0xfe, 0xff];
+
+/// Returns the text of bytes that are not UTF-8 as Windows-1252; `None` if they do not look like
+/// text: a control character, a rare character, or an accented letter that no letter is next to.
+fn windows_1252(bytes: &[u8]) -> Option<String> {
+    let is_letter = |place: Option<usize>| {
+        let byte = place.and_then(|place| bytes.get(place)).copied().unwrap_or_default();
+        byte.is_ascii_alphabetic() || (byte >= FIRST_LETTER && !RARE.contains(&byte))
+    };
+    let character = |(place, &byte): (usize, &u8)| match byte {
+        b'\t' | b'\r' | b'\n' | 0x20..=0x7e => Some(char::from(byte)),
+        0x80..=0x9f => MARKS.iter().find(|(mark, _)| *mark == byte).map(|(_, mark)| *mark),
+        0xa0..=0xbf => Some(char::from(byte)).filter(|sign| SIGNS.contains(*sign)),
+        FIRST_LETTER.. => {
+            let has_neighbour = is_letter(place.checked_sub(1)) || is_letter(Some(place + 1));
+            (has_neighbour && !RARE.contains(&byte)).then(|| char::from(byte))
+        }
+        _ => None,
+    };
+    bytes.iter().enumerate().map(character).collect()
+}
+
+/// Returns text for the search of a header: UTF-8, else Windows-1252, else what can be read of it.
+pub(super) fn decoded(bytes: &[u8]) -> Cow<'_, str> {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => Cow::Borrowed(text),
+        // The end of the searched beginning may cut a character.
+        Err(error) if error.error_len().is_none() => String::from_utf8_lossy(bytes),
+        Err(_) => windows_1252(bytes).map_or_else(|| String::from_utf8_lossy(bytes), Cow::Owned),
+    }
+}
+
+/// Returns a record whose cells that are not UTF-8 are decoded from Windows-1252; `None` if all are
+/// UTF-8, or if one does not look like text.
+pub(super) fn decoded_record(record: &ByteRecord) -> Option<ByteRecord> {
+    let is_utf16 = BYTE_ORDER_MARKS.iter().any(|mark| record.as_slice().starts_with(mark));
+    if is_utf16 || record.iter().all(|cell| std::str::from_utf8(cell).is_ok()) {
+        return None;
+    }
+    let cell = |cell: &[u8]| match std::str::from_utf8(cell) {
+        Ok(text) => Some(text.to_owned()),
+        Err(_) => windows_1252(cell),
+    };
+    record.iter().map(cell).collect::<Option<Vec<_>>>().map(ByteRecord::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_told_from_binary_data() {
+        for (bytes, text) in [
+            (&b"Pr\xfcfer"[..], Some("Prüfer")),
+            (b"Winkel (\xb0)", Some("Winkel (°)")),
+            (b"\xb5m \x96 \xc4rger", Some("µm – Ärger")),
+            (b"\xc3\x28", None),
+            (b"\xff\xfe", None),
+            (b"a\x00\xfc", None),
+            (b"\x81", None),
+        ] {
+            assert_eq!(windows_1252(bytes).as_deref(), text, "{bytes:?}");
+        }
+        assert_eq!(decoded("°".as_bytes()), "°");
+        assert_eq!(decoded_record(&ByteRecord::from(vec!["ä", "b"])), None);
+        let mixed = ByteRecord::from(vec![&b"M\xfcller"[..], "ä".as_bytes()]);
+        assert_eq!(decoded_record(&mixed), Some(ByteRecord::from(vec!["Müller", "ä"])));
+    }
+}
