@@ -91,7 +91,7 @@ fn other_sigma(problem: &Problem, found: &Identification) -> String {
             let rows = influential.rows.len();
             format!("mostly because of {} with gross errors", counted(rows, noun(found)))
         }
-        None => "so the model lacks something".to_owned(),
+        None => "so that σ is too small or the model lacks something".to_owned(),
     };
     format!(
         "The scatter is {size} × the declared σ{declared}, {cause}. Fit and standard errors take {taken}, estimated from residuals and \

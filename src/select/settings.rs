@@ -119,6 +119,9 @@ pub(super) const MAX_CORRECTED_ERROR: f64 = 0.95;
 pub(super) const MIN_ALTERNATIVE_ODDS: f64 = 0.05;
 /// Number of random subsets of the configurations by which the stability of a finding is measured.
 pub(super) const SUBSETS: u64 = 20;
+/// Smallest part of these subsets that must name an effect for its probability to be that of all
+/// rows. Of an effect that fewer subsets name, the mean over the subsets is stated.
+pub(super) const MIN_SHARE_OF_SUBSETS: f64 = 0.75;
 /// Reciprocal of the share of configurations that each of these subsets leaves out.
 pub(super) const SUBSET_PARTS: usize = 5;
 /// Number of resamples of the bootstrap interval of the gain.

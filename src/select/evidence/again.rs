@@ -16,7 +16,7 @@ use super::hypothesis::Hypothesis;
 use super::hypothesis_set::HypothesisSet;
 use super::posterior::Evidence;
 use super::products::{Products, Target};
-use super::search::{left_by, search};
+use super::search::{Weighted, left_by, search};
 use crate::problem::Effect;
 
 /// Smallest probability of a set whose hypotheses are considered again without some poses.
@@ -79,13 +79,18 @@ impl<'a> Again<'a> {
         blocks(self.fitted, self.data, self.hypotheses, &self.probable_candidates(), left_out)
     }
 
-    /// Returns the most probable set of hypotheses for the data without the poses `left_out`.
-    fn most_probable(&self, left_out: &[usize]) -> Option<Vec<&Hypothesis>> {
+    /// Returns the evidence about the probable hypotheses from the data without the poses `left_out`.
+    fn without(&self, left_out: &[usize]) -> Option<Evidence> {
         let (blocks, target) = self.blocks(left_out)?;
         let present = self.members(|known| known.effect().is_some());
-        let most = search(&Products::new(&blocks, &target), &present).into_iter().next()?;
         let candidates = self.probable_candidates();
-        Some(most.members.into_iter().map(|k| &candidates[k].hypothesis).collect())
+        let set = |Weighted { members, sizes, probability }: Weighted| HypothesisSet {
+            hypotheses: members.iter().map(|&k| candidates[k].hypothesis.clone()).collect(),
+            probability,
+            functions: members.iter().map(|&k| candidates[k].variant).zip(sizes).collect(),
+        };
+        let sets = search(&Products::new(&blocks, &target), &present).into_iter().map(set);
+        Some(Evidence { sets: sets.collect(), stand_ins: Vec::new(), left_out: left_out.to_vec() })
     }
 
     /// Returns the pose whose squared residual decreases most when `effect` is added to all other
@@ -124,21 +129,30 @@ pub(super) fn carried_by_one(
     let again = Again::new(fitted, data, hypotheses, (evidence, best));
     let alone = |hypothesis: &Hypothesis| {
         let pose = again.single_influential_pose(hypothesis.effect()?, &evidence.left_out)?;
-        let others = again.most_probable(&[evidence.left_out.as_slice(), &[pose]].concat())?;
-        (!others.iter().any(|other| other.site == hypothesis.site)).then_some(pose)
+        let others = again.without(&[evidence.left_out.as_slice(), &[pose]].concat())?;
+        (!others.best().iter().any(|other| other.site == hypothesis.site)).then_some(pose)
     };
     searched.into_iter().find_map(alone)
 }
 
-/// Returns how stable each effect of a set is: the share of random subsets (80 % of the
-/// configurations) whose most probable set contains it. Computed in the linear neighbourhood of the
-/// fit to all poses.
-pub(in crate::select) fn stability(
+/// Evidence about an effect in random subsets of the configurations, a fifth left out of each.
+#[derive(Debug, Clone)]
+pub(in crate::select) struct SubsetEvidence {
+    pub effect: Effect,
+    /// Part of the subsets whose most probable set holds the effect.
+    pub share: f64,
+    /// Mean probabilities of its place, of its quantities, and of its law.
+    pub means: [f64; 3],
+}
+
+/// Returns the evidence about each effect of a set in random subsets, linear about the fit to all
+/// rows. Another value of a searched argument counts for the effect.
+pub(in crate::select) fn subset_evidence(
     fitted: &Fitted,
     data: &Data,
     (evidence, best): (&Evidence, &HypothesisSet),
     added: &[Effect],
-) -> Vec<(Effect, f64)> {
+) -> Vec<SubsetEvidence> {
     let rows = data.evidence_rows();
     let configurations = number(rows.iter().map(|&row| bits(data.measurements.configuration(row))));
     let count = configurations.iter().max().map_or(0, |last| last + 1);
@@ -154,14 +168,25 @@ pub(in crate::select) fn stability(
         let is_out = |&pose: &usize| {
             left_out.contains(&configurations[pose]) || evidence.left_out.contains(&pose)
         };
-        let poses: Vec<usize> = (0..rows.len()).filter(is_out).collect();
-        let most = again.most_probable(&poses)?;
-        Some(most.into_iter().filter_map(Hypothesis::effect).cloned().collect::<Vec<Effect>>())
+        again.without(&(0..rows.len()).filter(is_out).collect::<Vec<usize>>())
     };
-    let drawn: Vec<Vec<Effect>> = (0..SUBSETS).into_par_iter().filter_map(drawn).collect();
-    let share = |effect: &Effect| {
-        let holds = drawn.iter().filter(|all| all.contains(effect)).count();
-        holds as f64 / drawn.len().max(1) as f64
+    let subsets: Vec<Evidence> = (0..SUBSETS).into_par_iter().filter_map(drawn).collect();
+    best.effects().into_iter().map(|effect| in_subsets(&subsets, effect)).collect()
+}
+
+fn in_subsets(subsets: &[Evidence], effect: Effect) -> SubsetEvidence {
+    let is_effect = |hypothesis: &&Hypothesis| {
+        hypothesis.effect().is_some_and(|other| other.is_but_for_search(&effect))
     };
-    best.effects().into_iter().map(|effect| (effect.clone(), share(&effect))).collect()
+    let holds = |subset: &&Evidence| subset.best().iter().any(|member| is_effect(&member));
+    let claims = |subset: &Evidence| {
+        let mut members = subset.sets.iter().flat_map(|set| &set.hypotheses);
+        let claims = subset.claims(members.find(is_effect)?);
+        Some([claims.place.1, claims.depends_on.1, claims.law.1])
+    };
+    let count = subsets.len().max(1) as f64;
+    let share = subsets.iter().filter(holds).count() as f64 / count;
+    let claims: Vec<[f64; 3]> = subsets.iter().filter_map(claims).collect();
+    let mean = |k: usize| claims.iter().map(|claims| claims[k]).sum::<f64>() / count;
+    SubsetEvidence { effect, share, means: [mean(0), mean(1), mean(2)] }
 }

@@ -42,7 +42,7 @@ use super::data::Data;
 use super::fitted::Fitted;
 use crate::problem::Effect;
 use again::carried_by_one;
-pub(super) use again::stability;
+pub(super) use again::{SubsetEvidence, subset_evidence};
 use block::Block;
 use blocks::blocks;
 use candidate::Candidate;

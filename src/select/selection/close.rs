@@ -126,7 +126,7 @@ pub fn close_by(
         .and_then(|evidence| Some((evidence, evidence.sure(rules.inclusion_threshold)?)));
     let mut unexplained =
         best.map_or_else(Vec::new, |best| unexplained::without_law(&fitted, &data, best));
-    let effects = found(&state, &fitted, best, is_trusted);
+    let effects = found(&state, &fitted, best, (is_trusted, findings.is_structured()));
     if unexplained.is_empty() {
         unexplained.extend(unexplained::nowhere(&findings));
     }

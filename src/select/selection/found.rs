@@ -1,6 +1,6 @@
 //! Claims, tests and alternatives for each effect that the search added.
 
-use crate::select::settings::MIN_ALTERNATIVE_ODDS;
+use crate::select::settings::{MIN_ALTERNATIVE_ODDS, MIN_SHARE_OF_SUBSETS};
 use std::collections::BTreeMap;
 
 use statrs::distribution::{ContinuousCDF as _, FisherSnedecor};
@@ -10,7 +10,7 @@ use super::status::Status;
 use crate::fit::{ErrorSummary, Estimate};
 use crate::problem::Effect;
 use crate::select::candidates::Candidates;
-use crate::select::evidence::{Claims, Evidence, HypothesisSet, stability};
+use crate::select::evidence::{Claims, Evidence, HypothesisSet, SubsetEvidence, subset_evidence};
 use crate::select::fitted::Fitted;
 use crate::select::harmonic_prior::is_gear;
 use crate::select::neighbourhood::tries;
@@ -47,18 +47,20 @@ pub struct Found {
 }
 
 /// Returns every effect that a fit contains in addition to the declared ones, with its tests. If
-/// the fit has cautions (`is_trusted` is false), no effect is more than probable.
+/// the fit has cautions (`is_trusted` is false), no effect is more than probable. If the
+/// residual of the fit is not noise (`is_structured`), its claims are means over subsets.
 pub(super) fn found(
     state: &SearchState,
     fitted: &Fitted,
     best: Option<(&Evidence, &HypothesisSet)>,
-    is_trusted: bool,
+    (is_trusted, is_structured): (bool, bool),
 ) -> Vec<Found> {
     let (data, rules) = (state.data, state.data.rules);
     let added = state.added(fitted);
     let parts: Vec<Effect> = added.iter().flat_map(Effect::parts).collect();
     let reconsidered = state.reconsidered(fitted);
-    let stable = best.map(|best| stability(fitted, data, best, &reconsidered)).unwrap_or_default();
+    let subsets =
+        best.map(|best| subset_evidence(fitted, data, best, &reconsidered)).unwrap_or_default();
     let p_values = p_values(state, fitted, &added);
     let held_out_after = |effect: &Effect| {
         let stays = |known: &Effect| added.iter().any(|kept| kept.covers(known));
@@ -71,12 +73,17 @@ pub(super) fn found(
         let alternatives = best.map_or_else(Vec::new, |(evidence, _)| {
             alternatives(evidence, &effect, &parts, MIN_ALTERNATIVE_ODDS)
         });
-        let shares = stable.iter().filter(|(part, _)| effect.covers(part)).map(|entry| entry.1);
+        let of_parts: Vec<&SubsetEvidence> =
+            subsets.iter().filter(|subset| effect.covers(&subset.effect)).collect();
+        let share = of_parts.iter().map(|subset| subset.share).reduce(f64::min);
         // Evidence about a fit whose searched argument was polished is about the argument before.
         let claims = best.and_then(|(evidence, set)| {
             let is_alike = |other: &Effect| other.is_but_for_search(&effect);
             let alike = || set.effects().into_iter().find(is_alike);
-            claims(evidence, &effect).or_else(|| claims(evidence, &alike()?))
+            let claims = claims(evidence, &effect).or_else(|| claims(evidence, &alike()?))?;
+            let is_steady =
+                !is_structured && share.is_none_or(|share| share >= MIN_SHARE_OF_SUBSETS);
+            Some(if is_steady { claims } else { over_subsets(claims, &of_parts) })
         });
         let check = reference_check(fitted, data, &effect);
         let verdict = check.as_ref().map(|check| check.verdict);
@@ -93,7 +100,7 @@ pub(super) fn found(
         let is_significant = p_value < rules.leaving_level;
         let status = Status::of(law, rules.stated, (is_significant, verdict));
         Found {
-            stability: shares.reduce(f64::min),
+            stability: share,
             status: if is_trusted { status } else { status.max(Status::Probable) },
             claims,
             p_value,
@@ -153,6 +160,22 @@ fn claims(evidence: &Evidence, effect: &Effect) -> Option<Claims> {
     } else {
         claims.into_iter().min_by(by_law)
     }
+}
+
+/// Returns claims with probabilities no larger than their means over random subsets of the
+/// configurations, those of the part with the most probable law.
+///
+/// Where no set of hypotheses describes the data, the posterior is surer of the best one than it may
+/// be; its mean over resampled data is not [Huggins and Miller 2023].
+fn over_subsets(mut claims: Claims, of_parts: &[&SubsetEvidence]) -> Claims {
+    if let Some(part) = of_parts.iter().max_by(|a, b| a.means[2].total_cmp(&b.means[2])) {
+        let probabilities =
+            [&mut claims.place.1, &mut claims.depends_on.1, &mut claims.law.1].into_iter();
+        probabilities
+            .zip(part.means)
+            .for_each(|(probability, mean)| *probability = probability.min(mean));
+    }
+    claims
 }
 
 /// Returns effects that may replace `effect`, only the most probable of each family at a place.
