@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use flexcal::files::{self, digest};
-use flexcal::fit::{self, Options, SolverChoice, Strategy};
+use flexcal::fit::{self, Options, SolverChoice, Strategy, Tolerance, Verdict};
+use flexcal::remainder::{self, Bounds};
 use flexcal::report;
 use flexcal::results::{AcceptanceRecord, AcceptanceResult, Document as _};
 
@@ -19,7 +20,10 @@ use super::progress::Line;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   flexcal accept problems/lunar-sampler --instrument 'laser tracker, 1.5 inch reflector'
-  flexcal accept out/lunar-sampler/problem.closed.toml
+  flexcal accept out/lunar-sampler/problem.closed.toml --tolerance-mm 2 --share 0.9 --risk 0.05
+
+With --tolerance-mm the exit status is 1 unless the verdict is pass. A remainder that the problem declares corrects the
+predictions.
 
 Writes acceptance.html, a page to print and sign, and acceptance.json with the digest of every input.")]
 pub struct Arguments {
@@ -28,6 +32,29 @@ pub struct Arguments {
     /// The instrument, for the record
     #[arg(long, value_name = "TEXT")]
     instrument: Option<String>,
+    /// Largest error that a pose may have [mm]; the arm passes if the share of poses within it is
+    /// large enough
+    #[arg(long, value_name = "MM", value_parser = length)]
+    tolerance_mm: Option<f64>,
+    /// Share of all poses that must be within the tolerance
+    #[arg(long, value_name = "P", default_value_t = 0.9, value_parser = super::remainder::level, requires = "tolerance_mm")]
+    share: f64,
+    /// Largest probability of a pass where fewer poses are within it, and of a fail where no fewer
+    /// are
+    #[arg(long, value_name = "P", default_value_t = 0.05, value_parser = super::remainder::level, requires = "tolerance_mm")]
+    risk: f64,
+    /// Correct predictions by what no law explains, if poses left out gain by it
+    #[arg(long)]
+    remainder: bool,
+}
+
+/// Probability with which a bound of the record holds.
+const LEVEL: f64 = 0.95;
+
+/// Reads a length that is greater than 0.
+fn length(text: &str) -> Result<f64, String> {
+    let length = text.parse::<f64>().ok().filter(|length| *length > 0.0 && length.is_finite());
+    length.ok_or_else(|| "a length in mm greater than 0 is needed, such as 0.2".to_owned())
 }
 
 /// Identifies, judges the held-out poses, and writes the record and the page.
@@ -39,7 +66,21 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let options = Options::default().with_strategy(Strategy::Joint).with_solver(SolverChoice::Auto);
     let fit = |sink| fit::identify(&problem, &data, &options.with_progress(sink));
     let found = Line::during(common.talks(), None, fit)?;
-    let judged = fit::acceptance(&problem, &data, &found)?;
+    let declared = remainder::declared(&problem)?.filter(|_| !arguments.remainder);
+    let fitted = if arguments.remainder {
+        remainder::fit(&found, &problem, &data)?
+    } else {
+        remainder::uncertainty(&found, &problem, &data)?
+    };
+    let fitted = fitted.as_ref();
+    let corrected = fitted.and_then(|fitted| fitted.remainder.as_ref());
+    let correction = declared.as_ref().or(corrected).or(fitted.map(|fitted| &fitted.alone));
+    let predicted = correction
+        .map(|correction| remainder::residuals(&found, &problem, &data, correction))
+        .transpose()?;
+    let has_remainder = declared.is_some() || corrected.is_some();
+    let rows = predicted.as_ref().filter(|_| has_remainder).map(|of| of.rows.as_slice());
+    let judged = fit::acceptance(&problem, &data, &found, rows)?;
     let file = common.problem_file();
     let inputs = std::iter::once(&file).chain(common.files(&problem));
     let record = AcceptanceRecord {
@@ -47,7 +88,23 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         commit: commit(&file),
         instrument: arguments.instrument.clone(),
     };
-    let result = AcceptanceResult::new(&problem, &data.measurements, &found, &judged, &record);
+    let mut result = AcceptanceResult::new(&problem, &data.measurements, &found, &judged, &record);
+    if let (Some(correction), Some(predicted)) = (correction, &predicted) {
+        let held_out = fit::held_out_positions(&problem, &data)?;
+        let poses = held_out.iter().map(|&row| predicted.poses[row]).collect();
+        let bounds = Bounds::new(correction, poses, LEVEL);
+        let errors = held_out.iter().map(|&row| predicted.rows[row].position.norm());
+        result = result.with_bounds(&bounds, bounds.coverage(errors), has_remainder);
+    }
+    let tolerance = arguments.tolerance_mm.map(|length| Tolerance {
+        length: length * 1e-3,
+        share: arguments.share,
+        risk: arguments.risk,
+    });
+    let test = tolerance.map(|tolerance| judged.test(tolerance));
+    if let Some(test) = &test {
+        result = result.with_tolerance(test);
+    }
     let (json, page) = (result.to_json(), report::acceptance_page(&problem, &result));
     results.write(&[("acceptance.json", &json), ("acceptance.html", &page)])?;
     common.tell(&json, || {
@@ -55,7 +112,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         let page = results.path("acceptance.html");
         format!("{text}{}Next: print {} and sign it\n", results.written(), page.display())
     })?;
-    Ok(diagnostic::judged(&found, common.quiet))
+    let outcome = diagnostic::judged(&found, common.quiet);
+    match &result.tolerance {
+        Some(tested) if tested.verdict != Verdict::Pass.as_str() => {
+            if common.quiet {
+                diagnostic::warn(&report::tolerance_text(tested));
+            }
+            Ok(Outcome::NotPassed)
+        }
+        _ => Ok(outcome),
+    }
 }
 
 /// Returns the SHA-256 digest of a file; `None` for a pipe, which cannot be read a second time.

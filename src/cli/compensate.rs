@@ -117,7 +117,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             (targets, sought)
         }
     };
-    let correction = super::remainder::of_estimate(&problem, &estimate)?;
+    let correction = remainder::of_estimate(&problem, &estimate)?;
     let (commands, bounds) = match &correction {
         Some(correction) => {
             let fitted = (&estimate, &x);

@@ -11,6 +11,7 @@ use flexcal::measurement::{Dataset, Measurements};
 use flexcal::model::Model;
 use flexcal::nalgebra::Vector3;
 use flexcal::problem::Problem;
+use flexcal::remainder;
 use flexcal::report::{self, shell_word};
 use flexcal::results::{Document as _, ExportResult, ExportedErrors, Summary};
 use flexcal::urdf::{Chain, Robot, YamlFormat, export, joint_origins, yaml};
@@ -102,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         estimates.model(Model::new(&problem, &estimates.words("base"), &estimates.words("tool"))?);
     let x = estimates.vector(&problem, &model)?;
     let best = if arguments.best_rigid {
-        let correction = super::remainder::of_estimate(&problem, &estimates)?;
+        let correction = remainder::of_estimate(&problem, &estimates)?;
         let corners = arguments.workspace_mm.map(|[x0, x1, y0, y1, z0, z1]| {
             [Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)].map(|corner| corner * 1e-3)
         });
@@ -201,7 +202,7 @@ fn write_c(
     estimate: &SavedEstimate,
 ) -> Result<Outcome, Box<dyn Error>> {
     let flags = &arguments.flags;
-    let correction = super::remainder::of_estimate(problem, estimate)?;
+    let correction = remainder::of_estimate(problem, estimate)?;
     let counts = (arguments.test_poses, arguments.test_commands);
     let (answers, model, x) = code::answers(problem, estimate, correction.as_ref(), counts)?;
     let sources = code::sources(problem, &model, &x, correction.as_ref(), &answers)?;

@@ -65,7 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         names.push(REMAINDER_FILE);
     }
     let Input { problem, data, results } = common.read("identify", &names)?;
-    let declared = super::remainder::declared(&problem)?.filter(|_| !arguments.remainder);
+    let declared = remainder::declared(&problem)?.filter(|_| !arguments.remainder);
     common.say_if_nothing_is_free(&problem);
     let stop = interrupt::stop();
     let options = Options::default()
@@ -108,13 +108,16 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
             format!(
                 "\n{}\n",
                 textwrap::fill(
-                    &report::remainder_text(&identification, corrected),
+                    &report::remainder_text(&identification, &corrected.outcome()),
                     output::columns().min(110)
                 )
             )
         })
         .unwrap_or_default();
-    let shown = PlotData::of_identification(&problem, &data, &identification)?;
+    let mut shown = PlotData::of_identification(&problem, &data, &identification)?;
+    if let Some(fitted) = &fitted {
+        shown = shown.with_uncertainty((&identification, &problem), &data, fitted)?;
+    }
     let told = report::identification_report(&problem, &identification, &shown);
     let residuals = match fitted.as_ref().and_then(|corrected| corrected.residuals.as_ref()) {
         Some(corrected) => corrected.rows.clone(),

@@ -60,9 +60,12 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let closure = Line::during(common.talks(), stop, close)?;
     let results = if closure.interrupted { unfinished.keeping_finished()? } else { results };
     let [files, joint_files] = unfinished.files_from(&results.folder)?;
-    let shown = PlotData::of_loop(&problem, &data, &closure)?;
+    let mut shown = PlotData::of_loop(&problem, &data, &closure)?;
     let closed = report::closed_problem(&text, &problem, &closure, [&files, &joint_files])?;
     let fitted = fitted(&problem, &closed, &closure, &data)?;
+    if let Some(fitted) = &fitted {
+        shown = shown.with_uncertainty((&closure.after, &closure.closed), &data, fitted)?;
+    }
     let kept = fitted.as_ref().and_then(|corrected| corrected.remainder.as_ref());
     let closed = problem::with_remainder(&closed, kept.map(|_| REMAINDER_FILE))?;
     let mut result = LoopResult::new(&problem, &closure);
@@ -86,7 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
         format!(
             "\n{}\n",
             textwrap::fill(
-                &report::remainder_text(&closure.after, corrected),
+                &report::remainder_text(&closure.after, &corrected.outcome()),
                 output::columns().min(110)
             )
         )

@@ -95,7 +95,7 @@ enum Command {
 }
 
 /// Runs the command line; `arguments` begin with the name of the program. Returns the exit status:
-/// 0 done, 1 the fit is not to be trusted, 2 bad input, 130 interrupted with nothing written.
+/// 0 done, 1 the fit is not to be trusted or the arm does not pass a tolerance, 2 bad input, 130 interrupted with nothing written.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
@@ -128,7 +128,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     };
     match outcome {
         Ok(Outcome::Done) => 0,
-        Ok(Outcome::NotTrusted | Outcome::Interrupted) => 1,
+        Ok(Outcome::NotTrusted | Outcome::NotPassed | Outcome::Interrupted) => 1,
         Err(error) => {
             diagnostic::print(error.as_ref());
             if error.downcast_ref().is_some_and(IdentifyError::is_interrupted) {

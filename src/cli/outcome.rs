@@ -7,6 +7,8 @@ pub enum Outcome {
     Done,
     /// The fit is not trusted: exit status 1.
     NotTrusted,
+    /// An arm does not pass the tolerance that it is tested for: exit status 1.
+    NotPassed,
     /// The command was interrupted and wrote incomplete results: exit status 1.
     Interrupted,
 }

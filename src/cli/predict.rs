@@ -63,7 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<Outcome, Box<dyn Error>> {
     let by_chance = matches!(problem.data.held_out, Some(HeldOut::Fraction { .. }));
     let split = Split::new(&problem, &rows).ok().filter(|_| !by_chance || common.data().is_empty());
     let correction = match &estimate {
-        Some(estimate) => super::remainder::of_estimate(&problem, estimate)?,
+        Some(estimate) => remainder::of_estimate(&problem, estimate)?,
         None => None,
     };
     let (prediction, bounds) = match (&estimate, &correction) {

@@ -73,7 +73,7 @@ pub fn best_rigid(
     let bases = model.base_frames(x.as_slice());
     let shifts: Vec<Vector3<f64>> = match correction.filter(|of| of.has_remainder()) {
         Some(correction) => {
-            let corrected = correction.at(problem, &model, &x, &poses);
+            let corrected = correction.at((problem, &model, &x), &[], &poses);
             let in_base = |(pose, shift): (&Pose, Vector3<f64>)| bases[pose.base].resolve(&shift);
             poses.iter().zip(corrected.iter().map(|pose| pose.shift)).map(in_base).collect()
         }

@@ -4,8 +4,12 @@
 use nalgebra::{DVector, Vector3};
 
 use super::correction::{CorrectedPose, Correction};
+use super::linearise::timed_poses;
 use super::residuals::in_measuring_frame;
-use crate::fit::{self, Command, Placement, PredictError, Prediction, SavedEstimate, StageError};
+use crate::fit::{
+    self, Command, Identification, IdentifyError, Placement, PredictError, Prediction,
+    SavedEstimate, StageError,
+};
 use crate::measurement::{Measurements, Split};
 use crate::model::Model;
 use crate::problem::Problem;
@@ -28,7 +32,8 @@ pub struct CorrectedPrediction {
 
 /// Predicts `rows` as [`fit::predict`] does, and adds the correction to the positions.
 ///
-/// Bases and tools of sessions that the estimate lacks are fitted to the corrected rows.
+/// Bases and tools of sessions that the correction has not seen are fitted to what it leaves of their
+/// rows, also where the estimate has some that were fitted without the correction.
 ///
 /// # Errors
 /// Returns the errors of [`fit::predict`].
@@ -39,13 +44,25 @@ pub fn predict(
     rows: &Measurements,
     split: Option<&Split>,
 ) -> Result<CorrectedPrediction, PredictError> {
-    let prediction = fit::predict(problem, Some(estimate), rows, split)?;
     let placement = Placement::of(rows);
     let model = estimate.model(Model::new(problem, &placement.bases, &placement.targets)?);
+    let unseen = correction.unseen_placements(&model);
+    let seen = estimate.without_fitted(|name| unseen.contains(name));
+    let is_placed_again = rows.position_measured && correction.has_remainder();
+    let again = (is_placed_again && !unseen.is_empty())
+        .then(|| fit::predict(problem, Some(&seen), rows, split).ok())
+        .flatten();
+    let estimate = if again.is_some() { &seen } else { estimate };
+    let prediction = match again {
+        Some(prediction) => prediction,
+        None => fit::predict(problem, Some(estimate), rows, split)?,
+    };
     let all: Vec<usize> = (0..rows.len()).collect();
     let mut poses = placement.poses(rows, &all, correction.sigma);
     estimate.count_time_in(&mut poses);
-    let corrected = correction.at(problem, &model, &prediction.x, &poses);
+    let is_placed = |k: &usize| prediction.placed.contains(&model.parameters[*k].name);
+    let placed: Vec<usize> = (0..model.parameters.len()).filter(is_placed).collect();
+    let corrected = correction.at((problem, &model, &prediction.x), &placed, &poses);
     if !correction.has_remainder() {
         return Ok(CorrectedPrediction { prediction, poses: corrected });
     }
@@ -59,6 +76,28 @@ pub fn predict(
         residual.predicted += shift;
     }
     Ok(CorrectedPrediction { prediction, poses: corrected })
+}
+
+/// Predicts positions of `rows` with the arm identified in `found` and its correction, as
+/// [`Identification::predict`], with the correction and uncertainty of each.
+///
+/// # Errors
+/// As [`Identification::predict`].
+pub fn predict_identified(
+    found: &Identification,
+    problem: &Problem,
+    correction: &Correction,
+    rows: &Measurements,
+) -> Result<(Vec<Vector3<f64>>, Vec<CorrectedPose>), IdentifyError> {
+    let mut positions = found.predict(problem, rows)?;
+    let model = found.model(problem, &Placement::of(rows))?;
+    let every_row: Vec<usize> = (0..rows.len()).collect();
+    let poses = timed_poses(rows, &every_row, (found.sigma, found.first_time));
+    let corrected = correction.at((problem, &model, &found.vector(&model)?), &[], &poses);
+    for (position, pose) in positions.iter_mut().zip(&corrected) {
+        *position += pose.shift;
+    }
+    Ok((positions, corrected))
 }
 
 /// Returns the rows with `shifts` \[m\] subtracted from their measured positions: what an arm
@@ -96,7 +135,7 @@ pub fn compensate(
     let corrected = |rows: &Measurements| {
         let mut poses = Placement::of(rows).poses(rows, &all, correction.sigma);
         estimate.count_time_in(&mut poses);
-        correction.at(problem, model, x, &poses)
+        correction.at((problem, model, x), &[], &poses)
     };
     let mut shifts: Vec<Vector3<f64>> = corrected(targets).iter().map(|pose| pose.shift).collect();
     let mut first: Option<Vec<Command>> = None;

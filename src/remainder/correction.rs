@@ -1,15 +1,17 @@
 //! Corrections of an identified arm's predictions, with their uncertainty.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::judge::Conditioned;
 use super::linearise::Linearisation;
-use super::posterior::{Posterior, RowPosterior};
+use super::placement_fit::PlacementFit;
+use super::posterior::{Posterior, RowFactors, RowPosterior};
 use super::rows::{AXES, Layout, Rows, SiteKind};
 use super::scores::{Scores, expected_size, fade};
 use crate::fit::Identification;
+use crate::model::parameter::Parameter;
 use crate::model::{Model, Pose};
 use crate::problem::{PoseView, Problem};
 
@@ -52,19 +54,35 @@ pub(super) struct Linearised {
     pub estimate: f64,
 }
 
+/// Parameters of a correction in a model.
+struct Columns {
+    /// Column of the posterior, and index in the model.
+    found: Vec<(usize, usize)>,
+    /// Deviation in the model from that about which the correction was linearised.
+    moved: DVector<f64>,
+}
+
 /// Correction of one predicted position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CorrectedPose {
     /// Vector that is added to the predicted position, measuring frame \[m\].
     pub shift: Vector3<f64>,
-    /// 1 σ of measured − predicted along each axis \[m\], including the noise of the measurement.
-    pub sigma: Vector3<f64>,
+    /// Covariance of measured − predicted, measuring frame \[m²\]: of parameters and remainder, of
+    /// the noise, and of what fading leaves out.
+    pub covariance: Matrix3<f64>,
     /// Expected root mean square of the error length ‖measured − predicted‖ \[m\]. Its product with
     /// [`Scores::quantile`] is an error bound.
     pub size: f64,
     /// True if the pose lies outside the measured range, or too far from measured poses to apply
     /// half of the correction.
     pub is_extrapolated: bool,
+}
+
+impl CorrectedPose {
+    /// 1 σ of measured − predicted along each axis \[m\].
+    pub fn sigma(&self) -> Vector3<f64> {
+        self.covariance.diagonal().map(f64::sqrt)
+    }
 }
 
 impl Correction {
@@ -102,6 +120,19 @@ impl Correction {
         self.posterior.hyper.sites() > 0
     }
 
+    /// Names of the free parameters of bases and tools of `model` none of whose parameters moved the
+    /// rows fitted: those of sessions and targets that took no part.
+    pub(super) fn unseen_placements<'a>(&self, model: &'a Model) -> HashSet<&'a str> {
+        let whole = |name: &str| name.split('.').next().unwrap_or_default().to_owned();
+        let seen: HashSet<String> =
+            self.parameters.iter().map(|parameter| whole(&parameter.name)).collect();
+        let is_unseen = |parameter: &&Parameter| {
+            parameter.site.is_placement() && !seen.contains(&whole(&parameter.name))
+        };
+        let unseen = model.parameters.iter().filter(is_unseen);
+        unseen.map(|parameter| parameter.name.as_str()).collect()
+    }
+
     /// Returns the indices of the joints whose coordinate errors the remainder describes, counted
     /// from 0.
     pub(crate) fn joints(&self) -> Vec<usize> {
@@ -124,13 +155,39 @@ impl Correction {
 
     /// Returns the corrections of `poses`, with the arm at the full parameter vector `x` of
     /// `model`. They are NaN for poses without equilibrium.
+    ///
+    /// The bases and tools `placed`, parameters of `model`, are fitted to the corrected poses that
+    /// use them. Mean and covariance leave out what that fit takes up.
     pub(crate) fn at(
         &self,
-        problem: &Problem,
-        model: &Model,
-        x: &DVector<f64>,
+        (problem, model, x): (&Problem, &Model, &DVector<f64>),
+        placed: &[usize],
         poses: &[Pose],
     ) -> Vec<CorrectedPose> {
+        let columns = self.columns(model, x);
+        let placed = PlacementFit::of((problem, model, x), placed, poses);
+        let of_chunk = |poses: &[Pose]| self.factors(&columns, (problem, model, x), poses);
+        let chunks = || poses.chunks(CHUNK).enumerate().map(|(k, poses)| (CHUNK * k, poses));
+        let mut taken = None;
+        for (first, poses) in chunks().filter(|_| placed.has_columns()) {
+            placed.add_to(&mut taken, first, &of_chunk(poses).1);
+        }
+        let corrected = |(first, poses): (usize, &[Pose])| {
+            let (rows, mut factors) = of_chunk(poses);
+            let mut noise_shares = vec![Vector3::repeat(1.0); poses.len()];
+            if let Some(taken) = &taken {
+                placed.subtract(taken, first, &mut factors);
+                for (k, share) in noise_shares.iter_mut().enumerate() {
+                    *share = placed.shares_left(first + k);
+                }
+            }
+            self.corrected(&rows, (&factors, &noise_shares), poses)
+        };
+        chunks().flat_map(corrected).collect()
+    }
+
+    /// Finds the parameters of the correction in `model`.
+    fn columns(&self, model: &Model, x: &DVector<f64>) -> Columns {
         let places: HashMap<&str, usize> = model
             .parameters
             .iter()
@@ -138,55 +195,69 @@ impl Correction {
             .map(|(k, parameter)| (parameter.name.as_str(), k))
             .collect();
         let place = |parameter: &Linearised| places.get(parameter.name.as_str()).copied();
-        let known: Vec<(usize, usize)> = self
-            .parameters
-            .iter()
-            .enumerate()
-            .filter_map(|(column, parameter)| Some((column, place(parameter)?)))
-            .collect();
+        let found = self.parameters.iter().enumerate();
+        let found = found.filter_map(|(column, parameter)| Some((column, place(parameter)?)));
+        let found: Vec<(usize, usize)> = found.collect();
         let mut moved = DVector::zeros(self.parameters.len());
-        for &(column, k) in &known {
+        for &(column, k) in &found {
             moved[column] = x[k] - self.parameters[column].deviation;
         }
-        let unknowns = known.iter().map(|&(_, k)| k).collect();
-        let linearisation = Linearisation { problem, model, x, unknowns, sigma: self.sigma };
-        let of_chunk = |poses: &[Pose]| {
-            let mut rows = linearisation.rows(&self.layout, poses.to_vec());
-            let mut jacobian =
-                rows.jacobian.clone().resize_horizontally(self.parameters.len(), 0.0);
-            jacobian.fill(0.0);
-            for (from, &(column, _)) in known.iter().enumerate() {
-                jacobian.set_column(column, &rows.jacobian.column(from));
-            }
-            rows.jacobian = jacobian;
-            self.corrected(&rows, &moved, poses)
-        };
-        poses.chunks(CHUNK).flat_map(of_chunk).collect()
+        Columns { found, moved }
     }
 
-    fn corrected(&self, rows: &Rows, moved: &DVector<f64>, poses: &[Pose]) -> Vec<CorrectedPose> {
-        let change = &rows.jacobian * moved;
+    /// Rows of some poses and the posterior of their corrections, as far as `x` does not make them
+    /// already. Coordinates of poses without an equilibrium have a residual of NaN and zeros.
+    fn factors(
+        &self,
+        Columns { found, moved }: &Columns,
+        (problem, model, x): (&Problem, &Model, &DVector<f64>),
+        poses: &[Pose],
+    ) -> (Rows, RowFactors) {
+        let unknowns = found.iter().map(|&(_, k)| k).collect();
+        let linearisation = Linearisation { problem, model, x, unknowns, sigma: self.sigma };
+        let mut rows = linearisation.rows(&self.layout, poses.to_vec());
+        let mut jacobian = DMatrix::zeros(AXES * poses.len(), self.parameters.len());
+        for (from, &(column, _)) in found.iter().enumerate() {
+            jacobian.set_column(column, &rows.jacobian.column(from));
+        }
+        rows.jacobian = jacobian;
+        for coordinate in (0..AXES * poses.len()).filter(|&k| rows.residual[k].is_nan()) {
+            rows.jacobian.row_mut(coordinate).fill(0.0);
+            rows.sites.column_mut(coordinate).fill(0.0);
+        }
+        let mut factors = self.posterior.factors(&rows);
+        factors.mean -= &rows.jacobian * moved;
+        (rows, factors)
+    }
+
+    /// Fades the corrections of rows with these posteriors; `noise_shares` are the parts of the
+    /// variance of the noise of each coordinate that residuals show.
+    fn corrected(
+        &self,
+        rows: &Rows,
+        (factors, noise_shares): (&RowFactors, &[Vector3<f64>]),
+        poses: &[Pose],
+    ) -> Vec<CorrectedPose> {
         let hyper = &self.posterior.hyper;
-        let one = |(row, posterior): (usize, RowPosterior)| {
+        let of_row = |(row, RowPosterior { mean, covariance, prior }): (usize, RowPosterior)| {
             let lost = rows.residual[AXES * row].is_nan();
-            let share = fade(posterior.covariance.trace(), posterior.prior);
-            let mean = posterior.mean - Vector3::from_fn(|axis, _| change[AXES * row + axis]);
+            let share = fade(covariance.trace(), prior);
             let has_remainder = self.has_remainder();
             let missed = if has_remainder { (1.0 - share) * mean.norm() } else { 0.0 };
-            let noise = hyper.noise_variance_of(rows.relative_sigma[row]);
-            let variance = posterior.covariance.diagonal().map(|value| value.max(0.0) + noise);
-            let sigma = variance.map(|value| (value + missed * missed / AXES as f64).sqrt());
+            let noise = noise_shares[row] * hyper.noise_variance_of(rows.relative_sigma[row]);
+            let variance = covariance.diagonal().map(|value| value.max(0.0)) + noise;
+            let added = variance.add_scalar(missed * missed / AXES as f64) - covariance.diagonal();
             let blank = if lost { f64::NAN } else { 0.0 };
             CorrectedPose {
                 shift: (if has_remainder { mean * share } else { Vector3::zeros() })
                     .add_scalar(blank),
-                sigma: sigma.add_scalar(blank),
+                covariance: (covariance + Matrix3::from_diagonal(&added)).add_scalar(blank),
                 size: expected_size(variance.sum(), missed) + blank,
                 is_extrapolated: (has_remainder && share < MIN_SHARE)
                     || self.is_outside(&poses[row].setup),
             }
         };
-        self.posterior.at(rows).into_iter().enumerate().map(one).collect()
+        factors.rows().into_iter().enumerate().map(of_row).collect()
     }
 
     /// Returns true if an input lies outside its measured range by more than the margin. An input

@@ -36,13 +36,43 @@ pub struct Fitted {
     pub is_declared: bool,
 }
 
+/// Outcome of the search for a remainder.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// Gain of a remainder on configurations left out, whether it is kept or not.
+    pub(crate) gain: Option<Gain>,
+    /// True if the remainder was read from a file that the problem declares.
+    pub(crate) is_declared: bool,
+    /// Number of joints that a remainder corrects.
+    pub(crate) joints: usize,
+    /// Mean held-out error with the remainder \[m\]; `None` if none is kept.
+    pub(crate) held_out: Option<f64>,
+}
+
 impl Fitted {
+    /// Outcome of the search for a remainder.
+    pub fn outcome(&self) -> Outcome {
+        let residuals = self.residuals.as_ref();
+        Outcome {
+            gain: self.gain,
+            is_declared: self.is_declared,
+            joints: self.remainder.as_ref().map_or(0, |remainder| remainder.joints().len()),
+            held_out: residuals.map(|corrected| corrected.errors.held_out.mean.norm),
+        }
+    }
+
+    /// Correction of predictions: the remainder, or else the uncertainty of the arm alone.
+    pub(crate) fn correction(&self) -> &Correction {
+        self.remainder.as_ref().unwrap_or(&self.alone)
+    }
+
     /// Returns the same result with a remainder that the problem declares instead of the fitted
     /// one.
     ///
     /// # Errors
     /// Returns an error if `problem` and `data` are not those that were identified.
-    pub(crate) fn with_declared(
+    #[doc(hidden)]
+    pub fn with_declared(
         self,
         remainder: Correction,
         (found, problem): (&Identification, &Problem),

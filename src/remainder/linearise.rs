@@ -58,6 +58,15 @@ impl Linearisation<'_> {
         Rows { residual, jacobian: -slopes, sites, inputs, configuration, relative_sigma }
     }
 
+    /// Derivatives of the positions of `poses` by the unknowns, shape = (3 poses, unknowns); NaN where
+    /// the arm has no equilibrium.
+    pub fn jacobian(&self, poses: Vec<Pose>) -> DMatrix<f64> {
+        let poses: Vec<Pose> = poses.into_iter().map(|pose| Pose { sigma: 1.0, ..pose }).collect();
+        let residuals =
+            PoseResiduals::new(self.model, poses, self.unknowns.clone(), self.x.clone());
+        -jacobian_and_residual(&residuals, &residuals.reduced(self.x)).0
+    }
+
     /// Returns the derivatives of the position with respect to each site's error, divided by the
     /// site's lever, shape = (sites, 3 poses).
     fn site_columns(&self, sites: &[Site], poses: &[Pose]) -> DMatrix<f64> {

@@ -11,15 +11,18 @@ mod blocks;
 mod bounds;
 mod correction;
 mod cross_validation;
+mod declared;
 mod fit;
 mod gain;
 mod hyperparameter_search;
 mod inducing;
+mod joint_errors;
 mod judge;
 mod kernel;
 mod likelihood;
 mod linearise;
 mod noise_likelihood;
+mod placement_fit;
 mod posterior;
 mod prior;
 mod residuals;
@@ -34,10 +37,17 @@ mod training_rows;
 
 pub use apply::{CorrectedPrediction, predict};
 pub use correction::{CorrectedPose, Correction};
+pub(crate) use fit::Outcome;
 pub use fit::{Fitted, fit};
 pub(crate) use gain::Gain;
-pub(crate) use saved::SavedRemainderError;
+pub(crate) use joint_errors::{JointError, JointErrorPoint};
+pub(crate) use residuals::residuals;
 // Public for the tests, the benches and the Python module only.
 #[doc(hidden)]
-pub use self::{apply::compensate, bounds::Bounds, fit::uncertainty};
+pub use self::{
+    apply::{compensate, predict_identified},
+    bounds::Bounds,
+    declared::{declared, of_estimate},
+    fit::uncertainty,
+};
 pub(crate) use tables::{CorrectionTables, InputSource, InputTable, SiteTable};

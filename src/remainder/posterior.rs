@@ -52,6 +52,37 @@ pub(super) struct RowPosterior {
     pub prior: f64,
 }
 
+/// Posterior of the corrections of some rows, its covariance as factors.
+#[derive(Debug, Clone)]
+pub(super) struct RowFactors {
+    /// Means of measured − predicted, three coordinates a row \[m\].
+    pub mean: DVector<f64>,
+    /// S of the covariance S Sᵀ that weights and parameters give, shape = (3 rows, features) \[m\].
+    pub spread: DMatrix<f64>,
+    /// Prior variance of the remainder at each row, its trace, and the covariance that the
+    /// features leave of it \[m²\].
+    priors: Vec<(f64, Matrix3<f64>)>,
+}
+
+impl RowFactors {
+    /// Posterior of each row.
+    pub fn rows(&self) -> Vec<RowPosterior> {
+        let of_row = |(row, &(prior, left)): (usize, &(f64, Matrix3<f64>))| RowPosterior {
+            mean: Vector3::from_fn(|axis, _| self.mean[AXES * row + axis]),
+            covariance: left + outer_block(&self.spread, row, self.spread.ncols()),
+            prior,
+        };
+        self.priors.par_iter().enumerate().map(of_row).collect()
+    }
+}
+
+/// Product F Fᵀ of the first columns F of the three coordinates of a row.
+fn outer_block(of: &DMatrix<f64>, row: usize, columns: usize) -> Matrix3<f64> {
+    let block = of.view((AXES * row, 0), (AXES, columns));
+    let product = block * block.transpose();
+    Matrix3::from_fn(|a, b| product[(a, b)])
+}
+
 /// Prediction of a row from the other rows.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct LeftOut {
@@ -77,11 +108,6 @@ fn coordinates(rows: &[usize]) -> Vec<usize> {
 }
 
 impl Posterior {
-    /// Returns the features of rows, shape = (3 rows, features).
-    fn features(&self, rows: &Rows) -> DMatrix<f64> {
-        features(&self.hyper, &self.inputs, (&self.inducing, &self.inverse), &self.prior, rows)
-    }
-
     /// Restores a posterior from the factor of A, the kernel weights c of the inducing variables,
     /// and the change of the parameters. Returns `None` if the covariance of the inducing variables
     /// is not positive definite.
@@ -135,23 +161,29 @@ impl Posterior {
     /// Returns the posterior of the correction at `rows`, whose Jacobians have one column for each
     /// parameter of the prior.
     pub fn at(&self, rows: &Rows) -> Vec<RowPosterior> {
-        let features = self.features(rows);
-        let mean = &features * &self.weights + &rows.jacobian * &self.prior.mean;
-        let spread = product_with_upper(&features, &self.inverse_factor.transpose());
+        self.factors(rows).rows()
+    }
+
+    /// Mean and factors of the covariance of the correction at such rows.
+    pub fn factors(&self, rows: &Rows) -> RowFactors {
+        self.factors_of(&self.hyper, rows)
+    }
+
+    /// The same for a part of the processes: some amplitudes of `part` are 0, and all else is as in
+    /// the hyperparameters.
+    pub fn factors_of(&self, part: &Hyperparameters, rows: &Rows) -> RowFactors {
+        let inducing = (&self.inducing, &self.inverse);
+        let features = features(part, &self.inputs, inducing, &self.prior, rows);
         let kernel = self.inducing.len();
-        let one = |row: usize| {
-            let first = AXES * row;
-            let block = |of: &DMatrix<f64>, columns: usize| {
-                let of = of.view((first, 0), (AXES, columns));
-                let product = of * of.transpose();
-                Matrix3::from_fn(|a, b| product[(a, b)])
-            };
-            let prior = variance(&self.hyper, rows, row);
-            let covariance = prior - block(&features, kernel) + block(&spread, spread.ncols());
-            let mean = Vector3::from_fn(|a, _| mean[first + a]);
-            RowPosterior { mean, covariance, prior: prior.trace() }
+        let of_row = |row: usize| {
+            let prior = variance(part, rows, row);
+            (prior.trace(), prior - outer_block(&features, row, kernel))
         };
-        (0..rows.len()).into_par_iter().map(one).collect()
+        RowFactors {
+            mean: &features * &self.weights + &rows.jacobian * &self.prior.mean,
+            spread: product_with_upper(&features, &self.inverse_factor.transpose()),
+            priors: (0..rows.len()).into_par_iter().map(of_row).collect(),
+        }
     }
 
     /// Predicts rows that were not used for training.

@@ -4,9 +4,10 @@ use super::document::{Block, Headline, Table};
 use super::errors::NOMINAL;
 use super::identify::BEFORE;
 use super::render::{report, text};
+use crate::fit::Verdict;
 use crate::problem::Problem;
 use crate::quantity::format::{about_three_digits, counted, number};
-use crate::results::{AcceptanceResult, PoseAccuracy};
+use crate::results::{AcceptanceResult, PoseAccuracy, TestedTolerance};
 
 /// Number of cycles in each pose that ISO 9283 requires.
 const CYCLES: usize = 30;
@@ -18,6 +19,7 @@ const SCOPE: &str = "These are errors of predicted positions. The accuracy that 
 pub fn acceptance_text(problem: &Problem, result: &AcceptanceResult) -> String {
     let poses = counted(result.poses, "held-out pose");
     let mut blocks = vec![Block::lines(format!("{}\n{poses}; {}", problem.title, result.protocol))];
+    blocks.extend(result.tolerance.as_ref().map(|test| Block::Text(tolerance_text(test))));
     blocks.extend(judgement(result));
     text(&blocks)
 }
@@ -59,6 +61,7 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
         ))
     });
     let mut blocks = vec![Block::Headline(head)];
+    blocks.extend(result.tolerance.as_ref().map(|test| Block::Text(tolerance_text(test))));
     blocks.extend(judgement(result));
     blocks.extend([
         Block::heading("How it was measured"),
@@ -83,15 +86,50 @@ pub fn acceptance_page(problem: &Problem, result: &AcceptanceResult) -> String {
     report(problem, "acceptance", &blocks).html
 }
 
-/// Returns AP before and after, the scope of the figures, and the repeatability.
-fn judgement<'a>(result: &AcceptanceResult) -> [Block<'a>; 3] {
+/// Returns the verdict on a tolerance and its grounds in words.
+pub fn tolerance_text(test: &TestedTolerance) -> String {
+    let percent = |share: f64| format!("{} %", (share * 1e4).round() / 100.0);
+    let (share, risk) = (percent(test.share), percent(test.risk));
+    let tolerance = format!("{} mm", number(test.tolerance_mm, 4));
+    let [least, most] = test.share_within.map(percent);
+    let beyond = match test.beyond {
+        0 => format!("none of {} lies beyond", counted(test.poses, "pose")),
+        1 => format!("1 of {} lies beyond", counted(test.poses, "pose")),
+        n => format!("{n} of {} lie beyond", counted(test.poses, "pose")),
+    };
+    let verdict = test.verdict;
+    if verdict == Verdict::Pass.as_str() {
+        format!(
+            "Pass: at least {share} of the poses err by no more than {tolerance}. The risk that this is \
+             wrong is at most {risk}; {beyond}, so at least {least} are within the tolerance."
+        )
+    } else if verdict == Verdict::Fail.as_str() {
+        format!(
+            "Fail: fewer than {share} of the poses err by no more than {tolerance}. The risk that this is \
+             wrong is at most {risk}; {beyond}, so at most {most} are within the tolerance."
+        )
+    } else {
+        let needed = test.poses_to_pass.map_or_else(String::new, |needed| {
+            format!(" {needed} held-out poses with no more of them beyond would pass.")
+        });
+        format!(
+            "Undecided: the held-out poses are too few to say whether {share} of the poses err by no \
+             more than {tolerance}; {beyond}, so {least} to {most} are within the tolerance, each \
+             bound with a risk of {risk}.{needed}"
+        )
+    }
+}
+
+/// Returns AP before and after, the scope of the figures, the bounds, and the repeatability.
+fn judgement<'a>(result: &AcceptanceResult) -> Vec<Block<'a>> {
     let row = |name: &str, of: &PoseAccuracy| {
         let [low, high] = of.interval_95_mm;
         let values = [of.mean_mm, low, high, of.rms_mm, of.max_mm].map(|value| number(value, 4));
         [vec![name.to_owned()], values.to_vec()].concat()
     };
     let header = ["pose accuracy AP, mm", "mean", "95 % from", "to", "rms", "max"];
-    let rows = vec![row(NOMINAL, &result.before), row("as identified", &result.after)];
+    let after = if result.remainder { "identified and corrected" } else { "as identified" };
+    let rows = vec![row(NOMINAL, &result.before), row(after, &result.after)];
     let note = "AP: distance from the predicted position to the barycentre of those measured in \
                 the same pose, after ISO 9283; the interval is of the mean, by bootstrap over poses";
     let table = Table::new(&header, rows, &[0]).noted(&[note]);
@@ -110,5 +148,15 @@ fn judgement<'a>(result: &AcceptanceResult) -> [Block<'a>; 3] {
              requires {CYCLES} cycles a pose."
         ),
     };
-    [Block::Table(table), Block::Text(SCOPE.to_owned()), Block::Text(repeats)]
+    let bound = result.bound.as_ref().map(|bound| {
+        Block::Text(format!(
+            "Bounds of {} % from the rows fitted: {} mm on average; {} % of the held-out rows lie \
+             within theirs.",
+            (bound.bounds.level * 1e6).round() / 1e4,
+            number(bound.bounds.mean_bound_mm, 4),
+            number(bound.coverage * 100.0, 1),
+        ))
+    });
+    let blocks = [Block::Table(table), Block::Text(SCOPE.to_owned())];
+    blocks.into_iter().chain(bound).chain([Block::Text(repeats)]).collect()
 }

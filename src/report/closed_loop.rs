@@ -225,8 +225,9 @@ fn blocks<'a>(
             figures::order(plots),
             figures::joint_map(plots),
         ]),
-        Block::heading("Parameters of the final fit"),
     ]);
+    blocks.extend(super::remainder::uncertainty(after, plots));
+    blocks.push(Block::heading("Parameters of the final fit"));
     blocks.extend(parameters(&closure.closed, after, &file));
     blocks.push(Block::figures([figures::contributions(&plots.contributions)]));
     blocks.push(Block::Page(all_told(after, plots, &file)));

@@ -67,6 +67,7 @@ fn blocks<'a>(problem: &Problem, found: &'a Identification, plots: &'a PlotData)
     blocks.extend(around(found));
     blocks.push(Block::figures([figures::errors(plots), figures::vectors(plots)]));
     blocks.push(Block::Poses(plots));
+    blocks.extend(super::remainder::uncertainty(found, plots));
     blocks.extend(remainder(problem, found, plots, FILE));
     blocks
 }

@@ -38,7 +38,7 @@ mod trace;
 mod unexplained;
 mod verdict;
 
-pub(crate) use acceptance::{acceptance_page, acceptance_text};
+pub(crate) use acceptance::{acceptance_page, acceptance_text, tolerance_text};
 pub(crate) use brief::{estimate_brief, tells_little};
 pub use closed_loop::{loop_report, loop_text};
 pub(crate) use compare::{compare_text, comparison_report};
@@ -48,7 +48,6 @@ pub use identify::{estimate_text, identification_report};
 pub(crate) use init::init_text;
 pub(crate) use noise::show_influential_rows;
 pub(crate) use predict::prediction_text;
-pub(crate) use remainder::remainder_text;
 pub use render::Report;
 pub(crate) use replica::{replica_report, replica_text};
 pub(crate) use shell::shell_word;
@@ -64,5 +63,6 @@ pub use self::{
     figures::is_figure,
     identify::why_not_trusted,
     plan::plan_text,
+    remainder::remainder_text,
     trace::trace_text,
 };

@@ -2,50 +2,73 @@
 
 use std::fmt::Write as _;
 
+use super::document::{Block, Column, Table};
+use super::figures;
 use crate::fit::{Identification, Residual};
-use crate::quantity::format::{counted, number};
-use crate::remainder::{Bounds, Fitted, Gain};
+use crate::quantity::format::{counted, mm, number};
+use crate::remainder::{Bounds, Gain, JointError, Outcome};
+use crate::results::PlotData;
 
-/// Returns one sentence on the result of the search for a remainder; `found` holds the errors
-/// without it.
-pub fn remainder_text(found: &Identification, fitted: &Fitted) -> String {
-    let Some(gain) = fitted.gain.filter(|_| !fitted.is_declared) else {
-        return match &fitted.residuals {
-            Some(corrected) => {
-                let before = number(found.fitted.held_out.mean.norm * 1e3, 4);
-                let after = number(corrected.errors.held_out.mean.norm * 1e3, 4);
-                format!(
-                    "Corrected by the remainder that the problem declares: mean error of held-out \
-                     poses {before} mm without it, {after} mm with it."
-                )
-            }
+/// Returns one sentence on the search for a remainder; `found` has the errors without it.
+pub fn remainder_text(found: &Identification, outcome: &Outcome) -> String {
+    let before = number(found.fitted.held_out.mean.norm * 1e3, 4);
+    let after = outcome.held_out.map(|error| number(error * 1e3, 4));
+    let Some(gain) = outcome.gain.filter(|_| !outcome.is_declared) else {
+        return match after {
+            Some(after) => format!(
+                "Corrected by the remainder that the problem declares: mean error of held-out \
+                 poses {before} mm without it, {after} mm with it."
+            ),
             None => "No remainder: too few configurations to fit one.".to_owned(),
         };
     };
     let [without, with] = [gain.without, gain.with].map(|error| number(error * 1e3, 4));
-    match &fitted.residuals {
-        Some(corrected) => {
-            let before = number(found.fitted.held_out.mean.norm * 1e3, 4);
-            let after = number(corrected.errors.held_out.mean.norm * 1e3, 4);
-            let joints = fitted.remainder.as_ref().map_or(0, |pose| pose.joints().len());
-            format!(
-                "Remainder at {}, kept: mean error of configurations left out {without} mm \
-                 without it, {with} mm with it; of held-out poses {before} mm and {after} mm.",
-                counted(joints, "joint"),
-            )
-        }
+    match after {
+        Some(after) => format!(
+            "Remainder at {}, kept: mean error of configurations left out {without} mm without it, \
+             {with} mm with it; of held-out poses {before} mm and {after} mm.",
+            counted(outcome.joints, "joint"),
+        ),
         None => format!(
             "No remainder is kept: mean error of configurations left out {without} mm without it, \
              {with} mm with it, a gain of {} standard errors (more than {} are needed); the log \
-             predictive density changes by {} per row (a rise is needed), the log likelihood by {} \
-             (more than {} is needed).",
+             predictive density changes by {} per row, {} standard errors (more than {} are needed), \
+             the log likelihood by {} (more than {} is needed).",
             number(gain.error.ratio(), 2),
             number(gain.threshold(), 2),
             number(gain.density.mean, 2),
+            number(gain.density.ratio(), 2),
+            number(gain.density_threshold(), 2),
             number(gain.evidence, 2),
             number(Gain::least_evidence(), 2),
         ),
     }
+}
+
+/// Returns the blocks on the remainder and on the uncertainty of predictions.
+pub(super) fn uncertainty<'a>(found: &Identification, plots: &'a PlotData) -> Vec<Block<'a>> {
+    let Some(uncertainty) = &plots.uncertainty else { return Vec::new() };
+    let mut blocks = vec![
+        Block::heading("Uncertainty of predictions"),
+        Block::Text(remainder_text(found, &uncertainty.outcome)),
+    ];
+    let motion = |k: usize| move |of: &JointError| mm(of.motions[k], 4);
+    let columns = [
+        Column::words("joint", |of: &JointError| format!("{}", of.joint + 1)),
+        Column::number("own command, mm", motion(0)),
+        Column::number("all commands, mm", motion(1)),
+        Column::number("compliance, mm", motion(2)),
+    ];
+    if !uncertainty.joints.is_empty() {
+        let note = "root mean square motion of the target by the errors of each joint: functions of \
+                    its own command, functions of all inputs, and its additional compliance";
+        blocks.push(Block::Table(Table::of(&uncertainty.joints, &columns).noted(&[note])));
+    }
+    blocks.push(Block::figures([
+        figures::joint_errors(plots),
+        figures::bounds_over_workspace(plots),
+    ]));
+    blocks
 }
 
 /// Returns the expected error and its bound in words. If there are `residuals`, adds the share of

@@ -6,13 +6,15 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::document::Document;
+use super::remainder::BoundSummary;
 use super::summary::rows_in;
 use super::tables::commanded_joints;
-use crate::fit::{Acceptance, Accuracy, Identification};
+use crate::fit::{Acceptance, Accuracy, Identification, ToleranceTest};
 use crate::measurement::Measurements;
 use crate::numeric::range;
 use crate::problem::{HeldOut, Problem};
 use crate::quantity::format::number;
+use crate::remainder::Bounds;
 
 /// Input files of an acceptance record, and facts that the caller provides.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -56,6 +58,55 @@ pub struct AcceptanceResult {
     pub repeated_poses: usize,
     /// Largest repeatability RP of these poses.
     pub repeatability_max_mm: Option<f64>,
+    /// True if a remainder corrects the predictions of the identified arm.
+    pub remainder: bool,
+    /// Bounds of the errors of the held-out rows; null for fewer than ten configurations.
+    pub bound: Option<CoveredBound>,
+    /// Test of a tolerance; null if none is required.
+    pub tolerance: Option<TestedTolerance>,
+}
+
+/// Bounds of the errors of some rows, with the share of the rows within theirs.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct CoveredBound {
+    #[serde(flatten)]
+    pub bounds: BoundSummary,
+    /// Share of the rows whose error lies within its bound.
+    pub coverage: f64,
+}
+
+/// Test of a tolerance on the accuracy AP of the identified arm in the held-out poses.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct TestedTolerance {
+    /// `pass`, `fail`, or `undecided` where the poses are too few.
+    pub verdict: &'static str,
+    pub tolerance_mm: f64,
+    /// Share of the poses that must be within the tolerance.
+    pub share: f64,
+    /// Largest probability of a wrong pass, and of a wrong fail.
+    pub risk: f64,
+    pub poses: usize,
+    /// Poses beyond the tolerance.
+    pub beyond: usize,
+    /// Bounds of the share of all poses within the tolerance, each at the risk.
+    pub share_within: [f64; 2],
+    /// Number of poses from which as many beyond the tolerance would pass.
+    pub poses_to_pass: Option<usize>,
+}
+
+impl From<&ToleranceTest> for TestedTolerance {
+    fn from(test: &ToleranceTest) -> Self {
+        Self {
+            verdict: test.verdict.as_str(),
+            tolerance_mm: test.tolerance.length * 1e3,
+            share: test.tolerance.share,
+            risk: test.tolerance.risk,
+            poses: test.poses,
+            beyond: test.beyond,
+            share_within: test.share_within,
+            poses_to_pass: test.poses_to_pass,
+        }
+    }
 }
 
 impl Document for AcceptanceResult {
@@ -134,7 +185,24 @@ impl AcceptanceResult {
             after: (&judged.after).into(),
             repeated_poses: repeatabilities().count(),
             repeatability_max_mm: repeatabilities().max_by(f64::total_cmp).map(|most| most * 1e3),
+            remainder: false,
+            bound: None,
+            tolerance: None,
         }
+    }
+
+    /// Returns the record with the bounds of some rows and their share within these; the predictions
+    /// may be corrected by a remainder.
+    #[must_use]
+    pub fn with_bounds(self, bounds: &Bounds, coverage: f64, remainder: bool) -> Self {
+        let bounds = BoundSummary::new(bounds);
+        Self { remainder, bound: Some(CoveredBound { bounds, coverage }), ..self }
+    }
+
+    /// Returns the record with the test of a tolerance.
+    #[must_use]
+    pub fn with_tolerance(self, test: &ToleranceTest) -> Self {
+        Self { tolerance: Some(test.into()), ..self }
     }
 }
 

@@ -232,7 +232,7 @@ impl LoopResult {
 
     /// Returns the result with the remainder, if one was accepted in addition to the effects.
     #[must_use]
-    pub(crate) fn with_remainder(mut self, closure: &ClosedLoop, fitted: &Fitted) -> Self {
+    pub fn with_remainder(mut self, closure: &ClosedLoop, fitted: &Fitted) -> Self {
         if let Some(corrected) = &fitted.residuals {
             self.after.errors = Errors::of(&corrected.errors);
         }

@@ -29,7 +29,7 @@ mod summary;
 pub(crate) mod tables;
 mod trace;
 
-pub(crate) use acceptance::{AcceptanceRecord, AcceptanceResult, PoseAccuracy};
+pub(crate) use acceptance::{AcceptanceRecord, AcceptanceResult, PoseAccuracy, TestedTolerance};
 pub(crate) use application::{CompensationResult, InitResult, PredictionErrors};
 pub(crate) use claims::Claims;
 pub use closed_loop::LoopResult;
@@ -45,7 +45,8 @@ pub(crate) use knowledge::{
 };
 pub use plots::PlotData;
 pub(crate) use plots::{
-    Contribution, Point, PoseError, ScriptData, Stage, StageErrors, procedure_stages, sample,
+    BoundAt, Contribution, Point, PoseError, ScriptData, Stage, StageErrors, procedure_stages,
+    sample,
 };
 pub(crate) use remainder::REMAINDER_FILE;
 pub(crate) use residual_size::{ResidualSize, exceeds_noise};

@@ -27,6 +27,9 @@ pub struct Remainder {
     pub left_out_mm: Option<f64>,
     /// Mean gain at configurations left out of the fit, divided by its standard error.
     pub gain_over_std_error: Option<f64>,
+    /// Mean rise of the logarithm of the predictive density of these configurations over its
+    /// standard error.
+    pub density_gain_over_std_error: Option<f64>,
     pub identification_without: Summary,
     pub held_out_without: Summary,
 }
@@ -43,6 +46,7 @@ impl Remainder {
             left_out_without_mm: fitted.gain.map(|gain| gain.without * 1e3),
             left_out_mm: fitted.gain.map(|gain| gain.with * 1e3),
             gain_over_std_error: fitted.gain.map(|gain| gain.error.ratio()),
+            density_gain_over_std_error: fitted.gain.map(|gain| gain.density.ratio()),
             identification_without: Summary::of(&found.fitted.identification),
             held_out_without: Summary::of(&found.fitted.held_out),
         })

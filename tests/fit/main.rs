@@ -21,6 +21,7 @@ mod robust;
 mod runaway;
 mod sigma;
 mod told;
+mod tolerance;
 mod tree;
 mod trust;
 mod trusted;

@@ -6,6 +6,8 @@ use nalgebra::Vector3;
 
 use crate::error::InputErrorKind;
 use crate::fit::IdentifyError;
+use crate::fit::apply::predict::Residual;
+use crate::fit::apply::tolerance::{Tolerance, ToleranceTest};
 use crate::fit::outcome::Identification;
 use crate::fit::stages::placement::Placement;
 use crate::measurement::Dataset;
@@ -31,6 +33,13 @@ pub struct Acceptance {
     pub before: Accuracy,
     /// Accuracy of the identified arm.
     pub after: Accuracy,
+}
+
+impl Acceptance {
+    /// Tests a tolerance on the accuracies AP of the identified arm.
+    pub fn test(&self, tolerance: Tolerance) -> ToleranceTest {
+        tolerance.test(&self.poses.iter().map(|pose| pose.after).collect::<Vec<f64>>())
+    }
 }
 
 /// Pose that was measured once or several times.
@@ -93,6 +102,8 @@ pub fn held_out_positions(
 /// Computes pose accuracy and repeatability of the identified arm in the held-out poses with
 /// measured positions. Poses without an equilibrium are left out.
 ///
+/// `corrected` are the residuals of all rows where a remainder corrects the predictions.
+///
 /// # Errors
 /// Returns an error if problem and data do not fit each other, or no held-out row measures a
 /// position.
@@ -100,13 +111,18 @@ pub fn acceptance(
     problem: &Problem,
     data: &Dataset,
     found: &Identification,
+    corrected: Option<&[Residual]>,
 ) -> Result<Acceptance, IdentifyError> {
     let measurements = &data.measurements;
     let held_out = held_out_positions(problem, data)?;
     let placement = Placement::of(measurements);
     let model = found.model(problem, &placement)?;
     let errors = |x| placement.position_errors(&model, x, measurements, &held_out);
-    let (before, after) = (errors(&found.registered_x), errors(&found.x));
+    let before = errors(&found.registered_x);
+    let after = match corrected {
+        Some(rows) => held_out.iter().map(|&row| rows[row].position).collect(),
+        None => errors(&found.x),
+    };
     let numbers = measurements.pose_numbers(problem);
     let mut groups: BTreeMap<(usize, [i64; 3]), Vec<usize>> = BTreeMap::new();
     for (k, &row) in held_out.iter().enumerate() {

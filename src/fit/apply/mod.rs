@@ -9,3 +9,4 @@ pub(super) mod predict;
 pub(super) mod predict_saved;
 pub(super) mod predicted_covariance;
 pub(super) mod saved_estimate;
+pub(super) mod tolerance;

@@ -60,6 +60,17 @@ impl Identification {
         Ok(self.strategy.model(declared))
     }
 
+    /// Returns the base frame of each session of `rows`, measuring frame.
+    pub(crate) fn base_frames(
+        &self,
+        problem: &Problem,
+        rows: &Measurements,
+    ) -> Result<Vec<Frame<f64>>, IdentifyError> {
+        let model = self.model(problem, &Placement::of(rows))?;
+        let x = self.vector(&model)?;
+        Ok(model.base_frames(x.as_slice()))
+    }
+
     /// Predicts the positions of the identified arm in the poses of `rows`, measuring frame \[m\];
     /// NaN where the arm has no equilibrium.
     ///
@@ -173,7 +184,7 @@ impl Identification {
 
     /// Returns the full parameter vector of `model` from the identified parameters of the same
     /// names.
-    pub(in crate::fit) fn vector(&self, model: &Model) -> Result<DVector<f64>, IdentifyError> {
+    pub(crate) fn vector(&self, model: &Model) -> Result<DVector<f64>, IdentifyError> {
         let x = model.parameters.iter().map(|parameter| {
             let place = self.estimates.iter().position(|estimate| estimate.name == parameter.name);
             place

@@ -58,6 +58,8 @@ struct Entry {
     /// Standard error of the value; `None` if it has none, or in files of older versions.
     std_error: Option<f64>,
     identified: Option<f64>,
+    /// False if the strategy held the parameter; older versions did not write it.
+    fitted: Option<bool>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -122,6 +124,13 @@ pub enum SavedEstimateError {
 }
 
 impl SavedEstimate {
+    /// Returns the estimate without some of the parameters that were fitted.
+    pub(crate) fn without_fitted(&self, is_left_out: impl Fn(&str) -> bool) -> Self {
+        let mut estimate = self.clone();
+        estimate.parameters.retain(|entry| entry.fitted != Some(true) || !is_left_out(&entry.name));
+        estimate
+    }
+
     /// Reads an `estimate.json`.
     ///
     /// # Errors

@@ -16,6 +16,7 @@ mod ranking;
 mod spectrum;
 mod strategies;
 mod svg;
+mod uncertainty;
 mod vectors;
 
 pub(super) use contribution::contributions;
@@ -31,16 +32,19 @@ pub(super) use ranking::ranking;
 pub(super) use spectrum::spectrum;
 pub(super) use strategies::{ablations, rounds, strategies};
 pub(super) use svg::{ACCENT, Colour, FAINT, GRID, INK, MUTED, WARM};
+pub(super) use uncertainty::{bounds_over_workspace, joint_errors};
 pub(super) use vectors::vectors;
 
 /// File names of all figures, except those of effects (numbered) and procedures (named).
-const NAMES: [&str; 14] = [
+const NAMES: [&str; 16] = [
     "ablations",
+    "bounds",
     "contributions",
     "correlations",
     "held-out-errors",
     "misprints",
     "ranking",
+    "remainder-joints",
     "residual-histogram",
     "residual-joints",
     "residual-order",

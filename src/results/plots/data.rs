@@ -11,6 +11,7 @@ use super::cause::{self, Cause, EffectFit};
 use super::contribution::{self, Contribution};
 use super::coverage::{self, Coverage};
 use super::pose::{PoseError, weighted_sample};
+use super::uncertainty::Uncertainty;
 use crate::error::{Location, Warning};
 use crate::fit::{
     Before, Comparison, Correlations, Identification, IdentifyError, Procedure, Strategy,
@@ -18,6 +19,7 @@ use crate::fit::{
 use crate::measurement::Dataset;
 use crate::model::{CentreLine, Model, Pose};
 use crate::problem::Problem;
+use crate::remainder::Fitted;
 use crate::residual_tests::Findings;
 use crate::results::tables::{CommandedJoint, commanded_joints};
 use crate::select::{ClosedLoop, Found, examine};
@@ -91,6 +93,8 @@ pub struct PlotData {
     pub causes: Vec<Cause>,
     /// Partial residuals of structure without a known cause.
     pub(crate) trend: Option<Cause>,
+    /// Uncertainty of predictions, and what a remainder does.
+    pub(crate) uncertainty: Option<Uncertainty>,
 }
 
 impl PlotData {
@@ -256,7 +260,23 @@ impl PlotData {
             correlations: identification.correlations(),
             causes: Vec::new(),
             trend: None,
+            uncertainty: None,
         }
+    }
+
+    /// Adds the uncertainty of predictions over the workspace, and what a remainder does at each
+    /// joint.
+    ///
+    /// # Errors
+    /// Returns an error if problem and data do not match.
+    pub fn with_uncertainty(
+        self,
+        (identification, problem): (&Identification, &Problem),
+        data: &Dataset,
+        fitted: &Fitted,
+    ) -> Result<Self, IdentifyError> {
+        let uncertainty = Uncertainty::of((identification, problem), data, fitted)?;
+        Ok(Self { uncertainty: Some(uncertainty), ..self })
     }
 
     /// Returns the number of rows whose target has a position, which figures could draw.

@@ -8,6 +8,7 @@ mod coverage;
 mod data;
 mod pose;
 mod script;
+mod uncertainty;
 
 pub use cause::{Cause, Point, Quantity};
 pub use contribution::Contribution;
@@ -16,3 +17,4 @@ pub use data::{PlotData, Stage, StageErrors};
 pub use pose::PoseError;
 pub(crate) use pose::sample;
 pub(crate) use script::ScriptData;
+pub(crate) use uncertainty::BoundAt;

@@ -48,7 +48,9 @@ fn uncertainty(bounds: &Bounds) -> Columns {
     let mut columns: Columns = ["x", "y", "z"]
         .into_iter()
         .enumerate()
-        .map(|(k, axis)| (format!("sigma_{axis}_mm"), numbers(&|pose| bounds.poses[pose].sigma[k])))
+        .map(|(k, axis)| {
+            (format!("sigma_{axis}_mm"), numbers(&|pose| bounds.poses[pose].sigma()[k]))
+        })
         .collect();
     columns.push((bounds.column(), numbers(&|pose| bounds.bound(pose))));
     let flags = bounds.poses.iter().map(|pose| pose.is_extrapolated).collect();

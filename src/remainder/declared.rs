@@ -1,0 +1,59 @@
+//! Choice of the correction that predictions of a problem use.
+
+use std::path::Path;
+
+use super::correction::Correction;
+use super::saved::SavedRemainderError;
+use crate::files::Changes;
+use crate::fit::SavedEstimate;
+use crate::problem::Problem;
+
+/// Reads the remainder that a problem declares and uses; `None` if there is none.
+///
+/// # Errors
+/// Returns an error if the file is no remainder of this problem.
+pub fn declared(problem: &Problem) -> Result<Option<Correction>, SavedRemainderError> {
+    of_problem(problem, Changes::Refused)
+}
+
+/// Reads the remainder that a problem declares and uses; `changes` may be accepted.
+fn of_problem(
+    problem: &Problem,
+    changes: Changes,
+) -> Result<Option<Correction>, SavedRemainderError> {
+    let used = problem.remainder.as_ref().filter(|declared| declared.is_used);
+    used.map(|declared| read(problem, &declared.file, changes)).transpose()
+}
+
+/// Reads the correction for predictions with `estimate`: the remainder of the problem, or else that
+/// of the estimate, or else only the uncertainty of predictions. Returns `None` if the estimate
+/// does not contain the uncertainty.
+///
+/// # Errors
+/// Returns an error if the file is no remainder of this problem.
+pub fn of_estimate(
+    problem: &Problem,
+    estimate: &SavedEstimate,
+) -> Result<Option<Correction>, SavedRemainderError> {
+    if let Some(declared) = of_problem(problem, estimate.changes)? {
+        return Ok(Some(declared));
+    }
+    if let Some(name) = estimate.remainder.as_ref().filter(|_| problem.remainder.is_none()) {
+        let file = estimate.file.with_file_name(name);
+        return read(problem, &file, estimate.changes).map(Some);
+    }
+    let parse = |text: &str| Correction::parse(text, &estimate.file);
+    let correction = estimate.prediction.as_deref().map(parse).transpose()?;
+    // An estimate of another arm is refused with a message of its own.
+    Ok(correction.filter(|declared| declared.check(problem, &estimate.file).is_ok()))
+}
+
+fn read(
+    problem: &Problem,
+    file: &Path,
+    changes: Changes,
+) -> Result<Correction, SavedRemainderError> {
+    let correction = Correction::read(file, changes)?;
+    correction.check(problem, file)?;
+    Ok(correction)
+}

@@ -1,0 +1,126 @@
+//! Errors of single joints that a remainder describes, for tables and figures.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::correction::Correction;
+use super::kernel::Hyperparameters;
+use super::rows::{AXES, Rows, Site, SiteKind};
+
+/// Error of a joint's coordinate that follows its own command, and motions of the target by all
+/// errors of the joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointError {
+    /// Joint, counted from 0.
+    pub joint: usize,
+    /// Length of the function of the joint's own command: \[rad\], or \[m\] of a joint that slides.
+    pub length: f64,
+    /// Error over the measured range of the command; its mean is taken off, because the offset of
+    /// the joint takes it up.
+    pub points: Vec<JointErrorPoint>,
+    /// Root mean square motion of the target at the centres by the function of the joint's own
+    /// command, by that of all inputs, and by the additional compliance \[m\].
+    pub motions: [f64; 3],
+}
+
+/// Error of a joint at a value of its command.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointErrorPoint {
+    /// Command \[rad or m\].
+    pub command: f64,
+    /// Mean error, as motion of the target at the lever of the joint \[m\].
+    pub mean: f64,
+    /// 1 σ of the error \[m\].
+    pub sigma: f64,
+}
+
+impl Correction {
+    /// Errors of each joint whose coordinate errs, at `count` commands; none without a remainder.
+    pub fn joint_errors(&self, count: usize) -> Vec<JointError> {
+        let sites = self.layout.sites.iter().enumerate();
+        let coordinates = sites.filter(|(_, site)| site.kind == SiteKind::Coordinate);
+        coordinates.filter_map(|(place, site)| self.joint_error(place, site, count)).collect()
+    }
+
+    fn joint_error(&self, place: usize, site: &Site, count: usize) -> Option<JointError> {
+        let inputs = &self.layout.inputs;
+        let input = inputs.sites[place].single?;
+        let (offset, unit) = inputs.standard[input];
+        let (low, high) = inputs.ranges[input];
+        let last = count.max(2) - 1;
+        let commands: Vec<f64> =
+            (0..=last).map(|k| low + (high - low) * k as f64 / last as f64).collect();
+        let mut rows = Rows {
+            residual: DVector::zeros(AXES * commands.len()),
+            jacobian: DMatrix::zeros(AXES * commands.len(), self.parameters.len()),
+            sites: DMatrix::zeros(self.layout.sites.len(), AXES * commands.len()),
+            inputs: DMatrix::zeros(inputs.sources.len(), commands.len()),
+            configuration: (0..commands.len()).collect(),
+            relative_sigma: vec![1.0; commands.len()],
+        };
+        for (row, command) in commands.iter().enumerate() {
+            rows.sites[(place, AXES * row)] = 1.0;
+            rows.inputs[(input, row)] = (command - offset) / unit;
+        }
+        let hyper = &self.posterior.hyper;
+        let single = Hyperparameters { single: only(&hyper.single, place), ..silent(hyper) };
+        let mut factors = self.posterior.factors_of(&single, &rows);
+        // The first coordinate of each row holds the error itself.
+        let mean = (0..commands.len()).map(|row| factors.mean[AXES * row]).sum::<f64>()
+            / commands.len() as f64;
+        let spread = (0..commands.len())
+            .map(|row| factors.spread.row(AXES * row).into_owned())
+            .reduce(|sum, row| sum + row)?
+            / commands.len() as f64;
+        for row in 0..commands.len() {
+            let mut of_row = factors.spread.row_mut(AXES * row);
+            of_row -= &spread;
+        }
+        let posteriors = factors.rows();
+        let points = commands.iter().zip(posteriors).map(|(&command, posterior)| JointErrorPoint {
+            command,
+            mean: posterior.mean.x - mean,
+            sigma: posterior.covariance[(0, 0)].max(0.0).sqrt(),
+        });
+        let compliance = self
+            .layout
+            .sites
+            .iter()
+            .position(|other| other.joint == site.joint && other.kind == SiteKind::Compliance);
+        let joint = Hyperparameters { joint: only(&hyper.joint, place), ..silent(hyper) };
+        let constant = compliance.map(|place| Hyperparameters {
+            constant: only(&hyper.constant, place),
+            ..silent(hyper)
+        });
+        Some(JointError {
+            joint: site.joint,
+            length: hyper.single_lengths[place] * unit,
+            points: points.collect(),
+            motions: [Some(single), Some(joint), constant]
+                .map(|part| part.map_or(0.0, |part| self.motion(&part))),
+        })
+    }
+
+    /// Root mean square motion of the target at the centres by part of the processes \[m\].
+    fn motion(&self, part: &Hyperparameters) -> f64 {
+        let inducing = &self.posterior.inducing;
+        let cross = inducing.cross(part, &self.layout.inputs, &inducing.centres);
+        let motion = cross * self.posterior.kernel_weights();
+        (motion.norm_squared() / inducing.centres.len().max(1) as f64).sqrt()
+    }
+}
+
+/// One of some amplitudes; 0 for all others.
+fn only(amplitudes: &[f64], place: usize) -> Vec<f64> {
+    amplitudes.iter().enumerate().map(|(k, a)| if k == place { *a } else { 0.0 }).collect()
+}
+
+/// The same lengths with amplitudes of 0.
+fn silent(hyper: &Hyperparameters) -> Hyperparameters {
+    let zeros = vec![0.0; hyper.sites()];
+    Hyperparameters {
+        single: zeros.clone(),
+        joint: zeros.clone(),
+        constant: zeros,
+        ..hyper.clone()
+    }
+}

@@ -1,0 +1,134 @@
+//! Bases and tools that are fitted to rows after their correction.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::linearise::Linearisation;
+use super::posterior::RowFactors;
+use super::rows::AXES;
+use crate::model::{Model, Pose};
+use crate::problem::Problem;
+
+/// Singular values below this share of the largest are no direction of a base or tool.
+const RANK_TOLERANCE: f64 = 1e-9;
+
+/// Fit of the bases, tools and points that a correction has no columns of, to the rows that use
+/// them, to first order.
+///
+/// With an orthonormal basis Q of their columns, the fit turns errors e of the rows into
+/// e − Q Qᵀ e.
+pub(super) struct PlacementFit {
+    /// Q, shape = (3 rows, directions); 0 for rows without an equilibrium.
+    basis: DMatrix<f64>,
+}
+
+/// Qᵀ of the mean and of the spread of the corrections of all rows.
+pub(super) struct Taken {
+    mean: DVector<f64>,
+    spread: DMatrix<f64>,
+}
+
+impl PlacementFit {
+    /// Linearises the placement `placed`, parameters of `model`, of `poses`, with the arm at the
+    /// full parameter vector `x`.
+    pub fn of(
+        (problem, model, x): (&Problem, &Model, &DVector<f64>),
+        placed: &[usize],
+        poses: &[Pose],
+    ) -> Self {
+        if placed.is_empty() {
+            return Self { basis: DMatrix::zeros(AXES * poses.len(), 0) };
+        }
+        let linearisation =
+            Linearisation { problem, model, x, unknowns: placed.to_vec(), sigma: 1.0 };
+        Self { basis: orthonormal(linearisation.jacobian(poses.to_vec())) }
+    }
+
+    /// True if a base, tool or point is fitted.
+    pub fn has_columns(&self) -> bool {
+        self.basis.ncols() > 0
+    }
+
+    /// Adds what the fit takes of the corrections of the rows from `first` on.
+    pub fn add_to(&self, taken: &mut Option<Taken>, first: usize, factors: &RowFactors) {
+        let basis = self.basis.rows(AXES * first, factors.mean.len());
+        let (mean, spread) = (basis.tr_mul(&factors.mean), basis.tr_mul(&factors.spread));
+        match taken {
+            Some(taken) => {
+                taken.mean += mean;
+                taken.spread += spread;
+            }
+            None => *taken = Some(Taken { mean, spread }),
+        }
+    }
+
+    /// Subtracts what the fit takes from the corrections of the rows from `first` on.
+    pub fn subtract(&self, taken: &Taken, first: usize, factors: &mut RowFactors) {
+        let basis = self.basis.rows(AXES * first, factors.mean.len());
+        factors.mean -= basis * &taken.mean;
+        factors.spread -= basis * &taken.spread;
+    }
+
+    /// Shares of the variance of independent noise that the fit leaves in the coordinates of a row.
+    pub fn shares_left(&self, row: usize) -> Vector3<f64> {
+        Vector3::from_fn(|axis, _| 1.0 - self.basis.row(AXES * row + axis).norm_squared())
+    }
+
+    /// Adds to the shifts what the fit takes of the residuals that they leave.
+    pub fn refit(&self, shifts: &mut [Vector3<f64>], residuals: &[Vector3<f64>]) {
+        let left = residuals.iter().zip(shifts.iter()).flat_map(|(residual, shift)| {
+            let left = residual - shift;
+            let is_usable = left.iter().all(|value| value.is_finite());
+            (0..AXES).map(move |axis| if is_usable { left[axis] } else { 0.0 })
+        });
+        let left = DVector::from_iterator(AXES * residuals.len(), left);
+        let taken = &self.basis * self.basis.tr_mul(&left);
+        for (row, shift) in shifts.iter_mut().enumerate() {
+            *shift += Vector3::from_fn(|axis, _| taken[AXES * row + axis]);
+        }
+    }
+}
+
+/// Orthonormal basis of the columns of a matrix; rows with a number that is not finite become 0.
+fn orthonormal(mut columns: DMatrix<f64>) -> DMatrix<f64> {
+    for mut row in columns.row_iter_mut() {
+        if row.iter().any(|value| !value.is_finite()) {
+            row.fill(0.0);
+        }
+    }
+    for mut column in columns.column_iter_mut() {
+        let length = column.norm();
+        if length > 0.0 {
+            column /= length;
+        }
+    }
+    let gram = columns.tr_mul(&columns).symmetric_eigen();
+    let largest = gram.eigenvalues.amax();
+    let kept: Vec<usize> = (0..gram.eigenvalues.len())
+        .filter(|&k| gram.eigenvalues[k] > RANK_TOLERANCE * largest)
+        .collect();
+    let mut directions = gram.eigenvectors.select_columns(&kept);
+    for (mut direction, &k) in directions.column_iter_mut().zip(&kept) {
+        direction /= gram.eigenvalues[k].sqrt();
+    }
+    columns * directions
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_basis_spans_dependent_columns_and_leaves_the_orthogonal_part() {
+        let first = DVector::from_vec(vec![1.0, 1.0, 0.0, 2.0, f64::NAN, 0.0]);
+        let columns = DMatrix::from_columns(&[first.clone(), first * 3.0]);
+        let basis = orthonormal(columns);
+        assert_eq!(basis.shape(), (6, 1));
+        let fit = PlacementFit { basis };
+        let mut shifts = [Vector3::zeros(); 2];
+        fit.refit(&mut shifts, &[Vector3::new(1.0, 3.0, 5.0), Vector3::new(4.0, 7.0, 8.0)]);
+        // (1, 3, 4) · (1, 1, 2) / 6 = 2 times (1, 1, 2).
+        assert!((shifts[0] - Vector3::new(2.0, 2.0, 0.0)).norm() < 1e-12, "{shifts:?}");
+        assert!((shifts[1] - Vector3::new(4.0, 0.0, 0.0)).norm() < 1e-12, "{shifts:?}");
+        assert!((fit.shares_left(1) - Vector3::new(1.0 - 4.0 / 6.0, 1.0, 1.0)).norm() < 1e-12);
+    }
+}

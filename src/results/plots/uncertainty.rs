@@ -1,0 +1,113 @@
+//! Bounds of predictions over the workspace, and what a remainder does at each joint.
+
+use nalgebra::Vector3;
+use rand::RngExt as _;
+
+use crate::fit::{Identification, IdentifyError};
+use crate::measurement::Dataset;
+use crate::problem::Problem;
+use crate::random::stream;
+use crate::remainder::{Bounds, Fitted, JointError, Outcome, predict_identified};
+
+/// Number of configurations whose bounds are drawn.
+const TRIED: usize = 1500;
+/// Probability with which a bound holds.
+const LEVEL: f64 = 0.95;
+/// Number of commands at which the error of a joint is drawn.
+const COMMANDS: usize = 120;
+/// Seed of the configurations.
+const SEED: u64 = 0x626f_756e_64;
+
+/// Uncertainty of predictions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Uncertainty {
+    /// Outcome of the search for a remainder.
+    pub outcome: Outcome,
+    /// Probability with which a bound holds.
+    pub level: f64,
+    /// Bounds over the workspace.
+    pub bounds: Vec<BoundAt>,
+    /// Errors of the joints that a remainder corrects; none without one.
+    pub joints: Vec<JointError>,
+}
+
+/// Bound of the error of a predicted position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoundAt {
+    /// Predicted position, frame of the arm's base \[m\].
+    pub position: Vector3<f64>,
+    /// Bound of measured − predicted \[m\].
+    pub bound: f64,
+    /// Length of the correction \[m\].
+    pub correction: f64,
+    /// True where the pose lies outside of what was measured.
+    pub is_extrapolated: bool,
+}
+
+impl Uncertainty {
+    /// Computes bounds at random configurations: every joint takes a value between two neighbours
+    /// among its measured values, independently of the other joints.
+    pub(super) fn of(
+        (found, problem): (&Identification, &Problem),
+        data: &Dataset,
+        fitted: &Fitted,
+    ) -> Result<Self, IdentifyError> {
+        let table = &data.measurements;
+        let mut rng = stream(SEED, 0);
+        let of_arm = |row: &&usize| table.observation(**row).is_of_arm();
+        let measured: Vec<usize> =
+            data.split.identification.iter().filter(of_arm).copied().collect();
+        let values: Vec<Vec<f64>> = (0..table.joints)
+            .map(|joint| {
+                let of_joint = measured.iter().map(|&row| table.configuration(row)[joint]);
+                let mut of_joint: Vec<f64> = of_joint.collect();
+                of_joint.sort_by(f64::total_cmp);
+                of_joint
+            })
+            .collect();
+        if measured.is_empty() {
+            return Ok(Self {
+                outcome: fitted.outcome(),
+                level: LEVEL,
+                bounds: Vec::new(),
+                joints: Vec::new(),
+            });
+        }
+        // Sessions have measuring frames of their own: all poses are of the first.
+        let first = table.session.of_row[measured[0]];
+        let of_session: Vec<usize> =
+            measured.iter().copied().filter(|&row| table.session.of_row[row] == first).collect();
+        let drawn: Vec<usize> =
+            (0..TRIED).map(|_| of_session[rng.random_range(0..of_session.len())]).collect();
+        let mut rows = table.select(&drawn);
+        let n = rows.joints;
+        for configuration in rows.configurations.chunks_mut(n) {
+            for (command, of_joint) in configuration.iter_mut().zip(&values) {
+                let low = rng.random_range(0..of_joint.len());
+                let high = (low + 1).min(of_joint.len() - 1);
+                let part: f64 = rng.random();
+                *command = of_joint[low] + part * (of_joint[high] - of_joint[low]);
+            }
+        }
+        let correction = fitted.correction();
+        let (positions, corrected) = predict_identified(found, problem, correction, &rows)?;
+        let bases = found.base_frames(problem, &rows)?;
+        let bounds = Bounds::new(correction, corrected, LEVEL);
+        let at = |(pose, position): (usize, &Vector3<f64>)| {
+            let base = &bases[rows.session.of_row[pose]];
+            BoundAt {
+                position: base.resolve(&(position - base.origin)),
+                bound: bounds.bound(pose),
+                correction: bounds.poses[pose].shift.norm(),
+                is_extrapolated: bounds.poses[pose].is_extrapolated,
+            }
+        };
+        let bounds = positions.iter().enumerate().map(at);
+        Ok(Self {
+            outcome: fitted.outcome(),
+            level: LEVEL,
+            bounds: bounds.filter(|at| at.bound.is_finite()).collect(),
+            joints: correction.joint_errors(COMMANDS),
+        })
+    }
+}
