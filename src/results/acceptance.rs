@@ -56,7 +56,7 @@ pub struct AcceptanceResult {
     pub after: PoseAccuracy,
     /// Number of poses measured three times or more.
     pub repeated_poses: usize,
-    /// Largest repeatability RP of these poses.
+    /// Largest repeatability RP of the poses measured three times or more.
     pub repeatability_max_mm: Option<f64>,
     /// True if a remainder corrects the predictions of the identified arm.
     pub remainder: bool,

@@ -105,7 +105,7 @@ pub struct FoundEffect {
     /// Probability that noise alone gains as much, corrected for the number of candidates.
     pub p_value: f64,
     pub parameters: Vec<ParameterValue>,
-    /// Effects that these data cannot distinguish from it, most probable first.
+    /// Effects that these data cannot distinguish from the found one, most probable first.
     pub alternatives: Vec<NamedEffect>,
     /// Held-out errors after the first round with the effect.
     pub held_out_after: Summary,

@@ -64,7 +64,7 @@ pub struct PlanResult {
     pub rank: usize,
     /// Number of parameter combinations that all candidates together determine.
     pub attainable_rank: usize,
-    /// Smallest number of poses that can reach that rank.
+    /// Smallest number of poses that can reach the rank `attainable_rank`.
     pub least_poses: usize,
     #[serde(flatten)]
     pub conditioning: Conditioning,

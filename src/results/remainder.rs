@@ -19,7 +19,7 @@ pub struct Remainder {
     pub file: Option<&'static str>,
     /// Joints whose errors the remainder describes.
     pub sites: Vec<String>,
-    /// Quantities on which these errors depend.
+    /// Quantities on which the joint errors of the remainder depend.
     pub inputs: Vec<String>,
     /// Mean error of configurations left out of the fit, without the remainder.
     pub left_out_without_mm: Option<f64>,

@@ -75,7 +75,7 @@ pub struct Candidate {
     pub cross_validated_gain_deg: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cross_validated_gain_px: Option<f64>,
-    /// Effects that are confounded with it on these poses.
+    /// Effects that these poses hardly distinguish from the candidate.
     pub alike: Vec<Confounded>,
     /// Pose that would distinguish the effect from the first confounded one.
     pub told_apart: Option<ToldApart>,

@@ -12,7 +12,7 @@ const MAX_POSES: usize = 200;
 pub struct Contribution {
     /// Name of the parameter or effect.
     pub name: String,
-    /// True for an effect.
+    /// True if the contribution is that of an effect, false if it is that of a parameter.
     pub is_effect: bool,
     /// Root mean square displacement of predicted positions if the parameter or effect is reset to
     /// nominal and everything else is unchanged \[m\].

@@ -29,7 +29,7 @@ struct Entry {
     /// Kind of measurement; absent for positions.
     #[serde(skip_serializing_if = "Option::is_none")]
     kind: Option<&'static str>,
-    /// Number of poses that it represents; absent if all are included.
+    /// Number of poses that the sampled pose represents; absent if all poses are included.
     #[serde(skip_serializing_if = "Option::is_none")]
     n: Option<f64>,
     q: Vec<f64>,
